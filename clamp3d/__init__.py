@@ -1,0 +1,28 @@
+"""Exact assembly checking for parts with round grooves (Concave Arc Surface collision detection).
+
+Lengths are millimetres, angles radians, poses 4x4 column-vector matrices ``T_target_source``.
+Names are loaded on first use, so ``import clamp3d`` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOME: dict[str, str] = {
+    "InputError": "clamp3d.errors",
+}
+
+__all__ = sorted(_HOME)  # noqa: PLE0605
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'clamp3d' has no attribute {name!r}; available: {', '.join(sorted(_HOME))}")
+    return getattr(importlib.import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *_HOME]

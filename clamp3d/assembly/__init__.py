@@ -1,0 +1,1 @@
+"""Connection matrix, sequence, screw joint, motion and final state."""

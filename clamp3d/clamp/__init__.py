@@ -1,0 +1,1 @@
+"""The product as data: dimensions, parts, conductors, built-in clamp files."""

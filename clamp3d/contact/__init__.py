@@ -1,0 +1,1 @@
+"""Interchangeable contact models: how a pair of parts is measured."""

@@ -1,0 +1,100 @@
+"""Rigid poses: 4x4 column-vector matrices ``T_target_source``, and the paper's section frame.
+
+World frame: X right, Y along the wires (away from the viewer), Z up. Section frame of the paper: x right, y down,
+angles counter-clockwise as seen; so x = X, y = -Z, and a positive angle turns X towards Z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clamp3d.errors import InputError
+
+Array = NDArray[np.float64]
+
+RIGID_TOLERANCE = 1e-9
+"""Largest entry of R R^T - 1 that still counts as a rotation (rounding of a product of many poses)."""
+
+
+def check_pose(pose: ArrayLike, name: str = "pose") -> Array:
+    """Return ``pose`` as a (4, 4) float64 array if it is rigid.
+
+    Raises InputError if the shape is wrong, a number is not finite, or the matrix scales, shears or reflects.
+
+    >>> check_pose(np.diag([2.0, 1.0, 1.0, 1.0]))
+    Traceback (most recent call last):
+    clamp3d.errors.InputError: pose must be rigid: its rotation part deviates from orthonormal by 3
+    """
+    try:
+        T = np.asarray(pose, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be a 4x4 matrix of numbers, got {type(pose).__name__}") from None
+    if T.shape != (4, 4):
+        raise InputError(f"{name} must have shape (4, 4), got {T.shape}")
+    if not np.isfinite(T).all():
+        raise InputError(f"{name} must be finite, got a NaN or infinite entry")
+    if not np.array_equal(T[3], (0.0, 0.0, 0.0, 1.0)):
+        raise InputError(f"{name} must have the last row 0 0 0 1, got {T[3].tolist()}")
+    R = T[:3, :3]
+    deviation = float(np.abs(R @ R.T - np.eye(3)).max())
+    if deviation > RIGID_TOLERANCE:
+        raise InputError(f"{name} must be rigid: its rotation part deviates from orthonormal by {deviation:.3g}")
+    if np.linalg.det(R) < 0:
+        raise InputError(f"{name} must be rigid: it reflects (determinant -1)")
+    return T
+
+
+def inverse(T: Array) -> Array:
+    """Inverse of rigid poses, shape (..., 4, 4)."""
+    out = np.zeros_like(T)
+    Rt = np.swapaxes(T[..., :3, :3], -1, -2)
+    out[..., :3, :3] = Rt
+    out[..., :3, 3] = -(Rt @ T[..., :3, 3:])[..., 0]
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def translation(x: float, y: float, z: float) -> Array:
+    """Pose that moves by (x, y, z) mm."""
+    T = np.eye(4)
+    T[:3, 3] = (x, y, z)
+    return T
+
+
+def rotation(axis: ArrayLike, angle: float) -> Array:
+    """Pose that turns by ``angle`` rad about ``axis`` (3,) through the origin, right-handed (Rodrigues' formula)."""
+    a = np.asarray(axis, dtype=np.float64)
+    a = a / np.linalg.norm(a)
+    K = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+    T = np.eye(4)
+    # 2 sin^2(t/2) in place of 1 - cos t keeps small angles exact.
+    T[:3, :3] += np.sin(angle) * K + 2.0 * np.sin(0.5 * angle) ** 2 * (K @ K)
+    return T
+
+
+@dataclass(frozen=True, slots=True)
+class SectionPose:
+    """Where a part lies in the paper's section frame: ``x`` right and ``y`` down in mm, ``angle`` ccw in rad."""
+
+    x: float
+    y: float
+    angle: float = 0.0
+
+    def T(self, along: float = 0.0) -> Array:
+        """World pose (4, 4), the part's middle at ``along`` mm on the wires' direction Y."""
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        return np.array(
+            [[c, 0.0, -s, self.x], [0.0, 1.0, 0.0, along], [s, 0.0, c, -self.y], [0.0, 0.0, 0.0, 1.0]]
+        )
+
+    def point(self, u: float, v: float) -> tuple[float, float]:
+        """Section coordinates (x, y) of the part's own point (u right, v down).
+
+        >>> SectionPose(1.0, 2.0, np.pi / 2).point(3.0, 0.0)
+        (1.0000000000000002, -1.0)
+        """
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        return float(self.x + u * c + v * s), float(self.y - u * s + v * c)

@@ -1,0 +1,1 @@
+"""Reports, drawings, files and pictures."""

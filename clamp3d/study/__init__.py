@@ -1,0 +1,1 @@
+"""Experiments on the methods: charts, complexity, stability, image measurement."""
