@@ -47,6 +47,7 @@ def conductor(designation: str) -> Conductor:
     if found is None:
         near = difflib.get_close_matches(designation, catalogue(), n=3, cutoff=0.0)
         raise InputError(
-            f"unknown conductor {designation!r}; nearest: {', '.join(near)} (all {len(catalogue())}: clamp3d conductors)"
+            f"unknown conductor {designation!r}; nearest: {', '.join(near)} "
+            f"(all {len(catalogue())}: clamp3d conductors)"
         )
     return found
