@@ -40,7 +40,7 @@ def conductor(designation: str) -> Conductor:
 
     >>> conductor("LJ-121")
     Traceback (most recent call last):
-    clamp3d.errors.InputError: unknown conductor 'LJ-121'; nearest: LJ-120, LJ-210, LJ-25 (all 51: clamp3d conductors)
+    clamp3d.errors.InputError: unknown conductor 'LJ-121'; nearest: LJ-210, LJ-120, LJ-25 (all 51: clamp3d conductors)
     """
     by_folded = {name.casefold(): entry for name, entry in catalogue().items()}
     found = by_folded.get(designation.strip().casefold())

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clamp3d.clamp.dimensions import Clamp, GrooveDimensions, PartName
+from clamp3d.clamp.dimensions import Clamp, GrooveDimensions, PartName, Wire
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import Cylinder, SweptArc
 
@@ -42,25 +42,30 @@ def groove_pairs(clamp: Clamp) -> dict[tuple[PartName, PartName], GroovePair]:
     ['P1-P6', 'P1-P7', 'P2-P6', 'P2-P7', 'P3-P2']
     """
     up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
-    wires: dict[PartName, Cylinder] = {
-        "P6": Cylinder(clamp.line.radius, clamp.wire_length),
-        "P7": Cylinder(clamp.jumper.radius, clamp.wire_length),
-    }
-    pairs = {}
-    for wire, key, side in (("P6", "line_groove", -1), ("P7", "jumper_groove", 1)):
-        g: GrooveDimensions = getattr(up, key)
-        arc = SweptArc(g.radius, math.acos((g.centre_depth - up.thickness) / g.radius), up.length)
-        T = _pose(_MOUTH_DOWN, up.width / 2 + side * g.offset, g.centre_depth)
-        pairs["P1", wire] = GroovePair("P1", wire, arc, T, wires[wire], _pose(_MOUTH_UP, 0.0, 0.0))
-    for wire, key, side in (("P6", "line_groove", -1), ("P7", "jumper_groove", 1)):
-        g = getattr(down, key)
-        arc = SweptArc(g.radius, math.acos((down.face_depth - g.centre_depth) / g.radius), down.length)
-        T = _pose(_MOUTH_UP, side * g.offset, g.centre_depth)
-        pairs["P2", wire] = GroovePair("P2", wire, arc, T, wires[wire], _pose(_MOUTH_UP, 0.0, 0.0))
+    sides: tuple[tuple[PartName, int, Wire, GrooveDimensions, GrooveDimensions], ...] = (
+        ("P6", -1, clamp.line, up.line_groove, down.line_groove),
+        ("P7", +1, clamp.jumper, up.jumper_groove, down.jumper_groove),
+    )
+    pairs: dict[tuple[PartName, PartName], GroovePair] = {}
+    for wire, side, dimensions, over, _ in sides:
+        cylinder = Cylinder(dimensions.radius, clamp.wire_length)
+        arc = _arc(over, over.centre_depth - up.thickness, up.length)
+        T = _pose(_MOUTH_DOWN, up.width / 2 + side * over.offset, over.centre_depth)
+        pairs["P1", wire] = GroovePair("P1", wire, arc, T, cylinder, _pose(_MOUTH_UP, 0.0, 0.0))
+    for wire, side, dimensions, _, under in sides:
+        cylinder = Cylinder(dimensions.radius, clamp.wire_length)
+        arc = _arc(under, down.face_depth - under.centre_depth, down.length)
+        T = _pose(_MOUTH_UP, side * under.offset, under.centre_depth)
+        pairs["P2", wire] = GroovePair("P2", wire, arc, T, cylinder, _pose(_MOUTH_UP, 0.0, 0.0))
     back = Cylinder(down.back_radius, down.length)
-    arc = SweptArc(saddle.radius, saddle.half_angle, saddle.length)
-    pairs["P3", "P2"] = GroovePair("P3", "P2", arc, _pose(_MOUTH_UP, 0.0, 0.0), back, _pose(_MOUTH_UP, 0.0, 0.0))
-    return pairs  # type: ignore[return-value]
+    seat = SweptArc(saddle.radius, saddle.half_angle, saddle.length)
+    pairs["P3", "P2"] = GroovePair("P3", "P2", seat, _pose(_MOUTH_UP, 0.0, 0.0), back, _pose(_MOUTH_UP, 0.0, 0.0))
+    return pairs
+
+
+def _arc(groove: GrooveDimensions, centre_to_face: float, length: float) -> SweptArc:
+    """The arc ends on the inner face, ``centre_to_face`` mm from its centre: that is its half angle."""
+    return SweptArc(groove.radius, math.acos(centre_to_face / groove.radius), length)
 
 
 def _pose(R: Array, u: float, v: float) -> Array:
