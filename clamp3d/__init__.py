@@ -12,7 +12,15 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOME: dict[str, str] = {
+    "ArcContact": "clamp3d.geometry.arc_circle",
+    "ArcRelation": "clamp3d.geometry.arc_circle",
+    "HoleContact": "clamp3d.geometry.rectangle",
+    "HoleRelation": "clamp3d.geometry.rectangle",
     "InputError": "clamp3d.errors",
+    "Rectangle": "clamp3d.geometry.rectangle",
+    "arc_circle": "clamp3d.geometry.arc_circle",
+    "classify_arc_circle": "clamp3d.geometry.arc_circle",
+    "hole_bolt": "clamp3d.geometry.rectangle",
 }
 
 __all__ = sorted(_HOME)
