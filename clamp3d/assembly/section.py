@@ -123,7 +123,9 @@ class Section:
         gradient[k:, S] = -(normal[k:] * turned).sum(1)
         pair = tuple(("P1", wire) for _ in up.feature) + tuple(("P2", wire) for _ in down.feature)
         section_point = np.column_stack([point[:, 0], -point[:, 2]])
-        return Gaps(np.concatenate([up.distance, down.distance]), gradient, pair, up.feature + down.feature, section_point)
+        return Gaps(
+            np.concatenate([up.distance, down.distance]), gradient, pair, up.feature + down.feature, section_point
+        )
 
     def face_gaps(self, q: Array) -> Gaps:
         """Gaps between the inner faces along the bolt, at both ends of their overlap, and to the tilt limits.

@@ -65,7 +65,11 @@ def solve_stepped(
         raise SolverError(f"the open clamp overlaps at a distance of {k * step:.4g} mm: nothing to close")
     # Of the tilts that are free at the last distance, the one that leaves the wires most room.
     q = max(
-        (p for i in range(-limit, limit + 1) if (p := _place(section, q, q[D], i * tilt_step, settle=True)) is not None),
+        (
+            p
+            for i in range(-limit, limit + 1)
+            if (p := _place(section, q, q[D], i * tilt_step, settle=True)) is not None
+        ),
         key=lambda p: float(section.gaps(p).value.min()),
         default=q,
     )
@@ -84,7 +88,7 @@ def _place(section: Section, q: Array, d: float, tilt: float, settle: bool = Fal
     return new
 
 
-class _Free(Exception):
+class _FreeError(Exception):
     """Found a free place: no need to look for a better one."""
 
 
@@ -100,7 +104,7 @@ def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
             q[i : i + 2] = x[:2]
             memo[key] = section.wire_gaps(q, wire)
             if not widest and memo[key].value.min() >= -FREE:
-                raise _Free
+                raise _FreeError
         return memo[key]
 
     def slack(x: Array) -> Array:
@@ -124,5 +128,5 @@ def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
             options={"maxiter": 60, "ftol": 1e-12},
         ).x
         return bool(gaps(found).value.min() >= -FREE)
-    except _Free:
+    except _FreeError:
         return True
