@@ -12,7 +12,14 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOME: dict[str, str] = {
+    "Cylinder": "clamp3d.geometry.shapes",
+    "Feature": "clamp3d.geometry.distance",
     "InputError": "clamp3d.errors",
+    "SignedDistance": "clamp3d.geometry.distance",
+    "SignedDistances": "clamp3d.geometry.distance",
+    "SweptArc": "clamp3d.geometry.shapes",
+    "signed_distance": "clamp3d.geometry.distance",
+    "signed_distances": "clamp3d.geometry.distance",
 }
 
 __all__ = sorted(_HOME)  # noqa: PLE0605
