@@ -14,10 +14,12 @@ __version__ = "0.1.0"
 _HOME: dict[str, str] = {
     "Cylinder": "clamp3d.geometry.shapes",
     "Feature": "clamp3d.geometry.distance",
+    "GroovePieces": "clamp3d.geometry.pieces",
     "InputError": "clamp3d.errors",
     "SignedDistance": "clamp3d.geometry.distance",
     "SignedDistances": "clamp3d.geometry.distance",
     "SweptArc": "clamp3d.geometry.shapes",
+    "groove_pieces": "clamp3d.geometry.pieces",
     "signed_distance": "clamp3d.geometry.distance",
     "signed_distances": "clamp3d.geometry.distance",
 }

@@ -86,9 +86,7 @@ class SectionPose:
     def T(self, along: float = 0.0) -> Array:
         """World pose (4, 4), the part's middle at ``along`` mm on the wires' direction Y."""
         c, s = np.cos(self.angle), np.sin(self.angle)
-        return np.array(
-            [[c, 0.0, -s, self.x], [0.0, 1.0, 0.0, along], [s, 0.0, c, -self.y], [0.0, 0.0, 0.0, 1.0]]
-        )
+        return np.array([[c, 0.0, -s, self.x], [0.0, 1.0, 0.0, along], [s, 0.0, c, -self.y], [0.0, 0.0, 0.0, 1.0]])
 
     def point(self, u: float, v: float) -> tuple[float, float]:
         """Section coordinates (x, y) of the part's own point (u right, v down).
