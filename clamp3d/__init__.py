@@ -22,9 +22,18 @@ _HOME: dict[str, str] = {
     "groove_pieces": "clamp3d.geometry.pieces",
     "signed_distance": "clamp3d.geometry.distance",
     "signed_distances": "clamp3d.geometry.distance",
+    "ArcContact": "clamp3d.geometry.arc_circle",
+    "ArcRelation": "clamp3d.geometry.arc_circle",
+    "HoleContact": "clamp3d.geometry.rectangle",
+    "HoleRelation": "clamp3d.geometry.rectangle",
+    "InputError": "clamp3d.errors",
+    "Rectangle": "clamp3d.geometry.rectangle",
+    "arc_circle": "clamp3d.geometry.arc_circle",
+    "classify_arc_circle": "clamp3d.geometry.arc_circle",
+    "hole_bolt": "clamp3d.geometry.rectangle",
 }
 
-__all__ = sorted(_HOME)  # noqa: PLE0605
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:

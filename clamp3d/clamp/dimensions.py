@@ -1,0 +1,278 @@
+"""Dimensions of a parallel groove clamp: frozen dataclasses, validated by pydantic.
+
+Lengths in mm; angles in degrees where a name ends in ``_deg`` (this is what the user types), properties give radians.
+Section frame of the paper: x right, y down, so "depth" and "below" are along +y.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field, model_validator
+from pydantic.dataclasses import dataclass
+
+from clamp3d.clamp.conductors import conductor
+from clamp3d.errors import InputError
+
+Length = Annotated[float, Field(gt=0.0, lt=1e5, allow_inf_nan=False, strict=True)]
+Offset = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False, strict=True)]
+PartName = Literal["P1", "P2", "P3", "P4", "P5", "P6", "P7"]
+ConnectionType = Literal[0, 1, 2, 3]
+
+PARTS: tuple[PartName, ...] = ("P1", "P2", "P3", "P4", "P5", "P6", "P7")
+TITLES: dict[PartName, str] = {
+    "P1": "up splint",
+    "P2": "down splint",
+    "P3": "saddle washer",
+    "P4": "bolt",
+    "P5": "nut",
+    "P6": "power line",
+    "P7": "jumper",
+}
+
+_FROZEN = ConfigDict(extra="forbid")
+
+
+@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+class Wire:
+    """A conductor, by catalogue name or by ``diameter``; exactly one of the two. Raises InputError if it is unknown."""
+
+    conductor: str | None = None
+    diameter: Length | None = None
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Wire:
+        if (self.conductor is None) == (self.diameter is None):
+            raise ValueError("conductor or diameter: give one of them, not both")
+        if self.conductor is not None:
+            try:
+                conductor(self.conductor)
+            except InputError as error:
+                raise ValueError(f"conductor: {error}") from None
+        return self
+
+    @property
+    def radius(self) -> float:
+        """Radius over all strands in mm."""
+        return 0.5 * (conductor(self.conductor).diameter if self.conductor is not None else float(self.diameter or 0.0))
+
+    @property
+    def label(self) -> str:
+        """Catalogue name, or the diameter where there is none."""
+        return self.conductor or f"diameter {self.diameter:g} mm"
+
+
+@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+class GrooveDimensions:
+    """A groove's arc: its centre lies ``offset`` beside the bolt axis and ``centre_depth`` below the part's origin."""
+
+    radius: Length
+    offset: Length
+    centre_depth: Offset
+
+
+@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+class UpSplint:
+    """P1: a plate with its two grooves underneath. Origin: its top left corner."""
+
+    width: Length
+    length: Length
+    thickness: Length
+    hole_diameter: Length
+    line_groove: GrooveDimensions
+    jumper_groove: GrooveDimensions
+
+    @model_validator(mode="after")
+    def _grooves_fit(self) -> UpSplint:
+        for key in ("line_groove", "jumper_groove"):
+            groove: GrooveDimensions = getattr(self, key)
+            _check_groove(key, groove, groove.centre_depth - self.thickness, self.width / 2, self.hole_diameter / 2)
+            if groove.centre_depth - groove.radius <= 0.0:
+                raise ValueError(
+                    f"{key}: the arc cuts the top face: centre_depth - radius must be > 0 mm, "
+                    f"got {groove.centre_depth - groove.radius:.4g}"
+                )
+        return self
+
+
+@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+class DownSplint:
+    """P2: grooves on top, a round back that tilts in the saddle. Origin: centre of the round back."""
+
+    width: Length
+    length: Length
+    face_depth: Length
+    back_radius: Length
+    back_half_angle_deg: Annotated[float, Field(gt=0.0, lt=90.0, strict=True)]
+    slot_width: Length
+    slot_length: Length
+    max_tilt_deg: Annotated[float, Field(gt=0.0, lt=45.0, strict=True)]
+    line_groove: GrooveDimensions
+    jumper_groove: GrooveDimensions
+
+    @property
+    def underside_depth(self) -> float:
+        """Flat underside below the origin, where the round back ends; mm."""
+        return self.back_radius * math.cos(math.radians(self.back_half_angle_deg))
+
+    @property
+    def max_tilt(self) -> float:
+        """Largest tilt either way in rad."""
+        return math.radians(self.max_tilt_deg)
+
+    @model_validator(mode="after")
+    def _grooves_fit(self) -> DownSplint:
+        if self.face_depth >= self.underside_depth:
+            raise ValueError(
+                f"face_depth must be above the flat underside (back_radius cos back_half_angle = "
+                f"{self.underside_depth:.4g} mm), got {self.face_depth:g}"
+            )
+        if 2 * self.back_radius * math.sin(math.radians(self.back_half_angle_deg)) > self.width:
+            raise ValueError(
+                f"width must be >= the round back's, 2 back_radius sin back_half_angle, got {self.width:g}"
+            )
+        for key in ("line_groove", "jumper_groove"):
+            groove: GrooveDimensions = getattr(self, key)
+            _check_groove(key, groove, self.face_depth - groove.centre_depth, self.width / 2, self.slot_width / 2)
+            if groove.centre_depth + groove.radius >= self.underside_depth:
+                raise ValueError(
+                    f"{key}: the arc cuts the underside: centre_depth + radius must be < "
+                    f"{self.underside_depth:.4g} mm, got {groove.centre_depth + groove.radius:.4g}"
+                )
+        return self
+
+
+@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+class Saddle:
+    """P3: saddle washer under the round back. Origin: centre of its concave arc."""
+
+    radius: Length
+    width: Length
+    length: Length
+    apex_thickness: Length
+    hole_diameter: Length
+
+    @property
+    def half_angle(self) -> float:
+        """Half angle of the concave arc in rad."""
+        return math.asin(self.width / 2 / self.radius)
+
+    @model_validator(mode="after")
+    def _is_saddle(self) -> Saddle:
+        if self.width >= 2 * self.radius:
+            raise ValueError(f"width must be < 2 radius = {2 * self.radius:g} mm, got {self.width:g}")
+        if self.hole_diameter >= self.width:
+            raise ValueError(f"hole_diameter must be < width = {self.width:g} mm, got {self.hole_diameter:g}")
+        return self
+
+
+@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+class Bolt:
+    """P4: hexagon bolt, head below the saddle. Origin: its free (upper) end."""
+
+    diameter: Length
+    pitch: Length
+    shank_length: Length
+    head_across_flats: Length
+    head_height: Length
+
+
+@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+class Nut:
+    """P5: hexagon nut and washers together, on the up splint. Origin: its free (upper) face."""
+
+    across_flats: Length
+    height: Length
+
+
+@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+class Clamp:
+    """A parallel groove clamp with its two wires, connection matrix and assembly sequence."""
+
+    name: str
+    description: str = ""
+    unit: Literal["mm"]
+    sequence: str
+    line: Wire
+    jumper: Wire
+    up_splint: UpSplint
+    down_splint: DownSplint
+    saddle: Saddle
+    bolt: Bolt
+    nut: Nut
+    connections: dict[PartName, dict[PartName, ConnectionType]]
+
+    @property
+    def wire_length(self) -> float:
+        """Length of wire that is shown and measured: the splints are well inside it (three times their length)."""
+        return 3.0 * max(self.up_splint.length, self.down_splint.length)
+
+    @property
+    def back_clearance(self) -> float:
+        """Distance of the two arc centres when the round back rests in the saddle's apex; mm."""
+        return self.saddle.radius - self.down_splint.back_radius
+
+    def connection(self, a: PartName, b: PartName) -> ConnectionType:
+        """Entry c_ij of the connection matrix (Eq. 1 and Table 1 of the paper), symmetric."""
+        first, second = sorted((a, b))
+        return self.connections.get(first, {}).get(second, 0)
+
+    @model_validator(mode="after")
+    def _parts_fit_each_other(self) -> Clamp:
+        r, down = self.bolt.diameter / 2, self.down_splint
+        for key, hole in (("up_splint", self.up_splint.hole_diameter), ("saddle", self.saddle.hole_diameter)):
+            if hole <= 2 * r:
+                raise ValueError(f"{key}.hole_diameter must be > bolt.diameter = {2 * r:g} mm, got {hole:g}")
+        if down.slot_length <= 2 * r:
+            raise ValueError(
+                f"down_splint.slot_length must be > bolt.diameter = {2 * r:g} mm, got {down.slot_length:g}"
+            )
+        # The leaning shank leaves the round back where its outer edge meets the circle: Table 2 at the back's end.
+        needed = 2 * down.back_radius * math.sin(down.max_tilt + math.asin(min(1.0, r / down.back_radius)))
+        if down.slot_width < needed:
+            raise ValueError(
+                f"down_splint.slot_width must be >= {needed:.4g} mm for a tilt of {down.max_tilt_deg:g} deg, "
+                f"got {down.slot_width:g}"
+            )
+        if self.back_clearance <= 0.0:
+            raise ValueError(
+                f"saddle.radius must be > down_splint.back_radius = {down.back_radius:g} mm, got {self.saddle.radius:g}"
+            )
+        reach = math.degrees(self.saddle.half_angle) + down.max_tilt_deg
+        if reach > down.back_half_angle_deg:
+            raise ValueError(
+                f"down_splint.back_half_angle_deg must be >= {reach:.4g} (saddle's half angle + max_tilt_deg), "
+                f"got {down.back_half_angle_deg:g}"
+            )
+        if self.nut.across_flats <= 2 * r:
+            raise ValueError(f"nut.across_flats must be > bolt.diameter = {2 * r:g} mm, got {self.nut.across_flats:g}")
+        for a, row in self.connections.items():
+            for b in row:
+                if a >= b:
+                    raise ValueError(
+                        f"connections.{a}.{b}: the matrix is given above its diagonal, write it as {b}.{a}"
+                    )
+        return self
+
+
+def _check_groove(
+    key: str, groove: GrooveDimensions, centre_to_face: float, half_width: float, half_hole: float
+) -> None:
+    """Raise ValueError unless the arc reaches the inner face and its mouth lies between hole and edge."""
+    if abs(centre_to_face) >= groove.radius:
+        raise ValueError(
+            f"{key}: the arc does not reach its face: the centre must be less than radius = "
+            f"{groove.radius:g} mm from the inner face, got {abs(centre_to_face):.4g}"
+        )
+    half_mouth = math.sqrt(groove.radius**2 - centre_to_face**2) if centre_to_face > 0 else groove.radius
+    if groove.offset + half_mouth > half_width:
+        raise ValueError(
+            f"{key}: the arc leaves the splint at its edge: offset must be <= {half_width - half_mouth:.4g} mm, "
+            f"got {groove.offset:g}"
+        )
+    if groove.offset - half_mouth < half_hole:
+        raise ValueError(
+            f"{key}: the arc meets the bolt hole: offset must be >= {half_hole + half_mouth:.4g} mm, "
+            f"got {groove.offset:g}"
+        )

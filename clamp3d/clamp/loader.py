@@ -1,0 +1,115 @@
+"""Clamp files: TOML in, validated dimensions out; every fault is one line with file, key, value and rule."""
+
+from __future__ import annotations
+
+import difflib
+import sys
+import typing
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from clamp3d.clamp.conductors import conductor
+from clamp3d.clamp.dimensions import Clamp, Wire
+from clamp3d.errors import InputError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+
+_UNKNOWN_KEY = {"unexpected_keyword_argument", "extra_forbidden"}
+
+
+def builtin_clamps() -> list[str]:
+    """Names of the clamp files inside the package.
+
+    >>> builtin_clamps()
+    ['reference']
+    """
+    folder = resources.files("clamp3d.clamp").joinpath("data")
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_clamp(source: str | Path = "reference", *, line: str | None = None, jumper: str | None = None) -> Clamp:
+    """Load a clamp by built-in name or file path; ``line`` and ``jumper`` replace its wires.
+
+    A wire is a catalogue designation or a diameter in mm ("21.6"). Raises InputError for anything that is not a
+    clamp, naming file, key, value and rule.
+
+    >>> load_clamp(jumper="21.6").jumper.radius
+    10.8
+    """
+    text, origin = _read(str(source))
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{origin}: not valid TOML: {error}") from None
+    clamp = _validate(data, origin)
+    if line is not None:
+        clamp = replace(clamp, line=wire(line, "--line"))
+    if jumper is not None:
+        clamp = replace(clamp, jumper=wire(jumper, "--jumper"))
+    return clamp
+
+
+def wire(text: str, name: str = "wire") -> Wire:
+    """A wire from what a user types: a designation, or a diameter in mm. Raises InputError."""
+    try:
+        diameter = float(text)
+    except ValueError:
+        return Wire(conductor=conductor(text).designation)
+    try:
+        return Wire(diameter=diameter)
+    except ValidationError:
+        raise InputError(f"{name} diameter must be > 0 and < 100000 mm, got {text}") from None
+
+
+def _read(source: str) -> tuple[str, str]:
+    if source in builtin_clamps():
+        return resources.files("clamp3d.clamp").joinpath(f"data/{source}.toml").read_text(encoding="utf-8"), source
+    path = Path(source)
+    if path.suffix != ".toml" and not path.exists():
+        raise InputError(f"unknown clamp {source!r}; built in: {', '.join(builtin_clamps())}; or give a .toml file")
+    try:
+        return path.read_text(encoding="utf-8"), str(path)
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text file in UTF-8") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _validate(data: dict[str, typing.Any], origin: str) -> Clamp:
+    try:
+        return TypeAdapter(Clamp).validate_python(data)
+    except ValidationError as failure:
+        # A misspelt key is both unknown and missing; the first says what to mend.
+        error = min(failure.errors(include_url=False), key=lambda e: e["type"] not in _UNKNOWN_KEY)
+        others = failure.error_count() - 1
+    key = ".".join(str(part) for part in error["loc"] if part != "[key]")
+    rule = error["msg"].replace("Input should", "must").removeprefix("Value error, ")
+    if error["type"] == "value_error":  # from our own validators, which begin with the key
+        line = f"{origin}: {key}.{rule}" if key else f"{origin}: {rule}"
+    elif error["type"] == "missing":
+        line = f"{origin}: {key} is missing"
+    elif error["type"] in _UNKNOWN_KEY:
+        near = difflib.get_close_matches(str(error["loc"][-1]), _keys_at(error["loc"][:-1]), n=1)
+        line = f"{origin}: {key} is not a known key" + (f"; did you mean {near[0]}?" if near else "")
+    elif isinstance(error["input"], (str, int, float, bool)):
+        line = f"{origin}: {key}: {rule}, got {error['input']!r}"
+    else:
+        line = f"{origin}: {key}: {rule}"
+    raise InputError(line + (f" (and {others} more)" if others else ""))
+
+
+def _keys_at(loc: tuple[int | str, ...]) -> list[str]:
+    """Names of the fields that a table of the clamp file may hold."""
+    kind: typing.Any = Clamp
+    for part in loc:
+        kind = typing.get_type_hints(kind).get(str(part))
+        if kind is None:
+            return []
+    return list(getattr(kind, "__dataclass_fields__", {}))
