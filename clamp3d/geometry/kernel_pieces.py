@@ -1,4 +1,4 @@
-"""Signed gap of every boundary piece of a groove on its own: arc surface, flat face M, flat face N, end faces -z and +z.
+"""Signed gap of every boundary piece of a groove on its own: arc surface, flat faces M and N, end faces -z and +z.
 
 Outside the material each gap is the plain distance of the axis from the piece (its edges included) minus the
 cylinder's radius, so the least of them is the signed distance. With the axis inside the material a piece's gap is
@@ -95,7 +95,7 @@ def put(row, distance, r, qx, qy, qz, ax, ay, az, feature, R, h):  # type: ignor
         nx = -qx / R
         ny = -qy / R
         nz = 0.0
-    elif feature == FLAT_M or feature == FLAT_N:
+    elif feature in (FLAT_M, FLAT_N):
         nx = nz = 0.0
         ny = 1.0
     elif feature == END_FACE:

@@ -31,21 +31,21 @@ class GroovePieces:
 
 
 def groove_pieces(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> GroovePieces:
-    """Signed gap of each closed boundary piece of ``groove`` to ``cylinder``; ``pose`` (4, 4) is ``T_groove_cylinder``.
+    """Signed gap of each closed boundary piece of ``groove`` to ``cylinder``; ``pose`` (4, 4): ``T_groove_cylinder``.
 
-        While the cylinder's axis is outside the material, ``min(distance)`` is ``signed_distance(...).distance``. With the
-        axis inside, the gaps of the pieces it came through stay negative and fall further, with normals that lead back out;
-        the other pieces keep their plain distance. Each gap is continuous, and smooth where its nearest point is unique;
-    the one exception is an axis that enters through an end face, where the side pieces change sign at once.
-        A cylinder along the groove that sticks out of it has its end pieces equal to the side piece that is nearest: take
-        rows 0 to 2 alone for such cylinders. Raises InputError if ``pose`` is not a finite rigid 4x4 matrix.
+    While the cylinder's axis is outside the material, ``min(distance)`` is ``signed_distance(...).distance``. With the
+    axis inside, the gaps of the pieces it came through stay negative and fall further, with normals that lead back
+    out; the other pieces keep their plain distance. Each gap is continuous, and smooth where its nearest point is
+    unique; the one exception is an axis that enters through an end face: there the side pieces change sign at once.
+    A cylinder along the groove that sticks out of it has its end pieces equal to the nearest side piece: take rows 0
+    to 2 alone for such cylinders. Raises InputError if ``pose`` is not a finite rigid 4x4 matrix.
 
-        >>> import numpy as np
-        >>> from clamp3d.geometry.pose import translation
-        >>> groove, wire = SweptArc(12.0, np.pi / 3, 50.0), Cylinder(15.0, 80.0)
-        >>> gaps = groove_pieces(groove, wire, translation(0.0, 5.0, 0.0))  # too thick for the groove: it rests on the lips
-        >>> gaps.distance[:3].round(3).tolist()
-        [0.103, 0.103, 0.103]
+    >>> import numpy as np
+    >>> from clamp3d.geometry.pose import translation
+    >>> groove, wire = SweptArc(12.0, np.pi / 3, 50.0), Cylinder(15.0, 80.0)
+    >>> gaps = groove_pieces(groove, wire, translation(0.0, 5.0, 0.0))  # too thick: it rests on the lips
+    >>> gaps.distance[:3].round(3).tolist()
+    [0.133, 0.133, 0.133]
     """
     T = as_pose(pose)
     out = np.empty((5, 14))
