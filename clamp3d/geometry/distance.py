@@ -14,13 +14,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import IntEnum
 from types import ModuleType
-from typing import Literal, overload
+from typing import Literal, NoReturn, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array, check_pose
+from clamp3d.geometry.pose import RIGID_TOLERANCE, Array, check_pose
 from clamp3d.geometry.shapes import Cylinder, SweptArc
 
 
@@ -94,6 +94,19 @@ def _gradient(normal: Array, point: Array) -> Array:
     return np.concatenate([normal, np.cross(point, normal)], axis=-1)
 
 
+def as_pose(pose: ArrayLike) -> Array:
+    """Return ``pose`` as the (4, 4) C-contiguous float64 array the kernel takes; only the shape is checked here."""
+    if type(pose) is np.ndarray and pose.dtype == np.float64 and pose.shape == (4, 4) and pose.flags.c_contiguous:
+        return pose
+    return np.ascontiguousarray(check_pose(pose))
+
+
+def reject(T: Array, name: str) -> NoReturn:
+    """Raise the InputError for a pose that the kernel refused."""
+    check_pose(T, name)
+    raise InputError(f"{name} must be rigid within the tolerance of {RIGID_TOLERANCE:g}")
+
+
 _kernel: ModuleType | None = None
 
 
@@ -120,14 +133,11 @@ def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Si
     >>> answer.distance, answer.feature.name
     (1.5, 'ARC')
     """
-    T = pose
-    if type(T) is not np.ndarray or T.dtype != np.float64 or T.shape != (4, 4) or not T.flags.c_contiguous:
-        T = np.ascontiguousarray(check_pose(pose))
+    T = as_pose(pose)
     out = np.empty(13)
     run = (_kernel or kernel()).single
     if not run(T, groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, out):
-        check_pose(T)
-        raise InputError("pose must be rigid")
+        reject(T, "pose")
     distance, bound, feature, along = out[[0, 10, 11, 12]].tolist()
     return SignedDistance(
         distance,
@@ -188,8 +198,7 @@ def signed_distances(
             found = list(pool.map(part, cuts[:-1], cuts[1:]))
     bad = [i for i in found if i >= 0]
     if bad:
-        check_pose(T[bad[0]], f"poses[{bad[0]}]")
-        raise InputError(f"poses[{bad[0]}] must be rigid")
+        reject(T[bad[0]], f"poses[{bad[0]}]")
     if not full:
         return out
     return SignedDistances(

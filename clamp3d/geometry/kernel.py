@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from clamp3d.geometry import kernel_pieces
 from clamp3d.geometry.jit import entry, formula, source_stamp
 from clamp3d.geometry.kernel_distance import nearest
 from clamp3d.geometry.pose import RIGID_TOLERANCE
@@ -60,7 +61,10 @@ def record(T, R, s, h, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E7
     out[12] = t
 
 
-def _entries(stamp: str) -> tuple[Any, Any, Any]:
+_pieces = kernel_pieces.pieces
+
+
+def _entries(stamp: str) -> tuple[Any, Any, Any, Any]:
     def single(T, R, half_angle, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E741
         stamp  # noqa: B018  # part of the cache key
         if not rigid(T):
@@ -90,11 +94,22 @@ def _entries(stamp: str) -> tuple[Any, Any, Any]:
             record(T[i], R, s, h, H, r, l, out[i])
         return -1
 
+    def pieces(T, R, half_angle, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E741
+        stamp  # noqa: B018
+        if not rigid(T):
+            return False
+        dx, dy, dz = axis(T)
+        s = R * math.sin(half_angle)
+        h = -R * math.cos(half_angle)
+        _pieces(R, s, h, H, half_angle, r, l, T[0, 3], T[1, 3], T[2, 3], dx, dy, dz, out)
+        return True
+
     return (
         entry(single, "b1(f8[:,::1],f8,f8,f8,f8,f8,f8[::1])"),
         entry(distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,f8[::1])"),
         entry(records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,f8[:,::1])"),
+        entry(pieces, "b1(f8[:,::1],f8,f8,f8,f8,f8,f8[:,::1])"),
     )
 
 
-single, distances, records = _entries(source_stamp())
+single, distances, records, pieces = _entries(source_stamp())

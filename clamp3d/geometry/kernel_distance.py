@@ -108,7 +108,7 @@ def edge_normal(feature, R, h, qx, qy, qz):  # type: ignore[no-untyped-def]
     y = -qy / R
     z = 0.0
     if feature != END_ARC and feature != LIP_M and feature != LIP_N:
-        x = 0.0 if feature == END_EDGE_M or feature == END_EDGE_N else x
+        x = 0.0 if feature in (END_EDGE_M, END_EDGE_N) else x
         y = 1.0
     elif feature != END_ARC:
         y += 1.0
@@ -231,7 +231,7 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
             return (R - r) - rho, bx, by, bz, -x / rho, -y / rho, 0.0, ARC, bt, bound
         return R - r, bx, by, bz, 0.0, 1.0, 0.0, ARC, bt, bound
     distance = math.sqrt(best2)
-    if feature == FLAT_M or feature == FLAT_N:
+    if feature in (FLAT_M, FLAT_N):
         return distance - r, bx, by, bz, 0.0, 1.0, 0.0, feature, bt, bound
     if feature == END_FACE:
         return distance - r, bx, by, bz, 0.0, 0.0, math.copysign(1.0, bz), feature, bt, bound
