@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from clamp3d.assembly.connections import GEOMETRY, PAIRS, Undeclared, convex_gaps
+from clamp3d.assembly.connections import CONVEX_PAIRS, GEOMETRY, PAIRS, Undeclared, convex_gap
 from clamp3d.assembly.result import Contact, Event, Seat, Waypoint
 from clamp3d.assembly.section import SPLINTS, WIRES, Section
 from clamp3d.clamp.dimensions import Clamp, PartName
@@ -26,7 +26,8 @@ Poses = dict[PartName, SectionPose]
 def measure_contacts(section: Section, poses: Poses, tolerance: float) -> tuple[Contact, ...]:
     """Every pair that the connection matrix declares or that touches; equality is ``|gap| <= tolerance`` mm."""
     clamp = section.clamp
-    convex = convex_gaps(clamp, poses) | {("P1", "P2"): _face_gap(section, poses)[0]}
+    convex = {pair: convex_gap(clamp, poses, *pair) for pair in CONVEX_PAIRS}
+    convex["P1", "P2"] = _face_gap(section, poses)[0]
     found = []
     for a, b in PAIRS:
         if clamp.connection(a, b) == 0 and convex.get((a, b), math.inf) > tolerance:
@@ -173,17 +174,23 @@ def _least_on_the_way(section: Section, before: Poses, after: Poses) -> dict[tup
             for name, p in before.items()
         }
 
-    def gaps(t: float) -> dict[tuple[PartName, PartName], float]:
+    def gap_at(pair: tuple[PartName, PartName], t: float) -> float:
         poses = at(t)
-        return convex_gaps(section.clamp, poses) | {("P1", "P2"): _face_gap(section, poses)[0]}
+        return _face_gap(section, poses)[0] if pair == ("P1", "P2") else convex_gap(section.clamp, poses, *pair)
 
-    ends = [gaps(0.0), gaps(1.0)]
-    least = {pair: min(end[pair] for end in ends) for pair in ends[0]}
-    longest = max(math.hypot(after[n].x - p.x, after[n].y - p.y) for n, p in before.items())
-    for pair, gap in least.items():
-        if 0.0 < gap < 2.0 * longest:  # else it meets anyway, or is out of reach
-            found = minimize_scalar(lambda t, pair=pair: gaps(t)[pair], bounds=(0.0, 1.0), method="bounded")
-            least[pair] = min(gap, float(found.fun))
+    least = {}
+    for pair in (*CONVEX_PAIRS, ("P1", "P2")):
+        a, b = pair
+        gap = min(gap_at(pair, 0.0), gap_at(pair, 1.0))
+        # The parts cannot come closer than their way relative to each other, turning counted at the splints' ends.
+        way = math.hypot(
+            after[a].x - before[a].x - after[b].x + before[b].x, after[a].y - before[a].y - after[b].y + before[b].y
+        )
+        way += 2.0 * section.lever * max(abs(after[n].angle - before[n].angle) for n in pair)
+        if 0.0 < gap < way:
+            found = minimize_scalar(lambda t, pair=pair: gap_at(pair, t), bounds=(0.0, 1.0), method="bounded")
+            gap = min(gap, float(found.fun))
+        least[pair] = gap
     return least
 
 
