@@ -15,7 +15,7 @@ from scipy.optimize import minimize, nnls
 
 from clamp3d.assembly.section import WIRES, D, Gaps, Section
 from clamp3d.clamp.dimensions import PartName
-from clamp3d.errors import SolverError
+from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array
 
 TOLERANCE = 1e-9
@@ -50,9 +50,14 @@ class FinalState:
 def solve_final_state(section: Section, start: Array | None = None) -> FinalState:
     """Close the clamp from ``start`` (an open state; by default straight and fully open).
 
-    Raises SolverError when feasibility or optimality cannot be shown to `TOLERANCE`.
+    Raises InputError if the start overlaps, SolverError when feasibility or optimality cannot be shown to `TOLERANCE`.
     """
     q = section.open_state(section.open_distance()) if start is None else np.array(start, dtype=np.float64)
+    gaps = section.gaps(q)
+    k = int(np.argmin(gaps.value))
+    if gaps.value[k] < -_ACTIVE:
+        a, b = gaps.pair[k]
+        raise InputError(f"the start must be an open state: {a} and {b} overlap by {-gaps.value[k]:.4g} mm")
     q = _descend(section, q, _CLOSING)
     q, optimality = _polish(section, q)
     force = _multipliers(section.gaps(q))
