@@ -56,6 +56,7 @@ def export(
     output: str | Path,
     poses: Mapping[PartName, ArrayLike] | None = None,
     state: str | None = None,
+    status: str | None = None,
     layout: Layout | None = None,
     mesh_error: float = DEFAULT_MESH_ERROR,
     unit: str | None = None,
@@ -64,8 +65,9 @@ def export(
     """Write parts of ``clamp`` into the folder ``output``, and a manifest ``manifest-<format>.json`` beside them.
 
     ``poses`` maps part names to ``T_world_part`` (4, 4) in mm; without it every part stays in its own frame, which
-    only the layout "parts" can have. ``state`` is what the manifest calls the poses. ``mesh_error`` is the largest
-    distance in mm of an arc from its chord (STEP has true arcs and ignores it). ``unit`` is one of mm, cm, m, in.
+    only the layout "parts" can have. ``state`` and ``status`` of the run they come from go into the manifest.
+    ``mesh_error`` is the largest distance in mm of an arc from its chord (STEP has true arcs and ignores it).
+    ``unit`` is one of mm, cm, m, in.
     World axes are Z up; GLB is turned to Y up. Files are written whole or not at all.
 
     Raises InputError for a value out of range or a folder that cannot be written, MissingLibraryError if the format
@@ -97,6 +99,7 @@ def export(
         "format": format,
         "layout": layout,
         "state": state,
+        "status": status,
         "unit": unit,
         "up": "Y" if format == "glb" else "Z",
         "mesh_error_mm": None if format == "step" else mesh_error,

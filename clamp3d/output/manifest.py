@@ -52,8 +52,7 @@ def manifest(
 def _part(item: PlacedPart, meshed: Placement | None, unit: str, up: str) -> dict[str, Any]:
     entry: dict[str, Any] = {
         "title": item.part.title,
-        "material": item.material.name,
-        "colour": "#{:02x}{:02x}{:02x}".format(*item.material.colour),
+        "colour": "#{:02X}{:02X}{:02X}".format(*item.colour),
         "T_world_part": None if item.T_world_part is None else item.T_world_part.tolist(),
         "volume_mm3": round(item.part.volume, 6),
         "chord_error_mm": 0.0,

@@ -90,7 +90,7 @@ def ply(items: Sequence[Placement], title: str, unit: str) -> bytes:
     for item in items:
         n, m = len(item.vertices), len(item.faces)
         vertices["position"][v : v + n] = item.vertices
-        vertices["colour"][v : v + n] = item.placed.material.colour
+        vertices["colour"][v : v + n] = item.placed.colour
         faces["corners"][f : f + m] = item.faces + v
         v, f = v + n, f + m
     header = "\n".join(
@@ -118,11 +118,12 @@ def obj(items: Sequence[Placement], title: str, unit: str, mtl_name: str) -> tup
     offset = 1
     for item in items:
         name = item.placed.label.replace(" ", "_")
-        lines += [f"o {name}", f"usemtl {name}"]
+        lines.append(f"o {name}")
         lines += [f"v {x} {y} {z}" for x, y, z in _text(item.vertices, unit)]
+        lines.append(f"usemtl {name}")
         lines += [f"f {a} {b} {c}" for a, b, c in (item.faces + offset).tolist()]
         offset += len(item.vertices)
-        colour = " ".join(f"{c / 255:.4f}" for c in item.placed.material.colour)
+        colour = " ".join(f"{c / 255:.4f}" for c in item.placed.colour)
         materials += [f"newmtl {name}", f"Kd {colour}", "Ka 0 0 0", "Ks 0.2 0.2 0.2", "Ns 40", "d 1", "illum 2"]
     return _join(lines), _join(materials)
 
@@ -150,17 +151,10 @@ def glb(items: Sequence[Placement], title: str, extras: dict[str, Any]) -> bytes
         tree["materials"] = []
         by_name = {item.placed.label: item for item in items}
         for entry in tree["meshes"]:
-            material = by_name[entry["name"]].placed.material
-            tree["materials"].append(
-                {
-                    "name": material.name,
-                    "pbrMetallicRoughness": {
-                        "baseColorFactor": [*(round(_linear(c), 6) for c in material.colour), 1.0],
-                        "metallicFactor": material.metallic,
-                        "roughnessFactor": material.roughness,
-                    },
-                }
-            )
+            colour = [*(round(_linear(c), 6) for c in by_name[entry["name"]].placed.colour), 1.0]
+            # Little metal: without surroundings to reflect, viewers show bare metal as black.
+            surface = {"baseColorFactor": colour, "metallicFactor": 0.1, "roughnessFactor": 0.6}
+            tree["materials"].append({"name": entry["name"], "pbrMetallicRoughness": surface})
             for primitive in entry["primitives"]:
                 primitive["material"] = len(tree["materials"]) - 1
 
@@ -182,7 +176,7 @@ def three_mf(items: Sequence[Placement], title: str, unit: str, description: str
         '<basematerials id="1">',
     ]
     for item in items:
-        name, colour = quoteattr(item.placed.material.name), "#{:02X}{:02X}{:02X}".format(*item.placed.material.colour)
+        name, colour = quoteattr(item.placed.label), "#{:02X}{:02X}{:02X}".format(*item.placed.colour)
         xml.append(f'<base name={name} displaycolor="{colour}"/>')
     xml.append("</basematerials>")
     components = []

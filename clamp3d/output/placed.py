@@ -1,4 +1,4 @@
-"""What goes into a file: each part with its pose, colour and material, in the order P1 to P7."""
+"""What goes into a file: each part with its name, pose and colour, in the order P1 to P7."""
 
 from __future__ import annotations
 
@@ -12,30 +12,7 @@ from clamp3d.clamp.dimensions import PARTS, PartName
 from clamp3d.clamp.parts import Part, check_part_name
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array, check_pose
-
-Colour = tuple[int, int, int]
-
-
-@dataclass(frozen=True, slots=True)
-class Material:
-    """Name, sRGB colour (0-255) and gloss for physically based viewers."""
-
-    name: str
-    colour: Colour
-    roughness: float
-    metallic: float = 0.25  # low: viewers without surroundings to reflect show bare metal as black
-
-
-# Chosen: no paper or clamp file names materials. Up and down splint differ a little, so that their parting is seen.
-MATERIALS: dict[PartName, Material] = {
-    "P1": Material("aluminium alloy, up splint", (176, 184, 194), 0.45),
-    "P2": Material("aluminium alloy, down splint", (139, 151, 166), 0.45),
-    "P3": Material("galvanised steel, saddle", (160, 146, 118), 0.55),
-    "P4": Material("galvanised steel, bolt", (118, 116, 112), 0.5),
-    "P5": Material("galvanised steel, nut", (96, 94, 90), 0.5),
-    "P6": Material("aluminium conductor, line", (196, 132, 72), 0.6),
-    "P7": Material("aluminium conductor, jumper", (98, 140, 108), 0.6),
-}
+from clamp3d.output.palette import PART_COLOURS
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +33,10 @@ class PlacedPart:
         return self.label.replace(" ", "-")
 
     @property
-    def material(self) -> Material:
-        """Colour and material of the part."""
-        return MATERIALS[self.part.name]
+    def colour(self) -> tuple[int, int, int]:
+        """Colour of the part in sRGB, 0 to 255."""
+        text = PART_COLOURS[self.part.name]
+        return int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16)
 
     @property
     def T(self) -> Array:

@@ -146,7 +146,7 @@ def _document(placed: Sequence[PlacedPart], title: str) -> Any:
     for item in placed:
         label = shapes.AddShape(solid(item.part), False)
         name(label, item.label)
-        r, g, b = (channel / 255 for channel in item.material.colour)
+        r, g, b = (channel / 255 for channel in item.colour)
         colour = Quantity_Color(r, g, b, Quantity_TypeOfColor.Quantity_TOC_sRGB)
         colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorGen)
         if tree:
