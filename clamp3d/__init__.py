@@ -26,8 +26,11 @@ _HOME: dict[str, str] = {
     "SweptArc": "clamp3d.geometry.shapes",
     "arc_circle": "clamp3d.geometry.arc_circle",
     "classify_arc_circle": "clamp3d.geometry.arc_circle",
+    "export": "clamp3d.output.export",
     "groove_pieces": "clamp3d.geometry.pieces",
     "hole_bolt": "clamp3d.geometry.rectangle",
+    "mesh": "clamp3d.clamp.meshes",
+    "parts": "clamp3d.clamp.parts",
     "signed_distance": "clamp3d.geometry.distance",
     "signed_distances": "clamp3d.geometry.distance",
 }
