@@ -22,28 +22,37 @@ ARC, LIP_M, LIP_N, FLAT_M, FLAT_N, END_FACE, END_ARC, END_EDGE_M, END_EDGE_N, CO
 
 @formula
 def section(x, y, R, s, h):  # type: ignore[no-untyped-def]
-    """Nearest boundary point of the groove's section to (x, y): signed gap, qx, qy, outward normal nx, ny, feature.
+    """Signed gap of (x, y) to the groove's section, negative inside the material, and the nearest feature.
 
-    The gap is negative inside the material. There it is the smaller of the depths below the flat faces and behind the
-    arc: the lips are never nearer, in minor and in major arcs.
+    Inside, the gap is the smaller of the depths below the flat faces and behind the arc: the lips are never nearer, in
+    minor and in major arcs.
     """
-    side = 1.0 if x >= 0.0 else -1.0
     ax = abs(x)
     rho = math.sqrt(x * x + y * y)
-    if y <= h and rho >= R:
-        if h - y < rho - R:
-            return y - h, x, h, 0.0, 1.0, FLAT_N if x >= 0.0 else FLAT_M
-        return R - rho, x / rho * R, y / rho * R, -x / rho, -y / rho, ARC
-    if y > h and ax >= s:
-        return y - h, x, h, 0.0, 1.0, FLAT_N if x >= 0.0 else FLAT_M
     if rho < R and ax * -h + y * s <= 0.0:  # within the angle of the arc: rho R sin(phi - half_angle) <= 0
+        return R - rho, ARC
+    if y <= h and rho >= R and rho - R <= h - y:
+        return R - rho, ARC
+    if (y > h and ax >= s) or (y <= h and rho >= R):
+        return y - h, FLAT_N if x >= 0.0 else FLAT_M
+    return math.sqrt((ax - s) * (ax - s) + (y - h) * (y - h)), LIP_N if x >= 0.0 else LIP_M
+
+
+@formula
+def section_foot(feature, x, y, R, s, h):  # type: ignore[no-untyped-def]
+    """Nearest point of a section feature to (x, y), and the unit normal that leads out of the material there."""
+    if feature == ARC:
+        rho = math.sqrt(x * x + y * y)
         if rho == 0.0:
-            return R, 0.0, -R, 0.0, 1.0, ARC
-        return R - rho, x / rho * R, y / rho * R, -x / rho, -y / rho, ARC
-    gap = math.sqrt((ax - s) * (ax - s) + (y - h) * (y - h))
+            return 0.0, -R, 0.0, 1.0
+        return x / rho * R, y / rho * R, -x / rho, -y / rho
+    if feature in (FLAT_M, FLAT_N):
+        return x, h, 0.0, 1.0
+    sx = -s if feature == LIP_M else s
+    gap = math.sqrt((x - sx) * (x - sx) + (y - h) * (y - h))
     if gap == 0.0:
-        return 0.0, side * s, h, -side * s / R, -h / R, LIP_N if x >= 0.0 else LIP_M
-    return gap, side * s, h, side * (ax - s) / gap, (y - h) / gap, LIP_N if x >= 0.0 else LIP_M
+        return sx, h, -sx / R, -h / R
+    return sx, h, (x - sx) / gap, (y - h) / gap
 
 
 @formula

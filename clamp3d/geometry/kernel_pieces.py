@@ -32,6 +32,7 @@ from clamp3d.geometry.kernel_features import (
     end_edge,
     lip_line,
     section,
+    section_foot,
 )
 
 PIECES = 5
@@ -201,7 +202,8 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
         t = (ez - cz) / dz
         x = cx + t * dx
         y = cy + t * dy
-        gap, qx, qy, nx, ny, f = section(x, y, R, s, h)
+        gap, f = section(x, y, R, s, h)
+        qx, qy, nx, ny = section_foot(f, x, y, R, s, h)
         if gap < 0.0:
             if min(high, low) < -gap:
                 end = l if up * dz * (1.0 if low < high else -1.0) < 0.0 else -l
@@ -226,7 +228,8 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
         t = -l if i == 0 else l
         x = cx + t * dx
         y = cy + t * dy
-        gap, qx, qy, _, _, f = section(x, y, R, s, h)
+        gap, f = section(x, y, R, s, h)
+        qx, qy, _, _ = section_foot(f, x, y, R, s, h)
         end = cz + t * dz - ez
         if gap <= 0.0:
             d2, qx, qy, f = end * end, x, y, END_FACE
@@ -238,7 +241,8 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
     if e2 * (l * l) <= (PARALLEL * R) * (PARALLEL * R):
         if high > 0.0 and low > 0.0:
             t = (ez - cz) / dz
-            gap, qx, qy, _, _, f = section(cx, cy, R, s, h)
+            gap, f = section(cx, cy, R, s, h)
+            qx, qy, _, _ = section_foot(f, cx, cy, R, s, h)
             best2, bx, by, bt, feature = gap * gap, qx, qy, t, beyond_end(f)
     else:
         d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l)

@@ -50,7 +50,7 @@ def groove_pieces(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Groo
     T = as_pose(pose)
     out = np.empty((5, 14))
     if not kernel().pieces(
-        T, groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, out
+        T[None], groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, out
     ):
         reject(T, "pose")
     return GroovePieces(out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7].astype(np.int8), out[:, 8:14])
