@@ -18,6 +18,9 @@ _OPTIONS: dict[str, Any] = {"fastmath": False, "error_model": "numpy", "nogil": 
 formula = numba.njit(**_OPTIONS)
 """Decorator of a formula: compiled into its callers, not cached by itself."""
 
+inlined = numba.njit(forceinline=True, **_OPTIONS)
+"""The same for a small formula: built into each caller, which drops what it does not use."""
+
 NOTICE_AFTER = 1.0
 """Seconds after which a build that is still running is announced on stderr."""
 

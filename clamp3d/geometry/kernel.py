@@ -6,15 +6,15 @@ import math
 from typing import Any
 
 from clamp3d.geometry import kernel_pieces
-from clamp3d.geometry.jit import entry, formula, source_stamp
-from clamp3d.geometry.kernel_distance import nearest
+from clamp3d.geometry.jit import entry, formula, inlined, source_stamp
+from clamp3d.geometry.kernel_distance import is_parallel, nearest, parallel
 from clamp3d.geometry.pose import RIGID_TOLERANCE
 
 RECORD = 13
 """Numbers per answer: distance, point on groove (3), point on cylinder (3), normal (3), bound, feature, t on axis."""
 
 
-@formula
+@inlined
 def rigid(T, k):  # type: ignore[no-untyped-def]
     """Whether pose k of (n, 4, 4) is finite and rigid within RIGID_TOLERANCE (same rule as ``pose.check_pose``)."""
     a, b, c = T[k, 0, 0], T[k, 0, 1], T[k, 0, 2]
@@ -78,10 +78,13 @@ def _entries(stamp: str) -> tuple[Any, Any, Any]:
         for i in range(T.shape[0]):
             if not rigid(T, i):
                 return i
-            d = nearest(
-                R, s, h, H, r, l, T[i, 0, 3], T[i, 1, 3], T[i, 2, 3], T[i, 0, 2], T[i, 1, 2], T[i, 2, 2]
-            )
-            out[i] = d[0]
+            x, y, z = T[i, 0, 3], T[i, 1, 3], T[i, 2, 3]
+            dx, dy, dz = T[i, 0, 2], T[i, 1, 2], T[i, 2, 2]
+            if is_parallel(R, l, dx, dy):  # inlined here it is free of what only the witnesses need
+                answer = parallel(R, s, h, H, r, l, x, y, z, dz)
+            else:
+                answer = nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)
+            out[i] = answer[0]
         return -1
 
     def records(T, R, half_angle, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E741

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.geometry.jit import formula
+from clamp3d.geometry.jit import formula, inlined
 from clamp3d.geometry.kernel_features import (
     ARC,
     CORNER_M,
@@ -26,7 +26,9 @@ from clamp3d.geometry.kernel_features import (
     clip,
     corner,
     deepest,
+    ellipse,
     end_arc,
+    end_arc_reach,
     end_edge,
     lip_line,
     point_depth,
@@ -42,7 +44,13 @@ PARALLEL = 2.0**-60
 deviation is smaller than the rounding of R itself, and it is part of the error bound."""
 
 
-@formula
+@inlined
+def is_parallel(R, l, dx, dy):  # type: ignore[no-untyped-def] # noqa: E741
+    """Whether an axis counts as parallel to the groove."""
+    return (dx * dx + dy * dy) * (l * l) <= (PARALLEL * R) * (PARALLEL * R)
+
+
+@inlined
 def parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def] # noqa: E741
     """Axis along z, centred at (x, y, z): the plane problem of a point and the section, and the gap along z."""
     gap, feature = section(x, y, R, s, h)
@@ -124,9 +132,9 @@ def edge_normal(feature, R, h, qx, qy, qz):  # type: ignore[no-untyped-def]
 @formula
 def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untyped-def] # noqa: E741
     """Signed distance of a cylinder centred at c with its axis along d (of any length but zero)."""
-    e2 = dx * dx + dy * dy
-    if e2 * (l * l) <= (PARALLEL * R) * (PARALLEL * R):
+    if is_parallel(R, l, dx, dy):
         return parallel(R, s, h, H, r, l, cx, cy, cz, dz)
+    e2 = dx * dx + dy * dy
     n = 1.0 / math.sqrt(e2 + dz * dz)
     dx *= n
     dy *= n
@@ -195,11 +203,18 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
                 d2, t = corner(-s if j == 0 else s, h, ez, cx, cy, cz, dx, dy, dz, l)
                 if d2 < best2:
                     best2, bt, bz, feature = d2, t, ez, CORNER_M if j == 0 else CORNER_N
+        ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
+        low_v, low_reach = end_arc_reach(-H, R, cz, dz, e2, p, along)
+        top_v, top_reach = end_arc_reach(H, R, cz, dz, e2, p, along)
+        top_first = top and (not bottom or top_reach < low_reach)
         for i in range(2):
-            if not (bottom if i == 0 else top):
+            at_top = top_first if i == 0 else not top_first
+            reach = top_reach if at_top else low_reach
+            if reach * reach >= best2 or not (top if at_top else bottom):
                 continue
-            ez = -H if i == 0 else H
-            d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, best2)
+            ez = H if at_top else -H
+            v = top_v if at_top else low_v
+            d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
             if d2 < best2:
                 best2, bt, bz, feature = d2, t, ez, END_ARC
                 bx, by, on_end_arc = x, y, True

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from clamp3d.geometry.jit import formula
-from clamp3d.geometry.kernel_distance import PARALLEL, edge_normal
+from clamp3d.geometry.kernel_distance import edge_normal, is_parallel
 from clamp3d.geometry.kernel_features import (
     ARC,
     CORNER_M,
@@ -28,7 +28,9 @@ from clamp3d.geometry.kernel_features import (
     clip,
     corner,
     deepest,
+    ellipse,
     end_arc,
+    end_arc_reach,
     end_edge,
     lip_line,
     section,
@@ -124,7 +126,7 @@ def put(row, distance, r, qx, qy, qz, ax, ay, az, feature, R, h):  # type: ignor
 def side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[no-untyped-def] # noqa: E741
     """Arc surface and flat faces without regard to sign: rows 0 to 2."""
     e2 = dx * dx + dy * dy
-    straight = e2 * (l * l) <= (PARALLEL * R) * (PARALLEL * R)
+    straight = is_parallel(R, l, dx, dy)
     for piece in range(3):
         side = 1.0 if piece == 2 else -1.0
         best = math.inf
@@ -180,7 +182,9 @@ def side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[
             for i in range(2):
                 ez = -H if i == 0 else H
                 if piece == 0:
-                    d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, best2)
+                    ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
+                    v, _ = end_arc_reach(ez, R, cz, dz, e2, p, along)
+                    d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
                     if d2 < best2:
                         best2, bx, by, bz, bt, feature = d2, x, y, ez, t, END_ARC
                 else:
@@ -238,7 +242,7 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
         if d2 < best2:
             best2, bx, by, bt, feature = d2, qx, qy, t, f
     e2 = dx * dx + dy * dy
-    if e2 * (l * l) <= (PARALLEL * R) * (PARALLEL * R):
+    if is_parallel(R, l, dx, dy):
         if high > 0.0 and low > 0.0:
             t = (ez - cz) / dz
             gap, f = section(cx, cy, R, s, h)
@@ -253,7 +257,9 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
             d2, t = corner(sx, h, ez, cx, cy, cz, dx, dy, dz, l)
             if d2 < best2:
                 best2, bx, by, bt, feature = d2, sx, h, t, CORNER_M if j == 0 else CORNER_N
-        d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, best2)
+        ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
+        v, _ = end_arc_reach(ez, R, cz, dz, e2, p, along)
+        d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
         if d2 < best2:
             best2, bx, by, bt, feature = d2, x, y, t, END_ARC
     put(row, math.sqrt(best2), r, bx, by, ez, cx + bt * dx, cy + bt * dy, cz + bt * dz, feature, R, h)
