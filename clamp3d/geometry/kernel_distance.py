@@ -67,7 +67,18 @@ def parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def] # n
             if end < -gap:
                 face = -H if inside < 0.0 else H
                 nz = -1.0 if inside < 0.0 else 1.0
-                return -end - r, x, y, face, 0.0, 0.0, nz, END_FACE, (inside - z) * up, bound + UNIT * 4.0 * (H + abs(z) + l)
+                return (
+                    -end - r,
+                    x,
+                    y,
+                    face,
+                    0.0,
+                    0.0,
+                    nz,
+                    END_FACE,
+                    (inside - z) * up,
+                    bound + UNIT * 4.0 * (H + abs(z) + l),
+                )
         if feature == ARC:
             # R - r first: exact for nearly equal radii, and rho is what is left.
             return (R - r) - math.sqrt(x * x + y * y), qx, qy, middle, nx, ny, 0.0, ARC, (middle - z) * up, bound

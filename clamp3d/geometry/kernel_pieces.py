@@ -9,8 +9,9 @@ negative on the piece's side of the lip and goes over into the plain distance on
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from clamp3d.geometry.jit import formula
+from clamp3d.geometry.jit import entry, formula, source_stamp
 from clamp3d.geometry.kernel_distance import edge_normal, is_parallel
 from clamp3d.geometry.kernel_features import (
     ARC,
@@ -36,6 +37,7 @@ from clamp3d.geometry.kernel_features import (
     section,
     section_foot,
 )
+from clamp3d.geometry.kernel_pose import axis, rigid
 
 PIECES = 5
 COLUMNS = 14
@@ -300,7 +302,7 @@ def enter(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, lo, hi, out):  #
 
 
 @formula
-def pieces(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[no-untyped-def] # noqa: E741
+def all_pieces(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[no-untyped-def] # noqa: E741
     """All pieces into out (5, 14)."""
     side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out)
     lo, hi = clip(h, H, cy, cz, dy, dz, l)
@@ -314,3 +316,21 @@ def pieces(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, out):  # type: 
         row[11] = y * gz - z * gy
         row[12] = z * gx - x * gz
         row[13] = x * gy - y * gx
+
+
+def _entry(stamp: str) -> Any:
+    def pieces(T, R, half_angle, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E741
+        stamp  # noqa: B018
+        if not rigid(T, 0):
+            return False
+        dx, dy, dz = axis(T, 0)
+        s = R * math.sin(half_angle)
+        h = -R * math.cos(half_angle)
+        all_pieces(R, s, h, H, half_angle, r, l, T[0, 0, 3], T[0, 1, 3], T[0, 2, 3], dx, dy, dz, out)
+        return True
+
+    return entry(pieces, "b1(f8[:,:,::1],f8,f8,f8,f8,f8,f8[:,::1])")
+
+
+pieces = _entry(source_stamp())
+"""Compiled entry point: one pose (1, 4, 4) into (5, 14); False for a pose that is not rigid."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.geometry.distance import as_pose, kernel, reject
+from clamp3d.geometry.distance import as_pose, reject
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import Cylinder, SweptArc
 
@@ -49,7 +49,9 @@ def groove_pieces(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Groo
     """
     T = as_pose(pose)
     out = np.empty((5, 14))
-    if not kernel().pieces(
+    from clamp3d.geometry.kernel_pieces import pieces  # compiled on first use
+
+    if not pieces(
         T[None], groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, out
     ):
         reject(T, "pose")
