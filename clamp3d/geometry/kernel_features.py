@@ -167,8 +167,8 @@ def farther_root(k, a, q):  # type: ignore[no-untyped-def]
 
 
 @formula
-def ellipse(R, cx, cy, dx, dy, e2):  # type: ignore[no-untyped-def] # noqa: E741
-    """Part of ``end_arc`` that both ends share: tilt direction ex, ey, the axis' place p on the major axis, and along."""
+def ellipse(R, cx, cy, dx, dy, e2):  # type: ignore[no-untyped-def]
+    """What both ends share in ``end_arc``: tilt direction ex, ey, the axis' place p on the major axis, and along it."""
     n = 1.0 / math.sqrt(e2)
     ex = dx * n
     ey = dy * n
@@ -176,7 +176,7 @@ def ellipse(R, cx, cy, dx, dy, e2):  # type: ignore[no-untyped-def] # noqa: E741
 
 
 @formula
-def end_arc_reach(ez, R, cz, dz, e2, p, along):  # type: ignore[no-untyped-def] # noqa: E741
+def end_arc_reach(ez, R, cz, dz, e2, p, along):  # type: ignore[no-untyped-def]
     """The axis' place v along the minor axis of the ellipse of ``end_arc``, and a lower bound on its distance."""
     v = (-dz * along - e2 / math.sqrt(e2) * (ez - cz)) / R
     if dz > 0.0:
@@ -315,6 +315,13 @@ def deepest(R, h, H, cx, cy, cz, dx, dy, dz, lo, hi):  # type: ignore[no-untyped
                 continue
             w = -B - math.copysign(math.sqrt(disc), B)
             t = w / A if i % 2 == 1 else C / w
+            for _ in range(2):  # the quadratic squares its terms: Newton's steps on the unsquared equation restore them
+                x = cx + t * dx
+                y = cy + t * dy
+                rho = math.sqrt(x * x + y * y)
+                slope = (x * dx + y * dy) / rho - g1
+                if rho > 0.0 and slope != 0.0:
+                    t -= (rho - R - (g0 + g1 * t)) / slope
         if not (lo <= t <= hi):
             continue
         depth, _ = point_depth(cx + t * dx, cy + t * dy, cz + t * dz, R, h, H)
