@@ -1,0 +1,112 @@
+"""From the round surfaces fitted to a mesh to a body that encloses it, for the same closed forms as designed parts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from clamp3d.fit.features import FittedSurface
+from clamp3d.fit.fit import FitResult
+from clamp3d.geometry.pose import Array
+from clamp3d.scene.convex import Convex, Rod, hull
+from clamp3d.scene.solid import Body, Bore
+from clamp3d.scene.trimodel import TriModel
+
+
+def fit_error(feature: FittedSurface, round_: bool) -> float:
+    """Error (mm) of a fitted surface: with the vertices taken to lie on a round surface, or with nothing assumed."""
+    return feature.fit_error if round_ else feature.error_bound
+
+
+def body_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[Body, float]:
+    """Body around the fitted mesh, and the error (mm) of the mesh itself: its largest chord error and that of the fit.
+
+    A groove or hole counts where no part of the mesh lies in its circle, over the whole length of the mesh; else the
+    mesh is asked. A mesh that is one cylinder with flat ends becomes one.
+    """
+    V, F = model.vertices, model.faces
+    points = V.copy()
+    for feature in result.cylinders:
+        # Facets are inscribed: their tangents in place of their chords enclose the round surface.
+        own = np.unique(F[feature.faces])
+        T = feature.T_part_feature
+        local = (V[own] - T[:3, 3]) @ T[:3, :3]
+        out = np.hypot(local[:, 0], local[:, 1])
+        reach = feature.radius / (1.0 - feature.chord_error / feature.radius) + feature.fit_error
+        local[:, :2] *= (np.maximum(reach, out) / out)[:, None]
+        points[own] = local @ T[:3, :3].T + T[:3, 3]
+    used = [bore for feature in (*result.grooves, *result.holes) if (bore := _bore(feature, V, F)) is not None]
+    outers: tuple[Convex, ...] = (hull(points),)
+    rod = _rod(result, V, F)
+    if rod is not None:
+        outers = (rod,)
+    error = max((fit_error(feature, round_) for feature in result.features), default=0.0)
+    mesh_error = max((feature.error_bound for feature in result.features), default=0.0)
+
+    in_feature = np.zeros(len(F), dtype=bool)
+    for feature in result.features:
+        in_feature[feature.faces] = True
+
+    def depth(x: Array) -> Array:
+        signed, face = model.depth(x), model.nearest(x)[1]
+        flat = (np.abs(signed) <= 1e-9 * model.scale) & ~in_feature[face]
+        found = np.where(flat, 0.0, signed - mesh_error)
+        for feature in result.features:  # a point on the fitted surface is on the part, within the error of the fit
+            local = (x - feature.T_part_feature[:3, 3]) @ feature.T_part_feature[:3, :3]
+            on = np.abs(np.hypot(local[:, 0], local[:, 1]) - feature.radius) <= 1e-9 * model.scale
+            on &= np.abs(local[:, 2]) <= 0.5 * feature.length + 1e-9 * model.scale
+            on &= np.abs(np.arctan2(local[:, 0], -local[:, 1])) <= feature.half_angle + 1e-9
+            found = np.where(on, np.maximum(found, 0.0), found)
+        return np.asarray(found)
+
+    return Body(outers, tuple(used), error=error, surface=None if rod is not None else depth), mesh_error
+
+
+def _bore(feature: FittedSurface, V: Array, F: Array) -> Bore | None:
+    """The groove or hole as a bore of the whole mesh; None if some of the mesh lies in its circle."""
+    T = feature.T_part_feature.copy()
+    local = (V - T[:3, 3]) @ T[:3, :3]
+    if _nearest_to_axis(local[:, :2][F]) < feature.radius - feature.error_bound - 1e-9 * feature.radius:
+        return None
+    low, high, top = float(local[:, 2].min()), float(local[:, 2].max()), float(local[:, 1].max())
+    T[:3, 3] += 0.5 * (low + high) * T[:3, 2]
+    half = math.pi
+    if feature.half_angle < math.pi:
+        if top > feature.radius * (1.0 - 1e-9):
+            return None  # the part rises above the groove's circle: the mesh says more than a groove without walls
+        # The mouth's plane goes through the part's highest point: all of it lies behind.
+        half = max(feature.half_angle, math.acos(max(-1.0, -top / feature.radius)))
+    return Bore(feature.radius, half, high - low, T)
+
+
+def _nearest_to_axis(flat: Array) -> float:
+    """Least distance of triangles (k, 3, 2) from the origin of their plane."""
+    a, b = flat, np.roll(flat, -1, axis=1)
+    ab = b - a
+    square = np.maximum(np.einsum("ijk,ijk->ij", ab, ab), 1e-300)
+    t = np.clip(-np.einsum("ijk,ijk->ij", a, ab) / square, 0.0, 1.0)
+    edge = np.linalg.norm(a + t[..., None] * ab, axis=2).min()
+    cross = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    around = ((cross > 0.0).all(axis=1) | (cross < 0.0).all(axis=1)).any()
+    return 0.0 if around else float(edge)
+
+
+def _rod(result: FitResult, V: Array, F: Array) -> Rod | None:
+    """The mesh as a cylinder with flat ends, if it is nothing else but holes in it."""
+    round_ones = [f for f in result.cylinders if f.full]
+    if len(result.cylinders) != 1 or len(round_ones) != 1 or result.grooves:
+        return None
+    feature = round_ones[0]
+    T = feature.T_part_feature.copy()
+    local = (V - T[:3, 3]) @ T[:3, :3]
+    rest = np.ones(len(F), dtype=bool)
+    for f in (feature, *result.holes):
+        rest[f.faces] = False
+    low, high = float(local[:, 2].min()), float(local[:, 2].max())
+    ends = local[:, 2][F[rest]]
+    slack = feature.fit_error + 1e-9 * feature.length
+    if not ((np.abs(ends - low) <= slack).all(axis=1) | (np.abs(ends - high) <= slack).all(axis=1)).all():
+        return None
+    T[:3, 3] += 0.5 * (low + high) * T[:3, 2]
+    return Rod(feature.radius, high - low, T)
