@@ -131,13 +131,13 @@ def _turned(bounds: Bounds, T: Array) -> Bounds:
 
 def _bore_rod(bore: Bore, rod: Rod, T: Array) -> Bounds:
     """The kernel's answer for a bore of the first body and a rod of the second, placed by ``T``."""
-    best = None
-    for groove, place in bore.covers():
-        answer = signed_distance(groove, Cylinder(rod.radius, rod.length), inverse(place) @ T @ rod.T)
-        if best is None or answer.distance < best[0].distance:
-            best = (answer, place)
-    assert best is not None
-    answer, place = best
+    answers = [
+        (signed_distance(groove, Cylinder(rod.radius, rod.length), inverse(place) @ T @ rod.T), place)
+        for groove, place in bore.covers()
+    ]
+    if len(answers) > 1 and any(answer.axis_inside for answer, _ in answers):
+        return Bounds()  # in the material the two halves' depths end where they meet, that of the whole does not
+    answer, place = min(answers, key=lambda found: found[0].distance)
     R, t = place[:3, :3], place[:3, 3]
     d, e = answer.distance, answer.error_bound
     return Bounds(d - e, d + e, R @ answer.point_on_groove + t, R @ answer.point_on_cylinder + t)
