@@ -1,7 +1,7 @@
 """Colours that mean the same in every picture, page and file.
 
-Parts: the light scheme of Paul Tol's "Colour schemes" (SRON/EPS/TN/09-002), told apart by colour-blind readers and none of
-them a verdict's. Each part also carries its name, so no picture speaks by colour alone.
+Parts: from the light scheme of Paul Tol's "Colour schemes" (SRON/EPS/TN/09-002), told apart by colour-blind readers and
+none of them a verdict's; bolt and nut are greys. Each part also carries its name, so no picture speaks by colour alone.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The section through the middle of the clamp, to scale, arcs as arcs: parts, names and dimensions on one axes.
 
-Everything is drawn in the paper's section frame (x right, y down, mm). The splints, the saddle and the wires are cut and
-hatched; bolt and nut are shown whole, as drawing practice has it (ISO 128). Needs matplotlib; nothing of pyplot is used.
+Everything is drawn in the paper's section frame (x right, y down, mm). The splints, the saddle and the wires are cut;
+bolt and nut are shown whole, as drawing practice has it (ISO 128). Needs matplotlib; nothing of pyplot is used.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
 from clamp3d.clamp.parts import Extrusion, Part, parts
-from clamp3d.clamp.profile import Arc, Profile
+from clamp3d.clamp.profile import Arc, Point, Profile
 from clamp3d.geometry.pose import Array, SectionPose
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, VERDICT_COLOURS, darker
 
@@ -88,6 +88,7 @@ def draw_section(
     shown, ghosts, bodies = set(only), set(faded), parts(clamp)
     ax.set_aspect("equal")
     ax.set_axis_off()
+    ax.margins(0.02)
     if not ax.yaxis_inverted():
         ax.invert_yaxis()
     for i, name in enumerate(_ORDER):
@@ -98,7 +99,7 @@ def draw_section(
 
 def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
     """Names of the parts: a column of balloons on the right, each with a line to its part; wires carry theirs."""
-    points = {name: poses[name].point(*_anchor(clamp, name)) for name in PARTS if name in poses}
+    points = {name: poses[name].point(*part_anchor(clamp, name)) for name in PARTS if name in poses}
     (left, edge), (low, high) = _extent(clamp, poses)
     column = edge + 0.19 * (edge - left)
     order = sorted(points, key=lambda name: points[name][1])
@@ -151,16 +152,24 @@ def draw_marks(ax: Axes, marks: Iterable[Mark], *, size: float = 6.0) -> None:
 
 def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses) -> None:
     """Distance between the splints at both edges, and the tilt of the down splint."""
-    up, down = clamp.up_splint, clamp.down_splint
-    p1, p2 = poses["P1"], poses["P2"]
-    half = down.width / 2
-    upper = [p1.point(0.0, up.thickness), p1.point(up.width, up.thickness)]
-    lower = [p2.point(-half, down.face_depth), p2.point(half, down.face_depth)]
-    out = 0.09 * up.width
-    for side, above, below in ((-1, upper[0], lower[0]), (1, upper[1], lower[1])):
-        x = (min if side < 0 else max)(above[0], below[0]) + side * out
+    for side, (above, below) in zip((-1, 1), _inner_edges(clamp, poses), strict=True):
+        x = (min if side < 0 else max)(above[0], below[0]) + side * 0.09 * clamp.up_splint.width
         dimension(ax, above, below, x, f"{below[1] - above[1]:.3f}", side)
-    _draw_tilt(ax, clamp, p2)
+    _draw_tilt(ax, clamp, poses["P2"])
+
+
+def edge_openings(clamp: Clamp, poses: Poses) -> tuple[float, float]:
+    """Height in mm between the splints' inner edges, on the line side (Table 4's distance) and the jumper side."""
+    left, right = ((below[1] - above[1]) for above, below in _inner_edges(clamp, poses))
+    return left, right
+
+
+def _inner_edges(clamp: Clamp, poses: Poses) -> list[tuple[Point, Point]]:
+    up, down = clamp.up_splint, clamp.down_splint
+    return [
+        (poses["P1"].point(u, up.thickness), poses["P2"].point(v, down.face_depth))
+        for u, v in ((0.0, -down.width / 2), (up.width, down.width / 2))
+    ]
 
 
 def dimension(ax: Axes, a: tuple[float, float], b: tuple[float, float], x: float, text: str, side: int) -> None:
@@ -188,6 +197,20 @@ def dimension(ax: Axes, a: tuple[float, float], b: tuple[float, float], x: float
         color=DIMENSION,
         zorder=26,
     )
+
+
+def part_anchor(clamp: Clamp, name: PartName) -> tuple[float, float]:
+    """A point (u, v) well inside the part, towards the right, for its balloon's line."""
+    up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
+    return {
+        "P1": (0.94 * up.width, 0.3 * up.thickness),
+        "P2": (0.46 * down.width, 0.5 * (down.face_depth + down.underside_depth)),
+        "P3": (0.42 * saddle.width, saddle.radius + 0.6 * saddle.apex_thickness),
+        "P4": (0.25 * clamp.bolt.diameter, 0.08 * clamp.bolt.shank_length),
+        "P5": (0.4 * clamp.nut.across_flats, 0.5 * clamp.nut.height),
+        "P6": (0.0, 0.0),
+        "P7": (0.0, 0.0),
+    }[name]
 
 
 def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
@@ -262,20 +285,6 @@ def _front_edges(profile: Profile) -> list[float]:
 
 def _pale(colour: str) -> str:
     return "#" + "".join(f"{round(255 - 0.4 * (255 - int(colour[i : i + 2], 16))):02X}" for i in (1, 3, 5))
-
-
-def _anchor(clamp: Clamp, name: PartName) -> tuple[float, float]:
-    """A point (u, v) well inside the part, towards the right, for its balloon's line."""
-    up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
-    return {
-        "P1": (0.94 * up.width, 0.3 * up.thickness),
-        "P2": (0.46 * down.width, 0.5 * (down.face_depth + down.underside_depth)),
-        "P3": (0.42 * saddle.width, saddle.radius + 0.6 * saddle.apex_thickness),
-        "P4": (0.25 * clamp.bolt.diameter, 0.08 * clamp.bolt.shank_length),
-        "P5": (0.4 * clamp.nut.across_flats, 0.5 * clamp.nut.height),
-        "P6": (0.0, 0.0),
-        "P7": (0.0, 0.0),
-    }[name]
 
 
 def _extent(clamp: Clamp, poses: Poses) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -60,6 +60,7 @@ def draw_solids(ax: Axes, solids: Sequence[Solid], camera: Camera, *, pixels_per
     low = np.min([v.min(0) for v in views], axis=0)[:2] - 1.0
     high = np.max([v.max(0) for v in views], axis=0)[:2] + 1.0
     size = np.ceil((high - low) * pixels_per_mm).astype(int)
+    high = low + size / pixels_per_mm
     depth = np.full((size[1], size[0]), -np.inf)
     image = np.zeros((size[1], size[0], 4))
     light = np.array([-0.35, 0.62, 0.70])
