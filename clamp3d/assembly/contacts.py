@@ -1,0 +1,185 @@
+"""Contacts of a state: every declared pair measured and named, and pairs that meet though they should not."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from clamp3d.assembly.connections import GEOMETRY, PAIRS, Undeclared, convex_gaps
+from clamp3d.assembly.result import Contact, Event, Seat, Waypoint
+from clamp3d.assembly.section import SPLINTS, WIRES, Section
+from clamp3d.clamp.dimensions import Clamp, PartName
+from clamp3d.geometry.arc_circle import classify_arc_circle
+from clamp3d.geometry.pose import SectionPose, inverse
+from clamp3d.geometry.rectangle import Rectangle, hole_bolt
+
+CONTACT = 1e-6
+"""Gap in mm up to which two parts touch."""
+
+Poses = dict[PartName, SectionPose]
+
+
+def measure_contacts(section: Section, poses: Poses, tolerance: float) -> tuple[Contact, ...]:
+    """Every pair that the connection matrix declares, at ``poses``; equality is ``|gap| <= tolerance`` mm."""
+    clamp = section.clamp
+    found = []
+    for a, b in PAIRS:
+        declared = clamp.connection(a, b)
+        if declared == 0:
+            continue
+        if GEOMETRY.get((a, b)) == 3:
+            found.append(_groove_contact(section, poses, a, b, tolerance))
+        elif GEOMETRY.get((a, b)) == 1:
+            axis = poses[b].point(0.0, clamp.nut.height / 2)
+            found.append(Contact(a, b, 1, "screw joint", 0.0, _world(axis), np.array([0.0, 0.0, 1.0]), "thread"))
+        elif (a, b) in _SEATS:
+            found.append(_seat_contact(clamp, poses, a, b, tolerance))
+        elif (a, b) in _HOLES:
+            found.append(_hole_contact(clamp, poses, a, b, tolerance))
+        else:
+            gap = _face_gap(section, poses) if (a, b) == ("P1", "P2") else convex_gaps(clamp, poses)[a, b]
+            away = _world((poses[b].x, poses[b].y)) - _world((poses[a].x, poses[a].y))
+            normal = away / max(float(np.linalg.norm(away)), 1e-300)
+            point = _world((poses[b].x, poses[b].y))
+            found.append(Contact(a, b, 2, "contact" if gap <= tolerance else "none", gap, point, normal, "box"))
+    return tuple(found)
+
+
+def seats(section: Section, contacts: Sequence[Contact], resolution: float) -> tuple[Seat, ...]:
+    """Whether each wire lies in each of its two grooves; a gap up to ``resolution`` mm counts as touching."""
+    by_pair = {(c.a, c.b): c for c in contacts}
+    found = []
+    for splint, wire in itertools.product(SPLINTS, WIRES):
+        contact = by_pair.get((splint, wire))
+        if contact is None:
+            found.append(Seat(splint, wire, False, math.nan, "pair not declared"))
+            continue
+        on_arc = not contact.feature.startswith(("face", "lip", "end", "corner"))
+        touching = contact.distance <= resolution
+        if touching and on_arc:
+            detail = "seated in the groove"
+        elif touching:
+            detail = f"rests on {contact.feature}"
+        else:
+            detail = "loose"
+        found.append(Seat(splint, wire, touching and on_arc, contact.distance, detail))
+    return tuple(found)
+
+
+def undeclared_meetings(section: Section, path: Sequence[Waypoint], events: Sequence[Event]) -> tuple[Undeclared, ...]:
+    """Pairs that met anywhere on ``path`` or in ``events`` otherwise than the connection matrix declares."""
+    clamp = section.clamp
+    met: dict[tuple[PartName, PartName], str] = {}
+    for event in events:
+        met.setdefault((event.a, event.b), event.step)
+    for before, after in itertools.pairwise(path):
+        for pair, gap in _least_on_the_way(section, before.poses, after.poses).items():
+            if gap <= CONTACT:
+                met.setdefault(pair, f"{after.step} ({after.label})")
+    return tuple(
+        Undeclared(a, b, clamp.connection(a, b), GEOMETRY.get((a, b), 2), where)
+        for (a, b), where in met.items()
+        if clamp.connection(a, b) != GEOMETRY.get((a, b), 2)
+    )
+
+
+# Rows of (hole, bolt) pairs and of flat seats: the nut on the up splint, the bolt's head under the saddle.
+_HOLES = {("P1", "P4"), ("P2", "P4")}
+_SEATS = {("P1", "P5"), ("P3", "P4")}
+
+
+def _groove_contact(section: Section, poses: Poses, a: PartName, b: PartName, tolerance: float) -> Contact:
+    key = (a, b) if (a, b) in section.pairs else (b, a)
+    pair = section.pairs[key]
+    T_a, T_b = poses[pair.a].T(), poses[pair.b].T()
+    pieces = section.model.pieces(pair, inverse(T_a) @ T_b)
+    section.queries.contact += 1
+    k = int(np.argmin(pieces.distance))
+    gap = float(pieces.distance[k])
+    T = inverse(T_a @ pair.T_a_groove) @ T_b @ pair.T_b_cylinder
+    g, r = pair.groove, pair.cylinder.radius
+    relation = classify_arc_circle(gap, g.radius, g.half_angle, r, float(T[0, 3]), float(T[1, 3]), tolerance=tolerance)
+    point = T_a[:3, :3] @ pieces.point[k] + T_a[:3, 3]
+    normal = T_a[:3, :3] @ pieces.normal[k]
+    if key != (a, b):
+        point, normal = point + gap * normal, -normal
+    return Contact(a, b, 3, relation.value, gap, point, normal, pieces.feature[k])
+
+
+def _seat_contact(clamp: Clamp, poses: Poses, a: PartName, b: PartName, tolerance: float) -> Contact:
+    if (a, b) == ("P1", "P5"):  # nut's lower face over the up splint's top face
+        gap, up = poses["P1"].y - (poses["P5"].y + clamp.nut.height), 1.0
+        point = (poses["P5"].x, poses["P1"].y)
+    else:  # bolt's head under the saddle's flat bottom
+        bottom = poses["P3"].y + clamp.saddle.radius + clamp.saddle.apex_thickness
+        gap, up = poses["P4"].y + clamp.bolt.shank_length - bottom, -1.0
+        point = (poses["P3"].x, bottom)
+    relation = "seat" if abs(gap) <= tolerance else "overlap" if gap < 0.0 else "none"
+    return Contact(a, b, 2, relation, gap, _world(point), np.array([0.0, 0.0, up]), "flat face")
+
+
+def _hole_contact(clamp: Clamp, poses: Poses, a: PartName, b: PartName, tolerance: float) -> Contact:
+    bolt = Rectangle(
+        *poses["P4"].point(0.0, clamp.bolt.shank_length / 2), clamp.bolt.diameter / 2, clamp.bolt.shank_length / 2
+    )
+    if a == "P1":
+        up = clamp.up_splint
+        middle, half_width, top, bottom = up.width / 2, up.hole_diameter / 2, 0.0, up.thickness
+    else:  # the slot's walls end where they come out of the round back
+        down = clamp.down_splint
+        middle, half_width, top = 0.0, down.slot_width / 2, down.face_depth
+        bottom = math.sqrt(down.back_radius**2 - half_width**2)
+    centre = poses[a].point(middle, 0.5 * (top + bottom))
+    hole = Rectangle(*centre, half_width, 0.5 * (bottom - top), poses[a].angle)
+    found = hole_bolt(hole, bolt, tolerance=tolerance)
+    side = -1.0 if found.gap_left <= found.gap_right else 1.0
+    point = found.points[0] if found.points else hole.point(side * half_width, 0.0)
+    normal = np.array([-side * math.cos(hole.angle), 0.0, -side * math.sin(hole.angle)])
+    gap = min(found.gap_left, found.gap_right)
+    return Contact(a, b, 2, found.relation.value, gap, _world(point), normal, "hole")
+
+
+def _face_gap(section: Section, poses: Poses) -> float:
+    """Least gap between the inner faces of the splints at world poses, mm."""
+    q = np.zeros(6)
+    q[4] = poses["P2"].y - poses["P1"].y
+    q[5] = section.lever * poses["P2"].angle
+    return float(section.face_gaps(q).value[:2].min())
+
+
+def _least_on_the_way(section: Section, before: Poses, after: Poses) -> dict[tuple[PartName, PartName], float]:
+    """Least gap of each convex pair while all parts go straight from one state to the next.
+
+    Between convex bodies that do not turn the gap is a convex function of the way, so one descent finds it.
+    """
+
+    def at(t: float) -> Poses:
+        return {
+            name: SectionPose(
+                p.x + t * (after[name].x - p.x), p.y + t * (after[name].y - p.y), p.angle + t * (after[name].angle - p.angle)
+            )
+            for name, p in before.items()
+        }
+
+    def gaps(t: float) -> dict[tuple[PartName, PartName], float]:
+        poses = at(t)
+        return convex_gaps(section.clamp, poses) | {("P1", "P2"): _face_gap(section, poses)}
+
+    ends = [gaps(0.0), gaps(1.0)]
+    least = {pair: min(end[pair] for end in ends) for pair in ends[0]}
+    longest = max(math.hypot(after[n].x - p.x, after[n].y - p.y) for n, p in before.items())
+    for pair, gap in least.items():
+        if 0.0 < gap < 2.0 * longest:  # else it meets anyway, or is out of reach
+            found = minimize_scalar(lambda t, pair=pair: gaps(t)[pair], bounds=(0.0, 1.0), method="bounded")
+            least[pair] = min(gap, float(found.fun))
+    return least
+
+
+def _world(point: tuple[float, float]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """World coordinates of a section point, in the middle of the clamp."""
+    return np.array([point[0], 0.0, -point[1]])
+

@@ -1,0 +1,142 @@
+"""The exact final state: least distance between the splints along the bolt, no overlap, both wires free to settle.
+
+scipy's SLSQP finds it from closed-form gradients; Newton's method on the Karush-Kuhn-Tucker conditions takes it to
+rounding; and the answer is then proven: feasible, stationary with multipliers >= 0, and no direction that stays
+feasible closes the splints further. What cannot be proven is an error, never an answer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize, nnls
+
+from clamp3d.assembly.section import D, SPLINTS, WIRES, Gaps, Section
+from clamp3d.clamp.dimensions import PartName
+from clamp3d.errors import SolverError
+from clamp3d.geometry.pose import Array
+
+TOLERANCE = 1e-9
+"""Largest violated gap and largest optimality residual of a proven answer, in mm."""
+
+_ACTIVE = 1e-6
+_STRIDE = 4.0
+"""How far one descent may move any coordinate, mm: gaps are far from linear beyond, and wires must not jump out."""
+_SHORTEST = 1e-3
+_CLOSING = np.eye(6)[D]
+
+
+@dataclass(frozen=True, slots=True)
+class FinalState:
+    """Where the section comes to rest, with the proof.
+
+    ``q`` (6,) as in `section`; ``gaps`` at q; ``force`` (k,) how much of the closing each gap carries (KKT multipliers,
+    1 = the whole bolt force); ``violation`` mm: deepest overlap; ``optimality`` mm: length of the last Newton step plus
+    the stationarity residual over 1 mm; ``loose``: wires that no contact force holds.
+    """
+
+    q: Array
+    gaps: Gaps
+    force: Array
+    violation: float
+    optimality: float
+    loose: tuple[PartName, ...]
+
+
+def solve_final_state(section: Section, start: Array | None = None) -> FinalState:
+    """Close the clamp from ``start`` (an open state; by default straight and fully open).
+
+    Raises SolverError when feasibility or optimality cannot be shown to `TOLERANCE`.
+    """
+    q = section.open_state(section.open_distance()) if start is None else np.array(start, dtype=np.float64)
+    q = _descend(section, q, _CLOSING)
+    q, optimality = _polish(section, q)
+    gaps = section.gaps(q)
+    force = _multipliers(gaps)
+    residual = float(np.abs(_CLOSING - force @ gaps.gradient).max())
+    violation = max(0.0, -float(gaps.value.min()))
+    optimality = max(optimality, residual)
+    loose = tuple(w for w in WIRES if not any(w in pair and f > 0.0 for pair, f in zip(gaps.pair, force, strict=True)))
+    if violation > TOLERANCE or not optimality <= TOLERANCE:
+        raise SolverError(
+            f"final state not proven: largest violated gap {violation:.3g} mm, optimality {optimality:.3g} mm, "
+            f"both must be <= {TOLERANCE:g} mm"
+        )
+    return FinalState(q, gaps, force, violation, optimality, loose)
+
+
+def _descend(section: Section, start: Array, goal: Array) -> Array:
+    """Least goal . q with no gap negative, by SLSQP."""
+    memo: dict[bytes, Gaps] = {}
+
+    def gaps(q: Array) -> Gaps:
+        key = q.tobytes()
+        if key not in memo:
+            memo.clear()
+            memo[key] = section.gaps(q)
+        return memo[key]
+
+    low, high = np.array(section.bounds()).T
+    q, stride = start, _STRIDE
+    while stride > _SHORTEST:
+        near = np.maximum(low, q - stride), np.minimum(high, q + stride)
+        found = minimize(
+            lambda q: goal @ q,
+            q,
+            jac=lambda q: goal,
+            bounds=np.column_stack(near),
+            constraints={"type": "ineq", "fun": lambda q: gaps(q).value, "jac": lambda q: gaps(q).gradient},
+            method="SLSQP",
+            options={"maxiter": 100, "ftol": 1e-13},
+        )
+        new = np.clip(found.x, *near)
+        if gaps(new).value.min() < -_ACTIVE or goal @ new > goal @ q:
+            stride *= 0.25  # lost its way: the linearised gaps of so long a stride were no guide
+            continue
+        advanced, moved, q = float(goal @ (q - new)), np.abs(new - q).max(), new
+        if advanced < _ACTIVE or moved < 0.5 * stride:
+            break
+    return q
+
+
+def _multipliers(gaps: Gaps) -> Array:
+    """Multipliers >= 0 (k,) of the gaps that are closed, by non-negative least squares; 0 where open."""
+    closed = np.abs(gaps.value) <= _ACTIVE
+    force = np.zeros(len(gaps.value))
+    if closed.any():
+        force[closed] = nnls(gaps.gradient[closed].T, _CLOSING)[0]
+    return force
+
+
+def _polish(section: Section, q: Array) -> tuple[Array, float]:
+    """Newton's method on stationarity and closed gaps together; returns the state and its last step in mm."""
+    step = np.inf
+    for _ in range(20):
+        gaps = section.gaps(q)
+        force = _multipliers(gaps)
+        carrying = np.flatnonzero(force > _ACTIVE)
+        free = np.flatnonzero(np.abs(gaps.gradient[carrying]).max(axis=0, initial=0.0) > 0.0)
+        hessian = _lagrangian_hessian(section, q, carrying, force[carrying])
+        A = gaps.gradient[carrying]
+        k, n = len(carrying), len(free)
+        kkt = np.block([[hessian[np.ix_(free, free)], -A[:, free].T], [A[:, free], np.zeros((k, k))]])
+        rhs = -np.concatenate([(_CLOSING - force[carrying] @ A)[free], gaps.value[carrying]])
+        move = np.zeros(6)
+        move[free] = np.linalg.lstsq(kkt, rhs, rcond=1e-12)[0][:n]
+        new = float(np.abs(move).max())
+        if not new < step:
+            break
+        q, step = q + move, new
+    return q, step
+
+
+def _lagrangian_hessian(section: Section, q: Array, rows: Array, force: Array) -> Array:
+    """Second derivatives (6, 6) of goal - force . gaps by central differences of the closed-form gradients."""
+    h = 1e-4
+    H = np.empty((6, 6))
+    for j in range(6):
+        e = np.zeros(6)
+        e[j] = h
+        H[j] = -(force @ (section.gaps(q + e).gradient[rows] - section.gaps(q - e).gradient[rows])) / (2.0 * h)
+    return 0.5 * (H + H.T)

@@ -1,0 +1,111 @@
+"""What a run answers: frozen dataclasses, no behaviour beyond reading them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from clamp3d.assembly.connections import Undeclared
+from clamp3d.clamp.dimensions import Clamp, ConnectionType, PartName
+from clamp3d.geometry.pose import Array, SectionPose
+
+Solver = Literal["exact", "stepped"]
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """How a declared pair stands: ``distance`` mm (positive apart), ``point`` (3,) and ``normal`` (3,) in the world.
+
+    ``relation`` is a column of Table 3 (type 3), a row of Table 2 or 'seat' (type 2), or 'screw joint' (type 1);
+    ``feature`` names the piece of the groove. ``point`` lies on part a, ``normal`` is unit from a to b.
+    """
+
+    a: PartName
+    b: PartName
+    type: ConnectionType
+    relation: str
+    distance: float
+    point: Array
+    normal: Array
+    feature: str
+
+
+@dataclass(frozen=True, slots=True)
+class Seat:
+    """A wire in a groove: ``seated`` if it touches the groove's arc; ``gap`` in mm; ``detail`` in words."""
+
+    splint: PartName
+    wire: PartName
+    seated: bool
+    gap: float
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A contact that ended or changed a motion: in ``step`` of the sequence, after ``travel`` mm of it."""
+
+    step: str
+    a: PartName
+    b: PartName
+    relation: str
+    point: Array
+    travel: float
+
+
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """Section poses of all parts at a moment of the run; between two waypoints every part moves straight and even."""
+
+    step: str
+    label: str
+    poses: dict[PartName, SectionPose]
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What the answer took: parts, pairs, questions to the contact model (C of Table 5), positions tried (M), meshes."""
+
+    parts: int
+    pairs: int
+    contact_queries: int
+    motion_steps: int
+    meshes_built: int
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A clamp assembled: where every part ends up, what touches, and how it came there.
+
+    ``distance`` is the height between the splints' inner edges on the line side (Table 4) in mm, ``closing`` that of
+    their origins along the bolt. ``status`` is 'clamped' or 'not clamped: ...'. ``violation`` and ``optimality`` in mm
+    prove the exact answer (None for the stepped solver). ``turns`` of the nut tighten the clamp from open.
+    """
+
+    clamp: Clamp
+    method: str
+    solver: Solver
+    limits: tuple[str, ...]
+    status: str
+    distance: float
+    closing: float
+    tilt: float
+    turns: float
+    poses: dict[PartName, SectionPose]
+    contacts: tuple[Contact, ...]
+    seats: tuple[Seat, ...]
+    events: tuple[Event, ...]
+    path: tuple[Waypoint, ...]
+    undeclared: tuple[Undeclared, ...]
+    violation: float | None
+    optimality: float | None
+    work: Work
+
+    @property
+    def clamped(self) -> bool:
+        """Whether the splints hold both wires."""
+        return self.status == "clamped"
+
+    def T_world(self, part: PartName) -> Array:
+        """Pose (4, 4) of a part in the world, lengths in mm."""
+        return self.poses[part].T()

@@ -1,0 +1,214 @@
+"""The virtual assembly: the sequence's motions one after the other, each ending at a contact, down to the final state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from clamp3d.assembly.connections import Undeclared
+from clamp3d.assembly.contacts import CONTACT, measure_contacts, seats, undeclared_meetings
+from clamp3d.assembly.final_state import FinalState, solve_final_state
+from clamp3d.assembly.motion import travel_to_contact
+from clamp3d.assembly.result import Event, Run, Solver, Waypoint, Work
+from clamp3d.assembly.screw import ScrewJoint
+from clamp3d.assembly.section import SPLINTS, WIRES, D, S, Section
+from clamp3d.assembly.sequence import parse_sequence
+from clamp3d.assembly.stepped import SteppedState, solve_stepped
+from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
+from clamp3d.contact.model import ContactModel
+from clamp3d.geometry.pose import Array, SectionPose
+
+STEP = 1.0 / 3.0
+"""Move along the bolt of the paper's program in mm (derived from its Table 4)."""
+TILT_STEP = math.radians(1.0)
+"""Turn of the paper's program in rad (derived from its Table 4)."""
+
+Poses = dict[PartName, SectionPose]
+_ROOM = 20.0
+"""Free way in mm between a wire and the open clamp before it comes in."""
+
+
+@dataclass
+class _Log:
+    """What happens on the way, told to ``listen`` as it happens."""
+
+    listen: Callable[[Waypoint], None] | None
+    events: list[Event] = field(default_factory=list)
+    path: list[Waypoint] = field(default_factory=list)
+
+    def stop(self, step: str, label: str, poses: Poses) -> None:
+        self.path.append(Waypoint(step, label, dict(poses)))
+        if self.listen is not None:
+            self.listen(self.path[-1])
+
+
+def assemble(
+    clamp: Clamp,
+    model: ContactModel,
+    *,
+    solver: Solver = "exact",
+    step: float = STEP,
+    tilt_step: float = TILT_STEP,
+    open_by: float = 0.0,
+    open_tilt: float = 0.0,
+    listen: Callable[[Waypoint], None] | None = None,
+) -> Run:
+    """Assemble ``clamp`` with its wires and measure its grooves by ``model``.
+
+    ``open_by`` mm and ``open_tilt`` rad open the clamp further than needed before it comes in. ``step`` (mm) and
+    ``tilt_step`` (rad) are the moves of the stepped solver. ``listen`` is told every waypoint as it is reached.
+    Raises InputError for bad settings or sequence and SolverError if an answer cannot be proven.
+
+    >>> from clamp3d.clamp.loader import load_clamp
+    >>> from clamp3d.contact.cas import Cas
+    >>> run = assemble(load_clamp(), Cas())
+    >>> run.status, round(run.distance, 3)
+    ('clamped', 31.53)
+    """
+    sequence = [str(s) for s in parse_sequence(clamp.sequence)]
+    section = Section(clamp, model)
+    log = _Log(listen)
+    q = section.open_state(section.open_distance() + open_by, open_tilt)
+    q = _come_in(section, q, sequence[0], log)
+    q = _put_in_jumper(section, q, sequence[1], log)
+    d_open = float(q[D])
+    _first_touch(section, q, sequence[2], log)
+    final: FinalState | SteppedState
+    if solver == "exact":
+        final = solve_final_state(section, q)
+    else:
+        final = solve_stepped(section, step=step, tilt_step=tilt_step)
+    closed = _poses(section, final.q, saddle_d=d_open)
+    log.stop(sequence[2], "splints closed", closed)
+    poses = _poses(section, final.q)
+    travel = d_open - float(final.q[D])
+    log.stop(sequence[3], "nut tightened", poses)
+    contacts = measure_contacts(section, poses, CONTACT)
+    resolution = CONTACT if solver == "exact" else step
+    for contact in contacts:
+        if contact.type == 3 and contact.distance <= resolution:
+            by = sequence[3] if (contact.a, contact.b) == ("P2", "P3") else sequence[2]
+            log.events.append(Event(by, contact.a, contact.b, contact.relation, contact.point, travel))
+    proof = (final.violation, final.optimality) if isinstance(final, FinalState) else (None, None)
+    motion_steps = final.motion_steps if isinstance(final, SteppedState) else 0
+    return Run(
+        clamp=clamp,
+        method=model.name,
+        solver=solver,
+        limits=model.limits,
+        status=_status(final, resolution),
+        distance=section.splint_distance(final.q),
+        closing=float(final.q[D]),
+        tilt=float(final.q[S]) / section.lever,
+        turns=ScrewJoint(clamp.bolt.pitch).turn(travel) / (2.0 * math.pi),
+        poses=poses,
+        contacts=contacts,
+        seats=seats(section, contacts, resolution),
+        events=tuple(log.events),
+        path=tuple(log.path),
+        undeclared=undeclared_meetings(section, log.path, log.events),
+        violation=proof[0],
+        optimality=proof[1],
+        work=Work(len(PARTS), len(PARTS) * (len(PARTS) - 1) // 2, section.queries.contact, motion_steps, 0),
+    )
+
+
+def _come_in(section: Section, q: Array, step: str, log: _Log) -> Array:
+    """The open clamp comes in from the right until the line lies under its groove, then settles down on the line."""
+    clamp = section.clamp
+    beside, over, settled = q.copy(), q.copy(), q.copy()
+    middle = 0.5 * (clamp.up_splint.thickness + section.down_splint(q).point(0.0, clamp.down_splint.face_depth)[1])
+    for state in (beside, over):
+        state[1] = middle
+    beside[0] = -clamp.line.radius - _ROOM
+    settled[:2] = over[:2]
+    travel, touch = travel_to_contact(section, settled, "P6", -_unit(1), "P1")
+    settled = settled - travel * _unit(1)
+    # The jumper waits clear of the clamp's way in.
+    waiting = settled.copy()
+    waiting[2] = settled[0] - beside[0] + clamp.up_splint.width + clamp.jumper.radius + _ROOM
+    waiting[3] = middle
+    jumper = _poses(section, waiting)["P7"]
+    for state, label in ((beside, "open clamp beside the line"), (over, "line between the splints")):
+        log.stop(step, label, _poses(section, state) | {"P7": jumper})
+    log.stop(step, "up splint rests on the line", _poses(section, waiting))
+    log.events.append(_event(section, waiting, step, touch, travel))
+    return waiting
+
+
+def _put_in_jumper(section: Section, q: Array, step: str, log: _Log) -> Array:
+    """The jumper comes in between the splints from its side and is lifted into the up splint's groove."""
+    inside = q.copy()
+    inside[2] = float(section.pairs["P1", "P7"].T_a_groove[0, 3])
+    log.stop(step, "jumper between the splints", _poses(section, inside))
+    travel, touch = travel_to_contact(section, inside, "P7", -_unit(3), "P1")
+    inside = inside - travel * _unit(3)
+    log.stop(step, "jumper in the up splint's groove", _poses(section, inside))
+    log.events.append(_event(section, inside, step, touch, travel))
+    return inside
+
+
+def _first_touch(section: Section, q: Array, step: str, log: _Log) -> None:
+    """The down splint rises along the bolt until it first touches a wire."""
+    reach = {wire: travel_to_contact(section, q, wire, -_unit(D), "P2", limit=float(q[D])) for wire in WIRES}
+    wire = min(WIRES, key=lambda w: reach[w][0])
+    travel, touch = reach[wire]
+    if touch is not None:
+        touching = q - travel * _unit(D)
+        log.stop(step, f"down splint touches {wire}", _poses(section, touching, saddle_d=float(q[D])))
+        log.events.append(_event(section, touching, step, touch, travel))
+
+
+def _unit(i: int) -> Array:
+    return np.asarray(np.eye(6)[i])
+
+
+def _poses(section: Section, q: Array, saddle_d: float | None = None) -> Poses:
+    """Section poses of all parts with the line at rest; ``saddle_d`` is where the saddle stands if not under P2."""
+    clamp = section.clamp
+    x, y = -float(q[0]), -float(q[1])
+    down = section.down_splint(q)
+    saddle_y = y + (down.y if saddle_d is None else saddle_d) - clamp.back_clearance
+    bolt_y = saddle_y + clamp.saddle.radius + clamp.saddle.apex_thickness - clamp.bolt.shank_length
+    bolt_x = x + section.bolt_x
+    return {
+        "P1": SectionPose(x, y),
+        "P2": SectionPose(bolt_x, y + down.y, down.angle),
+        "P3": SectionPose(bolt_x, saddle_y),
+        "P4": SectionPose(bolt_x, bolt_y),
+        "P5": SectionPose(bolt_x, y - clamp.nut.height),
+        "P6": SectionPose(0.0, 0.0),
+        "P7": SectionPose(x + float(q[2]), y + float(q[3])),
+    }
+
+
+def _event(section: Section, q: Array, step: str, touch: tuple[PartName, PartName] | None, travel: float) -> Event:
+    """The event of a motion that ended at ``touch``."""
+    assert touch is not None  # every motion here ends at a groove
+    contact = next(c for c in measure_contacts(section, _poses(section, q), CONTACT) if (c.a, c.b) == touch)
+    return Event(step, contact.a, contact.b, contact.relation, contact.point, travel)
+
+
+def _status(final: FinalState | SteppedState, resolution: float) -> str:
+    """'clamped' if both wires are held between the splints, else what stopped them."""
+    gaps = final.gaps
+    if isinstance(final, FinalState):
+        stops = {(p, f) for p, f, force in zip(gaps.pair, gaps.feature, final.force, strict=True) if force > 0.0}
+        loose = set(final.loose)
+    else:
+        near = [v <= resolution for v in gaps.value]
+        stops = {(p, f) for p, f, n in zip(gaps.pair, gaps.feature, near, strict=True) if n}
+        held = {p for p, _ in stops}
+        loose = {w for w in WIRES if not all((splint, w) in held for splint in SPLINTS)}
+    if not loose:
+        return "clamped"
+    reasons = []
+    if any(pair == ("P1", "P2") for pair, _ in stops):
+        reasons.append("faces meet")
+    if any(feature == "tilt limit" for _, feature in stops):
+        reasons.append("tilt limit reached")
+    wires = " and ".join(sorted(loose))
+    return f"not clamped: {' and '.join(reasons) or 'wires slip'}, {wires} loose"

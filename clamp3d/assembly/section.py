@@ -1,0 +1,174 @@
+"""The clamp in its section: six numbers place the wires and the down splint, gaps say what may not overlap.
+
+Everything is seen from the up splint (P1 at rest), in the paper's section frame. The state q holds (x6, y6, x7, y7,
+d, s) in mm: the two wire centres, the down splint's origin d below P1's along the bolt, and s = half width * tilt.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from clamp3d.clamp.dimensions import Clamp, PartName
+from clamp3d.clamp.features import GroovePair, groove_pairs
+from clamp3d.contact.model import ContactModel
+from clamp3d.geometry.pose import Array, SectionPose, inverse
+
+SPLINTS: tuple[PartName, PartName] = ("P1", "P2")
+WIRES: tuple[PartName, PartName] = ("P6", "P7")
+D, S = 4, 5
+"""Where the down splint's distance and scaled tilt stand in the state q."""
+
+_DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class Gaps:
+    """Values (k,) mm of the gaps at a state, their derivatives (k, 6) by q (dimensionless), and what each one is.
+
+    ``pair`` names the two parts, ``feature`` the piece; ``point`` (k, 2) is on the first part in P1's section frame.
+    """
+
+    value: Array
+    gradient: Array
+    pair: tuple[tuple[PartName, PartName], ...]
+    feature: tuple[str, ...]
+    point: Array
+
+
+@dataclass
+class Queries:
+    """How often the contact model was asked about a groove and a wire: C of Table 5."""
+
+    contact: int = 0
+
+
+@dataclass(frozen=True)
+class Section:
+    """A clamp whose grooves are measured by ``model``; counts its queries."""
+
+    clamp: Clamp
+    model: ContactModel
+    queries: Queries = field(default_factory=Queries)
+
+    @cached_property
+    def pairs(self) -> dict[tuple[PartName, PartName], GroovePair]:
+        """The clamp's grooves with what lies in them."""
+        return groove_pairs(self.clamp)
+
+    @property
+    def lever(self) -> float:
+        """Half width of the down splint in mm: it turns the tilt into a length."""
+        return self.clamp.down_splint.width / 2
+
+    @property
+    def bolt_x(self) -> float:
+        """Bolt axis from P1's left edge in mm."""
+        return self.clamp.up_splint.width / 2
+
+    def down_splint(self, q: Array) -> SectionPose:
+        """P2 seen from P1."""
+        return SectionPose(self.bolt_x, float(q[D]), float(q[S]) / self.lever)
+
+    def bounds(self) -> list[tuple[float, float]]:
+        """Limits of q: each wire stays in the mouth it was put into (a longer way out exists, but no wire takes it)."""
+        limits = [(-np.inf, np.inf)] * 6
+        for i, wire in enumerate(WIRES):
+            pair = self.pairs["P1", wire]
+            half_mouth = pair.groove.radius * math.sin(pair.groove.half_angle)
+            centre = float(pair.T_a_groove[0, 3])
+            limits[2 * i] = (centre - half_mouth, centre + half_mouth)
+        return limits
+
+    def splint_distance(self, q: Array) -> float:
+        """Height between the inner edges of the splints on the line side (the distance of Table 4); mm."""
+        up, down = self.clamp.up_splint, self.clamp.down_splint
+        return self.down_splint(q).point(-down.width / 2, down.face_depth)[1] - up.thickness
+
+    def open_state(self, d: float, tilt: float = 0.0) -> Array:
+        """State with the down splint at ``d`` and ``tilt``, both wires in the middle between their two arc centres."""
+        q = np.array([0.0, 0.0, 0.0, 0.0, d, self.lever * tilt])
+        pose = self.down_splint(q)
+        for i, wire in enumerate(WIRES):
+            up, down = self.pairs["P1", wire].T_a_groove, self.pairs["P2", wire].T_a_groove
+            q[2 * i : 2 * i + 2] = 0.5 * (np.array([up[0, 3], -up[2, 3]]) + pose.point(down[0, 3], -down[2, 3]))
+        return q
+
+    def open_distance(self) -> float:
+        """A distance d at which the clamp stands open: both wires pass between the faces at any allowed tilt; mm."""
+        up, down = self.clamp.up_splint, self.clamp.down_splint
+        thickest = 2.0 * max(self.clamp.line.radius, self.clamp.jumper.radius)
+        return up.thickness - down.face_depth + thickest + self.lever * math.sin(down.max_tilt) + 10.0
+
+    def wire_gaps(self, q: Array, wire: PartName) -> Gaps:
+        """Gaps of one wire to both splints, every piece of the contact model."""
+        i = 2 * WIRES.index(wire)
+        T_wire = SectionPose(q[i], q[i + 1]).T()
+        T_down = self.down_splint(q).T()
+        up = self.model.pieces(self.pairs["P1", wire], T_wire)
+        down = self.model.pieces(self.pairs["P2", wire], inverse(T_down) @ T_wire)
+        self.queries.contact += 2
+        k, n = len(up.distance), len(up.distance) + len(down.distance)
+        normal = np.vstack([up.normal, down.normal @ T_down[:3, :3].T])
+        point = np.vstack([up.point, down.point @ T_down[:3, :3].T + T_down[:3, 3]])
+        gradient = np.zeros((n, 6))
+        gradient[:, i] = normal[:, 0]
+        gradient[:, i + 1] = -normal[:, 2]
+        # The gap falls by what the groove's point moves along the normal: P2 moves down by d and turns about -Y.
+        turned = np.cross([0.0, -1.0, 0.0], point[k:] - T_down[:3, 3]) / self.lever
+        gradient[k:, D] = -(normal[k:] @ _DOWN)
+        gradient[k:, S] = -(normal[k:] * turned).sum(1)
+        pair = tuple(("P1", wire) for _ in up.feature) + tuple(("P2", wire) for _ in down.feature)
+        section_point = np.column_stack([point[:, 0], -point[:, 2]])
+        return Gaps(
+            np.concatenate([up.distance, down.distance]), gradient, pair, up.feature + down.feature, section_point
+        )
+
+    def face_gaps(self, q: Array) -> Gaps:
+        """Gaps between the inner faces along the bolt, at both ends of their overlap, and to the tilt limits.
+
+        The splints are taken as their rectangles here (convex object collision, type 2 of the paper). The gap between
+        two straight faces is least at an end of their overlap.
+        """
+        up, down = self.clamp.up_splint, self.clamp.down_splint
+        pose, v, half = self.down_splint(q), down.face_depth, down.width / 2
+        c, s = math.cos(pose.angle), math.sin(pose.angle)
+        value, gradient, point = np.empty(4), np.zeros((4, 6)), np.zeros((4, 2))
+        for k, side in enumerate((-1, 1)):
+            corner_x = pose.point(side * half, v)[0]
+            edge_x = self.bolt_x + side * up.width / 2
+            if side * (corner_x - edge_x) <= 0.0:  # P2's corner under P1's face
+                u, x = side * half, corner_x
+                slope = -u * c - v * s
+            else:  # P1's edge over P2's face
+                x = edge_x
+                u = (x - pose.x - v * s) / c
+                slope = -(x - pose.x) / c**2 + v * s / c**2
+            y = pose.y - u * s + v * c
+            value[k] = y - up.thickness
+            gradient[k, D], gradient[k, S] = 1.0, slope / self.lever
+            point[k] = (x, up.thickness)
+        limit = self.lever * down.max_tilt
+        value[2:] = limit - q[S], limit + q[S]
+        gradient[2:, S] = -1.0, 1.0
+        point[2:] = (pose.x, pose.y + down.back_radius)
+        pairs: tuple[tuple[PartName, PartName], ...] = (("P1", "P2"), ("P1", "P2"), ("P2", "P4"), ("P2", "P4"))
+        return Gaps(value, gradient, pairs, ("left edge", "right edge", "tilt limit", "tilt limit"), point)
+
+    def gaps(self, q: Array) -> Gaps:
+        """All gaps at a state: both wires, faces, tilt limits."""
+        return join(self.wire_gaps(q, "P6"), self.wire_gaps(q, "P7"), self.face_gaps(q))
+
+
+def join(*parts: Gaps) -> Gaps:
+    """One `Gaps` of several."""
+    return Gaps(
+        np.concatenate([g.value for g in parts]),
+        np.vstack([g.gradient for g in parts]),
+        sum((g.pair for g in parts), ()),
+        sum((g.feature for g in parts), ()),
+        np.vstack([g.point for g in parts]),
+    )

@@ -1,0 +1,28 @@
+"""Concave Arc Surface contact: the groove as it is, measured by the closed forms of the 3D kernel."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clamp3d.clamp.features import GroovePair
+from clamp3d.contact.model import Pieces
+from clamp3d.geometry.distance import groove_pieces, signed_distances
+from clamp3d.geometry.pose import Array, inverse
+
+
+class Cas:
+    """Arc against cylinder in closed form, for any pose; exact to rounding."""
+
+    name = "cas"
+    limits = ()
+
+    def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
+        """Gaps to the arc surface, the two faces beside it and the ends; see `ContactModel`."""
+        found = groove_pieces(pair.groove, pair.cylinder, inverse(pair.T_a_groove) @ T_a_b @ pair.T_b_cylinder)
+        R, p = pair.T_a_groove[:3, :3], pair.T_a_groove[:3, 3]
+        return Pieces(found.distance, found.point_on_groove @ R.T + p, found.normal @ R.T, found.feature)
+
+    def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
+        """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
+        poses = np.ascontiguousarray(inverse(pair.T_a_groove) @ T_a_b @ pair.T_b_cylinder)
+        return signed_distances(pair.groove, pair.cylinder, poses)
