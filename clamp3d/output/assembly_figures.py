@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
-from clamp3d.assembly.result import Run, Waypoint
-from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
+import numpy as np
+
+from clamp3d.assembly.result import Run
+from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.meshes import mesh
 from clamp3d.clamp.parts import parts
-from clamp3d.geometry.pose import SectionPose
+from clamp3d.geometry.pose import Array, SectionPose
 from clamp3d.output.figures import near, same_scale, title
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
-from clamp3d.output.section import Poses, draw_section, part_anchor
+from clamp3d.output.section import Poses, balloon, draw_section, label_wires, part_anchor
 from clamp3d.output.view3d import Camera, Solid, draw_solids
 
 if TYPE_CHECKING:
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MESH_ERROR = 0.01  # mm, far below a pixel
-_MOVED = 0.5  # mm; smaller motions get no arrow
+_MOVED = 2.0  # mm; smaller motions get no arrow
+_ARROW = 36.0  # mm; longest arrow
 
 
 def exploded_figure(clamp: Clamp) -> Figure:
@@ -35,20 +37,23 @@ def exploded_figure(clamp: Clamp) -> Figure:
     poses = exploded_poses(clamp)
     solids = _solids(clamp)
     draw_solids(ax, [Solid(solids[n], poses[n].T(), PART_COLOURS[n]) for n in PARTS], camera)
-    bodies = parts(clamp)
     x0, x1 = ax.get_xlim()
+    width = x1 - x0
     for name in PARTS:
-        u, y, v = _outer_point(clamp, name)
         T = poses[name].T()
+        u, y, v = _outer_point(clamp, name)
         px, py, _ = camera.project((T[:3, :3] @ (u, y, -v) + T[:3, 3])[None])[0]
-        column = x1 + 0.07 * (x1 - x0)
-        text = bodies[name].title + {"P6": f" {clamp.line.label}", "P7": f" {clamp.jumper.label}"}.get(name, "")
-        ax.plot([px, column - 5.0], [py, py], color=INK, lw=0.6, zorder=5)
+        text = TITLES[name] + {"P6": f"\n{clamp.line.label}", "P7": f"\n{clamp.jumper.label}"}.get(name, "")
+        left = name == "P6"  # its near end is the leftmost of all
+        column = x0 - 0.09 * width if left else x1 + 0.07 * width
+        ax.plot([px, column], [py, py], color=INK, lw=0.6, zorder=5)
         ax.plot([px], [py], ".", color=INK, ms=4, zorder=5)
-        box = {"boxstyle": "circle,pad=0.2", "fc": PART_COLOURS[name], "ec": INK, "lw": 0.8}
-        ax.annotate(name, (column, py), ha="center", va="center", fontsize=9, fontweight="bold", bbox=box)
-        ax.annotate(text, (column, py), (14, 0), textcoords="offset points", va="center", fontsize=9, color=INK)
-    ax.set_xlim(x0, x1 + 0.32 * (x1 - x0))
+        balloon(ax, name, column, py, size=9.0)
+        if left:
+            ax.annotate(text, (column, py), (0, -14), textcoords="offset points", ha="center", va="top", fontsize=9)
+        else:
+            ax.annotate(text, (column, py), (14, 0), textcoords="offset points", va="center", fontsize=9)
+    ax.set_xlim(x0 - 0.18 * width, x1 + 0.32 * width)
     title(ax, "parallel groove clamp, exploded", f"{clamp.name}: seven parts")
     return figure
 
@@ -84,39 +89,47 @@ def steps_figure(run: Run) -> Figure:
     figure = Figure(figsize=(3.3 * len(ends), 6.6), layout="constrained")
     axes = figure.subplots(2, len(ends), squeeze=False, height_ratios=(1.0, 1.0))
     solids = _solids(run.clamp)
-    before: Poses = run.path[0].poses
-    for i, (step, waypoint) in enumerate(ends):
+    start = 0
+    for i, (step, stop) in enumerate(ends):
+        waypoint = run.path[stop]
         poses = near(run.clamp, waypoint.poses)
         shown = [Solid(solids[n], p.T(), PART_COLOURS[n]) for n, p in poses.items()]
         draw_solids(axes[0, i], shown, Camera(), pixels_per_mm=3.0)
-        title(axes[0, i], f"{i + 1}  {step}", waypoint.label)
+        title(axes[0, i], f"{i + 1}   {step}", waypoint.label)
         draw_section(axes[1, i], run.clamp, poses)
-        _arrows(axes[1, i], run.clamp, before, poses)
-        before = waypoint.poses
+        label_wires(axes[1, i], poses)
+        _arrows(axes[1, i], run.clamp, [w.poses for w in run.path[start : stop + 1]], poses)
+        start = stop
     same_scale([*axes[1]])
     _same_window([*axes[0]])
     return figure
 
 
-def step_ends(run: Run) -> list[tuple[str, Waypoint]]:
-    """The last waypoint of each step, in order."""
-    last: dict[str, Waypoint] = {waypoint.step: waypoint for waypoint in run.path}
-    return list(last.items())
+def step_ends(run: Run) -> list[tuple[str, int]]:
+    """Each step of the sequence with the index of its last waypoint in ``run.path``, in order."""
+    return list({waypoint.step: i for i, waypoint in enumerate(run.path)}.items())
 
 
-def _arrows(ax: Axes, clamp: Clamp, before: Poses, after: Mapping[PartName, SectionPose]) -> None:
-    """An arrow for each part that moved in the step, at its end position and in the direction of its motion."""
-    style: dict[str, Any] = {"arrowstyle": "-|>,head_width=0.3,head_length=0.6", "color": DIMENSION, "lw": 1.8}
-    for name, pose in after.items():
-        if name not in before:
+def _arrows(ax: Axes, clamp: Clamp, path: Sequence[Poses], shown: Iterable[PartName]) -> None:
+    """The way of what moved, ending where it stands now; parts that moved alike share one arrow. Not to scale."""
+    style = {
+        "arrowstyle": "-|>,head_width=0.3,head_length=0.6",
+        "color": DIMENSION,
+        "lw": 1.8,
+        "shrinkA": 0,
+        "shrinkB": 0,
+    }
+    drawn: list[Array] = []
+    for name in shown:
+        way = np.array([poses[name].point(*part_anchor(clamp, name)) for poses in path])
+        moved = way - way[-1]
+        length = float(np.hypot(*np.diff(way, axis=0).T).sum())
+        if length < _MOVED or any(np.abs(moved - other).max() < _MOVED for other in drawn):
             continue
-        x1, y1 = pose.point(*part_anchor(clamp, name))
-        x0, y0 = before[name].point(*part_anchor(clamp, name))
-        way = math.hypot(x1 - x0, y1 - y0)
-        if way > _MOVED:
-            scale = min(1.0, 22.0 / way)
-            tail = (x1 - scale * (x1 - x0), y1 - scale * (y1 - y0))
-            ax.annotate("", (x1, y1), tail, arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=50)
+        drawn.append(moved)
+        way = way[-1] + moved * min(1.0, _ARROW / length)
+        ax.plot(*way.T, color=DIMENSION, lw=1.8, zorder=50)
+        ax.annotate("", way[-1], way[-2], arrowprops=style, zorder=50)
 
 
 def _same_window(axes: list[Axes]) -> None:
@@ -140,6 +153,6 @@ def _outer_point(clamp: Clamp, name: PartName) -> tuple[float, float, float]:
         "P3": (saddle.width / 2, -0.1 * saddle.length, saddle.radius + 0.6 * saddle.apex_thickness),
         "P4": (0.4 * clamp.bolt.diameter, 0.0, clamp.bolt.shank_length + 0.5 * clamp.bolt.head_height),
         "P5": (0.4 * clamp.nut.across_flats, 0.0, 0.5 * clamp.nut.height),
-        "P6": (0.0, 0.48 * clamp.wire_length, 0.0),
+        "P6": (0.0, -0.5 * clamp.wire_length, 0.0),
         "P7": (0.0, 0.45 * clamp.wire_length, 0.0),
     }[name]

@@ -23,6 +23,7 @@ from clamp3d.output.section import (
     draw_marks,
     draw_section,
     edge_openings,
+    label_wires,
 )
 
 if TYPE_CHECKING:
@@ -82,13 +83,14 @@ def states_figure(run: Run) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.5, 5.8), layout="constrained")
-    axes = figure.subplots(1, 2, width_ratios=(1.0, 1.18))
+    axes = figure.subplots(1, 2)
     names = ("(a) initial state", "(b) final state")
     for ax, all_poses, name in zip(axes, (run.path[0].poses, run.poses), names, strict=True):
         poses = near(run.clamp, all_poses)
         draw_section(ax, run.clamp, poses)
-        draw_dimensions(ax, run.clamp, poses)
+        draw_dimensions(ax, run.clamp, poses, sides=(-1, 1) if ax is axes[1] else (1,))
         title(ax, name, f"distance between the splints {edge_openings(run.clamp, poses)[0]:.3f} mm")
+    label_wires(axes[0], near(run.clamp, run.path[0].poses))
     draw_labels(axes[1], run.clamp, run.poses)
     draw_marks(axes[1], [_mark(contact) for contact in _arc_contacts(run)])
     same_scale(axes)
@@ -114,7 +116,7 @@ def contacts_figure(run: Run) -> Figure:
         x, y = mark.x + 0.09 * run.clamp.up_splint.width * _sideways(i), mark.y
         _number(overview, i + 1, x, y, (mark.x, mark.y))
         ax = figure.add_subplot(grid[i // 2, 1 + i % 2])
-        draw_section(ax, run.clamp, run.poses, line_width=1.6)
+        draw_section(ax, run.clamp, run.poses, only=(contact.a, contact.b), holes=False, line_width=1.6)
         draw_marks(ax, [mark], size=7.0)
         tip = {"arrowstyle": "-|>,head_width=0.2,head_length=0.5", "color": INK, "lw": 1.2, "shrinkA": 3, "shrinkB": 0}
         ax.annotate(
@@ -149,13 +151,13 @@ def near(clamp: Clamp, poses: Poses) -> dict[Any, Any]:
 
 
 def same_scale(axes: Sequence[Axes]) -> None:
-    """Give all axes a window of one size about their own middle, so that their scales agree."""
-    windows = [(ax.get_xlim(), ax.get_ylim()) for ax in axes]
-    width = max(x1 - x0 for (x0, x1), _ in windows)
-    height = max(y0 - y1 for _, (y0, y1) in windows)
-    for ax, ((x0, x1), (y0, y1)) in zip(axes, windows, strict=True):
-        ax.set_xlim(0.5 * (x0 + x1 - width), 0.5 * (x0 + x1 + width))
-        ax.set_ylim(0.5 * (y0 + y1 + height), 0.5 * (y0 + y1 - height))
+    """Give axes of one size windows of one size: equal heights, and equal widths about their own middle."""
+    width = max(ax.get_xlim()[1] - ax.get_xlim()[0] for ax in axes)
+    bottom, top = max(ax.get_ylim()[0] for ax in axes), min(ax.get_ylim()[1] for ax in axes)
+    for ax in axes:
+        middle = 0.5 * sum(ax.get_xlim())
+        ax.set_xlim(middle - width / 2, middle + width / 2)
+        ax.set_ylim(bottom, top)
 
 
 def _arc_contacts(run: Run) -> list[Contact]:

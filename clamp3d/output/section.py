@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 Poses = Mapping[PartName, SectionPose]
 
 _HATCH: dict[PartName, str] = {"P1": "////", "P2": "\\\\\\\\", "P3": "////"}
+WIRES: tuple[PartName, ...] = ("P6", "P7")
 _ORDER: tuple[PartName, ...] = ("P6", "P7", "P1", "P2", "P3", "P4", "P5")
 
 
@@ -81,11 +82,11 @@ def draw_section(
     poses: Poses,
     *,
     only: Iterable[PartName] = PARTS,
-    faded: Iterable[PartName] = (),
+    holes: bool = True,
     line_width: float = 0.9,
 ) -> None:
-    """Draw the parts at ``poses``; ``only`` leaves the others out, ``faded`` shows some as ghosts."""
-    shown, ghosts, bodies = set(only), set(faded), parts(clamp)
+    """Draw the parts of ``only`` at ``poses``; without ``holes`` it is the section beside the bolt."""
+    shown, bodies = set(only), parts(clamp)
     ax.set_aspect("equal")
     ax.set_axis_off()
     ax.margins(0.02)
@@ -93,12 +94,13 @@ def draw_section(
         ax.invert_yaxis()
     for i, name in enumerate(_ORDER):
         if name in shown and name in poses:
-            _draw_part(ax, bodies[name], poses[name], 2 + i, 0.25 if name in ghosts else 1.0, line_width)
+            _draw_part(ax, bodies[name], poses[name], 2 + i, holes, line_width)
     ax.autoscale_view()
 
 
 def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
     """Names of the parts: a column of balloons on the right, each with a line to its part; wires carry theirs."""
+    label_wires(ax, poses)
     points = {name: poses[name].point(*part_anchor(clamp, name)) for name in PARTS if name in poses}
     (left, edge), (low, high) = _extent(clamp, poses)
     column = edge + 0.19 * (edge - left)
@@ -109,16 +111,25 @@ def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
         title = bodies[name].title
         if name in wires:
             title += f"\n{wires[name].label}"
-            _balloon(ax, name, *points[name], size=7.0)
         else:
             x0, y0 = points[name]
             ax.plot([x0, column - 4.0], [y0, y], color=INK, lw=0.5, zorder=30)
             ax.plot([x0], [y0], ".", color=INK, ms=3.5, zorder=30)
-        _balloon(ax, name, column, y, size=8.0)
+        balloon(ax, name, column, y, size=8.0)
         ax.annotate(title, (column, y), (13, 0), textcoords="offset points", va="center", fontsize=8, color=INK)
+    ax.update_datalim([(column + 0.3 * (edge - left), heights[0]), (column, heights[-1])])
+    ax.autoscale_view()
 
 
-def _balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> None:
+def label_wires(ax: Axes, poses: Poses) -> None:
+    """The names of the wires in the middle of each."""
+    for name in WIRES:
+        if name in poses:
+            balloon(ax, name, poses[name].x, poses[name].y, size=7.0)
+
+
+def balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> None:
+    """The name of a part in a circle of its colour."""
     box = {"boxstyle": "circle,pad=0.2", "fc": PART_COLOURS[name], "ec": INK, "lw": 0.7}
     ax.annotate(name, (x, y), ha="center", va="center", fontsize=size, fontweight="bold", zorder=31, bbox=box)
 
@@ -150,9 +161,11 @@ def draw_marks(ax: Axes, marks: Iterable[Mark], *, size: float = 6.0) -> None:
             )
 
 
-def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses) -> None:
-    """Distance between the splints at both edges, and the tilt of the down splint."""
-    for side, (above, below) in zip((-1, 1), _inner_edges(clamp, poses), strict=True):
+def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int] = (-1, 1)) -> None:
+    """Distance between the splints at the edges (-1 line side, 1 jumper side), and the tilt of the down splint."""
+    edges = _inner_edges(clamp, poses)
+    for side in sides:
+        above, below = edges[side > 0]
         x = (min if side < 0 else max)(above[0], below[0]) + side * 0.09 * clamp.up_splint.width
         dimension(ax, above, below, x, f"{below[1] - above[1]:.3f}", side)
     _draw_tilt(ax, clamp, poses["P2"])
@@ -241,7 +254,7 @@ def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
     )
 
 
-def _draw_part(ax: Axes, part: Part, pose: SectionPose, z: int, alpha: float, line_width: float) -> None:
+def _draw_part(ax: Axes, part: Part, pose: SectionPose, z: int, holes: bool, line_width: float) -> None:
     from matplotlib.patches import PathPatch, Rectangle
     from matplotlib.transforms import Affine2D
 
@@ -250,7 +263,7 @@ def _draw_part(ax: Axes, part: Part, pose: SectionPose, z: int, alpha: float, li
     c, s = math.cos(pose.angle), math.sin(pose.angle)
     place = Affine2D(np.array([[c, s, pose.x], [-s, c, pose.y], [0.0, 0.0, 1.0]]))
     where = place + ax.transData
-    style: dict[str, Any] = {"lw": line_width, "ec": edge, "zorder": z, "alpha": alpha}
+    style: dict[str, Any] = {"lw": line_width, "ec": edge, "zorder": z}
     for body in part.bodies:
         path = arc_path(body.profile) if body.axis == "Y" else arc_path(_silhouette(body))
         patch = PathPatch(path, fc=colour, hatch=_HATCH.get(part.name), hatch_linewidth=0.45, transform=where, **style)
@@ -258,10 +271,11 @@ def _draw_part(ax: Axes, part: Part, pose: SectionPose, z: int, alpha: float, li
         ax.add_patch(patch)
         ax.update_datalim(place.transform(path.vertices))
         if body.axis == "Y":
-            for hole in part.holes:  # its far wall, seen behind the cut
+            for hole in part.holes if holes else ():  # its far wall, seen behind the cut
                 (u0, _), (u1, _) = hole.profile.bounds
                 wall = Rectangle((u0, -hole.end), u1 - u0, hole.length, fc=_pale(colour), transform=where, **style)
                 wall.set_clip_path(patch)
+                wall.set_clip_box(ax.bbox)
                 ax.add_patch(wall)
             outline = PathPatch(path, fc="none", transform=where, **style)
             ax.add_patch(outline)
