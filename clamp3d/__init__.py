@@ -14,13 +14,22 @@ __version__ = "0.1.0"
 _HOME: dict[str, str] = {
     "ArcContact": "clamp3d.geometry.arc_circle",
     "ArcRelation": "clamp3d.geometry.arc_circle",
+    "Cylinder": "clamp3d.geometry.shapes",
+    "Feature": "clamp3d.geometry.distance",
+    "GroovePieces": "clamp3d.geometry.pieces",
     "HoleContact": "clamp3d.geometry.rectangle",
     "HoleRelation": "clamp3d.geometry.rectangle",
     "InputError": "clamp3d.errors",
     "Rectangle": "clamp3d.geometry.rectangle",
+    "SignedDistance": "clamp3d.geometry.distance",
+    "SignedDistances": "clamp3d.geometry.distance",
+    "SweptArc": "clamp3d.geometry.shapes",
     "arc_circle": "clamp3d.geometry.arc_circle",
     "classify_arc_circle": "clamp3d.geometry.arc_circle",
+    "groove_pieces": "clamp3d.geometry.pieces",
     "hole_bolt": "clamp3d.geometry.rectangle",
+    "signed_distance": "clamp3d.geometry.distance",
+    "signed_distances": "clamp3d.geometry.distance",
 }
 
 __all__ = sorted(_HOME)

@@ -160,7 +160,9 @@ def _least_on_the_way(section: Section, before: Poses, after: Poses) -> dict[tup
     def at(t: float) -> Poses:
         return {
             name: SectionPose(
-                p.x + t * (after[name].x - p.x), p.y + t * (after[name].y - p.y), p.angle + t * (after[name].angle - p.angle)
+                p.x + t * (after[name].x - p.x),
+                p.y + t * (after[name].y - p.y),
+                p.angle + t * (after[name].angle - p.angle),
             )
             for name, p in before.items()
         }
@@ -182,4 +184,3 @@ def _least_on_the_way(section: Section, before: Poses, after: Poses) -> dict[tup
 def _world(point: tuple[float, float]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """World coordinates of a section point, in the middle of the clamp."""
     return np.array([point[0], 0.0, -point[1]])
-

@@ -10,9 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
 
-from clamp3d.assembly.section import D, SPLINTS, WIRES, Gaps, Section
+from clamp3d.assembly.section import WIRES, D, Gaps, Section
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.errors import SolverError
 from clamp3d.geometry.pose import Array
@@ -131,7 +132,7 @@ def _polish(section: Section, q: Array) -> tuple[Array, float]:
     return q, step
 
 
-def _lagrangian_hessian(section: Section, q: Array, rows: Array, force: Array) -> Array:
+def _lagrangian_hessian(section: Section, q: Array, rows: NDArray[np.intp], force: Array) -> Array:
     """Second derivatives (6, 6) of goal - force . gaps by central differences of the closed-form gradients."""
     h = 1e-4
     H = np.empty((6, 6))

@@ -1,14 +1,13 @@
-"""The virtual assembly: the sequence's motions one after the other, each ending at a contact, down to the final state."""
+"""The virtual assembly: the sequence's motions one after the other, each ending at a contact."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from clamp3d.assembly.connections import Undeclared
 from clamp3d.assembly.contacts import CONTACT, measure_contacts, seats, undeclared_meetings
 from clamp3d.assembly.final_state import FinalState, solve_final_state
 from clamp3d.assembly.motion import travel_to_contact

@@ -1,0 +1,300 @@
+"""One formula per feature of a groove: what a point or an axis is nearest to. Compiled; used by every entry point.
+
+Notation, in the groove's frame: material ``S = {y <= h, x^2 + y^2 >= R^2, |z| <= H}``, lips at ``(-s, h)`` (M) and
+``(s, h)`` (N), where ``s = R sin(half_angle)`` and ``h = -R cos(half_angle)``; the axis is ``c + t d``, ``|d| = 1``,
+``|t| <= l``.
+
+Which features can hold the least distance of the axis from S: at an inner ``t`` the distance is stationary. Over the
+inside of the arc surface it is ``R - rho(t)``, concave in t; over a flat or an end face it is linear. So neither has an
+inner minimum (only a constant stretch, which reaches an end of the axis or an edge). What remains: the ends of the axis
+against S, and the axis' inside against the edges (lips, end arcs, end edges) and the corners.
+"""
+
+from __future__ import annotations
+
+import math
+
+from clamp3d.geometry.jit import formula
+
+# Codes of the features; Feature in distance.py gives them names.
+ARC, LIP_M, LIP_N, FLAT_M, FLAT_N, END_FACE, END_ARC, END_EDGE_M, END_EDGE_N, CORNER_M, CORNER_N = range(11)
+
+
+@formula
+def section(x, y, R, s, h):  # type: ignore[no-untyped-def]
+    """Nearest boundary point of the groove's section to (x, y): signed gap, qx, qy, outward normal nx, ny, feature.
+
+    The gap is negative inside the material. There it is the smaller of the depths below the flat faces and behind the
+    arc: the lips are never nearer, in minor and in major arcs.
+    """
+    side = 1.0 if x >= 0.0 else -1.0
+    ax = abs(x)
+    rho = math.sqrt(x * x + y * y)
+    if y <= h and rho >= R:
+        if h - y < rho - R:
+            return y - h, x, h, 0.0, 1.0, FLAT_N if x >= 0.0 else FLAT_M
+        return R - rho, x / rho * R, y / rho * R, -x / rho, -y / rho, ARC
+    if y > h and ax >= s:
+        return y - h, x, h, 0.0, 1.0, FLAT_N if x >= 0.0 else FLAT_M
+    if rho < R and ax * -h + y * s <= 0.0:  # within the angle of the arc: rho R sin(phi - half_angle) <= 0
+        if rho == 0.0:
+            return R, 0.0, -R, 0.0, 1.0, ARC
+        return R - rho, x / rho * R, y / rho * R, -x / rho, -y / rho, ARC
+    gap = math.sqrt((ax - s) * (ax - s) + (y - h) * (y - h))
+    if gap == 0.0:
+        return 0.0, side * s, h, -side * s / R, -h / R, LIP_N if x >= 0.0 else LIP_M
+    return gap, side * s, h, side * (ax - s) / gap, (y - h) / gap, LIP_N if x >= 0.0 else LIP_M
+
+
+@formula
+def beyond_end(feature):  # type: ignore[no-untyped-def]
+    """Feature of an end face that a section feature ends in."""
+    if feature == ARC:
+        return END_ARC
+    if feature == LIP_M:
+        return CORNER_M
+    if feature == LIP_N:
+        return CORNER_N
+    if feature == FLAT_M:
+        return END_EDGE_M
+    return END_EDGE_N
+
+
+@formula
+def lip_line(sx, h, H, cx, cy, cz, dx, dy, dz, e2, l):  # type: ignore[no-untyped-def] # noqa: E741
+    """Squared distance of the axis' inside from the inside of the lip at x = sx (inf if they do not face), t, z."""
+    wx = cx - sx
+    wy = cy - h
+    t = -(wx * dx + wy * dy) / e2
+    z = cz + t * dz
+    if abs(t) > l or abs(z) > H:
+        return math.inf, t, z
+    cross = wx * dy - wy * dx
+    return cross * cross / e2, t, z
+
+
+@formula
+def end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l):  # type: ignore[no-untyped-def] # noqa: E741
+    """Squared distance of the axis' inside from the edges {y = h, z = ez, |x| >= s} (inf if they do not face), t, x."""
+    wy = cy - h
+    wz = cz - ez
+    f2 = dy * dy + dz * dz
+    if f2 == 0.0:
+        return math.inf, 0.0, 0.0
+    t = -(wy * dy + wz * dz) / f2
+    x = cx + t * dx
+    if abs(t) > l or abs(x) < s:
+        return math.inf, t, x
+    cross = wy * dz - wz * dy
+    return cross * cross / f2, t, x
+
+
+@formula
+def corner(kx, ky, kz, cx, cy, cz, dx, dy, dz, l):  # type: ignore[no-untyped-def] # noqa: E741
+    """Squared distance of the axis' inside from a corner (inf if its foot is not on the axis), t."""
+    mx = kx - cx
+    my = ky - cy
+    mz = kz - cz
+    t = mx * dx + my * dy + mz * dz
+    if abs(t) > l:
+        return math.inf, t
+    mx -= t * dx
+    my -= t * dy
+    mz -= t * dz
+    return mx * mx + my * my + mz * mz, t
+
+
+@formula
+def nearer_root(k, a, q):  # type: ignore[no-untyped-def]
+    """Root mu > 0 of (a / (k + mu))^2 + (q / mu)^2 = 1, for k, a >= 0 and q > 0 (or a > k).
+
+    1 / norm of the left side is concave in mu (a power mean of linear functions), so Newton's method on it climbs
+    from any lower bound to the root without passing it, and converges quadratically [Moré & Sorensen 1983].
+    """
+    mu = max(q, math.sqrt(a * a + q * q) - k)
+    for _ in range(40):
+        x = a / (k + mu)
+        y = q / mu
+        g = x * x + y * y
+        step = (math.sqrt(g) - 1.0) * g / (x * x / (k + mu) + y * y / mu)
+        mu += step
+        if step <= 1e-9 * mu:
+            break
+    return mu
+
+
+@formula
+def farther_root(k, a, q):  # type: ignore[no-untyped-def]
+    """Smaller root 0 < nu < k of (a / (k - nu))^2 + (q / nu)^2 = 1, for q > 0; -1 if there is none.
+
+    Concave like ``nearer_root``, but with a maximum: a slope that is not positive means that there is no root.
+    """
+    if a >= k or q >= k:
+        return -1.0
+    nu = q
+    for _ in range(60):
+        x = a / (k - nu)
+        y = q / nu
+        g = x * x + y * y
+        slope = y * y / nu - x * x / (k - nu)
+        if slope <= 0.0:
+            return -1.0
+        step = (math.sqrt(g) - 1.0) * g / slope
+        nu += step
+        if nu >= k:
+            return -1.0
+        if step <= 1e-9 * nu:
+            break
+    return nu
+
+
+@formula
+def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, limit2):  # type: ignore[no-untyped-def] # noqa: E741
+    """Squared distance of the axis' inside from the end arc in the plane z = ez, qx, qy, t; inf if it is >= limit2.
+
+    Seen along the axis the circle is an ellipse with the half axes R and R |dz| and the axis is a point. The distance
+    of that point from the circle's point at angle phi is a trigonometric polynomial of degree two in phi, its
+    stationary points a quartic. With C, S the cosine and sine from the major axis, they are C = p / (k + mu),
+    S = q / mu, C^2 + S^2 = 1 with k = dx^2 + dy^2. Only the root mu > 0 (the least distance) and the largest mu < 0
+    (the local minimum on the other side of the major axis) are minima; solving for them this way loses no digits where
+    the quartic's roots run together (axis through the arc's centre, small tilt).
+    """
+    e = math.sqrt(e2)
+    ex = dx / e
+    ey = dy / e
+    b = abs(dz)
+    sign = -1.0 if dz > 0.0 else 1.0
+    along = cx * ex + cy * ey
+    p = (cy * ex - cx * ey) / R
+    v = -sign * (dz * along + e * (ez - cz)) / R
+    low = R * (b - math.sqrt(b * b * p * p + v * v))  # the ellipse lies between its scaled copies through the point
+    if low * low >= limit2:
+        return math.inf, 0.0, 0.0, 0.0
+    q = b * v
+    best2 = math.inf
+    bx = by = bt = 0.0
+    root = 0.0
+    for branch in range(2):
+        if q != 0.0 or abs(p) > e2:
+            if branch == 0:
+                root = nearer_root(e2, abs(p), abs(q))
+                C = p / (e2 + root)
+                S = q / root
+            else:
+                root = farther_root(e2, abs(p), abs(q))
+                if root <= 0.0:
+                    break
+                C = p / (e2 - root)
+                S = -q / root
+            n = math.sqrt(C * C + S * S)
+            C /= n
+            S /= n
+        else:  # the point is on the major axis, within the evolute: two mirrored minima
+            C = p / e2
+            S = math.sqrt(max(0.0, 1.0 - C * C))
+            if branch == 1:
+                S = -S
+        qx = R * (S * ex - C * ey)
+        qy = R * (S * ey + C * ex)
+        if qy > h:
+            continue
+        t = (qx - cx) * dx + (qy - cy) * dy + (ez - cz) * dz
+        if abs(t) > l:
+            continue
+        du = R * (C - p)
+        dv = R * (b * S - v)
+        d2 = du * du + dv * dv
+        if d2 < best2:
+            best2 = d2
+            bx = qx
+            by = qy
+            bt = t
+        if branch == 0 and q != 0.0:
+            break
+    return best2, bx, by, bt
+
+
+@formula
+def clip(h, H, cy, cz, dy, dz, l):  # type: ignore[no-untyped-def] # noqa: E741
+    """Part lo <= t <= hi of the axis in the block {y <= h, |z| <= H}; lo > hi if there is none."""
+    lo = -l
+    hi = l
+    if dy > 0.0:
+        hi = min(hi, (h - cy) / dy)
+    elif dy < 0.0:
+        lo = max(lo, (h - cy) / dy)
+    elif cy > h:
+        return 1.0, -1.0
+    if dz > 0.0:
+        hi = min(hi, (H - cz) / dz)
+        lo = max(lo, (-H - cz) / dz)
+    elif dz < 0.0:
+        hi = min(hi, (-H - cz) / dz)
+        lo = max(lo, (H - cz) / dz)
+    elif abs(cz) > H:
+        return 1.0, -1.0
+    return lo, hi
+
+
+@formula
+def point_depth(x, y, z, R, h, H):  # type: ignore[no-untyped-def]
+    """Distance of a point of S from the boundary of S (negative outside): min of three, and its feature."""
+    rho = math.sqrt(x * x + y * y)
+    depth = rho - R
+    feature = ARC
+    if h - y < depth:
+        depth = h - y
+        feature = FLAT_N if x >= 0.0 else FLAT_M
+    if H - abs(z) < depth:
+        depth = H - abs(z)
+        feature = END_FACE
+    return depth, feature
+
+
+@formula
+def deepest(R, h, H, cx, cy, cz, dx, dy, dz, lo, hi):  # type: ignore[no-untyped-def]
+    """Deepest point of the axis in S for lo <= t <= hi: depth, t.
+
+    The depth is the smallest of a convex function (rho - R) and three linear ones, so its maximum is at an end, where
+    two linear ones cross, or where rho - R crosses a linear one (a quadratic).
+    """
+    best = -math.inf
+    bt = lo
+    for i in range(11):
+        if i < 2:
+            t = lo if i == 0 else hi
+        elif i < 5:
+            # h - y = H - z, h - y = H + z, H - z = H + z
+            if i == 2:
+                t = (h - cy - H + cz) / (dy - dz)
+            elif i == 3:
+                t = (h - cy - H - cz) / (dy + dz)
+            else:
+                t = -cz / dz
+        else:
+            j = (i - 5) // 2
+            if j == 0:
+                g0 = h - cy
+                g1 = -dy
+            elif j == 1:
+                g0 = H - cz
+                g1 = -dz
+            else:
+                g0 = H + cz
+                g1 = dz
+            # (R + g0 + g1 t)^2 = (cx + dx t)^2 + (cy + dy t)^2
+            A = dx * dx + dy * dy - g1 * g1
+            B = cx * dx + cy * dy - (R + g0) * g1
+            C = cx * cx + cy * cy - (R + g0) * (R + g0)
+            disc = B * B - A * C
+            if disc < 0.0:
+                continue
+            w = -B - math.copysign(math.sqrt(disc), B)
+            t = w / A if i % 2 == 1 else C / w
+        if not (lo <= t <= hi):
+            continue
+        depth, _ = point_depth(cx + t * dx, cy + t * dy, cz + t * dz, R, h, H)
+        if depth > best:
+            best = depth
+            bt = t
+    return best, bt
