@@ -26,10 +26,18 @@ _HOME: dict[str, str] = {
     "SweptArc": "clamp3d.geometry.shapes",
     "arc_circle": "clamp3d.geometry.arc_circle",
     "classify_arc_circle": "clamp3d.geometry.arc_circle",
+    "contacts_figure": "clamp3d.output.figures",
+    "exploded_figure": "clamp3d.output.assembly_figures",
     "groove_pieces": "clamp3d.geometry.pieces",
     "hole_bolt": "clamp3d.geometry.rectangle",
+    "save_figure": "clamp3d.output.figures",
+    "section_figure": "clamp3d.output.figures",
     "signed_distance": "clamp3d.geometry.distance",
     "signed_distances": "clamp3d.geometry.distance",
+    "states_figure": "clamp3d.output.figures",
+    "steps_figure": "clamp3d.output.assembly_figures",
+    "table2_figure": "clamp3d.output.legends",
+    "table3_figure": "clamp3d.output.legends",
 }
 
 __all__ = sorted(_HOME)

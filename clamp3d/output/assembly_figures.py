@@ -14,7 +14,7 @@ from clamp3d.clamp.parts import parts
 from clamp3d.geometry.pose import Array, SectionPose
 from clamp3d.output.figures import near, same_scale, title
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
-from clamp3d.output.section import Poses, balloon, draw_section, label_wires, part_anchor
+from clamp3d.output.section import Poses, balloon, draw_section, part_anchor
 from clamp3d.output.view3d import Camera, Solid, draw_solids
 
 if TYPE_CHECKING:
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 _MESH_ERROR = 0.01  # mm, far below a pixel
 _MOVED = 2.0  # mm; smaller motions get no arrow
-_ARROW = 36.0  # mm; longest arrow
+_ARROW = 60.0  # mm; longest arrow
 
 
 def exploded_figure(clamp: Clamp) -> Figure:
     """All seven parts drawn apart along the bolt, with names."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.2, 7.6), layout="constrained")
+    figure = Figure(figsize=(7.6, 6.4), layout="constrained")
     ax = figure.add_subplot()
     camera = Camera()
     poses = exploded_poses(clamp)
@@ -54,7 +54,7 @@ def exploded_figure(clamp: Clamp) -> Figure:
         else:
             ax.annotate(text, (column, py), (14, 0), textcoords="offset points", va="center", fontsize=9)
     ax.set_xlim(x0 - 0.18 * width, x1 + 0.32 * width)
-    title(ax, "parallel groove clamp, exploded", f"{clamp.name}: seven parts")
+    title(ax, "exploded view", f"{clamp.name} clamp: seven parts")
     return figure
 
 
@@ -86,8 +86,8 @@ def steps_figure(run: Run) -> Figure:
     from matplotlib.figure import Figure
 
     ends = step_ends(run)
-    figure = Figure(figsize=(3.3 * len(ends), 6.6), layout="constrained")
-    axes = figure.subplots(2, len(ends), squeeze=False, height_ratios=(1.0, 1.0))
+    figure = Figure(figsize=(3.1 * len(ends), 7.4), layout="constrained")
+    axes = figure.subplots(2, len(ends), squeeze=False, height_ratios=(1.0, 1.2))
     solids = _solids(run.clamp)
     start = 0
     for i, (step, stop) in enumerate(ends):
@@ -97,7 +97,8 @@ def steps_figure(run: Run) -> Figure:
         draw_solids(axes[0, i], shown, Camera(), pixels_per_mm=3.0)
         title(axes[0, i], f"{i + 1}   {step}", waypoint.label)
         draw_section(axes[1, i], run.clamp, poses)
-        label_wires(axes[1, i], poses)
+        for name, pose in poses.items():
+            balloon(axes[1, i], name, *pose.point(*_middle(run.clamp, name)), size=6.0)
         _arrows(axes[1, i], run.clamp, [w.poses for w in run.path[start : stop + 1]], poses)
         start = stop
     same_scale([*axes[1]])
@@ -142,6 +143,20 @@ def _same_window(axes: list[Axes]) -> None:
 
 def _solids(clamp: Clamp) -> dict[PartName, trimesh.Trimesh]:
     return {name: mesh(part, _MESH_ERROR) for name, part in parts(clamp).items()}
+
+
+def _middle(clamp: Clamp, name: PartName) -> tuple[float, float]:
+    """A point (u, v) in the middle of the part's material, beside the bolt, for its name."""
+    up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
+    return {
+        "P1": (0.27 * up.width, 0.45 * up.thickness),
+        "P2": (-0.21 * down.width, 0.5 * (down.face_depth + down.underside_depth)),
+        "P3": (-0.37 * saddle.width, saddle.radius + 0.3 * saddle.apex_thickness),
+        "P4": (0.0, clamp.bolt.shank_length + 0.5 * clamp.bolt.head_height),
+        "P5": (0.0, 0.5 * clamp.nut.height),
+        "P6": (0.0, 0.0),
+        "P7": (0.0, 0.0),
+    }[name]
 
 
 def _outer_point(clamp: Clamp, name: PartName) -> tuple[float, float, float]:

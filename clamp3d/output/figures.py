@@ -74,7 +74,7 @@ def section_figure(run: Run, waypoint: Waypoint | None = None) -> Figure:
     draw_dimensions(ax, run.clamp, poses)
     if waypoint is None:
         draw_marks(ax, [_mark(contact) for contact in _arc_contacts(run)])
-    title(ax, "final state" if waypoint is None else waypoint.label, f"{run.clamp.name}, section to scale, mm")
+    title(ax, "final state" if waypoint is None else waypoint.label, f"{run.clamp.name} clamp, section to scale, mm")
     return figure
 
 
@@ -107,7 +107,9 @@ def contacts_figure(run: Run) -> Figure:
     grid = figure.add_gridspec(rows, 3, width_ratios=(2.1, 1.0, 1.0))
     overview = figure.add_subplot(grid[:, 0])
     draw_section(overview, run.clamp, run.poses)
-    title(overview, "concave arc contacts", f"{run.clamp.name}, final state, section to scale")
+    title(
+        overview, "concave arc contacts", f"{run.clamp.name} clamp, final state; dot: contact point, arrow: its normal"
+    )
     half = 0.045 * run.clamp.up_splint.width
     for i, contact in enumerate(contacts):
         mark = _mark(contact)

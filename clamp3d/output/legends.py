@@ -49,7 +49,7 @@ def table2_figure() -> Figure:
         Rectangle(0.0, 0.0, _W, _H, grip),
         Rectangle(1.2, 0.0, _W, _H, 1.45 * grip),
     )
-    figure = Figure(figsize=(11.0, 3.0), layout="constrained")
+    figure = Figure(figsize=(11.0, 3.6), layout="constrained")
     for ax, hole in zip(figure.subplots(1, len(holes)), holes, strict=True):
         _hole_cell(ax, hole, hole_bolt(hole, _BOLT, tolerance=_TOLERANCE))
     figure.suptitle(
@@ -62,26 +62,22 @@ def table3_figure() -> Figure:
     """Table 3: a minor and a major arc against a small circle, and contact at the end point M (Fig. 6)."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11.0, 7.4), layout="constrained")
-    axes = figure.subplots(3, 5)
+    figure = Figure(figsize=(11.0, 7.6), layout="constrained")
+    axes = figure.subplots(3, 5, height_ratios=(1.0, 1.25, 1.25))
     for row, (half_angle, centres) in enumerate(_ARCS):
         for ax, (x, y) in zip(axes[row], centres, strict=True):
             _arc_cell(ax, half_angle, x, y)
-        axes[row, 0].annotate(
-            ("minor arc", "major arc")[row],
-            (-0.06, 0.5),
-            xycoords="axes fraction",
-            rotation=90,
-            va="center",
-            fontsize=10,
-        )
+            _frame(ax, (-17.6, 17.6), ((-20.5, 6.0), (-13.5, 17.0))[row])
+        side = ("minor arc", "major arc")[row]
+        axes[row, 0].annotate(side, (-0.04, 0.5), xycoords="axes fraction", rotation=90, va="center", fontsize=10)
     for ax, turn in ((axes[2, 3], 52.0), (axes[2, 4], 128.0)):
         m = (-_R * math.sin(_MINOR), -_R * math.cos(_MINOR))
         angle = math.atan2(m[1], m[0]) - math.radians(turn)  # from OM extended towards R, away from the arc
         _arc_cell(ax, _MINOR, m[0] + _r * math.cos(angle), m[1] + _r * math.sin(angle), fig_6=True)
+        _frame(ax, (m[0] - 8.5, m[0] + 11.5), (m[1] - 9.0, m[1] + 10.0))
     for ax in axes[2, :3]:
         ax.set_axis_off()
-    axes[2, 0].annotate(
+    legend = axes[2, 0].annotate(
         "Contact at the end point M (Fig. 6): RM is the tangent in M.\n"
         "Centre on the arc PR: exterior; on the arc RQ: interior.\n\n"
         "shaded: region of the arc, closed by the chord MN (dashed)\n"
@@ -93,6 +89,7 @@ def table3_figure() -> Figure:
         color=INK,
         annotation_clip=False,
     )
+    legend.set_in_layout(False)
     figure.suptitle("arc against small circle", x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
     return figure
 
@@ -122,11 +119,10 @@ def _hole_cell(ax: Axes, hole: Rectangle, contact: HoleContact) -> None:
             x, y = hole.x + side * hole.half_width * c + v * s, hole.y - side * hole.half_width * s + v * c
             if side * x < w:
                 _dot(ax, x, y, "clash")
-    _frame(ax, 14.0, 16.5)
-    ax.invert_yaxis()
+    _frame(ax, (-17.0, 17.0), (20.5, -16.5))
     ax.set_title(contact.relation.value, fontsize=9.5, color=INK)
     gaps = f"gap left {contact.gap_left + 0.0:.2f}, right {contact.gap_right + 0.0:.2f}".replace("-0.00", "0.00")
-    ax.annotate(gaps, (0.5, -0.02), xycoords="axes fraction", ha="center", va="top", fontsize=8, color=INK)
+    ax.annotate(gaps, (0.5, 0.0), xycoords="axes fraction", ha="center", va="bottom", fontsize=8, color=INK)
 
 
 def _arc_cell(ax: Axes, half_angle: float, x: float, y: float, *, fig_6: bool = False) -> None:
@@ -137,7 +133,7 @@ def _arc_cell(ax: Axes, half_angle: float, x: float, y: float, *, fig_6: bool = 
     found = arc_circle(_R, half_angle, _r, x, y, tolerance=_TOLERANCE)
     degrees = math.degrees(half_angle)
     region = Path.arc(270.0 - degrees, 270.0 + degrees)
-    ax.add_patch(PathPatch(Path(region.vertices * _R, region.codes), fc=blue, alpha=0.18, ec="none"))
+    ax.add_patch(PathPatch(Path(np.asarray(region.vertices) * _R, region.codes), fc=blue, alpha=0.18, ec="none"))
     m = np.array([-_R * math.sin(half_angle), -_R * math.cos(half_angle)])
     ax.plot([m[0], -m[0]], [m[1], m[1]], color=darker(blue), lw=0.8, ls="--")
     ax.add_patch(
@@ -145,21 +141,21 @@ def _arc_cell(ax: Axes, half_angle: float, x: float, y: float, *, fig_6: bool = 
     )
     ax.add_patch(Circle((x, y), _r, fc=yellow, ec=darker(yellow, 0.45), lw=1.0, alpha=0.8))
     ax.plot([x], [y], "+", color=INK, ms=6, mew=0.8)
-    for point, name, side in ((m, "M", -1), (m * (-1, 1), "N", 1)):
-        ax.annotate(name, point, (6 * side, 5), textcoords="offset points", ha="center", fontsize=8, color=INK)
+    for point, name, side in (((m[0], m[1]), "M", -1), ((-m[0], m[1]), "N", 1)):
+        offset = (11, -3) if fig_6 and name == "M" else (6 * side, 5)
+        ax.annotate(name, point, offset, textcoords="offset points", ha="center", fontsize=8, color=INK)
     if fig_6:
         _construction(ax, m)
     if found.relation in (ArcRelation.EXTERIOR_CONTACT, ArcRelation.INTERIOR_CONTACT, ArcRelation.INTERSECT):
         for px, py in found.points:
             _dot(ax, px, py, _VERDICT[found.relation])
-    _frame(ax, 18.0, 16.5)
     ax.set_title(found.relation.value, fontsize=9.5, color=INK)
     ax.annotate(
         f"gap {found.gap + 0.0:.2f}".replace("-0.00", "0.00"),
         (0.5, 0.0),
         xycoords="axes fraction",
         ha="center",
-        va="top",
+        va="bottom",
         fontsize=8,
         color=INK,
     )
@@ -194,8 +190,8 @@ def _dot(ax: Axes, x: float, y: float, verdict: str) -> None:
     ax.plot([x], [y], "o", ms=6, mec=INK, mew=0.7, mfc=VERDICT_COLOURS[verdict], zorder=10)
 
 
-def _frame(ax: Axes, half_width: float, half_height: float) -> None:
+def _frame(ax: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
     ax.set_aspect("equal")
     ax.set_axis_off()
-    ax.set_xlim(-half_width, half_width)
-    ax.set_ylim(-half_height, half_height)
+    ax.set_xlim(*x)
+    ax.set_ylim(*y)

@@ -51,7 +51,7 @@ def section_pose(T_world_part: Array) -> SectionPose:
 
 
 def arc_path(profile: Profile) -> MplPath:
-    """The outline as a closed path; each arc as cubic curves of at most 15 degrees, within 1e-9 radii of the arc."""
+    """The outline as a closed path; each arc as cubic curves of at most 15 degrees, within 1e-8 radii of the arc."""
     from matplotlib.path import Path
 
     vertices: list[tuple[float, float]] = [profile.edges[0].start]
