@@ -14,7 +14,7 @@ from clamp3d.assembly.result import Contact, Event, Seat, Waypoint
 from clamp3d.assembly.section import SPLINTS, WIRES, Section
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.geometry.arc_circle import classify_arc_circle
-from clamp3d.geometry.pose import SectionPose, inverse
+from clamp3d.geometry.pose import Array, SectionPose, inverse
 from clamp3d.geometry.rectangle import Rectangle, hole_bolt
 
 CONTACT = 1e-6
@@ -24,12 +24,12 @@ Poses = dict[PartName, SectionPose]
 
 
 def measure_contacts(section: Section, poses: Poses, tolerance: float) -> tuple[Contact, ...]:
-    """Every pair that the connection matrix declares, at ``poses``; equality is ``|gap| <= tolerance`` mm."""
+    """Every pair that the connection matrix declares or that touches; equality is ``|gap| <= tolerance`` mm."""
     clamp = section.clamp
+    convex = convex_gaps(clamp, poses) | {("P1", "P2"): _face_gap(section, poses)[0]}
     found = []
     for a, b in PAIRS:
-        declared = clamp.connection(a, b)
-        if declared == 0:
+        if clamp.connection(a, b) == 0 and convex.get((a, b), math.inf) > tolerance:
             continue
         if GEOMETRY.get((a, b)) == 3:
             found.append(_groove_contact(section, poses, a, b, tolerance))
@@ -40,8 +40,12 @@ def measure_contacts(section: Section, poses: Poses, tolerance: float) -> tuple[
             found.append(_seat_contact(clamp, poses, a, b, tolerance))
         elif (a, b) in _HOLES:
             found.append(_hole_contact(clamp, poses, a, b, tolerance))
+        elif (a, b) == ("P1", "P2"):
+            gap, point = _face_gap(section, poses)
+            relation = "faces meet" if gap <= tolerance else "none"
+            found.append(Contact(a, b, 2, relation, gap, point, np.array([0.0, 0.0, -1.0]), "inner face"))
         else:
-            gap = _face_gap(section, poses) if (a, b) == ("P1", "P2") else convex_gaps(clamp, poses)[a, b]
+            gap = convex[a, b]
             away = _world((poses[b].x, poses[b].y)) - _world((poses[a].x, poses[a].y))
             normal = away / max(float(np.linalg.norm(away)), 1e-300)
             point = _world((poses[b].x, poses[b].y))
@@ -143,12 +147,14 @@ def _hole_contact(clamp: Clamp, poses: Poses, a: PartName, b: PartName, toleranc
     return Contact(a, b, 2, found.relation.value, gap, _world(point), normal, "hole")
 
 
-def _face_gap(section: Section, poses: Poses) -> float:
-    """Least gap between the inner faces of the splints at world poses, mm."""
+def _face_gap(section: Section, poses: Poses) -> tuple[float, Array]:
+    """Least gap between the inner faces of the splints along the bolt in mm, and its point (3,) in the world."""
     q = np.zeros(6)
     q[4] = poses["P2"].y - poses["P1"].y
     q[5] = section.lever * poses["P2"].angle
-    return float(section.face_gaps(q).value[:2].min())
+    gaps = section.face_gaps(q)
+    k = int(np.argmin(gaps.value[:2]))
+    return float(gaps.value[k]), _world(poses["P1"].point(*gaps.point[k]))
 
 
 def _least_on_the_way(section: Section, before: Poses, after: Poses) -> dict[tuple[PartName, PartName], float]:
@@ -169,7 +175,7 @@ def _least_on_the_way(section: Section, before: Poses, after: Poses) -> dict[tup
 
     def gaps(t: float) -> dict[tuple[PartName, PartName], float]:
         poses = at(t)
-        return convex_gaps(section.clamp, poses) | {("P1", "P2"): _face_gap(section, poses)}
+        return convex_gaps(section.clamp, poses) | {("P1", "P2"): _face_gap(section, poses)[0]}
 
     ends = [gaps(0.0), gaps(1.0)]
     least = {pair: min(end[pair] for end in ends) for pair in ends[0]}
@@ -181,6 +187,6 @@ def _least_on_the_way(section: Section, before: Poses, after: Poses) -> dict[tup
     return least
 
 
-def _world(point: tuple[float, float]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _world(point: tuple[float, float]) -> Array:
     """World coordinates of a section point, in the middle of the clamp."""
     return np.array([point[0], 0.0, -point[1]])

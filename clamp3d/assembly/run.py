@@ -87,10 +87,11 @@ def assemble(
     log.stop(sequence[3], "nut tightened", poses)
     contacts = measure_contacts(section, poses, CONTACT)
     resolution = CONTACT if solver == "exact" else step
-    for contact in contacts:
-        if contact.type == 3 and contact.distance <= resolution:
-            by = sequence[3] if (contact.a, contact.b) == ("P2", "P3") else sequence[2]
-            log.events.append(Event(by, contact.a, contact.b, contact.relation, contact.point, travel))
+    drawn = {("P2", "P3"), ("P1", "P5"), ("P3", "P4")}  # closed by the nut, all else by the down splint
+    for by_nut, by in ((False, sequence[2]), (True, sequence[3])):
+        for c in contacts:
+            if c.type != 1 and c.distance <= resolution and ((c.a, c.b) in drawn) == by_nut:
+                log.events.append(Event(by, c.a, c.b, c.relation, c.point, travel))
     proof = (final.violation, final.optimality) if isinstance(final, FinalState) else (None, None)
     motion_steps = final.motion_steps if isinstance(final, SteppedState) else 0
     return Run(
@@ -170,7 +171,7 @@ def _poses(section: Section, q: Array, saddle_d: float | None = None) -> Poses:
     clamp = section.clamp
     x, y = -float(q[0]), -float(q[1])
     down = section.down_splint(q)
-    saddle_y = y + (down.y if saddle_d is None else saddle_d) - clamp.back_clearance
+    saddle_y = y + (down.y - _saddle_lift(section, q) if saddle_d is None else saddle_d - clamp.back_clearance)
     bolt_y = saddle_y + clamp.saddle.radius + clamp.saddle.apex_thickness - clamp.bolt.shank_length
     bolt_x = x + section.bolt_x
     return {
@@ -182,6 +183,20 @@ def _poses(section: Section, q: Array, saddle_d: float | None = None) -> Poses:
         "P6": SectionPose(0.0, 0.0),
         "P7": SectionPose(x + float(q[2]), y + float(q[3])),
     }
+
+
+def _saddle_lift(section: Section, q: Array) -> float:
+    """How far the saddle's arc centre stands above P2's origin when the nut has drawn it up to the round back; mm."""
+    pair = section.pairs["P3", "P2"]
+    lift = 0.0
+    for _ in range(100):
+        back = SectionPose(0.0, lift, float(q[S]) / section.lever)
+        section.queries.contact += 1
+        gap = float(section.model.pieces(pair, back.T()).distance.min())
+        if abs(gap) <= 1e-12 * section.clamp.saddle.radius:
+            break
+        lift += gap
+    return lift
 
 
 def _event(section: Section, q: Array, step: str, touch: tuple[PartName, PartName] | None, travel: float) -> Event:
