@@ -5,8 +5,6 @@ Each function returns a matplotlib figure (no pyplot, no window); `save_figure` 
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from clamp3d.assembly.result import Contact, Run, Waypoint
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.errors import InputError
+from clamp3d.output.files import whole_file
 from clamp3d.output.palette import INK
 from clamp3d.output.section import (
     Mark,
@@ -46,19 +45,8 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
     if suffix not in FORMATS:
         raise InputError(f"figure file must end in {', '.join(FORMATS)}, got {path.name!r}")
     metadata: dict[str, Any] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix, {})
-    try:
-        handle, temporary = tempfile.mkstemp(suffix=suffix, dir=path.parent)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
-    os.close(handle)
-    try:
-        with mpl.rc_context({"svg.hashsalt": "clamp3d"}):
-            figure.savefig(temporary, dpi=dpi, metadata=metadata)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    with whole_file(path) as temporary, mpl.rc_context({"svg.hashsalt": "clamp3d"}):
+        figure.savefig(temporary, dpi=dpi, metadata=metadata)
     return path
 
 

@@ -150,7 +150,7 @@ def test_files_are_whole_equal_and_named(tmp_path: Path, monkeypatch: pytest.Mon
     assert save_figure(table2_figure(), tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
     with pytest.raises(InputError, match=r"must end in \.svg, \.png, \.pdf, got 't\.gif'"):
         save_figure(table2_figure(), tmp_path / "t.gif")
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="cannot write"):
         save_figure(table2_figure(), tmp_path / "none" / "t.png")
     broken = table2_figure()
     monkeypatch.setattr(broken, "savefig", lambda *a, **k: (_ for _ in ()).throw(RuntimeError("disk")))
