@@ -33,6 +33,12 @@ _HOME: dict[str, str] = {
     "Translation": "clamp3d.geometry.motion",
     "arc_circle": "clamp3d.geometry.arc_circle",
     "classify_arc_circle": "clamp3d.geometry.arc_circle",
+    "contacts_figure": "clamp3d.output.figures",
+    "exploded_figure": "clamp3d.output.assembly_figures",
+    "groove_pieces": "clamp3d.geometry.pieces",
+    "hole_bolt": "clamp3d.geometry.rectangle",
+    "save_figure": "clamp3d.output.figures",
+    "section_figure": "clamp3d.output.figures",
     "export": "clamp3d.output.export",
     "first_contact": "clamp3d.geometry.motion",
     "groove_pieces": "clamp3d.geometry.pieces",
@@ -44,6 +50,10 @@ _HOME: dict[str, str] = {
     "signed_distance": "clamp3d.geometry.distance",
     "signed_distances": "clamp3d.geometry.distance",
     "sweep": "clamp3d.geometry.motion",
+    "states_figure": "clamp3d.output.figures",
+    "steps_figure": "clamp3d.output.assembly_figures",
+    "table2_figure": "clamp3d.output.legends",
+    "table3_figure": "clamp3d.output.legends",
 }
 
 __all__ = sorted(_HOME)
