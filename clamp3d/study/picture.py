@@ -172,7 +172,7 @@ def _contour(image: Image, name: PartName) -> Array:
 
 def _corner(contour: Array, towards: tuple[float, float]) -> Array:
     """The outline's corner furthest in a direction, as the meeting point of the two straight edges beside it."""
-    from skimage.measure import LineModelND, approximate_polygon
+    from skimage.measure import approximate_polygon
 
     polygon = approximate_polygon(contour, _STRAIGHT)[:-1]
     i = int(np.argmax(polygon @ np.array(towards)))
@@ -186,8 +186,8 @@ def _corner(contour: Array, towards: tuple[float, float]) -> Array:
         chosen = contour[(along > 4.0) & (along < 0.85 * length) & (across < 2.0 * _STRAIGHT)]
         if len(chosen) < 4:
             raise InputError("an edge beside an end point is too short in the picture; mark the end points by hand")
-        line = LineModelND.from_estimate(chosen)
-        lines.append((line.origin, line.direction))
+        middle = chosen.mean(axis=0)
+        lines.append((middle, np.linalg.svd(chosen - middle)[2][0]))  # total least squares
     (p, u), (q, v) = lines
     s, _ = np.linalg.solve(np.column_stack([u, -v]), q - p)
     corner: Array = p + s * u
