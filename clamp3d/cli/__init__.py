@@ -20,6 +20,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "reproduce": ("clamp3d.cli.reproduce", "Print Tables 1-5 of the paper beside this program's values."),
     "measure-image": ("clamp3d.cli.measure_image", "Measure a distance in a photograph by marked points."),
     "export": ("clamp3d.cli.export", "Write the parts as files for CAD review."),
+    "check": ("clamp3d.cli.check", "Check which parts of a scene clash, touch or keep their clearance."),
+    "sweep": ("clamp3d.cli.sweep", "Map how far a wire may be misplaced before a clamp no longer closes on it."),
     "conductors": ("clamp3d.cli.conductors", "List the conductor catalogue."),
 }
 

@@ -6,11 +6,12 @@ import itertools
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.errors import InputError
+from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.scene.bounds import Bounds, Verdict
 from clamp3d.scene.broad import Boxes, box_gaps, near_pairs
@@ -95,6 +96,23 @@ def check(
     work = _work(shop, scene, every, len(chosen), decided, full)
     names = None if asked is None else tuple((scene.parts[i].name, scene.parts[j].name) for i, j in asked)
     return CheckResult(scene, tuple(rows), moved, names, work)
+
+
+def check_full(scene: Scene, ladder: CheckResult, *, progress: Progress | None = None) -> CheckResult:
+    """Everything modelled at one fixed fidelity, every pair asked, compared with the ladder's result.
+
+    Raises SolverError naming the first pair whose verdict is not the same.
+    """
+    result = check(replace(scene, motions=()), pairs=ladder.asked, full=True, progress=progress)
+    seen = {(row.a, row.b): row.verdict for row in ladder.pairs}
+    for row in result.pairs:
+        verdict = seen.get((row.a, row.b), Verdict.CLEAR)
+        if verdict is not row.verdict:
+            raise SolverError(
+                f"pair {row.a}:{row.b}: the ladder says {verdict.value}, the full model {row.verdict.value} "
+                f"({row.low:.9g} to {row.high:.9g} mm)"
+            )
+    return result
 
 
 def _asked(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, int]]:
