@@ -9,7 +9,7 @@ import numpy as np
 from clamp3d.fit.features import FittedSurface
 from clamp3d.fit.fit import FitResult
 from clamp3d.geometry.pose import Array
-from clamp3d.scene.convex import Convex, Rod, hull
+from clamp3d.scene.convex import Rod, hull
 from clamp3d.scene.solid import Body, Bore
 from clamp3d.scene.trimodel import TriModel
 
@@ -19,11 +19,12 @@ def fit_error(feature: FittedSurface, round_: bool) -> float:
     return feature.fit_error if round_ else feature.error_bound
 
 
-def body_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[Body, float]:
-    """Body around the fitted mesh, and the error (mm) of the mesh itself: its largest chord error and that of the fit.
+def bodies_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[tuple[Body, ...], float]:
+    """Bodies around the fitted mesh, and the error (mm) of the mesh itself: its largest chord error and that of the fit.
 
     A groove or hole counts where no part of the mesh lies in its circle, over the whole length of the mesh; else the
-    mesh is asked. A mesh that is one cylinder with flat ends becomes one.
+    mesh is asked. Where the mesh is nothing but a round bar (a wire, a shank, a step of a turned part) it becomes a
+    cylinder with flat ends; the rest keeps its hull.
     """
     V, F = model.vertices, model.faces
     points = V.copy()
@@ -37,10 +38,6 @@ def body_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[Bo
         local[:, :2] *= (np.maximum(reach, out) / out)[:, None]
         points[own] = local @ T[:3, :3].T + T[:3, 3]
     used = [bore for feature in (*result.grooves, *result.holes) if (bore := _bore(feature, V, F)) is not None]
-    outers: tuple[Convex, ...] = (hull(points),)
-    rod = _rod(result, V, F)
-    if rod is not None:
-        outers = (rod,)
     error = max((fit_error(feature, round_) for feature in result.features), default=0.0)
     mesh_error = max((feature.error_bound for feature in result.features), default=0.0)
 
@@ -60,7 +57,11 @@ def body_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[Bo
             found = np.where(on, np.maximum(found, 0.0), found)
         return np.asarray(found)
 
-    return Body(outers, tuple(used), error=error, surface=None if rod is not None else depth), mesh_error
+    bores = tuple(used)
+    rods, rest = _rods(result, V, F)
+    made = [Body((rod,), bores, error=error) for rod in rods]
+    made += [Body((hull(points[index]),), bores, error=error, surface=depth) for index in rest]
+    return tuple(made), mesh_error
 
 
 def _bore(feature: FittedSurface, V: Array, F: Array) -> Bore | None:
@@ -92,21 +93,41 @@ def _nearest_to_axis(flat: Array) -> float:
     return 0.0 if around else float(edge)
 
 
-def _rod(result: FitResult, V: Array, F: Array) -> Rod | None:
-    """The mesh as a cylinder with flat ends, if it is nothing else but holes in it."""
-    round_ones = [f for f in result.cylinders if f.full]
-    if len(result.cylinders) != 1 or len(round_ones) != 1 or result.grooves:
-        return None
-    feature = round_ones[0]
-    T = feature.T_part_feature.copy()
+def _rods(result: FitResult, V: Array, F: Array) -> tuple[list[Rod], list[Array]]:
+    """Stretches along the first full cylinder's axis where the mesh is a round bar, and the vertices of the others."""
+    full = [f for f in result.cylinders if f.full]
+    everything = [np.unique(F)]
+    if not full:
+        return [], everything
+    T = full[0].T_part_feature
     local = (V - T[:3, 3]) @ T[:3, :3]
-    rest = np.ones(len(F), dtype=bool)
-    for f in (feature, *result.holes):
-        rest[f.faces] = False
-    low, high = float(local[:, 2].min()), float(local[:, 2].max())
-    ends = local[:, 2][F[rest]]
-    slack = feature.fit_error + 1e-9 * feature.length
-    if not ((np.abs(ends - low) <= slack).all(axis=1) | (np.abs(ends - high) <= slack).all(axis=1)).all():
-        return None
-    T[:3, 3] += 0.5 * (low + high) * T[:3, 2]
-    return Rod(feature.radius, high - low, T)
+    z, out = local[:, 2], np.hypot(local[:, 0], local[:, 1])
+    holes = np.zeros(len(V), dtype=bool)
+    for hole in result.holes:
+        holes[F[hole.faces]] = True
+    rods: list[Rod] = []
+    taken: list[tuple[float, float]] = []
+    for feature in full:
+        own = np.unique(F[feature.faces])
+        low, high = float(z[own].min()), float(z[own].max())
+        slack = feature.fit_error + 1e-9 * (high - low)
+        coaxial = np.abs(out[own] - feature.radius).max() <= 10.0 * slack
+        # Between the ends there must be nothing but this surface, and holes in it.
+        between = (z[F].min(axis=1) < high - slack) & (z[F].max(axis=1) > low + slack)
+        between[feature.faces] = False
+        if not coaxial or (between & ~holes[F].all(axis=1)).any() or any(low < b and a < high for a, b in taken):
+            continue
+        place = feature.T_part_feature.copy()
+        middle = float(((V[own] - place[:3, 3]) @ place[:3, 2]).min() + ((V[own] - place[:3, 3]) @ place[:3, 2]).max()) / 2
+        place[:3, 3] += middle * place[:3, 2]
+        rods.append(Rod(feature.radius, high - low, place))
+        taken.append((low, high))
+    rest = []
+    edges = [-math.inf, *(x for span in sorted(taken) for x in span), math.inf]
+    for low, high in zip(edges[0::2], edges[1::2], strict=True):
+        slack = 1e-6 * (1.0 + float(np.ptp(z)))
+        inside = (z[F].min(axis=1) >= low - slack) & (z[F].max(axis=1) <= high + slack)
+        index = np.unique(F[inside])
+        if len(index) and np.ptp(z[index]) > slack:  # a flat face between two stretches is the end of either
+            rest.append(index)
+    return (rods, rest) if rods else ([], everything)

@@ -1,4 +1,4 @@
-"""The ladder of fidelity for one pair: boxes, closed form, hulls, meshes; up only while the verdict is open."""
+"""The ladder of fidelity for one pair: boxes, closed forms (or hulls), facets, meshes; up only while the verdict is open."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from clamp3d.errors import SolverError
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.scene.bounds import Bounds, Thresholds, Verdict
+from clamp3d.scene.convex import Rod
+from clamp3d.scene.facets import rod_bounds
 from clamp3d.scene.model import FINEST, Ledger, Model
-from clamp3d.scene.solid import bodies_bounds
+from clamp3d.scene.solid import Body, bodies_bounds, turned
 from clamp3d.scene.trimodel import inside, tri_bounds
 
 COARSEST = 0.512
@@ -35,7 +37,7 @@ def climb(a: Model, b: Model, T: Array, start: Bounds, thresholds: Thresholds, e
     found = Answer(start, "boxes", "bounding boxes")
     if enough(start):
         return found
-    for rung in (_features, _hulls):
+    for rung in (_features, _facets):
         new = rung(a, b, T, lambda x, known=found.bounds: enough(known.meet(x)), ledger)  # type: ignore[misc]
         if new is not None:
             found = _meet(found, new)
@@ -62,7 +64,8 @@ def every_rung(a: Model, b: Model, T: Array, start: Bounds, thresholds: Threshol
     never: Enough = lambda _: False  # noqa: E731
     for new in (
         _features(a, b, T, never, ledger),
-        _hulls(a, b, T, never, ledger, always=True),
+        _hulls(a, b, T, never, ledger),
+        _facets(a, b, T, never, ledger),
         _meshes(a, b, T, FINEST, thresholds, ledger),
     ):
         if new is not None:
@@ -104,28 +107,49 @@ def _meet(old: Answer, new: Answer) -> Answer:
     return Answer(bounds, old.rung, old.method) if same else Answer(bounds, new.rung, new.method)
 
 
-def _features(a: Model, b: Model, T: Array, enough: Enough, ledger: Ledger) -> Answer | None:
-    if a.bodies is None or b.bodies is None:
-        return None
+def _features(a: Model, b: Model, T: Array, enough: Enough, ledger: Ledger) -> Answer:
+    """Closed forms of both; the convex hull of a part that has none stands in for it."""
+    closed = a.bodies is not None and b.bodies is not None
     found, method = None, ""
-    for x in a.bodies:
-        for y in b.bodies:
-            ledger.queries["features"] += 1
-            single = len(a.bodies) == len(b.bodies) == 1
+    single = len(a.forms) == len(b.forms) == 1
+    for x in a.forms:
+        for y in b.forms:
+            ledger.queries["features" if closed else "hulls"] += 1
             new, how = bodies_bounds(x, y, T, enough if single else lambda _: False)
             if found is None or new.high < found.high or (new.high == found.high and new.low < found.low):
                 method = how
             found = new if found is None else found.union(new)
     assert found is not None
-    return Answer(found, "features", method)
+    return Answer(found, "features" if closed else "hulls", method if closed else f"{method} on hulls")
 
 
-def _hulls(a: Model, b: Model, T: Array, enough: Enough, ledger: Ledger, *, always: bool = False) -> Answer | None:
-    if not always and a.bodies is not None and b.bodies is not None:
-        return None
+def _hulls(a: Model, b: Model, T: Array, enough: Enough, ledger: Ledger) -> Answer:
     ledger.queries["hulls"] += 1
     bounds, _ = bodies_bounds(a.hull_body, b.hull_body, T, enough)
     return Answer(bounds, "hulls", "convex hulls (GJK)")
+
+
+def _facets(a: Model, b: Model, T: Array, enough: Enough, ledger: Ledger) -> Answer | None:
+    """Exact cylinders of one part against the mesh of the other, where that comes as a mesh."""
+    found = None
+    for first, second, place, swapped in ((a, b, T, False), (b, a, inverse(T), True)):
+        if first.facets is None or second.bodies is None or not all(_round(body) for body in second.bodies):
+            continue
+        new = None
+        for body in second.bodies:
+            ledger.queries["facets"] += 1
+            one = rod_bounds(first.facets, body, place)
+            new = one if new is None else new.union(one)
+        assert new is not None
+        new = turned(new, place) if swapped else new
+        found = new if found is None else found.meet(new)
+        if enough(found):
+            break
+    return None if found is None else Answer(found, "facets", "cylinder on facets (FCL)")
+
+
+def _round(body: Body) -> bool:
+    return any(isinstance(piece, Rod) for piece in body.outers)
 
 
 def _meshes(a: Model, b: Model, T: Array, error: float, thresholds: Thresholds, ledger: Ledger) -> Answer:

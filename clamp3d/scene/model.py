@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.clamp.meshes import chord_error, mesh
 from clamp3d.geometry.pose import Array
 from clamp3d.scene.convex import Hull, hull
 from clamp3d.scene.drawn import bodies_of
+from clamp3d.scene.facets import Facets
 from clamp3d.scene.shapes import MeshShape, Shape, Solid
 from clamp3d.scene.solid import Body
 from clamp3d.scene.trimodel import TriModel
@@ -41,6 +43,7 @@ class Model:
         self.ledger = ledger
         self._meshes: dict[float, TriModel] = {}
         self._fit_error = 0.0
+        self._round_faces: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 
     @property
     def name(self) -> str:
@@ -69,18 +72,32 @@ class Model:
             return bodies_of(self.shape)
         if self.shape.fit != "off":
             from clamp3d.fit.fit import fit_mesh
-            from clamp3d.scene.fitted import body_of_fit
+            from clamp3d.scene.fitted import bodies_of_fit
 
             self.ledger.fits += 1
             result = fit_mesh(self.shape.mesh)
             if result.features:
-                body, self._fit_error = body_of_fit(result, self.raw, round_=self.shape.fit == "round")
-                return (body,)
+                self._round_faces = np.concatenate([feature.faces for feature in result.features])
+                made, self._fit_error = bodies_of_fit(result, self.raw, round_=self.shape.fit == "round")
+                return made
         raw = self.raw
         volume = float(raw.manifold.volume())
         if abs(float(raw.manifold.hull().volume()) - volume) <= 1e-9 * volume:
             return (Body((self._hull(self.shape.mesh.vertices),)),)
         return None
+
+    @property
+    def forms(self) -> tuple[Body, ...]:
+        """The closed form, or the hull in place of it."""
+        return self.bodies if self.bodies is not None else (self.hull_body,)
+
+    @cached_property
+    def facets(self) -> Facets | None:
+        """Facets of a mesh shape, flat and round ones apart; None for a drawn solid."""
+        if not isinstance(self.shape, MeshShape):
+            return None
+        _ = self.bodies
+        return Facets.of(self.raw, self._round_faces, self._fit_error)
 
     @cached_property
     def hull_body(self) -> Body:

@@ -92,7 +92,7 @@ def bodies_bounds(a: Body, b: Body, T: Array, enough: Callable[[Bounds], bool]) 
         for bore in first.bores:
             for rod in rods:
                 new = _attested(_bore_rod(bore, rod, place), first, second, place)
-                found, method = _better(found, method, _turned(new, back) if swapped else new, "groove kernel")
+                found, method = _better(found, method, turned(new, back) if swapped else new, "groove kernel")
                 if enough(found.widened(doubt)):
                     return found.widened(doubt), method
     for piece in a.outers:
@@ -110,7 +110,7 @@ def bodies_bounds(a: Body, b: Body, T: Array, enough: Callable[[Bounds], bool]) 
         for slot in first.slots:
             for piece in second.outers:
                 new = _attested(_slot_convex(slot, piece, place), first, second, place)
-                found, method = _better(found, method, _turned(new, back) if swapped else new, "slot")
+                found, method = _better(found, method, turned(new, back) if swapped else new, "slot")
                 if enough(found.widened(doubt)):
                     return found.widened(doubt), method
     return found.widened(doubt), method
@@ -121,10 +121,13 @@ def _better(old: Bounds, method: str, new: Bounds, name: str) -> tuple[Bounds, s
     return met, name if (met.low, met.high) != (old.low, old.high) else method
 
 
-def _turned(bounds: Bounds, T: Array) -> Bounds:
-    """Bounds found with the parts exchanged (points in the other frame), as seen from the first part."""
+def turned(bounds: Bounds, T: Array) -> Bounds:
+    """Bounds of the second part against the first, which ``T`` (4, 4) places in the second's frame, the other way round.
+
+    Their points are in the second's frame before and in the first's after.
+    """
     if bounds.point_a is None or bounds.point_b is None:
-        return bounds
+        return Bounds(bounds.low, bounds.high)
     R, t = inverse(T)[:3, :3], inverse(T)[:3, 3]
     return Bounds(bounds.low, bounds.high, R @ bounds.point_b + t, R @ bounds.point_a + t)
 
