@@ -232,7 +232,8 @@ def _gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Bounds:
         trials = [at + s * reach * n / size for s in (0.0, -0.5, 0.5, -0.25, 0.25)]
         new = _deepest(a, Ta, b, Tb, trials, low, MEMBER * (1.0 + float(np.abs(at).max())))
         found = found.meet(Bounds(new.low, new.high, new.point_a, new.point_b, m))
-    return found.meet(_touching(a, Ta, b, Tb))
+    shallow = found.high > -1e-3 or found.low > -1e-3
+    return found.meet(_touching(a, Ta, b, Tb)) if shallow else found
 
 
 def _touching(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Bounds:

@@ -74,6 +74,14 @@ def rod_bounds(facets: Facets, body: Body, T: Array) -> Bounds:
     return Bounds(bounds.low, high, p, p).widened(body.error)
 
 
+def axis_gap(facets: Facets, rod: Rod, T: Array) -> float:
+    """Lower bound (mm) of the gap between the mesh and a rod at ``T`` (4, 4); minus infinity if its axis is inside."""
+    distance, low, _, _ = _to_axis(facets, rod, T)
+    if distance <= 1e-9 or facets.whole.contains(T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
+        return -np.inf
+    return low - rod.radius - _WIDTH - 1e-12 * (facets.whole.scale + rod.length + float(np.abs(T[:3, 3]).max()))
+
+
 def _axis_inside(facets: Facets, body: Body, T: Array, distance: float) -> Bounds:
     """The axis passes through the material or lies in it: points of the body on a grid say how deep at least."""
     rod = next(piece for piece in body.outers if isinstance(piece, Rod))

@@ -46,16 +46,19 @@ def bodies_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[
         in_feature[feature.faces] = True
 
     def depth(x: Array) -> Array:
-        signed, face = model.depth(x), model.nearest(x)[1]
-        flat = (np.abs(signed) <= 1e-9 * model.scale) & ~in_feature[face]
-        found = np.where(flat, 0.0, signed - mesh_error)
+        away, face = model.nearest(x)
+        on = (away <= 1e-9 * model.scale) & ~in_feature[face]
         for feature in result.features:  # a point on the fitted surface is on the part, within the error of the fit
             local = (x - feature.T_part_feature[:3, 3]) @ feature.T_part_feature[:3, :3]
-            on = np.abs(np.hypot(local[:, 0], local[:, 1]) - feature.radius) <= 1e-9 * model.scale
-            on &= np.abs(local[:, 2]) <= 0.5 * feature.length + 1e-9 * model.scale
-            on &= np.abs(np.arctan2(local[:, 0], -local[:, 1])) <= feature.half_angle + 1e-9
-            found = np.where(on, np.maximum(found, 0.0), found)
-        return np.asarray(found)
+            touch = np.abs(np.hypot(local[:, 0], local[:, 1]) - feature.radius) <= 1e-9 * model.scale
+            touch &= np.abs(local[:, 2]) <= 0.5 * feature.length + 1e-9 * model.scale
+            on |= touch & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) <= feature.half_angle + 1e-9)
+        found = np.where(on, 0.0, -mesh_error - away)
+        # Nearer to the facets than their own error a point proves nothing; further in it does.
+        for k in np.flatnonzero(~on & (away > mesh_error)):
+            if model.contains(x[k]):
+                found[k] = away[k] - mesh_error
+        return found
 
     bores = tuple(used)
     rods, rest = _rods(result, V, F)

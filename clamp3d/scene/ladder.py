@@ -48,7 +48,7 @@ def climb(a: Model, b: Model, T: Array, start: Bounds, thresholds: Thresholds, e
         new = _meshes(a, b, T, error, thresholds, ledger)
         found = _meet(found, new)
         doubt = a.mesh(error).error + b.mesh(error).error
-        if enough(found.bounds) or error <= FINEST or doubt <= 1e-9:
+        if enough(found.bounds) or error <= FINEST or doubt <= 1e-9 or not (a.refines or b.refines):
             return found
         # The middle of the bounds guesses how far the nearest threshold is: go there, not step by step.
         middle = 0.5 * (found.bounds.low + found.bounds.high)

@@ -110,6 +110,11 @@ class Model:
         return hull(points)
 
     @property
+    def refines(self) -> bool:
+        """Whether a smaller chord error gives a better mesh: true of drawn solids with arcs."""
+        return isinstance(self.shape, Solid) and any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes))
+
+    @property
     def raw(self) -> TriModel:
         """The facets of a mesh shape as they are."""
         assert isinstance(self.shape, MeshShape)
@@ -127,7 +132,7 @@ class Model:
                 raw.error = self._fit_error
             return raw
         # Outlines without arcs are exact at any chord error: one mesh serves all.
-        key = error if any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes)) else 0.0
+        key = error if self.refines else 0.0
         if key not in self._meshes:
             start = time.perf_counter()
             made = mesh(self.shape, error)

@@ -84,11 +84,16 @@ class Motion:
         M[:3, 3] = self.point - M[:3, :3] @ self.point + t * self.travel
         return M
 
-    def speed(self, points: Array) -> float:
-        """Bound (mm per unit of t) of the speed of points (k, 3), given in the world at the start."""
+    def distance_from_axis(self, points: Array) -> float:
+        """Largest distance (mm) of points (k, 3) from the axis."""
         out = points - self.point
         out = out - np.outer(out @ self.axis, self.axis)
-        return float(np.linalg.norm(self.travel) + abs(self.angle) * np.linalg.norm(out, axis=1).max())
+        return float(np.linalg.norm(out, axis=1).max())
+
+    def speed(self, points: Array) -> float:
+        """Bound (mm per unit of t) of the speed of points (k, 3), given in the world at the start."""
+        turning = abs(self.angle) * self.distance_from_axis(points) if self.angle else 0.0
+        return float(np.linalg.norm(self.travel)) + turning
 
 
 def _names(parts: str | tuple[str, ...]) -> tuple[str, ...]:

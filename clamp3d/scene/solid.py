@@ -91,7 +91,7 @@ def bodies_bounds(a: Body, b: Body, T: Array, enough: Callable[[Bounds], bool]) 
         rods = [piece for piece in second.outers if isinstance(piece, Rod)]
         for bore in first.bores:
             for rod in rods:
-                new = _attested(_bore_rod(bore, rod, place), first, second, place)
+                new = _attested(bore_rod(bore, rod, place), first, second, place)
                 found, method = _better(found, method, turned(new, back) if swapped else new, "groove kernel")
                 if enough(found.widened(doubt)):
                     return found.widened(doubt), method
@@ -99,7 +99,8 @@ def bodies_bounds(a: Body, b: Body, T: Array, enough: Callable[[Bounds], bool]) 
         for other in b.outers:
             raw = convex_bounds(piece, here, other, T)
             new = _attested(raw, a, b, T)
-            if new.high == math.inf and raw.normal is not None:
+            dear = a.surface is not None or b.surface is not None
+            if new.high == math.inf and raw.normal is not None and (raw.low > -0.01 or not dear):
                 new = _face_to_face(raw, piece, other, a, b, T)
             closed = isinstance(piece, Rod) and isinstance(other, Rod) and new.high - new.low < 1e-9
             found, method = _better(found, method, new, "cylinders" if closed else "convex (GJK)")
@@ -132,7 +133,7 @@ def turned(bounds: Bounds, T: Array) -> Bounds:
     return Bounds(bounds.low, bounds.high, R @ bounds.point_b + t, R @ bounds.point_a + t)
 
 
-def _bore_rod(bore: Bore, rod: Rod, T: Array) -> Bounds:
+def bore_rod(bore: Bore, rod: Rod, T: Array) -> Bounds:
     """The kernel's answer for a bore of the first body and a rod of the second, placed by ``T``."""
     answers = [
         (signed_distance(groove, Cylinder(rod.radius, rod.length), inverse(place) @ T @ rod.T), place)
@@ -172,14 +173,13 @@ def _attested(bounds: Bounds, a: Body, b: Body, T: Array) -> Bounds:
     # The two may be slid along a cylinder together: where the contact is a line, its named point may not be on the body.
     shifts = np.vstack([np.zeros((1, 3)), *(_along(piece, None) for piece in a.outers), *(_along(w, T) for w in b.outers)])
     if bounds.high >= 0.0:
-        for s in (shifts[:1], shifts[1:]):
-            in_a = a.depth(p + s)
-            in_b = b.depth((q + s - T[:3, 3]) @ T[:3, :3])
-            good = np.flatnonzero((in_a >= -slack) & (in_b >= -slack))
-            if len(good):
-                k = int(good[0])
+        for s in (shifts[:1], *np.array_split(shifts[1:], max(1, len(shifts) // 8))):
+            k = _first_on_both(a, b, T, p + s, q + s, slack)
+            if k is not None:
                 return Bounds(bounds.low, bounds.high + 2.0 * slack, p + s[k], q + s[k])
         return Bounds(bounds.low)
+    if a.surface is not None or b.surface is not None:
+        shifts = shifts[:1]
     trials = np.vstack([x + shifts for x in (p, q, 0.5 * (p + q))])
     in_a, in_b = a.depth(trials), b.depth((trials - T[:3, 3]) @ T[:3, :3])
     both = np.where(np.minimum(in_a, in_b) >= -slack, np.maximum(in_a, in_b), -np.inf)
@@ -187,6 +187,17 @@ def _attested(bounds: Bounds, a: Body, b: Body, T: Array) -> Bounds:
     if both[k] == -np.inf:
         return Bounds(bounds.low)
     return Bounds(bounds.low, min(0.0, slack - float(both[k])), trials[k], trials[k])
+
+
+def _first_on_both(a: Body, b: Body, T: Array, p: Array, q: Array, slack: float) -> int | None:
+    """First row of which ``p`` (k, 3) lies on a and ``q`` (k, 3) on b, both in a's frame; the cheap body goes first."""
+    index = np.arange(len(p))
+    tests = [(a, p), (b, (q - T[:3, 3]) @ T[:3, :3])]
+    for body, points in sorted(tests, key=lambda test: test[0].surface is not None):
+        if not len(index):
+            return None
+        index = index[body.depth(points[index]) >= -slack]
+    return int(index[0]) if len(index) else None
 
 
 def _face_to_face(bounds: Bounds, piece: Convex, other: Convex, a: Body, b: Body, T: Array) -> Bounds:

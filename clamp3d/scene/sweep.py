@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,10 +21,14 @@ from clamp3d.scene.model import Ledger, Model
 from clamp3d.scene.motion import Motion
 from clamp3d.scene.result import PairResult
 from clamp3d.scene.scene import Scene
+from clamp3d.scene.swept import swept_low
+from clamp3d.scene.trimodel import TriModel, clearance_of_shells
 
 ACCURACY = 1e-4
 """A least distance on a way is found to within this (mm), or to what the models give."""
-_STEPS = 5000
+_STEPS = 2000
+SHELL_ERROR = 0.064
+"""Chord error (mm) of the meshes that a stretch of a motion is bounded with where closed forms say too little."""
 
 
 def check_motions(
@@ -33,8 +40,8 @@ def check_motions(
 ) -> tuple[PairResult, ...]:
     """Least distance of each moving part from each other part that it comes near, motion by motion.
 
-    Each motion starts where the one before has left the parts. Between two instants no distance changes faster than
-    the moving part's fastest point, so what lies between is bounded too: no thin part is stepped over.
+    Each motion starts where the one before has left the parts. What lies between two instants is bounded too, by the
+    speed of the part's fastest point and by swept shapes: no thin part is stepped over.
     """
     poses = [part.T_world.copy() for part in scene.parts]
     rows: list[PairResult] = []
@@ -84,90 +91,145 @@ def _near(
     return found
 
 
+class _Way:
+    """One moving part ``i`` against one standing part ``j``: bounds at an instant, and over a stretch around it."""
+
+    def __init__(
+        self, scene: Scene, models: list[Model], poses: list[Array], motion: Motion, i: int, j: int, ledger: Ledger
+    ) -> None:
+        self.a, self.b = models[i], models[j]
+        self.motion, self.start, self.back = motion, poses[i], inverse(poses[j])
+        self.thresholds, self.ledger = scene.thresholds, ledger
+        moving, standing = _corners(self.a, poses[i]), _corners(self.b, poses[j])
+        self.speed = motion.speed(moving)
+        self.reach = max(motion.distance_from_axis(moving), motion.distance_from_axis(standing))
+
+    def pose(self, t: float) -> Array:
+        """The standing part in the moving part's frame."""
+        return inverse(self.back @ self.motion.at(t) @ self.start)
+
+    def ask(self, t: float, enough: Callable[[Bounds], bool]) -> Answer:
+        """Bounds at the instant ``t``."""
+        T = self.pose(t)
+        pair = Boxes.of(np.array([self.a.bounds, self.b.bounds]), np.array([np.eye(4), T]))
+        start = Bounds(float(box_gaps(pair, np.array([[0, 1]]))[0]))
+        return climb(self.a, self.b, T, start, self.thresholds, enough, self.ledger)
+
+    def low(self, t: float, half: float, here: float, wanted: float) -> float:
+        """Lower bound from t - half to t + half, ``here`` being that at t; no better than ``wanted``."""
+        plain = here - self.speed * half
+        if plain >= wanted:
+            return plain
+        self.ledger.queries["swept"] += 1
+        stretch = (self.pose(t - half), self.pose(t), self.pose(t + half))
+        angle = self.motion.angle * half
+        swept = max(plain, swept_low(self.a, self.b, *stretch, angle=angle, reach=self.reach))
+        if swept >= min(wanted, here) - ACCURACY or len(self.shells) < 2:
+            return swept
+        return max(swept, self._by_shells(half, stretch[1]))
+
+    def _by_shells(self, half: float, T: Array) -> float:
+        """Lower bound by meshes: what is near the axis of a rotation hardly moves."""
+        self.ledger.queries["swept meshes"] += 1
+        mine, other = self.a.mesh(SHELL_ERROR), self.b.mesh(SHELL_ERROR)
+        shells = tuple((tree, half * speed) for tree, speed in self.shells)
+        if not shells:
+            return -np.inf
+        low = clearance_of_shells(shells, other, inverse(T), mine.heads)
+        outer = any(mine.contains(x) for x in other.heads @ T[:3, :3].T + T[:3, 3])
+        return -np.inf if outer else low - mine.error - other.error
+
+    @cached_property
+    def shells(self) -> tuple[tuple[Any, float], ...]:
+        """The moving mesh's triangles by their distance from the motion's axis: (tree, speed mm per unit of t)."""
+        mesh = self.a.mesh(SHELL_ERROR)
+        world = mesh.vertices @ self.start[:3, :3].T + self.start[:3, 3] - self.motion.point
+        out = np.linalg.norm(world - np.outer(world @ self.motion.axis, self.motion.axis), axis=1)[mesh.faces].max(axis=1)
+        straight = float(np.linalg.norm(self.motion.travel))
+        if not self.motion.angle:
+            return ((mesh.bvh, straight),)
+        ring = np.ceil(4.0 * np.log2(np.maximum(out / max(float(out.min()), 1e-3), 1.0))).astype(int)
+        return tuple(
+            (
+                TriModel(mesh.vertices, mesh.faces[ring == k], 0.0).bvh,
+                straight + abs(self.motion.angle) * float(out[ring == k].max()),
+            )
+            for k in np.unique(ring)
+        )
+
+
 def _least(
     scene: Scene, models: list[Model], poses: list[Array], motion: Motion, i: int, j: int, ledger: Ledger
 ) -> PairResult:
-    """Branch and bound over t: an interval is done when speed cannot bring it below the best distance found."""
+    """Branch and bound over t: a stretch is done when nothing in it can come below the best distance found."""
     a, b = scene.parts[i].name, scene.parts[j].name
     thresholds, allowance = scene.thresholds, scene.allowance(a, b)
-    speed = motion.speed(_corners(models[i], poses[i]))
-    back = inverse(poses[j])
-    best = Answer(Bounds(), "boxes", "bounding boxes")
-    at, contact_at = 0.0, None
-    floor = np.inf  # least lower bound of what has been given up
+    way = _Way(scene, models, poses, motion, i, j, ledger)
+    best, at = Answer(Bounds(), "boxes", "bounding boxes"), 0.0
 
-    def ask(t: float, half: float) -> tuple[Answer, float]:
+    def clash(bounds: Bounds) -> bool:
+        return verdict_of(bounds, thresholds, allowance) is Verdict.CLASH
+
+    def look(t: float, half: float, above: float) -> tuple[float, float]:
         nonlocal best, at
-        T = inverse(back @ motion.at(t) @ poses[i])
-        slack = speed * half
 
         def enough(bounds: Bounds) -> bool:
-            above = bounds.low - slack >= min(best.bounds.high, thresholds.reach + slack) - ACCURACY
-            return above or bounds.high - bounds.low <= ACCURACY or verdict_of(bounds, thresholds, allowance) is Verdict.CLASH
+            sharp = bounds.high - bounds.low <= max(ACCURACY, 0.02 * abs(bounds.low))
+            return sharp or bounds.low - way.speed * half >= best.bounds.high - ACCURACY or clash(bounds)
 
-        pair = Boxes.of(np.array([models[i].bounds, models[j].bounds]), np.array([np.eye(4), T]))
-        start = Bounds(float(box_gaps(pair, np.array([[0, 1]]))[0]))
-        answer = climb(models[i], models[j], T, start, thresholds, enough, ledger)
+        answer = way.ask(t, enough)
         if answer.bounds.high < best.bounds.high:
             best, at = answer, t
-        return answer, answer.bounds.low - slack
+        low = way.low(t, half, answer.bounds.low, best.bounds.high - ACCURACY) if half else answer.bounds.low
+        return max(low, above), answer.bounds.low
 
     heap: list[tuple[float, float, float, float]] = []
     for t, half in ((0.0, 0.0), (1.0, 0.0), (0.5, 0.5)):
-        answer, low = ask(t, half)
-        heapq.heappush(heap, (low, t, half, answer.bounds.low))
+        heapq.heappush(heap, (*look(t, half, -np.inf), t, half))
+    floor = np.inf  # of stretches that were given up
     for _ in range(_STEPS):
-        low, t, half, here = heap[0]
+        low, here, t, half = heap[0]
+        width = best.bounds.high - min(floor, low)
+        limit = max(2.0 * ACCURACY, 0.02 * abs(best.bounds.high), 2.0 * (best.bounds.high - best.bounds.low))
         verdict = verdict_of(Bounds(min(floor, low), best.bounds.high), thresholds, allowance)
-        if verdict_of(best.bounds, thresholds, allowance) is Verdict.CLASH:
-            break
-        if min(floor, low) >= best.bounds.high - 2.0 * ACCURACY or (
-            verdict is Verdict.CLEAR and low > thresholds.reach and best.bounds.high < np.inf and best.bounds.high - low < 0.05 * low
-        ):
+        if clash(best.bounds) or (width <= limit and verdict is not Verdict.UNCERTAIN) or width <= 2.0 * ACCURACY:
             break
         heapq.heappop(heap)
-        if here <= low + ACCURACY:  # the model has no more to say at this instant
+        if half * way.speed <= 0.5 * ACCURACY or here <= low + ACCURACY:  # the models have no more to say
             floor = min(floor, low)
-            if not heap:
-                break
-            continue
-        for s in (t - 0.5 * half, t + 0.5 * half):
-            answer, new = ask(s, 0.5 * half)
-            heapq.heappush(heap, (max(new, low), s, 0.5 * half, answer.bounds.low))
+        else:
+            for s in (t - 0.5 * half, t + 0.5 * half):
+                heapq.heappush(heap, (*look(s, 0.5 * half, low), s, 0.5 * half))
+        if not heap:
+            break
     low = min([floor, *(item[0] for item in heap)])
     bounds = Bounds(min(low, best.bounds.high), best.bounds.high, best.bounds.point_a, best.bounds.point_b)
     verdict = verdict_of(bounds, thresholds, allowance)
-    if bounds.high <= thresholds.contact:
-        contact_at = _first(scene, models, poses, motion, i, j, ledger, at)
+    contact_at = _first(way, at) if bounds.high <= thresholds.contact else None
     row = as_row(a, b, verdict, Answer(bounds, best.rung, best.method), motion.at(at) @ poses[i])
     return replace(row, motion=motion.name, t=at, contact_at=contact_at)
 
 
-def _first(
-    scene: Scene, models: list[Model], poses: list[Array], motion: Motion, i: int, j: int, ledger: Ledger, known: float
-) -> float:
-    """First instant at which the distance is contact, by steps that the speed makes safe; at most ``known``."""
-    speed = max(motion.speed(_corners(models[i], poses[i])), 1e-12)
-    contact = scene.thresholds.contact
-    back, t = inverse(poses[j]), 0.0
-    for _ in range(200):
-        T = inverse(back @ motion.at(t) @ poses[i])
-        answer = climb(
-            models[i],
-            models[j],
-            T,
-            Bounds(),
-            scene.thresholds,
-            lambda b: b.low > 2.0 * contact or b.high <= contact or b.high - b.low <= ACCURACY,
-            ledger,
-        )
-        gap = answer.bounds.low - contact
-        if gap <= ACCURACY:
-            return t
-        t += gap / speed
-        if t >= known:
-            return known
-    return t
+def _first(way: _Way, known: float) -> float:
+    """First instant of contact, at most ``known``: the leftmost stretch that can be neither cleared nor cut further."""
+    contact = way.thresholds.contact
+
+    def enough(bounds: Bounds) -> bool:
+        return bounds.low > 2.0 * contact or bounds.high <= contact or bounds.high - bounds.low <= ACCURACY
+
+    todo = [(0.0, known)]
+    for _ in range(_STEPS):
+        if not todo:
+            break
+        start, stop = todo.pop()
+        middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
+        if half * way.speed <= ACCURACY:
+            return start
+        here = way.ask(middle, enough).bounds.low
+        if way.low(middle, half, here, contact) > contact:
+            continue
+        todo += [(middle, stop), (start, middle)]
+    return known
 
 
 @dataclass(frozen=True, slots=True, eq=False)

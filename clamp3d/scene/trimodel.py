@@ -69,14 +69,22 @@ class TriModel:
         used = np.unique(self.faces)
         return np.asarray(self.vertices[used[np.unique(label[used], return_index=True)[1]]])
 
+    @cached_property
+    def corners(self) -> tuple[Array, Array, Array]:
+        """Corners of all triangles, three times (m, 3)."""
+        return tuple(np.ascontiguousarray(self.vertices[self.faces[:, k]]) for k in range(3))  # type: ignore[return-value]
+
     def winding(self, point: Array) -> float:
         """Winding number of the surface about a point (3,): 1 inside, 0 outside (Van Oosterom and Strackee 1983)."""
-        a, b, c = (self.vertices[self.faces[:, k]] - point for k in range(3))
-        la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
-        triple = np.einsum("ij,ij->i", a, np.cross(b, c))
-        dots = [np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a))]
-        below = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
-        return float(np.arctan2(triple, below).sum() / (2.0 * np.pi))
+        a, b, c = (x - point for x in self.corners)
+        la, lb, lc = (np.sqrt(np.einsum("ij,ij->i", x, x)) for x in (a, b, c))
+        triple = (
+            a[:, 0] * (b[:, 1] * c[:, 2] - b[:, 2] * c[:, 1])
+            + a[:, 1] * (b[:, 2] * c[:, 0] - b[:, 0] * c[:, 2])
+            + a[:, 2] * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
+        )
+        ab, bc, ca = (np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a)))
+        return float(np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2.0 * np.pi))
 
     def contains(self, point: Array) -> bool:
         """Whether a point (3,) that is not on the surface lies inside."""
@@ -135,6 +143,24 @@ def tri_bounds(a: TriModel, b: TriModel, T: Array, *, contact: float) -> Bounds:
     return Bounds(d, d, p, q).widened(doubt + rounding)
 
 
+def clearance_of_shells(shells: tuple[tuple[Any, float], ...], still: TriModel, T: Array, heads: Array) -> float:
+    """Gap (mm) that is left of a moving mesh's distance after each shell's travel: (tree, travel mm) at ``T`` (4, 4).
+
+    ``heads`` (k, 3), one vertex of each connected shell in the moving frame, tell a mesh inside the other.
+    """
+    import fcl
+
+    fixed, place = fcl.CollisionObject(still.bvh, fcl.Transform()), fcl.Transform(T[:3, :3], T[:3, 3])
+    low = np.inf
+    for tree, travel in shells:
+        d = float(fcl.distance(fixed, fcl.CollisionObject(tree, place), fcl.DistanceRequest(), fcl.DistanceResult()))
+        if d <= 0.0:
+            return -np.inf
+        low = min(low, d - travel)
+    inside_ = any(still.contains(x) for x in heads @ T[:3, :3].T + T[:3, 3])
+    return -np.inf if inside_ else float(low)
+
+
 def inside(inner: TriModel, outer: TriModel, T: Array, slack: float) -> bool:
     """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer`` or within ``slack`` mm of it."""
     outside = inner.manifold.transform(np.ascontiguousarray(T[:3])) - outer.manifold
@@ -155,6 +181,10 @@ def _overlap(a: TriModel, b: TriModel, T: Array, contact: float, rounding: float
     low, high = 0.0, 0.0
     for model, place in ((a, np.eye(4)), (b, back)):
         points = V @ place[:3, :3].T + place[:3, 3]
+        some = points[:: max(1, len(points) // 60)]
+        high = min(high, -float(model.distance(some).max()))
+        if high < -2.0 * contact - a.error - b.error:
+            return Bounds(-np.inf, high)
         deepest, limit = _deepest(model, points[F], contact, rounding)
         low, high = min(low, -limit), min(high, -deepest)
         if high < -2.0 * contact - a.error - b.error:
