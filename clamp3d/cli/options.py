@@ -41,6 +41,62 @@ def method_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
+def solver_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """``--solver --step --tilt-step-deg``."""
+    for option in (
+        click.option("--tilt-step-deg", type=float, metavar="A", help="Turn of the stepped solver.  [default: 1]"),
+        click.option(
+            "--step", type=float, metavar="MM", help="Move along the bolt of the stepped solver.  [default: 1/3]"
+        ),
+        click.option(
+            "--solver", type=click.Choice(["exact", "stepped"]), help="[default: exact; stepped if a step is given]"
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def solver_settings(solver: str | None, step: float | None, tilt_step_deg: float | None) -> dict[str, Any]:
+    """Arguments of `assemble` that the options mean. Raises click.UsageError for options that do not go together."""
+    if solver == "exact" and (step is not None or tilt_step_deg is not None):
+        raise click.UsageError("--step and --tilt-step-deg go with --solver stepped, not exact")
+    stepped = solver == "stepped" or step is not None or tilt_step_deg is not None
+    settings: dict[str, Any] = {"solver": "stepped" if stepped else "exact"}
+    if step is not None:
+        settings["step"] = step
+    if tilt_step_deg is not None:
+        settings["tilt_step"] = math.radians(tilt_step_deg)
+    return settings
+
+
+def viewer_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """``--html --url --host --port --timeout --open --mesh-error --clearance``: what `show` needs."""
+    for option in (
+        CLEARANCE_OPTION,
+        MESH_ERROR_OPTION,
+        click.option("--open", "open_browser", is_flag=True, help="Open the page in a browser."),
+        click.option(
+            "--timeout", type=click.FloatRange(min=0.0), metavar="S", help="Stop serving after S seconds (0: at once)."
+        ),
+        click.option(
+            "--port", type=click.IntRange(0, 65535), help="Port to serve on.  [default: first free from 7000]"
+        ),
+        click.option("--host", default="127.0.0.1", show_default=True, help="Address to serve on; 0.0.0.0 for all."),
+        click.option("--url", metavar="ZMQ_URL", help="Use a running meshcat server: the zmq_url that it printed."),
+        click.option("--html", "html_file", type=FILE, metavar="FILE", help="Write one page with the whole animation."),
+    ):
+        function = option(function)
+    return function
+
+
+MESH_ERROR_OPTION = click.option(
+    "--mesh-error", type=float, default=0.01, show_default=True, metavar="MM", help="Chord error of drawn meshes."
+)
+CLEARANCE_OPTION = click.option(
+    "--clearance", type=float, default=5.0, show_default=True, metavar="MM", help="Gap from which parts count as clear."
+)
+
+
 def contact_model(method: str, clamp: Clamp, unit_angle_deg: float | None) -> ContactModel:
     """The contact model that the options name. Raises click.UsageError for options that do not go together."""
     if unit_angle_deg is not None and method not in ("chords",):

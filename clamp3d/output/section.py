@@ -102,7 +102,7 @@ def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
     """Names of the parts: a column of balloons on the right, each with a line to its part; wires carry theirs."""
     label_wires(ax, poses)
     points = {name: poses[name].point(*part_anchor(clamp, name)) for name in PARTS if name in poses}
-    (left, edge), (low, high) = _extent(clamp, poses)
+    (left, edge), (low, high) = section_extent(clamp, poses)
     column = edge + 0.19 * (edge - left)
     order = sorted(points, key=lambda name: points[name][1])
     heights = _spread([points[name][1] for name in order], min((high - low) / len(order), 0.1 * (high - low)))
@@ -301,7 +301,7 @@ def _pale(colour: str) -> str:
     return "#" + "".join(f"{round(255 - 0.4 * (255 - int(colour[i : i + 2], 16))):02X}" for i in (1, 3, 5))
 
 
-def _extent(clamp: Clamp, poses: Poses) -> tuple[tuple[float, float], tuple[float, float]]:
+def section_extent(clamp: Clamp, poses: Poses) -> tuple[tuple[float, float], tuple[float, float]]:
     """Least and largest x, and y, of the parts at their poses (from their bounding boxes)."""
     xs, ys = [], []
     for name, part in parts(clamp).items():

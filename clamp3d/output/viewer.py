@@ -1,6 +1,7 @@
 """The viewer: a run streamed to meshcat while it goes on, and kept as one page.
 
->>> from clamp3d import Viewer, assemble, load_clamp
+>>> from clamp3d.assembly.run import assemble
+>>> from clamp3d.clamp.loader import load_clamp
 >>> from clamp3d.contact.cas import Cas
 >>> clamp, model = load_clamp(), Cas()
 >>> with Viewer(clamp, model) as viewer:  # open viewer.url in a browser, if you like

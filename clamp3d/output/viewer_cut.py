@@ -25,8 +25,8 @@ def cut_open(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, trimesh.Trimesh]:
     import trimesh
 
     raw = manifold3d.Mesh64(
-        vert_properties=np.ascontiguousarray(mesh.vertices, dtype=np.float64),
-        tri_verts=np.ascontiguousarray(mesh.faces, dtype=np.uint64),
+        vert_properties=np.array(mesh.vertices, dtype=np.float64),
+        tri_verts=np.array(mesh.faces, dtype=np.uint64),
     )
     half = manifold3d.Manifold(raw).trim_by_plane((0.0, 1.0, 0.0), 0.0).to_mesh64()
     vertices = np.asarray(half.vert_properties)[:, :3]

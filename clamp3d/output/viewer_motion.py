@@ -60,7 +60,7 @@ class Timeline:
     def poses(self, number: int) -> dict[str, Array]:
         """Pose (4, 4) in mm of every moving path of the scene at a waypoint."""
         stop = self.stops[number]
-        out = {}
+        out: dict[str, Array] = {}
         for part, pose in stop.waypoint.poses.items():
             T = pose.T() @ rotation((0.0, 0.0, 1.0), stop.turn) if part == "P5" else pose.T()
             out |= dict.fromkeys(self.followers[part], T)

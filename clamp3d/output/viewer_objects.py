@@ -10,6 +10,7 @@ import base64
 import io
 import math
 import uuid
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ Object = dict[str, Any]
 _CREASE = math.radians(25.0)
 """Faces that meet at less are shaded as one round surface; sharper edges are drawn as lines."""
 _FLOAT32, _UINT32 = 0x17, 0x16  # msgpack extension types of the viewer's typed arrays
-_FRONT = 10  # render order of what is drawn over the solids
+_FRONT = 10  # render order of lines that are drawn over the solids; labels come after them
 
 
 def solid(mesh: trimesh.Trimesh, colour: str, *, opacity: float = 1.0) -> Object:
@@ -61,7 +62,7 @@ def segments(points: ArrayLike, colour: str, *, on_top: bool = False) -> Object:
     material: Object = {"type": "LineBasicMaterial", "color": _number(colour), "depthTest": not on_top}
     if on_top:
         material["transparent"] = True  # three.js draws what is transparent after the solids
-    return _object("LineSegments", _geometry(position=points), material, on_top=on_top)
+    return _object("LineSegments", _geometry(position=points), material, order=_FRONT if on_top else 0)
 
 
 def dot(radius: float, colour: str) -> Object:
@@ -81,10 +82,17 @@ def arrow(start: Array, direction: Array, length: float, colour: str) -> Object:
     shaft = trimesh.creation.cylinder(radius, segment=[[0.0, 0.0, 0.0], [0.0, 0.0, length - head]], sections=16)
     tip = trimesh.creation.cone(3.0 * radius, head, sections=24)
     tip.apply_translation([0.0, 0.0, length - head])
-    both = trimesh.util.concatenate([shaft, tip])
-    both.apply_transform(trimesh.geometry.align_vectors([0.0, 0.0, 1.0], direction))
-    both.apply_translation(start)
-    return facets(both.vertices, both.faces, colour)
+    both = joined([shaft, tip])
+    return facets(both.vertices @ _upright(direction).T + start, both.faces, colour)
+
+
+def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """Several meshes as one, their vertices apart."""
+    import trimesh
+
+    first = np.cumsum([0, *(len(m.vertices) for m in meshes)])
+    faces = np.vstack([m.faces + k for m, k in zip(meshes, first[:-1], strict=True)])
+    return trimesh.Trimesh(np.vstack([m.vertices for m in meshes]), faces, process=False)
 
 
 def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str = INK) -> Object:
@@ -103,11 +111,19 @@ def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str 
     height = 100.0 * 0.014 * size
     matrix = np.diag([height * aspect, height, 1.0, 1.0])
     matrix[:3, 3] = at
-    out = _object("Sprite", None, material, on_top=True)
+    out = _object("Sprite", None, material, order=_FRONT + 1)
     out["object"]["matrix"] = matrix.T.ravel().tolist()
     out["images"] = [{"uuid": image, "url": "data:image/png;base64," + base64.b64encode(png).decode("ascii")}]
     out["textures"] = [{"uuid": texture, "image": image, "wrap": [1001, 1001], "repeat": [1, 1]}]
     return out
+
+
+def _upright(direction: Array) -> Array:
+    """A rotation (3, 3) that takes Z to the unit ``direction``."""
+    side = np.eye(3)[int(np.argmin(np.abs(direction)))]
+    x = np.cross(side, direction)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(direction, x), direction])
 
 
 @lru_cache(maxsize=256)
@@ -116,7 +132,7 @@ def _text_image(text: str, colour: str, ink: str) -> tuple[bytes, float]:
     from PIL import Image, ImageDraw, ImageFont
 
     font = ImageFont.load_default(36.0)
-    left, top, right, bottom = font.getbbox("Xg" + text)
+    _, top, _, bottom = font.getbbox("Xg" + text)
     height = int(bottom - top) + 20
     width = max(height, int(font.getlength(text)) + 36)
     picture = Image.new("RGBA", (width, height), (0, 0, 0, 0))
@@ -159,13 +175,13 @@ def _phong(colour: str, opacity: float) -> Object:
     }
 
 
-def _object(kind: str, geometry: Object | None, material: Object, *, on_top: bool = False) -> Object:
+def _object(kind: str, geometry: Object | None, material: Object, *, order: int = 0) -> Object:
     material["uuid"] = _name()
     body: Object = {"uuid": _name(), "type": kind, "material": material["uuid"]}
     if geometry is not None:
         body["geometry"] = geometry["uuid"]
-    if on_top:
-        body["renderOrder"] = _FRONT
+    if order:
+        body["renderOrder"] = order
     return {
         "metadata": {"version": 4.5, "type": "Object"},
         "geometries": [] if geometry is None else [geometry],

@@ -32,7 +32,9 @@ def _page(*, title: str, meshcat: str, messages: list[str]) -> str:
     import jinja2
 
     folder = resources.files("clamp3d.output").joinpath("templates")
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
     template = environment.from_string(folder.joinpath("viewer.html").read_text(encoding="utf-8"))
     return template.render(
         title=title,

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from clamp3d.assembly.contacts import CONTACT, measure_contacts
+from clamp3d.assembly.contacts import CONTACT, measure_pairs
 from clamp3d.assembly.result import Contact, Run, Waypoint
 from clamp3d.assembly.section import Section
 from clamp3d.assembly.verdict import CLEARANCE, verdict
@@ -20,10 +20,10 @@ from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.meshes import mesh
 from clamp3d.clamp.parts import parts
 from clamp3d.contact.model import ContactModel
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, SectionPose
 from clamp3d.output import viewer_objects as draw
 from clamp3d.output.palette import INK, PART_COLOURS, VERDICT_COLOURS, darker
-from clamp3d.output.section import edge_openings, part_anchor
+from clamp3d.output.section import edge_openings, part_anchor, section_extent
 from clamp3d.output.viewer_cut import cut_open, groove_surface
 from clamp3d.output.viewer_log import Command, Send
 from clamp3d.output.viewer_motion import Timeline
@@ -69,6 +69,7 @@ class AssemblyScene:
         self.clamp = clamp
         self.mesh_error = mesh_error
         self.clearance = clearance
+        self._bodies = parts(clamp)
         self._section = Section(clamp, model)
         self._send = send
         self._overlays = dict(overlays or {})
@@ -83,9 +84,12 @@ class AssemblyScene:
 
     def show(self, waypoint: Waypoint) -> None:
         """Move the parts to ``waypoint`` and show what touches there and how far the rest is apart."""
-        contacts = measure_contacts(self._section, waypoint.poses, CONTACT)
+        pairs = measure_pairs(self._section, waypoint.poses, CONTACT)
+        contacts = [c for c in pairs if self.clamp.connection(c.a, c.b) or c.distance <= CONTACT]
         verdicts = {f"{c.a}-{c.b}": self._verdict(c) for c in contacts}
-        number = self._timeline.add(waypoint, self._rows(contacts), verdicts)
+        if not self._timeline.stops:
+            self._frame([waypoint.poses])
+        number = self._timeline.add(waypoint, self._rows(contacts, waypoint), verdicts)
         for path, T in self._timeline.poses(number).items():
             self._transform(path, T)
         for group in ("contacts", "gaps"):
@@ -100,6 +104,7 @@ class AssemblyScene:
         """Rewind to the first waypoint and play the whole run once."""
         if not self._timeline.stops:
             return
+        self._frame([stop.waypoint.poses for stop in self._timeline.stops])
         # The state at rest is the animation's first, so that it does not matter which of the two a page reads first.
         for path, T in self._timeline.poses(0).items():
             self._transform(path, T)
@@ -111,30 +116,33 @@ class AssemblyScene:
         self._send(self._timeline.animation(ROOT, self._made))
 
     def _stage(self) -> None:
-        """Light background, no grid, and the camera in front of the clamp, a little from above and from the right."""
-        clamp = self.clamp
+        """Light background, softer light, no grid."""
         self._send({"type": "delete", "path": ROOT})
         for key, colour in (("top_color", [0.93, 0.95, 0.97]), ("bottom_color", [1.0, 1.0, 1.0])):
             self._property("/Background", key, colour)
         self._visible("/Grid", False)
         self._visible("/Axes", False)
-        height = clamp.bolt.shank_length + clamp.bolt.head_height
-        # Room for the clamp as it comes in from the right, and for the wire beyond it.
-        reach = 0.5 * max(1.25 * height, 1.35 * clamp.up_splint.width) * _UNIT
-        distance = reach / math.tan(math.radians(_FIELD_OF_VIEW / 2)) * 1.25
-        eye = distance * np.array([0.22, 0.26, 1.0]) / np.linalg.norm([0.22, 0.26, 1.0])
+        for light, intensity in (("AmbientLight", 0.5), ("FillLight", 0.25)):
+            self._property(f"/Lights/{light}/<object>", "intensity", intensity)
+
+    def _frame(self, states: Sequence[Mapping[PartName, SectionPose]]) -> None:
+        """The camera in front of all ``states``, a little from above and from the right."""
+        boxes = [section_extent(self.clamp, poses) for poses in states]
+        (left, right), (top, bottom) = ((min(b[i][0] for b in boxes), max(b[i][1] for b in boxes)) for i in (0, 1))
+        # The height counts: a window is wide, and what waits beside the clamp may stand at its edge.
+        reach = 0.5 * max(bottom - top, (right - left) / 1.6) * _UNIT
+        distance = 1.18 * reach / math.tan(math.radians(_FIELD_OF_VIEW / 2)) + 0.5 * self.clamp.up_splint.length * _UNIT
+        eye = distance * np.array([0.2, 0.24, 1.0]) / np.linalg.norm([0.2, 0.24, 1.0])
         camera = "/Cameras/default/rotated/<object>"  # its axes: right, up, towards the viewer
         self._property(camera, "fov", _FIELD_OF_VIEW)
         self._property(camera, "zoom", 1.0)
         self._property(camera, "position", eye.tolist())
-        middle = np.array([1.35 * clamp.up_splint.line_groove.offset, 0.0, -clamp.nut.height])
+        middle = np.array([0.5 * (left + right), 0.0, -0.5 * (top + bottom) - 0.05 * (bottom - top)])
         T = np.diag([_UNIT, _UNIT, _UNIT, 1.0])
         T[:3, 3] = -_UNIT * middle
         self._transform(ROOT, T)
-        self._object(
-            f"{ROOT}/caption",
-            draw.label(self._accuracy(), "#FFFFFF", middle + [0.0, 0.0, -0.62 * height], size=0.8),
-        )
+        below = np.array([middle[0], 0.0, -bottom - 0.04 * (bottom - top)])
+        self._object(f"{ROOT}/caption", draw.label(self._accuracy(), "#FFFFFF", below, size=0.8))
 
     def _accuracy(self) -> str:
         model = self._section.model
@@ -143,12 +151,16 @@ class AssemblyScene:
     def _followers(self, part: PartName) -> list[str]:
         """The nodes of the scene that move with a part."""
         trees = [f"{ROOT}/{tree}/{part} {TITLES[part]}" for tree in _TREES]
-        return [*trees, f"{ROOT}/labels/{part}", *(f"{ROOT}/overlay {o}/{part}" for o, p in self._overlays.items() if part in p)]
+        return [
+            *trees,
+            f"{ROOT}/labels/{part}",
+            *(f"{ROOT}/overlay {o}/{part}" for o, p in self._overlays.items() if part in p),
+        ]
 
     def _send_parts(self) -> None:
         clamp, error = self.clamp, self.mesh_error
         self._visible(f"{ROOT}/whole", False)
-        for name, part in parts(clamp).items():
+        for name, part in self._bodies.items():
             colour, edge = PART_COLOURS[name], darker(PART_COLOURS[name], 0.4)
             whole = mesh(part, error)
             path = f"{ROOT}/whole/{name} {TITLES[name]}"
@@ -164,7 +176,7 @@ class AssemblyScene:
                 self._object(f"{path}/cut", draw.facets(cap.vertices, cap.faces, colour, lit=False))
                 self._object(f"{path}/edges", draw.edges(half, edge))
             u, v = part_anchor(clamp, name)
-            self._object(f"{ROOT}/labels/{name}", draw.label(name, colour, (u, 0.0, -v)))
+            self._object(f"{ROOT}/labels/{name}", draw.label(name, colour, (u, 0.0, -v), size=0.85))
 
     def _send_overlay(self, name: str, overlay: Overlay) -> None:
         import trimesh
@@ -176,7 +188,7 @@ class AssemblyScene:
             for i, colour in enumerate(_OVERLAY_COLOURS):  # neighbours differ; a part may have hundreds of pieces
                 some = meshes[i :: len(_OVERLAY_COLOURS)]
                 if some:
-                    joined = trimesh.util.concatenate(some)
+                    joined = draw.joined(some)
                     solid = draw.facets(joined.vertices, joined.faces, colour, opacity=0.35)
                     self._object(f"{path}/{part}/pieces {i + 1}", solid)
                     self._object(f"{path}/{part}/edges {i + 1}", draw.edges(joined, darker(colour, 0.6)))
@@ -198,11 +210,10 @@ class AssemblyScene:
 
     def _send_gaps(self, path: str, contacts: Sequence[Contact], waypoint: Waypoint) -> None:
         self._visible(path, True)
-        reach = 0.5 * self.clamp.up_splint.width
         for c in contacts:
             if c.relation == "none" and c.feature == "box":  # its normal is not that of the nearest points
                 continue
-            if c.distance > reach or abs(c.distance) <= CONTACT:
+            if abs(c.distance) <= CONTACT or self._beside(c, waypoint):
                 continue
             self._gap(f"{path}/{c.a}-{c.b}", c.point, c.point + c.distance * c.normal, c.distance, self._verdict(c))
         opening = edge_openings(self.clamp, waypoint.poses)[0]
@@ -211,10 +222,23 @@ class AssemblyScene:
         self._gap(f"{path}/splints", top, top - [0.0, 0.0, opening], opening, None)
 
     def _gap(self, path: str, a: Array, b: Array, value: float, found: str | None) -> None:
-        colour = INK if found is None else VERDICT_COLOURS[found]
-        self._object(f"{path}/line", draw.segments(np.array([a, b]), colour, on_top=True))
+        """A line from ``a`` to ``b`` and its value beside it, so that the value does not hide a small gap."""
+        colour = INK if found is None else darker(VERDICT_COLOURS[found], 0.7)
+        width, middle = self.clamp.up_splint.width, 0.5 * (a + b)
+        upright = abs(b[2] - a[2]) >= abs(b[0] - a[0])
+        beside = middle + ([-0.15 * width, 0.0, 0.0] if upright else [-0.15 * width, 0.0, 0.1 * width])
+        self._object(f"{path}/line", draw.segments(np.array([a, b, middle, beside]), colour, on_top=True))
         text = f"{'splints ' if found is None else ''}{value:.3f} mm"
-        self._object(f"{path}/value", draw.label(text, "#FFFFFF", 0.5 * (a + b), size=0.75))
+        self._object(f"{path}/value", draw.label(text, "#FFFFFF", beside, size=0.7))
+
+    def _beside(self, c: Contact, waypoint: Waypoint) -> bool:
+        """Whether the nearest point lies beside its part: a groove's faces are measured as if they had no end."""
+        if c.type != 3:
+            return False
+        T = waypoint.poses[c.a].T()
+        x = float((T[:3, 0] * (c.point - T[:3, 3])).sum())
+        low, high = self._bodies[c.a].bounds[:, 0]
+        return not low - CONTACT <= x <= high + CONTACT
 
     def _colour_grooves(self, verdicts: Mapping[str, str]) -> None:
         for (a, b), pair in self._section.pairs.items():
@@ -235,18 +259,21 @@ class AssemblyScene:
     def _verdict(self, c: Contact) -> str:
         return verdict(c.distance, contact=CONTACT, clearance=self.clearance)
 
-    def _rows(self, contacts: Sequence[Contact]) -> list[dict[str, str]]:
+    def _rows(self, contacts: Sequence[Contact], waypoint: Waypoint) -> list[dict[str, str]]:
         """The contacts of a waypoint for the page's list, the arc contacts first."""
-        order = sorted(contacts, key=lambda c: (c.type != 3, c.a, c.b))
-        return [
-            {
-                "pair": f"{c.a}\N{EN DASH}{c.b}",
-                "what": c.relation if c.relation != "none" else f"nearest: {c.feature}",
-                "gap": "" if c.type == 1 else f"{c.distance + 0.0 if abs(c.distance) > CONTACT else 0.0:.3f}",
-                "verdict": self._verdict(c),
-            }
-            for c in order
-        ]
+        rows = []
+        for c in sorted(contacts, key=lambda c: (c.type != 3, c.a, c.b)):
+            gap = 0.0 if abs(c.distance) <= CONTACT else c.distance
+            beside = self._beside(c, waypoint)
+            rows.append(
+                {
+                    "pair": f"{c.a}\N{EN DASH}{c.b}",
+                    "what": "beside the groove" if beside else c.relation if c.relation != "none" else c.feature,
+                    "gap": "" if c.type == 1 else f"{'over ' if beside else ''}{gap:.3f} mm",
+                    "verdict": self._verdict(c),
+                }
+            )
+        return rows
 
     def _tell(self, status: str, run: Run | None = None) -> None:
         """What the page beside the picture shows; meshcat's own page takes no notice of it."""
@@ -267,7 +294,7 @@ class AssemblyScene:
                     {"name": name, "colour": VERDICT_COLOURS[name], "meaning": meaning}
                     for name, meaning in (
                         ("clash", "parts overlap"),
-                        ("contact", f"parts touch (within {CONTACT:g} mm)"),
+                        ("contact", "parts touch"),
                         ("clearance", f"gap up to {self.clearance:g} mm"),
                         ("clear", f"gap over {self.clearance:g} mm"),
                     )
@@ -296,7 +323,7 @@ def run_facts(run: Run) -> list[str]:
     """The run in a few short lines."""
     return [
         f"method {run.method}, {run.solver}",
-        f"distance between the splints {run.distance:.3f} mm",
+        f"distance between splints {run.distance:.3f} mm",
         f"tilt of the down splint {abs(math.degrees(run.tilt)):.2f}\N{DEGREE SIGN}",
         f"nut turned {run.turns:.2f} times from open",
     ]

@@ -99,7 +99,9 @@ class LocalServer:
             return server, sockets[0].getsockname()[1]
         if port is None:
             raise InputError(f"no free port for the viewer on {host} from {PORT} to {PORT + _PORTS - 1}: {failed}")
-        raise InputError(f"cannot serve the viewer on {host} port {port}: {failed}; leave --port out to take a free one")
+        raise InputError(
+            f"cannot serve the viewer on {host} port {port}: {failed}; leave --port out to take a free one"
+        )
 
     def _application(self) -> tornado.web.Application:
         import tornado.web

@@ -8,7 +8,7 @@ function clamp3dViewer(messages) {
   let data = null;
   let stop = -1;
 
-  // The scene is built from plain node names, so that nothing is created by asking for it.
+  // Unlike scene_tree.find, this makes no node that is not there.
   const node = (path) => path.split("/").filter((x) => x).reduce((n, name) => n && n.children[name], viewer.scene_tree);
   const show = (path, on) => {
     const n = node(path);
@@ -25,8 +25,9 @@ function clamp3dViewer(messages) {
     const text = document.createElement("label");
     text.append(box, " " + label);
     $("switches").append(text);
-    switches[name] = { apply: () => set(box.checked) };
-    box.addEventListener("change", switches[name].apply);
+    const own = { touched: false, apply: () => set(box.checked) };
+    switches[name] = own;
+    box.addEventListener("change", () => { own.touched = true; own.apply(); });
   }
   addSwitch("cutaway", "cutaway", true, (on) => { show("/clamp3d/cutaway", on); show("/clamp3d/whole", !on); });
   addSwitch("labels", "labels", true, (on) => show("/clamp3d/labels", on));
@@ -65,7 +66,7 @@ function clamp3dViewer(messages) {
     stop = -1;
     if (!data.done && data.stops.length) rows(data.stops[data.stops.length - 1]);
     // The panel says it already; the caption is for meshcat's own page.
-    show("/clamp3d/caption", false);
+    viewer.scene_tree.find(["clamp3d", "caption"]).set_property("visible", false);
   }
 
   function mark(s, i) {
@@ -82,7 +83,7 @@ function clamp3dViewer(messages) {
     const colour = Object.fromEntries(data.verdicts.map((v) => [v.name, v.colour]));
     $("rows").tBodies[0].replaceChildren(...s.rows.map((r) => {
       const tr = document.createElement("tr");
-      for (const [text, name] of [["\u00a0", "chip"], [r.pair, ""], [r.what, ""], [r.gap ? r.gap + " mm" : "", "gap"]]) {
+      for (const [text, name] of [["\u00a0", "chip"], [r.pair, ""], [r.what, ""], [r.gap, "gap"]]) {
         const td = document.createElement("td");
         if (name === "chip") {
           const chip = document.createElement("span");
@@ -108,7 +109,8 @@ function clamp3dViewer(messages) {
     refresh();
   }
   function go(i) {
-    seek(data.stops[Math.max(0, Math.min(data.stops.length - 1, i))].arrive);
+    // A moment later: three.js keeps key times as 32-bit floats, so the exact time may count as before.
+    seek(data.stops[Math.max(0, Math.min(data.stops.length - 1, i))].arrive + 0.005);
   }
   function current(t) {
     let i = 0;
@@ -132,9 +134,11 @@ function clamp3dViewer(messages) {
     const next = data.stops[i + 1];
     $("time").max = end();
     if (document.activeElement !== $("time") || animator.playing) $("time").value = t;
-    $("play").textContent = animator.playing ? "\u23f8" : "\u25b6";
+    $("play").firstElementChild.firstElementChild.setAttribute("d", animator.playing ? "M3 2h4v12H3zM9 2h4v12H9z" : "M3 1l11 7-11 7z");
     const moving = next && t > s.leave + 1e-6;
-    $("label").textContent = moving ? next.step + " moves: to \u201c" + next.label + "\u201d" : (i + 1) + "/" + data.stops.length + "  " + s.step + ": " + s.label;
+    const at = moving ? next : s;
+    $("label").textContent = (data.stops.indexOf(at) + 1) + "/" + data.stops.length + "  " + (moving ? "on the way: " : "") + at.label;
+    $("step").textContent = "step " + at.step;
     if (i !== stop) {
       stop = i;
       rows(s);
@@ -160,7 +164,7 @@ function clamp3dViewer(messages) {
     if (command.type === "set_property" && command.property === "userData" && command.path === "/clamp3d") tell(command.value);
     else if (command.type === "set_property" && command.property === "visible") {
       // A switch that the user has set outlasts what the program sends.
-      for (const s of Object.values(switches)) s.touched && s.apply();
+      for (const s of Object.values(switches)) if (s.touched) s.apply();
     }
   };
 
