@@ -14,6 +14,7 @@ from clamp3d.assembly.result import Run, Waypoint
 from clamp3d.assembly.run import assemble
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.contact.model import ContactModel
+from clamp3d.errors import InputError
 from clamp3d.output.viewer import Viewer
 
 
@@ -39,6 +40,8 @@ def run_and_view(
     ``serve`` starts a server, unless ``url`` names one. Raises click.UsageError for options that do not go together.
     """
     serve = serve and url is None
+    if html_file is not None and not html_file.absolute().parent.is_dir():
+        raise InputError(f"cannot write {html_file}: there is no folder {html_file.parent}")
     if open_browser and not serve and url is None:
         raise click.UsageError("--open goes with a page that is served, not with --html alone")
     if url is not None and (port is not None or timeout is not None):

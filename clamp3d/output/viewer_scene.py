@@ -66,6 +66,7 @@ class AssemblyScene:
         clearance: float = CLEARANCE,
         overlays: Mapping[str, Overlay] | None = None,
     ) -> None:
+        verdict(0.0, contact=CONTACT, clearance=clearance)  # a bad clearance is told now, not during the run
         self.clamp = clamp
         self.mesh_error = mesh_error
         self.clearance = clearance

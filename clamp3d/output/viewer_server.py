@@ -24,6 +24,7 @@ PORT = 7000
 """First port tried, meshcat's own; the next free one is taken unless the user named it."""
 _PORTS = 200
 _PATIENCE = 10.0  # s for a server that is said to be running
+_FAREWELL = 0.5  # s for the pages when we close
 
 
 def viewer_files() -> Path:
@@ -149,8 +150,10 @@ class LocalServer:
             self._server.stop()
             for client in list(self._clients):
                 client.close()
-            self._loop.run_until_complete(self._server.close_all_connections())
-            self._loop.run_until_complete(asyncio.sleep(0))
+            # A page answers the closing of its socket, or not: it gets a moment, and then its connection is dropped.
+            closing = asyncio.wait_for(self._server.close_all_connections(), _FAREWELL)
+            with contextlib.suppress(asyncio.TimeoutError):
+                self._loop.run_until_complete(closing)
             pending = asyncio.all_tasks(self._loop)
             for task in pending:
                 task.cancel()
