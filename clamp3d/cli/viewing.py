@@ -67,8 +67,8 @@ def run_and_view(
             click.echo(os.fspath(html_file))
         done(run)
         if serve:
-            if timeout is None and not quiet:
-                click.echo("serving the page until Ctrl-C ...", err=True)
             with contextlib.suppress(KeyboardInterrupt):  # the usual way to end; what was found decides the exit code
+                if timeout is None and not quiet:
+                    click.echo("serving the page until Ctrl-C ...", err=True)
                 viewer.wait(timeout)
     return run

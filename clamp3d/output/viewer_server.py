@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import importlib.util
 import threading
+import weakref
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,6 +45,7 @@ class LocalServer:
     def __init__(self, *, host: str = "127.0.0.1", port: int | None = None) -> None:
         self._log = CommandLog()
         self._clients: set[Any] = set()
+        self._streams: weakref.WeakSet[Any] = weakref.WeakSet()
         self._loop = asyncio.new_event_loop()
         try:
             self._server, self.port = self._listen(host, port)
@@ -80,9 +82,20 @@ class LocalServer:
         for client in list(self._clients):
             client.push(message)
 
+    async def _all_gone(self) -> None:
+        while self._clients:
+            await asyncio.sleep(0.01)
+
     def _listen(self, host: str, port: int | None) -> tuple[Any, int]:
         import tornado.httpserver
         import tornado.netutil
+
+        streams = self._streams
+
+        class Server(tornado.httpserver.HTTPServer):
+            def handle_stream(self, stream: Any, address: tuple[Any, ...]) -> None:
+                streams.add(stream)
+                super().handle_stream(stream, address)
 
         ports = range(PORT, PORT + _PORTS) if port is None else (port,)
         for candidate in ports:
@@ -93,7 +106,7 @@ class LocalServer:
                 continue
             asyncio.set_event_loop(self._loop)
             try:
-                server = tornado.httpserver.HTTPServer(self._application())
+                server = Server(self._application())
                 server.add_sockets(sockets)
             finally:
                 asyncio.set_event_loop(None)
@@ -151,9 +164,11 @@ class LocalServer:
             for client in list(self._clients):
                 client.close()
             # A page answers the closing of its socket, or not: it gets a moment, and then its connection is dropped.
-            closing = asyncio.wait_for(self._server.close_all_connections(), _FAREWELL)
             with contextlib.suppress(asyncio.TimeoutError):
-                self._loop.run_until_complete(closing)
+                self._loop.run_until_complete(asyncio.wait_for(self._all_gone(), _FAREWELL))
+            for stream in self._streams:
+                stream.close()
+            self._loop.run_until_complete(asyncio.sleep(0))
             pending = asyncio.all_tasks(self._loop)
             for task in pending:
                 task.cancel()
