@@ -134,11 +134,8 @@ def _hole_contact(clamp: Clamp, poses: Poses, a: PartName, b: PartName, toleranc
     centre = poses[a].point(middle, 0.5 * (top + bottom))
     hole = Rectangle(*centre, half_width, 0.5 * (bottom - top), poses[a].angle)
     found = hole_bolt(hole, bolt, tolerance=tolerance)
-    side = -1.0 if found.gap_left <= found.gap_right else 1.0
-    point = found.points[0] if found.points else hole.point(side * half_width, 0.0)
-    normal = np.array([-side * math.cos(hole.angle), 0.0, -side * math.sin(hole.angle)])
-    gap = min(found.gap_left, found.gap_right)
-    return Contact(a, b, 2, found.relation.value, gap, _world(point), normal, "hole")
+    gap, (nx, ny) = min(found.gap_left, found.gap_right), found.normal
+    return Contact(a, b, 2, found.relation.value, gap, _world(found.point), np.array([nx, 0.0, -ny]), "hole")
 
 
 def _face_gap(section: Section, poses: Poses) -> tuple[float, Array]:

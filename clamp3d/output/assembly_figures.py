@@ -14,7 +14,7 @@ from clamp3d.clamp.parts import parts
 from clamp3d.geometry.pose import Array, SectionPose
 from clamp3d.output.figures import near, same_scale, title
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
-from clamp3d.output.section import Poses, balloon, draw_section, part_anchor
+from clamp3d.output.section import Poses, balloon, draw_section, part_anchor, spread
 from clamp3d.output.view3d import Camera, Solid, draw_solids
 
 if TYPE_CHECKING:
@@ -39,20 +39,25 @@ def exploded_figure(clamp: Clamp) -> Figure:
     draw_solids(ax, [Solid(solids[n], poses[n].T(), PART_COLOURS[n]) for n in PARTS], camera)
     x0, x1 = ax.get_xlim()
     width = x1 - x0
+    points = {}
     for name in PARTS:
         T = poses[name].T()
         u, y, v = _outer_point(clamp, name)
-        px, py, _ = camera.project((T[:3, :3] @ (u, y, -v) + T[:3, 3])[None])[0]
+        points[name] = camera.project((T[:3, :3] @ (u, y, -v) + T[:3, 3])[None])[0, :2]
+    order = sorted((name for name in PARTS if name != "P6"), key=lambda name: float(points[name][1]))
+    heights = dict(zip(order, spread([float(points[n][1]) for n in order], 0.085 * width), strict=True))
+    for name, (px, py) in points.items():
+        level = heights[name] if name in heights else float(py)
         text = TITLES[name] + {"P6": f"\n{clamp.line.label}", "P7": f"\n{clamp.jumper.label}"}.get(name, "")
         left = name == "P6"  # its near end is the leftmost of all
         column = x0 - 0.09 * width if left else x1 + 0.07 * width
-        ax.plot([px, column], [py, py], color=INK, lw=0.6, zorder=5)
+        ax.plot([px, column], [py, level], color=INK, lw=0.6, zorder=5)
         ax.plot([px], [py], ".", color=INK, ms=4, zorder=5)
-        balloon(ax, name, column, py, size=9.0)
+        balloon(ax, name, column, level, size=9.0)
         if left:
-            ax.annotate(text, (column, py), (0, -14), textcoords="offset points", ha="center", va="top", fontsize=9)
+            ax.annotate(text, (column, level), (0, -14), textcoords="offset points", ha="center", va="top", fontsize=9)
         else:
-            ax.annotate(text, (column, py), (14, 0), textcoords="offset points", va="center", fontsize=9)
+            ax.annotate(text, (column, level), (14, 0), textcoords="offset points", va="center", fontsize=9)
     ax.set_xlim(x0 - 0.18 * width, x1 + 0.32 * width)
     title(ax, "exploded view", f"{clamp.name} clamp: seven parts")
     return figure

@@ -5,8 +5,6 @@ Each function returns a matplotlib figure (no pyplot, no window); `save_figure` 
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from clamp3d.assembly.result import Contact, Run, Waypoint
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.errors import InputError
+from clamp3d.output.files import whole_file
 from clamp3d.output.palette import INK
 from clamp3d.output.section import (
     Mark,
@@ -46,19 +45,8 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
     if suffix not in FORMATS:
         raise InputError(f"figure file must end in {', '.join(FORMATS)}, got {path.name!r}")
     metadata: dict[str, Any] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix, {})
-    try:
-        handle, temporary = tempfile.mkstemp(suffix=suffix, dir=path.parent)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
-    os.close(handle)
-    try:
-        with mpl.rc_context({"svg.hashsalt": "clamp3d"}):
-            figure.savefig(temporary, dpi=dpi, metadata=metadata)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    with whole_file(path) as temporary, mpl.rc_context({"svg.hashsalt": "clamp3d"}):
+        figure.savefig(temporary, dpi=dpi, metadata=metadata)
     return path
 
 
@@ -110,32 +98,45 @@ def contacts_figure(run: Run) -> Figure:
     title(
         overview, "concave arc contacts", f"{run.clamp.name} clamp, final state; dot: contact point, arrow: its normal"
     )
-    half = 0.045 * run.clamp.up_splint.width
     for i, contact in enumerate(contacts):
         mark = _mark(contact)
         draw_marks(overview, [mark], size=5.0)
-        nx, ny = float(contact.normal[0]), -float(contact.normal[2])
-        x, y = mark.x + 0.09 * run.clamp.up_splint.width * _sideways(i), mark.y
-        _number(overview, i + 1, x, y, (mark.x, mark.y))
-        ax = figure.add_subplot(grid[i // 2, 1 + i % 2])
-        draw_section(ax, run.clamp, run.poses, only=(contact.a, contact.b), holes=False, line_width=1.6)
-        draw_marks(ax, [mark], size=7.0)
-        tip = {"arrowstyle": "-|>,head_width=0.2,head_length=0.5", "color": INK, "lw": 1.2, "shrinkA": 3, "shrinkB": 0}
-        ax.annotate(
-            "", (mark.x + 0.6 * half * nx, mark.y + 0.6 * half * ny), (mark.x, mark.y), arrowprops=tip, zorder=42
-        )
-        ax.set_axis_on()
-        ax.set_xticks([])
-        ax.set_yticks([])
-        ax.set_xlim(mark.x - 1.5 * half, mark.x + 1.5 * half)
-        ax.set_ylim(mark.y + half, mark.y - half)
-        ax.set_title(
-            f"{i + 1}  {contact.a} and {contact.b}: {contact.relation}\ngap {_zero(contact.distance):.6f} mm",
-            fontsize=8,
-            loc="left",
-            color=INK,
-        )
+        side = 1 if i % 2 else -1
+        _number(overview, i + 1, mark, mark.x + side * 0.09 * run.clamp.up_splint.width)
+        _enlarge(figure.add_subplot(grid[i // 2, 1 + i % 2]), run, contact, f"{i + 1}  ")
     return figure
+
+
+def contact_figure(run: Run, contact: Contact) -> Figure:
+    """One contact of ``run``: where it is in the section, dimensioned, and enlarged with relation, gap and normal."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
+    overview, close = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
+    draw_section(overview, run.clamp, run.poses)
+    label_wires(overview, run.poses)
+    draw_dimensions(overview, run.clamp, run.poses)
+    draw_marks(overview, [_mark(contact)])
+    _enlarge(close, run, contact)
+    return figure
+
+
+def _enlarge(ax: Axes, run: Run, contact: Contact, number: str = "") -> None:
+    """The two parts about their contact point; grooves in the section beside the bolt, where they are whole."""
+    half = 0.045 * run.clamp.up_splint.width
+    mark = _mark(contact)
+    draw_section(ax, run.clamp, run.poses, only=(contact.a, contact.b), holes=contact.type != 3, line_width=1.6)
+    draw_marks(ax, [mark], size=7.0)
+    tip = {"arrowstyle": "-|>,head_width=0.2,head_length=0.5", "color": INK, "lw": 1.2, "shrinkA": 3, "shrinkB": 0}
+    end = mark.x + 0.6 * half * float(contact.normal[0]), mark.y - 0.6 * half * float(contact.normal[2])
+    ax.annotate("", end, (mark.x, mark.y), arrowprops=tip, zorder=42)
+    ax.set_axis_on()
+    ax.set_xticks([])
+    ax.set_yticks([])
+    ax.set_xlim(mark.x - 1.5 * half, mark.x + 1.5 * half)
+    ax.set_ylim(mark.y + half, mark.y - half)
+    heading = f"{number}{contact.a} and {contact.b}: {contact.relation}\ngap {_zero(contact.distance):.6f} mm"
+    ax.set_title(heading, fontsize=8, loc="left", color=INK)
 
 
 def title(ax: Axes, text: str, below: str = "") -> None:
@@ -172,14 +173,10 @@ def _mark(contact: Contact) -> Mark:
     return Mark(float(contact.point[0]), -float(contact.point[2]), "", verdict)
 
 
-def _sideways(i: int) -> int:
-    return 1 if i % 2 else -1
-
-
-def _number(ax: Axes, number: int, x: float, y: float, to: tuple[float, float]) -> None:
-    ax.plot([to[0], x], [to[1], y], color=INK, lw=0.8, zorder=45)
+def _number(ax: Axes, number: int, mark: Mark, x: float) -> None:
+    ax.plot([mark.x, x], [mark.y, mark.y], color=INK, lw=0.8, zorder=45)
     box = {"boxstyle": "circle,pad=0.25", "fc": "white", "ec": INK, "lw": 1.0}
-    ax.annotate(str(number), (x, y), ha="center", va="center", fontsize=9, fontweight="bold", zorder=46, bbox=box)
+    ax.annotate(str(number), (x, mark.y), ha="center", va="center", fontsize=9, fontweight="bold", zorder=46, bbox=box)
 
 
 def _zero(value: float) -> float:

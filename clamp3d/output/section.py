@@ -103,9 +103,9 @@ def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
     label_wires(ax, poses)
     points = {name: poses[name].point(*part_anchor(clamp, name)) for name in PARTS if name in poses}
     (left, edge), (low, high) = section_extent(clamp, poses)
-    column = edge + 0.19 * (edge - left)
+    column = edge + 0.27 * (edge - left)
     order = sorted(points, key=lambda name: points[name][1])
-    heights = _spread([points[name][1] for name in order], min((high - low) / len(order), 0.1 * (high - low)))
+    heights = spread([points[name][1] for name in order], min((high - low) / len(order), 0.1 * (high - low)))
     bodies, wires = parts(clamp), {"P6": clamp.line, "P7": clamp.jumper}
     for name, y in zip(order, heights, strict=True):
         title = bodies[name].title
@@ -229,13 +229,14 @@ def part_anchor(clamp: Clamp, name: PartName) -> tuple[float, float]:
 def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
     down = clamp.down_splint
     degrees = math.degrees(pose.angle)
-    corner = pose.point(-down.width / 2, down.underside_depth)
+    inward = 1.0 if pose.angle >= 0.0 else -1.0  # the lower corner is on the left if the tilt is positive
+    corner = pose.point(-inward * down.width / 2, down.underside_depth)
     style: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
-    reach = 0.19 * down.width
+    reach = inward * 0.19 * down.width
     if abs(degrees) < 5e-3:
         ax.annotate("parallel", corner, (0, -11), textcoords="offset points", fontsize=9, color=DIMENSION, va="center")
         return
-    ax.plot([corner[0] - 2.0, corner[0] + reach * 1.15], [corner[1]] * 2, ls=(0, (8, 2, 1, 2)), **style)
+    ax.plot([corner[0] - 0.06 * reach, corner[0] + reach * 1.15], [corner[1]] * 2, ls=(0, (8, 2, 1, 2)), **style)
     t = np.linspace(0.0, pose.angle, 30)
     xs, ys = corner[0] + reach * np.cos(t), corner[1] - reach * np.sin(t)
     ax.plot(xs, ys, **style)
@@ -314,7 +315,7 @@ def section_extent(clamp: Clamp, poses: Poses) -> tuple[tuple[float, float], tup
     return (min(xs), max(xs)), (min(ys), max(ys))
 
 
-def _spread(values: list[float], spacing: float) -> list[float]:
+def spread(values: list[float], spacing: float) -> list[float]:
     """The ascending ``values`` moved apart to at least ``spacing``, as little as a few sweeps allow."""
     out = list(values)
     for _ in range(200):

@@ -20,7 +20,7 @@ from clamp3d.contact.cas import Cas
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import SectionPose
 from clamp3d.output.assembly_figures import exploded_figure, exploded_poses, steps_figure
-from clamp3d.output.figures import contacts_figure, save_figure, section_figure, states_figure
+from clamp3d.output.figures import contact_figure, contacts_figure, save_figure, section_figure, states_figure
 from clamp3d.output.legends import table2_figure, table3_figure
 from clamp3d.output.palette import PART_COLOURS, VERDICT_COLOURS
 from clamp3d.output.section import arc_path, draw_dimensions, draw_section, edge_openings
@@ -96,6 +96,10 @@ def test_figures_name_what_they_show(run: Run) -> None:
     enlarged = [t for t in texts(contacts_figure(run)) if "interior contact" in t]
     assert len(enlarged) == 5
     assert all("gap 0.000000 mm" in t for t in enlarged)
+    for contact in run.contacts:
+        shown = texts(contact_figure(run, contact))
+        assert f"{contact.a} and {contact.b}: {contact.relation}" in "".join(shown)
+        assert "31.530" in shown
     assert set(PARTS) <= set(texts(exploded_figure(run.clamp)))
     steps = " ".join(texts(steps_figure(run)))
     for name in ("P1|P2P3P4P5", "P7", "P2", "P5|P3P4"):
@@ -150,7 +154,7 @@ def test_files_are_whole_equal_and_named(tmp_path: Path, monkeypatch: pytest.Mon
     assert save_figure(table2_figure(), tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
     with pytest.raises(InputError, match=r"must end in \.svg, \.png, \.pdf, got 't\.gif'"):
         save_figure(table2_figure(), tmp_path / "t.gif")
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="cannot write"):
         save_figure(table2_figure(), tmp_path / "none" / "t.png")
     broken = table2_figure()
     monkeypatch.setattr(broken, "savefig", lambda *a, **k: (_ for _ in ()).throw(RuntimeError("disk")))
