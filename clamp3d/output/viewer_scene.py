@@ -22,6 +22,7 @@ from clamp3d.clamp.parts import parts
 from clamp3d.contact.model import ContactModel
 from clamp3d.geometry.pose import Array, SectionPose
 from clamp3d.output import viewer_objects as draw
+from clamp3d.output.pair_rows import beside_part
 from clamp3d.output.palette import INK, PART_COLOURS, VERDICT_COLOURS, darker
 from clamp3d.output.section import edge_openings, part_anchor, section_extent
 from clamp3d.output.viewer_cut import cut_open, groove_surface
@@ -214,7 +215,7 @@ class AssemblyScene:
         for c in contacts:
             if c.relation == "none" and c.feature == "box":  # its normal is not that of the nearest points
                 continue
-            if abs(c.distance) <= CONTACT or self._beside(c, waypoint):
+            if abs(c.distance) <= CONTACT or beside_part(c, self._bodies[c.a], waypoint.poses[c.a]):
                 continue
             self._gap(f"{path}/{c.a}-{c.b}", c.point, c.point + c.distance * c.normal, c.distance, self._verdict(c))
         opening = edge_openings(self.clamp, waypoint.poses)[0]
@@ -231,15 +232,6 @@ class AssemblyScene:
         self._object(f"{path}/line", draw.segments(np.array([a, b, middle, beside]), colour, on_top=True))
         text = f"{'splints ' if found is None else ''}{value:.3f} mm"
         self._object(f"{path}/value", draw.label(text, "#FFFFFF", beside, size=0.7))
-
-    def _beside(self, c: Contact, waypoint: Waypoint) -> bool:
-        """Whether the nearest point lies beside its part: a groove's faces are measured as if they had no end."""
-        if c.type != 3:
-            return False
-        T = waypoint.poses[c.a].T()
-        x = float((T[:3, 0] * (c.point - T[:3, 3])).sum())
-        low, high = self._bodies[c.a].bounds[:, 0]
-        return not low - CONTACT <= x <= high + CONTACT
 
     def _colour_grooves(self, verdicts: Mapping[str, str]) -> None:
         for (a, b), pair in self._section.pairs.items():
@@ -265,7 +257,7 @@ class AssemblyScene:
         rows = []
         for c in sorted(contacts, key=lambda c: (c.type != 3, c.a, c.b)):
             gap = 0.0 if abs(c.distance) <= CONTACT else c.distance
-            beside = self._beside(c, waypoint)
+            beside = beside_part(c, self._bodies[c.a], waypoint.poses[c.a])
             rows.append(
                 {
                     "pair": f"{c.a}\N{EN DASH}{c.b}",
