@@ -76,7 +76,8 @@ class PairRow:
     def contact(self) -> Contact:
         """The row as a contact, for drawing."""
         kind = self.declared or 2
-        return Contact(self.a, self.b, kind, self.relation, self.distance, self.point, self.normal, self.feature)
+        relation = "apart" if self.relation == "none" else self.relation
+        return Contact(self.a, self.b, kind, relation, self.distance, self.point, self.normal, self.feature)
 
 
 def pair_rows(

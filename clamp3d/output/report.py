@@ -30,7 +30,8 @@ class StepRow:
     """The state at the end of a motion, as a line worker checks it; lengths in mm, tilt in rad.
 
     ``opening_line`` and ``opening_jumper`` are the heights between the splints' inner edges on either side,
-    ``turns`` those of the nut from open. ``seats`` say for each groove whether its wire lies in it.
+    ``turns`` those of the nut from open. ``seats`` say for each groove whether its wire lies in it, ``outside`` which
+    wires are not between the splints yet.
     """
 
     number: int
@@ -42,6 +43,7 @@ class StepRow:
     tilt: float
     turns: float
     seats: tuple[Seat, ...]
+    outside: tuple[PartName, ...]
 
     @property
     def parallel(self) -> bool:
@@ -50,6 +52,8 @@ class StepRow:
 
     def seat(self, wire: PartName) -> str:
         """A wire's place in words."""
+        if wire in self.outside:
+            return "not in the clamp yet"
         own = [s for s in self.seats if s.wire == wire]
         held = [s.splint for s in own if s.seated]
         if len(held) == len(own):
@@ -62,7 +66,7 @@ class StepRow:
 
 @dataclass(frozen=True, slots=True)
 class TighteningRow:
-    """A stage of the tightening: ``turns`` of the nut in this step, ``way`` mm the bolt is drawn up, gap of the saddle."""
+    """A stage of the tightening: ``turns`` of the nut in it, ``way`` mm the bolt is drawn up, gap of the saddle."""
 
     turns: float
     way: float
@@ -140,13 +144,17 @@ def saddle_gap(section: Section, poses: Poses) -> float:
 
 
 def contacts_to_draw(rows: tuple[PairRow, ...]) -> list[Contact]:
-    """Every pair that touches, overlaps, or is declared to: those get a picture."""
-    return [row.contact for row in rows if row.declared or row.distance <= CONTACT]
+    """Every pair that touches, overlaps, or is declared to: those get a picture. A thread has nothing to show."""
+    return [row.contact for row in rows if row.declared > 1 or (row.declared == 0 and row.distance <= CONTACT)]
 
 
 def _step(section: Section, number: int, waypoint: Waypoint, first: Poses) -> StepRow:
     poses = waypoint.poses
     line, jumper = edge_openings(section.clamp, poses)
+    pairs = measure_pairs(section, poses, CONTACT)
+    up = poses["P1"].x
+    wires: tuple[PartName, ...] = ("P6", "P7")
+    outside = tuple(w for w in wires if not up < poses[w].x < up + section.clamp.up_splint.width)
     return StepRow(
         number=number,
         step=waypoint.step,
@@ -155,8 +163,9 @@ def _step(section: Section, number: int, waypoint: Waypoint, first: Poses) -> St
         opening_line=line,
         opening_jumper=jumper,
         tilt=poses["P2"].angle - poses["P1"].angle,
-        turns=(_screwed(poses) - _screwed(first)) / section.clamp.bolt.pitch,
-        seats=seats(measure_pairs(section, poses, CONTACT), CONTACT),
+        turns=round((_screwed(poses) - _screwed(first)) / section.clamp.bolt.pitch, 9) + 0.0,
+        seats=seats(pairs, CONTACT),
+        outside=outside,
     )
 
 

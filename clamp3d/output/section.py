@@ -84,8 +84,12 @@ def draw_section(
     only: Iterable[PartName] = PARTS,
     holes: bool = True,
     line_width: float = 0.9,
+    window: tuple[Point, Point] | None = None,
 ) -> None:
-    """Draw the parts of ``only`` at ``poses``; without ``holes`` it is the section beside the bolt."""
+    """Draw the parts of ``only`` at ``poses``; without ``holes`` it is the section beside the bolt.
+
+    ``window`` is the part of the section ((x, y) least, largest) that the axes show, if not all of it.
+    """
     shown, bodies = set(only), parts(clamp)
     ax.set_aspect("equal")
     ax.set_axis_off()
@@ -94,7 +98,7 @@ def draw_section(
         ax.invert_yaxis()
     for i, name in enumerate(_ORDER):
         if name in shown and name in poses:
-            _draw_part(ax, bodies[name], poses[name], 2 + i, holes, line_width)
+            _draw_part(ax, bodies[name], poses[name], 2 + i, holes, line_width, window)
     ax.autoscale_view()
 
 
@@ -255,9 +259,18 @@ def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
     )
 
 
-def _draw_part(ax: Axes, part: Part, pose: SectionPose, z: int, holes: bool, line_width: float) -> None:
-    from matplotlib.patches import PathPatch, Rectangle
-    from matplotlib.transforms import Affine2D
+def _draw_part(
+    ax: Axes,
+    part: Part,
+    pose: SectionPose,
+    z: int,
+    holes: bool,
+    line_width: float,
+    window: tuple[Point, Point] | None,
+) -> None:
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+    from matplotlib.transforms import Affine2D, Bbox
 
     colour = PART_COLOURS[part.name]
     edge = darker(colour, 0.45)
@@ -274,10 +287,14 @@ def _draw_part(ax: Axes, part: Part, pose: SectionPose, z: int, holes: bool, lin
         if body.axis == "Y":
             for hole in part.holes if holes else ():  # its far wall, seen behind the cut
                 (u0, _), (u1, _) = hole.profile.bounds
-                wall = Rectangle((u0, -hole.end), u1 - u0, hole.length, fc=_pale(colour), transform=where, **style)
-                wall.set_clip_path(patch)
-                wall.set_clip_box(ax.bbox)
-                ax.add_patch(wall)
+                corners = [(u0, -hole.end), (u1, -hole.end), (u1, -hole.start), (u0, -hole.start), (u0, -hole.end)]
+                wall = Path(place.transform(corners), closed=True)
+                if window is not None:  # SVG clips by the part's outline or by the axes, not by both
+                    wall = wall.clip_to_bbox(Bbox(np.array(window)))
+                if np.size(wall.vertices):
+                    wall_patch = PathPatch(wall, fc=_pale(colour), transform=ax.transData, **style)
+                    wall_patch.set_clip_path(patch)
+                    ax.add_patch(wall_patch)
             outline = PathPatch(path, fc="none", transform=where, **style)
             ax.add_patch(outline)
         else:
