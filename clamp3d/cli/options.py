@@ -74,6 +74,14 @@ def viewer_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         CLEARANCE_OPTION,
         MESH_ERROR_OPTION,
+        click.option(
+            "--overlay",
+            "overlays",
+            multiple=True,
+            metavar="NAME[=SIZE]",
+            help="Also show what a baseline makes of the parts: wedges (unit angle in deg) or hulls (CoACD's threshold "
+            "in mm). May be given more than once.",
+        ),
         click.option("--open", "open_browser", is_flag=True, help="Open the page in a browser."),
         click.option(
             "--timeout", type=click.FloatRange(min=0.0), metavar="S", help="Stop serving after S seconds (0: at once)."

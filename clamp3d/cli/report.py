@@ -50,9 +50,11 @@ def command(
     from clamp3d.assembly.verdict import verdict
     from clamp3d.clamp.loader import load_clamp
     from clamp3d.clamp.profile import check_mesh_error
+    from clamp3d.output.files import check_folder
     from clamp3d.output.report import report
     from clamp3d.output.report_page import write_report
 
+    check_folder(output)
     check_mesh_error(mesh_error)
     verdict(0.0, contact=CONTACT, clearance=clearance)
     loaded = load_clamp(clamp, line=line, jumper=jumper)

@@ -15,7 +15,9 @@ from clamp3d.assembly.run import assemble
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.contact.model import ContactModel
 from clamp3d.errors import InputError
+from clamp3d.output.files import check_folder
 from clamp3d.output.viewer import Viewer
+from clamp3d.output.viewer_overlay import overlay
 
 
 def run_and_view(
@@ -31,6 +33,7 @@ def run_and_view(
     port: int | None,
     timeout: float | None,
     open_browser: bool,
+    overlays: tuple[str, ...],
     mesh_error: float,
     clearance: float,
     done: Callable[[Run], None] = lambda run: None,
@@ -40,15 +43,25 @@ def run_and_view(
     ``serve`` starts a server, unless ``url`` names one. Raises click.UsageError for options that do not go together.
     """
     serve = serve and url is None
-    if html_file is not None and not html_file.absolute().parent.is_dir():
-        raise InputError(f"cannot write {html_file}: there is no folder {html_file.parent}")
+    if html_file is not None:
+        if not html_file.absolute().parent.is_dir():
+            raise InputError(f"cannot write {html_file}: there is no folder {html_file.parent}")
+        check_folder(html_file.absolute().parent)
     if open_browser and not serve and url is None:
         raise click.UsageError("--open goes with a page that is served, not with --html alone")
     if url is not None and (port is not None or timeout is not None):
         raise click.UsageError("--port and --timeout go with a page served here, not with --url")
 
     with Viewer(
-        clamp, model, mesh_error=mesh_error, clearance=clearance, serve=serve, url=url, host=host, port=port
+        clamp,
+        model,
+        mesh_error=mesh_error,
+        clearance=clearance,
+        overlays=dict(overlay(clamp, text) for text in overlays),
+        serve=serve,
+        url=url,
+        host=host,
+        port=port,
     ) as viewer:
         if viewer.url is not None:
             click.echo(viewer.url)

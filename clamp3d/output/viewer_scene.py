@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.assembly.contacts import CONTACT, measure_pairs
 from clamp3d.assembly.result import Contact, Run, Waypoint
@@ -44,7 +45,7 @@ class ConvexPiece(Protocol):
     def vertices(self) -> Array: ...  # noqa: D102
 
     @property
-    def faces(self) -> Array: ...  # noqa: D102
+    def faces(self) -> NDArray[Any]: ...  # noqa: D102
 
 
 Overlay = Mapping[PartName, Sequence[ConvexPiece]]

@@ -256,6 +256,8 @@ def test_run_with_view_prints_its_result_and_ends_after_the_timeout(tmp_path):
         (["view", "--html", "no/such/folder/x.html"], "no/such/folder"),
         (["view", "--mesh-error", "nan", "--timeout", "0"], "mesh_error"),
         (["view", "--clearance", "-1", "--timeout", "0"], "clearance"),
+        (["view", "--overlay", "spheres"], "wedges[=UNIT_ANGLE_DEG], hulls[=THRESHOLD_MM]"),
+        (["view", "--overlay", "wedges=many"], "UNIT_ANGLE_DEG must be a number"),
         (["view", "--host", "203.0.113.7", "--timeout", "0"], "203.0.113.7"),
     ],
 )

@@ -16,7 +16,10 @@ from clamp3d.assembly.run import assemble
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.contact.cas import Cas
 from clamp3d.output.palette import PART_COLOURS
+from clamp3d.output.report import report
+from clamp3d.output.report_page import write_report
 from clamp3d.output.viewer import Viewer
+from clamp3d.output.viewer_overlay import overlay
 
 playwright_api = pytest.importorskip(
     "playwright.sync_api", reason="browser tests need playwright: pip install 'clamp3d[dev]'"
@@ -270,6 +273,40 @@ def test_live_page_follows_the_run(browser, run):
         start = time.monotonic()
     assert time.monotonic() - start < 5.0  # open pages do not hold us up
     wait_for(page, 'document.getElementById("status").textContent.includes("has ended")')
+    assert page.problems == []
+    page.context.close()
+
+
+def test_overlay_of_wedges_moves_with_its_part(browser, run, tmp_path):
+    title, pieces = overlay(run.clamp, "wedges=20")
+    with Viewer(run.clamp, Cas(), mesh_error=0.1, serve=False, overlays={title: pieces}) as viewer:
+        for waypoint in run.path:
+            viewer.show(waypoint)
+        viewer.finish(run)
+        viewer.write(tmp_path / "overlay.html")
+    page = open_page(browser, (tmp_path / "overlay.html").as_uri(), offline=True)
+    wait_for(page, "viewer.animator.duration > 0")
+    go_to(page, len(run.path) - 1)
+    assert not visible(page, f"overlay {title}")
+    before = pixels(page)
+    page.click("#switch-overlay-wedges-of-20-deg")
+    assert visible(page, f"overlay {title}")
+    assert (np.abs(pixels(page) - before).sum(2) > 30).sum() > 2000
+    T = pose_in_browser(page, [f"overlay {title}", "P2"])
+    np.testing.assert_allclose(T, run.poses["P2"].T(), atol=2e-4)
+    assert page.problems == []
+    page.context.close()
+
+
+def test_report_shows_its_pictures_and_links(browser, run, tmp_path):
+    write_report(report(run, Cas()), tmp_path)
+    page = open_page(browser, (tmp_path / "report.html").as_uri(), offline=True)
+    widths = page.evaluate("Promise.all([...document.images].map((i) => i.decode().then(() => i.naturalWidth)))")
+    assert len(widths) == 11
+    assert min(widths) > 100
+    page.click(".matrix a[href='#P2-P7']")
+    assert page.evaluate("document.querySelector('tr:target').id") == "P2-P7"
+    assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth + 1")
     assert page.problems == []
     page.context.close()
 
