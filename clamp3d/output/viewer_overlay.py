@@ -37,7 +37,7 @@ def overlay(clamp: Clamp, text: str) -> tuple[str, Overlay]:
     >>> from clamp3d.clamp.loader import load_clamp
     >>> title, pieces = overlay(load_clamp(), "wedges=20")
     >>> title, {name: len(p) for name, p in pieces.items()}["P3"]
-    ('wedges of 20 deg', 5)
+    ('wedges of 20 deg', 3)
     """
     name, _, size = text.partition("=")
     if name not in _KINDS:
