@@ -40,8 +40,8 @@ def groove_relation(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike, *, to
 
     A distance within ``tolerance`` mm of zero is a contact, one below an intersection (Eq. 5). A contact is interior if
     the cylinder lies on the hollow side of the surface at the point, exterior otherwise; at a lip or an end edge that
-    is the construction of Fig. 6, with the normal in place of the centre. A cylinder that is clear is inside if it has a
-    point in common with the groove's hollow, the region between arc and chord over the groove's length (Eq. 3),
+    is the construction of Fig. 6, with the normal in place of the centre. A cylinder that is clear is inside if it has
+    a point in common with the groove's hollow, the region between arc and chord over the groove's length (Eq. 3),
     else outside (Eq. 4). The answer is uncertain if the tolerance is below the distance's error bound and the distance
     is so near to zero that this matters. Raises InputError for a tolerance that is negative or not less than
     both radii, or a pose that is not rigid.

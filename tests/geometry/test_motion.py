@@ -74,7 +74,7 @@ def test_grazing_a_flat_face_on_a_circle():
     # A double root of the second kind: the lowest point of a circle touches the flat face.
     wire = Cylinder(3.0, 20.0)
     centre = np.array([30.0, H + 3.0 + 5.0, 0.0])
-    start = translation(*(centre + [-5.0, 0.0, 0.0]))
+    start = translation(centre[0] - 5.0, centre[1], 0.0)
     hit = first_contact(GROOVE, wire, Rotation(start, centre, (0, 0, 1), math.pi))
     assert hit.touches
     assert hit.instant == pytest.approx(0.5, abs=1e-7)

@@ -2,7 +2,6 @@ import math
 
 import numpy as np
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from clamp3d.geometry.distance import Feature, signed_distance

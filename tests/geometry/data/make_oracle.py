@@ -8,6 +8,7 @@ with 50 digits. Run: ``python tests/geometry/data/make_oracle.py [cases per clas
 
 from __future__ import annotations
 
+import itertools
 import json
 import sys
 from pathlib import Path
@@ -73,7 +74,7 @@ def brackets(R, half, H, length, c, d):
     for lo, hi in zip(starts, stops, strict=True):
         parts = 12 if hi - lo > 1e-3 * length else 1
         edges = np.linspace(lo, hi, parts + 1)
-        out += list(zip(edges[:-1], edges[1:], strict=True))
+        out += itertools.pairwise(edges)
     return out
 
 
