@@ -25,11 +25,11 @@ def travel_to_contact(
     travel = 0.0
     for _ in range(_MAX_ADVANCES):
         gaps = section.wire_gaps(q + travel * direction, wire)
-        gap = min(v for v, pair in zip(gaps.value, gaps.pair, strict=True) if pair[0] == splint)
+        gap = min(float(v) for v, pair in zip(gaps.value, gaps.pair, strict=True) if pair[0] == splint)
         if gap <= _TOUCH:
             if travel == 0.0 and gap < -_TOUCH:
                 raise SolverError(f"{splint} and {wire} overlap by {-gap:.3g} mm before the motion starts")
-            return travel, (splint, wire)
+            return float(travel), (splint, wire)
         travel += gap
         if travel >= limit:
             return limit, None

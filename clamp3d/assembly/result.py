@@ -64,7 +64,7 @@ class Waypoint:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What the answer took: parts, pairs, questions to the contact model (C of Table 5), positions tried (M), meshes."""
+    """What the answer took: questions to the contact model are C of Table 5, positions tried are M."""
 
     parts: int
     pairs: int

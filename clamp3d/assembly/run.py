@@ -1,15 +1,14 @@
-"""The virtual assembly: the sequence's motions one after the other, each ending at a contact, down to the final state."""
+"""The virtual assembly: the sequence's motions one after the other, each ending at a contact."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from clamp3d.assembly.connections import Undeclared
-from clamp3d.assembly.contacts import CONTACT, measure_contacts, seats, undeclared_meetings
+from clamp3d.assembly.contacts import CONTACT, measure_pairs, seats, undeclared_meetings
 from clamp3d.assembly.final_state import FinalState, solve_final_state
 from clamp3d.assembly.motion import travel_to_contact
 from clamp3d.assembly.result import Event, Run, Solver, Waypoint, Work
@@ -75,23 +74,25 @@ def assemble(
     q = _come_in(section, q, sequence[0], log)
     q = _put_in_jumper(section, q, sequence[1], log)
     d_open = float(q[D])
-    _first_touch(section, q, sequence[2], log)
     final: FinalState | SteppedState
     if solver == "exact":
         final = solve_final_state(section, q)
     else:
         final = solve_stepped(section, step=step, tilt_step=tilt_step)
+    travel = d_open - float(final.q[D])
+    _first_touch(section, q, sequence[2], log, travel)
     closed = _poses(section, final.q, saddle_d=d_open)
     log.stop(sequence[2], "splints closed", closed)
     poses = _poses(section, final.q)
-    travel = d_open - float(final.q[D])
     log.stop(sequence[3], "nut tightened", poses)
-    contacts = measure_contacts(section, poses, CONTACT)
+    pairs = measure_pairs(section, poses, CONTACT)
+    contacts = tuple(c for c in pairs if clamp.connection(c.a, c.b) != 0 or c.distance <= CONTACT)
     resolution = CONTACT if solver == "exact" else step
-    for contact in contacts:
-        if contact.type == 3 and contact.distance <= resolution:
-            by = sequence[3] if (contact.a, contact.b) == ("P2", "P3") else sequence[2]
-            log.events.append(Event(by, contact.a, contact.b, contact.relation, contact.point, travel))
+    drawn = {("P2", "P3"), ("P1", "P5"), ("P3", "P4")}  # closed by the nut, all else by the down splint
+    for by_nut, by in ((False, sequence[2]), (True, sequence[3])):
+        for c in contacts:
+            if c.type != 1 and c.distance <= resolution and ((c.a, c.b) in drawn) == by_nut:
+                log.events.append(Event(by, c.a, c.b, c.relation, c.point, travel))
     proof = (final.violation, final.optimality) if isinstance(final, FinalState) else (None, None)
     motion_steps = final.motion_steps if isinstance(final, SteppedState) else 0
     return Run(
@@ -106,7 +107,7 @@ def assemble(
         turns=ScrewJoint(clamp.bolt.pitch).turn(travel) / (2.0 * math.pi),
         poses=poses,
         contacts=contacts,
-        seats=seats(section, contacts, resolution),
+        seats=seats(pairs, resolution),
         events=tuple(log.events),
         path=tuple(log.path),
         undeclared=undeclared_meetings(section, log.path, log.events),
@@ -151,9 +152,9 @@ def _put_in_jumper(section: Section, q: Array, step: str, log: _Log) -> Array:
     return inside
 
 
-def _first_touch(section: Section, q: Array, step: str, log: _Log) -> None:
-    """The down splint rises along the bolt until it first touches a wire."""
-    reach = {wire: travel_to_contact(section, q, wire, -_unit(D), "P2", limit=float(q[D])) for wire in WIRES}
+def _first_touch(section: Section, q: Array, step: str, log: _Log, limit: float) -> None:
+    """The down splint rises along the bolt until it first touches a wire, within its whole way of ``limit`` mm."""
+    reach = {wire: travel_to_contact(section, q, wire, -_unit(D), "P2", limit=limit) for wire in WIRES}
     wire = min(WIRES, key=lambda w: reach[w][0])
     travel, touch = reach[wire]
     if touch is not None:
@@ -171,7 +172,7 @@ def _poses(section: Section, q: Array, saddle_d: float | None = None) -> Poses:
     clamp = section.clamp
     x, y = -float(q[0]), -float(q[1])
     down = section.down_splint(q)
-    saddle_y = y + (down.y if saddle_d is None else saddle_d) - clamp.back_clearance
+    saddle_y = y + (down.y - _saddle_lift(section, q) if saddle_d is None else saddle_d - clamp.back_clearance)
     bolt_y = saddle_y + clamp.saddle.radius + clamp.saddle.apex_thickness - clamp.bolt.shank_length
     bolt_x = x + section.bolt_x
     return {
@@ -185,10 +186,24 @@ def _poses(section: Section, q: Array, saddle_d: float | None = None) -> Poses:
     }
 
 
+def _saddle_lift(section: Section, q: Array) -> float:
+    """How far the saddle's arc centre stands above P2's origin when the nut has drawn it up to the round back; mm."""
+    pair = section.pairs["P3", "P2"]
+    lift = 0.0
+    for _ in range(100):
+        back = SectionPose(0.0, lift, float(q[S]) / section.lever)
+        section.queries.contact += 1
+        gap = float(section.model.pieces(pair, back.T()).distance.min())
+        if abs(gap) <= 1e-12 * section.clamp.saddle.radius:
+            break
+        lift += gap
+    return lift
+
+
 def _event(section: Section, q: Array, step: str, touch: tuple[PartName, PartName] | None, travel: float) -> Event:
     """The event of a motion that ended at ``touch``."""
     assert touch is not None  # every motion here ends at a groove
-    contact = next(c for c in measure_contacts(section, _poses(section, q), CONTACT) if (c.a, c.b) == touch)
+    contact = next(c for c in measure_pairs(section, _poses(section, q), CONTACT) if (c.a, c.b) == touch)
     return Event(step, contact.a, contact.b, contact.relation, contact.point, travel)
 
 

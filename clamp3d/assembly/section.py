@@ -121,7 +121,7 @@ class Section:
         turned = np.cross([0.0, -1.0, 0.0], point[k:] - T_down[:3, 3]) / self.lever
         gradient[k:, D] = -(normal[k:] @ _DOWN)
         gradient[k:, S] = -(normal[k:] * turned).sum(1)
-        pair = tuple(("P1", wire) for _ in up.feature) + tuple(("P2", wire) for _ in down.feature)
+        pair: tuple[tuple[PartName, PartName], ...] = (("P1", wire),) * k + (("P2", wire),) * (n - k)
         section_point = np.column_stack([point[:, 0], -point[:, 2]])
         return Gaps(
             np.concatenate([up.distance, down.distance]), gradient, pair, up.feature + down.feature, section_point

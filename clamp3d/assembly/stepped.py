@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from clamp3d.assembly.section import D, WIRES, Gaps, S, Section
+from clamp3d.assembly.section import WIRES, D, Gaps, S, Section
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array
@@ -108,7 +108,7 @@ def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
         return memo[key]
 
     def slack(x: Array) -> Array:
-        return gaps(x).value - x[2]
+        return np.asarray(gaps(x).value - x[2])
 
     def slack_gradient(x: Array) -> Array:
         found = gaps(x).gradient[:, i : i + 2]

@@ -6,8 +6,17 @@ import numpy as np
 
 from clamp3d.clamp.features import GroovePair
 from clamp3d.contact.model import Pieces
-from clamp3d.geometry.distance import groove_pieces, signed_distances
+from clamp3d.geometry.distance import Feature, signed_distances
+from clamp3d.geometry.pieces import groove_pieces
 from clamp3d.geometry.pose import Array, inverse
+
+_SIDES = slice(0, 3)
+"""Rows of `groove_pieces` that a wire through the whole groove can touch; the end faces are behind it."""
+
+LABELS = {
+    feature: feature.name.lower().replace("_m", " M").replace("_n", " N").replace("_", " ") for feature in Feature
+}
+"""Names for the user: 'arc', 'lip M', 'flat N', 'end face', ..."""
 
 
 class Cas:
@@ -17,10 +26,13 @@ class Cas:
     limits = ()
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
-        """Gaps to the arc surface, the two faces beside it and the ends; see `ContactModel`."""
+        """Gaps to the arc surface and the two faces beside it, for a wire that passes through; see `ContactModel`."""
         found = groove_pieces(pair.groove, pair.cylinder, inverse(pair.T_a_groove) @ T_a_b @ pair.T_b_cylinder)
         R, p = pair.T_a_groove[:3, :3], pair.T_a_groove[:3, 3]
-        return Pieces(found.distance, found.point_on_groove @ R.T + p, found.normal @ R.T, found.feature)
+        feature = tuple(LABELS[Feature(int(code))] for code in found.feature[_SIDES])
+        return Pieces(
+            found.distance[_SIDES], found.point_on_groove[_SIDES] @ R.T + p, found.normal[_SIDES] @ R.T, feature
+        )
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""

@@ -28,9 +28,15 @@ class Pieces:
 class ContactModel(Protocol):
     """One way to measure a `GroovePair`; all models answer the same questions on the same parts."""
 
-    name: str
-    limits: tuple[str, ...]
-    """What the model cannot do, in words for the user: 'no depth', 'surface only', ..."""
+    @property
+    def name(self) -> str:
+        """What the user calls it: 'cas', 'chords', ..."""
+        ...
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """What the model cannot do, in words for the user: 'no depth', 'surface only', ..."""
+        ...
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps of all pieces of ``pair`` with part b at ``T_a_b`` (4, 4) in part a's frame."""

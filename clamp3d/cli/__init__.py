@@ -1,0 +1,89 @@
+"""The command line: parse, call, print. Data on stdout, progress and messages on stderr.
+
+Exit codes: 0 clean, 1 a finding (clash, not clamped), 2 bad input, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+
+import click
+
+import clamp3d
+from clamp3d.errors import Clamp3dError
+
+# Name -> (module, one line for the list of commands). A command's module is loaded when it is called.
+COMMANDS: dict[str, tuple[str, str]] = {
+    "run": ("clamp3d.cli.run", "Assemble a clamp and print where every part ends up."),
+    "reproduce": ("clamp3d.cli.reproduce", "Print Tables 1-5 of the paper beside this program's values."),
+    "measure-image": ("clamp3d.cli.measure_image", "Measure a distance in a photograph by marked points."),
+    "export": ("clamp3d.cli.export", "Write the parts as files for CAD review."),
+    "conductors": ("clamp3d.cli.conductors", "List the conductor catalogue."),
+}
+
+
+class _LazyGroup(click.Group):
+    """A group that knows its commands by name and loads only the one that is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(COMMANDS[cmd_name][0]).command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if name not in COMMANDS and not name.startswith("-"):
+            raise click.UsageError(f"unknown command {name!r}; available: {', '.join(COMMANDS)}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
+
+
+@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(clamp3d.__version__, prog_name="clamp3d")
+def group() -> None:
+    """Exact assembly checker for parts with round grooves.
+
+    \b
+    clamp3d run                             assemble the built-in reference clamp
+    clamp3d run --line LJ-500 --jumper 16   other wires: by catalogue name or diameter in mm
+    clamp3d run my-clamp.toml --json out.json
+    """
+
+
+def main() -> None:
+    """Entry point: one line for every fault of input, never a traceback; CLAMP3D_DEBUG=1 shows it."""
+    try:
+        status = group.main(prog_name="clamp3d", standalone_mode=False)
+    except click.exceptions.Exit as stop:
+        status = stop.exit_code
+    except click.ClickException as error:
+        where = getattr(error, "ctx", None)
+        hint = f" (see {where.command_path} --help)" if where is not None else ""
+        status = _fail(error.format_message().replace("\n", " ") + hint)
+    except (KeyboardInterrupt, click.Abort):
+        print("clamp3d: interrupted", file=sys.stderr)
+        status = 130
+    except BrokenPipeError:  # the reader of stdout went away: nothing left to say
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = 0
+    except (Clamp3dError, OSError) as error:
+        if os.environ.get("CLAMP3D_DEBUG"):
+            raise
+        status = _fail(str(error))
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _fail(message: str) -> int:
+    print(f"clamp3d: error: {message}", file=sys.stderr)
+    return 2

@@ -1,0 +1,22 @@
+"""``clamp3d conductors``."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+
+@click.command("conductors")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def command(as_json: bool) -> None:
+    """List the conductor catalogue: designation, diameter over all strands, standard."""
+    from dataclasses import asdict
+
+    from clamp3d.clamp.conductors import catalogue
+
+    if as_json:
+        click.echo(json.dumps([asdict(entry) for entry in catalogue().values()], indent=2))
+        return
+    for entry in catalogue().values():
+        click.echo(f"{entry.designation:12s} {entry.diameter:7.2f} mm   {entry.standard}")
