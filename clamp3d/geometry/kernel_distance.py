@@ -152,6 +152,8 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
     dz *= n
     e2 *= n * n
 
+    # A direction is normalised to 3 units, a point of the axis (a product and a sum, |t| <= l) known to 5 units of
+    # |c| + l, s and h to 3 units of R, a difference of these and its norm to 3 more: 11, rounded up, and r's own.
     bound = UNIT * (12.0 * (abs(cx) + abs(cy) + abs(cz) + 2.0 * l + H + R) + r)
     high = l * abs(dy)
     if cy - high <= h:

@@ -205,7 +205,7 @@ def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: igno
     best2 = math.inf
     bx = by = bt = 0.0
     for branch in range(2):
-        if q != 0.0 or a > k:
+        if abs(q) > TINY or a > k:
             if branch == 0:
                 root = nearer_root(k, a, abs(q))
                 C = p / (k + root)
@@ -236,7 +236,7 @@ def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: igno
         d2 = du * du + dv * dv
         if d2 < best2:
             best2, bx, by, bt = d2, qx, qy, t
-        if branch == 0 and q != 0.0:
+        if branch == 0 and abs(q) > TINY:
             break
     return best2, bx, by, bt
 

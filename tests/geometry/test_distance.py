@@ -233,12 +233,33 @@ def test_mouth_narrower_than_the_wire():
     assert at_mouth.feature in (Feature.LIP_M, Feature.LIP_N)
 
 
+def test_tiny_and_huge_numbers():
+    groove, wire = SweptArc(12.0, 1.0, 50.0), Cylinder(5.0, 80.0)
+    for tiny in (5e-324, 1e-310, 2.3e-162, 1e-155, 1e-100):
+        for T in (translation(tiny, tiny, tiny), translation(tiny, 0.0, 0.0) @ rotation((1, 0, 0), tiny)):
+            answer = signed_distance(groove, wire, T)
+            assert answer.distance == 7.0
+            assert abs(np.linalg.norm(answer.normal) - 1.0) < 1e-14
+            assert abs(np.linalg.norm(answer.point_on_groove[:2]) - 12.0) < 1e-13
+        # On the major axis of the end arcs but for a hair: the stationary points of a tilted axis run together.
+        tilted = rotation((1, 0, 0), 0.3)
+        tilted[:3, 3] = (tiny, 25.0 * math.tan(-0.3) + tiny, 25.0)
+        at_zero = tilted.copy()
+        at_zero[0, 3] = 0.0
+        long = Cylinder(1.0, 200.0)
+        assert signed_distance(groove, long, tilted).distance == pytest.approx(
+            signed_distance(groove, long, at_zero).distance, abs=1e-14
+        )
+    far = signed_distance(groove, wire, translation(0.0, 1e90, 0.0))
+    assert far.distance == 1e90
+
+
 def test_limits():
     T = translation(0.3, -2.0, 1.0) @ rotation((1, 2, 3), 0.3)
     groove = SweptArc(12.0, 1.0, 50.0)
     # A cylinder of no length is a ball; its direction does not matter.
     balls = [
-        signed_distance(groove, Cylinder(1.0, 1e-300), translation(0.3, -2.0, 1.0) @ rotation((1, 2, 3), a))
+        signed_distance(groove, Cylinder(1.0, 1e-100), translation(0.3, -2.0, 1.0) @ rotation((1, 2, 3), a))
         for a in (0.0, 0.3, 2.0)
     ]
     assert len({b.distance for b in balls}) == 1
@@ -276,6 +297,7 @@ def test_deeper_is_lower():
         (lambda T: T.__setitem__((0, 1), 1e-6), "rigid"),
         (lambda T: T.__setitem__((3, 0), 1e-3), "last row"),
         (lambda T: T.__setitem__((3, 3), np.nan), "finite"),
+        (lambda T: T.__setitem__((1, 3), 1e200), "offset below 1e"),
     ],
 )
 def test_bad_poses_are_named(change, rule):
@@ -301,7 +323,13 @@ def test_bad_shapes_of_input():
             signed_distances(groove, wire, batch)
     with pytest.raises(InputError, match="workers must be at least 1, got 0"):
         signed_distances(groove, wire, np.eye(4)[None], workers=0)
-    for make in (lambda: SweptArc(-1.0, 1.0, 1.0), lambda: SweptArc(1.0, 4.0, 1.0), lambda: Cylinder(1.0, 0.0)):
+    for make in (
+        lambda: Cylinder(1e200, 1.0),
+        lambda: Cylinder(1.0, math.nan),
+        lambda: SweptArc(-1.0, 1.0, 1.0),
+        lambda: SweptArc(1.0, 4.0, 1.0),
+        lambda: Cylinder(1.0, 0.0),
+    ):
         with pytest.raises(InputError, match=r"must be .*got"):
             make()
     assert signed_distances(groove, wire, np.empty((0, 4, 4))).shape == (0,)
