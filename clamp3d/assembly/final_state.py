@@ -116,7 +116,8 @@ def _descend(section: Section, start: Array, goal: Array, free: tuple[int, ...] 
 
     q, stride = start, _STRIDE
     while stride > _SHORTEST:
-        near = np.maximum(low, q - stride)[index], np.minimum(high, q + stride)[index]
+        # A wire that is out of its mouth already may come back, not go further.
+        near = np.maximum(np.minimum(low, q), q - stride)[index], np.minimum(np.maximum(high, q), q + stride)[index]
         found = minimize(
             lambda x: goal[index] @ x,
             q[index],

@@ -13,7 +13,7 @@ from clamp3d.assembly.final_state import FinalState, solve_final_state
 from clamp3d.assembly.motion import travel_to_contact
 from clamp3d.assembly.result import Event, Run, Solver, Waypoint, Work
 from clamp3d.assembly.screw import ScrewJoint
-from clamp3d.assembly.section import SPLINTS, WIRES, D, S, Section
+from clamp3d.assembly.section import MOUTH, SPLINTS, WIRES, D, S, Section
 from clamp3d.assembly.sequence import parse_sequence
 from clamp3d.assembly.stepped import SteppedState, solve_stepped
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
@@ -218,6 +218,9 @@ def _status(final: FinalState | SteppedState, resolution: float) -> str:
         stops = {(p, f) for p, f, n in zip(gaps.pair, gaps.feature, near, strict=True) if n}
         held = {p for p, _ in stops}
         loose = {w for w in WIRES if not all((splint, w) in held for splint in SPLINTS)}
+    slipping = sorted({pair[1] for pair, feature in stops if feature == MOUTH})
+    if slipping:
+        return f"not clamped: {' and '.join(slipping)} slips out of its groove"
     if not loose:
         return "clamped"
     reasons = []
@@ -225,5 +228,6 @@ def _status(final: FinalState | SteppedState, resolution: float) -> str:
         reasons.append("faces meet")
     if any(feature == "tilt limit" for _, feature in stops):
         reasons.append("tilt limit reached")
-    wires = " and ".join(sorted(loose))
-    return f"not clamped: {' and '.join(reasons) or 'wires slip'}, {wires} loose"
+    if not reasons:  # a wire on four lips holds both splints, whatever they do to the other one
+        reasons.append(f"{' and '.join(w for w in WIRES if w not in loose)} alone holds the splints apart")
+    return f"not clamped: {' and '.join(reasons)}, {' and '.join(sorted(loose))} loose"
