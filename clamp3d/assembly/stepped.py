@@ -114,7 +114,6 @@ def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
         found = gaps(x).gradient[:, i : i + 2]
         return np.column_stack([found, -np.ones(len(found))])
 
-    low, high = section.bounds()[i]
     try:
         start = np.array([q[i], q[i + 1], 0.0])
         start[2] = gaps(start).value.min()
@@ -122,7 +121,7 @@ def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
             lambda x: -x[2],
             start,
             jac=lambda x: np.array([0.0, 0.0, -1.0]),
-            bounds=[(low, high), (None, None), (None, None)],
+            bounds=[*section.room(q, wire), (None, None)],
             constraints={"type": "ineq", "fun": slack, "jac": slack_gradient},
             method="SLSQP",
             options={"maxiter": 60, "ftol": 1e-12},

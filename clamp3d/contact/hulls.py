@@ -85,6 +85,11 @@ def intrusion(decomposition: Decomposition, pair: GroovePair) -> float:
 
 
 def _polytopes(name: PartName, decomposition: Decomposition) -> Polytopes:
-    hulls = decomposition.hulls
-    shapes = [convex(hull.vertices, hull.faces, f"{name} hull {i + 1}") for i, hull in enumerate(hulls)]
-    return Polytopes(shapes, [f"hull {i + 1}" for i in range(len(hulls))])
+    from trimesh.convex import convex_hull
+
+    shapes = []
+    for i, hull in enumerate(decomposition.hulls):
+        # CoACD's own triangles can be dented by 1e-6 mm where they are nearly flat; Qhull's are not.
+        exact = convex_hull(hull.vertices)
+        shapes.append(convex(exact.vertices, exact.faces, f"{name} hull {i + 1}"))
+    return Polytopes(shapes, [f"hull {i + 1}" for i in range(len(shapes))])
