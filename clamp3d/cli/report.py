@@ -14,6 +14,7 @@ from clamp3d.cli.options import (
     solver_options,
     solver_settings,
 )
+from clamp3d.cli.progress import narrator
 
 
 @click.command("report")
@@ -22,7 +23,7 @@ from clamp3d.cli.options import (
 @solver_options
 @CLEARANCE_OPTION
 @click.option(
-    "--mesh-error", type=float, default=0.001, show_default=True, metavar="MM", help="Chord error of outlines."
+    "--outline-error", type=float, default=0.001, show_default=True, metavar="MM", help="Chord error of outlines."
 )
 @click.option("--output", "-o", type=click.Path(file_okay=False, path_type=Path), required=True, metavar="DIR")
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
@@ -32,11 +33,13 @@ def command(
     jumper: str | None,
     method: str,
     unit_angle_deg: float | None,
+    threshold: float | None,
+    mesh_error: float | None,
     solver: str | None,
     step: float | None,
     tilt_step_deg: float | None,
     clearance: float,
-    mesh_error: float,
+    outline_error: float,
     output: Path,
     quiet: bool,
 ) -> None:
@@ -44,7 +47,7 @@ def command(
 
     Prints the paths of the files. Exit code 1 if the clamp does not close on both wires, or parts meet that should not.
     """
-    settings = solver_settings(solver, step, tilt_step_deg)
+    settings = solver_settings(method, solver, step, tilt_step_deg)
     from clamp3d.assembly.contacts import CONTACT
     from clamp3d.assembly.run import assemble
     from clamp3d.assembly.verdict import verdict
@@ -55,18 +58,18 @@ def command(
     from clamp3d.output.report_page import write_report
 
     check_folder(output)
-    check_mesh_error(mesh_error)
+    check_mesh_error(outline_error)
     verdict(0.0, contact=CONTACT, clearance=clearance)
     loaded = load_clamp(clamp, line=line, jumper=jumper)
-    model = contact_model(method, loaded, unit_angle_deg)
+    model = contact_model(
+        method, loaded, unit_angle_deg=unit_angle_deg, threshold=threshold, mesh_error=mesh_error, quiet=quiet
+    )
 
-    def say(what: str) -> None:
-        if not quiet:
-            click.echo(what, err=True)
-
-    run = assemble(loaded, model, listen=lambda w: say(f"{w.step:14s} {w.label}"), **settings)
-    made = report(run, model, clearance=clearance, mesh_error=mesh_error)
-    for path in write_report(made, output, progress=say):
+    with narrator(quiet) as tell:
+        run = assemble(loaded, model, listen=tell.waypoint, progress=tell.position, **settings)
+        made = report(run, model, clearance=clearance, mesh_error=outline_error)
+        paths = write_report(made, output, progress=tell.status)
+    for path in paths:
         click.echo(str(path))
     if not made.passed:
         raise click.exceptions.Exit(1)

@@ -16,9 +16,10 @@ from clamp3d.cli.options import (
     solver_settings,
     viewer_options,
 )
+from clamp3d.cli.progress import narrator
 
 if TYPE_CHECKING:
-    from clamp3d.assembly.result import Run, Waypoint
+    from clamp3d.assembly.result import Run
 
 
 @click.command("run")
@@ -35,6 +36,8 @@ def command(
     jumper: str | None,
     method: str,
     unit_angle_deg: float | None,
+    threshold: float | None,
+    mesh_error: float | None,
     solver: str | None,
     step: float | None,
     tilt_step_deg: float | None,
@@ -47,13 +50,16 @@ def command(
 
     Exit code 1 if the clamp does not close on both wires, or parts meet that should not.
     """
-    settings = solver_settings(solver, step, tilt_step_deg)
+    settings = solver_settings(method, solver, step, tilt_step_deg)
+    from clamp3d.assembly.run import assemble
     from clamp3d.clamp.loader import load_clamp
     from clamp3d.output.files import write_json
     from clamp3d.output.run_report import run_to_dict, run_to_text
 
     loaded = load_clamp(clamp, line=line, jumper=jumper)
-    model = contact_model(method, loaded, unit_angle_deg)
+    model = contact_model(
+        method, loaded, unit_angle_deg=unit_angle_deg, threshold=threshold, mesh_error=mesh_error, quiet=quiet
+    )
 
     def done(run: Run) -> None:
         if json_file is not None:
@@ -65,14 +71,8 @@ def command(
 
         result = run_and_view(loaded, model, settings, quiet=quiet, serve=view, done=done, **viewing)
     else:
-        from clamp3d.assembly.run import assemble
-
-        result = assemble(loaded, model, listen=None if quiet else say, **settings)
+        with narrator(quiet) as tell:
+            result = assemble(loaded, model, listen=tell.waypoint, progress=tell.position, **settings)
         done(result)
     if not result.clamped or result.undeclared:
         raise click.exceptions.Exit(1)
-
-
-def say(waypoint: Waypoint) -> None:
-    """Tell the terminal what the run has reached."""
-    click.echo(f"{waypoint.step:14s} {waypoint.label}", err=True)

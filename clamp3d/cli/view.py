@@ -28,6 +28,8 @@ def command(
     jumper: str | None,
     method: str,
     unit_angle_deg: float | None,
+    threshold: float | None,
+    mesh_error: float | None,
     solver: str | None,
     step: float | None,
     tilt_step_deg: float | None,
@@ -42,9 +44,11 @@ def command(
     from clamp3d.clamp.loader import load_clamp
     from clamp3d.cli.viewing import run_and_view
 
-    settings = solver_settings(solver, step, tilt_step_deg)
+    settings = solver_settings(method, solver, step, tilt_step_deg)
     loaded = load_clamp(clamp, line=line, jumper=jumper)
-    model = contact_model(method, loaded, unit_angle_deg)
+    model = contact_model(
+        method, loaded, unit_angle_deg=unit_angle_deg, threshold=threshold, mesh_error=mesh_error, quiet=quiet
+    )
     run = run_and_view(loaded, model, settings, quiet=quiet, serve=viewing["html_file"] is None, **viewing)
     if not run.clamped or run.undeclared:
         raise click.exceptions.Exit(1)

@@ -13,6 +13,7 @@ import click
 from clamp3d.assembly.result import Run, Waypoint
 from clamp3d.assembly.run import assemble
 from clamp3d.clamp.dimensions import Clamp
+from clamp3d.cli.progress import narrator
 from clamp3d.contact.model import ContactModel
 from clamp3d.errors import InputError
 from clamp3d.output.files import check_folder
@@ -34,7 +35,7 @@ def run_and_view(
     timeout: float | None,
     open_browser: bool,
     overlays: tuple[str, ...],
-    mesh_error: float,
+    draw_error: float,
     clearance: float,
     done: Callable[[Run], None] = lambda run: None,
 ) -> Run:
@@ -55,7 +56,7 @@ def run_and_view(
     with Viewer(
         clamp,
         model,
-        mesh_error=mesh_error,
+        mesh_error=draw_error,
         clearance=clearance,
         overlays=dict(overlay(clamp, text) for text in overlays),
         serve=serve,
@@ -68,12 +69,13 @@ def run_and_view(
             if open_browser:
                 click.launch(viewer.url)
 
-        def listen(waypoint: Waypoint) -> None:
-            viewer.show(waypoint)
-            if not quiet:
-                click.echo(f"{waypoint.step:14s} {waypoint.label}", err=True)
+        with narrator(quiet) as tell:
 
-        run = assemble(clamp, model, listen=listen, **settings)
+            def listen(waypoint: Waypoint) -> None:
+                viewer.show(waypoint)
+                tell.waypoint(waypoint)
+
+            run = assemble(clamp, model, listen=listen, progress=tell.position, **settings)
         viewer.finish(run)
         if html_file is not None:
             viewer.write(html_file)

@@ -51,9 +51,14 @@ class Hulls:
                 m.vertices, m.faces, self.parameters, name=name, time_limit=time_limit, progress=progress, cache=cache
             )
 
-        self.decompositions: Mapping[PartName, Decomposition] = PerPart([*meshes], decomposed)
+        self.decompositions: PerPart[Decomposition] = PerPart([*meshes], decomposed)
         self.parts = PerPart([*meshes], lambda name: _polytopes(name, self.decompositions[name]))
         self._wires = Wires()
+
+    @property
+    def meshes_built(self) -> int:
+        """How many parts had to be meshed so far."""
+        return self.decompositions.made
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every hull of part a; see `ContactModel`."""
@@ -85,6 +90,11 @@ def intrusion(decomposition: Decomposition, pair: GroovePair) -> float:
 
 
 def _polytopes(name: PartName, decomposition: Decomposition) -> Polytopes:
-    hulls = decomposition.hulls
-    shapes = [convex(hull.vertices, hull.faces, f"{name} hull {i + 1}") for i, hull in enumerate(hulls)]
-    return Polytopes(shapes, [f"hull {i + 1}" for i in range(len(hulls))])
+    from trimesh.convex import convex_hull
+
+    shapes = []
+    for i, hull in enumerate(decomposition.hulls):
+        # CoACD's own triangles can be dented by 1e-6 mm where they are nearly flat; Qhull's are not.
+        exact = convex_hull(hull.vertices)
+        shapes.append(convex(exact.vertices, exact.faces, f"{name} hull {i + 1}"))
+    return Polytopes(shapes, [f"hull {i + 1}" for i in range(len(shapes))])

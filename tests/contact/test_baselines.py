@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clamp3d.assembly.run import STEP, TILT_STEP, assemble
 from clamp3d.clamp.block import block_pair, grooved_block
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
@@ -164,3 +165,24 @@ def test_unknown_part_and_bad_pose_are_refused() -> None:
             checked.pieces(PAIR, np.full((4, 4), np.nan))
         with pytest.raises(InputError, match="must be finite"):
             checked.distances(PAIR, np.full((1, 4, 4), np.nan))
+
+
+@pytest.mark.parametrize(("unit_deg", "exact", "stepped"), [(20.0, 32.080, 32.196), (40.0, 32.647, 32.863)])
+def test_wedges_in_3d_assemble_the_clamp_to_the_published_distances(
+    unit_deg: float, exact: float, stepped: float
+) -> None:
+    clamp = load_clamp()
+    model = Wedges(parts(clamp), math.radians(unit_deg))
+    for solver, expected in (("exact", exact), ("stepped", stepped)):
+        result = assemble(clamp, model, solver=solver, step=STEP, tilt_step=TILT_STEP)  # type: ignore[arg-type]
+        assert result.clamped
+        assert result.distance == pytest.approx(expected, abs=2e-3)
+
+
+def test_meshes_assemble_the_clamp_to_their_chord_error() -> None:
+    clamp = load_clamp()
+    made = {name: mesh(part, 0.02) for name, part in parts(clamp).items() if name in ("P1", "P2", "P3")}
+    result = assemble(clamp, Mesh(made), solver="exact", step=STEP, tilt_step=TILT_STEP)
+    assert result.clamped
+    # Each of four grooves is too tight by the chord error at most; the wedge between wire and groove enlarges it.
+    assert 31.5298 < result.distance < 31.5298 + 4.0 * 0.02

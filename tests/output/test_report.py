@@ -249,7 +249,7 @@ def test_command_says_not_clamped_by_its_exit_code(tmp_path):
     [
         ((), "--output"),
         (("-o", "x", "--clearance", "-1"), "clearance"),
-        (("-o", "x", "--mesh-error", "0"), "mesh_error"),
+        (("-o", "x", "--outline-error", "0"), "mesh_error"),
         (("-o", "x", "nobody"), "nobody"),
         (("-o", "file/x"), "file"),
     ],

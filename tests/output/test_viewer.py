@@ -199,7 +199,7 @@ def command_line(*arguments):
 def test_page_is_one_file_that_names_no_other(tmp_path):
     page = tmp_path / "run.html"
     done = subprocess.run(
-        command_line("view", "--html", str(page), "--mesh-error", "0.1", "-q"), capture_output=True, text=True
+        command_line("view", "--html", str(page), "--draw-error", "0.1", "-q"), capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == [str(page)]
@@ -212,7 +212,7 @@ def test_page_is_one_file_that_names_no_other(tmp_path):
 
 def test_view_serves_until_interrupted_and_leaves_nothing():
     process = subprocess.Popen(
-        command_line("view", "--mesh-error", "0.1"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command_line("view", "--draw-error", "0.1"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     try:
         url = process.stdout.readline().strip()
@@ -254,7 +254,7 @@ def test_run_with_view_prints_its_result_and_ends_after_the_timeout(tmp_path):
         (["view", "--url", "tcp://127.0.0.1:1", "--port", "7000"], "--port and --timeout"),
         (["view", "--html", "x.html", "--open"], "--open"),
         (["view", "--html", "no/such/folder/x.html"], "no/such/folder"),
-        (["view", "--mesh-error", "nan", "--timeout", "0"], "mesh_error"),
+        (["view", "--draw-error", "nan", "--timeout", "0"], "mesh_error"),
         (["view", "--clearance", "-1", "--timeout", "0"], "clearance"),
         (["view", "--overlay", "spheres"], "wedges[=UNIT_ANGLE_DEG], hulls[=THRESHOLD_MM]"),
         (["view", "--overlay", "wedges=many"], "UNIT_ANGLE_DEG must be a number"),
