@@ -58,9 +58,9 @@ class StepRow:
         held = [s.splint for s in own if s.seated]
         if len(held) == len(own):
             return "fully in both grooves"
-        rests = [f"{s.splint}: {s.detail}" for s in own if not s.seated and s.gap <= CONTACT]
+        rests = [f"{s.splint}: {s.detail}" for s in own if not s.seated and s.detail != "loose"]
         words = [f"in {' and '.join(held)}'s groove"] if held else []
-        loose = [f"{s.gap:.1f} mm from {s.splint}" for s in own if not s.seated and s.gap > CONTACT]
+        loose = [f"{s.gap:.1f} mm from {s.splint}" for s in own if s.detail == "loose"]
         return "; ".join([*words, *rests, *loose])
 
 
@@ -123,7 +123,9 @@ def report(run: Run, model: ContactModel, *, clearance: float = CLEARANCE, mesh_
     rows = pair_rows(clamp, bodies, model, run.poses, clearance=clearance, mesh_error=mesh_error)
     section = Section(clamp, model)
     first = run.path[0].poses
-    steps = tuple(_step(section, number, waypoint, first) for number, waypoint in enumerate(run.path, 1))
+    # A solver that tries positions leaves small gaps; what it counted as seated is seated here.
+    resolution = max([CONTACT, *(s.gap for s in run.seats if s.seated)])
+    steps = tuple(_step(section, number, waypoint, first, resolution) for number, waypoint in enumerate(run.path, 1))
     model_limits = [f"method {run.method}: {limit}" for limit in run.limits]
     return Report(
         run=run,
@@ -148,7 +150,7 @@ def contacts_to_draw(rows: tuple[PairRow, ...]) -> list[Contact]:
     return [row.contact for row in rows if row.declared > 1 or (row.declared == 0 and row.distance <= CONTACT)]
 
 
-def _step(section: Section, number: int, waypoint: Waypoint, first: Poses) -> StepRow:
+def _step(section: Section, number: int, waypoint: Waypoint, first: Poses, resolution: float) -> StepRow:
     poses = waypoint.poses
     line, jumper = edge_openings(section.clamp, poses)
     pairs = measure_pairs(section, poses, CONTACT)
@@ -164,7 +166,7 @@ def _step(section: Section, number: int, waypoint: Waypoint, first: Poses) -> St
         opening_jumper=jumper,
         tilt=poses["P2"].angle - poses["P1"].angle,
         turns=round((_screwed(poses) - _screwed(first)) / section.clamp.bolt.pitch, 9) + 0.0,
-        seats=seats(pairs, CONTACT),
+        seats=seats(pairs, resolution),
         outside=outside,
     )
 
@@ -194,9 +196,11 @@ def _modelled(run: Run, mesh_error: float) -> tuple[str, ...]:
     grooves = (
         "arcs against cylinders in closed form" if run.method == "cas" else f"as the method {run.method} sees them"
     )
-    solver = (
-        "least distance along the bolt with both wires free" if run.solver == "exact" else "first position that fits"
-    )
+    solver = {
+        "exact": "least distance along the bolt with both wires free, proven",
+        "stepped": "first position in steps along the bolt that fits",
+        "bisection": "least distance along the bolt that fits, by bisection",
+    }[run.solver]
     return (
         "seven rigid parts of nominal dimensions that move in the section: along x and y, the down splint also tilts",
         f"the five concave arc contacts (each splint with each wire, saddle with round back), {grooves}",

@@ -240,7 +240,7 @@ def test_command_reports_a_clamp_of_ones_own(tmp_path):
 def test_command_says_not_clamped_by_its_exit_code(tmp_path):
     done = command_line("--line", LOOSE["line"], "--jumper", LOOSE["jumper"], "-q", "-o", "out", folder=tmp_path)
     assert done.returncode == 1
-    assert done.stderr == ""
+    assert [line for line in done.stderr.splitlines() if "compiling" not in line] == []
     assert "Not passed: not clamped" in (tmp_path / "out" / "report.html").read_text()
 
 
