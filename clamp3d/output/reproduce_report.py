@@ -82,7 +82,9 @@ def reproduction_to_text(found: Reproduction) -> str:
         f"  image detection, found:     {trials} (marking error chosen)",
     ]
     lines += [f"  {found.plateau}", ""]
-    lines.append("Table 5. Work counted: positions tried (M), contact queries (C), segments m of all four arcs")
+    lines.append(
+        "Table 5. Work counted: positions tried (M), groove queries (C; each one arc or its chords), segments m of all arcs"
+    )
     lines.append(f"  {'method':10s} {'unit':>8s} {'solver':>9s} {'M':>6s} {'C':>7s} {'m':>5s}  published M, C, total")
     for w in found.table5:
         unit = "-" if w.unit_angle_deg is None else f"{w.unit_angle_deg:g} deg"
