@@ -1,0 +1,315 @@
+"""From a mesh to its grooves, cylinders and holes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.fit.cylinder import Axis, covariance, fit_axis, perpendicular, surface_error
+from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
+from clamp3d.fit.mesh_file import Mesh, load_mesh
+from clamp3d.fit.regions import Region, Surface, face_span, find_regions
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+FULL_TURN_GAP = np.radians(30.0)
+"""A surface whose largest uncovered angle is below this goes all the way round."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FitResult:
+    """What was found in ``mesh``: features sorted by covered area, largest first, and ``notes`` for the reader.
+
+    ``feature_area`` and ``area`` (mm^2): area of all features and of the mesh.
+    """
+
+    mesh: Mesh
+    grooves: tuple[GrooveFit, ...]
+    cylinders: tuple[CylinderFit, ...]
+    holes: tuple[HoleFit, ...]
+    area: float
+    notes: tuple[str, ...]
+
+    @property
+    def features(self) -> tuple[FittedSurface, ...]:
+        """Grooves, cylinders and holes in this order."""
+        return (*self.grooves, *self.cylinders, *self.holes)
+
+    @property
+    def feature_area(self) -> float:
+        """Area (mm^2) of the triangles that belong to a feature."""
+        return float(sum(f.covered_area for f in self.features))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists for JSON; lengths in mm."""
+        low, high = self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)
+        return {
+            "mesh": self.mesh.name,
+            "vertices": len(self.mesh.vertices),
+            "triangles": len(self.mesh.faces),
+            "watertight": self.mesh.watertight,
+            "bounds_mm": [low.tolist(), high.tolist()],
+            "area_mm2": self.area,
+            "feature_area_mm2": self.feature_area,
+            "grooves": [f.to_dict() for f in self.grooves],
+            "cylinders": [f.to_dict() for f in self.cylinders],
+            "holes": [f.to_dict() for f in self.holes],
+            "notes": list(self.notes),
+        }
+
+
+def fit_file(
+    path: str | Path, *, unit: str | None = None, progress: Callable[[str, float], None] | None = None
+) -> FitResult:
+    """Fit the mesh in ``path``; see ``load_mesh`` for formats, units and errors."""
+    return fit_mesh(load_mesh(path, unit=unit), progress=progress)
+
+
+def fit_mesh(mesh: Mesh, *, progress: Callable[[str, float], None] | None = None) -> FitResult:
+    """Find the concave grooves, convex cylinders and holes of ``mesh`` (from ``load_mesh`` or ``make_mesh``).
+
+    ``progress(stage, fraction)`` is called while it works.
+    """
+    surface = Surface(mesh)
+    regions = _join(surface, find_regions(surface, progress))
+    regions.sort(key=lambda r: -float(surface.areas[r.faces].sum()))
+    grooves: list[GrooveFit] = []
+    cylinders: list[CylinderFit] = []
+    holes: list[HoleFit] = []
+    notes = list(mesh.notes)
+    for region in regions:
+        values = _measure(surface, region)
+        if values is None:
+            continue
+        if region.sign > 0:
+            cylinders.append(CylinderFit(name=f"C{len(cylinders) + 1}", **values))
+        elif values["half_angle"] < np.pi:
+            grooves.append(GrooveFit(name=f"G{len(grooves) + 1}", **values))
+        else:
+            holes.append(HoleFit(name=f"H{len(holes) + 1}", **values, through=_open_ended(surface, values)))
+    if not grooves:
+        notes.append("no groove: no concave circular arc found")
+    return FitResult(
+        mesh=mesh,
+        grooves=tuple(grooves),
+        cylinders=tuple(cylinders),
+        holes=tuple(holes),
+        area=float(surface.areas.sum()),
+        notes=tuple(notes),
+    )
+
+
+def _arc(surface: Surface, axis: Axis, u: Array, w: Array, faces: IntArray) -> tuple[float, float]:
+    """Middle (rad, from u towards w) and half angle of the arc that ``faces`` cover; half angle pi for a full turn."""
+    p = surface.V[surface.F[faces]] - axis.point
+    a = np.arctan2(p @ w, p @ u)
+    base = a[:, :1]
+    turned = base + (a - base + np.pi) % (2.0 * np.pi) - np.pi
+    low, high = turned.min(axis=1), turned.max(axis=1)
+    order = np.argsort(low)
+    low, high = low[order], high[order]
+    # Two turns of the sorted intervals make the circle a line.
+    low = np.concatenate([low, low + 2.0 * np.pi])
+    high = np.maximum.accumulate(np.concatenate([high, high + 2.0 * np.pi]))
+    gaps = low[1:] - high[:-1]
+    k = int(np.argmax(gaps))
+    if gaps[k] < FULL_TURN_GAP:
+        return 0.0, float(np.pi)
+    start, end = low[k + 1], high[k] + 2.0 * np.pi
+    return float(0.5 * (start + end)), float(0.5 * (end - start))
+
+
+def _borders(surface: Surface, faces: IntArray) -> tuple[Array, Array]:
+    """End points (k, 2, 3) of the region's border edges, and their lengths (k,)."""
+    F = surface.F[faces]
+    edges = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    ends = surface.V[unique[count == 1]]
+    return ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+
+def _median(values: Array, weights: Array) -> float:
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
+
+
+def _measure(surface: Surface, region: Region) -> dict[str, Any] | None:
+    """Frame, extent, residuals and errors of ``region``; None if the points leave the cylinder open."""
+    d = region.axis.direction
+    d = d if d[int(np.argmax(np.abs(d)))] > 0.0 else -d
+    axis = Axis(region.axis.point, d, region.axis.radius)
+    u, w = perpendicular(d)
+    middle, half = _arc(surface, axis, u, w, region.faces)
+    deepest = np.cos(middle) * u + np.sin(middle) * w
+    R = np.stack([np.cross(-deepest, d), -deepest, d], axis=1)
+
+    corners = (surface.V[np.unique(surface.F[region.faces])] - axis.point) @ R
+    z0, z1 = float(corners[:, 2].min()), float(corners[:, 2].max())
+    ends, weight = _borders(surface, region.faces)
+    local = (ends - axis.point) @ R
+    along = np.abs(local[:, 1, 2] - local[:, 0, 2]) > 0.5 * weight
+    z, angle = local[:, :, 2].mean(axis=1), np.arctan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
+    mid, reach = 0.5 * (z0 + z1), 0.5 * (z1 - z0)
+    length_error = arc_error = 0.0
+    low, high = ~along & (z - mid < -0.5 * reach), ~along & (z - mid > 0.5 * reach)
+    if low.any() and high.any():
+        a, b = _median(z[low], weight[low]), _median(z[high], weight[high])
+        length_error = max(float(np.abs(z[low] - a).max()), float(np.abs(z[high] - b).max()))
+        z0, z1 = a, b
+    if half < np.pi:
+        left, right = along & (angle < -0.5 * half), along & (angle > 0.5 * half)
+        if left.any() and right.any():
+            a, b = _median(angle[left], weight[left]), _median(angle[right], weight[right])
+            arc_error = max(float(np.abs(angle[left] - a).max()), float(np.abs(angle[right] - b).max()))
+            turn, half = 0.5 * (a + b), 0.5 * (b - a)
+            c, s = np.cos(turn), np.sin(turn)
+            R = R @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    length = z1 - z0
+    T = np.eye(4)
+    T[:3, :3] = R
+    T[:3, 3] = axis.point + 0.5 * (z0 + z1) * d
+
+    points = (surface.V[region.points] - T[:3, 3]) @ R
+    residual = np.hypot(points[:, 0], points[:, 1]) - axis.radius
+    freedom = max(len(points) - 5, 1)
+    rms = float(np.sqrt(residual @ residual / freedom))
+    noise = float(np.hypot(rms, surface.mesh.rounding))
+    C = covariance(points, axis.radius, noise * _inflation(surface, region, residual))
+    if C is None or length <= 0.0 or half <= 0.0:
+        return None
+    spans = face_span(surface, axis, region.faces)
+    area = float(surface.areas[region.faces].sum())
+    return {
+        "radius": axis.radius,
+        "half_angle": half,
+        "length": length,
+        "T_part_feature": T,
+        "residual_rms": rms,
+        "residual_max": float(np.abs(residual).max()),
+        "points": len(points),
+        "covered_area": area,
+        "coverage": min(1.0, area / (2.0 * half * axis.radius * length)),
+        "covariance": C,
+        "covariance_error": surface_error(C, half, length, freedom),
+        "form_error": _form_error(points, residual, rms) + 2.0 * surface.mesh.rounding,
+        "chord_error": float(2.0 * axis.radius * np.sin(0.25 * spans.max()) ** 2),
+        "arc_error": arc_error,
+        "length_error": length_error,
+        "faces": region.faces,
+    }
+
+
+def _inflation(surface: Surface, region: Region, residual: Array) -> float:
+    """Factor on the standard errors for residuals that neighbours share (a scanner's or a smoother's traces).
+
+    With correlation c between neighbours (first order autoregression along both directions of the surface) n points
+    are worth n ((1 - c) / (1 + c))^2 independent ones.
+    """
+    number = np.full(len(surface.V), -1)
+    number[region.points] = np.arange(len(region.points))
+    F = surface.F[region.faces]
+    edges = np.unique(np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1), axis=0)
+    i, j = number[edges[:, 0]], number[edges[:, 1]]
+    both = (i >= 0) & (j >= 0)
+    power = float(residual @ residual) / len(residual)
+    if both.sum() < 30 or power <= 0.0:
+        return 1.0
+    shared = float(np.mean(residual[i[both]] * residual[j[both]])) / power
+    if shared < 3.0 / np.sqrt(both.sum()):
+        return 1.0
+    shared = min(shared, 0.95)
+    return (1.0 + shared) / (1.0 - shared)
+
+
+def _form_error(points: Array, residual: Array, rms: float) -> float:
+    """Largest mean residual of patches of about 25 points, with three standard errors; few points: the largest of all.
+
+    Scatter averages out over a patch, a surface that is not round does not.
+    """
+    worst = float(np.abs(residual).max())
+    angle = np.arctan2(points[:, 0], -points[:, 1])
+    patches = [np.arange(len(points))]
+    flat = np.column_stack([angle * np.hypot(points[:, 0], points[:, 1]).mean(), points[:, 2]])
+    done = []
+    while patches:
+        index = patches.pop()
+        if len(index) < 50:
+            done.append(index)
+            continue
+        part = flat[index]
+        side = int(np.argmax(np.ptp(part, axis=0)))
+        order = np.argsort(part[:, side], kind="stable")
+        patches += [index[order[: len(index) // 2]], index[order[len(index) // 2 :]]]
+    if len(done) < 2:
+        return worst
+    means = [abs(float(residual[i].mean())) + 3.0 * rms / np.sqrt(len(i)) for i in done]
+    return min(worst, max(means))
+
+
+def _open_ended(surface: Surface, values: dict[str, Any]) -> bool:
+    """True if nothing closes either end: rays along the axis from the middle meet no face within a radius of the end."""
+    T, reach = values["T_part_feature"], 0.5 * values["length"] + values["radius"]
+    a, b, c = ((surface.V[surface.F[:, k]] - T[:3, 3]) @ T[:3, :3] for k in range(3))
+    # A face meets the axis if the origin lies in its projection along z: all three edge functions of one sign.
+    e = [p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((b, c), (c, a), (a, b))]
+    hit = ((e[0] >= 0) & (e[1] >= 0) & (e[2] >= 0)) | ((e[0] <= 0) & (e[1] <= 0) & (e[2] <= 0))
+    total = e[0] + e[1] + e[2]
+    hit &= total != 0.0
+    z = (e[0] * a[:, 2] + e[1] * b[:, 2] + e[2] * c[:, 2])[hit] / total[hit]
+    return not bool((np.abs(z) <= reach).any())
+
+
+def _join(surface: Surface, regions: list[Region]) -> list[Region]:
+    """Join pieces of one cylinder that a cut, a crack or a hole parts, if one fit holds for both and they are close."""
+    regions = list(regions)
+    merged = True
+    while merged:
+        merged = False
+        for i in range(len(regions)):
+            for j in range(i + 1, len(regions)):
+                both = _one(surface, regions[i], regions[j])
+                if both is not None:
+                    regions[i] = both
+                    del regions[j]
+                    merged = True
+                    break
+            if merged:
+                break
+    return regions
+
+
+def _one(surface: Surface, a: Region, b: Region) -> Region | None:
+    if a.sign != b.sign or abs(a.axis.radius - b.axis.radius) > 0.2 * a.axis.radius:
+        return None
+    if abs(a.axis.direction @ b.axis.direction) < 0.97:
+        return None
+    large, small = (a, b) if len(a.points) >= len(b.points) else (b, a)
+    tolerance = max(a.tolerance, b.tolerance)
+    V = surface.V
+    points = np.union1d(a.points, b.points)
+    axis = fit_axis(V[points], large.axis)
+    if axis is None:
+        return None
+    for region in (a, b):
+        if float(np.quantile(np.abs(axis.residual(V[region.points])), 0.9)) > tolerance:
+            return None
+    faces = np.concatenate([a.faces, b.faces])
+    # Far apart along the axis they are two features: one groove would claim material where there is none.
+    za, zb = ((V[np.unique(surface.F[r.faces])] - axis.point) @ axis.direction for r in (a, b))
+    gap = max(float(za.min() - zb.max()), float(zb.min() - za.max()))
+    if gap > 0.25 * min(float(np.ptp(za)), float(np.ptp(zb))):
+        return None
+    u, w = perpendicular(axis.direction)
+    half = _arc(surface, axis, u, w, faces)[1]
+    z = np.concatenate([za, zb])
+    area = float(surface.areas[faces].sum())
+    if area < 0.5 * 2.0 * half * axis.radius * float(np.ptp(z)):
+        return None
+    return Region(axis, a.sign, faces, points, tolerance)

@@ -1,0 +1,396 @@
+"""Region growing: which triangles belong to one circular cylinder.
+
+Two kinds of seed feed one growing rule. *Strips*: a tessellated cylinder consists of planar strips whose vertices lie
+on the surface; two neighbouring strips give the axis (cross product of their normals) and the circle exactly, however
+coarse. *Patches*: on dense or scanned meshes a quadric through a patch gives the principal curvatures, which a
+least-squares cylinder refines; patches grow until the curvature stands out of the noise.
+
+A triangle belongs to a cylinder if its vertices lie on the surface within the tolerance (or inside it by no more than
+the sagitta of the region's facets: cuts end on chords, not on the arc) and its normal is radial within half a facet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from clamp3d.fit.cylinder import Axis, circle, fit_axis, perpendicular
+from clamp3d.fit.mesh_file import Mesh
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+MAX_FACET = np.radians(46.0)
+"""Widest facet of a tessellated cylinder: an octagon counts as round, a hexagon (a nut, a bolt head) does not."""
+MIN_LINES = 4
+"""Fewest lines on a surface: three always lie on some circle (a trapezoid or V groove is not an arc)."""
+_PATCH_SIZES = (24, 96, 384, 1536)
+_GATES = tuple(np.radians(a) for a in (12.0, 25.0, 46.0))
+_MAX_SEEDS = 400
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Region:
+    """Triangles of one cylinder: ``sign`` +1 convex, -1 concave; ``points`` index the vertices that the fit uses."""
+
+    axis: Axis
+    sign: int
+    faces: IntArray
+    points: IntArray
+    tolerance: float
+
+
+class Surface:
+    """A mesh with what region growing asks for: normals, areas, neighbours, coplanar cells."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        import trimesh
+
+        self.mesh = mesh
+        self.V, self.F = mesh.vertices, mesh.faces
+        tm = trimesh.Trimesh(self.V, self.F, process=False)
+        self.normals = np.asarray(tm.face_normals)
+        self.areas = np.asarray(tm.area_faces)
+        self.centres = np.asarray(tm.triangles_center)
+        self.pairs = np.asarray(tm.face_adjacency, dtype=np.int64).reshape(-1, 2)
+        self.edges = np.asarray(tm.face_adjacency_edges, dtype=np.int64).reshape(-1, 2)
+        n1, n2 = self.normals[self.pairs[:, 0]], self.normals[self.pairs[:, 1]]
+        self.bend = np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
+        opposite = np.asarray(tm.face_adjacency_unshared, dtype=np.int64).reshape(-1, 2)
+        # Off-plane distance of each far corner: unlike an angle it does not blow up on slivers.
+        on_edge = self.V[self.edges[:, 0]]
+        self.step = np.maximum(
+            np.abs(np.einsum("ij,ij->i", self.V[opposite[:, 1]] - on_edge, n1)),
+            np.abs(np.einsum("ij,ij->i", self.V[opposite[:, 0]] - on_edge, n2)),
+        )
+        self.extent = float(np.ptp(self.V[np.unique(self.F)], axis=0).max())
+        self.floor = max(4.0 * mesh.rounding, 1e-9 * self.extent)
+
+    def labels(self, keep: BoolArray) -> IntArray:
+        """Component (m,) of each face when only the neighbour pairs ``keep`` (p,) connect."""
+        p = self.pairs[keep]
+        graph = coo_array((np.ones(len(p), dtype=np.int8), (p[:, 0], p[:, 1])), shape=(len(self.F),) * 2)
+        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+    def cells(self, tolerance: float) -> IntArray:
+        """Label (m,) of the planar cell of each face; neighbours within ``tolerance`` of one plane share a cell."""
+        return self.labels((self.step <= tolerance) & (self.bend < MAX_FACET))
+
+
+def face_span(surface: Surface, axis: Axis, faces: IntArray) -> Array:
+    """Angle (k,) that each of ``faces`` (k,) covers about the axis in rad."""
+    u = axis.radial(surface.V[surface.F[faces].reshape(-1)])[0].reshape(-1, 3, 3)
+    cosines = np.einsum("kij,kij->ki", u, u[:, [1, 2, 0]])
+    return np.asarray(2.0 * np.arcsin(np.sqrt(np.clip(0.5 * (1.0 - cosines), 0.0, 1.0))).max(axis=1))
+
+
+def _grow(surface: Surface, free: BoolArray, cells: IntArray, axis: Axis, sign: int, seed: IntArray, tolerance: float,
+          floor: float) -> Region | None:
+    """Grow from ``seed`` faces, refit, and repeat until the faces no longer change."""
+    V, F = surface.V, surface.F
+    faces = seed
+    points = np.unique(F[seed])
+    span = float(face_span(surface, axis, seed).max())
+    for _ in range(12):
+        if not 0.0 < axis.radius < 20.0 * surface.extent:
+            return None
+        u, r = axis.radial(V)
+        off = r - axis.radius
+        if span > MAX_FACET:
+            return None
+        sagitta = 2.0 * axis.radius * np.sin(0.25 * span) ** 2
+        on = np.abs(off) <= tolerance
+        near = (off <= tolerance) & (off >= -1.02 * sagitta - tolerance)
+        spread = np.einsum("ij,ij->i", surface.normals[faces], axis.radial(surface.centres[faces])[0])
+        slack = float(np.quantile(np.arccos(np.clip(sign * spread, -1.0, 1.0)), 0.9))
+        limit = np.cos(min(max(0.6 * span, 2.5 * slack, 0.02), 0.7))
+        mask = free & near[F].all(axis=1) & (on[F].sum(axis=1) >= 1)
+        index = np.flatnonzero(mask)
+        radial = axis.radial(surface.centres[index])[0]
+        mask[index] = (sign * np.einsum("ij,ij->i", surface.normals[index], radial) >= limit) & (
+            face_span(surface, axis, index) <= max(1.5 * span, 0.1)
+        )
+        if not mask[faces].any():
+            return None
+        label = surface.labels(mask[surface.pairs].all(axis=1))
+        inside = faces[mask[faces]]
+        names, where = np.unique(label[inside], return_inverse=True)
+        main = names[np.argmax(np.bincount(where, weights=surface.areas[inside]))]
+        grown = np.flatnonzero(mask & (label == main))
+        settled = len(grown) == len(faces) and bool((grown == faces).all())
+        faces = grown
+        points = _support(surface, cells, faces, on)
+        if len(points) < 6:
+            return None
+        better = fit_axis(V[points], axis)
+        if better is None:
+            return None
+        axis = better
+        res = axis.residual(V[points])
+        tolerance = max(floor, _tolerance(res))
+        full = on[F[faces]].all(axis=1)
+        span = float(face_span(surface, axis, faces[full]).max()) if full.any() else span
+        if settled:
+            break
+    return Region(axis, sign, faces, points, tolerance)
+
+
+def _tolerance(residual: Array) -> float:
+    """Distance that a vertex with the scatter of ``residual`` (n,) exceeds as rarely as four normal deviations.
+
+    The scatter is the median one, so a few strays do not widen it; five fitted parameters and few points do.
+    """
+    freedom = max(len(residual) - 5, 1)
+    scatter = 1.4826 * float(np.median(np.abs(residual))) * np.sqrt(len(residual) / freedom)
+    return scatter * float(stats.t.isf(3.2e-5, min(freedom, 1000)))
+
+
+def _support(surface: Surface, cells: IntArray, faces: IntArray, on: BoolArray) -> IntArray:
+    """Vertices that the fit may use: on the surface, and corners of it rather than points inside a planar strip.
+
+    Border vertices count only where they are needed: there the region's own border is uncertain, and on a cut mesh
+    they lie on chords.
+    """
+    F = surface.F
+    corner_vertex = F[faces].reshape(-1)
+    corner_cell = np.repeat(cells[faces], 3)
+    both = np.unique(np.column_stack([corner_vertex, corner_cell]), axis=0)
+    vertex, count = np.unique(both[:, 0], return_counts=True)
+    ridge = vertex[count >= 2]
+    keep = vertex[on[vertex]]
+    total = np.bincount(F.reshape(-1), minlength=len(surface.V))
+    inner = vertex[np.bincount(corner_vertex, minlength=len(surface.V))[vertex] == total[vertex]]
+    inner = inner[on[inner]]
+    if len(inner) >= max(50, 0.6 * len(keep)):
+        return np.asarray(inner)
+    flat = np.setdiff1d(keep, ridge)
+    if len(ridge) >= 0.6 * len(keep) and len(flat) > 0.25 * len(keep):
+        return np.asarray(ridge[on[ridge]])
+    return np.asarray(keep)
+
+
+def find_regions(surface: Surface, progress: Callable[[str, float], None] | None = None) -> list[Region]:
+    """All cylinders on the mesh, none overlapping; ``progress(stage, fraction)`` is called as it goes."""
+    free = np.ones(len(surface.F), dtype=bool)
+    found: list[Region] = []
+    tell = progress or (lambda stage, fraction: None)
+    for floor in (surface.floor, 40.0 * max(surface.mesh.rounding, surface.extent * 2.0**-24)):
+        cells = surface.cells(floor)
+        for region in _strips(surface, free, cells, floor, tell):
+            free[region.faces] = False
+            found.append(region)
+    cells = surface.cells(surface.floor)
+    for region in _patches(surface, free, cells, tell):
+        free[region.faces] = False
+        found.append(region)
+    return found
+
+
+def _strips(surface: Surface, free: BoolArray, cells: IntArray, floor: float,
+            tell: Callable[[str, float], None]) -> Iterator[Region]:
+    V, F = surface.V, surface.F
+    ridge = (surface.step > floor) & (surface.bend > 1e-5) & (surface.bend < MAX_FACET)
+    ridge &= cells[surface.pairs[:, 0]] != cells[surface.pairs[:, 1]]
+    order = np.flatnonzero(ridge)
+    members = np.argsort(cells, kind="stable")
+    starts = np.searchsorted(cells[members], np.arange(cells.max() + 2))
+    fails = np.zeros(cells.max() + 1, dtype=np.int64)
+    beside: list[set[int]] = [set() for _ in range(cells.max() + 1)]
+    for a, b in cells[surface.pairs[order]]:
+        beside[a].add(int(b))
+        beside[b].add(int(a))
+    for n, k in enumerate(order):
+        if n % 50 == 0:
+            tell("strips", n / len(order))
+        i, j = surface.pairs[k]
+        a, b = cells[i], cells[j]
+        if not (free[i] and free[j]) or fails[a] > 2 or fails[b] > 2:
+            continue
+        d = np.cross(surface.normals[i], surface.normals[j])
+        d /= np.linalg.norm(d)
+        seed = np.concatenate([members[starts[a] : starts[a + 1]], members[starts[b] : starts[b + 1]]])
+        corners = V[np.unique(F[seed])]
+        u, w = perpendicular(d)
+        flat = np.column_stack([corners @ u, corners @ w])
+        got = circle(flat)
+        if got is None:
+            continue
+        centre, radius = got
+        # Slack for the axis: a direction from two narrow strips is only as good as their normals.
+        loose = floor * (1.0 + 0.2 / surface.bend[k])
+        if radius > 20.0 * surface.extent or np.abs(np.hypot(*(flat - centre).T) - radius).max() > loose:
+            fails[[a, b]] += 1
+            continue
+        axis = Axis(centre[0] * u + centre[1] * w, d, radius)
+        # Two strips always lie on a circle: a third one must agree before the dear growing starts.
+        third = (beside[a] | beside[b]) - {a, b}
+        if not any(
+            np.abs(axis.residual(V[F[members[starts[c] : starts[c + 1]]].reshape(-1)])).max() <= loose for c in third
+        ):
+            fails[[a, b]] += 1
+            continue
+        sign = 1 if surface.normals[i] @ axis.radial(surface.centres[i : i + 1])[0][0] > 0.0 else -1
+        region = _grow(surface, free, cells, axis, sign, seed, loose, floor)
+        if region is None or region.tolerance > 4.0 * floor or not _accept(surface, cells, region):
+            fails[[a, b]] += 1
+            continue
+        yield region
+
+
+def _patches(surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[[str, float], None]) -> Iterator[Region]:
+    V, F = surface.V, surface.F
+    if not free.any():
+        return
+    size = np.bincount(cells)[cells]
+    todo = free & (size <= 4)
+    gates = [surface.labels(surface.bend < g) for g in _GATES]
+    tree = cKDTree(surface.centres)
+    rng = np.random.default_rng(0)
+    order = rng.permutation(np.flatnonzero(todo))
+    tried = 0
+    for n, start in enumerate(order):
+        if not (todo[start] and free[start]):
+            continue
+        tried += 1
+        if tried > _MAX_SEEDS:
+            return
+        tell("patches", n / len(order))
+        nearest = tree.query(surface.centres[start], k=min(_PATCH_SIZES[-1], len(F)))[1]
+        nearest = np.atleast_1d(nearest)
+        facing = free[nearest] & (surface.normals[nearest] @ surface.normals[start] > 0.5)
+        region = _from_patches(surface, free, cells, start, nearest[facing], gates)
+        if region is None:
+            todo[nearest[: _PATCH_SIZES[0] // 2]] = False
+            continue
+        todo[region.faces] = False
+        yield region
+
+
+def _from_patches(surface: Surface, free: BoolArray, cells: IntArray, start: int, nearest: IntArray,
+                  gates: list[IntArray]) -> Region | None:
+    for label in gates:
+        same = nearest[label[nearest] == label[start]]
+        last = 0
+        for size in _PATCH_SIZES:
+            patch = same[:size]
+            if len(patch) < 8 or len(patch) == last:
+                break
+            last = len(patch)
+            guess = _quadric(surface, patch)
+            if guess is None:
+                continue
+            axis0, sign, scatter = guess
+            points = surface.V[np.unique(surface.F[patch])]
+            axis = fit_axis(points, axis0, robust_scale=max(scatter, surface.floor))
+            if axis is None:
+                continue
+            noise = 1.4826 * float(np.median(np.abs(axis.residual(points))))
+            if noise > 1.6 * scatter + surface.floor:
+                continue
+            tolerance = max(surface.floor, 4.0 * noise)
+            region = _grow(surface, free, cells, axis, sign, patch, tolerance, surface.floor)
+            if region is not None and len(region.faces) >= 0.7 * len(patch) and _accept(surface, cells, region):
+                return region
+    return None
+
+
+def _quadric(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | None:
+    """Cylinder from the principal curvatures of a patch, and the scatter about the quadric; None if it looks flat."""
+    normal = surface.areas[patch] @ surface.normals[patch]
+    length = np.linalg.norm(normal)
+    if length <= 0.0:
+        return None
+    normal = normal / length
+    u, w = perpendicular(normal)
+    points = surface.V[np.unique(surface.F[patch])]
+    if len(points) < 9:
+        return None
+    m = points.mean(axis=0)
+    x, y, z = (points - m) @ u, (points - m) @ w, (points - m) @ normal
+    s = max(float(np.abs(x).max()), float(np.abs(y).max()))
+    A = np.column_stack([np.ones_like(x), x / s, y / s, (x / s) ** 2, x * y / s**2, (y / s) ** 2])
+    sol, _, rank, _ = np.linalg.lstsq(A, z, rcond=0.01)
+    if rank < 6:  # long strips: all points in two rings leave the curvature along the axis open
+        return _from_normals(surface, patch)
+    res = z - A @ sol
+    scatter = float(np.sqrt(res @ res / (len(points) - 6)))
+    C = np.linalg.inv(A.T @ A) * scatter**2
+    values, vectors = np.linalg.eigh(np.array([[2.0 * sol[3], sol[4]], [sol[4], 2.0 * sol[5]]]) / s**2)
+    big = int(np.argmax(np.abs(values)))
+    doubt = 2.0 * float(np.sqrt(C[3:, 3:].diagonal().max())) / s**2
+    if abs(values[big]) < 6.0 * doubt:
+        return None
+    radius = 1.0 / abs(values[big])
+    # Height over the outward normal: a valley (positive curvature) is a groove.
+    sign = -1 if values[big] > 0.0 else 1
+    d = vectors[0, 1 - big] * u + vectors[1, 1 - big] * w
+    top = m + sol[0] * normal
+    return Axis(top - sign * radius * normal, d, radius), sign, scatter
+
+
+def _from_normals(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | None:
+    """Cylinder whose axis is the direction that the patch's normals avoid most, and the scatter about it."""
+    N = surface.normals[patch]
+    vectors = np.linalg.eigh((N * surface.areas[patch][:, None]).T @ N)[1]
+    d = vectors[:, 0]
+    u, w = perpendicular(d)
+    points = surface.V[np.unique(surface.F[patch])]
+    flat = np.column_stack([points @ u, points @ w])
+    got = circle(flat)
+    if got is None:
+        return None
+    centre, radius = got
+    axis = Axis(centre[0] * u + centre[1] * w, d, radius)
+    lean = np.einsum("ij,ij->i", N, axis.radial(surface.centres[patch])[0]) @ surface.areas[patch]
+    scatter = float(np.sqrt(np.mean((np.hypot(*(flat - centre).T) - radius) ** 2)))
+    return axis, 1 if lean > 0.0 else -1, scatter
+
+
+def _accept(surface: Surface, cells: IntArray, region: Region) -> bool:
+    """True if the region is long, round and distinct enough to be a cylinder rather than an accident."""
+    V, F = surface.V, surface.F
+    axis = region.axis
+    u, w = perpendicular(axis.direction)
+    p = V[region.points] - axis.point
+    angle = np.sort(np.arctan2(p @ w, p @ u))
+    gaps = np.diff(angle, append=angle[0] + 2.0 * np.pi)
+    arc = 2.0 * np.pi - float(gaps.max())
+    noise = max(region.tolerance / 4.0, 1e-12)
+    lines = int((gaps > 1e-3 * max(arc, 1e-9)).sum())
+    spans = face_span(surface, axis, region.faces)
+    if lines < MIN_LINES:
+        return False
+    # Every trapezoid with equal flanks lies on a circle: with three facets ask for three equal ones.
+    if lines == MIN_LINES and (spans.max() > 1.02 * spans.min() or spans.max() > np.radians(30.0)):
+        return False
+    if 2.0 * axis.radius * np.sin(0.25 * arc) ** 2 < 6.0 * noise or arc < 2.0 * float(np.median(spans)):
+        return False
+    z = (V[np.unique(F[region.faces])] - axis.point) @ axis.direction
+    length = float(np.ptp(z))
+    chord = 2.0 * axis.radius * np.sin(0.5 * float(spans.max()))
+    if length < 2.0 * chord and _runs_on(surface, region, float(spans.max())):
+        return False
+    return len(region.points) >= 8 and length > 0.0
+
+
+def _runs_on(surface: Surface, region: Region, span: float) -> bool:
+    """True if the surface goes on smoothly past both round ends: a band of a sphere or torus, not a cylinder."""
+    inside = np.zeros(len(surface.F), dtype=bool)
+    inside[region.faces] = True
+    border = inside[surface.pairs[:, 0]] != inside[surface.pairs[:, 1]]
+    e = surface.V[surface.edges[border]]
+    middle = e.mean(axis=1)
+    across = np.abs((e[:, 1] - e[:, 0]) @ region.axis.direction) < 0.5 * np.linalg.norm(e[:, 1] - e[:, 0], axis=1)
+    z = (middle - region.axis.point) @ region.axis.direction
+    z = z - 0.5 * (z.min() + z.max()) if len(z) else z
+    smooth = surface.bend[border] < 1.5 * span
+    ends = [across & (z > 0.0), across & (z < 0.0)]
+    return all(bool(end.any()) and bool(smooth[end].mean() > 0.7) for end in ends)
