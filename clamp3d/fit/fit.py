@@ -158,13 +158,13 @@ def _measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     z, angle = local[:, :, 2].mean(axis=1), np.arctan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
     mid, reach = 0.5 * (z0 + z1), 0.5 * (z1 - z0)
     length_error = arc_error = 0.0
-    low, high = ~along & (z - mid < -0.5 * reach), ~along & (z - mid > 0.5 * reach)
+    low, high = ~along & (z - mid < -0.8 * reach), ~along & (z - mid > 0.8 * reach)
     if low.any() and high.any():
         a, b = _median(z[low], weight[low]), _median(z[high], weight[high])
         length_error = max(float(np.abs(z[low] - a).max()), float(np.abs(z[high] - b).max()))
         z0, z1 = a, b
     if half < np.pi:
-        left, right = along & (angle < -0.5 * half), along & (angle > 0.5 * half)
+        left, right = along & (angle < -0.8 * half), along & (angle > 0.8 * half)
         if left.any() and right.any():
             a, b = _median(angle[left], weight[left]), _median(angle[right], weight[right])
             arc_error = max(float(np.abs(angle[left] - a).max()), float(np.abs(angle[right] - b).max()))

@@ -199,6 +199,8 @@ def _strips(surface: Surface, free: BoolArray, cells: IntArray, floor: float,
     V, F = surface.V, surface.F
     ridge = (surface.step > floor) & (surface.bend > 1e-5) & (surface.bend < MAX_FACET)
     ridge &= cells[surface.pairs[:, 0]] != cells[surface.pairs[:, 1]]
+    # A whole strip has four corners, so two triangles at least: this spares dense meshes the search.
+    ridge &= (np.bincount(cells)[cells[surface.pairs]] >= 2).all(axis=1)
     order = np.flatnonzero(ridge)
     members = np.argsort(cells, kind="stable")
     starts = np.searchsorted(cells[members], np.arange(cells.max() + 2))
@@ -256,6 +258,7 @@ def _patches(surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[
     rng = np.random.default_rng(0)
     order = rng.permutation(np.flatnonzero(todo))
     tried = 0
+    limit = _noise_limit(surface, tree, rng.permutation(len(F))[:150])
     for n, start in enumerate(order):
         if not (todo[start] and free[start]):
             continue
@@ -266,7 +269,7 @@ def _patches(surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[
         nearest = tree.query(surface.centres[start], k=min(_PATCH_SIZES[-1], len(F)))[1]
         nearest = np.atleast_1d(nearest)
         facing = free[nearest] & (surface.normals[nearest] @ surface.normals[start] > 0.5)
-        region = _from_patches(surface, free, cells, start, nearest[facing], gates)
+        region = _from_patches(surface, free, cells, start, nearest[facing], gates, limit)
         if region is None:
             todo[nearest[: _PATCH_SIZES[0] // 2]] = False
             continue
@@ -275,7 +278,7 @@ def _patches(surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[
 
 
 def _from_patches(surface: Surface, free: BoolArray, cells: IntArray, start: int, nearest: IntArray,
-                  gates: list[IntArray]) -> Region | None:
+                  gates: list[IntArray], limit: float) -> Region | None:
     for label in gates:
         same = nearest[label[nearest] == label[start]]
         last = 0
@@ -288,6 +291,8 @@ def _from_patches(surface: Surface, free: BoolArray, cells: IntArray, start: int
             if guess is None:
                 continue
             axis0, sign, scatter = guess
+            if scatter > limit:
+                continue
             points = surface.V[np.unique(surface.F[patch])]
             axis = fit_axis(points, axis0, robust_scale=max(scatter, surface.floor))
             if axis is None:
@@ -297,32 +302,62 @@ def _from_patches(surface: Surface, free: BoolArray, cells: IntArray, start: int
                 continue
             tolerance = max(surface.floor, 4.0 * noise)
             region = _grow(surface, free, cells, axis, sign, patch, tolerance, surface.floor)
-            if region is not None and len(region.faces) >= 0.7 * len(patch) and _accept(surface, cells, region):
+            if region is None or len(region.faces) < 0.7 * len(patch) or not _accept(surface, cells, region):
+                continue
+            if np.sqrt(np.mean(region.axis.residual(surface.V[region.points]) ** 2)) <= limit:
                 return region
     return None
 
 
-def _quadric(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | None:
-    """Cylinder from the principal curvatures of a patch, and the scatter about the quadric; None if it looks flat."""
+def _noise_limit(surface: Surface, tree: cKDTree, sample: IntArray) -> float:
+    """Largest scatter (mm) that still counts as this mesh's noise: twice the median over small patches.
+
+    Without it the rounded edges of a scan pass as badly fitting cylinders.
+    """
+    scatters = []
+    for start in sample:
+        patch = np.atleast_1d(tree.query(surface.centres[start], k=min(_PATCH_SIZES[0], len(surface.F)))[1])
+        scatter = _quadric_fit(surface, patch[surface.normals[patch] @ surface.normals[start] > 0.5])
+        if scatter is not None:
+            scatters.append(scatter[2])
+    if len(scatters) < 20:
+        return np.inf
+    side = float(np.sqrt(np.median(surface.areas[sample])))
+    return 2.0 * float(np.median(scatters)) + 0.005 * side
+
+
+def _quadric_fit(surface: Surface, patch: IntArray) -> tuple[Array, Array, float, float, Array] | None:
+    """Height over the patch's mean plane as a quadric.
+
+    Returns coefficients (6,) and covariance (6, 6) in units of the size, scatter (mm), size (mm) and frame (4, 3): the
+    rows u, w, normal and the middle. None if fewer than 9 vertices or all on two lines.
+    """
     normal = surface.areas[patch] @ surface.normals[patch]
     length = np.linalg.norm(normal)
-    if length <= 0.0:
+    points = surface.V[np.unique(surface.F[patch])]
+    if length <= 0.0 or len(points) < 9:
         return None
     normal = normal / length
     u, w = perpendicular(normal)
-    points = surface.V[np.unique(surface.F[patch])]
-    if len(points) < 9:
-        return None
     m = points.mean(axis=0)
     x, y, z = (points - m) @ u, (points - m) @ w, (points - m) @ normal
     s = max(float(np.abs(x).max()), float(np.abs(y).max()))
-    A = np.column_stack([np.ones_like(x), x / s, y / s, (x / s) ** 2, x * y / s**2, (y / s) ** 2])
+    x, y = x / s, y / s
+    A = np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y])
     sol, _, rank, _ = np.linalg.lstsq(A, z, rcond=0.01)
-    if rank < 6:  # long strips: all points in two rings leave the curvature along the axis open
-        return _from_normals(surface, patch)
+    if rank < 6:
+        return None
     res = z - A @ sol
     scatter = float(np.sqrt(res @ res / (len(points) - 6)))
-    C = np.linalg.inv(A.T @ A) * scatter**2
+    return sol, np.linalg.inv(A.T @ A) * scatter**2, scatter, s, np.stack([u, w, normal, m])
+
+
+def _quadric(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | None:
+    """Cylinder from the principal curvatures of a patch, and the scatter about the quadric; None if it looks flat."""
+    got = _quadric_fit(surface, patch)
+    if got is None:  # long strips: all points in two rings leave the curvature along the axis open
+        return _from_normals(surface, patch)
+    sol, C, scatter, s, (u, w, normal, m) = got
     values, vectors = np.linalg.eigh(np.array([[2.0 * sol[3], sol[4]], [sol[4], 2.0 * sol[5]]]) / s**2)
     big = int(np.argmax(np.abs(values)))
     doubt = 2.0 * float(np.sqrt(C[3:, 3:].diagonal().max())) / s**2
