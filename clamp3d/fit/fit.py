@@ -125,19 +125,56 @@ def _arc(surface: Surface, axis: Axis, u: Array, w: Array, faces: IntArray) -> t
     return float(0.5 * (start + end)), float(0.5 * (end - start))
 
 
-def _borders(surface: Surface, faces: IntArray) -> tuple[Array, Array]:
-    """End points (k, 2, 3) of the region's border edges, and their lengths (k,)."""
+@dataclass(frozen=True, slots=True)
+class _End:
+    """One side of a region: where it ends (rad or mm), how far its border strays, whether the mesh goes on, creased."""
+
+    at: float
+    stray: float
+    goes_on: bool
+    crease: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Border:
+    """Border edges of a region: ends (k, 2, 3), lengths (k,), bend to the triangle outside (k,), 0 on the mesh's rim."""
+
+    ends: Array
+    length: Array
+    bend: Array
+    inner_bend: float
+
+    def end(self, values: Array, side: NDArray[np.bool_]) -> _End | None:
+        """Length-weighted median of ``values`` (k,) on ``side`` (k,); None without a border there."""
+        if not side.any():
+            return None
+        v, w, bend = values[side], self.length[side], self.bend[side]
+        order = np.argsort(v)
+        total = np.cumsum(w[order])
+        at = float(v[order][np.searchsorted(total, 0.5 * total[-1])])
+        goes_on = bool((bend > 0.0).mean() > 0.5)
+        return _End(at, float(np.abs(v - at).max()), goes_on, bool(np.median(bend) > 2.0 * self.inner_bend))
+
+
+def _border(surface: Surface, faces: IntArray) -> _Border:
+    inside = np.zeros(len(surface.F), dtype=bool)
+    inside[faces] = True
+    first, second = inside[surface.pairs].T
+    crossing = first != second
     F = surface.F[faces]
+    n = len(surface.V)
     edges = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    ends = surface.V[unique[count == 1]]
-    return ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-
-
-def _median(values: Array, weights: Array) -> float:
-    order = np.argsort(values)
-    total = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
+    key, count = np.unique(edges[:, 0] * n + edges[:, 1], return_counts=True)
+    key = key[count == 1]
+    shared = np.sort(surface.edges[crossing], axis=1)
+    shared_key = shared[:, 0] * n + shared[:, 1]
+    bend = np.zeros(len(key))
+    known = np.isin(shared_key, key)
+    bend[np.searchsorted(key, shared_key[known])] = np.maximum(surface.bend[crossing][known], 1e-12)
+    ends = surface.V[np.stack([key // n, key % n], axis=1)]
+    both = surface.bend[first & second]
+    inner = float(np.median(both[both > 1e-4])) if (both > 1e-4).any() else 0.0
+    return _Border(ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), bend, inner)
 
 
 def _measure(surface: Surface, region: Region) -> dict[str, Any] | None:
@@ -152,25 +189,24 @@ def _measure(surface: Surface, region: Region) -> dict[str, Any] | None:
 
     corners = (surface.V[np.unique(surface.F[region.faces])] - axis.point) @ R
     z0, z1 = float(corners[:, 2].min()), float(corners[:, 2].max())
-    ends, weight = _borders(surface, region.faces)
-    local = (ends - axis.point) @ R
-    along = np.abs(local[:, 1, 2] - local[:, 0, 2]) > 0.5 * weight
+    border = _border(surface, region.faces)
+    local = (border.ends - axis.point) @ R
+    along = np.abs(local[:, 1, 2] - local[:, 0, 2]) > 0.5 * border.length
     z, angle = local[:, :, 2].mean(axis=1), np.arctan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
-    mid, reach = 0.5 * (z0 + z1), 0.5 * (z1 - z0)
+    # Off the corners, where the two kinds of border mix.
+    v, t = (2.0 * z - z0 - z1) / (z1 - z0), angle / half
+    spans = face_span(surface, axis, region.faces)
+    low, high = (border.end(z, ~along & (k * v > 0.8) & (np.abs(t) < 0.85)) for k in (-1, 1))
     length_error = arc_error = 0.0
-    low, high = ~along & (z - mid < -0.8 * reach), ~along & (z - mid > 0.8 * reach)
-    if low.any() and high.any():
-        a, b = _median(z[low], weight[low]), _median(z[high], weight[high])
-        length_error = max(float(np.abs(z[low] - a).max()), float(np.abs(z[high] - b).max()))
-        z0, z1 = a, b
-    if half < np.pi:
-        left, right = along & (angle < -0.8 * half), along & (angle > 0.8 * half)
-        if left.any() and right.any():
-            a, b = _median(angle[left], weight[left]), _median(angle[right], weight[right])
-            arc_error = max(float(np.abs(angle[left] - a).max()), float(np.abs(angle[right] - b).max()))
-            turn, half = 0.5 * (a + b), 0.5 * (b - a)
-            c, s = np.cos(turn), np.sin(turn)
-            R = R @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    if low and high:
+        step = 0.0 if region.strips else float(np.median(np.ptp((surface.V[surface.F[region.faces]] @ d), axis=1)))
+        z0, z1, length_error = _ends(low, high, step, z1 - z0)
+    left, right = (border.end(angle, along & (k * t > 0.8) & (np.abs(v) < 0.85)) for k in (-1, 1))
+    if half < np.pi and left and right:
+        a, b, arc_error = _ends(left, right, 0.0 if region.strips else float(np.median(spans)), 2.0 * half)
+        half = 0.5 * (b - a)
+        c, s = np.cos(0.5 * (a + b)), np.sin(0.5 * (a + b))
+        R = R @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     length = z1 - z0
     T = np.eye(4)
     T[:3, :3] = R
@@ -184,7 +220,6 @@ def _measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     C = covariance(points, axis.radius, noise * _inflation(surface, region, residual))
     if C is None or length <= 0.0 or half <= 0.0:
         return None
-    spans = face_span(surface, axis, region.faces)
     area = float(surface.areas[region.faces].sum())
     return {
         "radius": axis.radius,
@@ -204,6 +239,23 @@ def _measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         "length_error": length_error,
         "faces": region.faces,
     }
+
+
+def _ends(first: _End, last: _End, step: float, extent: float) -> tuple[float, float, float]:
+    """Ends of a region and their error, from its borders.
+
+    On a dense mesh (facets of ``step`` well below ``extent``) the triangles across the border belong to neither side,
+    so the end lies about half a facet further, half a facet uncertain; on a coarse one a crease is the end.
+    """
+    shift, error = [0.0, 0.0], 0.0
+    for k, end in enumerate((first, last)):
+        doubt = 0.0
+        if end.goes_on and step < 0.05 * extent:
+            shift[k] = doubt = 0.5 * step
+        elif end.goes_on and not end.crease:
+            doubt = min(step, 0.5 * extent)
+        error = max(error, end.stray + doubt)
+    return first.at - shift[0], last.at + shift[1], error
 
 
 def _inflation(surface: Surface, region: Region, residual: Array) -> float:
@@ -291,8 +343,11 @@ def _one(surface: Surface, a: Region, b: Region) -> Region | None:
     if abs(a.axis.direction @ b.axis.direction) < 0.97:
         return None
     large, small = (a, b) if len(a.points) >= len(b.points) else (b, a)
-    tolerance = max(a.tolerance, b.tolerance)
     V = surface.V
+    tolerance = max(a.tolerance, b.tolerance)
+    if _side_by_side(surface, large.axis, a.faces, b.faces):
+        span = float(max(face_span(surface, large.axis, r.faces).max() for r in (a, b)))
+        tolerance = max(tolerance, 0.3 * 2.0 * large.axis.radius * np.sin(0.25 * span) ** 2)
     points = np.union1d(a.points, b.points)
     axis = fit_axis(V[points], large.axis)
     if axis is None:
@@ -312,4 +367,11 @@ def _one(surface: Surface, a: Region, b: Region) -> Region | None:
     area = float(surface.areas[faces].sum())
     if area < 0.5 * 2.0 * half * axis.radius * float(np.ptp(z)):
         return None
-    return Region(axis, a.sign, faces, points, tolerance)
+    return Region(axis, a.sign, faces, points, tolerance, a.strips and b.strips)
+
+
+def _side_by_side(surface: Surface, axis: Axis, a: IntArray, b: IntArray) -> bool:
+    """True if both sets of faces cover much the same length of the axis."""
+    za, zb = ((surface.V[np.unique(surface.F[f])] - axis.point) @ axis.direction for f in (a, b))
+    shared = min(float(za.max()), float(zb.max())) - max(float(za.min()), float(zb.min()))
+    return shared > 0.5 * min(float(np.ptp(za)), float(np.ptp(zb)))

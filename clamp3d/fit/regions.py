@@ -39,13 +39,18 @@ _MAX_SEEDS = 400
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Region:
-    """Triangles of one cylinder: ``sign`` +1 convex, -1 concave; ``points`` index the vertices that the fit uses."""
+    """Triangles of one cylinder: ``sign`` +1 convex, -1 concave; ``points`` index the vertices that the fit uses.
+
+    ``tolerance`` (mm): farthest that a vertex may lie off. ``strips``: found as an exact tessellation, whose border is
+    the surface's own; otherwise the triangles across the border are missing.
+    """
 
     axis: Axis
     sign: int
     faces: IntArray
     points: IntArray
     tolerance: float
+    strips: bool
 
 
 class Surface:
@@ -93,8 +98,10 @@ def face_span(surface: Surface, axis: Axis, faces: IntArray) -> Array:
 
 
 def _grow(surface: Surface, free: BoolArray, cells: IntArray, axis: Axis, sign: int, seed: IntArray, tolerance: float,
-          floor: float) -> Region | None:
+          floor: float, *, strips: bool) -> Region | None:
     """Grow from ``seed`` faces, refit, and repeat until the faces no longer change."""
+    # Voxel and remeshed surfaces put their vertices off by a good part of the facets' sagitta.
+    share = 0.0 if strips else 0.3
     V, F = surface.V, surface.F
     faces = seed
     points = np.unique(F[seed])
@@ -107,6 +114,7 @@ def _grow(surface: Surface, free: BoolArray, cells: IntArray, axis: Axis, sign: 
         if span > MAX_FACET:
             return None
         sagitta = 2.0 * axis.radius * np.sin(0.25 * span) ** 2
+        tolerance = max(tolerance, share * sagitta)
         on = np.abs(off) <= tolerance
         near = (off <= tolerance) & (off >= -1.02 * sagitta - tolerance)
         spread = np.einsum("ij,ij->i", surface.normals[faces], axis.radial(surface.centres[faces])[0])
@@ -140,7 +148,7 @@ def _grow(surface: Surface, free: BoolArray, cells: IntArray, axis: Axis, sign: 
         span = float(face_span(surface, axis, faces[full]).max()) if full.any() else span
         if settled:
             break
-    return Region(axis, sign, faces, points, tolerance)
+    return Region(axis, sign, faces, points, tolerance, strips)
 
 
 def _tolerance(residual: Array) -> float:
@@ -240,7 +248,7 @@ def _strips(surface: Surface, free: BoolArray, cells: IntArray, floor: float,
             fails[[a, b]] += 1
             continue
         sign = 1 if surface.normals[i] @ axis.radial(surface.centres[i : i + 1])[0][0] > 0.0 else -1
-        region = _grow(surface, free, cells, axis, sign, seed, loose, floor)
+        region = _grow(surface, free, cells, axis, sign, seed, loose, floor, strips=True)
         if region is None or region.tolerance > 4.0 * floor or not _accept(surface, cells, region):
             fails[[a, b]] += 1
             continue
@@ -257,24 +265,26 @@ def _patches(surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[
     tree = cKDTree(surface.centres)
     rng = np.random.default_rng(0)
     order = rng.permutation(np.flatnonzero(todo))
-    tried = 0
-    limit = _noise_limit(surface, tree, rng.permutation(len(F))[:150])
-    for n, start in enumerate(order):
-        if not (todo[start] and free[start]):
-            continue
-        tried += 1
-        if tried > _MAX_SEEDS:
-            return
-        tell("patches", n / len(order))
-        nearest = tree.query(surface.centres[start], k=min(_PATCH_SIZES[-1], len(F)))[1]
-        nearest = np.atleast_1d(nearest)
-        facing = free[nearest] & (surface.normals[nearest] @ surface.normals[start] > 0.5)
-        region = _from_patches(surface, free, cells, start, nearest[facing], gates, limit)
-        if region is None:
-            todo[nearest[: _PATCH_SIZES[0] // 2]] = False
-            continue
-        todo[region.faces] = False
-        yield region
+    noise = _noise(surface, tree, rng.permutation(len(F))[:150])
+    # First what fits as well as the mesh allows, then the rest: else a lip takes part of its groove.
+    for stage, factor in enumerate((1.25, 2.0)):
+        limit = factor * noise
+        open_ = todo & free
+        tried = 0
+        for n, start in enumerate(order):
+            if not (open_[start] and free[start]):
+                continue
+            tried += 1
+            if tried > _MAX_SEEDS:
+                break
+            tell("patches", 0.5 * (stage + n / len(order)))
+            nearest = np.atleast_1d(tree.query(surface.centres[start], k=min(_PATCH_SIZES[-1], len(F)))[1])
+            facing = free[nearest] & (surface.normals[nearest] @ surface.normals[start] > 0.5)
+            region = _from_patches(surface, free, cells, start, nearest[facing], gates, limit)
+            if region is None:
+                open_[nearest[: _PATCH_SIZES[0] // 2]] = False
+                continue
+            yield region
 
 
 def _from_patches(surface: Surface, free: BoolArray, cells: IntArray, start: int, nearest: IntArray,
@@ -301,7 +311,7 @@ def _from_patches(surface: Surface, free: BoolArray, cells: IntArray, start: int
             if noise > 1.6 * scatter + surface.floor:
                 continue
             tolerance = max(surface.floor, 4.0 * noise)
-            region = _grow(surface, free, cells, axis, sign, patch, tolerance, surface.floor)
+            region = _grow(surface, free, cells, axis, sign, patch, tolerance, surface.floor, strips=False)
             if region is None or len(region.faces) < 0.7 * len(patch) or not _accept(surface, cells, region):
                 continue
             if np.sqrt(np.mean(region.axis.residual(surface.V[region.points]) ** 2)) <= limit:
@@ -309,8 +319,8 @@ def _from_patches(surface: Surface, free: BoolArray, cells: IntArray, start: int
     return None
 
 
-def _noise_limit(surface: Surface, tree: cKDTree, sample: IntArray) -> float:
-    """Largest scatter (mm) that still counts as this mesh's noise: twice the median over small patches.
+def _noise(surface: Surface, tree: cKDTree, sample: IntArray) -> float:
+    """Scatter (mm) of this mesh's vertices: the median over small patches at the faces ``sample``.
 
     Without it the rounded edges of a scan pass as badly fitting cylinders.
     """
@@ -323,7 +333,7 @@ def _noise_limit(surface: Surface, tree: cKDTree, sample: IntArray) -> float:
     if len(scatters) < 20:
         return np.inf
     side = float(np.sqrt(np.median(surface.areas[sample])))
-    return 2.0 * float(np.median(scatters)) + 0.005 * side
+    return float(np.median(scatters)) + 0.003 * side
 
 
 def _quadric_fit(surface: Surface, patch: IntArray) -> tuple[Array, Array, float, float, Array] | None:
