@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from clamp3d.fit.cylinder import Axis, covariance, fit_axis, perpendicular, surface_error
 from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
 from clamp3d.fit.mesh_file import Mesh, load_mesh
-from clamp3d.fit.regions import Region, Surface, face_span, find_regions
+from clamp3d.fit.regions import Region, Surface, find_regions, sagitta
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -195,7 +195,6 @@ def _measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     z, angle = local[:, :, 2].mean(axis=1), np.arctan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
     # Off the corners, where the two kinds of border mix.
     v, t = (2.0 * z - z0 - z1) / (z1 - z0), angle / half
-    spans = face_span(surface, axis, region.faces)
     low, high = (border.end(z, ~along & (k * v > 0.8) & (np.abs(t) < 0.85)) for k in (-1, 1))
     length_error = arc_error = 0.0
     if low and high:
@@ -203,7 +202,7 @@ def _measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         z0, z1, length_error = _ends(low, high, step, z1 - z0)
     left, right = (border.end(angle, along & (k * t > 0.8) & (np.abs(v) < 0.85)) for k in (-1, 1))
     if half < np.pi and left and right:
-        a, b, arc_error = _ends(left, right, 0.0 if region.strips else float(np.median(spans)), 2.0 * half)
+        a, b, arc_error = _ends(left, right, 0.0 if region.strips else _facet(surface, axis, region.faces), 2.0 * half)
         half = 0.5 * (b - a)
         c, s = np.cos(0.5 * (a + b)), np.sin(0.5 * (a + b))
         R = R @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -234,7 +233,7 @@ def _measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         "covariance": C,
         "covariance_error": surface_error(C, half, length, freedom),
         "form_error": _form_error(points, residual, rms) + 2.0 * surface.mesh.rounding,
-        "chord_error": float(2.0 * axis.radius * np.sin(0.25 * spans.max()) ** 2),
+        "chord_error": sagitta(axis.radius, region.span),
         "arc_error": arc_error,
         "length_error": length_error,
         "faces": region.faces,
@@ -256,6 +255,13 @@ def _ends(first: _End, last: _End, step: float, extent: float) -> tuple[float, f
             doubt = min(step, 0.5 * extent)
         error = max(error, end.stray + doubt)
     return first.at - shift[0], last.at + shift[1], error
+
+
+def _facet(surface: Surface, axis: Axis, faces: IntArray) -> float:
+    """Median angle (rad) that a triangle covers."""
+    u = axis.radial(surface.V[surface.F[faces].reshape(-1)])[0].reshape(-1, 3, 3)
+    chord = np.linalg.norm(u - u[:, [1, 2, 0]], axis=2).max(axis=1)
+    return float(np.median(2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))))
 
 
 def _inflation(surface: Surface, region: Region, residual: Array) -> float:
@@ -346,8 +352,7 @@ def _one(surface: Surface, a: Region, b: Region) -> Region | None:
     V = surface.V
     tolerance = max(a.tolerance, b.tolerance)
     if _side_by_side(surface, large.axis, a.faces, b.faces):
-        span = float(max(face_span(surface, large.axis, r.faces).max() for r in (a, b)))
-        tolerance = max(tolerance, 0.3 * 2.0 * large.axis.radius * np.sin(0.25 * span) ** 2)
+        tolerance = max(tolerance, 0.3 * sagitta(large.axis.radius, max(a.span, b.span)))
     points = np.union1d(a.points, b.points)
     axis = fit_axis(V[points], large.axis)
     if axis is None:
@@ -367,7 +372,7 @@ def _one(surface: Surface, a: Region, b: Region) -> Region | None:
     area = float(surface.areas[faces].sum())
     if area < 0.5 * 2.0 * half * axis.radius * float(np.ptp(z)):
         return None
-    return Region(axis, a.sign, faces, points, tolerance, a.strips and b.strips)
+    return Region(axis, a.sign, faces, points, tolerance, max(a.span, b.span), a.strips and b.strips)
 
 
 def _side_by_side(surface: Surface, axis: Axis, a: IntArray, b: IntArray) -> bool:

@@ -41,7 +41,7 @@ _MAX_SEEDS = 400
 class Region:
     """Triangles of one cylinder: ``sign`` +1 convex, -1 concave; ``points`` index the vertices that the fit uses.
 
-    ``tolerance`` (mm): farthest that a vertex may lie off. ``strips``: found as an exact tessellation, whose border is
+    ``tolerance`` (mm): farthest that a vertex may lie off; ``span`` (rad): the widest facet. ``strips``: found as an exact tessellation, whose border is
     the surface's own; otherwise the triangles across the border are missing.
     """
 
@@ -50,6 +50,7 @@ class Region:
     faces: IntArray
     points: IntArray
     tolerance: float
+    span: float
     strips: bool
 
 
@@ -76,6 +77,7 @@ class Surface:
             np.abs(np.einsum("ij,ij->i", self.V[opposite[:, 1]] - on_edge, n1)),
             np.abs(np.einsum("ij,ij->i", self.V[opposite[:, 0]] - on_edge, n2)),
         )
+        self.valence = np.bincount(self.F.reshape(-1), minlength=len(self.V))
         self.extent = float(np.ptp(self.V[np.unique(self.F)], axis=0).max())
         self.floor = max(4.0 * mesh.rounding, 1e-9 * self.extent)
 
@@ -90,11 +92,23 @@ class Surface:
         return self.labels((self.step <= tolerance) & (self.bend < MAX_FACET))
 
 
-def face_span(surface: Surface, axis: Axis, faces: IntArray) -> Array:
-    """Angle (k,) that each of ``faces`` (k,) covers about the axis in rad."""
-    u = axis.radial(surface.V[surface.F[faces].reshape(-1)])[0].reshape(-1, 3, 3)
-    cosines = np.einsum("kij,kij->ki", u, u[:, [1, 2, 0]])
-    return np.asarray(2.0 * np.arcsin(np.sqrt(np.clip(0.5 * (1.0 - cosines), 0.0, 1.0))).max(axis=1))
+def facet_span(surface: Surface, axis: Axis, faces: IntArray, cells: IntArray) -> Array:
+    """Angle (rad) about the axis of each planar cell that has some of ``faces``, counting those faces only."""
+    u, w = perpendicular(axis.direction)
+    p = surface.V[surface.F[faces]] - axis.point
+    angle = np.arctan2(p @ w, p @ u)
+    _, first, cell = np.unique(cells[faces], return_index=True, return_inverse=True)
+    base = angle[first, 0][cell][:, None]
+    turned = (angle - base + np.pi) % (2.0 * np.pi) - np.pi
+    low, high = np.zeros(len(first)), np.zeros(len(first))
+    np.minimum.at(low, cell, turned.min(axis=1))
+    np.maximum.at(high, cell, turned.max(axis=1))
+    return np.asarray(high - low)
+
+
+def sagitta(radius: float, span: float) -> float:
+    """Distance between an arc of ``span`` rad and its chord."""
+    return float(2.0 * radius * np.sin(0.25 * span) ** 2)
 
 
 def _grow(surface: Surface, free: BoolArray, cells: IntArray, axis: Axis, sign: int, seed: IntArray, tolerance: float,
@@ -105,27 +119,21 @@ def _grow(surface: Surface, free: BoolArray, cells: IntArray, axis: Axis, sign: 
     V, F = surface.V, surface.F
     faces = seed
     points = np.unique(F[seed])
-    span = float(face_span(surface, axis, seed).max())
+    span = float(facet_span(surface, axis, seed, cells).max())
     for _ in range(12):
-        if not 0.0 < axis.radius < 20.0 * surface.extent:
+        if not 0.0 < axis.radius < 20.0 * surface.extent or span > MAX_FACET:
             return None
-        u, r = axis.radial(V)
-        off = r - axis.radius
-        if span > MAX_FACET:
-            return None
-        sagitta = 2.0 * axis.radius * np.sin(0.25 * span) ** 2
-        tolerance = max(tolerance, share * sagitta)
-        on = np.abs(off) <= tolerance
-        near = (off <= tolerance) & (off >= -1.02 * sagitta - tolerance)
-        spread = np.einsum("ij,ij->i", surface.normals[faces], axis.radial(surface.centres[faces])[0])
-        slack = float(np.quantile(np.arccos(np.clip(sign * spread, -1.0, 1.0)), 0.9))
+        off = axis.residual(V)
+        depth = sagitta(axis.radius, span)
+        tolerance = max(tolerance, share * depth)
+        near = (off <= tolerance) & (off >= -1.02 * depth - tolerance)
+        lean = np.einsum("ij,ij->i", surface.normals[faces], axis.radial(surface.centres[faces])[0])
+        slack = float(np.quantile(np.arccos(np.clip(sign * lean, -1.0, 1.0)), 0.9))
         limit = np.cos(min(max(0.6 * span, 2.5 * slack, 0.02), 0.7))
-        mask = free & near[F].all(axis=1) & (on[F].sum(axis=1) >= 1)
+        mask = free & near[F].all(axis=1)
         index = np.flatnonzero(mask)
         radial = axis.radial(surface.centres[index])[0]
-        mask[index] = (sign * np.einsum("ij,ij->i", surface.normals[index], radial) >= limit) & (
-            face_span(surface, axis, index) <= max(1.5 * span, 0.1)
-        )
+        mask[index] = sign * np.einsum("ij,ij->i", surface.normals[index], radial) >= limit
         if not mask[faces].any():
             return None
         label = surface.labels(mask[surface.pairs].all(axis=1))
@@ -135,20 +143,18 @@ def _grow(surface: Surface, free: BoolArray, cells: IntArray, axis: Axis, sign: 
         grown = np.flatnonzero(mask & (label == main))
         settled = len(grown) == len(faces) and bool((grown == faces).all())
         faces = grown
-        points = _support(surface, cells, faces, on)
+        points = _support(surface, faces, np.abs(off) <= tolerance)
         if len(points) < 6:
             return None
         better = fit_axis(V[points], axis)
         if better is None:
             return None
         axis = better
-        res = axis.residual(V[points])
-        tolerance = max(floor, _tolerance(res))
-        full = on[F[faces]].all(axis=1)
-        span = float(face_span(surface, axis, faces[full]).max()) if full.any() else span
+        tolerance = max(floor, _tolerance(axis.residual(V[points])))
+        span = float(facet_span(surface, axis, faces, cells).max())
         if settled:
             break
-    return Region(axis, sign, faces, points, tolerance, strips)
+    return Region(axis, sign, faces, points, tolerance, span, strips)
 
 
 def _tolerance(residual: Array) -> float:
@@ -161,28 +167,15 @@ def _tolerance(residual: Array) -> float:
     return scatter * float(stats.t.isf(3.2e-5, min(freedom, 1000)))
 
 
-def _support(surface: Surface, cells: IntArray, faces: IntArray, on: BoolArray) -> IntArray:
-    """Vertices that the fit may use: on the surface, and corners of it rather than points inside a planar strip.
+def _support(surface: Surface, faces: IntArray, on: BoolArray) -> IntArray:
+    """Vertices (k,) of ``faces`` that the fit may use: those ``on`` the surface, which leaves out points on chords.
 
-    Border vertices count only where they are needed: there the region's own border is uncertain, and on a cut mesh
-    they lie on chords.
+    On a dense mesh only those with all their faces in the region: the border is chosen by the fit itself.
     """
-    F = surface.F
-    corner_vertex = F[faces].reshape(-1)
-    corner_cell = np.repeat(cells[faces], 3)
-    both = np.unique(np.column_stack([corner_vertex, corner_cell]), axis=0)
-    vertex, count = np.unique(both[:, 0], return_counts=True)
-    ridge = vertex[count >= 2]
-    keep = vertex[on[vertex]]
-    total = np.bincount(F.reshape(-1), minlength=len(surface.V))
-    inner = vertex[np.bincount(corner_vertex, minlength=len(surface.V))[vertex] == total[vertex]]
-    inner = inner[on[inner]]
-    if len(inner) >= max(50, 0.6 * len(keep)):
-        return np.asarray(inner)
-    flat = np.setdiff1d(keep, ridge)
-    if len(ridge) >= 0.6 * len(keep) and len(flat) > 0.25 * len(keep):
-        return np.asarray(ridge[on[ridge]])
-    return np.asarray(keep)
+    inside = np.bincount(surface.F[faces].reshape(-1), minlength=len(surface.V))
+    keep = np.flatnonzero((inside > 0) & on)
+    inner = keep[inside[keep] == surface.valence[keep]]
+    return np.asarray(inner if len(inner) >= max(50, 0.6 * len(keep)) else keep)
 
 
 def find_regions(surface: Surface, progress: Callable[[str, float], None] | None = None) -> list[Region]:
@@ -210,49 +203,57 @@ def _strips(surface: Surface, free: BoolArray, cells: IntArray, floor: float,
     # A whole strip has four corners, so two triangles at least: this spares dense meshes the search.
     ridge &= (np.bincount(cells)[cells[surface.pairs]] >= 2).all(axis=1)
     order = np.flatnonzero(ridge)
-    members = np.argsort(cells, kind="stable")
-    starts = np.searchsorted(cells[members], np.arange(cells.max() + 2))
+    if len(order) == 0:
+        return
+    vector = V[surface.edges[order, 1]] - V[surface.edges[order, 0]]
+    vector /= np.maximum(np.linalg.norm(vector, axis=1), 1e-300)[:, None]
+    members = _groups(np.arange(len(F)), cells)
+    sides = cells[surface.pairs[order]]
+    ridges = _groups(np.tile(np.arange(len(order)), 2), sides.T.reshape(-1))
     fails = np.zeros(cells.max() + 1, dtype=np.int64)
-    beside: list[set[int]] = [set() for _ in range(cells.max() + 1)]
-    for a, b in cells[surface.pairs[order]]:
-        beside[a].add(int(b))
-        beside[b].add(int(a))
     for n, k in enumerate(order):
         if n % 50 == 0:
             tell("strips", n / len(order))
         i, j = surface.pairs[k]
-        a, b = cells[i], cells[j]
+        a, b = sides[n]
         if not (free[i] and free[j]) or fails[a] > 2 or fails[b] > 2:
             continue
-        d = np.cross(surface.normals[i], surface.normals[j])
-        d /= np.linalg.norm(d)
-        seed = np.concatenate([members[starts[a] : starts[a + 1]], members[starts[b] : starts[b + 1]]])
-        corners = V[np.unique(F[seed])]
+        fails[[a, b]] += 1
+        d = vector[n]
+        # Lines along the axis: the corners of the strips; what else they have (a split strip) lies on chords.
+        own = np.concatenate([ridges[a], ridges[b]])
+        own = own[np.abs(vector[own] @ d) > 0.9999]
+        corners = np.unique(surface.edges[order[own]])
         u, w = perpendicular(d)
-        flat = np.column_stack([corners @ u, corners @ w])
+        flat = np.column_stack([V[corners] @ u, V[corners] @ w])
         got = circle(flat)
         if got is None:
             continue
         centre, radius = got
-        # Slack for the axis: a direction from two narrow strips is only as good as their normals.
-        loose = floor * (1.0 + 0.2 / surface.bend[k])
+        # Slack for the axis: a direction from one edge is only as good as its ends.
+        loose = 3.0 * floor
         if radius > 20.0 * surface.extent or np.abs(np.hypot(*(flat - centre).T) - radius).max() > loose:
-            fails[[a, b]] += 1
             continue
         axis = Axis(centre[0] * u + centre[1] * w, d, radius)
         # Two strips always lie on a circle: a third one must agree before the dear growing starts.
-        third = (beside[a] | beside[b]) - {a, b}
-        if not any(
-            np.abs(axis.residual(V[F[members[starts[c] : starts[c + 1]]].reshape(-1)])).max() <= loose for c in third
-        ):
-            fails[[a, b]] += 1
+        next_cells = np.setdiff1d(sides[own], (a, b))
+        third = np.concatenate([ridges[c] for c in next_cells]) if len(next_cells) else np.empty(0, dtype=np.int64)
+        far = np.setdiff1d(third[np.abs(vector[third] @ d) > 0.9999], own)
+        ends = surface.edges[order[far]]
+        if not (np.abs(axis.residual(V[ends.reshape(-1)])).reshape(-1, 2) <= 4.0 * loose).all(axis=1).any():
             continue
+        seed = np.concatenate([members[a], members[b]])
         sign = 1 if surface.normals[i] @ axis.radial(surface.centres[i : i + 1])[0][0] > 0.0 else -1
         region = _grow(surface, free, cells, axis, sign, seed, loose, floor, strips=True)
-        if region is None or region.tolerance > 4.0 * floor or not _accept(surface, cells, region):
-            fails[[a, b]] += 1
-            continue
-        yield region
+        if region is not None and region.tolerance <= 4.0 * floor and _accept(surface, cells, region):
+            yield region
+
+
+def _groups(values: IntArray, label: IntArray) -> dict[int, IntArray]:
+    """``values`` (n,) by their ``label`` (n,)."""
+    order = np.argsort(label, kind="stable")
+    names, start = np.unique(label[order], return_index=True)
+    return {int(k): v for k, v in zip(names, np.split(values[order], start[1:]), strict=True)}
 
 
 def _patches(surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[[str, float], None]) -> Iterator[Region]:
@@ -371,7 +372,7 @@ def _quadric(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | Non
     values, vectors = np.linalg.eigh(np.array([[2.0 * sol[3], sol[4]], [sol[4], 2.0 * sol[5]]]) / s**2)
     big = int(np.argmax(np.abs(values)))
     doubt = 2.0 * float(np.sqrt(C[3:, 3:].diagonal().max())) / s**2
-    if abs(values[big]) < 6.0 * doubt:
+    if abs(values[big]) < 6.0 * doubt or abs(values[big]) * surface.extent < 0.05:
         return None
     radius = 1.0 / abs(values[big])
     # Height over the outward normal: a valley (positive curvature) is a groove.
@@ -410,7 +411,7 @@ def _accept(surface: Surface, cells: IntArray, region: Region) -> bool:
     arc = 2.0 * np.pi - float(gaps.max())
     noise = max(region.tolerance / 4.0, 1e-12)
     lines = int((gaps > 1e-3 * max(arc, 1e-9)).sum())
-    spans = face_span(surface, axis, region.faces)
+    spans = facet_span(surface, axis, region.faces, cells)
     if lines < MIN_LINES:
         return False
     # Every trapezoid with equal flanks lies on a circle: with three facets ask for three equal ones.
