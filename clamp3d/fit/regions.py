@@ -70,6 +70,9 @@ class Surface:
         self.edges = np.asarray(tm.face_adjacency_edges, dtype=np.int64).reshape(-1, 2)
         n1, n2 = self.normals[self.pairs[:, 0]], self.normals[self.pairs[:, 1]]
         self.bend = np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
+        sides = np.sort(self.F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        _, first, count = np.unique(sides[:, 0] * len(self.V) + sides[:, 1], return_index=True, return_counts=True)
+        self.rim, self.rim_faces = sides[first[count == 1]], first[count == 1] // 3
         opposite = np.asarray(tm.face_adjacency_unshared, dtype=np.int64).reshape(-1, 2)
         # Off-plane distance of each far corner: unlike an angle it does not blow up on slivers.
         on_edge = self.V[self.edges[:, 0]]
@@ -205,25 +208,29 @@ def _strips(surface: Surface, free: BoolArray, cells: IntArray, floor: float,
     order = np.flatnonzero(ridge)
     if len(order) == 0:
         return
-    vector = V[surface.edges[order, 1]] - V[surface.edges[order, 0]]
+    # Lines: edges of planar cells, creases and the mesh's rim included, for they bound the last strips.
+    split = cells[surface.pairs[:, 0]] != cells[surface.pairs[:, 1]]
+    ends = np.concatenate([surface.edges[split], surface.rim])
+    cell = np.concatenate([cells[surface.pairs[split]], cells[surface.rim_faces][:, None].repeat(2, axis=1)])
+    vector = V[ends[:, 1]] - V[ends[:, 0]]
     vector /= np.maximum(np.linalg.norm(vector, axis=1), 1e-300)[:, None]
     members = _groups(np.arange(len(F)), cells)
-    sides = cells[surface.pairs[order]]
-    ridges = _groups(np.tile(np.arange(len(order)), 2), sides.T.reshape(-1))
+    lines = _groups(np.tile(np.arange(len(ends)), 2), cell.T.reshape(-1))
     fails = np.zeros(cells.max() + 1, dtype=np.int64)
     for n, k in enumerate(order):
         if n % 50 == 0:
             tell("strips", n / len(order))
         i, j = surface.pairs[k]
-        a, b = sides[n]
+        a, b = cells[i], cells[j]
         if not (free[i] and free[j]) or fails[a] > 2 or fails[b] > 2:
             continue
         fails[[a, b]] += 1
-        d = vector[n]
+        d = V[surface.edges[k, 1]] - V[surface.edges[k, 0]]
+        d /= np.linalg.norm(d)
         # Lines along the axis: the corners of the strips; what else they have (a split strip) lies on chords.
-        own = np.concatenate([ridges[a], ridges[b]])
+        own = np.concatenate([lines[a], lines[b]])
         own = own[np.abs(vector[own] @ d) > 0.9999]
-        corners = np.unique(surface.edges[order[own]])
+        corners = np.unique(ends[own])
         u, w = perpendicular(d)
         flat = np.column_stack([V[corners] @ u, V[corners] @ w])
         got = circle(flat)
@@ -236,11 +243,10 @@ def _strips(surface: Surface, free: BoolArray, cells: IntArray, floor: float,
             continue
         axis = Axis(centre[0] * u + centre[1] * w, d, radius)
         # Two strips always lie on a circle: a third one must agree before the dear growing starts.
-        next_cells = np.setdiff1d(sides[own], (a, b))
-        third = np.concatenate([ridges[c] for c in next_cells]) if len(next_cells) else np.empty(0, dtype=np.int64)
-        far = np.setdiff1d(third[np.abs(vector[third] @ d) > 0.9999], own)
-        ends = surface.edges[order[far]]
-        if not (np.abs(axis.residual(V[ends.reshape(-1)])).reshape(-1, 2) <= 4.0 * loose).all(axis=1).any():
+        beyond = np.setdiff1d(cell[own], (a, b))
+        third = np.concatenate([lines[c] for c in beyond]) if len(beyond) else np.empty(0, dtype=np.int64)
+        far = ends[np.setdiff1d(third[np.abs(vector[third] @ d) > 0.9999], own)]
+        if not (np.abs(axis.residual(V[far.reshape(-1)])).reshape(-1, 2) <= 4.0 * loose).all(axis=1).any():
             continue
         seed = np.concatenate([members[a], members[b]])
         sign = 1 if surface.normals[i] @ axis.radial(surface.centres[i : i + 1])[0][0] > 0.0 else -1
