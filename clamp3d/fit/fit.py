@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
-from clamp3d.fit.cylinder import Axis, covariance, fit_axis, perpendicular, surface_error
+from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, fit_axis, perpendicular, surface_error
 from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
 from clamp3d.fit.mesh_file import Mesh, load_mesh
 from clamp3d.fit.regions import Region, Surface, find_regions, sagitta
@@ -127,37 +128,44 @@ def _arc(surface: Surface, axis: Axis, u: Array, w: Array, faces: IntArray) -> t
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """One side of a region: where it ends (rad or mm), how far its border strays, whether the mesh goes on, creased."""
+    """One side of a region: where it ends (rad or mm), how far its border strays, and whether that is the true end.
+
+    ``sharp``: the mesh ends there too, or a crease leads to much larger triangles, as in a CAD mesh. Otherwise the
+    triangles across the border may straddle the edge.
+    """
 
     at: float
     stray: float
-    goes_on: bool
-    crease: bool
+    sharp: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Border:
-    """Border edges of a region: ends (k, 2, 3), lengths (k,), bend to the triangle outside (k,), 0 on the mesh's rim."""
+    """Border edges of a region: ends (k, 2, 3), lengths (k,), bend (rad) to the triangle outside (k,) and its area (k,) in
+    terms of the region's own; both infinite on the mesh's rim. ``inner_bend``: median bend within the region.
+    """
 
     ends: Array
     length: Array
     bend: Array
+    growth: Array
     inner_bend: float
 
     def end(self, values: Array, side: NDArray[np.bool_]) -> _End | None:
         """Length-weighted median of ``values`` (k,) on ``side`` (k,); None without a border there."""
         if not side.any():
             return None
-        v, w, bend = values[side], self.length[side], self.bend[side]
+        v, w = values[side], self.length[side]
         order = np.argsort(v)
         total = np.cumsum(w[order])
         at = float(v[order][np.searchsorted(total, 0.5 * total[-1])])
-        goes_on = bool((bend > 0.0).mean() > 0.5)
+        crease = np.median(self.bend[side]) > 2.0 * self.inner_bend
+        sharp = bool(crease and np.median(self.growth[side]) > 4.0)
         # A few border edges belong to a corner or a pock mark: nine tenths of the border say how far it strays.
         far = np.abs(v - at)
         by_size = np.argsort(far)
         stray = float(far[by_size][np.searchsorted(np.cumsum(w[by_size]), 0.9 * total[-1])])
-        return _End(at, stray, goes_on, bool(np.median(bend) > 2.0 * self.inner_bend))
+        return _End(at, stray, sharp)
 
 
 def _border(surface: Surface, faces: IntArray) -> _Border:
@@ -172,13 +180,16 @@ def _border(surface: Surface, faces: IntArray) -> _Border:
     key = key[count == 1]
     shared = np.sort(surface.edges[crossing], axis=1)
     shared_key = shared[:, 0] * n + shared[:, 1]
-    bend = np.zeros(len(key))
     known = np.isin(shared_key, key)
-    bend[np.searchsorted(key, shared_key[known])] = np.maximum(surface.bend[crossing][known], 1e-12)
+    at = np.searchsorted(key, shared_key[known])
+    bend, growth = np.full(len(key), np.inf), np.full(len(key), np.inf)
+    bend[at] = surface.bend[crossing][known]
+    outside = np.where(first, surface.pairs[:, 1], surface.pairs[:, 0])[crossing][known]
+    growth[at] = surface.areas[outside] / np.median(surface.areas[faces])
     ends = surface.V[np.stack([key // n, key % n], axis=1)]
     both = surface.bend[first & second]
     inner = float(np.median(both[both > 1e-4])) if (both > 1e-4).any() else 0.0
-    return _Border(ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), bend, inner)
+    return _Border(ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), bend, growth, inner)
 
 
 def _measure(surface: Surface, region: Region) -> dict[str, Any] | None:
@@ -234,7 +245,8 @@ def _measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         "points": len(points),
         "covered_area": area,
         "coverage": min(1.0, area / (2.0 * half * axis.radius * length)),
-        "covariance": C,
+        # Few points know their own scatter badly: three standard errors shall mean 99.73 % all the same.
+        "covariance": C * (float(stats.t.isf(0.5 * (1.0 - CONFIDENCE), freedom)) / 3.0) ** 2,
         "covariance_error": surface_error(C, half, length, freedom),
         "form_error": _form_error(points, residual, rms) + 2.0 * surface.mesh.rounding,
         "chord_error": sagitta(axis.radius, region.span),
@@ -248,15 +260,15 @@ def _ends(first: _End, last: _End, step: float, extent: float) -> tuple[float, f
     """Ends of a region and their error, from its borders.
 
     On a dense mesh (facets of ``step`` well below ``extent``) the triangles across the border belong to neither side,
-    so the end lies about half a facet further, half a facet uncertain; on a coarse one a crease is the end.
+    so the end lies about half a facet further, half a facet uncertain.
     """
     shift, error = [0.0, 0.0], 0.0
     for k, end in enumerate((first, last)):
         doubt = 0.0
-        if end.goes_on and step < 0.05 * extent:
+        if not end.sharp and step < 0.1 * extent:
             shift[k] = doubt = 0.5 * step
-        elif end.goes_on and not end.crease:
-            doubt = min(step, 0.5 * extent)
+        elif not end.sharp and step < 0.5 * extent:
+            doubt = step
         error = max(error, end.stray + doubt)
     return first.at - shift[0], last.at + shift[1], error
 

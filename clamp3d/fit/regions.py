@@ -165,8 +165,12 @@ def _tolerance(residual: Array) -> float:
 
     The scatter is the median one, so a few strays do not widen it; five fitted parameters and few points do.
     """
-    freedom = max(len(residual) - 5, 1)
-    scatter = 1.4826 * float(np.median(np.abs(residual))) * np.sqrt(len(residual) / freedom)
+    n = len(residual)
+    freedom = max(n - 5, 1)
+    scatter = 1.4826 * float(np.median(np.abs(residual)))
+    if n < 60:  # the median of few is too rough
+        scatter = max(scatter, float(np.sqrt(np.mean(residual**2))))
+    scatter *= np.sqrt(n / freedom)
     return scatter * float(stats.t.isf(3.2e-5, min(freedom, 1000)))
 
 
@@ -403,7 +407,17 @@ def _from_normals(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] 
     axis = Axis(centre[0] * u + centre[1] * w, d, radius)
     lean = np.einsum("ij,ij->i", N, axis.radial(surface.centres[patch])[0]) @ surface.areas[patch]
     scatter = float(np.sqrt(np.mean((np.hypot(*(flat - centre).T) - radius) ** 2)))
+    reach = min(float(np.ptp((flat - flat.mean(axis=0)) @ _tangent(flat, centre))) / radius, np.pi)
+    if sagitta(radius, reach) < 6.0 * scatter:
+        return None
     return axis, 1 if lean > 0.0 else -1, scatter
+
+
+def _tangent(flat: Array, centre: Array) -> Array:
+    """Unit vector (2,) along the arc at the middle of the points ``flat`` (n, 2) about ``centre``."""
+    out = flat.mean(axis=0) - centre
+    size = float(np.linalg.norm(out))
+    return np.array([-out[1], out[0]]) / size if size > 0.0 else np.array([1.0, 0.0])
 
 
 def _accept(surface: Surface, cells: IntArray, region: Region) -> bool:
