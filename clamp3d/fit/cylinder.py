@@ -89,7 +89,7 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
 
     def residual(x: Array) -> Array:
         _, _, r, radius, _ = parts(x)
-        return r - abs(radius)
+        return np.asarray(r - abs(radius))
 
     def jacobian(x: Array) -> Array:
         q, t, r, radius, n = parts(x)
@@ -101,7 +101,7 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
         J[:, 3] = -t * u[:, 1] / n
         # The centre moves away as the radius grows: 1 + u.e is 1 - cos(angle from the arc's middle), tiny on an arc.
         J[:, 4] = radius * radius * (np.sign(radius) + u[:, 0])
-        return J * scale
+        return np.asarray(J * scale)
 
     x0 = np.array([reach - start.radius, 0.0, 0.0, 0.0, k0]) / scale
     tiny = 1e-13
@@ -109,9 +109,7 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
         if robust_scale is None:
             got = least_squares(residual, x0, jacobian, method="lm", xtol=tiny, ftol=tiny, gtol=tiny, max_nfev=60)
         else:
-            got = least_squares(
-                residual, x0, jacobian, method="trf", loss="cauchy", f_scale=robust_scale, max_nfev=25
-            )
+            got = least_squares(residual, x0, jacobian, method="trf", loss="cauchy", f_scale=robust_scale, max_nfev=25)
     except (ValueError, np.linalg.LinAlgError):
         return None
     h, g, a, b, k = got.x * scale

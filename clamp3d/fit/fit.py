@@ -141,8 +141,10 @@ class _End:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Border:
-    """Border edges of a region: ends (k, 2, 3), lengths (k,), bend (rad) to the triangle outside (k,) and its area (k,) in
-    terms of the region's own; both infinite on the mesh's rim. ``inner_bend``: median bend within the region.
+    """Border edges of a region: ends (k, 2, 3) and lengths (k,).
+
+    ``bend`` (k,) in rad to the triangle outside and ``growth`` (k,), its area in terms of the region's triangles, are
+    infinite on the mesh's rim. ``inner_bend``: median bend within the region.
     """
 
     ends: Array
@@ -324,11 +326,11 @@ def _form_error(points: Array, residual: Array, rms: float) -> float:
     if len(done) < 2:
         return worst
     means = [abs(float(residual[i].mean())) + 3.0 * rms / np.sqrt(len(i)) for i in done]
-    return min(worst, max(means))
+    return min(worst, float(max(means)))
 
 
 def _open_ended(surface: Surface, values: dict[str, Any]) -> bool:
-    """True if nothing closes either end: rays along the axis from the middle meet no face within a radius of the end."""
+    """True if nothing closes either end: from the middle, no face crosses the axis up to a radius past the ends."""
     T, reach = values["T_part_feature"], 0.5 * values["length"] + values["radius"]
     a, b, c = ((surface.V[surface.F[:, k]] - T[:3, 3]) @ T[:3, :3] for k in range(3))
     # A face meets the axis if the origin lies in its projection along z: all three edge functions of one sign.
@@ -364,7 +366,7 @@ def _one(surface: Surface, a: Region, b: Region) -> Region | None:
         return None
     if abs(a.axis.direction @ b.axis.direction) < 0.97:
         return None
-    large, small = (a, b) if len(a.points) >= len(b.points) else (b, a)
+    large = a if len(a.points) >= len(b.points) else b
     V = surface.V
     tolerance = max(a.tolerance, b.tolerance)
     if _side_by_side(surface, large.axis, a.faces, b.faces):

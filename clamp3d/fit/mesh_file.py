@@ -97,7 +97,9 @@ def _read(file: Path, kind: str) -> tuple[Array, IntArray, str | None]:
         raise
     except Exception as error:  # trimesh raises whatever its parsers meet
         reason = str(error).strip().splitlines()
-        raise InputError(f"{file}: not a readable {kind[1:].upper()} file ({reason[0] if reason else error!r})") from None
+        raise InputError(
+            f"{file}: not a readable {kind[1:].upper()} file ({reason[0] if reason else error!r})"
+        ) from None
     if not parts or not any(len(p.faces) for p in parts):
         raise InputError(f"{file}: no triangles in the file")
     offsets = np.cumsum([0, *(len(p.vertices) for p in parts)])
@@ -140,14 +142,15 @@ def make_mesh(
     if F.min() < 0 or F.max() >= len(V):
         bad = int(F.max()) if F.max() >= len(V) else int(F.min())
         raise InputError(f"{name}: face index {bad} is out of range for {len(V)} vertices")
-    used = np.unique(F)
-    if not np.isfinite(V[used]).all():
-        bad = int(used[~np.isfinite(V[used]).all(axis=1)][0])
-        raise InputError(f"{name}: vertex {bad} is not finite: {V[bad].tolist()}")
+    used, F = np.unique(F, return_inverse=True)
+    V, F = V[used], F.reshape(-1, 3)
+    if not np.isfinite(V).all():
+        bad = int(np.flatnonzero(~np.isfinite(V).all(axis=1))[0])
+        raise InputError(f"{name}: vertex {used[bad]} is not finite: {V[bad].tolist()}")
 
     notes = []
-    reach = float(np.abs(V[used]).max())
-    extent = float(np.ptp(V[used], axis=0).max())
+    reach = float(np.abs(V).max())
+    extent = float(np.ptp(V, axis=0).max())
     if extent <= 0.0:
         raise InputError(f"{name}: all vertices lie in one point")
     rounding = reach * (2.0**-24 if float32 else 2.0**-50)
@@ -164,8 +167,8 @@ def make_mesh(
     mesh.remove_unreferenced_vertices()
     if not mesh.is_winding_consistent:
         before = mesh.faces.copy()
-        trimesh.repair.fix_winding(mesh)
-        turned = int((before != mesh.faces).any(axis=1).sum())
+        trimesh.repair.fix_winding(mesh)  # type: ignore[no-untyped-call]
+        turned = int(np.any(before != np.asarray(mesh.faces), axis=1).sum())
         notes.append(f"{turned} triangles turned to one winding")
     watertight = bool(mesh.is_watertight)
     if not watertight:
@@ -191,8 +194,7 @@ def _merge(V: Array, F: IntArray, tolerance: float) -> tuple[Array, IntArray]:
 
     unique, inverse = np.unique(V, axis=0, return_inverse=True)
     inverse = inverse.reshape(-1)
-    finite = np.isfinite(unique).all(axis=1)
-    pairs = cKDTree(np.where(finite[:, None], unique, 1e30)).query_pairs(tolerance, output_type="ndarray")
+    pairs = np.asarray(cKDTree(unique).query_pairs(tolerance, output_type="ndarray"))
     if len(pairs):
         graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(unique), len(unique)))
         _, label = connected_components(graph, directed=False)

@@ -41,8 +41,8 @@ _MAX_SEEDS = 400
 class Region:
     """Triangles of one cylinder: ``sign`` +1 convex, -1 concave; ``points`` index the vertices that the fit uses.
 
-    ``tolerance`` (mm): farthest that a vertex may lie off; ``span`` (rad): the widest facet. ``strips``: found as an exact tessellation, whose border is
-    the surface's own; otherwise the triangles across the border are missing.
+    ``tolerance`` (mm): farthest that a vertex may lie off; ``span`` (rad): the widest facet. ``strips``: found as an
+    exact tessellation, whose border is the surface's own; otherwise the triangles across the border are missing.
     """
 
     axis: Axis
@@ -114,8 +114,18 @@ def sagitta(radius: float, span: float) -> float:
     return float(2.0 * radius * np.sin(0.25 * span) ** 2)
 
 
-def _grow(surface: Surface, free: BoolArray, cells: IntArray, axis: Axis, sign: int, seed: IntArray, tolerance: float,
-          floor: float, *, strips: bool) -> Region | None:
+def _grow(
+    surface: Surface,
+    free: BoolArray,
+    cells: IntArray,
+    axis: Axis,
+    sign: int,
+    seed: IntArray,
+    tolerance: float,
+    floor: float,
+    *,
+    strips: bool,
+) -> Region | None:
     """Grow from ``seed`` faces, refit, and repeat until the faces no longer change."""
     # Voxel and remeshed surfaces put their vertices off by a good part of the facets' sagitta.
     share = 0.0 if strips else 0.3
@@ -133,13 +143,13 @@ def _grow(surface: Surface, free: BoolArray, cells: IntArray, axis: Axis, sign: 
         lean = np.einsum("ij,ij->i", surface.normals[faces], axis.radial(surface.centres[faces])[0])
         slack = float(np.quantile(np.arccos(np.clip(sign * lean, -1.0, 1.0)), 0.9))
         limit = np.cos(min(max(0.6 * span, 2.5 * slack, 0.02), 0.7))
-        mask = free & near[F].all(axis=1)
+        mask: BoolArray = free & np.asarray(near[F].all(axis=1))
         index = np.flatnonzero(mask)
         radial = axis.radial(surface.centres[index])[0]
         mask[index] = sign * np.einsum("ij,ij->i", surface.normals[index], radial) >= limit
         if not mask[faces].any():
             return None
-        label = surface.labels(mask[surface.pairs].all(axis=1))
+        label = surface.labels(np.asarray(mask[surface.pairs].all(axis=1)))
         inside = faces[mask[faces]]
         names, where = np.unique(label[inside], return_inverse=True)
         main = names[np.argmax(np.bincount(where, weights=surface.areas[inside]))]
@@ -157,6 +167,15 @@ def _grow(surface: Surface, free: BoolArray, cells: IntArray, axis: Axis, sign: 
         span = float(facet_span(surface, axis, faces, cells).max())
         if settled:
             break
+    corners = np.unique(F[faces])
+    if len(points) < len(corners) <= min(60, 1.25 * len(points)):
+        # Scatter can look like points on chords: if all points make one consistent surface, none was.
+        whole = fit_axis(V[corners], axis)
+        if whole is not None:
+            res = whole.residual(V[corners])
+            wider = max(floor, _tolerance(res))
+            if wider <= 3.0 * tolerance and float(np.abs(res).max()) <= wider:
+                axis, points, tolerance = whole, corners, wider
     return Region(axis, sign, faces, points, tolerance, span, strips)
 
 
@@ -171,7 +190,7 @@ def _tolerance(residual: Array) -> float:
     if n < 60:  # the median of few is too rough
         scatter = max(scatter, float(np.sqrt(np.mean(residual**2))))
     scatter *= np.sqrt(n / freedom)
-    return scatter * float(stats.t.isf(3.2e-5, min(freedom, 1000)))
+    return float(scatter * stats.t.isf(3.2e-5, min(freedom, 1000)))
 
 
 def _support(surface: Surface, faces: IntArray, on: BoolArray) -> IntArray:
@@ -202,8 +221,9 @@ def find_regions(surface: Surface, progress: Callable[[str, float], None] | None
     return found
 
 
-def _strips(surface: Surface, free: BoolArray, cells: IntArray, floor: float,
-            tell: Callable[[str, float], None]) -> Iterator[Region]:
+def _strips(
+    surface: Surface, free: BoolArray, cells: IntArray, floor: float, tell: Callable[[str, float], None]
+) -> Iterator[Region]:
     V, F = surface.V, surface.F
     ridge = (surface.step > floor) & (surface.bend > 1e-5) & (surface.bend < MAX_FACET)
     ridge &= cells[surface.pairs[:, 0]] != cells[surface.pairs[:, 1]]
@@ -266,8 +286,9 @@ def _groups(values: IntArray, label: IntArray) -> dict[int, IntArray]:
     return {int(k): v for k, v in zip(names, np.split(values[order], start[1:]), strict=True)}
 
 
-def _patches(surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[[str, float], None]) -> Iterator[Region]:
-    V, F = surface.V, surface.F
+def _patches(
+    surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[[str, float], None]
+) -> Iterator[Region]:
     if not free.any():
         return
     size = np.bincount(cells)[cells]
@@ -276,7 +297,7 @@ def _patches(surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[
     tree = cKDTree(surface.centres)
     rng = np.random.default_rng(0)
     order = rng.permutation(np.flatnonzero(todo))
-    noise = _noise(surface, tree, rng.permutation(len(F))[:150])
+    noise = _noise(surface, tree, rng.permutation(len(surface.F))[:150])
     # First what fits as well as the mesh allows, then the rest: else a lip takes part of its groove.
     for stage, factor in enumerate((1.25, 2.0)):
         limit = factor * noise
@@ -289,7 +310,7 @@ def _patches(surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[
             if tried > _MAX_SEEDS:
                 break
             tell("patches", 0.5 * (stage + n / len(order)))
-            nearest = np.atleast_1d(tree.query(surface.centres[start], k=min(_PATCH_SIZES[-1], len(F)))[1])
+            nearest = np.atleast_1d(tree.query(surface.centres[start], k=min(_PATCH_SIZES[-1], len(surface.F)))[1])
             facing = free[nearest] & (surface.normals[nearest] @ surface.normals[start] > 0.5)
             region = _from_patches(surface, free, cells, start, nearest[facing], gates, limit)
             if region is None:
@@ -298,8 +319,15 @@ def _patches(surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[
             yield region
 
 
-def _from_patches(surface: Surface, free: BoolArray, cells: IntArray, start: int, nearest: IntArray,
-                  gates: list[IntArray], limit: float) -> Region | None:
+def _from_patches(
+    surface: Surface,
+    free: BoolArray,
+    cells: IntArray,
+    start: int,
+    nearest: IntArray,
+    gates: list[IntArray],
+    limit: float,
+) -> Region | None:
     for label in gates:
         same = nearest[label[nearest] == label[start]]
         last = 0
