@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, fit_axis, perpendicular, surface_error
+from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, fit_axis, patches_of, perpendicular, surface_error
 from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
 from clamp3d.fit.mesh_file import Mesh, load_mesh
 from clamp3d.fit.regions import Region, Surface, find_regions, sagitta
@@ -305,28 +305,15 @@ def _inflation(surface: Surface, region: Region, residual: Array) -> float:
 
 
 def _form_error(points: Array, residual: Array, rms: float) -> float:
-    """Largest mean residual of patches of about 25 points, with three standard errors; few points: the largest of all.
+    """Largest mean residual of a patch, with three standard errors of a mean; few points: the largest of all.
 
     Scatter averages out over a patch, a surface that is not round does not.
     """
     worst = float(np.abs(residual).max())
-    angle = np.arctan2(points[:, 0], -points[:, 1])
-    patches = [np.arange(len(points))]
-    flat = np.column_stack([angle * np.hypot(points[:, 0], points[:, 1]).mean(), points[:, 2]])
-    done = []
-    while patches:
-        index = patches.pop()
-        if len(index) < 50:
-            done.append(index)
-            continue
-        part = flat[index]
-        side = int(np.argmax(np.ptp(part, axis=0)))
-        order = np.argsort(part[:, side], kind="stable")
-        patches += [index[order[: len(index) // 2]], index[order[len(index) // 2 :]]]
-    if len(done) < 2:
+    patches = patches_of(points)
+    if len(patches) < 2:
         return worst
-    means = [abs(float(residual[i].mean())) + 3.0 * rms / np.sqrt(len(i)) for i in done]
-    return min(worst, float(max(means)))
+    return min(worst, max(abs(float(residual[i].mean())) + 3.0 * rms / float(np.sqrt(len(i))) for i in patches))
 
 
 def _open_ended(surface: Surface, values: dict[str, Any]) -> bool:

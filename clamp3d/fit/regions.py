@@ -34,7 +34,7 @@ MIN_LINES = 4
 """Fewest lines on a surface: three always lie on some circle (a trapezoid or V groove is not an arc)."""
 _PATCH_SIZES = (24, 96, 384, 1536)
 _GATES = tuple(np.radians(a) for a in (12.0, 25.0, 46.0))
-_MAX_SEEDS = 400
+_MAX_SEEDS = 250
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -275,8 +275,12 @@ def _strips(
         seed = np.concatenate([members[a], members[b]])
         sign = 1 if surface.normals[i] @ axis.radial(surface.centres[i : i + 1])[0][0] > 0.0 else -1
         region = _grow(surface, free, cells, axis, sign, seed, loose, floor, strips=True)
-        if region is not None and region.tolerance <= 4.0 * floor and _accept(surface, cells, region):
+        if region is None:
+            continue
+        if region.tolerance <= 4.0 * floor and _accept(surface, cells, region):
             yield region
+        else:  # its other strips would only grow the same again
+            fails[np.unique(cells[region.faces])] += 3
 
 
 def _groups(values: IntArray, label: IntArray) -> dict[int, IntArray]:
@@ -328,8 +332,10 @@ def _from_patches(
     gates: list[IntArray],
     limit: float,
 ) -> Region | None:
-    for label in gates:
-        same = nearest[label[nearest] == label[start]]
+    sames = [nearest[label[nearest] == label[start]] for label in gates]
+    for k, same in enumerate(sames):
+        if k and len(same) == len(sames[k - 1]):
+            continue
         last = 0
         for size in _PATCH_SIZES:
             patch = same[:size]
@@ -350,6 +356,8 @@ def _from_patches(
             if noise > 1.6 * scatter + surface.floor:
                 continue
             tolerance = max(surface.floor, 4.0 * noise)
+            if tolerance > 0.1 * axis.radius:
+                continue
             region = _grow(surface, free, cells, axis, sign, patch, tolerance, surface.floor, strips=False)
             if region is None or len(region.faces) < 0.7 * len(patch) or not _accept(surface, cells, region):
                 continue
@@ -412,6 +420,8 @@ def _quadric(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | Non
     doubt = 2.0 * float(np.sqrt(C[3:, 3:].diagonal().max())) / s**2
     if abs(values[big]) < 6.0 * doubt or abs(values[big]) * surface.extent < 0.05:
         return None
+    if abs(values[1 - big]) > 0.15 * abs(values[big]) + 4.0 * doubt:  # curved both ways
+        return None
     radius = 1.0 / abs(values[big])
     # Height over the outward normal: a valley (positive curvature) is a groove.
     sign = -1 if values[big] > 0.0 else 1
@@ -469,22 +479,43 @@ def _accept(surface: Surface, cells: IntArray, region: Region) -> bool:
         return False
     z = (V[np.unique(F[region.faces])] - axis.point) @ axis.direction
     length = float(np.ptp(z))
-    chord = 2.0 * axis.radius * np.sin(0.5 * float(spans.max()))
-    if length < 2.0 * chord and _runs_on(surface, region, float(spans.max())):
+    if _runs_on(surface, region, length):
+        return False
+    p = p @ np.stack([u, w, axis.direction], axis=1)
+    if _bent(p, axis.residual(V[region.points]), axis.radius):
         return False
     return len(region.points) >= 8 and length > 0.0
 
 
-def _runs_on(surface: Surface, region: Region, span: float) -> bool:
-    """True if the surface goes on smoothly past both round ends: a band of a sphere or torus, not a cylinder."""
+def _bent(local: Array, residual: Array, radius: float) -> bool:
+    """True if a loose fit (over 1 % of the radius) is loose because the shape is bent, oval or a barrel.
+
+    Points ``local`` (n, 3) in the cylinder's own frame. Scatter leaves nothing for a smooth second-order correction to
+    explain; another shape lets it explain more than half.
+    """
+    power = float(residual @ residual)
+    if np.sqrt(power / len(residual)) <= 0.01 * radius or len(residual) < 12:
+        return False
+    r = np.hypot(local[:, 0], local[:, 1])
+    x, y, z = local[:, 0] / r, local[:, 1] / r, local[:, 2] - local[:, 2].mean()
+    A = np.column_stack([np.ones_like(x), x, y, z, z * x, z * y, z * z, z * z * x, z * z * y, x * y, x * x])
+    left = residual - A @ np.linalg.lstsq(A, residual, rcond=1e-9)[0]
+    return float(left @ left) / power < 0.5 - 5.0 / len(residual)
+
+
+def _runs_on(surface: Surface, region: Region, length: float) -> bool:
+    """True if the surface goes on smoothly past both round ends with bands as long: a ring of a sphere or torus."""
     inside = np.zeros(len(surface.F), dtype=bool)
     inside[region.faces] = True
-    border = inside[surface.pairs[:, 0]] != inside[surface.pairs[:, 1]]
-    e = surface.V[surface.edges[border]]
-    middle = e.mean(axis=1)
-    across = np.abs((e[:, 1] - e[:, 0]) @ region.axis.direction) < 0.5 * np.linalg.norm(e[:, 1] - e[:, 0], axis=1)
-    z = (middle - region.axis.point) @ region.axis.direction
+    first, second = inside[surface.pairs].T
+    border = first != second
+    ends = surface.V[surface.edges[border]] @ region.axis.direction
+    run = np.linalg.norm(np.diff(surface.V[surface.edges[border]], axis=1)[:, 0], axis=1)
+    across = np.abs(ends[:, 1] - ends[:, 0]) < 0.5 * run
+    z = ends.mean(axis=1)
     z = z - 0.5 * (z.min() + z.max()) if len(z) else z
-    smooth = surface.bend[border] < 1.5 * span
-    ends = [across & (z > 0.0), across & (z < 0.0)]
-    return all(bool(end.any()) and bool(smooth[end].mean() > 0.7) for end in ends)
+    smooth = surface.bend[border] < 1.5 * region.span
+    outside = np.where(first, surface.pairs[:, 1], surface.pairs[:, 0])[border]
+    band = np.ptp(surface.V[surface.F[outside]] @ region.axis.direction, axis=1)
+    both = [across & (z > 0.0), across & (z < 0.0)]
+    return all(bool(e.any() and smooth[e].mean() > 0.7 and np.median(band[e]) > 0.3 * length) for e in both)
