@@ -275,9 +275,9 @@ def _strips(
         seed = np.concatenate([members[a], members[b]])
         sign = 1 if surface.normals[i] @ axis.radial(surface.centres[i : i + 1])[0][0] > 0.0 else -1
         region = _grow(surface, free, cells, axis, sign, seed, loose, floor, strips=True)
-        if region is None:
+        if region is None or region.tolerance > 4.0 * floor:
             continue
-        if region.tolerance <= 4.0 * floor and _accept(surface, cells, region):
+        if _accept(surface, cells, region):
             yield region
         else:  # its other strips would only grow the same again
             fails[np.unique(cells[region.faces])] += 3
@@ -316,7 +316,7 @@ def _patches(
             tell("patches", 0.5 * (stage + n / len(order)))
             nearest = np.atleast_1d(tree.query(surface.centres[start], k=min(_PATCH_SIZES[-1], len(surface.F)))[1])
             facing = free[nearest] & (surface.normals[nearest] @ surface.normals[start] > 0.5)
-            region = _from_patches(surface, free, cells, start, nearest[facing], gates, limit)
+            region = _from_patches(surface, free, cells, start, nearest[facing], gates, limit, open_)
             if region is None:
                 open_[nearest[: _PATCH_SIZES[0] // 2]] = False
                 continue
@@ -331,6 +331,7 @@ def _from_patches(
     nearest: IntArray,
     gates: list[IntArray],
     limit: float,
+    seeds: BoolArray,
 ) -> Region | None:
     sames = [nearest[label[nearest] == label[start]] for label in gates]
     for k, same in enumerate(sames):
@@ -346,8 +347,8 @@ def _from_patches(
             if guess is None:
                 continue
             axis0, sign, scatter = guess
-            if scatter > limit:
-                continue
+            if scatter > limit:  # an edge is in it: so it is in every larger patch
+                break
             points = surface.V[np.unique(surface.F[patch])]
             axis = fit_axis(points, axis0, robust_scale=max(scatter, surface.floor))
             if axis is None:
@@ -359,7 +360,10 @@ def _from_patches(
             if tolerance > 0.1 * axis.radius:
                 continue
             region = _grow(surface, free, cells, axis, sign, patch, tolerance, surface.floor, strips=False)
-            if region is None or len(region.faces) < 0.7 * len(patch) or not _accept(surface, cells, region):
+            if region is None or len(region.faces) < 0.7 * len(patch):
+                continue
+            if not _accept(surface, cells, region):  # every seed within would grow the same again
+                seeds[region.faces] = False
                 continue
             if np.sqrt(np.mean(region.axis.residual(surface.V[region.points]) ** 2)) <= limit:
                 return region
