@@ -1,5 +1,7 @@
 """Reading: units, axes, repairs, and one line for every kind of bad file."""
 
+import sys
+
 import numpy as np
 import pytest
 import trimesh
@@ -17,9 +19,6 @@ def part():
 
 @pytest.mark.parametrize("kind", ["stl", "ply", "obj", "3mf"])
 def test_formats_in_mm(part, tmp_path, kind):
-    if kind == "3mf":
-        pytest.importorskip("lxml")
-        pytest.importorskip("networkx")
     file = tmp_path / f"part.{kind}"
     part.export(file)
     result = fit_file(file)
@@ -39,8 +38,8 @@ def test_gltf_is_metres_and_y_up(part, tmp_path):
 
 def test_unit_option(part, tmp_path):
     part.export(tmp_path / "part.stl")
-    assert np.isclose(np.ptp(load_mesh(tmp_path / "part.stl", unit="inch").vertices[:, 0]), 137 * 25.4, rtol=1e-6)
-    with pytest.raises(InputError, match="unknown unit 'foot'; available: mm, cm, m, inch"):
+    assert np.isclose(np.ptp(load_mesh(tmp_path / "part.stl", unit="in").vertices[:, 0]), 137 * 25.4, rtol=1e-6)
+    with pytest.raises(InputError, match="unknown unit 'foot'; available: mm, cm, m, in"):
         load_mesh(tmp_path / "part.stl", unit="foot")
 
 
@@ -68,9 +67,35 @@ def test_bad_files_give_one_line(tmp_path, name, content, message):
     assert "\n" not in str(caught.value)
 
 
-def test_step_says_what_to_do(tmp_path):
-    with pytest.raises(MissingLibraryError, match="STEP"):
+def test_step_without_its_library_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "OCP", None)
+    (tmp_path / "part.step").write_text("ISO-10303-21;")
+    with pytest.raises(MissingLibraryError, match=r"pip install 'clamp3d\[step\]'"):
         load_mesh(tmp_path / "part.step")
+
+
+def test_step_of_the_up_splint(tmp_path):
+    pytest.importorskip("OCP")
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+    from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
+
+    block = BRepPrimAPI_MakeBox(gp_Pnt(-40, -20, 0), gp_Pnt(40, 0, 60)).Shape()
+    tool = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(3, 15, -10), gp_Dir(0, 0, 1)), 23.8012, 100).Shape()
+    writer = STEPControl_Writer()
+    writer.Transfer(BRepAlgoAPI_Cut(block, tool).Shape(), STEPControl_StepModelType.STEPControl_AsIs)
+    writer.Write(str(tmp_path / "part.step"))
+    result = fit_file(tmp_path / "part.step")
+    assert result.mesh.watertight
+    (g,) = result.features
+    assert abs(g.radius - 23.8012) < 1e-6
+    assert np.allclose(g.T_part_feature[:2, 3], [3, 15], atol=1e-6)
+    assert abs(g.half_angle - np.arccos(15 / 23.8012)) < 1e-6
+    assert g.chord_error <= 0.02
+    (tmp_path / "bad.step").write_text("nothing")
+    with pytest.raises(InputError, match="not a readable STEP file"):
+        load_mesh(tmp_path / "bad.step")
 
 
 @pytest.mark.parametrize(
