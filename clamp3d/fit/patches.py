@@ -22,7 +22,7 @@ _MAX_SEEDS = 250
 
 
 def patches(surface: Surface, free: BoolArray, cells: IntArray, tell: Callable[[str, float], None]) -> Iterator[Region]:
-    """Cylinders among the ``free`` faces (m,), from seeds all over them; the caller takes what is found off ``free``."""
+    """Cylinders among the ``free`` faces (m,), seeded all over; the caller takes what is found off ``free``."""
     if not free.any():
         return
     size = np.bincount(cells)[cells]
