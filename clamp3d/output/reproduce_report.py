@@ -83,7 +83,7 @@ def reproduction_to_text(found: Reproduction) -> str:
     ]
     lines += [f"  {found.plateau}", ""]
     lines.append(
-        "Table 5. Work counted: positions tried (M), groove queries (C; each one arc or its chords), segments m of all arcs"
+        "Table 5. Work: positions tried (M), groove queries (C; each one arc or its chords), segments m of all arcs"
     )
     lines.append(f"  {'method':10s} {'unit':>8s} {'solver':>9s} {'M':>6s} {'C':>7s} {'m':>5s}  published M, C, total")
     for w in found.table5:
