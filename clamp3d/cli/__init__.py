@@ -21,6 +21,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "report": ("clamp3d.cli.report", "Write a report for an assembly reviewer."),
     "reproduce": ("clamp3d.cli.reproduce", "Print Tables 1-5 of the paper beside this program's values."),
     "measure-image": ("clamp3d.cli.measure_image", "Measure a distance in a photograph by marked points."),
+    "fit": ("clamp3d.cli.fit", "Find round grooves, cylinders and holes in a mesh."),
     "export": ("clamp3d.cli.export", "Write the parts as files for CAD review."),
     "conductors": ("clamp3d.cli.conductors", "List the conductor catalogue."),
 }
