@@ -86,6 +86,17 @@ class Section:
             limits[2 * i] = (centre - half_mouth, centre + half_mouth)
         return limits
 
+    def room(self, q: Array, wire: PartName) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Limits of a wire's (x, y) at a state: its mouth, and the bottoms of the two grooves that face each other.
+
+        Parts of finite size are free behind their grooves too; a search must not put the wire there.
+        """
+        i = WIRES.index(wire)
+        up, down = self.pairs["P1", wire], self.pairs["P2", wire]
+        top = -up.T_a_groove[2, 3] - up.groove.radius
+        centre = self.down_splint(q).point(down.T_a_groove[0, 3], -down.T_a_groove[2, 3])[1]
+        return self.bounds()[2 * i], (float(top), centre + down.groove.radius)
+
     def splint_distance(self, q: Array) -> float:
         """Height between the inner edges of the splints on the line side (the distance of Table 4); mm."""
         up, down = self.clamp.up_splint, self.clamp.down_splint

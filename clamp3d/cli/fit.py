@@ -16,8 +16,8 @@ from clamp3d.cli.options import FILE
 @click.argument("mesh", metavar="MESH", type=click.Path(path_type=Path))
 @click.option(
     "--unit",
-    metavar="UNIT",
-    help="Unit of the file's numbers: mm, cm, m, inch.  [default: the file's own; mm for STL, OBJ, PLY]",
+    type=click.Choice(["mm", "cm", "m", "in"]),
+    help="Unit of the file's numbers.  [default: the file's own; mm for STL, OBJ, PLY]",
 )
 @click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the result as JSON.")
 @click.option(
@@ -25,7 +25,7 @@ from clamp3d.cli.options import FILE
 )
 @click.option("--quiet", "-q", is_flag=True, help="No progress and no notes.")
 def command(mesh: Path, unit: str | None, json_file: Path | None, html_file: Path | None, quiet: bool) -> None:
-    """Find round grooves, cylinders and holes in MESH (STL, OBJ, PLY, GLB, 3MF) and say how well they are known.
+    """Find round grooves, cylinders and holes in MESH (STL, OBJ, PLY, GLB, 3MF, STEP) and say how well they are known.
 
     A mesh without any is said to have none, with exit code 0.
     """

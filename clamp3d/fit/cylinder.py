@@ -165,3 +165,19 @@ def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> f
         g = np.column_stack([np.ones(len(u)), u, z * u])
         worst = max(worst, float(np.einsum("ij,jk,ik->i", g, C, g).max()))
     return float(np.sqrt(5.0 * stats.f.ppf(CONFIDENCE, 5, max(freedom, 1)) * worst))
+
+
+def patches_of(local: Array) -> list[NDArray[np.intp]]:
+    """Points ``local`` (n, 3) of a cylinder's own frame in patches of 25 to 49, by halving along the longer side."""
+    angle = np.arctan2(local[:, 0], -local[:, 1])
+    flat = np.column_stack([angle * np.hypot(local[:, 0], local[:, 1]).mean(), local[:, 2]])
+    todo, done = [np.arange(len(local))], []
+    while todo:
+        index = todo.pop()
+        if len(index) < 50:
+            done.append(index)
+            continue
+        part = flat[index]
+        order = np.argsort(part[:, int(np.argmax(np.ptp(part, axis=0)))], kind="stable")
+        todo += [index[order[: len(index) // 2]], index[order[len(index) // 2 :]]]
+    return done

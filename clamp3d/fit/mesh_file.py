@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.errors import Clamp3dError, InputError, MissingLibraryError
+from clamp3d.errors import Clamp3dError, InputError
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-UNITS_MM: dict[str, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4}
+UNITS_MM: dict[str, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 """Millimetres in one unit of length."""
 
 FORMATS: dict[str, str | None] = {
@@ -25,6 +24,8 @@ FORMATS: dict[str, str | None] = {
     ".glb": "m",
     ".gltf": "m",
     ".3mf": "mm",
+    ".step": "mm",
+    ".stp": "mm",
 }
 """Readable formats; the value is the unit that the format itself fixes (None: the file does not say)."""
 
@@ -48,34 +49,32 @@ class Mesh:
 
 
 def load_mesh(path: str | Path, *, unit: str | None = None) -> Mesh:
-    """Read ``path`` (STL, OBJ, PLY, GLB, GLTF or 3MF) as one mesh in mm, Z up.
+    """Read ``path`` (STL, OBJ, PLY, GLB, GLTF, 3MF or STEP) as one mesh in mm, Z up.
 
     ``unit`` is one of ``UNITS_MM``; the default is mm for STL, OBJ and PLY (which carry no unit), the unit in the file
-    for 3MF, metres for glTF (whose Y up becomes Z up). Several bodies become one mesh.
+    for 3MF and STEP, metres for glTF (whose Y up becomes Z up). Several bodies become one mesh.
     Raises InputError if the file is missing, unreadable, empty, or has a number that is not finite;
-    MissingLibraryError if the format needs a library that is not installed.
+    MissingLibraryError for STEP without the extra ``step``.
     """
     file = Path(path)
     kind = file.suffix.lower()
     if unit is not None and unit not in UNITS_MM:
         raise InputError(f"unknown unit {unit!r}; available: {', '.join(UNITS_MM)}")
-    if kind in _STEP:
-        raise MissingLibraryError(
-            f"{file}: STEP is a B-rep, not a mesh: export it as STL or 3MF (chord error 0.05 mm or less) and fit that"
-        )
     if kind not in FORMATS:
         raise InputError(f"{file}: unknown mesh format {kind or '(none)'!r}; available: {', '.join(FORMATS)}")
     if not file.is_file():
         raise InputError(f"{file}: no such file")
-    if kind == ".3mf":
-        for library in ("lxml", "networkx"):
-            if importlib.util.find_spec(library) is None:
-                raise MissingLibraryError(f"reading 3MF needs {library}: pip install {library}")
-    vertices, faces, file_unit = _read(file, kind)
+    if kind in _STEP:
+        from clamp3d.fit.step_file import read_step
+
+        file_unit: str | None = "mm"
+        vertices, faces = read_step(file)
+    else:
+        vertices, faces, file_unit = _read(file, kind)
     if kind in (".glb", ".gltf"):
         vertices = np.column_stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]])
     scale = UNITS_MM[unit or file_unit or "mm"]
-    mesh = make_mesh(vertices, faces, name=file.name, scale=scale, float32=True)
+    mesh = make_mesh(vertices, faces, name=file.name, scale=scale, float32=kind not in _STEP)
     notes = list(mesh.notes)
     if unit is None and file_unit is None:
         size = float(np.ptp(mesh.vertices, axis=0).max())
@@ -105,7 +104,7 @@ def _read(file: Path, kind: str) -> tuple[Array, IntArray, str | None]:
     offsets = np.cumsum([0, *(len(p.vertices) for p in parts)])
     vertices = np.concatenate([np.asarray(p.vertices, dtype=np.float64) for p in parts])
     faces = np.concatenate([np.asarray(p.faces, dtype=np.int64) + o for p, o in zip(parts, offsets, strict=False)])
-    names = {"millimeter": "mm", "millimeters": "mm", "centimeter": "cm", "meter": "m", "meters": "m", "in": "inch"}
+    names = {"millimeter": "mm", "millimeters": "mm", "centimeter": "cm", "meter": "m", "meters": "m", "inch": "in"}
     if kind in (".glb", ".gltf"):
         return vertices, faces, "m"
     if kind != ".3mf":

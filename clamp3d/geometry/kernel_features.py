@@ -22,6 +22,9 @@ ARC, LIP_M, LIP_N, FLAT_M, FLAT_N, END_FACE, END_ARC, END_EDGE_M, END_EDGE_N, CO
 CONVERGED = 1e-7
 """Last relative step of a quadratic iteration: the error left is of the order of its square."""
 
+TINY = 1e-150
+"""Below this the square of a length underflows, and with it the direction of the vector."""
+
 
 @inlined
 def section(x, y, R, s, h):  # type: ignore[no-untyped-def]
@@ -46,14 +49,14 @@ def section_foot(feature, x, y, R, s, h):  # type: ignore[no-untyped-def]
     """Nearest point of a section feature to (x, y), and the unit normal that leads out of the material there."""
     if feature == ARC:
         rho = math.sqrt(x * x + y * y)
-        if rho == 0.0:
+        if rho < TINY:
             return 0.0, -R, 0.0, 1.0
         return x / rho * R, y / rho * R, -x / rho, -y / rho
     if feature in (FLAT_M, FLAT_N):
         return x, h, 0.0, 1.0
     sx = -s if feature == LIP_M else s
     gap = math.sqrt((x - sx) * (x - sx) + (y - h) * (y - h))
-    if gap == 0.0:
+    if gap < TINY:
         return sx, h, -sx / R, -h / R
     return sx, h, (x - sx) / gap, (y - h) / gap
 
@@ -202,7 +205,7 @@ def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: igno
     best2 = math.inf
     bx = by = bt = 0.0
     for branch in range(2):
-        if q != 0.0 or a > k:
+        if abs(q) > TINY or a > k:
             if branch == 0:
                 root = nearer_root(k, a, abs(q))
                 C = p / (k + root)
@@ -233,7 +236,7 @@ def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: igno
         d2 = du * du + dv * dv
         if d2 < best2:
             best2, bx, by, bt = d2, qx, qy, t
-        if branch == 0 and q != 0.0:
+        if branch == 0 and abs(q) > TINY:
             break
     return best2, bx, by, bt
 

@@ -18,7 +18,7 @@ from clamp3d.geometry.shapes import Cylinder, SweptArc
 RESOLUTION = 1e-9
 """Default resolution of a search, in parts of the largest length of the scene."""
 
-_EVALUATIONS = 2_000_000
+_EVALUATIONS = 300_000
 
 
 def _vector(name: str, value: ArrayLike, *, unit: bool = False) -> Array:
@@ -257,7 +257,9 @@ def sweep(groove: SweptArc, cylinder: Cylinder, motion: Screw, *, resolution: fl
     if values[best] <= least:
         instant, least = float(coarse[best]), float(values[best])
     start = 0.0
-    while start < 1.0:
+    # Nothing is deeper than the middle between the end faces.
+    bottom = -0.5 * groove.length - cylinder.radius + search.slack
+    while start < 1.0 and least > bottom:
         status, _, middle, now = search.march(start, least, least - 1e-3 * search.slack, -math.inf)
         if status == 0:
             break

@@ -40,8 +40,8 @@ def groove_relation(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike, *, to
 
     A distance within ``tolerance`` mm of zero is a contact, one below an intersection (Eq. 5). A contact is interior if
     the cylinder lies on the hollow side of the surface at the point, exterior otherwise; at a lip or an end edge that
-    is the construction of Fig. 6, with the normal in place of the centre. A cylinder that is clear is inside if it has a
-    point in common with the groove's hollow, the region between arc and chord over the groove's length (Eq. 3),
+    is the construction of Fig. 6, with the normal in place of the centre. A cylinder that is clear is inside if it has
+    a point in common with the groove's hollow, the region between arc and chord over the groove's length (Eq. 3),
     else outside (Eq. 4). The answer is uncertain if the tolerance is below the distance's error bound and the distance
     is so near to zero that this matters. Raises InputError for a tolerance that is negative or not less than
     both radii, or a pose that is not rigid.
@@ -83,23 +83,23 @@ def _reaches_hollow(groove: SweptArc, cylinder: Cylinder, T: Array) -> bool:
     points of an axis and the block: a plane problem in y and z.
     """
     h, H = -groove.radius * math.cos(groove.half_angle), 0.5 * groove.length
-    c, d = T[1:3, 3], T[1:3, 2] / np.linalg.norm(T[:3, 2])
+    cy, cz = T[1:3, 3].tolist()
+    dy, dz = (T[1:3, 2] / np.linalg.norm(T[:3, 2])).tolist()
     half = 0.5 * cylinder.length
 
     def distance(t: float) -> float:
-        y, z = c + t * d
-        return math.hypot(max(y - h, 0.0), max(abs(z) - H, 0.0))
+        return math.hypot(max(cy + t * dy - h, 0.0), max(abs(cz + t * dz) - H, 0.0))
 
     # Convex in t: least at an end, where it meets a plane of the block, or at the foot of an edge of the block.
     places = [-half, half]
+    n2 = dy * dy + dz * dz
+    if dy != 0.0:
+        places.append((h - cy) / dy)
     for edge in (-H, H):
-        if d[1] != 0.0:
-            places.append(float((edge - c[1]) / d[1]))
-        n2 = float(d @ d)
+        if dz != 0.0:
+            places.append((edge - cz) / dz)
         if n2 > 0.0:
-            places.append(float((h - c[0]) * d[0] + (edge - c[1]) * d[1]) / n2)
-    if d[0] != 0.0:
-        places.append(float((h - c[0]) / d[0]))
+            places.append((h - cy) * (dy / n2) + (edge - cz) * (dz / n2))
     return min(distance(min(max(t, -half), half)) for t in places) < cylinder.radius
 
 

@@ -105,7 +105,9 @@ def fit_to_html(result: FitResult) -> str:
     data = {
         "positions": _base64((V[F] - middle).astype("<f4")),
         "owner": _base64(owner),
-        "size": float(np.linalg.norm(high - low)),
+        "size": 2.0 * max(float(np.linalg.norm(p - middle)) for p in (low, *(q for r in rows for q in r["axis"]))),
+        # A groove's mouth is its +y: look at the side that most of the grooves open to.
+        "from_below": sum(float(g.T_part_feature[2, 1]) for g in result.grooves) < -0.1,
         "colours": [r["colour"] for r in rows],
         "axes": [(np.array(r["axis"]) - middle).tolist() for r in rows],
     }
@@ -143,8 +145,8 @@ def _vector(values: np.ndarray[tuple[int], np.dtype[np.float64]], digits: int) -
 
 
 def _short(value: float) -> str:
-    """Two significant digits; nothing below a millionth."""
-    return "< 0.000001" if value < 1e-6 else f"{value:.2g}" if value < 1e-3 else f"{value:.4f}"
+    """Four decimals, two digits of what is smaller, 0 below a millionth."""
+    return "0" if value < 1e-6 else f"{value:.1e}" if value < 1e-3 else f"{value:.4f}"
 
 
 def _base64(array: np.ndarray[tuple[int, ...], np.dtype[np.generic]]) -> str:

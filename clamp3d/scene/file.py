@@ -238,7 +238,7 @@ class MeshTable(_Placed):
     TAG: ClassVar[str] = "mesh"
     shape: Literal["mesh"]
     file: str
-    unit: Literal["mm", "cm", "m", "inch"] | None = None
+    unit: Literal["mm", "cm", "m", "in"] | None = None
     fit: shapes.Fit = "bound"
 
     def make(self, folder: Path) -> shapes.AnyShape:
