@@ -73,7 +73,9 @@ def distance_text(row: PairResult) -> str:
     '> 2.5'
     """
     if row.distance is None:
-        return f"> {row.low:.4g}" if row.low > -float("inf") else f"< {row.high:.4g}" if row.high < float("inf") else "?"
+        return (
+            f"> {row.low:.4g}" if row.low > -float("inf") else f"< {row.high:.4g}" if row.high < float("inf") else "?"
+        )
     # As many decimals as the bound gives, no more than 1e-6 mm.
     digits = 6
     while digits > 1 and 0.5 * 10.0**-digits < row.error_bound / 10.0:
@@ -124,7 +126,15 @@ def _row_text(row: PairResult) -> tuple[str, ...]:
 
 def _motion_text(row: PairResult) -> tuple[str, ...]:
     contact = "" if row.contact_at is None else f"{row.contact_at:.4f}"
-    return (str(row.motion), f"{row.a} - {row.b}", row.verdict.value, distance_text(row), f"{row.t:.4f}", contact, row.method)
+    return (
+        str(row.motion),
+        f"{row.a} - {row.b}",
+        row.verdict.value,
+        distance_text(row),
+        f"{row.t:.4f}",
+        contact,
+        row.method,
+    )
 
 
 def _columns(rows: list[tuple[str, ...]], head: tuple[str, ...]) -> list[str]:
@@ -161,8 +171,8 @@ def _work_text(work: Work) -> list[str]:
         f"decided: {decided}",
         f"built: {work.meshes} meshes ({work.triangles} triangles), {work.hulls} hulls, {work.fits} fits "
         f"for {work.shapes} shapes; asked: {queries or 'nothing'}; {sum(work.seconds.values()):.2f} s",
-        f"one fixed fidelity (every part meshed at {work.fixed_error:g} mm, every pair asked): {work.fixed_meshes} meshes, "
-        f"{work.fixed_triangles} triangles, {work.fixed_queries} queries",
+        f"one fixed fidelity (every part meshed at {work.fixed_error:g} mm, every pair asked): {work.fixed_meshes} "
+        f"meshes, {work.fixed_triangles} triangles, {work.fixed_queries} queries",
     ]
 
 
@@ -171,7 +181,10 @@ def check_to_html(result: CheckResult, full: CheckResult | None = None) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("clamp3d.output", "templates"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+        loader=PackageLoader("clamp3d.output", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
     )
     names = [part.name for part in result.scene.parts]
     shown = names if len(names) <= _PAGE_MATRIX else sorted({n for row in listed(result) for n in (row.a, row.b)})

@@ -29,7 +29,7 @@ class Boxes:
     @property
     def reach(self) -> Array:
         """Half sizes (n, 3) of the boxes along the world's axes around them."""
-        return np.einsum("nij,nj->ni", np.abs(self.R), self.half)
+        return np.asarray(np.einsum("nij,nj->ni", np.abs(self.R), self.half))
 
 
 def near_pairs(boxes: Boxes, reach: float) -> NDArray[np.int64]:
@@ -42,7 +42,7 @@ def near_pairs(boxes: Boxes, reach: float) -> NDArray[np.int64]:
     half = boxes.reach + 0.5 * reach * (1.0 + 1e-9)
     low, high = boxes.centre - half, boxes.centre + half
     tree = index.Index((np.arange(n), low, high), properties=index.Property(dimension=3))
-    second, count = tree.intersection_v(low, high)
+    second, count = tree.intersection_v(low, high)  # type: ignore[no-untyped-call]
     first = np.repeat(np.arange(n), count.astype(np.int64))
     second = np.asarray(second, dtype=np.int64)
     pairs = np.column_stack([first, second])[first < second]

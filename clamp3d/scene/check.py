@@ -162,9 +162,7 @@ def as_row(a: str, b: str, verdict: Verdict, answer: Answer, T_a: Array) -> Pair
     )
 
 
-def _work(
-    shop: Workshop, scene: Scene, pairs: int, candidates: int, decided: Counter[str], full: bool
-) -> Work:
+def _work(shop: Workshop, scene: Scene, pairs: int, candidates: int, decided: Counter[str], full: bool) -> Work:
     ledger = shop.ledger
     used: NDArray[np.int64] = np.array([m.triangles_at(FINEST) for m in shop.models], dtype=np.int64)
     return Work(

@@ -41,7 +41,7 @@ class Rod:
         return np.asarray(t + R @ np.array([scale * m[0], scale * m[1], np.copysign(0.5 * self.length, m[2])]))
 
     def face(self, n: Array) -> Array:
-        """Points (k, 3) of what lies furthest along ``n`` (3,): a line on the side, the rim and middle of an end, a point."""
+        """Points (k, 3) of what lies furthest along ``n`` (3,): a line on the side, the rim of an end, a point."""
         m = n @ self.T[:3, :3]
         across = float(np.hypot(m[0], m[1]))
         if across < _FLAT:
@@ -253,7 +253,7 @@ def _depth(piece: Convex, T: Array, x: Array) -> float:
 
 
 def _slab(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array) -> tuple[float, Array]:
-    """Largest signed gap between two planes square to a normal near ``n`` (from a to b) that part the pieces; and it."""
+    """Largest signed gap between two planes square to a normal near ``n`` (a to b) that part the pieces; and it."""
     Ra, Rb = Ta[:3, :3], Tb[:3, :3]
     offset = Tb[:3, 3] - Ta[:3, 3]
     best, normal = -np.inf, n

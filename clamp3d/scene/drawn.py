@@ -1,4 +1,4 @@
-"""From drawn solids to bodies in closed form: circles are cylinders, concave arcs are grooves, the rest is polyhedra."""
+"""From drawn solids to bodies in closed form: circles are cylinders, concave arcs grooves, the rest polyhedra."""
 
 from __future__ import annotations
 
@@ -28,12 +28,15 @@ def bodies_of(solid: Solid) -> tuple[Body, ...] | None:
         if pieces is None:
             return None
         for outers, grooves in pieces:
-            bores, slots = list(grooves), []
+            bores, slots = list(grooves), list[Slot]()
             for hole in solid.holes:
                 hollow = _hollow(hole, outers)
                 if hollow is None:
                     return None
-                (bores if isinstance(hollow, Bore) else slots).append(hollow)  # type: ignore[arg-type]
+                if isinstance(hollow, Bore):
+                    bores.append(hollow)
+                else:
+                    slots.append(hollow)
             found.append(Body(outers, tuple(bores), tuple(slots)))
     return tuple(found)
 

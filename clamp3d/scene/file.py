@@ -55,7 +55,9 @@ class Pose:
     def _one_turn(self) -> Pose:
         turns = [k for k in ("rpy_deg", "axis", "quaternion", "matrix") if getattr(self, k) is not None]
         if len(turns) > 1:
-            raise ValueError(f"{turns[1]}: give one of rpy_deg, axis with angle_deg, quaternion, matrix, not {turns[0]} too")
+            raise ValueError(
+                f"{turns[1]}: give one of rpy_deg, axis with angle_deg, quaternion, matrix, not {turns[0]} too"
+            )
         if (self.axis is None) != (self.angle_deg is None):
             raise ValueError("axis: give axis and angle_deg together")
         if self.axis is not None and not any(self.axis):
@@ -273,7 +275,7 @@ PartTable = Annotated[
 
 @dataclass(frozen=True, config=_FROZEN, kw_only=True)
 class ClampTable(_Placed):
-    """``[clamp]``: all seven parts of a clamp, P1 to P7, as `clamp3d run` leaves them; its connections are allowed."""
+    """``[clamp]``: the parts P1 to P7 of a clamp as `clamp3d run` leaves them; their connections are allowed."""
 
     name: str = "reference"
     line: str | None = None
@@ -309,7 +311,7 @@ class TurnTable:
 
 @dataclass(frozen=True, config=_FROZEN, kw_only=True)
 class MotionTable:
-    """``[[motions]]``: ``parts`` move together by one of ``translate``, ``rotate``, ``screw``, ``to``, one after another."""
+    """``[[motions]]``, one after another: ``parts`` move together by ``translate``, ``rotate``, ``screw`` or ``to``."""
 
     parts: Annotated[list[str], Field(min_length=1)]
     name: str | None = None
@@ -384,7 +386,7 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
         raise InputError(f"{origin}: not valid TOML: {error}") from None
     table: SceneTable = validate(SceneTable, data, origin, _TAGS)
     made: list[ScenePart] = []
-    allowed = []
+    allowed: list[Allowed] = []
     files: dict[tuple[str, str | None, str], shapes.AnyShape] = {}
     try:
         if table.clamp is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.fit.features import FittedSurface
 from clamp3d.fit.fit import FitResult
@@ -13,6 +14,8 @@ from clamp3d.scene.convex import Rod, hull
 from clamp3d.scene.solid import Body, Bore
 from clamp3d.scene.trimodel import TriModel
 
+Faces = NDArray[np.int64]
+
 
 def fit_error(feature: FittedSurface, round_: bool) -> float:
     """Error (mm) of a fitted surface: with the vertices taken to lie on a round surface, or with nothing assumed."""
@@ -20,7 +23,7 @@ def fit_error(feature: FittedSurface, round_: bool) -> float:
 
 
 def bodies_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[tuple[Body, ...], float]:
-    """Bodies around the fitted mesh, and the error (mm) of the mesh itself: its largest chord error and that of the fit.
+    """Bodies around the fitted mesh, and the error (mm) of the mesh itself: largest chord error and that of the fit.
 
     A groove or hole counts where no part of the mesh lies in its circle, over the whole length of the mesh; else the
     mesh is asked. Where the mesh is nothing but a round bar (a wire, a shank, a step of a turned part) it becomes a
@@ -28,13 +31,13 @@ def bodies_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[
     """
     V, F = model.vertices, model.faces
     points = V.copy()
-    for feature in result.cylinders:
+    for convex in result.cylinders:
         # Facets are inscribed: their tangents in place of their chords enclose the round surface.
-        own = np.unique(F[feature.faces])
-        T = feature.T_part_feature
+        own = np.unique(F[convex.faces])
+        T = convex.T_part_feature
         local = (V[own] - T[:3, 3]) @ T[:3, :3]
         out = np.hypot(local[:, 0], local[:, 1])
-        reach = feature.radius / (1.0 - feature.chord_error / feature.radius) + feature.fit_error
+        reach = convex.radius / (1.0 - convex.chord_error / convex.radius) + convex.fit_error
         local[:, :2] *= (np.maximum(reach, out) / out)[:, None]
         points[own] = local @ T[:3, :3].T + T[:3, 3]
     used = [bore for feature in (*result.grooves, *result.holes) if (bore := _bore(feature, V, F)) is not None]
@@ -48,11 +51,11 @@ def bodies_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[
     def depth(x: Array) -> Array:
         away, face = model.nearest(x)
         on = (away <= 1e-9 * model.scale) & ~in_feature[face]
-        for feature in result.features:  # a point on the fitted surface is on the part, within the error of the fit
-            local = (x - feature.T_part_feature[:3, 3]) @ feature.T_part_feature[:3, :3]
-            touch = np.abs(np.hypot(local[:, 0], local[:, 1]) - feature.radius) <= 1e-9 * model.scale
-            touch &= np.abs(local[:, 2]) <= 0.5 * feature.length + 1e-9 * model.scale
-            on |= touch & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) <= feature.half_angle + 1e-9)
+        for surface in result.features:  # a point on the fitted surface is on the part, within the error of the fit
+            local = (x - surface.T_part_feature[:3, 3]) @ surface.T_part_feature[:3, :3]
+            touch = np.abs(np.hypot(local[:, 0], local[:, 1]) - surface.radius) <= 1e-9 * model.scale
+            touch &= np.abs(local[:, 2]) <= 0.5 * surface.length + 1e-9 * model.scale
+            on |= touch & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) <= surface.half_angle + 1e-9)
         found = np.where(on, 0.0, -mesh_error - away)
         # Nearer to the facets than their own error a point proves nothing; further in it does.
         for k in np.flatnonzero(~on & (away > mesh_error)):
@@ -67,7 +70,7 @@ def bodies_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[
     return tuple(made), mesh_error
 
 
-def _bore(feature: FittedSurface, V: Array, F: Array) -> Bore | None:
+def _bore(feature: FittedSurface, V: Array, F: Faces) -> Bore | None:
     """The groove or hole as a bore of the whole mesh; None if some of the mesh lies in its circle."""
     T = feature.T_part_feature.copy()
     local = (V - T[:3, 3]) @ T[:3, :3]
@@ -96,7 +99,7 @@ def _nearest_to_axis(flat: Array) -> float:
     return 0.0 if around else float(edge)
 
 
-def _rods(result: FitResult, V: Array, F: Array) -> tuple[list[Rod], list[Array]]:
+def _rods(result: FitResult, V: Array, F: Faces) -> tuple[list[Rod], list[Faces]]:
     """Stretches along the first full cylinder's axis where the mesh is a round bar, and the vertices of the others."""
     full = [f for f in result.cylinders if f.full]
     everything = [np.unique(F)]
@@ -121,7 +124,9 @@ def _rods(result: FitResult, V: Array, F: Array) -> tuple[list[Rod], list[Array]
         if not coaxial or (between & ~holes[F].all(axis=1)).any() or any(low < b and a < high for a, b in taken):
             continue
         place = feature.T_part_feature.copy()
-        middle = float(((V[own] - place[:3, 3]) @ place[:3, 2]).min() + ((V[own] - place[:3, 3]) @ place[:3, 2]).max()) / 2
+        middle = (
+            float(((V[own] - place[:3, 3]) @ place[:3, 2]).min() + ((V[own] - place[:3, 3]) @ place[:3, 2]).max()) / 2
+        )
         place[:3, 3] += middle * place[:3, 2]
         rods.append(Rod(feature.radius, high - low, place))
         taken.append((low, high))

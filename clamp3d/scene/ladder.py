@@ -1,4 +1,4 @@
-"""The ladder of fidelity for one pair: boxes, closed forms (or hulls), facets, meshes; up only while the verdict is open."""
+"""The ladder of fidelity for one pair: boxes, closed forms or hulls, facets, meshes; up while the verdict is open."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ class Answer:
 Enough = Callable[[Bounds], bool]
 
 
-def climb(a: Model, b: Model, T: Array, start: Bounds, thresholds: Thresholds, enough: Enough, ledger: Ledger) -> Answer:
+def climb(
+    a: Model, b: Model, T: Array, start: Bounds, thresholds: Thresholds, enough: Enough, ledger: Ledger
+) -> Answer:
     """Bounds of ``b`` at ``T`` (4, 4) in a's frame, from ``start`` (what the boxes said), until ``enough``."""
     found = Answer(start, "boxes", "bounding boxes")
     if enough(start):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -48,6 +47,7 @@ class Allowed:
 class Scene:
     """Parts in the world, what counts as contact and clearance, what may touch, and how parts move.
 
+    >>> import math
     >>> from clamp3d.scene import shapes
     >>> from clamp3d.geometry.shapes import SweptArc
     >>> scene = Scene(clearance=1.0)
@@ -84,7 +84,9 @@ class Scene:
                     raise InputError(f"motion {motion.name!r}: {unknown_part(name, seen)}")
 
     @classmethod
-    def of(cls, parts: Mapping[str, tuple[AnyShape, ArrayLike]], *, clearance: float = 0.0, contact: float = 0.01) -> Scene:
+    def of(
+        cls, parts: Mapping[str, tuple[AnyShape, ArrayLike]], *, clearance: float = 0.0, contact: float = 0.01
+    ) -> Scene:
         """Scene of ``{name: (shape, T_world)}``. Raises InputError for bad names, shapes or poses."""
         made = tuple(_part(name, shape, T) for name, (shape, T) in parts.items())
         return cls(made, clearance=clearance, contact=contact)

@@ -6,6 +6,7 @@ shapes are equal values, so a thousand equal bolts share one model.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -141,7 +142,7 @@ def groove_block(
         if face - height >= centre - radius:
             raise InputError(f"groove at x = {x:g} mm cuts the back: height must be > {face - centre + radius:g} mm")
         arcs.append((x, reach, Arc((x, centre), radius, -math.pi / 2 + half, -math.pi / 2 - half)))
-    for (x0, r0, _), (x1, r1, _) in zip(arcs, arcs[1:], strict=False):
+    for (x0, r0, _), (x1, r1, _) in itertools.pairwise(arcs):
         if x0 - r0 <= x1 + r1:
             raise InputError(f"grooves at x = {x1:g} and {x0:g} mm meet: they must be > {r0 + r1:g} mm apart")
     w, back, half_length = width / 2, face - height, groove.length / 2

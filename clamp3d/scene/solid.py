@@ -123,7 +123,7 @@ def _better(old: Bounds, method: str, new: Bounds, name: str) -> tuple[Bounds, s
 
 
 def turned(bounds: Bounds, T: Array) -> Bounds:
-    """Bounds of the second part against the first, which ``T`` (4, 4) places in the second's frame, the other way round.
+    """Bounds of the second part against the first, placed by ``T`` (4, 4) in the second's frame, the other way round.
 
     Their points are in the second's frame before and in the first's after.
     """
@@ -170,8 +170,10 @@ def _attested(bounds: Bounds, a: Body, b: Body, T: Array) -> Bounds:
     if p is None or q is None:
         return Bounds(bounds.low)
     slack = MEMBER * (1.0 + float(max(np.abs(p).max(), np.abs(q).max())))
-    # The two may be slid along a cylinder together: where the contact is a line, its named point may not be on the body.
-    shifts = np.vstack([np.zeros((1, 3)), *(_along(piece, None) for piece in a.outers), *(_along(w, T) for w in b.outers)])
+    # The two may be slid along a cylinder together: of a line of contact the named point may not be on the body.
+    shifts = np.vstack(
+        [np.zeros((1, 3)), *(_along(piece, None) for piece in a.outers), *(_along(w, T) for w in b.outers)]
+    )
     if bounds.high >= 0.0:
         for s in (shifts[:1], *np.array_split(shifts[1:], max(1, len(shifts) // 8))):
             k = _first_on_both(a, b, T, p + s, q + s, slack)

@@ -144,7 +144,9 @@ class _Way:
         """The moving mesh's triangles by their distance from the motion's axis: (tree, speed mm per unit of t)."""
         mesh = self.a.mesh(SHELL_ERROR)
         world = mesh.vertices @ self.start[:3, :3].T + self.start[:3, 3] - self.motion.point
-        out = np.linalg.norm(world - np.outer(world @ self.motion.axis, self.motion.axis), axis=1)[mesh.faces].max(axis=1)
+        out = np.linalg.norm(world - np.outer(world @ self.motion.axis, self.motion.axis), axis=1)[mesh.faces].max(
+            axis=1
+        )
         straight = float(np.linalg.norm(self.motion.travel))
         if not self.motion.angle:
             return ((mesh.bvh, straight),)
@@ -250,7 +252,7 @@ class PoseSweep:
         """Worst verdict (n,) of each pose."""
         order = {v.value: k for k, v in enumerate(Verdict)}
         ranks = np.vectorize(order.__getitem__, otypes=[np.int64])(self.verdict)
-        return np.array([v.value for v in Verdict])[ranks.min(axis=1)]
+        return np.asarray(np.array([v.value for v in Verdict])[ranks.min(axis=1)])
 
 
 def sweep_poses(
@@ -273,7 +275,9 @@ def sweep_poses(
     """
     shop = workshop or Workshop()
     i = scene.index(part)
-    rest = [scene.index(name) for name in others] if others is not None else [k for k in range(len(scene.parts)) if k != i]
+    rest = (
+        [scene.index(name) for name in others] if others is not None else [k for k in range(len(scene.parts)) if k != i]
+    )
     if i in rest:
         raise InputError(f"others must not hold {part!r} itself")
     try:
@@ -300,7 +304,7 @@ def sweep_poses(
         shop.ledger.queries["boxes"] += n
         low[:, column] = gaps
         local = inverse(T_other) @ T
-        for k in np.flatnonzero(gaps < scene.thresholds.reach + 1e-6):
+        for k in np.flatnonzero(gaps < scene.thresholds.reach + 1e-6).tolist():
             answer = climb(
                 other,
                 model,

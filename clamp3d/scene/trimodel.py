@@ -106,7 +106,7 @@ class TriModel:
             answer = fcl.DistanceResult()
             fcl.distance(surface, ball, request, answer)
             face[k] = answer.b1
-        foot = closest_point(self.vertices[self.faces[face]], points)
+        foot = closest_point(self.vertices[self.faces[face]], points)  # type: ignore[no-untyped-call]
         return np.linalg.norm(foot - points, axis=1), face
 
     def distance(self, points: Array) -> Array:
@@ -211,8 +211,8 @@ def _deepest(model: TriModel, triangles: Array, contact: float, rounding: float)
         face = np.column_stack([face.reshape(-1, 3), centre_face])
         best = np.full(len(todo), np.inf)
         for k in range(4):
-            over = closest_point(np.repeat(own[face[:, k]], 3, axis=0), corners) - corners
-            best = np.minimum(best, np.linalg.norm(over, axis=1).reshape(-1, 3).max(axis=1))
+            foot = closest_point(np.repeat(own[face[:, k]], 3, axis=0), corners)  # type: ignore[no-untyped-call]
+            best = np.minimum(best, np.linalg.norm(foot - corners, axis=1).reshape(-1, 3).max(axis=1))
         open_ = best > max(deepest, 0.25 * contact) * 1.001 + rounding
         limit = max(limit, float(best[~open_].max(initial=0.0)))
         done += len(todo)

@@ -35,6 +35,7 @@ SEAT_TOLERANCE = 0.5
 
 _TOUCH = 1e-7
 _ITERATIONS = 400
+_STRAIGHT = 1e-5
 
 
 class Outcome(IntEnum):
@@ -51,7 +52,7 @@ class Outcome(IntEnum):
 
 
 _IN_GROOVE = (Feature.ARC, Feature.END_ARC)
-_OUTSIDE = (Feature.FLAT_M, Feature.FLAT_N, Feature.CORNER_M, Feature.CORNER_N, Feature.END_FACE)
+_FACES = (Feature.FLAT_M, Feature.FLAT_N, Feature.END_EDGE_M, Feature.END_EDGE_N, Feature.END_FACE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,14 +144,24 @@ class WireClosing:
         poses = self.poses(misplacement)
         opening = np.zeros(len(poses))
         features = np.empty((len(poses), 2), dtype=np.int8)
+        beside = np.zeros(len(poses), dtype=bool)
         for k, (pair, T_groove_world, away) in enumerate(self._splints):
-            travel, features[:, k] = _approach(pair, T_groove_world, poses @ pair.T_b_cylinder, away)
+            travel, features[:, k], flat = _approach(pair, T_groove_world, poses @ pair.T_b_cylinder, away)
             opening += travel
+            beside |= flat & ~np.isin(features[:, k], _IN_GROOVE)
         in_groove = np.isin(features, _IN_GROOVE).all(axis=1)
-        outside = np.isin(features, _OUTSIDE).any(axis=1) | ~np.isfinite(opening)
+        outside = beside | ~np.isfinite(opening)
         closed = in_groove & (opening <= self.seat_tolerance)
         outcome = np.where(closed, Outcome.CLOSES, np.where(outside, Outcome.CANNOT_SEAT, Outcome.TOUCHES_WRONGLY))
         return Outcomes(np.asarray(misplacement, dtype=np.float64), outcome.astype(np.int8), opening, features)
+
+    def cloud(self, ranges: Mapping[Freedom, float], count: int, *, seed: int = 0) -> Outcomes:
+        """Outcomes of ``count`` misplacements spread evenly at random over half ``ranges`` (mm or rad)."""
+        m = np.zeros((count, 4))
+        rng = np.random.default_rng(seed)
+        for freedom, reach in ranges.items():
+            m[:, FREEDOMS.index(freedom)] = rng.uniform(-reach, reach, count)
+        return self.close(m)
 
     def limits(self, freedom: Freedom, reach: float) -> Limits:
         """How far one freedom alone may go either way before the clamp does not close, searched up to ``reach``."""
@@ -174,12 +185,12 @@ class WireClosing:
                 low, high = float(steps[max(first - 1, 0)]), float(steps[first])
                 if first == 0 or high - low < 1e-9 * reach:
                     break
-            found.append((sign * low, low >= reach))
+            found.append((sign * low, bool(low >= reach)))
         (below, below_open), (above, above_open) = found
         return Limits(freedom, below + 0.0, above, below_open, above_open)
 
     def tolerances(self, ranges: Mapping[Freedom, float], *, samples: int = 4000, seed: int = 0) -> Tolerances:
-        """Limits of each freedom in ``ranges`` (its half range, mm or rad), and the share of them that holds at once."""
+        """Limits of each freedom in ``ranges`` (half ranges, mm or rad), and the share of them that holds at once."""
         limits = tuple(self.limits(freedom, reach) for freedom, reach in ranges.items())
         rng = np.random.default_rng(seed)
         unit = np.array(list(itertools.product((0.0, 1.0), repeat=len(limits))))
@@ -202,8 +213,11 @@ class WireClosing:
         return Tolerances(self.wire, self.seat_tolerance, limits, inside, samples)
 
 
-def _approach(pair: GroovePair, T_groove_world: Array, poses: Array, away: Array) -> tuple[Array, NDArray[np.int8]]:
-    """How far from its place (mm along ``away``) a splint touches wires at ``poses`` (n, 4, 4), and with what.
+def _approach(
+    pair: GroovePair, T_groove_world: Array, poses: Array, away: Array
+) -> tuple[Array, NDArray[np.int8], NDArray[np.bool_]]:
+    """How far from its place (mm along ``away``) a splint touches wires at ``poses`` (n, 4, 4), with what, and whether
+    that is a face beside the mouth, or its edge.
 
     The splint comes from afar. Each step is the distance that is left, which a straight motion cannot overrun.
     """
@@ -224,5 +238,9 @@ def _approach(pair: GroovePair, T_groove_world: Array, poses: Array, away: Array
             break
     local[:, :3, 3] = home - travel[:, None] * step
     answer = signed_distances(groove, cylinder, local, full=True)
-    travel = np.where(travel <= -far, np.inf, travel)
-    return travel, answer.feature
+    d = local[:, :3, 2]
+    straight = np.array([0.0, 1.0, 0.0]) - d[:, 1:2] * d
+    straight /= np.maximum(np.linalg.norm(straight, axis=1), 1e-300)[:, None]
+    # A wire flat on a face touches the corner of the lip as well: the normal tells which.
+    flat = np.isin(answer.feature, _FACES) | (np.linalg.norm(answer.normal - straight, axis=1) < _STRAIGHT)
+    return np.where(travel <= -far, np.inf, travel), answer.feature, flat
