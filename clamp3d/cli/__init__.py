@@ -23,6 +23,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "measure-image": ("clamp3d.cli.measure_image", "Measure a distance in a photograph by marked points."),
     "fit": ("clamp3d.cli.fit", "Find round grooves, cylinders and holes in a mesh."),
     "export": ("clamp3d.cli.export", "Write the parts as files for CAD review."),
+    "check": ("clamp3d.cli.check", "Check which parts of a scene clash, touch or keep their clearance."),
+    "sweep": ("clamp3d.cli.sweep", "Map how far a wire may be misplaced before a clamp no longer closes on it."),
     "conductors": ("clamp3d.cli.conductors", "List the conductor catalogue."),
 }
 
