@@ -18,6 +18,7 @@ from clamp3d.errors import Clamp3dError
 COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("clamp3d.cli.run", "Assemble a clamp and print where every part ends up."),
     "reproduce": ("clamp3d.cli.reproduce", "Print Tables 1-5 of the paper beside this program's values."),
+    "compare": ("clamp3d.cli.compare", "Measure every contact method: accuracy against speed."),
     "measure-image": ("clamp3d.cli.measure_image", "Measure a distance in a photograph by marked points."),
     "export": ("clamp3d.cli.export", "Write the parts as files for CAD review."),
     "conductors": ("clamp3d.cli.conductors", "List the conductor catalogue."),
