@@ -134,10 +134,12 @@ def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Si
     (1.5, 'ARC')
     """
     T = as_pose(pose)
-    out = np.empty(13)
-    run = (_kernel or kernel()).single
-    if not run(T, groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, out):
+    record = np.empty((1, 13))
+    run = (_kernel or kernel()).records
+    half, along = 0.5 * groove.length, 0.5 * cylinder.length
+    if run(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, record) >= 0:
         reject(T, "pose")
+    out = record[0]
     distance, bound, feature, along = out[[0, 10, 11, 12]].tolist()
     return SignedDistance(
         distance,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import hashlib
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,13 @@ _OPTIONS: dict[str, Any] = {"fastmath": False, "error_model": "numpy", "nogil": 
 formula = numba.njit(**_OPTIONS)
 """Decorator of a formula: compiled into its callers, not cached by itself."""
 
+inlined = numba.njit(forceinline=True, **_OPTIONS)
+"""The same for a small formula: built into each caller, which drops what it does not use."""
+
 NOTICE_AFTER = 1.0
 """Seconds after which a build that is still running is announced on stderr."""
+
+_announced = False
 
 
 def source_stamp() -> str:
@@ -34,16 +38,12 @@ def source_stamp() -> str:
     return digest.hexdigest()
 
 
-@contextmanager
-def _announced() -> Iterator[None]:
-    text = "clamp3d: compiling the contact kernel, once for this machine (a few seconds) ..."
-    timer = threading.Timer(NOTICE_AFTER, lambda: print(text, file=sys.stderr, flush=True))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
+def _announce() -> None:
+    global _announced
+    if not _announced:
+        _announced = True
+        text = "clamp3d: compiling the contact kernel, once for this machine (a few seconds) ..."
+        print(text, file=sys.stderr, flush=True)
 
 
 def entry(function: Callable[..., Any], signature: str) -> Any:
@@ -51,8 +51,12 @@ def entry(function: Callable[..., Any], signature: str) -> Any:
 
     Without a writable cache folder (read-only installation and home, full disk) it is compiled in memory.
     """
-    with _announced():
-        try:
-            return numba.njit(signature, cache=True, **_OPTIONS)(function)
-        except (OSError, RuntimeError):
-            return numba.njit(signature, **_OPTIONS)(function)
+    timer = threading.Timer(NOTICE_AFTER, _announce)
+    timer.daemon = True
+    timer.start()
+    try:
+        return numba.njit(signature, cache=True, **_OPTIONS)(function)
+    except (OSError, RuntimeError):
+        return numba.njit(signature, **_OPTIONS)(function)
+    finally:
+        timer.cancel()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.geometry.jit import formula
+from clamp3d.geometry.jit import formula, inlined
 from clamp3d.geometry.kernel_features import (
     ARC,
     CORNER_M,
@@ -26,11 +26,14 @@ from clamp3d.geometry.kernel_features import (
     clip,
     corner,
     deepest,
+    ellipse,
     end_arc,
+    end_arc_reach,
     end_edge,
     lip_line,
     point_depth,
     section,
+    section_foot,
 )
 
 UNIT = 2.0**-53
@@ -41,10 +44,18 @@ PARALLEL = 2.0**-60
 deviation is smaller than the rounding of R itself, and it is part of the error bound."""
 
 
-@formula
-def parallel(R, s, h, H, r, l, x, y, z):  # type: ignore[no-untyped-def] # noqa: E741
+@inlined
+def is_parallel(R, l, dx, dy):  # type: ignore[no-untyped-def] # noqa: E741
+    """Whether an axis counts as parallel to the groove."""
+    return (dx * dx + dy * dy) * (l * l) <= (PARALLEL * R) * (PARALLEL * R)
+
+
+@inlined
+def parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def] # noqa: E741
     """Axis along z, centred at (x, y, z): the plane problem of a point and the section, and the gap along z."""
-    gap, qx, qy, nx, ny, feature = section(x, y, R, s, h)
+    gap, feature = section(x, y, R, s, h)
+    qx, qy, nx, ny = section_foot(feature, x, y, R, s, h)
+    up = math.copysign(1.0, dz)
     lo = max(z - l, -H)
     hi = min(z + l, H)
     bound = UNIT * (6.0 * (R + abs(x) + abs(y)) + r)
@@ -56,15 +67,26 @@ def parallel(R, s, h, H, r, l, x, y, z):  # type: ignore[no-untyped-def] # noqa:
             if end < -gap:
                 face = -H if inside < 0.0 else H
                 nz = -1.0 if inside < 0.0 else 1.0
-                return -end - r, x, y, face, 0.0, 0.0, nz, END_FACE, inside - z, bound + UNIT * 4.0 * (H + abs(z) + l)
+                return (
+                    -end - r,
+                    x,
+                    y,
+                    face,
+                    0.0,
+                    0.0,
+                    nz,
+                    END_FACE,
+                    (inside - z) * up,
+                    bound + UNIT * 4.0 * (H + abs(z) + l),
+                )
         if feature == ARC:
             # R - r first: exact for nearly equal radii, and rho is what is left.
-            return (R - r) - math.sqrt(x * x + y * y), qx, qy, middle, nx, ny, 0.0, ARC, middle - z, bound
-        return gap - r, qx, qy, middle, nx, ny, 0.0, feature, middle - z, bound
+            return (R - r) - math.sqrt(x * x + y * y), qx, qy, middle, nx, ny, 0.0, ARC, (middle - z) * up, bound
+        return gap - r, qx, qy, middle, nx, ny, 0.0, feature, (middle - z) * up, bound
     above = hi == H
     face = H if above else -H
     nz = 1.0 if above else -1.0
-    t = -l if above else l
+    t = -l * up if above else l * up
     end = lo - hi
     bound += UNIT * 4.0 * (H + abs(z) + l)
     if gap <= 0.0:
@@ -120,123 +142,118 @@ def edge_normal(feature, R, h, qx, qy, qz):  # type: ignore[no-untyped-def]
 
 @formula
 def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untyped-def] # noqa: E741
-    """Signed distance of any cylinder; (dx, dy, dz) is a unit vector."""
+    """Signed distance of a cylinder centred at c with its axis along d (of any length but zero)."""
+    if is_parallel(R, l, dx, dy):
+        return parallel(R, s, h, H, r, l, cx, cy, cz, dz)
     e2 = dx * dx + dy * dy
-    if e2 * (l * l) <= (PARALLEL * R) * (PARALLEL * R):
-        return parallel(R, s, h, H, r, l, cx, cy, cz)
+    n = 1.0 / math.sqrt(e2 + dz * dz)
+    dx *= n
+    dy *= n
+    dz *= n
+    e2 *= n * n
 
     bound = UNIT * (12.0 * (abs(cx) + abs(cy) + abs(cz) + 2.0 * l + H + R) + r)
-    lo, hi = clip(h, H, cy, cz, dy, dz, l)
-    if lo <= hi:
-        x = cx + lo * dx
-        y = cy + lo * dy
-        rho2 = x * x + y * y
-        x = cx + hi * dx
-        y = cy + hi * dy
-        # rho is convex along the axis: if any point of the part in the block is behind the arc, one of its ends is.
-        if max(rho2, x * x + y * y) >= R * R:
-            return inside(R, h, H, r, cx, cy, cz, dx, dy, dz, lo, hi, bound)
+    high = l * abs(dy)
+    if cy - high <= h:
+        lo, hi = clip(h, H, cy, cz, dy, dz, l)
+        if lo <= hi:
+            x = cx + lo * dx
+            y = cy + lo * dy
+            rho2 = x * x + y * y
+            x = cx + hi * dx
+            y = cy + hi * dy
+            # rho is convex along the axis: if any point of the part in the block is behind the arc, an end of it is.
+            if max(rho2, x * x + y * y) >= R * R:
+                return inside(R, h, H, r, cx, cy, cz, dx, dy, dz, lo, hi, bound)
 
+    # Ends of the axis against S; top and bottom: whether the axis reaches beyond the end faces.
     best2 = math.inf
-    bt = bx = by = bz = 0.0
+    bt = bz = 0.0
     feature = ARC
-    top = False
-    bottom = False
-
-    # Ends of the axis against S.
+    top = bottom = False
     for i in range(2):
         t = -l if i == 0 else l
-        x = cx + t * dx
-        y = cy + t * dy
         z = cz + t * dz
-        gap, qx, qy, _, _, f = section(x, y, R, s, h)
+        gap, f = section(cx + t * dx, cy + t * dy, R, s, h)
+        d2 = gap * gap
         end = abs(z) - H
         if end > 0.0:
             if z > 0.0:
                 top = True
             else:
                 bottom = True
-            z = H if z > 0.0 else -H
+            z = math.copysign(H, z)
             if gap <= 0.0:
                 d2 = end * end
-                qx = x
-                qy = y
                 f = END_FACE
             else:
-                d2 = gap * gap + end * end
+                d2 += end * end
                 f = beyond_end(f)
-        else:
-            d2 = gap * gap
         if d2 < best2:
-            best2 = d2
-            bt = t
-            bx = qx
-            by = qy
-            bz = z
-            feature = f
+            best2, bt, bz, feature = d2, t, z, f
 
     # Inside of the axis against the lips.
     for i in range(2):
-        sx = -s if i == 0 else s
-        d2, t, z = lip_line(sx, h, H, cx, cy, cz, dx, dy, dz, e2, l)
+        d2, t, z = lip_line(-s if i == 0 else s, h, H, cx, cy, cz, dx, dy, dz, e2, l)
         if d2 < best2:
-            best2 = d2
-            bt = t
-            bx = sx
-            by = h
-            bz = z
-            feature = LIP_M if i == 0 else LIP_N
+            best2, bt, bz, feature = d2, t, z, LIP_M if i == 0 else LIP_N
 
-    # Inside of the axis against the edges and corners of the ends it passes.
-    for i in range(2):
-        if not (bottom if i == 0 else top):
-            continue
-        ez = -H if i == 0 else H
-        d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l)
-        if d2 < best2:
-            best2 = d2
-            bt = t
-            bx = x
-            by = h
-            bz = ez
-            feature = END_EDGE_M if x < 0.0 else END_EDGE_N
-        for j in range(2):
-            sx = -s if j == 0 else s
-            d2, t = corner(sx, h, ez, cx, cy, cz, dx, dy, dz, l)
+    # Inside of the axis against the edges and corners of the ends it passes; the end arcs last: they cost most.
+    bx = by = 0.0
+    on_end_arc = False
+    if top or bottom:
+        for i in range(2):
+            if not (bottom if i == 0 else top):
+                continue
+            ez = -H if i == 0 else H
+            if cy + high > h:
+                d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l)
+                if d2 < best2:
+                    best2, bt, bz, feature = d2, t, ez, END_EDGE_M if x < 0.0 else END_EDGE_N
+            for j in range(2):
+                d2, t = corner(-s if j == 0 else s, h, ez, cx, cy, cz, dx, dy, dz, l)
+                if d2 < best2:
+                    best2, bt, bz, feature = d2, t, ez, CORNER_M if j == 0 else CORNER_N
+        ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
+        low_v, low_reach = end_arc_reach(-H, R, cz, dz, e2, p, along)
+        top_v, top_reach = end_arc_reach(H, R, cz, dz, e2, p, along)
+        top_first = top and (not bottom or top_reach < low_reach)
+        for i in range(2):
+            at_top = top_first if i == 0 else not top_first
+            reach = top_reach if at_top else low_reach
+            if reach * reach >= best2 or not (top if at_top else bottom):
+                continue
+            ez = H if at_top else -H
+            v = top_v if at_top else low_v
+            d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
             if d2 < best2:
-                best2 = d2
-                bt = t
-                bx = sx
-                by = h
-                bz = ez
-                feature = CORNER_M if j == 0 else CORNER_N
-    for i in range(2):
-        if not (bottom if i == 0 else top):
-            continue
-        ez = -H if i == 0 else H
-        d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, best2)
-        if d2 < best2:
-            best2 = d2
-            bt = t
-            bx = x
-            by = y
-            bz = ez
-            feature = END_ARC
+                best2, bt, bz, feature = d2, t, ez, END_ARC
+                bx, by, on_end_arc = x, y, True
 
+    x = cx + bt * dx
+    y = cy + bt * dy
     if feature == ARC:
-        x = cx + bt * dx
-        y = cy + bt * dy
-        rho = math.sqrt(x * x + y * y)
-        if rho > 0.0:
-            return (R - r) - rho, bx, by, bz, -x / rho, -y / rho, 0.0, ARC, bt, bound
-        return R - r, bx, by, bz, 0.0, 1.0, 0.0, ARC, bt, bound
+        bx, by, nx, ny = section_foot(ARC, x, y, R, s, h)
+        # R - r first: exact for nearly equal radii, and rho is what is left.
+        return (R - r) - math.sqrt(x * x + y * y), bx, by, bz, nx, ny, 0.0, ARC, bt, bound
     distance = math.sqrt(best2)
     if feature in (FLAT_M, FLAT_N):
-        return distance - r, bx, by, bz, 0.0, 1.0, 0.0, feature, bt, bound
+        return distance - r, x, h, bz, 0.0, 1.0, 0.0, feature, bt, bound
     if feature == END_FACE:
-        return distance - r, bx, by, bz, 0.0, 0.0, math.copysign(1.0, bz), feature, bt, bound
-    nx = cx + bt * dx - bx
-    ny = cy + bt * dy - by
+        return distance - r, x, y, bz, 0.0, 0.0, math.copysign(1.0, bz), feature, bt, bound
+    if feature == END_ARC:
+        if not on_end_arc:
+            bx, by, nx, ny = section_foot(ARC, x, y, R, s, h)
+    else:
+        by = h
+        if feature in (LIP_M, CORNER_M):
+            bx = -s
+        elif feature in (LIP_N, CORNER_N):
+            bx = s
+        else:
+            bx = x
+    nx = x - bx
+    ny = y - by
     nz = cz + bt * dz - bz
     n = math.sqrt(nx * nx + ny * ny + nz * nz)
     if n <= bound:

@@ -14,36 +14,48 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.geometry.jit import formula
+from clamp3d.geometry.jit import formula, inlined
 
 # Codes of the features; Feature in distance.py gives them names.
 ARC, LIP_M, LIP_N, FLAT_M, FLAT_N, END_FACE, END_ARC, END_EDGE_M, END_EDGE_N, CORNER_M, CORNER_N = range(11)
 
+CONVERGED = 1e-7
+"""Last relative step of a quadratic iteration: the error left is of the order of its square."""
 
-@formula
+
+@inlined
 def section(x, y, R, s, h):  # type: ignore[no-untyped-def]
-    """Nearest boundary point of the groove's section to (x, y): signed gap, qx, qy, outward normal nx, ny, feature.
+    """Signed gap of (x, y) to the groove's section, negative inside the material, and the nearest feature.
 
-    The gap is negative inside the material. There it is the smaller of the depths below the flat faces and behind the
-    arc: the lips are never nearer, in minor and in major arcs.
+    Inside, the gap is the smaller of the depths below the flat faces and behind the arc: the lips are never nearer, in
+    minor and in major arcs.
     """
-    side = 1.0 if x >= 0.0 else -1.0
     ax = abs(x)
     rho = math.sqrt(x * x + y * y)
-    if y <= h and rho >= R:
-        if h - y < rho - R:
-            return y - h, x, h, 0.0, 1.0, FLAT_N if x >= 0.0 else FLAT_M
-        return R - rho, x / rho * R, y / rho * R, -x / rho, -y / rho, ARC
-    if y > h and ax >= s:
-        return y - h, x, h, 0.0, 1.0, FLAT_N if x >= 0.0 else FLAT_M
     if rho < R and ax * -h + y * s <= 0.0:  # within the angle of the arc: rho R sin(phi - half_angle) <= 0
+        return R - rho, ARC
+    if y <= h and rho >= R and rho - R <= h - y:
+        return R - rho, ARC
+    if (y > h and ax >= s) or (y <= h and rho >= R):
+        return y - h, FLAT_N if x >= 0.0 else FLAT_M
+    return math.sqrt((ax - s) * (ax - s) + (y - h) * (y - h)), LIP_N if x >= 0.0 else LIP_M
+
+
+@inlined
+def section_foot(feature, x, y, R, s, h):  # type: ignore[no-untyped-def]
+    """Nearest point of a section feature to (x, y), and the unit normal that leads out of the material there."""
+    if feature == ARC:
+        rho = math.sqrt(x * x + y * y)
         if rho == 0.0:
-            return R, 0.0, -R, 0.0, 1.0, ARC
-        return R - rho, x / rho * R, y / rho * R, -x / rho, -y / rho, ARC
-    gap = math.sqrt((ax - s) * (ax - s) + (y - h) * (y - h))
+            return 0.0, -R, 0.0, 1.0
+        return x / rho * R, y / rho * R, -x / rho, -y / rho
+    if feature in (FLAT_M, FLAT_N):
+        return x, h, 0.0, 1.0
+    sx = -s if feature == LIP_M else s
+    gap = math.sqrt((x - sx) * (x - sx) + (y - h) * (y - h))
     if gap == 0.0:
-        return 0.0, side * s, h, -side * s / R, -h / R, LIP_N if x >= 0.0 else LIP_M
-    return gap, side * s, h, side * (ax - s) / gap, (y - h) / gap, LIP_N if x >= 0.0 else LIP_M
+        return sx, h, -sx / R, -h / R
+    return sx, h, (x - sx) / gap, (y - h) / gap
 
 
 @formula
@@ -108,17 +120,23 @@ def corner(kx, ky, kz, cx, cy, cz, dx, dy, dz, l):  # type: ignore[no-untyped-de
 def nearer_root(k, a, q):  # type: ignore[no-untyped-def]
     """Root mu > 0 of (a / (k + mu))^2 + (q / mu)^2 = 1, for k, a >= 0 and q > 0 (or a > k).
 
-    1 / norm of the left side is concave in mu (a power mean of linear functions), so Newton's method on it climbs
-    from any lower bound to the root without passing it, and converges quadratically [Moré & Sorensen 1983].
+    1 / norm of the left side is concave in mu (a power mean of linear functions): Newton's method on it is below the
+    root after one step, climbs to it without passing it, and converges quadratically [Moré & Sorensen 1983]. It starts
+    from the root's expansion in k, exact for small tilt.
     """
-    mu = max(q, math.sqrt(a * a + q * q) - k)
+    n2 = a * a + q * q
+    n = math.sqrt(n2)
+    low = max(q, n - k)
+    mu = max(low, n - k * (a * a / n2))
     for _ in range(40):
-        x = a / (k + mu)
-        y = q / mu
-        g = x * x + y * y
-        step = (math.sqrt(g) - 1.0) * g / (x * x / (k + mu) + y * y / mu)
-        mu += step
-        if step <= 1e-9 * mu:
+        u = 1.0 / (k + mu)
+        v = 1.0 / mu
+        x2 = (a * u) * (a * u)
+        y2 = (q * v) * (q * v)
+        g = x2 + y2
+        step = (math.sqrt(g) - 1.0) * g / (x2 * u + y2 * v)
+        mu = max(low, mu + step)
+        if abs(step) <= CONVERGED * mu:
             break
     return mu
 
@@ -143,14 +161,33 @@ def farther_root(k, a, q):  # type: ignore[no-untyped-def]
         nu += step
         if nu >= k:
             return -1.0
-        if step <= 1e-9 * nu:
+        if step <= CONVERGED * nu:
             break
     return nu
 
 
 @formula
-def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, limit2):  # type: ignore[no-untyped-def] # noqa: E741
-    """Squared distance of the axis' inside from the end arc in the plane z = ez, qx, qy, t; inf if it is >= limit2.
+def ellipse(R, cx, cy, dx, dy, e2):  # type: ignore[no-untyped-def] # noqa: E741
+    """Part of ``end_arc`` that both ends share: tilt direction ex, ey, the axis' place p on the major axis, and along."""
+    n = 1.0 / math.sqrt(e2)
+    ex = dx * n
+    ey = dy * n
+    return ex, ey, (cy * ex - cx * ey) / R, cx * ex + cy * ey
+
+
+@formula
+def end_arc_reach(ez, R, cz, dz, e2, p, along):  # type: ignore[no-untyped-def] # noqa: E741
+    """The axis' place v along the minor axis of the ellipse of ``end_arc``, and a lower bound on its distance."""
+    v = (-dz * along - e2 / math.sqrt(e2) * (ez - cz)) / R
+    if dz > 0.0:
+        v = -v
+    # The ellipse lies outside (for a point inside it) or inside (outside) its scaled copy through the point.
+    return v, R * abs(abs(dz) - math.sqrt(dz * dz * p * p + v * v))
+
+
+@formula
+def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
+    """Squared distance of the axis' inside from the end arc in the plane z = ez (inf if they do not face), qx, qy, t.
 
     Seen along the axis the circle is an ellipse with the half axes R and R |dz| and the axis is a point. The distance
     of that point from the circle's point at angle phi is a trigonometric polynomial of degree two in phi, its
@@ -159,45 +196,35 @@ def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, limit2):  # type: ignore[no
     (the local minimum on the other side of the major axis) are minima; solving for them this way loses no digits where
     the quartic's roots run together (axis through the arc's centre, small tilt).
     """
-    e = math.sqrt(e2)
-    ex = dx / e
-    ey = dy / e
     b = abs(dz)
-    sign = -1.0 if dz > 0.0 else 1.0
-    along = cx * ex + cy * ey
-    p = (cy * ex - cx * ey) / R
-    v = -sign * (dz * along + e * (ez - cz)) / R
-    low = R * (b - math.sqrt(b * b * p * p + v * v))  # the ellipse lies between its scaled copies through the point
-    if low * low >= limit2:
-        return math.inf, 0.0, 0.0, 0.0
     q = b * v
+    a = abs(p)
     best2 = math.inf
     bx = by = bt = 0.0
-    root = 0.0
     for branch in range(2):
-        if q != 0.0 or abs(p) > e2:
+        if q != 0.0 or a > k:
             if branch == 0:
-                root = nearer_root(e2, abs(p), abs(q))
-                C = p / (e2 + root)
+                root = nearer_root(k, a, abs(q))
+                C = p / (k + root)
                 S = q / root
             else:
-                root = farther_root(e2, abs(p), abs(q))
+                root = farther_root(k, a, abs(q))
                 if root <= 0.0:
                     break
-                C = p / (e2 - root)
+                C = p / (k - root)
                 S = -q / root
-            n = math.sqrt(C * C + S * S)
-            C /= n
-            S /= n
+            n = 1.0 / math.sqrt(C * C + S * S)
+            C *= n
+            S *= n
         else:  # the point is on the major axis, within the evolute: two mirrored minima
-            C = p / e2
+            C = p / k
             S = math.sqrt(max(0.0, 1.0 - C * C))
             if branch == 1:
                 S = -S
-        qx = R * (S * ex - C * ey)
         qy = R * (S * ey + C * ex)
         if qy > h:
             continue
+        qx = R * (S * ex - C * ey)
         t = (qx - cx) * dx + (qy - cy) * dy + (ez - cz) * dz
         if abs(t) > l:
             continue
@@ -205,10 +232,7 @@ def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, limit2):  # type: ignore[no
         dv = R * (b * S - v)
         d2 = du * du + dv * dv
         if d2 < best2:
-            best2 = d2
-            bx = qx
-            by = qy
-            bt = t
+            best2, bx, by, bt = d2, qx, qy, t
         if branch == 0 and q != 0.0:
             break
     return best2, bx, by, bt

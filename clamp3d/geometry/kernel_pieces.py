@@ -9,9 +9,10 @@ negative on the piece's side of the lip and goes over into the plain distance on
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from clamp3d.geometry.jit import formula
-from clamp3d.geometry.kernel_distance import PARALLEL, edge_normal
+from clamp3d.geometry.jit import entry, formula, source_stamp
+from clamp3d.geometry.kernel_distance import edge_normal, is_parallel
 from clamp3d.geometry.kernel_features import (
     ARC,
     CORNER_M,
@@ -28,11 +29,15 @@ from clamp3d.geometry.kernel_features import (
     clip,
     corner,
     deepest,
+    ellipse,
     end_arc,
+    end_arc_reach,
     end_edge,
     lip_line,
     section,
+    section_foot,
 )
+from clamp3d.geometry.kernel_pose import axis, rigid
 
 PIECES = 5
 COLUMNS = 14
@@ -123,7 +128,7 @@ def put(row, distance, r, qx, qy, qz, ax, ay, az, feature, R, h):  # type: ignor
 def side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[no-untyped-def] # noqa: E741
     """Arc surface and flat faces without regard to sign: rows 0 to 2."""
     e2 = dx * dx + dy * dy
-    straight = e2 * (l * l) <= (PARALLEL * R) * (PARALLEL * R)
+    straight = is_parallel(R, l, dx, dy)
     for piece in range(3):
         side = 1.0 if piece == 2 else -1.0
         best = math.inf
@@ -179,7 +184,9 @@ def side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[
             for i in range(2):
                 ez = -H if i == 0 else H
                 if piece == 0:
-                    d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, best2)
+                    ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
+                    v, _ = end_arc_reach(ez, R, cz, dz, e2, p, along)
+                    d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
                     if d2 < best2:
                         best2, bx, by, bz, bt, feature = d2, x, y, ez, t, END_ARC
                 else:
@@ -201,7 +208,8 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
         t = (ez - cz) / dz
         x = cx + t * dx
         y = cy + t * dy
-        gap, qx, qy, nx, ny, f = section(x, y, R, s, h)
+        gap, f = section(x, y, R, s, h)
+        qx, qy, nx, ny = section_foot(f, x, y, R, s, h)
         if gap < 0.0:
             if min(high, low) < -gap:
                 end = l if up * dz * (1.0 if low < high else -1.0) < 0.0 else -l
@@ -226,7 +234,8 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
         t = -l if i == 0 else l
         x = cx + t * dx
         y = cy + t * dy
-        gap, qx, qy, _, _, f = section(x, y, R, s, h)
+        gap, f = section(x, y, R, s, h)
+        qx, qy, _, _ = section_foot(f, x, y, R, s, h)
         end = cz + t * dz - ez
         if gap <= 0.0:
             d2, qx, qy, f = end * end, x, y, END_FACE
@@ -235,10 +244,11 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
         if d2 < best2:
             best2, bx, by, bt, feature = d2, qx, qy, t, f
     e2 = dx * dx + dy * dy
-    if e2 * (l * l) <= (PARALLEL * R) * (PARALLEL * R):
+    if is_parallel(R, l, dx, dy):
         if high > 0.0 and low > 0.0:
             t = (ez - cz) / dz
-            gap, qx, qy, _, _, f = section(cx, cy, R, s, h)
+            gap, f = section(cx, cy, R, s, h)
+            qx, qy, _, _ = section_foot(f, cx, cy, R, s, h)
             best2, bx, by, bt, feature = gap * gap, qx, qy, t, beyond_end(f)
     else:
         d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l)
@@ -249,7 +259,9 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
             d2, t = corner(sx, h, ez, cx, cy, cz, dx, dy, dz, l)
             if d2 < best2:
                 best2, bx, by, bt, feature = d2, sx, h, t, CORNER_M if j == 0 else CORNER_N
-        d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, best2)
+        ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
+        v, _ = end_arc_reach(ez, R, cz, dz, e2, p, along)
+        d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
         if d2 < best2:
             best2, bx, by, bt, feature = d2, x, y, t, END_ARC
     put(row, math.sqrt(best2), r, bx, by, ez, cx + bt * dx, cy + bt * dy, cz + bt * dz, feature, R, h)
@@ -290,7 +302,7 @@ def enter(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, lo, hi, out):  #
 
 
 @formula
-def pieces(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[no-untyped-def] # noqa: E741
+def all_pieces(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[no-untyped-def] # noqa: E741
     """All pieces into out (5, 14)."""
     side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out)
     lo, hi = clip(h, H, cy, cz, dy, dz, l)
@@ -304,3 +316,21 @@ def pieces(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, out):  # type: 
         row[11] = y * gz - z * gy
         row[12] = z * gx - x * gz
         row[13] = x * gy - y * gx
+
+
+def _entry(stamp: str) -> Any:
+    def pieces(T, R, half_angle, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E741
+        stamp  # noqa: B018
+        if not rigid(T, 0):
+            return False
+        dx, dy, dz = axis(T, 0)
+        s = R * math.sin(half_angle)
+        h = -R * math.cos(half_angle)
+        all_pieces(R, s, h, H, half_angle, r, l, T[0, 0, 3], T[0, 1, 3], T[0, 2, 3], dx, dy, dz, out)
+        return True
+
+    return entry(pieces, "b1(f8[:,:,::1],f8,f8,f8,f8,f8,f8[:,::1])")
+
+
+pieces = _entry(source_stamp())
+"""Compiled entry point: one pose (1, 4, 4) into (5, 14); False for a pose that is not rigid."""

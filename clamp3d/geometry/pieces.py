@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.geometry.distance import as_pose, kernel, reject
+from clamp3d.geometry.distance import as_pose, reject
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import Cylinder, SweptArc
 
@@ -49,8 +49,10 @@ def groove_pieces(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Groo
     """
     T = as_pose(pose)
     out = np.empty((5, 14))
-    if not kernel().pieces(
-        T, groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, out
+    from clamp3d.geometry.kernel_pieces import pieces  # compiled on first use
+
+    if not pieces(
+        T[None], groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, out
     ):
         reject(T, "pose")
     return GroovePieces(out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7].astype(np.int8), out[:, 8:14])
