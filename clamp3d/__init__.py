@@ -28,6 +28,7 @@ _HOME: dict[str, str] = {
     "classify_arc_circle": "clamp3d.geometry.arc_circle",
     "groove_pieces": "clamp3d.geometry.pieces",
     "hole_bolt": "clamp3d.geometry.rectangle",
+    "relative_pose": "clamp3d.geometry.pose",
     "signed_distance": "clamp3d.geometry.distance",
     "signed_distances": "clamp3d.geometry.distance",
 }

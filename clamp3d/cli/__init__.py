@@ -18,6 +18,7 @@ from clamp3d.errors import Clamp3dError
 COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("clamp3d.cli.run", "Assemble a clamp and print where every part ends up."),
     "reproduce": ("clamp3d.cli.reproduce", "Print Tables 1-5 of the paper beside this program's values."),
+    "stress": ("clamp3d.cli.stress", "Put families of hard cases to every contact method."),
     "conductors": ("clamp3d.cli.conductors", "List the conductor catalogue."),
 }
 
