@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -48,44 +49,41 @@ class Undeclared:
         )
 
 
-def boxes(clamp: Clamp, poses: Mapping[PartName, SectionPose]) -> dict[PartName, tuple[Box, ...]]:
-    """The solid parts as rectangles in the section; the bolt is its shank and its head."""
-    up, down, saddle, bolt, nut = clamp.up_splint, clamp.down_splint, clamp.saddle, clamp.bolt, clamp.nut
-    saddle_top = (saddle.radius**2 - (saddle.width / 2) ** 2) ** 0.5
-    saddle_bottom = saddle.radius + saddle.apex_thickness
-    half_nut, half_head = nut.across_flats / 2, bolt.head_across_flats / 2
-    return {
-        "P1": (Box(poses["P1"], 0.0, up.width, 0.0, up.thickness),),
-        "P2": (Box(poses["P2"], -down.width / 2, down.width / 2, down.face_depth, down.back_radius),),
-        "P3": (Box(poses["P3"], -saddle.width / 2, saddle.width / 2, saddle_top, saddle_bottom),),
-        "P4": (
-            Box(poses["P4"], -bolt.diameter / 2, bolt.diameter / 2, 0.0, bolt.shank_length),
-            Box(poses["P4"], -half_head, half_head, bolt.shank_length, bolt.shank_length + bolt.head_height),
-        ),
-        "P5": (Box(poses["P5"], -half_nut, half_nut, 0.0, nut.height),),
-    }
+def boxes(clamp: Clamp, part: PartName, pose: SectionPose) -> tuple[Box, ...]:
+    """A solid part (P1 to P5) as rectangles in the section; the bolt is its shank and its head."""
+    if part == "P1":
+        up = clamp.up_splint
+        return (Box(pose, 0.0, up.width, 0.0, up.thickness),)
+    if part == "P2":
+        down = clamp.down_splint
+        return (Box(pose, -down.width / 2, down.width / 2, down.face_depth, down.back_radius),)
+    if part == "P3":
+        saddle = clamp.saddle
+        top = saddle.radius * math.cos(saddle.half_angle)
+        return (Box(pose, -saddle.width / 2, saddle.width / 2, top, saddle.radius + saddle.apex_thickness),)
+    if part == "P4":
+        bolt = clamp.bolt
+        half, half_head, end = bolt.diameter / 2, bolt.head_across_flats / 2, bolt.shank_length
+        return (Box(pose, -half, half, 0.0, end), Box(pose, -half_head, half_head, end, end + bolt.head_height))
+    nut = clamp.nut
+    return (Box(pose, -nut.across_flats / 2, nut.across_flats / 2, 0.0, nut.height),)
 
 
-def convex_gaps(clamp: Clamp, poses: Mapping[PartName, SectionPose]) -> dict[tuple[PartName, PartName], float]:
-    """Least gap in mm of every pair that no hole, groove, seat or thread joins.
+def convex_gap(clamp: Clamp, poses: Mapping[PartName, SectionPose], a: PartName, b: PartName) -> float:
+    """Least gap in mm of one of the `CONVEX_PAIRS`, ``a`` before ``b``.
 
     Between two boxes it is the separation along their axes: its sign is exact.
     """
-    solid = boxes(clamp, poses)
     radius = {"P6": clamp.line.radius, "P7": clamp.jumper.radius}
-    gaps = {}
-    for a, b in PAIRS:
-        if (a, b) in GEOMETRY or (a, b) in _JOINED:
-            continue
-        if a in radius:
-            apart = ((poses[a].x - poses[b].x) ** 2 + (poses[a].y - poses[b].y) ** 2) ** 0.5
-            gaps[a, b] = apart - radius[a] - radius[b]
-        elif b in radius:
-            gaps[a, b] = min(box_disk(box, poses[b], radius[b]) for box in solid[a])
-        else:
-            gaps[a, b] = min(box_box(x, y) for x in solid[a] for y in solid[b])
-    return gaps
+    if a in radius:
+        return math.hypot(poses[a].x - poses[b].x, poses[a].y - poses[b].y) - radius[a] - radius[b]
+    if b in radius:
+        return min(box_disk(box, poses[b], radius[b]) for box in boxes(clamp, a, poses[a]))
+    return min(box_box(x, y) for x in boxes(clamp, a, poses[a]) for y in boxes(clamp, b, poses[b]))
 
 
 # The bolt passes through these, and the nut sits on P1: their gaps are Table 2 and seats. P1-P2: `Section.face_gaps`.
 _JOINED = {("P1", "P2"), ("P1", "P4"), ("P1", "P5"), ("P2", "P4"), ("P3", "P4")}
+
+CONVEX_PAIRS = tuple(pair for pair in PAIRS if pair not in GEOMETRY and pair not in _JOINED)
+"""Pairs that no hole, groove, seat or thread joins: both are convex in the section."""

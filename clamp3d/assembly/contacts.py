@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from clamp3d.assembly.connections import GEOMETRY, PAIRS, Undeclared, convex_gaps
+from clamp3d.assembly.connections import CONVEX_PAIRS, GEOMETRY, PAIRS, Undeclared, convex_gap
 from clamp3d.assembly.result import Contact, Event, Seat, Waypoint
 from clamp3d.assembly.section import SPLINTS, WIRES, Section
 from clamp3d.clamp.dimensions import Clamp, PartName
@@ -23,46 +23,18 @@ CONTACT = 1e-6
 Poses = dict[PartName, SectionPose]
 
 
-def measure_contacts(section: Section, poses: Poses, tolerance: float) -> tuple[Contact, ...]:
-    """Every pair that the connection matrix declares or that touches; equality is ``|gap| <= tolerance`` mm."""
-    clamp = section.clamp
-    convex = convex_gaps(clamp, poses) | {("P1", "P2"): _face_gap(section, poses)[0]}
-    found = []
-    for a, b in PAIRS:
-        if clamp.connection(a, b) == 0 and convex.get((a, b), math.inf) > tolerance:
-            continue
-        if GEOMETRY.get((a, b)) == 3:
-            found.append(_groove_contact(section, poses, a, b, tolerance))
-        elif GEOMETRY.get((a, b)) == 1:
-            axis = poses[b].point(0.0, clamp.nut.height / 2)
-            found.append(Contact(a, b, 1, "screw joint", 0.0, _world(axis), np.array([0.0, 0.0, 1.0]), "thread"))
-        elif (a, b) in _SEATS:
-            found.append(_seat_contact(clamp, poses, a, b, tolerance))
-        elif (a, b) in _HOLES:
-            found.append(_hole_contact(clamp, poses, a, b, tolerance))
-        elif (a, b) == ("P1", "P2"):
-            gap, point = _face_gap(section, poses)
-            relation = "faces meet" if gap <= tolerance else "none"
-            found.append(Contact(a, b, 2, relation, gap, point, np.array([0.0, 0.0, -1.0]), "inner face"))
-        else:
-            gap = convex[a, b]
-            away = _world((poses[b].x, poses[b].y)) - _world((poses[a].x, poses[a].y))
-            normal = away / max(float(np.linalg.norm(away)), 1e-300)
-            point = _world((poses[b].x, poses[b].y))
-            found.append(Contact(a, b, 2, "contact" if gap <= tolerance else "none", gap, point, normal, "box"))
-    return tuple(found)
+def measure_pairs(section: Section, poses: Poses, tolerance: float) -> tuple[Contact, ...]:
+    """All 21 pairs at ``poses``, in the order of the connection matrix; equality is ``|gap| <= tolerance`` mm."""
+    return tuple(_measure(section, poses, a, b, tolerance) for a, b in PAIRS)
 
 
-def seats(section: Section, contacts: Sequence[Contact], resolution: float) -> tuple[Seat, ...]:
-    """Whether each wire lies in each of its two grooves; a gap up to ``resolution`` mm counts as touching."""
-    by_pair = {(c.a, c.b): c for c in contacts}
+def seats(pairs: Sequence[Contact], resolution: float) -> tuple[Seat, ...]:
+    """Whether each wire lies in each of its two grooves, of `measure_pairs`; a gap up to ``resolution`` mm touches."""
+    by_pair = {(c.a, c.b): c for c in pairs}
     found = []
     for splint, wire in itertools.product(SPLINTS, WIRES):
-        contact = by_pair.get((splint, wire))
-        if contact is None:
-            found.append(Seat(splint, wire, False, math.nan, "pair not declared"))
-            continue
-        on_arc = not contact.feature.startswith(("face", "lip", "end", "corner"))
+        contact = by_pair[splint, wire]
+        on_arc = not contact.feature.startswith(("face ", "flat", "lip", "end", "corner"))
         touching = contact.distance <= resolution
         if touching and on_arc:
             detail = "seated in the groove"
@@ -94,6 +66,28 @@ def undeclared_meetings(section: Section, path: Sequence[Waypoint], events: Sequ
 # Rows of (hole, bolt) pairs and of flat seats: the nut on the up splint, the bolt's head under the saddle.
 _HOLES = {("P1", "P4"), ("P2", "P4")}
 _SEATS = {("P1", "P5"), ("P3", "P4")}
+
+
+def _measure(section: Section, poses: Poses, a: PartName, b: PartName, tolerance: float) -> Contact:
+    clamp, kind = section.clamp, GEOMETRY.get((a, b), 2)
+    if kind == 3:
+        return _groove_contact(section, poses, a, b, tolerance)
+    if kind == 1:
+        axis = poses[b].point(0.0, clamp.nut.height / 2)
+        return Contact(a, b, 1, "screw joint", 0.0, _world(axis), np.array([0.0, 0.0, 1.0]), "thread")
+    if (a, b) in _SEATS:
+        return _seat_contact(clamp, poses, a, b, tolerance)
+    if (a, b) in _HOLES:
+        return _hole_contact(clamp, poses, a, b, tolerance)
+    if (a, b) == ("P1", "P2"):
+        gap, point = _face_gap(section, poses)
+        relation = "faces meet" if gap <= tolerance else "none"
+        return Contact(a, b, 2, relation, gap, point, np.array([0.0, 0.0, -1.0]), "inner face")
+    gap = convex_gap(clamp, poses, a, b)
+    point = _world((poses[b].x, poses[b].y))
+    away = point - _world((poses[a].x, poses[a].y))
+    normal = away / max(float(np.linalg.norm(away)), 1e-300)
+    return Contact(a, b, 2, "contact" if gap <= tolerance else "none", gap, point, normal, "box")
 
 
 def _groove_contact(section: Section, poses: Poses, a: PartName, b: PartName, tolerance: float) -> Contact:
@@ -140,11 +134,8 @@ def _hole_contact(clamp: Clamp, poses: Poses, a: PartName, b: PartName, toleranc
     centre = poses[a].point(middle, 0.5 * (top + bottom))
     hole = Rectangle(*centre, half_width, 0.5 * (bottom - top), poses[a].angle)
     found = hole_bolt(hole, bolt, tolerance=tolerance)
-    side = -1.0 if found.gap_left <= found.gap_right else 1.0
-    point = found.points[0] if found.points else hole.point(side * half_width, 0.0)
-    normal = np.array([-side * math.cos(hole.angle), 0.0, -side * math.sin(hole.angle)])
-    gap = min(found.gap_left, found.gap_right)
-    return Contact(a, b, 2, found.relation.value, gap, _world(point), normal, "hole")
+    gap, (nx, ny) = min(found.gap_left, found.gap_right), found.normal
+    return Contact(a, b, 2, found.relation.value, gap, _world(found.point), np.array([nx, 0.0, -ny]), "hole")
 
 
 def _face_gap(section: Section, poses: Poses) -> tuple[float, Array]:
@@ -173,17 +164,23 @@ def _least_on_the_way(section: Section, before: Poses, after: Poses) -> dict[tup
             for name, p in before.items()
         }
 
-    def gaps(t: float) -> dict[tuple[PartName, PartName], float]:
+    def gap_at(pair: tuple[PartName, PartName], t: float) -> float:
         poses = at(t)
-        return convex_gaps(section.clamp, poses) | {("P1", "P2"): _face_gap(section, poses)[0]}
+        return _face_gap(section, poses)[0] if pair == ("P1", "P2") else convex_gap(section.clamp, poses, *pair)
 
-    ends = [gaps(0.0), gaps(1.0)]
-    least = {pair: min(end[pair] for end in ends) for pair in ends[0]}
-    longest = max(math.hypot(after[n].x - p.x, after[n].y - p.y) for n, p in before.items())
-    for pair, gap in least.items():
-        if 0.0 < gap < 2.0 * longest:  # else it meets anyway, or is out of reach
-            found = minimize_scalar(lambda t, pair=pair: gaps(t)[pair], bounds=(0.0, 1.0), method="bounded")
-            least[pair] = min(gap, float(found.fun))
+    least = {}
+    for pair in (*CONVEX_PAIRS, ("P1", "P2")):
+        a, b = pair
+        gap = min(gap_at(pair, 0.0), gap_at(pair, 1.0))
+        # The parts cannot come closer than their way relative to each other, turning counted at the splints' ends.
+        way = math.hypot(
+            after[a].x - before[a].x - after[b].x + before[b].x, after[a].y - before[a].y - after[b].y + before[b].y
+        )
+        way += 2.0 * section.lever * max(abs(after[n].angle - before[n].angle) for n in pair)
+        if 0.0 < gap < way:
+            found = minimize_scalar(lambda t, pair=pair: gap_at(pair, t), bounds=(0.0, 1.0), method="bounded")
+            gap = min(gap, float(found.fun))
+        least[pair] = gap
     return least
 
 

@@ -15,7 +15,7 @@ from scipy.optimize import minimize, nnls
 
 from clamp3d.assembly.section import WIRES, D, Gaps, Section
 from clamp3d.clamp.dimensions import PartName
-from clamp3d.errors import SolverError
+from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array
 
 TOLERANCE = 1e-9
@@ -25,6 +25,8 @@ _ACTIVE = 1e-6
 _STRIDE = 4.0
 """How far one descent may move any coordinate, mm: gaps are far from linear beyond, and wires must not jump out."""
 _SHORTEST = 1e-3
+_NO_FORCE = 1e-9
+"""Multipliers below are rounding of the least squares: a wire they hold is not held."""
 _CLOSING = np.eye(6)[D]
 
 
@@ -48,17 +50,24 @@ class FinalState:
 def solve_final_state(section: Section, start: Array | None = None) -> FinalState:
     """Close the clamp from ``start`` (an open state; by default straight and fully open).
 
-    Raises SolverError when feasibility or optimality cannot be shown to `TOLERANCE`.
+    Raises InputError if the start overlaps, SolverError when feasibility or optimality cannot be shown to `TOLERANCE`.
     """
     q = section.open_state(section.open_distance()) if start is None else np.array(start, dtype=np.float64)
+    gaps = section.gaps(q)
+    k = int(np.argmin(gaps.value))
+    if gaps.value[k] < -_ACTIVE:
+        a, b = gaps.pair[k]
+        raise InputError(f"the start must be an open state: {a} and {b} overlap by {-gaps.value[k]:.4g} mm")
     q = _descend(section, q, _CLOSING)
     q, optimality = _polish(section, q)
+    force = _multipliers(section.gaps(q))
+    loose = _without_force(section.gaps(q), force)
+    for wire in loose:
+        q = _rest(section, q, wire)
     gaps = section.gaps(q)
-    force = _multipliers(gaps)
     residual = float(np.abs(_CLOSING - force @ gaps.gradient).max())
     violation = max(0.0, -float(gaps.value.min()))
     optimality = max(optimality, residual)
-    loose = tuple(w for w in WIRES if not any(w in pair and f > 0.0 for pair, f in zip(gaps.pair, force, strict=True)))
     if violation > TOLERANCE or not optimality <= TOLERANCE:
         raise SolverError(
             f"final state not proven: largest violated gap {violation:.3g} mm, optimality {optimality:.3g} mm, "
@@ -67,8 +76,30 @@ def solve_final_state(section: Section, start: Array | None = None) -> FinalStat
     return FinalState(q, gaps, force, violation, optimality, loose)
 
 
-def _descend(section: Section, start: Array, goal: Array) -> Array:
-    """Least goal . q with no gap negative, by SLSQP."""
+def _without_force(gaps: Gaps, force: Array) -> tuple[PartName, ...]:
+    """The wires that no force holds."""
+    return tuple(w for w in WIRES if not any(w in pair and f > 0.0 for pair, f in zip(gaps.pair, force, strict=True)))
+
+
+def _rest(section: Section, q: Array, wire: PartName) -> Array:
+    """Where gravity leaves a loose wire: the clamp hangs on the line, the jumper lies in the down splint."""
+    x, y = 2 * WIRES.index(wire), 2 * WIRES.index(wire) + 1
+    goal = np.zeros(6)
+    goal[y] = 1.0 if wire == "P6" else -1.0
+    q = _descend(section, q, goal, free=(x, y))
+    for _ in range(50):  # out of the overlap that the descent tolerates, straight away from what it touches
+        gaps = section.wire_gaps(q, wire)
+        k = int(np.argmin(gaps.value))
+        if gaps.value[k] >= 0.0:
+            break
+        q = q - gaps.value[k] * np.where(np.isin(np.arange(6), (x, y)), gaps.gradient[k], 0.0)
+    return q
+
+
+def _descend(section: Section, start: Array, goal: Array, free: tuple[int, ...] = tuple(range(6))) -> Array:
+    """Least goal . q with no gap negative, by SLSQP; only the coordinates ``free`` move."""
+    index = list(free)
+    low, high = np.array(section.bounds()).T
     memo: dict[bytes, Gaps] = {}
 
     def gaps(q: Array) -> Gaps:
@@ -78,20 +109,29 @@ def _descend(section: Section, start: Array, goal: Array) -> Array:
             memo[key] = section.gaps(q)
         return memo[key]
 
-    low, high = np.array(section.bounds()).T
+    def at(x: Array) -> Array:
+        new = q.copy()
+        new[index] = x
+        return new
+
     q, stride = start, _STRIDE
     while stride > _SHORTEST:
-        near = np.maximum(low, q - stride), np.minimum(high, q + stride)
+        # A wire that is out of its mouth already may come back, not go further.
+        near = np.maximum(np.minimum(low, q), q - stride)[index], np.minimum(np.maximum(high, q), q + stride)[index]
         found = minimize(
-            lambda q: goal @ q,
-            q,
-            jac=lambda q: goal,
+            lambda x: goal[index] @ x,
+            q[index],
+            jac=lambda x: goal[index],
             bounds=np.column_stack(near),
-            constraints={"type": "ineq", "fun": lambda q: gaps(q).value, "jac": lambda q: gaps(q).gradient},
+            constraints={
+                "type": "ineq",
+                "fun": lambda x: gaps(at(x)).value,
+                "jac": lambda x: gaps(at(x)).gradient[:, index],
+            },
             method="SLSQP",
             options={"maxiter": 100, "ftol": 1e-13},
         )
-        new = np.clip(found.x, *near)
+        new = at(np.clip(found.x, *near))
         if gaps(new).value.min() < -_ACTIVE or goal @ new > goal @ q:
             stride *= 0.25  # lost its way: the linearised gaps of so long a stride were no guide
             continue
@@ -107,6 +147,7 @@ def _multipliers(gaps: Gaps) -> Array:
     force = np.zeros(len(gaps.value))
     if closed.any():
         force[closed] = nnls(gaps.gradient[closed].T, _CLOSING)[0]
+    force[force < _NO_FORCE] = 0.0
     return force
 
 
@@ -116,7 +157,7 @@ def _polish(section: Section, q: Array) -> tuple[Array, float]:
     for _ in range(20):
         gaps = section.gaps(q)
         force = _multipliers(gaps)
-        carrying = np.flatnonzero(force > _ACTIVE)
+        carrying = np.flatnonzero(force)
         free = np.flatnonzero(np.abs(gaps.gradient[carrying]).max(axis=0, initial=0.0) > 0.0)
         hessian = _lagrangian_hessian(section, q, carrying, force[carrying])
         A = gaps.gradient[carrying]

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from clamp3d.assembly.contacts import CONTACT, measure_contacts, seats, undeclared_meetings
+from clamp3d.assembly.contacts import CONTACT, measure_pairs, seats, undeclared_meetings
 from clamp3d.assembly.final_state import FinalState, solve_final_state
 from clamp3d.assembly.motion import travel_to_contact
 from clamp3d.assembly.result import Event, Run, Solver, Waypoint, Work
 from clamp3d.assembly.screw import ScrewJoint
-from clamp3d.assembly.section import SPLINTS, WIRES, D, S, Section
+from clamp3d.assembly.section import MOUTH, SPLINTS, WIRES, D, S, Section
 from clamp3d.assembly.sequence import parse_sequence
-from clamp3d.assembly.stepped import SteppedState, solve_stepped
+from clamp3d.assembly.stepped import SteppedState, solve_bisection, solve_stepped
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
 from clamp3d.contact.model import ContactModel
 from clamp3d.geometry.pose import Array, SectionPose
@@ -24,6 +24,8 @@ STEP = 1.0 / 3.0
 """Move along the bolt of the paper's program in mm (derived from its Table 4)."""
 TILT_STEP = math.radians(1.0)
 """Turn of the paper's program in rad (derived from its Table 4)."""
+RESOLUTION = 1e-3
+"""Where bisection stops, mm."""
 
 Poses = dict[PartName, SectionPose]
 _ROOM = 20.0
@@ -54,11 +56,13 @@ def assemble(
     open_by: float = 0.0,
     open_tilt: float = 0.0,
     listen: Callable[[Waypoint], None] | None = None,
+    progress: Callable[[int, float], None] | None = None,
 ) -> Run:
     """Assemble ``clamp`` with its wires and measure its grooves by ``model``.
 
     ``open_by`` mm and ``open_tilt`` rad open the clamp further than needed before it comes in. ``step`` (mm) and
-    ``tilt_step`` (rad) are the moves of the stepped solver. ``listen`` is told every waypoint as it is reached.
+    ``tilt_step`` (rad) are the moves of the stepped solver and the first ones of bisection. ``listen`` is told every
+    waypoint as it is reached, ``progress`` the positions tried and the distance in mm while solvers try positions.
     Raises InputError for bad settings or sequence and SolverError if an answer cannot be proven.
 
     >>> from clamp3d.clamp.loader import load_clamp
@@ -74,19 +78,22 @@ def assemble(
     q = _come_in(section, q, sequence[0], log)
     q = _put_in_jumper(section, q, sequence[1], log)
     d_open = float(q[D])
-    _first_touch(section, q, sequence[2], log)
     final: FinalState | SteppedState
     if solver == "exact":
         final = solve_final_state(section, q)
+    elif solver == "stepped":
+        final = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
     else:
-        final = solve_stepped(section, step=step, tilt_step=tilt_step)
+        final = solve_bisection(section, resolution=RESOLUTION, step=step, tilt_step=tilt_step, progress=progress)
+    travel = d_open - float(final.q[D])
+    _first_touch(section, q, sequence[2], log, travel)
     closed = _poses(section, final.q, saddle_d=d_open)
     log.stop(sequence[2], "splints closed", closed)
     poses = _poses(section, final.q)
-    travel = d_open - float(final.q[D])
     log.stop(sequence[3], "nut tightened", poses)
-    contacts = measure_contacts(section, poses, CONTACT)
-    resolution = CONTACT if solver == "exact" else step
+    pairs = measure_pairs(section, poses, CONTACT)
+    contacts = tuple(c for c in pairs if clamp.connection(c.a, c.b) != 0 or c.distance <= CONTACT)
+    resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
     drawn = {("P2", "P3"), ("P1", "P5"), ("P3", "P4")}  # closed by the nut, all else by the down splint
     for by_nut, by in ((False, sequence[2]), (True, sequence[3])):
         for c in contacts:
@@ -106,13 +113,15 @@ def assemble(
         turns=ScrewJoint(clamp.bolt.pitch).turn(travel) / (2.0 * math.pi),
         poses=poses,
         contacts=contacts,
-        seats=seats(section, contacts, resolution),
+        seats=seats(pairs, resolution),
         events=tuple(log.events),
         path=tuple(log.path),
         undeclared=undeclared_meetings(section, log.path, log.events),
         violation=proof[0],
         optimality=proof[1],
-        work=Work(len(PARTS), len(PARTS) * (len(PARTS) - 1) // 2, section.queries.contact, motion_steps, 0),
+        work=Work(
+            len(PARTS), len(PARTS) * (len(PARTS) - 1) // 2, section.queries.contact, motion_steps, model.meshes_built
+        ),
     )
 
 
@@ -151,9 +160,9 @@ def _put_in_jumper(section: Section, q: Array, step: str, log: _Log) -> Array:
     return inside
 
 
-def _first_touch(section: Section, q: Array, step: str, log: _Log) -> None:
-    """The down splint rises along the bolt until it first touches a wire."""
-    reach = {wire: travel_to_contact(section, q, wire, -_unit(D), "P2", limit=float(q[D])) for wire in WIRES}
+def _first_touch(section: Section, q: Array, step: str, log: _Log, limit: float) -> None:
+    """The down splint rises along the bolt until it first touches a wire, within its whole way of ``limit`` mm."""
+    reach = {wire: travel_to_contact(section, q, wire, -_unit(D), "P2", limit=limit) for wire in WIRES}
     wire = min(WIRES, key=lambda w: reach[w][0])
     travel, touch = reach[wire]
     if touch is not None:
@@ -202,7 +211,7 @@ def _saddle_lift(section: Section, q: Array) -> float:
 def _event(section: Section, q: Array, step: str, touch: tuple[PartName, PartName] | None, travel: float) -> Event:
     """The event of a motion that ended at ``touch``."""
     assert touch is not None  # every motion here ends at a groove
-    contact = next(c for c in measure_contacts(section, _poses(section, q), CONTACT) if (c.a, c.b) == touch)
+    contact = next(c for c in measure_pairs(section, _poses(section, q), CONTACT) if (c.a, c.b) == touch)
     return Event(step, contact.a, contact.b, contact.relation, contact.point, travel)
 
 
@@ -217,6 +226,9 @@ def _status(final: FinalState | SteppedState, resolution: float) -> str:
         stops = {(p, f) for p, f, n in zip(gaps.pair, gaps.feature, near, strict=True) if n}
         held = {p for p, _ in stops}
         loose = {w for w in WIRES if not all((splint, w) in held for splint in SPLINTS)}
+    slipping = sorted({pair[1] for pair, feature in stops if feature == MOUTH})
+    if slipping:
+        return f"not clamped: {' and '.join(slipping)} slips out of its groove"
     if not loose:
         return "clamped"
     reasons = []
@@ -224,5 +236,6 @@ def _status(final: FinalState | SteppedState, resolution: float) -> str:
         reasons.append("faces meet")
     if any(feature == "tilt limit" for _, feature in stops):
         reasons.append("tilt limit reached")
-    wires = " and ".join(sorted(loose))
-    return f"not clamped: {' and '.join(reasons) or 'wires slip'}, {wires} loose"
+    if not reasons:  # a wire on four lips holds both splints, whatever they do to the other one
+        reasons.append(f"{' and '.join(w for w in WIRES if w not in loose)} alone holds the splints apart")
+    return f"not clamped: {' and '.join(reasons)}, {' and '.join(sorted(loose))} loose"

@@ -22,6 +22,9 @@ WIRES: tuple[PartName, PartName] = ("P6", "P7")
 D, S = 4, 5
 """Where the down splint's distance and scaled tilt stand in the state q."""
 
+MOUTH = "mouth"
+"""Feature of the gaps that keep a wire in the mouth it was put into."""
+
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
@@ -82,6 +85,17 @@ class Section:
             centre = float(pair.T_a_groove[0, 3])
             limits[2 * i] = (centre - half_mouth, centre + half_mouth)
         return limits
+
+    def room(self, q: Array, wire: PartName) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Limits of a wire's (x, y) at a state: its mouth, and the bottoms of the two grooves that face each other.
+
+        Parts of finite size are free behind their grooves too; a search must not put the wire there.
+        """
+        i = WIRES.index(wire)
+        up, down = self.pairs["P1", wire], self.pairs["P2", wire]
+        top = -up.T_a_groove[2, 3] - up.groove.radius
+        centre = self.down_splint(q).point(down.T_a_groove[0, 3], -down.T_a_groove[2, 3])[1]
+        return self.bounds()[2 * i], (float(top), centre + down.groove.radius)
 
     def splint_distance(self, q: Array) -> float:
         """Height between the inner edges of the splints on the line side (the distance of Table 4); mm."""
@@ -158,9 +172,19 @@ class Section:
         pairs: tuple[tuple[PartName, PartName], ...] = (("P1", "P2"), ("P1", "P2"), ("P2", "P4"), ("P2", "P4"))
         return Gaps(value, gradient, pairs, ("left edge", "right edge", "tilt limit", "tilt limit"), point)
 
+    def mouth_gaps(self, q: Array) -> Gaps:
+        """Ways left to each wire's centre before it slips out of the up splint's mouth, to both sides."""
+        value, gradient = np.empty(4), np.zeros((4, 6))
+        for i, (low, high) in enumerate(self.bounds()[:4:2]):
+            value[2 * i : 2 * i + 2] = q[2 * i] - low, high - q[2 * i]
+            gradient[2 * i : 2 * i + 2, 2 * i] = 1.0, -1.0
+        point = np.repeat(q[:4].reshape(2, 2), 2, axis=0)
+        pair: tuple[tuple[PartName, PartName], ...] = (("P1", "P6"), ("P1", "P6"), ("P1", "P7"), ("P1", "P7"))
+        return Gaps(value, gradient, pair, (MOUTH,) * 4, point)
+
     def gaps(self, q: Array) -> Gaps:
-        """All gaps at a state: both wires, faces, tilt limits."""
-        return join(self.wire_gaps(q, "P6"), self.wire_gaps(q, "P7"), self.face_gaps(q))
+        """All gaps at a state: both wires, faces, tilt limits, mouths."""
+        return join(self.wire_gaps(q, "P6"), self.wire_gaps(q, "P7"), self.face_gaps(q), self.mouth_gaps(q))
 
 
 def join(*parts: Gaps) -> Gaps:

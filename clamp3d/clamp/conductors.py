@@ -35,6 +35,11 @@ def catalogue() -> dict[str, Conductor]:
     }
 
 
+@lru_cache(maxsize=1)
+def _folded() -> dict[str, Conductor]:
+    return {name.casefold(): entry for name, entry in catalogue().items()}
+
+
 def conductor(designation: str) -> Conductor:
     """The conductor of that designation, upper and lower case alike. Raises InputError naming the nearest ones.
 
@@ -42,8 +47,7 @@ def conductor(designation: str) -> Conductor:
     Traceback (most recent call last):
     clamp3d.errors.InputError: unknown conductor 'LJ-121'; nearest: LJ-210, LJ-120, LJ-25 (all 51: clamp3d conductors)
     """
-    by_folded = {name.casefold(): entry for name, entry in catalogue().items()}
-    found = by_folded.get(designation.strip().casefold())
+    found = _folded().get(designation.strip().casefold())
     if found is None:
         near = difflib.get_close_matches(designation, catalogue(), n=3, cutoff=0.0)
         raise InputError(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clamp3d.clamp.dimensions import (
     PARTS,
@@ -63,12 +64,10 @@ class Extrusion:
         """Area times length in mm^3."""
         return self.profile.area * self.length
 
-    @property
-    def bounds(self) -> Array:
-        """Lower and upper corner (2, 3) in part axes, mm."""
-        low, high = self.profile.bounds
-        corners = np.array([[*low, self.start], [*high, self.end]]) @ _FRAMES[self.axis].T
-        return np.sort(corners, axis=0)
+    def support(self, direction: ArrayLike) -> float:
+        """Largest dot product of ``direction`` (3,) in part axes with a point of the body, mm; exact on arcs."""
+        da, db, along = (float(d) for d in np.asarray(direction) @ _FRAMES[self.axis])
+        return self.profile.support(da, db) + max(along * self.start, along * self.end)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +87,12 @@ class Part:
     @property
     def bounds(self) -> Array:
         """Lower and upper corner (2, 3) of the bounding box in part axes, mm; arcs taken as arcs."""
-        boxes = np.array([body.bounds for body in self.bodies])
-        return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+        return self.bounds_at(np.eye(4))
+
+    def bounds_at(self, T: Array) -> Array:
+        """Lower and upper corner (2, 3) of the bounding box along the target's axes, placed by ``T`` (4, 4)."""
+        reach = [[max(body.support(s * axis) for body in self.bodies) for axis in T[:3, :3]] for s in (-1.0, 1.0)]
+        return np.array([T[:3, 3] - reach[0], T[:3, 3] + reach[1]]) + 0.0
 
 
 def parts(clamp: Clamp) -> dict[PartName, Part]:

@@ -164,18 +164,19 @@ class Profile:
     @property
     def bounds(self) -> tuple[Point, Point]:
         """Lower and upper corner (a, b) of the bounding box in mm, arcs taken as arcs."""
-        points: list[Point] = []
+        return (-self.support(-1.0, 0.0), -self.support(0.0, -1.0)), (self.support(1.0, 0.0), self.support(0.0, 1.0))
+
+    def support(self, da: float, db: float) -> float:
+        """Largest value of da * a + db * b over the outline, exact on arcs: how far it reaches in that direction."""
+        reach, direction = -math.inf, math.atan2(db, da)
         for edge in self.edges:
-            points += [edge.start, edge.end]
+            reach = max(reach, *(da * a + db * b for a, b in (edge.start, edge.end)))
             if isinstance(edge, Arc):
                 low, high = sorted((edge.start_angle, edge.end_angle))
-                quarter = math.pi / 2
-                (a, b), R = edge.centre, edge.radius
-                # The circle's own extreme points, written without cos and sin to stay exact.
-                extremes = ((a + R, b), (a, b + R), (a - R, b), (a, b - R))
-                points += [extremes[k % 4] for k in range(math.ceil(low / quarter), math.floor(high / quarter) + 1)]
-        a_all, b_all = zip(*points, strict=True)
-        return (min(a_all), min(b_all)), (max(a_all), max(b_all))
+                turns = math.ceil((low - direction) / (2.0 * math.pi))
+                if direction + 2.0 * math.pi * turns <= high:
+                    reach = max(reach, da * edge.centre[0] + db * edge.centre[1] + edge.radius * math.hypot(da, db))
+        return reach
 
     def polygon(self, mesh_error: float) -> Array:
         """Vertices (n, 2) in mm, counter-clockwise: arcs as equal chords within ``mesh_error`` mm, ends on the arc.

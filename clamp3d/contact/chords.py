@@ -7,7 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from clamp3d.clamp.features import GroovePair
+from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.features import GroovePair, groove_pairs
 from clamp3d.contact.model import Pieces
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array, inverse
@@ -27,11 +28,17 @@ class Chords:
 
     name = "chords"
     limits = ("parallel axes only", "groove too tight by the chord error")
+    meshes_built = 0
 
     def __init__(self, unit_angle: float) -> None:
         if not 0.0 < unit_angle < math.pi:
             raise InputError(f"unit angle must be between 0 and 180 deg, got {math.degrees(unit_angle):g}")
         self.unit_angle = unit_angle
+
+    def segments(self, clamp: Clamp) -> int:
+        """Chords of the four wire grooves together: m of Table 5."""
+        pairs = groove_pairs(clamp).values()
+        return sum(len(_polyline(p.groove, self.unit_angle)[2]) - 2 for p in pairs if p.b in ("P6", "P7"))
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every chord and to the two faces; see `ContactModel`."""

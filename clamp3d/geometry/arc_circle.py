@@ -86,8 +86,9 @@ def arc_circle(
             gap = (from_centre - arc_radius) - circle_radius
         else:  # radii first: their difference is the small number that matters
             gap = (arc_radius - circle_radius) - from_centre
-        scale = arc_radius / from_centre if from_centre > 0.0 else 0.0
-        point = (x * scale, y * scale) if from_centre > 0.0 else (0.0, -arc_radius)
+        coaxial = from_centre <= _EPS * _EPS * arc_radius  # direction lost; the quotient would overflow
+        scale = 0.0 if coaxial else arc_radius / from_centre
+        point = (0.0, -arc_radius) if coaxial else (x * scale, y * scale)
         feature, points = ArcFeature.ARC, (point,)
         if math.hypot(abs(point[0]) + m_x, point[1] - m_y) <= tolerance:
             feature = ArcFeature.M if x < 0.0 else ArcFeature.N

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import RIGID_TOLERANCE, Array, check_pose
-from clamp3d.geometry.shapes import Cylinder, SweptArc
+from clamp3d.geometry.shapes import LARGEST, Cylinder, SweptArc
 
 
 class Feature(IntEnum):
@@ -104,6 +104,8 @@ def as_pose(pose: ArrayLike) -> Array:
 def reject(T: Array, name: str) -> NoReturn:
     """Raise the InputError for a pose that the kernel refused."""
     check_pose(T, name)
+    if np.abs(T[:3, 3]).sum() >= LARGEST:
+        raise InputError(f"{name} must have an offset below {LARGEST:g} mm, got {T[:3, 3].tolist()}")
     raise InputError(f"{name} must be rigid within the tolerance of {RIGID_TOLERANCE:g}")
 
 
@@ -127,7 +129,7 @@ def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Si
     normalised. Raises InputError if ``pose`` is not a finite rigid 4x4 matrix.
 
     >>> import numpy as np
-    >>> from clamp3d.geometry.shapes import Cylinder, SweptArc
+    >>> from clamp3d.geometry.shapes import LARGEST, Cylinder, SweptArc
     >>> groove, wire = SweptArc(12.0, np.radians(70.0), 50.0), Cylinder(10.5, 80.0)
     >>> answer = signed_distance(groove, wire, np.eye(4))
     >>> answer.distance, answer.feature.name
@@ -140,15 +142,16 @@ def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Si
     if run(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, record) >= 0:
         reject(T, "pose")
     out = record[0]
-    distance, bound, feature, along = out[[0, 10, 11, 12]].tolist()
+    values = out.tolist()
+    distance = values[0]
     return SignedDistance(
         distance,
         out[1:4],
         out[4:7],
         out[7:10],
-        _FEATURES[int(feature)],
-        along,
-        bound,
+        _FEATURES[int(values[11])],
+        values[12],
+        values[10],
         distance < -cylinder.radius,
     )
 
@@ -170,7 +173,7 @@ def signed_distances(
     poses. Raises InputError that names the first pose that is not finite and rigid.
 
     >>> import numpy as np
-    >>> from clamp3d.geometry.shapes import Cylinder, SweptArc
+    >>> from clamp3d.geometry.shapes import LARGEST, Cylinder, SweptArc
     >>> signed_distances(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.eye(4)[None])
     array([1.5])
     """

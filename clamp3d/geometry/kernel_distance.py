@@ -152,6 +152,8 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
     dz *= n
     e2 *= n * n
 
+    # A direction is normalised to 3 units, a point of the axis (a product and a sum, |t| <= l) known to 5 units of
+    # |c| + l, s and h to 3 units of R, a difference of these and its norm to 3 more: 11, rounded up, and r's own.
     bound = UNIT * (12.0 * (abs(cx) + abs(cy) + abs(cz) + 2.0 * l + H + R) + r)
     high = l * abs(dy)
     if cy - high <= h:
@@ -255,11 +257,16 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
     nx = x - bx
     ny = y - by
     nz = cz + bt * dz - bz
-    n = math.sqrt(nx * nx + ny * ny + nz * nz)
-    if n <= bound:
+    if nx * nx + ny * ny + nz * nz <= bound * bound:
         nx, ny, nz = edge_normal(feature, R, h, bx, by, bz)
-    else:
-        nx /= n
-        ny /= n
-        nz /= n
-    return distance - r, bx, by, bz, nx, ny, nz, feature, bt, bound
+    # Inside the axis the normal is across it, at an end it points back from it: with the axis close to the edge itself
+    # the difference above knows that to few digits only.
+    along = nx * dx + ny * dy + nz * dz
+    if abs(bt) < l or along * bt > 0.0:
+        nx -= along * dx
+        ny -= along * dy
+        nz -= along * dz
+    n = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if n == 0.0:
+        nx, ny, nz, n = -dy, dx, 0.0, math.sqrt(e2)
+    return distance - r, bx, by, bz, nx / n, ny / n, nz / n, feature, bt, bound

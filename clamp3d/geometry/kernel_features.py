@@ -22,6 +22,9 @@ ARC, LIP_M, LIP_N, FLAT_M, FLAT_N, END_FACE, END_ARC, END_EDGE_M, END_EDGE_N, CO
 CONVERGED = 1e-7
 """Last relative step of a quadratic iteration: the error left is of the order of its square."""
 
+TINY = 1e-150
+"""Below this the square of a length underflows, and with it the direction of the vector."""
+
 
 @inlined
 def section(x, y, R, s, h):  # type: ignore[no-untyped-def]
@@ -46,14 +49,14 @@ def section_foot(feature, x, y, R, s, h):  # type: ignore[no-untyped-def]
     """Nearest point of a section feature to (x, y), and the unit normal that leads out of the material there."""
     if feature == ARC:
         rho = math.sqrt(x * x + y * y)
-        if rho == 0.0:
+        if rho < TINY:
             return 0.0, -R, 0.0, 1.0
         return x / rho * R, y / rho * R, -x / rho, -y / rho
     if feature in (FLAT_M, FLAT_N):
         return x, h, 0.0, 1.0
     sx = -s if feature == LIP_M else s
     gap = math.sqrt((x - sx) * (x - sx) + (y - h) * (y - h))
-    if gap == 0.0:
+    if gap < TINY:
         return sx, h, -sx / R, -h / R
     return sx, h, (x - sx) / gap, (y - h) / gap
 
@@ -167,8 +170,8 @@ def farther_root(k, a, q):  # type: ignore[no-untyped-def]
 
 
 @formula
-def ellipse(R, cx, cy, dx, dy, e2):  # type: ignore[no-untyped-def] # noqa: E741
-    """Part of ``end_arc`` that both ends share: tilt direction ex, ey, the axis' place p on the major axis, and along."""
+def ellipse(R, cx, cy, dx, dy, e2):  # type: ignore[no-untyped-def]
+    """What both ends share in ``end_arc``: tilt direction ex, ey, the axis' place p on the major axis, and along it."""
     n = 1.0 / math.sqrt(e2)
     ex = dx * n
     ey = dy * n
@@ -176,7 +179,7 @@ def ellipse(R, cx, cy, dx, dy, e2):  # type: ignore[no-untyped-def] # noqa: E741
 
 
 @formula
-def end_arc_reach(ez, R, cz, dz, e2, p, along):  # type: ignore[no-untyped-def] # noqa: E741
+def end_arc_reach(ez, R, cz, dz, e2, p, along):  # type: ignore[no-untyped-def]
     """The axis' place v along the minor axis of the ellipse of ``end_arc``, and a lower bound on its distance."""
     v = (-dz * along - e2 / math.sqrt(e2) * (ez - cz)) / R
     if dz > 0.0:
@@ -202,7 +205,7 @@ def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: igno
     best2 = math.inf
     bx = by = bt = 0.0
     for branch in range(2):
-        if q != 0.0 or a > k:
+        if abs(q) > TINY or a > k:
             if branch == 0:
                 root = nearer_root(k, a, abs(q))
                 C = p / (k + root)
@@ -233,7 +236,7 @@ def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: igno
         d2 = du * du + dv * dv
         if d2 < best2:
             best2, bx, by, bt = d2, qx, qy, t
-        if branch == 0 and q != 0.0:
+        if branch == 0 and abs(q) > TINY:
             break
     return best2, bx, by, bt
 
@@ -315,6 +318,13 @@ def deepest(R, h, H, cx, cy, cz, dx, dy, dz, lo, hi):  # type: ignore[no-untyped
                 continue
             w = -B - math.copysign(math.sqrt(disc), B)
             t = w / A if i % 2 == 1 else C / w
+            for _ in range(2):  # the quadratic squares its terms: Newton's steps on the unsquared equation restore them
+                x = cx + t * dx
+                y = cy + t * dy
+                rho = math.sqrt(x * x + y * y)
+                slope = (x * dx + y * dy) / rho - g1
+                if rho > 0.0 and slope != 0.0:
+                    t -= (rho - R - (g0 + g1 * t)) / slope
         if not (lo <= t <= hi):
             continue
         depth, _ = point_depth(cx + t * dx, cy + t * dy, cz + t * dz, R, h, H)

@@ -25,6 +25,7 @@ from clamp3d.geometry.kernel_features import (
     FLAT_N,
     LIP_M,
     LIP_N,
+    TINY,
     beyond_end,
     clip,
     corner,
@@ -50,7 +51,7 @@ def arc_section(x, y, R, s, h):  # type: ignore[no-untyped-def]
     ax = abs(x)
     rho = math.sqrt(x * x + y * y)
     if ax * -h + y * s <= 0.0:
-        if rho == 0.0:
+        if rho < TINY:
             return R, 0.0, -R, ARC
         return abs(R - rho), x / rho * R, y / rho * R, ARC
     gap = math.sqrt((ax - s) * (ax - s) + (y - h) * (y - h))

@@ -6,11 +6,12 @@ import math
 
 from clamp3d.geometry.jit import formula, inlined
 from clamp3d.geometry.pose import RIGID_TOLERANCE
+from clamp3d.geometry.shapes import LARGEST
 
 
 @inlined
 def rigid(T, k):  # type: ignore[no-untyped-def]
-    """Whether pose k of (n, 4, 4) is finite and rigid within RIGID_TOLERANCE (same rule as ``pose.check_pose``)."""
+    """Whether pose k of (n, 4, 4) is rigid by the rule of ``pose.check_pose``, and its offset below LARGEST."""
     a, b, c = T[k, 0, 0], T[k, 0, 1], T[k, 0, 2]
     d, e, f = T[k, 1, 0], T[k, 1, 1], T[k, 1, 2]
     g, h, i = T[k, 2, 0], T[k, 2, 1], T[k, 2, 2]
@@ -29,7 +30,7 @@ def rigid(T, k):  # type: ignore[no-untyped-def]
         return False
     offset = abs(T[k, 0, 3]) + abs(T[k, 1, 3]) + abs(T[k, 2, 3])
     last = abs(T[k, 3, 0]) + abs(T[k, 3, 1]) + abs(T[k, 3, 2]) + abs(T[k, 3, 3] - 1.0)
-    return offset < math.inf and last == 0.0
+    return offset < LARGEST and last == 0.0
 
 
 @formula

@@ -57,21 +57,6 @@ def inverse(T: Array) -> Array:
     return out
 
 
-def relative_pose(T_world_a: Array, T_world_b: Array) -> Array:
-    """Pose ``T_a_b`` of b seen from a, shape (..., 4, 4): the positions are subtracted before anything is turned.
-
-    So the rounding error of its position is at most 5e-16 times the distance of the two origins, however far both are
-    from the world's origin; ``inverse(T_world_a) @ T_world_b`` loses 1e-16 of that distance (1e-7 mm at 1e9 mm).
-    """
-    A, B = np.asarray(T_world_a, np.float64), np.asarray(T_world_b, np.float64)
-    Rt = np.swapaxes(A[..., :3, :3], -1, -2)
-    out = np.zeros(np.broadcast_shapes(A.shape, B.shape))
-    out[..., :3, :3] = Rt @ B[..., :3, :3]
-    out[..., :3, 3:] = Rt @ (B[..., :3, 3:] - A[..., :3, 3:])
-    out[..., 3, 3] = 1.0
-    return out
-
-
 def translation(x: float, y: float, z: float) -> Array:
     """Pose that moves by (x, y, z) mm."""
     T = np.eye(4)

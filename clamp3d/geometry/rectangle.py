@@ -20,10 +20,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import TypeAlias
 
 from clamp3d.errors import InputError
 
 _EPS = 2.0**-52
+
+Point: TypeAlias = tuple[float, float]
 
 
 class HoleRelation(str, Enum):
@@ -57,10 +60,14 @@ class Rectangle:
             if getattr(self, name) <= 0.0:
                 raise InputError(f"rectangle {name} must be > 0 mm, got {getattr(self, name)}")
 
-    def point(self, u: float, v: float) -> tuple[float, float]:
+    def point(self, u: float, v: float) -> Point:
         """Section coordinates of the rectangle's own point, ``u`` right and ``v`` down of its centre."""
         c, s = math.cos(self.angle), math.sin(self.angle)
         return self.x + u * c + v * s, self.y - u * s + v * c
+
+    def axis(self, sign: float) -> Point:
+        """Direction (x, y) of the rectangle's width axis, or its opposite for ``sign`` -1."""
+        return sign * math.cos(self.angle), -sign * math.sin(self.angle)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,14 +75,27 @@ class HoleContact:
     """A hole against its bolt: least signed gap on either side in mm (positive apart) and the points that touch.
 
     A gap is taken square to the flat that is met: the bolt's side for a corner of the hole, the hole's wall for a
-    corner of the bolt. ``points`` are (x, y) in the section; ``tolerance`` in mm is the one applied.
+    corner of the bolt. ``points`` (x, y) in the section touch. ``point`` is the hole's where the lesser gap is, and
+    ``normal`` (x, y) unit from the hole to the bolt: the bolt's point is ``point + gap * normal``. For a bolt that is
+    not in the hole ``point`` is the middle of a wall. ``tolerance`` in mm is the one applied.
     """
 
     relation: HoleRelation
     gap_left: float
     gap_right: float
-    points: tuple[tuple[float, float], ...]
+    points: tuple[Point, ...]
+    point: Point
+    normal: Point
     tolerance: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Facing:
+    """One end of the stretch that a wall and a side of the bolt share: its gap, the hole's point and the normal."""
+
+    gap: float
+    point: Point
+    normal: Point
 
 
 def hole_bolt(hole: Rectangle, bolt: Rectangle, *, tolerance: float) -> HoleContact:
@@ -96,9 +116,11 @@ def hole_bolt(hole: Rectangle, bolt: Rectangle, *, tolerance: float) -> HoleCont
     sizes = hole.half_width + hole.half_height + bolt.half_width + bolt.half_height
     offset = abs(hole.x - bolt.x) + abs(hole.y - bolt.y)
     tolerance = max(tolerance, 4.0 * _EPS * (sizes + offset))
-    left, right = _side(hole, bolt, turn, -1), _side(hole, bolt, turn, +1)
-    gaps = [min((gap for gap, _ in side), default=math.inf) for side in (left, right)]
-    touching = [[point for gap, point in side if abs(gap) <= tolerance] for side in (left, right)]
+    sides = [_side(hole, bolt, turn, side) for side in (-1, 1)]
+    gaps = [min((end.gap for end in side), default=math.inf) for side in sides]
+    touching = [[end.point for end in side if abs(end.gap) <= tolerance] for side in sides]
+    wall = _Facing(math.inf, hole.point(-hole.half_width, 0.0), hole.axis(1.0))
+    least = min((end for side in sides for end in side), key=lambda end: end.gap, default=wall)
     if min(gaps) < -tolerance:
         relation = HoleRelation.OVERLAP
     elif touching[0] and touching[1]:
@@ -107,11 +129,12 @@ def hole_bolt(hole: Rectangle, bolt: Rectangle, *, tolerance: float) -> HoleCont
         relation = HoleRelation.TWO_POINTS_ONE_SIDE
     else:
         relation = HoleRelation.ONE_POINT if touching[0] or touching[1] else HoleRelation.NONE
-    return HoleContact(relation, gaps[0], gaps[1], tuple(touching[0] + touching[1]), tolerance)
+    points = tuple(touching[0] + touching[1])
+    return HoleContact(relation, gaps[0], gaps[1], points, least.point, least.normal, tolerance)
 
 
-def _side(hole: Rectangle, bolt: Rectangle, turn: float, side: int) -> list[tuple[float, tuple[float, float]]]:
-    """Gap and touching point at both ends of the stretch that wall and side share; side -1 left, +1 right.
+def _side(hole: Rectangle, bolt: Rectangle, turn: float, side: int) -> list[_Facing]:
+    """Both ends of the stretch that wall and side share; side -1 left, +1 right.
 
     The gap is linear along that stretch, so its least value is at one of the two.
     """
@@ -128,8 +151,10 @@ def _side(hole: Rectangle, bolt: Rectangle, turn: float, side: int) -> list[tupl
     ends = []
     for height, at_corner, v in ((top, wall[0], -hole.half_height), (bottom, wall[1], hole.half_height)):
         if height == at_corner:  # the hole's corner faces the bolt's side
-            ends.append((level + side * v * s, hole.point(side * hole.half_width, v)))
+            ends.append(_Facing(level + side * v * s, hole.point(side * hole.half_width, v), bolt.axis(-side)))
         else:  # the bolt's corner faces the hole's wall
             along = (height - cy + side * hole.half_width * s) / c
-            ends.append(((level + side * along * s) * c, bolt.point(side * bolt.half_width, height)))
+            gap, (nx, ny) = (level + side * along * s) * c, hole.axis(-side)
+            x, y = bolt.point(side * bolt.half_width, height)
+            ends.append(_Facing(gap, (x - gap * nx, y - gap * ny), (nx, ny)))
     return ends

@@ -7,10 +7,15 @@ from dataclasses import dataclass
 
 from clamp3d.errors import InputError
 
+LARGEST = 1e100
+"""Lengths from 1 / LARGEST to LARGEST mm: their squares neither overflow nor underflow."""
+
 
 def _positive(name: str, value: float) -> None:
     if not (math.isfinite(value) and value > 0.0):
         raise InputError(f"{name} must be a finite length > 0 mm, got {value}")
+    if not 1.0 / LARGEST <= value <= LARGEST:
+        raise InputError(f"{name} must be between {1.0 / LARGEST:g} and {LARGEST:g} mm, got {value}")
 
 
 @dataclass(frozen=True, slots=True)

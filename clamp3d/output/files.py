@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -47,3 +48,41 @@ def write_text(path: Path, text: str) -> None:
 def write_json(path: Path, data: Any) -> None:
     """Write ``data`` as JSON without NaN. Raises InputError if it cannot be written."""
     write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
+
+
+def check_folder(folder: Path) -> None:
+    """Raise InputError if ``folder`` neither exists nor can be made, before long work is done for it."""
+    there = folder.absolute()
+    while not there.exists():
+        there = there.parent
+    if not there.is_dir():
+        raise InputError(f"cannot write into {folder}: {there} is not a folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError(f"cannot write into {folder}: no permission to write in {there}")
+
+
+def write_files(folder: Path, files: Mapping[str, bytes]) -> list[Path]:
+    """Write ``files`` (name to content) into ``folder``, made if need be; none is replaced before all are on the disk.
+
+    Raises InputError if the folder cannot be written to.
+    """
+    paths = [folder / name for name in files]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with ExitStack() as stack:
+            for path, content in zip(paths, files.values(), strict=True):
+                if path.is_dir():
+                    raise InputError(f"cannot write {path}: it is a folder")
+                stack.enter_context(whole_file(path)).write_bytes(content)
+    except OSError as error:
+        raise InputError(f"cannot write into {folder}: {error.strerror}") from None
+    return paths
+
+
+def file_stem(name: str) -> str:
+    """A clamp's name as a file name: letters, digits, point, dash and underscore.
+
+    >>> file_stem("JB-3 (left/right)")
+    'JB-3-left-right'
+    """
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "clamp"

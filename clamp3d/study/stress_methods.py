@@ -11,7 +11,8 @@ import numpy as np
 
 from clamp3d.errors import InputError
 from clamp3d.geometry.distance import signed_distances
-from clamp3d.geometry.pose import Array, relative_pose
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.relation3d import relative_pose
 from clamp3d.study.stress_cases import Cases
 
 _WORLD = 5e-16
@@ -38,7 +39,7 @@ def poses(cases: Cases) -> Array:
     """Poses (n, 4, 4) of the wires in their grooves' frames, as a user gets them from world poses."""
     if cases.T_world_groove is None:
         return cases.T_world_wire
-    return relative_pose(cases.T_world_groove, cases.T_world_wire)
+    return np.array([relative_pose(a, b) for a, b in zip(cases.T_world_groove, cases.T_world_wire, strict=True)])
 
 
 class CasMethod:

@@ -225,3 +225,18 @@ def test_profile_of_a_circular_segment() -> None:
     x, y = cap.polygon(0.05).T
     shoelace = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
     assert (cap.area - shoelace, gained) == pytest.approx((lost, 0.0))
+
+
+def test_bounds_of_a_turned_part_hold_its_mesh_to_the_chord_error() -> None:
+    generator = np.random.default_rng(3)
+    for name, part in REFERENCE.items():
+        solid = mesh(part, 1e-4)
+        for _ in range(10):
+            Q = np.linalg.qr(generator.normal(size=(3, 3)))[0]
+            T = np.eye(4)
+            T[:3, :3], T[:3, 3] = Q * np.linalg.det(Q), generator.normal(size=3) * 100
+            vertices = solid.vertices @ T[:3, :3].T + T[:3, 3]
+            low, high = part.bounds_at(T)
+            for slack in (vertices.min(axis=0) - low, high - vertices.max(axis=0)):
+                assert (slack > -1e-10).all(), name
+                assert (slack < 1e-4 + 1e-10).all(), name

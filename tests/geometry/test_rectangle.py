@@ -7,7 +7,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import LineString
+from shapely import LineString, Point
 from shapely.geometry import Polygon
 
 from clamp3d.errors import InputError
@@ -135,3 +135,11 @@ def test_gaps_against_polygons(x: float, y: float, w: float, turn: float, lean: 
         )
         corner = [hole.point(side * w, v) for v in (-hole_height, hole_height)]
         assert LineString(corner).distance(Polygon(corners(moved))) == pytest.approx(1.0, abs=1e-9)
+    # Witness contract: unit normal, point on the hole's wall, point + gap * normal on the bolt's outline.
+    gap = min(got.gap_left, got.gap_right)
+    assert math.hypot(*got.normal) == pytest.approx(1.0)
+    p = corners(hole)
+    walls = [LineString([p[0], p[3]]), LineString([p[1], p[2]])]
+    on_bolt = got.point[0] + gap * got.normal[0], got.point[1] + gap * got.normal[1]
+    assert min(wall.distance(Point(got.point)) for wall in walls) < 1e-9
+    assert Polygon(corners(bolt)).exterior.distance(Point(on_bolt)) < 1e-9

@@ -1,0 +1,92 @@
+"""``clamp3d measure-image``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from clamp3d.cli.options import FILE
+
+
+@click.command("measure-image")
+@click.argument("image", type=FILE)
+@click.option("--points", required=True, metavar="'X,Y X,Y'", help="The two end points in px from the top left.")
+@click.option("--reference", required=True, metavar="'X,Y X,Y'", help="The two ends of a measured length, in px.")
+@click.option("--scale", required=True, type=float, metavar="MM", help="That length, by calliper.")
+@click.option(
+    "--measure",
+    "kind",
+    type=click.Choice(["height", "straight"]),
+    default="height",
+    show_default=True,
+    help="Square to the reference line, or straight from point to point.",
+)
+@click.option("--snap", type=float, metavar="PX", help="Move each mark to the strongest corner within PX pixels.")
+@click.option("--marking-error", type=float, metavar="PX", help="Of a mark, one sigma.  [default: 4.5; 0.5 snapped]")
+@click.option(
+    "--calliper-error",
+    type=float,
+    default=0.02,
+    show_default=True,
+    metavar="MM",
+    help="Standard deviation of a reading.",
+)
+@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the result as JSON.")
+def command(
+    image: Path,
+    points: str,
+    reference: str,
+    scale: float,
+    kind: str,
+    snap: float | None,
+    marking_error: float | None,
+    calliper_error: float,
+    json_file: Path | None,
+) -> None:
+    """Measure a distance in the photograph IMAGE by marked points and a length of known size.
+
+    \b
+    clamp3d measure-image clamp.jpg --points "31,458 58,584" --reference "31,458 579,458" --scale 137
+    """
+    from dataclasses import asdict
+    from typing import cast
+
+    import numpy as np
+
+    from clamp3d.output.files import write_json
+    from clamp3d.study.image import MARKING_ERROR, Kind, measure_image
+    from clamp3d.study.picture import check_marks, load_image, snap_marks
+
+    marks = np.array(_marks("--points", points) + _marks("--reference", reference))
+    shown = load_image(image)
+    marks = check_marks(shown, marks) if snap is None else snap_marks(shown, marks, snap)
+    if marking_error is None:
+        marking_error = MARKING_ERROR if snap is None else 0.5
+    found = measure_image(
+        marks[:2],
+        marks[2:],
+        scale,
+        kind=cast(Kind, kind),
+        marking_error=marking_error,
+        calliper_error=calliper_error,
+    )
+    if json_file is not None:
+        write_json(json_file, {"image": str(image), "kind": kind, "marks": marks.tolist(), **asdict(found)})
+    click.echo(f"distance     {found.distance:.3f} mm +- {found.uncertainty:.3f} mm ({kind}; one standard deviation)")
+    click.echo(f"height       {found.height:.3f} mm, straight {found.straight:.3f} mm")
+    click.echo(
+        f"scale        {found.mm_per_px:.6f} mm/px, marks +- {marking_error:g} px, reading +- {calliper_error:g} mm"
+    )
+    click.echo(f"marks        {', '.join(f'({x:.2f}, {y:.2f})' for x, y in marks)}")
+
+
+def _marks(option: str, text: str) -> list[tuple[float, float]]:
+    """Two positions from "X,Y X,Y". Raises click.UsageError."""
+    try:
+        pairs = [tuple(float(v) for v in pair.split(",")) for pair in text.replace(";", " ").split()]
+    except ValueError:
+        pairs = []
+    if [len(pair) for pair in pairs] != [2, 2]:
+        raise click.UsageError(f"{option} must be two positions 'X,Y X,Y' in px, got {text!r}")
+    return [(pair[0], pair[1]) for pair in pairs]

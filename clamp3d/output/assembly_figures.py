@@ -1,0 +1,178 @@
+"""Pictures of how the clamp goes together: exploded view (Fig. 1 of the paper) and assembly steps (Fig. 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from clamp3d.assembly.result import Run
+from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
+from clamp3d.clamp.meshes import mesh
+from clamp3d.clamp.parts import parts
+from clamp3d.geometry.pose import Array, SectionPose
+from clamp3d.output.figures import near, same_scale, title
+from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
+from clamp3d.output.section import Poses, balloon, draw_section, part_anchor, spread
+from clamp3d.output.view3d import Camera, Solid, draw_solids
+
+if TYPE_CHECKING:
+    import trimesh
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MESH_ERROR = 0.01  # mm, far below a pixel
+_MOVED = 2.0  # mm; smaller motions get no arrow
+_ARROW = 60.0  # mm; longest arrow
+
+
+def exploded_figure(clamp: Clamp) -> Figure:
+    """All seven parts drawn apart along the bolt, with names."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.6, 6.4), layout="constrained")
+    ax = figure.add_subplot()
+    camera = Camera()
+    poses = exploded_poses(clamp)
+    solids = _solids(clamp)
+    draw_solids(ax, [Solid(solids[n], poses[n].T(), PART_COLOURS[n]) for n in PARTS], camera)
+    x0, x1 = ax.get_xlim()
+    width = x1 - x0
+    points = {}
+    for name in PARTS:
+        T = poses[name].T()
+        u, y, v = _outer_point(clamp, name)
+        points[name] = camera.project((T[:3, :3] @ (u, y, -v) + T[:3, 3])[None])[0, :2]
+    order = sorted((name for name in PARTS if name != "P6"), key=lambda name: float(points[name][1]))
+    heights = dict(zip(order, spread([float(points[n][1]) for n in order], 0.085 * width), strict=True))
+    for name, (px, py) in points.items():
+        level = heights[name] if name in heights else float(py)
+        text = TITLES[name] + {"P6": f"\n{clamp.line.label}", "P7": f"\n{clamp.jumper.label}"}.get(name, "")
+        left = name == "P6"  # its near end is the leftmost of all
+        column = x0 - 0.09 * width if left else x1 + 0.07 * width
+        ax.plot([px, column], [py, level], color=INK, lw=0.6, zorder=5)
+        ax.plot([px], [py], ".", color=INK, ms=4, zorder=5)
+        balloon(ax, name, column, level, size=9.0)
+        if left:
+            ax.annotate(text, (column, level), (0, -14), textcoords="offset points", ha="center", va="top", fontsize=9)
+        else:
+            ax.annotate(text, (column, level), (14, 0), textcoords="offset points", va="center", fontsize=9)
+    ax.set_xlim(x0 - 0.18 * width, x1 + 0.32 * width)
+    title(ax, "exploded view", f"{clamp.name} clamp: seven parts")
+    return figure
+
+
+def exploded_poses(clamp: Clamp) -> dict[PartName, SectionPose]:
+    """Parts apart along the bolt, as far as they stay threaded on it; line centre at the origin, splints straight."""
+    up, down, saddle, bolt, nut = clamp.up_splint, clamp.down_splint, clamp.saddle, clamp.bolt, clamp.nut
+    x = up.line_groove.offset
+    gap = 0.16 * up.width
+    r = max(clamp.line.radius, clamp.jumper.radius)
+    p2 = r + gap - min(down.line_groove.centre_depth + down.line_groove.radius, down.face_depth)
+    p3 = p2 + down.back_radius - saddle.radius + 0.8 * gap
+    head = p3 + saddle.radius + saddle.apex_thickness + 0.6 * gap
+    p1 = -r - gap - up.thickness
+    p4 = head - bolt.shank_length
+    p5 = min(p4, p1) - nut.height - 0.6 * gap
+    return {
+        "P1": SectionPose(x - up.width / 2, p1),
+        "P2": SectionPose(x, p2),
+        "P3": SectionPose(x, p3),
+        "P4": SectionPose(x, p4),
+        "P5": SectionPose(x, p5),
+        "P6": SectionPose(0.0, 0.0),
+        "P7": SectionPose(x + up.jumper_groove.offset, 0.0),
+    }
+
+
+def steps_figure(run: Run) -> Figure:
+    """Each step of the sequence where it ends: in the view (upper row) and in the section (lower)."""
+    from matplotlib.figure import Figure
+
+    ends = step_ends(run)
+    figure = Figure(figsize=(3.1 * len(ends), 7.4), layout="constrained")
+    axes = figure.subplots(2, len(ends), squeeze=False, height_ratios=(1.0, 1.2))
+    solids = _solids(run.clamp)
+    start = 0
+    for i, (step, stop) in enumerate(ends):
+        waypoint = run.path[stop]
+        poses = near(run.clamp, waypoint.poses)
+        shown = [Solid(solids[n], p.T(), PART_COLOURS[n]) for n, p in poses.items()]
+        draw_solids(axes[0, i], shown, Camera(), pixels_per_mm=3.0)
+        title(axes[0, i], f"{i + 1}   {step}", waypoint.label)
+        draw_section(axes[1, i], run.clamp, poses)
+        for name, pose in poses.items():
+            balloon(axes[1, i], name, *pose.point(*_middle(run.clamp, name)), size=6.0)
+        _arrows(axes[1, i], run.clamp, [w.poses for w in run.path[start : stop + 1]], poses)
+        start = stop
+    same_scale([*axes[1]])
+    _same_window([*axes[0]])
+    return figure
+
+
+def step_ends(run: Run) -> list[tuple[str, int]]:
+    """Each step of the sequence with the index of its last waypoint in ``run.path``, in order."""
+    return list({waypoint.step: i for i, waypoint in enumerate(run.path)}.items())
+
+
+def _arrows(ax: Axes, clamp: Clamp, path: Sequence[Poses], shown: Iterable[PartName]) -> None:
+    """The way of what moved, ending where it stands now; parts that moved alike share one arrow. Not to scale."""
+    style = {
+        "arrowstyle": "-|>,head_width=0.3,head_length=0.6",
+        "color": DIMENSION,
+        "lw": 1.8,
+        "shrinkA": 0,
+        "shrinkB": 0,
+    }
+    drawn: list[Array] = []
+    for name in shown:
+        way = np.array([poses[name].point(*part_anchor(clamp, name)) for poses in path])
+        moved = way - way[-1]
+        length = float(np.hypot(*np.diff(way, axis=0).T).sum())
+        if length < _MOVED or any(np.abs(moved - other).max() < _MOVED for other in drawn):
+            continue
+        drawn.append(moved)
+        way = way[-1] + moved * min(1.0, _ARROW / length)
+        ax.plot(*way.T, color=DIMENSION, lw=1.8, zorder=50)
+        ax.annotate("", way[-1], way[-2], arrowprops=style, zorder=50)
+
+
+def _same_window(axes: list[Axes]) -> None:
+    x0, x1 = min(ax.get_xlim()[0] for ax in axes), max(ax.get_xlim()[1] for ax in axes)
+    y0, y1 = min(ax.get_ylim()[0] for ax in axes), max(ax.get_ylim()[1] for ax in axes)
+    for ax in axes:
+        ax.set_xlim(x0, x1)
+        ax.set_ylim(y0, y1)
+
+
+def _solids(clamp: Clamp) -> dict[PartName, trimesh.Trimesh]:
+    return {name: mesh(part, _MESH_ERROR) for name, part in parts(clamp).items()}
+
+
+def _middle(clamp: Clamp, name: PartName) -> tuple[float, float]:
+    """A point (u, v) in the middle of the part's material, beside the bolt, for its name."""
+    up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
+    return {
+        "P1": (0.27 * up.width, 0.45 * up.thickness),
+        "P2": (-0.21 * down.width, 0.5 * (down.face_depth + down.underside_depth)),
+        "P3": (-0.37 * saddle.width, saddle.radius + 0.3 * saddle.apex_thickness),
+        "P4": (0.0, clamp.bolt.shank_length + 0.5 * clamp.bolt.head_height),
+        "P5": (0.0, 0.5 * clamp.nut.height),
+        "P6": (0.0, 0.0),
+        "P7": (0.0, 0.0),
+    }[name]
+
+
+def _outer_point(clamp: Clamp, name: PartName) -> tuple[float, float, float]:
+    """A point (u, along, v) on the right of the part's near face, for its name's line."""
+    up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
+    return {
+        "P1": (up.width, -0.1 * up.length, 0.5 * up.thickness),
+        "P2": (down.width / 2, -0.1 * down.length, 0.5 * (down.face_depth + down.underside_depth)),
+        "P3": (saddle.width / 2, -0.1 * saddle.length, saddle.radius + 0.6 * saddle.apex_thickness),
+        "P4": (0.4 * clamp.bolt.diameter, 0.0, clamp.bolt.shank_length + 0.5 * clamp.bolt.head_height),
+        "P5": (0.4 * clamp.nut.across_flats, 0.0, 0.5 * clamp.nut.height),
+        "P6": (0.0, -0.5 * clamp.wire_length, 0.0),
+        "P7": (0.0, 0.45 * clamp.wire_length, 0.0),
+    }[name]

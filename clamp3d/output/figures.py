@@ -1,0 +1,186 @@
+"""Pictures of a run in the section: one state, both states side by side, the five arc contacts.
+
+Each function returns a matplotlib figure (no pyplot, no window); `save_figure` writes it as SVG, PNG or PDF.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from clamp3d.assembly.result import Contact, Run, Waypoint
+from clamp3d.clamp.dimensions import Clamp
+from clamp3d.errors import InputError
+from clamp3d.output.files import whole_file
+from clamp3d.output.palette import INK
+from clamp3d.output.section import (
+    Mark,
+    Poses,
+    draw_dimensions,
+    draw_labels,
+    draw_marks,
+    draw_section,
+    edge_openings,
+    label_wires,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FORMATS = (".svg", ".png", ".pdf")
+_TOUCHING = 1e-6  # mm
+
+
+def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
+    """Write ``figure`` to ``path`` by its suffix, whole or not at all; equal figures give equal files.
+
+    Raises InputError for a suffix other than .svg, .png, .pdf and for a folder that cannot be written.
+    """
+    import matplotlib as mpl
+
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS:
+        raise InputError(f"figure file must end in {', '.join(FORMATS)}, got {path.name!r}")
+    metadata: dict[str, Any] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix, {})
+    with whole_file(path) as temporary, mpl.rc_context({"svg.hashsalt": "clamp3d"}):
+        figure.savefig(temporary, dpi=dpi, metadata=metadata)
+    return path
+
+
+def section_figure(run: Run, waypoint: Waypoint | None = None) -> Figure:
+    """The section at ``waypoint`` (by default the final state) to scale: names, dimensions, contact points."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    ax = figure.add_subplot()
+    poses = near(run.clamp, run.poses if waypoint is None else waypoint.poses)
+    draw_section(ax, run.clamp, poses)
+    draw_labels(ax, run.clamp, poses)
+    draw_dimensions(ax, run.clamp, poses)
+    if waypoint is None:
+        draw_marks(ax, [_mark(contact) for contact in _arc_contacts(run)])
+    title(ax, "final state" if waypoint is None else waypoint.label, f"{run.clamp.name} clamp, section to scale, mm")
+    return figure
+
+
+def states_figure(run: Run) -> Figure:
+    """Initial and final state side by side at one scale, as in Fig. 2 of the paper."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.5, 5.8), layout="constrained")
+    axes = figure.subplots(1, 2)
+    names = ("(a) initial state", "(b) final state")
+    for ax, all_poses, name in zip(axes, (run.path[0].poses, run.poses), names, strict=True):
+        poses = near(run.clamp, all_poses)
+        draw_section(ax, run.clamp, poses)
+        draw_dimensions(ax, run.clamp, poses, sides=(-1, 1) if ax is axes[1] else (1,))
+        title(ax, name, f"distance between the splints {edge_openings(run.clamp, poses)[0]:.3f} mm")
+    label_wires(axes[0], near(run.clamp, run.path[0].poses))
+    draw_labels(axes[1], run.clamp, run.poses)
+    draw_marks(axes[1], [_mark(contact) for contact in _arc_contacts(run)])
+    same_scale(axes)
+    return figure
+
+
+def contacts_figure(run: Run) -> Figure:
+    """The concave arc contacts in the section, as in Fig. 5, and each enlarged with its relation and gap."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.5, 5.8), layout="constrained")
+    contacts = _arc_contacts(run)
+    rows = max(1, (len(contacts) + 1) // 2)
+    grid = figure.add_gridspec(rows, 3, width_ratios=(2.1, 1.0, 1.0))
+    overview = figure.add_subplot(grid[:, 0])
+    draw_section(overview, run.clamp, run.poses)
+    title(
+        overview, "concave arc contacts", f"{run.clamp.name} clamp, final state; dot: contact point, arrow: its normal"
+    )
+    for i, contact in enumerate(contacts):
+        mark = _mark(contact)
+        draw_marks(overview, [mark], size=5.0)
+        side = 1 if i % 2 else -1
+        _number(overview, i + 1, mark, mark.x + side * 0.09 * run.clamp.up_splint.width)
+        _enlarge(figure.add_subplot(grid[i // 2, 1 + i % 2]), run, contact, f"{i + 1}  ")
+    return figure
+
+
+def contact_figure(run: Run, contact: Contact) -> Figure:
+    """One contact of ``run``: where it is in the section, dimensioned, and enlarged with relation, gap and normal."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
+    overview, close = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
+    draw_section(overview, run.clamp, run.poses)
+    label_wires(overview, run.poses)
+    draw_dimensions(overview, run.clamp, run.poses)
+    draw_marks(overview, [_mark(contact)])
+    _enlarge(close, run, contact)
+    return figure
+
+
+def _enlarge(ax: Axes, run: Run, contact: Contact, number: str = "") -> None:
+    """The two parts about their contact point; grooves in the section beside the bolt, where they are whole."""
+    half = 0.045 * run.clamp.up_splint.width
+    mark = _mark(contact)
+    window = (mark.x - 1.5 * half, mark.y - half), (mark.x + 1.5 * half, mark.y + half)
+    pair, holes = (contact.a, contact.b), contact.type != 3
+    draw_section(ax, run.clamp, run.poses, only=pair, holes=holes, line_width=1.6, window=window)
+    draw_marks(ax, [mark], size=7.0)
+    tip = {"arrowstyle": "-|>,head_width=0.2,head_length=0.5", "color": INK, "lw": 1.2, "shrinkA": 3, "shrinkB": 0}
+    end = mark.x + 0.6 * half * float(contact.normal[0]), mark.y - 0.6 * half * float(contact.normal[2])
+    ax.annotate("", end, (mark.x, mark.y), arrowprops=tip, zorder=42)
+    ax.set_axis_on()
+    ax.set_xticks([])
+    ax.set_yticks([])
+    ax.set_xlim(mark.x - 1.5 * half, mark.x + 1.5 * half)
+    ax.set_ylim(mark.y + half, mark.y - half)
+    heading = f"{number}{contact.a} and {contact.b}: {contact.relation}\ngap {_zero(contact.distance):.6f} mm"
+    ax.set_title(heading, fontsize=8, loc="left", color=INK)
+
+
+def title(ax: Axes, text: str, below: str = "") -> None:
+    """A bold title and a smaller line under it, on the left."""
+    ax.set_title(f"{text}\n", fontsize=11, fontweight="bold", loc="left", color=INK)
+    ax.annotate(
+        below, (0.0, 1.0), (0.0, 8.0), "axes fraction", textcoords="offset points", fontsize=8.5, color=INK, va="bottom"
+    )
+
+
+def near(clamp: Clamp, poses: Poses) -> dict[Any, Any]:
+    """The poses without wires that are still far away from the clamp."""
+    middle = poses["P1"].x + clamp.up_splint.width / 2
+    return {name: pose for name, pose in poses.items() if abs(pose.x - middle) < 0.9 * clamp.up_splint.width}
+
+
+def same_scale(axes: Sequence[Axes]) -> None:
+    """Give axes of one size windows of one size: equal heights, and equal widths about their own middle."""
+    width = max(ax.get_xlim()[1] - ax.get_xlim()[0] for ax in axes)
+    bottom, top = max(ax.get_ylim()[0] for ax in axes), min(ax.get_ylim()[1] for ax in axes)
+    for ax in axes:
+        middle = 0.5 * sum(ax.get_xlim())
+        ax.set_xlim(middle - width / 2, middle + width / 2)
+        ax.set_ylim(bottom, top)
+
+
+def _arc_contacts(run: Run) -> list[Contact]:
+    return [contact for contact in run.contacts if contact.type == 3]
+
+
+def _mark(contact: Contact) -> Mark:
+    d = contact.distance
+    verdict = "contact" if abs(d) <= _TOUCHING else "clear" if d > 0.0 else "clash"
+    return Mark(float(contact.point[0]), -float(contact.point[2]), "", verdict)
+
+
+def _number(ax: Axes, number: int, mark: Mark, x: float) -> None:
+    ax.plot([mark.x, x], [mark.y, mark.y], color=INK, lw=0.8, zorder=45)
+    box = {"boxstyle": "circle,pad=0.25", "fc": "white", "ec": INK, "lw": 1.0}
+    ax.annotate(str(number), (x, mark.y), ha="center", va="center", fontsize=9, fontweight="bold", zorder=46, bbox=box)
+
+
+def _zero(value: float) -> float:
+    """No -0.000000 in print."""
+    return 0.0 if abs(value) < 5e-7 else value

@@ -1,0 +1,41 @@
+"""Colours that mean the same in every picture, page and file.
+
+Parts: from the light scheme of Paul Tol's "Colour schemes" (SRON/EPS/TN/09-002), told apart by colour-blind readers and
+none of them a verdict's; bolt and nut are greys. Each part also carries its name, so no picture speaks by colour alone.
+"""
+
+from __future__ import annotations
+
+from clamp3d.clamp.dimensions import PartName
+
+PART_COLOURS: dict[PartName, str] = {
+    "P1": "#77AADD",
+    "P2": "#44BB99",
+    "P3": "#EE8866",
+    "P4": "#D5D9DE",
+    "P5": "#AEB6C0",
+    "P6": "#EEDD88",
+    "P7": "#FFAABB",
+}
+
+VERDICT_COLOURS: dict[str, str] = {
+    "clash": "#D32F2F",
+    "contained": "#D32F2F",
+    "contact": "#F2B705",
+    "allowed": "#F2B705",
+    "clearance": "#00A6C0",
+    "clear": "#8A8F98",
+    "uncertain": "#8A8F98",
+}
+
+INK = "#20262E"
+DIMENSION = "#8B1A4F"
+
+
+def darker(colour: str, factor: float = 0.62) -> str:
+    """The same hue for lines and hatching on ``colour`` ("#RRGGBB"); ``factor`` 0 is black.
+
+    >>> darker("#FF8000", 0.5)
+    '#804000'
+    """
+    return "#" + "".join(f"{round(int(colour[i : i + 2], 16) * factor):02X}" for i in (1, 3, 5))

@@ -1,0 +1,348 @@
+"""The section through the middle of the clamp, to scale, arcs as arcs: parts, names and dimensions on one axes.
+
+Everything is drawn in the paper's section frame (x right, y down, mm). The splints, the saddle and the wires are cut;
+bolt and nut are shown whole, as drawing practice has it (ISO 128). Needs matplotlib; nothing of pyplot is used.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
+from clamp3d.clamp.parts import Extrusion, Part, parts
+from clamp3d.clamp.profile import Arc, Point, Profile
+from clamp3d.geometry.pose import Array, SectionPose
+from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, VERDICT_COLOURS, darker
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.path import Path as MplPath
+
+Poses = Mapping[PartName, SectionPose]
+
+_HATCH: dict[PartName, str] = {"P1": "////", "P2": "\\\\\\\\", "P3": "////"}
+WIRES: tuple[PartName, ...] = ("P6", "P7")
+_ORDER: tuple[PartName, ...] = ("P6", "P7", "P1", "P2", "P3", "P4", "P5")
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A point of the section worth a dot: a contact. ``x``, ``y`` in mm; ``verdict`` picks the colour."""
+
+    x: float
+    y: float
+    label: str
+    verdict: str = "contact"
+
+
+def section_pose(T_world_part: Array) -> SectionPose:
+    """Where a pose (4, 4) puts its part in the section; what leaves the section (yaw, pitch, Y) is not seen in it.
+
+    >>> section_pose(SectionPose(1.0, 2.0, 0.25).T(along=7.0))
+    SectionPose(x=1.0, y=2.0, angle=0.25)
+    """
+    T = T_world_part
+    return SectionPose(float(T[0, 3]), float(-T[2, 3]), math.atan2(float(T[2, 0]), float(T[0, 0])))
+
+
+def arc_path(profile: Profile) -> MplPath:
+    """The outline as a closed path; each arc as cubic curves of at most 15 degrees, within 1e-8 radii of the arc."""
+    from matplotlib.path import Path
+
+    vertices: list[tuple[float, float]] = [profile.edges[0].start]
+    codes = [int(Path.MOVETO)]
+    for edge in profile.edges:
+        if isinstance(edge, Arc):
+            n = max(1, math.ceil(abs(edge.sweep) / math.radians(15.0)))
+            step = edge.sweep / n
+            handle = 4.0 / 3.0 * math.tan(step / 4.0)  # the usual cubic: tangent at both ends, middle on the arc
+            for k in range(n):
+                t0, t1 = edge.start_angle + k * step, edge.start_angle + (k + 1) * step
+                (x0, y0), (x1, y1) = edge.at(t0), edge.at(t1)
+                r = handle * edge.radius
+                vertices += [(x0 - r * math.sin(t0), y0 + r * math.cos(t0))]
+                vertices += [(x1 + r * math.sin(t1), y1 - r * math.cos(t1)), (x1, y1)]
+                codes += [int(Path.CURVE4)] * 3
+        else:
+            vertices.append(edge.end)
+            codes.append(int(Path.LINETO))
+    vertices.append(vertices[0])
+    codes.append(int(Path.CLOSEPOLY))
+    return Path(np.array(vertices), codes)
+
+
+def draw_section(
+    ax: Axes,
+    clamp: Clamp,
+    poses: Poses,
+    *,
+    only: Iterable[PartName] = PARTS,
+    holes: bool = True,
+    line_width: float = 0.9,
+    window: tuple[Point, Point] | None = None,
+) -> None:
+    """Draw the parts of ``only`` at ``poses``; without ``holes`` it is the section beside the bolt.
+
+    ``window`` is the part of the section ((x, y) least, largest) that the axes show, if not all of it.
+    """
+    shown, bodies = set(only), parts(clamp)
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    ax.margins(0.02)
+    if not ax.yaxis_inverted():
+        ax.invert_yaxis()
+    for i, name in enumerate(_ORDER):
+        if name in shown and name in poses:
+            _draw_part(ax, bodies[name], poses[name], 2 + i, holes, line_width, window)
+    ax.autoscale_view()
+
+
+def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
+    """Names of the parts: a column of balloons on the right, each with a line to its part; wires carry theirs."""
+    label_wires(ax, poses)
+    points = {name: poses[name].point(*part_anchor(clamp, name)) for name in PARTS if name in poses}
+    (left, edge), (low, high) = section_extent(clamp, poses)
+    column = edge + 0.27 * (edge - left)
+    order = sorted(points, key=lambda name: points[name][1])
+    heights = spread([points[name][1] for name in order], min((high - low) / len(order), 0.1 * (high - low)))
+    bodies, wires = parts(clamp), {"P6": clamp.line, "P7": clamp.jumper}
+    for name, y in zip(order, heights, strict=True):
+        title = bodies[name].title
+        if name in wires:
+            title += f"\n{wires[name].label}"
+        else:
+            x0, y0 = points[name]
+            ax.plot([x0, column - 4.0], [y0, y], color=INK, lw=0.5, zorder=30)
+            ax.plot([x0], [y0], ".", color=INK, ms=3.5, zorder=30)
+        balloon(ax, name, column, y, size=8.0)
+        ax.annotate(title, (column, y), (13, 0), textcoords="offset points", va="center", fontsize=8, color=INK)
+    ax.update_datalim([(column + 0.3 * (edge - left), heights[0]), (column, heights[-1])])
+    ax.autoscale_view()
+
+
+def label_wires(ax: Axes, poses: Poses) -> None:
+    """The names of the wires in the middle of each."""
+    for name in WIRES:
+        if name in poses:
+            balloon(ax, name, poses[name].x, poses[name].y, size=7.0)
+
+
+def balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> None:
+    """The name of a part in a circle of its colour."""
+    box = {"boxstyle": "circle,pad=0.2", "fc": PART_COLOURS[name], "ec": INK, "lw": 0.7}
+    ax.annotate(name, (x, y), ha="center", va="center", fontsize=size, fontweight="bold", zorder=31, bbox=box)
+
+
+def draw_marks(ax: Axes, marks: Iterable[Mark], *, size: float = 6.0) -> None:
+    """Contact points as dots in the colour of their verdict, with their labels."""
+    for mark in marks:
+        ax.plot(
+            [mark.x],
+            [mark.y],
+            "o",
+            ms=size,
+            mec=INK,
+            mew=0.7,
+            mfc=VERDICT_COLOURS[mark.verdict],
+            zorder=40,
+            clip_on=False,
+        )
+        if mark.label:
+            ax.annotate(
+                mark.label,
+                (mark.x, mark.y),
+                (6, -3),
+                textcoords="offset points",
+                fontsize=7,
+                color=INK,
+                zorder=41,
+                bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85},
+            )
+
+
+def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int] = (-1, 1)) -> None:
+    """Distance between the splints at the edges (-1 line side, 1 jumper side), and the tilt of the down splint."""
+    edges = _inner_edges(clamp, poses)
+    for side in sides:
+        above, below = edges[side > 0]
+        x = (min if side < 0 else max)(above[0], below[0]) + side * 0.09 * clamp.up_splint.width
+        dimension(ax, above, below, x, f"{below[1] - above[1]:.3f}", side)
+    _draw_tilt(ax, clamp, poses["P2"])
+
+
+def edge_openings(clamp: Clamp, poses: Poses) -> tuple[float, float]:
+    """Height in mm between the splints' inner edges, on the line side (Table 4's distance) and the jumper side."""
+    left, right = ((below[1] - above[1]) for above, below in _inner_edges(clamp, poses))
+    return left, right
+
+
+def _inner_edges(clamp: Clamp, poses: Poses) -> list[tuple[Point, Point]]:
+    up, down = clamp.up_splint, clamp.down_splint
+    return [
+        (poses["P1"].point(u, up.thickness), poses["P2"].point(v, down.face_depth))
+        for u, v in ((0.0, -down.width / 2), (up.width, down.width / 2))
+    ]
+
+
+def dimension(ax: Axes, a: tuple[float, float], b: tuple[float, float], x: float, text: str, side: int) -> None:
+    """A vertical dimension at ``x`` between the heights of ``a`` and ``b``; small ones get their arrows outside."""
+    style: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
+    for px, py in (a, b):
+        ax.plot([px + 1.5 * side, x + 2.0 * side], [py, py], **style)
+    y0, y1 = sorted((a[1], b[1]))
+    arrow: dict[str, Any] = {"color": DIMENSION, "lw": 0.8, "shrinkA": 0.0, "shrinkB": 0.0}
+    if y1 - y0 > 9.0:
+        ax.annotate("", (x, y0), (x, y1), arrowprops={"arrowstyle": "<|-|>,head_width=0.18,head_length=0.45", **arrow})
+    else:
+        for tip, tail in ((y0, y0 - 9.0), (y1, y1 + 9.0)):
+            ax.annotate(
+                "", (x, tip), (x, tail), arrowprops={"arrowstyle": "-|>,head_width=0.18,head_length=0.45", **arrow}
+            )
+    ax.annotate(
+        text,
+        (x + 2.0 * side, 0.5 * (y0 + y1)),
+        (3 * side, 0),
+        textcoords="offset points",
+        ha="right" if side < 0 else "left",
+        va="center",
+        fontsize=9,
+        color=DIMENSION,
+        zorder=26,
+    )
+
+
+def part_anchor(clamp: Clamp, name: PartName) -> tuple[float, float]:
+    """A point (u, v) well inside the part, towards the right, for its balloon's line."""
+    up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
+    return {
+        "P1": (0.94 * up.width, 0.3 * up.thickness),
+        "P2": (0.46 * down.width, 0.5 * (down.face_depth + down.underside_depth)),
+        "P3": (0.42 * saddle.width, saddle.radius + 0.6 * saddle.apex_thickness),
+        "P4": (0.25 * clamp.bolt.diameter, 0.08 * clamp.bolt.shank_length),
+        "P5": (0.4 * clamp.nut.across_flats, 0.5 * clamp.nut.height),
+        "P6": (0.0, 0.0),
+        "P7": (0.0, 0.0),
+    }[name]
+
+
+def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
+    down = clamp.down_splint
+    degrees = math.degrees(pose.angle)
+    inward = 1.0 if pose.angle >= 0.0 else -1.0  # the lower corner is on the left if the tilt is positive
+    corner = pose.point(-inward * down.width / 2, down.underside_depth)
+    style: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
+    reach = inward * 0.19 * down.width
+    if abs(degrees) < 5e-3:
+        ax.annotate("parallel", corner, (0, -11), textcoords="offset points", fontsize=9, color=DIMENSION, va="center")
+        return
+    ax.plot([corner[0] - 0.06 * reach, corner[0] + reach * 1.15], [corner[1]] * 2, ls=(0, (8, 2, 1, 2)), **style)
+    t = np.linspace(0.0, pose.angle, 30)
+    xs, ys = corner[0] + reach * np.cos(t), corner[1] - reach * np.sin(t)
+    ax.plot(xs, ys, **style)
+    head: dict[str, Any] = {"arrowstyle": "-|>,head_width=0.18,head_length=0.45", "color": DIMENSION, "lw": 0.8}
+    for tip, tail in ((0, 3), (-1, -4)):
+        ax.annotate("", (xs[tip], ys[tip]), (xs[tail], ys[tail]), arrowprops={**head, "shrinkA": 0, "shrinkB": 0})
+    ax.annotate(
+        f"{abs(degrees):.2f}\N{DEGREE SIGN}",
+        (corner[0] + 0.45 * reach, max(corner[1], ys.max())),
+        (0, -10),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=9,
+        color=DIMENSION,
+    )
+
+
+def _draw_part(
+    ax: Axes,
+    part: Part,
+    pose: SectionPose,
+    z: int,
+    holes: bool,
+    line_width: float,
+    window: tuple[Point, Point] | None,
+) -> None:
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+    from matplotlib.transforms import Affine2D, Bbox
+
+    colour = PART_COLOURS[part.name]
+    edge = darker(colour, 0.45)
+    c, s = math.cos(pose.angle), math.sin(pose.angle)
+    place = Affine2D(np.array([[c, s, pose.x], [-s, c, pose.y], [0.0, 0.0, 1.0]]))
+    where = place + ax.transData
+    style: dict[str, Any] = {"lw": line_width, "ec": edge, "zorder": z}
+    for body in part.bodies:
+        path = arc_path(body.profile) if body.axis == "Y" else arc_path(_silhouette(body))
+        patch = PathPatch(path, fc=colour, hatch=_HATCH.get(part.name), hatch_linewidth=0.45, transform=where, **style)
+        patch.set_hatchcolor(darker(colour, 0.75))
+        ax.add_patch(patch)
+        ax.update_datalim(place.transform(path.vertices))
+        if body.axis == "Y":
+            for hole in part.holes if holes else ():  # its far wall, seen behind the cut
+                (u0, _), (u1, _) = hole.profile.bounds
+                corners = [(u0, -hole.end), (u1, -hole.end), (u1, -hole.start), (u0, -hole.start), (u0, -hole.end)]
+                wall = Path(place.transform(corners), closed=True)
+                if window is not None:  # SVG clips by the part's outline or by the axes, not by both
+                    wall = wall.clip_to_bbox(Bbox(np.array(window)))
+                if np.size(wall.vertices):
+                    wall_patch = PathPatch(wall, fc=_pale(colour), transform=ax.transData, **style)
+                    wall_patch.set_clip_path(patch)
+                    ax.add_patch(wall_patch)
+            outline = PathPatch(path, fc="none", transform=where, **style)
+            ax.add_patch(outline)
+        else:
+            for u in _front_edges(body.profile):
+                ax.plot([u, u], [-body.end, -body.start], color=edge, lw=0.6 * line_width, transform=where, zorder=z)
+
+
+def _silhouette(body: Extrusion) -> Profile:
+    """Outline in (u, v) of a body that is drawn along Z, seen along the wires."""
+    (a0, _), (a1, _) = body.profile.bounds
+    return Profile.rectangle(a1 - a0, body.length, (0.5 * (a0 + a1), -0.5 * (body.start + body.end)))
+
+
+def _front_edges(profile: Profile) -> list[float]:
+    """Where corners of a body drawn along Z show on its front between its two silhouette lines."""
+    (a0, _), (a1, _) = profile.bounds
+    corners = [edge.start for edge in profile.edges if not isinstance(edge, Arc)]
+    return [a for a, b in corners if b < 0.0 and a0 + 1e-9 < a < a1 - 1e-9]
+
+
+def _pale(colour: str) -> str:
+    return "#" + "".join(f"{round(255 - 0.4 * (255 - int(colour[i : i + 2], 16))):02X}" for i in (1, 3, 5))
+
+
+def section_extent(clamp: Clamp, poses: Poses) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Least and largest x, and y, of the parts at their poses (from their bounding boxes)."""
+    xs, ys = [], []
+    for name, part in parts(clamp).items():
+        if name in poses:
+            (x0, _, z0), (x1, _, z1) = part.bounds
+            for u, v in ((x0, -z0), (x0, -z1), (x1, -z0), (x1, -z1)):
+                x, y = poses[name].point(float(u), float(v))
+                xs.append(x)
+                ys.append(y)
+    return (min(xs), max(xs)), (min(ys), max(ys))
+
+
+def spread(values: list[float], spacing: float) -> list[float]:
+    """The ascending ``values`` moved apart to at least ``spacing``, as little as a few sweeps allow."""
+    out = list(values)
+    for _ in range(200):
+        moved = False
+        for i in range(len(out) - 1):
+            lack = spacing - (out[i + 1] - out[i])
+            if lack > 1e-6:
+                out[i] -= lack / 2
+                out[i + 1] += lack / 2
+                moved = True
+        if not moved:
+            break
+    return out

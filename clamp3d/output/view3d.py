@@ -1,0 +1,132 @@
+"""Pictures of meshes in parallel projection with hidden lines removed, drawn on matplotlib axes.
+
+matplotlib sorts whole triangles by depth, which fails where grooves and wires reach into each other; so depth is kept
+per pixel here, and edges are drawn as lines where that depth says they are seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.geometry.pose import Array
+from clamp3d.output.palette import darker
+
+if TYPE_CHECKING:
+    import trimesh
+    from matplotlib.axes import Axes
+
+_CREASE = math.radians(25.0)
+"""Edges sharper than this are drawn; below it the facets stand for one round surface."""
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """A mesh at a pose ``T`` (4, 4) in a colour "#RRGGBB"."""
+
+    mesh: trimesh.Trimesh
+    T: Array
+    colour: str
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """Parallel projection; ``azimuth`` turns it to the right and ``elevation`` up from the view along +Y; rad."""
+
+    azimuth: float = math.radians(32.0)
+    elevation: float = math.radians(24.0)
+
+    def axes(self) -> Array:
+        """Rows (3, 3): right, up, and towards the viewer, in the world."""
+        ca, sa = math.cos(self.azimuth), math.sin(self.azimuth)
+        ce, se = math.cos(self.elevation), math.sin(self.elevation)
+        return np.array([[ca, sa, 0.0], [-sa * se, ca * se, ce], [sa * ce, -ca * ce, se]])
+
+    def project(self, points: Array) -> Array:
+        """World points (n, 3) to (right, up, depth towards the viewer) (n, 3) in mm."""
+        return points @ self.axes().T
+
+
+def draw_solids(ax: Axes, solids: Sequence[Solid], camera: Camera, *, pixels_per_mm: float = 5.0) -> None:
+    """Draw the solids with shading and their visible edges; axes in mm of the picture plane."""
+    from matplotlib.collections import LineCollection
+
+    views = [camera.project(s.mesh.vertices @ s.T[:3, :3].T + s.T[:3, 3]) for s in solids]
+    low = np.min([v.min(0) for v in views], axis=0)[:2] - 1.0
+    high = np.max([v.max(0) for v in views], axis=0)[:2] + 1.0
+    size = np.ceil((high - low) * pixels_per_mm).astype(int)
+    high = low + size / pixels_per_mm
+    depth = np.full((size[1], size[0]), -np.inf)
+    image = np.zeros((size[1], size[0], 4))
+    light = np.array([-0.35, 0.62, 0.70])
+    for solid, view in zip(solids, views, strict=True):
+        normals = solid.mesh.face_normals @ solid.T[:3, :3].T @ camera.axes().T
+        rgb = np.array([int(solid.colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
+        pixels = (view - [*low, 0.0]) * [pixels_per_mm, pixels_per_mm, 1.0]
+        for face, normal in zip(solid.mesh.faces, normals, strict=True):
+            if normal[2] > 1e-9:
+                shade = 0.62 + 0.43 * max(0.0, float(normal @ light))
+                _fill(depth, image, pixels[face], np.append(np.minimum(rgb * shade, 1.0), 1.0))
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    ax.imshow(image, extent=(low[0], high[0], low[1], high[1]), origin="lower", interpolation="antialiased", zorder=1)
+    for solid, view in zip(solids, views, strict=True):
+        lines = _visible(_edges(solid, camera), view, depth, low, pixels_per_mm)
+        ax.add_collection(LineCollection(lines, colors=darker(solid.colour, 0.4), linewidths=0.6, zorder=2))
+    ax.set_xlim(low[0], high[0])
+    ax.set_ylim(low[1], high[1])
+
+
+def _fill(depth: Array, image: Array, triangle: Array, colour: Array) -> None:
+    """Paint a triangle (3, 3) of pixel coordinates and depth where it is nearer than what is there."""
+    (x0, y0, z0), (x1, y1, z1), (x2, y2, z2) = triangle
+    twice = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+    if abs(twice) < 1e-9:
+        return
+    left, right = max(0, math.floor(min(x0, x1, x2))), min(depth.shape[1], math.ceil(max(x0, x1, x2)) + 1)
+    bottom, top = max(0, math.floor(min(y0, y1, y2))), min(depth.shape[0], math.ceil(max(y0, y1, y2)) + 1)
+    x, y = np.arange(left, right) + 0.5, (np.arange(bottom, top) + 0.5)[:, None]
+    b = ((x - x0) * (y2 - y0) - (x2 - x0) * (y - y0)) / twice
+    c = ((x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)) / twice
+    z = z0 + b * (z1 - z0) + c * (z2 - z0)
+    window = depth[bottom:top, left:right]
+    nearer = (b >= -1e-6) & (c >= -1e-6) & (b + c <= 1.0 + 1e-6) & (z > window)
+    window[nearer] = z[nearer]
+    image[bottom:top, left:right][nearer] = colour
+
+
+def _edges(solid: Solid, camera: Camera) -> NDArray[np.int64]:
+    """Vertex pairs (n, 2) of creases and of outlines against the view."""
+    mesh = solid.mesh
+    towards = mesh.face_normals @ solid.T[:3, :3].T @ camera.axes()[2]
+    front = towards[mesh.face_adjacency] > 0.0
+    crease = (mesh.face_adjacency_angles > _CREASE) & front.any(1)
+    outline = front[:, 0] != front[:, 1]
+    return np.asarray(mesh.face_adjacency_edges[crease | outline], dtype=np.int64)
+
+
+def _visible(edges: NDArray[np.int64], view: Array, depth: Array, low: Array, pixels_per_mm: float) -> list[Array]:
+    """The stretches (2, 2) of the edges that nothing hides, in mm."""
+    stretches: list[Array] = []
+    for i, j in edges:
+        a, b = view[i], view[j]
+        n = max(2, math.ceil(float(np.hypot(*(b - a)[:2])) * pixels_per_mm))
+        points = a + np.linspace(0.0, 1.0, n + 1)[:, None] * (b - a)
+        column, row = (((points[:, :2] - low) * pixels_per_mm).astype(int)).T
+        # An edge lies between pixels of its own two faces: seen if it is not behind all the pixels around it.
+        around = np.full(len(points), np.inf)
+        for dx in (-1, 0, 1):
+            for dy in (-1, 0, 1):
+                r = np.clip(row + dy, 0, depth.shape[0] - 1)
+                c = np.clip(column + dx, 0, depth.shape[1] - 1)
+                around = np.minimum(around, depth[r, c])
+        seen = points[:, 2] >= around - 0.05
+        starts = np.flatnonzero(seen & ~np.append(False, seen[:-1]))
+        ends = np.flatnonzero(seen & ~np.append(seen[1:], False))
+        stretches += [points[[s, e], :2] for s, e in zip(starts, ends, strict=True) if e > s]
+    return stretches

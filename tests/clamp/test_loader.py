@@ -1,0 +1,93 @@
+"""Clamp files: what is right loads, what is wrong gives one line with file, key, value and rule."""
+
+from importlib import resources
+
+import pytest
+
+from clamp3d.clamp.conductors import catalogue, conductor
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.errors import InputError
+
+REFERENCE = resources.files("clamp3d.clamp").joinpath("data/reference.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('unit = "mm"', 'unit = "inch"', "unit: must be 'mm', got 'inch'"),
+        ('unit = "mm"', "", "unit is missing"),
+        ("thickness = 27.7260", "", "up_splint.thickness is missing"),
+        ("thickness = 27.7260", "thicknes = 27.7260", "up_splint.thicknes is not a known key; did you mean thickness?"),
+        ("radius = 23.8012", "radius = -23.0", "up_splint.line_groove.radius: must be greater than 0, got -23.0"),
+        ("radius = 23.8012", "radius = 0", "up_splint.line_groove.radius: must be greater than 0, got 0"),
+        ("radius = 23.8012", 'radius = "23 mm"', "up_splint.line_groove.radius: must be a valid number, got '23 mm'"),
+        ("radius = 23.8012", "radius = nan", "up_splint.line_groove.radius: must be a finite number"),
+        ("radius = 23.8012", "radius = true", "up_splint.line_groove.radius: must be a valid number, got True"),
+        ("radius = 23.8012", "radius = 20.0", "up_splint.line_groove: the arc does not reach its face"),
+        ("offset = 46.0349", "offset = 60.0", "the arc leaves the splint at its edge: offset must be <= 57.4"),
+        ("offset = 46.0349", "offset = 15.0", "the arc meets the bolt hole: offset must be >= 22.08"),
+        ("thickness = 27.7260", "thickness = 40.0", "the arc leaves the splint at its edge"),
+        ("slot_width = 42.0", "slot_width = 40.0", "down_splint.slot_width must be >= 41.22 mm for a tilt of 13.4 deg"),
+        ("hole_diameter = 22.0", "hole_diameter = 20.0", "up_splint.hole_diameter must be > bolt.diameter = 20 mm"),
+        ("radius = 49.230", "radius = 47.0", "saddle.radius must be > down_splint.back_radius = 48 mm, got 47"),
+        ("max_tilt_deg = 13.4", "max_tilt_deg = 13.9", "down_splint.back_half_angle_deg must be >= 40.44"),
+        ('conductor = "LJ-630"', 'conductor = "LJ-631"', "line.conductor: unknown conductor 'LJ-631'; nearest: LJ-630"),
+        ('conductor = "LJ-630"', "", "line.conductor or diameter: give one of them"),
+        ("P4 = 2, P5", "P4 = 4, P5", "connections.P1.P4: must be 0, 1, 2 or 3, got 4"),
+        ("P4 = 2, P5", "P9 = 2, P5", "connections.P1.P9: must be 'P1', 'P2'"),
+        ("P4 = { P5 = 1 }", "P5 = { P4 = 1 }", "connections.P5.P4: the matrix is given above its diagonal"),
+        ("[nut]", "[nut", "not valid TOML"),
+    ],
+)
+def test_bad_files_give_one_clear_line(tmp_path, old, new, message):
+    assert old in REFERENCE
+    path = tmp_path / "mine.toml"
+    path.write_text(REFERENCE.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_clamp(path)
+    text = str(caught.value)
+    assert text.startswith(f"{path}: ")
+    assert message in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize("source", ["nothing.toml", "nothing", "."])
+def test_a_file_that_is_not_there(source):
+    with pytest.raises(InputError, match=r"cannot be read|unknown clamp"):
+        load_clamp(source)
+
+
+def test_a_file_that_is_not_text(tmp_path):
+    path = tmp_path / "x.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="not a text file in UTF-8"):
+        load_clamp(path)
+
+
+def test_wires_by_name_and_by_diameter():
+    clamp = load_clamp(line="lj-500", jumper="21.6")
+    assert clamp.line.radius == pytest.approx(14.56)
+    assert clamp.line.label == "LJ-500"
+    assert clamp.jumper.radius == pytest.approx(10.8)
+    assert clamp.jumper.label == "diameter 21.6 mm"
+    for text in ("0", "-3", "nan", "inf", "1e9"):
+        with pytest.raises(InputError, match=r"--line diameter must be > 0"):
+            load_clamp(line=text)
+
+
+def test_catalogue_is_complete():
+    assert len(catalogue()) == 51
+    assert conductor("Pigeon").diameter == 12.75
+    assert all(0 < c.diameter < 50 and c.standard and c.source for c in catalogue().values())
+
+
+def test_the_reference_is_symmetric_in_its_connection_matrix():
+    clamp = load_clamp()
+    assert clamp.connection("P6", "P1") == clamp.connection("P1", "P6") == 3
+    assert clamp.connection("P1", "P2") == 0
+    assert clamp.connection("P5", "P4") == 1
+
+
+def test_the_round_back_stands_on_the_saddle_as_published():
+    # P2 and P3 of the published final state: 21.604 - 20.374 = 1.230 mm between the two centres.
+    assert load_clamp().back_clearance == pytest.approx(1.230, abs=1e-12)

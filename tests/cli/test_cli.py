@@ -1,0 +1,103 @@
+"""The command line as a user meets it: a process, its exit code, stdout, stderr and files."""
+
+import json
+import math
+import subprocess
+import sys
+import time
+
+import pytest
+
+from clamp3d.study import published
+
+
+def clamp3d(*arguments, **kwargs):
+    command = [sys.executable, "-m", "clamp3d", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **kwargs)
+
+
+def test_help_is_quick_and_lists_every_command():
+    seconds = []
+    for _ in range(3):
+        start = time.perf_counter()
+        done = clamp3d("--help")
+        seconds.append(time.perf_counter() - start)
+    assert done.returncode == 0
+    assert "reproduce" in done.stdout
+    heavy = ("numpy", "numba", "scipy", "trimesh", "fcl", "coacd", "meshcat")
+    code = f"import sys, clamp3d.cli; print([m for m in {heavy} if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+    assert min(seconds) < 1.0  # 0.3 s on a free machine; this only guards against loading the numeric stack
+
+
+def test_run_prints_the_published_state_and_writes_json(tmp_path):
+    path = tmp_path / "out.json"
+    done = clamp3d("run", "--json", path)
+    assert done.returncode == 0, done.stderr
+    assert "clamped; distance between the splints 31.530 mm, tilt 12.00 deg" in done.stdout
+    assert "line between the splints" in done.stderr
+    data = json.loads(path.read_text())
+    assert {"clamp", "method", "solver", "distance_mm", "parts", "contacts", "work"} <= set(data)
+    for part, (x, y, angle) in published.FINAL_STATE.items():
+        section = data["parts"][part]["section"]
+        assert (round(section["x"], 3), round(section["y"], 3)) == (x, y)
+        assert section["angle_deg"] == pytest.approx(angle, abs=0.01)
+        T = data["parts"][part]["T_world"]
+        # World: X right, Z up = -y; a counter-clockwise angle turns X towards Z.
+        assert (T[0][3], T[2][3]) == pytest.approx((section["x"], -section["y"]))
+        assert T[2][0] == pytest.approx(math.sin(math.radians(section["angle_deg"])))
+    assert {"a", "b", "type", "relation", "distance_mm", "point"} <= set(data["contacts"][0])
+    assert data["work"]["meshes_built"] == 0
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_quiet_says_nothing_on_stderr():
+    assert clamp3d("run", "--quiet").stderr == ""
+
+
+def test_a_clamp_that_does_not_close_is_a_finding():
+    done = clamp3d("run", "--line", "LJ-16", "--jumper", "LJ-16", "-q")
+    assert done.returncode == 1
+    assert "not clamped: faces meet" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["rum"], "unknown command 'rum'; available: run, "),
+        (["run", "nothing"], "unknown clamp 'nothing'; built in: reference"),
+        (["run", "--line", "LJ-631"], "unknown conductor 'LJ-631'"),
+        (["run", "--jumper", "-4"], "--jumper diameter must be > 0"),
+        (["run", "--method", "magic"], "'magic' is not one of"),
+        (["run", "--unit-angle-deg", "5"], "--unit-angle-deg goes with"),
+        (["run", "--method", "chords", "--unit-angle-deg", "0"], "unit angle must be between 0 and 180 deg, got 0"),
+        (["run", "--step", "-1"], "step must be > 0 mm, got -1"),
+        (["run", "--solver", "exact", "--step", "1"], "--step and --tilt-step-deg go with --solver stepped"),
+        (["run", "--json", "/nowhere/x.json", "-q"], "cannot write /nowhere/x.json: No such file or directory"),
+        (["run", "--json"], "requires an argument"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(arguments, message):
+    done = clamp3d(*arguments)
+    assert done.returncode == 2
+    assert message in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr
+
+
+def test_reproduce_matches_the_paper(tmp_path):
+    path = tmp_path / "r.json"
+    done = clamp3d("reproduce", "--json", path)
+    assert done.returncode == 0, done.stderr
+    assert "DIFFERS" not in done.stdout
+    data = json.loads(path.read_text())
+    stepped = {r["unit_angle_deg"]: r for r in data["table4"] if r["solver"] == "stepped"}
+    assert stepped[None]["distance_mm"] == pytest.approx(published.CAS_DISTANCE, abs=0.002)
+    for unit, distance in published.CHORD_DISTANCES.items():
+        assert stepped[unit]["distance_mm"] == pytest.approx(distance, abs=0.002)
+        assert stepped[unit]["published_mm"] == distance
+    assert {r["solver"] for r in data["table4"]} == {"stepped", "exact"}
+    for row in data["final_state"]:
+        assert row["x"] == pytest.approx(row["published_x"], abs=5e-4)
+        assert row["y"] == pytest.approx(row["published_y"], abs=5e-4)
+        assert row["angle_deg"] == pytest.approx(row["published_angle_deg"], abs=0.01)
+    assert "1/3 mm" in data["plateau"]

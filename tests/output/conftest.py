@@ -1,0 +1,25 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clamp3d.clamp.dimensions import PARTS, Clamp
+from clamp3d.clamp.loader import load_clamp
+
+
+@pytest.fixture(scope="session")
+def reference() -> Clamp:
+    return load_clamp()
+
+
+@pytest.fixture(scope="session")
+def odd_poses() -> dict[str, np.ndarray]:
+    """A turned and moved pose for each part: a transposed matrix or a swapped axis cannot hide in it."""
+    generator = np.random.default_rng(7)
+    poses = {}
+    for name in PARTS:
+        Q, _ = np.linalg.qr(generator.normal(size=(3, 3)))
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = Q * np.linalg.det(Q), generator.normal(size=3) * 200
+        poses[name] = T
+    return poses

@@ -1,0 +1,131 @@
+"""``clamp3d export`` from the command line to the files, and the committed review set."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from clamp3d import cli
+from clamp3d.clamp.dimensions import PARTS
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.parts import parts
+
+ROOT = Path(__file__).resolve().parents[2]
+# x, y, degrees of the published final state (section frame: y down), relative to the line.
+PUBLISHED = {
+    "P1": (-23.328, -41.374, 0.0),
+    "P2": (45.172, -20.374, 12.0),
+    "P3": (45.172, -21.604, 0.0),
+    "P4": (45.172, -120.184, 0.0),
+    "P5": (45.172, -67.774, 0.0),
+    "P6": (0.0, 0.0, 0.0),
+    "P7": (94.969, -9.260, 0.0),
+}
+
+
+@pytest.fixture
+def clamp3d(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(cli.COMMANDS, "export", ("clamp3d.cli.export", "Write the parts as files for CAD review."))
+
+    def run(*arguments: object) -> int:
+        monkeypatch.setattr(sys, "argv", ["clamp3d", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        return int(stop.value.code or 0)
+
+    return run
+
+
+def test_final_state_is_exported_where_it_is_published(clamp3d, tmp_path: Path, capfd) -> None:
+    assert clamp3d("export", "--format", "glb", "--output", tmp_path) == 0
+    out, err = capfd.readouterr()
+    assert out.split() == [str(tmp_path / "reference.glb"), str(tmp_path / "manifest-glb.json")]
+    assert "state final: nut tightened (clamped)" in err
+    listing = json.loads((tmp_path / "manifest-glb.json").read_text())
+    for name, (x, y, degrees) in PUBLISHED.items():
+        T = np.array(listing["parts"][name]["T_world_part"])
+        np.testing.assert_allclose(T[:3, 3], [x, 0.0, -y], atol=6e-4)
+        assert np.degrees(np.arctan2(T[2, 0], T[0, 0])) == pytest.approx(degrees, abs=0.01)
+    assert (listing["state"], listing["status"]) == ("final", "clamped")
+    # As a reader sees it: metres, Y up; the nut's top face 67.774 mm above the line, the bolt's end 120.184 mm.
+    scene = trimesh.load(tmp_path / "reference.glb")
+    assert scene.bounds[1][1] == pytest.approx(0.120184, abs=1e-6)
+
+
+def test_parts_keep_their_own_frames_unless_a_state_is_named(clamp3d, tmp_path: Path) -> None:
+    assert clamp3d("export", "--format", "stl", "--output", tmp_path / "own", "--mesh-error", "0.1", "-q") == 0
+    assert clamp3d("export", "--format", "stl", "--output", tmp_path / "open", "--state", "open", "-q") == 0
+    assert clamp3d("export", "--format", "stl", "--output", tmp_path / "step", "--state", "P7", "-q") == 0
+    assert clamp3d("export", "--format", "stl", "--output", tmp_path / "3", "--state", "3", "-q") == 0
+    own, opened, step, third = (trimesh.load(tmp_path / d / "P2-down-splint.stl") for d in ("own", "open", "step", "3"))
+    np.testing.assert_allclose(own.bounds, parts(load_clamp())["P2"].bounds, atol=1e-5)
+    assert opened.bounds[0][0] > step.bounds[0][0] + 50.0  # the open clamp stands beside the line
+    assert third.bounds[0][2] > step.bounds[0][2] + 20.0  # the third step closes the down splint
+    listing = json.loads((tmp_path / "own" / "manifest-stl.json").read_text())
+    assert listing["parts"]["P1"]["T_world_part"] is None
+    assert listing["mesh_error_mm"] == 0.1
+
+
+def test_other_wires_and_units(clamp3d, tmp_path: Path) -> None:
+    arguments = ("--jumper", "21.6", "--line", "LJ-500", "--layout", "assembly", "--unit", "in", "-q")
+    assert clamp3d("export", "--format", "obj", "--output", tmp_path, *arguments) == 0
+    listing = json.loads((tmp_path / "manifest-obj.json").read_text())
+    low, high = np.array(listing["parts"]["P7"]["bounds"])
+    assert high[2] - low[2] == pytest.approx(21.6 / 25.4, abs=0.02 / 25.4)
+    assert listing["parameters"]["line"]["conductor"] == "LJ-500"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--state", "P9"), "unknown state 'P9'; available: open, P1|P2P3P4P5 (or 1), P7 (or 2)"),
+        (("--mesh-error", "0"), "mesh_error must be a finite length >= 1e-06 mm, got 0"),
+        (("--mesh-error", "wide"), "'wide' is not a valid float"),
+        (("--format", "dwg"), "'dwg' is not one of"),
+        (("--format", "glb", "--unit", "mm"), "unit of glb must be m"),
+        (("nowhere.toml",), "nowhere.toml"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(clamp3d, tmp_path: Path, capfd, arguments, message: str) -> None:
+    assert clamp3d("export", "--format", "stl", "--output", tmp_path / "out", *arguments) == 2
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert message in err.splitlines()[-1]
+    assert "Traceback" not in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_step_without_open_cascade_says_what_to_install(clamp3d, tmp_path: Path, capfd, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "OCP", None)
+    assert clamp3d("export", "--format", "step", "--output", tmp_path / "out", "-q") == 2
+    assert "STEP needs Open CASCADE: pip install 'clamp3d[step]'" in capfd.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_review_set_is_what_a_new_build_gives() -> None:
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / "build_meshes.py"), "--check"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert (done.stdout, done.returncode) == ("", 0), done.stderr
+
+
+def test_review_set_holds_the_seven_parts_and_stays_small() -> None:
+    folder = ROOT / "meshes"
+    assert sum(path.stat().st_size for path in folder.iterdir()) < 2_000_000
+    for name, path in zip(PARTS, sorted(folder.glob("P*.stl")), strict=True):
+        solid = trimesh.load(path)
+        assert path.name.startswith(name)
+        assert solid.is_watertight
+        np.testing.assert_allclose(solid.bounds, parts(load_clamp())[name].bounds, atol=1e-5)

@@ -1,0 +1,319 @@
+"""Every mesh format read back by a reader that had no part in writing it."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import trimesh
+
+from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
+from clamp3d.clamp.meshes import volume_bounds
+from clamp3d.clamp.parts import parts
+from clamp3d.errors import InputError
+from clamp3d.output.export import FORMATS, export
+from clamp3d.output.palette import PART_COLOURS
+
+MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+MESH_ERROR = 0.02
+FACETED = [f for f in FORMATS if f != "step"]
+
+
+def check_solid(
+    name: str, clamp: Clamp, vertices: np.ndarray, faces: np.ndarray, T: np.ndarray, rounding: float
+) -> None:
+    """The triangles (mm, world, Z up) are the part placed by T: closed, volume and box within the chord error."""
+    part = parts(clamp)[name]
+    solid = trimesh.Trimesh(vertices, faces, process=False)
+    solid.merge_vertices()
+    assert solid.is_watertight
+    assert solid.is_winding_consistent
+    low, high = volume_bounds(part, MESH_ERROR)
+    slack = rounding * solid.area
+    assert low - slack <= solid.volume <= high + slack
+    inside, outside = part.bounds_at(T)
+    assert (solid.bounds[0] >= inside - rounding).all()
+    assert (solid.bounds[0] <= inside + MESH_ERROR + rounding).all()
+    assert (solid.bounds[1] <= outside + rounding).all()
+    assert (solid.bounds[1] >= outside - MESH_ERROR - rounding).all()
+
+
+def read_stl(path: Path) -> np.ndarray:
+    """Corners (n, 3, 3) of a binary STL, straight from its bytes."""
+    data = path.read_bytes()
+    assert not data.startswith(b"solid")  # readers would take it for text
+    (count,) = struct.unpack_from("<I", data, 80)
+    assert len(data) == 84 + 50 * count
+    rows = np.frombuffer(data, dtype=np.dtype([("v", "<f4", (4, 3)), ("a", "<u2")]), offset=84)
+    corners = rows["v"][:, 1:].astype(float)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1)
+    solid = length > 1e-6
+    np.testing.assert_allclose(rows["v"][solid, 0], normals[solid] / length[solid, None], atol=1e-6)
+    return corners
+
+
+@pytest.mark.parametrize("unit", ["mm", "in"])
+def test_stl_parts_are_in_their_own_frames(reference: Clamp, tmp_path: Path, unit: str) -> None:
+    written = export(reference, format="stl", output=tmp_path, mesh_error=MESH_ERROR, unit=unit)
+    assert [p.name for p in written.files] == [f"{n}-{TITLES[n].replace(' ', '-')}.stl" for n in PARTS]
+    for name, path in zip(PARTS, written.files, strict=True):
+        assert f"unit {unit}".encode() in path.read_bytes()[:80]
+        corners = read_stl(path) * MM[unit]
+        check_solid(
+            name, reference, corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), np.eye(4), 2e-5
+        )
+
+
+def test_stl_assembly_is_in_the_world(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
+    written = export(
+        reference, format="stl", output=tmp_path, layout="assembly", poses=odd_poses, mesh_error=MESH_ERROR
+    )
+    assert [p.name for p in written.files] == ["reference.stl"]
+    whole = trimesh.load(written.files[0])
+    low = np.min([parts(reference)[n].bounds_at(odd_poses[n])[0] for n in PARTS], axis=0)
+    np.testing.assert_allclose(whole.bounds[0], low, atol=MESH_ERROR + 5e-5)
+    assert whole.body_count == 7
+
+
+def test_stl_that_would_lose_accuracy_is_refused(reference: Clamp, tmp_path: Path) -> None:
+    far = np.eye(4)
+    far[0, 3] = 1e6
+    poses = dict.fromkeys(PARTS, far)
+    with pytest.raises(InputError, match=r"stl holds 32-bit numbers: the pose of P1 would lose 0\.03"):
+        export(reference, format="stl", output=tmp_path / "stl", poses=poses)
+    assert not (tmp_path / "stl").exists()
+    # The others hold the same place exactly.
+    for format in ("ply", "obj"):
+        written = export(reference, format=format, output=tmp_path, poses=poses, mesh_error=MESH_ERROR, names=["P1"])
+        solid = trimesh.load(written.files[0], process=False, force="mesh")
+        np.testing.assert_allclose(solid.bounds - [1e6, 0, 0], parts(reference)["P1"].bounds, atol=1e-9)
+
+
+@pytest.mark.parametrize("layout", ["parts", "assembly"])
+def test_ply(reference: Clamp, odd_poses: dict, tmp_path: Path, layout: str) -> None:
+    written = export(
+        reference, format="ply", output=tmp_path, poses=odd_poses, layout=layout, mesh_error=MESH_ERROR, unit="m"
+    )
+    seen = []
+    for path in written.files:
+        header = path.read_bytes().split(b"end_header")[0].decode("ascii")
+        assert "comment unit m, Z up" in header
+        loaded = trimesh.load(path, process=False)
+        colours = np.asarray(loaded.visual.vertex_colors)[:, :3]
+        for name in (n for n in PARTS if f"comment part {n} {TITLES[n]}\n" in header):
+            mine = (colours == trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3]).all(axis=1)
+            faces = loaded.faces[mine[loaded.faces].all(axis=1)]
+            check_solid(name, reference, loaded.vertices * 1000.0, faces, odd_poses[name], 1e-9)
+            seen.append(name)
+    assert seen == list(PARTS)
+
+
+def test_obj_has_named_coloured_objects(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
+    written = export(
+        reference, format="obj", output=tmp_path, poses=odd_poses, layout="assembly", mesh_error=MESH_ERROR
+    )
+    model, materials = written.files
+    assert (model.name, materials.name) == ("reference.obj", "reference.mtl")
+    text = model.read_text()
+    assert "# unit mm, Z up\nmtllib reference.mtl\n" in text
+    scene = trimesh.load(model, split_objects=True, group_material=False, process=False, maintain_order=True)
+    assert set(scene.geometry) == {f"{n}_{TITLES[n].replace(' ', '_')}" for n in PARTS}
+    for name in PARTS:
+        solid = scene.geometry[f"{name}_{TITLES[name].replace(' ', '_')}"]
+        check_solid(name, reference, solid.vertices, solid.faces, odd_poses[name], 1e-8)
+        colour = trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3]
+        assert f"newmtl {name}_" in materials.read_text()
+        np.testing.assert_allclose(solid.visual.material.main_color[:3], colour, atol=1)
+
+
+def read_glb(path: Path) -> tuple[dict, bytes]:
+    data = path.read_bytes()
+    magic, version, total = struct.unpack_from("<4sII", data)
+    assert (magic, version, total) == (b"glTF", 2, len(data))
+    length, kind = struct.unpack_from("<I4s", data, 12)
+    assert kind == b"JSON"
+    assert length % 4 == 0
+    tree = json.loads(data[20 : 20 + length])
+    size, kind = struct.unpack_from("<I4s", data, 20 + length)
+    assert kind == b"BIN\0"
+    return tree, data[28 + length : 28 + length + size]
+
+
+def accessor(tree: dict, buffer: bytes, index: int) -> np.ndarray:
+    entry = tree["accessors"][index]
+    view = tree["bufferViews"][entry["bufferView"]]
+    kind = {5125: "<u4", 5126: "<f4"}[entry["componentType"]]
+    width = {"SCALAR": 1, "VEC3": 3}[entry["type"]]
+    start = view.get("byteOffset", 0) + entry.get("byteOffset", 0)
+    values = np.frombuffer(buffer, kind, entry["count"] * width, start).reshape(-1, width)
+    np.testing.assert_array_equal(values.max(axis=0), np.array(entry["max"], dtype=kind))
+    return values
+
+
+def test_glb_is_metres_and_y_up_with_local_coordinates(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
+    written = export(reference, format="glb", output=tmp_path, poses=odd_poses, mesh_error=MESH_ERROR)
+    tree, buffer = read_glb(written.files[0])
+    assert tree["asset"]["version"] == "2.0"
+    assert tree["asset"]["extras"] == {"unit": "m", "mesh_error_mm": MESH_ERROR}
+    nodes = tree["nodes"]
+    (root,) = (nodes[i] for i in tree["scenes"][tree["scene"]]["nodes"])
+    assert root["name"] == "reference"
+    turn = np.array(root["matrix"]).reshape(4, 4).T
+    np.testing.assert_array_equal(turn @ [0, 0, 1, 1], [0, 1, 0, 1])  # up
+    np.testing.assert_array_equal(turn @ [1, 0, 0, 1], [1, 0, 0, 1])
+    assert np.linalg.det(turn) == 1.0
+    children = [nodes[i] for i in root["children"]]
+    assert [child["name"] for child in children] == [f"{n} {TITLES[n]}" for n in PARTS]
+    for name, child in zip(PARTS, children, strict=True):
+        T = np.array(child["matrix"]).reshape(4, 4).T
+        T[:3, 3] *= 1000.0
+        np.testing.assert_allclose(T, odd_poses[name], atol=1e-12)
+        (primitive,) = tree["meshes"][child["mesh"]]["primitives"]
+        assert primitive["mode"] == 4
+        local = accessor(tree, buffer, primitive["attributes"]["POSITION"]).astype(float) * 1000.0
+        faces = accessor(tree, buffer, primitive["indices"]).reshape(-1, 3)
+        check_solid(name, reference, local, faces, np.eye(4), 2e-5)
+        colour = tree["materials"][primitive["material"]]["pbrMetallicRoughness"]["baseColorFactor"]
+        srgb = [12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in colour[:3]]
+        assert [round(255 * c) for c in srgb] == list(trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3])
+
+
+_CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+
+
+@pytest.mark.parametrize("unit", ["mm", "in"])
+def test_3mf_xml(reference: Clamp, odd_poses: dict, tmp_path: Path, unit: str) -> None:
+    written = export(reference, format="3mf", output=tmp_path, poses=odd_poses, mesh_error=MESH_ERROR, unit=unit)
+    with zipfile.ZipFile(written.files[0]) as package:
+        assert package.testzip() is None
+        assert package.namelist()[0] == "[Content_Types].xml"
+        root = ElementTree.fromstring(package.read("3D/3dmodel.model"))
+    assert root.get("unit") == {"mm": "millimeter", "in": "inch"}[unit]
+    objects = {o.get("id"): o for o in root.iter(f"{_CORE}object")}
+    bases = root.find(f".//{_CORE}basematerials")
+    assert bases is not None
+    (item,) = root.iter(f"{_CORE}item")
+    tree = objects[item.get("objectid")]
+    assert tree.get("name") == "reference"
+    components = list(tree.iter(f"{_CORE}component"))
+    assert len(components) == 7
+    for name, component in zip(PARTS, components, strict=True):
+        leaf = objects[component.get("objectid")]
+        assert leaf.get("name") == f"{name} {TITLES[name]}"
+        assert bases[int(leaf.get("pindex", "-1"))].get("displaycolor") == PART_COLOURS[name].upper()
+        vertices = np.array([[float(v.get(k, "nan")) for k in "xyz"] for v in leaf.iter(f"{_CORE}vertex")])
+        faces = np.array([[int(t.get(k, "-1")) for k in ("v1", "v2", "v3")] for t in leaf.iter(f"{_CORE}triangle")])
+        M = np.array([float(x) for x in component.get("transform", "").split()]).reshape(4, 3)  # row vectors: v M
+        world = (np.hstack([vertices, np.ones((len(vertices), 1))]) @ M) * MM[unit]
+        check_solid(name, reference, world, faces, odd_poses[name], 1e-8)
+
+
+def test_3mf_by_lib3mf(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
+    lib3mf = pytest.importorskip("lib3mf", reason="lib3mf is not installed")
+    written = export(reference, format="3mf", output=tmp_path, poses=odd_poses, mesh_error=MESH_ERROR)
+    model = lib3mf.get_wrapper().CreateModel()
+    reader = model.QueryReader("3mf")
+    reader.SetStrictModeActive(True)
+    reader.ReadFromFile(str(written.files[0]))
+    assert reader.GetWarningCount() == 0
+    assert model.GetUnit() == lib3mf.ModelUnit.MilliMeter
+    meshes = model.GetMeshObjects()
+    names = []
+    while meshes.MoveNext():
+        item = meshes.GetCurrentMeshObject()
+        assert item.IsManifoldAndOriented()
+        names.append(item.GetName())
+        box = item.GetOutbox()
+        seen = [list(box.MinCoordinate), list(box.MaxCoordinate)]
+        np.testing.assert_allclose(seen, parts(reference)[names[-1][:2]].bounds, atol=2e-5)
+    assert names == [f"{n} {TITLES[n]}" for n in PARTS]
+    trees = model.GetComponentsObjects()
+    assert trees.MoveNext()
+    assert trees.GetCurrentComponentsObject().GetName() == "reference"
+
+
+@pytest.mark.parametrize("format", FACETED)
+def test_same_input_gives_the_same_bytes_and_the_manifest_tells_of_them(
+    reference: Clamp, odd_poses: dict, tmp_path: Path, format: str
+) -> None:
+    import hashlib
+
+    runs = [
+        export(reference, format=format, output=tmp_path / str(i), poses=odd_poses, mesh_error=MESH_ERROR, state="odd")
+        for i in range(2)
+    ]
+    for a, b in zip((*runs[0].files, runs[0].manifest), (*runs[1].files, runs[1].manifest), strict=True):
+        assert a.read_bytes() == b.read_bytes()
+    listing = json.loads(runs[0].manifest.read_text())
+    assert list(listing["files"]) == [p.name for p in runs[0].files]
+    for path in runs[0].files:
+        entry = listing["files"][path.name]
+        assert entry["bytes"] == path.stat().st_size
+        assert entry["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert listing["unit"] == ("m" if format == "glb" else "mm")
+    assert listing["up"] == ("Y" if format == "glb" else "Z")
+    assert (listing["state"], listing["mesh_error_mm"]) == ("odd", MESH_ERROR)
+    assert listing["parameters"]["saddle"]["radius"] == 49.230
+    for name in PARTS:
+        entry = listing["parts"][name]
+        assert 0.0 < entry["chord_error_mm"] <= MESH_ERROR
+        assert entry["volume_mm3"] == pytest.approx(parts(reference)[name].volume, abs=1e-6)
+        np.testing.assert_array_equal(entry["T_world_part"], odd_poses[name])
+    # The box in the manifest is the one a reader sees.
+    if format in ("stl", "ply", "glb", "3mf"):
+        loaded = trimesh.load(runs[0].files[0])
+        if len(runs[0].files) == 1:
+            boxes = np.array([listing["parts"][n]["bounds"] for n in PARTS])
+            expected = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+        else:
+            expected = np.array(listing["parts"]["P1"]["bounds"])
+        np.testing.assert_allclose(loaded.bounds, expected, atol=1e-4 if listing["unit"] == "mm" else 1e-7)
+
+
+def test_bad_settings_are_one_clear_line_and_leave_no_file(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
+    scaled = {**odd_poses, "P3": np.diag([2.0, 2.0, 2.0, 1.0])}
+    some = {name: odd_poses[name] for name in ("P1", "P2")}
+    for arguments, message in [
+        ({"format": "dxf"}, "format must be one of stl, obj, ply, glb, 3mf, step, got 'dxf'"),
+        ({"format": "glb", "unit": "mm", "poses": odd_poses}, "unit of glb must be m, as glTF 2.0 demands, got 'mm'"),
+        ({"format": "stl", "unit": "ft"}, "unit must be one of mm, cm, m, in, got 'ft'"),
+        ({"format": "stl", "layout": "zip"}, "layout must be one of parts, assembly, got 'zip'"),
+        ({"format": "stl", "mesh_error": math.nan}, "mesh_error must be a finite length"),
+        ({"format": "3mf"}, "layout 'assembly' needs poses"),
+        ({"format": "3mf", "poses": scaled}, "pose of P3 must be rigid"),
+        ({"format": "3mf", "poses": some}, "missing: P3, P4, P5, P6, P7"),
+        ({"format": "stl", "poses": {"P8": np.eye(4)}}, "unknown part 'P8'"),
+        ({"format": "stl", "names": []}, "parts must name at least one of P1"),
+    ]:
+        with pytest.raises(InputError, match="^.*" + message.replace("(", r"\(")):
+            export(reference, output=tmp_path / "none", **arguments)
+    assert not (tmp_path / "none").exists()
+
+
+def test_files_are_written_whole_or_not_at_all(reference: Clamp, tmp_path: Path) -> None:
+    (tmp_path / "P7-jumper.stl").mkdir()
+    (tmp_path / "P1-up-splint.stl").write_text("mine")
+    with pytest.raises(InputError, match=r"cannot write .*P7-jumper\.stl: it is a folder"):
+        export(reference, format="stl", output=tmp_path)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["P1-up-splint.stl", "P7-jumper.stl"]
+    assert (tmp_path / "P1-up-splint.stl").read_text() == "mine"
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"cannot write into .*file"):
+        export(reference, format="stl", output=tmp_path / "file")
+
+
+def test_any_name_of_a_clamp_gives_readable_files(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
+    odd = replace(reference, name='Überklemme <5>/"a"\nnext\x01')
+    for format in ("glb", "3mf", "obj", "ply", "stl"):
+        written = export(odd, format=format, output=tmp_path, poses=odd_poses, layout="assembly", mesh_error=0.5)
+        assert written.files[0].name == f"berklemme-5-a-next.{format}"
+        loaded = trimesh.load(written.files[0])
+        assert loaded.extents.max() > 0.1

@@ -1,0 +1,276 @@
+"""Files read back by Open CASCADE: STEP with true surfaces, names, colours and units; GLB in mm, Z up."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
+from clamp3d.clamp.features import groove_pairs
+from clamp3d.clamp.meshes import volume_bounds
+from clamp3d.clamp.parts import parts
+from clamp3d.errors import InputError
+from clamp3d.geometry.pose import inverse
+from clamp3d.output.export import export
+from clamp3d.output.palette import PART_COLOURS
+
+pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
+
+
+@dataclass
+class Product:
+    name: str
+    shape: Any  # placed
+    T: np.ndarray
+    colour: list[int] | None
+
+
+def read_step(path: Path) -> tuple[str, list[Product]]:
+    """Name of the root product and its leaves (itself, if it has none); lengths in mm whatever the file's unit."""
+    from OCP.IFSelect import IFSelect_ReturnStatus
+    from OCP.STEPCAFControl import STEPCAFControl_Reader
+
+    document = new_document()
+    reader = STEPCAFControl_Reader()
+    reader.SetNameMode(True)
+    reader.SetColorMode(True)
+    assert reader.ReadFile(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone
+    assert reader.Transfer(document)
+    return products(document)
+
+
+def new_document() -> Any:
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDocStd import TDocStd_Document
+
+    return TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
+
+
+def products(document: Any) -> tuple[str, list[Product]]:
+    from OCP.collections import Sequence_TDF_Label
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    free = Sequence_TDF_Label()
+    shapes.GetFreeShapes(free)
+    (root,) = list(free)
+    return name_of(root), list(_leaves(document, root, TopLoc_Location()))
+
+
+def _leaves(document: Any, label: Any, place: Any) -> Iterator[Product]:
+    from OCP.collections import Sequence_TDF_Label
+    from OCP.TDF import TDF_Label
+    from OCP.XCAFDoc import XCAFDoc_ShapeTool
+
+    children = Sequence_TDF_Label()
+    if XCAFDoc_ShapeTool.GetComponents_s(label, children):
+        for component in list(children):
+            referred = TDF_Label()
+            assert XCAFDoc_ShapeTool.GetReferredShape_s(component, referred)
+            yield from _leaves(document, referred, place.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(component)))
+    else:
+        M = place.Transformation()
+        T = np.vstack([[[M.Value(i, j) for j in range(1, 5)] for i in range(1, 4)], [0, 0, 0, 1]])
+        shape = XCAFDoc_ShapeTool.GetShape_s(label).Moved(place)
+        yield Product(name_of(label), shape, T, _colour(document, label))
+
+
+def name_of(label: Any) -> str:
+    from OCP.TDataStd import TDataStd_Name
+
+    attribute = TDataStd_Name()
+    assert label.FindAttribute(TDataStd_Name.GetID_s(), attribute)
+    return str(attribute.Get().ToExtString())
+
+
+def faces(shape: Any) -> Iterator[Any]:
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    explorer = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
+    while explorer.More():
+        yield TopoDS.Face(explorer.Current())
+        explorer.Next()
+
+
+def volume(shape: Any) -> float:
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties, 1e-9)
+    return float(properties.Mass())
+
+
+def bounds(shape: Any) -> np.ndarray:
+    """Tight box (2, 3) of a shape, arcs taken as arcs."""
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    low, high = box.CornerMin(), box.CornerMax()
+    return np.array([[low.X(), low.Y(), low.Z()], [high.X(), high.Y(), high.Z()]])
+
+
+def triangles(shape: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) and faces (m, 3) of a shape that has a triangulation instead of surfaces."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopLoc import TopLoc_Location
+
+    points, corners = [], []
+    for face in faces(shape):
+        place = TopLoc_Location()
+        mesh = BRep_Tool.Triangulation_s(face, place)
+        for i in range(1, mesh.NbNodes() + 1):
+            point = mesh.Node(i).Transformed(place.Transformation())
+            points.append([point.X(), point.Y(), point.Z()])
+        corners += [[mesh.Triangle(i).Value(k) - 1 for k in (1, 2, 3)] for i in range(1, mesh.NbTriangles() + 1)]
+    return np.array(points), np.array(corners)
+
+
+def _colour(document: Any, label: Any) -> list[int] | None:
+    from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
+    from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType
+
+    colour = Quantity_Color()
+    for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
+        if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
+            values = colour.Values(Quantity_TypeOfColor.Quantity_TOC_sRGB)
+            return [round(255 * value) for value in values]
+    return None
+
+
+def surfaces(shape: Any) -> list[Any]:
+    from OCP.BRep import BRep_Tool
+
+    return [BRep_Tool.Surface_s(face) for face in faces(shape)]
+
+
+@pytest.mark.parametrize("unit", ["mm", "in", "m"])
+def test_step_assembly(reference: Clamp, odd_poses: dict, tmp_path: Path, unit: str) -> None:
+    written = export(reference, format="step", output=tmp_path, poses=odd_poses, unit=unit)
+    text = written.files[0].read_text()
+    assert {"mm": "SI_UNIT(.MILLI.,.METRE.)", "in": "CONVERSION_BASED_UNIT('INCH'", "m": "SI_UNIT($,.METRE.)"}[
+        unit
+    ] in text
+    root, found = read_step(written.files[0])
+    assert root == "reference"
+    assert [product.name for product in found] == [f"{name} {TITLES[name]}" for name in PARTS]
+    for name, product in zip(PARTS, found, strict=True):
+        part = parts(reference)[name]
+        np.testing.assert_allclose(product.T, odd_poses[name], atol=1e-9)
+        assert volume(product.shape) == pytest.approx(part.volume, rel=1e-9)
+        np.testing.assert_allclose(bounds(product.shape), part.bounds_at(odd_poses[name]), atol=2e-6)
+        assert product.colour == list(trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3])
+
+
+def test_step_keeps_cylinders_as_cylinders_and_planes_as_planes(reference: Clamp, tmp_path: Path) -> None:
+    written = export(reference, format="step", output=tmp_path, layout="parts")
+    radii: dict[str, Counter[float]] = {}
+    for name, path in zip(PARTS, written.files, strict=True):
+        root, (product,) = read_step(path)
+        assert root == f"{name} {TITLES[name]}"
+        kinds = surfaces(product.shape)
+        assert {type(surface).__name__ for surface in kinds} <= {"Geom_Plane", "Geom_CylindricalSurface"}
+        radii[name] = Counter(round(s.Radius(), 9) for s in kinds if type(s).__name__ == "Geom_CylindricalSurface")
+    assert radii == {
+        "P1": {23.8012: 2, 11.0: 1},
+        "P2": {23.8012: 2, 48.0: 1},
+        "P3": {49.23: 1, 11.0: 1},
+        "P4": {10.0: 1},
+        "P5": {10.0: 1},
+        "P6": {16.335: 1},
+        "P7": {7.125: 1},
+    }
+
+
+def test_step_grooves_lie_where_the_contact_features_do(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
+    """Axis and radius of every groove as read in the world, against the feature that the contact model measures."""
+    written = export(reference, format="step", output=tmp_path, poses=odd_poses)
+    _, found = read_step(written.files[0])
+    for (a, _), pair in groove_pairs(reference).items():
+        product = found[PARTS.index(a)]
+        to_groove = inverse(odd_poses[a] @ pair.T_a_groove)
+        errors = []
+        for surface in surfaces(product.shape):
+            if type(surface).__name__ != "Geom_CylindricalSurface" or abs(surface.Radius() - pair.groove.radius) > 1e-9:
+                continue
+            axis = surface.Axis()
+            point = to_groove @ [*_xyz(axis.Location()), 1.0]
+            direction = to_groove[:3, :3] @ _xyz(axis.Direction())
+            errors.append(max(np.abs(point[:2]).max(), np.abs(direction[:2]).max()))
+        assert min(errors) < 1e-9
+
+
+def test_step_same_input_same_bytes_and_manifest(
+    reference: Clamp,
+    odd_poses: dict,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
+    runs = [export(reference, format="step", output=tmp_path / str(i), poses=odd_poses, state="odd") for i in range(3)]
+    assert len({run.files[0].read_bytes() for run in runs}) == 1
+    assert b"'1970-01-02T00:00:00'" in runs[0].files[0].read_bytes()
+    assert capfd.readouterr().out == ""  # stdout is for data
+    listing = json.loads(runs[0].manifest.read_text())
+    assert (listing["unit"], listing["mesh_error_mm"]) == ("mm", None)
+    _, found = read_step(runs[0].files[0])
+    for name, product in zip(PARTS, found, strict=True):
+        entry = listing["parts"][name]
+        assert entry["chord_error_mm"] == 0.0
+        assert entry["volume_mm3"] == pytest.approx(volume(product.shape), rel=1e-9)
+        np.testing.assert_allclose(entry["bounds"], bounds(product.shape), atol=2e-6)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "today")
+    with pytest.raises(InputError, match="SOURCE_DATE_EPOCH must be whole seconds since 1970, got 'today'"):
+        export(reference, format="step", output=tmp_path, poses=odd_poses)
+
+
+def test_glb_comes_back_in_millimetres_and_z_up(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
+    from OCP.Message import Message_ProgressRange
+    from OCP.RWGltf import RWGltf_CafReader
+    from OCP.RWMesh import RWMesh_CoordinateSystem
+    from OCP.TCollection import TCollection_AsciiString
+
+    written = export(reference, format="glb", output=tmp_path, poses=odd_poses, mesh_error=0.02)
+    document = new_document()
+    reader = RWGltf_CafReader()
+    reader.SetDocument(document)
+    reader.SetSystemLengthUnit(0.001)
+    reader.SetSystemCoordinateSystem(RWMesh_CoordinateSystem.RWMesh_CoordinateSystem_Zup)
+    assert reader.Perform(TCollection_AsciiString(str(written.files[0])), Message_ProgressRange())
+    root = reader.SingleShape()
+    while len(list(_children(root))) == 1:
+        (root,) = _children(root)
+    for name, shape in zip(PARTS, _children(root), strict=True):
+        part = parts(reference)[name]
+        solid = trimesh.Trimesh(*triangles(shape), process=False)
+        low, high = volume_bounds(part, 0.02)
+        slack = 1e-4 * solid.area  # 32-bit poses and coordinates
+        assert low - slack <= solid.volume <= high + slack
+        np.testing.assert_allclose(solid.bounds, part.bounds_at(odd_poses[name]), atol=0.02 + 1e-4)
+
+
+def _xyz(point: Any) -> list[float]:
+    return [point.X(), point.Y(), point.Z()]
+
+
+def _children(shape: Any) -> Iterator[Any]:
+    from OCP.TopoDS import TopoDS_Iterator
+
+    iterator = TopoDS_Iterator(shape)
+    while iterator.More():
+        yield iterator.Value()
+        iterator.Next()

@@ -1,0 +1,165 @@
+"""Drawings: arcs are arcs, to scale, with the right numbers; files come whole and equal."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.path import Path as Path4
+
+from clamp3d.assembly.result import Run
+from clamp3d.assembly.run import assemble
+from clamp3d.clamp.dimensions import PARTS
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.parts import parts
+from clamp3d.contact.cas import Cas
+from clamp3d.errors import InputError
+from clamp3d.geometry.pose import SectionPose
+from clamp3d.output.assembly_figures import exploded_figure, exploded_poses, steps_figure
+from clamp3d.output.figures import contact_figure, contacts_figure, save_figure, section_figure, states_figure
+from clamp3d.output.legends import table2_figure, table3_figure
+from clamp3d.output.palette import PART_COLOURS, VERDICT_COLOURS
+from clamp3d.output.section import arc_path, draw_dimensions, draw_section, edge_openings
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    return assemble(load_clamp(), Cas())
+
+
+def texts(figure: Figure) -> list[str]:
+    return [t.get_text() for ax in figure.axes for t in (*ax.texts, ax.title, ax._left_title) if t.get_text()]
+
+
+def test_curves_lie_on_their_arcs() -> None:
+    """Every point of every curve, against the circle it belongs to: 1e-8 radii."""
+    for part in parts(load_clamp()).values():
+        for body in part.bodies:
+            circles = [(arc.centre, arc.radius) for arc in body.profile.arcs]
+            for curve, code in arc_path(body.profile).iter_bezier():
+                if code == Path4.CURVE4:
+                    points = curve(np.linspace(0.0, 1.0, 21))
+                    worst = min(np.abs(np.hypot(*(points - c).T) - r).max() / r for c, r in circles)
+                    assert worst < 1e-8
+
+
+def test_outline_encloses_the_area_of_the_part() -> None:
+    for part in parts(load_clamp()).values():
+        profile = part.bodies[0].profile
+        points = np.vstack([curve(np.linspace(0.0, 1.0, 401)[:-1]) for curve, _ in arc_path(profile).iter_bezier()])
+        x, y = points.T
+        area = 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+        assert area == pytest.approx(profile.area, rel=1e-6)
+
+
+def test_drawing_is_to_scale_and_where_the_parts_are(run: Run) -> None:
+    """The wires' outlines on the canvas: round, of one scale, y down."""
+    figure = Figure(figsize=(6.0, 6.0))
+    ax = figure.add_subplot()
+    draw_section(ax, run.clamp, run.poses, only=("P6", "P7", "P4"))
+    figure.draw_without_rendering()
+    boxes = {}
+    for patch in ax.patches:
+        colour = tuple(round(255 * c) for c in patch.get_facecolor()[:3])
+        box = patch.get_path().get_extents(patch.get_transform())
+        boxes[colour] = box
+    line, jumper = (boxes[tuple(bytes.fromhex(PART_COLOURS[n][1:]))] for n in ("P6", "P7"))
+    scale = line.width / (2.0 * run.clamp.line.radius)
+    assert line.height == pytest.approx(line.width, rel=1e-6)
+    assert jumper.width == pytest.approx(scale * 2.0 * run.clamp.jumper.radius, rel=1e-6)
+    assert (jumper.x0 + jumper.x1 - line.x0 - line.x1) / 2 == pytest.approx(scale * run.poses["P7"].x, rel=1e-6)
+    assert (jumper.y0 + jumper.y1 - line.y0 - line.y1) / 2 == pytest.approx(-scale * run.poses["P7"].y, rel=1e-6)
+
+
+def test_dimensions_are_the_published_ones(run: Run) -> None:
+    assert {"31.530", "3.046", "12.00°"} <= set(texts(section_figure(run)))
+    left, right = edge_openings(run.clamp, run.poses)
+    assert left == pytest.approx(31.530, abs=5e-4)
+    assert left - right == pytest.approx(137.0 * math.sin(math.radians(12.0)), abs=1e-3)
+
+
+def test_dimensions_follow_the_poses(run: Run) -> None:
+    ax = Figure().add_subplot()
+    down = SectionPose(45.172, -10.374)
+    draw_dimensions(ax, run.clamp, {**run.poses, "P2": down})
+    expected = down.y + run.clamp.down_splint.face_depth - run.poses["P1"].y - run.clamp.up_splint.thickness
+    shown = [t.get_text() for t in ax.texts if t.get_text()]
+    assert shown == [f"{expected:.3f}", f"{expected:.3f}", "parallel"]
+
+
+def test_figures_name_what_they_show(run: Run) -> None:
+    assert set(PARTS) <= set(texts(states_figure(run)))
+    enlarged = [t for t in texts(contacts_figure(run)) if "interior contact" in t]
+    assert len(enlarged) == 5
+    assert all("gap 0.000000 mm" in t for t in enlarged)
+    for contact in run.contacts:
+        shown = texts(contact_figure(run, contact))
+        assert f"{contact.a} and {contact.b}: {contact.relation}" in "".join(shown)
+        assert "31.530" in shown
+    assert set(PARTS) <= set(texts(exploded_figure(run.clamp)))
+    steps = " ".join(texts(steps_figure(run)))
+    for name in ("P1|P2P3P4P5", "P7", "P2", "P5|P3P4"):
+        assert name in steps
+
+
+def test_exploded_parts_keep_clear_of_each_other() -> None:
+    clamp = load_clamp(line="LJ-800")
+    poses, bodies = exploded_poses(clamp), parts(clamp)
+    spans = sorted(
+        (float(poses[n].T()[2, 3] + bodies[n].bounds[0, 2]), float(poses[n].T()[2, 3] + bodies[n].bounds[1, 2]))
+        for n in ("P1", "P2", "P3", "P5", "P6")
+    )
+    for below, above in itertools.pairwise(spans):
+        assert below[1] < above[0]
+
+
+def test_legends_show_every_relation() -> None:
+    assert [ax.get_title() for ax in table2_figure().axes] == [
+        "none",
+        "one point",
+        "two points on one side",
+        "two points on different sides",
+        "overlap",
+    ]
+    row = ["inside", "outside", "intersect", "exterior contact", "interior contact"]
+    assert [ax.get_title() for ax in table3_figure().axes] == [*row, *row, "", "", "", *row[3:]]
+
+
+def test_colours_of_parts_and_verdicts_are_apart() -> None:
+    """Also for the two common kinds of colour blindness: matrices of Machado et al. 2009, severity 1."""
+    protan = np.array(
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    )
+    deutan = np.array(
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+    )
+    coloured = [PART_COLOURS[n] for n in ("P1", "P2", "P3", "P6", "P7")]
+    verdicts = [VERDICT_COLOURS[v] for v in ("clash", "contact", "clearance", "clear")]
+    for palette in (coloured, verdicts):
+        srgb = np.array([[int(c[i : i + 2], 16) / 255 for i in (1, 3, 5)] for c in palette])
+        linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+        for matrix in (np.eye(3), protan, deutan):
+            seen = linear @ matrix.T
+            apart = np.linalg.norm(seen[:, None] - seen[None], axis=2)[np.triu_indices(len(palette), 1)]
+            assert apart.min() > 0.1
+
+
+def test_files_are_whole_equal_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first, second = (save_figure(table2_figure(), tmp_path / f"{i}.svg") for i in (1, 2))
+    assert first.read_bytes() == second.read_bytes()
+    assert save_figure(table2_figure(), tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(InputError, match=r"must end in \.svg, \.png, \.pdf, got 't\.gif'"):
+        save_figure(table2_figure(), tmp_path / "t.gif")
+    with pytest.raises(InputError, match="cannot write"):
+        save_figure(table2_figure(), tmp_path / "none" / "t.png")
+    broken = table2_figure()
+    monkeypatch.setattr(broken, "savefig", lambda *a, **k: (_ for _ in ()).throw(RuntimeError("disk")))
+    before, kept = sorted(tmp_path.iterdir()), first.read_bytes()
+    with pytest.raises(RuntimeError):
+        save_figure(broken, first)
+    assert sorted(tmp_path.iterdir()) == before
+    assert first.read_bytes() == kept

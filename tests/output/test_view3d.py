@@ -1,0 +1,80 @@
+"""Hidden surfaces and lines: what is in front is what is seen, whatever the order."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import trimesh
+from matplotlib.figure import Figure
+
+from clamp3d.geometry.pose import translation
+from clamp3d.output.view3d import Camera, Solid, draw_solids
+
+FRONT = Camera(azimuth=0.0, elevation=0.0)  # looks along +Y: right is X, up is Z, near is -Y
+
+
+def scene(solids: list[Solid], camera: Camera = FRONT) -> tuple[np.ndarray, list[np.ndarray]]:
+    ax = Figure().add_subplot()
+    draw_solids(ax, solids, camera, pixels_per_mm=10.0)
+    return np.asarray(ax.images[0].get_array()), [c.get_segments() for c in ax.collections]
+
+
+def block(size: tuple[float, float, float], at: tuple[float, float, float], colour: str) -> Solid:
+    return Solid(trimesh.creation.box(size), translation(*at), colour)
+
+
+def test_axes_are_right_handed_and_face_the_viewer() -> None:
+    for azimuth, elevation in ((0.0, 0.0), (0.5, 0.4), (-1.0, 1.2)):
+        axes = Camera(azimuth, elevation).axes()
+        assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-15)
+        assert np.linalg.det(axes) == pytest.approx(1.0)
+    assert FRONT.axes() == pytest.approx(np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]))
+
+
+def test_the_nearer_block_hides_the_other_in_every_order() -> None:
+    near, far = block((4, 1, 4), (0, -5, 0), "#FF0000"), block((8, 1, 8), (0, 5, 0), "#0000FF")
+    for order in itertools.permutations((near, far)):
+        image, _ = scene(list(order))
+        h, w = image.shape[:2]
+        middle, corner = image[h // 2, w // 2], image[15, 15]
+        assert middle[0] > 0.3 > middle[2]
+        assert corner[2] > 0.3 > corner[0]
+        assert image[0, 0, 3] == 0.0  # outside of both: nothing
+
+
+def test_hidden_edges_are_not_drawn() -> None:
+    """A small block behind a large one leaves no line; in front of it, its four front edges (and those behind them)."""
+    small, large = "#FF0000", "#0000FF"
+    _, (hidden, _) = scene([block((2, 1, 2), (0, 5, 0), small), block((8, 1, 8), (0, -5, 0), large)])
+    assert hidden == []
+    _, (seen, _) = scene([block((2, 1, 2), (0, -5, 0), small), block((8, 1, 8), (0, 5, 0), large)])
+    corners = np.abs(np.concatenate(seen))
+    assert corners == pytest.approx(np.ones_like(corners), abs=0.02)
+
+
+def test_an_edge_that_goes_behind_something_ends_there() -> None:
+    """A bar passes behind a post 2 wide: its lines are 20 long, less the 2 that are hidden."""
+    bar, post = block((20, 1, 2), (0, 5, 0), "#FF0000"), block((2, 1, 20), (0, -5, 0), "#0000FF")
+    _, (lines, _) = scene([bar, post])
+    level = [s for s in lines if abs(s[0, 1] - 1.0) < 0.05 and abs(s[1, 1] - 1.0) < 0.05]
+    spans = sorted({(round(float(min(s[:, 0])), 0), round(float(max(s[:, 0])), 0)) for s in level})
+    assert spans == [(-10.0, -1.0), (1.0, 10.0)]
+
+
+def test_round_surfaces_have_no_facet_lines() -> None:
+    """A cylinder seen from the side: two ends and two outlines."""
+    pin = Solid(trimesh.creation.cylinder(radius=3.0, height=10.0, sections=64), np.eye(4), "#808080")
+    image, (lines,) = scene([pin])
+    upright = [s for s in lines if abs(s[0, 0] - s[1, 0]) < 0.05 and abs(s[0, 1] - s[1, 1]) > 5.0]
+    assert sorted(round(float(s[0, 0])) for s in upright) == [-3, 3]
+    covered = float((image[..., 3] > 0).sum()) / 100.0
+    assert covered == pytest.approx(60.0, rel=0.02)
+
+
+def test_foreshortening() -> None:
+    """Seen from 30 degrees above, a height of 10 shows as 10 cos 30."""
+    axes = Camera(azimuth=0.3, elevation=math.radians(30.0))
+    assert axes.project(np.array([[0.0, 0.0, 10.0]]))[0, 1] == pytest.approx(10.0 * math.cos(math.radians(30.0)))
