@@ -74,10 +74,10 @@ def command(
         click.echo(f"# truth: {float(truth_50_digits(cases, case))!r} mm")
         return
 
+    from clamp3d.cli.progress import bar
     from clamp3d.output.files import write_json, write_text
-    from clamp3d.output.progress import progress
 
-    with progress("families", quiet=quiet) as report:
+    with bar("families", quiet) as report:
         result = run_stress(
             families or None,
             methods or None,

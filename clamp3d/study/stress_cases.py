@@ -43,7 +43,7 @@ class Shapes:
 
     def size(self) -> Array:
         """Largest length of each (k,), mm."""
-        return np.maximum.reduce([self.R, self.L, self.r, self.length])
+        return np.asarray(np.maximum.reduce([self.R, self.L, self.r, self.length]))
 
     def groove(self, k: int) -> SweptArc:
         """Groove of row k."""
@@ -85,7 +85,7 @@ class Cases:
         apart = self.T_world_wire[:, :3, 3]
         if self.T_world_groove is not None:
             apart = apart - self.T_world_groove[:, :3, 3]
-        return np.maximum(self.shapes.size()[self.shape], np.abs(apart).max(axis=1))
+        return np.asarray(np.maximum(self.shapes.size()[self.shape], np.abs(apart).max(axis=1)))
 
     def take(self, rows: ArrayLike) -> Cases:
         """The named cases."""
@@ -198,7 +198,11 @@ def contact_on(
     zero, one = np.zeros(n, Extended), np.ones(n, Extended)
     lip = np.stack([side * R * sin, -R * cos, zero], 1)
     beside = lip + np.stack([side * R * rng.uniform(0.01, 3.0, n), zero, zero], 1)
-    below = np.stack([side * (R * sin + R * rng.uniform(0.0, 3.0, n)), -R * (cos + rng.uniform(0.0, 2.0, n)), zero], 1)
+    # Under the end face; beside a major arc, so that it is not in the hollow.
+    widest = np.where(a > np.pi / 2, R, R * sin)
+    below = np.stack(
+        [side * (widest + R * rng.uniform(0.0, 3.0, n)), -R * (cos + rng.uniform(0.0, 2.0, n)), zero], 1
+    )
     on_arc = np.stack([R * np.sin(p), -R * np.cos(p), zero], 1)
     up, out = np.stack([zero, one, zero], 1), np.stack([zero, zero, end], 1)
     inward = -on_arc / R[:, None]
@@ -209,7 +213,7 @@ def contact_on(
 
     def mix(u: NDArray[Any], v: NDArray[Any], weight: NDArray[Any]) -> NDArray[Any]:
         angle = weight * Extended(np.pi) / 2
-        return np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
+        return np.asarray(np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v)
 
     q, normal = np.zeros((n, 3), Extended), np.zeros((n, 3), Extended)
     table = {

@@ -322,7 +322,10 @@ def _vanishing(rng: np.random.Generator, n: int) -> Cases:
 def _ties(rng: np.random.Generator, n: int) -> Cases:
     shapes, shape, _ = _setting(rng, n)
     R, r = shapes.R[shape], shapes.r[shape]
-    off = lambda: R * signed_powers(rng, n, -16, -6, 0.4)  # noqa: E731
+
+    def off() -> Array:
+        return R * signed_powers(rng, n, -16, -6, 0.4)
+
     kind = rng.integers(3, size=n)
     y = np.select([kind == 0, kind == 1], [rng.uniform(-0.2, 1.5, n) * R + r, off()], rng.uniform(-1, 1, n) * R)
     z = np.where(kind == 2, rng.choice([-1, 1], n) * shapes.L[shape] / 2, 0.0)
@@ -356,7 +359,10 @@ def _crossed(rng: np.random.Generator, n: int) -> Cases:
     shapes, shape, _ = _setting(rng, n)
     R, r, H = shapes.R[shape], shapes.r[shape], shapes.L[shape] / 2
     h = -R * np.cos(shapes.half_angle[shape])
-    small = lambda: R * signed_powers(rng, n, -16, -2)  # noqa: E731
+
+    def small() -> Array:
+        return R * signed_powers(rng, n, -16, -2)
+
     over = rng.random(n) < 0.5
     y = np.where(over, h + r, rng.uniform(-2, 1, n) * R) + small()
     z = np.where(over, rng.choice([-1, 0, 1], n) * H, rng.choice([-1, 1], n) * (H + r)) + small()

@@ -82,16 +82,27 @@ class _Lowest:
 
 
 def _brackets(scene: _Scene, case: Any, t: NDArray[Any], f: NDArray[Any], best: NDArray[Any]) -> tuple[Any, Any, Any]:
-    """Stretches (case, lo, hi) around samples no higher than their neighbours that could reach below the best."""
+    """Stretches (case, lo, hi) around samples no higher than their neighbours that could reach below the best.
+
+    Samples that rounding alone tells apart are level; of a level run only the two ends are looked at.
+    """
+    grain = EXTENDED_ERROR / 16 * scene.size[case][:, None]
+    f = np.round(f / grain) * grain
     left = np.concatenate([f[:, :1], f[:, :-1]], 1)
     right = np.concatenate([f[:, 1:], f[:, -1:]], 1)
     lower, upper = np.concatenate([t[:, :1], t[:, :-1]], 1), np.concatenate([t[:, 1:], t[:, -1:]], 1)
-    i, j = np.nonzero((f <= left) & (f <= right) & (upper > lower))
+    i, j = np.nonzero((f <= left) & (f <= right) & ((f < left) | (f < right) | _first_or_last(f)) & (upper > lower))
     lo, hi, middle = lower[i, j], upper[i, j], f[i, j]
     width = np.maximum(hi - t[i, j], t[i, j] - lo)
     reach = middle - width * scene.slope(case[i], t[i, j], middle, width)
     near = reach < best[case[i]] - EXTENDED_ERROR / 64 * scene.size[case[i]]
     return case[i[near]], lo[near], hi[near]
+
+
+def _first_or_last(f: NDArray[Any]) -> NDArray[np.bool_]:
+    mask = np.zeros(f.shape, bool)
+    mask[:, [0, -1]] = True
+    return mask
 
 
 class _Scene:

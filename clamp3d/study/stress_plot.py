@@ -23,6 +23,7 @@ def plot(run: StressRun, path: Path) -> None:
     import matplotlib.pyplot as plt
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
+    from matplotlib.patches import Rectangle
 
     methods = list(dict.fromkeys(o.method for o in run.outcomes))
     families = list(dict.fromkeys(o.family for o in run.outcomes))
@@ -36,7 +37,7 @@ def plot(run: StressRun, path: Path) -> None:
             outcome = by[family, name]
             rate = outcome.failure_rate
             face = "white" if rate == 0.0 else _NONE if rate is None else colours(norm(max(rate, _LEAST)))
-            axes.add_patch(plt.Rectangle((j, i), 1, 1, facecolor=face, edgecolor="white", linewidth=1.5))
+            axes.add_patch(Rectangle((j, i), 1, 1, facecolor=face, edgecolor="white", linewidth=1.5))
             light = sum(matplotlib.colors.to_rgb(face)) / 3.0 > 0.5
             axes.text(
                 j + 0.5,

@@ -40,8 +40,8 @@ def table(run: StressRun) -> str:
             f"{beyond:>7s} {_length(o.worst_error):>9s} {_length(o.median_error):>9s} {each:8.1f}  {_trouble(o)}"
         )
     lines.append(
-        f"seed {run.seed}, {run.n} cases a family; {run.checked_50_digits} truths a family worked out again at 50 digits: "
-        f"largest difference {run.worst_truth_difference:.1g} of the scene"
+        f"seed {run.seed}, {run.n} cases a family; {run.checked_50_digits} truths a family worked out again at 50 "
+        f"digits: largest difference {run.worst_truth_difference:.1g} of the scene"
     )
     return "\n".join(lines)
 
@@ -57,8 +57,8 @@ def markdown(run: StressRun, command: str) -> str:
         "",
         "Machine: " + ", ".join(f"{k} {v}" for k, v in run.machine.items()) + ".",
         "",
-        "Share of wrong verdicts (false hits, false misses, exceptions, crashes, no answer in time) among the cases that "
-        "the method takes on:",
+        "Share of wrong verdicts (false hits, false misses, exceptions, crashes, no answer in time) among the cases "
+        "that the method takes on:",
         "",
         "| family | " + " | ".join(methods) + " |",
         "|---|" + "---|" * len(methods),

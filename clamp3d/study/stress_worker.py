@@ -77,7 +77,11 @@ def _record(answers: Answers, rows: NDArray[np.intp], found: Measured | None, wh
     answers.asked[rows] = True
     answers.seconds += seconds
     if found is not None:
-        answers.distance[rows], answers.bound[rows] = found.distance, found.bound
+        answers.distance[rows] = np.where(found.unfit, np.nan, found.distance)
+        answers.bound[rows] = found.bound
+        answers.refused[rows] = found.unfit
+        if found.unfit.any():
+            answers.note(f"refused: {found.why}")
     elif why.startswith("refused: "):
         answers.refused[rows] = True
         answers.note(why)
