@@ -82,7 +82,12 @@ def test_screw_to_a_pose_arrives_there():
 
 def test_motions_follow_one_another():
     box, rod = shapes.box((10, 10, 10)), shapes.cylinder(1, 10)
-    scene = Scene(clearance=2.0).add("box", box).add("rod", rod, translation(30, 0, 0)).add("tip", rod, translation(40, 0, 0))
+    scene = (
+        Scene(clearance=2.0)
+        .add("box", box)
+        .add("rod", rod, translation(30, 0, 0))
+        .add("tip", rod, translation(40, 0, 0))
+    )
     up = Motion.translate(("rod", "tip"), (0, 20, 0), name="up")
     over = Motion.translate(("rod", "tip"), (-60, 0, 0), name="over")
     result = check(replace(scene, motions=(up, over)))

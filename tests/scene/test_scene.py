@@ -51,7 +51,16 @@ def clamp_scene(run, **settings):
     return scene
 
 
-TOUCHING = {("P1", "P5"), ("P1", "P6"), ("P1", "P7"), ("P2", "P3"), ("P2", "P6"), ("P2", "P7"), ("P3", "P4"), ("P4", "P5")}
+TOUCHING = {
+    ("P1", "P5"),
+    ("P1", "P6"),
+    ("P1", "P7"),
+    ("P2", "P3"),
+    ("P2", "P6"),
+    ("P2", "P7"),
+    ("P3", "P4"),
+    ("P4", "P5"),
+}
 
 
 def test_closed_clamp(run):
@@ -125,7 +134,9 @@ def test_broad_phase_against_brute_force():
     T[:, :3, 3] = rng.uniform(-150, 150, (n, 3))
     boxes = Boxes.of(bounds, T)
     corners = np.array(list(itertools.product((0, 1), repeat=3)))
-    world = np.array([np.where(corners == 0, b[0], b[1]) @ P[:3, :3].T + P[:3, 3] for b, P in zip(bounds, T, strict=True)])
+    world = np.array(
+        [np.where(corners == 0, b[0], b[1]) @ P[:3, :3].T + P[:3, 3] for b, P in zip(bounds, T, strict=True)]
+    )
     low, high = world.min(axis=1), world.max(axis=1)
     near = {
         (i, j)
