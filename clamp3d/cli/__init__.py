@@ -20,6 +20,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "view": ("clamp3d.cli.view", "Show the assembly in a browser, or write it as one page."),
     "report": ("clamp3d.cli.report", "Write a report for an assembly reviewer."),
     "reproduce": ("clamp3d.cli.reproduce", "Print Tables 1-5 of the paper beside this program's values."),
+    "compare": ("clamp3d.cli.compare", "Measure every contact method: accuracy against speed."),
+    "stress": ("clamp3d.cli.stress", "Put families of hard cases to every contact method."),
     "measure-image": ("clamp3d.cli.measure_image", "Measure a distance in a photograph by marked points."),
     "fit": ("clamp3d.cli.fit", "Find round grooves, cylinders and holes in a mesh."),
     "export": ("clamp3d.cli.export", "Write the parts as files for CAD review."),

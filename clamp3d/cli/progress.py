@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -52,3 +52,20 @@ def narrator(quiet: bool) -> Iterator[Narrator]:
         return
     with console.status("") as status:
         yield Narrator(console, status)
+
+
+@contextmanager
+def bar(what: str, quiet: bool) -> Iterator[Callable[[int, int, str], None]]:
+    """A function ``report(done, of, text)`` that moves a bar labelled ``what``; silent if stderr is no terminal."""
+    import sys
+
+    if quiet or not sys.stderr.isatty():
+        yield lambda done, of, text: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("{task.fields[text]}"), console=Console(stderr=True), transient=True) as shown:
+        task = shown.add_task(what, total=None, text="")
+        yield lambda done, of, text: shown.update(task, completed=done, total=of, text=text)

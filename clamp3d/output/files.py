@@ -39,6 +39,18 @@ def whole_file(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def check_writable(path: Path) -> None:
+    """Raise InputError if a file ``path`` cannot be written: to ask before long work."""
+    if path.is_dir():
+        raise InputError(f"cannot write {path}: it is a folder")
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}") from None
+    os.close(handle)
+    os.unlink(name)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write ``text`` as UTF-8. Raises InputError if it cannot be written."""
     with whole_file(path) as temporary:
