@@ -1,8 +1,16 @@
 """Before any test: the contact kernel is compiled once, so that no test measures or prints its compilation."""
 
+import os
+
+from hypothesis import settings
+
 from clamp3d import Cylinder, SweptArc, signed_distance
 from clamp3d.geometry.pieces import groove_pieces
 from clamp3d.geometry.pose import translation
+
+# A run that decides about a change repeats the same examples; a run at the desk looks for new ones.
+settings.register_profile("ci", derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 
 def pytest_sessionstart(session):

@@ -34,7 +34,7 @@ def seats(pairs: Sequence[Contact], resolution: float) -> tuple[Seat, ...]:
     found = []
     for splint, wire in itertools.product(SPLINTS, WIRES):
         contact = by_pair[splint, wire]
-        on_arc = not contact.feature.startswith(("face", "lip", "end", "corner"))
+        on_arc = not contact.feature.startswith(("face ", "flat", "lip", "end", "corner"))
         touching = contact.distance <= resolution
         if touching and on_arc:
             detail = "seated in the groove"

@@ -9,7 +9,7 @@ from clamp3d.assembly.connections import Undeclared
 from clamp3d.clamp.dimensions import Clamp, ConnectionType, PartName
 from clamp3d.geometry.pose import Array, SectionPose
 
-Solver = Literal["exact", "stepped"]
+Solver = Literal["exact", "stepped", "bisection"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class Run:
 
     ``distance`` is the height between the splints' inner edges on the line side (Table 4) in mm, ``closing`` that of
     their origins along the bolt. ``status`` is 'clamped' or 'not clamped: ...'. ``violation`` and ``optimality`` in mm
-    prove the exact answer (None for the stepped solver). ``turns`` of the nut tighten the clamp from open.
+    prove the exact answer (None for the other solvers). ``turns`` of the nut tighten the clamp from open.
     """
 
     clamp: Clamp

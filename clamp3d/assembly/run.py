@@ -15,7 +15,7 @@ from clamp3d.assembly.result import Event, Run, Solver, Waypoint, Work
 from clamp3d.assembly.screw import ScrewJoint
 from clamp3d.assembly.section import MOUTH, SPLINTS, WIRES, D, S, Section
 from clamp3d.assembly.sequence import parse_sequence
-from clamp3d.assembly.stepped import SteppedState, solve_stepped
+from clamp3d.assembly.stepped import SteppedState, solve_bisection, solve_stepped
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
 from clamp3d.contact.model import ContactModel
 from clamp3d.geometry.pose import Array, SectionPose
@@ -24,6 +24,8 @@ STEP = 1.0 / 3.0
 """Move along the bolt of the paper's program in mm (derived from its Table 4)."""
 TILT_STEP = math.radians(1.0)
 """Turn of the paper's program in rad (derived from its Table 4)."""
+RESOLUTION = 1e-3
+"""Where bisection stops, mm."""
 
 Poses = dict[PartName, SectionPose]
 _ROOM = 20.0
@@ -54,11 +56,13 @@ def assemble(
     open_by: float = 0.0,
     open_tilt: float = 0.0,
     listen: Callable[[Waypoint], None] | None = None,
+    progress: Callable[[int, float], None] | None = None,
 ) -> Run:
     """Assemble ``clamp`` with its wires and measure its grooves by ``model``.
 
     ``open_by`` mm and ``open_tilt`` rad open the clamp further than needed before it comes in. ``step`` (mm) and
-    ``tilt_step`` (rad) are the moves of the stepped solver. ``listen`` is told every waypoint as it is reached.
+    ``tilt_step`` (rad) are the moves of the stepped solver and the first ones of bisection. ``listen`` is told every
+    waypoint as it is reached, ``progress`` the positions tried and the distance in mm while solvers try positions.
     Raises InputError for bad settings or sequence and SolverError if an answer cannot be proven.
 
     >>> from clamp3d.clamp.loader import load_clamp
@@ -77,8 +81,10 @@ def assemble(
     final: FinalState | SteppedState
     if solver == "exact":
         final = solve_final_state(section, q)
+    elif solver == "stepped":
+        final = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
     else:
-        final = solve_stepped(section, step=step, tilt_step=tilt_step)
+        final = solve_bisection(section, resolution=RESOLUTION, step=step, tilt_step=tilt_step, progress=progress)
     travel = d_open - float(final.q[D])
     _first_touch(section, q, sequence[2], log, travel)
     closed = _poses(section, final.q, saddle_d=d_open)
@@ -87,7 +93,7 @@ def assemble(
     log.stop(sequence[3], "nut tightened", poses)
     pairs = measure_pairs(section, poses, CONTACT)
     contacts = tuple(c for c in pairs if clamp.connection(c.a, c.b) != 0 or c.distance <= CONTACT)
-    resolution = CONTACT if solver == "exact" else step
+    resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
     drawn = {("P2", "P3"), ("P1", "P5"), ("P3", "P4")}  # closed by the nut, all else by the down splint
     for by_nut, by in ((False, sequence[2]), (True, sequence[3])):
         for c in contacts:
@@ -113,7 +119,9 @@ def assemble(
         undeclared=undeclared_meetings(section, log.path, log.events),
         violation=proof[0],
         optimality=proof[1],
-        work=Work(len(PARTS), len(PARTS) * (len(PARTS) - 1) // 2, section.queries.contact, motion_steps, 0),
+        work=Work(
+            len(PARTS), len(PARTS) * (len(PARTS) - 1) // 2, section.queries.contact, motion_steps, model.meshes_built
+        ),
     )
 
 

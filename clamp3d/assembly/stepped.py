@@ -1,7 +1,8 @@
-"""The stepped final state, as the paper's program finds it: fixed moves, first position without overlap counts.
+"""Final states found by trying positions: for any contact model, also one without smooth gradients.
 
-The down splint's distance along the bolt takes multiples of ``step``, its tilt multiples of ``tilt_step``; the wires
-settle freely. It closes step by step from the open state and stops where no tilt leaves the wires a free place.
+`solve_stepped` does it as the paper's program: the down splint's distance along the bolt takes multiples of ``step``,
+its tilt multiples of ``tilt_step``, the wires settle freely, and the first position without overlap counts.
+`solve_bisection` goes on from there with moves halved until they are below a resolution.
 """
 
 from __future__ import annotations
@@ -73,6 +74,42 @@ def solve_stepped(
         key=lambda p: float(section.gaps(p).value.min()),
         default=q,
     )
+    return SteppedState(q, section.gaps(q), tried)
+
+
+def solve_bisection(
+    section: Section,
+    *,
+    resolution: float,
+    step: float,
+    tilt_step: float,
+    progress: Callable[[int, float], None] | None = None,
+) -> SteppedState:
+    """Close the clamp in steps, then halve step and tilt step until the step is at most ``resolution`` mm.
+
+    Raises as `solve_stepped`, and InputError for a resolution that is not positive.
+    """
+    if not (math.isfinite(resolution) and resolution > 0.0):
+        raise InputError(f"resolution must be > 0 mm, got {resolution:g}")
+    state = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
+    q, tried = state.q, state.motion_steps
+    limit = section.clamp.down_splint.max_tilt
+    while step > resolution:
+        step, tilt_step = 0.5 * step, 0.5 * tilt_step
+        closer = True
+        while closer:
+            closer = False
+            tilt = float(q[S]) / section.lever
+            for candidate in (tilt, tilt + tilt_step, tilt - tilt_step):
+                if abs(candidate) > limit:
+                    continue
+                tried += 1
+                placed = _place(section, q, float(q[D]) - step, candidate, settle=True)
+                if placed is not None:
+                    q, closer = placed, True
+                    break
+            if closer and progress is not None:
+                progress(tried, float(q[D]))
     return SteppedState(q, section.gaps(q), tried)
 
 

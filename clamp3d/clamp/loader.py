@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import sys
 import typing
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -48,7 +49,7 @@ def load_clamp(source: str | Path = "reference", *, line: str | None = None, jum
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{origin}: not valid TOML: {error}") from None
-    clamp = _validate(data, origin)
+    clamp: Clamp = validate(Clamp, data, origin)
     if line is not None:
         clamp = replace(clamp, line=wire(line, "--line"))
     if jumper is not None:
@@ -82,21 +83,26 @@ def _read(source: str) -> tuple[str, str]:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
 
 
-def _validate(data: dict[str, typing.Any], origin: str) -> Clamp:
+def validate(kind: typing.Any, data: typing.Any, origin: str, tags: Mapping[str, type] | None = None) -> typing.Any:
+    """``data`` as ``kind`` (a pydantic model or dataclass), else InputError: one line with origin, key, value and rule.
+
+    ``tags`` maps the tags of a discriminated union, which are no keys of the file, to its members.
+    """
+    tags = tags or {}
     try:
-        return TypeAdapter(Clamp).validate_python(data)
+        return TypeAdapter(kind).validate_python(data)
     except ValidationError as failure:
         # A misspelt key is both unknown and missing; the first says what to mend.
         error = min(failure.errors(include_url=False), key=lambda e: e["type"] not in _UNKNOWN_KEY)
         others = failure.error_count() - 1
-    key = ".".join(str(part) for part in error["loc"] if part != "[key]")
+    key = ".".join(str(part) for part in error["loc"] if part != "[key]" and part not in tags)
     rule = error["msg"].replace("Input should", "must").removeprefix("Value error, ")
     if error["type"] == "value_error":  # from our own validators, which begin with the key
         line = f"{origin}: {key}.{rule}" if key else f"{origin}: {rule}"
     elif error["type"] == "missing":
         line = f"{origin}: {key} is missing"
     elif error["type"] in _UNKNOWN_KEY:
-        near = difflib.get_close_matches(str(error["loc"][-1]), _keys_at(error["loc"][:-1]), n=1)
+        near = difflib.get_close_matches(str(error["loc"][-1]), _keys_at(kind, error["loc"][:-1], tags), n=1)
         line = f"{origin}: {key} is not a known key" + (f"; did you mean {near[0]}?" if near else "")
     elif isinstance(error["input"], (str, int, float, bool)):
         line = f"{origin}: {key}: {rule}, got {error['input']!r}"
@@ -105,11 +111,16 @@ def _validate(data: dict[str, typing.Any], origin: str) -> Clamp:
     raise InputError(line + (f" (and {others} more)" if others else ""))
 
 
-def _keys_at(loc: tuple[int | str, ...]) -> list[str]:
-    """Names of the fields that a table of the clamp file may hold."""
-    kind: typing.Any = Clamp
+def _keys_at(kind: typing.Any, loc: tuple[int | str, ...], tags: Mapping[str, type]) -> list[str]:
+    """Names of the fields that a table of the file may hold."""
     for part in loc:
-        kind = typing.get_type_hints(kind).get(str(part))
-        if kind is None:
-            return []
+        if part in tags:
+            kind = tags[str(part)]
+        elif dict in (kind, typing.get_origin(kind)) or isinstance(part, int):
+            kind = next(iter(reversed(typing.get_args(kind))), None)
+        else:
+            kind = typing.get_type_hints(kind).get(str(part)) if hasattr(kind, "__annotations__") else None
+        options = [a for a in typing.get_args(kind) if a is not type(None)]
+        if type(None) in typing.get_args(kind) and len(options) == 1:
+            kind = options[0]
     return list(getattr(kind, "__dataclass_fields__", {}))

@@ -6,7 +6,7 @@ differs from the analytic part, so the volume lies within bounds that are comput
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -20,7 +20,26 @@ if TYPE_CHECKING:
 _THROUGH = 1.0  # mm by which a hole's tool stands out at both ends, so that no two faces coincide
 
 
-def mesh(part: Part, mesh_error: float = 0.01) -> trimesh.Trimesh:
+class Drawn(Protocol):
+    """What can be meshed: bodies drawn along an axis, less holes; a `Part`, or any other solid drawn like one."""
+
+    @property
+    def name(self) -> str:
+        """Name for messages and metadata."""
+        ...
+
+    @property
+    def bodies(self) -> tuple[Extrusion, ...]:
+        """Outlines drawn along an axis; they touch at most."""
+        ...
+
+    @property
+    def holes(self) -> tuple[Extrusion, ...]:
+        """Hollows, each right through."""
+        ...
+
+
+def mesh(part: Drawn, mesh_error: float = 0.01) -> trimesh.Trimesh:
     """Watertight mesh of a part in its own frame, mm, oriented outward.
 
     ``mesh_error`` is the largest distance in mm between an arc and its chord. ``mesh.metadata`` holds ``units``
@@ -47,7 +66,7 @@ def mesh(part: Part, mesh_error: float = 0.01) -> trimesh.Trimesh:
     return out
 
 
-def chord_error(part: Part, mesh_error: float) -> float:
+def chord_error(part: Drawn, mesh_error: float) -> float:
     """Largest distance in mm between an arc of the part and its chords in ``mesh(part, mesh_error)``."""
     return max(shape.profile.chord_error(mesh_error) for shape in (*part.bodies, *part.holes))
 
@@ -70,7 +89,7 @@ def volume_bounds(part: Part, mesh_error: float) -> tuple[float, float]:
     return low, high
 
 
-def _solid(part: Part, mesh_error: float) -> Any:
+def _solid(part: Drawn, mesh_error: float) -> Any:
     import manifold3d
 
     solid = _extrude(part.bodies[0], mesh_error)

@@ -17,10 +17,16 @@ from clamp3d.errors import Clamp3dError
 # Name -> (module, one line for the list of commands). A command's module is loaded when it is called.
 COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("clamp3d.cli.run", "Assemble a clamp and print where every part ends up."),
+    "view": ("clamp3d.cli.view", "Show the assembly in a browser, or write it as one page."),
+    "report": ("clamp3d.cli.report", "Write a report for an assembly reviewer."),
     "reproduce": ("clamp3d.cli.reproduce", "Print Tables 1-5 of the paper beside this program's values."),
     "compare": ("clamp3d.cli.compare", "Measure every contact method: accuracy against speed."),
+    "stress": ("clamp3d.cli.stress", "Put families of hard cases to every contact method."),
     "measure-image": ("clamp3d.cli.measure_image", "Measure a distance in a photograph by marked points."),
+    "fit": ("clamp3d.cli.fit", "Find round grooves, cylinders and holes in a mesh."),
     "export": ("clamp3d.cli.export", "Write the parts as files for CAD review."),
+    "check": ("clamp3d.cli.check", "Check which parts of a scene clash, touch or keep their clearance."),
+    "sweep": ("clamp3d.cli.sweep", "Map how far a wire may be misplaced before a clamp no longer closes on it."),
     "conductors": ("clamp3d.cli.conductors", "List the conductor catalogue."),
 }
 
@@ -59,6 +65,7 @@ def group() -> None:
     clamp3d run                             assemble the built-in reference clamp
     clamp3d run --line LJ-500 --jumper 16   other wires: by catalogue name or diameter in mm
     clamp3d run my-clamp.toml --json out.json
+    clamp3d view                            watch it in a browser
     """
 
 

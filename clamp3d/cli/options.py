@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.contact.model import ContactModel
 
-METHODS = ("cas", "chords")
+METHODS = ("cas", "chords", "wedges", "hulls", "mesh")
 
 FILE = click.Path(dir_okay=False, path_type=Path)
 
@@ -30,25 +30,139 @@ def clamp_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def method_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """``--method --unit-angle-deg``."""
+    """``--method`` and what goes with each of them; `contact_model` takes the values by name."""
     for option in (
-        click.option("--unit-angle-deg", type=float, metavar="A", help="Angle of one chord; for chords.  [default: 5]"),
+        click.option("--mesh-error", type=float, metavar="MM", help="Chord error of hulls and mesh.  [default: 0.05]"),
         click.option(
-            "--method", type=click.Choice(METHODS), default="cas", show_default=True, help="How grooves are measured."
+            "--threshold", type=float, metavar="MM", help="Concavity that CoACD may leave: hulls.  [default: 2]"
+        ),
+        click.option(
+            "--unit-angle-deg", type=float, metavar="A", help="Angle of a chord: chords, wedges.  [default: 5]"
+        ),
+        click.option(
+            "--method",
+            type=click.Choice(METHODS),
+            default="cas",
+            show_default=True,
+            help="How grooves are measured: as arcs, as chords in the section, or by FCL on convex wedges, on CoACD "
+            "hulls, on meshes.",
         ),
     ):
         function = option(function)
     return function
 
 
-def contact_model(method: str, clamp: Clamp, unit_angle_deg: float | None) -> ContactModel:
+def solver_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """``--solver --step --tilt-step-deg``."""
+    for option in (
+        click.option("--tilt-step-deg", type=float, metavar="A", help="Turn of the stepped solver.  [default: 1]"),
+        click.option(
+            "--step", type=float, metavar="MM", help="Move along the bolt of the stepped solver.  [default: 1/3]"
+        ),
+        click.option(
+            "--solver",
+            type=click.Choice(["exact", "stepped", "bisection"]),
+            help="[default: exact for cas and chords, bisection for the others; stepped if a step is given]",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def solver_settings(method: str, solver: str | None, step: float | None, tilt_step_deg: float | None) -> dict[str, Any]:
+    """Arguments of `assemble` that the options mean. Raises click.UsageError for options that do not go together."""
+    if solver == "exact" and (step is not None or tilt_step_deg is not None):
+        raise click.UsageError("--step and --tilt-step-deg go with --solver stepped, not exact")
+    if solver is None:
+        by_step = step is not None or tilt_step_deg is not None
+        solver = "stepped" if by_step else "exact" if method in ("cas", "chords") else "bisection"
+    settings: dict[str, Any] = {"solver": solver}
+    if step is not None:
+        settings["step"] = step
+    if tilt_step_deg is not None:
+        settings["tilt_step"] = math.radians(tilt_step_deg)
+    return settings
+
+
+def viewer_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """``--html --url --host --port --timeout --open --overlay --draw-error --clearance``: what a viewer needs."""
+    for option in (
+        CLEARANCE_OPTION,
+        DRAW_ERROR_OPTION,
+        click.option(
+            "--overlay",
+            "overlays",
+            multiple=True,
+            metavar="NAME[=SIZE]",
+            help="Also show what a baseline makes of the parts: wedges (unit angle in deg) or hulls (CoACD's threshold "
+            "in mm). May be given more than once.",
+        ),
+        click.option("--open", "open_browser", is_flag=True, help="Open the page in a browser."),
+        click.option(
+            "--timeout", type=click.FloatRange(min=0.0), metavar="S", help="Stop serving after S seconds (0: at once)."
+        ),
+        click.option(
+            "--port", type=click.IntRange(0, 65535), help="Port to serve on.  [default: first free from 7000]"
+        ),
+        click.option("--host", default="127.0.0.1", show_default=True, help="Address to serve on; 0.0.0.0 for all."),
+        click.option("--url", metavar="ZMQ_URL", help="Use a running meshcat server: the zmq_url that it printed."),
+        click.option("--html", "html_file", type=FILE, metavar="FILE", help="Write one page with the whole animation."),
+    ):
+        function = option(function)
+    return function
+
+
+DRAW_ERROR_OPTION = click.option(
+    "--draw-error", type=float, default=0.01, show_default=True, metavar="MM", help="Chord error of drawn facets."
+)
+CLEARANCE_OPTION = click.option(
+    "--clearance", type=float, default=5.0, show_default=True, metavar="MM", help="Gap from which parts count as clear."
+)
+
+
+def contact_model(
+    method: str,
+    clamp: Clamp,
+    *,
+    unit_angle_deg: float | None = None,
+    threshold: float | None = None,
+    mesh_error: float | None = None,
+    quiet: bool = False,
+) -> ContactModel:
     """The contact model that the options name. Raises click.UsageError for options that do not go together."""
-    if unit_angle_deg is not None and method not in ("chords",):
-        raise click.UsageError(f"--unit-angle-deg goes with --method chords, not {method}")
+    for name, value, methods in (
+        ("--unit-angle-deg", unit_angle_deg, ("chords", "wedges")),
+        ("--threshold", threshold, ("hulls",)),
+        ("--mesh-error", mesh_error, ("hulls", "mesh")),
+    ):
+        if value is not None and method not in methods:
+            raise click.UsageError(f"{name} goes with --method {' or '.join(methods)}, not {method}")
     if method == "cas":
         from clamp3d.contact.cas import Cas
 
         return Cas()
-    from clamp3d.contact.chords import Chords
+    unit_angle = math.radians(5.0 if unit_angle_deg is None else unit_angle_deg)
+    if method == "chords":
+        from clamp3d.contact.chords import Chords
 
-    return Chords(math.radians(5.0 if unit_angle_deg is None else unit_angle_deg))
+        return Chords(unit_angle)
+    from clamp3d.clamp.parts import parts
+
+    solids = parts(clamp)
+    if method == "wedges":
+        from clamp3d.contact.wedges import Wedges
+
+        return Wedges(solids, unit_angle)
+    from clamp3d.clamp.meshes import mesh
+    from clamp3d.contact.polytopes import PerPart
+
+    meshes = PerPart([*solids], lambda name: mesh(solids[name], 0.05 if mesh_error is None else mesh_error))
+    if method == "mesh":
+        from clamp3d.contact.mesh import Mesh
+
+        return Mesh(meshes)
+    from clamp3d.contact.decomposition import DecompositionParameters
+    from clamp3d.contact.hulls import Hulls
+
+    parameters = DecompositionParameters() if threshold is None else DecompositionParameters(threshold=threshold)
+    return Hulls(meshes, parameters, progress=False if quiet else None)

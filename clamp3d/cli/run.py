@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from clamp3d.cli.options import FILE, clamp_arguments, contact_model, method_options
+from clamp3d.cli.options import (
+    FILE,
+    clamp_arguments,
+    contact_model,
+    method_options,
+    solver_options,
+    solver_settings,
+    viewer_options,
+)
+from clamp3d.cli.progress import narrator
 
 if TYPE_CHECKING:
-    from clamp3d.assembly.result import Waypoint
+    from clamp3d.assembly.result import Run
 
 
 @click.command("run")
 @clamp_arguments
 @method_options
-@click.option("--solver", type=click.Choice(["exact", "stepped"]), help="[default: exact; stepped if a step is given]")
-@click.option("--step", type=float, metavar="MM", help="Move along the bolt of the stepped solver.  [default: 1/3]")
-@click.option("--tilt-step-deg", type=float, metavar="A", help="Turn of the stepped solver.  [default: 1]")
+@solver_options
 @click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the result as JSON.")
+@click.option("--view", is_flag=True, help="Show the run in a browser while it goes on; prints the page's address.")
+@viewer_options
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
 def command(
     clamp: str,
@@ -28,40 +36,43 @@ def command(
     jumper: str | None,
     method: str,
     unit_angle_deg: float | None,
+    threshold: float | None,
+    mesh_error: float | None,
     solver: str | None,
     step: float | None,
     tilt_step_deg: float | None,
     json_file: Path | None,
+    view: bool,
     quiet: bool,
+    **viewing: Any,
 ) -> None:
     """Assemble CLAMP (a built-in name or a TOML file) with its wires, and print where every part ends up.
 
     Exit code 1 if the clamp does not close on both wires, or parts meet that should not.
     """
-    if solver == "exact" and (step is not None or tilt_step_deg is not None):
-        raise click.UsageError("--step and --tilt-step-deg go with --solver stepped, not exact")
-    from clamp3d.assembly.run import STEP, TILT_STEP, assemble
+    settings = solver_settings(method, solver, step, tilt_step_deg)
+    from clamp3d.assembly.run import assemble
     from clamp3d.clamp.loader import load_clamp
     from clamp3d.output.files import write_json
     from clamp3d.output.run_report import run_to_dict, run_to_text
 
     loaded = load_clamp(clamp, line=line, jumper=jumper)
-    stepped = solver == "stepped" or step is not None or tilt_step_deg is not None
-
-    def listen(waypoint: Waypoint) -> None:
-        if not quiet:
-            click.echo(f"{waypoint.step:14s} {waypoint.label}", err=True)
-
-    result = assemble(
-        loaded,
-        contact_model(method, loaded, unit_angle_deg),
-        solver="stepped" if stepped else "exact",
-        step=STEP if step is None else step,
-        tilt_step=TILT_STEP if tilt_step_deg is None else math.radians(tilt_step_deg),
-        listen=listen,
+    model = contact_model(
+        method, loaded, unit_angle_deg=unit_angle_deg, threshold=threshold, mesh_error=mesh_error, quiet=quiet
     )
-    if json_file is not None:
-        write_json(json_file, run_to_dict(result))
-    click.echo(run_to_text(result))
+
+    def done(run: Run) -> None:
+        if json_file is not None:
+            write_json(json_file, run_to_dict(run))
+        click.echo(run_to_text(run))
+
+    if view or viewing["html_file"] is not None or viewing["url"] is not None:
+        from clamp3d.cli.viewing import run_and_view
+
+        result = run_and_view(loaded, model, settings, quiet=quiet, serve=view, done=done, **viewing)
+    else:
+        with narrator(quiet) as tell:
+            result = assemble(loaded, model, listen=tell.waypoint, progress=tell.position, **settings)
+        done(result)
     if not result.clamped or result.undeclared:
         raise click.exceptions.Exit(1)

@@ -24,6 +24,7 @@ class Cas:
 
     name = "cas"
     limits = ()
+    meshes_built = 0
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to the arc surface and the two faces beside it, for a wire that passes through; see `ContactModel`."""

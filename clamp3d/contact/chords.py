@@ -28,6 +28,7 @@ class Chords:
 
     name = "chords"
     limits = ("parallel axes only", "groove too tight by the chord error")
+    meshes_built = 0
 
     def __init__(self, unit_angle: float) -> None:
         if not 0.0 < unit_angle < math.pi:

@@ -51,9 +51,14 @@ class Hulls:
                 m.vertices, m.faces, self.parameters, name=name, time_limit=time_limit, progress=progress, cache=cache
             )
 
-        self.decompositions: Mapping[PartName, Decomposition] = PerPart([*meshes], decomposed)
+        self.decompositions: PerPart[Decomposition] = PerPart([*meshes], decomposed)
         self.parts = PerPart([*meshes], lambda name: _polytopes(name, self.decompositions[name]))
         self._wires = Wires()
+
+    @property
+    def meshes_built(self) -> int:
+        """How many parts had to be meshed so far."""
+        return self.decompositions.made
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every hull of part a; see `ContactModel`."""

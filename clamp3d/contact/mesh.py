@@ -30,11 +30,16 @@ class Mesh:
     limits = ("surface only", "no depth beyond 0.4 of the wire's radius", "groove too tight by the mesh's chord error")
 
     def __init__(self, meshes: Mapping[PartName, trimesh.Trimesh]) -> None:
-        self.parts: Mapping[PartName, Shape] = PerPart(
+        self.parts: PerPart[Shape] = PerPart(
             [*meshes], lambda name: bvh(meshes[name].vertices, meshes[name].faces, name)
         )
         self._facets = PerPart([*meshes], lambda name: facets(self.parts[name]))
         self._wires = Wires()
+
+    @property
+    def meshes_built(self) -> int:
+        """How many parts had to be meshed so far."""
+        return self.parts.made
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every flat face of part a's mesh; see `ContactModel`. They do not see a contained wire."""

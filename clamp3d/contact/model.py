@@ -38,6 +38,11 @@ class ContactModel(Protocol):
         """What the model cannot do, in words for the user: 'no depth', 'surface only', ..."""
         ...
 
+    @property
+    def meshes_built(self) -> int:
+        """How many parts had to be meshed so far."""
+        ...
+
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps of all pieces of ``pair`` with part b at ``T_a_b`` (4, 4) in part a's frame."""
         ...

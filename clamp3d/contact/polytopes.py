@@ -84,6 +84,11 @@ class PerPart(Mapping[PartName, _T]):
     def __init__(self, names: Sequence[PartName], make: Callable[[PartName], _T]) -> None:
         self._names, self._make, self._made = tuple(names), make, dict[PartName, _T]()
 
+    @property
+    def made(self) -> int:
+        """How many have been asked for so far."""
+        return len(self._made)
+
     def __getitem__(self, name: PartName) -> _T:
         if name not in self._made:
             if name not in self._names:

@@ -52,6 +52,7 @@ class Wedges:
 
     name = "wedges"
     limits = ("groove too tight by the chord error", "bolt hole filled", "depth of single wedges")
+    meshes_built = 0
 
     def __init__(self, parts: Mapping[PartName, Part], unit_angle: float) -> None:
         if not 0.0 < unit_angle < math.pi:

@@ -191,6 +191,11 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
             else:
                 d2 += end * end
                 f = beyond_end(f)
+        elif gap < 0.0 and end * end < d2:
+            # In the material by the rounding of z alone (an axis in the plane of an end face): it is on the face.
+            d2 = end * end
+            z = math.copysign(H, z)
+            f = END_FACE
         if d2 < best2:
             best2, bt, bz, feature = d2, t, z, f
 

@@ -125,7 +125,9 @@ def _enlarge(ax: Axes, run: Run, contact: Contact, number: str = "") -> None:
     """The two parts about their contact point; grooves in the section beside the bolt, where they are whole."""
     half = 0.045 * run.clamp.up_splint.width
     mark = _mark(contact)
-    draw_section(ax, run.clamp, run.poses, only=(contact.a, contact.b), holes=contact.type != 3, line_width=1.6)
+    window = (mark.x - 1.5 * half, mark.y - half), (mark.x + 1.5 * half, mark.y + half)
+    pair, holes = (contact.a, contact.b), contact.type != 3
+    draw_section(ax, run.clamp, run.poses, only=pair, holes=holes, line_width=1.6, window=window)
     draw_marks(ax, [mark], size=7.0)
     tip = {"arrowstyle": "-|>,head_width=0.2,head_length=0.5", "color": INK, "lw": 1.2, "shrinkA": 3, "shrinkB": 0}
     end = mark.x + 0.6 * half * float(contact.normal[0]), mark.y - 0.6 * half * float(contact.normal[2])

@@ -62,6 +62,17 @@ def write_json(path: Path, data: Any) -> None:
     write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
 
 
+def check_folder(folder: Path) -> None:
+    """Raise InputError if ``folder`` neither exists nor can be made, before long work is done for it."""
+    there = folder.absolute()
+    while not there.exists():
+        there = there.parent
+    if not there.is_dir():
+        raise InputError(f"cannot write into {folder}: {there} is not a folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError(f"cannot write into {folder}: no permission to write in {there}")
+
+
 def write_files(folder: Path, files: Mapping[str, bytes]) -> list[Path]:
     """Write ``files`` (name to content) into ``folder``, made if need be; none is replaced before all are on the disk.
 

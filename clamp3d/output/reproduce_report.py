@@ -38,6 +38,7 @@ def reproduction_to_dict(found: Reproduction) -> dict[str, Any]:
             }
             for row in found.table4
         ],
+        "image_trials_mm": list(found.image_trials),
         "table5": [asdict(row) for row in found.table5],
         "plateau": found.plateau,
     }
@@ -75,8 +76,15 @@ def reproduction_to_text(found: Reproduction) -> str:
         theirs, apart = (f"{d.published:.3f}", _tidy(d.distance - (d.published or 0.0))) if known else ("-", "-")
         lines.append(f"  {d.method:10s} {unit:>8s} {d.solver:>9s} {d.distance:10.3f} {theirs:>10s} {apart:>10s}")
     image = ", ".join(f"{v:.3f}" for v in published.IMAGE_DISTANCES)
-    lines += [f"  image detection, published: {image}", f"  {found.plateau}", ""]
-    lines.append("Table 5. Work counted: positions tried (M), contact queries (C), segments m of all four arcs")
+    trials = ", ".join(f"{v:.3f}" for v in found.image_trials)
+    lines += [
+        f"  image detection, published: {image}",
+        f"  image detection, found:     {trials} (marking error chosen)",
+    ]
+    lines += [f"  {found.plateau}", ""]
+    lines.append(
+        "Table 5. Work: positions tried (M), groove queries (C; each one arc or its chords), segments m of all arcs"
+    )
     lines.append(f"  {'method':10s} {'unit':>8s} {'solver':>9s} {'M':>6s} {'C':>7s} {'m':>5s}  published M, C, total")
     for w in found.table5:
         unit = "-" if w.unit_angle_deg is None else f"{w.unit_angle_deg:g} deg"

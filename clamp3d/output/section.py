@@ -84,8 +84,12 @@ def draw_section(
     only: Iterable[PartName] = PARTS,
     holes: bool = True,
     line_width: float = 0.9,
+    window: tuple[Point, Point] | None = None,
 ) -> None:
-    """Draw the parts of ``only`` at ``poses``; without ``holes`` it is the section beside the bolt."""
+    """Draw the parts of ``only`` at ``poses``; without ``holes`` it is the section beside the bolt.
+
+    ``window`` is the part of the section ((x, y) least, largest) that the axes show, if not all of it.
+    """
     shown, bodies = set(only), parts(clamp)
     ax.set_aspect("equal")
     ax.set_axis_off()
@@ -94,7 +98,7 @@ def draw_section(
         ax.invert_yaxis()
     for i, name in enumerate(_ORDER):
         if name in shown and name in poses:
-            _draw_part(ax, bodies[name], poses[name], 2 + i, holes, line_width)
+            _draw_part(ax, bodies[name], poses[name], 2 + i, holes, line_width, window)
     ax.autoscale_view()
 
 
@@ -102,7 +106,7 @@ def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
     """Names of the parts: a column of balloons on the right, each with a line to its part; wires carry theirs."""
     label_wires(ax, poses)
     points = {name: poses[name].point(*part_anchor(clamp, name)) for name in PARTS if name in poses}
-    (left, edge), (low, high) = _extent(clamp, poses)
+    (left, edge), (low, high) = section_extent(clamp, poses)
     column = edge + 0.27 * (edge - left)
     order = sorted(points, key=lambda name: points[name][1])
     heights = spread([points[name][1] for name in order], min((high - low) / len(order), 0.1 * (high - low)))
@@ -255,9 +259,18 @@ def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
     )
 
 
-def _draw_part(ax: Axes, part: Part, pose: SectionPose, z: int, holes: bool, line_width: float) -> None:
-    from matplotlib.patches import PathPatch, Rectangle
-    from matplotlib.transforms import Affine2D
+def _draw_part(
+    ax: Axes,
+    part: Part,
+    pose: SectionPose,
+    z: int,
+    holes: bool,
+    line_width: float,
+    window: tuple[Point, Point] | None,
+) -> None:
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+    from matplotlib.transforms import Affine2D, Bbox
 
     colour = PART_COLOURS[part.name]
     edge = darker(colour, 0.45)
@@ -274,10 +287,14 @@ def _draw_part(ax: Axes, part: Part, pose: SectionPose, z: int, holes: bool, lin
         if body.axis == "Y":
             for hole in part.holes if holes else ():  # its far wall, seen behind the cut
                 (u0, _), (u1, _) = hole.profile.bounds
-                wall = Rectangle((u0, -hole.end), u1 - u0, hole.length, fc=_pale(colour), transform=where, **style)
-                wall.set_clip_path(patch)
-                wall.set_clip_box(ax.bbox)
-                ax.add_patch(wall)
+                corners = [(u0, -hole.end), (u1, -hole.end), (u1, -hole.start), (u0, -hole.start), (u0, -hole.end)]
+                wall = Path(place.transform(corners), closed=True)
+                if window is not None:  # SVG clips by the part's outline or by the axes, not by both
+                    wall = wall.clip_to_bbox(Bbox(np.array(window)))
+                if np.size(wall.vertices):
+                    wall_patch = PathPatch(wall, fc=_pale(colour), transform=ax.transData, **style)
+                    wall_patch.set_clip_path(patch)
+                    ax.add_patch(wall_patch)
             outline = PathPatch(path, fc="none", transform=where, **style)
             ax.add_patch(outline)
         else:
@@ -302,7 +319,7 @@ def _pale(colour: str) -> str:
     return "#" + "".join(f"{round(255 - 0.4 * (255 - int(colour[i : i + 2], 16))):02X}" for i in (1, 3, 5))
 
 
-def _extent(clamp: Clamp, poses: Poses) -> tuple[tuple[float, float], tuple[float, float]]:
+def section_extent(clamp: Clamp, poses: Poses) -> tuple[tuple[float, float], tuple[float, float]]:
     """Least and largest x, and y, of the parts at their poses (from their bounding boxes)."""
     xs, ys = [], []
     for name, part in parts(clamp).items():

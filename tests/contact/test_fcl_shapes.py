@@ -46,7 +46,7 @@ def test_parallel_wire_and_box(x: float, y: float, r: float, length: float, turn
     wire = Wire(Cylinder(r, length))
     wire.place(move @ translation(x, y, 0.0))
     found = measure(shape, wire)
-    assert found.distance == pytest.approx(exact, abs=3e-6)
+    assert found.distance == pytest.approx(exact, abs=3e-6 + 1e-5 * abs(exact))  # FCL stops by relative progress
     assert found.distance > exact - 1e-9  # FCL errs on the far side
     assert distance(shape, wire) == pytest.approx(found.distance, abs=1e-12)
     _check_contract(shape, wire, found.normal, found.distance)
@@ -58,7 +58,7 @@ def _check_contract(shape: object, wire: Wire, normal: Array, d: float) -> None:
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-12)
     before = wire.T
     wire.place(translation(*(-d * normal)) @ before)
-    assert distance(shape, wire) == pytest.approx(0.0, abs=6e-6)  # type: ignore[arg-type]
+    assert distance(shape, wire) == pytest.approx(0.0, abs=6e-6 + 1e-5 * abs(d))  # type: ignore[arg-type]
     wire.place(before)
 
 

@@ -1,0 +1,112 @@
+"""``clamp3d stress``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from clamp3d.cli.options import FILE
+
+
+@click.command("stress")
+@click.option("--family", "families", multiple=True, metavar="NAME", help="Only this family; may be repeated.")
+@click.option("--method", "methods", multiple=True, metavar="NAME", help="Only this method; may be repeated.")
+@click.option("--list", "show_list", is_flag=True, help="List families and methods.")
+@click.option("--n", type=click.IntRange(1), default=1000, show_default=True, help="Cases per family.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the cases.")
+@click.option("--check", type=click.IntRange(0), default=20, show_default=True, help="Truths checked at 50 digits.")
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(1.0),
+    default=60.0,
+    show_default=True,
+    metavar="S",
+    help="Seconds for each other method per family.",
+)
+@click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
+@click.option(
+    "--case", type=click.IntRange(0), metavar="I", help="Print case I of the family as Python, with its truth."
+)
+@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the result as JSON.")
+@click.option("--markdown", "markdown_file", type=FILE, metavar="FILE", help="Write the result as Markdown.")
+@click.option("--plot", "plot_file", type=FILE, metavar="FILE", help="Draw the matrix (.png, .svg, .pdf).")
+@click.option("--quiet", "-q", is_flag=True, help="No progress.")
+def command(
+    families: tuple[str, ...],
+    methods: tuple[str, ...],
+    show_list: bool,
+    n: int,
+    seed: int,
+    check: int,
+    time_limit: float,
+    workers: int,
+    case: int | None,
+    json_file: Path | None,
+    markdown_file: Path | None,
+    plot_file: Path | None,
+    quiet: bool,
+) -> None:
+    """Put families of hard contact cases with known answers to every contact method, and count what goes wrong.
+
+    Exit code 1 if the project's own method, cas, has a wrong verdict or an error beyond its bound.
+    """
+    from clamp3d.errors import InputError
+    from clamp3d.study.stress import run_stress
+    from clamp3d.study.stress_families import FAMILIES, cases_of
+    from clamp3d.study.stress_methods import METHODS
+    from clamp3d.study.stress_oracle import truth_50_digits
+    from clamp3d.study.stress_report import markdown, table
+
+    if show_list:
+        for family in FAMILIES.values():
+            click.echo(f"{family.name:24s} {family.about}")
+        for name, (about, _) in METHODS.items():
+            click.echo(f"{name:24s} (method) {about}")
+        return
+    if case is not None:
+        if len(families) != 1 or families[0] not in FAMILIES:
+            raise click.UsageError("--case needs one --family; see --list")
+        if case >= n:
+            raise InputError(f"--case must be less than --n = {n}, got {case}")
+        cases = cases_of(families[0], n, seed)
+        click.echo(cases.snippet(case))
+        click.echo(f"# truth: {float(truth_50_digits(cases, case))!r} mm")
+        return
+
+    from clamp3d.cli.progress import bar
+    from clamp3d.output.files import write_json, write_text
+
+    with bar("families", quiet) as report:
+        result = run_stress(
+            families or None,
+            methods or None,
+            n=n,
+            seed=seed,
+            check=check,
+            time_limit=time_limit,
+            workers=workers,
+            progress=lambda family, done, of: report(done, of, family),
+        )
+    if json_file is not None:
+        write_json(json_file, _clean(result.to_dict()))
+    if markdown_file is not None:
+        extra = "".join(f' --family "{f}"' for f in families) + "".join(f' --method "{m}"' for m in methods)
+        write_text(markdown_file, markdown(result, f"clamp3d stress --n {n} --seed {seed} --check {check}{extra}"))
+    if plot_file is not None:
+        from clamp3d.study.stress_plot import plot
+
+        plot(result, plot_file)
+    click.echo(table(result))
+    own = [o for o in result.outcomes if o.method == "cas"]
+    if any(o.wrong or o.beyond_bound for o in own):
+        raise click.exceptions.Exit(1)
+
+
+def _clean(value: object) -> object:
+    """NaN is no JSON: null in its place."""
+    if isinstance(value, dict):
+        return {k: _clean(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_clean(v) for v in value]
+    return None if isinstance(value, float) and value != value else value

@@ -1,0 +1,89 @@
+"""``clamp3d sweep``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import click
+
+from clamp3d.cli.options import FILE, clamp_arguments
+
+PICTURES = (".png", ".svg", ".pdf")
+
+
+@click.command("sweep")
+@clamp_arguments
+@click.option("--wire", type=click.Choice(["P6", "P7"]), default="P6", show_default=True, help="Line or jumper.")
+@click.option("--offset", type=float, default=15.0, show_default=True, metavar="MM", help="Half range across the wire.")
+@click.option("--height", type=float, metavar="MM", help="Half range along the bolt.  [default: not varied]")
+@click.option("--yaw-deg", type=float, default=6.0, show_default=True, metavar="A", help="Half range about the bolt.")
+@click.option(
+    "--pitch-deg", type=float, default=3.0, show_default=True, metavar="A", help="Half range about the cross axis."
+)
+@click.option("--seat-tolerance", type=float, metavar="MM", help="Opening that still counts as closed.  [default: 0.5]")
+@click.option("--steps", type=click.IntRange(3, 1001), default=121, show_default=True, help="Grid points per freedom.")
+@click.option(
+    "--random", "count", type=click.IntRange(1, 10_000_000), metavar="N", help="Also try N random misplacements."
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random ones.")
+@click.option("--map", "map_file", type=FILE, metavar="FILE", help="Draw the map (PNG, SVG or PDF).")
+@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all points as JSON.")
+def command(
+    clamp: str,
+    line: str | None,
+    jumper: str | None,
+    wire: str,
+    offset: float,
+    height: float | None,
+    yaw_deg: float,
+    pitch_deg: float,
+    seat_tolerance: float | None,
+    steps: int,
+    count: int | None,
+    seed: int,
+    map_file: Path | None,
+    json_file: Path | None,
+) -> None:
+    """How far a wire may be misplaced before CLAMP no longer closes on it: the pose tolerance that a robot needs.
+
+    The wire is held where it is while the splints close along the bolt. Closes: both touch it in their grooves with
+    little opening. Touches wrongly: on a lip, or too far open. Cannot seat: on a face beside the groove.
+    """
+    from clamp3d.clamp.loader import load_clamp
+    from clamp3d.errors import InputError
+    from clamp3d.output.files import write_json
+    from clamp3d.output.sweep_report import draw_map, grid, planes, sweep_to_dict, sweep_to_text
+    from clamp3d.study.misalign import FREEDOMS, SEAT_TOLERANCE, Freedom, WireClosing
+
+    given = {"offset": offset, "height": height, "yaw": _angle(yaw_deg), "pitch": _angle(pitch_deg)}
+    ranges: dict[Freedom, float] = {f: value for f in FREEDOMS if (value := given[f]) is not None and value != 0.0}
+    for name, value in ranges.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(f"{name}: half range must be > 0 (or 0: not varied), got {value:g}")
+        if name in ("yaw", "pitch") and value >= math.pi / 2:
+            raise InputError(f"{name}: half range must be < 90 deg, got {math.degrees(value):g}")
+    if not ranges:
+        raise InputError("nothing to vary: give --offset, --height, --yaw-deg or --pitch-deg")
+    if map_file is not None and map_file.suffix.lower() not in PICTURES:
+        raise InputError(f"{map_file}: the map's name must end in one of {', '.join(PICTURES)}")
+    if map_file is not None and len(ranges) < 2:
+        raise InputError("a map needs two freedoms with a range")
+    closing = WireClosing(
+        load_clamp(clamp, line=line, jumper=jumper),
+        "P6" if wire == "P6" else "P7",
+        seat_tolerance=SEAT_TOLERANCE if seat_tolerance is None else seat_tolerance,
+    )
+    tolerances = closing.tolerances(ranges, seed=seed)
+    cloud = closing.cloud(ranges, count, seed=seed) if count is not None else None
+    wanted = planes(ranges) if map_file is not None or json_file is not None else []
+    grids = {(x, y): grid(closing, x, y, ranges, steps) for x, y in wanted}
+    if json_file is not None:
+        write_json(json_file, sweep_to_dict(closing, tolerances, grids, cloud))
+    if map_file is not None:
+        draw_map(map_file, closing, tolerances, grids, ranges)
+    click.echo(sweep_to_text(closing, tolerances, cloud))
+
+
+def _angle(degrees: float) -> float:
+    return math.radians(degrees)

@@ -1,0 +1,183 @@
+"""Least-squares cylinder through points, with the covariance of radius and axis.
+
+Distances are geometric (orthogonal), so the answer does not depend on where the part lies. The unknowns follow
+Lukacs, Martin and Marshall (Faithful least-squares fitting of spheres, cylinders, cones and tori, ECCV 1998): the
+offset of the *surface* from the points' centroid and the curvature 1/R, in place of the distant centre and R. So a
+shallow arc, whose centre is hardly known, stays a well scaled problem, and a plane is the harmless limit 1/R = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.optimize import least_squares
+
+Array = NDArray[np.float64]
+
+CONFIDENCE = 0.9973
+"""Probability of the covariance part of every error bound: three standard deviations of a normal distribution."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Axis:
+    """A cylinder without ends: ``point`` (3,) on the axis, unit ``direction`` (3,), ``radius`` in mm."""
+
+    point: Array
+    direction: Array
+    radius: float
+
+    def radial(self, points: Array) -> tuple[Array, Array]:
+        """Unit vectors (n, 3) from the axis to ``points`` (n, 3), and distances (n,) from the axis in mm."""
+        q = points - self.point
+        q = q - np.outer(q @ self.direction, self.direction)
+        r = np.sqrt(np.einsum("ij,ij->i", q, q))
+        return q / np.maximum(r, 1e-300)[:, None], r
+
+    def residual(self, points: Array) -> Array:
+        """Distance (n,) of ``points`` (n, 3) from the surface in mm, positive outside the radius."""
+        return self.radial(points)[1] - self.radius
+
+
+def perpendicular(direction: Array) -> tuple[Array, Array]:
+    """Two unit vectors (3,) that make a right-handed frame with ``direction``."""
+    helper = np.zeros(3)
+    helper[int(np.argmin(np.abs(direction)))] = 1.0
+    u = np.cross(helper, direction)
+    u /= np.linalg.norm(u)
+    return u, np.cross(direction, u)
+
+
+def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -> Axis | None:
+    """Least-squares cylinder through ``points`` (n, 3), n >= 5, from ``start``; None if it is a plane or diverges.
+
+    ``robust_scale`` (mm) switches on the Cauchy loss with that scale, so that few stray points do not pull.
+
+    >>> t = np.linspace(-0.5, 0.5, 9)
+    >>> ring = np.stack([7 * np.sin(t), -7 * np.cos(t), 0 * t], axis=1)
+    >>> points = np.concatenate([ring, ring + [0.0, 0.0, 30.0]])
+    >>> start = Axis(np.array([0.2, 0.3, 0.0]), np.array([0.0, 0.0, 1.0]), 7.5)
+    >>> round(fit_axis(points, start).radius, 9)
+    7.0
+    """
+    if len(points) < 5:
+        return None
+    centroid = points.mean(axis=0)
+    w = start.direction
+    inward = start.point - centroid
+    inward = inward - (inward @ w) * w
+    size = float(np.abs(points - centroid).max())
+    reach = float(np.linalg.norm(inward))
+    # On a full turn the centroid lies on the axis and any direction serves.
+    e = inward / reach if reach > 1e-6 * size else perpendicular(w)[0]
+    f = np.cross(w, e)
+    local = (points - centroid) @ np.stack([e, f, w], axis=1)
+    k0 = 1.0 / start.radius
+    scale = np.array([1.0, 1.0, 1.0 / size, 1.0 / size, 1.0 / size**2])
+
+    def parts(x: Array) -> tuple[Array, Array, Array, float, float]:
+        h, g, a, b, k = x * scale
+        radius = 1.0 / k if abs(k) > 1e-12 / size else 1e12 * size
+        n = np.sqrt(1.0 + a * a + b * b)
+        d = np.array([a, b, 1.0]) / n
+        p = local - np.array([h + radius, g, 0.0])
+        t = p @ d
+        q = p - t[:, None] * d
+        return q, t, np.sqrt(np.einsum("ij,ij->i", q, q)), radius, float(n)
+
+    def residual(x: Array) -> Array:
+        _, _, r, radius, _ = parts(x)
+        return np.asarray(r - abs(radius))
+
+    def jacobian(x: Array) -> Array:
+        q, t, r, radius, n = parts(x)
+        u = q / np.maximum(r, 1e-300)[:, None]
+        J = np.empty((len(local), 5))
+        J[:, 0] = -u[:, 0]
+        J[:, 1] = -u[:, 1]
+        J[:, 2] = -t * u[:, 0] / n
+        J[:, 3] = -t * u[:, 1] / n
+        # The centre moves away as the radius grows: 1 + u.e is 1 - cos(angle from the arc's middle), tiny on an arc.
+        J[:, 4] = radius * radius * (np.sign(radius) + u[:, 0])
+        return np.asarray(J * scale)
+
+    x0 = np.array([reach - start.radius, 0.0, 0.0, 0.0, k0]) / scale
+    tiny = 1e-13
+    try:
+        if robust_scale is None:
+            got = least_squares(residual, x0, jacobian, method="lm", xtol=tiny, ftol=tiny, gtol=tiny, max_nfev=60)
+        else:
+            got = least_squares(residual, x0, jacobian, method="trf", loss="cauchy", f_scale=robust_scale, max_nfev=25)
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+    h, g, a, b, k = got.x * scale
+    if not np.isfinite(got.x).all() or k * size < 1e-3:
+        return None
+    radius = 1.0 / k
+    d = np.array([a, b, 1.0]) / np.sqrt(1.0 + a * a + b * b)
+    to_world = np.stack([e, f, w])
+    c = np.array([h + radius, g, 0.0])
+    c = c - (c @ d) * d
+    return Axis(point=centroid + c @ to_world, direction=d @ to_world, radius=float(radius))
+
+
+def circle(points: Array) -> tuple[Array, float] | None:
+    """Centre (2,) and radius of the algebraic (Kasa) circle through ``points`` (n, 2), n >= 3; None if on a line."""
+    m = points.mean(axis=0)
+    p = points - m
+    A = np.column_stack([2.0 * p, np.ones(len(p))])
+    sol, _, rank, _ = np.linalg.lstsq(A, np.einsum("ij,ij->i", p, p), rcond=1e-9)
+    if rank < 3:
+        return None
+    return m + sol[:2], float(np.sqrt(max(sol[2] + sol[0] ** 2 + sol[1] ** 2, 0.0)))
+
+
+def covariance(local: Array, radius: float, noise: float) -> Array | None:
+    """Covariance (5, 5) of (radius, x, y, tilt_x, tilt_y) for points ``local`` (n, 3) in the cylinder's own frame.
+
+    The axis is (x + z tilt_x, y + z tilt_y, z); lengths in mm, tilts in rad. ``noise`` is the standard deviation of a
+    point's distance from the surface. None if the points leave a parameter open (all in one ring, or on one line).
+    """
+    u = local[:, :2] / np.maximum(np.hypot(local[:, 0], local[:, 1]), 1e-300)[:, None]
+    z = local[:, 2:]
+    size = float(np.abs(local).max())
+    J = np.column_stack([np.ones(len(u)), u, z * u / size])
+    values, vectors = np.linalg.eigh(J.T @ J)
+    if values[0] < 1e-10 * values[-1]:
+        return None
+    C: Array = (vectors / values) @ vectors.T * noise**2
+    unscale = np.array([1.0, 1.0, 1.0, 1.0 / size, 1.0 / size])
+    return C * np.outer(unscale, unscale)
+
+
+def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> float:
+    """Largest distance (mm) between fitted and true surface over the arc, from the covariance ``C`` alone.
+
+    Holds for the whole arc and length at once with probability ``CONFIDENCE`` (Scheffe's simultaneous band with five
+    parameters and ``freedom`` degrees of freedom); the arc is centred on -y.
+    """
+    a = np.linspace(-half_angle, half_angle, 49)
+    u = np.stack([np.sin(a), -np.cos(a)], axis=1)
+    worst = 0.0
+    for z in (-0.5 * length, 0.0, 0.5 * length):
+        g = np.column_stack([np.ones(len(u)), u, z * u])
+        worst = max(worst, float(np.einsum("ij,jk,ik->i", g, C, g).max()))
+    return float(np.sqrt(5.0 * stats.f.ppf(CONFIDENCE, 5, max(freedom, 1)) * worst))
+
+
+def patches_of(local: Array) -> list[NDArray[np.intp]]:
+    """Points ``local`` (n, 3) of a cylinder's own frame in patches of 25 to 49, by halving along the longer side."""
+    angle = np.arctan2(local[:, 0], -local[:, 1])
+    flat = np.column_stack([angle * np.hypot(local[:, 0], local[:, 1]).mean(), local[:, 2]])
+    todo, done = [np.arange(len(local))], []
+    while todo:
+        index = todo.pop()
+        if len(index) < 50:
+            done.append(index)
+            continue
+        part = flat[index]
+        order = np.argsort(part[:, int(np.argmax(np.ptp(part, axis=0)))], kind="stable")
+        todo += [index[order[: len(index) // 2]], index[order[len(index) // 2 :]]]
+    return done

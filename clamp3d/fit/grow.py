@@ -1,0 +1,189 @@
+"""One cylinder's triangles: growing from a seed, refitting, and judging the outcome."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
+from clamp3d.fit.surface import MAX_FACET, Surface, facet_span, sagitta
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+MIN_LINES = 4
+"""Fewest lines on a surface: three always lie on some circle (a trapezoid or V groove is not an arc)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Region:
+    """Triangles of one cylinder: ``sign`` +1 convex, -1 concave; ``points`` index the vertices that the fit uses.
+
+    ``tolerance`` (mm): farthest that a vertex may lie off; ``span`` (rad): the widest facet. ``strips``: found as an
+    exact tessellation, whose border is the surface's own; otherwise the triangles across the border are missing.
+    """
+
+    axis: Axis
+    sign: int
+    faces: IntArray
+    points: IntArray
+    tolerance: float
+    span: float
+    strips: bool
+
+
+def grow(
+    surface: Surface,
+    free: BoolArray,
+    cells: IntArray,
+    axis: Axis,
+    sign: int,
+    seed: IntArray,
+    tolerance: float,
+    floor: float,
+    *,
+    strips: bool,
+) -> Region | None:
+    """Grow from ``seed`` faces, refit, and repeat until the faces no longer change."""
+    # Voxel and remeshed surfaces put their vertices off by a good part of the facets' sagitta.
+    share = 0.0 if strips else 0.3
+    V, F = surface.V, surface.F
+    faces = seed
+    points = np.unique(F[seed])
+    span = float(facet_span(surface, axis, seed, cells).max())
+    for _ in range(12):
+        if not 0.0 < axis.radius < 20.0 * surface.extent or span > MAX_FACET:
+            return None
+        off = axis.residual(V)
+        depth = sagitta(axis.radius, span)
+        tolerance = max(tolerance, share * depth)
+        near = (off <= tolerance) & (off >= -1.02 * depth - tolerance)
+        lean = np.einsum("ij,ij->i", surface.normals[faces], axis.radial(surface.centres[faces])[0])
+        slack = float(np.quantile(np.arccos(np.clip(sign * lean, -1.0, 1.0)), 0.9))
+        limit = np.cos(min(max(0.6 * span, 2.5 * slack, 0.02), 0.7))
+        mask: BoolArray = free & np.asarray(near[F].all(axis=1))
+        index = np.flatnonzero(mask)
+        radial = axis.radial(surface.centres[index])[0]
+        mask[index] = sign * np.einsum("ij,ij->i", surface.normals[index], radial) >= limit
+        if not mask[faces].any():
+            return None
+        label = surface.labels(np.asarray(mask[surface.pairs].all(axis=1)))
+        inside = faces[mask[faces]]
+        names, where = np.unique(label[inside], return_inverse=True)
+        main = names[np.argmax(np.bincount(where, weights=surface.areas[inside]))]
+        grown = np.flatnonzero(mask & (label == main))
+        settled = len(grown) == len(faces) and bool((grown == faces).all())
+        faces = grown
+        points = _support(surface, faces, np.abs(off) <= tolerance)
+        if len(points) < 6:
+            return None
+        better = fit_axis(V[points], axis)
+        if better is None:
+            return None
+        axis = better
+        tolerance = max(floor, _tolerance(axis.residual(V[points])))
+        span = float(facet_span(surface, axis, faces, cells).max())
+        if settled:
+            break
+    corners = np.unique(F[faces])
+    if len(points) < len(corners) <= min(60, 1.25 * len(points)):
+        # Scatter can look like points on chords: if all points make one consistent surface, none was.
+        whole = fit_axis(V[corners], axis)
+        if whole is not None:
+            res = whole.residual(V[corners])
+            wider = max(floor, _tolerance(res))
+            if wider <= 3.0 * tolerance and float(np.abs(res).max()) <= wider:
+                axis, points, tolerance = whole, corners, wider
+    return Region(axis, sign, faces, points, tolerance, span, strips)
+
+
+def _tolerance(residual: Array) -> float:
+    """Distance that a vertex with the scatter of ``residual`` (n,) exceeds as rarely as four normal deviations.
+
+    The scatter is the median one, so a few strays do not widen it; five fitted parameters and few points do.
+    """
+    n = len(residual)
+    freedom = max(n - 5, 1)
+    scatter = 1.4826 * float(np.median(np.abs(residual)))
+    if n < 60:  # the median of few is too rough
+        scatter = max(scatter, float(np.sqrt(np.mean(residual**2))))
+    scatter *= np.sqrt(n / freedom)
+    return float(scatter * stats.t.isf(3.2e-5, min(freedom, 1000)))
+
+
+def _support(surface: Surface, faces: IntArray, on: BoolArray) -> IntArray:
+    """Vertices (k,) of ``faces`` that the fit may use: those ``on`` the surface, which leaves out points on chords.
+
+    On a dense mesh only those with all their faces in the region: the border is chosen by the fit itself.
+    """
+    inside = np.bincount(surface.F[faces].reshape(-1), minlength=len(surface.V))
+    keep = np.flatnonzero((inside > 0) & on)
+    inner = keep[inside[keep] == surface.valence[keep]]
+    return np.asarray(inner if len(inner) >= max(50, 0.6 * len(keep)) else keep)
+
+
+def accept(surface: Surface, cells: IntArray, region: Region) -> bool:
+    """True if the region is long, round and distinct enough to be a cylinder rather than an accident."""
+    V, F = surface.V, surface.F
+    axis = region.axis
+    u, w = perpendicular(axis.direction)
+    p = V[region.points] - axis.point
+    angle = np.sort(np.arctan2(p @ w, p @ u))
+    gaps = np.diff(angle, append=angle[0] + 2.0 * np.pi)
+    arc = 2.0 * np.pi - float(gaps.max())
+    noise = max(region.tolerance / 4.0, 1e-12)
+    lines = int((gaps > 1e-3 * max(arc, 1e-9)).sum())
+    spans = facet_span(surface, axis, region.faces, cells)
+    if lines < MIN_LINES:
+        return False
+    # Every trapezoid with equal flanks lies on a circle: with three facets ask for three equal ones.
+    if lines == MIN_LINES and (spans.max() > 1.02 * spans.min() or spans.max() > np.radians(30.0)):
+        return False
+    if 2.0 * axis.radius * np.sin(0.25 * arc) ** 2 < 6.0 * noise or arc < 2.0 * float(np.median(spans)):
+        return False
+    z = (V[np.unique(F[region.faces])] - axis.point) @ axis.direction
+    length = float(np.ptp(z))
+    if _runs_on(surface, region, length):
+        return False
+    p = p @ np.stack([u, w, axis.direction], axis=1)
+    if _bent(p, axis.residual(V[region.points]), axis.radius):
+        return False
+    return len(region.points) >= 8 and length > 0.0
+
+
+def _bent(local: Array, residual: Array, radius: float) -> bool:
+    """True if a loose fit (over 1 % of the radius) is loose because the shape is bent, oval or a barrel.
+
+    Points ``local`` (n, 3) in the cylinder's own frame. Scatter leaves nothing for a smooth second-order correction to
+    explain; another shape lets it explain more than half.
+    """
+    power = float(residual @ residual)
+    if np.sqrt(power / len(residual)) <= 0.01 * radius or len(residual) < 12:
+        return False
+    r = np.hypot(local[:, 0], local[:, 1])
+    x, y, z = local[:, 0] / r, local[:, 1] / r, local[:, 2] - local[:, 2].mean()
+    A = np.column_stack([np.ones_like(x), x, y, z, z * x, z * y, z * z, z * z * x, z * z * y, x * y, x * x])
+    left = residual - A @ np.linalg.lstsq(A, residual, rcond=1e-9)[0]
+    return float(left @ left) / power < 0.5 - 5.0 / len(residual)
+
+
+def _runs_on(surface: Surface, region: Region, length: float) -> bool:
+    """True if the surface goes on smoothly past both round ends with bands as long: a ring of a sphere or torus."""
+    inside = np.zeros(len(surface.F), dtype=bool)
+    inside[region.faces] = True
+    first, second = inside[surface.pairs].T
+    border = first != second
+    ends = surface.V[surface.edges[border]] @ region.axis.direction
+    run = np.linalg.norm(np.diff(surface.V[surface.edges[border]], axis=1)[:, 0], axis=1)
+    across = np.abs(ends[:, 1] - ends[:, 0]) < 0.5 * run
+    z = ends.mean(axis=1)
+    z = z - 0.5 * (z.min() + z.max()) if len(z) else z
+    smooth = surface.bend[border] < 1.5 * region.span
+    outside = np.where(first, surface.pairs[:, 1], surface.pairs[:, 0])[border]
+    band = np.ptp(surface.V[surface.F[outside]] @ region.axis.direction, axis=1)
+    both = [across & (z > 0.0), across & (z < 0.0)]
+    return all(bool(e.any() and smooth[e].mean() > 0.7 and np.median(band[e]) > 0.3 * length) for e in both)

@@ -1,0 +1,232 @@
+"""Where a scene goes: a web server of our own in a thread, or a meshcat server that is already running.
+
+Our own server speaks meshcat's protocol to its viewer (three.js, from the meshcat package) and lives in a thread of
+this process: it ends with it, however that ends, and nothing is left behind. It listens on this machine only unless
+asked otherwise.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import importlib.util
+import threading
+import weakref
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from clamp3d.errors import Clamp3dError, InputError, MissingLibraryError
+from clamp3d.output.viewer_log import Command, CommandLog
+
+if TYPE_CHECKING:
+    import tornado.web
+
+PORT = 7000
+"""First port tried, meshcat's own; the next free one is taken unless the user named it."""
+_PORTS = 200
+_PATIENCE = 10.0  # s for a server that is said to be running
+_FAREWELL = 0.5  # s for the pages when we close
+
+
+def viewer_files() -> Path:
+    """Folder with meshcat's built viewer. Raises MissingLibraryError if meshcat is not installed."""
+    spec = importlib.util.find_spec("meshcat")
+    if spec is None or not spec.submodule_search_locations:
+        raise MissingLibraryError("the viewer needs meshcat: pip install meshcat")
+    return Path(spec.submodule_search_locations[0]) / "viewer" / "dist"
+
+
+class LocalServer:
+    """A page with the scene at ``url``, for any number of browsers, now or later. Use as a context, or `close`.
+
+    Raises InputError if a ``port`` that was asked for, or every port from 7000 on, is taken, or ``host`` is not ours.
+    """
+
+    def __init__(self, *, host: str = "127.0.0.1", port: int | None = None) -> None:
+        self._log = CommandLog()
+        self._clients: set[Any] = set()
+        self._streams: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._loop = asyncio.new_event_loop()
+        try:
+            self._server, self.port = self._listen(host, port)
+        except BaseException:
+            self._loop.close()
+            raise
+        self.host = host
+        self._thread = threading.Thread(target=self._run, name="clamp3d viewer", daemon=True)
+        self._thread.start()
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return f"http://{self.host}:{self.port}/"
+
+    def send(self, command: Command) -> None:
+        """Pass a command to every page that is open and keep it for those to come; never waits for a browser."""
+        self._loop.call_soon_threadsafe(self._publish, command)
+
+    def close(self) -> None:
+        """Stop listening, drop the pages, end the thread. A second call does nothing."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join(timeout=10.0)
+
+    def __enter__(self) -> LocalServer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _publish(self, command: Command) -> None:
+        message = self._log.add(command)
+        for client in list(self._clients):
+            client.push(message)
+
+    async def _all_gone(self) -> None:
+        while self._clients:
+            await asyncio.sleep(0.01)
+
+    def _listen(self, host: str, port: int | None) -> tuple[Any, int]:
+        import tornado.httpserver
+        import tornado.netutil
+
+        streams = self._streams
+
+        class Server(tornado.httpserver.HTTPServer):
+            def handle_stream(self, stream: Any, address: tuple[Any, ...]) -> None:
+                streams.add(stream)
+                super().handle_stream(stream, address)
+
+        ports = range(PORT, PORT + _PORTS) if port is None else (port,)
+        for candidate in ports:
+            try:
+                sockets = tornado.netutil.bind_sockets(candidate, address=host)
+            except (OSError, OverflowError) as error:
+                failed = error
+                continue
+            asyncio.set_event_loop(self._loop)
+            try:
+                server = Server(self._application())
+                server.add_sockets(sockets)
+            finally:
+                asyncio.set_event_loop(None)
+            return server, sockets[0].getsockname()[1]
+        if port is None:
+            raise InputError(f"no free port for the viewer on {host} from {PORT} to {PORT + _PORTS - 1}: {failed}")
+        raise InputError(
+            f"cannot serve the viewer on {host} port {port}: {failed}; leave --port out to take a free one"
+        )
+
+    def _application(self) -> tornado.web.Application:
+        import tornado.web
+        import tornado.websocket
+
+        from clamp3d.output.viewer_page import live_page
+
+        owner, page = self, live_page()
+
+        class Scene(tornado.websocket.WebSocketHandler):
+            def open(self, *_: str) -> None:
+                owner._clients.add(self)
+                for message in owner._log.messages():
+                    self.push(message)
+
+            def push(self, message: bytes) -> None:
+                with contextlib.suppress(tornado.websocket.WebSocketClosedError):
+                    self.write_message(message, binary=True)
+
+            def on_message(self, message: str | bytes) -> None:
+                pass  # the viewer only answers requests for pictures, and we make none
+
+            def on_close(self) -> None:
+                owner._clients.discard(self)
+
+        class Page(tornado.web.RequestHandler):
+            def get(self) -> None:
+                self.set_header("Cache-Control", "no-store")
+                self.finish(page)
+
+        return tornado.web.Application(
+            [
+                ("/scene", Scene),
+                ("/(main.min.js)", tornado.web.StaticFileHandler, {"path": str(viewer_files())}),
+                ("/(?:index.html)?", Page),
+            ],
+            log_function=lambda _: None,
+        )
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_forever()
+        finally:
+            self._server.stop()
+            for client in list(self._clients):
+                client.close()
+            # A page answers the closing of its socket, or not: it gets a moment, and then its connection is dropped.
+            with contextlib.suppress(asyncio.TimeoutError):
+                self._loop.run_until_complete(asyncio.wait_for(self._all_gone(), _FAREWELL))
+            for stream in self._streams:
+                stream.close()
+            self._loop.run_until_complete(asyncio.sleep(0))
+            pending = asyncio.all_tasks(self._loop)
+            for task in pending:
+                task.cancel()
+            self._loop.run_until_complete(asyncio.gather(*pending, return_exceptions=True))
+            self._loop.close()
+
+
+class RemoteServer:
+    """A meshcat server that somebody else runs; ``zmq_url`` is what ``meshcat-server`` prints, tcp://HOST:PORT.
+
+    It keeps the scene when we leave. Raises InputError if the address is not one, or nobody answers there.
+    """
+
+    def __init__(self, zmq_url: str) -> None:
+        import zmq
+
+        if not zmq_url.startswith(("tcp://", "ipc://")):
+            raise InputError(f"--url must be the zmq_url that meshcat-server prints (tcp://HOST:PORT), got {zmq_url!r}")
+        self.zmq_url = zmq_url
+        self._context = zmq.Context()
+        self._socket = self._context.socket(zmq.REQ)
+        self._socket.setsockopt(zmq.LINGER, 0)
+        self._socket.setsockopt(zmq.RCVTIMEO, int(1000 * _PATIENCE))
+        self._socket.setsockopt(zmq.SNDTIMEO, int(1000 * _PATIENCE))
+        try:
+            self._socket.connect(zmq_url)
+            self.url = self._ask(b"url").decode("utf-8", "replace")
+        except zmq.ZMQError as error:
+            self.close()
+            raise InputError(f"--url {zmq_url}: {error}") from None
+        except BaseException:
+            self.close()
+            raise
+
+    def send(self, command: Command) -> None:
+        """Pass a command on. Raises Clamp3dError if the server has gone."""
+        import umsgpack
+
+        self._ask(command["type"].encode(), command["path"].encode(), umsgpack.packb(command))
+
+    def close(self) -> None:
+        """Leave the server to itself. A second call does nothing."""
+        self._context.destroy(linger=0)
+
+    def __enter__(self) -> RemoteServer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _ask(self, *frames: bytes) -> bytes:
+        import zmq
+
+        try:
+            self._socket.send_multipart(frames)
+            answer: bytes = self._socket.recv()
+        except zmq.Again:
+            raise Clamp3dError(f"no meshcat server answers at {self.zmq_url} (waited {_PATIENCE:g} s)") from None
+        if answer.startswith(b"error"):
+            raise Clamp3dError(f"meshcat server at {self.zmq_url}: {answer.decode('utf-8', 'replace')}")
+        return answer

@@ -1,0 +1,107 @@
+"""Text of a stress run: the table on the terminal and the Markdown for a document."""
+
+from __future__ import annotations
+
+from clamp3d.study.stress import Outcome, StressRun
+from clamp3d.study.stress_families import FAMILIES
+from clamp3d.study.stress_methods import METHODS
+
+
+def _length(x: float | None) -> str:
+    return "-" if x is None else f"{x:.2g}"
+
+
+def _rate(outcome: Outcome) -> str:
+    rate = outcome.failure_rate
+    if rate is None:
+        return "refused" if outcome.refused else "not asked"
+    return "0" if outcome.wrong == 0 else f"{100.0 * rate:.2g} %"
+
+
+def _trouble(outcome: Outcome) -> str:
+    parts = [f"{n} {what}" for n, what in ((outcome.exceptions, "raised"), (outcome.crashes, "crashed")) if n]
+    if outcome.late:
+        parts.append(f"{outcome.late} late")
+    return ", ".join(parts)
+
+
+def table(run: StressRun) -> str:
+    """One line per family and method, fixed width."""
+    head = (
+        f"{'family':24s} {'method':14s} {'asked':>7s} {'refused':>7s} {'false hit':>9s} {'false miss':>10s} "
+        f"{'> bound':>7s} {'worst mm':>9s} {'median':>9s} {'us each':>8s}  failures"
+    )
+    lines = [head, "-" * len(head)]
+    for o in run.outcomes:
+        each = 1e6 * o.seconds / o.asked if o.asked else 0.0
+        beyond = "-" if o.beyond_bound is None else str(o.beyond_bound)
+        lines.append(
+            f"{o.family:24s} {o.method:14s} {o.asked:7d} {o.refused:7d} {o.false_hits:9d} {o.false_misses:10d} "
+            f"{beyond:>7s} {_length(o.worst_error):>9s} {_length(o.median_error):>9s} {each:8.1f}  {_trouble(o)}"
+        )
+    lines.append(
+        f"seed {run.seed}, {run.n} cases a family; {run.checked_50_digits} truths a family worked out again at 50 "
+        f"digits: largest difference {run.worst_truth_difference:.1g} of the scene"
+    )
+    return "\n".join(lines)
+
+
+def markdown(run: StressRun, command: str) -> str:
+    """The matrix of failure rates, what each family is, and the worst case of each method with its reproducer."""
+    methods = list(dict.fromkeys(o.method for o in run.outcomes))
+    families = list(dict.fromkeys(o.family for o in run.outcomes))
+    by = {(o.family, o.method): o for o in run.outcomes}
+    lines = [
+        f"Made by `{command}`: {run.n} cases a family, seed {run.seed}; {run.checked_50_digits} truths a family worked "
+        f"out a second time at 50 digits (largest difference {run.worst_truth_difference:.1g} of the scene).",
+        "",
+        "Machine: " + ", ".join(f"{k} {v}" for k, v in run.machine.items()) + ".",
+        "",
+        "Share of wrong verdicts (false hits, false misses, exceptions, crashes, no answer in time) among the cases "
+        "that the method takes on:",
+        "",
+        "| family | " + " | ".join(methods) + " |",
+        "|---|" + "---|" * len(methods),
+    ]
+    lines += [f"| {f} | " + " | ".join(_rate(by[f, m]) for m in methods) + " |" for f in families]
+    lines += ["", "Largest error in mm (and in parts of the method's own bound):", ""]
+    lines += ["| family | " + " | ".join(methods) + " |", "|---|" + "---|" * len(methods)]
+    for f in families:
+        cells = []
+        for m in methods:
+            o = by[f, m]
+            ratio = "" if o.worst_ratio is None else f" ({o.worst_ratio:.2g})"
+            cells.append(_length(o.worst_error) + ratio)
+        lines.append(f"| {f} | " + " | ".join(cells) + " |")
+    lines += ["", "The families:", ""]
+    lines += [f"- **{f}**: {FAMILIES[f].about}" for f in families]
+    findings = [finding(o, run) for o in run.outcomes if o.examples]
+    if findings:
+        lines += ["", "What was found, one line each, worst case first; the command prints the case as Python:", ""]
+        lines += findings
+    lines += ["", "The methods:", ""]
+    lines += [f"- **{m}**: {METHODS[m][0]}" for m in methods]
+    return "\n".join(lines) + "\n"
+
+
+def finding(o: Outcome, run: StressRun) -> str:
+    """One line: what a method got wrong in a family, and how to see it."""
+    first = o.examples[0]
+    counts = [
+        f"{n} {what}"
+        for n, what in (
+            (o.false_hits, "false hits"),
+            (o.false_misses, "false misses"),
+            (o.beyond_bound or 0, "errors beyond its bound"),
+            (o.exceptions, "exceptions"),
+            (o.crashes, "crashes of the interpreter"),
+            (o.late, "without an answer in time"),
+        )
+        if n
+    ]
+    answer = "none" if first.answer != first.answer else f"{first.answer:.6g} mm"
+    return (
+        f"- {o.method}, {o.family}: {', '.join(counts)} of {o.asked - o.refused}; {first.what}: truth "
+        f"{first.truth:.6g} mm, answer {answer} "
+        f'(`clamp3d stress --family "{o.family}" --n {run.n} --seed {run.seed} --case {first.case}`)'
+    )

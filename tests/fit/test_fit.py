@@ -1,0 +1,201 @@
+"""Whole meshes: exact, coarse, rotated, mirrored, scattered, broken, and without any groove."""
+
+import numpy as np
+import pytest
+import trimesh
+from fit_shapes import (
+    CENTRE_HEIGHT,
+    CENTRES,
+    HALF,
+    LENGTH,
+    RADIUS,
+    distance_to_axis,
+    prism,
+    scan,
+    splint,
+    surface_points,
+)
+
+from clamp3d.fit.fit import fit_mesh
+from clamp3d.fit.mesh_file import make_mesh
+
+
+def fitted(mesh, *, T=None, sigma=0.0, seed=0, float32=True):
+    V = np.array(mesh.vertices)
+    V = V + np.random.default_rng(seed).normal(0.0, sigma, V.shape) if sigma else V
+    if T is not None:
+        V = V @ T[:3, :3].T + T[:3, 3]
+    V = V.astype(np.float32).astype(np.float64) if float32 else V
+    return fit_mesh(make_mesh(V, mesh.faces, float32=float32))
+
+
+def check_grooves(result, T=None, *, mirror=False, within="fit_error"):
+    """Both grooves are there, and the fitted surface lies within its own error of the true one."""
+    T = np.eye(4) if T is None else T
+    assert len(result.grooves) == 2
+    seen = set()
+    for g in result.grooves:
+        R = g.T_part_feature[:3, :3]
+        assert np.allclose(R.T @ R, np.eye(3), atol=1e-12)
+        assert np.isclose(np.linalg.det(R), 1.0)
+        own = np.linalg.inv(T) @ np.append(g.T_part_feature[:3, 3], 1.0)
+        k = int(np.argmin([abs(own[0] - x) for x in CENTRES]))
+        seen.add(k)
+        centre = (T @ np.array([CENTRES[k], CENTRE_HEIGHT, 0.0, 1.0]))[:3]
+        axis = T[:3, :3] @ np.array([0.0, 0.0, 1.0])
+        off = distance_to_axis(surface_points(g), centre, axis) - RADIUS
+        assert np.abs(off).max() <= getattr(g, within)
+        mouth = T[:3, :3] @ np.array([0.0, -1.0, 0.0])
+        assert R[:, 1] @ mouth > np.cos(0.05)
+        assert abs(g.half_angle - HALF) <= g.arc_error + 3e-6
+        assert abs(g.length - LENGTH) <= 2 * g.length_error + 1e-4
+    assert seen == {0, 1}
+
+
+@pytest.mark.parametrize("chord_error", [0.3, 0.05, 0.005])
+def test_exact_tessellation_has_no_facet_bias(chord_error):
+    result = fitted(splint(chord_error, hole=11.0))
+    check_grooves(result)
+    for g in result.grooves:
+        # Single precision at 68 mm is 4e-6 mm; a shallow arc magnifies it. An inscribed-facet bias would be 0.7 of
+        # the chord error.
+        assert abs(g.radius - RADIUS) < 2e-4
+        assert 0.4 * chord_error < g.chord_error <= chord_error
+        assert g.error_bound <= g.chord_error + 2e-4
+    (hole,) = result.holes
+    assert hole.through
+    assert abs(hole.radius - 11.0) < 1e-5
+    assert not result.cylinders
+    assert result.notes == ()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_answer_turns_with_the_part(seed):
+    T = trimesh.transformations.random_rotation_matrix(np.random.default_rng(seed).random(3))
+    T[:3, 3] = [500.0, -300.0, 20.0]
+    result = fitted(splint(hole=11.0), T=T)
+    check_grooves(result, T)
+    assert len(result.holes) == 1
+    assert not result.cylinders
+
+
+def test_mirrored_part_keeps_its_grooves():
+    mesh = splint(hole=11.0)
+    flip = np.diag([1.0, 1.0, -1.0, 1.0])
+    mirrored = trimesh.Trimesh(mesh.vertices @ flip[:3, :3], mesh.faces, process=False)  # winding now inside out
+    result = fitted(mirrored)
+    check_grooves(result, flip)
+    assert not result.cylinders
+    assert any("inside out" in note for note in result.notes)
+
+
+def test_stray_vertices_within_three_standard_errors():
+    for seed in range(4):
+        result = fitted(splint(), sigma=0.02, seed=seed, float32=False)
+        check_grooves(result)
+        for g in result.grooves:
+            assert abs(g.radius - RADIUS) <= 3 * g.radius_std
+            assert 0.03 < g.radius_std < 0.4  # the shallow arc knows its radius ten times worse than its surface
+            assert g.covariance_error < 0.2
+
+
+@pytest.mark.parametrize(("step", "sigma"), [(1.0, 0.02), (1.5, 0.05)])
+def test_scan_within_three_standard_errors(step, sigma):
+    for seed in range(3):
+        result = fit_mesh(make_mesh(*scan(step, sigma, seed)))
+        (g,) = result.features
+        assert g.name == "G1"
+        d = g.T_part_feature[:3, 2]
+        at = g.T_part_feature[:3, :3].T @ (
+            np.array([0.0, CENTRE_HEIGHT, g.T_part_feature[2, 3]]) - g.T_part_feature[:3, 3]
+        )
+        tilt = g.T_part_feature[:3, :3].T @ (np.array([0.0, 0.0, 1.0]) * np.sign(d[2]))
+        error = np.array([RADIUS - g.radius, at[0], at[1], tilt[0], tilt[1]])
+        assert np.all(np.abs(error) <= 3.0 * np.sqrt(np.diag(g.covariance)))
+        off = (
+            distance_to_axis(surface_points(g), np.array([0.0, CENTRE_HEIGHT, 0.0]), np.array([0.0, 0.0, 1.0])) - RADIUS
+        )
+        assert np.abs(off).max() <= g.error_bound
+        assert abs(g.residual_rms / sigma - 1.0) < 0.15
+        assert abs(g.half_angle - HALF) <= g.arc_error
+        assert any("open mesh" in note for note in result.notes)
+
+
+def test_split_strips_and_cracks():
+    """Triangles cut in four put vertices on chords; a torn mesh parts the groove; neither moves the surface."""
+    whole = splint()
+    check_grooves(fitted(whole.subdivide()))
+    centre = whole.triangles_center
+    torn = trimesh.Trimesh(whole.vertices, whole.faces[~((centre[:, 0] > 55) & (centre[:, 0] < 57))], process=False)
+    soup = trimesh.Trimesh(**trimesh.triangles.to_kwargs(torn.triangles), process=False)
+    turned = soup.faces.copy()
+    turned[::7] = turned[::7, ::-1]
+    soup.faces = turned
+    result = fitted(soup)
+    assert len(result.grooves) == 2
+    for g in result.grooves:
+        k = int(np.argmin([abs(g.T_part_feature[0, 3] - x) for x in CENTRES]))
+        off = (
+            distance_to_axis(surface_points(g), np.array([CENTRES[k], CENTRE_HEIGHT, 0]), np.array([0, 0, 1.0]))
+            - RADIUS
+        )
+        assert np.abs(off).max() <= g.fit_error
+    assert any("turned" in note for note in result.notes)
+
+
+def test_cylinder_wire_and_blind_hole():
+    wire = trimesh.creation.cylinder(7.125, 180.0, sections=48)
+    (c,) = fitted(wire).features
+    assert (c.name, c.full) == ("C1", True)
+    assert abs(c.radius - 7.125) < 1e-5
+    assert abs(c.length - 180.0) < 1e-4
+    block = trimesh.creation.box([40.0, 40.0, 40.0])
+    drill = trimesh.creation.cylinder(6.0, 40.0, sections=40)
+    drill.apply_translation([0.0, 0.0, 15.0])
+    (h,) = fitted(trimesh.boolean.difference([block, drill], engine="manifold")).features
+    assert not h.through
+    assert abs(h.radius - 6.0) < 1e-5
+    assert abs(h.length - 25.0) < 1e-4
+
+
+def test_major_arc_is_a_groove_of_more_than_half_a_turn():
+    block = trimesh.creation.box([30.0, 20.0, 50.0])
+    tool = trimesh.creation.cylinder(7.0, 100.0, sections=64)
+    tool.apply_translation([0.0, 6.0, 0.0])
+    (g,) = fitted(trimesh.boolean.difference([block, tool], engine="manifold")).grooves
+    assert abs(g.radius - 7.0) < 1e-4
+    assert abs(np.degrees(g.half_angle) - (180 - np.degrees(np.arccos(4.0 / 7.0)))) < 0.1
+    assert np.allclose(g.T_part_feature[:3, 1], [0, 1, 0], atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        trimesh.creation.box([30.0, 20.0, 10.0]),
+        trimesh.creation.icosphere(subdivisions=3, radius=10.0),
+        trimesh.creation.cone(10.0, 20.0, sections=48),
+        trimesh.creation.cylinder(10.0, 20.0, sections=6),  # a hexagon is a nut
+        trimesh.creation.torus(20.0, 5.0),
+    ],
+    ids=["box", "sphere", "cone", "hexagon", "torus"],
+)
+def test_nothing_is_made_up(mesh):
+    result = fitted(mesh)
+    assert not result.grooves
+    assert not result.features
+    assert "no groove: no concave circular arc found" in result.notes
+
+
+@pytest.mark.parametrize("flank_deg", [20.0, 45.0, 60.0])
+def test_v_and_trapezoid_grooves_are_not_arcs(flank_deg):
+    s = 5.0 * np.tan(np.radians(flank_deg))
+    for bottom in (0.0, 4.0):
+        dip = (
+            [(-bottom - 5.0, 0.0), (-bottom, -s), (bottom, -s), (bottom + 5.0, 0.0)]
+            if bottom
+            else [(-5, 0), (0, -s), (5, 0)]
+        )
+        outline = [(-20.0, -20.0), (20.0, -20.0), (20.0, 0.0), *dip[::-1], (-20.0, 0.0)]
+        assert not fitted(prism(outline, 30.0)).features
+    mesh = prism(outline, 30.0).subdivide().subdivide().subdivide()
+    assert not fitted(mesh, sigma=0.02).grooves

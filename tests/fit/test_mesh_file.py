@@ -1,0 +1,125 @@
+"""Reading: units, axes, repairs, and one line for every kind of bad file."""
+
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+from fit_shapes import RADIUS, splint
+
+from clamp3d.errors import InputError, MissingLibraryError
+from clamp3d.fit.fit import fit_file
+from clamp3d.fit.mesh_file import load_mesh, make_mesh
+
+
+@pytest.fixture(scope="module")
+def part():
+    return splint(0.3, hole=11.0)
+
+
+@pytest.mark.parametrize("kind", ["stl", "ply", "obj", "3mf"])
+def test_formats_in_mm(part, tmp_path, kind):
+    file = tmp_path / f"part.{kind}"
+    part.export(file)
+    result = fit_file(file)
+    assert [round(g.radius, 2) for g in result.grooves] == [round(RADIUS, 2)] * 2
+    assert result.mesh.watertight
+    assert any("carries no unit" in note for note in result.notes) == (kind != "3mf")
+
+
+def test_gltf_is_metres_and_y_up(part, tmp_path):
+    # Written as the specification asks: (x, y, z) mm with Z up becomes (x, z, -y) m.
+    V = np.column_stack([part.vertices[:, 0], part.vertices[:, 2], -part.vertices[:, 1]]) / 1000.0
+    trimesh.Trimesh(V, part.faces, process=False).export(tmp_path / "part.glb")
+    mesh = load_mesh(tmp_path / "part.glb")
+    assert np.allclose(mesh.vertices.min(axis=0), part.vertices.min(axis=0), atol=1e-4)
+    assert np.allclose(mesh.vertices.max(axis=0), part.vertices.max(axis=0), atol=1e-4)
+
+
+def test_unit_option(part, tmp_path):
+    part.export(tmp_path / "part.stl")
+    assert np.isclose(np.ptp(load_mesh(tmp_path / "part.stl", unit="in").vertices[:, 0]), 137 * 25.4, rtol=1e-6)
+    with pytest.raises(InputError, match="unknown unit 'foot'; available: mm, cm, m, in"):
+        load_mesh(tmp_path / "part.stl", unit="foot")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.stl", None, "no such file"),
+        ("a.stl", b"", "no triangles"),
+        ("a.stl", b"solid nothing\nendsolid nothing\n", "a.stl"),
+        ("a.stl", b"\x00" * 84 + b"half a facet", "a.stl"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nf 1 2 9\n", "a.obj"),
+        ("a.glb", b"not a glb", "GLB"),
+        ("a.3mf", b"not a zip", "3MF"),
+        ("a.ply", b"ply\nformat ascii 1.0\nend_header\n", "a.ply"),
+        ("a.dxf", b"", "unknown mesh format '.dxf'; available: .stl"),
+        ("a.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
+    ],
+)
+def test_bad_files_give_one_line(tmp_path, name, content, message):
+    file = tmp_path / name
+    if content is not None:
+        file.write_bytes(content)
+    with pytest.raises(InputError, match=message) as caught:
+        load_mesh(file)
+    assert "\n" not in str(caught.value)
+
+
+def test_step_without_its_library_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "OCP", None)
+    (tmp_path / "part.step").write_text("ISO-10303-21;")
+    with pytest.raises(MissingLibraryError, match=r"pip install 'clamp3d\[step\]'"):
+        load_mesh(tmp_path / "part.step")
+
+
+def test_step_of_the_up_splint(tmp_path):
+    pytest.importorskip("OCP")
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+    from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
+
+    block = BRepPrimAPI_MakeBox(gp_Pnt(-40, -20, 0), gp_Pnt(40, 0, 60)).Shape()
+    tool = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(3, 15, -10), gp_Dir(0, 0, 1)), 23.8012, 100).Shape()
+    writer = STEPControl_Writer()
+    writer.Transfer(BRepAlgoAPI_Cut(block, tool).Shape(), STEPControl_StepModelType.STEPControl_AsIs)
+    writer.Write(str(tmp_path / "part.step"))
+    result = fit_file(tmp_path / "part.step")
+    assert result.mesh.watertight
+    (g,) = result.features
+    assert abs(g.radius - 23.8012) < 1e-6
+    assert np.allclose(g.T_part_feature[:2, 3], [3, 15], atol=1e-6)
+    assert abs(g.half_angle - np.arccos(15 / 23.8012)) < 1e-6
+    assert g.chord_error <= 0.02
+    (tmp_path / "bad.step").write_text("nothing")
+    with pytest.raises(InputError, match="not a readable STEP file"):
+        load_mesh(tmp_path / "bad.step")
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "message"),
+    [
+        (np.zeros((3, 2)), [[0, 1, 2]], r"shape \(n, 3\)"),
+        (np.eye(3), [[0, 1]], r"shape \(m, 3\)"),
+        (np.eye(3), [[0, 1, 3]], "face index 3 is out of range for 3 vertices"),
+        (np.eye(3), [[0, 1, -1]], "face index -1"),
+        (np.eye(3), [[0.0, 1.0, 2.0]], "integers"),
+        (np.full((3, 3), np.inf), [[0, 1, 2]], "not finite"),
+        (np.zeros((3, 3)), [[0, 1, 2]], "one point"),
+        (np.diag([1.0, 0, 0]), [[0, 1, 2], [0, 0, 1]], "no triangle with an area"),
+    ],
+)
+def test_bad_arrays(vertices, faces, message):
+    with pytest.raises(InputError, match=message):
+        make_mesh(vertices, np.array(faces))
+
+
+def test_repairs_are_noted():
+    box = trimesh.creation.box([1.0, 1.0, 1.0])
+    faces = np.concatenate([box.faces[:, ::-1], box.faces[:1]])
+    mesh = make_mesh(box.vertices, faces)
+    assert mesh.watertight
+    assert trimesh.Trimesh(mesh.vertices, mesh.faces).volume > 0.0
+    assert mesh.notes == ("1 doubled triangles left out", "inside out: all triangles turned")
