@@ -67,20 +67,22 @@ def _contact(found: Comparison) -> Iterator[str]:
     yield "  known: from elsewhere; false hits / false misses of 80 poses (chords: 40) within the band of contact;"
     yield "  times in CPU microseconds per query; MB of the process, libraries included"
     yield (
-        f"  {'method':16s} {'pieces':>6s} {'median':>8s} {'worst':>8s} {'depth':>8s} {'known':>8s}  "
-        f"{'0.02 mm':>7s} {'1e-4':>7s} {'1e-6':>7s}  {'one':>8s} {'many':>8s} {'set-up s':>8s} {'load s':>6s} {'MB':>6s}"
+        f"  {'method':17s} {'pieces':>6s} {'median':>8s} {'worst':>8s} {'depth':>8s} {'known':>8s}  "
+        f"{'0.02 mm':>7s} {'1e-4':>7s} {'1e-6':>7s}  {'one':>8s} {'many':>8s} {'set-up s':>8s} {'load s':>6s} "
+        f"{'MB':>5s}"
     )
     for row in (*found.contact, *found.peers):
         if isinstance(row, NotMeasured):
-            yield f"  {row.label:16s} {row.reason}"
+            yield f"  {row.label:17s} {row.reason}"
             continue
         known = KNOWN.get(Method(row.method, row.setting).key)
         bands = " ".join(f"{f'{b.false_hits}/{b.false_misses}':>7s}" for b in row.bands)
         depth = "none" if row.depth_error is None else f"{row.depth_error:.2g}"
         memory = "-" if row.memory is None or row.library_memory is None else f"{row.memory + row.library_memory:.0f}"
-        figures = f"{row.pieces:6d} {row.median_error:8.2g} {row.worst_error:8.2g} {depth:>8s} {f'{known[0]:g}' if known else '-':>8s}"
-        times = f"{row.one * 1e6:8.3g} {row.many * 1e6:8.3g} {row.setup:8.2g} {row.load:6.2f} {memory:>6s}"
-        yield f"  {row.label:16s} {figures}  {bands}  {times}"
+        elsewhere = f"{known[0]:g}" if known else "-"
+        figures = f"{row.pieces:6d} {row.median_error:8.2g} {row.worst_error:8.2g} {depth:>8s} {elsewhere:>8s}"
+        times = f"{row.one * 1e6:8.3g} {row.many * 1e6:8.3g} {row.setup:8.2g} {row.load:6.2f} {memory:>5s}"
+        yield f"  {row.label:17s} {figures}  {bands}  {times}"
 
 
 def _assembly(found: Comparison) -> Iterator[str]:
@@ -114,33 +116,26 @@ def _assembly(found: Comparison) -> Iterator[str]:
         f"error {image.median_by_hand:.2f} median, {image.worst_by_hand:.1f} worst of {image.trials}"
     )
     yield f"    first five {five}; published {theirs_five}"
-    yield f"  in a picture, end points found automatically: error {image.automatic:.4f}, {image.automatic_seconds:.2f} CPU s"
+    yield f"  in a picture, found automatically: error {image.automatic:.4f}, {image.automatic_seconds:.2f} CPU s"
 
 
 def _complexity(found: Comparison) -> Iterator[str]:
     yield "Table 5 measured: exponents p in ~ v^p of positions tried (M), contact tests in all (M C) and CPU time"
     yield (
         f"  {'search':8s} {'method':7s} {'v':>4s} {'with':28s} {'M':>6s} {'M C':>6s} {'time':>6s}   {'published':>13s}"
-        "   smallest to largest: M, M C, CPU s"
+        "   from .. to: M, M C, CPU s"
     )
     if isinstance(found.complexity, NotMeasured):
         yield f"  {found.complexity.reason}"
         return
     for s in found.complexity:
-        fits = (
-            " ".join(f"{round(e, 2) + 0.0:6.2f}" for e in s.exponents)
-            if len(s.values) > 1
-            else " ".join(["     -"] * 3)
-        )
+        several = len(s.values) > 1
+        fits = " ".join(f"{round(e, 2) + 0.0:6.2f}" if several else "     -" for e in s.exponents)
         paper = "-" if s.published is None else f"{s.published[0]:g}, {s.published[1]:g}, {s.published[2]:g}"
-        spread = (
-            f"{s.positions[0]}..{s.positions[-1]}, {s.tests[0]}..{s.tests[-1]}, {s.seconds[0]:.3g}..{s.seconds[-1]:.3g}"
-            if len(s.values) > 1
-            else f"{s.positions[0]}, {s.tests[0]}, {s.seconds[0]:.3g}"
-        )
+        spread = f"{_span(s.positions)}, {_span(s.tests)}, {_span(s.seconds)}"
         yield f"  {s.search:8s} {s.method:7s} {s.varied:>4s} {s.fixed:28s} {fits}   {paper:>13s}   {spread}"
     yield "  grid: the paper's search, every combination of n places for each of a moving parts"
-    yield "  stepped: one way along the bolt, wires settle; exact: gradients, no steps; a test: an arc or chord and a wire"
+    yield "  stepped: one way along the bolt, wires settle; exact: gradients; test: an arc or chord and a wire"
 
 
 def _span(values: Sequence[float]) -> str:

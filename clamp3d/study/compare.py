@@ -205,7 +205,8 @@ def _imaged(data: dict[str, Any]) -> Imaged:
 
 
 def _sweeps(data: dict[str, Any]) -> tuple[Sweep, ...]:
-    def sweep(fields: Any) -> Sweep:
-        return Sweep(**{name: tuple(v) if isinstance(v, list) else v for name, v in fields.items()})
+    def sweep(fields: dict[str, Any]) -> Sweep:
+        values: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in fields.items()}
+        return Sweep(**values)
 
     return tuple(sweep(fields) for fields in data["sweeps"])

@@ -59,7 +59,7 @@ def measure(
     *,
     load: Callable[[Method], None] = load,
     prepare: Callable[[Method], Prepared] = prepare,
-    budget: float = 1.0,
+    budget: float = 0.6,
 ) -> Measured:
     """Measure one method in this process; ``budget`` is about how many seconds the timing of each kind may take."""
     poses = known_poses()

@@ -40,7 +40,11 @@ class Method:
     @property
     def label(self) -> str:
         """The method in words, 'wedges 5 deg'."""
-        return self.family if self.setting is None else f"{self.family} {self.setting:g} {UNITS[self.family]}".rstrip()
+        return (
+            self.family
+            if self.setting is None
+            else f"{self.family} {self.setting:g} {UNITS.get(self.family, 'deg')}".rstrip()
+        )
 
     @property
     def key(self) -> str:
@@ -73,6 +77,7 @@ class Prepared:
 
 
 UNITS = {"chords": "deg", "wedges": "deg", "hulls": "", "mesh": "mm"}
+"""Of a family's setting; degrees for those not named here."""
 METHODS = (
     Method("cas"),
     *(Method("chords", a) for a in UNIT_ANGLES_DEG),

@@ -126,7 +126,7 @@ def chord_error(unit_angle: float) -> float:
     """Largest distance in mm between the groove's arc and equal chords of at most ``unit_angle`` rad.
 
     >>> [round(chord_error(math.radians(a)), 5) for a in (1.0, 5.0, 10.0, 20.0)]
-    [0.00046, 0.01142, 0.04566, 0.1823]
+    [0.00046, 0.01142, 0.04566, 0.18231]
     """
     m = math.ceil(2.0 * GROOVE.half_angle / unit_angle - 1e-9)
     return 2.0 * GROOVE.radius * math.sin(GROOVE.half_angle / m / 2.0) ** 2
