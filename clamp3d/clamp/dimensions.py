@@ -239,10 +239,12 @@ class Clamp:
             raise ValueError(
                 f"saddle.radius must be > down_splint.back_radius = {down.back_radius:g} mm, got {self.saddle.radius:g}"
             )
-        reach = math.degrees(self.saddle.half_angle) + down.max_tilt_deg
+        # The saddle's edge as seen from the back's centre, which lies back_clearance below the saddle's own.
+        edge = self.saddle.radius * math.cos(self.saddle.half_angle) - self.back_clearance
+        reach = math.degrees(math.atan2(self.saddle.width / 2, edge)) + down.max_tilt_deg
         if reach > down.back_half_angle_deg:
             raise ValueError(
-                f"down_splint.back_half_angle_deg must be >= {reach:.4g} (saddle's half angle + max_tilt_deg), "
+                f"down_splint.back_half_angle_deg must be >= {reach:.4g} (saddle's edge + max_tilt_deg), "
                 f"got {down.back_half_angle_deg:g}"
             )
         if self.nut.across_flats <= 2 * r:
