@@ -33,13 +33,24 @@ Enough = Callable[[Bounds], bool]
 
 
 def climb(
-    a: Model, b: Model, T: Array, start: Bounds, thresholds: Thresholds, enough: Enough, ledger: Ledger
+    a: Model,
+    b: Model,
+    T: Array,
+    start: Bounds,
+    thresholds: Thresholds,
+    enough: Enough,
+    ledger: Ledger,
+    *,
+    forms: bool = True,
 ) -> Answer:
-    """Bounds of ``b`` at ``T`` (4, 4) in a's frame, from ``start`` (what the boxes said), until ``enough``."""
+    """Bounds of ``b`` at ``T`` (4, 4) in a's frame, from ``start`` (what the boxes said), until ``enough``.
+
+    Without ``forms`` the closed forms are left out: a caller that asks often may know that they say nothing here.
+    """
     found = Answer(start, "boxes", "bounding boxes")
     if enough(start):
         return found
-    for rung in (_features, _facets):
+    for rung in (_features, _facets) if forms else (_facets,):
         new = rung(a, b, T, lambda x, known=found.bounds: enough(known.meet(x)), ledger)  # type: ignore[misc]
         if new is not None:
             found = _meet(found, new)

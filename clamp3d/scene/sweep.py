@@ -27,6 +27,7 @@ from clamp3d.scene.trimodel import TriModel, clearance_of_shells
 ACCURACY = 1e-4
 """A least distance on a way is found to within this (mm), or to what the models give."""
 _STEPS = 2000
+_PATIENCE = 12
 SHELL_ERROR = 0.064
 """Chord error (mm) of the meshes that a stretch of a motion is bounded with where closed forms say too little."""
 
@@ -100,9 +101,9 @@ class _Way:
         self.a, self.b = models[i], models[j]
         self.motion, self.start, self.back = motion, poses[i], inverse(poses[j])
         self.thresholds, self.ledger = scene.thresholds, ledger
-        moving, standing = _corners(self.a, poses[i]), _corners(self.b, poses[j])
-        self.speed = motion.speed(moving)
-        self.reach = max(motion.distance_from_axis(moving), motion.distance_from_axis(standing))
+        self.speed = motion.speed(_corners(self.a, poses[i]))
+        # How often in a row closed forms, and swept ones, had nothing to say: hulls in each other never have.
+        self.mute = self.mute_swept = 0
 
     def pose(self, t: float) -> Array:
         """The standing part in the moving part's frame."""
@@ -113,17 +114,22 @@ class _Way:
         T = self.pose(t)
         pair = Boxes.of(np.array([self.a.bounds, self.b.bounds]), np.array([np.eye(4), T]))
         start = Bounds(float(box_gaps(pair, np.array([[0, 1]]))[0]))
-        return climb(self.a, self.b, T, start, self.thresholds, enough, self.ledger)
+        answer = climb(self.a, self.b, T, start, self.thresholds, enough, self.ledger, forms=self.mute < _PATIENCE)
+        self.mute = self.mute + 1 if answer.rung == "meshes" else 0
+        return answer
 
     def low(self, t: float, half: float, here: float, wanted: float) -> float:
         """Lower bound from t - half to t + half, ``here`` being that at t; no better than ``wanted``."""
         plain = here - self.speed * half
         if plain >= wanted:
             return plain
-        self.ledger.queries["swept"] += 1
         stretch = (self.pose(t - half), self.pose(t), self.pose(t + half))
-        angle = self.motion.angle * half
-        swept = max(plain, swept_low(self.a, self.b, *stretch, angle=angle, reach=self.reach))
+        swept = plain
+        if self.mute_swept < _PATIENCE:
+            self.ledger.queries["swept"] += 1
+            angle = self.motion.angle * half
+            swept = max(plain, swept_low(self.a, self.b, *stretch, angle=angle))
+            self.mute_swept = 0 if swept > plain else self.mute_swept + 1
         if swept >= min(wanted, here) - ACCURACY or len(self.shells) < 2:
             return swept
         return max(swept, self._by_shells(half, stretch[1]))

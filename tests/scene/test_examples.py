@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +66,8 @@ def test_hinge_meets_where_the_solids_first_do():
 
     instants = np.linspace(0.0, 1.0, 641)
     first = instants[np.argmax([common(t) > 1e-9 for t in instants])]
-    row = next(r for r in check(scene).motions if r.motion == "unfold too far" and r.b == "leaf-a")
+    only = Scene(scene.parts[:2]).moved({"leaf-b": rotation([0, 0, 1], folded) @ scene.parts[1].T_world})
+    row = check(replace(only, motions=scene.motions[1:])).motions[0]
     # Contact within the meshes' error of 0.05 mm, at 12 mm from the axis, is told before the facets meet.
     assert first - 0.01 <= row.contact_at <= first + 1e-6
 

@@ -110,3 +110,48 @@ def test_distance_along_a_way_is_bounded_for_polyhedra():
     assert row.low <= gap <= row.high + 1e-9
     assert row.t == pytest.approx(0.5, abs=0.02)
     assert inverse(motion.at(0.5)).shape == (4, 4)
+
+
+def test_no_instant_is_below_the_least_distance():
+    rng = np.random.default_rng(4)
+    pool = [
+        BLOCK,
+        shapes.cylinder(5, 40),
+        shapes.cylinder(8, 12, bore=4.2),
+        shapes.box((30, 12, 18)),
+        shapes.box((30, 25, 6), holes=[shapes.Hole(4.0, (3.0, 2.0))]),
+    ]
+    seen = set()
+    for _ in range(40):
+        still, moving = (pool[k] for k in rng.integers(len(pool), size=2))
+        start = rotation(rng.normal(size=3), rng.uniform(0, 6))
+        start[:3, 3] = rng.normal(size=3) * 18
+        motion = Motion.screw(
+            "moving",
+            rng.normal(size=3),
+            rng.choice([0.0, 0.3, 2.0]),
+            point=rng.normal(size=3) * 10,
+            travel=rng.normal() * 20,
+        )
+        rows = move(still, moving, start, motion, clearance=1.0)
+        scene = Scene(clearance=1.0).add("still", still).add("moving", moving, start)
+        instants = np.linspace(0, 1, 60)
+        found = []
+        for t in instants:
+            found += check(scene.moved({"moving": motion.at(t) @ start})).pairs
+        verdicts = {row.verdict.value for row in found}
+        if not rows:
+            assert verdicts <= {"clear"}
+            continue
+        row = rows[0]
+        seen.add(row.verdict.value)
+        for one in found:
+            assert row.low <= one.high + 1e-6
+        if verdicts & {"clash", "contained"}:
+            assert row.verdict.value == "clash"
+            first = next(t for t in instants if check(scene.moved({"moving": motion.at(t) @ start})).pairs
+                         and check(scene.moved({"moving": motion.at(t) @ start})).pairs[0].high < -0.01)  # fmt: skip
+            assert row.contact_at <= first + 1e-9
+        elif "clearance" in verdicts:
+            assert row.verdict.value != "clear"
+    assert seen >= {"clash", "clear"}
