@@ -83,6 +83,7 @@ def _contact(found: Comparison) -> Iterator[str]:
         figures = f"{row.pieces:6d} {row.median_error:8.2g} {row.worst_error:8.2g} {depth:>8s} {elsewhere:>8s}"
         times = f"{row.one * 1e6:8.3g} {row.many * 1e6:8.3g} {row.setup:8.2g} {row.load:6.2f} {memory:>5s}"
         yield f"  {row.label:17s} {figures}  {bands}  {times}"
+    yield "  CoACD's cuts move with the tessellation: 4 to 6 hulls and 0.4 to 1.0 mm at 0.02, 13 to 165 hulls at 0.01"
 
 
 def _assembly(found: Comparison) -> Iterator[str]:
