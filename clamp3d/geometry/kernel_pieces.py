@@ -307,7 +307,7 @@ def all_pieces(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, out):  # ty
     """All pieces into out (5, 14)."""
     side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out)
     lo, hi = clip(h, H, cy, cz, dy, dz, l)
-    if lo <= hi:
+    if lo <= hi and abs(cz + 0.5 * (lo + hi) * dz) < H:  # an axis that only touches an end face is on it, not inside
         enter(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, lo, hi, out)
     end_piece(-H, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out[3])
     end_piece(H, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out[4])

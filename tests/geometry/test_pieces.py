@@ -134,3 +134,13 @@ def test_gradients_of_tilted_pieces():
         assert error[smooth].max(initial=0.0) < 1e-4
         checked += smooth.sum()
     assert checked > 1000
+
+
+def test_an_axis_that_ends_in_the_plane_of_an_end_face_is_outside():
+    groove, wire = SweptArc(1.0, 1.0, 1.0), Cylinder(1.0, 1.0)
+    T = translation(0.0, -2.0, 1.0)
+    assert not signed_distance(groove, wire, T).axis_inside
+    gaps = groove_pieces(groove, wire, T).distance
+    lip = math.hypot(math.sin(1.0), 2.0 - math.cos(1.0)) - 1.0  # the face's nearest point, from (0, -2)
+    assert np.allclose(gaps[:3], [0.0, lip, lip], atol=1e-12)
+    assert abs(gaps.min() + 1.0) < 1e-12
