@@ -103,12 +103,21 @@ class Section:
         return self.down_splint(q).point(-down.width / 2, down.face_depth)[1] - up.thickness
 
     def open_state(self, d: float, tilt: float = 0.0) -> Array:
-        """State with the down splint at ``d`` and ``tilt``, both wires in the middle between their two arc centres."""
+        """State with the down splint at ``d`` and ``tilt``, both wires in the middle between their two arc centres.
+
+        Where that is beside the up splint's mouth, or so deep that the wire would meet an inner face, it is put clear.
+        """
         q = np.array([0.0, 0.0, 0.0, 0.0, d, self.lever * tilt])
         pose = self.down_splint(q)
         for i, wire in enumerate(WIRES):
             up, down = self.pairs["P1", wire].T_a_groove, self.pairs["P2", wire].T_a_groove
             q[2 * i : 2 * i + 2] = 0.5 * (np.array([up[0, 3], -up[2, 3]]) + pose.point(down[0, 3], -down[2, 3]))
+            q[2 * i] = min(max(q[2 * i], self.bounds()[2 * i][0]), self.bounds()[2 * i][1])
+            r, face = self.pairs["P1", wire].cylinder.radius, self.clamp.down_splint.face_depth
+            under = pose.point((q[2 * i] - pose.x) / math.cos(pose.angle), face)[1]
+            low, high = self.clamp.up_splint.thickness + r, under - r / math.cos(pose.angle)
+            if low <= high:
+                q[2 * i + 1] = min(max(q[2 * i + 1], low), high)
         return q
 
     def open_distance(self) -> float:

@@ -82,7 +82,11 @@ def _section_point(T: Array) -> Array:
 
 
 def _signed(centre: Array, starts: Array, ends: Array) -> tuple[Array, Array, Array]:
-    """Distance (k,), foot (k, 2) and normal (k, 2) from each segment to a point, negative behind the segment."""
+    """Distance (k,), foot (k, 2) and normal (k, 2) from each segment to a point, negative where it is in the material.
+
+    The hollow is convex: below the faces a point is in the material if it is behind any chord. Above them it is not,
+    though it may be behind the last chords of a major arc.
+    """
     along = ends - starts
     length = np.sqrt((along**2).sum(1))
     unit = along / length[:, None]
@@ -94,6 +98,8 @@ def _signed(centre: Array, starts: Array, ends: Array) -> tuple[Array, Array, Ar
     height = (offset * left).sum(1)
     gap = np.hypot(t - clamped, height)
     within = t == clamped
-    distance = np.where(within, height, gap)
-    normal = np.where(within[:, None], left, (centre - foot) / np.where(gap > 0.0, gap, 1.0)[:, None])
+    solid = centre[1] <= starts[0, 1] and (height[1:-1] < 0.0).any()
+    facing = within & (solid | (height >= 0.0))
+    distance = np.where(facing, height, gap)
+    normal = np.where(facing[:, None], left, (centre - foot) / np.where(gap > 0.0, gap, 1.0)[:, None])
     return distance, foot, normal

@@ -159,13 +159,15 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
     if cy - high <= h:
         lo, hi = clip(h, H, cy, cz, dy, dz, l)
         if lo <= hi:
-            x = cx + lo * dx
-            y = cy + lo * dy
-            rho2 = x * x + y * y
-            x = cx + hi * dx
-            y = cy + hi * dy
             # rho is convex along the axis: if any point of the part in the block is behind the arc, an end of it is.
-            if max(rho2, x * x + y * y) >= R * R:
+            behind = False
+            for i in range(2):
+                t = lo if i == 0 else hi
+                x = cx + t * dx
+                y = cy + t * dy
+                if x * x + y * y >= R * R and (h < 0.0 or abs(x) * -h + y * s <= 0.0):
+                    behind = True
+            if behind:
                 return inside(R, h, H, r, cx, cy, cz, dx, dy, dz, lo, hi, bound)
 
     # Ends of the axis against S; top and bottom: whether the axis reaches beyond the end faces.

@@ -31,15 +31,18 @@ def section(x, y, R, s, h):  # type: ignore[no-untyped-def]
     """Signed gap of (x, y) to the groove's section, negative inside the material, and the nearest feature.
 
     Inside, the gap is the smaller of the depths below the flat faces and behind the arc: the lips are never nearer, in
-    minor and in major arcs.
+    minor and in major arcs. In the mouth of a major arc y <= h and rho >= R exclude each other but for the rounding
+    of h; there the angle decides (nearly full circles, whose mouth is wide by the root of that rounding).
     """
     ax = abs(x)
     rho = math.sqrt(x * x + y * y)
-    if rho < R and ax * -h + y * s <= 0.0:  # within the angle of the arc: rho R sin(phi - half_angle) <= 0
+    within = ax * -h + y * s <= 0.0  # within the angle of the arc: rho R sin(phi - half_angle) <= 0
+    if rho < R and within:
         return R - rho, ARC
-    if y <= h and rho >= R and rho - R <= h - y:
+    solid = y <= h and rho >= R and (within or h < 0.0)
+    if solid and rho - R <= h - y:
         return R - rho, ARC
-    if (y > h and ax >= s) or (y <= h and rho >= R):
+    if (y > h and ax >= s) or solid:
         return y - h, FLAT_N if x >= 0.0 else FLAT_M
     return math.sqrt((ax - s) * (ax - s) + (y - h) * (y - h)), LIP_N if x >= 0.0 else LIP_M
 
