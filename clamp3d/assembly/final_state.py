@@ -25,8 +25,8 @@ TOLERANCE = 1e-9
 
 _ACTIVE = 1e-6
 _ACTIVE_TRIES = (1e-6, 1e-8, 1e-10)
-"""Gaps that count as closed, mm: a wire that nearly fills its groove is within the first of contacts it does not have."""
-_ATTEMPTS = 4
+"""Gaps that count as closed, mm: a wire that nearly fills its groove is within the first of contacts it lacks."""
+_ATTEMPTS = 3
 _LEVEL = 1e-6
 """Curvature in 1/mm that counts as none: rounding of the differences that it is taken from."""
 _STRIDE = 4.0
@@ -68,24 +68,34 @@ def solve_final_state(section: Section, start: Array | None = None) -> FinalStat
     if gaps.value[k] < -_ACTIVE:
         a, b = gaps.pair[k]
         raise InputError(f"the start must be an open state: {a} and {b} overlap by {-gaps.value[k]:.4g} mm")
-    found: FinalState | None = None
+    found = _closed(section, q)
     for attempt in range(_ATTEMPTS):
-        q = _descend(section, q, _CLOSING)
-        for active in _ACTIVE_TRIES:
-            state = _finish(section, q, active)
-            if found is None or _flaw(state) < _flaw(found):
-                found = state
-            if _flaw(found) <= TOLERANCE:
-                break
-        if _flaw(found) <= TOLERANCE and found.curvature >= -_LEVEL:
+        if _proven(found):
             return found
         # A place where the closed gaps hang together badly, or a saddle: open a little, aside, and close again.
-        q = _aside(section, found.q, attempt)
-    assert found is not None
+        again = _closed(section, _aside(section, found.q, attempt))
+        if _proven(again) or _flaw(again) < _flaw(found):
+            found = again
     raise SolverError(
         f"final state not proven: largest violated gap {found.violation:.3g} mm, optimality {found.optimality:.3g} mm, "
         f"both must be <= {TOLERANCE:g} mm; curvature {found.curvature:.3g} 1/mm, must be >= 0"
     )
+
+
+def _closed(section: Section, q: Array) -> FinalState:
+    """Where closing from q ends, with the set of closed gaps that proves it best."""
+    q = _descend(section, q, _CLOSING)
+    best = _finish(section, q, _ACTIVE_TRIES[0])
+    for active in _ACTIVE_TRIES[1:]:
+        if _flaw(best) <= TOLERANCE:
+            break
+        best = min(best, _finish(section, q, active), key=_flaw)
+    return best
+
+
+def _proven(state: FinalState) -> bool:
+    """Feasible, stationary, and no saddle."""
+    return _flaw(state) <= TOLERANCE and state.curvature >= -_LEVEL
 
 
 def _flaw(state: FinalState) -> float:

@@ -2,7 +2,7 @@
 
 Of each wire only the envelopes count: ``f1(x)``, the highest place that the up splint leaves its centre at ``x``, and
 ``d + f2(x, tilt)``, the lowest place over the down splint. A wire fits if ``f1(x) <= d + f2(x, tilt)`` somewhere in its
-mouth, so the least distance for a tilt is ``max over wires of min over x of f1 - f2`` (or where the faces meet), and the
+mouth, so the least distance for a tilt is ``max over wires of min over x of f1 - f2`` (or where faces meet), and the
 final state is its least value over the tilts: nothing but a function on a grid.
 """
 
@@ -185,7 +185,7 @@ class Envelope:
         return max(self.wire(0, tilt), self.wire(1, tilt), self.faces(tilt))
 
     def falls(self, q: Array, reach: float = 0.02) -> float:
-        """How far in mm a state is above the lowest one with tilt and wires within ``reach`` mm of it (0: a minimum)."""
+        """How far in mm a state is above the lowest with tilt and wires within ``reach`` mm of it (0: a minimum)."""
         lever = self.clamp.down_splint.width / 2
         limit = self.clamp.down_splint.max_tilt
         best = np.inf
