@@ -71,11 +71,13 @@ def solve_final_state(section: Section, start: Array | None = None) -> FinalStat
     found = _closed(section, q)
     for attempt in range(_ATTEMPTS):
         if _proven(found):
-            return found
+            break
         # A place where the closed gaps hang together badly, or a saddle: open a little, aside, and close again.
         again = _closed(section, _aside(section, found.q, attempt))
         if _proven(again) or _flaw(again) < _flaw(found):
             found = again
+    if _proven(found):
+        return found
     raise SolverError(
         f"final state not proven: largest violated gap {found.violation:.3g} mm, optimality {found.optimality:.3g} mm, "
         f"both must be <= {TOLERANCE:g} mm; curvature {found.curvature:.3g} 1/mm, must be >= 0"
