@@ -13,11 +13,6 @@ from clamp3d.geometry.pose import Array, inverse
 _SIDES = slice(0, 3)
 """Rows of `groove_pieces` that a wire through the whole groove can touch; the end faces are behind it."""
 
-LABELS = {
-    feature: feature.name.lower().replace("_m", " M").replace("_n", " N").replace("_", " ") for feature in Feature
-}
-"""Names for the user: 'arc', 'lip M', 'flat N', 'end face', ..."""
-
 
 class Cas:
     """Arc against cylinder in closed form, for any pose; exact to rounding."""
@@ -30,7 +25,7 @@ class Cas:
         """Gaps to the arc surface and the two faces beside it, for a wire that passes through; see `ContactModel`."""
         found = groove_pieces(pair.groove, pair.cylinder, inverse(pair.T_a_groove) @ T_a_b @ pair.T_b_cylinder)
         R, p = pair.T_a_groove[:3, :3], pair.T_a_groove[:3, 3]
-        feature = tuple(LABELS[Feature(int(code))] for code in found.feature[_SIDES])
+        feature = tuple(str(Feature(int(code))) for code in found.feature[_SIDES])
         return Pieces(
             found.distance[_SIDES], found.point_on_groove[_SIDES] @ R.T + p, found.normal[_SIDES] @ R.T, feature
         )

@@ -39,6 +39,11 @@ class Feature(IntEnum):
     CORNER_M = 9
     CORNER_N = 10
 
+    def __str__(self) -> str:
+        """Name for the user: 'arc', 'lip M', 'flat N', 'end face', ..."""
+        words = self.name.lower().split("_")
+        return " ".join(word.upper() if word in ("m", "n") else word for word in words)
+
 
 _FEATURES = tuple(Feature)
 
