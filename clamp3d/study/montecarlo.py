@@ -7,6 +7,7 @@ process, several, or a Dask cluster. (On processors with other floating point li
 
 from __future__ import annotations
 
+import importlib
 import math
 import re
 import signal
@@ -17,7 +18,7 @@ from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -265,7 +266,7 @@ def _quiet() -> None:
 
 def _on_cluster(tasks: list[tuple[Spec, int, int]], scheduler: str) -> Iterator[tuple[int, list[Sample]]]:
     try:
-        import distributed
+        distributed: Any = importlib.import_module("distributed")
     except ImportError:
         raise MissingLibraryError("a Dask cluster needs dask.distributed: pip install 'clamp3d[cluster]'") from None
     try:
@@ -276,7 +277,7 @@ def _on_cluster(tasks: list[tuple[Spec, int, int]], scheduler: str) -> Iterator[
     with client:
         futures = client.map(_chunk, tasks, pure=False)
         try:
-            for future in distributed.as_completed(futures):
+            for future in distributed.as_completed(futures, loop=client.loop):
                 try:
                     yield future.result()
                 except (distributed.KilledWorker, distributed.client.FutureCancelledError) as error:

@@ -1,0 +1,108 @@
+"""Sensitivities and a Monte Carlo over tolerances as text, JSON data, and a histogram."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from clamp3d import __version__
+from clamp3d.output.files import whole_file
+from clamp3d.output.palette import INK
+from clamp3d.study.montecarlo import MonteCarlo
+from clamp3d.study.sensitivity import DIMENSIONS, Sensitivity
+
+PERCENTILES = (0.1, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 99.9)
+_SHARE = {"uniform": 1.0 / 3.0, "normal": 1.0 / 9.0}  # variance by the square of the tolerance
+
+
+def shares(result: MonteCarlo, rows: tuple[Sensitivity, ...]) -> dict[str, float]:
+    """Each dimension's variance (derivative * standard deviation)^2 in mm^2: their sum is the linear prediction."""
+    tolerance = dict(zip(DIMENSIONS, result.spec.tolerance, strict=True))
+    return {row.name: (row.derivative * tolerance[row.name]) ** 2 * _SHARE[result.spec.distribution] for row in rows}
+
+
+def tolerance_to_text(result: MonteCarlo, rows: tuple[Sensitivity, ...], note: str = "") -> str:
+    """Table of sensitivities, percentiles, and what does not clamp; ``note`` stands where there are no ``rows``."""
+    tolerance = dict(zip(DIMENSIONS, result.spec.tolerance, strict=True))
+    variance = shares(result, rows)
+    total = sum(variance.values())
+    n, m = len(result.status), len(result.clamped)
+    nominal = "does not clamp" if result.nominal is None else f"{result.nominal:.4f} mm"
+    lines = [f"clamp {result.spec.clamp.name}: splint distance {nominal}"]
+    if rows:
+        lines.append(f"{'dimension':40s} {'mm':>9s} {'+-mm':>7s} {'mm per mm':>10s} {'variance':>9s}")
+    else:
+        lines.append(note)
+    for row in rows:
+        share = f"{100 * variance[row.name] / total:.1f} %" if total > 0.0 else "-"
+        lines.append(f"{row.name:40s} {row.value:9.4f} {tolerance[row.name]:7.4f} {row.derivative:+10.5f} {share:>9s}")
+    lines.append(f"{n} clamps within these tolerances (chosen, {result.spec.distribution}), seed {result.spec.seed}:")
+    if m:
+        spread = f"mean {result.clamped.mean():.4f} mm, standard deviation {result.clamped.std():.4f} mm"
+        lines.append(spread + (f" (linear: {math.sqrt(total):.4f} mm)" if rows else ""))
+        values = result.percentiles(PERCENTILES)
+        lines += [f"  {p:5.1f} %  {v:9.4f} mm" for p, v in zip(PERCENTILES, values, strict=True)]
+    lines.append(f"not clamped: {n - m} of {n} ({100 * (n - m) / n:.2f} %)")
+    lines += [f"  {count:6d}  {reason}" for reason, count in result.reasons().items()]
+    return "\n".join(lines)
+
+
+def tolerance_to_dict(result: MonteCarlo, rows: tuple[Sensitivity, ...]) -> dict[str, Any]:
+    """All of it as JSON data; lengths in mm, null for a sample that does not clamp."""
+    return {
+        "clamp3d": __version__,
+        "clamp": result.spec.clamp.name,
+        "seed": result.spec.seed,
+        "n": len(result.status),
+        "distribution": result.spec.distribution,
+        "tolerances_mm": dict(zip(DIMENSIONS, result.spec.tolerance, strict=True)),
+        "nominal_mm": result.nominal,
+        "sensitivities": [asdict(row) for row in rows],
+        "percentiles_mm": dict(zip(map(str, PERCENTILES), result.percentiles(PERCENTILES), strict=False)),
+        "not_clamped": result.reasons(),
+        "distance_mm": [None if math.isnan(d) else d for d in result.distance.tolist()],
+    }
+
+
+def draw_histogram(path: Path, result: MonteCarlo) -> None:
+    """Write the histogram as PNG, SVG or PDF by the file's name; nominal, median, 5 and 95 % are marked and named."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.5, 4.4), layout="constrained")
+    axes = figure.add_subplot()
+    n, m = len(result.status), len(result.clamped)
+    if m:
+        axes.hist(result.clamped, bins=min(80, max(5, round(2.0 * m ** (1 / 3)))), color="#56B4E9", edgecolor="white")
+        axes.set_ylim(0.0, 1.22 * axes.get_ylim()[1])
+        marks: list[tuple[str, float, Any]] = [
+            (f"{p:g} %", v, (0, (4, 3)))
+            for p, v in zip((5.0, 50.0, 95.0), result.percentiles((5, 50, 95)), strict=True)
+        ]
+        if result.nominal is not None:
+            marks.append(("nominal", result.nominal, "-"))
+        for name, value, style in marks:
+            upper = name == "nominal"
+            axes.axvline(value, color="#D55E00" if upper else INK, linestyle=style, linewidth=1.3)
+            axes.annotate(
+                f"{name} {value:.3f}",
+                (value, 0.95 if upper else 0.88),
+                xycoords=("data", "axes fraction"),
+                xytext=(4, 0),
+                textcoords="offset points",
+                fontsize=8,
+                color=INK,
+            )
+    else:
+        axes.text(0.5, 0.5, "no sample clamps", transform=axes.transAxes, ha="center")
+    axes.set_xlabel("splint distance (mm)")
+    axes.set_ylabel("clamps")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.set_title(
+        f"{result.spec.clamp.name}: {n} clamps within tolerances, {n - m} not clamped (seed {result.spec.seed})",
+        fontsize=10,
+    )
+    kind = path.suffix.lower().lstrip(".")
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format=kind, dpi=130)
