@@ -52,8 +52,8 @@ def command(
 
     The same seed gives the same clamps and distances, however the work is spread.
     """
-    from clamp3d.cli.progress import bar
     from clamp3d.clamp.loader import load_clamp
+    from clamp3d.cli.progress import bar
     from clamp3d.errors import InputError, SolverError
     from clamp3d.output.files import check_writable, write_json
     from clamp3d.output.tolerance_report import draw_histogram, tolerance_to_dict, tolerance_to_text
