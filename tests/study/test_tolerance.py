@@ -13,9 +13,10 @@ from clamp3d.study.montecarlo import monte_carlo
 from clamp3d.study.sensitivity import DIMENSIONS, dimension, sensitivity, with_dimensions
 
 
-def _distance(clamp):
+def _distance(clamp, near):
     section = Section(clamp, Cas())
-    return section.splint_distance(solve_final_state(section).q)
+    start = section.open_state(near.q[4] + 0.5, near.q[5] / section.lever)
+    return section.splint_distance(solve_final_state(section, start).q)
 
 
 # Wires in the arcs, and a line too thick for its grooves: it rests on lips.
@@ -23,13 +24,16 @@ def _distance(clamp):
 def test_derivatives_are_the_solvers_differences(line, jumper):
     clamp = load_clamp(line=line, jumper=jumper)
     rows = {row.name: row for row in sensitivity(clamp)}
+    near = solve_final_state(Section(clamp, Cas()))
+    carrying = {f for f, force in zip(near.gaps.feature, near.force, strict=True) if force > 0.0}
+    assert any(f.startswith("lip") for f in carrying) == (line is not None)
     h = 2e-3
     for name in DIMENSIONS:
         value = dimension(clamp, name)
         wide, narrow = (
             (
-                _distance(with_dimensions(clamp, {name: value + e}))
-                - _distance(with_dimensions(clamp, {name: value - e}))
+                _distance(with_dimensions(clamp, {name: value + e}), near)
+                - _distance(with_dimensions(clamp, {name: value - e}), near)
             )
             / (2 * e)
             for e in (h, h / 2)
@@ -40,15 +44,15 @@ def test_derivatives_are_the_solvers_differences(line, jumper):
 
 def test_samples_do_not_depend_on_where_they_run():
     clamp = load_clamp()
-    alone = monte_carlo(clamp, n=60, seed=5)
-    assert monte_carlo(clamp, n=60, seed=5, processes=2).distance.tobytes() == alone.distance.tobytes()
+    alone = monte_carlo(clamp, n=52, seed=5)
+    assert monte_carlo(clamp, n=52, seed=5, processes=2).distance.tobytes() == alone.distance.tobytes()
     assert monte_carlo(clamp, n=3, seed=5).distance.tolist() == alone.distance[:3].tolist()
     assert monte_carlo(clamp, n=3, seed=6).distance.tolist() != alone.distance[:3].tolist()
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
     ) as cluster:
-        there = monte_carlo(clamp, n=60, seed=5, scheduler=cluster.scheduler_address)
+        there = monte_carlo(clamp, n=52, seed=5, scheduler=cluster.scheduler_address)
     assert there.distance.tobytes() == alone.distance.tobytes()
     assert there.status == alone.status
 
