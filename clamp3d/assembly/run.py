@@ -106,7 +106,7 @@ def assemble(
         method=model.name,
         solver=solver,
         limits=model.limits,
-        status=_status(final, resolution),
+        status=final_status(final, resolution),
         distance=section.splint_distance(final.q),
         closing=float(final.q[D]),
         tilt=float(final.q[S]) / section.lever,
@@ -215,7 +215,7 @@ def _event(section: Section, q: Array, step: str, touch: tuple[PartName, PartNam
     return Event(step, contact.a, contact.b, contact.relation, contact.point, travel)
 
 
-def _status(final: FinalState | SteppedState, resolution: float) -> str:
+def final_status(final: FinalState | SteppedState, resolution: float) -> str:
     """'clamped' if both wires are held between the splints, else what stopped them."""
     gaps = final.gaps
     if isinstance(final, FinalState):

@@ -23,7 +23,7 @@ from typing import Any, Literal
 import numpy as np
 
 from clamp3d.assembly.final_state import FinalState, solve_final_state
-from clamp3d.assembly.run import _status
+from clamp3d.assembly.run import final_status
 from clamp3d.assembly.section import D, S, Section
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.contact.cas import Cas
@@ -193,7 +193,7 @@ def _spec(
         pass
     else:
         start = (float(final.q[D]) + _OPENED, float(final.q[S]) / section.lever)
-        nominal = section.splint_distance(final.q) if _status(final, 0.0) == CLAMPED else None
+        nominal = section.splint_distance(final.q) if final_status(final, 0.0) == CLAMPED else None
     return Spec(clamp, seed, distribution, tuple(of(name) for name in DIMENSIONS), start), nominal
 
 
@@ -212,7 +212,7 @@ def _sample(spec: Spec, index: int) -> Sample:
         final = _close(section, spec.start)
     except SolverError as error:
         return None, f"not solved: {_without_numbers(str(error))}"
-    status = _status(final, 0.0)
+    status = final_status(final, 0.0)
     return (section.splint_distance(final.q) if status == CLAMPED else None), status
 
 
@@ -226,7 +226,7 @@ def _close(section: Section, start: tuple[float, float] | None) -> FinalState:
             except SolverError:
                 pass
             else:
-                if _status(final, 0.0) == CLAMPED:
+                if final_status(final, 0.0) == CLAMPED:
                     return final
     return solve_final_state(section)
 

@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from clamp3d.assembly.final_state import FinalState, solve_final_state
-from clamp3d.assembly.run import _status
+from clamp3d.assembly.run import final_status
 from clamp3d.assembly.section import WIRES, D, S, Section
 from clamp3d.clamp.dimensions import Clamp, GrooveDimensions, Wire
 from clamp3d.contact.cas import Cas
@@ -111,7 +111,7 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
     """
     section = Section(clamp, Cas())
     final = solve_final_state(section)
-    status = _status(final, 0.0)
+    status = final_status(final, 0.0)
     if status != "clamped":
         raise SolverError(f"no sensitivity: {status}")
     derivative = _derivatives(section, final)
