@@ -234,7 +234,7 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
                 continue
             ez = H if at_top else -H
             v = top_v if at_top else low_v
-            d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
+            d2, x, y, t = end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
             if d2 < best2:
                 best2, bt, bz, feature = d2, t, ez, END_ARC
                 bx, by, on_end_arc = x, y, True

@@ -192,7 +192,7 @@ def end_arc_reach(ez, R, cz, dz, e2, p, along):  # type: ignore[no-untyped-def]
 
 
 @formula
-def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
+def end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
     """Squared distance of the axis' inside from the end arc in the plane z = ez (inf if they do not face), qx, qy, t.
 
     Seen along the axis the circle is an ellipse with the half axes R and R |dz| and the axis is a point. The distance
@@ -227,10 +227,10 @@ def end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: igno
             S = math.sqrt(max(0.0, 1.0 - C * C))
             if branch == 1:
                 S = -S
-        qy = R * (S * ey + C * ex)
-        if qy > h:
-            continue
         qx = R * (S * ex - C * ey)
+        qy = R * (S * ey + C * ex)
+        if qy > h or (h > 0.0 and abs(qx) * -h + qy * s > 0.0):  # in the mouth; nearly full arcs: by the angle
+            continue
         t = (qx - cx) * dx + (qy - cy) * dy + (ez - cz) * dz
         if abs(t) > l:
             continue

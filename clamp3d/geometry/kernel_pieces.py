@@ -187,7 +187,7 @@ def side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[
                 if piece == 0:
                     ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
                     v, _ = end_arc_reach(ez, R, cz, dz, e2, p, along)
-                    d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
+                    d2, x, y, t = end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
                     if d2 < best2:
                         best2, bx, by, bz, bt, feature = d2, x, y, ez, t, END_ARC
                 else:
@@ -262,7 +262,7 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
                 best2, bx, by, bt, feature = d2, sx, h, t, CORNER_M if j == 0 else CORNER_N
         ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
         v, _ = end_arc_reach(ez, R, cz, dz, e2, p, along)
-        d2, x, y, t = end_arc(ez, R, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
+        d2, x, y, t = end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
         if d2 < best2:
             best2, bx, by, bt, feature = d2, x, y, t, END_ARC
     put(row, math.sqrt(best2), r, bx, by, ez, cx + bt * dx, cy + bt * dy, cz + bt * dz, feature, R, h)
