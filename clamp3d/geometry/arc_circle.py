@@ -23,7 +23,9 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+from clamp3d.checks import number, real, shown
 from clamp3d.errors import InputError
+from clamp3d.geometry.shapes import arc_angle, place, size
 
 _EPS = 2.0**-52
 
@@ -76,7 +78,9 @@ def arc_circle(
     >>> arc_circle(7.0, math.radians(100), 6.935, 0.0, 0.0, tolerance=1e-9).gap
     0.06500000000000039
     """
-    tolerance = _checked(arc_radius, half_angle, circle_radius, x, y, tolerance)
+    arc_radius, half_angle, circle_radius, x, y, tolerance = _checked(
+        arc_radius, half_angle, circle_radius, x, y, tolerance
+    )
     m_x, m_y = -arc_radius * math.sin(half_angle), -arc_radius * math.cos(half_angle)
     distance_m, distance_n = math.hypot(x - m_x, y - m_y), math.hypot(x + m_x, y - m_y)
     points: tuple[tuple[float, float], ...]
@@ -111,9 +115,13 @@ def classify_arc_circle(
 
     Raises InputError as ``arc_circle`` does, and for a gap that is not a number.
     """
-    tolerance = _checked(arc_radius, half_angle, circle_radius, x, y, tolerance)
-    if math.isnan(gap):
-        raise InputError("gap must be a number, got nan")
+    arc_radius, half_angle, circle_radius, x, y, tolerance = _checked(
+        arc_radius, half_angle, circle_radius, x, y, tolerance
+    )
+    known = real(gap)
+    if known is None or math.isnan(known):
+        raise InputError(f"gap must be a number, got {shown(gap)}")
+    gap = known
     if gap < -tolerance:
         return ArcRelation.INTERSECT
     chord_x, chord_y = arc_radius * math.sin(half_angle), -arc_radius * math.cos(half_angle)
@@ -134,15 +142,15 @@ def _in_span(x: float, y: float, half_angle: float) -> bool:
     return math.atan2(abs(x), 0.0 - y) <= half_angle  # 0.0 - y, not -y: atan2(0, -0.0) is pi
 
 
-def _checked(arc_radius: float, half_angle: float, circle_radius: float, x: float, y: float, tolerance: float) -> float:
-    """The tolerance to apply. Raises InputError naming the value that breaks its rule."""
-    for name, value in (("arc_radius", arc_radius), ("circle_radius", circle_radius)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(f"{name} must be a finite length > 0 mm, got {value}")
-    if not 0.0 < half_angle < math.pi:
-        raise InputError(f"half_angle must be between 0 and pi rad, got {half_angle}")
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise InputError(f"circle centre must be finite, got ({x}, {y})")
+def _checked(
+    arc_radius: float, half_angle: float, circle_radius: float, x: float, y: float, tolerance: float
+) -> tuple[float, float, float, float, float, float]:
+    """All six as floats, with the tolerance to apply. Raises InputError naming the value that breaks its rule."""
+    arc_radius, circle_radius = size("arc_radius", arc_radius), size("circle_radius", circle_radius)
+    half_angle = arc_angle("half_angle", half_angle)
+    x, y = place("circle centre x", x), place("circle centre y", y)
+    tolerance = number("tolerance", tolerance, rule="be >= 0 mm and less than both radii")
     if not 0.0 <= tolerance < min(arc_radius, circle_radius):
         raise InputError(f"tolerance must be >= 0 mm and less than both radii, got {tolerance}")
-    return max(tolerance, 4.0 * _EPS * (arc_radius + circle_radius + abs(x) + abs(y)))
+    tolerance = max(tolerance, 4.0 * _EPS * (arc_radius + circle_radius + abs(x) + abs(y)))
+    return arc_radius, half_angle, circle_radius, x, y, tolerance

@@ -19,9 +19,10 @@ from typing import Literal, NoReturn, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clamp3d.checks import array, flag, whole
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import RIGID_TOLERANCE, Array, check_pose
-from clamp3d.geometry.shapes import LARGEST, Cylinder, SweptArc
+from clamp3d.geometry.shapes import LARGEST, Cylinder, SweptArc, check_shapes
 
 
 class Feature(IntEnum):
@@ -100,10 +101,10 @@ def _gradient(normal: Array, point: Array) -> Array:
 
 
 def as_pose(pose: ArrayLike) -> Array:
-    """Return ``pose`` as the (4, 4) C-contiguous float64 array the kernel takes; only the shape is checked here."""
-    if type(pose) is np.ndarray and pose.dtype == np.float64 and pose.shape == (4, 4) and pose.flags.c_contiguous:
+    """Return ``pose`` as the (4, 4) float64 array the kernel takes (C order, writeable); shape alone is checked."""
+    if type(pose) is np.ndarray and pose.dtype == np.float64 and pose.shape == (4, 4) and pose.flags.carray:
         return pose
-    return np.ascontiguousarray(check_pose(pose))
+    return np.require(check_pose(pose), np.float64, ["C", "A", "W"])
 
 
 def reject(T: Array, name: str) -> NoReturn:
@@ -140,6 +141,8 @@ def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Si
     >>> answer.distance, answer.feature.name
     (1.5, 'ARC')
     """
+    if type(groove) is not SweptArc or type(cylinder) is not Cylinder:
+        check_shapes(groove, cylinder)
     T = as_pose(pose)
     record = np.empty((1, 13))
     run = (_kernel or kernel()).records
@@ -182,14 +185,11 @@ def signed_distances(
     >>> signed_distances(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.eye(4)[None])
     array([1.5])
     """
-    try:
-        T = np.ascontiguousarray(poses, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"poses must be an (n, 4, 4) array of numbers, got {type(poses).__name__}") from None
-    if T.ndim != 3 or T.shape[1:] != (4, 4):
-        raise InputError(f"poses must have shape (n, 4, 4), got {T.shape}")
-    if workers is not None and workers < 1:
-        raise InputError(f"workers must be at least 1, got {workers}")
+    check_shapes(groove, cylinder)
+    flag("full", full)
+    T = np.require(array("poses", poses, (None, 4, 4), finite=False), np.float64, ["C", "A", "W"])
+    if workers is not None:
+        workers = whole("workers", workers, least=1)
     n = len(T)
     out = np.empty((n, 13) if full else n)
     run = kernel().records if full else kernel().distances

@@ -165,7 +165,9 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
                 t = lo if i == 0 else hi
                 x = cx + t * dx
                 y = cy + t * dy
-                if x * x + y * y >= R * R and (h < 0.0 or abs(x) * -h + y * s <= 0.0):
+                if (x * x + y * y >= R * R and (h < 0.0 or abs(x) * -h + y * s <= 0.0)) or (
+                    abs(x) >= s and (dy < 0.0 if i == 0 else dy > 0.0) and t == (h - cy) / dy
+                ):
                     behind = True
             if behind:
                 return inside(R, h, H, r, cx, cy, cz, dx, dy, dz, lo, hi, bound)
@@ -181,11 +183,12 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
         gap, f = section(cx + t * dx, cy + t * dy, R, s, h)
         d2 = gap * gap
         end = abs(z) - H
-        if end > 0.0:
+        if end >= 0.0:  # level with it too: an axis in the plane of an end face leaves it by less than rounding
             if z > 0.0:
                 top = True
             else:
                 bottom = True
+        if end > 0.0:
             z = math.copysign(H, z)
             if gap <= 0.0:
                 d2 = end * end
@@ -215,7 +218,7 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
             if not (bottom if i == 0 else top):
                 continue
             ez = -H if i == 0 else H
-            if cy + high > h:
+            if cy + high >= h:
                 d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l)
                 if d2 < best2:
                     best2, bt, bz, feature = d2, t, ez, END_EDGE_M if x < 0.0 else END_EDGE_N

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.geometry.distance import as_pose, reject
 from clamp3d.geometry.pose import Array
-from clamp3d.geometry.shapes import Cylinder, SweptArc
+from clamp3d.geometry.shapes import Cylinder, SweptArc, check_shapes
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +47,8 @@ def groove_pieces(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Groo
     >>> gaps.distance[:3].round(3).tolist()
     [0.133, 0.133, 0.133]
     """
+    if type(groove) is not SweptArc or type(cylinder) is not Cylinder:
+        check_shapes(groove, cylinder)
     T = as_pose(pose)
     out = np.empty((5, 14))
     from clamp3d.geometry.kernel_pieces import pieces  # compiled on first use

@@ -6,12 +6,15 @@ angles counter-clockwise as seen; so x = X, y = -Z, and a positive angle turns X
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clamp3d.checks import array, number
 from clamp3d.errors import InputError
+from clamp3d.geometry.shapes import LARGEST
 
 Array = NDArray[np.float64]
 
@@ -28,19 +31,17 @@ def check_pose(pose: ArrayLike, name: str = "pose") -> Array:
     Traceback (most recent call last):
     clamp3d.errors.InputError: pose must be rigid: its rotation part deviates from orthonormal by 3
     """
-    try:
-        T = np.asarray(pose, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be a 4x4 matrix of numbers, got {type(pose).__name__}") from None
-    if T.shape != (4, 4):
-        raise InputError(f"{name} must have shape (4, 4), got {T.shape}")
+    T = array(name, pose, (4, 4), finite=False)
     if not np.isfinite(T).all():
         raise InputError(f"{name} must be finite, got a NaN or infinite entry")
     if not np.array_equal(T[3], (0.0, 0.0, 0.0, 1.0)):
         raise InputError(f"{name} must have the last row 0 0 0 1, got {T[3].tolist()}")
+    if not np.abs(T[:3, 3]).max() < LARGEST:
+        raise InputError(f"{name} must have an offset below {LARGEST:g} mm, got {T[:3, 3].tolist()}")
     R = T[:3, :3]
-    deviation = float(np.abs(R @ R.T - np.eye(3)).max())
-    if deviation > RIGID_TOLERANCE:
+    with np.errstate(over="ignore", invalid="ignore"):
+        deviation = float(np.abs(R @ R.T - np.eye(3)).max())
+    if not deviation <= RIGID_TOLERANCE:
         raise InputError(f"{name} must be rigid: its rotation part deviates from orthonormal by {deviation:.3g}")
     if np.linalg.det(R) < 0:
         raise InputError(f"{name} must be rigid: it reflects (determinant -1)")
@@ -58,16 +59,29 @@ def inverse(T: Array) -> Array:
 
 
 def translation(x: float, y: float, z: float) -> Array:
-    """Pose that moves by (x, y, z) mm."""
+    """Pose that moves by (x, y, z) mm. Raises InputError for what is no finite number."""
     T = np.eye(4)
-    T[:3, 3] = (x, y, z)
+    T[:3, 3] = number("x", x), number("y", y), number("z", z)
     return T
 
 
+def unit(axis: Array, name: str = "axis") -> Array:
+    """Direction (3,) of a finite vector, of any length but zero. Raises InputError for that."""
+    largest = float(np.abs(axis).max())
+    if largest == 0.0:
+        raise InputError(f"{name} must not be zero")
+    # A power of two changes no digit, and no square overflows or underflows.
+    scaled = np.ldexp(axis, -math.frexp(largest)[1]) if not 1e-100 < largest < 1e100 else axis
+    return np.asarray(scaled / np.linalg.norm(scaled))
+
+
 def rotation(axis: ArrayLike, angle: float) -> Array:
-    """Pose that turns by ``angle`` rad about ``axis`` (3,) through the origin, right-handed (Rodrigues' formula)."""
-    a = np.asarray(axis, dtype=np.float64)
-    a = a / np.linalg.norm(a)
+    """Pose that turns by ``angle`` rad about ``axis`` (3,) through the origin, right-handed (Rodrigues' formula).
+
+    Raises InputError for numbers that are not finite, or an axis of length zero.
+    """
+    a, angle = array("axis", axis, (3,)), number("angle", angle)
+    a = unit(a)
     K = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
     T = np.eye(4)
     # 2 sin^2(t/2) in place of 1 - cos t keeps small angles exact.
@@ -82,6 +96,10 @@ class SectionPose:
     x: float
     y: float
     angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("x", "y", "angle"):
+            object.__setattr__(self, name, number(name, getattr(self, name)))
 
     def T(self, along: float = 0.0) -> Array:
         """World pose (4, 4), the part's middle at ``along`` mm on the wires' direction Y."""

@@ -22,7 +22,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
 
+from clamp3d.checks import instance, number
 from clamp3d.errors import InputError
+from clamp3d.geometry.shapes import place, size
 
 _EPS = 2.0**-52
 
@@ -53,12 +55,9 @@ class Rectangle:
     angle: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("x", "y", "half_width", "half_height", "angle"):
-            if not math.isfinite(getattr(self, name)):
-                raise InputError(f"rectangle {name} must be finite, got {getattr(self, name)}")
-        for name in ("half_width", "half_height"):
-            if getattr(self, name) <= 0.0:
-                raise InputError(f"rectangle {name} must be > 0 mm, got {getattr(self, name)}")
+        rules = {"x": place, "y": place, "half_width": size, "half_height": size, "angle": number}
+        for name, rule in rules.items():
+            object.__setattr__(self, name, rule(f"rectangle {name}", getattr(self, name)))
 
     def point(self, u: float, v: float) -> Point:
         """Section coordinates of the rectangle's own point, ``u`` right and ``v`` down of its centre."""
@@ -108,10 +107,13 @@ def hole_bolt(hole: Rectangle, bolt: Rectangle, *, tolerance: float) -> HoleCont
     >>> contact.relation.value, contact.gap_left, contact.gap_right
     ('two points on one side', 0.0, 2.0)
     """
+    instance("hole", hole, Rectangle)
+    instance("bolt", bolt, Rectangle)
+    tolerance = number("tolerance", tolerance, rule="be finite and >= 0 mm")
     turn = math.remainder(hole.angle - bolt.angle, 2.0 * math.pi)
     if not abs(turn) < 0.5 * math.pi:
         raise InputError(f"hole and bolt must be turned by less than 90 deg, got {math.degrees(turn):.4g} deg")
-    if not (math.isfinite(tolerance) and tolerance >= 0.0):
+    if not tolerance >= 0.0:
         raise InputError(f"tolerance must be finite and >= 0 mm, got {tolerance}")
     sizes = hole.half_width + hole.half_height + bolt.half_width + bolt.half_height
     offset = abs(hole.x - bolt.x) + abs(hole.y - bolt.y)

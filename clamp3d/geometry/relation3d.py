@@ -9,10 +9,11 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clamp3d.checks import number
 from clamp3d.errors import InputError
 from clamp3d.geometry.distance import Feature, SignedDistance, as_pose, signed_distance
 from clamp3d.geometry.pose import Array, check_pose
-from clamp3d.geometry.shapes import Cylinder, SweptArc
+from clamp3d.geometry.shapes import Cylinder, SweptArc, check_shapes
 
 
 class Relation3D(str, Enum):
@@ -52,6 +53,8 @@ def groove_relation(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike, *, to
     >>> groove_relation(groove, wire, translation(0.0, -0.065, 0.0), tolerance=1e-9).relation.value
     'interior contact'
     """
+    check_shapes(groove, cylinder)
+    tolerance = number("tolerance", tolerance, rule="be >= 0 mm and less than both radii")
     if not 0.0 <= tolerance < min(groove.radius, cylinder.radius):
         raise InputError(f"tolerance must be >= 0 mm and less than both radii, got {tolerance}")
     contact = signed_distance(groove, cylinder, pose)

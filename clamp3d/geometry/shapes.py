@@ -5,17 +5,35 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from clamp3d.checks import instance, number, positive
 from clamp3d.errors import InputError
 
 LARGEST = 1e100
 """Lengths from 1 / LARGEST to LARGEST mm: their squares neither overflow nor underflow."""
 
 
-def _positive(name: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise InputError(f"{name} must be a finite length > 0 mm, got {value}")
-    if not 1.0 / LARGEST <= value <= LARGEST:
-        raise InputError(f"{name} must be between {1.0 / LARGEST:g} and {LARGEST:g} mm, got {value}")
+def size(name: str, value: object) -> float:
+    """A length > 0 mm whose square neither overflows nor underflows, as a float. Raises InputError for any other."""
+    x = positive(name, value)
+    if not 1.0 / LARGEST <= x <= LARGEST:
+        raise InputError(f"{name} must be between {1.0 / LARGEST:g} and {LARGEST:g} mm, got {x}")
+    return x
+
+
+def place(name: str, value: object) -> float:
+    """A coordinate in mm whose square does not overflow, as a float. Raises InputError for any other."""
+    x = number(name, value)
+    if not abs(x) <= LARGEST:
+        raise InputError(f"{name} must be between {-LARGEST:g} and {LARGEST:g} mm, got {x}")
+    return x
+
+
+def arc_angle(name: str, value: object) -> float:
+    """Half the angle of an arc in rad, as a float. Raises InputError unless it is between 0 and pi."""
+    x = number(name, value, rule="be between 0 and pi rad")
+    if not 0.0 < x < math.pi:
+        raise InputError(f"{name} must be between 0 and pi rad, got {x}")
+    return x
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +51,9 @@ class SweptArc:
     length: float
 
     def __post_init__(self) -> None:
-        _positive("groove radius", self.radius)
-        _positive("groove length", self.length)
-        if not 0.0 < self.half_angle < math.pi:
-            raise InputError(f"groove half_angle must be between 0 and pi rad, got {self.half_angle}")
+        object.__setattr__(self, "radius", size("groove radius", self.radius))
+        object.__setattr__(self, "length", size("groove length", self.length))
+        object.__setattr__(self, "half_angle", arc_angle("groove half_angle", self.half_angle))
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,5 +64,11 @@ class Cylinder:
     length: float
 
     def __post_init__(self) -> None:
-        _positive("cylinder radius", self.radius)
-        _positive("cylinder length", self.length)
+        object.__setattr__(self, "radius", size("cylinder radius", self.radius))
+        object.__setattr__(self, "length", size("cylinder length", self.length))
+
+
+def check_shapes(groove: object, cylinder: object) -> None:
+    """Raise InputError unless the two are a groove and a cylinder, in this order."""
+    instance("groove", groove, SweptArc)
+    instance("cylinder", cylinder, Cylinder)

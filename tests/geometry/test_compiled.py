@@ -36,8 +36,7 @@ def test_cold_and_warm_start(tmp_path):
     assert cold[0] == warm[0] == "1.5"
     assert said.count("compiling the contact kernel") == 1
     assert silent == ""
-    assert float(cold[1]) < 15.0  # seconds of CPU; 4 to 5 on an idle machine
-    assert float(warm[1]) < 2.0  # 0.5 to 0.7
+    assert float(warm[1]) < 0.5 * float(cold[1])  # seconds of CPU: 0.5 and 4.5 on an idle machine
 
 
 def test_a_changed_formula_is_compiled_again(tmp_path):

@@ -321,7 +321,7 @@ def test_bad_shapes_of_input():
     for batch in (np.eye(4), np.zeros((2, 3, 4)), "up"):
         with pytest.raises(InputError, match="poses"):
             signed_distances(groove, wire, batch)
-    with pytest.raises(InputError, match="workers must be at least 1, got 0"):
+    with pytest.raises(InputError, match="workers must be a whole number >= 1, got 0"):
         signed_distances(groove, wire, np.eye(4)[None], workers=0)
     for make in (
         lambda: Cylinder(1e200, 1.0),
@@ -339,3 +339,43 @@ def test_bad_shapes_of_input():
     assert signed_distance(groove, wire, np.asfortranarray(T)).distance == wanted
     assert signed_distance(groove, wire, T.tolist()).distance == wanted
     assert signed_distances(groove, wire, np.asfortranarray(T[None]))[0] == wanted
+
+
+def test_axis_through_the_thin_edge_beside_a_nearly_closed_mouth():
+    # The material beside a mouth of 1e-7 mm is thinner there than the rounding of a radius; the axis passes through it.
+    groove = SweptArc(5.161415441164862, 3.1415926427670393, 2.0250675696346696)
+    wire = Cylinder(3.5867976131830965, 23.721288892512312)
+    T = np.eye(4)
+    T[:3, 0] = -0.9911410683349434, -0.13281333765803433, -8.365718838961366e-10
+    T[:3, 1] = -0.13281333765803433, 0.9911410683349434, 6.243053336094173e-09
+    T[:3, 2] = 0.0, 6.298854457299527e-09, -1.0
+    T[:3, 3] = 7.726659662254022e-08, 5.161415441164861, 0.0
+    answer = signed_distance(groove, wire, T)
+    assert abs(answer.distance + wire.radius) <= answer.error_bound
+
+
+@pytest.mark.parametrize("turned", [np.eye(4), np.diag([-1.0, 1.0, -1.0, 1.0])])
+def test_axis_level_with_an_end_face_touches_it(turned):
+    # Neither end of the axis is beyond the face's plane by more than rounding, but the axis lies on the face.
+    groove = SweptArc(10.3457246493177, 3.0524651459900665, 23.430698414214742)
+    wire = Cylinder(9.626253306467202, 26.304754317132005)
+    T = np.eye(4)
+    T[:3, 0] = -0.11533551134736529, 0.1153355113473654, -0.9866080476280759
+    T[:3, 1] = -0.6976372408510326, 0.6976372408510327, 0.16310904437068008
+    T[:3, 2] = 0.7071067811865476, 0.7071067811865475, 6.123233995736766e-17
+    T[:3, 3] = 9.958802570348058e-09, 9.121022893692713, 11.715349207107371
+    answer = signed_distance(groove, wire, turned @ T)
+    assert abs(answer.distance + wire.radius) <= answer.error_bound
+
+
+@pytest.mark.parametrize("turned", [np.eye(4), np.diag([-1.0, 1.0, -1.0, 1.0])])
+def test_axis_level_with_the_flat_faces_touches_them(turned):
+    groove = SweptArc(60.27661206694996, 0.4055364276778771, 187.53846554205296)
+    wire = Cylinder(48.58597632250411, 1669.9322504748816)
+    T = np.eye(4)
+    T[:3, 0] = 0.1960587234597981, -0.9607923573335858, 0.19605872345979813
+    T[:3, 1] = -0.679382791182787, -0.27726890573840257, -0.6793827911827871
+    T[:3, 2] = 0.7071067811865476, -3.4762175193439656e-18, -0.7071067811865475
+    T[:3, 3] = 315.64366617869393, -55.38763045396105, -102.3385888129202
+    answer = signed_distance(groove, wire, turned @ T)
+    assert abs(answer.distance + wire.radius) <= answer.error_bound

@@ -137,13 +137,30 @@ def test_against_dense_sampling(half, length, about, tilt, place, axis, angle, t
 def test_bad_motions_are_named():
     with pytest.raises(InputError, match="axis must not be zero"):
         Rotation(np.eye(4), (0, 0, 0), (0, 0, 0), 1.0)
-    with pytest.raises(InputError, match="vector must be three finite numbers"):
+    with pytest.raises(InputError, match="vector must be finite, got nan"):
         Translation(np.eye(4), (0, np.nan, 0))
     with pytest.raises(InputError, match="start must be rigid"):
         Translation(2.0 * np.diag([1, 1, 1, 0.5]), (0, 0, 1))
-    with pytest.raises(InputError, match="angle must be finite"):
+    with pytest.raises(InputError, match="angle must be a finite number"):
         Screw(np.eye(4), (0, 0, 0), (0, 0, 1), math.inf, 1.0)
-    with pytest.raises(InputError, match="margin must be finite"):
+    with pytest.raises(InputError, match="margin must be a finite number"):
         first_contact(GROOVE, WIRE, Translation(np.eye(4), (0, 0, 1)), margin=math.nan)
     with pytest.raises(InputError, match="motion must be a Translation, Rotation or Screw, got int"):
         sweep(GROOVE, WIRE, 3)
+
+
+def test_a_wire_that_crosses_an_end_edge_at_level_distance_is_answered_quickly():
+    # Skew to the edge and moving along the plane that touches it, it is as near all the way: once minutes of marching.
+    groove, wire = SweptArc(12.0, math.radians(70.0), 50.0), Cylinder(2.0, 80.0)
+    normal = np.array([0.0, 1.0, 1.0]) / math.sqrt(2.0)
+    lean = np.array([0.0, -0.6, 0.6]) / math.sqrt(0.72) * 0.6 + np.array([0.8, 0.0, 0.0])
+    T = np.eye(4)
+    T[:3, 2], T[:3, 0] = lean, normal
+    T[:3, 1] = np.cross(T[:3, 2], T[:3, 0])
+    for gap in (1e-10, -1e-10):
+        T[:3, 3] = np.array([40.0, H, 25.0]) + (2.0 + gap) * normal
+        path = Translation(T, (20.0, 0.0, 0.0))
+        least, hit = sweep(groove, wire, path), first_contact(groove, wire, path)
+        assert least.distance == pytest.approx(gap, abs=1e-13)
+        assert hit.touches == (gap < 0.0)
+        assert least.evaluations + hit.evaluations < 5000

@@ -97,9 +97,9 @@ def test_bad_tolerance(tolerance: float) -> None:
 
 
 def test_bad_rectangles() -> None:
-    with pytest.raises(InputError, match="half_width must be > 0 mm, got -1"):
+    with pytest.raises(InputError, match="half_width must be a finite length > 0 mm, got -1"):
         Rectangle(0.0, 0.0, -1.0, 1.0)
-    with pytest.raises(InputError, match="x must be finite"):
+    with pytest.raises(InputError, match="x must be a finite number"):
         Rectangle(math.nan, 0.0, 1.0, 1.0)
     with pytest.raises(InputError, match="less than 90 deg"):
         hole_bolt(Rectangle(0.0, 0.0, W, H, math.pi / 2), BOLT, tolerance=TOL)
