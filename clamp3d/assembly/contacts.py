@@ -20,6 +20,9 @@ from clamp3d.geometry.rectangle import Rectangle, hole_bolt
 CONTACT = 1e-6
 """Gap in mm up to which two parts touch."""
 
+OFF_ARC = ("face ", "flat", "lip", "end", "corner")
+"""How the names of features begin that are not of a groove's arc."""
+
 Poses = dict[PartName, SectionPose]
 
 
@@ -34,7 +37,7 @@ def seats(pairs: Sequence[Contact], resolution: float) -> tuple[Seat, ...]:
     found = []
     for splint, wire in itertools.product(SPLINTS, WIRES):
         contact = by_pair[splint, wire]
-        on_arc = not contact.feature.startswith(("face ", "flat", "lip", "end", "corner"))
+        on_arc = not contact.feature.startswith(OFF_ARC)
         touching = contact.distance <= resolution
         if touching and on_arc:
             detail = "seated in the groove"

@@ -9,12 +9,13 @@ starts lead to are found by `equilibria`.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
 
+from clamp3d.assembly.curvature import LEVEL, lagrangian_hessian, least_curvature, normals_turned
 from clamp3d.assembly.section import WIRES, D, Gaps, S, Section
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.errors import InputError, SolverError
@@ -27,13 +28,15 @@ _ACTIVE = 1e-6
 _ACTIVE_TRIES = (1e-6, 1e-8, 1e-10)
 """Gaps that count as closed, mm: a wire that nearly fills its groove is within the first of contacts it lacks."""
 _ATTEMPTS = 3
-_LEVEL = 1e-6
-"""Curvature in 1/mm that counts as none: rounding of the differences that it is taken from."""
-_STRIDE = 4.0
-"""How far one descent may move any coordinate, mm: gaps are far from linear beyond, and wires must not jump out."""
-_SHORTEST = 1e-3
+STRIDE = 0.06
+"""How far one descent may move any coordinate, in parts of the down splint's half width: gaps are far from linear
+beyond, and wires must not jump out."""
+_SHORTEST, _ASIDE = 1.5e-5, 1.5e-3
+"""Shortest stride, and how far a second try begins from the first one's end, in the same parts."""
 _NO_FORCE = 1e-9
 """Multipliers below are rounding of the least squares: a wire they hold is not held."""
+_MOST_STRIDES = 1000
+"""A closing of the reference clamp from fully open takes about ten."""
 _CLOSING = np.eye(6)[D]
 
 
@@ -42,9 +45,10 @@ class FinalState:
     """Where the section comes to rest, with the proof.
 
     ``q`` (6,) as in `section`; ``gaps`` at q; ``force`` (k,) how much of the closing each gap carries (KKT multipliers,
-    1 = the whole bolt force); ``violation`` mm: deepest overlap; ``optimality`` mm: length of the last Newton step plus
-    the stationarity residual over 1 mm; ``loose``: wires that no contact force holds. ``curvature`` 1/mm: least second
-    derivative of the distance by motions that keep the carrying contacts closed (and overlap nothing), > 0 proves a
+    1 = the whole bolt force); ``violation`` mm: deepest overlap; ``optimality`` mm: largest of the last Newton step,
+    the stationarity residual over 1 mm, less what rounding turns normals by (`normals_turned`), and how far what
+    carries is open, weighed by its force; ``loose``: wires that no contact force holds. ``curvature`` 1/mm: least
+    second derivative of the distance by motions that keep what carries closed (and overlap nothing), > 0 proves a
     strict minimum, 0 a level one; inf if there is no such motion.
     """
 
@@ -57,9 +61,11 @@ class FinalState:
     curvature: float
 
 
-def solve_final_state(section: Section, start: Array | None = None) -> FinalState:
+def solve_final_state(section: Section, start: Array | None = None, stride: float = STRIDE) -> FinalState:
     """Close the clamp from ``start`` (an open state; by default straight and fully open).
 
+    ``stride`` (parts of the down splint's half width) is the longest move of a descent: short ones keep to the nearest
+    place of rest.
     Raises InputError if the start overlaps, SolverError when feasibility or optimality cannot be shown to `TOLERANCE`.
     """
     q = section.open_state(section.open_distance()) if start is None else np.array(start, dtype=np.float64)
@@ -68,12 +74,12 @@ def solve_final_state(section: Section, start: Array | None = None) -> FinalStat
     if gaps.value[k] < -_ACTIVE:
         a, b = gaps.pair[k]
         raise InputError(f"the start must be an open state: {a} and {b} overlap by {-gaps.value[k]:.4g} mm")
-    found = _closed(section, q)
+    found = _closed(section, q, stride)
     for attempt in range(_ATTEMPTS):
         if _proven(found):
             break
         # A place where the closed gaps hang together badly, or a saddle: open a little, aside, and close again.
-        again = _closed(section, _aside(section, found.q, attempt))
+        again = _closed(section, _aside(section, found.q, attempt), stride)
         if _proven(again) or _flaw(again) < _flaw(found):
             found = again
     if _proven(found):
@@ -84,9 +90,9 @@ def solve_final_state(section: Section, start: Array | None = None) -> FinalStat
     )
 
 
-def _closed(section: Section, q: Array) -> FinalState:
+def _closed(section: Section, q: Array, stride: float) -> FinalState:
     """Where closing from q ends, with the set of closed gaps that proves it best."""
-    q = _descend(section, q, _CLOSING)
+    q = _descend(section, q, _CLOSING, stride=stride)
     best = _finish(section, q, _ACTIVE_TRIES[0])
     for active in _ACTIVE_TRIES[1:]:
         if _flaw(best) <= TOLERANCE:
@@ -97,7 +103,7 @@ def _closed(section: Section, q: Array) -> FinalState:
 
 def _proven(state: FinalState) -> bool:
     """Feasible, stationary, and no saddle."""
-    return _flaw(state) <= TOLERANCE and state.curvature >= -_LEVEL
+    return _flaw(state) <= TOLERANCE and state.curvature >= -LEVEL
 
 
 def _flaw(state: FinalState) -> float:
@@ -116,17 +122,20 @@ def _finish(section: Section, q: Array, active: float) -> FinalState:
         q = _rest(section, q, wire)
     if loose:
         gaps = section.gaps(q)
-    residual = float(np.abs(_CLOSING - force @ gaps.gradient).max())
+    residual = max(0.0, float(np.abs(_CLOSING - force @ gaps.gradient).max()) - normals_turned(section, q))
     violation = max(0.0, -float(gaps.value.min()))
-    return FinalState(q, gaps, force, violation, max(optimality, residual), loose, _curvature(section, q, gaps, force))
+    ajar = float(force @ np.abs(gaps.value))  # what carries must be closed: the distance is off by what it is open
+    curvature = least_curvature(section, q, gaps, force, TOLERANCE)
+    return FinalState(q, gaps, force, violation, max(optimality, residual, ajar), loose, curvature)
 
 
 def _aside(section: Section, q: Array, attempt: int) -> Array:
     """An open state near q, another one for each attempt."""
     rng = np.random.default_rng(attempt)
     new = q.copy()
-    new[:4] += rng.uniform(-0.1, 0.1, 4)
-    new[S] += rng.uniform(-0.1, 0.1)
+    step = _ASIDE * section.lever
+    new[:4] += rng.uniform(-step, step, 4)
+    new[S] += rng.uniform(-step, step)
     low, high = np.array(section.bounds()).T
     limit = section.lever * section.clamp.down_splint.max_tilt
     new = np.clip(new, low, high)
@@ -136,45 +145,10 @@ def _aside(section: Section, q: Array, attempt: int) -> Array:
         k = int(np.argmin(gaps.value))
         if gaps.value[k] >= 0.0:
             break
-        new[D] += 0.1
+        new[D] += step
         if gaps.pair[k][0] == "P1":  # opening does not help the wire out of the up splint
             new[:4] -= gaps.value[k] * gaps.gradient[k, :4]
     return new
-
-
-def _curvature(section: Section, q: Array, gaps: Gaps, force: Array) -> float:
-    """Least second derivative of the Lagrangian by unit motions of the critical cone.
-
-    These keep what carries closed and open no other closed gap into overlap. The cone has one or two dimensions here
-    (a plane is looked at degree by degree); more are looked at by random directions.
-    """
-    carrying = np.flatnonzero(force)
-    A = gaps.gradient[carrying]
-    free = np.flatnonzero(np.abs(A).max(axis=0, initial=0.0) > 0.0)
-    if not len(free):
-        return np.inf
-    _, sizes, rows = np.linalg.svd(A[:, free])
-    tangent = rows[int((sizes > 1e-9).sum()) :]
-    if not len(tangent):
-        return np.inf
-    hessian = _lagrangian_hessian(section, q, carrying, force[carrying])[np.ix_(free, free)]
-    reduced = tangent @ hessian @ tangent.T
-    least = float(np.linalg.eigvalsh(reduced).min())
-    closed = np.flatnonzero((np.abs(gaps.value) <= TOLERANCE) & (force == 0.0))
-    if least >= -_LEVEL or not len(closed):
-        return least
-    m = len(tangent)
-    if m == 1:
-        motions = np.array([[1.0], [-1.0]])
-    elif m == 2:
-        angle = np.linspace(0.0, 2.0 * np.pi, 721)
-        motions = np.column_stack([np.cos(angle), np.sin(angle)])
-    else:
-        motions = np.random.default_rng(0).normal(size=(20_000, m))
-        motions /= np.linalg.norm(motions, axis=1)[:, None]
-    opens = gaps.gradient[np.ix_(closed, free)] @ tangent.T @ motions.T
-    motions = motions[(opens >= -1e-7).all(axis=0)]
-    return float(np.einsum("ni,ij,nj->n", motions, reduced, motions).min(initial=np.inf))
 
 
 def _without_force(gaps: Gaps, force: Array) -> tuple[PartName, ...]:
@@ -197,7 +171,9 @@ def _rest(section: Section, q: Array, wire: PartName) -> Array:
     return q
 
 
-def _descend(section: Section, start: Array, goal: Array, free: tuple[int, ...] = tuple(range(6))) -> Array:
+def _descend(
+    section: Section, start: Array, goal: Array, free: tuple[int, ...] = tuple(range(6)), stride: float = STRIDE
+) -> Array:
     """Least goal . q with no gap negative, by SLSQP; only the coordinates ``free`` move."""
     index = list(free)
     low, high = np.array(section.bounds()).T
@@ -215,8 +191,10 @@ def _descend(section: Section, start: Array, goal: Array, free: tuple[int, ...] 
         new[index] = x
         return new
 
-    q, stride = start, _STRIDE
-    while stride > _SHORTEST:
+    q, stride, shortest = start, stride * section.lever, _SHORTEST * section.lever
+    for _ in range(_MOST_STRIDES):
+        if stride <= shortest:
+            return q
         # A wire that is out of its mouth already may come back, not go further.
         near = np.maximum(np.minimum(low, q), q - stride)[index], np.minimum(np.maximum(high, q), q + stride)[index]
         found = minimize(
@@ -238,13 +216,23 @@ def _descend(section: Section, start: Array, goal: Array, free: tuple[int, ...] 
             continue
         advanced, moved, q = float(goal @ (q - new)), np.abs(new - q).max(), new
         if advanced < _ACTIVE or moved < 0.5 * stride:
-            break
-    return q
+            return q
+    raise SolverError(
+        f"closing takes more than {_MOST_STRIDES} strides of {stride:.3g} mm: the down splint's width "
+        f"({2.0 * section.lever:.3g} mm) is too small beside the way it closes"
+    )
 
 
 def _multipliers(gaps: Gaps, active: float) -> Array:
-    """Multipliers >= 0 (k,) of the gaps within ``active`` mm, by non-negative least squares; 0 of the others."""
+    """Multipliers >= 0 (k,) of the gaps within ``active`` mm, by non-negative least squares; 0 of the others.
+
+    A lip ends the arc and the face beside it and is in both gaps: the face's counts, for the arc's jumps to the other
+    lip when that comes nearer, and its derivatives with it.
+    """
     closed = np.abs(gaps.value) <= active
+    for i, j in itertools.combinations(np.flatnonzero(closed), 2):
+        if gaps.value[i] == gaps.value[j] and (gaps.pair[i], gaps.feature[i]) == (gaps.pair[j], gaps.feature[j]):
+            closed[i] = False
     force = np.zeros(len(gaps.value))
     if closed.any():
         force[closed] = nnls(gaps.gradient[closed].T, _CLOSING)[0]
@@ -264,7 +252,7 @@ def _polish(section: Section, q: Array, active: float) -> tuple[Array, float]:
         overlapping = (gaps.value < -TOLERANCE) & (gaps.value >= -active)
         carrying = np.flatnonzero((force > 0.0) | overlapping)
         free = np.flatnonzero(np.abs(gaps.gradient[carrying]).max(axis=0, initial=0.0) > 0.0)
-        hessian = _lagrangian_hessian(section, q, carrying, force[carrying])
+        hessian = lagrangian_hessian(section, q, carrying, force[carrying])
         A = gaps.gradient[carrying]
         k, n = len(carrying), len(free)
         kkt = np.block([[hessian[np.ix_(free, free)], -A[:, free].T], [A[:, free], np.zeros((k, k))]])
@@ -276,16 +264,3 @@ def _polish(section: Section, q: Array, active: float) -> tuple[Array, float]:
             break
         q, step = q + move, new
     return q, step
-
-
-def _lagrangian_hessian(section: Section, q: Array, rows: NDArray[np.intp], force: Array) -> Array:
-    """Second derivatives (6, 6) of goal - force . gaps by central differences of the closed-form gradients."""
-    # A wire that nearly fills its groove turns its normal within R - r: the step must be short beside that.
-    slack = [abs(p.groove.radius - p.cylinder.radius) for p in section.pairs.values() if p.a != "P3"]
-    h = min(1e-4, max(1e-8, 0.03 * min(slack)))
-    H = np.empty((6, 6))
-    for j in range(6):
-        e = np.zeros(6)
-        e[j] = h
-        H[j] = -(force @ (section.gaps(q + e).gradient[rows] - section.gaps(q - e).gradient[rows])) / (2.0 * h)
-    return 0.5 * (H + H.T)

@@ -74,12 +74,29 @@ class Work:
 
 
 @dataclass(frozen=True, slots=True)
+class Equilibrium:
+    """Another state that closing the clamp can end in: ``distance``, ``closing`` (mm) and ``tilt`` (rad) as of `Run`.
+
+    ``status`` is that of a run; ``detail`` says what holds it where that is not the grooves' arcs. ``rests``: it is an
+    equilibrium; if not, a wire slips out of its groove there.
+    """
+
+    distance: float
+    closing: float
+    tilt: float
+    status: str
+    detail: str
+    rests: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Run:
     """A clamp assembled: where every part ends up, what touches, and how it came there.
 
     ``distance`` is the height between the splints' inner edges on the line side (Table 4) in mm, ``closing`` that of
     their origins along the bolt. ``status`` is 'clamped' or 'not clamped: ...'. ``violation`` and ``optimality`` in mm
     prove the exact answer (None for the other solvers). ``turns`` of the nut tighten the clamp from open.
+    ``others`` are the other states that closing can end in, the one closed furthest first (None: not looked for).
     """
 
     clamp: Clamp
@@ -100,6 +117,7 @@ class Run:
     violation: float | None
     optimality: float | None
     work: Work
+    others: tuple[Equilibrium, ...] | None = None
 
     @property
     def clamped(self) -> bool:

@@ -9,15 +9,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from clamp3d.assembly.contacts import CONTACT, measure_pairs, seats, undeclared_meetings
+from clamp3d.assembly.equilibria import describe, equilibria, same, slipping
 from clamp3d.assembly.final_state import FinalState, solve_final_state
 from clamp3d.assembly.motion import travel_to_contact
-from clamp3d.assembly.result import Event, Run, Solver, Waypoint, Work
+from clamp3d.assembly.result import Equilibrium, Event, Run, Solver, Waypoint, Work
 from clamp3d.assembly.screw import ScrewJoint
 from clamp3d.assembly.section import MOUTH, SPLINTS, WIRES, D, S, Section
 from clamp3d.assembly.sequence import parse_sequence
 from clamp3d.assembly.stepped import SteppedState, solve_bisection, solve_stepped
+from clamp3d.checks import choice, function, instance, number
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
-from clamp3d.contact.model import ContactModel
+from clamp3d.contact.model import ContactModel, check_model
+from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array, SectionPose
 
 STEP = 1.0 / 3.0
@@ -28,6 +31,8 @@ RESOLUTION = 1e-3
 """Where bisection stops, mm."""
 
 Poses = dict[PartName, SectionPose]
+_WIDEST = 1000.0
+"""The most that a clamp is opened further than it needs, mm: it closes by small strides."""
 _ROOM = 20.0
 """Free way in mm between a wire and the open clamp before it comes in."""
 
@@ -55,13 +60,15 @@ def assemble(
     tilt_step: float = TILT_STEP,
     open_by: float = 0.0,
     open_tilt: float = 0.0,
+    others: bool = False,
     listen: Callable[[Waypoint], None] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Run:
     """Assemble ``clamp`` with its wires and measure its grooves by ``model``.
 
     ``open_by`` mm and ``open_tilt`` rad open the clamp further than needed before it comes in. ``step`` (mm) and
-    ``tilt_step`` (rad) are the moves of the stepped solver and the first ones of bisection. ``listen`` is told every
+    ``tilt_step`` (rad) are the moves of the stepped solver and the first ones of bisection. ``others``: also find the
+    other states that closing can end in (exact solver only). ``listen`` is told every
     waypoint as it is reached, ``progress`` the positions tried and the distance in mm while solvers try positions.
     Raises InputError for bad settings or sequence and SolverError if an answer cannot be proven.
 
@@ -71,6 +78,15 @@ def assemble(
     >>> run.status, round(run.distance, 3)
     ('clamped', 31.53)
     """
+    instance("clamp", clamp, Clamp)
+    choice("solver", solver, ("exact", "stepped", "bisection"))
+    check_model(model)
+    step, tilt_step = number("step", step), number("tilt step", tilt_step)
+    open_by, open_tilt = number("open_by", open_by), number("open_tilt", open_tilt)
+    if not 0.0 <= open_by <= _WIDEST:
+        raise InputError(f"open_by must be between 0 and {_WIDEST:g} mm, got {open_by:g}")
+    function("listen", listen)
+    function("progress", progress)
     sequence = [str(s) for s in parse_sequence(clamp.sequence)]
     section = Section(clamp, model)
     log = _Log(listen)
@@ -99,6 +115,8 @@ def assemble(
         for c in contacts:
             if c.type != 1 and c.distance <= resolution and ((c.a, c.b) in drawn) == by_nut:
                 log.events.append(Event(by, c.a, c.b, c.relation, c.point, travel))
+    undeclared = undeclared_meetings(section, log.path, log.events)
+    queries = section.queries.contact  # what the run itself asked, without the other equilibria
     proof = (final.violation, final.optimality) if isinstance(final, FinalState) else (None, None)
     motion_steps = final.motion_steps if isinstance(final, SteppedState) else 0
     return Run(
@@ -116,12 +134,27 @@ def assemble(
         seats=seats(pairs, resolution),
         events=tuple(log.events),
         path=tuple(log.path),
-        undeclared=undeclared_meetings(section, log.path, log.events),
+        undeclared=undeclared,
         violation=proof[0],
         optimality=proof[1],
-        work=Work(
-            len(PARTS), len(PARTS) * (len(PARTS) - 1) // 2, section.queries.contact, motion_steps, model.meshes_built
-        ),
+        work=Work(len(PARTS), len(PARTS) * (len(PARTS) - 1) // 2, queries, motion_steps, model.meshes_built),
+        others=_others(section, final) if others and isinstance(final, FinalState) else None,
+    )
+
+
+def _others(section: Section, final: FinalState) -> tuple[Equilibrium, ...]:
+    """The equilibria beside the final state."""
+    return tuple(
+        Equilibrium(
+            distance=section.splint_distance(state.q),
+            closing=float(state.q[D]),
+            tilt=float(state.q[S]) / section.lever,
+            status=final_status(state, CONTACT),
+            detail=describe(state),
+            rests=not slipping(state),
+        )
+        for state in equilibria(section)
+        if not same(state, final)
     )
 
 

@@ -12,9 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
+from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import GroovePair, groove_pairs
-from clamp3d.contact.model import ContactModel
+from clamp3d.contact.model import ContactModel, check_model
 from clamp3d.geometry.pose import Array, SectionPose, inverse
 
 SPLINTS: tuple[PartName, PartName] = ("P1", "P2")
@@ -24,8 +25,6 @@ D, S = 4, 5
 
 MOUTH = "mouth"
 """Feature of the gaps that keep a wire in the mouth it was put into."""
-
-_DOWN = np.array([0.0, 0.0, -1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +55,10 @@ class Section:
     clamp: Clamp
     model: ContactModel
     queries: Queries = field(default_factory=Queries)
+
+    def __post_init__(self) -> None:
+        instance("clamp", self.clamp, Clamp)
+        check_model(self.model)
 
     @cached_property
     def pairs(self) -> dict[tuple[PartName, PartName], GroovePair]:
@@ -131,24 +134,22 @@ class Section:
         i = 2 * WIRES.index(wire)
         T_wire = SectionPose(q[i], q[i + 1]).T()
         T_down = self.down_splint(q).T()
+        R, p = T_down[:3, :3], T_down[:3, 3]
         up = self.model.pieces(self.pairs["P1", wire], T_wire)
         down = self.model.pieces(self.pairs["P2", wire], inverse(T_down) @ T_wire)
         self.queries.contact += 2
         k, n = len(up.distance), len(up.distance) + len(down.distance)
-        normal = np.vstack([up.normal, down.normal @ T_down[:3, :3].T])
-        point = np.vstack([up.point, down.point @ T_down[:3, :3].T + T_down[:3, 3]])
-        gradient = np.zeros((n, 6))
-        gradient[:, i] = normal[:, 0]
-        gradient[:, i + 1] = -normal[:, 2]
+        normal, arm = down.normal @ R.T, down.point @ R.T
+        gradient, point = np.zeros((n, 6)), np.empty((n, 2))
+        gradient[:k, i], gradient[:k, i + 1] = up.normal[:, 0], -up.normal[:, 2]
+        gradient[k:, i], gradient[k:, i + 1] = normal[:, 0], -normal[:, 2]
         # The gap falls by what the groove's point moves along the normal: P2 moves down by d and turns about -Y.
-        turned = np.cross([0.0, -1.0, 0.0], point[k:] - T_down[:3, 3]) / self.lever
-        gradient[k:, D] = -(normal[k:] @ _DOWN)
-        gradient[k:, S] = -(normal[k:] * turned).sum(1)
+        gradient[k:, D] = normal[:, 2]
+        gradient[k:, S] = (normal[:, 0] * arm[:, 2] - normal[:, 2] * arm[:, 0]) / self.lever
+        point[:k, 0], point[:k, 1] = up.point[:, 0], -up.point[:, 2]
+        point[k:, 0], point[k:, 1] = arm[:, 0] + p[0], -(arm[:, 2] + p[2])
         pair: tuple[tuple[PartName, PartName], ...] = (("P1", wire),) * k + (("P2", wire),) * (n - k)
-        section_point = np.column_stack([point[:, 0], -point[:, 2]])
-        return Gaps(
-            np.concatenate([up.distance, down.distance]), gradient, pair, up.feature + down.feature, section_point
-        )
+        return Gaps(np.concatenate([up.distance, down.distance]), gradient, pair, up.feature + down.feature, point)
 
     def face_gaps(self, q: Array) -> Gaps:
         """Gaps between the inner faces along the bolt, at both ends of their overlap, and to the tilt limits.
@@ -200,8 +201,8 @@ def join(*parts: Gaps) -> Gaps:
     """One `Gaps` of several."""
     return Gaps(
         np.concatenate([g.value for g in parts]),
-        np.vstack([g.gradient for g in parts]),
+        np.concatenate([g.gradient for g in parts]),
         sum((g.pair for g in parts), ()),
         sum((g.feature for g in parts), ()),
-        np.vstack([g.point for g in parts]),
+        np.concatenate([g.point for g in parts]),
     )

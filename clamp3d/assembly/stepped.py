@@ -23,6 +23,10 @@ FREE = 1e-9
 """Overlap up to this many mm is rounding, not overlap."""
 
 
+_MOVES = 100_000
+"""The most moves of one kind from one end to the other."""
+
+
 @dataclass(frozen=True, slots=True)
 class SteppedState:
     """Last free position ``q`` (6,) as in `section`, its gaps, and ``motion_steps``: positions tried (M of Table 5)."""
@@ -46,6 +50,12 @@ def solve_stepped(
     for name, value, unit in (("step", step, "mm"), ("tilt step", math.degrees(tilt_step), "deg")):
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(f"{name} must be > 0 {unit}, got {value:g}")
+    for name, value, reach, unit in (
+        ("step", step, section.open_distance(), "mm"),
+        ("tilt step", math.degrees(tilt_step), section.clamp.down_splint.max_tilt_deg, "deg"),
+    ):
+        if not value * _MOVES >= reach:
+            raise InputError(f"{name} must be >= {reach / _MOVES:.4g} {unit} here, got {value:g}")
     limit = int(section.clamp.down_splint.max_tilt / tilt_step + 1e-9)
     k = math.ceil(section.open_distance() / step)
     q = section.open_state(k * step)

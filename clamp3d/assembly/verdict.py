@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from clamp3d.checks import number
 from clamp3d.errors import InputError
 
 Verdict = Literal["clear", "clearance", "contact", "clash", "contained", "allowed", "uncertain"]
@@ -30,6 +31,7 @@ def verdict(
     >>> verdict(0.01, error_bound=0.02, contact=1e-6)
     'uncertain'
     """
+    clearance = number("clearance", clearance)
     if not 0.0 <= contact <= clearance:
         raise InputError(f"clearance must be >= the contact tolerance = {contact:g} mm, got {clearance:g}")
 

@@ -14,7 +14,7 @@ from clamp3d.clamp.conductors import catalogue
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.contact.cas import Cas
 from clamp3d.contact.chords import Chords
-from clamp3d.errors import InputError
+from clamp3d.errors import InputError, SolverError
 from clamp3d.study import published
 
 # Reference clamp, exact distances with each arc replaced by chords; computed independently to +-0.002 mm.
@@ -161,3 +161,9 @@ def test_steps_must_be_positive(clamp):
         solve_stepped(section, step=0.0, tilt_step=TILT_STEP)
     with pytest.raises(InputError, match="tilt step must be > 0 deg, got nan"):
         solve_stepped(section, step=STEP, tilt_step=math.nan)
+
+
+def test_a_closing_that_would_take_for_ever_is_refused(monkeypatch):
+    monkeypatch.setattr("clamp3d.assembly.final_state._MOST_STRIDES", 2)
+    with pytest.raises(SolverError, match=r"closing takes more than 2 strides of .* the down splint's width"):
+        solve_final_state(Section(load_clamp(), Cas()))
