@@ -1,8 +1,27 @@
 """Errors of the package: one clear line each, naming value, rule and choices."""
 
+import re
+
+LONGEST = 900
+"""Characters of a message: what a user gave may be longer."""
+
+
+def one_line(message: str) -> str:
+    r"""A message on one short line, whatever the names and values in it hold.
+
+    >>> one_line("no file named 'a\nb'")
+    "no file named 'a\\nb'"
+    """
+    if len(message) > LONGEST:
+        message = f"{message[: LONGEST // 2]} ... {message[-LONGEST // 2 :]}"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
+
 
 class Clamp3dError(Exception):
-    """Base of every error that clamp3d raises on purpose."""
+    """Base of every error that clamp3d raises on purpose; its message is one line."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(one_line(str(message)))
 
 
 class InputError(Clamp3dError, ValueError):
@@ -15,3 +34,12 @@ class SolverError(Clamp3dError):
 
 class MissingLibraryError(Clamp3dError, ImportError):
     """An optional library is not installed. The message says what to install."""
+
+
+def without_numbers(message: str) -> str:
+    """The rule without the values, so that equal reasons count together.
+
+    >>> without_numbers("radius of P1 must be > 0 mm, got -1.5e-3")
+    'radius of P1 must be > ... mm, got ...'
+    """
+    return re.sub(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?", "...", message)

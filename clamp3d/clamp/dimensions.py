@@ -9,13 +9,24 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
+from pydantic_core import PydanticCustomError
 
 from clamp3d.clamp.conductors import conductor
 from clamp3d.errors import InputError
 
-Length = Annotated[float, Field(gt=0.0, lt=1e5, allow_inf_nan=False, strict=True)]
+SMALLEST = 1e-6
+"""Least length in mm: ratios of lengths stay within what a picture, a file and a turn of a nut can hold."""
+
+
+def _not_tiny(value: float) -> float:
+    if value < SMALLEST:
+        raise PydanticCustomError("length", "Input should be at least {least} mm", {"least": f"{SMALLEST:g}"})
+    return value
+
+
+Length = Annotated[float, Field(gt=0.0, lt=1e5, allow_inf_nan=False, strict=True), AfterValidator(_not_tiny)]
 Offset = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False, strict=True)]
 PartName = Literal["P1", "P2", "P3", "P4", "P5", "P6", "P7"]
 ConnectionType = Literal[0, 1, 2, 3]
@@ -221,6 +232,12 @@ class Clamp:
     @model_validator(mode="after")
     def _parts_fit_each_other(self) -> Clamp:
         r, down = self.bolt.diameter / 2, self.down_splint
+        for key, wire in (("line", self.line), ("jumper", self.jumper)):
+            if wire.radius >= self.up_splint.width:
+                raise ValueError(
+                    f"{key}: the diameter must be less than twice up_splint.width = {self.up_splint.width:g} mm, "
+                    f"got {2.0 * wire.radius:g}; are both in mm?"
+                )
         for key, hole in (("up_splint", self.up_splint.hole_diameter), ("saddle", self.saddle.hole_diameter)):
             if hole <= 2 * r:
                 raise ValueError(f"{key}.hole_diameter must be > bolt.diameter = {2 * r:g} mm, got {hole:g}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import sys
 import typing
 from collections.abc import Mapping
@@ -12,8 +13,9 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
+from clamp3d import checks
 from clamp3d.clamp.conductors import conductor
-from clamp3d.clamp.dimensions import Clamp, Wire
+from clamp3d.clamp.dimensions import SMALLEST, Clamp, Wire
 from clamp3d.errors import InputError
 
 if sys.version_info >= (3, 11):
@@ -44,21 +46,18 @@ def load_clamp(source: str | Path = "reference", *, line: str | None = None, jum
     >>> load_clamp(jumper="21.6").jumper.radius
     10.8
     """
-    text, origin = _read(str(source))
+    text, origin = _read(checks.path("clamp", source))
+    clamp: Clamp = validate(Clamp, parse_toml(text, origin), origin)
+    wires = {key: wire(given, key) for key, given in (("line", line), ("jumper", jumper)) if given is not None}
     try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{origin}: not valid TOML: {error}") from None
-    clamp: Clamp = validate(Clamp, data, origin)
-    if line is not None:
-        clamp = replace(clamp, line=wire(line, "--line"))
-    if jumper is not None:
-        clamp = replace(clamp, jumper=wire(jumper, "--jumper"))
-    return clamp
+        return replace(clamp, **wires) if wires else clamp  # type: ignore[arg-type]
+    except ValidationError as failure:
+        raise _one_line(failure, Clamp, origin, {}) from None
 
 
 def wire(text: str, name: str = "wire") -> Wire:
     """A wire from what a user types: a designation, or a diameter in mm. Raises InputError."""
+    checks.text(name, text)
     try:
         diameter = float(text)
     except ValueError:
@@ -66,21 +65,39 @@ def wire(text: str, name: str = "wire") -> Wire:
     try:
         return Wire(diameter=diameter)
     except ValidationError:
-        raise InputError(f"{name} diameter must be > 0 and < 100000 mm, got {text}") from None
+        raise InputError(
+            f"{name} diameter must be > 0 (at least {SMALLEST:g}) and < 100000 mm, got {checks.short(text, 40)}"
+        ) from None
 
 
-def _read(source: str) -> tuple[str, str]:
+def _read(path: Path) -> tuple[str, str]:
+    source = str(path)
     if source in builtin_clamps():
         return resources.files("clamp3d.clamp").joinpath(f"data/{source}.toml").read_text(encoding="utf-8"), source
-    path = Path(source)
-    if path.suffix != ".toml" and not path.exists():
-        raise InputError(f"unknown clamp {source!r}; built in: {', '.join(builtin_clamps())}; or give a .toml file")
+    if path.suffix != ".toml" and not os.path.exists(path):
+        built_in = ", ".join(builtin_clamps())
+        raise InputError(f"unknown clamp {checks.shown(source)}; built in: {built_in}; or give a .toml file")
+    return read_text(path), source
+
+
+def read_text(path: Path) -> str:
+    """Text of a UTF-8 file, a byte order mark left out. Raises InputError if it cannot be read or is no text."""
     try:
-        return path.read_text(encoding="utf-8"), str(path)
+        return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a text file in UTF-8") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        raise InputError(f"{checks.short(path)}: cannot be read: {error.strerror}") from None
+
+
+def parse_toml(text: str, origin: str) -> dict[str, typing.Any]:
+    """Tables of a TOML text. Raises InputError naming ``origin`` and the line."""
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, ValueError) as error:  # an integer of thousands of digits is a ValueError
+        raise InputError(f"{origin}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise InputError(f"{origin}: not valid TOML: tables or arrays nested too deeply") from None
 
 
 def validate(kind: typing.Any, data: typing.Any, origin: str, tags: Mapping[str, type] | None = None) -> typing.Any:
@@ -88,14 +105,18 @@ def validate(kind: typing.Any, data: typing.Any, origin: str, tags: Mapping[str,
 
     ``tags`` maps the tags of a discriminated union, which are no keys of the file, to its members.
     """
-    tags = tags or {}
     try:
         return TypeAdapter(kind).validate_python(data)
     except ValidationError as failure:
-        # A misspelt key is both unknown and missing; the first says what to mend.
-        error = min(failure.errors(include_url=False), key=lambda e: e["type"] not in _UNKNOWN_KEY)
-        others = failure.error_count() - 1
-    key = ".".join(str(part) for part in error["loc"] if part != "[key]" and part not in tags)
+        raise _one_line(failure, kind, origin, tags or {}) from None
+
+
+def _one_line(failure: ValidationError, kind: typing.Any, origin: str, tags: Mapping[str, type]) -> InputError:
+    """The error that says what pydantic found."""
+    # A misspelt key is both unknown and missing; the first says what to mend.
+    error = min(failure.errors(include_url=False), key=lambda e: e["type"] not in _UNKNOWN_KEY)
+    others = failure.error_count() - 1
+    key = checks.short(".".join(str(part) for part in error["loc"] if part != "[key]" and part not in tags), 100)
     rule = error["msg"].replace("Input should", "must").removeprefix("Value error, ")
     if error["type"] == "value_error":  # from our own validators, which begin with the key
         line = f"{origin}: {key}.{rule}" if key else f"{origin}: {rule}"
@@ -105,10 +126,10 @@ def validate(kind: typing.Any, data: typing.Any, origin: str, tags: Mapping[str,
         near = difflib.get_close_matches(str(error["loc"][-1]), _keys_at(kind, error["loc"][:-1], tags), n=1)
         line = f"{origin}: {key} is not a known key" + (f"; did you mean {near[0]}?" if near else "")
     elif isinstance(error["input"], (str, int, float, bool)):
-        line = f"{origin}: {key}: {rule}, got {error['input']!r}"
+        line = f"{origin}: {key}: {rule}, got {checks.shown(error['input'])}"
     else:
         line = f"{origin}: {key}: {rule}"
-    raise InputError(line + (f" (and {others} more)" if others else ""))
+    return InputError(line + (f" (and {others} more)" if others else ""))
 
 
 def _keys_at(kind: typing.Any, loc: tuple[int | str, ...], tags: Mapping[str, type]) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from clamp3d.clamp.parts import Extrusion, Part
 from clamp3d.clamp.profile import check_mesh_error
-from clamp3d.errors import Clamp3dError
+from clamp3d.errors import Clamp3dError, InputError
 
 if TYPE_CHECKING:
     import trimesh
@@ -53,7 +53,9 @@ def mesh(part: Drawn, mesh_error: float = 0.01) -> trimesh.Trimesh:
     """
     import trimesh
 
-    check_mesh_error(mesh_error)
+    mesh_error = check_mesh_error(mesh_error)
+    if not all(hasattr(part, name) for name in ("name", "bodies", "holes")):
+        raise InputError(f"part must be a Part or another drawn solid, got {type(part).__name__}")
     solid = _solid(part, mesh_error)
     raw = solid.to_mesh64()
     out = trimesh.Trimesh(
@@ -97,8 +99,10 @@ def _solid(part: Drawn, mesh_error: float) -> Any:
         solid += _extrude(body, mesh_error)
     for hole in part.holes:
         solid -= _extrude(hole, mesh_error, _THROUGH)
-    if solid.status() != manifold3d.Error.NoError or solid.is_empty():
+    if solid.status() != manifold3d.Error.NoError:
         raise Clamp3dError(f"mesh of {part.name}: manifold3d reports {solid.status().name}")
+    if solid.is_empty():
+        raise Clamp3dError(f"mesh of {part.name} is empty: one of its sizes vanishes beside the others")
     return solid
 
 

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clamp3d.checks import instance, shown
 from clamp3d.clamp.dimensions import (
     PARTS,
     TITLES,
@@ -102,6 +103,7 @@ def parts(clamp: Clamp) -> dict[PartName, Part]:
     >>> {name: round(part.volume) for name, part in parts(load_clamp()).items()}["P1"]
     212456
     """
+    instance("clamp", clamp, Clamp)
     return {
         "P1": _up_splint(clamp.up_splint),
         "P2": _down_splint(clamp.down_splint),
@@ -115,8 +117,8 @@ def parts(clamp: Clamp) -> dict[PartName, Part]:
 
 def check_part_name(name: str) -> PartName:
     """Return ``name`` if it is one of P1 to P7, else raise InputError."""
-    if name not in PARTS:
-        raise InputError(f"unknown part {name!r}; available: {', '.join(PARTS)}")
+    if not (isinstance(name, str) and name in PARTS):
+        raise InputError(f"unknown part {shown(name)}; available: {', '.join(PARTS)}")
     return name
 
 

@@ -14,6 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from clamp3d.checks import number
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
 
@@ -206,6 +207,8 @@ class Profile:
 
 def check_mesh_error(mesh_error: float) -> float:
     """Return ``mesh_error`` if it is a usable chord error in mm, else raise InputError."""
-    if not (math.isfinite(mesh_error) and mesh_error >= MIN_MESH_ERROR):
-        raise InputError(f"mesh_error must be a finite length >= {MIN_MESH_ERROR:g} mm, got {mesh_error:g}")
-    return mesh_error
+    rule = f"be a finite length >= {MIN_MESH_ERROR:g} mm"
+    value = number("mesh_error", mesh_error, rule=rule)
+    if not value >= MIN_MESH_ERROR:
+        raise InputError(f"mesh_error must {rule}, got {value:g}")
+    return value

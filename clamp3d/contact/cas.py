@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from clamp3d.clamp.features import GroovePair
-from clamp3d.contact.model import Pieces
+from clamp3d.contact.model import Pieces, pose_of, poses_of
 from clamp3d.geometry.distance import Feature, signed_distances
 from clamp3d.geometry.pieces import groove_pieces
-from clamp3d.geometry.pose import Array, inverse
+from clamp3d.geometry.pose import Array
 
 _SIDES = slice(0, 3)
 """Rows of `groove_pieces` that a wire through the whole groove can touch; the end faces are behind it."""
+_NAMES = tuple(str(feature) for feature in Feature)
 
 
 class Cas:
@@ -23,14 +24,14 @@ class Cas:
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to the arc surface and the two faces beside it, for a wire that passes through; see `ContactModel`."""
-        found = groove_pieces(pair.groove, pair.cylinder, inverse(pair.T_a_groove) @ T_a_b @ pair.T_b_cylinder)
-        R, p = pair.T_a_groove[:3, :3], pair.T_a_groove[:3, 3]
-        feature = tuple(str(Feature(int(code))) for code in found.feature[_SIDES])
-        return Pieces(
-            found.distance[_SIDES], found.point_on_groove[_SIDES] @ R.T + p, found.normal[_SIDES] @ R.T, feature
-        )
+        T_a_b = pose_of(pair, T_a_b)
+        found = groove_pieces(pair.groove, pair.cylinder, pair.T_groove_a @ T_a_b @ pair.T_b_cylinder)
+        R, p = pair.T_groove_a[:3, :3], pair.T_a_groove[:3, 3]
+        feature = tuple(_NAMES[code] for code in found.feature[_SIDES].tolist())
+        return Pieces(found.distance[_SIDES], found.point_on_groove[_SIDES] @ R + p, found.normal[_SIDES] @ R, feature)
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
-        poses = np.ascontiguousarray(inverse(pair.T_a_groove) @ T_a_b @ pair.T_b_cylinder)
+        T_a_b = poses_of(pair, T_a_b)
+        poses = np.ascontiguousarray(pair.T_groove_a @ T_a_b @ pair.T_b_cylinder)
         return signed_distances(pair.groove, pair.cylinder, poses)

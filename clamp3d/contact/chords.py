@@ -9,9 +9,9 @@ import numpy as np
 
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.features import GroovePair, groove_pairs
-from clamp3d.contact.model import Pieces
+from clamp3d.contact.model import Pieces, check_unit_angle, pose_of, poses_of
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array, inverse
+from clamp3d.geometry.pose import Array, check_pose, inverse
 from clamp3d.geometry.shapes import SweptArc
 
 _PARALLEL = 1e-9
@@ -31,8 +31,7 @@ class Chords:
     meshes_built = 0
 
     def __init__(self, unit_angle: float) -> None:
-        if not 0.0 < unit_angle < math.pi:
-            raise InputError(f"unit angle must be between 0 and 180 deg, got {math.degrees(unit_angle):g}")
+        unit_angle = check_unit_angle(unit_angle)
         self.unit_angle = unit_angle
 
     def segments(self, clamp: Clamp) -> int:
@@ -42,6 +41,7 @@ class Chords:
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every chord and to the two faces; see `ContactModel`."""
+        T_a_b = check_pose(pose_of(pair, T_a_b), "T_a_b")
         T = inverse(pair.T_a_groove) @ T_a_b @ pair.T_b_cylinder
         centre = _section_point(T[None])[0]
         starts, ends, features = _polyline(pair.groove, self.unit_angle)
@@ -52,7 +52,10 @@ class Chords:
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
-        T = inverse(pair.T_a_groove) @ T_a_b @ pair.T_b_cylinder
+        poses = poses_of(pair, T_a_b)
+        for i, pose in enumerate(poses):
+            check_pose(pose, f"T_a_b[{i}]")
+        T = inverse(pair.T_a_groove) @ poses @ pair.T_b_cylinder
         starts, ends, _ = _polyline(pair.groove, self.unit_angle)
         signed = [_signed(centre, starts, ends)[0].min() for centre in _section_point(T)]
         return np.array(signed) - pair.cylinder.radius

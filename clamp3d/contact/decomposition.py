@@ -12,7 +12,11 @@ What its settings do, as measured with coacd 1.0.14:
   corners happen to be. Other tessellations give 4 to 6 hulls and 0.4 to 1.0 mm at 0.02, 13 to 165 hulls at 0.01.
 - ``preprocess_mode`` "on" remeshes: outer faces move by 0.1 mm and more. "auto" leaves a manifold mesh as it is.
 - Hull corners are rounded: some 0.005 mm of the part may lie outside its hulls (`Decomposition.uncovered`).
-- The answer depends on the order of the vertices and on the orientation of the mesh, not on the number of cores.
+- The answer depends on the orientation of the mesh and a little on the order of its vertices, not on the number of
+  cores. That block in 14 chords at 0.0234 (2 mm by ``real_metric``): ten random orders all give 4 hulls, intrusion
+  1.131 mm, 1 s; ten random rotations 8 to 24 hulls, 1.59 to 2.64 mm, up to 0.17 mm of the part left out, 2 to 58 s.
+  So a coaxial wire with 1.5 mm of clearance is free in the first ten and a clash in the others. ``mesh_hash`` and the
+  cache tell meshes by their vertices and faces in their order: turned or reordered it is another mesh.
 """
 
 from __future__ import annotations

@@ -24,6 +24,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clamp3d.checks import array
+from clamp3d.contact.shells import winding_number
 from clamp3d.contact.solid import Solid, check_solid
 from clamp3d.errors import InputError, MissingLibraryError
 from clamp3d.geometry.pose import Array, check_pose
@@ -145,14 +147,9 @@ def transform(T: Array) -> Any:
 
 def check_poses(poses: ArrayLike, name: str = "poses") -> Array:
     """Return ``poses`` as (n, 4, 4) float64 if every one is rigid, else raise InputError naming the first bad one."""
-    try:
-        T = np.asarray(poses, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be an array of numbers with shape (n, 4, 4)") from None
-    if T.ndim != 3 or T.shape[1:] != (4, 4):
-        raise InputError(f"{name} must have shape (n, 4, 4), got {T.shape}")
+    T = array(name, poses, (None, 4, 4), finite=False)
     R = T[:, :3, :3]
-    with np.errstate(invalid="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         bent = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
         good = np.isfinite(T).all(axis=(1, 2)) & (bent <= 1e-10) & (np.linalg.det(R) > 0.0)
     good &= (T[:, 3] == (0.0, 0.0, 0.0, 1.0)).all(axis=1)
@@ -206,24 +203,7 @@ def contained(shape: Shape, wire: Wire) -> bool:
     middle = wire.T[:3, 3]
     if (middle < shape.bounds[0]).any() or (middle > shape.bounds[1]).any():
         return False
-    return winding_number(shape.solid, middle) > 0.5
-
-
-def winding_number(solid: Solid, point: Array) -> float:
-    """How often the surface winds round a point (3,): 1 inside, 0 outside.
-
-    Sum of the triangles' solid angles over 4 pi (Van Oosterom and Strackee 1983, doi:10.1109/TBME.1983.325207).
-
-    >>> V, F = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
-    >>> round(winding_number(check_solid(V, F), np.array([0.1, 0.1, 0.1])), 12)
-    1.0
-    """
-    a, b, c = np.moveaxis(solid.vertices[solid.faces] - point, 1, 0)
-    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
-    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
-    dots = [np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a))]
-    angle = 2.0 * np.arctan2(triple, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
-    return float(angle.sum() / (4.0 * np.pi))
+    return winding_number(shape.solid.vertices, shape.solid.faces, middle) > 0.5
 
 
 def _nearest(shape: Shape, wire: Wire) -> Measurement:

@@ -11,7 +11,7 @@ from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.features import GroovePair
 from clamp3d.contact.decomposition import Decomposition, DecompositionParameters, decompose
 from clamp3d.contact.fcl_shapes import convex
-from clamp3d.contact.model import Pieces
+from clamp3d.contact.model import Pieces, pose_of, poses_of
 from clamp3d.contact.polytopes import PerPart, Polytopes, Wires
 from clamp3d.geometry.pose import Array, inverse
 
@@ -62,10 +62,12 @@ class Hulls:
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every hull of part a; see `ContactModel`."""
+        T_a_b = pose_of(pair, T_a_b)
         return self.parts[pair.a].pieces(self._wires.of(pair), T_a_b @ pair.T_b_cylinder)
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
+        T_a_b = poses_of(pair, T_a_b)
         return self.parts[pair.a].distances(self._wires.of(pair), T_a_b @ pair.T_b_cylinder)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.features import GroovePair
 from clamp3d.contact.fcl_shapes import Shape, bvh, check_poses, distance, facets, measure
-from clamp3d.contact.model import Pieces
+from clamp3d.contact.model import Pieces, pose_of, poses_of
 from clamp3d.contact.polytopes import PerPart, Wires
 from clamp3d.geometry.pose import Array
 
@@ -43,6 +43,7 @@ class Mesh:
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every flat face of part a's mesh; see `ContactModel`. They do not see a contained wire."""
+        T_a_b = pose_of(pair, T_a_b)
         wire = self._wires.of(pair)
         wire.place(check_poses((T_a_b @ pair.T_b_cylinder)[None])[0])
         found = [measure(facet, wire) for facet in self._facets[pair.a]]
@@ -55,6 +56,7 @@ class Mesh:
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Distances (n,) for poses (n, 4, 4), negative where the wire crosses the surface or lies inside it."""
+        T_a_b = poses_of(pair, T_a_b)
         wire, shape = self._wires.of(pair), self.parts[pair.a]
         poses = check_poses(T_a_b @ pair.T_b_cylinder)
         out = np.empty(len(poses))

@@ -9,12 +9,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.features import GroovePair
 from clamp3d.clamp.parts import Part
 from clamp3d.clamp.profile import Arc, Segment
 from clamp3d.contact.fcl_shapes import convex
-from clamp3d.contact.model import Pieces
+from clamp3d.contact.model import Pieces, check_unit_angle, pose_of, poses_of
 from clamp3d.contact.polytopes import PerPart, Polytopes, Wires
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
@@ -55,18 +56,20 @@ class Wedges:
     meshes_built = 0
 
     def __init__(self, parts: Mapping[PartName, Part], unit_angle: float) -> None:
-        if not 0.0 < unit_angle < math.pi:
-            raise InputError(f"unit angle must be between 0 and 180 deg, got {math.degrees(unit_angle):g}")
+        unit_angle = check_unit_angle(unit_angle)
+        instance("parts", parts, Mapping)
         self.unit_angle = unit_angle
         self.parts = PerPart([*parts], lambda name: _polytopes(parts[name], unit_angle))
         self._wires = Wires()
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every wedge of part a; see `ContactModel`."""
+        T_a_b = pose_of(pair, T_a_b)
         return self.parts[pair.a].pieces(self._wires.of(pair), T_a_b @ pair.T_b_cylinder)
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
+        T_a_b = poses_of(pair, T_a_b)
         return self.parts[pair.a].distances(self._wires.of(pair), T_a_b @ pair.T_b_cylinder)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.checks import function, instance
 from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
 from clamp3d.fit.join import join
 from clamp3d.fit.measure import measure
@@ -75,6 +76,8 @@ def fit_mesh(mesh: Mesh, *, progress: Callable[[str, float], None] | None = None
 
     ``progress(stage, fraction)`` is called while it works.
     """
+    instance("mesh", mesh, Mesh)
+    function("progress", progress)
     surface = Surface(mesh)
     regions = join(surface, find_regions(surface, progress))
     regions.sort(key=lambda r: -float(surface.areas[r.faces].sum()))

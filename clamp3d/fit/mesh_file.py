@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import logging
+import os
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clamp3d import checks
+from clamp3d.contact.shells import inside_out, volume
 from clamp3d.errors import Clamp3dError, InputError
 
 Array = NDArray[np.float64]
@@ -30,6 +36,10 @@ FORMATS: dict[str, str | None] = {
 """Readable formats; the value is the unit that the format itself fixes (None: the file does not say)."""
 
 _STEP = (".step", ".stp")
+_SILENT = logging.NullHandler()
+
+LARGEST, SMALLEST = 1e12, 1e-9
+"""Largest coordinate and least extent in mm: beyond them products of three lengths lose their digits or vanish."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,14 +66,14 @@ def load_mesh(path: str | Path, *, unit: str | None = None) -> Mesh:
     Raises InputError if the file is missing, unreadable, empty, or has a number that is not finite;
     MissingLibraryError for STEP without the extra ``step``.
     """
-    file = Path(path)
+    file = checks.path("mesh", path)
     kind = file.suffix.lower()
-    if unit is not None and unit not in UNITS_MM:
-        raise InputError(f"unknown unit {unit!r}; available: {', '.join(UNITS_MM)}")
+    if unit is not None:
+        checks.choice("unit", unit, UNITS_MM)
     if kind not in FORMATS:
         raise InputError(f"{file}: unknown mesh format {kind or '(none)'!r}; available: {', '.join(FORMATS)}")
-    if not file.is_file():
-        raise InputError(f"{file}: no such file")
+    if not os.path.isfile(file):
+        raise InputError(f"{checks.short(file)}: no such file")
     if kind in _STEP:
         from clamp3d.fit.step_file import read_step
 
@@ -85,20 +95,23 @@ def load_mesh(path: str | Path, *, unit: str | None = None) -> Mesh:
 def _read(file: Path, kind: str) -> tuple[Array, IntArray, str | None]:
     import trimesh
 
+    # What it logs about a file goes to who has asked for logs, not on stderr.
+    logging.getLogger("trimesh").addHandler(_SILENT)
+
     try:
         options: dict[str, Any] = {"process": False}
         if kind == ".obj":
             options["skip_materials"] = True
-        scene = trimesh.load_scene(file, file_type=kind[1:], **options)
-        parts = [g for g in scene.dump() if isinstance(g, trimesh.Trimesh)]
+        with np.errstate(all="ignore"):  # numbers that are none are looked for below
+            scene = trimesh.load_scene(file, file_type=kind[1:], **options)
+            parts = [g for g in scene.dump() if isinstance(g, trimesh.Trimesh)]
         file_unit = scene.units
     except Clamp3dError:
         raise
     except Exception as error:  # trimesh raises whatever its parsers meet
-        reason = str(error).strip().splitlines()
-        raise InputError(
-            f"{file}: not a readable {kind[1:].upper()} file ({reason[0] if reason else error!r})"
-        ) from None
+        told = isinstance(error, (trimesh.exchange.stl.HeaderError, zipfile.BadZipFile, json.JSONDecodeError))
+        reason = f" ({' '.join(str(error).split())})" if told else ""
+        raise InputError(f"{file}: not a readable {kind[1:].upper()} file{reason}") from None
     if not parts or not any(len(p.faces) for p in parts):
         raise InputError(f"{file}: no triangles in the file")
     offsets = np.cumsum([0, *(len(p.vertices) for p in parts)])
@@ -121,23 +134,19 @@ def make_mesh(
     """Check, clean and orient a mesh: ``vertices`` (n, 3), ``faces`` (m, 3); lengths are multiplied by ``scale``.
 
     Equal vertices are merged, triangles without area and doubled triangles dropped, windings made consistent and, on a
-    closed mesh, outward. ``float32``: the coordinates passed through single precision.
-    Raises InputError for wrong shapes, numbers that are not finite, indices out of range or no triangle left.
+    closed mesh, outward, body by body. ``float32``: the coordinates passed through single precision (so they have if
+    their type says so). Raises InputError for wrong shapes, numbers that are not finite, indices out of range, no
+    triangle left or a closed surface without a volume.
     """
     import trimesh
 
-    try:
-        V = np.array(vertices, dtype=np.float64) * scale
-        F = np.array(faces)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: vertices and faces must be arrays of numbers") from None
-    if V.ndim != 2 or V.shape[1:] != (3,) or len(V) == 0:
-        raise InputError(f"{name}: vertices must have shape (n, 3), got {V.shape}")
-    if F.ndim != 2 or F.shape[1:] != (3,) or len(F) == 0:
-        raise InputError(f"{name}: faces must have shape (m, 3), got {F.shape}")
-    if not np.issubdtype(F.dtype, np.integer):
-        raise InputError(f"{name}: faces must be integers, got {F.dtype}")
-    F = F.astype(np.int64)
+    checks.text("name of a mesh", name)
+    scale, float32 = checks.positive("scale", scale), checks.flag("float32", float32)
+    float32 = float32 or getattr(vertices, "dtype", None) == np.float32
+    V = checks.array(f"{name}: vertices", vertices, (None, 3), finite=False)
+    F = _indices(f"{name}: faces", faces)
+    if len(V) == 0:
+        raise InputError(f"{name}: vertices must not be empty")
     if F.min() < 0 or F.max() >= len(V):
         bad = int(F.max()) if F.max() >= len(V) else int(F.min())
         raise InputError(f"{name}: face index {bad} is out of range for {len(V)} vertices")
@@ -146,12 +155,19 @@ def make_mesh(
     if not np.isfinite(V).all():
         bad = int(np.flatnonzero(~np.isfinite(V).all(axis=1))[0])
         raise InputError(f"{name}: vertex {used[bad]} is not finite: {V[bad].tolist()}")
+    with np.errstate(over="ignore", under="ignore"):
+        V = V * scale
+    if not np.abs(V).max() <= LARGEST:
+        bad = int(np.abs(V).max(axis=1).argmax())
+        raise InputError(f"{name}: vertex {used[bad]} must be within {LARGEST:g} mm, got {V[bad].tolist()}")
 
     notes = []
     reach = float(np.abs(V).max())
     extent = float(np.ptp(V, axis=0).max())
     if extent <= 0.0:
         raise InputError(f"{name}: all vertices lie in one point")
+    if extent < SMALLEST:
+        raise InputError(f"{name}: extent must be >= {SMALLEST:g} mm, got {extent:.3g} mm; is the unit right?")
     rounding = reach * (2.0**-24 if float32 else 2.0**-50)
     V, F = _merge(V, F, max(4.0 * rounding, 1e-9 * extent))
     cornered = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
@@ -172,10 +188,17 @@ def make_mesh(
     watertight = bool(mesh.is_watertight)
     if not watertight:
         notes.append("open mesh: the material's side is taken from the winding")
-    elif mesh.volume < 0.0:
-        mesh.invert()
-        notes.append("inside out: all triangles turned")
-    V, F = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+    V, F = np.asarray(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+    if watertight:
+        enclosed = volume(V, F)
+        if enclosed < 0.0:
+            F = np.ascontiguousarray(F[:, ::-1])
+            notes.append("inside out: all triangles turned")
+        for rows in inside_out(V, F):
+            F[rows] = F[rows][:, ::-1]
+            notes.append(f"a body of {len(rows)} triangles inside out: turned")
+        if not volume(V, F) > 0.0:
+            raise InputError(f"{name}: the surface encloses no volume")
     longest = np.linalg.norm(V[F] - V[F[:, [1, 2, 0]]], axis=2).max(axis=1)
     twice_area = np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1)
     # Slivers go last: they close the surface, but their normals are rounding.
@@ -183,6 +206,21 @@ def make_mesh(
     if len(F) == 0:
         raise InputError(f"{name}: no triangle with an area")
     return Mesh(name, V, F, watertight, rounding, tuple(notes))
+
+
+def _indices(name: str, faces: ArrayLike) -> IntArray:
+    """Faces (m, 3), m > 0, of whole numbers."""
+    try:
+        F = np.asarray(faces)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        raise InputError(f"{name} must be an array of integers with shape (m, 3)") from None
+    if F.dtype.kind not in "iu" and F.size:
+        raise InputError(f"{name} must be integers, got {F.dtype}")
+    if F.ndim != 2 or F.shape[1:] != (3,) or len(F) == 0:
+        raise InputError(f"{name} must have shape (m, 3), got {F.shape}")
+    if F.dtype.kind == "u" and F.max() > np.iinfo(np.int64).max:
+        raise InputError(f"{name}: index {F.max()} is out of range")
+    return F.astype(np.int64)
 
 
 def _merge(V: Array, F: IntArray, tolerance: float) -> tuple[Array, IntArray]:

@@ -27,15 +27,16 @@ def read_step(file: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.IFSelect import IFSelect_ReturnStatus
-    from OCP.Message import Message, Message_Gravity
+    from OCP.Message import Message
     from OCP.STEPControl import STEPControl_Reader
     from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS
 
-    for printer in Message.DefaultMessenger_s().Printers():
-        printer.SetTraceLevel(Message_Gravity.Message_Fail)
+    messenger = Message.DefaultMessenger_s()
+    for printer in [*messenger.Printers()]:  # they print on stdout
+        messenger.RemovePrinter(printer)
     reader = STEPControl_Reader()
     if reader.ReadFile(str(file)) != IFSelect_ReturnStatus.IFSelect_RetDone or reader.TransferRoots() == 0:
         raise InputError(f"{file}: not a readable STEP file")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clamp3d.assembly.result import Run
+from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.meshes import mesh
 from clamp3d.clamp.parts import parts
@@ -31,6 +32,7 @@ def exploded_figure(clamp: Clamp) -> Figure:
     """All seven parts drawn apart along the bolt, with names."""
     from matplotlib.figure import Figure
 
+    instance("clamp", clamp, Clamp)
     figure = Figure(figsize=(7.6, 6.4), layout="constrained")
     ax = figure.add_subplot()
     camera = Camera()
@@ -90,6 +92,7 @@ def steps_figure(run: Run) -> Figure:
     """Each step of the sequence where it ends: in the view (upper row) and in the section (lower)."""
     from matplotlib.figure import Figure
 
+    instance("run", run, Run)
     ends = step_ends(run)
     figure = Figure(figsize=(3.1 * len(ends), 7.4), layout="constrained")
     axes = figure.subplots(2, len(ends), squeeze=False, height_ratios=(1.0, 1.2))

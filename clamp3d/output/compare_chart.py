@@ -18,10 +18,10 @@ from clamp3d.output.compare_report import comparison_to_text
 from clamp3d.output.figures import save_figure
 from clamp3d.output.files import write_text
 from clamp3d.output.palette import INK
-from clamp3d.study.compare import Comparison, pareto
-from clamp3d.study.compare_jobs import Imaged
-from clamp3d.study.compare_measure import Measured
-from clamp3d.study.compare_scene import chord_error
+from clamp3d.study.compare.jobs import Imaged
+from clamp3d.study.compare.measure import Measured
+from clamp3d.study.compare.run import Comparison, pareto
+from clamp3d.study.compare.scene import chord_error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,10 +7,10 @@ from dataclasses import asdict
 from typing import Any
 
 from clamp3d.study import published
-from clamp3d.study.compare import KNOWN, Comparison, NotMeasured, exact_distance
-from clamp3d.study.compare_jobs import Assembled
-from clamp3d.study.compare_measure import Measured
-from clamp3d.study.compare_methods import Method
+from clamp3d.study.compare.jobs import Assembled
+from clamp3d.study.compare.measure import Measured
+from clamp3d.study.compare.methods import Method
+from clamp3d.study.compare.run import KNOWN, Comparison, NotMeasured, exact_distance
 
 
 def comparison_to_dict(found: Comparison) -> dict[str, Any]:

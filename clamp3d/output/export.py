@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, TypeAlias, TypeVar, get_args
+from typing import Literal, TypeAlias, get_args
 
 from numpy.typing import ArrayLike
 
+from clamp3d.checks import choice, instance, path, shown, text
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.profile import check_mesh_error
@@ -24,8 +25,6 @@ Format: TypeAlias = Literal["stl", "obj", "ply", "glb", "3mf", "step"]
 Layout: TypeAlias = Literal["parts", "assembly"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 LAYOUTS: tuple[Layout, ...] = get_args(Layout)
-
-_T = TypeVar("_T", bound=str)
 
 DEFAULT_MESH_ERROR = 0.01
 """Chord error in mm where none is chosen."""
@@ -73,13 +72,19 @@ def export(
     Raises InputError for a value out of range or a folder that cannot be written, MissingLibraryError if the format
     is STEP and Open CASCADE is not installed.
     """
-    _choice("format", format, FORMATS)
-    layout = _choice("layout", default_layout(format) if layout is None else layout, LAYOUTS)
+    instance("clamp", clamp, Clamp)
+    choice("format", format, FORMATS)
+    layout = default_layout(format) if layout is None else layout
+    choice("layout", layout, LAYOUTS)
     unit = default_unit(format) if unit is None else unit
-    if format == "glb" and unit != "m":
-        raise InputError(f"unit of glb must be m, as glTF 2.0 demands, got {unit!r}")
-    _choice("unit", unit, tuple(MILLIMETRES))
-    check_mesh_error(mesh_error)
+    if format == "glb" and not (isinstance(unit, str) and unit == "m"):
+        raise InputError(f"unit of glb must be m, as glTF 2.0 demands, got {shown(unit)}")
+    choice("unit", unit, MILLIMETRES)
+    mesh_error = check_mesh_error(mesh_error)
+    for key, value in (("state", state), ("status", status)):
+        if value is not None:
+            text(key, value)
+    folder = path("output", output)
     if layout == "assembly" and poses is None:
         raise InputError("layout 'assembly' needs poses: without them all parts would lie on one origin")
 
@@ -106,7 +111,7 @@ def export(
     }
     contents = {name: data for name, (data, _) in files.items()}
     contents[f"manifest-{format}.json"] = manifest(clamp, placed, meshed, files, settings)
-    *paths, listing = write_files(Path(output), contents)
+    *paths, listing = write_files(folder, contents)
     return Export(tuple(paths), listing)
 
 
@@ -133,9 +138,3 @@ def _render(
     if format == "3mf":
         return {name: mesh_formats.three_mf(meshed, title, unit, f"chord error {mesh_error:g} mm at most")}
     return {name: step(placed, title, unit)}
-
-
-def _choice(name: str, value: _T, choices: tuple[_T, ...]) -> _T:
-    if value not in choices:
-        raise InputError(f"{name} must be one of {', '.join(choices)}, got {value!r}")
-    return value

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clamp3d.assembly.result import Contact, Run, Waypoint
+from clamp3d.checks import instance, whole
+from clamp3d.checks import path as checked_path
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.errors import InputError
 from clamp3d.output.files import whole_file
@@ -39,8 +41,10 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
     Raises InputError for a suffix other than .svg, .png, .pdf and for a folder that cannot be written.
     """
     import matplotlib as mpl
+    from matplotlib.figure import Figure
 
-    path = Path(path)
+    instance("figure", figure, Figure)
+    path, dpi = checked_path("figure file", path), whole("dpi", dpi, least=1)
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
         raise InputError(f"figure file must end in {', '.join(FORMATS)}, got {path.name!r}")
@@ -54,6 +58,9 @@ def section_figure(run: Run, waypoint: Waypoint | None = None) -> Figure:
     """The section at ``waypoint`` (by default the final state) to scale: names, dimensions, contact points."""
     from matplotlib.figure import Figure
 
+    instance("run", run, Run)
+    if waypoint is not None:
+        instance("waypoint", waypoint, Waypoint)
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
     ax = figure.add_subplot()
     poses = near(run.clamp, run.poses if waypoint is None else waypoint.poses)
@@ -70,6 +77,7 @@ def states_figure(run: Run) -> Figure:
     """Initial and final state side by side at one scale, as in Fig. 2 of the paper."""
     from matplotlib.figure import Figure
 
+    instance("run", run, Run)
     figure = Figure(figsize=(11.5, 5.8), layout="constrained")
     axes = figure.subplots(1, 2)
     names = ("(a) initial state", "(b) final state")
@@ -89,6 +97,7 @@ def contacts_figure(run: Run) -> Figure:
     """The concave arc contacts in the section, as in Fig. 5, and each enlarged with its relation and gap."""
     from matplotlib.figure import Figure
 
+    instance("run", run, Run)
     figure = Figure(figsize=(11.5, 5.8), layout="constrained")
     contacts = _arc_contacts(run)
     rows = max(1, (len(contacts) + 1) // 2)
@@ -111,6 +120,8 @@ def contact_figure(run: Run, contact: Contact) -> Figure:
     """One contact of ``run``: where it is in the section, dimensioned, and enlarged with relation, gap and normal."""
     from matplotlib.figure import Figure
 
+    instance("run", run, Run)
+    instance("contact", contact, Contact)
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     overview, close = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
     draw_section(overview, run.clamp, run.poses)

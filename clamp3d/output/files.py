@@ -11,6 +11,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
+from clamp3d.checks import short
 from clamp3d.errors import InputError
 
 
@@ -18,37 +19,56 @@ from clamp3d.errors import InputError
 def whole_file(path: Path) -> Iterator[Path]:
     """A temporary path beside ``path`` that takes its place when the block ends well, and is removed when not.
 
+    A link stays, its target is written; what is neither a file nor a folder (a device, a pipe) is written into.
     Raises InputError if the folder does not exist or cannot be written to.
     """
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
-    os.close(handle)
-    temporary = Path(name)
-    try:
+    target = _target(path)
+    with ExitStack() as stack:
+        try:
+            aside = stack.enter_context(tempfile.TemporaryDirectory()) if _special(target) else None
+            folder = target.parent if aside is None else Path(aside)
+            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=folder)
+        except OSError as error:
+            raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
+        os.close(handle)
+        temporary = Path(name)
+        stack.callback(temporary.unlink, missing_ok=True)
         yield temporary
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
         try:
-            os.replace(temporary, path)
+            if _special(target):
+                target.write_bytes(temporary.read_bytes())
+            else:
+                os.replace(temporary, target)
         except OSError as error:
-            raise InputError(f"cannot write {path}: {error.strerror}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+            raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
 
 
 def check_writable(path: Path) -> None:
     """Raise InputError if a file ``path`` cannot be written: to ask before long work."""
-    if path.is_dir():
-        raise InputError(f"cannot write {path}: it is a folder")
+    target = _target(path)
+    if _special(target):
+        return
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
+        raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
     os.close(handle)
     os.unlink(name)
+
+
+def _target(path: Path) -> Path:
+    """The file that is written for ``path``: where a link leads."""
+    if os.path.isdir(path):
+        raise InputError(f"cannot write {short(path)}: it is a folder")
+    return Path(os.path.realpath(path))
+
+
+def _special(path: Path) -> bool:
+    """Whether it is there and neither a file nor a folder."""
+    return os.path.exists(path) and not os.path.isfile(path)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -65,9 +85,11 @@ def write_json(path: Path, data: Any) -> None:
 def check_folder(folder: Path) -> None:
     """Raise InputError if ``folder`` neither exists nor can be made, before long work is done for it."""
     there = folder.absolute()
-    while not there.exists():
+    while not os.path.lexists(there):
         there = there.parent
-    if not there.is_dir():
+    if any(len(os.fsencode(name)) > 255 for name in folder.parts):
+        raise InputError(f"cannot write into {short(folder)}: a name is longer than 255 bytes")
+    if not os.path.isdir(there):
         raise InputError(f"cannot write into {folder}: {there} is not a folder")
     if not os.access(there, os.W_OK | os.X_OK):
         raise InputError(f"cannot write into {folder}: no permission to write in {there}")
@@ -87,7 +109,7 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> list[Path]:
                     raise InputError(f"cannot write {path}: it is a folder")
                 stack.enter_context(whole_file(path)).write_bytes(content)
     except OSError as error:
-        raise InputError(f"cannot write into {folder}: {error.strerror}") from None
+        raise InputError(f"cannot write into {short(folder)}: {error.strerror}") from None
     return paths
 
 

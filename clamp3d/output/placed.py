@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clamp3d.checks import instance, items
 from clamp3d.clamp.dimensions import PARTS, PartName
 from clamp3d.clamp.parts import Part, check_part_name
 from clamp3d.errors import InputError
@@ -51,9 +52,11 @@ def place(
 
     Raises InputError for an unknown part, a part without a pose, or a pose that is not rigid.
     """
+    if poses is not None:
+        instance("poses", poses, Mapping)
     for name in poses or ():
         check_part_name(name)
-    chosen = set(PARTS if names is None else map(check_part_name, names))
+    chosen = set(PARTS if names is None else map(check_part_name, items("names", names, "part names")))
     if not chosen:
         raise InputError(f"parts must name at least one of {', '.join(PARTS)}")
     missing = [name for name in PARTS if poses is not None and name in chosen and name not in poses]

@@ -39,7 +39,7 @@ def run_to_dict(run: Run) -> dict[str, Any]:
                 "b": c.b,
                 "type": c.type,
                 "relation": c.relation,
-                "distance_mm": c.distance,
+                "distance_mm": c.distance if math.isfinite(c.distance) else None,
                 "point": c.point.tolist(),
                 "normal": c.normal.tolist(),
                 "feature": c.feature,
@@ -63,6 +63,19 @@ def run_to_dict(run: Run) -> dict[str, Any]:
         ],
         "undeclared": [str(u) for u in run.undeclared],
         "residuals": {"largest_violated_gap_mm": run.violation, "optimality_mm": run.optimality},
+        "other_ends": None
+        if run.others is None
+        else [
+            {
+                "distance_mm": e.distance,
+                "closing_mm": e.closing,
+                "tilt_deg": math.degrees(e.tilt),
+                "status": e.status,
+                "detail": e.detail,
+                "rests": e.rests,
+            }
+            for e in run.others
+        ],
         "work": {
             "parts": run.work.parts,
             "pairs": run.work.pairs,
@@ -82,6 +95,11 @@ def run_to_text(run: Run) -> str:
         + (f" ({'; '.join(run.limits)})" if run.limits else ""),
         f"{run.status}; distance between the splints {run.distance:.3f} mm, tilt {math.degrees(run.tilt):.2f} deg, "
         f"nut turned {run.turns:.2f} times from open",
+        *(
+            f"{'another equilibrium:' if e.rests else 'put together otherwise it ends at'} "
+            f"{e.distance:.3f} mm, tilt {_tidy(math.degrees(e.tilt), 2)} deg" + (f": {e.detail}" if e.detail else "")
+            for e in run.others or ()
+        ),
         "",
         "final state (mm; x right, y down from the power line's centre, angle counter-clockwise)",
         f"  {'part':18s} {'x':>10s} {'y':>10s} {'angle_deg':>10s}",

@@ -77,7 +77,7 @@ def draw_histogram(path: Path, result: MonteCarlo) -> None:
         axes.hist(result.clamped, bins=min(80, max(5, round(2.0 * m ** (1 / 3)))), color="#56B4E9", edgecolor="white")
         axes.set_ylim(0.0, 1.22 * axes.get_ylim()[1])
         marks: list[tuple[str, float, Any]] = [
-            (f"{p:g} %", v, (0, (4, 3)))
+            ("median" if p == 50.0 else f"{p:g} % below", v, (0, (4, 3)))
             for p, v in zip((5.0, 50.0, 95.0), result.percentiles((5, 50, 95)), strict=True)
         ]
         if result.nominal is not None:

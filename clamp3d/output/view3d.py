@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.axes import Axes
 
+_FEWEST, _MOST = 100, 4000
+"""Pixels along the longer side of a picture."""
 _CREASE = math.radians(25.0)
 """Edges sharper than this are drawn; below it the facets stand for one round surface."""
 
@@ -53,12 +55,17 @@ class Camera:
 
 
 def draw_solids(ax: Axes, solids: Sequence[Solid], camera: Camera, *, pixels_per_mm: float = 5.0) -> None:
-    """Draw the solids with shading and their visible edges; axes in mm of the picture plane."""
+    """Draw the solids with shading and their visible edges; axes in mm of the picture plane.
+
+    Very small and very large solids get as many pixels as a picture needs, and no more.
+    """
     from matplotlib.collections import LineCollection
 
     views = [camera.project(s.mesh.vertices @ s.T[:3, :3].T + s.T[:3, 3]) for s in solids]
-    low = np.min([v.min(0) for v in views], axis=0)[:2] - 1.0
-    high = np.max([v.max(0) for v in views], axis=0)[:2] + 1.0
+    low, high = np.min([v.min(0) for v in views], axis=0)[:2], np.max([v.max(0) for v in views], axis=0)[:2]
+    extent = float((high - low).max())
+    pixels_per_mm = min(max(pixels_per_mm, _FEWEST / extent), _MOST / extent)
+    low, high = low - 5.0 / pixels_per_mm, high + 5.0 / pixels_per_mm
     size = np.ceil((high - low) * pixels_per_mm).astype(int)
     high = low + size / pixels_per_mm
     depth = np.full((size[1], size[0]), -np.inf)
@@ -125,7 +132,7 @@ def _visible(edges: NDArray[np.int64], view: Array, depth: Array, low: Array, pi
                 r = np.clip(row + dy, 0, depth.shape[0] - 1)
                 c = np.clip(column + dx, 0, depth.shape[1] - 1)
                 around = np.minimum(around, depth[r, c])
-        seen = points[:, 2] >= around - 0.05
+        seen = points[:, 2] >= around - 0.25 / pixels_per_mm
         starts = np.flatnonzero(seen & ~np.append(False, seen[:-1]))
         ends = np.flatnonzero(seen & ~np.append(seen[1:], False))
         stretches += [points[[s, e], :2] for s, e in zip(starts, ends, strict=True) if e > s]

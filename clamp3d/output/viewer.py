@@ -16,8 +16,9 @@ from pathlib import Path
 
 from clamp3d.assembly.result import Run, Waypoint
 from clamp3d.assembly.verdict import CLEARANCE
+from clamp3d.checks import flag, instance, text
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.contact.model import ContactModel
+from clamp3d.contact.model import ContactModel, check_model
 from clamp3d.output.viewer_log import Command, CommandLog
 from clamp3d.output.viewer_page import write_page
 from clamp3d.output.viewer_scene import AssemblyScene, Overlay
@@ -47,6 +48,15 @@ class Viewer:
         host: str = "127.0.0.1",
         port: int | None = None,
     ) -> None:
+        instance("clamp", clamp, Clamp)
+        check_model(model)
+        serve = flag("serve", serve)
+        if overlays is not None:
+            instance("overlays", overlays, Mapping)
+            for name, overlay in overlays.items():
+                instance(f"overlay {text('name of an overlay', name)}", overlay, Mapping)
+        if url is not None:
+            text("url", url)
         self._log = CommandLog()
         self._title = f"{clamp.name} clamp"
         self._server: LocalServer | RemoteServer | None = None

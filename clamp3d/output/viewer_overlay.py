@@ -13,6 +13,7 @@ from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.meshes import mesh
 from clamp3d.clamp.parts import Part, parts
+from clamp3d.contact.model import check_unit_angle
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
 from clamp3d.output.viewer_scene import ConvexPiece, Overlay
@@ -56,13 +57,12 @@ def wedge_overlay(clamp: Clamp, unit_angle_deg: float) -> tuple[str, Overlay]:
     """Every grooved part cut into the wedges of the convex partitioning."""
     from clamp3d.contact.wedges import part_wedges, prism
 
-    if not 0.0 < unit_angle_deg < 180.0:
-        raise InputError(f"unit angle must be between 0 and 180 deg, got {unit_angle_deg:g}")
+    unit_angle = check_unit_angle(math.radians(unit_angle_deg))
 
     def pieces(part: Part) -> Sequence[ConvexPiece]:
         body = part.bodies[0]
         out = []
-        for wedge in part_wedges(part, math.radians(unit_angle_deg)):
+        for wedge in part_wedges(part, unit_angle):
             vertices, faces = prism(wedge.polygon, body.start, body.end)
             out.append(Prism(vertices @ body.frame.T, faces))
         return out

@@ -10,11 +10,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import importlib.util
+import socket
 import threading
 import weakref
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from clamp3d.checks import shown, text, whole
 from clamp3d.errors import Clamp3dError, InputError, MissingLibraryError
 from clamp3d.output.viewer_log import Command, CommandLog
 
@@ -97,6 +99,13 @@ class LocalServer:
                 streams.add(stream)
                 super().handle_stream(stream, address)
 
+        text("host", host)
+        if port is not None and not 0 <= whole("port", port, least=0) <= 65535:
+            raise InputError(f"port must be from 0 to 65535, got {port}")
+        try:  # once, not for every port
+            socket.getaddrinfo(host or "(none)", None)
+        except (OSError, ValueError):
+            raise InputError(f"host must be the name or an address of this machine, got {shown(host)}") from None
         ports = range(PORT, PORT + _PORTS) if port is None else (port,)
         for candidate in ports:
             try:
@@ -112,9 +121,11 @@ class LocalServer:
                 asyncio.set_event_loop(None)
             return server, sockets[0].getsockname()[1]
         if port is None:
-            raise InputError(f"no free port for the viewer on {host} from {PORT} to {PORT + _PORTS - 1}: {failed}")
+            raise InputError(
+                f"no free port for the viewer on {host} from {PORT} to {PORT + _PORTS - 1}: {_why(failed)}"
+            )
         raise InputError(
-            f"cannot serve the viewer on {host} port {port}: {failed}; leave --port out to take a free one"
+            f"cannot serve the viewer on {host} port {port}: {_why(failed)}; leave --port out to take a free one"
         )
 
     def _application(self) -> tornado.web.Application:
@@ -230,3 +241,8 @@ class RemoteServer:
         if answer.startswith(b"error"):
             raise Clamp3dError(f"meshcat server at {self.zmq_url}: {answer.decode('utf-8', 'replace')}")
         return answer
+
+
+def _why(error: Exception) -> str:
+    """What the system says, without its number."""
+    return getattr(error, "strerror", None) or str(error)

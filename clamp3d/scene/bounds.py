@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+from clamp3d.checks import number, positive
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
 
@@ -72,9 +73,10 @@ class Thresholds:
     clearance: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.contact) and self.contact > 0.0):
-            raise InputError(f"contact must be a finite length > 0 mm, got {self.contact}")
-        if not (math.isfinite(self.clearance) and (self.clearance == 0.0 or self.clearance > self.contact)):
+        object.__setattr__(self, "contact", positive("contact", self.contact))
+        rule = f"be 0 or > contact = {self.contact:g} mm"
+        object.__setattr__(self, "clearance", number("clearance", self.clearance, rule=rule))
+        if not (self.clearance == 0.0 or self.clearance > self.contact):
             raise InputError(f"clearance must be 0 or > contact = {self.contact:g} mm, got {self.clearance}")
 
     @property

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.checks import flag, function, instance
 from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.scene.bounds import Bounds, Verdict
@@ -18,7 +19,7 @@ from clamp3d.scene.broad import Boxes, box_gaps, near_pairs
 from clamp3d.scene.ladder import Answer, climb, contained, every_rung, verdict_of
 from clamp3d.scene.model import FINEST, Ledger, Model
 from clamp3d.scene.result import CheckResult, PairResult, Work
-from clamp3d.scene.scene import Scene
+from clamp3d.scene.scene import Scene, name_pairs
 from clamp3d.scene.shapes import Shape
 
 Progress = Callable[[str, int, int], None]
@@ -57,6 +58,11 @@ def check(
     should two of them contradict each other. ``progress(stage, done, of)`` is told what happens. A ``workshop`` keeps
     models from one check to the next. Raises InputError for unknown names.
     """
+    instance("scene", scene, Scene)
+    if workshop is not None:
+        instance("workshop", workshop, Workshop)
+    full = flag("full", full)
+    function("progress", progress)
     shop = workshop or Workshop()
     began = time.perf_counter()
     models = [shop.model(part.shape) for part in scene.parts]
@@ -117,7 +123,7 @@ def check_full(scene: Scene, ladder: CheckResult, *, progress: Progress | None =
 
 def _asked(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, int]]:
     found = set()
-    for a, b in pairs:
+    for a, b in name_pairs("pairs", pairs):
         i, j = sorted((scene.index(a), scene.index(b)))
         if i == j:
             raise InputError(f"pair {a}:{b} must name two different parts")

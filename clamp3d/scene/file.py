@@ -6,7 +6,6 @@ Lengths in mm, angles in degrees (keys that end in ``_deg``). See the package's 
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -14,20 +13,16 @@ import numpy as np
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic.dataclasses import dataclass
 
+from clamp3d import checks
 from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import Length, Offset, PartName
-from clamp3d.clamp.loader import load_clamp, validate
+from clamp3d.clamp.loader import load_clamp, parse_toml, read_text, validate
 from clamp3d.errors import Clamp3dError, InputError
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import SweptArc
 from clamp3d.scene import shapes
 from clamp3d.scene.motion import Motion
 from clamp3d.scene.scene import Allowed, Scene, ScenePart
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 _FROZEN = ConfigDict(extra="forbid")
 _SNAP = 1e-4
@@ -71,8 +66,9 @@ class Pose:
             if len(rows) not in (3, 4) or (len(rows) == 4 and rows[3] != [0.0, 0.0, 0.0, 1.0]):
                 raise ValueError("matrix: must have 3 rows of 4 numbers, or a fourth row 0, 0, 0, 1")
             R = np.array(rows)[:3, :3]
-            off = float(np.abs(R @ R.T - np.eye(3)).max())
-            if off > _SNAP or np.linalg.det(R) < 0.0:
+            with np.errstate(over="ignore", invalid="ignore"):
+                off = float(np.abs(R @ R.T - np.eye(3)).max())
+            if not off <= _SNAP or np.linalg.det(R) < 0.0:
                 raise ValueError(f"matrix: must be rigid (a rotation and a translation): deviates by {off:.3g}")
         return self
 
@@ -357,14 +353,8 @@ class SceneTable:
 
 def load_scene(path: str | Path) -> Scene:
     """Read a scene file. Raises InputError for anything that is not a scene, naming file, key, value and rule."""
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not a text file in UTF-8") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    return parse_scene(text, origin=str(path), folder=path.parent, name=path.stem)
+    path = checks.path("scene", path)
+    return parse_scene(read_text(path), origin=str(path), folder=path.parent, name=path.stem)
 
 
 def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name: str = "scene") -> Scene:
@@ -380,11 +370,7 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
     >>> scene.parts[0].T_world[:3, 3].tolist()
     [0.0, 0.0, 5.0]
     """
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{origin}: not valid TOML: {error}") from None
-    table: SceneTable = validate(SceneTable, data, origin, _TAGS)
+    table: SceneTable = validate(SceneTable, parse_toml(text, origin), origin, _TAGS)
     made: list[ScenePart] = []
     allowed: list[Allowed] = []
     files: dict[tuple[str, str | None, str], shapes.AnyShape] = {}

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clamp3d.checks import array, items, number, text
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array, check_pose, inverse, rotation
+from clamp3d.geometry.pose import Array, check_pose, inverse, rotation, unit
+from clamp3d.geometry.shapes import LARGEST, place
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +32,8 @@ class Motion:
     @classmethod
     def translate(cls, parts: str | tuple[str, ...], by: ArrayLike, *, name: str = "translation") -> Motion:
         """Straight motion ``by`` (3,) mm. Raises InputError unless it is finite."""
-        return cls(name, _names(parts), np.array([0.0, 0.0, 1.0]), np.zeros(3), 0.0, _vector("by", by))
+        z = np.array([0.0, 0.0, 1.0])
+        return cls(text("name", name), _names(parts), z, np.zeros(3), 0.0, _vector("by", by))
 
     @classmethod
     def screw(
@@ -48,18 +50,15 @@ class Motion:
 
         Raises InputError for an axis of length zero or numbers that are not finite.
         """
-        u = _vector("axis", axis)
-        size = float(np.linalg.norm(u))
-        if not size > 0.0:
-            raise InputError("axis must not have length zero")
-        if not (math.isfinite(angle) and math.isfinite(travel)):
-            raise InputError(f"angle and travel must be finite, got {angle} and {travel}")
-        return cls(name, _names(parts), u / size, _vector("point", point), float(angle), travel * u / size)
+        u = unit(array("axis", axis, (3,)))
+        angle, travel = number("angle", angle), place("travel", travel)
+        return cls(text("name", name), _names(parts), u, _vector("point", point), angle, travel * u)
 
     @classmethod
     def to_pose(cls, parts: str | tuple[str, ...], to: ArrayLike, *, name: str = "to pose") -> Motion:
         """By one screw to the pose ``to`` (4, 4) of the first part; the others go along."""
-        return cls(name, _names(parts), np.array([0.0, 0.0, 1.0]), np.zeros(3), 0.0, np.zeros(3), check_pose(to, "to"))
+        z = np.array([0.0, 0.0, 1.0])
+        return cls(text("name", name), _names(parts), z, np.zeros(3), 0.0, np.zeros(3), check_pose(to, "to"))
 
     def from_pose(self, T: Array) -> Motion:
         """The motion with ``to`` resolved for a first part that stands at ``T`` (4, 4)."""
@@ -97,17 +96,16 @@ class Motion:
 
 
 def _names(parts: str | tuple[str, ...]) -> tuple[str, ...]:
-    names = (parts,) if isinstance(parts, str) else tuple(parts)
+    names = (parts,) if isinstance(parts, str) else items("parts of a motion", parts, "part names")
+    for name in names:
+        text("part of a motion", name)
     if not names:
         raise InputError("a motion must name at least one part")
     return names
 
 
 def _vector(name: str, value: ArrayLike) -> Array:
-    try:
-        v = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be three numbers") from None
-    if v.shape != (3,) or not np.isfinite(v).all():
-        raise InputError(f"{name} must be three finite numbers, got {np.asarray(value).tolist()}")
+    v = array(name, value, (3,))
+    if not np.abs(v).max() <= LARGEST:
+        raise InputError(f"{name} must be three lengths up to {LARGEST:g} mm, got {v.tolist()}")
     return v

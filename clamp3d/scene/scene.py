@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clamp3d.checks import instance, items, number, shown, text
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array, check_pose
 from clamp3d.scene.bounds import Thresholds
@@ -35,6 +36,9 @@ class Allowed:
     overlap: float = 0.0
 
     def __post_init__(self) -> None:
+        text("allowed part", self.a)
+        text("allowed part", self.b)
+        object.__setattr__(self, "overlap", number("allowed overlap", self.overlap, rule="be >= 0 mm"))
         if not self.overlap >= 0.0:
             raise InputError(f"allowed overlap must be >= 0 mm, got {self.overlap}")
 
@@ -69,6 +73,13 @@ class Scene:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "thresholds", Thresholds(self.contact, self.clearance))
+        text("name of a scene", self.name)
+        kinds = {"parts": ScenePart, "allowed": Allowed, "motions": Motion}
+        for key, kind in kinds.items():
+            given = items(key, getattr(self, key), f"{kind.__name__}s")
+            for item in given:
+                instance(f"each of {key}", item, kind)
+            object.__setattr__(self, key, given)
         seen: set[str] = set()
         for part in self.parts:
             if part.name in seen:
@@ -88,6 +99,10 @@ class Scene:
         cls, parts: Mapping[str, tuple[AnyShape, ArrayLike]], *, clearance: float = 0.0, contact: float = 0.01
     ) -> Scene:
         """Scene of ``{name: (shape, T_world)}``. Raises InputError for bad names, shapes or poses."""
+        instance("parts", parts, Mapping)
+        for name, value in parts.items():
+            if not (isinstance(value, (tuple, list)) and len(value) == 2):
+                raise InputError(f"part {shown(name)} must be a pair (shape, T_world), got {shown(value)}")
         made = tuple(_part(name, shape, T) for name, (shape, T) in parts.items())
         return cls(made, clearance=clearance, contact=contact)
 
@@ -104,10 +119,11 @@ class Scene:
 
     def allow(self, *pairs: tuple[str, str], overlap: float = 0.0) -> Scene:
         """The scene with contact of these pairs allowed, and overlap up to ``overlap`` mm."""
-        return replace(self, allowed=(*self.allowed, *(Allowed(a, b, overlap) for a, b in pairs)))
+        return replace(self, allowed=(*self.allowed, *(Allowed(a, b, overlap) for a, b in name_pairs("pairs", pairs))))
 
     def moved(self, poses: Mapping[str, ArrayLike]) -> Scene:
         """The scene with parts at other poses ``{name: T_world}``."""
+        instance("poses", poses, Mapping)
         for name in poses:
             self.index(name)
         parts = tuple(_part(p.name, p.shape, poses[p.name]) if p.name in poses else p for p in self.parts)
@@ -115,6 +131,7 @@ class Scene:
 
     def index(self, name: str) -> int:
         """Position of a part in ``parts``. Raises InputError for an unknown name."""
+        text("part", name)
         for i, part in enumerate(self.parts):
             if part.name == name:
                 return i
@@ -126,14 +143,26 @@ class Scene:
         return max(found) if found else None
 
 
+def name_pairs(name: str, pairs: object) -> list[tuple[str, str]]:
+    """Pairs of part names. Raises InputError for anything else."""
+    found = []
+    for pair in items(name, pairs, "pairs of part names"):
+        two = items(name, pair, "pairs of part names")
+        if len(two) != 2:
+            raise InputError(f"{name} must be pairs of part names, got {shown(pair)}")
+        found.append((text("part", two[0]), text("part", two[1])))
+    return found
+
+
 def unknown_part(name: str, names: Iterable[str]) -> str:
     """The message for a name that is no part."""
     known = sorted(names)
-    shown = ", ".join(known[:12]) + (f", ... ({len(known)} in all)" if len(known) > 12 else "")
-    return f"unknown part {name!r}; available: {shown or 'none'}"
+    listed = ", ".join(known[:12]) + (f", ... ({len(known)} in all)" if len(known) > 12 else "")
+    return f"unknown part {shown(name)}; available: {listed or 'none'}"
 
 
 def _part(name: str, shape: AnyShape, T_world: ArrayLike) -> ScenePart:
+    text("name of a part", name)
     if not name or any(c in name for c in ":,*? \t\n"):
-        raise InputError(f"part name must not be empty or hold a space or one of : , * ?, got {name!r}")
+        raise InputError(f"part name must not be empty or hold a space or one of : , * ?, got {shown(name)}")
     return ScenePart(name, as_shape(shape), check_pose(T_world, f"pose of {name}"))

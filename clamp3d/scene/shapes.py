@@ -14,12 +14,14 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from clamp3d.checks import array, choice, instance, items, number, text
 from clamp3d.clamp.parts import Extrusion, Part
 from clamp3d.clamp.profile import Arc, Profile
 from clamp3d.errors import InputError
 from clamp3d.fit.mesh_file import Mesh
 from clamp3d.geometry.pose import Array
-from clamp3d.geometry.shapes import Cylinder, SweptArc
+from clamp3d.geometry.shapes import Cylinder, SweptArc, place
+from clamp3d.geometry.shapes import size as _size
 
 Fit = Literal["bound", "round", "off"]
 FITS: tuple[Fit, ...] = ("bound", "round", "off")
@@ -33,6 +35,16 @@ class Solid:
     bodies: tuple[Extrusion, ...]
     holes: tuple[Extrusion, ...] = ()
 
+    def __post_init__(self) -> None:
+        text("name of a solid", self.name)
+        for key in ("bodies", "holes"):
+            made = items(f"{key} of solid {self.name}", getattr(self, key), "extrusions")
+            for item in made:
+                instance(f"{key} of solid {self.name}", item, Extrusion)
+            object.__setattr__(self, key, made)
+        if not self.bodies:
+            raise InputError(f"bodies of solid {self.name} must be at least one extrusion")
+
     @property
     def bounds(self) -> Array:
         """Lower and upper corner (2, 3) of the bounding box, mm; arcs taken as arcs."""
@@ -42,11 +54,20 @@ class Solid:
 
 @dataclass(frozen=True, slots=True)
 class Hole:
-    """A round hole right through a solid along its ``axis`` y or z, centred at ``at``: (x, z) or (x, y) mm."""
+    """A round hole right through a solid along its ``axis`` y or z, centred at ``at``: (x, z) or (x, y) mm.
+
+    Raises InputError for values out of range.
+    """
 
     radius: float
     at: tuple[float, float] = (0.0, 0.0)
     axis: Literal["y", "z"] = "z"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", _size("hole radius", self.radius))
+        u, v = (place("hole at", x) for x in array("hole at", self.at, (2,)))
+        object.__setattr__(self, "at", (u, v))
+        choice("hole axis", self.axis, ("y", "z"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,8 +84,9 @@ class MeshShape:
     name: str = field(default="mesh")
 
     def __post_init__(self) -> None:
-        if self.fit not in FITS:
-            raise InputError(f"unknown fit {self.fit!r}; available: {', '.join(FITS)}")
+        instance("mesh", self.mesh, Mesh)
+        choice("fit", self.fit, FITS)
+        text("name of a mesh", self.name)
         if not self.mesh.watertight:
             raise InputError(f"{self.mesh.name}: mesh must be watertight to have an inside; close it or merge vertices")
 
@@ -73,30 +95,21 @@ Shape: TypeAlias = Solid | MeshShape
 AnyShape: TypeAlias = Shape | Part | Cylinder | SweptArc
 
 
-def _length(name: str, value: float) -> float:
-    if not (math.isfinite(value) and value > 0.0):
-        raise InputError(f"{name} must be a finite length > 0 mm, got {value}")
-    return float(value)
-
-
 def _drill(holes: Sequence[Hole], low: Array, high: Array) -> tuple[Extrusion, ...]:
     made = []
-    for hole in holes:
-        _length("hole radius", hole.radius)
+    for hole in items("holes", holes, "holes"):
+        instance("hole", hole, Hole)
         if hole.axis == "z":
             made.append(Extrusion(Profile.circle(hole.radius, hole.at), "Z", float(low[2]), float(high[2])))
-        elif hole.axis == "y":  # outlines along Y are (u, v) = (x, -z)
+        else:  # outlines along Y are (u, v) = (x, -z)
             at = (hole.at[0], -hole.at[1])
             made.append(Extrusion(Profile.circle(hole.radius, at), "Y", float(low[1]), float(high[1])))
-        else:
-            raise InputError(f"unknown hole axis {hole.axis!r}; available: y, z")
     return tuple(made)
 
 
 def cylinder(radius: float, length: float, *, bore: float = 0.0, name: str = "cylinder") -> Solid:
     """Cylinder on z, centred, flat ends; ``bore`` > 0 makes it a tube. Raises InputError for sizes that are not > 0."""
-    _length("radius", radius)
-    half = _length("length", length) / 2
+    radius, half, bore = _size("radius", radius), _size("length", length) / 2, number("bore", bore)
     if bore != 0.0 and not 0.0 < bore < radius:
         raise InputError(f"bore must be between 0 and radius = {radius:g} mm, got {bore}")
     holes = (Extrusion(Profile.circle(bore), "Z", -half, half),) if bore else ()
@@ -105,7 +118,7 @@ def cylinder(radius: float, length: float, *, bore: float = 0.0, name: str = "cy
 
 def box(size: Sequence[float], *, holes: Sequence[Hole] = (), name: str = "box") -> Solid:
     """Box of ``size`` (x, y, z) mm, centred, with round holes right through it."""
-    x, y, z = (_length("size", value) for value in size)
+    x, y, z = (_size("size", value) for value in array("size", size, (3,)))
     corner = np.array([x, y, z]) / 2
     body = Extrusion(Profile.rectangle(x, y), "Z", -z / 2, z / 2)
     return Solid(name, (body,), _drill(holes, -corner, corner))
@@ -130,10 +143,14 @@ def groove_block(
     >>> block.bounds.tolist()
     [[-20.0, -23.5, -25.0], [20.0, -3.5, 25.0]]
     """
-    width, height = _length("width", width), _length("height", height)
+    instance("groove", groove, SweptArc)
+    width, height = _size("width", width), _size("height", height)
+    sides = [
+        tuple(array("others", other, (3,)).tolist()) for other in items("others", others, "(x, radius, half angle)")
+    ]
     face = -groove.radius * math.cos(groove.half_angle)
     arcs = []
-    for x, radius, half in sorted([(0.0, groove.radius, groove.half_angle), *others], reverse=True):
+    for x, radius, half in sorted([(0.0, groove.radius, groove.half_angle), *sides], reverse=True):
         SweptArc(radius, half, groove.length)
         centre = face + radius * math.cos(half)
         reach = radius * math.sin(min(half, math.pi / 2))

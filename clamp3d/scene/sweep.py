@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clamp3d.checks import array, instance, items
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array, check_pose, inverse
 from clamp3d.scene.bounds import Bounds, Verdict
@@ -279,19 +280,19 @@ def sweep_poses(
     >>> sweep_poses(scene, "pin", [translation(0, 0, z) for z in (12.0, 12.5, 0.0)]).worst.tolist()
     ['contact', 'clear', 'clash']
     """
+    instance("scene", scene, Scene)
+    if workshop is not None:
+        instance("workshop", workshop, Workshop)
     shop = workshop or Workshop()
     i = scene.index(part)
     rest = (
-        [scene.index(name) for name in others] if others is not None else [k for k in range(len(scene.parts)) if k != i]
+        [scene.index(name) for name in items("others", others, "part names")]
+        if others is not None
+        else [k for k in range(len(scene.parts)) if k != i]
     )
     if i in rest:
         raise InputError(f"others must not hold {part!r} itself")
-    try:
-        T = np.asarray(poses, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("poses must be an (n, 4, 4) array of numbers") from None
-    if T.ndim != 3 or T.shape[1:] != (4, 4):
-        raise InputError(f"poses must have shape (n, 4, 4), got {T.shape}")
+    T = array("poses", poses, (None, 4, 4), finite=False)
     for k, pose in enumerate(T):
         check_pose(pose, f"poses[{k}]")
     n = len(T)

@@ -19,6 +19,8 @@ from clamp3d.scene.bounds import Bounds
 
 _PATCHES = 4000
 """Triangles of an overlap that are measured before its depth stays open."""
+_INNER = 40
+"""Points inside an overlap that are looked at."""
 
 
 @dataclass(eq=False)
@@ -131,6 +133,8 @@ def tri_bounds(a: TriModel, b: TriModel, T: Array, *, contact: float) -> Bounds:
         return _overlap(a, b, T, contact, rounding).widened(doubt + rounding)
     answer = fcl.DistanceResult()
     d = fcl.distance(oa, ob, fcl.DistanceRequest(enable_nearest_points=True), answer)
+    if d <= rounding:
+        return _overlap(a, b, T, contact, rounding).widened(doubt + rounding)
     p, q = (np.asarray(x, dtype=np.float64) for x in answer.nearest_points)
     R, t = T[:3, :3], T[:3, 3]
     for outer, heads, points in (
@@ -189,7 +193,30 @@ def _overlap(a: TriModel, b: TriModel, T: Array, contact: float, rounding: float
         low, high = min(low, -limit), min(high, -deepest)
         if high < -2.0 * contact - a.error - b.error:
             return Bounds(-np.inf, high)
+    # What has nearly the same surface as both, as a part that is there twice has, is deep inside only.
+    inner = _inner_points(V[F], 4.0 * (contact + a.error + b.error))
+    inner = inner[[TriModel(V, F, 0.0).contains(x) for x in inner]]
+    if len(inner):
+        deepest = max(a.distance(inner).max(), b.distance(inner @ back[:3, :3].T + back[:3, 3]).max())
+        if deepest > -high:
+            return Bounds(-np.inf, -float(deepest))
     return Bounds(low, high)
+
+
+def _inner_points(triangles: Array, least: float) -> Array:
+    """Points (k, 3) under the middles of the largest of a closed mesh's ``triangles`` (m, 3, 3).
+
+    They lie ``least`` mm deep, and as deep as the mesh is thick on average: volume over area, which is the inner radius
+    of a ball but for a factor of 3.
+    """
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    size = np.linalg.norm(cross, axis=1)
+    rows = np.argsort(-size)[:_INNER]
+    rows = rows[size[rows] > 0.0]
+    origin = triangles.reshape(-1, 3).mean(axis=0)
+    volume = float(np.einsum("ij,ij->", triangles[:, 0] - origin, cross)) / 6.0
+    middle, normal = triangles[rows].mean(axis=1), cross[rows] / size[rows, None]
+    return np.concatenate([middle - h * normal for h in (2.0 * volume / max(float(size.sum()), 1e-300), least)])
 
 
 def _deepest(model: TriModel, triangles: Array, contact: float, rounding: float) -> tuple[float, float]:

@@ -71,7 +71,7 @@ def test_wires_by_name_and_by_diameter():
     assert clamp.jumper.radius == pytest.approx(10.8)
     assert clamp.jumper.label == "diameter 21.6 mm"
     for text in ("0", "-3", "nan", "inf", "1e9"):
-        with pytest.raises(InputError, match=r"--line diameter must be > 0"):
+        with pytest.raises(InputError, match=r"line diameter must be > 0"):
             load_clamp(line=text)
 
 

@@ -38,12 +38,16 @@ def _with(array: np.ndarray, row: int, value: object) -> np.ndarray:
         (V, _with(F, 5, [0, 1, 2.5]), "must be whole numbers"),
         (V, _with(F, 5, [0, 1, np.nan]), "must be whole numbers"),
         (V, _with(F, 5, [0, 5, 5]), "three different corners, got [0, 5, 5] at row 5"),
-        (V, F[1:], "3 of 18 edges belong to one face only"),
+        (V, F[1:], "3 of 18 edges have one face only, at face 0, vertices 0 and 3"),
+        (V[F[1:]].reshape(-1, 3), np.arange(33).reshape(-1, 3), "33 of 33 edges have one face only"),
+        (np.vstack([V, V + 9.0]), np.vstack([F, F[:, ::-1] + 8]), "must enclose a volume > 0 mm^3, got 0"),
+        (np.vstack([2.0 * V, V - 9.0]), np.vstack([F, F[:, ::-1] + 8]), "the one of face 12 (12 faces) encloses -24"),
+        (np.vstack([2.0 * V, V - 1.0]), np.vstack([F, F[:, ::-1] + 8]), "is no cavity of another"),
+        (_with(V, 3, 1e300), F, "must be below 1e+30 mm"),
         (V, np.vstack([F, F[:1]]), "have more than two faces"),
         (V, np.vstack([F[:1, ::-1], F[1:]]), "3 edges run the same way in both faces"),
         (V, F[:, ::-1], "must enclose a volume > 0 mm^3, got -24"),
         (V * [1.0, 1.0, 0.0], F, "must enclose a volume > 0 mm^3, got 0"),
-        (V[F].reshape(-1, 3), np.arange(36).reshape(-1, 3), "merge equal vertices first"),
     ],
 )
 def test_bad_mesh_is_one_clear_line(vertices: object, faces: object, rule: str) -> None:
@@ -53,6 +57,14 @@ def test_bad_mesh_is_one_clear_line(vertices: object, faces: object, rule: str) 
     assert message.startswith("part P9")
     assert rule in message
     assert "\n" not in message
+
+
+def test_corners_of_triangles_are_merged_and_cavities_kept() -> None:
+    soup = check_solid(V[F].reshape(-1, 3), np.arange(36).reshape(-1, 3))
+    assert len(soup.vertices) == 8
+    assert {tuple(map(tuple, soup.vertices[face])) for face in soup.faces} == {tuple(map(tuple, V[f])) for f in F}
+    hollow = check_solid(np.vstack([4.0 * V, V + 1.0]), np.vstack([F, F[:, ::-1] + 8]))
+    assert len(hollow.faces) == 24
 
 
 def test_good_mesh_is_copied_and_locked() -> None:

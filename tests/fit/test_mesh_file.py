@@ -39,7 +39,7 @@ def test_gltf_is_metres_and_y_up(part, tmp_path):
 def test_unit_option(part, tmp_path):
     part.export(tmp_path / "part.stl")
     assert np.isclose(np.ptp(load_mesh(tmp_path / "part.stl", unit="in").vertices[:, 0]), 137 * 25.4, rtol=1e-6)
-    with pytest.raises(InputError, match="unknown unit 'foot'; available: mm, cm, m, in"):
+    with pytest.raises(InputError, match="unit must be one of mm, cm, m, in, got 'foot'"):
         load_mesh(tmp_path / "part.stl", unit="foot")
 
 

@@ -173,3 +173,23 @@ def test_thresholds():
     assert t.verdict(Bounds(-0.02, 0.0)) is Verdict.UNCERTAIN
     assert t.verdict(Bounds(1.0 - 1e-9, 1.0 + 1e-9)) is Verdict.CLEAR
     assert t.verdict(Bounds(-math.inf, -0.02)) is Verdict.CLASH
+
+
+@pytest.mark.parametrize("full", [False, True])
+@pytest.mark.parametrize("shift", [0.0, 1e-9])
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: shapes.box((50.0, 40.0, 30.0)),
+        lambda: shapes.cylinder(10.0, 40.0),
+        lambda: shapes.cylinder(12.0, 40.0, bore=8.0),
+        lambda: shapes.groove_block(SweptArc(12.0, 1.2, 50.0), 60.0, 30.0),
+    ],
+)
+def test_a_part_that_is_there_twice_clashes(make, shift, full):
+    # The surfaces coincide, so no point of either lies deep in the other: only what is between them does.
+    T = rotation([1, 2, 3], 0.7) @ translation(5.0, 6.0, 7.0)
+    scene = Scene().add("a", make(), T).add("b", make(), T @ translation(shift, 0.0, 0.0))
+    (row,) = check(scene, full=full).pairs
+    assert row.verdict in (Verdict.CLASH, Verdict.CONTAINED)
+    assert row.high < -1.0

@@ -1,0 +1,201 @@
+"""Checks of values that come from outside: each returns the value as what it should be, or raises InputError.
+
+A number is a real number: an int, a float, a NumPy scalar or an array of no dimension; no text, no bool, nothing
+complex, so that a slip is refused and not converted.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import os
+import warnings
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.errors import InputError
+
+
+def shown(value: object) -> str:
+    """``repr`` of a value on one short line, for messages.
+
+    >>> shown("a" * 200)[-12:]
+    'aaaaaaaa ...'
+    """
+    if isinstance(value, np.ndarray):
+        if value.size > 6:
+            return f"array of shape {value.shape}"
+        value = value.tolist()
+    if isinstance(value, np.generic):
+        value = value.item()
+    try:
+        text = repr(value[:80] if isinstance(value, (str, bytes)) else value)
+    except Exception:  # an int of more digits than Python prints; an object that cannot be shown
+        return type(value).__name__
+    text = " ".join(text.split())
+    return text if len(text) <= 80 and not (isinstance(value, str) and len(value) > 80) else text[:76] + " ..."
+
+
+def short(value: object, most: int = 200) -> str:
+    """``str`` of a value, for messages: long ones lose their middle."""
+    text = str(value)
+    return text if len(text) <= most else f"{text[: most // 2]} ... {text[-most // 2 :]}"
+
+
+def number(name: str, value: object, *, rule: str = "be a finite number") -> float:
+    """A finite real number as a float.
+
+    >>> number("angle", np.float32(0.5))
+    0.5
+    """
+    if isinstance(value, float) and math.isfinite(value):
+        return float(value)  # NumPy's float64 is a float
+    x = real(value)
+    if x is None or not math.isfinite(x):
+        raise InputError(f"{name} must {rule}, got {shown(value)}")
+    return x
+
+
+def real(value: object) -> float | None:
+    """A real number as a float, NaN and infinities too; None for anything else."""
+    if isinstance(value, np.ndarray):
+        if value.ndim or value.dtype.kind not in "iuf" or isinstance(value, np.ma.MaskedArray):
+            return None
+        value = value.item()
+    if not isinstance(value, numbers.Real) or isinstance(value, (bool, np.timedelta64)):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def positive(name: str, value: object) -> float:
+    """A finite length > 0 mm as a float.
+
+    >>> positive("radius", -1)
+    Traceback (most recent call last):
+    clamp3d.errors.InputError: radius must be a finite length > 0 mm, got -1
+    """
+    x = number(name, value, rule="be a finite length > 0 mm")
+    if not x > 0.0:
+        raise InputError(f"{name} must be a finite length > 0 mm, got {shown(value)}")
+    return x
+
+
+def whole(name: str, value: object, *, least: int, most: int | None = None) -> int:
+    """A whole number from ``least`` to ``most`` as an int."""
+    if isinstance(value, numbers.Integral) and not isinstance(value, (bool, np.timedelta64)):
+        n = int(value)
+        if n >= least and (most is None or n <= most):
+            return n
+    rule = f">= {least}" if most is None else f"from {least} to {most}"
+    raise InputError(f"{name} must be a whole number {rule}, got {shown(value)}")
+
+
+def array(name: str, value: object, shape: tuple[int | None, ...], *, finite: bool = True) -> NDArray[np.float64]:
+    """Real numbers as a float64 array of ``shape``, None for any length; what is one already is not copied.
+
+    >>> array("axis", (0, 0, 1), (3,)).tolist()
+    [0.0, 0.0, 1.0]
+    >>> array("axis", "xyz", (3,))
+    Traceback (most recent call last):
+    clamp3d.errors.InputError: axis must be an array of numbers with shape (3,), got 'xyz'
+    """
+    words = ", ".join("n" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
+    rule = f"{name} must be an array of numbers with shape ({words})"
+    out = _as_floats(value)
+    if out is None:
+        raise InputError(f"{rule}, got {shown(value)}")
+    if out.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, out.shape, strict=True)):
+        raise InputError(f"{name} must have shape ({words}), got {out.shape}")
+    if finite and not np.isfinite(out).all():
+        raise InputError(f"{name} must be finite, got {_first_bad(out)}")
+    return out
+
+
+def _as_floats(value: object) -> NDArray[np.float64] | None:
+    """Real numbers of any type as float64, None for what is none."""
+    if isinstance(value, np.ndarray) and value.dtype == np.float64 and not isinstance(value, np.ma.MaskedArray):
+        return value.view(np.ndarray)
+    if isinstance(value, np.ma.MaskedArray):
+        return None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # a masked number in a list: NaN
+            given = np.asarray(value)
+        if given.dtype.kind not in "biufO":
+            # An empty list has no kind of its own; other text, complex numbers, times are no numbers.
+            return given.astype(np.float64) if given.size == 0 and given.dtype.kind == "f" else None
+        if given.dtype.kind == "O" and any(real(item) is None for item in given.flat):
+            return None
+        with np.errstate(over="ignore"):
+            return given.astype(np.float64)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        return None
+
+
+def _first_bad(values: NDArray[np.float64]) -> str:
+    row = tuple(int(i[0]) for i in np.nonzero(~np.isfinite(values)))
+    return f"{values[row]} at {list(row)}"
+
+
+def instance(name: str, value: object, *kinds: type) -> None:
+    """Raise InputError unless ``value`` is of one of ``kinds``.
+
+    >>> instance("clamp", "reference", dict)
+    Traceback (most recent call last):
+    clamp3d.errors.InputError: clamp must be a dict, got str
+    """
+    if not isinstance(value, kinds):
+        words = " or ".join(kind.__name__ for kind in kinds)
+        raise InputError(f"{name} must be a {words}, got {type(value).__name__}")
+
+
+def flag(name: str, value: object) -> bool:
+    """True or False."""
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    raise InputError(f"{name} must be True or False, got {shown(value)}")
+
+
+def choice(name: str, value: object, choices: Iterable[str]) -> None:
+    """Raise InputError unless ``value`` is one of ``choices``, which the message lists."""
+    choices = tuple(choices)
+    if not (isinstance(value, str) and value in choices):
+        raise InputError(f"{name} must be one of {', '.join(choices)}, got {shown(value)}")
+
+
+def items(name: str, value: object, what: str) -> tuple[Any, ...]:
+    """The items of a list, a tuple or another sequence, not of a text; ``what`` they are, for the message."""
+    if isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview)):
+        return tuple(value)
+    if isinstance(value, (set, frozenset, np.ndarray)) and getattr(value, "ndim", 1) > 0:
+        return tuple(value)
+    raise InputError(f"{name} must be a list of {what}, got {shown(value)}")
+
+
+def text(name: str, value: object) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise InputError(f"{name} must be a text, got {shown(value)}")
+    return value
+
+
+def function(name: str, value: object) -> None:
+    """Raise InputError unless ``value`` is None or can be called."""
+    if value is not None and not callable(value):
+        raise InputError(f"{name} must be a function, got {shown(value)}")
+
+
+def path(name: str, value: object) -> Path:
+    """A file's or a folder's path, from a text or a path."""
+    if isinstance(value, (str, os.PathLike)):
+        found = os.fspath(value)
+        if isinstance(found, str) and "\0" not in found:
+            return Path(found)
+    raise InputError(f"{name} must be a path, got {shown(value)}")
