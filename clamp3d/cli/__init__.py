@@ -12,7 +12,7 @@ import sys
 import click
 
 import clamp3d
-from clamp3d.errors import Clamp3dError
+from clamp3d.errors import Clamp3dError, one_line
 
 # Name -> (module, one line for the list of commands). A command's module is loaded when it is called.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -94,5 +94,5 @@ def main() -> None:
 
 
 def _fail(message: str) -> int:
-    print(f"clamp3d: error: {message}", file=sys.stderr)
+    print(f"clamp3d: error: {one_line(message)}", file=sys.stderr)
     return 2

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from clamp3d.cli.options import FILE
+from clamp3d.cli.options import OUTPUT
 
 if TYPE_CHECKING:
     from clamp3d.scene.check import Progress
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 @click.option("--pairs", metavar="A:B,...", help="Only these pairs, for instance P1:P6,P2:P7.")
 @click.option("--clearance", type=float, metavar="MM", help="Gap that parts must keep; replaces the file's.")
 @click.option("--full", is_flag=True, help="Also ask every model at its finest for every pair, and compare (slow).")
-@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the result as JSON.")
-@click.option("--html", "html_file", type=FILE, metavar="FILE", help="Write the result as a page.")
+@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write the result as JSON.")
+@click.option("--html", "html_file", type=OUTPUT, metavar="FILE", help="Write the result as a page.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
 def command(
     scene: Path,

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import FILE
+from clamp3d.cli.options import OUTPUT
 
 
 @click.command("compare")
-@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures as JSON.")
-@click.option("--plot", "plot_file", type=FILE, metavar="FILE", help="Draw the chart: .png, .svg or .html.")
+@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write all figures as JSON.")
+@click.option("--plot", "plot_file", type=OUTPUT, metavar="FILE", help="Draw the chart: .png, .svg or .html.")
 @click.option("--peers", is_flag=True, help="Also measure coal, trimesh, MuJoCo, manifold3d and Open CASCADE.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
 def command(json_file: Path | None, plot_file: Path | None, peers: bool, quiet: bool) -> None:
@@ -26,7 +26,7 @@ def command(json_file: Path | None, plot_file: Path | None, peers: bool, quiet: 
     from clamp3d.output.compare_chart import check_format, save_comparison
     from clamp3d.output.compare_report import comparison_to_dict, comparison_to_text
     from clamp3d.output.files import check_writable, write_json
-    from clamp3d.study.compare import compare
+    from clamp3d.study.compare.run import compare
 
     if plot_file is not None:
         check_format(plot_file)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import FILE
+from clamp3d.cli.options import OUTPUT
 
 
 @click.command("fit")
@@ -19,9 +19,9 @@ from clamp3d.cli.options import FILE
     type=click.Choice(["mm", "cm", "m", "in"]),
     help="Unit of the file's numbers.  [default: the file's own; mm for STL, OBJ, PLY]",
 )
-@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the result as JSON.")
+@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write the result as JSON.")
 @click.option(
-    "--html", "html_file", type=FILE, metavar="FILE", help="Write a page: the mesh, its features, their errors."
+    "--html", "html_file", type=OUTPUT, metavar="FILE", help="Write a page: the mesh, its features, their errors."
 )
 @click.option("--quiet", "-q", is_flag=True, help="No progress and no notes.")
 def command(mesh: Path, unit: str | None, json_file: Path | None, html_file: Path | None, quiet: bool) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import FILE
+from clamp3d.cli.options import FILE, OUTPUT
 
 
 @click.command("measure-image")
@@ -32,7 +32,7 @@ from clamp3d.cli.options import FILE
     metavar="MM",
     help="Standard deviation of a reading.",
 )
-@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the result as JSON.")
+@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write the result as JSON.")
 def command(
     image: Path,
     points: str,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,21 @@ if TYPE_CHECKING:
 METHODS = ("cas", "chords", "wedges", "hulls", "mesh")
 
 FILE = click.Path(dir_okay=False, path_type=Path)
+
+
+class _Output(click.Path):
+    """A file to write: that it can be written is found out before the work, not after."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        from clamp3d.output.files import check_writable
+
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        check_writable(path)
+        return path
+
+
+OUTPUT = _Output(dir_okay=False, path_type=Path)
+"""A file to write; `FILE` is one that is read."""
 
 
 def clamp_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -106,7 +122,9 @@ def viewer_options(function: Callable[..., Any]) -> Callable[..., Any]:
         ),
         click.option("--host", default="127.0.0.1", show_default=True, help="Address to serve on; 0.0.0.0 for all."),
         click.option("--url", metavar="ZMQ_URL", help="Use a running meshcat server: the zmq_url that it printed."),
-        click.option("--html", "html_file", type=FILE, metavar="FILE", help="Write one page with the whole animation."),
+        click.option(
+            "--html", "html_file", type=OUTPUT, metavar="FILE", help="Write one page with the whole animation."
+        ),
     ):
         function = option(function)
     return function

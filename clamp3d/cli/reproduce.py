@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import FILE
+from clamp3d.cli.options import OUTPUT
 
 
 @click.command("reproduce")
-@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the tables as JSON.")
+@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write the tables as JSON.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
 def command(json_file: Path | None, quiet: bool) -> None:
     """Print Tables 1-5 of the paper beside this program's values, with the difference of each."""

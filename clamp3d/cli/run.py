@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from clamp3d.cli.options import (
-    FILE,
+    OUTPUT,
     clamp_arguments,
     contact_model,
     method_options,
@@ -26,7 +26,12 @@ if TYPE_CHECKING:
 @clamp_arguments
 @method_options
 @solver_options
-@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the result as JSON.")
+@click.option(
+    "--equilibria/--no-equilibria",
+    default=None,
+    help="Also tell the other states that the clamp can come to rest in.  [default: with method cas, exact solver]",
+)
+@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write the result as JSON.")
 @click.option("--view", is_flag=True, help="Show the run in a browser while it goes on; prints the page's address.")
 @viewer_options
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
@@ -41,6 +46,7 @@ def command(
     solver: str | None,
     step: float | None,
     tilt_step_deg: float | None,
+    equilibria: bool | None,
     json_file: Path | None,
     view: bool,
     quiet: bool,
@@ -51,6 +57,9 @@ def command(
     Exit code 1 if the clamp does not close on both wires, or parts meet that should not.
     """
     settings = solver_settings(method, solver, step, tilt_step_deg)
+    if equilibria and settings["solver"] != "exact":
+        raise click.UsageError(f"--equilibria goes with --solver exact, not {settings['solver']}")
+    settings["others"] = equilibria if equilibria is not None else method == "cas" and settings["solver"] == "exact"
     from clamp3d.assembly.run import assemble
     from clamp3d.clamp.loader import load_clamp
     from clamp3d.output.files import write_json

@@ -6,11 +6,17 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import FILE
+from clamp3d.cli.options import OUTPUT
 
 
 @click.command("stress")
-@click.option("--family", "families", multiple=True, metavar="NAME", help="Only this family; may be repeated.")
+@click.option(
+    "--family",
+    "families",
+    multiple=True,
+    metavar="NAME",
+    help="Only this family, or pose, motion, mesh, assembly for a kind; may be repeated.",
+)
 @click.option("--method", "methods", multiple=True, metavar="NAME", help="Only this method; may be repeated.")
 @click.option("--list", "show_list", is_flag=True, help="List families and methods.")
 @click.option("--n", type=click.IntRange(1), default=1000, show_default=True, help="Cases per family.")
@@ -28,9 +34,9 @@ from clamp3d.cli.options import FILE
 @click.option(
     "--case", type=click.IntRange(0), metavar="I", help="Print case I of the family as Python, with its truth."
 )
-@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the result as JSON.")
-@click.option("--markdown", "markdown_file", type=FILE, metavar="FILE", help="Write the result as Markdown.")
-@click.option("--plot", "plot_file", type=FILE, metavar="FILE", help="Draw the matrix (.png, .svg, .pdf).")
+@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write the result as JSON.")
+@click.option("--markdown", "markdown_file", type=OUTPUT, metavar="FILE", help="Write the result as Markdown.")
+@click.option("--plot", "plot_file", type=OUTPUT, metavar="FILE", help="Draw the matrix (.png, .svg, .pdf).")
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
 def command(
     families: tuple[str, ...],
@@ -52,26 +58,24 @@ def command(
     Exit code 1 if the project's own method, cas, has a wrong verdict or an error beyond its bound.
     """
     from clamp3d.errors import InputError
-    from clamp3d.study.stress import run_stress
-    from clamp3d.study.stress_families import FAMILIES, cases_of
-    from clamp3d.study.stress_methods import METHODS
-    from clamp3d.study.stress_oracle import truth_50_digits
-    from clamp3d.study.stress_report import markdown, table
+    from clamp3d.study.stress.registry import FAMILIES, METHODS
+    from clamp3d.study.stress.report import markdown, table
+    from clamp3d.study.stress.run import run_stress
 
     if show_list:
-        for family in FAMILIES.values():
-            click.echo(f"{family.name:24s} {family.about}")
-        for name, (about, _) in METHODS.items():
-            click.echo(f"{name:24s} (method) {about}")
+        for each in FAMILIES.values():
+            click.echo(f"{each.name:28s} {each.about}")
+        for name, about in METHODS.items():
+            click.echo(f"{name:28s} (method) {about}")
         return
     if case is not None:
         if len(families) != 1 or families[0] not in FAMILIES:
             raise click.UsageError("--case needs one --family; see --list")
+        family = FAMILIES[families[0]]
+        n = max(1, int(n * family.part))
         if case >= n:
-            raise InputError(f"--case must be less than --n = {n}, got {case}")
-        cases = cases_of(families[0], n, seed)
-        click.echo(cases.snippet(case))
-        click.echo(f"# truth: {float(truth_50_digits(cases, case))!r} mm")
+            raise InputError(f"--case must be less than the number of cases, {n}, got {case}")
+        click.echo(family.case(n, seed, case))
         return
 
     from clamp3d.cli.progress import bar
@@ -94,7 +98,7 @@ def command(
         extra = "".join(f' --family "{f}"' for f in families) + "".join(f' --method "{m}"' for m in methods)
         write_text(markdown_file, markdown(result, f"clamp3d stress --n {n} --seed {seed} --check {check}{extra}"))
     if plot_file is not None:
-        from clamp3d.study.stress_plot import plot
+        from clamp3d.study.stress.plot import plot
 
         plot(result, plot_file)
     click.echo(table(result))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import FILE, clamp_arguments
+from clamp3d.cli.options import OUTPUT, clamp_arguments
 
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -27,8 +27,8 @@ PICTURES = (".png", ".svg", ".pdf")
     "--random", "count", type=click.IntRange(1, 10_000_000), metavar="N", help="Also try N random misplacements."
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random ones.")
-@click.option("--map", "map_file", type=FILE, metavar="FILE", help="Draw the map (PNG, SVG or PDF).")
-@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all points as JSON.")
+@click.option("--map", "map_file", type=OUTPUT, metavar="FILE", help="Draw the map (PNG, SVG or PDF).")
+@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write all points as JSON.")
 def command(
     clamp: str,
     line: str | None,

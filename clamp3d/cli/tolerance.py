@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import FILE, clamp_arguments
+from clamp3d.cli.options import OUTPUT, clamp_arguments
 
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -28,9 +28,9 @@ PICTURES = (".png", ".svg", ".pdf")
 )
 @click.option("--processes", type=click.IntRange(1, 1024), default=1, show_default=True, help="Processes.")
 @click.option("--scheduler", metavar="ADDRESS", help="Spread over this Dask cluster (extra 'cluster').")
-@click.option("--resume", type=FILE, metavar="FILE", help="Keep finished work here; go on from it if it exists.")
-@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all samples as JSON.")
-@click.option("--plot", "plot_file", type=FILE, metavar="FILE", help="Draw the histogram (.png, .svg, .pdf).")
+@click.option("--resume", type=OUTPUT, metavar="FILE", help="Keep finished work here; go on from it if it exists.")
+@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write all samples as JSON.")
+@click.option("--plot", "plot_file", type=OUTPUT, metavar="FILE", help="Draw the histogram (.png, .svg, .pdf).")
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
 def command(
     clamp: str,

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.assembly.result import Run
+from clamp3d.checks import array, choice, instance, number, whole
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
 from clamp3d.study.picture import Picture, find_end_points, picture
@@ -35,6 +36,12 @@ FITTING_ERROR = 0.05
 """Measured on drawn pictures: standard deviation in px of an automatic end point (largest of all: 0.1 px)."""
 CALLIPER_ERROR = 0.02
 """Chosen: standard deviation in mm of a reading, the usual resolution of a vernier calliper."""
+
+
+_FARTHEST = 1e9
+"""Largest pixel coordinate: no picture is larger."""
+_LONGEST = 1e12
+"""Lengths and errors from 1 / _LONGEST to _LONGEST."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,14 +119,13 @@ def measure_image(
     (15.0, 15.811, 0.349)
     """
     marks = np.array([_marks("points", points), _marks("reference", reference)])
-    _check("reference_mm", reference_mm, above=0.0)
-    _check("marking_error", marking_error)
-    _check("calliper_error", calliper_error)
+    reference_mm = _check("reference_mm", reference_mm, above=0.0)
+    marking_error = _check("marking_error", marking_error)
+    calliper_error = _check("calliper_error", calliper_error)
     for name, (a, b) in zip(("points", "reference"), marks, strict=True):
         if math.dist(a, b) < 1.0:
             raise InputError(f"{name} must be two marks at least 1 px apart, got {a.tolist()} and {b.tolist()}")
-    if kind not in ("height", "straight"):
-        raise InputError(f"kind must be height or straight, got {kind!r}")
+    choice("kind", kind, ("height", "straight"))
     value = _distance(marks, reference_mm, kind)
     unique, place = np.unique(marks.reshape(4, 2), axis=0, return_inverse=True)
     step = 1e-3
@@ -146,10 +152,10 @@ def marked_distances(
 
     Three marks a trial: the up splint's left end point serves as reference and as end point.
     """
-    if count < 1:
-        raise InputError(f"count of trials must be >= 1, got {count}")
-    _check("marking_error", marking_error)
-    _check("calliper_error", calliper_error)
+    count = whole("count of trials", count, least=1)
+    marking_error = _check("marking_error", marking_error)
+    calliper_error = _check("calliper_error", calliper_error)
+    choice("kind", kind, ("height", "straight"))
     rng = np.random.default_rng(seed)
     marks = shown.end_points + rng.normal(0.0, marking_error, (count, 3, 2))
     readings = shown.reference + rng.normal(0.0, calliper_error, count)
@@ -170,6 +176,9 @@ def image_study(
 
     The first five trials are those to lay beside the paper's. Raises InputError for settings out of range.
     """
+    instance("run", run, Run)
+    count, seed = whole("count of trials", count, least=1, most=100_000_000), whole("seed", seed, least=0)
+    px_per_mm = _check("px_per_mm", px_per_mm, above=0.0)
     shown = picture(run, px_per_mm, seed=seed)
     values = marked_distances(
         shown, max(count, 5), marking_error=marking_error, calliper_error=calliper_error, seed=seed, kind=kind
@@ -225,15 +234,17 @@ def _distance(marks: Array, reference_mm: float | Array, kind: Kind) -> Array:
 
 
 def _marks(name: str, values: ArrayLike) -> Array:
-    try:
-        marks = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be two pixel positions (x, y), got {values!r}") from None
-    if marks.shape != (2, 2) or not np.isfinite(marks).all():
-        raise InputError(f"{name} must be two finite pixel positions (x, y), got {marks.tolist()}")
+    marks = array(name, values, (2, 2))
+    if not np.abs(marks).max() <= _FARTHEST:
+        raise InputError(f"{name} must be two pixel positions (x, y) within {_FARTHEST:g} px, got {marks.tolist()}")
     return marks
 
 
-def _check(name: str, value: float, *, above: float | None = None) -> None:
-    if not math.isfinite(value) or value < 0.0 or (above is not None and value <= above):
-        raise InputError(f"{name} must be finite and {'> 0' if above is not None else '>= 0'}, got {value}")
+def _check(name: str, value: float, *, above: float | None = None) -> float:
+    rule = f"be finite and {'> 0' if above is not None else '>= 0'}"
+    x = number(name, value, rule=rule)
+    if x < 0.0 or (above is not None and x <= above):
+        raise InputError(f"{name} must {rule}, got {x}")
+    if not (x == 0.0 or 1.0 / _LONGEST <= x <= _LONGEST):
+        raise InputError(f"{name} must be between {1.0 / _LONGEST:g} and {_LONGEST:g}, got {x}")
+    return x

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.assembly.run import assemble
+from clamp3d.checks import array, choice, instance, number, positive, whole
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import GroovePair, groove_pairs
 from clamp3d.contact.cas import Cas
@@ -34,6 +35,7 @@ SEAT_TOLERANCE = 0.5
 """Opening in mm up to which a clamp counts as closed: what its bolt still draws together."""
 
 _TOUCH = 1e-7
+_FARTHEST = 1e6  # mm; a wire further off is not misplaced but elsewhere
 _ITERATIONS = 400
 _STRAIGHT = 1e-5
 
@@ -105,10 +107,9 @@ class WireClosing:
     """
 
     def __init__(self, clamp: Clamp, wire: PartName = "P6", *, seat_tolerance: float = SEAT_TOLERANCE) -> None:
-        if wire not in ("P6", "P7"):
-            raise InputError(f"wire must be P6 or P7, got {wire!r}")
-        if not (math.isfinite(seat_tolerance) and seat_tolerance > 0.0):
-            raise InputError(f"seat tolerance must be a finite length > 0 mm, got {seat_tolerance}")
+        instance("clamp", clamp, Clamp)
+        choice("wire", wire, ("P6", "P7"))
+        seat_tolerance = positive("seat tolerance", seat_tolerance)
         run = assemble(clamp, Cas())
         if not run.clamped:
             raise InputError(f"clamp {clamp.name} with {clamp.line.label} and {clamp.jumper.label}: {run.status}")
@@ -123,9 +124,9 @@ class WireClosing:
 
     def poses(self, misplacement: Array) -> Array:
         """World poses (n, 4, 4) of the wire for misplacements (n, 4): offset, height (mm), yaw, pitch (rad)."""
-        m = np.asarray(misplacement, dtype=np.float64)
-        if m.ndim != 2 or m.shape[1] != 4 or not np.isfinite(m).all():
-            raise InputError(f"misplacements must be finite with shape (n, 4), got {m.shape}")
+        m = array("misplacements", misplacement, (None, 4))
+        if not np.abs(m[:, :2]).max(initial=0.0) <= _FARTHEST:
+            raise InputError(f"misplacements must be up to {_FARTHEST:g} mm, got {np.abs(m[:, :2]).max():g}")
         cy, sy, cp, sp = np.cos(m[:, 2]), np.sin(m[:, 2]), np.cos(m[:, 3]), np.sin(m[:, 3])
         T = np.zeros((len(m), 4, 4))
         # Rz(yaw) Rx(pitch), about the wire's middle.
@@ -157,14 +158,16 @@ class WireClosing:
 
     def cloud(self, ranges: Mapping[Freedom, float], count: int, *, seed: int = 0) -> Outcomes:
         """Outcomes of ``count`` misplacements spread evenly at random over half ``ranges`` (mm or rad)."""
-        m = np.zeros((count, 4))
-        rng = np.random.default_rng(seed)
-        for freedom, reach in ranges.items():
+        m = np.zeros((whole("count", count, least=1, most=10_000_000), 4))
+        rng = np.random.default_rng(whole("seed", seed, least=0))
+        for freedom, reach in _ranges(ranges).items():
             m[:, FREEDOMS.index(freedom)] = rng.uniform(-reach, reach, count)
         return self.close(m)
 
     def limits(self, freedom: Freedom, reach: float) -> Limits:
         """How far one freedom alone may go either way before the clamp does not close, searched up to ``reach``."""
+        choice("freedom", freedom, FREEDOMS)
+        ((freedom, reach),) = _ranges({freedom: reach}).items()
         column = FREEDOMS.index(freedom)
 
         def closes(values: Array) -> NDArray[np.bool_]:
@@ -191,8 +194,8 @@ class WireClosing:
 
     def tolerances(self, ranges: Mapping[Freedom, float], *, samples: int = 4000, seed: int = 0) -> Tolerances:
         """Limits of each freedom in ``ranges`` (half ranges, mm or rad), and the share of them that holds at once."""
-        limits = tuple(self.limits(freedom, reach) for freedom, reach in ranges.items())
-        rng = np.random.default_rng(seed)
+        limits = tuple(self.limits(freedom, reach) for freedom, reach in _ranges(ranges).items())
+        samples, rng = whole("samples", samples, least=0), np.random.default_rng(whole("seed", seed, least=0))
         unit = np.array(list(itertools.product((0.0, 1.0), repeat=len(limits))))
         unit = np.vstack([unit, rng.random((samples, len(limits)))])
         low, high = np.array([x.low for x in limits]), np.array([x.high for x in limits])
@@ -211,6 +214,23 @@ class WireClosing:
                 middle = 0.5 * (inside + outside)
                 inside, outside = (middle, outside) if all_close(middle) else (inside, middle)
         return Tolerances(self.wire, self.seat_tolerance, limits, inside, samples)
+
+
+def _ranges(ranges: Mapping[Freedom, float]) -> dict[Freedom, float]:
+    """Half ranges, at least one, > 0; turns by less than a right angle."""
+    instance("ranges", ranges, Mapping)
+    if not ranges:
+        raise InputError(f"ranges must hold at least one of {', '.join(FREEDOMS)}")
+    checked: dict[Freedom, float] = {}
+    for freedom, reach in ranges.items():
+        choice("freedom", freedom, FREEDOMS)
+        turn = freedom in ("yaw", "pitch")
+        rule = "be > 0 and < 90 deg" if turn else f"be > 0 and up to {_FARTHEST:g} mm"
+        checked[freedom] = number(f"{freedom}: half range", reach, rule=rule)
+        if not 0.0 < checked[freedom] < (math.pi / 2 if turn else _FARTHEST):
+            got = f"{math.degrees(checked[freedom]):g} deg" if turn else f"{checked[freedom]:g} mm"
+            raise InputError(f"{freedom}: half range must {rule}, got {got}")
+    return checked
 
 
 def _approach(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import importlib
 import math
-import re
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -27,7 +26,7 @@ from clamp3d.assembly.run import final_status
 from clamp3d.assembly.section import D, S, Section
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.contact.cas import Cas
-from clamp3d.errors import InputError, MissingLibraryError, SolverError
+from clamp3d.errors import InputError, MissingLibraryError, SolverError, without_numbers
 from clamp3d.geometry.pose import Array
 from clamp3d.study.journal import Journal
 from clamp3d.study.sensitivity import DIMENSIONS, dimension, with_dimensions
@@ -207,11 +206,11 @@ def _sample(spec: Spec, index: int) -> Sample:
     try:
         section = Section(with_dimensions(spec.clamp, sample_dimensions(spec, index)), Cas())
     except InputError as error:
-        return None, f"not a clamp: {_without_numbers(str(error))}"
+        return None, f"not a clamp: {without_numbers(str(error))}"
     try:
         final = _close(section, spec.start)
     except SolverError as error:
-        return None, f"not solved: {_without_numbers(str(error))}"
+        return None, f"not solved: {without_numbers(str(error))}"
     status = final_status(final, 0.0)
     return (section.splint_distance(final.q) if status == CLAMPED else None), status
 
@@ -229,11 +228,6 @@ def _close(section: Section, start: tuple[float, float] | None) -> FinalState:
                 if final_status(final, 0.0) == CLAMPED:
                     return final
     return solve_final_state(section)
-
-
-def _without_numbers(message: str) -> str:
-    """The rule without the sample's own values, so that equal reasons count together."""
-    return re.sub(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?", "...", message)
 
 
 def _solve(
@@ -269,6 +263,8 @@ def _on_cluster(tasks: list[tuple[Spec, int, int]], scheduler: str) -> Iterator[
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
         raise MissingLibraryError("a Dask cluster needs dask.distributed: pip install 'clamp3d[cluster]'") from None
+    if not scheduler.strip():  # Dask would start a cluster of its own
+        raise InputError("scheduler must be an address like tcp://host:8786, got ''")
     try:
         client = distributed.Client(scheduler, timeout="10s", set_as_default=False)
     except (OSError, ValueError, TypeError) as error:

@@ -115,7 +115,9 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
     if status != "clamped":
         raise SolverError(f"no sensitivity: {status}")
     derivative = _derivatives(section, final)
-    rows = [Sensitivity(n, dimension(clamp, n), v) for n, v in zip(DIMENSIONS, derivative, strict=True) if v != 0.0]
+    rows = [
+        Sensitivity(n, dimension(clamp, n), float(v)) for n, v in zip(DIMENSIONS, derivative, strict=True) if v != 0.0
+    ]
     return tuple(sorted(rows, key=lambda row: -round(abs(row.derivative), 9)))
 
 

@@ -67,7 +67,7 @@ def test_a_clamp_that_does_not_close_is_a_finding():
         (["rum"], "unknown command 'rum'; available: run, "),
         (["run", "nothing"], "unknown clamp 'nothing'; built in: reference"),
         (["run", "--line", "LJ-631"], "unknown conductor 'LJ-631'"),
-        (["run", "--jumper", "-4"], "--jumper diameter must be > 0"),
+        (["run", "--jumper", "-4"], "jumper diameter must be > 0"),
         (["run", "--method", "magic"], "'magic' is not one of"),
         (["run", "--unit-angle-deg", "5"], "--unit-angle-deg goes with"),
         (["run", "--method", "chords", "--unit-angle-deg", "0"], "unit angle must be between 0 and 180 deg, got 0"),

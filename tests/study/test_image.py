@@ -154,11 +154,11 @@ def test_snapping_finds_the_corner(shown: Picture) -> None:
 def test_bad_values() -> None:
     good = [(0.0, 0.0), (3.0, 4.0)]
     for arguments, message in (
-        (([(0, 0)], good, 1.0), "points must be two"),
-        (([(0, 0), (0, math.nan)], good, 1.0), "points must be two finite"),
+        (([(0, 0)], good, 1.0), "points must have shape"),
+        (([(0, 0), (0, math.nan)], good, 1.0), "points must be finite"),
         ((good, [(1, 1), (1.5, 1)], 1.0), "reference must be two marks at least 1 px apart"),
         ((good, good, 0.0), "reference_mm must be finite and > 0, got 0.0"),
-        ((good, "ab", 1.0), "reference must be two pixel positions"),
+        ((good, "ab", 1.0), "reference must be an array of numbers"),
     ):
         with pytest.raises(InputError, match=message):
             measure_image(*arguments)  # type: ignore[arg-type]

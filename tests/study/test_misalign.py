@@ -105,11 +105,11 @@ def test_outcomes_by_mouth(closing):
 
 def test_bad_input():
     clamp = load_clamp()
-    with pytest.raises(InputError, match="wire must be P6 or P7, got 'P1'"):
+    with pytest.raises(InputError, match="wire must be one of P6, P7, got 'P1'"):
         WireClosing(clamp, "P1")
     with pytest.raises(InputError, match="seat tolerance must be a finite length > 0 mm"):
         WireClosing(clamp, seat_tolerance=-1.0)
-    with pytest.raises(InputError, match=r"misplacements must be finite with shape \(n, 4\)"):
+    with pytest.raises(InputError, match=r"misplacements must have shape \(n, 4\)"):
         WireClosing(clamp).close(np.zeros((2, 3)))
     thin = replace(clamp, line=replace(clamp.line, conductor=None, diameter=3.0))
     with pytest.raises(InputError, match="not clamped"):

@@ -26,14 +26,15 @@ from clamp3d.contact.chords import Chords
 from clamp3d.errors import InputError
 from clamp3d.output.compare_chart import check_format, save_comparison
 from clamp3d.output.compare_report import comparison_to_dict, comparison_to_text
-from clamp3d.study import compare as study
-from clamp3d.study import compare_jobs, compare_peers
-from clamp3d.study.compare import Comparison, NotMeasured, compare, machine, pareto
-from clamp3d.study.compare_jobs import Assembled, JobError, assembled, imaged, run_job
-from clamp3d.study.compare_measure import Band, Measured, measure, verdicts
-from clamp3d.study.compare_methods import METHODS, Method, prepare
-from clamp3d.study.compare_peers import PEER_METHODS, load_peer, missing_peers, prepare_peer
-from clamp3d.study.compare_scene import chord_error, known_poses
+from clamp3d.study.compare import jobs as compare_jobs
+from clamp3d.study.compare import peers as compare_peers
+from clamp3d.study.compare import run as study
+from clamp3d.study.compare.jobs import Assembled, JobError, assembled, imaged, run_job
+from clamp3d.study.compare.measure import Band, Measured, measure, verdicts
+from clamp3d.study.compare.methods import METHODS, Method, prepare
+from clamp3d.study.compare.peers import PEER_METHODS, load_peer, missing_peers, prepare_peer
+from clamp3d.study.compare.run import Comparison, NotMeasured, compare, machine, pareto
+from clamp3d.study.compare.scene import chord_error, known_poses
 from clamp3d.study.complexity import Sweep, complexity, fitted, grid_search
 
 QUICK = 0.01

@@ -7,7 +7,6 @@ rounded on the way to float64 poses is not forgotten: the truth of a case is wor
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +18,7 @@ from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import Cylinder, SweptArc
 
 Extended = np.longdouble
-"""80-bit floats where the platform has them: only there is the quick truth good enough (see `stress_oracle`)."""
+"""80-bit floats where the platform has them: only there is the quick truth good enough (see `oracle`)."""
 
 PARALLEL_FEATURES = ("arc", "lip", "flat")
 FEATURES = (*PARALLEL_FEATURES, "end face", "end arc", "end edge", "corner")
@@ -108,11 +107,6 @@ class Cases:
             lines.append(f"T_world_groove = np.array({self.T_world_groove[i].tolist()})")
             pose = "clamp3d.relative_pose(T_world_groove, T_world_wire)"
         return "\n".join([*lines, f"print(clamp3d.signed_distance(groove, wire, {pose}))"])
-
-
-def generator(family: str, seed: int) -> np.random.Generator:
-    """The family's own stream of random numbers: the same for a seed, whatever else runs."""
-    return np.random.default_rng([seed, zlib.crc32(family.encode())])
 
 
 def signed_powers(rng: np.random.Generator, n: int, low: float, high: float, zeros: float = 0.1) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from clamp3d.geometry.pose import check_pose
-from clamp3d.study.compare_scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, chord_error, in_part_frame, known_poses
+from clamp3d.study.compare.scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, chord_error, in_part_frame, known_poses
 
 POSES = known_poses()
 
@@ -48,7 +48,7 @@ def test_parallel_distances_are_the_closed_form_at_50_digits() -> None:
 
 
 def test_tilted_distances_are_those_of_the_search() -> None:
-    path = Path(__file__).parents[1] / "geometry" / "data" / "make_oracle.py"
+    path = Path(__file__).parents[2] / "geometry" / "data" / "make_oracle.py"
     spec = importlib.util.spec_from_file_location("make_oracle", path)
     assert spec is not None
     assert spec.loader is not None

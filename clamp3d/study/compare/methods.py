@@ -12,7 +12,7 @@ import numpy as np
 from clamp3d.contact.model import ContactModel
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
-from clamp3d.study.compare_scene import GROOVE, WIRE, block, chord_error, in_part_frame, pair
+from clamp3d.study.compare.scene import GROOVE, WIRE, block, chord_error, in_part_frame, pair
 
 if TYPE_CHECKING:
     from clamp3d.clamp.dimensions import Clamp
@@ -99,7 +99,7 @@ def load(method: Method) -> None:
 
 
 def prepare(method: Method, *, time_limit: float = 300.0) -> Prepared:
-    """Set a method up for the scene of `compare_scene`; everything that can be done before the first pose is done.
+    """Set a method up for the scene of `compare.scene`; everything that can be done before the first pose is done.
 
     Raises InputError for an unknown method, and what the method itself raises.
     """

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.clamp.features import GroovePair
 from clamp3d.clamp.parts import Extrusion, Part
@@ -19,39 +16,14 @@ from clamp3d.geometry.distance import SignedDistances, signed_distances
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.relation3d import relative_pose
 from clamp3d.geometry.shapes import SweptArc
-from clamp3d.study.stress_cases import Cases
+from clamp3d.study.stress.poses.cases import Cases
+from clamp3d.study.stress.worker import Measured, Measures, Method
 
 _WORLD = 5e-16
 """Rounding of a position by `relative_pose`, in parts of the distance between the two origins."""
 
 _FCL = 2e-6
 """Error of FCL's own distance in mm, as measured in `contact.fcl_shapes` (worst of 600 000), rounded up."""
-
-
-@dataclass(frozen=True, slots=True)
-class Measured:
-    """Distances (n,) mm and the method's own bound of their errors (n,) mm; NaN where it gives none.
-
-    ``unfit`` (n,) marks cases that the method does not claim to answer, ``why`` says so; their numbers do not count.
-    """
-
-    distance: Array
-    bound: Array
-    unfit: NDArray[np.bool_]
-    why: str = ""
-
-
-class Method(Protocol):
-    """A contact method: ``measure`` answers cases that share one shape, or raises InputError if it cannot.
-
-    ``depth``: whether its negative distances are depths, exact or bounded like its clearances.
-    """
-
-    depth: bool
-
-    def measure(self, cases: Cases) -> Measured:
-        """Distances of ``cases``, all on the shape of the first."""
-        ...
 
 
 def poses(cases: Cases) -> Array:
@@ -69,7 +41,7 @@ def _by_kernel(cases: Cases, T: Array) -> SignedDistances:
 class CasMethod:
     """The project's kernel, with its error bound; what `relative_pose` rounds is added to it."""
 
-    depth = True
+    measures: Measures = "depth"
 
     def measure(self, cases: Cases) -> Measured:
         """See `Method`."""
@@ -85,7 +57,7 @@ class CasMethod:
 class ChordsMethod:
     """The paper's convex partitioning at ``unit_angle`` rad; its bound is the chord error."""
 
-    depth = False
+    measures: Measures = "clearance"
 
     def __init__(self, unit_angle: float) -> None:
         from clamp3d.contact.chords import Chords
@@ -109,7 +81,7 @@ class SolidMethod:
     flat ends and the truth's wire has round ones: only cases whose nearest place is on the wire's side count.
     """
 
-    depth = False
+    measures: Measures = "clearance"
 
     def __init__(self, build: Callable[[Part, float], ContactModel], bound: Callable[[Cases], Array]) -> None:
         self._build, self._bound = build, bound

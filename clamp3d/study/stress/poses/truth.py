@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.errors import MissingLibraryError
-from clamp3d.study.stress_cases import Cases, Extended
+from clamp3d.study.stress.poses.cases import Cases, Extended
 
 EXTENDED_WORKS = bool(np.finfo(Extended).eps < 1e-18)
 """Whether the platform's long double is wide enough for `truth`; if not, it calls `truth_50_digits` case by case."""

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from clamp3d.study.stress import Outcome, StressRun
-from clamp3d.study.stress_families import FAMILIES
-from clamp3d.study.stress_methods import METHODS
+from clamp3d.study.stress.assemblies.family import ASSEMBLIES, COUNTS
+from clamp3d.study.stress.outcome import Outcome
+from clamp3d.study.stress.registry import FAMILIES, METHODS
+from clamp3d.study.stress.run import StressRun
 
 
 def _length(x: float | None) -> str:
     return "-" if x is None else f"{x:.2g}"
 
 
-def _rate(outcome: Outcome) -> str:
+def _rate(outcome: Outcome | None) -> str:
+    if outcome is None:
+        return ""
     rate = outcome.failure_rate
     if rate is None:
         return "refused" if outcome.refused else "not asked"
-    return "0" if outcome.wrong == 0 else f"{100.0 * rate:.2g} %"
+    share = "0" if outcome.wrong == 0 else f"{100.0 * rate:.2g} %"
+    return f"{share} of {outcome.asked - outcome.refused}"
 
 
 def _trouble(outcome: Outcome) -> str:
@@ -28,7 +32,7 @@ def _trouble(outcome: Outcome) -> str:
 def table(run: StressRun) -> str:
     """One line per family and method, fixed width."""
     head = (
-        f"{'family':24s} {'method':14s} {'asked':>7s} {'refused':>7s} {'false hit':>9s} {'false miss':>10s} "
+        f"{'family':28s} {'method':14s} {'asked':>7s} {'refused':>7s} {'false hit':>9s} {'false miss':>10s} "
         f"{'> bound':>7s} {'worst mm':>9s} {'median':>9s} {'us each':>8s}  failures"
     )
     lines = [head, "-" * len(head)]
@@ -36,13 +40,15 @@ def table(run: StressRun) -> str:
         each = 1e6 * o.seconds / o.asked if o.asked else 0.0
         beyond = "-" if o.beyond_bound is None else str(o.beyond_bound)
         lines.append(
-            f"{o.family:24s} {o.method:14s} {o.asked:7d} {o.refused:7d} {o.false_hits:9d} {o.false_misses:10d} "
+            f"{o.family:28s} {o.method:14s} {o.asked:7d} {o.refused:7d} {o.false_hits:9d} {o.false_misses:10d} "
             f"{beyond:>7s} {_length(o.worst_error):>9s} {_length(o.median_error):>9s} {each:8.1f}  {_trouble(o)}"
         )
     lines.append(
-        f"seed {run.seed}, {run.n} cases a family; {run.checked_50_digits} truths a family worked out again at 50 "
-        f"digits: largest difference {run.worst_truth_difference:.1g} of the scene"
+        f"seed {run.seed}, {run.n} cases a family; {run.checked_50_digits} truths a family of poses worked out again "
+        f"at 50 digits: largest difference {run.worst_truth_difference:.1g} of the scene"
     )
+    if any(o.family in ASSEMBLIES for o in run.outcomes):
+        lines.append(f"assemblies: {COUNTS}")
     return "\n".join(lines)
 
 
@@ -52,8 +58,9 @@ def markdown(run: StressRun, command: str) -> str:
     families = list(dict.fromkeys(o.family for o in run.outcomes))
     by = {(o.family, o.method): o for o in run.outcomes}
     lines = [
-        f"Made by `{command}`: {run.n} cases a family, seed {run.seed}; {run.checked_50_digits} truths a family worked "
-        f"out a second time at 50 digits (largest difference {run.worst_truth_difference:.1g} of the scene).",
+        f"Made by `{command}`: {run.n} cases a family, seed {run.seed}; {run.checked_50_digits} truths a family of "
+        "poses worked out a second time at 50 digits "
+        f"(largest difference {run.worst_truth_difference:.1g} of the scene).",
         "",
         "Machine: " + ", ".join(f"{k} {v}" for k, v in run.machine.items()) + ".",
         "",
@@ -63,24 +70,26 @@ def markdown(run: StressRun, command: str) -> str:
         "| family | " + " | ".join(methods) + " |",
         "|---|" + "---|" * len(methods),
     ]
-    lines += [f"| {f} | " + " | ".join(_rate(by[f, m]) for m in methods) + " |" for f in families]
+    lines += [f"| {f} | " + " | ".join(_rate(by.get((f, m))) for m in methods) + " |" for f in families]
     lines += ["", "Largest error in mm (and in parts of the method's own bound):", ""]
     lines += ["| family | " + " | ".join(methods) + " |", "|---|" + "---|" * len(methods)]
     for f in families:
         cells = []
         for m in methods:
-            o = by[f, m]
-            ratio = "" if o.worst_ratio is None else f" ({o.worst_ratio:.2g})"
-            cells.append(_length(o.worst_error) + ratio)
+            o = by.get((f, m))
+            ratio = "" if o is None or o.worst_ratio is None else f" ({o.worst_ratio:.2g})"
+            cells.append("" if o is None else _length(o.worst_error) + ratio)
         lines.append(f"| {f} | " + " | ".join(cells) + " |")
     lines += ["", "The families:", ""]
     lines += [f"- **{f}**: {FAMILIES[f].about}" for f in families]
+    if any(f in ASSEMBLIES for f in families):
+        lines += ["", f"Of assemblies: {COUNTS}."]
     findings = [finding(o, run) for o in run.outcomes if o.examples]
     if findings:
         lines += ["", "What was found, one line each, worst case first; the command prints the case as Python:", ""]
         lines += findings
     lines += ["", "The methods:", ""]
-    lines += [f"- **{m}**: {METHODS[m][0]}" for m in methods]
+    lines += [f"- **{m}**: {METHODS[m]}" for m in methods]
     return "\n".join(lines) + "\n"
 
 

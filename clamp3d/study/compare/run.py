@@ -12,10 +12,10 @@ from typing import Any
 
 import clamp3d
 from clamp3d.errors import Clamp3dError
-from clamp3d.study.compare_jobs import Assembled, Imaged, JobError, Kind, run_job
-from clamp3d.study.compare_measure import Band, Measured
-from clamp3d.study.compare_methods import CLAMP_THRESHOLD, METHODS, Method
-from clamp3d.study.compare_peers import PEER_METHODS, missing_peers
+from clamp3d.study.compare.jobs import Assembled, Imaged, JobError, Kind, run_job
+from clamp3d.study.compare.measure import Band, Measured
+from clamp3d.study.compare.methods import CLAMP_THRESHOLD, METHODS, Method
+from clamp3d.study.compare.peers import PEER_METHODS, missing_peers
 from clamp3d.study.complexity import Sweep
 
 CONTACT_LIMIT = 90.0

@@ -1,6 +1,6 @@
 """Each measurement in a process of its own: a crash, a hang or used memory of one method leaves the others alone.
 
-``python -m clamp3d.study.compare_jobs KIND METHOD OUT.json`` is the process; `run_job` starts it and waits.
+``python -m clamp3d.study.compare.jobs KIND METHOD OUT.json`` is the process; `run_job` starts it and waits.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Any, Literal, cast
 
 from clamp3d.assembly.result import Solver
 from clamp3d.errors import Clamp3dError
-from clamp3d.study.compare_methods import Method
+from clamp3d.study.compare.methods import Method
 
 Kind = Literal["contact", "peer", "assembly", "image", "complexity"]
 
@@ -71,7 +71,7 @@ def run_job(kind: Kind, method: str, *, time_limit: float) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="clamp3d-") as folder:
         target = Path(folder) / "out.json"
         worker = subprocess.Popen(
-            [sys.executable, "-m", "clamp3d.study.compare_jobs", kind, method, str(target)],
+            [sys.executable, "-m", "clamp3d.study.compare.jobs", kind, method, str(target)],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
@@ -106,7 +106,7 @@ def assembled(method: Method, *, time_limit: float = 300.0) -> tuple[Assembled, 
     """Assemble the reference clamp by both solvers, exact first; quick ones several times, the median counts."""
     from clamp3d.assembly.run import assemble
     from clamp3d.clamp.loader import load_clamp
-    from clamp3d.study.compare_methods import assembly_model, load
+    from clamp3d.study.compare.methods import assembly_model, load
 
     clamp = load_clamp("reference")
     load(method)
@@ -168,12 +168,12 @@ def imaged() -> Imaged:
 
 def _answer(kind: str, method: str) -> Mapping[str, Any]:
     if kind == "contact":
-        from clamp3d.study.compare_measure import measure
+        from clamp3d.study.compare.measure import measure
 
         return asdict(measure(Method.parse(method)))
     if kind == "peer":
-        from clamp3d.study.compare_measure import measure
-        from clamp3d.study.compare_peers import load_peer, prepare_peer
+        from clamp3d.study.compare.measure import measure
+        from clamp3d.study.compare.peers import load_peer, prepare_peer
 
         return asdict(measure(Method.parse(method), load=load_peer, prepare=prepare_peer))
     if kind == "image":

@@ -3,23 +3,61 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 import time
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.errors import Clamp3dError
+from clamp3d.errors import Clamp3dError, without_numbers
 from clamp3d.geometry.pose import Array
-from clamp3d.study.stress_cases import Cases
-from clamp3d.study.stress_families import cases_of
-from clamp3d.study.stress_methods import Measured, Method, method
 
 _MAX_DEATHS = 5
+
+Measures = Literal["depth", "clearance", "verdict"]
+"""What a method's answers are good for: signed distances, distances while apart, or their sign alone."""
+
+
+class Cases(Protocol):
+    """Cases of any kind, ``shape`` (n,) the number of the shapes that each is about."""
+
+    @property
+    def shape(self) -> NDArray[np.intp]: ...  # noqa: D102
+
+    def __len__(self) -> int: ...
+
+    def take(self, rows: ArrayLike) -> Any:
+        """The named cases."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Distances (n,) mm and the method's own bound of their errors (n,) mm; NaN where it gives none.
+
+    ``unfit`` (n,) marks cases that the method does not claim to answer, ``why`` says so; their numbers do not count.
+    """
+
+    distance: Array
+    bound: Array
+    unfit: NDArray[np.bool_]
+    why: str = ""
+
+
+class Method(Protocol):
+    """A contact method: ``measure`` answers cases that share one shape, or raises InputError if it cannot."""
+
+    @property
+    def measures(self) -> Measures: ...  # noqa: D102
+
+    def measure(self, cases: Any) -> Measured:
+        """Distances of ``cases``, all on the shape of the first."""
+        ...
 
 
 @dataclass
@@ -84,15 +122,15 @@ def _record(answers: Answers, rows: NDArray[np.intp], found: Measured | None, wh
             answers.note(f"refused: {found.why}")
     elif why.startswith("refused: "):
         answers.refused[rows] = True
-        answers.note(why)
+        answers.note(without_numbers(why))
     else:
         answers.failed[rows] = True
-        answers.note(why)
+        answers.note(without_numbers(why))
 
 
-def run_here(name: str, cases: Cases, time_limit: float | None = None) -> Answers:
+def run_here(asked: Method, cases: Cases, time_limit: float | None = None) -> Answers:
     """Put ``cases`` to a method in this process; groups of one shape at a time, singly where a group has no answer."""
-    asked, answers = method(name), Answers.empty(len(cases))
+    answers = Answers.empty(len(cases))
     groups = _groups(cases)
     if groups:
         _measure(asked, cases, groups[0][:1])  # compile and import before the clock runs
@@ -118,8 +156,9 @@ def _parts(
 
 def _serve(pipe: Connection, name: str, family: str, n: int, seed: int) -> None:
     """Child: answer the rows that are sent, until the parent closes the pipe."""
-    cases = cases_of(family, n, seed)
-    asked = method(name)
+    from clamp3d.study.stress.registry import FAMILIES
+
+    asked, cases = FAMILIES[family].question(name, n, seed)
     pipe.send("ready")
     try:
         while True:
@@ -163,7 +202,7 @@ def run_isolated(
                 try:
                     pipe.recv()
                 except EOFError:
-                    answers.note(f"the interpreter ended with code {_code(child)} at start")
+                    answers.note(f"the interpreter ended with {_code(child)} at start")
                     break
             rows = queue.pop()
             try:
@@ -184,9 +223,7 @@ def run_isolated(
                 answers.asked[rows] = True
                 (answers.crashed if in_time else answers.late).append(int(rows[0]))
                 answers.note(
-                    f"the interpreter ended with code {_code(child)}"
-                    if in_time
-                    else f"no answer within {case_limit:g} s"
+                    f"the interpreter ended with {_code(child)}" if in_time else f"no answer within {case_limit:g} s"
                 )
             _end(child, pipe)
             child = None
@@ -196,10 +233,11 @@ def run_isolated(
     return answers
 
 
-def _code(child: Any) -> int | None:
+def _code(child: Any) -> str:
+    """How a child ended, in words."""
     child.join(5.0)
     code: int | None = child.exitcode
-    return code
+    return signal.Signals(-code).name if code is not None and code < 0 else f"exit code {code}"
 
 
 def _end(child: Any, pipe: Any) -> None:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from clamp3d.geometry.pose import Array
-from clamp3d.study.compare_methods import MANY, Method, Prepared, load, prepare
-from clamp3d.study.compare_scene import BANDS, CLEAR, OVERLAP, Poses, known_poses
+from clamp3d.study.compare.methods import MANY, Method, Prepared, load, prepare
+from clamp3d.study.compare.scene import BANDS, CLEAR, OVERLAP, Poses, known_poses
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A method on the poses of `compare_scene`; errors in mm, times in CPU seconds of one core, memory in MB.
+    """A method on the poses of `compare.scene`; errors in mm, times in CPU seconds of one core, memory in MB.
 
     ``median_error`` and ``worst_error`` are of the distance of a wire that is clear, ``depth_error`` is the worst on
     overlaps up to 0.3 mm deep (None: no depth). ``load`` is the import of the libraries, ``setup`` what comes before

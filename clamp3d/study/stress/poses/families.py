@@ -1,18 +1,17 @@
 """Families of hard contact cases: what has broken collision code, each with a seeded generator.
 
-Every family takes ``(rng, n)`` and returns n `Cases`. `FAMILIES` maps name -> `Family`.
+Every generator takes ``(rng, n)`` and returns n `Cases`. `POSES` maps name -> `PoseFamily`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.geometry.pose import Array
-from clamp3d.study.stress_cases import (
+from clamp3d.study.stress.poses.cases import (
     FEATURES,
     PARALLEL_FEATURES,
     Cases,
@@ -26,25 +25,14 @@ from clamp3d.study.stress_cases import (
     signed_powers,
     spread,
 )
+from clamp3d.study.stress.poses.family import Generator, PoseFamily
 
-Generator = Callable[[np.random.Generator, int], Cases]
-
-
-@dataclass(frozen=True, slots=True)
-class Family:
-    """A kind of difficulty: ``make(rng, n)`` builds n cases, ``about`` says in one line what is hard."""
-
-    name: str
-    about: str
-    make: Generator
-
-
-FAMILIES: dict[str, Family] = {}
+POSES: dict[str, PoseFamily] = {}
 
 
 def _family(name: str, about: str) -> Callable[[Generator], Generator]:
     def register(make: Generator) -> Generator:
-        FAMILIES[name] = Family(name, about, make)
+        POSES[name] = PoseFamily(name, about, make)
         return make
 
     return register
@@ -371,6 +359,50 @@ def _crossed(rng: np.random.Generator, n: int) -> Cases:
     return Cases(shapes, shape, poses_from_axes(rng, np.stack([x, y, z], 1), d), np.full(n, np.nan))
 
 
+@_family(
+    "in a face's plane",
+    "axis in the plane of an end face or of the flat faces to 1e-18 ... 1e-9, through what lies in it",
+)
+def _in_plane(rng: np.random.Generator, n: int) -> Cases:
+    shapes, shape, _ = _setting(rng, n)
+    R, a, H = shapes.R[shape], shapes.half_angle[shape], 0.5 * shapes.L[shape]
+    off = R * signed_powers(rng, n, -18, -9, 0.4)
+    out = signed_powers(rng, n, -18, -9, 0.4)
+    # Through the lips, the arc's ends, or anywhere.
+    aim = rng.choice([-1.0, 1.0, 0.0], n)
+    x, y = aim * R * np.sin(a), -R * np.cos(a)
+    anywhere = rng.random(n) < 0.5
+    x, y = np.where(anywhere, rng.uniform(-2, 2, n) * R, x), np.where(anywhere, rng.uniform(-2, 2, n) * R, y)
+    z = rng.uniform(-1.5, 1.5, n) * H
+    turn = np.where(rng.random(n) < 0.5, rng.uniform(-np.pi, np.pi, n), rng.choice([-1, 1], n) * np.pi / 4)
+    u, v = np.cos(turn), np.sin(turn)
+    t = rng.uniform(-0.7, 0.7, n) * shapes.length[shape]
+    in_end = rng.random(n) < 0.6
+    end = rng.choice([-1.0, 1.0], n) * H
+    h = -R * np.cos(a)
+    d = np.stack([u, np.where(in_end, v, out), np.where(in_end, out, v)], 1)
+    centre = np.stack([x - t * u, np.where(in_end, y - t * v, h + off), np.where(in_end, end + off, z - t * v)], 1)
+    return Cases(shapes, shape, poses_from_axes(rng, centre, d), np.full(n, np.nan))
+
+
+@_family(
+    "through two points", "axis through two points of faces, edges or corners to 0, 1e-16 ... 1e-9; also along an edge"
+)
+def _two_points(rng: np.random.Generator, n: int) -> Cases:
+    shapes, shape, feature = _setting(rng, n)
+    other = np.where(rng.random(n) < 0.3, feature, rng.choice(FEATURES, n))  # along an edge, or across a face
+    a, b = contact_on(rng, shapes, shape, feature), contact_on(rng, shapes, shape, other)
+    R = shapes.R[shape].astype(Extended)
+    p, q = ((c.q + (R * signed_powers(rng, n, -16, -9, 0.5))[:, None] * c.normal) for c in (a, b))
+    d = q - p
+    same = (d * d).sum(1) == 0
+    d[same] = (0, 0, 1)
+    norm = np.sqrt((d * d).sum(1))[:, None]
+    ahead = np.where(rng.random(n) < 0.3, 0.5, rng.uniform(-0.5, 0.5, n)) * shapes.length[shape]
+    centre = p + ahead.astype(Extended)[:, None] * d / norm
+    return Cases(shapes, shape, poses_from_axes(rng, centre, d), np.full(n, np.nan))
+
+
 @_family("poses barely rigid", "rotations off by up to 1e-9, as products of many poses are")
 def _barely_rigid(rng: np.random.Generator, n: int) -> Cases:
     shapes, shape, feature = _setting(rng, n)
@@ -379,19 +411,3 @@ def _barely_rigid(rng: np.random.Generator, n: int) -> Cases:
     T = cases.T_world_wire.copy()
     T[:, :3, :3] += rng.uniform(-1.0, 1.0, (n, 3, 3)) * 10.0 ** rng.uniform(-16, -9.8, n)[:, None, None]
     return Cases(shapes, shape, T, np.full(n, np.nan))
-
-
-def cases_of(family: str, n: int, seed: int) -> Cases:
-    """The family's n cases for a seed: always the same ones.
-
-    >>> cases_of("tangency", 3, 0).shapes.groove(0) == cases_of("tangency", 3, 0).shapes.groove(0)
-    True
-    """
-    from clamp3d.study.stress_cases import generator
-
-    return FAMILIES[family].make(generator(family, seed), n)
-
-
-def as_array(x: NDArray[np.longdouble]) -> Array:
-    """Long doubles rounded to float64."""
-    return np.asarray(x, np.float64)

@@ -24,8 +24,8 @@ import numpy as np
 
 from clamp3d.contact.wedges import part_wedges, prism
 from clamp3d.geometry.pose import Array
-from clamp3d.study.compare_methods import Method, Prepared
-from clamp3d.study.compare_scene import WIRE, block, chord_error, pair
+from clamp3d.study.compare.methods import Method, Prepared
+from clamp3d.study.compare.scene import WIRE, block, chord_error, pair
 
 PEER_ANGLES_DEG = (1.0, 5.0, 20.0)
 _FARTHEST = 2.0  # mm
@@ -66,7 +66,7 @@ def load_peer(method: Method) -> None:
 
 
 def prepare_peer(method: Method) -> Prepared:
-    """Set a peer up for the scene of `compare_scene`, everything in the groove's frame."""
+    """Set a peer up for the scene of `compare.scene`, everything in the groove's frame."""
     return _MAKERS[method.family](math.radians(method.setting or 0.0))
 
 

@@ -1,0 +1,1 @@
+"""Contact methods on one scene with known answers: accuracy against time."""

@@ -1,0 +1,1 @@
+"""Families of hard cases with known answers, put to every contact method."""

@@ -1,0 +1,1 @@
+"""The final state of random clamps, against a search that knows neither gradients nor multipliers."""

@@ -1,0 +1,1 @@
+"""Faulty meshes of a block with a groove, and good ones that are hard to read."""

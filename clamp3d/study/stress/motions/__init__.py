@@ -1,0 +1,1 @@
+"""Families of hard motions: a wire that moves past a groove, and the least distance on its way."""

@@ -1,0 +1,1 @@
+"""Hard poses of a wire in a groove."""

@@ -1,0 +1,32 @@
+"""All families and all methods by name, in the order in which they are shown."""
+
+from __future__ import annotations
+
+from clamp3d.study.stress.assemblies.family import ASSEMBLIES
+from clamp3d.study.stress.family import Family
+from clamp3d.study.stress.meshes.families import MESHES
+from clamp3d.study.stress.motions.families import MOTIONS
+from clamp3d.study.stress.poses.families import POSES
+
+FAMILIES: dict[str, Family] = {**POSES, **MOTIONS, **MESHES, **ASSEMBLIES}
+
+METHODS: dict[str, str] = {name: about for family in FAMILIES.values() for name, about in family.methods.items()}
+"""Name -> what it is."""
+
+
+def expand(names: list[str]) -> list[str]:
+    """Families by name; ``pose``, ``motion``, ``mesh`` and ``assembly`` stand for all of their kind.
+
+    >>> expand(["ties", "mesh"])[:2]
+    ['ties', 'mesh: open']
+    """
+    return [family for name in names for family in KINDS.get(name, [name])]
+
+
+KINDS = {
+    "pose": list(POSES),
+    "motion": list(MOTIONS),
+    "mesh": list(MESHES),
+    "assembly": list(ASSEMBLIES),
+}
+"""Kind -> its families."""
