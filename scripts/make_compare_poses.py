@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from clamp3d.geometry.distance import signed_distance
-from clamp3d.study.compare_scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, pose
+from clamp3d.study.compare.scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, pose
 
 ROOT = Path(__file__).resolve().parent.parent
 FIELDS = ("lean", "group", "x", "y", "z", "a", "b", "c", "distance")
@@ -79,7 +79,7 @@ def main() -> None:
             )
             rows.append([lean, group, *(repr(float(v)) for v in (*origin, *turn)), value])
             print(f"\r{lean} {i + 1}/{len(poses)}", end="", file=sys.stderr, flush=True)
-    head = "# Groove R 12, 140 deg, 60 long; wire radius 10.5, length 200; see clamp3d/study/compare_scene.py\n"
+    head = "# Groove R 12, 140 deg, 60 long; wire radius 10.5, length 200; see clamp3d/study/compare/scene.py\n"
     text = head + ",".join(FIELDS) + "\n" + "".join(",".join(row) + "\n" for row in rows)
     (ROOT / "clamp3d/study/data/compare_poses.csv").write_text(text, encoding="utf-8")
 
