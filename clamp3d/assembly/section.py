@@ -27,6 +27,10 @@ MOUTH = "mouth"
 """Feature of the gaps that keep a wire in the mouth it was put into."""
 
 
+_SPARE, _SPARE_OF_LEVER = 10.0, 0.2
+"""How much wider than the wires need a clamp stands open, mm, and at most how much of its half width."""
+
+
 @dataclass(frozen=True, slots=True)
 class Gaps:
     """Values (k,) mm of the gaps at a state, their derivatives (k, 6) by q (dimensionless), and what each one is.
@@ -127,7 +131,8 @@ class Section:
         """A distance d at which the clamp stands open: both wires pass between the faces at any allowed tilt; mm."""
         up, down = self.clamp.up_splint, self.clamp.down_splint
         thickest = 2.0 * max(self.clamp.line.radius, self.clamp.jumper.radius)
-        return up.thickness - down.face_depth + thickest + self.lever * math.sin(down.max_tilt) + 10.0
+        spare = min(_SPARE, _SPARE_OF_LEVER * self.lever)
+        return up.thickness - down.face_depth + thickest + self.lever * math.sin(down.max_tilt) + spare
 
     def wire_gaps(self, q: Array, wire: PartName) -> Gaps:
         """Gaps of one wire to both splints, every piece of the contact model."""

@@ -108,13 +108,14 @@ def test_least_distance_is_monotone_between_its_places():
             assert (d <= np.maximum(ends[j - 1], ends[j]) + 1e-10).all()
 
 
-def test_sizes_scale_every_distance():
+@pytest.mark.parametrize("factor", [1e-3, 1e-2, 1e2])
+def test_sizes_scale_every_distance(factor):
     clamp = random_clamp(np.random.default_rng(8))
-    small = scaled(clamp, 1e-2)
-    for one, other in zip(minima(Envelope(clamp)), minima(Envelope(small)), strict=True):
-        assert other.d == pytest.approx(1e-2 * one.d, abs=1e-9)
-    closed = [solve_final_state(Section(c, Cas())).q[4:] for c in (clamp, small)]
-    assert closed[1] == pytest.approx(1e-2 * closed[0], abs=1e-8)
+    other = scaled(clamp, factor)
+    for one, same in zip(minima(Envelope(clamp)), minima(Envelope(other)), strict=True):
+        assert same.d == pytest.approx(factor * one.d, abs=1e-9 * max(1.0, factor))
+    closed = [solve_final_state(Section(c, Cas())).q[4:] for c in (clamp, other)]
+    assert closed[1] == pytest.approx(factor * closed[0], abs=1e-8 * max(1.0, factor))
 
 
 def test_random_starts_lead_to_places_that_are_named():
