@@ -77,7 +77,9 @@ def _measure(section: Section, poses: Poses, a: PartName, b: PartName, tolerance
         return _groove_contact(section, poses, a, b, tolerance)
     if kind == 1:
         axis = poses[b].point(0.0, clamp.nut.height / 2)
-        return Contact(a, b, 1, "screw joint", 0.0, _world(axis), np.array([0.0, 0.0, 1.0]), "thread")
+        gap = max(0.0, poses[a].y - poses[b].y - clamp.nut.height)  # the bolt's end below the nut
+        relation = "none" if gap else "screw joint"
+        return Contact(a, b, 1, relation, gap, _world(axis), np.array([0.0, 0.0, 1.0]), "thread")
     if (a, b) in _SEATS:
         return _seat_contact(clamp, poses, a, b, tolerance)
     if (a, b) in _HOLES:
@@ -138,6 +140,8 @@ def _hole_contact(clamp: Clamp, poses: Poses, a: PartName, b: PartName, toleranc
     hole = Rectangle(*centre, half_width, 0.5 * (bottom - top), poses[a].angle)
     found = hole_bolt(hole, bolt, tolerance=tolerance)
     gap, (nx, ny) = min(found.gap_left, found.gap_right), found.normal
+    if math.isinf(gap):  # the bolt ends before the hole
+        gap = convex_gap(clamp, poses, a, b)
     return Contact(a, b, 2, found.relation.value, gap, _world(found.point), np.array([nx, 0.0, -ny]), "hole")
 
 

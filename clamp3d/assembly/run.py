@@ -14,8 +14,9 @@ from clamp3d.assembly.final_state import FinalState, solve_final_state
 from clamp3d.assembly.motion import travel_to_contact
 from clamp3d.assembly.result import Equilibrium, Event, Run, Solver, Waypoint, Work
 from clamp3d.assembly.screw import ScrewJoint
-from clamp3d.assembly.section import MOUTH, SPLINTS, WIRES, D, S, Section
+from clamp3d.assembly.section import WIRES, D, S, Section
 from clamp3d.assembly.sequence import parse_sequence
+from clamp3d.assembly.status import final_status
 from clamp3d.assembly.stepped import SteppedState, solve_bisection, solve_stepped
 from clamp3d.checks import choice, function, instance, number
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
@@ -124,7 +125,7 @@ def assemble(
         method=model.name,
         solver=solver,
         limits=model.limits,
-        status=final_status(final, resolution),
+        status=final_status(clamp, final, resolution),
         distance=section.splint_distance(final.q),
         closing=float(final.q[D]),
         tilt=float(final.q[S]) / section.lever,
@@ -149,7 +150,7 @@ def _others(section: Section, final: FinalState) -> tuple[Equilibrium, ...]:
             distance=section.splint_distance(state.q),
             closing=float(state.q[D]),
             tilt=float(state.q[S]) / section.lever,
-            status=final_status(state, CONTACT),
+            status=final_status(section.clamp, state, CONTACT),
             detail=describe(state),
             rests=not slipping(state),
         )
@@ -246,29 +247,3 @@ def _event(section: Section, q: Array, step: str, touch: tuple[PartName, PartNam
     assert touch is not None  # every motion here ends at a groove
     contact = next(c for c in measure_pairs(section, _poses(section, q), CONTACT) if (c.a, c.b) == touch)
     return Event(step, contact.a, contact.b, contact.relation, contact.point, travel)
-
-
-def final_status(final: FinalState | SteppedState, resolution: float) -> str:
-    """'clamped' if both wires are held between the splints, else what stopped them."""
-    gaps = final.gaps
-    if isinstance(final, FinalState):
-        stops = {(p, f) for p, f, force in zip(gaps.pair, gaps.feature, final.force, strict=True) if force > 0.0}
-        loose = set(final.loose)
-    else:
-        near = [v <= resolution for v in gaps.value]
-        stops = {(p, f) for p, f, n in zip(gaps.pair, gaps.feature, near, strict=True) if n}
-        held = {p for p, _ in stops}
-        loose = {w for w in WIRES if not all((splint, w) in held for splint in SPLINTS)}
-    slipping = sorted({pair[1] for pair, feature in stops if feature == MOUTH})
-    if slipping:
-        return f"not clamped: {' and '.join(slipping)} slips out of its groove"
-    if not loose:
-        return "clamped"
-    reasons = []
-    if any(pair == ("P1", "P2") for pair, _ in stops):
-        reasons.append("faces meet")
-    if any(feature == "tilt limit" for _, feature in stops):
-        reasons.append("tilt limit reached")
-    if not reasons:  # a wire on four lips holds both splints, whatever they do to the other one
-        reasons.append(f"{' and '.join(w for w in WIRES if w not in loose)} alone holds the splints apart")
-    return f"not clamped: {' and '.join(reasons)}, {' and '.join(sorted(loose))} loose"

@@ -22,8 +22,8 @@ from typing import Any, Literal
 import numpy as np
 
 from clamp3d.assembly.final_state import FinalState, solve_final_state
-from clamp3d.assembly.run import final_status
 from clamp3d.assembly.section import D, S, Section
+from clamp3d.assembly.status import CLAMPED, final_status
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.contact.cas import Cas
 from clamp3d.errors import InputError, MissingLibraryError, SolverError, without_numbers
@@ -39,8 +39,6 @@ WIRE_TOLERANCE_PERCENT = 1.0
 """Chosen: conductors are within 1 % of their nominal diameter."""
 CHUNK = 50
 """Samples that are solved, sent and kept together: about a second of work."""
-CLAMPED = "clamped"
-
 # ISO 2768-1:1989, table 1, class m: (nominal sizes up to, permissible deviation either way), mm.
 _MEDIUM = ((6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8), (2000.0, 1.2), (math.inf, 2.0))
 _OPENED = 3.0
@@ -192,7 +190,7 @@ def _spec(
         pass
     else:
         start = (float(final.q[D]) + _OPENED, float(final.q[S]) / section.lever)
-        nominal = section.splint_distance(final.q) if final_status(final, 0.0) == CLAMPED else None
+        nominal = section.splint_distance(final.q) if final_status(section.clamp, final, 0.0) == CLAMPED else None
     return Spec(clamp, seed, distribution, tuple(of(name) for name in DIMENSIONS), start), nominal
 
 
@@ -211,8 +209,8 @@ def _sample(spec: Spec, index: int) -> Sample:
         final = _close(section, spec.start)
     except SolverError as error:
         return None, f"not solved: {without_numbers(str(error))}"
-    status = final_status(final, 0.0)
-    return (section.splint_distance(final.q) if status == CLAMPED else None), status
+    status = final_status(section.clamp, final, 0.0)
+    return (section.splint_distance(final.q) if status == CLAMPED else None), without_numbers(status)
 
 
 def _close(section: Section, start: tuple[float, float] | None) -> FinalState:
@@ -225,7 +223,7 @@ def _close(section: Section, start: tuple[float, float] | None) -> FinalState:
             except SolverError:
                 pass
             else:
-                if final_status(final, 0.0) == CLAMPED:
+                if final_status(section.clamp, final, 0.0) == CLAMPED:
                     return final
     return solve_final_state(section)
 

@@ -20,8 +20,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from clamp3d.assembly.final_state import FinalState, solve_final_state
-from clamp3d.assembly.run import final_status
 from clamp3d.assembly.section import WIRES, D, S, Section
+from clamp3d.assembly.status import CLAMPED, final_status
 from clamp3d.clamp.dimensions import Clamp, GrooveDimensions, Wire
 from clamp3d.contact.cas import Cas
 from clamp3d.errors import InputError, SolverError
@@ -111,8 +111,8 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
     """
     section = Section(clamp, Cas())
     final = solve_final_state(section)
-    status = final_status(final, 0.0)
-    if status != "clamped":
+    status = final_status(clamp, final, 0.0)
+    if status != CLAMPED:
         raise SolverError(f"no sensitivity: {status}")
     derivative = _derivatives(section, final)
     rows = [

@@ -1,5 +1,7 @@
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from clamp3d.assembly.run import assemble
@@ -7,7 +9,8 @@ from clamp3d.assembly.screw import ScrewJoint
 from clamp3d.assembly.sequence import parse_sequence
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.contact.cas import Cas
-from clamp3d.errors import InputError
+from clamp3d.errors import InputError, SolverError
+from clamp3d.study.sensitivity import sensitivity
 
 
 def test_the_papers_sequence():
@@ -85,7 +88,29 @@ def test_a_matrix_with_a_missing_entry_is_reported():
     clamp = load_clamp()
     rows = {a: dict(row) for a, row in clamp.connections.items()}
     del rows["P2"]["P7"]
-    from dataclasses import replace
-
     run = assemble(replace(clamp, connections=rows), Cas())
     assert [(u.a, u.b, u.declared, u.met_as) for u in run.undeclared] == [("P2", "P7", 0, 3)]
+
+
+def with_bolt(shank_length):
+    clamp = load_clamp()
+    return replace(clamp, bolt=replace(clamp.bolt, shank_length=shank_length))
+
+
+@pytest.mark.parametrize("lacking", [-0.01, 0.01, 30.0, 67.0])
+def test_a_bolt_that_does_not_fill_the_nut_does_not_clamp(lacking):
+    poses = assemble(load_clamp(), Cas()).poses
+    through = load_clamp().bolt.shank_length + poses["P4"].y - poses["P5"].y  # its end flush with the nut's free face
+    run = assemble(with_bolt(through - lacking), Cas())
+    if lacking < 0.0:
+        assert run.status == "clamped"
+    else:
+        assert run.status == f"not clamped: the bolt is {lacking:.4g} mm too short for the nut"
+    gaps = {(c.a, c.b): c.distance for c in run.contacts}
+    assert gaps["P4", "P5"] == pytest.approx(max(0.0, lacking - run.clamp.nut.height), abs=1e-9)
+    assert np.isfinite(list(gaps.values())).all()
+
+
+def test_a_bolt_that_is_too_short_has_no_tolerance():
+    with pytest.raises(SolverError, match="no sensitivity: not clamped: the bolt is 29.99 mm too short"):
+        sensitivity(with_bolt(77.6))
