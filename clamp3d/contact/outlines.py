@@ -69,20 +69,39 @@ def _chord_error(part: Part, mesh_error: float) -> float:
 
 
 def _polygon_gap(p: Array, q: Array, error: float) -> OutlineGap:
-    from matplotlib.path import Path
-
-    one, other = Path(np.vstack([p, p[:1]])), Path(np.vstack([q, q[:1]]))
-    if one.intersects_path(other, filled=True):
-        contained = not one.intersects_path(other, filled=False)
-        inside = q[0] if contained and one.contains_point(q[0]) else p[0]
-        return OutlineGap(0.0, inside, inside, error, True, contained)
+    crossing = _edges_cross(p, q)
+    for inner, outer in ((q, p), (p, q)):
+        if crossing or _contains(outer, inner[0]):
+            return OutlineGap(0.0, inner[0], inner[0], error, True, not crossing)
     # Apart: the nearest points are a corner of one and a point of an edge of the other.
     on_q, d_pq = _nearest(p, q)
     on_p, d_qp = _nearest(q, p)
     i, j = int(np.argmin(d_pq)), int(np.argmin(d_qp))
     if d_pq[i] <= d_qp[j]:
-        return OutlineGap(float(d_pq[i]), p[i], on_q[i], error, False, False)
-    return OutlineGap(float(d_qp[j]), on_p[j], q[j], error, False, False)
+        return OutlineGap(float(d_pq[i]), p[i], on_q[i], error, d_pq[i] == 0.0, False)
+    return OutlineGap(float(d_qp[j]), on_p[j], q[j], error, d_qp[j] == 0.0, False)
+
+
+def _edges_cross(p: Array, q: Array) -> bool:
+    """Whether an edge of one polygon runs through an edge of the other; a touch is no crossing."""
+    a, b = p[:, None], np.roll(p, -1, axis=0)[:, None]
+    c, d = q[None], np.roll(q, -1, axis=0)[None]
+    apart = (_side(a, b, c) * _side(a, b, d) < 0.0) & (_side(c, d, a) * _side(c, d, b) < 0.0)
+    return bool(apart.any())
+
+
+def _side(a: Array, b: Array, x: Array) -> Array:
+    """On which side of the line from a to b points lie: 1, 0, -1."""
+    ab, ax = b - a, x - a
+    return np.sign(ab[..., 0] * ax[..., 1] - ab[..., 1] * ax[..., 0])
+
+
+def _contains(polygon: Array, point: Array) -> bool:
+    """Whether a ray from the point to the right crosses the edges an odd number of times."""
+    a, b = polygon, np.roll(polygon, -1, axis=0)
+    a, b = np.where(a[:, 1:] <= b[:, 1:], a, b), np.where(a[:, 1:] <= b[:, 1:], b, a)  # upwards
+    level = (a[:, 1] <= point[1]) & (point[1] < b[:, 1])
+    return bool((_side(a, b, point)[level] > 0.0).sum() % 2)
 
 
 def _nearest(points: Array, polygon: Array) -> tuple[Array, Array]:

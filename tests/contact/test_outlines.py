@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from clamp3d.clamp.loader import load_clamp
@@ -36,6 +36,7 @@ def polygon(part, where):
 
 
 @settings(max_examples=60, deadline=None)
+@example(a="P1", b="P1", pose_a=SectionPose(0.0, 0.0, 1.1754943508222875e-38), pose_b=SectionPose(0.0, 28.0))
 @given(a=st.sampled_from(sorted(PARTS)), b=st.sampled_from(sorted(PARTS)), pose_a=pose, pose_b=pose)
 def test_distance_and_overlap_agree_with_shapely(a, b, pose_a, pose_b):
     p, q = polygon(PARTS[a], pose_a), polygon(PARTS[b], pose_b)
@@ -64,3 +65,9 @@ def test_a_wire_inside_another_is_contained_and_one_across_its_edge_is_not():
     across = outline_gap(PARTS["P6"], SectionPose(0, 0), PARTS["P7"], SectionPose(16, 0), ERROR)
     assert (inside.overlap, inside.contained) == (True, True)
     assert (across.overlap, across.contained) == (True, False)
+
+
+def test_a_part_that_is_there_twice_overlaps():
+    for name, part in PARTS.items():
+        where = SectionPose(3.0, -2.0, 0.1)
+        assert outline_gap(part, where, part, where, ERROR).overlap, name
