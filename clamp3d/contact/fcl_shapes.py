@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.checks import array
-from clamp3d.contact.shells import winding_number
+from clamp3d.contact.shells import corners_of, winding_number
 from clamp3d.contact.solid import Solid, check_solid
 from clamp3d.errors import InputError, MissingLibraryError
 from clamp3d.geometry.pose import Array, check_pose
@@ -203,7 +203,7 @@ def contained(shape: Shape, wire: Wire) -> bool:
     middle = wire.T[:3, 3]
     if (middle < shape.bounds[0]).any() or (middle > shape.bounds[1]).any():
         return False
-    return winding_number(shape.solid.vertices, shape.solid.faces, middle) > 0.5
+    return winding_number(corners_of(shape.solid.vertices, shape.solid.faces), middle) > 0.5
 
 
 def _nearest(shape: Shape, wire: Wire) -> Measurement:

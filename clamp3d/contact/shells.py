@@ -34,17 +34,27 @@ def volume(vertices: Array, faces: Faces) -> float:
     return found if abs(found) > _FLAT * area * float((high - low).max()) else 0.0
 
 
-def winding_number(vertices: Array, faces: Faces, point: Array) -> float:
+def corners_of(vertices: Array, faces: Faces) -> tuple[Array, Array, Array]:
+    """First, second and third corners (m, 3) of all triangles."""
+    a, b, c = (np.ascontiguousarray(vertices[faces[:, k]]) for k in range(3))
+    return a, b, c
+
+
+def winding_number(corners: tuple[Array, Array, Array], point: Array) -> float:
     """How often a surface winds round a point (3,): 1 inside, 0 outside, -1 inside one that is inside out.
 
-    Sum of the triangles' solid angles over 4 pi (Van Oosterom and Strackee 1983, doi:10.1109/TBME.1983.325207).
+    ``corners`` are those of `corners_of`. Sum of the triangles' solid angles over 4 pi (Van Oosterom and Strackee 1983,
+    doi:10.1109/TBME.1983.325207).
     """
-    a, b, c = np.moveaxis(vertices[faces] - point, 1, 0)
-    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
-    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
-    dots = [np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a))]
-    angle = 2.0 * np.arctan2(triple, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
-    return float(angle.sum() / (4.0 * np.pi))
+    a, b, c = (x - point for x in corners)
+    la, lb, lc = (np.sqrt(np.einsum("ij,ij->i", x, x)) for x in (a, b, c))
+    triple = (
+        a[:, 0] * (b[:, 1] * c[:, 2] - b[:, 2] * c[:, 1])
+        + a[:, 1] * (b[:, 2] * c[:, 0] - b[:, 0] * c[:, 2])
+        + a[:, 2] * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
+    )
+    ab, bc, ca = (np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a)))
+    return float(np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2.0 * np.pi))
 
 
 def shells(faces: Faces, vertices: int) -> list[NDArray[np.intp]]:
@@ -72,8 +82,9 @@ def inside_out(vertices: Array, faces: Faces) -> list[NDArray[np.intp]]:
             continue
         rest = np.ones(len(faces), dtype=bool)
         rest[rows] = False
-        corners = np.unique(faces[rows])
-        corners = corners[:: max(1, len(corners) // _ASKED)]
-        if not rest.any() or min(winding_number(vertices, faces[rest], vertices[k]) for k in corners) < 0.9:
+        asked = np.unique(faces[rows])
+        asked = asked[:: max(1, len(asked) // _ASKED)]
+        outer = corners_of(vertices, faces[rest])
+        if not rest.any() or min(winding_number(outer, vertices[k]) for k in asked) < 0.9:
             found.append(rows)
     return found

@@ -45,10 +45,8 @@ def comparison_to_dict(found: Comparison) -> dict[str, Any]:
 
 def comparison_to_text(found: Comparison) -> str:
     """The tables as lines for a terminal."""
-    m = found.machine
-    versions = ", ".join(f"{name} {version}" for name, version in m.versions.items())
     lines = [
-        f"{m.processor}, {m.cores} cores, {m.system}; Python {m.python}, clamp3d {m.clamp3d}, {versions}",
+        str(found.machine),
         "",
         *_contact(found),
         "",

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.contact.shells import corners_of, shells, winding_number
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.scene.bounds import Bounds
 
@@ -62,35 +63,16 @@ class TriModel:
     @cached_property
     def heads(self) -> Array:
         """One vertex (k, 3) of each connected shell."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        i, j = self.faces[:, [0, 1, 2]].ravel(), self.faces[:, [1, 2, 0]].ravel()
-        n = len(self.vertices)
-        label = connected_components(coo_array((np.ones(len(i)), (i, j)), shape=(n, n)), directed=False)[1]
-        used = np.unique(self.faces)
-        return np.asarray(self.vertices[used[np.unique(label[used], return_index=True)[1]]])
+        return self.vertices[[self.faces[rows[0], 0] for rows in shells(self.faces, len(self.vertices))]]
 
     @cached_property
     def corners(self) -> tuple[Array, Array, Array]:
         """Corners of all triangles, three times (m, 3)."""
-        return tuple(np.ascontiguousarray(self.vertices[self.faces[:, k]]) for k in range(3))  # type: ignore[return-value]
-
-    def winding(self, point: Array) -> float:
-        """Winding number of the surface about a point (3,): 1 inside, 0 outside (Van Oosterom and Strackee 1983)."""
-        a, b, c = (x - point for x in self.corners)
-        la, lb, lc = (np.sqrt(np.einsum("ij,ij->i", x, x)) for x in (a, b, c))
-        triple = (
-            a[:, 0] * (b[:, 1] * c[:, 2] - b[:, 2] * c[:, 1])
-            + a[:, 1] * (b[:, 2] * c[:, 0] - b[:, 0] * c[:, 2])
-            + a[:, 2] * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
-        )
-        ab, bc, ca = (np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a)))
-        return float(np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2.0 * np.pi))
+        return corners_of(self.vertices, self.faces)
 
     def contains(self, point: Array) -> bool:
         """Whether a point (3,) that is not on the surface lies inside."""
-        return self.winding(point) > 0.5
+        return winding_number(self.corners, point) > 0.5
 
     def nearest(self, points: Array) -> tuple[Array, NDArray[np.int64]]:
         """Distance (k,) of points (k, 3) from the surface, never negative, and the triangle (k,) it is to.
@@ -195,7 +177,8 @@ def _overlap(a: TriModel, b: TriModel, T: Array, contact: float, rounding: float
             return Bounds(-np.inf, high)
     # What has nearly the same surface as both, as a part that is there twice has, is deep inside only.
     inner = _inner_points(V[F], 4.0 * (contact + a.error + b.error))
-    inner = inner[[TriModel(V, F, 0.0).contains(x) for x in inner]]
+    overlap = TriModel(V, F, 0.0)
+    inner = inner[[overlap.contains(x) for x in inner]]
     if len(inner):
         deepest = max(a.distance(inner).max(), b.distance(inner @ back[:3, :3].T + back[:3, 3]).max())
         if deepest > -high:

@@ -112,5 +112,5 @@ def test_a_bolt_that_does_not_fill_the_nut_does_not_clamp(lacking):
 
 
 def test_a_bolt_that_is_too_short_has_no_tolerance():
-    with pytest.raises(SolverError, match="no sensitivity: not clamped: the bolt is 29.99 mm too short"):
+    with pytest.raises(SolverError, match=r"no sensitivity: not clamped: the bolt is 29\.99 mm too short"):
         sensitivity(with_bolt(77.6))

@@ -15,7 +15,7 @@ import numpy as np
 
 from clamp3d.clamp import loader
 from tests.fuzz import garbage
-from tests.fuzz.cli_calls import OLD, call, check_outputs
+from tests.fuzz.cli_calls import call, check_outputs, some_old
 from tests.fuzz.runner import FindingError
 
 if sys.version_info >= (3, 11):
@@ -58,9 +58,7 @@ def make(rng: np.random.Generator, folder: Path) -> tuple[str, Callable[[], bool
         what, data = garbage.spoil(rng, tomllib.loads(TEXT))
         Path(folder, name).write_text(garbage.to_toml(data), encoding="utf-8", errors="surrogatepass")
     args, written = _command(rng, folder, name)
-    old = [path for path in written if rng.integers(3) == 0]
-    for path in old:
-        path.write_bytes(OLD)
+    old = some_old(rng, written)
 
     def ask() -> bool:
         called = call(args)

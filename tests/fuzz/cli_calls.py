@@ -10,6 +10,8 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from tests.fuzz.runner import FindingError
 
 OLD = b"what was here before\n"
@@ -87,6 +89,14 @@ def held_to_rules(called: Called) -> Called:
     if any(not c.isprintable() for c in message):
         raise FindingError(f"message holds control characters: {message[:300]!r}")
     return called
+
+
+def some_old(rng: np.random.Generator, paths: list[Path]) -> list[Path]:
+    """One in three of ``paths``, made to be there before the command."""
+    old = [path for path in paths if rng.integers(3) == 0]
+    for path in old:
+        path.write_bytes(OLD)
+    return old
 
 
 def check_outputs(called: Called, folder: Path, old: list[Path], written: list[Path]) -> None:

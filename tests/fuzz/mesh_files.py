@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from tests.fuzz import garbage
-from tests.fuzz.cli_calls import OLD, call, check_outputs
+from tests.fuzz.cli_calls import call, check_outputs, some_old
 from tests.fuzz.runner import FindingError
 
 _MODEL = b"<?xml version='1.0'?><model xmlns='http://schemas.microsoft.com/3dmanufacturing/core/2015/02'"
@@ -77,9 +77,7 @@ def make(rng: np.random.Generator, folder: Path) -> tuple[str, Callable[[], bool
     name = f"part.{suffix}"
     Path(folder, name).write_bytes(content)
     args, written = _command(rng, folder, name)
-    old = [path for path in written if rng.integers(3) == 0]
-    for path in old:
-        path.write_bytes(OLD)
+    old = some_old(rng, written)
 
     def ask() -> bool:
         called = call(args)

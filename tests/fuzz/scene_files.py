@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tests.fuzz import garbage
-from tests.fuzz.cli_calls import OLD, Called, call, check_outputs
+from tests.fuzz.cli_calls import Called, call, check_outputs, some_old
 from tests.fuzz.runner import FindingError
 
 if sys.version_info >= (3, 11):
@@ -162,9 +162,7 @@ def make(rng: np.random.Generator, folder: Path) -> tuple[str, Callable[[], bool
     same = same and mesh > 1
     args, written = _command(rng, folder, name)
     same = same and not {"--clearance", "--pairs"} & {*args}
-    old = [path for path in written if rng.integers(3) == 0]
-    for path in old:
-        path.write_bytes(OLD)
+    old = some_old(rng, written)
 
     def ask() -> bool:
         called = call(args)

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import metadata
 from typing import Any
 
-import clamp3d
 from clamp3d.errors import Clamp3dError
 from clamp3d.study.compare.jobs import Assembled, Imaged, JobError, Kind, run_job
 from clamp3d.study.compare.measure import Band, Measured
 from clamp3d.study.compare.methods import CLAMP_THRESHOLD, METHODS, Method
 from clamp3d.study.compare.peers import PEER_METHODS, missing_peers
 from clamp3d.study.complexity import Sweep
+from clamp3d.study.machine import Machine, machine
 
 CONTACT_LIMIT = 90.0
 """Seconds that one method may take on the poses, its set-up included."""
@@ -56,18 +53,6 @@ class NotMeasured:
     setting: float | None
     label: str
     reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class Machine:
-    """Where the figures come from; ``versions`` of the libraries that took part."""
-
-    system: str
-    processor: str
-    cores: int
-    python: str
-    clamp3d: str
-    versions: dict[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +120,7 @@ def compare(
     sweeps = job("complexity", Method("complexity"), _sweeps, ASSEMBLY_LIMIT, "counting work for Table 5")
     progress(total, total, "done")
     return Comparison(
-        machine(peers),
+        machine((*LIBRARIES, *(PEER_LIBRARIES if peers else ()))),
         tuple(contact),
         tuple(beside),
         tuple(exact),
@@ -164,35 +149,6 @@ def pareto(rows: Sequence[Measured]) -> list[Measured]:
         if not front or row.worst_error < front[-1].worst_error:
             front.append(row)
     return front
-
-
-def machine(peers: bool = False) -> Machine:
-    """This machine and what is installed on it."""
-    versions = {}
-    for name in (*LIBRARIES, *(PEER_LIBRARIES if peers else ())):
-        try:
-            versions[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return Machine(
-        f"{platform.system()} {platform.machine()}",
-        _processor(),
-        os.cpu_count() or 1,
-        platform.python_version(),
-        clamp3d.__version__,
-        versions,
-    )
-
-
-def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
-            for line in file:
-                if line.startswith("model name"):
-                    return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
 
 
 def _both(data: dict[str, Any]) -> tuple[Assembled, Assembled]:

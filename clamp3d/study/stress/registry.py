@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from clamp3d.study.stress.assemblies.family import ASSEMBLIES
 from clamp3d.study.stress.family import Family
 from clamp3d.study.stress.meshes.families import MESHES
 from clamp3d.study.stress.motions.families import MOTIONS
 from clamp3d.study.stress.poses.families import POSES
 
-FAMILIES: dict[str, Family] = {**POSES, **MOTIONS, **MESHES, **ASSEMBLIES}
+KINDS: dict[str, Mapping[str, Family]] = {"pose": POSES, "motion": MOTIONS, "mesh": MESHES, "assembly": ASSEMBLIES}
+"""Kind -> its families by name."""
+
+FAMILIES: dict[str, Family] = {name: family for kind in KINDS.values() for name, family in kind.items()}
 
 METHODS: dict[str, str] = {name: about for family in FAMILIES.values() for name, about in family.methods.items()}
 """Name -> what it is."""
@@ -21,12 +26,3 @@ def expand(names: list[str]) -> list[str]:
     ['ties', 'mesh: open']
     """
     return [family for name in names for family in KINDS.get(name, [name])]
-
-
-KINDS = {
-    "pose": list(POSES),
-    "motion": list(MOTIONS),
-    "mesh": list(MESHES),
-    "assembly": list(ASSEMBLIES),
-}
-"""Kind -> its families."""

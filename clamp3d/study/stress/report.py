@@ -62,7 +62,7 @@ def markdown(run: StressRun, command: str) -> str:
         "poses worked out a second time at 50 digits "
         f"(largest difference {run.worst_truth_difference:.1g} of the scene).",
         "",
-        "Machine: " + ", ".join(f"{k} {v}" for k, v in run.machine.items()) + ".",
+        f"Machine: {run.machine}.",
         "",
         "Share of wrong verdicts (false hits, false misses, exceptions, crashes, no answer in time) among the cases "
         "that the method takes on:",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
@@ -11,8 +9,11 @@ from multiprocessing import get_context
 from typing import Any
 
 from clamp3d.errors import InputError, SolverError
+from clamp3d.study.machine import Machine, machine
 from clamp3d.study.stress.outcome import Outcome
 from clamp3d.study.stress.registry import FAMILIES, KINDS, METHODS, expand
+
+LIBRARIES = ("numpy", "numba", "scipy", "python-fcl", "coacd", "mpmath")
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ class StressRun:
     n: int
     checked_50_digits: int
     worst_truth_difference: float
-    machine: dict[str, str]
+    machine: Machine
     outcomes: tuple[Outcome, ...]
 
     def to_dict(self) -> dict[str, Any]:
@@ -34,31 +35,6 @@ class StressRun:
         for row, outcome in zip(out["outcomes"], self.outcomes, strict=True):
             row["failure_rate"] = outcome.failure_rate
         return out
-
-
-def machine() -> dict[str, str]:
-    """What the figures were taken on."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    found = {"system": f"{platform.system()} {platform.machine()}", "processor": _processor()}
-    found |= {"cores": str(os.cpu_count()), "python": platform.python_version()}
-    for name in ("numpy", "numba", "scipy", "python-fcl", "coacd", "mpmath"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
-
-
-def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            for line in file:
-                if line.startswith("model name"):
-                    return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
-    return platform.processor() or "unknown"
 
 
 def run_family(
@@ -121,4 +97,4 @@ def run_stress(
         if off > allowed:
             raise SolverError(f"{family}: the truth itself is off by {off:.3g} of the scene, must be <= {allowed:.3g}")
     worst = max(difference for _, difference in found.values())
-    return StressRun(seed, n, check, worst, machine(), outcomes)
+    return StressRun(seed, n, check, worst, machine(LIBRARIES), outcomes)

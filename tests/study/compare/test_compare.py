@@ -33,9 +33,10 @@ from clamp3d.study.compare.jobs import Assembled, JobError, assembled, imaged, r
 from clamp3d.study.compare.measure import Band, Measured, measure, verdicts
 from clamp3d.study.compare.methods import METHODS, Method, prepare
 from clamp3d.study.compare.peers import PEER_METHODS, load_peer, missing_peers, prepare_peer
-from clamp3d.study.compare.run import Comparison, NotMeasured, compare, machine, pareto
+from clamp3d.study.compare.run import LIBRARIES, Comparison, NotMeasured, compare, pareto
 from clamp3d.study.compare.scene import chord_error, known_poses
 from clamp3d.study.complexity import Sweep, complexity, fitted, grid_search
+from clamp3d.study.machine import machine
 
 QUICK = 0.01
 
@@ -222,7 +223,7 @@ def _comparison() -> Comparison:
     late = NotMeasured("hulls", 2.0, "hulls 2 mm", "not finished in 150 s")
     sweep = Sweep("grid", "cas", "n", "a = 1", (1.0, 2.0), (1, 2), (4, 8), (0.1, 0.2), (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
     image = dataclasses.replace(IMAGE)
-    return Comparison(machine(True), contact, peers, (rows[0], late), (rows[1], late), image, (sweep,), 12.0)
+    return Comparison(machine(LIBRARIES), contact, peers, (rows[0], late), (rows[1], late), image, (sweep,), 12.0)
 
 
 IMAGE = compare_jobs.Imaged(10, 4.5, 4.0, 1.08, 7.1, (31.9, 31.1, 31.2, 30.9, 32.1), 0.006, 0.2)

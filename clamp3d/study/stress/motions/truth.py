@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.errors import MissingLibraryError
 from clamp3d.geometry.pose import Array
+from clamp3d.study.stress.digits import fifty_digits, golden, point_distance
 from clamp3d.study.stress.motions.cases import Motions
 
 TRUTH_ERROR = 2e-13
@@ -83,16 +83,10 @@ def truth_50_digits(cases: Motions, i: int, found: Least) -> Any:
     It answers for the value of a minimum that is there, not for its being the lowest.
     Raises MissingLibraryError without mpmath.
     """
-    try:
-        import mpmath
-    except ImportError:
-        raise MissingLibraryError("50-digit answers need mpmath: pip install mpmath") from None
-    mp = mpmath.mp.clone()
-    mp.dps = 50
+    mp = fifty_digits()
     k = int(cases.shape[i])
     R, a, L, r, length = (mp.mpf(float(v[k])) for v in _columns(cases))
-    H, half = L / 2, length / 2
-    corner = mp.mpc(R * mp.cos(a), R * mp.sin(a))
+    half, sdf = length / 2, point_distance(mp, R, a, L)
 
     def vector(values: Array) -> Any:
         return [mp.mpf(float(v)) for v in values]
@@ -119,33 +113,8 @@ def truth_50_digits(cases: Motions, i: int, found: Least) -> Any:
             )
         return out
 
-    def sdf(x: Any) -> Any:
-        """By complex numbers: the section turned so that -y is real."""
-        point = mp.mpc(-x[1], abs(x[0]))
-        to_lip = abs(point - corner)
-        to_arc = abs(abs(point) - R) if mp.arg(point) <= a else to_lip
-        to_ray = abs(point.real - corner.real) if point.imag >= corner.imag else to_lip
-        g, e = min(to_arc, to_ray), abs(x[2]) - H
-        if point.real >= corner.real and abs(point) >= R:
-            g = -g
-        return max(g, e) if g <= 0 and e <= 0 else mp.hypot(max(g, 0), max(e, 0))
-
-    tau = (mp.sqrt(5) - 1) / 2
-
-    def golden(f: Any, lo: Any, hi: Any, goal: Any) -> Any:
-        best = min(f(lo), f(hi))
-        x, y = hi - tau * (hi - lo), lo + tau * (hi - lo)
-        fx, fy = f(x), f(y)
-        while hi - lo > goal:
-            if fx < fy:
-                hi, y, fy = y, x, fx
-                x = hi - tau * (hi - lo)
-                fx = f(x)
-            else:
-                lo, x, fx = x, y, fy
-                y = lo + tau * (hi - lo)
-                fy = f(y)
-        return min(best, fx, fy)
+    def least(f: Any, lo: Any, hi: Any, goal: Any) -> Any:
+        return min(f(lo), f(hi), golden(mp, f, lo, hi, goal))
 
     def at(s: Any) -> Any:
         if angle:
@@ -155,7 +124,7 @@ def truth_50_digits(cases: Motions, i: int, found: Least) -> Any:
         else:
             centre, way = [c[j] + s * v[j] for j in range(3)], d
         lo, hi = max(-half, t0 - span), min(half, t0 + span)
-        return golden(lambda t: sdf([centre[j] + t * way[j] for j in range(3)]), lo, hi, span * mp.mpf(10) ** -12)
+        return least(lambda t: sdf([centre[j] + t * way[j] for j in range(3)]), lo, hi, span * mp.mpf(10) ** -12)
 
     t0, s0 = mp.mpf(float(found.along[i])), mp.mpf(float(found.instant[i]))
     scene = float(cases.scene()[i])
@@ -163,7 +132,7 @@ def truth_50_digits(cases: Motions, i: int, found: Least) -> Any:
     span = mp.mpf(1e-5 * float(cases.shapes.size()[k]))
     around = span / mp.mpf(speed) if speed else mp.mpf(0)
     lo, hi = max(mp.mpf(0), s0 - around), min(mp.mpf(1), s0 + around)
-    return (golden(at, lo, hi, around * mp.mpf(10) ** -12) if hi > lo else at(lo)) - r
+    return (least(at, lo, hi, around * mp.mpf(10) ** -12) if hi > lo else at(lo)) - r
 
 
 def _columns(cases: Motions) -> tuple[Array, ...]:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.errors import MissingLibraryError
+from clamp3d.study.stress.digits import fifty_digits, golden, point_distance
 from clamp3d.study.stress.poses.cases import Cases, Extended
 
 EXTENDED_WORKS = bool(np.finfo(Extended).eps < 1e-18)
@@ -204,12 +204,7 @@ def truth_50_digits(cases: Cases, i: int) -> Any:
 
     Raises MissingLibraryError without mpmath.
     """
-    try:
-        import mpmath
-    except ImportError:
-        raise MissingLibraryError("50-digit answers need mpmath: pip install mpmath") from None
-    mp = mpmath.mp.clone()
-    mp.dps = 50
+    mp = fifty_digits()
     k = int(cases.shape[i])
     s = cases.shapes
     R, a, L, r, length = (mp.mpf(float(v[k])) for v in (s.R, s.half_angle, s.L, s.r, s.length))
@@ -222,51 +217,24 @@ def truth_50_digits(cases: Cases, i: int) -> Any:
         d = [mp.fsum(mp.mpf(float(G[m, j])) * d[m] for m in range(3)) for j in range(3)]
     norm = mp.sqrt(mp.fsum(v * v for v in d))
     d = [v / norm for v in d]
-    H, half = L / 2, length / 2
-    lip = (R * mp.sin(a), -R * mp.cos(a))
+    half = length / 2
+    point = point_distance(mp, R, a, L)
 
     def sdf(t: Any) -> Any:
-        """Signed distance of a point from the prism, by complex numbers: the section turned so that -y is real."""
-        x, y, z = abs(c[0] + t * d[0]), c[1] + t * d[1], c[2] + t * d[2]
-        point = mp.mpc(-y, x)
-        corner = mp.mpc(-lip[1], lip[0])
-        to_lip = abs(point - corner)
-        to_arc = abs(abs(point) - R) if mp.arg(point) <= a else to_lip
-        to_ray = abs(point.real - corner.real) if x >= lip[0] else to_lip
-        solid = point.real >= corner.real and abs(point) >= R
-        g, e = min(to_arc, to_ray), abs(z) - H
-        if solid:
-            g = -g
-        return max(g, e) if g <= 0 and e <= 0 else mp.hypot(max(g, 0), max(e, 0))
+        return point([c[j] + t * d[j] for j in range(3)])
 
-    brackets = _branch_and_bound(cases, i)
-    tau = (mp.sqrt(5) - 1) / 2
     best = min(sdf(-half), sdf(half))
     goal = mp.mpf(10) ** -45 * (half + 1)
-    for lo, hi in brackets:
+    for lo, hi in _branch_and_bound(cases, i):
         # A bracket may hold a plateau with two ends a rounding apart: look at it at 50 digits before closing in.
         p, q = max(mp.mpf(lo), -half), min(mp.mpf(hi), half)
         grid = [p + (q - p) * j / 16 for j in range(17)]
         values = [sdf(t) for t in grid]
         best = min(best, *values)
         for j in range(17):
-            if values[j] > min(values[max(j - 1, 0)], values[min(j + 1, 16)]):
-                continue
-            p, q = grid[max(j - 1, 0)], grid[min(j + 1, 16)]
-            u, v = q - tau * (q - p), p + tau * (q - p)
-            fu, fv = sdf(u), sdf(v)
-            while q - p > goal:
-                if fu < fv:
-                    q, v, fv = v, u, fu
-                    u = q - tau * (q - p)
-                    fu = sdf(u)
-                else:
-                    p, u, fu = u, v, fv
-                    v = p + tau * (q - p)
-                    fv = sdf(v)
-                if min(fu, fv) - (q - p) > best:  # cannot reach below any more
-                    break
-            best = min(best, fu, fv)
+            before, after = max(j - 1, 0), min(j + 1, 16)
+            if values[j] <= min(values[before], values[after]):
+                best = min(best, golden(mp, sdf, grid[before], grid[after], goal, enough=best))
     return best - r
 
 
