@@ -14,6 +14,7 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from clamp3d.clamp.conductors import conductor
+from clamp3d.clamp.validation import one_line_errors
 from clamp3d.errors import InputError
 
 SMALLEST = 1e-6
@@ -45,6 +46,7 @@ TITLES: dict[PartName, str] = {
 _FROZEN = ConfigDict(extra="forbid")
 
 
+@one_line_errors
 @dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
 class Wire:
     """A conductor, by catalogue name or by ``diameter``; exactly one of the two. Raises InputError if it is unknown."""
@@ -74,6 +76,7 @@ class Wire:
         return self.conductor or f"diameter {self.diameter:g} mm"
 
 
+@one_line_errors
 @dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
 class GrooveDimensions:
     """A groove's arc: its centre lies ``offset`` beside the bolt axis and ``centre_depth`` below the part's origin."""
@@ -83,6 +86,7 @@ class GrooveDimensions:
     centre_depth: Offset
 
 
+@one_line_errors
 @dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
 class UpSplint:
     """P1: a plate with its two grooves underneath. Origin: its top left corner."""
@@ -107,6 +111,7 @@ class UpSplint:
         return self
 
 
+@one_line_errors
 @dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
 class DownSplint:
     """P2: grooves on top, a round back that tilts in the saddle. Origin: centre of the round back."""
@@ -154,6 +159,7 @@ class DownSplint:
         return self
 
 
+@one_line_errors
 @dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
 class Saddle:
     """P3: saddle washer under the round back. Origin: centre of its concave arc."""
@@ -178,6 +184,7 @@ class Saddle:
         return self
 
 
+@one_line_errors
 @dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
 class Bolt:
     """P4: hexagon bolt, head below the saddle. Origin: its free (upper) end."""
@@ -189,6 +196,7 @@ class Bolt:
     head_height: Length
 
 
+@one_line_errors
 @dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
 class Nut:
     """P5: hexagon nut and washers together, on the up splint. Origin: its free (upper) face."""
@@ -197,6 +205,7 @@ class Nut:
     height: Length
 
 
+@one_line_errors
 @dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
 class Clamp:
     """A parallel groove clamp with its two wires, connection matrix and assembly sequence."""

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
 import typing
-from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields
 from importlib import resources
 from pathlib import Path
-
-from pydantic import TypeAdapter, ValidationError
 
 from clamp3d import checks
 from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import SMALLEST, Clamp, Wire
+from clamp3d.clamp.validation import validate
 from clamp3d.errors import InputError
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
-
-
-_UNKNOWN_KEY = {"unexpected_keyword_argument", "extra_forbidden"}
 
 
 def builtin_clamps() -> list[str]:
@@ -49,10 +43,9 @@ def load_clamp(source: str | Path = "reference", *, line: str | None = None, jum
     text, origin = _read(checks.path("clamp", source))
     clamp: Clamp = validate(Clamp, parse_toml(text, origin), origin)
     wires = {key: wire(given, key) for key, given in (("line", line), ("jumper", jumper)) if given is not None}
-    try:
-        return replace(clamp, **wires) if wires else clamp  # type: ignore[arg-type]
-    except ValidationError as failure:
-        raise _one_line(failure, Clamp, origin, {}) from None
+    if wires:
+        clamp = validate(Clamp, {f.name: getattr(clamp, f.name) for f in fields(clamp)} | wires, origin)
+    return clamp
 
 
 def wire(text: str, name: str = "wire") -> Wire:
@@ -64,7 +57,7 @@ def wire(text: str, name: str = "wire") -> Wire:
         return Wire(conductor=conductor(text).designation)
     try:
         return Wire(diameter=diameter)
-    except ValidationError:
+    except InputError:
         raise InputError(
             f"{name} diameter must be > 0 (at least {SMALLEST:g}) and < 100000 mm, got {checks.short(text, 40)}"
         ) from None
@@ -98,50 +91,3 @@ def parse_toml(text: str, origin: str) -> dict[str, typing.Any]:
         raise InputError(f"{origin}: not valid TOML: {error}") from None
     except RecursionError:
         raise InputError(f"{origin}: not valid TOML: tables or arrays nested too deeply") from None
-
-
-def validate(kind: typing.Any, data: typing.Any, origin: str, tags: Mapping[str, type] | None = None) -> typing.Any:
-    """``data`` as ``kind`` (a pydantic model or dataclass), else InputError: one line with origin, key, value and rule.
-
-    ``tags`` maps the tags of a discriminated union, which are no keys of the file, to its members.
-    """
-    try:
-        return TypeAdapter(kind).validate_python(data)
-    except ValidationError as failure:
-        raise _one_line(failure, kind, origin, tags or {}) from None
-
-
-def _one_line(failure: ValidationError, kind: typing.Any, origin: str, tags: Mapping[str, type]) -> InputError:
-    """The error that says what pydantic found."""
-    # A misspelt key is both unknown and missing; the first says what to mend.
-    error = min(failure.errors(include_url=False), key=lambda e: e["type"] not in _UNKNOWN_KEY)
-    others = failure.error_count() - 1
-    key = checks.short(".".join(str(part) for part in error["loc"] if part != "[key]" and part not in tags), 100)
-    rule = error["msg"].replace("Input should", "must").removeprefix("Value error, ")
-    if error["type"] == "value_error":  # from our own validators, which begin with the key
-        line = f"{origin}: {key}.{rule}" if key else f"{origin}: {rule}"
-    elif error["type"] == "missing":
-        line = f"{origin}: {key} is missing"
-    elif error["type"] in _UNKNOWN_KEY:
-        near = difflib.get_close_matches(str(error["loc"][-1]), _keys_at(kind, error["loc"][:-1], tags), n=1)
-        line = f"{origin}: {key} is not a known key" + (f"; did you mean {near[0]}?" if near else "")
-    elif isinstance(error["input"], (str, int, float, bool)):
-        line = f"{origin}: {key}: {rule}, got {checks.shown(error['input'])}"
-    else:
-        line = f"{origin}: {key}: {rule}"
-    return InputError(line + (f" (and {others} more)" if others else ""))
-
-
-def _keys_at(kind: typing.Any, loc: tuple[int | str, ...], tags: Mapping[str, type]) -> list[str]:
-    """Names of the fields that a table of the file may hold."""
-    for part in loc:
-        if part in tags:
-            kind = tags[str(part)]
-        elif dict in (kind, typing.get_origin(kind)) or isinstance(part, int):
-            kind = next(iter(reversed(typing.get_args(kind))), None)
-        else:
-            kind = typing.get_type_hints(kind).get(str(part)) if hasattr(kind, "__annotations__") else None
-        options = [a for a in typing.get_args(kind) if a is not type(None)]
-        if type(None) in typing.get_args(kind) and len(options) == 1:
-            kind = options[0]
-    return list(getattr(kind, "__dataclass_fields__", {}))

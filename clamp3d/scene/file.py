@@ -16,7 +16,8 @@ from pydantic.dataclasses import dataclass
 from clamp3d import checks
 from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import Length, Offset, PartName
-from clamp3d.clamp.loader import load_clamp, parse_toml, read_text, validate
+from clamp3d.clamp.loader import load_clamp, parse_toml, read_text
+from clamp3d.clamp.validation import validate
 from clamp3d.errors import Clamp3dError, InputError
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import SweptArc
