@@ -16,6 +16,7 @@ import numpy as np
 
 import clamp3d
 from clamp3d.assembly.run import assemble
+from clamp3d.clamp.dimensions import Wire
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.contact.cas import Cas
@@ -601,6 +602,8 @@ def targets() -> dict[str, tuple[float, Make]]:
                 open_tilt=_choice(0.0, 0.05),
             ),
         ),
+        "Wire": (1, lambda r, f: (Wire, {"diameter": float(r.uniform(5.0, 50.0))})),
+        "replace": (3, _changed_clamp),
         "Section": (2, _simple(c.Section, clamp=_fixed(_clamp()), model=_choice(*_models()))),
         "equilibria": (0.1, _simple(c.equilibria, section=_fixed(c.Section(_clamp(), Cas())))),
         "parts": (2, _simple(c.parts, clamp=_fixed(_clamp()))),
@@ -676,6 +679,18 @@ def targets() -> dict[str, tuple[float, Make]]:
         "table2_figure": (0.05, _simple(c.table2_figure)),
         "table3_figure": (0.05, _simple(c.table3_figure)),
     }
+
+
+def _changed_clamp(rng: Rng, folder: Path) -> tuple[Callable[..., Any], dict[str, Any]]:
+    """One part of the clamp with its own dimensions, to be given again."""
+    name = garbage.pick(rng, ("line", "up_splint", "down_splint", "saddle", "bolt", "nut"))
+    part = getattr(_clamp(), name)
+    values = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+
+    def change(**values: Any) -> Any:
+        return dataclasses.replace(_clamp(), **{name: dataclasses.replace(part, **values)})
+
+    return change, values
 
 
 def _few(value: Any) -> Any:
