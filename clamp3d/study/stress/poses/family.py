@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from clamp3d.study.stress.family import generator
 from clamp3d.study.stress.outcome import OWN, Outcome, judge
-from clamp3d.study.stress.poses.cases import Cases
+from clamp3d.study.stress.poses.cases import FEATURES, Cases, Shapes, random_shapes, shape_count, spread
 from clamp3d.study.stress.poses.methods import METHODS, method
 from clamp3d.study.stress.poses.truth import EXTENDED_ERROR, truth, truth_50_digits
 from clamp3d.study.stress.worker import Method, run_here, run_isolated
@@ -75,6 +75,28 @@ class PoseFamily:
         """See `Family`."""
         cases = self.cases(n, seed)
         return f"{cases.snippet(i)}\n# truth: {float(truth_50_digits(cases, i))!r} mm"
+
+
+def into(families: dict[str, PoseFamily]) -> Callable[[str, str], Callable[[Generator], Generator]]:
+    """A decorator ``(name, about)`` for generators that adds them to ``families``."""
+
+    def family(name: str, about: str) -> Callable[[Generator], Generator]:
+        def register(make: Generator) -> Generator:
+            families[name] = PoseFamily(name, about, make)
+            return make
+
+        return register
+
+    return family
+
+
+def setting(
+    rng: np.random.Generator, n: int, features: tuple[str, ...] = FEATURES, **given: object
+) -> tuple[Shapes, NDArray[np.intp], NDArray[np.str_]]:
+    """Random shapes, the shape (n,) of each case, and the feature (n,) that it touches."""
+    k = shape_count(n)
+    shapes = random_shapes(rng, k, **given)  # type: ignore[arg-type]
+    return shapes, spread(n, k), rng.choice(features, n)
 
 
 def _exact(cases: Cases) -> NDArray[Any]:
