@@ -8,20 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.geometry.pose import Array
 from clamp3d.study.stress.motions.cases import Motions, motions
+from clamp3d.study.stress.motions.contacts import moved, screws_through, square_to, touching
 from clamp3d.study.stress.motions.family import Generator, MotionFamily
 from clamp3d.study.stress.poses.cases import (
     FEATURES,
-    Cases,
-    Contact,
     Extended,
-    Shapes,
     contact_on,
     place,
     poses_from_axes,
@@ -85,66 +82,6 @@ def _rotated(axis: Array, x: Array, angle: Array) -> Array:
     )
 
 
-def _touching(
-    rng: np.random.Generator, shapes: Shapes, shape: NDArray[np.intp], feature: NDArray[np.str_], gap: Array
-) -> tuple[Cases, NDArray[np.longdouble]]:
-    """Poses at a contact, a third of them along the groove, and the unit normals (n, 3) there."""
-    contact = contact_on(rng, shapes, shape, feature)
-    tilt = np.where(rng.random(len(shape)) < 0.33, 0.0, rng.uniform(-1.5, 1.5, len(shape)))
-    return place(rng, shapes, shape, contact, gap, tilt=tilt), _unit(contact)
-
-
-def _unit(contact: Contact) -> NDArray[np.longdouble]:
-    return np.asarray(contact.normal / np.sqrt((contact.normal**2).sum(1))[:, None])
-
-
-def _square_to(rng: np.random.Generator, normal: NDArray[np.longdouble]) -> NDArray[np.longdouble]:
-    """Random unit vectors (n, 3) square to ``normal``."""
-    v = rng.normal(size=normal.shape).astype(Extended)
-    v = np.cross(normal, v)
-    return np.asarray(v / np.sqrt((v * v).sum(1))[:, None])
-
-
-def _moved(T: Array, by: NDArray[Any]) -> Array:
-    """Poses moved by (n, 3) mm, rounded once."""
-    out = T.copy()
-    out[:, :3, 3] = T[:, :3, 3].astype(Extended) + by
-    return out
-
-
-def _turned(
-    T: Array, point: NDArray[np.longdouble], axis: NDArray[np.longdouble], angle: NDArray[np.longdouble]
-) -> Array:
-    """Poses turned by ``angle`` (n,) about axes (n, 3), rounded once."""
-    sine, versine = np.sin(angle)[:, None], 2 * np.sin(angle / 2)[:, None] ** 2
-
-    def turn(x: NDArray[np.longdouble]) -> NDArray[np.longdouble]:
-        once = np.cross(axis, x)
-        return np.asarray(x + sine * once + versine * np.cross(axis, once))
-
-    out = T.copy()
-    wide = T.astype(Extended)
-    for j in range(3):
-        out[:, :3, j] = turn(wide[:, :3, j])
-    out[:, :3, 3] = point + turn(wide[:, :3, 3] - point)
-    return out
-
-
-def _screws_through(
-    cases: Cases, point: Array, axis: Array, angle: Array, travel: Array, instant: Array, *, built: bool = True
-) -> Motions:
-    """Screws that are at the poses of ``cases`` at ``instant`` (n,)."""
-    point, axis = np.asarray(point, np.float64), np.asarray(axis, np.float64)
-    p, u = point.astype(Extended), axis.astype(Extended)
-    u = u / np.sqrt((u * u).sum(1))[:, None]
-    s = instant.astype(Extended)
-    start = _turned(cases.T_world_wire, p, u, -s * angle)
-    start = _moved(start, -(s * travel)[:, None] * u)
-    gap = cases.gap if built else np.nan
-    return motions(cases.shapes, cases.shape, start, travel=travel, angle=angle, point=point, axis=axis, gap=gap,
-                   instant=instant)  # fmt: skip
-
-
 @_family(
     "grazing",
     "straight past a lip, an edge or a corner on a tangent: clear or deep by 1e-12 ... 1e-2 of the radius",
@@ -154,8 +91,8 @@ def _grazing(rng: np.random.Generator, n: int) -> Motions:
     k = shape_count(n)
     shapes, shape = random_shapes(rng, k), spread(n, k)
     gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
-    cases, normal = _touching(rng, shapes, shape, rng.choice(_CONVEX, n), gap)
-    way = _square_to(rng, normal)
+    cases, normal = touching(rng, shapes, shape, rng.choice(_CONVEX, n), gap)
+    way = square_to(rng, normal)
     # A third square to the groove: the wire's centre moves in the section.
     section = np.stack([-normal[:, 1], normal[:, 0], np.zeros(n)], 1)
     flat = np.sqrt((section * section).sum(1))
@@ -163,7 +100,7 @@ def _grazing(rng: np.random.Generator, n: int) -> Motions:
     way = np.where(across[:, None], section / np.maximum(flat, 0.1)[:, None], way)
     travel = np.asarray(way * (shapes.R[shape] * 10.0 ** rng.uniform(-1, 1, n))[:, None], np.float64)
     instant = rng.uniform(0.05, 0.95, n)
-    start = _moved(cases.T_world_wire, -instant[:, None] * travel.astype(Extended))
+    start = moved(cases.T_world_wire, -instant[:, None] * travel.astype(Extended))
     return motions(shapes, shape, start, travel=travel, gap=gap, instant=instant)
 
 
@@ -175,12 +112,12 @@ def _turning_screws(rng: np.random.Generator, n: int, turns: Array, pitch: Array
     shape = spread(n, k)
     gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
     feature = rng.choice(FEATURES, n)
-    cases, normal = _touching(rng, shapes, shape, feature, gap)
+    cases, normal = touching(rng, shapes, shape, feature, gap)
     # In the hollow a circle narrower than it, square to the groove.
     hollow = np.isin(feature, ["arc", "end arc"])
     room = (shapes.R - shapes.r)[shape]
     radius = np.where(hollow, room * rng.uniform(0.1, 0.9, n), shapes.R[shape] * 10.0 ** rng.uniform(-1, 1, n))
-    axis = _square_to(rng, normal)
+    axis = square_to(rng, normal)
     along = (feature == "arc") | (rng.random(n) < 0.33) & (np.abs(normal[:, 2]) < 1e-9)
     axis = np.where(along[:, None], [[0.0, 0.0, 1.0]], axis)
     centre = cases.T_world_wire[:, :3, 3]
@@ -188,7 +125,7 @@ def _turning_screws(rng: np.random.Generator, n: int, turns: Array, pitch: Array
         axis * rng.uniform(-1, 1, n)[:, None] * radius[:, None], np.float64
     )  # fmt: skip
     instant = rng.uniform(0.05, 0.95, n)
-    return _screws_through(cases, point, np.asarray(axis, float), turns, pitch * radius * turns, instant)
+    return screws_through(cases, point, np.asarray(axis, float), turns, pitch * radius * turns, instant)
 
 
 @_family("turning", "circles about any axis that touch at one instant and curve away, on any feature", choose=True)
@@ -240,16 +177,16 @@ def _thin(rng: np.random.Generator, n: int) -> Motions:
     )
     shape = spread(n, k)
     gap = shapes.r[shape] * np.where(rng.random(n) < 0.5, signed_powers(rng, n, -6, -0.1), -rng.uniform(0, 0.9, n))
-    cases, normal = _touching(rng, shapes, shape, rng.choice(_CONVEX, n), gap)
+    cases, normal = touching(rng, shapes, shape, rng.choice(_CONVEX, n), gap)
     fast = (shapes.R[shape] * 10.0 ** rng.uniform(0.5, 2, n))[:, None]
-    tangent = _square_to(rng, normal)
+    tangent = square_to(rng, normal)
     # Through the sheet or past it, along the groove, off from the contact's own tangent.
     through = sheet[shape] & (rng.random(n) < 0.7)
     lean = 0.1 * np.abs(rng.normal(size=(n, 2)))
     z = np.column_stack([lean * rng.choice([-1, 1], (n, 2)), rng.choice([-1.0, 1.0], n)])
     travel = np.asarray(np.where(through[:, None], z, tangent) * fast, np.float64)
     instant = rng.uniform(0.05, 0.95, n)
-    start = _moved(cases.T_world_wire, -instant[:, None] * travel.astype(Extended))
+    start = moved(cases.T_world_wire, -instant[:, None] * travel.astype(Extended))
     return motions(shapes, shape, start, travel=travel, gap=gap, instant=instant)
 
 
@@ -337,8 +274,8 @@ def _start(rng: np.random.Generator, n: int) -> Motions:
     shapes, shape = random_shapes(rng, k), spread(n, k)
     r = shapes.r[shape]
     gap = np.where(rng.random(n) < 0.2, -r * rng.uniform(0, 0.99, n), r * signed_powers(rng, n, -12, -2, 0.3))
-    cases, normal = _touching(rng, shapes, shape, rng.choice(FEATURES, n), gap)
-    way = _square_to(rng, normal)
+    cases, normal = touching(rng, shapes, shape, rng.choice(FEATURES, n), gap)
+    way = square_to(rng, normal)
     away = np.where(rng.random(n) < 0.3, 0.0, rng.uniform(-0.2, 1.5, n))[:, None]
     length = (shapes.R[shape] * 10.0 ** rng.uniform(-2, 1, n))[:, None]
     travel = np.asarray((np.cos(away) * way + np.sin(away) * normal) * length, np.float64)
@@ -347,7 +284,7 @@ def _start(rng: np.random.Generator, n: int) -> Motions:
     radius = (shapes.R[shape] * 10.0 ** rng.uniform(-2, 0, n))[:, None]
     point = np.asarray(cases.T_world_wire[:, :3, 3] + radius * normal, np.float64)
     turns = motions(shapes, shape, cases.T_world_wire, travel=0.0, angle=2.0 * np.pi * rng.integers(1, 4, n),
-                    point=point, axis=np.asarray(_square_to(rng, normal), float), gap=gap, instant=0.0)  # fmt: skip
+                    point=point, axis=np.asarray(square_to(rng, normal), float), gap=gap, instant=0.0)  # fmt: skip
     return _choose(rng.random(n) < 0.75, leaves, turns)
 
 
@@ -359,14 +296,14 @@ def _from_far(rng: np.random.Generator, n: int) -> Motions:
     shapes, shape = random_shapes(rng, k), spread(n, k)
     gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
     feature = rng.choice(FEATURES, n)
-    cases, normal = _touching(rng, shapes, shape, feature, gap)
+    cases, normal = touching(rng, shapes, shape, feature, gap)
     lean = rng.uniform(0.0, 1.4, n)[:, None]
-    way = np.cos(lean) * normal + np.sin(lean) * _square_to(rng, normal)
+    way = np.cos(lean) * normal + np.sin(lean) * square_to(rng, normal)
     distance = 10.0 ** rng.uniform(3, 6, n)
     arrives = rng.random(n) < 0.6
     past = np.isin(feature, _CONVEX) & ~arrives
-    way = np.where(past[:, None], _square_to(rng, normal), way)
+    way = np.where(past[:, None], square_to(rng, normal), way)
     instant = np.where(past, rng.uniform(0.1, 0.9, n), 1.0)
     travel = np.asarray(-way * distance[:, None], np.float64)
-    start = _moved(cases.T_world_wire, -instant.astype(Extended)[:, None] * travel)
+    start = moved(cases.T_world_wire, -instant.astype(Extended)[:, None] * travel)
     return motions(shapes, shape, start, travel=travel, gap=gap, instant=instant)
