@@ -8,6 +8,7 @@ from typing import Any
 from clamp3d.errors import InputError
 from clamp3d.output.files import whole_file
 from clamp3d.study.stress.outcome import Outcome
+from clamp3d.study.stress.report import percent
 from clamp3d.study.stress.run import StressRun
 
 _LEAST = 1e-4
@@ -115,4 +116,4 @@ def _cell(o: Outcome) -> str:
     if rate is None:
         return "refused" if o.refused else "no time"
     dead = " †" if o.crashes else ""
-    return ("0" if o.wrong == 0 else f"{100.0 * rate:.2g} %".replace("1e+02", "100")) + dead
+    return percent(rate) + dead

@@ -12,14 +12,35 @@ def _length(x: float | None) -> str:
     return "-" if x is None else f"{x:.2g}"
 
 
-def _rate(outcome: Outcome | None) -> str:
-    if outcome is None:
-        return ""
+def percent(rate: float) -> str:
+    """A share to two digits.
+
+    >>> percent(0.0), percent(0.0312), percent(0.126), percent(1.0)
+    ('0', '3.1 %', '13 %', '100 %')
+    """
+    x = 100.0 * rate
+    return "0" if x == 0.0 else f"{x:.0f} %" if x >= 9.95 else f"{x:.2g} %"
+
+
+def _rate(outcome: Outcome) -> str:
     rate = outcome.failure_rate
     if rate is None:
         return "refused" if outcome.refused else "not asked"
-    share = "0" if outcome.wrong == 0 else f"{100.0 * rate:.2g} %"
-    return f"{share} of {outcome.asked - outcome.refused}"
+    return f"{percent(rate)} of {outcome.asked - outcome.refused}"
+
+
+def _errors(outcome: Outcome) -> str:
+    if outcome.worst_error is None:
+        return "-"
+    ratio = "" if outcome.worst_ratio is None else f" ({outcome.worst_ratio:.2g})"
+    return f"{_length(outcome.worst_error)} / {_length(outcome.median_error)}{ratio}"
+
+
+def _each(outcome: Outcome) -> str:
+    if not outcome.asked:
+        return ""
+    seconds = outcome.seconds / outcome.asked
+    return next(f"{seconds * k:.3g} {unit}" for k, unit in ((1e6, "us"), (1e3, "ms"), (1.0, "s")) if seconds * k < 1e3)
 
 
 def _trouble(outcome: Outcome) -> str:
@@ -64,23 +85,22 @@ def markdown(run: StressRun, command: str) -> str:
         "",
         f"Machine: {run.machine}.",
         "",
-        "Share of wrong verdicts (false hits, false misses, exceptions, crashes, no answer in time) among the cases "
-        "that the method takes on:",
-        "",
-        "| family | " + " | ".join(methods) + " |",
-        "|---|" + "---|" * len(methods),
     ]
-    lines += [f"| {f} | " + " | ".join(_rate(by.get((f, m))) for m in methods) + " |" for f in families]
-    lines += ["", "Largest error in mm (and in parts of the method's own bound):", ""]
-    lines += ["| family | " + " | ".join(methods) + " |", "|---|" + "---|" * len(methods)]
-    for f in families:
-        cells = []
-        for m in methods:
-            o = by.get((f, m))
-            ratio = "" if o is None or o.worst_ratio is None else f" ({o.worst_ratio:.2g})"
-            cells.append("" if o is None else _length(o.worst_error) + ratio)
-        lines.append(f"| {f} | " + " | ".join(cells) + " |")
-    lines += ["", "The families:", ""]
+    for title, cell in (
+        (
+            "Share of wrong verdicts (false hits, false misses, exceptions, crashes, no answer in time) among the "
+            "cases that the method takes on:",
+            _rate,
+        ),
+        ("Largest and median error in mm (largest in parts of the method's own bound):", _errors),
+        ("Time a case, set-up of the shapes included:", _each),
+    ):
+        lines += [title, "", "| family | " + " | ".join(methods) + " |", "|---|" + "---|" * len(methods)]
+        for f in families:
+            cells = [cell(by[f, m]) if (f, m) in by else "" for m in methods]
+            lines.append(f"| {f} | " + " | ".join(cells) + " |")
+        lines.append("")
+    lines += ["The families:", ""]
     lines += [f"- **{f}**: {FAMILIES[f].about}" for f in families]
     if any(f in ASSEMBLIES for f in families):
         lines += ["", f"Of assemblies: {COUNTS}."]
