@@ -24,6 +24,8 @@ def equilibria(section: Section) -> tuple[FinalState, ...]:
     Starts are taken just above every place of rest of the sampled distance (`landscape`). A clamp in which a wire can
     rest on a lip as well as in its groove has more than one state; which one it comes to depends on how it is put
     together. States in which a wire is about to slip out of its mouth are among them, for there the closing ends too.
+    A place so shallow that opening by 1.5e-4 of the down splint's half width (0.01 mm of the reference clamp) lets the
+    clamp slide on may be missing.
     Raises SolverError if no start leads to a proven state.
 
     >>> from clamp3d.clamp.loader import load_clamp

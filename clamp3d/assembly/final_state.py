@@ -161,14 +161,16 @@ def _rest(section: Section, q: Array, wire: PartName) -> Array:
     x, y = 2 * WIRES.index(wire), 2 * WIRES.index(wire) + 1
     goal = np.zeros(6)
     goal[y] = 1.0 if wire == "P6" else -1.0
-    q = _descend(section, q, goal, free=(x, y))
-    for _ in range(50):  # out of the overlap that the descent tolerates, straight away from what it touches
-        gaps = section.wire_gaps(q, wire)
-        k = int(np.argmin(gaps.value))
-        if gaps.value[k] >= 0.0:
-            break
-        q = q - gaps.value[k] * np.where(np.isin(np.arange(6), (x, y)), gaps.gradient[k], 0.0)
-    return q
+    fallen = _descend(section, q, goal, free=(x, y))
+    for _ in range(50):  # out of the overlap that the descent tolerates, not into what else is as near
+        gaps = section.wire_gaps(fallen, wire)
+        depth = -float(gaps.value.min())
+        if depth <= 0.0:
+            return fallen
+        near = gaps.value < depth
+        fallen = fallen.copy()
+        fallen[[x, y]] -= np.linalg.lstsq(gaps.gradient[near][:, [x, y]], gaps.value[near], rcond=None)[0]
+    return fallen if depth <= TOLERANCE else q
 
 
 def _descend(

@@ -16,6 +16,7 @@ from clamp3d.contact.cas import Cas
 from clamp3d.contact.chords import Chords
 from clamp3d.errors import InputError, SolverError
 from clamp3d.study import published
+from clamp3d.study.stress.assemblies.family import ASSEMBLIES
 
 # Reference clamp, exact distances with each arc replaced by chords; computed independently to +-0.002 mm.
 EXACT_CHORDS = {1.0: 31.5314, 5.0: 31.564, 10.0: 31.660, 20.0: 32.080, 40.0: 32.647}
@@ -167,3 +168,11 @@ def test_a_closing_that_would_take_for_ever_is_refused(monkeypatch):
     monkeypatch.setattr("clamp3d.assembly.final_state._MOST_STRIDES", 2)
     with pytest.raises(SolverError, match=r"closing takes more than 2 strides of .* the down splint's width"):
         solve_final_state(Section(load_clamp(), Cas()))
+
+
+def test_a_loose_wire_in_a_sliver_is_put_down_without_overlap():
+    """The faces meet and leave the jumper 3e-7 mm of room between two arcs whose normals are nearly opposite."""
+    case = ASSEMBLIES["assembly: faces meet"].cases(17, 0).cases[16]
+    state = solve_final_state(Section(case.clamp, Cas()), case.start)
+    assert state.loose == ("P7",)
+    assert state.gaps.value.min() >= -1e-9

@@ -37,7 +37,7 @@ def _errors(outcome: Outcome) -> str:
 
 
 def _each(outcome: Outcome) -> str:
-    if not outcome.asked:
+    if not outcome.asked or not outcome.seconds:  # not asked, or it died each time
         return ""
     seconds = outcome.seconds / outcome.asked
     return next(f"{seconds * k:.3g} {unit}" for k, unit in ((1e6, "us"), (1e3, "ms"), (1.0, "s")) if seconds * k < 1e3)

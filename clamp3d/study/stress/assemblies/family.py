@@ -29,8 +29,9 @@ COUNTS = (
 )
 """What the counts mean for these families."""
 
-SAME = 1e-4
-"""Distances in mm up to which a place of rest counts as named: twins nanometres apart are one to a user."""
+SAME = 1.5e-6
+"""Up to this part of the half width (1e-4 mm for the reference clamp) a place of rest counts as named: twins nanometres
+apart are one to a user."""
 
 _AS_PYTHON = """
 from clamp3d.assembly.equilibria import equilibria
@@ -163,8 +164,8 @@ def _missed(truths: _Truths, i: int, rest: Rest) -> float:
     """The lowest place of rest that a solver that is to name all did not; NaN if there is none."""
     if rest.others is None:
         return float("nan")
-    named = np.array([q[4] for q in rest.others])
-    return next((m.d for m in truths[i] if m.firm and np.abs(named - m.d).min() > SAME), float("nan"))
+    named, same = np.array([q[4] for q in rest.others]), SAME * truths.envelope(i).lever
+    return next((m.d for m in truths[i] if m.firm and np.abs(named - m.d).min() > same), float("nan"))
 
 
 def _of(what: Any, values: Any) -> float | None:

@@ -21,15 +21,17 @@ _LEVELS, _POINTS = 14, 13  # the last tilts are 1e-13 rad apart
 _SAME = 1e-7
 
 
-_SHALLOW, _NEAR = 0.01, 1.0
+_SHALLOW, _NEAR = 1.5e-4, 1.5e-2
+"""In parts of the down splint's half width: 0.01 mm and 1 mm for the reference clamp."""
 
 
 @dataclass(frozen=True, slots=True)
 class Minimum:
     """A place of rest: distance ``d`` in mm and ``tilt`` in rad.
 
-    It is ``firm`` if opening the clamp by 0.01 mm, less than the roughness of any casting, does not let it slide to a
-    lower one within 1 mm. The edges of nearly equal grooves make pairs of minima nanometres apart, which are not.
+    It is ``firm`` if opening the clamp by 1.5e-4 of the down splint's half width (0.01 mm for the reference clamp, less
+    than the roughness of any casting) does not let it slide to a lower one within a hundred times as much. The edges of
+    nearly equal grooves make pairs of minima nanometres apart, which are not.
     """
 
     d: float
@@ -96,7 +98,9 @@ def minima(envelope: Envelope, count: int = 301) -> list[Minimum]:
             d, tilt = float(q[4]), float(q[5] / envelope.lever)
             same = any(abs(d - other.d) <= _SAME and abs(tilt - other.tilt) <= 1e-5 for other in found)
             if not same and envelope.falls(q) <= _SAME:
-                found.append(Minimum(d, tilt, envelope.falls(q, _NEAR, _SHALLOW) <= _SAME))
+                found.append(
+                    Minimum(d, tilt, envelope.falls(q, _NEAR * envelope.lever, _SHALLOW * envelope.lever) <= _SAME)
+                )
     return sorted(found, key=lambda minimum: minimum.d)
 
 
