@@ -14,7 +14,7 @@ import click
 from clamp3d.cli.options import OUTPUT
 
 if TYPE_CHECKING:
-    from clamp3d.scene.check import Progress
+    from clamp3d.scene.model import Progress
 
 
 @click.command("check")

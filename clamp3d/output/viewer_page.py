@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import base64
+import importlib.util
 from importlib import resources
 from pathlib import Path
 
+from clamp3d.errors import MissingLibraryError
 from clamp3d.output.files import write_text
 from clamp3d.output.viewer_log import CommandLog
+
+
+def viewer_files() -> Path:
+    """Folder with meshcat's built viewer. Raises MissingLibraryError if meshcat is not installed."""
+    spec = importlib.util.find_spec("meshcat")
+    if spec is None or not spec.submodule_search_locations:
+        raise MissingLibraryError("the viewer needs meshcat: pip install meshcat")
+    return Path(spec.submodule_search_locations[0]) / "viewer" / "dist"
 
 
 def live_page() -> str:
@@ -17,8 +27,6 @@ def live_page() -> str:
 
 def write_page(path: Path, log: CommandLog, title: str) -> None:
     """Write the scene as one page that needs nothing else, not even a network. Raises InputError if it cannot."""
-    from clamp3d.output.viewer_server import viewer_files
-
     folder = viewer_files()
     script = (folder / "main.min.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
     notices = folder / "main.min.js.LICENSE.txt"

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import importlib.util
 import socket
 import threading
 import weakref
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clamp3d.checks import shown, text, whole
-from clamp3d.errors import Clamp3dError, InputError, MissingLibraryError
+from clamp3d.errors import Clamp3dError, InputError
 from clamp3d.output.viewer_log import Command, CommandLog
+from clamp3d.output.viewer_page import live_page, viewer_files
 
 if TYPE_CHECKING:
     import tornado.web
@@ -28,14 +27,6 @@ PORT = 7000
 _PORTS = 200
 _PATIENCE = 10.0  # s for a server that is said to be running
 _FAREWELL = 0.5  # s for the pages when we close
-
-
-def viewer_files() -> Path:
-    """Folder with meshcat's built viewer. Raises MissingLibraryError if meshcat is not installed."""
-    spec = importlib.util.find_spec("meshcat")
-    if spec is None or not spec.submodule_search_locations:
-        raise MissingLibraryError("the viewer needs meshcat: pip install meshcat")
-    return Path(spec.submodule_search_locations[0]) / "viewer" / "dist"
 
 
 class LocalServer:
@@ -131,8 +122,6 @@ class LocalServer:
     def _application(self) -> tornado.web.Application:
         import tornado.web
         import tornado.websocket
-
-        from clamp3d.output.viewer_page import live_page
 
         owner, page = self, live_page()
 

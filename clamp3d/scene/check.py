@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,32 +16,11 @@ from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.scene.bounds import Bounds, Verdict
 from clamp3d.scene.broad import Boxes, box_gaps, near_pairs
-from clamp3d.scene.ladder import Answer, climb, contained, every_rung, verdict_of
-from clamp3d.scene.model import FINEST, Ledger, Model
+from clamp3d.scene.ladder import as_row, climb, contained, every_rung, verdict_of
+from clamp3d.scene.model import FINEST, Ledger, Model, Progress, Workshop
 from clamp3d.scene.result import CheckResult, PairResult, Work
 from clamp3d.scene.scene import Scene, name_pairs
-from clamp3d.scene.shapes import Shape
-
-Progress = Callable[[str, int, int], None]
-
-
-class Workshop:
-    """The models of a scene's shapes, shared by equal shapes, kept as long as it lives."""
-
-    def __init__(self) -> None:
-        self.ledger = Ledger()
-        self._models: dict[Shape, Model] = {}
-
-    def model(self, shape: Shape) -> Model:
-        """The one model of a shape and its equals."""
-        if shape not in self._models:
-            self._models[shape] = Model(shape, self.ledger)
-        return self._models[shape]
-
-    @property
-    def models(self) -> tuple[Model, ...]:
-        """All models so far."""
-        return tuple(self._models.values())
+from clamp3d.scene.sweep import check_motions
 
 
 def check(
@@ -94,8 +73,6 @@ def check(
     ledger.seconds["pairs"] += time.perf_counter() - began
     moved: tuple[PairResult, ...] = ()
     if scene.motions:
-        from clamp3d.scene.sweep import check_motions
-
         began = time.perf_counter()
         moved = check_motions(scene, models, asked, ledger, progress)
         ledger.seconds["motions"] += time.perf_counter() - began
@@ -149,23 +126,6 @@ def _pair(
     if verdict is Verdict.CLASH and contained(models[i], models[j], T_ab, thresholds, ledger):
         verdict = Verdict.CONTAINED
     return as_row(a, b, verdict, answer, T[i])
-
-
-def as_row(a: str, b: str, verdict: Verdict, answer: Answer, T_a: Array) -> PairResult:
-    """The answer as a row, its points in the world."""
-    p, q = answer.bounds.point_a, answer.bounds.point_b
-    R, t = T_a[:3, :3], T_a[:3, 3]
-    return PairResult(
-        a,
-        b,
-        verdict,
-        answer.bounds.low,
-        answer.bounds.high,
-        answer.rung,
-        answer.method,
-        None if p is None else R @ p + t,
-        None if q is None else R @ q + t,
-    )
 
 
 def _work(shop: Workshop, scene: Scene, pairs: int, candidates: int, decided: Counter[str], full: bool) -> Work:

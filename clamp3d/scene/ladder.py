@@ -11,6 +11,7 @@ from clamp3d.scene.bounds import Bounds, Thresholds, Verdict
 from clamp3d.scene.convex import Rod
 from clamp3d.scene.facets import rod_bounds
 from clamp3d.scene.model import FINEST, Ledger, Model
+from clamp3d.scene.result import PairResult
 from clamp3d.scene.solid import Body, bodies_bounds, turned
 from clamp3d.scene.trimodel import inside, tri_bounds
 
@@ -171,6 +172,23 @@ def _meshes(a: Model, b: Model, T: Array, error: float, thresholds: Thresholds, 
     bounds = tri_bounds(x, y, T, contact=thresholds.contact)
     doubt = x.error + y.error
     return Answer(bounds, "meshes", f"meshes (FCL), chord error {doubt:.2g} mm" if doubt > 0.0 else "meshes (FCL)")
+
+
+def as_row(a: str, b: str, verdict: Verdict, answer: Answer, T_a: Array) -> PairResult:
+    """The answer as a row, its points in the world."""
+    p, q = answer.bounds.point_a, answer.bounds.point_b
+    R, t = T_a[:3, :3], T_a[:3, 3]
+    return PairResult(
+        a,
+        b,
+        verdict,
+        answer.bounds.low,
+        answer.bounds.high,
+        answer.rung,
+        answer.method,
+        None if p is None else R @ p + t,
+        None if q is None else R @ q + t,
+    )
 
 
 def verdict_of(bounds: Bounds, thresholds: Thresholds, allowance: float | None) -> Verdict:

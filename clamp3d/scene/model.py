@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter, defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -18,6 +19,9 @@ from clamp3d.scene.facets import Facets
 from clamp3d.scene.shapes import MeshShape, Shape, Solid
 from clamp3d.scene.solid import Body
 from clamp3d.scene.trimodel import TriModel
+
+Progress = Callable[[str, int, int], None]
+"""What is being done, how much of it is, and of how much."""
 
 FINEST = 0.001
 """Smallest chord error (mm) that a mesh is made with; a pair still open then is uncertain."""
@@ -168,3 +172,22 @@ def _bulge(shape: MeshShape) -> float:
     smooth = (angles > 1e-6) & (angles < np.radians(65.0))
     # A chord w that turns by t has the sagitta w / 2 tan(t / 4).
     return float((0.5 * wide * np.tan(0.25 * angles))[smooth].max(initial=0.0))
+
+
+class Workshop:
+    """The models of a scene's shapes, shared by equal shapes, kept as long as it lives."""
+
+    def __init__(self) -> None:
+        self.ledger = Ledger()
+        self._models: dict[Shape, Model] = {}
+
+    def model(self, shape: Shape) -> Model:
+        """The one model of a shape and its equals."""
+        if shape not in self._models:
+            self._models[shape] = Model(shape, self.ledger)
+        return self._models[shape]
+
+    @property
+    def models(self) -> tuple[Model, ...]:
+        """All models so far."""
+        return tuple(self._models.values())

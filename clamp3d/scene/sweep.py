@@ -16,9 +16,8 @@ from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array, check_pose, inverse
 from clamp3d.scene.bounds import Bounds, Verdict
 from clamp3d.scene.broad import Boxes, box_gaps, near_pairs
-from clamp3d.scene.check import Progress, Workshop, as_row
-from clamp3d.scene.ladder import Answer, climb, verdict_of
-from clamp3d.scene.model import Ledger, Model
+from clamp3d.scene.ladder import Answer, as_row, climb, verdict_of
+from clamp3d.scene.model import Ledger, Model, Progress, Workshop
 from clamp3d.scene.motion import Motion
 from clamp3d.scene.result import PairResult
 from clamp3d.scene.scene import Scene

@@ -24,7 +24,8 @@ from clamp3d.geometry.shapes import Cylinder, SweptArc
 from clamp3d.scene import shapes
 from clamp3d.scene.bounds import Verdict
 from clamp3d.scene.broad import Boxes, box_gaps, near_pairs
-from clamp3d.scene.check import Workshop, check, check_full
+from clamp3d.scene.check import check, check_full
+from clamp3d.scene.model import Workshop
 from clamp3d.scene.scene import Scene
 from clamp3d.scene.sweep import sweep_poses
 

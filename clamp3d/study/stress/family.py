@@ -9,7 +9,6 @@ from typing import Protocol
 import numpy as np
 
 from clamp3d.study.stress.outcome import Outcome
-from clamp3d.study.stress.worker import Cases, Method
 
 
 class Family(Protocol):
@@ -34,10 +33,6 @@ class Family(Protocol):
 
     @property
     def methods(self) -> Mapping[str, str]: ...  # noqa: D102
-
-    def question(self, name: str, n: int, seed: int) -> tuple[Method, Cases]:
-        """A method and the n cases of a seed, made anew: what a child process starts with."""
-        ...
 
     def run(
         self, methods: Sequence[str], n: int, seed: int, time_limit: float, check: int

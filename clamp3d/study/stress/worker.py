@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 import multiprocessing
 import signal
 import time
@@ -18,6 +20,8 @@ from clamp3d.errors import Clamp3dError, without_numbers
 from clamp3d.geometry.pose import Array
 
 _MAX_DEATHS = 5
+_IMPORTED = ("scipy.optimize", "scipy.spatial", "trimesh", "fcl")
+"""Loaded in a child before the clock runs."""
 
 Measures = Literal["depth", "clearance", "verdict"]
 """What a method's answers are good for: signed distances, distances while apart, or their sign alone."""
@@ -154,11 +158,12 @@ def _parts(
         yield np.array([row]), *_measure(asked, cases, np.array([row]))
 
 
-def _serve(pipe: Connection, name: str, family: str, n: int, seed: int) -> None:
+def _serve(pipe: Connection, make: Callable[[], Method], cases: Cases) -> None:
     """Child: answer the rows that are sent, until the parent closes the pipe."""
-    from clamp3d.study.stress.registry import FAMILIES
-
-    asked, cases = FAMILIES[family].question(name, n, seed)
+    asked = make()
+    for name in _IMPORTED:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
     pipe.send("ready")
     try:
         while True:
@@ -167,17 +172,8 @@ def _serve(pipe: Connection, name: str, family: str, n: int, seed: int) -> None:
         return
 
 
-def run_isolated(
-    name: str,
-    family: str,
-    cases: Cases,
-    seed: int,
-    *,
-    time_limit: float,
-    case_limit: float = 20.0,
-    serve: Callable[..., None] = _serve,
-) -> Answers:
-    """Put ``cases`` (all n of ``family`` and ``seed``) to a method in a child process that may die.
+def run_isolated(make: Callable[[], Method], cases: Cases, *, time_limit: float, case_limit: float = 20.0) -> Answers:
+    """Put ``cases`` to the method that ``make`` (which must pickle) returns, in a child process that may die.
 
     A group on which the child dies or is silent for ``case_limit`` seconds is asked again case by case; after
     some deaths the family is left. ``time_limit`` seconds are for the whole family.
@@ -193,7 +189,7 @@ def run_isolated(
         while queue and time.monotonic() < end and deaths < _MAX_DEATHS:
             if child is None:
                 pipe, other = context.Pipe()
-                child = context.Process(target=serve, args=(other, name, family, len(cases), seed), daemon=True)
+                child = context.Process(target=_serve, args=(other, make, cases), daemon=True)
                 child.start()
                 other.close()
                 if not pipe.poll(120.0):

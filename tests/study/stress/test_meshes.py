@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -57,12 +59,12 @@ def test_bare_libraries_are_found_out() -> None:
     numbers = MESHES["mesh: bad numbers"]
     cases = numbers.cases(6, 20)
     what = [cases[i].mesh.what for i in range(6)]
-    fcl = run_isolated("FCL alone", numbers.name, cases, 20, time_limit=60.0)
+    fcl = run_isolated(partial(method, "FCL alone"), cases, time_limit=60.0)
     assert fcl.crashed == [what.index("a corner far beyond")]
     assert fcl.failed[what.index("a corner negative")]
     assert not fcl.refused.any()
     assert numbers.cases(1, 57)[0].mesh.what == "a coordinate nan"
-    coacd = run_isolated("CoACD alone", numbers.name, numbers.cases(1, 57), 57, time_limit=60.0)
+    coacd = run_isolated(partial(method, "CoACD alone"), numbers.cases(1, 57), time_limit=60.0)
     assert coacd.crashed == [0]
     opened = _ask(MESHES["mesh: open"], "FCL alone", 60)
     assert opened.false_misses > 0

@@ -8,9 +8,8 @@ import pytest
 import clamp3d
 from clamp3d.geometry import motion as motion_module
 from clamp3d.study.stress.motions import methods
-from clamp3d.study.stress.motions.cases import motions
+from clamp3d.study.stress.motions.cases import motions, poses
 from clamp3d.study.stress.motions.families import MOTIONS
-from clamp3d.study.stress.motions.methods import poses
 from clamp3d.study.stress.motions.truth import TRUTH_ERROR, truth
 from clamp3d.study.stress.poses.cases import Cases, Shapes
 from clamp3d.study.stress.poses.truth import EXTENDED_WORKS

@@ -12,7 +12,6 @@ from clamp3d.errors import InputError
 from clamp3d.study.stress.outcome import Outcome, judge
 from clamp3d.study.stress.poses.cases import Cases, Shapes
 from clamp3d.study.stress.poses.families import POSES
-from clamp3d.study.stress.poses.methods import METHODS
 from clamp3d.study.stress.poses.truth import EXTENDED_ERROR, EXTENDED_WORKS, truth, truth_50_digits
 from clamp3d.study.stress.run import run_family, run_stress
 from clamp3d.study.stress.worker import Answers, Measured, run_isolated
@@ -111,16 +110,9 @@ class _Fatal:
 _BAD = POSES["tangency"].cases(6, 0).gap[[2, 4]]
 
 
-def _serve_fatal(pipe, name, family, n, seed):
-    METHODS["fatal"] = ("ends the interpreter", _Fatal)
-    from clamp3d.study.stress.worker import _serve
-
-    _serve(pipe, name, family, n, seed)
-
-
 def test_a_method_that_ends_the_interpreter_is_counted():
     cases = POSES["tangency"].cases(6, 0)
-    answers = run_isolated("fatal", "tangency", cases, 0, time_limit=60.0, case_limit=3.0, serve=_serve_fatal)
+    answers = run_isolated(_Fatal, cases, time_limit=60.0, case_limit=3.0)
     assert answers.crashed == [2]
     assert answers.late == [4]
     assert np.isfinite(answers.distance).sum() == 4

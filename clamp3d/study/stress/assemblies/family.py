@@ -20,7 +20,7 @@ from clamp3d.study.stress.assemblies.methods import METHODS, Assemblies, Rest, S
 from clamp3d.study.stress.assemblies.minima import Minimum, minima
 from clamp3d.study.stress.family import generator
 from clamp3d.study.stress.outcome import EXAMPLES, OWN, Example, Outcome
-from clamp3d.study.stress.worker import Answers, Method, run_here
+from clamp3d.study.stress.worker import Answers, run_here
 
 COUNTS = (
     "one clamp for 100 cases; a false hit is an answer that is no place of rest within the method's bound, a false "
@@ -63,10 +63,6 @@ class AssemblyFamily:
         """The n cases of a seed: always the same ones."""
         rng = generator(self.name, seed)
         return Assemblies([MAKERS[self.name][1](rng) for _ in range(n)], np.arange(n))
-
-    def question(self, name: str, n: int, seed: int) -> tuple[Method, Assemblies]:
-        """See `Family`."""
-        return method(name), self.cases(n, seed)
 
     def run(
         self, methods: Sequence[str], n: int, seed: int, time_limit: float, check: int

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from clamp3d.study.stress.meshes.cases import Fault, MeshCases, make_cases
 from clamp3d.study.stress.meshes.methods import METHODS, method
 from clamp3d.study.stress.outcome import TOUCHING, Outcome, judge
 from clamp3d.study.stress.poses.truth import EXTENDED_ERROR, truth, truth_50_digits
-from clamp3d.study.stress.worker import Answers, Method, run_isolated
+from clamp3d.study.stress.worker import Answers, run_isolated
 
 
 def _millimetre(rng: np.random.Generator) -> float:
@@ -39,10 +40,6 @@ class MeshFamily:
         """The n cases for a seed: always the same ones."""
         return make_cases(self.name, seed, n, self.fault, self.unit)
 
-    def question(self, name: str, n: int, seed: int) -> tuple[Method, MeshCases]:
-        """A method, and what it is asked."""
-        return method(name), self.cases(n, seed)
-
     def run(
         self, methods: Sequence[str], n: int, seed: int, time_limit: float, check: int
     ) -> tuple[list[Outcome], float]:
@@ -56,7 +53,7 @@ class MeshFamily:
             worst = max(worst, (difference - 2e-16 * abs(float(exact[i]))) / float(size[i]))
         outcomes = []
         for name in methods:
-            answers = run_isolated(name, self.name, cases, seed, time_limit=time_limit)
+            answers = run_isolated(partial(method, name), cases, time_limit=time_limit)
             outcomes.append(self.judge(name, cases, answers))
         return outcomes, worst
 

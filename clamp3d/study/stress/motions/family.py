@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from clamp3d.study.stress.family import generator
-from clamp3d.study.stress.motions.cases import Motions
-from clamp3d.study.stress.motions.methods import METHODS, CasMethod, method, poses
+from clamp3d.study.stress.motions.cases import Motions, poses
+from clamp3d.study.stress.motions.methods import METHODS, CasMethod, method
 from clamp3d.study.stress.motions.truth import TRUTH_ERROR, Least, truth, truth_50_digits
 from clamp3d.study.stress.outcome import OWN, Outcome, judge
 from clamp3d.study.stress.poses.cases import Cases
 from clamp3d.study.stress.poses.truth import truth_50_digits as pose_truth
-from clamp3d.study.stress.worker import Answers, Method, run_here, run_isolated
+from clamp3d.study.stress.worker import Answers, run_here, run_isolated
 
 Generator = Callable[[np.random.Generator, int], Motions]
 
@@ -48,10 +49,6 @@ class MotionFamily:
         """
         return self.make(generator(self.name, seed), n)
 
-    def question(self, name: str, n: int, seed: int) -> tuple[Method, Motions]:
-        """A method, and what it is asked."""
-        return method(name), self.cases(n, seed)
-
     def run(
         self, methods: Sequence[str], n: int, seed: int, time_limit: float, check: int
     ) -> tuple[list[Outcome], float]:
@@ -71,7 +68,7 @@ class MotionFamily:
             if name == OWN:
                 check_first_contacts(cases, exact, own, answers)
             else:
-                answers = run_isolated(name, self.name, cases, seed, time_limit=time_limit)
+                answers = run_isolated(partial(method, name), cases, time_limit=time_limit)
             outcomes.append(judge(self.name, name, size, exact.distance, answers, method(name).measures))
         return outcomes, worst
 

@@ -21,8 +21,7 @@ from clamp3d.contact.wedges import part_wedges, prism
 from clamp3d.errors import MissingLibraryError
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import SweptArc
-from clamp3d.study.stress.motions.cases import Motions
-from clamp3d.study.stress.motions.methods import poses
+from clamp3d.study.stress.motions.cases import Motions, poses
 from clamp3d.study.stress.poses.methods import block
 from clamp3d.study.stress.worker import Measured, Measures
 

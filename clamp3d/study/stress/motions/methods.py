@@ -12,7 +12,7 @@ from clamp3d.errors import InputError
 from clamp3d.geometry.distance import signed_distances
 from clamp3d.geometry.motion import first_contact, sweep
 from clamp3d.geometry.pose import Array
-from clamp3d.study.stress.motions.cases import Motions
+from clamp3d.study.stress.motions.cases import Motions, poses
 from clamp3d.study.stress.worker import Measured, Measures, Method
 
 
@@ -73,23 +73,6 @@ class SteppedMethod:
         for i in range(len(cases)):
             least[i] = signed_distances(groove, wire, poses(cases, i, self.instants), workers=1).min()
         return Measured(least, np.full(len(cases), np.nan), np.zeros(len(cases), bool))
-
-
-def poses(cases: Motions, i: int, instants: Array) -> Array:
-    """Poses (m, 4, 4) of case i at some instants, by the matrices of its turns."""
-    s = instants[:, None]
-    start = cases.start[i]
-    T = np.repeat(start[None], len(s), 0)
-    if cases.angle[i] == 0.0:
-        T[:, :3, 3] = start[:3, 3] + s * cases.travel[i]
-        return T
-    u = cases.axis[i] / math.sqrt(float(cases.axis[i] @ cases.axis[i]))
-    K = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
-    angle = (instants * cases.angle[i])[:, None, None]
-    less_one = np.sin(angle) * K + 2.0 * np.sin(0.5 * angle) ** 2 * (K @ K)
-    T[:, :3, :3] += less_one @ start[:3, :3]
-    T[:, :3, 3] += less_one @ (start[:3, 3] - cases.point[i]) + s * (cases.travel[i, 0] * u)
-    return T
 
 
 def _fcl() -> Method:

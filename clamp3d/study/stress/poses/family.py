@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from clamp3d.study.stress.outcome import OWN, Outcome, judge
 from clamp3d.study.stress.poses.cases import FEATURES, Cases, Shapes, random_shapes, shape_count, spread
 from clamp3d.study.stress.poses.methods import METHODS, method
 from clamp3d.study.stress.poses.truth import EXTENDED_ERROR, truth, truth_50_digits
-from clamp3d.study.stress.worker import Method, run_here, run_isolated
+from clamp3d.study.stress.worker import run_here, run_isolated
 
 Generator = Callable[[np.random.Generator, int], Cases]
 
@@ -46,10 +47,6 @@ class PoseFamily:
         """
         return self.make(generator(self.name, seed), n)
 
-    def question(self, name: str, n: int, seed: int) -> tuple[Method, Cases]:
-        """A method, and what it is asked."""
-        return method(name), self.cases(n, seed)
-
     def run(
         self, methods: Sequence[str], n: int, seed: int, time_limit: float, check: int
     ) -> tuple[list[Outcome], float]:
@@ -67,7 +64,7 @@ class PoseFamily:
             if name == OWN:
                 answers = run_here(method(name), cases)
             else:
-                answers = run_isolated(name, self.name, cases, seed, time_limit=time_limit)
+                answers = run_isolated(partial(method, name), cases, time_limit=time_limit)
             outcomes.append(judge(self.name, name, size, exact, answers, method(name).measures))
         return outcomes, worst
 
