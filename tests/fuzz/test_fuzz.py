@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import clamp3d
-from tests.fuzz import api_calls, runner
+from tests.fuzz import api_targets, runner
 
 COUNTS = {"clamp files": 150, "scene files": 150, "API calls": 2000, "mesh files": 150, "command lines": 150}
 SEED = 20_000
@@ -21,8 +21,8 @@ def test_every_input_ends_in_an_answer_or_a_clear_refusal(kind):
 
 
 def test_everything_public_is_called():
-    called = {name.split(".")[0] for name in api_calls.targets()}
-    assert set(clamp3d.__all__) <= called | api_calls.RESULTS
+    called = {name.split(".")[0] for name in api_targets.targets()}
+    assert set(clamp3d.__all__) <= called | api_targets.RESULTS
 
 
 def test_what_dies_or_hangs_is_counted_and_ends_nothing_else():

@@ -1,0 +1,479 @@
+"""Everything public that a user calls, with good arguments for it."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import clamp3d
+from clamp3d.assembly.run import assemble
+from clamp3d.clamp.dimensions import Wire
+from clamp3d.clamp.features import groove_pairs
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.contact.cas import Cas
+from clamp3d.contact.chords import Chords
+from clamp3d.contact.wedges import Wedges
+from clamp3d.geometry import pose as poses
+from clamp3d.scene import shapes
+from clamp3d.scene.motion import Motion
+from clamp3d.scene.scene import Allowed
+from tests.fuzz import garbage
+from tests.fuzz.api_values import Rng, pose, pose_batch, rigid
+
+Make = Callable[[Rng, Path], tuple[Callable[..., Any], dict[str, Any]]]
+
+RESULTS = {
+    "ArcContact",
+    "Cas",
+    "Equilibrium",
+    "ArcRelation",
+    "CheckResult",
+    "Clearance",
+    "CylinderFit",
+    "Feature",
+    "FitResult",
+    "GrooveFit",
+    "GroovePieces",
+    "GrooveRelation",
+    "HoleContact",
+    "HoleFit",
+    "HoleRelation",
+    "ImageMeasurement",
+    "ImageStudy",
+    "InputError",
+    "MotionContact",
+    "PairResult",
+    "PoseSweep",
+    "Relation3D",
+    "SignedDistance",
+    "SignedDistances",
+    "Verdict",
+}
+"""Public names that a user reads and does not call."""
+
+
+@functools.cache
+def _clamp() -> Any:
+    return load_clamp()
+
+
+@functools.cache
+def _run() -> Any:
+    return assemble(_clamp(), Cas())
+
+
+@functools.cache
+def _models() -> tuple[Any, ...]:
+    from clamp3d.clamp.meshes import mesh
+    from clamp3d.contact.mesh import Mesh
+
+    solids = clamp3d.parts(_clamp())
+    return (
+        Cas(),
+        Chords(0.2),
+        Wedges(solids, 0.2),
+        Mesh({name: mesh(solids[name], 0.5) for name in ("P1", "P2", "P3")}),
+    )
+
+
+@functools.cache
+def _scene() -> Any:
+    block = shapes.groove_block(clamp3d.SweptArc(7.0, 1.0, 50.0), 40.0, 20.0)
+    return clamp3d.Scene(clearance=0.5).add("block", block).add("wire", shapes.cylinder(6.5, 80.0))
+
+
+_TETRAHEDRON = ([[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+
+
+@functools.cache
+def _mesh() -> Any:
+    return clamp3d.make_mesh(*_TETRAHEDRON)
+
+
+def size(rng: Rng) -> float:
+    """A length that is good, mostly an ordinary one."""
+    return float(rng.uniform(1.0, 20.0)) if rng.integers(4) else 10.0 ** float(rng.uniform(-6, 6))
+
+
+def _groove(rng: Rng) -> Any:
+    return clamp3d.SweptArc(size(rng), float(rng.uniform(0.05, 3.1)), size(rng))
+
+
+def _wire(rng: Rng) -> Any:
+    return clamp3d.Cylinder(size(rng), size(rng))
+
+
+def _motion(rng: Rng) -> Any:
+    T = poses.translation(0.0, 40.0, 0.0) @ rigid(rng, 5.0)
+    way = rng.integers(3)
+    if way == 0:
+        return clamp3d.Translation(T, rng.normal(size=3) * 40.0)
+    if way == 1:
+        return clamp3d.Rotation(T, rng.normal(size=3), rng.normal(size=3), float(rng.uniform(-7, 7)))
+    return clamp3d.Screw(T, rng.normal(size=3), rng.normal(size=3), float(rng.uniform(-7, 7)), 30.0)
+
+
+def _marks(rng: Rng) -> Any:
+    return rng.uniform(0.0, 500.0, (2, 2))
+
+
+def _three(rng: Rng) -> Any:
+    return rng.normal(size=3).tolist()
+
+
+def _stl(folder: Path) -> Path:
+    import trimesh
+
+    trimesh.creation.box((10.0, 8.0, 6.0)).export(folder / "box.stl")
+    return folder / "box.stl"
+
+
+def _model_call(name: str) -> Make:
+    def make(rng: Rng, folder: Path) -> Any:
+        model = garbage.pick(rng, _models())
+        pair = garbage.pick(rng, list(groove_pairs(_clamp()).values())[:4])
+        first = _run().T_world(pair.a)
+        T = np.linalg.inv(first) @ _run().T_world(pair.b)
+        T[:3, :3], T[:3, 3] = np.round(T[:3, :3], 15), T[:3, 3] + rng.normal(size=3)
+        many = name == "distances"
+        value = pose_batch(rng) if many else pose(rng)
+        if rng.integers(2):
+            value = np.array([T] * 3) if many else T
+        if many and np.size(value) > 200:
+            value = value[:10]
+        return getattr(model, name), {"pair": pair, "T_a_b": value}
+
+    return make
+
+
+def _simple(function: Callable[..., Any], **makers: Callable[[Rng], Any]) -> Make:
+    return lambda rng, folder: (function, {name: maker(rng) for name, maker in makers.items()})
+
+
+def _angle(rng: Rng) -> float:
+    return float(rng.uniform(-4.0, 4.0))
+
+
+def _tolerance(rng: Rng) -> float:
+    return float(rng.choice([0.0, 1e-9, 1e-6, 1e-3]))
+
+
+def _fixed(value: Any) -> Callable[[Rng], Any]:
+    return lambda rng: value
+
+
+def _choice(*values: Any) -> Callable[[Rng], Any]:
+    return lambda rng: garbage.pick(rng, values)
+
+
+def _rectangle(rng: Rng) -> Any:
+    return clamp3d.Rectangle(*rng.normal(size=2), size(rng), size(rng), float(rng.normal(0, 0.3)))
+
+
+def targets() -> dict[str, tuple[float, Make]]:
+    """Everything callable with how often it is called, by name."""
+    c = clamp3d
+    vertices, faces = _TETRAHEDRON
+    return {
+        "SweptArc": (5, _simple(c.SweptArc, radius=size, half_angle=lambda r: float(r.uniform(0, 3.2)), length=size)),
+        "Cylinder": (3, _simple(c.Cylinder, radius=size, length=size)),
+        "signed_distance": (20, _simple(c.signed_distance, groove=_groove, cylinder=_wire, pose=pose)),
+        "signed_distances": (
+            20,
+            _simple(
+                c.signed_distances,
+                groove=_groove,
+                cylinder=_wire,
+                poses=pose_batch,
+                full=_choice(True, False),
+                workers=_choice(None, 1, 2),
+            ),
+        ),
+        "groove_pieces": (10, _simple(c.groove_pieces, groove=_groove, cylinder=_wire, pose=pose)),
+        "groove_relation": (
+            10,
+            _simple(c.groove_relation, groove=_groove, cylinder=_wire, pose=pose, tolerance=_tolerance),
+        ),
+        "relative_pose": (8, _simple(c.relative_pose, T_world_a=pose, T_world_b=pose)),
+        "Translation": (5, _simple(c.Translation, start=pose, vector=_three)),
+        "Rotation": (5, _simple(c.Rotation, start=pose, point=_three, axis=_three, angle=_angle)),
+        "Screw": (5, _simple(c.Screw, start=pose, point=_three, axis=_three, angle=_angle, travel=_angle)),
+        "Screw.pose": (3, lambda r, f: (_motion(r).pose, {"instant": float(r.random())})),
+        "first_contact": (
+            3,
+            _simple(
+                c.first_contact,
+                groove=_groove,
+                cylinder=_wire,
+                motion=_motion,
+                margin=_choice(0.0, 0.1, -0.1),
+                resolution=_choice(None, 1e-3),
+            ),
+        ),
+        "sweep": (2, _simple(c.sweep, groove=_groove, cylinder=_wire, motion=_motion, resolution=_choice(None, 1e-3))),
+        "arc_circle": (
+            8,
+            _simple(
+                c.arc_circle,
+                arc_radius=size,
+                half_angle=lambda r: float(r.uniform(0, 3.2)),
+                circle_radius=size,
+                x=_angle,
+                y=_angle,
+                tolerance=_tolerance,
+            ),
+        ),
+        "classify_arc_circle": (
+            4,
+            _simple(
+                c.classify_arc_circle,
+                gap=_angle,
+                arc_radius=size,
+                half_angle=_fixed(1.0),
+                circle_radius=size,
+                x=_angle,
+                y=_angle,
+                tolerance=_tolerance,
+            ),
+        ),
+        "Rectangle": (4, _simple(c.Rectangle, x=_angle, y=_angle, half_width=size, half_height=size, angle=_angle)),
+        "hole_bolt": (5, _simple(c.hole_bolt, hole=_rectangle, bolt=_rectangle, tolerance=_tolerance)),
+        "check_pose": (5, _simple(poses.check_pose, pose=pose)),
+        "rotation": (4, _simple(poses.rotation, axis=_three, angle=_angle)),
+        "translation": (3, _simple(poses.translation, x=_angle, y=_angle, z=_angle)),
+        "SectionPose": (3, _simple(poses.SectionPose, x=_angle, y=_angle, angle=_angle)),
+        "pieces": (8, _model_call("pieces")),
+        "distances": (8, _model_call("distances")),
+        "Chords": (1, _simple(Chords, unit_angle=lambda r: float(r.uniform(0, 3.2)))),
+        "Wedges": (
+            1,
+            _simple(Wedges, parts=_fixed(c.parts(_clamp())), unit_angle=lambda r: float(r.uniform(0.1, 3.2))),
+        ),
+        "make_mesh": (
+            8,
+            _simple(
+                c.make_mesh,
+                vertices=lambda r: (np.array(vertices) * size(r)).tolist(),
+                faces=_fixed(faces),
+                name=_fixed("m"),
+                scale=_choice(1.0, 1000.0),
+                float32=_choice(True, False),
+            ),
+        ),
+        "load_mesh": (1, lambda r, f: (c.load_mesh, {"path": _stl(f), "unit": garbage.pick(r, (None, "mm", "in"))})),
+        "fit_file": (1, lambda r, f: (c.fit_file, {"path": _stl(f), "unit": None, "progress": None})),
+        "fit_mesh": (2, _simple(c.fit_mesh, mesh=_fixed(_mesh()), progress=_fixed(None))),
+        "MeshShape": (3, _simple(c.MeshShape, mesh=_fixed(_mesh()), fit=_choice(*shapes.FITS), name=_fixed("m"))),
+        "Solid": (2, _simple(c.Solid, name=_fixed("s"), bodies=_fixed(shapes.box((1, 2, 3)).bodies), holes=_fixed(()))),
+        "shapes.Hole": (
+            2,
+            lambda r, f: (shapes.Hole, {"radius": 3.0, "at": (1.0, 2.0), "axis": garbage.pick(r, ("y", "z"))}),
+        ),
+        "shapes.cylinder": (3, _simple(shapes.cylinder, radius=size, length=size, bore=_fixed(0.0), name=_fixed("c"))),
+        "shapes.box": (
+            3,
+            _simple(shapes.box, size=lambda r: [size(r) for _ in range(3)], holes=_fixed(()), name=_fixed("b")),
+        ),
+        "shapes.groove_block": (
+            3,
+            _simple(
+                shapes.groove_block,
+                groove=_groove,
+                width=lambda r: 100.0 * size(r),
+                height=lambda r: 100.0 * size(r),
+                others=_fixed(()),
+                holes=_fixed(()),
+            ),
+        ),
+        "Scene": (
+            4,
+            _simple(
+                c.Scene,
+                parts=_fixed(_scene().parts),
+                contact=_tolerance,
+                clearance=_choice(0.0, 0.5),
+                allowed=_fixed(()),
+                motions=_fixed(()),
+                name=_fixed("s"),
+            ),
+        ),
+        "Scene.of": (
+            2,
+            lambda r, f: (
+                c.Scene.of,
+                {"parts": {"a": (shapes.box((1, 2, 3)), pose(r))}, "clearance": 0.0, "contact": 0.01},
+            ),
+        ),
+        "Scene.add": (
+            3,
+            lambda r, f: (_scene().add, {"name": "a", "shape": shapes.box((1, 2, 3)), "T_world": pose(r)}),
+        ),
+        "Allowed": (2, _simple(Allowed, a=_fixed("block"), b=_fixed("w*"), overlap=_choice(0.0, 0.1))),
+        "Scene.moved": (2, lambda r, f: (_scene().moved, {"poses": {"wire": pose(r)}})),
+        "Scene.load": (1, lambda r, f: (c.Scene.load, {"path": "no.toml"})),
+        "Motion.translate": (2, _simple(Motion.translate, parts=_fixed("wire"), by=_three, name=_fixed("m"))),
+        "Motion.screw": (
+            2,
+            _simple(
+                Motion.screw,
+                parts=_fixed("wire"),
+                axis=_three,
+                angle=_angle,
+                point=_three,
+                travel=_angle,
+                name=_fixed("m"),
+            ),
+        ),
+        "Motion.to_pose": (2, _simple(Motion.to_pose, parts=_fixed("wire"), to=pose, name=_fixed("m"))),
+        "check": (
+            2,
+            lambda r, f: (
+                c.check,
+                {
+                    "scene": _scene().moved({"wire": rigid(r)}),
+                    "pairs": garbage.pick(r, (None, [("wire", "block")])),
+                    "full": False,
+                    "progress": None,
+                    "workshop": None,
+                },
+            ),
+        ),
+        "sweep_poses": (
+            2,
+            lambda r, f: (
+                c.sweep_poses,
+                {"scene": _scene(), "part": "wire", "others": None, "poses": _few(pose_batch(r)), "workshop": None},
+            ),
+        ),
+        "load_clamp": (
+            3,
+            lambda r, f: (
+                load_clamp,
+                {
+                    "source": "reference",
+                    "line": garbage.pick(r, (None, "LJ-500", "20")),
+                    "jumper": garbage.pick(r, (None, "16")),
+                },
+            ),
+        ),
+        "assemble": (
+            1,
+            _simple(
+                assemble,
+                clamp=_fixed(_clamp()),
+                model=_choice(*_models()[:2]),
+                solver=_fixed("exact"),
+                step=_fixed(2.0),
+                tilt_step=_fixed(0.1),
+                open_by=_choice(0.0, 3.0),
+                open_tilt=_choice(0.0, 0.05),
+            ),
+        ),
+        "Wire": (1, lambda r, f: (Wire, {"diameter": float(r.uniform(5.0, 50.0))})),
+        "replace": (3, _changed_clamp),
+        "Section": (2, _simple(c.Section, clamp=_fixed(_clamp()), model=_choice(*_models()))),
+        "equilibria": (0.1, _simple(c.equilibria, section=_fixed(c.Section(_clamp(), Cas())))),
+        "parts": (2, _simple(c.parts, clamp=_fixed(_clamp()))),
+        "mesh": (2, _simple(c.mesh, part=_choice(*c.parts(_clamp()).values()), mesh_error=_choice(0.5, 0.1))),
+        "export": (
+            2,
+            lambda r, f: (
+                c.export,
+                {
+                    "clamp": _clamp(),
+                    "format": garbage.pick(r, ("stl", "obj", "ply", "glb", "3mf")),
+                    "output": f / "out",
+                    "poses": {n: _run().T_world(n) for n in _run().poses},
+                    "state": "final",
+                    "status": "clamped",
+                    "layout": None,
+                    "mesh_error": 0.5,
+                    "unit": None,
+                    "names": garbage.pick(r, (None, ["P1"])),
+                },
+            ),
+        ),
+        "WireClosing": (
+            1,
+            _simple(c.WireClosing, clamp=_fixed(_clamp()), wire=_choice("P6", "P7"), seat_tolerance=size),
+        ),
+        "WireClosing.close": (1, lambda r, f: (_closing().close, {"misplacement": 0.1 * r.normal(size=(3, 4))})),
+        "WireClosing.cloud": (1, lambda r, f: (_closing().cloud, {"ranges": {"offset": 1.0}, "count": 5, "seed": 0})),
+        "WireClosing.limits": (0.3, lambda r, f: (_closing().limits, {"freedom": "offset", "reach": 5.0})),
+        "measure_image": (
+            4,
+            _simple(
+                c.measure_image,
+                points=_marks,
+                reference=_marks,
+                reference_mm=size,
+                kind=_choice("height", "straight"),
+                marking_error=_choice(4.5, 0.0),
+                calliper_error=_fixed(0.02),
+            ),
+        ),
+        "image_study": (
+            0.3,
+            _simple(
+                c.image_study,
+                run=_fixed(_run()),
+                count=_fixed(5),
+                px_per_mm=_fixed(4.0),
+                seed=_fixed(1),
+                kind=_choice("height", "straight"),
+            ),
+        ),
+        "Viewer": (
+            0.2,
+            _simple(
+                c.Viewer,
+                clamp=_fixed(_clamp()),
+                model=_fixed(Cas()),
+                mesh_error=_fixed(1.0),
+                clearance=_fixed(5.0),
+                overlays=_fixed(None),
+                serve=_fixed(False),
+                url=_fixed(None),
+            ),
+        ),
+        "save_figure": (0.2, lambda r, f: (c.save_figure, {"figure": _figure(), "path": f / "x.svg", "dpi": 50})),
+        "section_figure": (0.2, _simple(c.section_figure, run=_fixed(_run()), waypoint=_choice(None, _run().path[1]))),
+        "states_figure": (0.1, _simple(c.states_figure, run=_fixed(_run()))),
+        "contacts_figure": (0.1, _simple(c.contacts_figure, run=_fixed(_run()))),
+        "contact_figure": (0.1, _simple(c.contact_figure, run=_fixed(_run()), contact=_fixed(_run().contacts[0]))),
+        "exploded_figure": (0.1, _simple(c.exploded_figure, clamp=_fixed(_clamp()))),
+        "steps_figure": (0.1, _simple(c.steps_figure, run=_fixed(_run()))),
+        "table2_figure": (0.05, _simple(c.table2_figure)),
+        "table3_figure": (0.05, _simple(c.table3_figure)),
+    }
+
+
+def _changed_clamp(rng: Rng, folder: Path) -> tuple[Callable[..., Any], dict[str, Any]]:
+    """One part of the clamp with its own dimensions, to be given again."""
+    name = garbage.pick(rng, ("line", "up_splint", "down_splint", "saddle", "bolt", "nut"))
+    part = getattr(_clamp(), name)
+    values = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+
+    def change(**values: Any) -> Any:
+        return dataclasses.replace(_clamp(), **{name: dataclasses.replace(part, **values)})
+
+    return change, values
+
+
+def _few(value: Any) -> Any:
+    return value[:5] if isinstance(value, np.ndarray) and value.ndim and len(value) > 5 else value
+
+
+@functools.cache
+def _closing() -> Any:
+    return clamp3d.WireClosing(_clamp())
+
+
+@functools.cache
+def _figure() -> Any:
+    return clamp3d.table2_figure()
