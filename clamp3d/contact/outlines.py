@@ -69,48 +69,12 @@ def _chord_error(part: Part, mesh_error: float) -> float:
 
 
 def _polygon_gap(p: Array, q: Array, error: float) -> OutlineGap:
-    crossing = _edges_cross(p, q)
-    for inner, outer in ((q, p), (p, q)):
-        if crossing or _contains(outer, inner[0]):
-            return OutlineGap(0.0, inner[0], inner[0], error, True, not crossing)
-    # Apart: the nearest points are a corner of one and a point of an edge of the other.
-    on_q, d_pq = _nearest(p, q)
-    on_p, d_qp = _nearest(q, p)
-    i, j = int(np.argmin(d_pq)), int(np.argmin(d_qp))
-    if d_pq[i] <= d_qp[j]:
-        return OutlineGap(float(d_pq[i]), p[i], on_q[i], error, d_pq[i] == 0.0, False)
-    return OutlineGap(float(d_qp[j]), on_p[j], q[j], error, d_qp[j] == 0.0, False)
+    import shapely
 
-
-def _edges_cross(p: Array, q: Array) -> bool:
-    """Whether an edge of one polygon runs through an edge of the other; a touch is no crossing."""
-    a, b = p[:, None], np.roll(p, -1, axis=0)[:, None]
-    c, d = q[None], np.roll(q, -1, axis=0)[None]
-    apart = (_side(a, b, c) * _side(a, b, d) < 0.0) & (_side(c, d, a) * _side(c, d, b) < 0.0)
-    return bool(apart.any())
-
-
-def _side(a: Array, b: Array, x: Array) -> Array:
-    """On which side of the line from a to b points lie: 1, 0, -1."""
-    ab, ax = b - a, x - a
-    return np.sign(ab[..., 0] * ax[..., 1] - ab[..., 1] * ax[..., 0])
-
-
-def _contains(polygon: Array, point: Array) -> bool:
-    """Whether a ray from the point to the right crosses the edges an odd number of times."""
-    a, b = polygon, np.roll(polygon, -1, axis=0)
-    a, b = np.where(a[:, 1:] <= b[:, 1:], a, b), np.where(a[:, 1:] <= b[:, 1:], b, a)  # upwards
-    level = (a[:, 1] <= point[1]) & (point[1] < b[:, 1])
-    return bool((_side(a, b, point)[level] > 0.0).sum() % 2)
-
-
-def _nearest(points: Array, polygon: Array) -> tuple[Array, Array]:
-    """Nearest point (n, 2) of the polygon's edges to each of ``points`` (n, 2), and how far it is (n,)."""
-    start = polygon[None]
-    along = np.roll(polygon, -1, axis=0)[None] - start
-    t = ((points[:, None] - start) * along).sum(-1) / (along**2).sum(-1)
-    foot = start + np.clip(t, 0.0, 1.0)[..., None] * along
-    distance = np.linalg.norm(points[:, None] - foot, axis=-1)
-    k = np.argmin(distance, axis=1)
-    rows = np.arange(len(points))
-    return foot[rows, k], distance[rows, k]
+    one, other = shapely.Polygon(p), shapely.Polygon(q)
+    if one.intersects(other):
+        contained = one.contains(other) or other.contains(one)
+        inside = np.array(one.intersection(other).representative_point().coords[0])
+        return OutlineGap(0.0, inside, inside, error, True, bool(contained))
+    a, b = shapely.get_coordinates(shapely.shortest_line(one, other))
+    return OutlineGap(float(np.hypot(*(b - a))), a, b, error, False, False)

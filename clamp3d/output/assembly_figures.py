@@ -12,6 +12,7 @@ from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.meshes import mesh
 from clamp3d.clamp.parts import parts
+from clamp3d.clamp.profile import MIN_MESH_ERROR
 from clamp3d.geometry.pose import Array, SectionPose
 from clamp3d.output.figures import near, same_scale, title
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
@@ -23,9 +24,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MESH_ERROR = 0.01  # mm, far below a pixel
-_MOVED = 2.0  # mm; smaller motions get no arrow
-_ARROW = 60.0  # mm; longest arrow
+# In parts of the up splint's width:
+_MESH_ERROR = 7e-5  # far below a pixel
+_MOVED = 0.015  # smaller motions get no arrow
+_ARROW = 0.45  # longest arrow
 
 
 def exploded_figure(clamp: Clamp) -> Figure:
@@ -102,7 +104,7 @@ def steps_figure(run: Run) -> Figure:
         waypoint = run.path[stop]
         poses = near(run.clamp, waypoint.poses)
         shown = [Solid(solids[n], p.T(), PART_COLOURS[n]) for n, p in poses.items()]
-        draw_solids(axes[0, i], shown, Camera(), pixels_per_mm=3.0)
+        draw_solids(axes[0, i], shown, Camera(), pixels=600)
         title(axes[0, i], f"{i + 1}   {step}", waypoint.label)
         draw_section(axes[1, i], run.clamp, poses)
         for name, pose in poses.items():
@@ -129,14 +131,15 @@ def _arrows(ax: Axes, clamp: Clamp, path: Sequence[Poses], shown: Iterable[PartN
         "shrinkB": 0,
     }
     drawn: list[Array] = []
+    least = _MOVED * clamp.up_splint.width
     for name in shown:
         way = np.array([poses[name].point(*part_anchor(clamp, name)) for poses in path])
         moved = way - way[-1]
         length = float(np.hypot(*np.diff(way, axis=0).T).sum())
-        if length < _MOVED or any(np.abs(moved - other).max() < _MOVED for other in drawn):
+        if length < least or any(np.abs(moved - other).max() < least for other in drawn):
             continue
         drawn.append(moved)
-        way = way[-1] + moved * min(1.0, _ARROW / length)
+        way = way[-1] + moved * min(1.0, _ARROW * clamp.up_splint.width / length)
         ax.plot(*way.T, color=DIMENSION, lw=1.8, zorder=50)
         ax.annotate("", way[-1], way[-2], arrowprops=style, zorder=50)
 
@@ -150,7 +153,8 @@ def _same_window(axes: list[Axes]) -> None:
 
 
 def _solids(clamp: Clamp) -> dict[PartName, trimesh.Trimesh]:
-    return {name: mesh(part, _MESH_ERROR) for name, part in parts(clamp).items()}
+    error = max(MIN_MESH_ERROR, _MESH_ERROR * clamp.up_splint.width)
+    return {name: mesh(part, error) for name, part in parts(clamp).items()}
 
 
 def _middle(clamp: Clamp, name: PartName) -> tuple[float, float]:

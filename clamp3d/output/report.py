@@ -12,6 +12,7 @@ from clamp3d.assembly.contacts import CONTACT, measure_pairs, seats
 from clamp3d.assembly.result import Contact, Run, Seat, Waypoint
 from clamp3d.assembly.section import Section
 from clamp3d.assembly.verdict import CLEARANCE
+from clamp3d.checks import number
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.contact.model import ContactModel
@@ -119,6 +120,7 @@ def report(run: Run, model: ContactModel, *, clearance: float = CLEARANCE, mesh_
     >>> len(found.rows), found.passed, found.findings
     (21, True, ())
     """
+    clearance = number("clearance", clearance)
     clamp, bodies = run.clamp, parts(run.clamp)
     rows = pair_rows(clamp, bodies, model, run.poses, clearance=clearance, mesh_error=mesh_error)
     section = Section(clamp, model)

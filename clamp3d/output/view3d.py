@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.axes import Axes
 
-_FEWEST, _MOST = 100, 4000
-"""Pixels along the longer side of a picture."""
 _CREASE = math.radians(25.0)
 """Edges sharper than this are drawn; below it the facets stand for one round surface."""
 
@@ -54,17 +52,13 @@ class Camera:
         return points @ self.axes().T
 
 
-def draw_solids(ax: Axes, solids: Sequence[Solid], camera: Camera, *, pixels_per_mm: float = 5.0) -> None:
-    """Draw the solids with shading and their visible edges; axes in mm of the picture plane.
-
-    Very small and very large solids get as many pixels as a picture needs, and no more.
-    """
+def draw_solids(ax: Axes, solids: Sequence[Solid], camera: Camera, *, pixels: int = 1100) -> None:
+    """Draw the solids with shading and their visible edges, ``pixels`` along the longer side; axes in mm."""
     from matplotlib.collections import LineCollection
 
     views = [camera.project(s.mesh.vertices @ s.T[:3, :3].T + s.T[:3, 3]) for s in solids]
     low, high = np.min([v.min(0) for v in views], axis=0)[:2], np.max([v.max(0) for v in views], axis=0)[:2]
-    extent = float((high - low).max())
-    pixels_per_mm = min(max(pixels_per_mm, _FEWEST / extent), _MOST / extent)
+    pixels_per_mm = pixels / float((high - low).max())
     low, high = low - 5.0 / pixels_per_mm, high + 5.0 / pixels_per_mm
     size = np.ceil((high - low) * pixels_per_mm).astype(int)
     high = low + size / pixels_per_mm
@@ -74,11 +68,11 @@ def draw_solids(ax: Axes, solids: Sequence[Solid], camera: Camera, *, pixels_per
     for solid, view in zip(solids, views, strict=True):
         normals = solid.mesh.face_normals @ solid.T[:3, :3].T @ camera.axes().T
         rgb = np.array([int(solid.colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
-        pixels = (view - [*low, 0.0]) * [pixels_per_mm, pixels_per_mm, 1.0]
+        points = (view - [*low, 0.0]) * [pixels_per_mm, pixels_per_mm, 1.0]
         for face, normal in zip(solid.mesh.faces, normals, strict=True):
             if normal[2] > 1e-9:
                 shade = 0.62 + 0.43 * max(0.0, float(normal @ light))
-                _fill(depth, image, pixels[face], np.append(np.minimum(rgb * shade, 1.0), 1.0))
+                _fill(depth, image, points[face], np.append(np.minimum(rgb * shade, 1.0), 1.0))
     ax.set_aspect("equal")
     ax.set_axis_off()
     ax.imshow(image, extent=(low[0], high[0], low[1], high[1]), origin="lower", interpolation="antialiased", zorder=1)

@@ -17,6 +17,7 @@ from clamp3d.assembly.contacts import CONTACT, measure_pairs
 from clamp3d.assembly.result import Contact, Run, Waypoint
 from clamp3d.assembly.section import Section
 from clamp3d.assembly.verdict import CLEARANCE, verdict
+from clamp3d.checks import number
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.meshes import mesh
 from clamp3d.clamp.parts import parts
@@ -68,7 +69,8 @@ class AssemblyScene:
         clearance: float = CLEARANCE,
         overlays: Mapping[str, Overlay] | None = None,
     ) -> None:
-        verdict(0.0, contact=CONTACT, clearance=clearance)  # a bad clearance is told now, not during the run
+        clearance = number("clearance", clearance)
+        verdict(0.0, contact=CONTACT, clearance=clearance)  # a bad one is told now, not during the run
         self.clamp = clamp
         self.mesh_error = mesh_error
         self.clearance = clearance
@@ -111,9 +113,9 @@ class AssemblyScene:
         # The state at rest is the animation's first, so that it does not matter which of the two a page reads first.
         for path, T in self._timeline.poses(0).items():
             self._transform(path, T)
-        for number in range(len(self._timeline.stops)):
+        for index in range(len(self._timeline.stops)):
             for group in ("contacts", "gaps"):
-                self._visible(f"{ROOT}/{group}/{self._timeline.name(number)}", number == 0)
+                self._visible(f"{ROOT}/{group}/{self._timeline.name(index)}", index == 0)
         self._colour_grooves(self._timeline.stops[0].verdicts)
         self._tell(run.status, run)
         self._send(self._timeline.animation(ROOT, self._made))

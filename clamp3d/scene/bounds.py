@@ -19,6 +19,10 @@ RESOLUTION = 1e-6
 """Bounds closer than this (mm) count as one number, and a gap that misses a threshold by less as meeting it."""
 
 
+FARTHEST = 1e9
+"""Largest coordinate in a scene, mm: beyond, rounding of positions comes near to `RESOLUTION`."""
+
+
 class Verdict(str, Enum):
     """How a pair of parts stands, from worst to best."""
 

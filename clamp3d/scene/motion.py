@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from clamp3d.checks import array, items, number, text
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array, check_pose, inverse, rotation, unit
-from clamp3d.geometry.shapes import LARGEST, place
+from clamp3d.scene.bounds import FARTHEST
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,14 +51,16 @@ class Motion:
         Raises InputError for an axis of length zero or numbers that are not finite.
         """
         u = unit(array("axis", axis, (3,)))
-        angle, travel = number("angle", angle), place("travel", travel)
+        angle, travel = number("angle", angle), number("travel", travel)
+        if not abs(travel) <= FARTHEST:
+            raise InputError(f"travel must be up to {FARTHEST:g} mm, got {travel:g}")
         return cls(text("name", name), _names(parts), u, _vector("point", point), angle, travel * u)
 
     @classmethod
     def to_pose(cls, parts: str | tuple[str, ...], to: ArrayLike, *, name: str = "to pose") -> Motion:
         """By one screw to the pose ``to`` (4, 4) of the first part; the others go along."""
         z = np.array([0.0, 0.0, 1.0])
-        return cls(text("name", name), _names(parts), z, np.zeros(3), 0.0, np.zeros(3), check_pose(to, "to"))
+        return cls(text("name", name), _names(parts), z, np.zeros(3), 0.0, np.zeros(3), scene_pose(to, "to"))
 
     def from_pose(self, T: Array) -> Motion:
         """The motion with ``to`` resolved for a first part that stands at ``T`` (4, 4)."""
@@ -106,6 +108,13 @@ def _names(parts: str | tuple[str, ...]) -> tuple[str, ...]:
 
 def _vector(name: str, value: ArrayLike) -> Array:
     v = array(name, value, (3,))
-    if not np.abs(v).max() <= LARGEST:
-        raise InputError(f"{name} must be three lengths up to {LARGEST:g} mm, got {v.tolist()}")
+    if not np.abs(v).max() <= FARTHEST:
+        raise InputError(f"{name} must be three lengths up to {FARTHEST:g} mm, got {v.tolist()}")
     return v
+
+
+def scene_pose(value: ArrayLike, name: str) -> Array:
+    """A rigid pose (4, 4) with an offset up to `FARTHEST`. Raises InputError for any other."""
+    T = check_pose(value, name)
+    _vector(f"offset of {name}", T[:3, 3])
+    return T

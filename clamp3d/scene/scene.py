@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import instance, items, number, shown, text
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array, check_pose
+from clamp3d.geometry.pose import Array
 from clamp3d.scene.bounds import Thresholds
-from clamp3d.scene.motion import Motion
+from clamp3d.scene.motion import Motion, scene_pose
 from clamp3d.scene.shapes import AnyShape, Shape, as_shape
 
 
@@ -165,4 +165,4 @@ def _part(name: str, shape: AnyShape, T_world: ArrayLike) -> ScenePart:
     text("name of a part", name)
     if not name or any(c in name for c in ":,*? \t\n"):
         raise InputError(f"part name must not be empty or hold a space or one of : , * ?, got {shown(name)}")
-    return ScenePart(name, as_shape(shape), check_pose(T_world, f"pose of {name}"))
+    return ScenePart(name, as_shape(shape), scene_pose(T_world, f"pose of {name}"))

@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import array, instance, items
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array, check_pose, inverse
+from clamp3d.geometry.pose import Array, inverse
 from clamp3d.scene.bounds import Bounds, Verdict
 from clamp3d.scene.broad import Boxes, box_gaps, near_pairs
 from clamp3d.scene.ladder import Answer, as_row, climb, verdict_of
 from clamp3d.scene.model import Ledger, Model, Progress, Workshop
-from clamp3d.scene.motion import Motion
+from clamp3d.scene.motion import Motion, scene_pose
 from clamp3d.scene.result import PairResult
 from clamp3d.scene.scene import Scene
 from clamp3d.scene.swept import swept_low
@@ -293,7 +293,7 @@ def sweep_poses(
         raise InputError(f"others must not hold {part!r} itself")
     T = array("poses", poses, (None, 4, 4), finite=False)
     for k, pose in enumerate(T):
-        check_pose(pose, f"poses[{k}]")
+        scene_pose(pose, f"poses[{k}]")
     n = len(T)
     low, high = np.full((n, len(rest)), np.inf), np.full((n, len(rest)), np.inf)
     verdict = np.full((n, len(rest)), Verdict.CLEAR.value, dtype=object)

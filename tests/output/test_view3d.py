@@ -17,8 +17,10 @@ FRONT = Camera(azimuth=0.0, elevation=0.0)  # looks along +Y: right is X, up is 
 
 
 def scene(solids: list[Solid], camera: Camera = FRONT) -> tuple[np.ndarray, list[np.ndarray]]:
+    """The picture, 10 pixels a mm, and the lines drawn on it."""
+    points = np.concatenate([camera.project(s.mesh.vertices + s.T[:3, 3]) for s in solids])
     ax = Figure().add_subplot()
-    draw_solids(ax, solids, camera, pixels_per_mm=10.0)
+    draw_solids(ax, solids, camera, pixels=round(10.0 * float(np.ptp(points[:, :2], axis=0).max())))
     return np.asarray(ax.images[0].get_array()), [c.get_segments() for c in ax.collections]
 
 
@@ -78,3 +80,12 @@ def test_foreshortening() -> None:
     """Seen from 30 degrees above, a height of 10 shows as 10 cos 30."""
     axes = Camera(azimuth=0.3, elevation=math.radians(30.0))
     assert axes.project(np.array([[0.0, 0.0, 10.0]]))[0, 1] == pytest.approx(10.0 * math.cos(math.radians(30.0)))
+
+
+def test_a_body_a_thousand_times_as_large_is_the_same_picture() -> None:
+    pictures = []
+    for k in (1.0, 1024.0):
+        ax = Figure().add_subplot()
+        draw_solids(ax, [block((4 * k, 2 * k, 3 * k), (0, 0, 0), "#FF0000")], Camera(), pixels=200)
+        pictures.append(np.asarray(ax.images[0].get_array()))
+    assert pictures[0] == pytest.approx(pictures[1], abs=1e-9)

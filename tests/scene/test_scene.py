@@ -26,6 +26,7 @@ from clamp3d.scene.bounds import Verdict
 from clamp3d.scene.broad import Boxes, box_gaps, near_pairs
 from clamp3d.scene.check import check, check_full
 from clamp3d.scene.model import Workshop
+from clamp3d.scene.motion import Motion
 from clamp3d.scene.scene import Scene
 from clamp3d.scene.sweep import sweep_poses
 
@@ -238,6 +239,8 @@ def test_pose_sweep_equals_single_checks():
         (lambda: shapes.groove_block(SweptArc(7, 1, 50), 10, 20), "width must be > 11.78"),
         (lambda: shapes.groove_block(SweptArc(7, 1, 50), 40, 2), "height must be > 3.2"),
         (lambda: Scene(clearance=0.001), "clearance must be 0 or > contact = 0.01 mm"),
+        (lambda: Motion.screw("pin", (0, 0, 1), 1.0, point=(0, 1e18, 0)), "point must be three lengths up to 1e"),
+        (lambda: Scene().add("a", shapes.box((1, 1, 1)), translation(0, 0, 2e9)), "offset of pose of a must be three"),
         (lambda: Scene().allow(("a", "b")), "allowed: unknown part 'a'; available: none"),
     ],
 )
