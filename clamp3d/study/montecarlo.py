@@ -263,8 +263,10 @@ def _on_cluster(tasks: list[tuple[Spec, int, int]], scheduler: str) -> Iterator[
         raise MissingLibraryError("a Dask cluster needs dask.distributed: pip install 'clamp3d[cluster]'") from None
     if not scheduler.strip():  # Dask would start a cluster of its own
         raise InputError("scheduler must be an address like tcp://host:8786, got ''")
+    # A client that finds no scheduler waits 20 s for it when it is thrown away, and then prints a traceback.
+    kind = type("Client", (distributed.Client,), {"__del__": lambda self: None})
     try:
-        client = distributed.Client(scheduler, timeout="10s", set_as_default=False)
+        client = kind(scheduler, timeout="10s", set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"no Dask scheduler at {scheduler!r}: {reason}") from None

@@ -1,4 +1,6 @@
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -114,3 +116,11 @@ def test_what_does_not_clamp_is_counted_by_reason():
 def test_bad_settings(settings, match):
     with pytest.raises(InputError, match=match):
         monte_carlo(load_clamp(), **settings)
+
+
+def test_an_address_without_a_scheduler_is_one_line():
+    pytest.importorskip("distributed")
+    line = [sys.executable, "-m", "clamp3d", "tolerance", "--n", "2", "--scheduler", "x"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "clamp3d: error: no Dask scheduler at 'x': missing port number in address 'x'\n"
