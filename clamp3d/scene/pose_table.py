@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, unit
 
 FROZEN = ConfigDict(extra="forbid")
 """Of every table: a key that is not known is an error."""
@@ -69,10 +69,11 @@ class Pose:
         if self.rpy_deg is not None:
             T[:3, :3] = _quarter_turns(self.rpy_deg)
         elif self.axis is not None and self.angle_deg is not None:
-            axis = np.array(self.axis) / np.linalg.norm(self.axis)
+            axis = unit(np.array(self.axis))
             T[:3, :3] = _tidy(Rotation.from_rotvec(math.radians(self.angle_deg) * axis).as_matrix())
         elif self.quaternion is not None:
-            T[:3, :3] = _tidy(Rotation.from_quat(self.quaternion).as_matrix())
+            q = np.array(self.quaternion) / max(map(abs, self.quaternion))  # its square neither overflows nor vanishes
+            T[:3, :3] = _tidy(Rotation.from_quat(q).as_matrix())
         elif self.matrix is not None:
             rows = np.array(self.matrix[:3])
             u, _, vt = np.linalg.svd(rows[:, :3])

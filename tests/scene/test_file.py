@@ -187,3 +187,10 @@ def test_open_and_unreadable_meshes(tmp_path):
             parse_scene(f'[parts.m]\nshape = "mesh"\nfile = "{name}.stl"\nunit = "mm"\n', folder=tmp_path)
     with pytest.raises(InputError, match="cannot be read"):
         Scene.load(Path(tmp_path / "missing.toml"))
+
+
+@pytest.mark.parametrize("size", [1e-300, 1.0, 1e308])
+@pytest.mark.parametrize("turn", ["axis = [0, 0, {}], angle_deg = 90", "quaternion = [0, 0, {0}, {0}]"])
+def test_a_turn_does_not_depend_on_how_long_its_axis_is(turn, size):
+    scene = parse_scene(f"[parts.a]\nshape = 'box'\nsize = [1, 2, 3]\npose = {{ {turn.format(size)} }}")
+    assert scene.parts[0].T_world[:3, :3] == pytest.approx(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]]), abs=1e-15)
