@@ -22,10 +22,10 @@ from collections.abc import Callable
 import fcl
 import numpy as np
 
-from clamp3d.geometry.distance import signed_distance, signed_distances
-from clamp3d.geometry.pieces import groove_pieces
-from clamp3d.geometry.pose import rotation
-from clamp3d.geometry.shapes import Cylinder, SweptArc
+from clamp3d.core.distance import signed_distance, signed_distances
+from clamp3d.core.pieces import groove_pieces
+from clamp3d.core.pose import rotation
+from clamp3d.core.primitives import Cylinder, SweptArc
 
 GROOVE, WIRE = SweptArc(12.0, np.radians(70.0), 50.0), Cylinder(10.5, 80.0)
 BACK, SIDE = 30.0, 40.0  # the block that peers need in place of unbounded material

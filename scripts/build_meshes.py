@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.assembly.run import assemble
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.contact.cas import Cas
 from clamp3d.output.export import export
 
 MESHES = Path(__file__).resolve().parent.parent / "meshes"

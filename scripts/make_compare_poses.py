@@ -1,7 +1,7 @@
 """Make ``clamp3d/study/data/compare_poses.csv``: poses of a wire in a groove with their distances to 25 digits.
 
 ``python scripts/make_compare_poses.py`` (minutes). The values come from the search of
-``tests/geometry/data/make_oracle.py``; the kernel only helps to find poses near contact.
+``tests/core/data/make_oracle.py``; the kernel only helps to find poses near contact.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from clamp3d.geometry.distance import signed_distance
-from clamp3d.study.compare.scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, pose
+from clamp3d.bench.compare.scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, pose
+from clamp3d.core.distance import signed_distance
 
 ROOT = Path(__file__).resolve().parent.parent
 FIELDS = ("lean", "group", "x", "y", "z", "a", "b", "c", "distance")
 
 
 def load_oracle():
-    spec = importlib.util.spec_from_file_location("make_oracle", ROOT / "tests/geometry/data/make_oracle.py")
+    spec = importlib.util.spec_from_file_location("make_oracle", ROOT / "tests/core/data/make_oracle.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

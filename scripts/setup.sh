@@ -1,17 +1,17 @@
 # Sourced by the scripts here: makes .venv with this package and the extras named, once for each pyproject.toml.
-# Needs Python 3.10 or later with venv and pip. Usage: . scripts/setup.sh; setup [EXTRA,...]
+# Needs Python 3.11 or later with venv and pip. Usage: . scripts/setup.sh; setup [EXTRA,...]
 
 setup() {
     local extras="${1:-}" python="" candidate stamp wanted
-    for candidate in "${PYTHON:-}" python3 python3.13 python3.12 python3.11 python3.10 python; do
+    for candidate in "${PYTHON:-}" python3 python3.14 python3.13 python3.12 python3.11 python; do
         if [ -n "$candidate" ] && command -v "$candidate" >/dev/null 2>&1 &&
-            "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null; then
+            "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
             python="$candidate"
             break
         fi
     done
     if [ -z "$python" ]; then
-        echo "setup: Python 3.10 or later is needed; set PYTHON=/path/to/python3" >&2
+        echo "setup: Python 3.11 or later is needed; set PYTHON=/path/to/python3" >&2
         return 2
     fi
     wanted="$extras $("$python" --version) $(cksum <pyproject.toml)"

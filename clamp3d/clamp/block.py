@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.clamp.features import GroovePair
-from clamp3d.clamp.parts import Extrusion, Part
-from clamp3d.clamp.profile import Arc, Profile
+from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.pose import Array, rotation
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.profile import Arc, Profile
+from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array, rotation
-from clamp3d.geometry.shapes import Cylinder, SweptArc
 
 
-def grooved_block(groove: SweptArc, *, width: float, depth: float) -> Part:
+def grooved_block(groove: SweptArc, *, width: float, depth: float) -> Solid:
     """Block ``width`` x ``depth`` mm in section, as long as its groove, whose mouth is in the middle of the top face.
 
     The arc centre is the part's origin, the mouth is up (+Z), the groove runs along Y. Raises InputError where the
@@ -33,7 +34,7 @@ def grooved_block(groove: SweptArc, *, width: float, depth: float) -> Part:
         (-w, face), Arc((0.0, 0.0), R, math.pi / 2 + half, math.pi / 2 - half), (w, face), (w, bottom), (-w, bottom)
     )
     body = Extrusion(outline, "Y", -groove.length / 2, groove.length / 2)
-    return Part("P1", "Grooved block", (body,), (), body.volume)
+    return Solid("P1", (body,), title="Grooved block", volume=body.volume)
 
 
 def block_pair(groove: SweptArc, wire: Cylinder) -> GroovePair:

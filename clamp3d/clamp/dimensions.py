@@ -7,14 +7,15 @@ Section frame of the paper: x right, y down, so "depth" and "below" are along +y
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Literal, TypeAlias, cast
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from clamp3d.clamp.conductors import conductor
-from clamp3d.clamp.validation import one_line_errors
+from clamp3d.core.validation import one_line_errors
 from clamp3d.errors import InputError
 
 SMALLEST = 1e-6
@@ -29,7 +30,9 @@ def _not_tiny(value: float) -> float:
 
 Length = Annotated[float, Field(gt=0.0, lt=1e5, allow_inf_nan=False, strict=True), AfterValidator(_not_tiny)]
 Offset = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False, strict=True)]
-PartName = Literal["P1", "P2", "P3", "P4", "P5", "P6", "P7"]
+ClampPart = Literal["P1", "P2", "P3", "P4", "P5", "P6", "P7"]
+"""Names of a clamp's parts, as files may give them."""
+PartName: TypeAlias = str
 ConnectionType = Literal[0, 1, 2, 3]
 
 PARTS: tuple[PartName, ...] = ("P1", "P2", "P3", "P4", "P5", "P6", "P7")
@@ -221,7 +224,7 @@ class Clamp:
     saddle: Saddle
     bolt: Bolt
     nut: Nut
-    connections: dict[PartName, dict[PartName, ConnectionType]]
+    connections: dict[ClampPart, dict[ClampPart, ConnectionType]]
 
     @property
     def wire_length(self) -> float:
@@ -235,8 +238,9 @@ class Clamp:
 
     def connection(self, a: PartName, b: PartName) -> ConnectionType:
         """Entry c_ij of the connection matrix (Eq. 1 and Table 1 of the paper), symmetric."""
+        rows = cast(Mapping[str, Mapping[str, ConnectionType]], self.connections)
         first, second = sorted((a, b))
-        return self.connections.get(first, {}).get(second, 0)
+        return rows.get(first, {}).get(second, 0)
 
     @model_validator(mode="after")
     def _parts_fit_each_other(self) -> Clamp:

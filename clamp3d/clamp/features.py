@@ -6,37 +6,17 @@ Part frames: origin as published (section), middle of the part along the wires; 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from clamp3d.clamp.dimensions import Clamp, GrooveDimensions, PartName, Wire
-from clamp3d.geometry.pose import Array, inverse
-from clamp3d.geometry.shapes import Cylinder, SweptArc
+from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.pose import Array
+from clamp3d.core.primitives import Cylinder, SweptArc
 
 # Columns: the feature's x, y, z in part axes. A groove's mouth is +y and its axis z; a cylinder's axis is z.
 _MOUTH_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 _MOUTH_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-
-
-@dataclass(frozen=True, slots=True)
-class GroovePair:
-    """A groove and the cylinder that is meant to lie in it (type 3 of the connection matrix).
-
-    ``T_a_groove`` and ``T_b_cylinder`` (4, 4) place them in the frames of their parts ``a`` and ``b``;
-    ``T_groove_a`` is the first one's inverse.
-    """
-
-    a: PartName
-    b: PartName
-    groove: SweptArc
-    T_a_groove: Array
-    cylinder: Cylinder
-    T_b_cylinder: Array
-    T_groove_a: Array = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "T_groove_a", inverse(self.T_a_groove))
 
 
 def groove_pairs(clamp: Clamp) -> dict[tuple[PartName, PartName], GroovePair]:
@@ -79,3 +59,8 @@ def _pose(R: Array, u: float, v: float) -> Array:
     T[:3, :3] = R
     T[:3, 3] = (u, 0.0, -v)
     return T
+
+
+def wire_pairs(clamp: Clamp) -> list[GroovePair]:
+    """The four pairs of a splint's groove and a wire."""
+    return [pair for pair in groove_pairs(clamp).values() if pair.b in ("P6", "P7")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import sys
+import tomllib
 import typing
 from dataclasses import fields
 from importlib import resources
@@ -12,13 +12,8 @@ from pathlib import Path
 from clamp3d import checks
 from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import SMALLEST, Clamp, Wire
-from clamp3d.clamp.validation import validate
+from clamp3d.core.validation import validate
 from clamp3d.errors import InputError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 
 def builtin_clamps() -> list[str]:

@@ -7,11 +7,6 @@ given in the paper's section coordinates u right, v down, so X = u and Z = -v.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
-
-import numpy as np
-from numpy.typing import ArrayLike
 
 from clamp3d.checks import instance, shown
 from clamp3d.clamp.dimensions import (
@@ -27,76 +22,13 @@ from clamp3d.clamp.dimensions import (
     UpSplint,
     Wire,
 )
-from clamp3d.clamp.profile import Arc, Profile
+from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.profile import Arc, Profile
+from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array
-
-# Columns: directions of the outline's a, b and of the drawing axis in part axes; both are right-handed.
-_FRAMES = {
-    "Y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
-    "Z": np.eye(3),
-}
 
 
-@dataclass(frozen=True, slots=True)
-class Extrusion:
-    """An outline drawn along part axis Y or Z from ``start`` to ``end`` mm.
-
-    Along Y the outline's coordinates are (u, v), u = X and v = -Z; along Z they are (X, Y).
-    """
-
-    profile: Profile
-    axis: Literal["Y", "Z"]
-    start: float
-    end: float
-
-    @property
-    def frame(self) -> Array:
-        """Rotation (3, 3): outline coordinates (a, b, along) to part axes (X, Y, Z)."""
-        return _FRAMES[self.axis].copy()
-
-    @property
-    def length(self) -> float:
-        """Length along the axis in mm."""
-        return self.end - self.start
-
-    @property
-    def volume(self) -> float:
-        """Area times length in mm^3."""
-        return self.profile.area * self.length
-
-    def support(self, direction: ArrayLike) -> float:
-        """Largest dot product of ``direction`` (3,) in part axes with a point of the body, mm; exact on arcs."""
-        da, db, along = (float(d) for d in np.asarray(direction) @ _FRAMES[self.axis])
-        return self.profile.support(da, db) + max(along * self.start, along * self.end)
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """One part: the union of ``bodies`` (they touch at most) less the ``holes`` (each goes right through).
-
-    ``volume`` in mm^3 is closed form; ``not_modelled`` says what the real part has and this one has not.
-    """
-
-    name: PartName
-    title: str
-    bodies: tuple[Extrusion, ...]
-    holes: tuple[Extrusion, ...]
-    volume: float
-    not_modelled: str = ""
-
-    @property
-    def bounds(self) -> Array:
-        """Lower and upper corner (2, 3) of the bounding box in part axes, mm; arcs taken as arcs."""
-        return self.bounds_at(np.eye(4))
-
-    def bounds_at(self, T: Array) -> Array:
-        """Lower and upper corner (2, 3) of the bounding box along the target's axes, placed by ``T`` (4, 4)."""
-        reach = [[max(body.support(s * axis) for body in self.bodies) for axis in T[:3, :3]] for s in (-1.0, 1.0)]
-        return np.array([T[:3, 3] - reach[0], T[:3, 3] + reach[1]]) + 0.0
-
-
-def parts(clamp: Clamp) -> dict[PartName, Part]:
+def parts(clamp: Clamp) -> dict[PartName, Solid]:
     """All seven parts of a clamp, in the order P1 to P7. Raises InputError if a hole is longer than its part.
 
     >>> from clamp3d.clamp.loader import load_clamp
@@ -122,7 +54,7 @@ def check_part_name(name: str) -> PartName:
     return name
 
 
-def _up_splint(d: UpSplint) -> Part:
+def _up_splint(d: UpSplint) -> Solid:
     _check_hole("up_splint.hole_diameter", d.hole_diameter, d.length)
     middle = d.width / 2
     outline = Profile.of(
@@ -135,10 +67,10 @@ def _up_splint(d: UpSplint) -> Part:
     )
     body = _along_wires(outline, d.length)
     hole = Extrusion(Profile.circle(d.hole_diameter / 2, (middle, 0.0)), "Z", -d.thickness, 0.0)
-    return Part("P1", TITLES["P1"], (body,), (hole,), body.volume - hole.volume)
+    return Solid("P1", (body,), (hole,), title=TITLES["P1"], volume=body.volume - hole.volume)
 
 
-def _down_splint(d: DownSplint) -> Part:
+def _down_splint(d: DownSplint) -> Solid:
     _check_hole("down_splint.slot_length", d.slot_length, d.length)
     half = math.radians(d.back_half_angle_deg)
     right = d.width / 2
@@ -158,10 +90,10 @@ def _down_splint(d: DownSplint) -> Part:
     reach = min(s, back)
     under_back = reach * math.sqrt(d.back_radius**2 - reach**2) + d.back_radius**2 * math.asin(reach / d.back_radius)
     section = under_back + 2.0 * (s - reach) * d.underside_depth - 2.0 * s * d.face_depth
-    return Part("P2", TITLES["P2"], (body,), (slot,), body.volume - section * d.slot_length)
+    return Solid("P2", (body,), (slot,), title=TITLES["P2"], volume=body.volume - section * d.slot_length)
 
 
-def _saddle(d: Saddle) -> Part:
+def _saddle(d: Saddle) -> Solid:
     _check_hole("saddle.hole_diameter", d.hole_diameter, d.length)
     bottom = d.radius + d.apex_thickness
     edge = math.sqrt(d.radius**2 - (d.width / 2) ** 2)
@@ -176,24 +108,31 @@ def _saddle(d: Saddle) -> Part:
     a = d.hole_diameter / 2
     hole = Extrusion(Profile.circle(a), "Z", -bottom, -edge)
     drilled = math.pi * a * a * bottom - _disk_under_arch(a, d.radius)
-    return Part("P3", TITLES["P3"], (body,), (hole,), body.volume - drilled)
+    return Solid("P3", (body,), (hole,), title=TITLES["P3"], volume=body.volume - drilled)
 
 
-def _bolt(d: Bolt) -> Part:
+def _bolt(d: Bolt) -> Solid:
     shank = Extrusion(Profile.circle(d.diameter / 2), "Z", -d.shank_length, 0.0)
     head = Extrusion(Profile.hexagon(d.head_across_flats), "Z", -d.shank_length - d.head_height, -d.shank_length)
-    return Part("P4", TITLES["P4"], (shank, head), (), shank.volume + head.volume, "thread")
+    return Solid("P4", (shank, head), title=TITLES["P4"], volume=shank.volume + head.volume, not_modelled="thread")
 
 
-def _nut(d: Nut, bolt_diameter: float) -> Part:
+def _nut(d: Nut, bolt_diameter: float) -> Solid:
     body = Extrusion(Profile.hexagon(d.across_flats), "Z", -d.height, 0.0)
     hole = Extrusion(Profile.circle(bolt_diameter / 2), "Z", -d.height, 0.0)
-    return Part("P5", TITLES["P5"], (body,), (hole,), body.volume - hole.volume, "thread; washers are part of the nut")
+    return Solid(
+        "P5",
+        (body,),
+        (hole,),
+        title=TITLES["P5"],
+        volume=body.volume - hole.volume,
+        not_modelled="thread; washers are part of the nut",
+    )
 
 
-def _wire(name: PartName, wire: Wire, length: float) -> Part:
+def _wire(name: PartName, wire: Wire, length: float) -> Solid:
     body = _along_wires(Profile.circle(wire.radius), length)
-    return Part(name, TITLES[name], (body,), (), body.volume, "strands")
+    return Solid(name, (body,), title=TITLES[name], volume=body.volume, not_modelled="strands")
 
 
 def _groove(d: GrooveDimensions, centre: float, centre_to_face: float, *, up: bool) -> Arc:

@@ -14,7 +14,7 @@ import click
 from clamp3d.cli.options import OUTPUT
 
 if TYPE_CHECKING:
-    from clamp3d.scene.model import Progress
+    from clamp3d.collide.model import Progress
 
 
 @click.command("check")
@@ -38,12 +38,12 @@ def command(
 
     Each pair is measured only as finely as its verdict needs. Exit code 1 if parts clash.
     """
+    from clamp3d.collide.check import check, check_full
     from clamp3d.output.files import write_json, write_text
     from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
-    from clamp3d.scene.check import check, check_full
-    from clamp3d.scene.scene import Scene
+    from clamp3d.scenefile.file import load_scene
 
-    loaded = Scene.load(scene)
+    loaded = load_scene(scene)
     if clearance is not None:
         loaded = replace(loaded, clearance=clearance)
     asked = _pairs(pairs) if pairs is not None else None

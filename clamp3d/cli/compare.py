@@ -23,10 +23,10 @@ def command(json_file: Path | None, plot_file: Path | None, peers: bool, quiet: 
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from clamp3d.output.compare_chart import check_format, save_comparison
-    from clamp3d.output.compare_report import comparison_to_dict, comparison_to_text
+    from clamp3d.bench.compare.chart import check_format, save_comparison
+    from clamp3d.bench.compare.report import comparison_to_dict, comparison_to_text
+    from clamp3d.bench.compare.run import compare
     from clamp3d.output.files import check_writable, write_json
-    from clamp3d.study.compare.run import compare
 
     if plot_file is not None:
         check_format(plot_file)

@@ -59,9 +59,9 @@ def command(
         state = "final"
     poses = status = None
     if state is not None:
-        from clamp3d.assembly.run import assemble
-        from clamp3d.assembly.states import state as find_state
-        from clamp3d.contact.cas import Cas
+        from clamp3d.baselines.cas import Cas
+        from clamp3d.clamp.assemble import assemble
+        from clamp3d.clamp.states import state as find_state
 
         run = assemble(loaded, Cas())
         waypoint = find_state(run, state)

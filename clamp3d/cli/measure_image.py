@@ -54,9 +54,9 @@ def command(
 
     import numpy as np
 
+    from clamp3d.bench.image import MARKING_ERROR, Kind, measure_image
+    from clamp3d.bench.picture import check_marks, load_image, snap_marks
     from clamp3d.output.files import write_json
-    from clamp3d.study.image import MARKING_ERROR, Kind, measure_image
-    from clamp3d.study.picture import check_marks, load_image, snap_marks
 
     marks = np.array(_marks("--points", points) + _marks("--reference", reference))
     shown = load_image(image)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
+    from clamp3d.baselines.model import ContactModel
     from clamp3d.clamp.dimensions import Clamp
-    from clamp3d.contact.model import ContactModel
 
 METHODS = ("cas", "chords", "wedges", "hulls", "mesh")
 
@@ -156,31 +156,31 @@ def contact_model(
         if value is not None and method not in methods:
             raise click.UsageError(f"{name} goes with --method {' or '.join(methods)}, not {method}")
     if method == "cas":
-        from clamp3d.contact.cas import Cas
+        from clamp3d.baselines.cas import Cas
 
         return Cas()
     unit_angle = math.radians(5.0 if unit_angle_deg is None else unit_angle_deg)
     if method == "chords":
-        from clamp3d.contact.chords import Chords
+        from clamp3d.baselines.chords import Chords
 
         return Chords(unit_angle)
     from clamp3d.clamp.parts import parts
 
     solids = parts(clamp)
     if method == "wedges":
-        from clamp3d.contact.wedges import Wedges
+        from clamp3d.baselines.wedges import Wedges
 
         return Wedges(solids, unit_angle)
-    from clamp3d.clamp.meshes import mesh
-    from clamp3d.contact.polytopes import PerPart
+    from clamp3d.baselines.polytopes import PerPart
+    from clamp3d.core.meshing import mesh
 
     meshes = PerPart([*solids], lambda name: mesh(solids[name], 0.05 if mesh_error is None else mesh_error))
     if method == "mesh":
-        from clamp3d.contact.mesh import Mesh
+        from clamp3d.baselines.mesh import Mesh
 
         return Mesh(meshes)
-    from clamp3d.contact.decomposition import DecompositionParameters
-    from clamp3d.contact.hulls import Hulls
+    from clamp3d.baselines.decomposition import DecompositionParameters
+    from clamp3d.baselines.hulls import Hulls
 
     parameters = DecompositionParameters() if threshold is None else DecompositionParameters(threshold=threshold)
     return Hulls(meshes, parameters, progress=False if quiet else None)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.status import Status
 
-    from clamp3d.assembly.result import Waypoint
+    from clamp3d.clamp.result import Waypoint
 
 
 class Narrator:

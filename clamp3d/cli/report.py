@@ -48,11 +48,11 @@ def command(
     Prints the paths of the files. Exit code 1 if the clamp does not close on both wires, or parts meet that should not.
     """
     settings = solver_settings(method, solver, step, tilt_step_deg)
-    from clamp3d.assembly.contacts import CONTACT
-    from clamp3d.assembly.run import assemble
-    from clamp3d.assembly.verdict import verdict
+    from clamp3d.clamp.assemble import assemble
+    from clamp3d.clamp.contacts import CONTACT
     from clamp3d.clamp.loader import load_clamp
-    from clamp3d.clamp.profile import check_mesh_error
+    from clamp3d.clamp.verdict import verdict
+    from clamp3d.core.profile import check_mesh_error
     from clamp3d.output.files import check_folder
     from clamp3d.output.report import report
     from clamp3d.output.report_page import write_report

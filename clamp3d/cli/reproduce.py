@@ -14,9 +14,9 @@ from clamp3d.cli.options import OUTPUT
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
 def command(json_file: Path | None, quiet: bool) -> None:
     """Print Tables 1-5 of the paper beside this program's values, with the difference of each."""
+    from clamp3d.bench.reproduce import reproduce
+    from clamp3d.bench.reproduce_report import reproduction_to_dict, reproduction_to_text
     from clamp3d.output.files import write_json
-    from clamp3d.output.reproduce_report import reproduction_to_dict, reproduction_to_text
-    from clamp3d.study.reproduce import reproduce
 
     found = reproduce(lambda message: None if quiet else click.echo(message, err=True))
     if json_file is not None:

@@ -19,7 +19,7 @@ from clamp3d.cli.options import (
 from clamp3d.cli.progress import narrator
 
 if TYPE_CHECKING:
-    from clamp3d.assembly.result import Run
+    from clamp3d.clamp.result import Run
 
 
 @click.command("run")
@@ -60,7 +60,7 @@ def command(
     if equilibria and settings["solver"] != "exact":
         raise click.UsageError(f"--equilibria goes with --solver exact, not {settings['solver']}")
     settings["others"] = equilibria if equilibria is not None else method == "cas" and settings["solver"] == "exact"
-    from clamp3d.assembly.run import assemble
+    from clamp3d.clamp.assemble import assemble
     from clamp3d.clamp.loader import load_clamp
     from clamp3d.output.files import write_json
     from clamp3d.output.run_report import run_to_dict, run_to_text

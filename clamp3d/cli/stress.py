@@ -57,10 +57,10 @@ def command(
 
     Exit code 1 if the project's own method, cas, has a wrong verdict or an error beyond its bound.
     """
+    from clamp3d.bench.stress.registry import FAMILIES, METHODS
+    from clamp3d.bench.stress.report import markdown, table
+    from clamp3d.bench.stress.run import run_stress
     from clamp3d.errors import InputError
-    from clamp3d.study.stress.registry import FAMILIES, METHODS
-    from clamp3d.study.stress.report import markdown, table
-    from clamp3d.study.stress.run import run_stress
 
     if show_list:
         for each in FAMILIES.values():
@@ -98,7 +98,7 @@ def command(
         extra = "".join(f' --family "{f}"' for f in families) + "".join(f' --method "{m}"' for m in methods)
         write_text(markdown_file, markdown(result, f"clamp3d stress --n {n} --seed {seed} --check {check}{extra}"))
     if plot_file is not None:
-        from clamp3d.study.stress.plot import plot
+        from clamp3d.bench.stress.plot import plot
 
         plot(result, plot_file)
     click.echo(table(result))

@@ -51,10 +51,10 @@ def command(
     little opening. Touches wrongly: on a lip, or too far open. Cannot seat: on a face beside the groove.
     """
     from clamp3d.clamp.loader import load_clamp
+    from clamp3d.clamp.placement import FREEDOMS, SEAT_TOLERANCE, Freedom, WireClosing
     from clamp3d.errors import InputError
     from clamp3d.output.files import write_json
-    from clamp3d.output.sweep_report import draw_map, grid, planes, sweep_to_dict, sweep_to_text
-    from clamp3d.study.misalign import FREEDOMS, SEAT_TOLERANCE, Freedom, WireClosing
+    from clamp3d.output.placement_report import draw_map, grid, planes, sweep_to_dict, sweep_to_text
 
     given = {"offset": offset, "height": height, "yaw": _angle(yaw_deg), "pitch": _angle(pitch_deg)}
     ranges: dict[Freedom, float] = {f: value for f in FREEDOMS if (value := given[f]) is not None and value != 0.0}

@@ -53,12 +53,12 @@ def command(
     The same seed gives the same clamps and distances, however the work is spread.
     """
     from clamp3d.clamp.loader import load_clamp
+    from clamp3d.clamp.sensitivity import sensitivity
+    from clamp3d.clamp.tolerance import monte_carlo
     from clamp3d.cli.progress import bar
     from clamp3d.errors import InputError, SolverError
     from clamp3d.output.files import check_writable, write_json
     from clamp3d.output.tolerance_report import draw_histogram, tolerance_to_dict, tolerance_to_text
-    from clamp3d.study.montecarlo import monte_carlo
-    from clamp3d.study.sensitivity import sensitivity
 
     if plot_file is not None and plot_file.suffix.lower() not in PICTURES:
         raise InputError(f"{plot_file}: the plot's name must end in one of {', '.join(PICTURES)}")

@@ -10,11 +10,11 @@ from typing import Any
 
 import click
 
-from clamp3d.assembly.result import Run, Waypoint
-from clamp3d.assembly.run import assemble
+from clamp3d.baselines.model import ContactModel
+from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.result import Run, Waypoint
 from clamp3d.cli.progress import narrator
-from clamp3d.contact.model import ContactModel
 from clamp3d.errors import InputError
 from clamp3d.output.files import check_folder
 from clamp3d.output.viewer import Viewer

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.geometry.shapes import Cylinder, SweptArc
+from clamp3d.core.primitives import Cylinder, SweptArc
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

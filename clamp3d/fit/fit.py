@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.brep.mesh_file import load_mesh
 from clamp3d.checks import function, instance
+from clamp3d.core.mesh import Mesh
 from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
 from clamp3d.fit.join import join
 from clamp3d.fit.measure import measure
-from clamp3d.fit.mesh_file import Mesh, load_mesh
 from clamp3d.fit.regions import find_regions
 from clamp3d.fit.surface import Surface
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from clamp3d.core.mesh import Mesh
 from clamp3d.fit.cylinder import Axis, perpendicular
-from clamp3d.fit.mesh_file import Mesh
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clamp3d.assembly.result import Run
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
-from clamp3d.clamp.meshes import mesh
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.profile import MIN_MESH_ERROR
-from clamp3d.geometry.pose import Array, SectionPose
+from clamp3d.clamp.result import Run
+from clamp3d.core.meshing import mesh
+from clamp3d.core.pose import Array, SectionPose
+from clamp3d.core.profile import MIN_MESH_ERROR
 from clamp3d.output.figures import near, same_scale, title
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
 from clamp3d.output.section import Poses, balloon, draw_section, part_anchor, spread

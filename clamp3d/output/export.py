@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from clamp3d.checks import choice, instance, path, shown, text
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.profile import check_mesh_error
+from clamp3d.core.profile import check_mesh_error
 from clamp3d.errors import InputError
 from clamp3d.output import mesh_formats
 from clamp3d.output.files import file_stem, write_files

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clamp3d.assembly.result import Contact, Run, Waypoint
 from clamp3d.checks import instance, whole
 from clamp3d.checks import path as checked_path
 from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.result import Contact, Run, Waypoint
 from clamp3d.errors import InputError
 from clamp3d.output.files import whole_file
 from clamp3d.output.palette import INK

@@ -13,8 +13,8 @@ import numpy as np
 
 from clamp3d import __version__
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.clamp.meshes import volume_bounds
-from clamp3d.geometry.pose import Array
+from clamp3d.core.meshing import volume_bounds
+from clamp3d.core.pose import Array
 from clamp3d.output.mesh_formats import MILLIMETRES, Placement
 from clamp3d.output.placed import PlacedPart
 
@@ -54,7 +54,7 @@ def _part(item: PlacedPart, meshed: Placement | None, unit: str, up: str) -> dic
         "title": item.part.title,
         "colour": "#{:02X}{:02X}{:02X}".format(*item.colour),
         "T_world_part": None if item.T_world_part is None else item.T_world_part.tolist(),
-        "volume_mm3": round(item.part.volume, 6),
+        "volume_mm3": None if item.part.volume is None else round(item.part.volume, 6),
         "chord_error_mm": 0.0,
     }
     bounds = item.part.bounds_at(item.T) / MILLIMETRES[unit]

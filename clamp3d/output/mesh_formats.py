@@ -16,9 +16,9 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from clamp3d.clamp.meshes import mesh
+from clamp3d.core.meshing import mesh
+from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array
 from clamp3d.output.placed import PlacedPart
 
 if TYPE_CHECKING:

@@ -8,17 +8,17 @@ from typing import Literal
 
 import numpy as np
 
-from clamp3d.assembly.connections import CONVEX_PAIRS, TYPES, convex_gap
-from clamp3d.assembly.contacts import CONTACT, measure_pairs
-from clamp3d.assembly.result import Contact
-from clamp3d.assembly.section import Section
-from clamp3d.assembly.verdict import Verdict, verdict
+from clamp3d.baselines.model import ContactModel
+from clamp3d.clamp.connections import CONVEX_PAIRS, TYPES, convex_gap
+from clamp3d.clamp.contacts import CONTACT, measure_pairs
 from clamp3d.clamp.dimensions import TITLES, Clamp, ConnectionType, PartName
-from clamp3d.clamp.features import GroovePair
-from clamp3d.clamp.parts import Part
-from clamp3d.contact.model import ContactModel
-from clamp3d.contact.outlines import outline_gap
-from clamp3d.geometry.pose import Array, SectionPose, inverse
+from clamp3d.clamp.outlines import outline_gap
+from clamp3d.clamp.result import Contact
+from clamp3d.clamp.section import Section
+from clamp3d.clamp.verdict import Verdict, verdict
+from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.pose import Array, SectionPose, inverse
+from clamp3d.core.shapes import Solid
 
 Poses = dict[PartName, SectionPose]
 Severity = Literal["error", "warning", "note", "ok"]
@@ -81,7 +81,13 @@ class PairRow:
 
 
 def pair_rows(
-    clamp: Clamp, parts: dict[PartName, Part], model: ContactModel, poses: Poses, *, clearance: float, mesh_error: float
+    clamp: Clamp,
+    parts: dict[PartName, Solid],
+    model: ContactModel,
+    poses: Poses,
+    *,
+    clearance: float,
+    mesh_error: float,
 ) -> tuple[PairRow, ...]:
     """All 21 pairs at ``poses``; pairs without a groove, hole, seat or thread are measured on their outlines."""
     section = Section(clamp, model)
@@ -93,7 +99,7 @@ def pair_rows(
     )
 
 
-def beside_part(contact: Contact, part: Part, pose: SectionPose) -> bool:
+def beside_part(contact: Contact, part: Solid, pose: SectionPose) -> bool:
     """Whether a groove's nearest point lies beside its part: the kernel's faces run on without an end."""
     if contact.type != 3:
         return False
@@ -106,7 +112,7 @@ def beside_part(contact: Contact, part: Part, pose: SectionPose) -> bool:
 def error_bound(model: ContactModel, pair: GroovePair, T_a_b: Array) -> float | None:
     """Largest error in mm of ``model``'s distance: rounding for the closed form, chord error for chords, else None."""
     if model.name == "cas":
-        from clamp3d.geometry.distance import signed_distance
+        from clamp3d.core.distance import signed_distance
 
         T = inverse(pair.T_a_groove) @ T_a_b @ pair.T_b_cylinder
         return float(signed_distance(pair.groove, pair.cylinder, T).error_bound)
@@ -117,7 +123,7 @@ def error_bound(model: ContactModel, pair: GroovePair, T_a_b: Array) -> float | 
     return 2.0 * pair.groove.radius * math.sin(0.5 * pair.groove.half_angle / chords) ** 2
 
 
-def _joined_row(section: Section, parts: dict[PartName, Part], poses: Poses, c: Contact, clearance: float) -> PairRow:
+def _joined_row(section: Section, parts: dict[PartName, Solid], poses: Poses, c: Contact, clearance: float) -> PairRow:
     clamp, model = section.clamp, section.model
     bound: float | None = _ROUNDING * max(abs(v) for pose in poses.values() for v in (pose.x, pose.y, 1.0))
     method, remark = "closed form (Table 2)", ""
@@ -145,7 +151,7 @@ def _joined_row(section: Section, parts: dict[PartName, Part], poses: Poses, c: 
 
 
 def _outline_row(
-    clamp: Clamp, parts: dict[PartName, Part], poses: Poses, c: Contact, clearance: float, mesh_error: float
+    clamp: Clamp, parts: dict[PartName, Solid], poses: Poses, c: Contact, clearance: float, mesh_error: float
 ) -> PairRow:
     gap = outline_gap(parts[c.a], poses[c.a], parts[c.b], poses[c.b], mesh_error)
     declared = clamp.connection(c.a, c.b)

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import instance, items
 from clamp3d.clamp.dimensions import PARTS, PartName
-from clamp3d.clamp.parts import Part, check_part_name
+from clamp3d.clamp.parts import check_part_name
+from clamp3d.core.pose import Array, check_pose
+from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array, check_pose
 from clamp3d.output.palette import PART_COLOURS
 
 
@@ -20,7 +21,7 @@ from clamp3d.output.palette import PART_COLOURS
 class PlacedPart:
     """A part, and ``T_world_part`` (4, 4) in mm; without a pose it stays in its own frame."""
 
-    part: Part
+    part: Solid
     T_world_part: Array | None
 
     @property
@@ -46,7 +47,7 @@ class PlacedPart:
 
 
 def place(
-    parts: Mapping[PartName, Part], poses: Mapping[PartName, ArrayLike] | None, names: Iterable[str] | None = None
+    parts: Mapping[PartName, Solid], poses: Mapping[PartName, ArrayLike] | None, names: Iterable[str] | None = None
 ) -> tuple[PlacedPart, ...]:
     """Pair the chosen parts (all by default) with their poses; ``poses=None`` leaves each in its own frame.
 

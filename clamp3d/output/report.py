@@ -8,15 +8,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from clamp3d.assembly.contacts import CONTACT, measure_pairs, seats
-from clamp3d.assembly.result import Contact, Run, Seat, Waypoint
-from clamp3d.assembly.section import Section
-from clamp3d.assembly.verdict import CLEARANCE
+from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import number
+from clamp3d.clamp.contacts import CONTACT, measure_pairs, seats
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.parts import parts
-from clamp3d.contact.model import ContactModel
-from clamp3d.geometry.pose import SectionPose
+from clamp3d.clamp.result import Contact, Run, Seat, Waypoint
+from clamp3d.clamp.section import Section
+from clamp3d.clamp.verdict import CLEARANCE
+from clamp3d.core.pose import SectionPose
 from clamp3d.output.pair_rows import PairRow, pair_rows
 from clamp3d.output.section import edge_openings
 
@@ -113,9 +113,9 @@ def report(run: Run, model: ContactModel, *, clearance: float = CLEARANCE, mesh_
     ``mesh_error`` mm is the chord error of the outlines that pairs without a groove are measured on. Raises InputError
     for a bad clearance or mesh error.
 
-    >>> from clamp3d.assembly.run import assemble
+    >>> from clamp3d.clamp.assemble import assemble
     >>> from clamp3d.clamp.loader import load_clamp
-    >>> from clamp3d.contact.cas import Cas
+    >>> from clamp3d.baselines.cas import Cas
     >>> found = report(assemble(load_clamp(), Cas()), Cas())
     >>> len(found.rows), found.passed, found.findings
     (21, True, ())

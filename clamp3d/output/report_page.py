@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clamp3d import __version__
-from clamp3d.assembly.contacts import CONTACT
-from clamp3d.assembly.verdict import VERDICTS
+from clamp3d.clamp.contacts import CONTACT
 from clamp3d.clamp.dimensions import PARTS, TITLES
+from clamp3d.clamp.verdict import VERDICTS
 from clamp3d.output.files import write_files
 from clamp3d.output.pair_rows import SEVERITIES, PairRow
 from clamp3d.output.palette import PART_COLOURS, VERDICT_COLOURS
@@ -155,7 +155,7 @@ def versions() -> dict[str, str]:
 def made_at() -> str:
     """The time in UTC; SOURCE_DATE_EPOCH, if set, so that equal reports can be equal files."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    zone = datetime.timezone.utc
+    zone = datetime.UTC
     now = datetime.datetime.fromtimestamp(int(epoch), zone) if epoch else datetime.datetime.now(zone)
     return now.strftime("%Y-%m-%d %H:%M UTC")
 

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 from clamp3d import __version__
-from clamp3d.assembly.result import Run
 from clamp3d.clamp.dimensions import PARTS, TITLES
+from clamp3d.clamp.result import Run
 
 
 def run_to_dict(run: Run) -> dict[str, Any]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from clamp3d import __version__
+from clamp3d.collide.bounds import Verdict
+from clamp3d.collide.result import CheckResult, PairResult, Work
 from clamp3d.output.palette import VERDICT_COLOURS
-from clamp3d.scene.bounds import Verdict
-from clamp3d.scene.result import CheckResult, PairResult, Work
 
 _ORDER = {verdict: k for k, verdict in enumerate(Verdict)}
 _MATRIX = 14

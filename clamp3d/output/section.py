@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
-from clamp3d.clamp.parts import Extrusion, Part, parts
-from clamp3d.clamp.profile import Arc, Point, Profile
-from clamp3d.geometry.pose import Array, SectionPose
+from clamp3d.clamp.parts import parts
+from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.pose import Array, SectionPose
+from clamp3d.core.profile import Arc, Point, Profile
+from clamp3d.core.shapes import Solid
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, VERDICT_COLOURS, darker
 
 if TYPE_CHECKING:
@@ -261,7 +263,7 @@ def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
 
 def _draw_part(
     ax: Axes,
-    part: Part,
+    part: Solid,
     pose: SectionPose,
     z: int,
     holes: bool,

@@ -15,10 +15,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from clamp3d.clamp.parts import Extrusion, Part
-from clamp3d.clamp.profile import Arc
+from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.pose import Array
+from clamp3d.core.profile import Arc
+from clamp3d.core.shapes import Solid
 from clamp3d.errors import Clamp3dError, InputError, MissingLibraryError
-from clamp3d.geometry.pose import Array
 from clamp3d.output.placed import PlacedPart
 
 UNITS = {"mm": "MM", "cm": "CM", "m": "M", "in": "INCH"}
@@ -58,7 +59,7 @@ def step(placed: Sequence[PlacedPart], title: str, unit: str) -> bytes:
     return _canonical(content)
 
 
-def solid(part: Part) -> Any:
+def solid(part: Solid) -> Any:
     """The part as a TopoDS_Shape in its own frame, mm: its extrusions fused, its holes cut.
 
     Raises MissingLibraryError without Open CASCADE.
@@ -111,7 +112,7 @@ def _prism(shape: Extrusion, overlap: float = 0.0) -> Any:
     return BRepPrimAPI_MakePrism(face, gp_Vec(*(along * (shape.length + 2.0 * overlap)).tolist())).Shape()
 
 
-def _only_solid(shape: Any, part: Part) -> Any:
+def _only_solid(shape: Any, part: Solid) -> Any:
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp_Explorer
 
@@ -224,9 +225,9 @@ def _header(writer: Any, title: str, stamp: str) -> None:
 def _time_stamp() -> str:
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     if epoch is None:
-        return datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%S")
+        return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%S")
     try:
-        moment = datetime.datetime.fromtimestamp(int(epoch), datetime.timezone.utc)
+        moment = datetime.datetime.fromtimestamp(int(epoch), datetime.UTC)
     except (ValueError, OverflowError, OSError):
         raise InputError(f"SOURCE_DATE_EPOCH must be whole seconds since 1970, got {epoch!r}") from None
     return moment.strftime("%Y-%m-%dT%H:%M:%S")

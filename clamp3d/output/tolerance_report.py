@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from clamp3d import __version__
+from clamp3d.clamp.sensitivity import DIMENSIONS, Sensitivity
+from clamp3d.clamp.tolerance import MonteCarlo
 from clamp3d.output.files import whole_file
 from clamp3d.output.palette import INK
-from clamp3d.study.montecarlo import MonteCarlo
-from clamp3d.study.sensitivity import DIMENSIONS, Sensitivity
 
 PERCENTILES = (0.1, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 99.9)
 _SHARE = {"uniform": 1.0 / 3.0, "normal": 1.0 / 9.0}  # variance by the square of the tolerance

@@ -1,8 +1,8 @@
 """The viewer: a run streamed to meshcat while it goes on, and kept as one page.
 
->>> from clamp3d.assembly.run import assemble
+>>> from clamp3d.clamp.assemble import assemble
 >>> from clamp3d.clamp.loader import load_clamp
->>> from clamp3d.contact.cas import Cas
+>>> from clamp3d.baselines.cas import Cas
 >>> clamp, model = load_clamp(), Cas()
 >>> with Viewer(clamp, model) as viewer:  # open viewer.url in a browser, if you like
 ...     viewer.finish(assemble(clamp, model, listen=viewer.show))
@@ -14,11 +14,11 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from clamp3d.assembly.result import Run, Waypoint
-from clamp3d.assembly.verdict import CLEARANCE
+from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import flag, instance, text
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.contact.model import ContactModel, check_model
+from clamp3d.clamp.result import Run, Waypoint
+from clamp3d.clamp.verdict import CLEARANCE
 from clamp3d.output.viewer_log import Command, CommandLog
 from clamp3d.output.viewer_page import write_page
 from clamp3d.output.viewer_scene import AssemblyScene, Overlay

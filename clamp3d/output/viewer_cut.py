@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.clamp.profile import Arc
-from clamp3d.geometry.pose import Array
-from clamp3d.geometry.shapes import SweptArc
+from clamp3d.core.pose import Array
+from clamp3d.core.primitives import SweptArc
+from clamp3d.core.profile import Arc
 
 if TYPE_CHECKING:
     import trimesh

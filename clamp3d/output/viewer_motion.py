@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.assembly.result import Waypoint
-from clamp3d.assembly.screw import ScrewJoint
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
-from clamp3d.geometry.pose import Array, SectionPose, rotation
+from clamp3d.clamp.result import Waypoint
+from clamp3d.clamp.screw import ScrewJoint
+from clamp3d.core.pose import Array, SectionPose, rotation
 from clamp3d.output.viewer_log import Command
 
 _HOLD = 1.2  # s at each waypoint

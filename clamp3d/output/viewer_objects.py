@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.geometry.pose import Array
+from clamp3d.core.pose import Array
 from clamp3d.output.palette import INK
 
 if TYPE_CHECKING:

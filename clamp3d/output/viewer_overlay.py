@@ -9,13 +9,14 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from clamp3d.baselines.model import check_unit_angle
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
-from clamp3d.clamp.meshes import mesh
-from clamp3d.clamp.parts import Part, parts
-from clamp3d.contact.model import check_unit_angle
+from clamp3d.clamp.parts import parts
+from clamp3d.core.meshing import mesh
+from clamp3d.core.pose import Array
+from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array
 from clamp3d.output.viewer_scene import ConvexPiece, Overlay
 
 MESH_ERROR = 0.05
@@ -55,11 +56,11 @@ def overlay(clamp: Clamp, text: str) -> tuple[str, Overlay]:
 
 def wedge_overlay(clamp: Clamp, unit_angle_deg: float) -> tuple[str, Overlay]:
     """Every grooved part cut into the wedges of the convex partitioning."""
-    from clamp3d.contact.wedges import part_wedges, prism
+    from clamp3d.baselines.wedges import part_wedges, prism
 
     unit_angle = check_unit_angle(math.radians(unit_angle_deg))
 
-    def pieces(part: Part) -> Sequence[ConvexPiece]:
+    def pieces(part: Solid) -> Sequence[ConvexPiece]:
         body = part.bodies[0]
         out = []
         for wedge in part_wedges(part, unit_angle):
@@ -72,18 +73,18 @@ def wedge_overlay(clamp: Clamp, unit_angle_deg: float) -> tuple[str, Overlay]:
 
 def hull_overlay(clamp: Clamp, threshold: float) -> tuple[str, Overlay]:
     """Every grooved part as the hulls CoACD makes of its mesh (taken from the cache if it has them)."""
-    from clamp3d.contact.decomposition import DecompositionParameters, decompose
+    from clamp3d.baselines.decomposition import DecompositionParameters, decompose
 
     parameters = DecompositionParameters(threshold=threshold)
 
-    def pieces(part: Part) -> Sequence[ConvexPiece]:
+    def pieces(part: Solid) -> Sequence[ConvexPiece]:
         solid = mesh(part, MESH_ERROR)
         return decompose(solid.vertices, solid.faces, parameters, name=part.name).hulls
 
     return f"hulls of CoACD at {threshold:g} mm", {part.name: pieces(part) for part in _grooved(clamp)}
 
 
-def _grooved(clamp: Clamp) -> list[Part]:
+def _grooved(clamp: Clamp) -> list[Solid]:
     names: dict[PartName, None] = dict.fromkeys(a for a, _ in groove_pairs(clamp))
     bodies = parts(clamp)
     return [bodies[name] for name in names]

@@ -13,16 +13,16 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.assembly.contacts import CONTACT, measure_pairs
-from clamp3d.assembly.result import Contact, Run, Waypoint
-from clamp3d.assembly.section import Section
-from clamp3d.assembly.verdict import CLEARANCE, verdict
+from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import number
+from clamp3d.clamp.contacts import CONTACT, measure_pairs
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
-from clamp3d.clamp.meshes import mesh
 from clamp3d.clamp.parts import parts
-from clamp3d.contact.model import ContactModel
-from clamp3d.geometry.pose import Array, SectionPose
+from clamp3d.clamp.result import Contact, Run, Waypoint
+from clamp3d.clamp.section import Section
+from clamp3d.clamp.verdict import CLEARANCE, verdict
+from clamp3d.core.meshing import mesh
+from clamp3d.core.pose import Array, SectionPose
 from clamp3d.output import viewer_objects as draw
 from clamp3d.output.pair_rows import beside_part
 from clamp3d.output.palette import INK, PART_COLOURS, VERDICT_COLOURS, darker

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from clamp3d.study import published
+from clamp3d.bench import published
 
 
 def clamp3d(*arguments, **kwargs):

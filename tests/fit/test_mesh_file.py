@@ -7,9 +7,10 @@ import pytest
 import trimesh
 from fit_shapes import RADIUS, splint
 
+from clamp3d.brep.mesh_file import load_mesh
+from clamp3d.core.mesh import make_mesh
 from clamp3d.errors import InputError, MissingLibraryError
 from clamp3d.fit.fit import fit_file
-from clamp3d.fit.mesh_file import load_mesh, make_mesh
 
 
 @pytest.fixture(scope="module")

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clamp3d.assembly.run import assemble
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Wire
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.meshes import mesh
 from clamp3d.clamp.parts import parts
-from clamp3d.contact.cas import Cas
+from clamp3d.core.meshing import mesh
 from clamp3d.fit.fit import fit_file
 
 

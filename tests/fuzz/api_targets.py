@@ -11,17 +11,18 @@ from typing import Any
 import numpy as np
 
 import clamp3d
-from clamp3d.assembly.run import assemble
+from clamp3d.baselines.cas import Cas
+from clamp3d.baselines.chords import Chords
+from clamp3d.baselines.wedges import Wedges
+from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Wire
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.contact.cas import Cas
-from clamp3d.contact.chords import Chords
-from clamp3d.contact.wedges import Wedges
-from clamp3d.geometry import pose as poses
-from clamp3d.scene import shapes
-from clamp3d.scene.motion import Motion
-from clamp3d.scene.scene import Allowed
+from clamp3d.collide.motion import Motion
+from clamp3d.collide.scene import Allowed
+from clamp3d.core import pose as poses
+from clamp3d.core import shapes
+from clamp3d.scenefile.file import load_scene
 from tests.fuzz import garbage
 from tests.fuzz.api_values import Rng, pose, pose_batch, rigid
 
@@ -69,8 +70,8 @@ def _run() -> Any:
 
 @functools.cache
 def _models() -> tuple[Any, ...]:
-    from clamp3d.clamp.meshes import mesh
-    from clamp3d.contact.mesh import Mesh
+    from clamp3d.baselines.mesh import Mesh
+    from clamp3d.core.meshing import mesh
 
     solids = clamp3d.parts(_clamp())
     return (
@@ -315,7 +316,7 @@ def targets() -> dict[str, tuple[float, Make]]:
         ),
         "Allowed": (2, _simple(Allowed, a=_fixed("block"), b=_fixed("w*"), overlap=_choice(0.0, 0.1))),
         "Scene.moved": (2, lambda r, f: (_scene().moved, {"poses": {"wire": pose(r)}})),
-        "Scene.load": (1, lambda r, f: (c.Scene.load, {"path": "no.toml"})),
+        "load_scene": (1, lambda r, f: (load_scene, {"path": "no.toml"})),
         "Motion.translate": (2, _simple(Motion.translate, parts=_fixed("wire"), by=_three, name=_fixed("m"))),
         "Motion.screw": (
             2,

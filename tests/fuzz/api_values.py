@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import clamp3d
-from clamp3d.geometry import pose as poses
+from clamp3d.core import pose as poses
 from tests.fuzz import garbage
 
 Rng = np.random.Generator

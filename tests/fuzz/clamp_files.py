@@ -6,7 +6,7 @@ import copy
 import json
 import math
 import os
-import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,6 @@ from clamp3d.clamp import loader
 from tests.fuzz import garbage
 from tests.fuzz.cli_calls import call, check_outputs, some_old
 from tests.fuzz.runner import FindingError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 TEXT = (Path(loader.__file__).parent / "data" / "reference.toml").read_text(encoding="utf-8")
 DISTANCE = 31.5298

@@ -25,9 +25,9 @@ FORMATS = ("stl", "obj", "ply", "glb", "3mf")
 @functools.cache
 def _block() -> Any:
     """A block with a groove of radius 7, 16 chords."""
-    from clamp3d.clamp.meshes import mesh
-    from clamp3d.geometry.shapes import SweptArc
-    from clamp3d.scene import shapes
+    from clamp3d.core import shapes
+    from clamp3d.core.meshing import mesh
+    from clamp3d.core.primitives import SweptArc
 
     return mesh(shapes.groove_block(SweptArc(7.0, 1.0, 30.0), 30.0, 15.0), 0.05)
 

@@ -134,7 +134,7 @@ def _serve(pipe: Any, kind: str, seed: int) -> None:
     sys.stdin = open(os.devnull)  # noqa: SIM115
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    from clamp3d.geometry.distance import kernel
+    from clamp3d.core.distance import kernel
 
     kernel()
     pipe.send("ready")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,6 @@ import numpy as np
 from tests.fuzz import garbage
 from tests.fuzz.cli_calls import Called, call, check_outputs, some_old
 from tests.fuzz.runner import FindingError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 _PARTS = """
 contact = 0.01

@@ -15,10 +15,10 @@ import trimesh
 
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
 from clamp3d.clamp.features import groove_pairs
-from clamp3d.clamp.meshes import volume_bounds
 from clamp3d.clamp.parts import parts
+from clamp3d.core.meshing import volume_bounds
+from clamp3d.core.pose import inverse
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import inverse
 from clamp3d.output.export import export
 from clamp3d.output.palette import PART_COLOURS
 

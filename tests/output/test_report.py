@@ -18,15 +18,15 @@ import numpy as np
 import pytest
 
 import clamp3d
-from clamp3d.assembly.connections import CONVEX_PAIRS, PAIRS
-from clamp3d.assembly.run import assemble
-from clamp3d.assembly.verdict import verdict
+from clamp3d.baselines.cas import Cas
+from clamp3d.baselines.chords import Chords
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.connections import CONVEX_PAIRS, PAIRS
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.contact.cas import Cas
-from clamp3d.contact.chords import Chords
+from clamp3d.clamp.verdict import verdict
+from clamp3d.core.pose import SectionPose
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import SectionPose
 from clamp3d.output.pair_rows import pair_rows
 from clamp3d.output.report import report
 from clamp3d.output.report_page import FILES, report_csv, report_html, report_to_dict, write_report

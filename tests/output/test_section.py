@@ -11,17 +11,17 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Path4
 
-from clamp3d.assembly.result import Run
-from clamp3d.assembly.run import assemble
+from clamp3d.baselines.cas import Cas
+from clamp3d.bench.legends import table2_figure, table3_figure
+from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.contact.cas import Cas
+from clamp3d.clamp.result import Run
+from clamp3d.core.pose import SectionPose
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import SectionPose
 from clamp3d.output.assembly_figures import exploded_figure, exploded_poses, steps_figure
 from clamp3d.output.figures import contact_figure, contacts_figure, save_figure, section_figure, states_figure
-from clamp3d.output.legends import table2_figure, table3_figure
 from clamp3d.output.palette import PART_COLOURS, VERDICT_COLOURS
 from clamp3d.output.section import arc_path, draw_dimensions, draw_section, edge_openings
 

@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 
 import clamp3d
-from clamp3d.assembly.run import assemble
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.contact.cas import Cas
 from clamp3d.errors import Clamp3dError, InputError
 from clamp3d.output import viewer_server
 from clamp3d.output.viewer import Viewer

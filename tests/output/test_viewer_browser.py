@@ -12,9 +12,9 @@ import time
 import numpy as np
 import pytest
 
-from clamp3d.assembly.run import assemble
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.contact.cas import Cas
 from clamp3d.output.palette import PART_COLOURS
 from clamp3d.output.report import report
 from clamp3d.output.report_page import write_report

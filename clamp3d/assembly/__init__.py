@@ -1,1 +1,0 @@
-"""Connection matrix, sequence, screw joint, motion and final state."""

@@ -1,0 +1,104 @@
+"""What a contact model is: a way to measure the gap between a groove and the cylinder that lies in it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from clamp3d.checks import array, instance, number, shown
+from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.pose import Array, check_pose
+from clamp3d.core.primitives import LARGEST
+from clamp3d.errors import InputError
+
+FINEST_DEG = 0.01
+"""Smallest angle of a chord: a full circle then has 36 000."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """Signed gaps (k,) mm from each piece of a grooved part to the cylinder, in the frame of the grooved part.
+
+    A model cuts the groove into pieces (an arc and two faces, chords, hulls); the least is the pair's distance.
+    ``point`` (k, 3) mm lies on the groove, ``normal`` (k, 3) is unit from groove to cylinder, ``feature``
+    names the piece.
+    Each gap is continuous in the pose, so a solver takes every piece as a constraint of its own.
+    """
+
+    distance: Array
+    point: Array
+    normal: Array
+    feature: tuple[str, ...]
+
+
+class ContactModel(Protocol):
+    """One way to measure a `GroovePair`; all models answer the same questions on the same parts."""
+
+    @property
+    def name(self) -> str:
+        """What the user calls it: 'cas', 'chords', ..."""
+        ...
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """What the model cannot do, in words for the user: 'no depth', 'surface only', ..."""
+        ...
+
+    @property
+    def meshes_built(self) -> int:
+        """How many parts had to be meshed so far."""
+        ...
+
+    def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
+        """Gaps of all pieces of ``pair`` with part b at ``T_a_b`` (4, 4) in part a's frame."""
+        ...
+
+    def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
+        """Signed distances (n,) mm for poses (n, 4, 4)."""
+        ...
+
+
+def check_model(model: object) -> None:
+    """Raise InputError unless ``model`` can answer as a `ContactModel`; a class in place of a model cannot."""
+    answers = all(callable(getattr(model, name, None)) for name in ("pieces", "distances"))
+    if isinstance(model, type) or not answers:
+        raise InputError(f"model must be a contact model, got {shown(model)}")
+
+
+def check_unit_angle(unit_angle: object) -> float:
+    """The angle of a chord in rad as a float. Raises InputError unless it is from 0.01 deg to less than 180 deg."""
+    rule = "unit angle must be between 0 and 180 deg"
+    value = number("unit angle", unit_angle, rule=rule.removeprefix("unit angle must "))
+    if not 0.0 < value < math.pi:
+        raise InputError(f"{rule}, got {math.degrees(value):g}")
+    if math.degrees(value) < FINEST_DEG:
+        raise InputError(f"unit angle must be >= {FINEST_DEG:g} deg, got {math.degrees(value):g}")
+    return value
+
+
+def pose_of(pair: GroovePair, T_a_b: Array) -> Array:
+    """``T_a_b`` as the (4, 4) array of moderate numbers that `ContactModel.pieces` works on, rigid or not.
+
+    Raises InputError for any other, and for a pair that is none. Quick: solvers ask thousands of times.
+    """
+    if type(pair) is not GroovePair:
+        instance("pair", pair, GroovePair)
+    T = array("T_a_b", T_a_b, (4, 4), finite=False)
+    if not np.vdot(T, T) < LARGEST**2:  # NaN, infinite, or too large to be multiplied
+        check_pose(T, "T_a_b")
+        raise InputError(f"T_a_b must have an offset up to {LARGEST:g} mm, got {shown(T[:3, 3])}")
+    return T
+
+
+def poses_of(pair: GroovePair, T_a_b: Array) -> Array:
+    """``T_a_b`` as the (n, 4, 4) array that `ContactModel.distances` works on, as `pose_of` does."""
+    instance("pair", pair, GroovePair)
+    T = array("T_a_b", T_a_b, (None, 4, 4), finite=False)
+    small = np.abs(T).max(axis=(1, 2), initial=0.0) < 1e-2 * LARGEST
+    for i in np.flatnonzero(~small):
+        check_pose(T[i], f"T_a_b[{i}]")
+        raise InputError(f"T_a_b[{i}] must have an offset up to {1e-2 * LARGEST:g} mm, got {shown(T[i, :3, 3])}")
+    return T

@@ -1,0 +1,135 @@
+"""What one method is measured for: errors, wrong verdicts near contact, times, memory."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from clamp3d.bench.compare.methods import MANY, Method, Prepared, load, prepare
+from clamp3d.bench.compare.scene import BANDS, CLEAR, OVERLAP, Poses, known_poses
+from clamp3d.core.pose import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """Verdicts up to ``band`` mm from contact: of ``free`` poses ``false_hits``, of ``hits`` ``false_misses``."""
+
+    band: float
+    free: int
+    hits: int
+    false_hits: int
+    false_misses: int
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A method on the poses of `compare.scene`; errors in mm, times in CPU seconds of one core, memory in MB.
+
+    ``median_error`` and ``worst_error`` are of the distance of a wire that is clear, ``depth_error`` is the worst on
+    overlaps up to 0.3 mm deep (None: no depth). ``load`` is the import of the libraries, ``setup`` what comes before
+    the first pose. ``one`` and ``many`` are seconds per pose, medians of repeated passes over all clear poses.
+    ``memory`` is what the process grew by from set-up and queries, ``library_memory`` from the import (None where the
+    system does not tell).
+    """
+
+    method: str
+    setting: float | None
+    label: str
+    pieces: int
+    poses: int
+    median_error: float
+    worst_error: float
+    depth_error: float | None
+    bands: tuple[Band, ...]
+    load: float
+    setup: float
+    one: float
+    many: float
+    memory: float | None
+    library_memory: float | None
+
+
+def measure(
+    method: Method,
+    *,
+    load: Callable[[Method], None] = load,
+    prepare: Callable[[Method], Prepared] = prepare,
+    budget: float = 0.6,
+) -> Measured:
+    """Measure one method in this process; ``budget`` is about how many seconds the timing of each kind may take."""
+    poses = known_poses()
+    before = resident()
+    start = time.process_time()
+    load(method)
+    load_time, loaded = time.process_time() - start, resident()
+    start = time.process_time()
+    ready = prepare(method)
+    setup = time.process_time() - start + ready.elsewhere
+    if ready.parallel_only:
+        poses = poses.select(poses.parallel)
+    values = np.array([ready.one(T) for T in poses.T])
+    clear = poses.group == CLEAR
+    error = np.abs(poses.error(values))
+    timed = np.ascontiguousarray(poses.T[clear])
+    one = repeated(lambda: [ready.one(T) for T in timed], budget) / len(timed)
+    if not np.array_equal(ready.many(timed), values[clear]):
+        raise AssertionError(f"{method.label}: one and many differ")
+    grown = resident()  # before the batch, whose poses and answers are the caller's
+    batch = np.tile(timed, (MANY // len(timed), 1, 1)) if ready.batched else timed
+    many = repeated(lambda: ready.many(batch), budget) / len(batch)
+    return Measured(
+        method=method.family,
+        setting=method.setting,
+        label=method.label,
+        pieces=ready.pieces,
+        poses=len(poses),
+        median_error=float(np.median(error[clear])),
+        worst_error=float(error[clear].max()),
+        depth_error=float(error[poses.group == OVERLAP].max()) if ready.depth else None,
+        bands=tuple(verdicts(poses, values, band) for band in BANDS),
+        load=load_time,
+        setup=setup,
+        one=one,
+        many=many,
+        memory=None if grown is None or loaded is None else max(0.0, grown - loaded),
+        library_memory=None if loaded is None or before is None else max(0.0, loaded - before),
+    )
+
+
+def verdicts(poses: Poses, values: Array, band: float) -> Band:
+    """Hits and misses of ``values`` (n,) on the poses of a band; touching counts as a hit."""
+    chosen = poses.group == f"{band:g}"
+    hit, said = poses.distance[chosen] <= 0.0, values[chosen] <= 0.0
+    return Band(band, int((~hit).sum()), int(hit.sum()), int((said & ~hit).sum()), int((hit & ~said).sum()))
+
+
+def repeated(run: Callable[[], object], budget: float, most: int = 15) -> float:
+    """Median CPU time of ``run`` in s: at least 3 runs, at most ``most``, until ``budget`` s are spent."""
+    times: list[float] = []
+    while len(times) < 3 or (len(times) < most and sum(times) < budget):
+        start = time.process_time()
+        run()
+        times.append(time.process_time() - start)
+    return statistics.median(times)
+
+
+def resident() -> float | None:
+    """Memory of this process in MB: resident now (Linux), its peak (macOS), None elsewhere."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            import os
+
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+    except OSError:
+        pass
+    try:
+        import resource
+    except ImportError:
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3

@@ -1,0 +1,198 @@
+"""The methods that are compared, each made ready for the scene: one call for a pose, one for many."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from clamp3d.baselines.model import ContactModel
+from clamp3d.bench.compare.scene import GROOVE, WIRE, block, chord_error, in_part_frame, pair
+from clamp3d.core.pose import Array
+from clamp3d.errors import InputError
+
+if TYPE_CHECKING:
+    from clamp3d.clamp.dimensions import Clamp
+
+UNIT_ANGLES_DEG = (1.0, 5.0, 10.0, 20.0, 40.0)
+HULL_THRESHOLDS = (0.01, 0.02, 0.05)
+"""On CoACD's own scale, as its figures for this block are known."""
+MESH_ERRORS = (0.0005, 0.01, 0.05, 0.2)
+HULLS_CHORD_DEG = 5.0
+"""Chords of the mesh that CoACD is given; finer ones give it more to do and no better hulls."""
+CLAMP_THRESHOLD = 2.0
+"""mm: hulls of the reference clamp. See `clamp3d.baselines.decomposition`."""
+
+MANY = 100_000
+"""Poses in a batch of a method that takes arrays as a whole; the others go through them one by one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """A ``family`` ('cas', 'chords', ...) with its ``setting`` in the family's own unit, None if it has none."""
+
+    family: str
+    setting: float | None = None
+
+    @property
+    def label(self) -> str:
+        """The method in words, 'wedges 5 deg'."""
+        return (
+            self.family
+            if self.setting is None
+            else f"{self.family} {self.setting:g} {UNITS.get(self.family, 'deg')}".rstrip()
+        )
+
+    @property
+    def key(self) -> str:
+        """The method as one word, 'wedges:5'."""
+        return self.family if self.setting is None else f"{self.family}:{self.setting!r}"
+
+    @classmethod
+    def parse(cls, key: str) -> Method:
+        """The method of a `key`."""
+        family, _, setting = key.partition(":")
+        return cls(family, float(setting) if setting else None)
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A method ready to measure poses of the wire in the groove's frame.
+
+    ``one`` takes a pose (4, 4), ``many`` takes poses (n, 4, 4). ``pieces`` counts the convex pieces, triangles or
+    chords. ``batched``: ``many`` is more than a loop. ``depth``: a negative value measures the overlap.
+    ``elsewhere`` are seconds of the set-up that other processes took (CoACD, also when its answer was cached).
+    """
+
+    one: Callable[[Array], float]
+    many: Callable[[Array], Array]
+    pieces: int
+    batched: bool = False
+    depth: bool = True
+    parallel_only: bool = False
+    elsewhere: float = 0.0
+
+
+UNITS = {"chords": "deg", "wedges": "deg", "hulls": "", "mesh": "mm"}
+"""Of a family's setting; degrees for those not named here."""
+METHODS = (
+    Method("cas"),
+    *(Method("chords", a) for a in UNIT_ANGLES_DEG),
+    *(Method("wedges", a) for a in UNIT_ANGLES_DEG),
+    *(Method("hulls", t) for t in HULL_THRESHOLDS),
+    *(Method("mesh", e) for e in MESH_ERRORS),
+)
+
+
+def load(method: Method) -> None:
+    """Import what the method needs, so that its set-up time is its own."""
+    if method.family == "cas":
+        import clamp3d.core.kernel  # noqa: F401
+    elif method.family != "chords":
+        import fcl  # noqa: F401
+        import manifold3d  # noqa: F401
+        import scipy.spatial  # noqa: F401
+        import trimesh  # noqa: F401
+
+
+def prepare(method: Method, *, time_limit: float = 300.0) -> Prepared:
+    """Set a method up for the scene of `compare.scene`; everything that can be done before the first pose is done.
+
+    Raises InputError for an unknown method, and what the method itself raises.
+    """
+    if method.family == "cas":
+        return _cas()
+    model, pieces, elsewhere = _model(method, time_limit)
+    groove = pair()
+
+    def many(poses: Array) -> Array:
+        return model.distances(groove, in_part_frame(poses))
+
+    def one(pose: Array) -> float:
+        return float(many(pose[None])[0])
+
+    many(np.eye(4)[None])
+    return Prepared(one, many, pieces, parallel_only=method.family == "chords", elsewhere=elsewhere)
+
+
+def assembly_model(method: Method, clamp: Clamp, *, time_limit: float = 300.0) -> ContactModel:
+    """The method for the parts of a clamp, set up for all of its grooves; hull thresholds are in mm here."""
+    from clamp3d.clamp.features import groove_pairs
+    from clamp3d.clamp.parts import parts
+
+    setting = method.setting or 0.0
+    if method.family == "cas":
+        from clamp3d.baselines.cas import Cas
+
+        return Cas()
+    if method.family == "chords":
+        from clamp3d.baselines.chords import Chords
+
+        return Chords(math.radians(setting))
+    model: ContactModel
+    if method.family == "wedges":
+        from clamp3d.baselines.wedges import Wedges
+
+        model = Wedges(parts(clamp), math.radians(setting))
+    else:
+        from clamp3d.core.meshing import mesh
+
+        error = setting if method.family == "mesh" else 0.01
+        grooved = {p.a for p in groove_pairs(clamp).values()}
+        meshes = {name: mesh(part, error) for name, part in parts(clamp).items() if name in grooved}
+        if method.family == "mesh":
+            from clamp3d.baselines.mesh import Mesh
+
+            model = Mesh(meshes)
+        else:
+            from clamp3d.baselines.decomposition import DecompositionParameters
+            from clamp3d.baselines.hulls import Hulls
+
+            model = Hulls(meshes, DecompositionParameters(threshold=setting), time_limit=time_limit, progress=False)
+    for groove in groove_pairs(clamp).values():  # models make their pieces when they are first asked
+        model.pieces(groove, groove.T_a_groove)
+    return model
+
+
+def _cas() -> Prepared:
+    from clamp3d.core.distance import signed_distance, signed_distances
+
+    return Prepared(
+        lambda T: signed_distance(GROOVE, WIRE, T).distance,
+        lambda poses: signed_distances(GROOVE, WIRE, poses, workers=1),
+        1,
+        batched=True,
+    )
+
+
+def _model(method: Method, time_limit: float) -> tuple[ContactModel, int, float]:
+    """The contact model for the block, how many pieces it has, and seconds that another process spent on it."""
+    setting = method.setting or 0.0
+    if method.family == "chords":
+        from clamp3d.baselines.chords import Chords
+
+        return Chords(math.radians(setting)), math.ceil(2.0 * GROOVE.half_angle / math.radians(setting) - 1e-9), 0.0
+    if method.family == "wedges":
+        from clamp3d.baselines.wedges import Wedges
+
+        wedges = Wedges({"P1": block()}, math.radians(setting))
+        return wedges, len(wedges.parts["P1"].shapes), 0.0
+    from clamp3d.core.meshing import mesh
+
+    if method.family == "mesh":
+        from clamp3d.baselines.mesh import Mesh
+
+        made = mesh(block(), setting)
+        return Mesh({"P1": made}), len(made.faces), 0.0
+    if method.family == "hulls":
+        from clamp3d.baselines.decomposition import DecompositionParameters
+        from clamp3d.baselines.hulls import Hulls
+
+        made = mesh(block(), chord_error(math.radians(HULLS_CHORD_DEG)) * (1.0 + 1e-9))
+        parameters = DecompositionParameters(threshold=setting, real_metric=False)
+        hulls = Hulls({"P1": made}, parameters, time_limit=time_limit, progress=False)
+        return hulls, len(hulls.parts["P1"].shapes), hulls.decompositions["P1"].seconds
+    raise InputError(f"unknown method {method.family!r}; available: cas, {', '.join(UNITS)}")

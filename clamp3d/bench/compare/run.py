@@ -1,0 +1,168 @@
+"""Every method on the same poses and the same assembly: accuracy, wrong verdicts, set-up, speed, memory."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from clamp3d.bench.compare.jobs import Assembled, Imaged, JobError, Kind, run_job
+from clamp3d.bench.compare.measure import Band, Measured
+from clamp3d.bench.compare.methods import CLAMP_THRESHOLD, METHODS, Method
+from clamp3d.bench.compare.peers import PEER_METHODS, missing_peers
+from clamp3d.bench.complexity import Sweep
+from clamp3d.bench.machine import Machine, machine
+from clamp3d.errors import Clamp3dError
+
+CONTACT_LIMIT = 90.0
+"""Seconds that one method may take on the poses, its set-up included."""
+ASSEMBLY_LIMIT = 150.0
+"""Seconds for one assembly; CoACD alone takes 60 of them on the reference clamp."""
+
+KNOWN: dict[str, tuple[float, int | None]] = {
+    "chords:1.0": (0.00046, None),
+    "chords:5.0": (0.0114, None),
+    "chords:10.0": (0.0457, None),
+    "chords:20.0": (0.182, None),
+    "wedges:1.0": (0.00046, None),
+    "wedges:5.0": (0.0114, None),
+    "wedges:10.0": (0.0457, None),
+    "wedges:20.0": (0.182, None),
+    "hulls:0.05": (2.17, 2),
+    "hulls:0.02": (0.556, 4),
+    "hulls:0.01": (0.18, 79),
+}
+"""Known figures for this groove: error in mm, and for hulls their number."""
+
+ASSEMBLIES = (
+    *(m for m in METHODS if m.family in ("cas", "chords", "wedges")),
+    Method("hulls", CLAMP_THRESHOLD),
+    *(m for m in METHODS if m.family == "mesh" and (m.setting or 0.0) >= 0.01),
+)
+"""Finer meshes give the same distance to 1e-3 mm and take a minute."""
+LIBRARIES = ("numpy", "numba", "scipy", "python-fcl", "coacd", "trimesh", "manifold3d")
+PEER_LIBRARIES = ("coal", "mujoco", "cadquery-ocp-novtk")
+
+
+@dataclass(frozen=True, slots=True)
+class NotMeasured:
+    """A method without figures and the ``reason`` in one line."""
+
+    method: str
+    setting: float | None
+    label: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """All answers; ``peers`` is empty unless asked for. ``seconds`` is the whole time on the clock."""
+
+    machine: Machine
+    contact: tuple[Measured | NotMeasured, ...]
+    peers: tuple[Measured | NotMeasured, ...]
+    exact: tuple[Assembled | NotMeasured, ...]
+    stepped: tuple[Assembled | NotMeasured, ...]
+    image: Imaged | NotMeasured
+    complexity: tuple[Sweep, ...] | NotMeasured
+    seconds: float
+
+    @property
+    def measured(self) -> tuple[Measured, ...]:
+        """Methods with figures on the poses, peers behind."""
+        return tuple(row for row in (*self.contact, *self.peers) if isinstance(row, Measured))
+
+
+def compare(
+    *, peers: bool = False, progress: Callable[[int, int, str], None] = lambda done, total, what: None
+) -> Comparison:
+    """Measure all methods, one process after the other; ``progress`` is told jobs done, jobs in all and what is next.
+
+    Takes some minutes. A method that fails or does not end in time becomes a row that says so.
+    """
+    start = time.monotonic()
+    peer_methods = PEER_METHODS if peers else ()
+    absent = missing_peers() if peers else {}
+    total = 3 + len(METHODS) + len(ASSEMBLIES) + len(peer_methods)
+    done = 0
+
+    def job(kind: Kind, method: Method, make: Callable[[dict[str, Any]], Any], limit: float, what: str) -> Any:
+        nonlocal done
+        progress(done, total, what)
+        try:
+            return make(run_job(kind, method.key, time_limit=limit))
+        except JobError as error:
+            return NotMeasured(method.family, method.setting, method.label, str(error))
+        finally:
+            done += 1
+
+    def row(data: dict[str, Any]) -> Measured:
+        return Measured(**data | {"bands": tuple(Band(**band) for band in data["bands"])})
+
+    # The first process pays for compiling the kernel on a machine that has not done so.
+    job("assembly", Method("cas"), dict, ASSEMBLY_LIMIT, "warming up")
+    contact = [job("contact", m, row, CONTACT_LIMIT, f"{m.label} on known poses") for m in METHODS]
+    beside: list[Measured | NotMeasured] = []
+    for m in peer_methods:
+        if m.family in absent:
+            beside.append(NotMeasured(m.family, m.setting, m.label, absent[m.family]))
+            done += 1
+        else:
+            beside.append(job("peer", m, row, CONTACT_LIMIT, f"{m.label} on known poses"))
+    exact: list[Assembled | NotMeasured] = []
+    stepped: list[Assembled | NotMeasured] = []
+    for m in ASSEMBLIES:
+        both = job("assembly", m, _both, ASSEMBLY_LIMIT, f"assembly by {m.label}")
+        for rows, found in zip((exact, stepped), both if isinstance(both, tuple) else (both, both), strict=True):
+            rows.append(found)
+    image = job("image", Method("image"), _imaged, ASSEMBLY_LIMIT, "measuring in a picture")
+    sweeps = job("complexity", Method("complexity"), _sweeps, ASSEMBLY_LIMIT, "counting work for Table 5")
+    progress(total, total, "done")
+    return Comparison(
+        machine((*LIBRARIES, *(PEER_LIBRARIES if peers else ()))),
+        tuple(contact),
+        tuple(beside),
+        tuple(exact),
+        tuple(stepped),
+        image,
+        sweeps,
+        time.monotonic() - start,
+    )
+
+
+def exact_distance(found: Comparison) -> float:
+    """The assembled clamp's splint distance in mm by the exact method. Raises Clamp3dError if that failed."""
+    for row in found.exact:
+        if isinstance(row, Assembled) and row.method == "cas":
+            return row.distance
+    raise Clamp3dError("the assembly by cas gave no distance to compare with")
+
+
+def pareto(rows: Sequence[Measured]) -> list[Measured]:
+    """Those that no other row beats in both worst error and time per single query, the fastest first.
+
+    Methods that only take parallel axes (chords) do not answer the same question and stay out.
+    """
+    front: list[Measured] = []
+    for row in sorted((r for r in rows if r.method != "chords"), key=lambda r: (r.one, r.worst_error)):
+        if not front or row.worst_error < front[-1].worst_error:
+            front.append(row)
+    return front
+
+
+def _both(data: dict[str, Any]) -> tuple[Assembled, Assembled]:
+    exact, stepped = (Assembled(**row) for row in data["rows"])
+    return exact, stepped
+
+
+def _imaged(data: dict[str, Any]) -> Imaged:
+    return Imaged(**data | {"first_five": tuple(data["first_five"])})
+
+
+def _sweeps(data: dict[str, Any]) -> tuple[Sweep, ...]:
+    def sweep(fields: dict[str, Any]) -> Sweep:
+        values: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in fields.items()}
+        return Sweep(**values)
+
+    return tuple(sweep(fields) for fields in data["sweeps"])

@@ -1,0 +1,132 @@
+"""The scene on which all methods are compared: a wire in a 140 degree groove, at poses whose distance is known.
+
+Groove R 12, wire radius 10.5, block 137 x 30 x 60: a scene with published figures for chords and for CoACD. The poses
+and their signed distances to 25 digits are data (``data/compare_poses.csv``), found at 50 digits by a search that
+knows only the distance of a point from the groove (``scripts/make_compare_poses.py``).
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.clamp.block import block_pair, grooved_block
+from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.pose import Array, inverse
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.shapes import Solid
+
+GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)
+WIRE = Cylinder(10.5, 200.0)
+WIDTH, DEPTH = 137.0, 30.0
+"""Of the block in mm; it is as long as its groove."""
+
+BANDS = (0.02, 1e-4, 1e-6)
+"""Near contact: poses with a distance of either sign up to so many mm."""
+CLEAR, OVERLAP = "clear", "overlap"
+
+Lean = Literal["parallel", "tilted"]
+
+
+@dataclass(frozen=True, slots=True)
+class Poses:
+    """Poses ``T`` (n, 4, 4) of the wire in the groove's frame with their ``distance`` (n,) mm, exact to rounding.
+
+    ``group`` (n,) is 'clear' (1e-3 to 1 mm apart), 'overlap' (up to 0.3 mm deep) or a band as '0.02', '0.0001',
+    '1e-06'; ``parallel`` (n,) tells the poses with parallel axes. ``residual`` (n,) is what the 25 digits have beyond
+    ``distance``.
+    """
+
+    T: Array
+    distance: Array
+    residual: Array
+    group: NDArray[np.str_]
+    parallel: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.distance)
+
+    def select(self, keep: NDArray[np.bool_]) -> Poses:
+        """Those where ``keep`` (n,) is true."""
+        return Poses(self.T[keep], self.distance[keep], self.residual[keep], self.group[keep], self.parallel[keep])
+
+    def error(self, values: Array) -> Array:
+        """``values`` (n,) less the exact distances, in mm, right to far below rounding."""
+        return np.asarray((values - self.distance) - self.residual)
+
+
+@lru_cache(maxsize=1)
+def known_poses() -> Poses:
+    """All poses, 210 with parallel axes and 210 tilted by up to 1.7 degrees.
+
+    >>> poses = known_poses()
+    >>> len(poses), int((poses.group == CLEAR).sum())
+    (420, 120)
+    """
+    from fractions import Fraction
+
+    text = resources.files("clamp3d.bench").joinpath("data/compare_poses.csv").read_text(encoding="utf-8")
+    rows = list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
+    T = np.array(
+        [pose([float(row[k]) for k in ("x", "y", "z")], [float(row[k]) for k in ("a", "b", "c")]) for row in rows]
+    )
+    distance = np.array([float(row["distance"]) for row in rows])
+    residual = [float(Fraction(row["distance"]) - Fraction(d)) for row, d in zip(rows, distance.tolist(), strict=True)]
+    group, lean = (np.array([row[k] for row in rows]) for k in ("group", "lean"))
+    return Poses(T, distance, np.array(residual), group, lean == "parallel")
+
+
+def pose(origin: list[float], turn: list[float]) -> Array:
+    """Pose (4, 4) from ``origin`` (mm) and Cayley parameters: lean ``(a, b)`` of the axis, then ``c`` about itself.
+
+    Only sums, products and quotients make the axis, so that it is the same to the last bit on every machine.
+    """
+    a, b, c = turn
+    lean = 1.0 + a * a + b * b
+    C = np.array(
+        [
+            [1.0 + a * a - b * b, 2.0 * a * b, 2.0 * b],
+            [2.0 * a * b, 1.0 - a * a + b * b, -2.0 * a],
+            [-2.0 * b, 2.0 * a, 1.0 - a * a - b * b],
+        ]
+    )
+    spin = 1.0 + c * c
+    S = np.array([[(1.0 - c * c) / spin, -2.0 * c / spin, 0.0], [2.0 * c / spin, (1.0 - c * c) / spin, 0.0]])
+    T = np.eye(4)
+    T[:3, 2] = C[:, 2] / lean
+    T[:3, :2] = (C / lean)[:, :2] @ S[:, :2]
+    T[:3, 3] = origin
+    return T
+
+
+def block() -> Solid:
+    """The grooved block in its part frame (`clamp3d.clamp.block`)."""
+    return grooved_block(GROOVE, width=WIDTH, depth=DEPTH)
+
+
+def pair() -> GroovePair:
+    """Groove and wire for a contact model."""
+    return block_pair(GROOVE, WIRE)
+
+
+def in_part_frame(T: Array) -> Array:
+    """Poses ``T_a_b`` of `pair` for poses (n, 4, 4) of the wire in the groove's frame; no rounding: quarter turns."""
+    made = pair()
+    return np.asarray(made.T_a_groove @ T @ inverse(made.T_b_cylinder))
+
+
+def chord_error(unit_angle: float) -> float:
+    """Largest distance in mm between the groove's arc and equal chords of at most ``unit_angle`` rad.
+
+    >>> [round(chord_error(math.radians(a)), 5) for a in (1.0, 5.0, 10.0, 20.0)]
+    [0.00046, 0.01142, 0.04566, 0.18231]
+    """
+    m = math.ceil(2.0 * GROOVE.half_angle / unit_angle - 1e-9)
+    return 2.0 * GROOVE.radius * math.sin(GROOVE.half_angle / m / 2.0) ** 2

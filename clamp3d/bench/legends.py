@@ -1,0 +1,197 @@
+"""Tables 2 and 3 of the paper as pictures: every title is what the package answers for the case that is drawn."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from clamp3d.core.arc_circle import ArcRelation, arc_circle
+from clamp3d.core.rectangle import HoleContact, HoleRelation, Rectangle, hole_bolt
+from clamp3d.output.palette import INK, PART_COLOURS, VERDICT_COLOURS, darker
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_TOLERANCE = 1e-9
+_R, _r = 10.0, 3.6
+_MINOR, _MAJOR = math.radians(62.0), math.radians(128.0)
+_BOLT = Rectangle(0.0, 0.0, 5.0, 15.0)
+_W, _H = 6.6, 6.0
+
+# Table 3: half angle and circle centre of each cell.
+_ARCS: tuple[tuple[float, tuple[tuple[float, float], ...]], ...] = (
+    (_MINOR, ((1.2, -5.3), (-1.5, 1.5), (5.2, -8.4), (0.0, -_R - _r), (0.0, -_R + _r))),
+    (_MAJOR, ((-1.2, 0.6), (0.0, 11.5), (-9.4, 0.0), (_R + _r, 0.0), (_R - _r, 0.0))),
+)
+_VERDICT = {
+    ArcRelation.INSIDE: "clear",
+    ArcRelation.OUTSIDE: "clear",
+    ArcRelation.INTERSECT: "clash",
+    ArcRelation.EXTERIOR_CONTACT: "contact",
+    ArcRelation.INTERIOR_CONTACT: "contact",
+}
+
+
+def table2_figure() -> Figure:
+    """Table 2: the hole of the down splint against the bolt, and overlap."""
+    from matplotlib.figure import Figure
+
+    grip = math.acos(_BOLT.half_width / math.hypot(_W, _H)) - math.atan2(_H, _W)
+    half = grip / 2
+    reach = _W * math.cos(half) - _H * math.sin(half) - _BOLT.half_width
+    holes = (
+        Rectangle(0.0, 0.0, _W, _H, half),
+        Rectangle(reach, 0.0, _W, _H, half),
+        Rectangle(_W - _BOLT.half_width, 0.0, _W, _H),
+        Rectangle(0.0, 0.0, _W, _H, grip),
+        Rectangle(1.2, 0.0, _W, _H, 1.45 * grip),
+    )
+    figure = Figure(figsize=(11.0, 3.6), layout="constrained")
+    for ax, hole in zip(figure.subplots(1, len(holes)), holes, strict=True):
+        _hole_cell(ax, hole, hole_bolt(hole, _BOLT, tolerance=_TOLERANCE))
+    figure.suptitle(
+        "bolt hole of a splint against the bolt", x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK
+    )
+    return figure
+
+
+def table3_figure() -> Figure:
+    """Table 3: a minor and a major arc against a small circle, and contact at the end point M (Fig. 6)."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 7.6), layout="constrained")
+    axes = figure.subplots(3, 5, height_ratios=(1.0, 1.25, 1.25))
+    for row, (half_angle, centres) in enumerate(_ARCS):
+        for ax, (x, y) in zip(axes[row], centres, strict=True):
+            _arc_cell(ax, half_angle, x, y)
+            _frame(ax, (-17.6, 17.6), ((-20.5, 6.0), (-13.5, 17.0))[row])
+        side = ("minor arc", "major arc")[row]
+        axes[row, 0].annotate(side, (-0.04, 0.5), xycoords="axes fraction", rotation=90, va="center", fontsize=10)
+    for ax, turn in ((axes[2, 3], 52.0), (axes[2, 4], 128.0)):
+        m = (-_R * math.sin(_MINOR), -_R * math.cos(_MINOR))
+        angle = math.atan2(m[1], m[0]) - math.radians(turn)  # from OM extended towards R, away from the arc
+        _arc_cell(ax, _MINOR, m[0] + _r * math.cos(angle), m[1] + _r * math.sin(angle), fig_6=True)
+        _frame(ax, (m[0] - 8.5, m[0] + 11.5), (m[1] - 9.0, m[1] + 10.0))
+    for ax in axes[2, :3]:
+        ax.set_axis_off()
+    legend = axes[2, 0].annotate(
+        "Contact at the end point M (Fig. 6): RM is the tangent in M.\n"
+        "Centre on the arc PR: exterior; on the arc RQ: interior.\n\n"
+        "shaded: region of the arc, closed by the chord MN (dashed)\n"
+        "dot: nearest point of the arc; cross: centre of the circle",
+        (0.0, 0.55),
+        xycoords="axes fraction",
+        va="center",
+        fontsize=9,
+        color=INK,
+        annotation_clip=False,
+    )
+    legend.set_in_layout(False)
+    figure.suptitle("arc against small circle", x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
+    return figure
+
+
+def _hole_cell(ax: Axes, hole: Rectangle, contact: HoleContact) -> None:
+    from matplotlib.patches import Polygon
+
+    green, grey = PART_COLOURS["P2"], PART_COLOURS["P4"]
+    for side in (-1, 1):
+        wall = [
+            hole.point(side * hole.half_width, -hole.half_height),
+            hole.point(side * hole.half_width, hole.half_height),
+        ]
+        far = [hole.point(side * 13.0, hole.half_height), hole.point(side * 13.0, -hole.half_height)]
+        patch = Polygon(wall + far, fc=green, ec=darker(green, 0.45), hatch="////", hatch_linewidth=0.45, lw=1.0)
+        patch.set_hatchcolor(darker(green, 0.75))
+        ax.add_patch(patch)
+    w, h = _BOLT.half_width, _BOLT.half_height
+    ax.add_patch(Polygon([(-w, -h), (w, -h), (w, h), (-w, h)], fc=grey, ec=darker(grey, 0.45), lw=1.0, alpha=0.85))
+    ax.plot([0, 0], [-h - 1, h + 1], color=INK, lw=0.5, ls=(0, (10, 3, 2, 3)))
+    for x, y in contact.points:
+        _dot(ax, x, y, "contact")
+    if contact.relation is HoleRelation.OVERLAP:
+        c, s = math.cos(hole.angle), math.sin(hole.angle)
+        for side in (-1, 1):  # the corner that is deepest in the bolt
+            v = -side * math.copysign(hole.half_height, hole.angle)
+            x, y = hole.x + side * hole.half_width * c + v * s, hole.y - side * hole.half_width * s + v * c
+            if side * x < w:
+                _dot(ax, x, y, "clash")
+    _frame(ax, (-17.0, 17.0), (20.5, -16.5))
+    ax.set_title(contact.relation.value, fontsize=9.5, color=INK)
+    gaps = f"gap left {contact.gap_left + 0.0:.2f}, right {contact.gap_right + 0.0:.2f}".replace("-0.00", "0.00")
+    ax.annotate(gaps, (0.5, 0.0), xycoords="axes fraction", ha="center", va="bottom", fontsize=8, color=INK)
+
+
+def _arc_cell(ax: Axes, half_angle: float, x: float, y: float, *, fig_6: bool = False) -> None:
+    from matplotlib.patches import Arc, Circle, PathPatch
+    from matplotlib.path import Path
+
+    blue, yellow = PART_COLOURS["P1"], PART_COLOURS["P6"]
+    found = arc_circle(_R, half_angle, _r, x, y, tolerance=_TOLERANCE)
+    degrees = math.degrees(half_angle)
+    region = Path.arc(270.0 - degrees, 270.0 + degrees)
+    ax.add_patch(PathPatch(Path(np.asarray(region.vertices) * _R, region.codes), fc=blue, alpha=0.18, ec="none"))
+    m = np.array([-_R * math.sin(half_angle), -_R * math.cos(half_angle)])
+    ax.plot([m[0], -m[0]], [m[1], m[1]], color=darker(blue), lw=0.8, ls="--")
+    ax.add_patch(
+        Arc((0, 0), 2 * _R, 2 * _R, theta1=270.0 - degrees, theta2=270.0 + degrees, ec=darker(blue, 0.5), lw=2.2)
+    )
+    ax.add_patch(Circle((x, y), _r, fc=yellow, ec=darker(yellow, 0.45), lw=1.0, alpha=0.8))
+    ax.plot([x], [y], "+", color=INK, ms=6, mew=0.8)
+    for point, name, side in (((m[0], m[1]), "M", -1), ((-m[0], m[1]), "N", 1)):
+        offset = (11, -3) if fig_6 and name == "M" else (6 * side, 5)
+        ax.annotate(name, point, offset, textcoords="offset points", ha="center", fontsize=8, color=INK)
+    if fig_6:
+        _construction(ax, m)
+    if found.relation in (ArcRelation.EXTERIOR_CONTACT, ArcRelation.INTERIOR_CONTACT, ArcRelation.INTERSECT):
+        for px, py in found.points:
+            _dot(ax, px, py, _VERDICT[found.relation])
+    ax.set_title(found.relation.value, fontsize=9.5, color=INK)
+    ax.annotate(
+        f"gap {found.gap + 0.0:.2f}".replace("-0.00", "0.00"),
+        (0.5, 0.0),
+        xycoords="axes fraction",
+        ha="center",
+        va="bottom",
+        fontsize=8,
+        color=INK,
+    )
+
+
+def _construction(ax: Axes, m: Any) -> None:
+    """P, Q and R of Fig. 6 about M: circle of the small circle's radius, line OM, tangent RM."""
+    from matplotlib.patches import Circle
+
+    out = m / np.hypot(*m)
+    off = np.array([-out[1], out[0]]) if out[0] * out[1] < 0 else np.array([out[1], -out[0]])
+    ax.add_patch(Circle(tuple(m), _r, fc="none", ec=INK, lw=0.6, ls=":"))
+    points = {"P": m + _r * out, "Q": m - _r * out, "R": m + _r * off}
+    ax.plot([0.0, points["P"][0]], [0.0, points["P"][1]], color=INK, lw=0.6)
+    ax.plot([m[0], points["R"][0]], [m[1], points["R"][1]], color=INK, lw=0.6)
+    ax.annotate("O", (0.0, 0.0), (4, 2), textcoords="offset points", fontsize=8, color=INK)
+    for name, point in points.items():
+        ax.plot(*point, ".", color=INK, ms=3)
+        away = point - m
+        ax.annotate(
+            name,
+            point + 1.3 * away / np.hypot(*away),
+            ha="center",
+            va="center",
+            fontsize=8,
+            fontweight="bold",
+            color=INK,
+        )
+
+
+def _dot(ax: Axes, x: float, y: float, verdict: str) -> None:
+    ax.plot([x], [y], "o", ms=6, mec=INK, mew=0.7, mfc=VERDICT_COLOURS[verdict], zorder=10)
+
+
+def _frame(ax: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    ax.set_xlim(*x)
+    ax.set_ylim(*y)

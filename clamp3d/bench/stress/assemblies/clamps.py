@@ -1,0 +1,234 @@
+"""Clamps and starts that are hard to close, each family a seeded generator.
+
+Every generator takes a random number generator and returns one `Case`. All grooves are minor arcs. `MAKERS` maps name
+-> (what is hard, generator).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp.dimensions import Clamp, Wire
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.section import Section
+from clamp3d.core.pose import Array
+
+_RADIUS, _OFFSET = 23.8012, 48.0
+_PLACES = tuple((part, key) for part in ("up_splint", "down_splint") for key in ("line_groove", "jumper_groove"))
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A clamp with its wires, and the open state that it is closed from (None: straight and fully open)."""
+
+    clamp: Clamp
+    start: Array | None = None
+
+
+MAKERS: dict[str, tuple[str, Callable[[np.random.Generator], Case]]] = {}
+
+
+def _family(
+    name: str, about: str
+) -> Callable[[Callable[[np.random.Generator], Case]], Callable[[np.random.Generator], Case]]:
+    def register(make: Callable[[np.random.Generator], Case]) -> Callable[[np.random.Generator], Case]:
+        MAKERS[f"assembly: {name}"] = (about, make)
+        return make
+
+    return register
+
+
+@cache
+def _base() -> Clamp:
+    return load_clamp()
+
+
+def clamp_of(
+    radius: ArrayLike, half_angle: ArrayLike, offset: ArrayLike, diameter: ArrayLike, max_tilt_deg: float | None = None
+) -> Clamp | None:
+    """The reference clamp with other grooves and wires; None if such grooves do not fit into its splints.
+
+    Of the grooves up line, up jumper, down line, down jumper: ``radius`` (4,) mm, ``half_angle`` (4,) rad, ``offset``
+    (4,) mm from the bolt; ``diameter`` (2,) mm of line and jumper.
+    """
+    base, parts = _base(), dict[str, dict[str, Any]](up_splint={}, down_splint={})
+    R, half, beside = (np.broadcast_to(np.asarray(v, float), 4) for v in (radius, half_angle, offset))
+    for (part, key), r, h, o in zip(_PLACES, R, half, beside, strict=True):
+        depth = r * math.cos(h)
+        depth = base.up_splint.thickness + depth if part == "up_splint" else base.down_splint.face_depth - depth
+        parts[part][key] = replace(
+            getattr(getattr(base, part), key), radius=float(r), offset=float(o), centre_depth=float(depth)
+        )
+    if max_tilt_deg is not None:
+        parts["down_splint"]["max_tilt_deg"] = max_tilt_deg
+    line, jumper = (Wire(diameter=float(d)) for d in np.broadcast_to(np.asarray(diameter, float), 2))
+    try:
+        splints = {part: replace(getattr(base, part), **changed) for part, changed in parts.items()}
+        return replace(base, name="random", line=line, jumper=jumper, **splints)
+    except ValueError:
+        return None
+
+
+def _first(make: Callable[[], Clamp | None]) -> Clamp:
+    while True:
+        found = make()
+        if found is not None:
+            return found
+
+
+def _near_one(rng: np.random.Generator, shape: int, low: float = -12.0, high: float = -3.0) -> Array:
+    """1 +- 1e-12 ... 1e-3, or just 1."""
+    off = 10.0 ** rng.uniform(low, high, shape) * rng.choice([-1.0, 0.0, 1.0], shape, p=[0.4, 0.2, 0.4])
+    return np.asarray(1.0 + off)
+
+
+def _grooves(rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """Four grooves that differ: radii, half angles, offsets."""
+    scale = rng.uniform(0.5, 1.2)
+    return (
+        _RADIUS * scale * rng.uniform(0.85, 1.15, 4),
+        np.arccos(np.cos(rng.uniform(0.3, 1.3, 4))),
+        _OFFSET * rng.uniform(0.85, 1.15, 4),
+    )
+
+
+def random_clamp(rng: np.random.Generator) -> Clamp:
+    """A clamp of the reference's kind with any grooves and any wires."""
+
+    def make() -> Clamp | None:
+        R, half, offset = _grooves(rng)
+        return clamp_of(R, half, offset, rng.uniform(2.0, 60.0, 2))
+
+    return _first(make)
+
+
+def open_start(rng: np.random.Generator, section: Section) -> Array:
+    """An open state (6,), a poor one: far open, fully tilted, wires beside the middle or against a lip."""
+    limit, bounds = section.clamp.down_splint.max_tilt, section.bounds()
+    while True:
+        tilt = float(rng.choice([-limit, 0.0, limit, rng.uniform(-limit, limit)]))
+        q = section.open_state(section.open_distance() + rng.choice([0.0, 1.0, 100.0]) * rng.random(), tilt)
+        for i in (0, 2):
+            low, high = bounds[i]
+            # A lip itself, a hair inside it, or anywhere in the mouth.
+            place = rng.choice([0.0, 10.0 ** rng.uniform(-9.0, -2.0), rng.random()])
+            q[i] = low + place * (high - low) if rng.random() < 0.5 else high - place * (high - low)
+            q[i + 1] += rng.uniform(-5.0, 5.0)
+        if section.gaps(q).value.min() >= 0.0:
+            return q
+
+
+@_family("random clamps", "grooves and wires of any size, closed from the open clamp")
+def _random(rng: np.random.Generator) -> Case:
+    return Case(random_clamp(rng))
+
+
+@_family("poor starts", "far open, fully tilted, wires against a lip or beside the middle")
+def _poor(rng: np.random.Generator) -> Case:
+    clamp = random_clamp(rng)
+    return Case(clamp, open_start(rng, Section(clamp, Cas())))
+
+
+@_family("equal clearances", "grooves and wires equal, or equal up to 1e-12 ... 1e-3: which contact carries is a hair")
+def _equal(rng: np.random.Generator) -> Case:
+    def make() -> Clamp | None:
+        R, half, offset = _RADIUS * rng.uniform(0.5, 1.2), rng.uniform(0.3, 1.3), _OFFSET * rng.uniform(0.85, 1.15)
+        wire = 2.0 * R * rng.uniform(0.3, 1.3)
+        return clamp_of(R * _near_one(rng, 4), half, offset * _near_one(rng, 4), wire * _near_one(rng, 2))
+
+    return Case(_first(make))
+
+
+@_family("wire fills groove", "a wire's radius is a groove's, or up to 1e-12 ... 1e-3 beside it: arc or both lips")
+def _fills(rng: np.random.Generator) -> Case:
+    def make() -> Clamp | None:
+        R, half, offset = _grooves(rng)
+        if rng.random() < 0.5:  # facing grooves alike: it fills both
+            R[2:], half[2:], offset[2:] = R[:2] * _near_one(rng, 2), half[:2], offset[:2] * _near_one(rng, 2)
+        wires = rng.uniform(10.0, 50.0, 2)
+        for i in (0, 1):
+            if i == 0 or rng.random() < 0.5:
+                wires[i] = 2.0 * R[i + 2 * int(rng.integers(2))] * _near_one(rng, 1)[0]
+        return clamp_of(R, half, offset, wires)
+
+    return Case(_first(make))
+
+
+@_family("lip contacts", "wires thicker than their grooves, or grooves aside: on lips, or about to slide onto one")
+def _lips(rng: np.random.Generator) -> Case:
+    def make() -> Clamp | None:
+        R, half, offset = _grooves(rng)
+        if rng.random() < 0.5:  # facing grooves so far aside that arc and lip compete
+            offset[2:] = offset[:2] + R[:2] * np.sin(half[:2]) * rng.uniform(-0.6, 0.6, 2)
+            wires = 2.0 * R[:2] * rng.uniform(0.5, 1.05, 2)
+        else:
+            wires = 2.0 * R[:2] * rng.uniform(1.0, 1.8, 2)
+        return clamp_of(R, half, offset, wires)
+
+    return Case(_first(make))
+
+
+@_family("faces meet", "wires about as thick as both grooves are deep: held by the wires, by the faces, or by both")
+def _faces(rng: np.random.Generator) -> Case:
+    def make() -> Clamp | None:
+        R, half, offset = _grooves(rng)
+        offset[2:] = offset[:2] * (1.0 + rng.uniform(-0.02, 0.02, 2))
+        depth = R * 2.0 * np.sin(0.5 * half) ** 2
+        wires = (depth[:2] + depth[2:]) * np.where(rng.random(2) < 0.5, _near_one(rng, 2), rng.uniform(0.1, 1.3, 2))
+        return clamp_of(R, half, offset, wires)
+
+    return Case(_first(make))
+
+
+@_family("tilt limit", "one thick and one thin wire and little tilt: the limit carries, or nearly does")
+def _tilted(rng: np.random.Generator) -> Case:
+    def make() -> Clamp | None:
+        R, half, offset = _grooves(rng)
+        wires = np.array([rng.uniform(20.0, 60.0), rng.uniform(2.0, 20.0)])[:: int(rng.choice([-1, 1]))]
+        return clamp_of(R, half, offset, wires, max_tilt_deg=float(rng.choice([1e-6, 1e-3, rng.uniform(0.1, 12.8)])))
+
+    return Case(_first(make))
+
+
+@_family("sizes", "the whole clamp 1e-3 to 1e2 times its size: metres in place of millimetres, or a clamp of metres")
+def _sizes(rng: np.random.Generator) -> Case:
+    return Case(scaled(random_clamp(rng), float(10.0 ** rng.uniform(-3.0, 2.0))))
+
+
+_NO_LENGTHS = {"back_half_angle_deg", "max_tilt_deg", "connections", "name", "description", "unit", "sequence"}
+
+
+def scaled(clamp: Clamp, factor: float) -> Clamp:
+    """The clamp with every length times ``factor``."""
+
+    def of(value: Any, name: str) -> Any:
+        if name in _NO_LENGTHS:
+            return value
+        if isinstance(value, Wire):
+            return Wire(diameter=2.0 * value.radius * factor)
+        if is_dataclass(value):
+            return replace(value, **{f.name: of(getattr(value, f.name), f.name) for f in fields(value)})  # type: ignore[type-var]
+        return value * factor
+
+    return replace(clamp, **{f.name: of(getattr(clamp, f.name), f.name) for f in fields(clamp)})
+
+
+def snippet(case: Case) -> str:
+    """Python lines that make ``clamp`` and ``start``."""
+    base, clamp = _base(), case.clamp
+    changed = [f.name for f in fields(clamp) if getattr(clamp, f.name) != getattr(base, f.name)]
+    names = sorted({type(getattr(clamp, name)).__name__ for name in changed} - {"str"} | {"GrooveDimensions"})
+    lines = ["from dataclasses import replace", "", "import numpy as np", ""]
+    lines.append(f"from clamp3d.clamp.dimensions import {', '.join(names)}")
+    lines += ["from clamp3d.clamp.loader import load_clamp", "", "clamp = replace(", "    load_clamp(),"]
+    lines += [f"    {name}={getattr(clamp, name)!r}," for name in changed]
+    start = "None" if case.start is None else f"np.array({case.start.tolist()})"
+    return "\n".join([*lines, ")", f"start = {start}"])

@@ -1,0 +1,148 @@
+"""Cases of the motion families: shapes, the motion of the wire in the groove's frame, and what it was built from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clamp3d.bench.stress.poses.cases import Shapes
+from clamp3d.core.motion import Screw, Translation
+from clamp3d.core.pose import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Motions:
+    """n motions: ``shape`` (n,) row of ``shapes``; a turn by ``angle`` (n,) rad and a ``travel`` (n, 3) mm from 0 to 1.
+
+    ``start`` (n, 4, 4) is ``T_groove_wire`` at instant 0. Where ``angle`` is 0 the motion is a `Translation`; else a
+    `Screw` about ``axis`` (n, 3) through ``point`` (n, 3), and ``travel`` is along the axis: its first number is the
+    length. ``gap`` (n,) mm is the least distance that the case was built for, NaN if it was built from none, and
+    ``instant`` (n,) where; another place may come nearer. ``number`` (n,) tells the cases apart when some are taken.
+    """
+
+    shapes: Shapes
+    shape: NDArray[np.intp]
+    start: Array
+    point: Array
+    axis: Array
+    angle: Array
+    travel: Array
+    gap: Array
+    instant: Array
+    number: NDArray[np.intp]
+
+    def __len__(self) -> int:
+        return len(self.shape)
+
+    def take(self, rows: ArrayLike) -> Motions:
+        """The named cases."""
+        i = np.asarray(rows, dtype=np.intp)
+        return Motions(
+            self.shapes,
+            self.shape[i],
+            self.start[i],
+            self.point[i],
+            self.axis[i],
+            self.angle[i],
+            self.travel[i],
+            self.gap[i],
+            self.instant[i],
+            self.number[i],
+        )
+
+    def motion(self, i: int) -> Screw:
+        """Case i as the project's own motion."""
+        if self.angle[i] == 0.0:
+            return Translation(self.start[i], self.travel[i])
+        return Screw(self.start[i], self.point[i], self.axis[i], float(self.angle[i]), float(self.travel[i, 0]))
+
+    def vector(self) -> Array:
+        """Travel (n, 3) mm as a vector, as long doubles."""
+        axis = self.unit_axis()
+        turns = (self.angle != 0.0)[:, None]
+        return np.asarray(np.where(turns, axis * self.travel[:, :1], self.travel.astype(np.longdouble)))
+
+    def unit_axis(self) -> Array:
+        """Axes (n, 3) of length 1, as long doubles."""
+        axis = self.axis.astype(np.longdouble)
+        return np.asarray(axis / np.sqrt((axis * axis).sum(1))[:, None])
+
+    def scene(self) -> Array:
+        """Largest length of each case (n,), mm: sizes, the start, the point of the axis and the travel."""
+        far = np.abs(np.concatenate([self.start[:, :3, 3], self.point, np.asarray(self.vector(), float)], 1)).max(1)
+        return np.asarray(np.maximum(self.shapes.size()[self.shape], far))
+
+    def snippet(self, i: int) -> str:
+        """Python lines that ask for case i alone, bit by bit the same numbers."""
+        k = int(self.shape[i])
+        start = f"np.array({self.start[i].tolist()})"
+        if self.angle[i] == 0.0:
+            motion = f"clamp3d.Translation({start}, {self.travel[i].tolist()})"
+        else:
+            numbers = f"{self.point[i].tolist()}, {self.axis[i].tolist()}, {float(self.angle[i])!r}"
+            motion = f"clamp3d.Screw({start}, {numbers}, {float(self.travel[i, 0])!r})"
+        lines = [
+            "import numpy as np",
+            "import clamp3d",
+            f"groove = clamp3d.{self.shapes.groove(k)!r}",
+            f"wire = clamp3d.{self.shapes.cylinder(k)!r}",
+            f"motion = {motion}",
+            "print(clamp3d.sweep(groove, wire, motion))",
+            "print(clamp3d.first_contact(groove, wire, motion))",
+        ]
+        return "\n".join(lines)
+
+
+def motions(
+    shapes: Shapes,
+    shape: NDArray[np.intp],
+    start: Array,
+    *,
+    travel: ArrayLike,
+    angle: ArrayLike = 0.0,
+    point: ArrayLike = 0.0,
+    axis: ArrayLike = (0.0, 0.0, 1.0),
+    gap: ArrayLike = np.nan,
+    instant: ArrayLike = np.nan,
+) -> Motions:
+    """Cases from columns, each spread to n rows; ``travel`` (n, 3) mm, or (n,) along the axis of a turn."""
+    n = len(shape)
+
+    def spread(x: ArrayLike, *more: int) -> Array:
+        return np.array(np.broadcast_to(np.asarray(x, np.float64), (n, *more)))
+
+    travel = np.asarray(travel, np.float64)
+    if travel.ndim < 2:
+        travel = spread(travel)[:, None] * [1.0, 0.0, 0.0]
+    return Motions(
+        shapes,
+        shape,
+        start,
+        spread(point, 3),
+        spread(axis, 3),
+        spread(angle),
+        spread(travel, 3),
+        spread(gap),
+        spread(instant),
+        np.arange(n),
+    )
+
+
+def poses(cases: Motions, i: int, instants: Array) -> Array:
+    """Poses (m, 4, 4) of case i at some instants, by the matrices of its turns."""
+    s = instants[:, None]
+    start = cases.start[i]
+    T = np.repeat(start[None], len(s), 0)
+    if cases.angle[i] == 0.0:
+        T[:, :3, 3] = start[:3, 3] + s * cases.travel[i]
+        return T
+    u = cases.axis[i] / math.sqrt(float(cases.axis[i] @ cases.axis[i]))
+    K = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
+    angle = (instants * cases.angle[i])[:, None, None]
+    less_one = np.sin(angle) * K + 2.0 * np.sin(0.5 * angle) ** 2 * (K @ K)
+    T[:, :3, :3] += less_one @ start[:3, :3]
+    T[:, :3, 3] += less_one @ (start[:3, 3] - cases.point[i]) + s * (cases.travel[i, 0] * u)
+    return T

@@ -1,0 +1,309 @@
+"""Families of hard motions, each with a seeded generator, built backwards from where and how closely it comes near.
+
+A generator takes ``(rng, n)`` and returns n `Motions`: first the pose at the place of least clearance, as for single
+poses, then a motion through it whose clearance is least there. `MOTIONS` maps name -> `MotionFamily`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.bench.stress.motions.cases import Motions, motions
+from clamp3d.bench.stress.motions.contacts import moved, screws_through, square_to, touching
+from clamp3d.bench.stress.motions.family import Generator, MotionFamily
+from clamp3d.bench.stress.poses.cases import (
+    FEATURES,
+    Extended,
+    contact_on,
+    place,
+    poses_from_axes,
+    random_shapes,
+    shape_count,
+    signed_powers,
+    spread,
+)
+from clamp3d.core.pose import Array
+
+MOTIONS: dict[str, MotionFamily] = {}
+
+_CONVEX = ("lip", "end arc", "end edge", "corner")
+"""Features that a wire passes on a tangent."""
+
+
+def _family(name: str, about: str, *, choose: bool = False) -> Callable[[Generator], Generator]:
+    """Register a generator; ``choose`` from three times as many cases, mostly those that touch first where built to."""
+
+    def register(make: Generator) -> Generator:
+        name_ = f"motion: {name}"
+        MOTIONS[name_] = MotionFamily(name_, about, (lambda rng, n: _best(rng, n, make)) if choose else make)
+        return make
+
+    return register
+
+
+def _best(rng: np.random.Generator, n: int, make: Generator) -> Motions:
+    """Of 3 n cases n, in their order: those that stand as they were built before those that do not, by and large."""
+    cases = make(rng, 3 * n)
+    rank = np.where(_spoilt(cases), 1.0, 0.0) + rng.random(3 * n) * 1.2
+    rows = np.sort(np.argsort(rank, kind="stable")[:n])
+    return replace(cases.take(rows), number=np.arange(n))
+
+
+def _spoilt(cases: Motions) -> NDArray[np.bool_]:
+    """Whether a rough look (n,) finds the wire deeper elsewhere on its way than it was built for."""
+    out = np.zeros(len(cases), bool)
+    s, k = cases.shapes, cases.shape
+    R, a, H, half = (v[k][:, None] for v in (s.R, s.half_angle, 0.5 * s.L, 0.5 * s.length))
+    axis, vector = np.asarray(cases.unit_axis(), float), np.asarray(cases.vector(), float)
+    c, d = cases.start[:, :3, 3], cases.start[:, :3, 2]
+    gap = np.where(np.isfinite(cases.gap), cases.gap, -np.inf)
+    t = np.linspace(-1.0, 1.0, 9) * half
+    for u in np.linspace(0.0, 1.0, 33):
+        centre = cases.point + _rotated(axis, c - cases.point, u * cases.angle) + u * vector
+        points = centre[:, None, :] + t[:, :, None] * _rotated(axis, d, u * cases.angle)[:, None, :]
+        x, y, z = np.abs(points[..., 0]), points[..., 1], np.abs(points[..., 2])
+        rho, lip = np.hypot(x, y), np.hypot(x - R * np.sin(a), y + R * np.cos(a))
+        arc = np.where(x * np.cos(a) + y * np.sin(a) <= 0.0, np.abs(R - rho), lip)
+        ray = np.where(x >= R * np.sin(a), np.abs(y + R * np.cos(a)), lip)
+        g = np.where((y <= -R * np.cos(a)) & (rho >= R), 0.0, np.minimum(arc, ray))
+        low = np.hypot(g, np.maximum(z - H, 0.0)).min(1)
+        out |= low - s.r[k] < gap - 1e-9 * s.R[k]
+    return out
+
+
+def _rotated(axis: Array, x: Array, angle: Array) -> Array:
+    once = np.cross(axis, x)
+    return np.asarray(
+        x + np.sin(angle)[:, None] * once + 2.0 * np.sin(0.5 * angle)[:, None] ** 2 * np.cross(axis, once)
+    )
+
+
+@_family(
+    "grazing",
+    "straight past a lip, an edge or a corner on a tangent: clear or deep by 1e-12 ... 1e-2 of the radius",
+    choose=True,
+)
+def _grazing(rng: np.random.Generator, n: int) -> Motions:
+    k = shape_count(n)
+    shapes, shape = random_shapes(rng, k), spread(n, k)
+    gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
+    cases, normal = touching(rng, shapes, shape, rng.choice(_CONVEX, n), gap)
+    way = square_to(rng, normal)
+    # A third square to the groove: the wire's centre moves in the section.
+    section = np.stack([-normal[:, 1], normal[:, 0], np.zeros(n)], 1)
+    flat = np.sqrt((section * section).sum(1))
+    across = (rng.random(n) < 0.33) & (flat > 0.1)
+    way = np.where(across[:, None], section / np.maximum(flat, 0.1)[:, None], way)
+    travel = np.asarray(way * (shapes.R[shape] * 10.0 ** rng.uniform(-1, 1, n))[:, None], np.float64)
+    instant = rng.uniform(0.05, 0.95, n)
+    start = moved(cases.T_world_wire, -instant[:, None] * travel.astype(Extended))
+    return motions(shapes, shape, start, travel=travel, gap=gap, instant=instant)
+
+
+def _turning_screws(rng: np.random.Generator, n: int, turns: Array, pitch: Array) -> Motions:
+    """Circles and helices that curve away from where they touch, on any feature."""
+    k = shape_count(n)
+    R = 10.0 ** rng.uniform(0.0, 2.0, k)
+    shapes = random_shapes(rng, k, R=R, length=R * 10.0 ** rng.uniform(-1.0, 1.0, k))
+    shape = spread(n, k)
+    gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
+    feature = rng.choice(FEATURES, n)
+    cases, normal = touching(rng, shapes, shape, feature, gap)
+    # In the hollow a circle narrower than it, square to the groove.
+    hollow = np.isin(feature, ["arc", "end arc"])
+    room = (shapes.R - shapes.r)[shape]
+    radius = np.where(hollow, room * rng.uniform(0.1, 0.9, n), shapes.R[shape] * 10.0 ** rng.uniform(-1, 1, n))
+    axis = square_to(rng, normal)
+    along = (feature == "arc") | (rng.random(n) < 0.33) & (np.abs(normal[:, 2]) < 1e-9)
+    axis = np.where(along[:, None], [[0.0, 0.0, 1.0]], axis)
+    centre = cases.T_world_wire[:, :3, 3]
+    point = centre + np.asarray(radius[:, None] * normal, np.float64) + np.asarray(
+        axis * rng.uniform(-1, 1, n)[:, None] * radius[:, None], np.float64
+    )  # fmt: skip
+    instant = rng.uniform(0.05, 0.95, n)
+    return screws_through(cases, point, np.asarray(axis, float), turns, pitch * radius * turns, instant)
+
+
+@_family("turning", "circles about any axis that touch at one instant and curve away, on any feature", choose=True)
+def _turning(rng: np.random.Generator, n: int) -> Motions:
+    return _turning_screws(rng, n, 10.0 ** rng.uniform(-1.3, 0.8, n) * rng.choice([-1.0, 1.0], n), np.zeros(n))
+
+
+@_family(
+    "screws", "turn and advance together, up to six turns, near at one place; and screws of no plan at all", choose=True
+)
+def _screws(rng: np.random.Generator, n: int) -> Motions:
+    part = n // 2
+    turns = 10.0 ** rng.uniform(-1.0, np.log10(12.0 * np.pi), n) * rng.choice([-1.0, 1.0], n)
+    pitch = signed_powers(rng, n, -3, 0)
+    built = _turning_screws(rng, n, turns, pitch)
+    size = built.shapes.size()[built.shape][:, None]
+    centre, point = rng.uniform(-1.5, 1.5, (n, 3)) * size, rng.uniform(-1.0, 1.0, (n, 3)) * size
+    T = poses_from_axes(rng, centre, rng.normal(size=(n, 3)))
+    free = motions(built.shapes, built.shape, T, travel=rng.uniform(-2, 2, n) * size[:, 0], angle=turns, point=point,
+                   axis=rng.normal(size=(n, 3)))  # fmt: skip
+    return _choose(rng.permutation(n) < part, built, free)
+
+
+def _choose(first: NDArray[np.bool_], a: Motions, b: Motions) -> Motions:
+    """Row by row one of two of the same shapes."""
+
+    def pick(x: Array, y: Array) -> Array:
+        return np.where(first.reshape(-1, *[1] * (x.ndim - 1)), x, y)
+
+    return Motions(a.shapes, a.shape, pick(a.start, b.start), pick(a.point, b.point), pick(a.axis, b.axis),
+                   pick(a.angle, b.angle), pick(a.travel, b.travel), pick(a.gap, b.gap), pick(a.instant, b.instant),
+                   a.number)  # fmt: skip
+
+
+@_family("thin and fast", "a thin groove or a thin short wire crossed in 1e-6 ... 1e-2 of the motion")
+def _thin(rng: np.random.Generator, n: int) -> Motions:
+    k = shape_count(n)
+    R = 10.0 ** rng.uniform(0, 2, k)
+    sheet = rng.random(k) < 0.5
+    thin = R * 10.0 ** rng.uniform(-6, -2, k)
+    r = np.where(rng.random(k) < 0.5, thin, R * 10.0 ** rng.uniform(-5, -1, k))
+    shapes = random_shapes(
+        rng,
+        k,
+        R=R,
+        L=np.where(sheet, thin, R * 10.0 ** rng.uniform(-1, 1, k)),
+        r=r,
+        length=r * 10.0 ** rng.uniform(-2, 1, k),
+    )
+    shape = spread(n, k)
+    gap = shapes.r[shape] * np.where(rng.random(n) < 0.5, signed_powers(rng, n, -6, -0.1), -rng.uniform(0, 0.9, n))
+    cases, normal = touching(rng, shapes, shape, rng.choice(_CONVEX, n), gap)
+    fast = (shapes.R[shape] * 10.0 ** rng.uniform(0.5, 2, n))[:, None]
+    tangent = square_to(rng, normal)
+    # Through the sheet or past it, along the groove, off from the contact's own tangent.
+    through = sheet[shape] & (rng.random(n) < 0.7)
+    lean = 0.1 * np.abs(rng.normal(size=(n, 2)))
+    z = np.column_stack([lean * rng.choice([-1, 1], (n, 2)), rng.choice([-1.0, 1.0], n)])
+    travel = np.asarray(np.where(through[:, None], z, tangent) * fast, np.float64)
+    instant = rng.uniform(0.05, 0.95, n)
+    start = moved(cases.T_world_wire, -instant[:, None] * travel.astype(Extended))
+    return motions(shapes, shape, start, travel=travel, gap=gap, instant=instant)
+
+
+@_family("narrow mouth", "arcs over 180 deg: entry through the mouth hits where it is narrower, sliding along is free")
+def _narrow_mouth(rng: np.random.Generator, n: int) -> Motions:
+    k = shape_count(n)
+    a = np.pi / 2 + rng.uniform(0.01, 1.4, k)
+    R = 10.0 ** rng.uniform(0, 2, k)
+    s = R * np.sin(a)
+    off = 10.0 ** rng.uniform(-10, -0.5, k) * rng.choice([-1.0, 1.0], k)
+    r = np.minimum(s * (1.0 + off), R * (1.0 - 10.0 ** rng.uniform(-4, -1, k)))
+    shapes = random_shapes(rng, k, R=R, half_angle=a, r=r)
+    shape = spread(n, k)
+    R, r, s, L, length = (v[shape] for v in (shapes.R, shapes.r, s, shapes.L, shapes.length))
+    h = -R * np.cos(shapes.half_angle[shape])
+    exact = np.asarray(R, Extended) * np.sin(np.asarray(shapes.half_angle, Extended)[shape]) - r
+    z = np.zeros(n)
+    # Straight down through the mouth, in the middle or a little beside it, level or a little tilted.
+    level = rng.random(n) < 0.6
+    beside = np.where(level, 0.0, R * signed_powers(rng, n, -9, -1, 0.3))
+    tilt = np.stack([np.where(level, 0.0, signed_powers(rng, n, -9, -1, 0.3)) for _ in range(2)] + [z + 1.0], 1)
+    top, bottom = h + r + R * rng.uniform(0.1, 3.0, n), rng.uniform(-0.3, 0.3, n) * (R - r)
+    down = motions(
+        shapes,
+        shape,
+        poses_from_axes(rng, np.stack([beside, top, rng.uniform(-0.5, 0.5, n) * L], 1), tilt),
+        travel=np.stack([z, bottom - top, z], 1),
+        gap=np.where(level, np.asarray(exact, float), np.nan),
+        instant=(top - h) / (top - bottom),
+    )
+    # Along the groove from beyond its end, in line with it, on its axis or off it towards the deepest line.
+    far = 0.5 * (L + length) + r + R * rng.uniform(0.1, 3.0, n)
+    y = -(R - r) * np.where(rng.random(n) < 0.5, 0.0, 1.0 - 10.0 ** rng.uniform(-6, -0.1, n))
+    side = rng.choice([-1.0, 1.0], n)
+    slide = motions(
+        shapes,
+        shape,
+        poses_from_axes(rng, np.stack([z, y, -side * far], 1), np.stack([z, z, z + 1.0], 1)),
+        travel=np.stack([z, z, 2.0 * side * far], 1),
+        gap=(R - r) + y,
+        instant=0.5,
+    )
+    return _choose(rng.random(n) < 0.6, down, slide)
+
+
+@_family(
+    "level", "clearance that does not change: slides along the groove, a face or an edge, turns about its axis; rest"
+)
+def _level(rng: np.random.Generator, n: int) -> Motions:
+    k = shape_count(n)
+    shapes, shape = random_shapes(rng, k), spread(n, k)
+    gap = shapes.r[shape] * signed_powers(rng, n, -9, -1)
+    feature = rng.choice(("arc", "lip", "flat", "end edge"), n)
+    contact = contact_on(rng, shapes, shape, feature)
+    contact.ends[:] = False
+    cases = place(rng, shapes, shape, contact, gap, tilt=np.zeros(n))
+    R = shapes.R[shape]
+    length = R * 10.0 ** rng.uniform(-1, 1.5, n) * rng.choice([-1.0, 1.0], n)
+    z = np.zeros(n)
+    along_z = np.stack([z, z, length], 1)
+    along_x = np.stack([length, z, z], 1)
+    on_edge = (feature == "end edge") | ((feature == "flat") & (rng.random(n) < 0.5))
+    travel = np.where(on_edge[:, None], along_x, along_z)
+    kind = rng.random(n)
+    travel = np.where((kind < 0.1)[:, None], 0.0, travel)
+    slides = motions(shapes, shape, cases.T_world_wire, travel=travel, gap=gap, instant=0.5)
+    # About the groove's axis, with or without advance: level as long as it stays behind the arc or at one lip.
+    angle = rng.uniform(0.01, 6.0, n) * rng.choice([-1.0, 1.0], n)
+    advance = np.where(rng.random(n) < 0.5, 0.0, length)
+    turns = motions(shapes, shape, cases.T_world_wire, travel=advance, angle=angle, gap=gap, instant=0.0)
+    # About the wire's own axis: nothing moves.
+    own = cases.T_world_wire
+    spins = motions(shapes, shape, own, travel=np.where(rng.random(n) < 0.5, 0.0, length), angle=angle,
+                    point=own[:, :3, 3], axis=own[:, :3, 2], gap=gap, instant=0.5)  # fmt: skip
+    return _choose(kind < 0.6, slides, _choose(kind < 0.85, turns, spins))
+
+
+@_family(
+    "start",
+    "starts in contact or by 1e-12 ... 1e-2 of the radius off it, and leaves, slides or comes back",
+    choose=True,
+)
+def _start(rng: np.random.Generator, n: int) -> Motions:
+    k = shape_count(n)
+    shapes, shape = random_shapes(rng, k), spread(n, k)
+    r = shapes.r[shape]
+    gap = np.where(rng.random(n) < 0.2, -r * rng.uniform(0, 0.99, n), r * signed_powers(rng, n, -12, -2, 0.3))
+    cases, normal = touching(rng, shapes, shape, rng.choice(FEATURES, n), gap)
+    way = square_to(rng, normal)
+    away = np.where(rng.random(n) < 0.3, 0.0, rng.uniform(-0.2, 1.5, n))[:, None]
+    length = (shapes.R[shape] * 10.0 ** rng.uniform(-2, 1, n))[:, None]
+    travel = np.asarray((np.cos(away) * way + np.sin(away) * normal) * length, np.float64)
+    leaves = motions(shapes, shape, cases.T_world_wire, travel=travel, gap=gap, instant=0.0)
+    # Full circles that come back to the contact, curving away from it.
+    radius = (shapes.R[shape] * 10.0 ** rng.uniform(-2, 0, n))[:, None]
+    point = np.asarray(cases.T_world_wire[:, :3, 3] + radius * normal, np.float64)
+    turns = motions(shapes, shape, cases.T_world_wire, travel=0.0, angle=2.0 * np.pi * rng.integers(1, 4, n),
+                    point=point, axis=np.asarray(square_to(rng, normal), float), gap=gap, instant=0.0)  # fmt: skip
+    return _choose(rng.random(n) < 0.75, leaves, turns)
+
+
+@_family(
+    "from far", "comes from 1e3 ... 1e6 mm away and stops at, or flies past, 1e-12 ... 1e-2 of the radius", choose=True
+)
+def _from_far(rng: np.random.Generator, n: int) -> Motions:
+    k = shape_count(n)
+    shapes, shape = random_shapes(rng, k), spread(n, k)
+    gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
+    feature = rng.choice(FEATURES, n)
+    cases, normal = touching(rng, shapes, shape, feature, gap)
+    lean = rng.uniform(0.0, 1.4, n)[:, None]
+    way = np.cos(lean) * normal + np.sin(lean) * square_to(rng, normal)
+    distance = 10.0 ** rng.uniform(3, 6, n)
+    arrives = rng.random(n) < 0.6
+    past = np.isin(feature, _CONVEX) & ~arrives
+    way = np.where(past[:, None], square_to(rng, normal), way)
+    instant = np.where(past, rng.uniform(0.1, 0.9, n), 1.0)
+    travel = np.asarray(-way * distance[:, None], np.float64)
+    start = moved(cases.T_world_wire, -instant.astype(Extended)[:, None] * travel)
+    return motions(shapes, shape, start, travel=travel, gap=gap, instant=instant)

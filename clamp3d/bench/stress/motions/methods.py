@@ -1,0 +1,102 @@
+"""The methods that motions are put to: does the wire touch on its way, and how near does it come?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.bench.stress.motions.cases import Motions, poses
+from clamp3d.bench.stress.worker import Measured, Measures, Method
+from clamp3d.core.distance import signed_distances
+from clamp3d.core.motion import first_contact, sweep
+from clamp3d.core.pose import Array
+from clamp3d.errors import InputError
+
+
+class CasMethod:
+    """`sweep` for the least distance and `first_contact`, whose answers are kept for `first_contacts`.
+
+    The bound is that of rounding (distance and pose) and the resolution of the search.
+    """
+
+    measures: Measures = "depth"
+
+    def __init__(self) -> None:
+        self._first: dict[int, tuple[bool, float, float]] = {}
+        self._lowest: dict[int, float] = {}
+
+    def measure(self, cases: Motions) -> Measured:
+        """See `Method`."""
+        k = int(cases.shape[0])
+        groove, wire = cases.shapes.groove(k), cases.shapes.cylinder(k)
+        distance, bound = np.empty(len(cases)), np.empty(len(cases))
+        for i in range(len(cases)):
+            motion = cases.motion(i)
+            least = sweep(groove, wire, motion)
+            first = first_contact(groove, wire, motion)
+            distance[i] = least.distance
+            bound[i] = max(least.error_bound, first.error_bound) + max(least.resolution, first.resolution)
+            self._lowest[int(cases.number[i])] = least.instant
+            self._first[int(cases.number[i])] = (first.touches, first.instant, first.contact.distance)
+        return Measured(distance, bound, np.zeros(len(cases), bool))
+
+    def instants(self, n: int) -> Array:
+        """Instants (n, 1) that `sweep` named, -1 where it was not asked."""
+        out = np.full((n, 1), -1.0)
+        out[list(self._lowest), 0] = list(self._lowest.values())
+        return out
+
+    def first_contacts(self, n: int) -> tuple[NDArray[np.bool_], Array, Array]:
+        """Whether, when (n,) and at which distance (n,) `first_contact` found contact; NaN where not asked."""
+        touches, instant, at = np.zeros(n, bool), np.full(n, np.nan), np.full(n, np.nan)
+        for i, (hit, when, distance) in self._first.items():
+            touches[i], instant[i], at[i] = hit, when, distance
+        return touches, instant, at
+
+
+class SteppedMethod:
+    """Exact distances at evenly spaced poses, ends included: the least of them. It has no bound."""
+
+    measures: Measures = "depth"
+
+    def __init__(self, steps: int) -> None:
+        self.instants = np.linspace(0.0, 1.0, steps + 1)
+
+    def measure(self, cases: Motions) -> Measured:
+        """See `Method`."""
+        k = int(cases.shape[0])
+        groove, wire = cases.shapes.groove(k), cases.shapes.cylinder(k)
+        least = np.empty(len(cases))
+        for i in range(len(cases)):
+            least[i] = signed_distances(groove, wire, poses(cases, i, self.instants), workers=1).min()
+        return Measured(least, np.full(len(cases), np.nan), np.zeros(len(cases), bool))
+
+
+def _fcl() -> Method:
+    from clamp3d.bench.stress.motions.fcl_continuous import FclMethod
+
+    return FclMethod(math.radians(5.0))
+
+
+METHODS: dict[str, tuple[str, Callable[[], Method]]] = {
+    "cas": ("closed forms of the arc groove; its bound is that of rounding", CasMethod),
+    "stepped 100": (
+        "exact distances at 101 evenly spaced poses of a motion, the usual practice; no bound",
+        lambda: SteppedMethod(100),
+    ),
+    "FCL continuous": (
+        "python-fcl's continuous collision of wedges of 5 degrees, conservative advancement; verdicts only",
+        _fcl,
+    ),
+}
+"""Name -> what it is, and how it is made."""
+
+
+def method(name: str) -> Method:
+    """The method of that name. Raises InputError naming the choices."""
+    if name not in METHODS:
+        raise InputError(f"unknown method {name!r}; available: {', '.join(METHODS)}")
+    return METHODS[name][1]()

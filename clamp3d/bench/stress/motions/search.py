@@ -1,0 +1,241 @@
+"""Compiled part of `truth`: least signed distance of a moving axis from a groove by brute force.
+
+Cells of (instant, place on the axis) are halved, lowest bound first, by the one bound that needs no thought: ``sdf``
+has slope 1. That finds where it is low; golden section within golden section finds how low.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from clamp3d.core.jit import entry
+from clamp3d.core.jit import formula as _compiled
+
+_GOLDEN = 0.6180339887498949
+_STARTS = 4
+
+
+@_compiled
+def sdf(x, y, z, R, s, h, H):  # type: ignore[no-untyped-def]
+    """Signed distance of a point: from the boundary pieces of the section, and the prism rule."""
+    x = abs(x)
+    rho = math.sqrt(x * x + y * y)
+    lip = math.sqrt((x - s) * (x - s) + (y - h) * (y - h))
+    arc = abs(R - rho) if x * -h + y * s <= 0.0 else lip
+    ray = abs(y - h) if x >= s else lip
+    g = min(arc, ray)
+    if y <= h and rho >= R:
+        g = -g
+    e = abs(z) - H
+    if g <= 0.0 and e <= 0.0:
+        return max(g, e)
+    g, e = max(g, 0.0), max(e, 0.0)
+    return math.sqrt(g * g + e * e)
+
+
+@_compiled
+def frame(m, u, p):  # type: ignore[no-untyped-def]
+    """Centre and direction at u into p (6,): turned by the matrix of a rotation."""
+    for k in range(3):
+        p[k] = m[k] + u * m[12 + k]
+        p[3 + k] = m[3 + k]
+    if m[15] != 0.0:
+        half = math.sin(0.5 * u * m[15])
+        sine, versine = math.sin(u * m[15]), 2.0 * half * half
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            a, b, c = m[9 + k], m[9 + i], m[9 + j]
+            own, one, two = -versine * (b * b + c * c), a * b * versine - c * sine, a * c * versine + b * sine
+            p[k] += own * (m[k] - m[6 + k]) + one * (m[i] - m[6 + i]) + two * (m[j] - m[6 + j])
+            p[3 + k] += own * m[3 + k] + one * m[3 + i] + two * m[3 + j]
+
+
+@_compiled
+def on_axis(p, t, g):  # type: ignore[no-untyped-def]
+    """Value at t on the axis p; g: R, s, h, H."""
+    return sdf(p[0] + t * p[3], p[1] + t * p[4], p[2] + t * p[5], g[0], g[1], g[2], g[3])
+
+
+@_compiled
+def along_axis(m, u, lo, hi, g, p):  # type: ignore[no-untyped-def]
+    """Lowest value at instant u between lo and hi on the axis, and its place."""
+    frame(m, u, p)
+    best, place = on_axis(p, lo, g), lo
+    f = on_axis(p, hi, g)
+    if f < best:
+        best, place = f, hi
+    x, y = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
+    fx, fy = on_axis(p, x, g), on_axis(p, y, g)
+    for _ in range(52):
+        if fx < fy:
+            hi, y, fy = y, x, fx
+            x = hi - _GOLDEN * (hi - lo)
+            fx = on_axis(p, x, g)
+        else:
+            lo, x, fx = x, y, fy
+            y = lo + _GOLDEN * (hi - lo)
+            fy = on_axis(p, y, g)
+    if fx < best:
+        best, place = fx, x
+    if fy < best:
+        best, place = fy, y
+    return best, place
+
+
+@_compiled
+def polish(m, u, t, wu, wt, u0, u1, l, g, p, speed, limit):  # type: ignore[no-untyped-def] # noqa: E741
+    """Lowest value within wu, wt of u, t; followed where it leads out of there."""
+    best, bu, bt = math.inf, u, t
+    for _ in range(12):
+        lo, hi = max(u0, bu - wu), min(u1, bu + wu)
+        tl, th = max(-l, bt - wt), min(l, bt + wt)
+        a, b = lo, hi
+        old, ou, ot = best, bu, bt
+        for i in range(3):
+            e = lo if i == 0 else hi if i == 1 else bu
+            f, place = along_axis(m, e, tl, th, g, p)
+            if f < best:
+                best, bu, bt = f, e, place
+        x, y = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
+        fx, px = along_axis(m, x, tl, th, g, p)
+        fy, py = along_axis(m, y, tl, th, g, p)
+        for _ in range(52):
+            if min(fx, fy) - speed * (b - a) > limit:  # cannot become the lowest any more
+                break
+            if fx < fy:
+                b, y, fy, py = y, x, fx, px
+                x = b - _GOLDEN * (b - a)
+                fx, px = along_axis(m, x, tl, th, g, p)
+            else:
+                a, x, fx, px = x, y, fy, py
+                y = a + _GOLDEN * (b - a)
+                fy, py = along_axis(m, y, tl, th, g, p)
+        if fx < best:
+            best, bu, bt = fx, x, px
+        if fy < best:
+            best, bu, bt = fy, y, py
+        inside = (bu - ou < 0.99 * wu and ou - bu < 0.99 * wu) or bu == u0 or bu == u1
+        if (inside and abs(bt - ot) < 0.99 * wt) or not best < old:
+            break
+    return best, bu, bt
+
+
+@_compiled
+def push(heap, top, key, u, t, hu, ht, f):  # type: ignore[no-untyped-def]
+    """Into the heap, lowest key first."""
+    i = top
+    while i > 0 and heap[(i - 1) // 2, 0] > key:
+        heap[i] = heap[(i - 1) // 2]
+        i = (i - 1) // 2
+    heap[i, 0], heap[i, 1], heap[i, 2], heap[i, 3], heap[i, 4], heap[i, 5] = key, u, t, hu, ht, f
+
+
+@_compiled
+def drop(heap, top):  # type: ignore[no-untyped-def]
+    """The first of ``top`` rows out of the heap."""
+    last = heap[top - 1].copy()
+    i = 0
+    while 2 * i + 1 < top - 1:
+        j = 2 * i + 1
+        if j + 1 < top - 1 and heap[j + 1, 0] < heap[j, 0]:
+            j += 1
+        if heap[j, 0] >= last[0]:
+            break
+        heap[i] = heap[j]
+        i = j
+    heap[i] = last
+
+
+@_compiled
+def least(g, l, m, u0, u1, hints, size, cells, heap, p):  # type: ignore[no-untyped-def] # noqa: E741
+    """Least value for u0 <= u <= u1, |t| <= l with u and t; last, how much lower it could be by slope alone."""
+    far = 0.0
+    for i in range(2):
+        t = -l if i == 0 else l
+        ox, oy, oz = m[0] + t * m[3] - m[6], m[1] + t * m[4] - m[7], m[2] + t * m[5] - m[8]
+        kx, ky, kz = m[10] * oz - m[11] * oy, m[11] * ox - m[9] * oz, m[9] * oy - m[10] * ox
+        far = max(far, math.sqrt(kx * kx + ky * ky + kz * kz))
+    speed = math.sqrt((far * m[15]) ** 2 + m[12] ** 2 + m[13] ** 2 + m[14] ** 2)
+    wide = 1e-3 * size / speed if speed > 0.0 else 0.0
+    best, bu, bt = math.inf, u0, 0.0
+    for hint in hints:
+        if u0 <= hint <= u1:
+            frame(m, hint, p)
+            low, place, near = math.inf, 0.0, l / 512.0
+            before, here = math.inf, on_axis(p, -l, g)
+            for j in range(1025):
+                t = near * (j - 512)
+                after = on_axis(p, t + near, g) if j < 1024 else math.inf
+                if here <= before and here <= after:
+                    f, t = along_axis(m, hint, max(-l, t - near), min(l, t + near), g, p)
+                    if f < low:
+                        low, place = f, t
+                before, here = here, after
+            if low < best:
+                best, bu, bt = low, hint, place
+            f, u, t = polish(m, hint, place, wide, min(l, max(near, 1e-3 * size)), u0, u1, l, g, p, speed, best)
+            if f < best:
+                best, bu, bt = f, u, t
+    frame(m, 0.5 * (u0 + u1), p)
+    f = on_axis(p, 0.0, g)
+    push(heap, 0, -math.inf, 0.5 * (u0 + u1), 0.0, 0.5 * (u1 - u0), l, f)
+    top = 1
+    for _ in range(cells):
+        if heap[0, 0] >= best - 1e-9 * size or top + 2 > len(heap):
+            break
+        key, u, t, hu, ht, f = heap[0]
+        drop(heap, top)
+        top -= 1
+        if f < best:
+            best, bu, bt = f, u, t
+        by_u = speed * hu > ht
+        hu, ht = (0.5 * hu, ht) if by_u else (hu, 0.5 * ht)
+        for i in range(2):
+            sign = -1.0 if i == 0 else 1.0
+            cu, ct = (u + sign * hu, t) if by_u else (u, t + sign * ht)
+            frame(m, cu, p)
+            f = on_axis(p, ct, g)
+            push(
+                heap,
+                top,
+                max(key, f - math.sqrt((speed * hu) ** 2 + ht * ht + 2.0 * speed * hu * ht)),
+                cu,
+                ct,
+                hu,
+                ht,
+                f,
+            )
+            top += 1
+    slack = max(0.0, best - heap[0, 0])
+    # From the lowest cells, no two of them side by side.
+    for _ in range(_STARTS):
+        low, row = math.inf, -1
+        for i in range(top):
+            if heap[i, 5] < low and heap[i, 0] < best:
+                low, row = heap[i, 5], i
+        if row < 0:
+            break
+        u, t, hu, ht = heap[row, 1], heap[row, 2], heap[row, 3], heap[row, 4]
+        f, pu, pt = polish(m, u, t, 3.0 * hu, 3.0 * ht, u0, u1, l, g, p, speed, best)
+        if f < best:
+            best, bu, bt = f, pu, pt
+        for i in range(top):
+            if abs(heap[i, 1] - u) <= 6.0 * hu and abs(heap[i, 2] - t) <= 6.0 * ht:
+                heap[i, 5] = math.inf
+    return best, bu, bt, slack
+
+
+def _least_of(shapes, motions, u0, u1, hints, sizes, cells, out):  # type: ignore[no-untyped-def]
+    """`least` of n motions (n, 16) and shapes (n, 4): R, half angle, H, half length; out (n, 4)."""
+    heap, p, g = np.empty((2 * cells + 8, 6)), np.empty(6), np.empty(4)
+    for i in range(len(motions)):
+        R, a = shapes[i, 0], shapes[i, 1]
+        g[0], g[1], g[2], g[3] = R, R * math.sin(a), -R * math.cos(a), shapes[i, 2]
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = least(
+            g, shapes[i, 3], motions[i], u0[i], u1[i], hints[i], sizes[i], cells, heap, p
+        )
+
+
+least_of = entry(_least_of, "void(f8[:,::1],f8[:,::1],f8[::1],f8[::1],f8[:,::1],f8[::1],i8,f8[:,::1])")

@@ -1,0 +1,120 @@
+"""Families of poses that are hard for their numbers: tiny, huge, mixed, far away, rounded."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clamp3d.bench.stress.poses.cases import (
+    FEATURES,
+    Cases,
+    Extended,
+    Shapes,
+    contact_on,
+    place,
+    poses_from_axes,
+    random_shapes,
+    shape_count,
+    signed_powers,
+    spread,
+)
+from clamp3d.bench.stress.poses.family import PoseFamily, into, setting
+
+FAMILIES: dict[str, PoseFamily] = {}
+_family = into(FAMILIES)
+
+
+@_family("full and tiny arcs", "half angles of 1e-12 ... 1e-2 rad and of pi less that")
+def _extreme_arcs(rng: np.random.Generator, n: int) -> Cases:
+    k = shape_count(n)
+    small = 10.0 ** rng.uniform(-12, -2, k)
+    shapes = random_shapes(rng, k, half_angle=np.where(rng.random(k) < 0.5, small, np.pi - small))
+    shape, feature = spread(n, k), rng.choice(FEATURES, n)
+    gap = shapes.r[shape] * signed_powers(rng, n, -14, -1)
+    contact = contact_on(rng, shapes, shape, feature)
+    return place(rng, shapes, shape, contact, gap, tilt=signed_powers(rng, n, -9, 0, 0.5))
+
+
+@_family("sizes", "all lengths times 1e-6 ... 1e6, gaps of 0 and 1e-15 ... 1e-1 of the radius")
+def _sizes(rng: np.random.Generator, n: int) -> Cases:
+    k = shape_count(n)
+    scale = 10.0 ** rng.uniform(-6, 6, k)
+    base = random_shapes(rng, k)
+    shapes = Shapes(base.R * scale, base.half_angle, base.L * scale, base.r * scale, base.length * scale)
+    shape, feature = spread(n, k), rng.choice(FEATURES, n)
+    gap = shapes.r[shape] * signed_powers(rng, n, -15, -1)
+    return place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap)
+
+
+@_family("metres", "a clamp in metres in place of millimetres: R 5e-3 ... 5e-2, gaps of 1e-7 ... 1e-4")
+def _metres(rng: np.random.Generator, n: int) -> Cases:
+    k = shape_count(n)
+    R = rng.uniform(5e-3, 5e-2, k)
+    given = {"r": R * rng.uniform(0.5, 0.99, k), "L": R * rng.uniform(1, 8, k), "length": R * rng.uniform(1, 20, k)}
+    shapes = random_shapes(rng, k, R=R, **given)
+    shape, feature = spread(n, k), rng.choice(FEATURES, n)
+    gap = signed_powers(rng, n, -7, -4)
+    return place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap)
+
+
+@_family("mixed sizes", "wire and groove, or length and radius, different by 1e-6 ... 1e6")
+def _mixed_sizes(rng: np.random.Generator, n: int) -> Cases:
+    k = shape_count(n)
+    R = 10.0 ** rng.uniform(-3, 3, k)
+    given = {name: R * 10.0 ** rng.uniform(-6, 6, k) for name in ("r", "L", "length")}
+    shapes = random_shapes(rng, k, R=R, **given)
+    shape, feature = spread(n, k), rng.choice(FEATURES, n)
+    gap = np.minimum(shapes.r, shapes.R)[shape] * signed_powers(rng, n, -12, 0)
+    tilt = signed_powers(rng, n, -12, 0, 0.3)
+    return place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap, tilt=tilt)
+
+
+@_family("far from the origin", "both bodies turned and 1e3 ... 1e9 mm from the world's origin")
+def _far(rng: np.random.Generator, n: int) -> Cases:
+    shapes, shape, feature = setting(rng, n)
+    gap = shapes.r[shape] * signed_powers(rng, n, -9, -1)
+    near = place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap)
+    away = rng.normal(size=(n, 3))
+    away *= (10.0 ** rng.uniform(3, 9, n) / np.sqrt((away**2).sum(1)))[:, None]
+    world = poses_from_axes(rng, away, rng.normal(size=(n, 3)))
+    exact = np.asarray(world, Extended) @ np.asarray(near.T_world_wire, Extended)
+    return Cases(shapes, shape, np.asarray(exact, np.float64), np.full(n, np.nan), world)
+
+
+@_family("far wire", "a long wire whose middle is 1e3 ... 1e6 mm away and whose side still touches")
+def _far_wire(rng: np.random.Generator, n: int) -> Cases:
+    k = shape_count(n)
+    shapes = random_shapes(rng, k, length=10.0 ** rng.uniform(3, 6.3, k))
+    shape, feature = spread(n, k), rng.choice(FEATURES, n)
+    gap = shapes.r[shape] * signed_powers(rng, n, -9, -1)
+    contact = contact_on(rng, shapes, shape, feature)
+    return place(rng, shapes, shape, contact, gap, tilt=signed_powers(rng, n, -6, 0.5, 0.1))
+
+
+@_family("vanishing sizes", "groove length, wire length or wire radius down to 1e-12 of the rest")
+def _vanishing(rng: np.random.Generator, n: int) -> Cases:
+    k = shape_count(n)
+    R = 10.0 ** rng.uniform(0, 2, k)
+    which = rng.integers(3, size=k)
+    tiny = R * 10.0 ** rng.uniform(-12, -3, k)
+    base = random_shapes(rng, k, R=R)
+    shapes = Shapes(
+        R,
+        base.half_angle,
+        np.where(which == 0, tiny, base.L),
+        np.where(which == 1, tiny, base.r),
+        np.where(which == 2, tiny, base.length),
+    )
+    shape, feature = spread(n, k), rng.choice(FEATURES, n)
+    gap = shapes.R[shape] * signed_powers(rng, n, -12, -1)
+    gap = np.where(gap < -0.5 * shapes.r[shape], -gap, gap)
+    return place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap)
+
+
+@_family("poses barely rigid", "rotations off by up to 1e-9, as products of many poses are")
+def _barely_rigid(rng: np.random.Generator, n: int) -> Cases:
+    shapes, shape, feature = setting(rng, n)
+    gap = shapes.r[shape] * signed_powers(rng, n, -15, -1)
+    cases = place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap)
+    T = cases.T_world_wire.copy()
+    T[:, :3, :3] += rng.uniform(-1.0, 1.0, (n, 3, 3)) * 10.0 ** rng.uniform(-16, -9.8, n)[:, None, None]
+    return Cases(shapes, shape, T, np.full(n, np.nan))

@@ -1,0 +1,100 @@
+"""The stress suite: every family of hard cases put to every contact method, and what is counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from typing import Any
+
+from clamp3d.bench.machine import Machine, machine
+from clamp3d.bench.stress.outcome import Outcome
+from clamp3d.bench.stress.registry import FAMILIES, KINDS, METHODS, expand
+from clamp3d.errors import InputError, SolverError
+
+LIBRARIES = ("numpy", "numba", "scipy", "python-fcl", "coacd", "mpmath")
+
+
+@dataclass(frozen=True, slots=True)
+class StressRun:
+    """A run of the suite: ``checked_50_digits`` truths per family were worked out a second time with mpmath."""
+
+    seed: int
+    n: int
+    checked_50_digits: int
+    worst_truth_difference: float
+    machine: Machine
+    outcomes: tuple[Outcome, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        out = asdict(self)
+        out["families"] = {o.family: FAMILIES[o.family].about for o in self.outcomes}
+        out["methods"] = {o.method: METHODS[o.method] for o in self.outcomes}
+        for row, outcome in zip(out["outcomes"], self.outcomes, strict=True):
+            row["failure_rate"] = outcome.failure_rate
+        return out
+
+
+def run_family(
+    family: str, methods: Sequence[str], n: int, seed: int, time_limit: float, check: int
+) -> tuple[list[Outcome], float]:
+    """Those of ``methods`` that it can be put to on one family, and the worst difference of ``check`` truths."""
+    asked = FAMILIES[family]
+    return asked.run([m for m in methods if m in asked.methods], max(1, int(n * asked.part)), seed, time_limit, check)
+
+
+def run_stress(
+    families: Sequence[str] | None = None,
+    methods: Sequence[str] | None = None,
+    *,
+    n: int = 1000,
+    seed: int = 0,
+    check: int = 20,
+    time_limit: float = 60.0,
+    workers: int = 1,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> StressRun:
+    """Put ``families`` (all by default, see `expand`) to ``methods`` (all by default), n cases each.
+
+    ``check`` truths per family are worked out again at 50 digits; ``time_limit`` seconds are given to each other
+    method per family; ``workers`` processes share the families. ``progress`` is told the family that is done, how many
+    are, and of how many. The result does not depend on ``workers``, up to times.
+    Raises InputError for unknown names and numbers that are not positive.
+    """
+    families = list(FAMILIES) if families is None else expand(list(families))
+    methods = list(METHODS if methods is None else methods)
+    for given, known, what in ((families, {**KINDS, **FAMILIES}, "family"), (methods, METHODS, "method")):
+        for name in given:
+            if name not in known:
+                raise InputError(f"unknown {what} {name!r}; available: {', '.join(known)}")
+    for label, value, least in (("n", n, 1), ("seed", seed, 0), ("check", check, 0), ("workers", workers, 1)):
+        if value < least:
+            raise InputError(f"{label} must be at least {least}, got {value}")
+    found: dict[str, tuple[list[Outcome], float]] = {}
+
+    def done(family: str, result: tuple[list[Outcome], float]) -> None:
+        found[family] = result
+        if progress is not None:
+            progress(family, len(found), len(families))
+
+    if workers == 1:
+        for family in families:
+            done(family, run_family(family, methods, n, seed, time_limit, check))
+    else:
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            waiting = {pool.submit(run_family, f, methods, n, seed, time_limit, check): f for f in families}
+            try:
+                for future in as_completed(waiting):
+                    done(waiting[future], future.result())
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+    outcomes = tuple(o for family in families for o in found[family][0])
+    for family, (_, off) in found.items():
+        allowed = FAMILIES[family].truth_error
+        if off > allowed:
+            raise SolverError(f"{family}: the truth itself is off by {off:.3g} of the scene, must be <= {allowed:.3g}")
+    worst = max(difference for _, difference in found.values())
+    return StressRun(seed, n, check, worst, machine(LIBRARIES), outcomes)

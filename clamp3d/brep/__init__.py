@@ -1,0 +1,1 @@
+"""Geometry from files: meshes, and the boundary representation (STEP) of CAD."""

@@ -1,0 +1,124 @@
+"""Roughly where a clamp can come to rest: the distance that its parts allow, sampled over tilts and the wires' places.
+
+For each groove the curve on which the wire's centre runs when it touches is found point by point, moving the wire by
+its distance until that is small (conservative advancement: no step can pass through). The two curves of a wire,
+turned against each other, tell how close the splints can come with the wire at a place; the larger of both wires'
+distances and of the faces' is what a state allows, and each state no higher than those beside it is worth a start.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from clamp3d.clamp.section import WIRES, D, S, Section
+from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.pose import Array
+
+_TILTS, _PLACES = 481, 961
+_ADVANCES = 80
+_CLEAR = 1e-3
+"""Room in parts of the wire's radius that a start leaves to what it would touch."""
+
+
+def resting_starts(section: Section) -> list[Array]:
+    """Open states q (6,), each just above a place where the clamp may come to rest; the lowest first."""
+    limit, lever = section.clamp.down_splint.max_tilt, section.lever
+    tilts = np.linspace(-limit, limit, _TILTS)
+    faces = np.array([_faces(section, tilt) for tilt in tilts])
+    wires = [_Valleys(section, i, tilts) for i in range(len(WIRES))]
+    found: list[Array] = []
+    for k, tilt in enumerate(tilts):
+        left, right = max(k - 1, 0), min(k + 1, _TILTS - 1)
+        for a, b in itertools.product(*(w.at(k) for w in wires)):
+            one, other = wires[0].beside[a], wires[1].beside[b]
+            here = max(faces[k], one[1], other[1])
+            if here > max(faces[left], one[0], other[0]) or here > max(faces[right], one[2], other[2]):
+                continue
+            q = np.zeros(6)
+            q[D], q[S] = here, lever * tilt
+            for i, w, valley in ((0, wires[0], a), (2, wires[1], b)):
+                place = w.place[valley]
+                q[i : i + 2] = w.x[place], 0.5 * (w.over[place] + here + w.under[k, place])
+            found.append(q)
+    found.sort(key=lambda q: float(q[D]))
+    return [opened for q in found if (opened := _open(section, q)) is not None]
+
+
+class _Valleys:
+    """The valleys of the distance d that one wire allows, all tilts after another.
+
+    ``place`` (v,) is where the wire lies in each, ``beside`` (v, 3) the distance there, in the middle, and where the
+    wire slides to when the splint is tilted by one step less and one more.
+    """
+
+    def __init__(self, section: Section, i: int, tilts: Array) -> None:
+        wire, bolt = WIRES[i], section.bolt_x
+        up, down = section.pairs["P1", wire], section.pairs["P2", wire]
+        r, (low, high) = up.cylinder.radius, section.bounds()[2 * i]
+        face = section.clamp.down_splint.face_depth
+        self.x = np.linspace(low, high, _PLACES)
+        self.over = _curve(section, up, self.x, section.clamp.up_splint.thickness + 1.01 * r, -1.0)
+        deep = max(abs(face - 1.01 * r), abs(-float(down.T_a_groove[2, 3]) + down.groove.radius))
+        aside, c = deep * math.sin(tilts[-1]), math.cos(tilts[-1])
+        u = np.linspace((low - bolt - aside) / c, (high - bolt + aside) / c, _PLACES)
+        v = _curve(section, down, u, face - 1.01 * r, 1.0)
+        self.under = np.empty((len(tilts), _PLACES))
+        for k, tilt in enumerate(tilts):
+            c, s = math.cos(tilt), math.sin(tilt)
+            self.under[k] = np.interp(self.x, np.maximum.accumulate(bolt + u * c + v * s), v * c - u * s)
+        least = self.over - self.under
+        walled = np.pad(least, ((0, 0), (1, 1)), constant_values=np.inf)
+        to_left, to_right = walled[:, :-2], walled[:, 2:]
+        step = np.where((to_right < least) & (to_right <= to_left), 1, np.where(to_left < least, -1, 0))
+        row, self.place = np.nonzero(step == 0)
+        key = row * _PLACES + self.place
+        self.beside = np.empty((len(key), 3))
+        for column, shift in enumerate((-1, 0, 1)):
+            rows = np.clip(row + shift, 0, len(tilts) - 1)
+            # Downhill there is the next valley on that side.
+            after = np.searchsorted(key, rows * _PLACES + self.place, side="left")
+            end = key[np.where(step[rows, self.place] < 0, after - 1, after)]
+            self.beside[:, column] = least[rows, end % _PLACES]
+        self._first = np.searchsorted(row, np.arange(len(tilts) + 1))
+
+    def at(self, k: int) -> range:
+        """The valleys at tilt k."""
+        return range(self._first[k], self._first[k + 1])
+
+
+def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: float) -> Array:
+    """How deep (n,) a wire's centre gets into a groove at places u (n,), from depth ``start`` in the sense ``sign``."""
+    T = np.tile(np.eye(4), (len(u), 1, 1))
+    T[:, 0, 3], T[:, 2, 3] = u, -start
+    moving = np.arange(len(u))
+    for _ in range(_ADVANCES):
+        way = section.model.distances(pair, T[moving])
+        T[moving, 2, 3] -= sign * np.maximum(way, 0.0)
+        moving = moving[way > 1e-5 * pair.cylinder.radius]
+        if not len(moving):
+            break
+    return -T[:, 2, 3]
+
+
+def _faces(section: Section, tilt: float) -> float:
+    """Least d at which the inner faces do not overlap."""
+    q = np.zeros(6)
+    q[S] = section.lever * tilt
+    return float(-section.face_gaps(q).value[:2].min())
+
+
+def _open(section: Section, q: Array) -> Array | None:
+    """The state opened until nothing overlaps; None if that is not near."""
+    r = min(section.pairs["P1", wire].cylinder.radius for wire in WIRES)
+    for _ in range(30):
+        lacking = float(section.gaps(q).value.min())
+        if lacking >= 0.0:
+            return q
+        more = max(2.0 * -lacking, _CLEAR * r)
+        q = q.copy()
+        q[D] += more
+        q[[1, 3]] += 0.5 * more
+    return None

@@ -1,0 +1,20 @@
+"""A clamp as a scene: its seven parts at their poses, and the contacts that its connection matrix declares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.parts import parts
+from clamp3d.collide.scene import Allowed, Part, Scene
+from clamp3d.core.pose import Array
+
+CONTACT = 1e-6
+"""Gap or overlap in mm up to which two parts of a clamp touch."""
+
+
+def clamp_scene(clamp: Clamp, poses: Mapping[str, Array], *, clearance: float = 0.0, contact: float = CONTACT) -> Scene:
+    """The parts P1 to P7 at ``poses`` (``T_world_part``, mm); contacts that the matrix declares are allowed."""
+    placed = tuple(Part(name, solid, poses[name]) for name, solid in parts(clamp).items())
+    allowed = tuple(Allowed(a, b) for a, row in clamp.connections.items() for b, kind in row.items() if kind)
+    return Scene(placed, contact, clearance, allowed, name=clamp.name)

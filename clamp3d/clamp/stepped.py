@@ -1,0 +1,178 @@
+"""Final states found by trying positions: for any contact model, also one without smooth gradients.
+
+`solve_stepped` does it as the paper's program: the down splint's distance along the bolt takes multiples of ``step``,
+its tilt multiples of ``tilt_step``, the wires settle freely, and the first position without overlap counts.
+`solve_bisection` goes on from there with moves halved until they are below a resolution.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from clamp3d.clamp.dimensions import PartName
+from clamp3d.clamp.section import WIRES, D, Gaps, S, Section
+from clamp3d.core.pose import Array
+from clamp3d.errors import InputError, SolverError
+
+FREE = 1e-9
+"""Overlap up to this many mm is rounding, not overlap."""
+
+
+_MOVES = 100_000
+"""The most moves of one kind from one end to the other."""
+
+
+@dataclass(frozen=True, slots=True)
+class SteppedState:
+    """Last free position ``q`` (6,) as in `section`, its gaps, and ``motion_steps``: positions tried (M of Table 5)."""
+
+    q: Array
+    gaps: Gaps
+    motion_steps: int
+
+
+def solve_stepped(
+    section: Section,
+    *,
+    step: float,
+    tilt_step: float,
+    progress: Callable[[int, float], None] | None = None,
+) -> SteppedState:
+    """Close the clamp in moves of ``step`` mm and ``tilt_step`` rad; ``progress`` is told the moves made and d in mm.
+
+    Raises InputError for moves that are not positive, SolverError if the open clamp already overlaps.
+    """
+    for name, value, unit in (("step", step, "mm"), ("tilt step", math.degrees(tilt_step), "deg")):
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(f"{name} must be > 0 {unit}, got {value:g}")
+    for name, value, reach, unit in (
+        ("step", step, section.open_distance(), "mm"),
+        ("tilt step", math.degrees(tilt_step), section.clamp.down_splint.max_tilt_deg, "deg"),
+    ):
+        if not value * _MOVES >= reach:
+            raise InputError(f"{name} must be >= {reach / _MOVES:.4g} {unit} here, got {value:g}")
+    limit = int(section.clamp.down_splint.max_tilt / tilt_step + 1e-9)
+    k = math.ceil(section.open_distance() / step)
+    q = section.open_state(k * step)
+    tried, tilt, found = 0, 0, False
+    while True:
+        for candidate in sorted(range(-limit, limit + 1), key=lambda i: (abs(i - tilt), abs(i))):
+            tried += 1
+            placed = _place(section, q, k * step, candidate * tilt_step)
+            if placed is not None:
+                q, tilt, found = placed, candidate, True
+                break
+        else:
+            break
+        if progress is not None:
+            progress(tried, k * step)
+        k -= 1
+    if not found:
+        raise SolverError(f"the open clamp overlaps at a distance of {k * step:.4g} mm: nothing to close")
+    # Of the tilts that are free at the last distance, the one that leaves the wires most room.
+    q = max(
+        (
+            p
+            for i in range(-limit, limit + 1)
+            if (p := _place(section, q, q[D], i * tilt_step, settle=True)) is not None
+        ),
+        key=lambda p: float(section.gaps(p).value.min()),
+        default=q,
+    )
+    return SteppedState(q, section.gaps(q), tried)
+
+
+def solve_bisection(
+    section: Section,
+    *,
+    resolution: float,
+    step: float,
+    tilt_step: float,
+    progress: Callable[[int, float], None] | None = None,
+) -> SteppedState:
+    """Close the clamp in steps, then halve step and tilt step until the step is at most ``resolution`` mm.
+
+    Raises as `solve_stepped`, and InputError for a resolution that is not positive.
+    """
+    if not (math.isfinite(resolution) and resolution > 0.0):
+        raise InputError(f"resolution must be > 0 mm, got {resolution:g}")
+    state = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
+    q, tried = state.q, state.motion_steps
+    limit = section.clamp.down_splint.max_tilt
+    while step > resolution:
+        step, tilt_step = 0.5 * step, 0.5 * tilt_step
+        closer = True
+        while closer:
+            closer = False
+            tilt = float(q[S]) / section.lever
+            for candidate in (tilt, tilt + tilt_step, tilt - tilt_step):
+                if abs(candidate) > limit:
+                    continue
+                tried += 1
+                placed = _place(section, q, float(q[D]) - step, candidate, settle=True)
+                if placed is not None:
+                    q, closer = placed, True
+                    break
+            if closer and progress is not None:
+                progress(tried, float(q[D]))
+    return SteppedState(q, section.gaps(q), tried)
+
+
+def _place(section: Section, q: Array, d: float, tilt: float, settle: bool = False) -> Array | None:
+    """State with the down splint at (d, tilt) and the wires in a free place, or None; ``settle`` seeks the widest."""
+    new = q.copy()
+    new[D], new[S] = d, section.lever * tilt
+    if section.face_gaps(new).value.min() < -FREE:
+        return None
+    for wire in WIRES:
+        if not _settle(section, new, wire, settle):
+            return None
+    return new
+
+
+class _FreeError(Exception):
+    """Found a free place: no need to look for a better one."""
+
+
+def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
+    """Move one wire of ``q`` in place to where its least gap is largest; whether it is free there."""
+    i = 2 * WIRES.index(wire)
+    memo: dict[bytes, Gaps] = {}
+
+    def gaps(x: Array) -> Gaps:
+        key = x[:2].tobytes()
+        if key not in memo:
+            memo.clear()
+            q[i : i + 2] = x[:2]
+            memo[key] = section.wire_gaps(q, wire)
+            if not widest and memo[key].value.min() >= -FREE:
+                raise _FreeError
+        return memo[key]
+
+    def slack(x: Array) -> Array:
+        return np.asarray(gaps(x).value - x[2])
+
+    def slack_gradient(x: Array) -> Array:
+        found = gaps(x).gradient[:, i : i + 2]
+        return np.column_stack([found, -np.ones(len(found))])
+
+    try:
+        start = np.array([q[i], q[i + 1], 0.0])
+        start[2] = gaps(start).value.min()
+        found = minimize(
+            lambda x: -x[2],
+            start,
+            jac=lambda x: np.array([0.0, 0.0, -1.0]),
+            bounds=[*section.room(q, wire), (None, None)],
+            constraints={"type": "ineq", "fun": slack, "jac": slack_gradient},
+            method="SLSQP",
+            options={"maxiter": 60, "ftol": 1e-12},
+        ).x
+        return bool(gaps(found).value.min() >= -FREE)
+    except _FreeError:
+        return True

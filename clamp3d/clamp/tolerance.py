@@ -1,0 +1,282 @@
+"""Monte Carlo over manufacturing tolerances and conductor diameters: how the splint distance scatters.
+
+Every sample draws from a generator of its own, seeded by (seed, index of the sample), and is solved by itself from a
+start that only the nominal clamp decides. So its result does not depend on how the samples are spread: over one
+process, several, or a Dask cluster. (On processors with other floating point libraries the last digits may differ.)
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.final_state import FinalState, solve_final_state
+from clamp3d.clamp.journal import Journal
+from clamp3d.clamp.section import D, S, Section
+from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
+from clamp3d.clamp.status import CLAMPED, final_status
+from clamp3d.core.pose import Array
+from clamp3d.errors import InputError, MissingLibraryError, SolverError, without_numbers
+
+Distribution = Literal["uniform", "normal"]
+Sample = tuple[float | None, str]
+"""Splint distance in mm where the clamp holds both wires, and the status in words."""
+
+WIRE_TOLERANCE_PERCENT = 1.0
+"""Chosen: conductors are within 1 % of their nominal diameter."""
+CHUNK = 50
+"""Samples that are solved, sent and kept together: about a second of work."""
+# ISO 2768-1:1989, table 1, class m: (nominal sizes up to, permissible deviation either way), mm.
+_MEDIUM = ((6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8), (2000.0, 1.2), (math.inf, 2.0))
+_OPENED = 3.0
+"""How far above the nominal final state a sample starts, mm."""
+_SIGMAS = 3.0
+"""A tolerance is so many standard deviations of the normal distribution."""
+_TOP = 0.5
+"""Largest tolerance, as part of the nominal size of a wire."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spec:
+    """What is sampled: ``tolerance`` (n,) mm either way of each of `DIMENSIONS`; ``start`` is (d, tilt) in mm, rad."""
+
+    clamp: Clamp
+    seed: int
+    distribution: Distribution
+    tolerance: tuple[float, ...]
+    start: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class MonteCarlo:
+    """``distance`` (n,) mm, NaN where the clamp does not hold both wires; ``status`` (n,) says why.
+
+    ``nominal`` is the nominal clamp's distance in mm (None if it does not clamp).
+    """
+
+    spec: Spec
+    nominal: float | None
+    distance: Array
+    status: tuple[str, ...]
+
+    @property
+    def clamped(self) -> Array:
+        """Distances (m,) of the samples that hold both wires, in mm."""
+        return np.asarray(self.distance[~np.isnan(self.distance)])
+
+    def reasons(self) -> dict[str, int]:
+        """How many samples do not clamp, by their reason, most frequent first."""
+        count: dict[str, int] = {}
+        for status in self.status:
+            if status != CLAMPED:
+                count[status] = count.get(status, 0) + 1
+        return dict(sorted(count.items(), key=lambda item: (-item[1], item[0])))
+
+    def percentiles(self, at: tuple[float, ...]) -> tuple[float, ...]:
+        """Percentiles of the clamped distances in mm; empty where none clamps."""
+        return tuple(float(v) for v in np.percentile(self.clamped, at)) if len(self.clamped) else ()
+
+
+def general_tolerance(size: float) -> float:
+    """Deviation either way in mm that ISO 2768-1 class m permits a length of ``size`` mm (0.1 also below its 0.5).
+
+    >>> general_tolerance(23.8), general_tolerance(48.8), general_tolerance(137.0)
+    (0.2, 0.3, 0.5)
+    """
+    return next(deviation for top, deviation in _MEDIUM if abs(size) <= top)
+
+
+def monte_carlo(
+    clamp: Clamp,
+    *,
+    n: int = 1000,
+    seed: int = 0,
+    tolerance: float | None = None,
+    wire_tolerance_percent: float = WIRE_TOLERANCE_PERCENT,
+    distribution: Distribution = "uniform",
+    processes: int = 1,
+    scheduler: str | None = None,
+    resume: Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> MonteCarlo:
+    """Assemble ``n`` clamps whose dimensions and wires scatter independently about their nominal sizes.
+
+    ``tolerance`` is mm either way for every dimension of the splints (None: ISO 2768-1 m by its size),
+    ``wire_tolerance_percent`` that of the wires' diameters; uniform within them, or normal with 3 sigma = tolerance.
+    ``processes`` share the work, or the Dask cluster at the address ``scheduler``. ``resume`` names a file that keeps
+    what is finished; a run with the same settings (n may differ) goes on from it. ``progress(done, n)`` is told
+    samples. Raises InputError for settings out of range, MissingLibraryError without dask.distributed, and SolverError
+    if a worker dies.
+
+    >>> from clamp3d.clamp.loader import load_clamp
+    >>> result = monte_carlo(load_clamp(), n=3, tolerance=0.01, wire_tolerance_percent=0.0)
+    >>> result.status, bool(abs(result.distance - result.nominal).max() < 0.1)
+    (('clamped', 'clamped', 'clamped'), True)
+    """
+    spec, nominal = _spec(clamp, seed, tolerance, wire_tolerance_percent, distribution)
+    for name, value in (("n", n), ("processes", processes)):
+        if value < 1:
+            raise InputError(f"{name} must be >= 1, got {value}")
+    header = {"monte_carlo": 1, **asdict(spec), "chunk": CHUNK}
+    with Journal(resume, header) if resume is not None else nullcontext() as journal:
+        kept: dict[int, list[Sample]] = {}
+        for k, piece in (journal.pieces if journal is not None else {}).items():
+            kept[k] = [(distance, status) for distance, status in piece]
+        sizes = {k: min(CHUNK, n - k * CHUNK) for k in range(math.ceil(n / CHUNK))}
+        waiting = [(spec, k, size) for k, size in sizes.items() if len(kept.get(k, ())) < size]
+        done = n - sum(size for _, _, size in waiting)
+        if progress is not None:
+            progress(done, n)
+        for k, samples in _solve(waiting, processes, scheduler):
+            kept[k] = samples
+            if journal is not None:
+                journal.add(k, samples)
+            done += len(samples)
+            if progress is not None:
+                progress(done, n)
+    samples = [sample for k, size in sizes.items() for sample in kept[k][:size]]
+    distance = np.array([math.nan if d is None else d for d, _ in samples])
+    return MonteCarlo(spec, nominal, distance, tuple(status for _, status in samples))
+
+
+def sample_dimensions(spec: Spec, index: int) -> dict[str, float]:
+    """Dimensions in mm of sample ``index``, drawn from its own generator."""
+    rng = np.random.default_rng(np.random.SeedSequence(spec.seed, spawn_key=(index,)))
+    count = len(DIMENSIONS)
+    unit = rng.uniform(-1.0, 1.0, count) if spec.distribution == "uniform" else rng.standard_normal(count) / _SIGMAS
+    return {
+        name: dimension(spec.clamp, name) + float(t * u)
+        for name, t, u in zip(DIMENSIONS, spec.tolerance, unit, strict=True)
+        if t > 0.0
+    }
+
+
+def _spec(
+    clamp: Clamp, seed: int, tolerance: float | None, percent: float, distribution: Distribution
+) -> tuple[Spec, float | None]:
+    if seed < 0:
+        raise InputError(f"seed must be >= 0, got {seed}")
+    if tolerance is not None and not 0.0 <= tolerance < 1e5:
+        raise InputError(f"tolerance must be >= 0 and < 100000 mm, got {tolerance:g}")
+    if not 0.0 <= percent <= 100.0 * _TOP:
+        raise InputError(f"wire tolerance must be from 0 to {100.0 * _TOP:g} %, got {percent:g}")
+    if distribution not in ("uniform", "normal"):
+        raise InputError(f"unknown distribution {distribution!r}; available: uniform, normal")
+
+    def of(name: str) -> float:
+        size = dimension(clamp, name)
+        if name.endswith(".diameter"):
+            return size * percent / 100.0
+        return general_tolerance(size) if tolerance is None else tolerance
+
+    start, nominal = None, None
+    section = Section(clamp, Cas())
+    try:
+        final = solve_final_state(section)
+    except SolverError:
+        pass
+    else:
+        start = (float(final.q[D]) + _OPENED, float(final.q[S]) / section.lever)
+        nominal = section.splint_distance(final.q) if final_status(section.clamp, final, 0.0) == CLAMPED else None
+    return Spec(clamp, seed, distribution, tuple(of(name) for name in DIMENSIONS), start), nominal
+
+
+def _chunk(task: tuple[Spec, int, int]) -> tuple[int, list[Sample]]:
+    """Chunk ``k``: its first ``size`` samples."""
+    spec, k, size = task
+    return k, [_sample(spec, index) for index in range(k * CHUNK, k * CHUNK + size)]
+
+
+def _sample(spec: Spec, index: int) -> Sample:
+    try:
+        section = Section(with_dimensions(spec.clamp, sample_dimensions(spec, index)), Cas())
+    except InputError as error:
+        return None, f"not a clamp: {without_numbers(str(error))}"
+    try:
+        final = _close(section, spec.start)
+    except SolverError as error:
+        return None, f"not solved: {without_numbers(str(error))}"
+    status = final_status(section.clamp, final, 0.0)
+    return (section.splint_distance(final.q) if status == CLAMPED else None), without_numbers(status)
+
+
+def _close(section: Section, start: tuple[float, float] | None) -> FinalState:
+    """From a little above the nominal final state, which is quicker; from fully open if that does not do."""
+    if start is not None:
+        q = section.open_state(*start)
+        if float(section.gaps(q).value.min()) >= 0.0:
+            try:
+                final = solve_final_state(section, q)
+            except SolverError:
+                pass
+            else:
+                if final_status(section.clamp, final, 0.0) == CLAMPED:
+                    return final
+    return solve_final_state(section)
+
+
+def _solve(
+    tasks: list[tuple[Spec, int, int]], processes: int, scheduler: str | None
+) -> Iterator[tuple[int, list[Sample]]]:
+    """Chunks as they are finished, in any order."""
+    if not tasks:
+        return
+    if scheduler is not None:
+        yield from _on_cluster(tasks, scheduler)
+    elif processes == 1:
+        yield from map(_chunk, tasks)
+    else:
+        workers = min(processes, len(tasks))
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_quiet) as pool:
+            try:
+                for future in as_completed([pool.submit(_chunk, task) for task in tasks]):
+                    yield future.result()
+            except BrokenProcessPool:
+                raise SolverError("a worker process died; finished samples are kept by a resume file only") from None
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+
+
+def _quiet() -> None:
+    """Ctrl-C goes to all processes of a terminal: the first one stops the work, the others say nothing."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _on_cluster(tasks: list[tuple[Spec, int, int]], scheduler: str) -> Iterator[tuple[int, list[Sample]]]:
+    try:
+        distributed: Any = importlib.import_module("distributed")
+    except ImportError:
+        raise MissingLibraryError("a Dask cluster needs dask.distributed: pip install 'clamp3d[cluster]'") from None
+    if not scheduler.strip():  # Dask would start a cluster of its own
+        raise InputError("scheduler must be an address like tcp://host:8786, got ''")
+    # A client that finds no scheduler waits 20 s for it when it is thrown away, and then prints a traceback.
+    kind = type("Client", (distributed.Client,), {"__del__": lambda self: None})
+    try:
+        client = kind(scheduler, timeout="10s", set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"no Dask scheduler at {scheduler!r}: {reason}") from None
+    with client:
+        futures = client.map(_chunk, tasks, pure=False)
+        try:
+            for future in distributed.as_completed(futures, loop=client.loop):
+                try:
+                    yield future.result()
+                except (distributed.KilledWorker, distributed.client.FutureCancelledError) as error:
+                    raise SolverError(f"the Dask cluster lost the work: {error}") from None
+        finally:
+            client.cancel(futures)

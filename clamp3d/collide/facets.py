@@ -1,0 +1,119 @@
+"""An exact cylinder against the facets of a mesh: the distance of its axis from the triangles, less its radius.
+
+The axis enters FCL as a triangle of no width, whose distance from other triangles is exact to rounding. Facets of
+round surfaces carry the error bound of the fit, flat ones none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.collide.body import Body
+from clamp3d.collide.bounds import Bounds
+from clamp3d.collide.convex import Rod
+from clamp3d.collide.trimodel import TriModel
+from clamp3d.core.pose import Array
+
+_WIDTH = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Facets:
+    """A closed mesh in groups of triangles: (tree, error mm) of the flat and of the round ones."""
+
+    whole: TriModel
+    groups: tuple[tuple[Any, float], ...]
+
+    @classmethod
+    def of(cls, mesh: TriModel, round_faces: NDArray[np.int64], error: float) -> Facets:
+        """Groups of ``mesh``; ``round_faces`` lie within ``error`` mm of the true surface, the others on it."""
+        is_round = np.zeros(len(mesh.faces), dtype=bool)
+        is_round[round_faces] = True
+        groups = []
+        for mask, doubt in ((~is_round, 0.0), (is_round, error)):
+            if mask.any():
+                groups.append((TriModel(mesh.vertices, mesh.faces[mask], doubt).bvh, doubt))
+        return cls(mesh, tuple(groups))
+
+
+@lru_cache(maxsize=1024)
+def _axis(rod: Rod) -> Any:
+    half, T = 0.5 * rod.length, rod.T
+    ends = T[:3, 3] + np.outer([-half, half, half], T[:3, 2])
+    ends[2] += _WIDTH * T[:3, 0]
+    return TriModel(ends, np.array([[0, 1, 2]]), 0.0).bvh
+
+
+def rod_bounds(facets: Facets, body: Body, T: Array) -> Bounds:
+    """Bounds of the signed distance of a ``body`` with a rod around it, at ``T`` (4, 4) in the mesh's frame."""
+    rod = next(piece for piece in body.outers if isinstance(piece, Rod))
+    distance, low, p, a = _to_axis(facets, rod, T)
+    slack = 1e-12 * (facets.whole.scale + float(np.abs(T[:3, 3]).max()) + rod.length) + _WIDTH
+    if distance <= slack:
+        return _axis_inside(facets, body, T, 0.0)
+    axis = T[:3, :3] @ rod.T[:3, 2]
+    if facets.whole.contains(T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
+        return _axis_inside(facets, body, T, distance)
+    bounds = Bounds(low - rod.radius - slack)
+    n = (p - a) / distance
+    q = a + rod.radius * n
+    R, t = T[:3, :3], T[:3, 3]
+    error = max(doubt for _, doubt in facets.groups) if low < distance else 0.0
+    if distance >= rod.radius:
+        # Square to the axis the nearest point is on the side, which flat ends share with round ones.
+        if abs(float(n @ axis)) < 1e-7 and body.depth(((q - t) @ R)[None])[0] >= -slack:
+            return Bounds(bounds.low - body.error, distance - rod.radius + error + slack + body.error, p, q)
+        return bounds.widened(body.error)
+    deep = float(body.depth(((p - t) @ R)[None])[0])
+    high = slack + error - deep if deep >= -slack else np.inf
+    return Bounds(bounds.low, high, p, p).widened(body.error)
+
+
+def axis_gap(facets: Facets, rod: Rod, T: Array) -> float:
+    """Lower bound (mm) of the gap between the mesh and a rod at ``T`` (4, 4); minus infinity if its axis is inside."""
+    distance, low, _, _ = _to_axis(facets, rod, T)
+    if distance <= 1e-9 or facets.whole.contains(T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
+        return -np.inf
+    return low - rod.radius - _WIDTH - 1e-12 * (facets.whole.scale + rod.length + float(np.abs(T[:3, 3]).max()))
+
+
+def _axis_inside(facets: Facets, body: Body, T: Array, distance: float) -> Bounds:
+    """The axis passes through the material or lies in it: points of the body on a grid say how deep at least."""
+    rod = next(piece for piece in body.outers if isinstance(piece, Rod))
+    turn = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    ring = np.vstack([[0.0, 0.0], 0.5 * np.column_stack([np.cos(turn), np.sin(turn)])]) * rod.radius
+    z = np.linspace(-0.48, 0.48, 9) * rod.length
+    local = np.column_stack([np.tile(ring, (len(z), 1)), np.repeat(z, len(ring))])
+    own = local @ rod.T[:3, :3].T + rod.T[:3, 3]
+    world = own @ T[:3, :3].T + T[:3, 3]
+    in_body = body.depth(own)
+    in_mesh = facets.whole.depth(world)
+    both = np.where((in_body >= 0.0) & (in_mesh >= 0.0), np.maximum(in_body, in_mesh), -np.inf)
+    k = int(np.argmax(both))
+    if both[k] == -np.inf:
+        return Bounds()
+    error = max(doubt for _, doubt in facets.groups) + body.error
+    return Bounds(-np.inf, error - float(both[k]), world[k], world[k])
+
+
+def _to_axis(facets: Facets, rod: Rod, T: Array) -> tuple[float, float, Array, Array]:
+    """Distance of the facets from the rod's axis, a lower bound of it for the true part, and the nearest points."""
+    import fcl
+
+    axis = fcl.CollisionObject(_axis(rod), fcl.Transform(T[:3, :3], T[:3, 3]))
+    best, low, where = np.inf, np.inf, (np.zeros(3), np.zeros(3))
+    for tree, doubt in facets.groups:
+        answer = fcl.DistanceResult()
+        d = float(
+            fcl.distance(fcl.CollisionObject(tree), axis, fcl.DistanceRequest(enable_nearest_points=True), answer)
+        )
+        low = min(low, max(d, 0.0) - doubt)
+        if d < best:
+            best = d
+            where = tuple(np.asarray(x, dtype=np.float64) for x in answer.nearest_points)  # type: ignore[assignment]
+    return best, low, *where

@@ -1,0 +1,141 @@
+"""From the round surfaces fitted to a mesh to a body that encloses it, for the same closed forms as designed parts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.collide.body import Body, Bore
+from clamp3d.collide.convex import Rod, hull
+from clamp3d.collide.trimodel import TriModel
+from clamp3d.core.pose import Array
+from clamp3d.fit.features import FittedSurface
+from clamp3d.fit.fit import FitResult
+
+Faces = NDArray[np.int64]
+
+
+def fit_error(feature: FittedSurface, round_: bool) -> float:
+    """Error (mm) of a fitted surface: with the vertices taken to lie on a round surface, or with nothing assumed."""
+    return feature.fit_error if round_ else feature.error_bound
+
+
+def bodies_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[tuple[Body, ...], float]:
+    """Bodies around the fitted mesh, and the error (mm) of the mesh itself: largest chord error and that of the fit.
+
+    A groove or hole counts where no part of the mesh lies in its circle, over the whole length of the mesh; else the
+    mesh is asked. Where the mesh is nothing but a round bar (a wire, a shank, a step of a turned part) it becomes a
+    cylinder with flat ends; the rest keeps its hull.
+    """
+    V, F = model.vertices, model.faces
+    points = V.copy()
+    for convex in result.cylinders:
+        # Facets are inscribed: their tangents in place of their chords enclose the round surface.
+        own = np.unique(F[convex.faces])
+        T = convex.T_part_feature
+        local = (V[own] - T[:3, 3]) @ T[:3, :3]
+        out = np.hypot(local[:, 0], local[:, 1])
+        reach = convex.radius / (1.0 - convex.chord_error / convex.radius) + convex.fit_error
+        local[:, :2] *= (np.maximum(reach, out) / out)[:, None]
+        points[own] = local @ T[:3, :3].T + T[:3, 3]
+    used = [bore for feature in (*result.grooves, *result.holes) if (bore := _bore(feature, V, F)) is not None]
+    error = max((fit_error(feature, round_) for feature in result.features), default=0.0)
+    mesh_error = max((feature.error_bound for feature in result.features), default=0.0)
+
+    in_feature = np.zeros(len(F), dtype=bool)
+    for feature in result.features:
+        in_feature[feature.faces] = True
+
+    def depth(x: Array) -> Array:
+        away, face = model.nearest(x)
+        on = (away <= 1e-9 * model.scale) & ~in_feature[face]
+        for surface in result.features:  # a point on the fitted surface is on the part, within the error of the fit
+            local = (x - surface.T_part_feature[:3, 3]) @ surface.T_part_feature[:3, :3]
+            touch = np.abs(np.hypot(local[:, 0], local[:, 1]) - surface.radius) <= 1e-9 * model.scale
+            touch &= np.abs(local[:, 2]) <= 0.5 * surface.length + 1e-9 * model.scale
+            on |= touch & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) <= surface.half_angle + 1e-9)
+        found = np.where(on, 0.0, -mesh_error - away)
+        # Nearer to the facets than their own error a point proves nothing; further in it does.
+        for k in np.flatnonzero(~on & (away > mesh_error)):
+            if model.contains(x[k]):
+                found[k] = away[k] - mesh_error
+        return found
+
+    bores = tuple(used)
+    rods, rest = _rods(result, V, F)
+    made = [Body((rod,), bores, error=error) for rod in rods]
+    made += [Body((hull(points[index]),), bores, error=error, surface=depth) for index in rest]
+    return tuple(made), mesh_error
+
+
+def _bore(feature: FittedSurface, V: Array, F: Faces) -> Bore | None:
+    """The groove or hole as a bore of the whole mesh; None if some of the mesh lies in its circle."""
+    T = feature.T_part_feature.copy()
+    local = (V - T[:3, 3]) @ T[:3, :3]
+    if _nearest_to_axis(local[:, :2][F]) < feature.radius - feature.error_bound - 1e-9 * feature.radius:
+        return None
+    low, high, top = float(local[:, 2].min()), float(local[:, 2].max()), float(local[:, 1].max())
+    T[:3, 3] += 0.5 * (low + high) * T[:3, 2]
+    half = math.pi
+    if feature.half_angle < math.pi:
+        if top > feature.radius * (1.0 - 1e-9):
+            return None  # the part rises above the groove's circle: the mesh says more than a groove without walls
+        # The mouth's plane goes through the part's highest point: all of it lies behind.
+        half = max(feature.half_angle, math.acos(max(-1.0, -top / feature.radius)))
+    return Bore(feature.radius, half, high - low, T)
+
+
+def _nearest_to_axis(flat: Array) -> float:
+    """Least distance of triangles (k, 3, 2) from the origin of their plane."""
+    a, b = flat, np.roll(flat, -1, axis=1)
+    ab = b - a
+    square = np.maximum(np.einsum("ijk,ijk->ij", ab, ab), 1e-300)
+    t = np.clip(-np.einsum("ijk,ijk->ij", a, ab) / square, 0.0, 1.0)
+    edge = np.linalg.norm(a + t[..., None] * ab, axis=2).min()
+    cross = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    around = ((cross > 0.0).all(axis=1) | (cross < 0.0).all(axis=1)).any()
+    return 0.0 if around else float(edge)
+
+
+def _rods(result: FitResult, V: Array, F: Faces) -> tuple[list[Rod], list[Faces]]:
+    """Stretches along the first full cylinder's axis where the mesh is a round bar, and the vertices of the others."""
+    full = [f for f in result.cylinders if f.full]
+    everything = [np.unique(F)]
+    if not full:
+        return [], everything
+    T = full[0].T_part_feature
+    local = (V - T[:3, 3]) @ T[:3, :3]
+    z, out = local[:, 2], np.hypot(local[:, 0], local[:, 1])
+    holes = np.zeros(len(V), dtype=bool)
+    for hole in result.holes:
+        holes[F[hole.faces]] = True
+    rods: list[Rod] = []
+    taken: list[tuple[float, float]] = []
+    for feature in full:
+        own = np.unique(F[feature.faces])
+        low, high = float(z[own].min()), float(z[own].max())
+        slack = feature.fit_error + 1e-9 * (high - low)
+        coaxial = np.abs(out[own] - feature.radius).max() <= 10.0 * slack
+        # Between the ends there must be nothing but this surface, and holes in it.
+        between = (z[F].min(axis=1) < high - slack) & (z[F].max(axis=1) > low + slack)
+        between[feature.faces] = False
+        if not coaxial or (between & ~holes[F].all(axis=1)).any() or any(low < b and a < high for a, b in taken):
+            continue
+        place = feature.T_part_feature.copy()
+        middle = (
+            float(((V[own] - place[:3, 3]) @ place[:3, 2]).min() + ((V[own] - place[:3, 3]) @ place[:3, 2]).max()) / 2
+        )
+        place[:3, 3] += middle * place[:3, 2]
+        rods.append(Rod(feature.radius, high - low, place))
+        taken.append((low, high))
+    rest = []
+    edges = [-math.inf, *(x for span in sorted(taken) for x in span), math.inf]
+    for low, high in zip(edges[0::2], edges[1::2], strict=True):
+        slack = 1e-6 * (1.0 + float(np.ptp(z)))
+        inside = (z[F].min(axis=1) >= low - slack) & (z[F].max(axis=1) <= high + slack)
+        index = np.unique(F[inside])
+        if len(index) and np.ptp(z[index]) > slack:  # a flat face between two stretches is the end of either
+            rest.append(index)
+    return (rods, rest) if rods else ([], everything)

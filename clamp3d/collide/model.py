@@ -1,0 +1,193 @@
+"""A shape's models, each made the first time somebody asks for it, kept, and counted."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.collide.body import Body
+from clamp3d.collide.convex import Hull, hull
+from clamp3d.collide.drawn import bodies_of
+from clamp3d.collide.facets import Facets
+from clamp3d.collide.trimodel import TriModel
+from clamp3d.core.meshing import chord_error, mesh
+from clamp3d.core.pose import Array
+from clamp3d.core.shapes import MeshShape, Shape, Solid
+
+Progress = Callable[[str, int, int], None]
+"""What is being done, how much of it is, and of how much."""
+
+FINEST = 0.001
+"""Smallest chord error (mm) that a mesh is made with; a pair still open then is uncertain."""
+
+
+@dataclass
+class Ledger:
+    """What a check has built and asked so far."""
+
+    meshes: int = 0
+    triangles: int = 0
+    hulls: int = 0
+    fits: int = 0
+    queries: Counter[str] = field(default_factory=Counter)
+    seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+
+
+class Model:
+    """All that can be known of one shape; ``ledger`` is told what is built."""
+
+    def __init__(self, shape: Shape, ledger: Ledger) -> None:
+        self.shape = shape
+        self.ledger = ledger
+        self._meshes: dict[float, TriModel] = {}
+        self._fit_error = 0.0
+        self._round_faces: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+
+    @property
+    def name(self) -> str:
+        """The shape's name."""
+        return self.shape.name
+
+    @cached_property
+    def bounds(self) -> Array:
+        """Lower and upper corner (2, 3) of a box that holds the true part, mm."""
+        if isinstance(self.shape, Solid):
+            return self.shape.bounds
+        V = self.shape.mesh.vertices
+        reach = _bulge(self.shape) if self.shape.fit != "off" else 0.0
+        return np.array([V.min(axis=0) - reach, V.max(axis=0) + reach])
+
+    @cached_property
+    def bodies(self) -> tuple[Body, ...] | None:
+        """The shape in closed form; None if it has none."""
+        start = time.perf_counter()
+        found = self._bodies()
+        self.ledger.seconds["models"] += time.perf_counter() - start
+        return found
+
+    def _bodies(self) -> tuple[Body, ...] | None:
+        if isinstance(self.shape, Solid):
+            return bodies_of(self.shape)
+        if self.shape.fit != "off":
+            from clamp3d.collide.fitted import bodies_of_fit
+            from clamp3d.fit.fit import fit_mesh
+
+            self.ledger.fits += 1
+            result = fit_mesh(self.shape.mesh)
+            if result.features:
+                self._round_faces = np.concatenate([feature.faces for feature in result.features])
+                made, self._fit_error = bodies_of_fit(result, self.raw, round_=self.shape.fit == "round")
+                return made
+        raw = self.raw
+        volume = float(raw.manifold.volume())
+        if abs(float(raw.manifold.hull().volume()) - volume) <= 1e-9 * volume:
+            return (Body((self._hull(self.shape.mesh.vertices),)),)
+        return None
+
+    @property
+    def forms(self) -> tuple[Body, ...]:
+        """The closed form, or the hull in place of it."""
+        return self.bodies if self.bodies is not None else (self.hull_body,)
+
+    @cached_property
+    def facets(self) -> Facets | None:
+        """Facets of a mesh shape, flat and round ones apart; None for a drawn solid."""
+        if not isinstance(self.shape, MeshShape):
+            return None
+        _ = self.bodies
+        return Facets.of(self.raw, self._round_faces, self._fit_error)
+
+    @cached_property
+    def hull_body(self) -> Body:
+        """Convex hull of the part, with its mesh to tell what of it is material."""
+        made = self.mesh(0.5)
+        return Body((self._hull(made.vertices),), error=made.error, surface=made.depth)
+
+    def _hull(self, points: Array) -> Hull:
+        self.ledger.hulls += 1
+        return hull(points)
+
+    @property
+    def refines(self) -> bool:
+        """Whether a smaller chord error gives a better mesh: true of drawn solids with arcs."""
+        return isinstance(self.shape, Solid) and any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes))
+
+    @property
+    def raw(self) -> TriModel:
+        """The facets of a mesh shape as they are."""
+        assert isinstance(self.shape, MeshShape)
+        if 0.0 not in self._meshes:
+            source = self.shape.mesh
+            self._meshes[0.0] = self._counted(TriModel(source.vertices, source.faces, 0.0))
+        return self._meshes[0.0]
+
+    def mesh(self, error: float) -> TriModel:
+        """Mesh within ``error`` mm, or as near as the shape allows; its own ``error`` says how near."""
+        if isinstance(self.shape, MeshShape):
+            raw = self.raw
+            if self.shape.fit != "off":
+                _ = self.bodies
+                raw.error = self._fit_error
+            return raw
+        # Outlines without arcs are exact at any chord error: one mesh serves all.
+        key = error if self.refines else 0.0
+        if key not in self._meshes:
+            start = time.perf_counter()
+            made = mesh(self.shape, error)
+            # Where two curved surfaces cross, the edge strays further than either.
+            factor = 2.0 if self.shape.holes else 1.0
+            model = TriModel(np.array(made.vertices), np.array(made.faces, dtype=np.int64), 0.0)
+            model.error = factor * chord_error(self.shape, error)
+            self._meshes[key] = self._counted(model)
+            self.ledger.seconds["models"] += time.perf_counter() - start
+        return self._meshes[key]
+
+    def triangles_at(self, error: float) -> int:
+        """Triangles of a mesh at ``error`` mm, from the outlines alone (caps and sides); no mesh is made."""
+        if isinstance(self.shape, MeshShape):
+            return len(self.shape.mesh.faces)
+        body = sum(4 * len(e.profile.polygon(error)) - 4 for e in self.shape.bodies)
+        return body + sum(4 * len(e.profile.polygon(error)) + 4 for e in self.shape.holes)
+
+    def _counted(self, made: TriModel) -> TriModel:
+        self.ledger.meshes += 1
+        self.ledger.triangles += len(made.faces)
+        return made
+
+
+def _bulge(shape: MeshShape) -> float:
+    """How far round surfaces through the vertices can stand out of the facets, mm, from widths and bends alone."""
+    import trimesh
+
+    facets = trimesh.Trimesh(shape.mesh.vertices, shape.mesh.faces, process=False)
+    angles, pairs, edges = facets.face_adjacency_angles, facets.face_adjacency, facets.face_adjacency_edges
+    length = np.linalg.norm(np.diff(facets.vertices[edges], axis=1)[:, 0], axis=1)
+    wide = 2.0 * facets.area_faces[pairs].max(axis=1) / np.maximum(length, 1e-300)
+    smooth = (angles > 1e-6) & (angles < np.radians(65.0))
+    # A chord w that turns by t has the sagitta w / 2 tan(t / 4).
+    return float((0.5 * wide * np.tan(0.25 * angles))[smooth].max(initial=0.0))
+
+
+class Workshop:
+    """The models of a scene's shapes, shared by equal shapes, kept as long as it lives."""
+
+    def __init__(self) -> None:
+        self.ledger = Ledger()
+        self._models: dict[Shape, Model] = {}
+
+    def model(self, shape: Shape) -> Model:
+        """The one model of a shape and its equals."""
+        if shape not in self._models:
+            self._models[shape] = Model(shape, self.ledger)
+        return self._models[shape]
+
+    @property
+    def models(self) -> tuple[Model, ...]:
+        """All models so far."""
+        return tuple(self._models.values())

@@ -1,0 +1,160 @@
+"""A scene as data: parts with poses, thresholds, allowed contacts and motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clamp3d.checks import instance, items, number, shown, text
+from clamp3d.collide.bounds import Thresholds
+from clamp3d.collide.motion import Motion, scene_pose
+from clamp3d.core.pose import Array
+from clamp3d.core.shapes import AnyShape, Shape, as_shape
+from clamp3d.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """A part and where it stands: ``T_world`` (4, 4)."""
+
+    name: str
+    shape: Shape
+    T_world: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Allowed:
+    """Contact of ``a`` with ``b`` (names, or patterns with * and ?) is meant, and overlap up to ``overlap`` mm."""
+
+    a: str
+    b: str
+    overlap: float = 0.0
+
+    def __post_init__(self) -> None:
+        text("allowed part", self.a)
+        text("allowed part", self.b)
+        object.__setattr__(self, "overlap", number("allowed overlap", self.overlap, rule="be >= 0 mm"))
+        if not self.overlap >= 0.0:
+            raise InputError(f"allowed overlap must be >= 0 mm, got {self.overlap}")
+
+    def fits(self, a: str, b: str) -> bool:
+        """Whether it speaks of these two, in either order."""
+        return any(fnmatchcase(x, self.a) and fnmatchcase(y, self.b) for x, y in ((a, b), (b, a)))
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Parts in the world, what counts as contact and clearance, what may touch, and how parts move.
+
+    >>> import math
+    >>> from clamp3d.core import shapes
+    >>> from clamp3d.core.primitives import SweptArc
+    >>> scene = Scene(clearance=1.0)
+    >>> scene = scene.add("block", shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 20.0))
+    >>> scene = scene.add("wire", shapes.cylinder(6.935, 80.0))
+    >>> from clamp3d.collide.check import check
+    >>> row = check(scene).pairs[0]
+    >>> row.verdict.value, round(row.distance, 6), row.method
+    ('clearance', 0.065, 'groove kernel')
+    """
+
+    parts: tuple[Part, ...] = ()
+    contact: float = 0.01
+    clearance: float = 0.0
+    allowed: tuple[Allowed, ...] = ()
+    motions: tuple[Motion, ...] = ()
+    name: str = "scene"
+    thresholds: Thresholds = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "thresholds", Thresholds(self.contact, self.clearance))
+        text("name of a scene", self.name)
+        kinds = {"parts": Part, "allowed": Allowed, "motions": Motion}
+        for key, kind in kinds.items():
+            given = items(key, getattr(self, key), f"{kind.__name__}s")
+            for item in given:
+                instance(f"each of {key}", item, kind)
+            object.__setattr__(self, key, given)
+        seen: set[str] = set()
+        for part in self.parts:
+            if part.name in seen:
+                raise InputError(f"part {part.name!r} is there twice; names must differ")
+            seen.add(part.name)
+        for item in self.allowed:
+            for name in (item.a, item.b):
+                if not any(fnmatchcase(part, name) for part in seen):
+                    raise InputError(f"allowed: {unknown_part(name, seen)}")
+        for motion in self.motions:
+            for name in motion.parts:
+                if name not in seen:
+                    raise InputError(f"motion {motion.name!r}: {unknown_part(name, seen)}")
+
+    @classmethod
+    def of(
+        cls, parts: Mapping[str, tuple[AnyShape, ArrayLike]], *, clearance: float = 0.0, contact: float = 0.01
+    ) -> Scene:
+        """Scene of ``{name: (shape, T_world)}``. Raises InputError for bad names, shapes or poses."""
+        instance("parts", parts, Mapping)
+        for name, value in parts.items():
+            if not (isinstance(value, (tuple, list)) and len(value) == 2):
+                raise InputError(f"part {shown(name)} must be a pair (shape, T_world), got {shown(value)}")
+        made = tuple(_part(name, shape, T) for name, (shape, T) in parts.items())
+        return cls(made, clearance=clearance, contact=contact)
+
+    def add(self, name: str, shape: AnyShape, T_world: ArrayLike | None = None) -> Scene:
+        """The scene with one more part. Raises InputError for a bad name, shape or pose."""
+        return replace(self, parts=(*self.parts, _part(name, shape, np.eye(4) if T_world is None else T_world)))
+
+    def allow(self, *pairs: tuple[str, str], overlap: float = 0.0) -> Scene:
+        """The scene with contact of these pairs allowed, and overlap up to ``overlap`` mm."""
+        return replace(self, allowed=(*self.allowed, *(Allowed(a, b, overlap) for a, b in name_pairs("pairs", pairs))))
+
+    def moved(self, poses: Mapping[str, ArrayLike]) -> Scene:
+        """The scene with parts at other poses ``{name: T_world}``."""
+        instance("poses", poses, Mapping)
+        for name in poses:
+            self.index(name)
+        parts = tuple(_part(p.name, p.shape, poses[p.name]) if p.name in poses else p for p in self.parts)
+        return replace(self, parts=parts)
+
+    def index(self, name: str) -> int:
+        """Position of a part in ``parts``. Raises InputError for an unknown name."""
+        text("part", name)
+        for i, part in enumerate(self.parts):
+            if part.name == name:
+                return i
+        raise InputError(unknown_part(name, (p.name for p in self.parts)))
+
+    def allowance(self, a: str, b: str) -> float | None:
+        """Allowed overlap of a pair in mm; None if even contact is not meant."""
+        found = [item.overlap for item in self.allowed if item.fits(a, b)]
+        return max(found) if found else None
+
+
+def name_pairs(name: str, pairs: object) -> list[tuple[str, str]]:
+    """Pairs of part names. Raises InputError for anything else."""
+    found = []
+    for pair in items(name, pairs, "pairs of part names"):
+        two = items(name, pair, "pairs of part names")
+        if len(two) != 2:
+            raise InputError(f"{name} must be pairs of part names, got {shown(pair)}")
+        found.append((text("part", two[0]), text("part", two[1])))
+    return found
+
+
+def unknown_part(name: str, names: Iterable[str]) -> str:
+    """The message for a name that is no part."""
+    known = sorted(names)
+    listed = ", ".join(known[:12]) + (f", ... ({len(known)} in all)" if len(known) > 12 else "")
+    return f"unknown part {shown(name)}; available: {listed or 'none'}"
+
+
+def _part(name: str, shape: AnyShape, T_world: ArrayLike) -> Part:
+    text("name of a part", name)
+    if not name or any(c in name for c in ":,*? \t\n"):
+        raise InputError(f"part name must not be empty or hold a space or one of : , * ?, got {shown(name)}")
+    return Part(name, as_shape(shape), scene_pose(T_world, f"pose of {name}"))

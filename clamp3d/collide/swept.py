@@ -1,0 +1,89 @@
+"""Lower bounds that hold for a whole stretch of a motion: one part still, the other's pieces swept.
+
+A cylinder is swept into a longer and thicker one: sliding along its own axis costs nothing, so a pin in its bore
+keeps its clearance over any stretch. A polyhedron is swept into the hull of its first and last position.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clamp3d.collide.body import Body, bore_rod
+from clamp3d.collide.convex import Convex, Rod, convex_bounds, hull
+from clamp3d.collide.facets import axis_gap
+from clamp3d.collide.model import Model
+from clamp3d.core.pose import Array, inverse
+
+
+def swept_low(a: Model, b: Model, before: Array, middle: Array, after: Array, *, angle: float) -> float:
+    """Distance (mm) that ``b`` certainly keeps from ``a`` while it goes from ``before`` over ``middle`` to ``after``.
+
+    All three (4, 4) in a's frame, evenly spaced on one screw that turns by ``angle`` (rad) between two of them. Minus
+    infinity for half a turn or more.
+    """
+    if abs(angle) >= 0.5 * np.pi:
+        return -np.inf
+    there = (before, middle, after)
+    back = tuple(inverse(T) for T in there)
+    best = np.inf
+    for x in a.forms:
+        for y in b.forms:
+            low = max(_one_way(x, y, there, angle), _bores(y, x, back, angle))
+            best = min(best, low - x.error - y.error)
+    for still, moving, poses in ((a, b, there), (b, a, back)):
+        if still.facets is not None and moving.bodies is not None:
+            lows = []
+            for body in moving.bodies:
+                rods = [piece for piece in body.outers if isinstance(piece, Rod)]
+                if not rods:
+                    break
+                rod = _swept_rod(rods[0], poses, angle)
+                lows.append(axis_gap(still.facets, rod, poses[1]) - body.error)
+            else:
+                best = max(best, min(lows))
+    return float(best)
+
+
+def _one_way(still: Body, moving: Body, poses: tuple[Array, ...], angle: float) -> float:
+    best = _bores(still, moving, poses, angle)
+    for piece in still.outers:
+        for other in moving.outers:
+            if isinstance(other, Rod):
+                swept: Convex = _swept_rod(other, poses, angle)
+                best = max(best, convex_bounds(piece, np.eye(4), swept, poses[1]).low)
+            else:
+                ways = np.array([other.vertices @ T[:3, :3].T + T[:3, 3] for T in poses])
+                around = hull((ways if angle else ways[::2]).reshape(-1, 3))
+                best = max(best, convex_bounds(piece, np.eye(4), around, np.eye(4)).low - _sagitta(ways, angle))
+    return best
+
+
+def _bores(still: Body, moving: Body, poses: tuple[Array, ...], angle: float) -> float:
+    best = -np.inf
+    for bore in still.bores:
+        for piece in moving.outers:
+            if isinstance(piece, Rod):
+                best = max(best, bore_rod(bore, _swept_rod(piece, poses, angle), poses[1]).low)
+    return best
+
+
+def _swept_rod(rod: Rod, poses: tuple[Array, ...], angle: float) -> Rod:
+    """A rod, in its own part's frame at the middle pose, that holds the moving one all the time."""
+    ends = rod.T[:3, 3] + np.outer([-0.5 * rod.length, 0.5 * rod.length], rod.T[:3, 2])
+    home = inverse(poses[1] @ rod.T)
+    ways = np.array([(ends @ T[:3, :3].T + T[:3, 3]) @ home[:3, :3].T + home[:3, 3] for T in poses])
+    local, sag = ways.reshape(-1, 3), _sagitta(ways, angle)
+    axes = [home[:3, :3] @ T[:3, :3] @ rod.T[:3, 2] for T in poses]
+    tilt = rod.radius * max(float(np.hypot(axis[0], axis[1])) for axis in axes)
+    low, high = float(local[:, 2].min() - sag - tilt), float(local[:, 2].max() + sag + tilt)
+    aside = float(np.hypot(local[:, 0], local[:, 1]).max())
+    T = rod.T.copy()
+    T[:3, 3] += 0.5 * (low + high) * rod.T[:3, 2]
+    return Rod(rod.radius + aside + sag, high - low, T)
+
+
+def _sagitta(ways: Array, angle: float) -> float:
+    """How far points stray from the straight lines between their places ``ways`` (3, k, 3), on arcs of ``angle``."""
+    # An arc of angle a over a chord c: c / 2 tan(a / 4).
+    chord = float(np.linalg.norm(np.diff(ways, axis=0), axis=2).max())
+    return 0.5 * chord * float(np.tan(0.25 * abs(angle)))

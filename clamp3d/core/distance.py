@@ -1,0 +1,223 @@
+"""Exact signed distance of a cylinder from a groove, in any pose.
+
+The distance is ``min over the cylinder's axis of sdf(point) - cylinder.radius``, where ``sdf`` is the exact signed
+distance from the groove's material: the Euclidean distance outside, minus the distance from its boundary inside.
+So it is exact for every clearance and for every overlap less deep than the cylinder's radius; once the axis itself
+enters the material it is at most ``-radius``, falls with the depth of the axis, and ``axis_inside`` is set.
+The cylinder's surface is all points at its radius from its axis segment: its ends are rounded.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from enum import IntEnum
+from types import ModuleType
+from typing import Literal, NoReturn, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clamp3d.checks import array, flag, whole
+from clamp3d.core.pose import RIGID_TOLERANCE, Array, check_pose
+from clamp3d.core.primitives import LARGEST, Cylinder, SweptArc, check_shapes
+from clamp3d.errors import InputError
+
+
+class Feature(IntEnum):
+    """Part of a groove that a cylinder is nearest to. Seen from +z, M is the lip at -x and N the lip at +x."""
+
+    ARC = 0
+    LIP_M = 1
+    LIP_N = 2
+    FLAT_M = 3
+    FLAT_N = 4
+    END_FACE = 5
+    END_ARC = 6
+    END_EDGE_M = 7
+    END_EDGE_N = 8
+    CORNER_M = 9
+    CORNER_N = 10
+
+    def __str__(self) -> str:
+        """Name for the user: 'arc', 'lip M', 'flat N', 'end face', ..."""
+        words = self.name.lower().split("_")
+        return " ".join(word.upper() if word in ("m", "n") else word for word in words)
+
+
+_FEATURES = tuple(Feature)
+
+
+@dataclass(frozen=True, slots=True)
+class SignedDistance:
+    """Answer of ``signed_distance``; all in the groove's frame, mm.
+
+    ``point_on_cylinder = point_on_groove + distance * normal``; the normal is unit, from groove to cylinder.
+    ``along`` is where the nearest axis point lies, from the cylinder's middle; ``error_bound`` bounds the rounding
+    error of ``distance``. For cylinders that touch along a line the points are in the middle of it.
+    """
+
+    distance: float
+    point_on_groove: Array
+    point_on_cylinder: Array
+    normal: Array
+    feature: Feature
+    along: float
+    error_bound: float
+    axis_inside: bool
+
+    @property
+    def gradient(self) -> Array:
+        """Rate of the distance by the cylinder's twist (6,): 3 linear, then 3 angular about the groove's origin.
+
+        Moving the cylinder by ``v`` mm and ``w`` rad (both in the groove's frame) changes the distance by
+        ``gradient @ (v, w)`` to first order. Where two places are equally near it is the one of the place named.
+        """
+        return _gradient(self.normal, self.point_on_cylinder)
+
+
+@dataclass(frozen=True, slots=True)
+class SignedDistances:
+    """Answers of ``signed_distances(..., full=True)``: the fields of ``SignedDistance`` with n in front."""
+
+    distance: Array
+    point_on_groove: Array
+    point_on_cylinder: Array
+    normal: Array
+    feature: NDArray[np.int8]
+    along: Array
+    error_bound: Array
+    axis_inside: NDArray[np.bool_]
+
+    @property
+    def gradient(self) -> Array:
+        """Rates of the distances by the cylinder's twist, shape (n, 6); see ``SignedDistance.gradient``."""
+        return _gradient(self.normal, self.point_on_cylinder)
+
+
+def _gradient(normal: Array, point: Array) -> Array:
+    return np.concatenate([normal, np.cross(point, normal)], axis=-1)
+
+
+def as_pose(pose: ArrayLike) -> Array:
+    """Return ``pose`` as the (4, 4) float64 array the kernel takes (C order, writeable); shape alone is checked."""
+    if type(pose) is np.ndarray and pose.dtype == np.float64 and pose.shape == (4, 4) and pose.flags.carray:
+        return pose
+    return np.require(check_pose(pose), np.float64, ["C", "A", "W"])
+
+
+def reject(T: Array, name: str) -> NoReturn:
+    """Raise the InputError for a pose that the kernel refused."""
+    check_pose(T, name)
+    if np.abs(T[:3, 3]).sum() >= LARGEST:
+        raise InputError(f"{name} must have an offset below {LARGEST:g} mm, got {T[:3, 3].tolist()}")
+    raise InputError(f"{name} must be rigid within the tolerance of {RIGID_TOLERANCE:g}")
+
+
+_kernel: ModuleType | None = None
+
+
+def kernel() -> ModuleType:
+    """Return the compiled entry points, loaded (or compiled, with a notice on stderr) on first use."""
+    global _kernel
+    if _kernel is None:
+        from clamp3d.core import kernel as module
+
+        _kernel = module
+    return _kernel
+
+
+def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> SignedDistance:
+    """Signed distance of ``cylinder`` from ``groove`` with witnesses; ``pose`` (4, 4) is ``T_groove_cylinder``.
+
+    Only the cylinder's position and axis direction matter, so ``pose`` enters as its last column and its third,
+    normalised. Raises InputError if ``pose`` is not a finite rigid 4x4 matrix.
+
+    >>> import numpy as np
+    >>> from clamp3d.core.primitives import LARGEST, Cylinder, SweptArc
+    >>> groove, wire = SweptArc(12.0, np.radians(70.0), 50.0), Cylinder(10.5, 80.0)
+    >>> answer = signed_distance(groove, wire, np.eye(4))
+    >>> answer.distance, answer.feature.name
+    (1.5, 'ARC')
+    """
+    if type(groove) is not SweptArc or type(cylinder) is not Cylinder:
+        check_shapes(groove, cylinder)
+    T = as_pose(pose)
+    record = np.empty((1, 13))
+    run = (_kernel or kernel()).records
+    half, along = 0.5 * groove.length, 0.5 * cylinder.length
+    if run(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, record) >= 0:
+        reject(T, "pose")
+    out = record[0]
+    values = out.tolist()
+    distance = values[0]
+    return SignedDistance(
+        distance,
+        out[1:4],
+        out[4:7],
+        out[7:10],
+        _FEATURES[int(values[11])],
+        values[12],
+        values[10],
+        distance < -cylinder.radius,
+    )
+
+
+@overload
+def signed_distances(
+    groove: SweptArc, cylinder: Cylinder, poses: ArrayLike, *, full: Literal[False] = False, workers: int | None = None
+) -> Array: ...
+@overload
+def signed_distances(
+    groove: SweptArc, cylinder: Cylinder, poses: ArrayLike, *, full: Literal[True], workers: int | None = None
+) -> SignedDistances: ...
+def signed_distances(
+    groove: SweptArc, cylinder: Cylinder, poses: ArrayLike, *, full: bool = False, workers: int | None = None
+) -> Array | SignedDistances:
+    """Signed distances for ``poses`` (n, 4, 4): (n,) float64, or all fields as arrays with ``full=True``.
+
+    The same formulas as ``signed_distance``, so the same bits. ``workers`` threads (all cores by default) share the
+    poses. Raises InputError that names the first pose that is not finite and rigid.
+
+    >>> import numpy as np
+    >>> from clamp3d.core.primitives import LARGEST, Cylinder, SweptArc
+    >>> signed_distances(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.eye(4)[None])
+    array([1.5])
+    """
+    check_shapes(groove, cylinder)
+    flag("full", full)
+    T = np.require(array("poses", poses, (None, 4, 4), finite=False), np.float64, ["C", "A", "W"])
+    if workers is not None:
+        workers = whole("workers", workers, least=1)
+    n = len(T)
+    out = np.empty((n, 13) if full else n)
+    run = kernel().records if full else kernel().distances
+    sizes = (groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length)
+    threads = min(workers or os.cpu_count() or 1, max(1, n // 4096))
+
+    def part(start: int, stop: int) -> int:
+        bad = run(T[start:stop], *sizes, out[start:stop])
+        return bad if bad < 0 else start + int(bad)
+
+    if threads == 1:
+        found = [part(0, n)]
+    else:
+        cuts = [n * i // threads for i in range(threads + 1)]
+        with ThreadPoolExecutor(threads) as pool:
+            found = list(pool.map(part, cuts[:-1], cuts[1:]))
+    bad = [i for i in found if i >= 0]
+    if bad:
+        reject(T[bad[0]], f"poses[{bad[0]}]")
+    if not full:
+        return out
+    return SignedDistances(
+        out[:, 0],
+        out[:, 1:4],
+        out[:, 4:7],
+        out[:, 7:10],
+        out[:, 11].astype(np.int8),
+        out[:, 12],
+        out[:, 10],
+        out[:, 0] < -cylinder.radius,
+    )

@@ -1,0 +1,282 @@
+"""The signed distance of a cylinder's axis segment from a groove, with witnesses: one formula for single and batch.
+
+Where nothing else is said a result is the tuple ``(distance, qx, qy, qz, nx, ny, nz, feature, t, bound)``: signed
+distance of the cylinder's surface, point on the groove, unit normal from groove to cylinder, code of the feature, place
+on the axis, bound on the rounding error of the distance.
+"""
+
+from __future__ import annotations
+
+import math
+
+from clamp3d.core.jit import formula, inlined
+from clamp3d.core.kernel_features import (
+    ARC,
+    CORNER_M,
+    CORNER_N,
+    END_ARC,
+    END_EDGE_M,
+    END_EDGE_N,
+    END_FACE,
+    FLAT_M,
+    FLAT_N,
+    LIP_M,
+    LIP_N,
+    beyond_end,
+    clip,
+    corner,
+    deepest,
+    ellipse,
+    end_arc,
+    end_arc_reach,
+    end_edge,
+    lip_line,
+    point_depth,
+    section,
+    section_foot,
+)
+
+UNIT = 2.0**-53
+"""Unit roundoff of float64."""
+
+PARALLEL = 2.0**-60
+"""An axis that leaves the groove's direction by less than this part of R over its length counts as parallel: the
+deviation is smaller than the rounding of R itself, and it is part of the error bound."""
+
+
+@inlined
+def is_parallel(R, l, dx, dy):  # type: ignore[no-untyped-def] # noqa: E741
+    """Whether an axis counts as parallel to the groove."""
+    return (dx * dx + dy * dy) * (l * l) <= (PARALLEL * R) * (PARALLEL * R)
+
+
+@inlined
+def parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def] # noqa: E741
+    """Axis along z, centred at (x, y, z): the plane problem of a point and the section, and the gap along z."""
+    gap, feature = section(x, y, R, s, h)
+    qx, qy, nx, ny = section_foot(feature, x, y, R, s, h)
+    up = math.copysign(1.0, dz)
+    lo = max(z - l, -H)
+    hi = min(z + l, H)
+    bound = UNIT * (6.0 * (R + abs(x) + abs(y)) + r)
+    if lo <= hi:
+        middle = 0.5 * (lo + hi)
+        if gap < 0.0:
+            inside = lo if lo > 0.0 else (hi if hi < 0.0 else 0.0)
+            end = H - abs(inside)
+            if end < -gap:
+                face = -H if inside < 0.0 else H
+                nz = -1.0 if inside < 0.0 else 1.0
+                return (
+                    -end - r,
+                    x,
+                    y,
+                    face,
+                    0.0,
+                    0.0,
+                    nz,
+                    END_FACE,
+                    (inside - z) * up,
+                    bound + UNIT * 4.0 * (H + abs(z) + l),
+                )
+        if feature == ARC:
+            # R - r first: exact for nearly equal radii, and rho is what is left.
+            return (R - r) - math.sqrt(x * x + y * y), qx, qy, middle, nx, ny, 0.0, ARC, (middle - z) * up, bound
+        return gap - r, qx, qy, middle, nx, ny, 0.0, feature, (middle - z) * up, bound
+    above = hi == H
+    face = H if above else -H
+    nz = 1.0 if above else -1.0
+    t = -l * up if above else l * up
+    end = lo - hi
+    bound += UNIT * 4.0 * (H + abs(z) + l)
+    if gap <= 0.0:
+        return end - r, x, y, face, 0.0, 0.0, nz, END_FACE, t, bound
+    distance = math.sqrt(gap * gap + end * end)
+    return (
+        distance - r,
+        qx,
+        qy,
+        face,
+        nx * (gap / distance),
+        ny * (gap / distance),
+        nz * (end / distance),
+        beyond_end(feature),
+        t,
+        bound,
+    )
+
+
+@formula
+def inside(R, h, H, r, cx, cy, cz, dx, dy, dz, lo, hi, bound):  # type: ignore[no-untyped-def]
+    """Axis that enters S: minus the depth of its deepest point, minus r."""
+    depth, t = deepest(R, h, H, cx, cy, cz, dx, dy, dz, lo, hi)
+    x = cx + t * dx
+    y = cy + t * dy
+    z = cz + t * dz
+    depth, feature = point_depth(x, y, z, R, h, H)
+    if feature == ARC:
+        rho = math.sqrt(x * x + y * y)
+        return -depth - r, x / rho * R, y / rho * R, z, -x / rho, -y / rho, 0.0, ARC, t, bound
+    if feature == END_FACE:
+        side = 1.0 if z >= 0.0 else -1.0
+        return -depth - r, x, y, side * H, 0.0, 0.0, side, END_FACE, t, bound
+    return -depth - r, x, h, z, 0.0, 1.0, 0.0, feature, t, bound
+
+
+@formula
+def edge_normal(feature, R, h, qx, qy, qz):  # type: ignore[no-untyped-def]
+    """A unit normal in the middle of the normal cone of an edge, for an axis that passes through the edge itself."""
+    x = -qx / R
+    y = -qy / R
+    z = 0.0
+    if feature != END_ARC and feature != LIP_M and feature != LIP_N:
+        x = 0.0 if feature in (END_EDGE_M, END_EDGE_N) else x
+        y = 1.0
+    elif feature != END_ARC:
+        y += 1.0
+    if feature != LIP_M and feature != LIP_N:
+        z = 1.0 if qz > 0.0 else -1.0
+    n = math.sqrt(x * x + y * y + z * z)
+    return x / n, y / n, z / n
+
+
+@formula
+def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untyped-def] # noqa: E741
+    """Signed distance of a cylinder centred at c with its axis along d (of any length but zero)."""
+    if is_parallel(R, l, dx, dy):
+        return parallel(R, s, h, H, r, l, cx, cy, cz, dz)
+    e2 = dx * dx + dy * dy
+    n = 1.0 / math.sqrt(e2 + dz * dz)
+    dx *= n
+    dy *= n
+    dz *= n
+    e2 *= n * n
+
+    # A direction is normalised to 3 units, a point of the axis (a product and a sum, |t| <= l) known to 5 units of
+    # |c| + l, s and h to 3 units of R, a difference of these and its norm to 3 more: 11, rounded up, and r's own.
+    bound = UNIT * (12.0 * (abs(cx) + abs(cy) + abs(cz) + 2.0 * l + H + R) + r)
+    high = l * abs(dy)
+    if cy - high <= h:
+        lo, hi = clip(h, H, cy, cz, dy, dz, l)
+        if lo <= hi:
+            # rho is convex along the axis: if any point of the part in the block is behind the arc, an end of it is.
+            behind = False
+            for i in range(2):
+                t = lo if i == 0 else hi
+                x = cx + t * dx
+                y = cy + t * dy
+                if (x * x + y * y >= R * R and (h < 0.0 or abs(x) * -h + y * s <= 0.0)) or (
+                    abs(x) >= s and (dy < 0.0 if i == 0 else dy > 0.0) and t == (h - cy) / dy
+                ):
+                    behind = True
+            if behind:
+                return inside(R, h, H, r, cx, cy, cz, dx, dy, dz, lo, hi, bound)
+
+    # Ends of the axis against S; top and bottom: whether the axis reaches beyond the end faces.
+    best2 = math.inf
+    bt = bz = 0.0
+    feature = ARC
+    top = bottom = False
+    for i in range(2):
+        t = -l if i == 0 else l
+        z = cz + t * dz
+        gap, f = section(cx + t * dx, cy + t * dy, R, s, h)
+        d2 = gap * gap
+        end = abs(z) - H
+        if end >= 0.0:  # level with it too: an axis in the plane of an end face leaves it by less than rounding
+            if z > 0.0:
+                top = True
+            else:
+                bottom = True
+        if end > 0.0:
+            z = math.copysign(H, z)
+            if gap <= 0.0:
+                d2 = end * end
+                f = END_FACE
+            else:
+                d2 += end * end
+                f = beyond_end(f)
+        elif gap < 0.0 and end * end < d2:
+            # In the material by the rounding of z alone (an axis in the plane of an end face): it is on the face.
+            d2 = end * end
+            z = math.copysign(H, z)
+            f = END_FACE
+        if d2 < best2:
+            best2, bt, bz, feature = d2, t, z, f
+
+    # Inside of the axis against the lips.
+    for i in range(2):
+        d2, t, z = lip_line(-s if i == 0 else s, h, H, cx, cy, cz, dx, dy, dz, e2, l)
+        if d2 < best2:
+            best2, bt, bz, feature = d2, t, z, LIP_M if i == 0 else LIP_N
+
+    # Inside of the axis against the edges and corners of the ends it passes; the end arcs last: they cost most.
+    bx = by = 0.0
+    on_end_arc = False
+    if top or bottom:
+        for i in range(2):
+            if not (bottom if i == 0 else top):
+                continue
+            ez = -H if i == 0 else H
+            if cy + high >= h:
+                d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l)
+                if d2 < best2:
+                    best2, bt, bz, feature = d2, t, ez, END_EDGE_M if x < 0.0 else END_EDGE_N
+            for j in range(2):
+                d2, t = corner(-s if j == 0 else s, h, ez, cx, cy, cz, dx, dy, dz, l)
+                if d2 < best2:
+                    best2, bt, bz, feature = d2, t, ez, CORNER_M if j == 0 else CORNER_N
+        ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
+        low_v, low_reach = end_arc_reach(-H, R, cz, dz, e2, p, along)
+        top_v, top_reach = end_arc_reach(H, R, cz, dz, e2, p, along)
+        top_first = top and (not bottom or top_reach < low_reach)
+        for i in range(2):
+            at_top = top_first if i == 0 else not top_first
+            reach = top_reach if at_top else low_reach
+            if reach * reach >= best2 or not (top if at_top else bottom):
+                continue
+            ez = H if at_top else -H
+            v = top_v if at_top else low_v
+            d2, x, y, t = end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
+            if d2 < best2:
+                best2, bt, bz, feature = d2, t, ez, END_ARC
+                bx, by, on_end_arc = x, y, True
+
+    x = cx + bt * dx
+    y = cy + bt * dy
+    if feature == ARC:
+        bx, by, nx, ny = section_foot(ARC, x, y, R, s, h)
+        # R - r first: exact for nearly equal radii, and rho is what is left.
+        return (R - r) - math.sqrt(x * x + y * y), bx, by, bz, nx, ny, 0.0, ARC, bt, bound
+    distance = math.sqrt(best2)
+    if feature in (FLAT_M, FLAT_N):
+        return distance - r, x, h, bz, 0.0, 1.0, 0.0, feature, bt, bound
+    if feature == END_FACE:
+        return distance - r, x, y, bz, 0.0, 0.0, math.copysign(1.0, bz), feature, bt, bound
+    if feature == END_ARC:
+        if not on_end_arc:
+            bx, by, nx, ny = section_foot(ARC, x, y, R, s, h)
+    else:
+        by = h
+        if feature in (LIP_M, CORNER_M):
+            bx = -s
+        elif feature in (LIP_N, CORNER_N):
+            bx = s
+        else:
+            bx = x
+    nx = x - bx
+    ny = y - by
+    nz = cz + bt * dz - bz
+    if nx * nx + ny * ny + nz * nz <= bound * bound:
+        nx, ny, nz = edge_normal(feature, R, h, bx, by, bz)
+    # Inside the axis the normal is across it, at an end it points back from it: with the axis close to the edge itself
+    # the difference above knows that to few digits only.
+    along = nx * dx + ny * dy + nz * dz
+    if abs(bt) < l or along * bt > 0.0:
+        nx -= along * dx
+        ny -= along * dy
+        nz -= along * dz
+    n = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if n == 0.0:
+        nx, ny, nz, n = -dy, dx, 0.0, math.sqrt(e2)
+    return distance - r, bx, by, bz, nx / n, ny / n, nz / n, feature, bt, bound

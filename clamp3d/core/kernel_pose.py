@@ -1,0 +1,41 @@
+"""The pose as the kernel takes it: checked, and read as a place and an axis direction."""
+
+from __future__ import annotations
+
+import math
+
+from clamp3d.core.jit import formula, inlined
+from clamp3d.core.pose import RIGID_TOLERANCE
+from clamp3d.core.primitives import LARGEST
+
+
+@inlined
+def rigid(T, k):  # type: ignore[no-untyped-def]
+    """Whether pose k of (n, 4, 4) is rigid by the rule of ``pose.check_pose``, and its offset below LARGEST."""
+    a, b, c = T[k, 0, 0], T[k, 0, 1], T[k, 0, 2]
+    d, e, f = T[k, 1, 0], T[k, 1, 1], T[k, 1, 2]
+    g, h, i = T[k, 2, 0], T[k, 2, 1], T[k, 2, 2]
+    aa = abs(a * a + b * b + c * c - 1.0)
+    bb = abs(d * d + e * e + f * f - 1.0)
+    cc = abs(g * g + h * h + i * i - 1.0)
+    ab = abs(a * d + b * e + c * f)
+    ac = abs(a * g + b * h + c * i)
+    bc = abs(d * g + e * h + f * i)
+    # Every comparison is false for a NaN. The sum decides nearly always: it is no less than the largest.
+    if not aa + bb + cc + ab + ac + bc <= RIGID_TOLERANCE:
+        t = RIGID_TOLERANCE
+        if not (aa <= t and bb <= t and cc <= t and ab <= t and ac <= t and bc <= t):
+            return False
+    if not a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.0:
+        return False
+    offset = abs(T[k, 0, 3]) + abs(T[k, 1, 3]) + abs(T[k, 2, 3])
+    last = abs(T[k, 3, 0]) + abs(T[k, 3, 1]) + abs(T[k, 3, 2]) + abs(T[k, 3, 3] - 1.0)
+    return offset < LARGEST and last == 0.0
+
+
+@formula
+def axis(T, k):  # type: ignore[no-untyped-def]
+    """Unit direction of the z axis of pose k: the column as given, normalised."""
+    x, y, z = T[k, 0, 2], T[k, 1, 2], T[k, 2, 2]
+    n = math.sqrt(x * x + y * y + z * z)
+    return x / n, y / n, z / n

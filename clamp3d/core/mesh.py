@@ -1,0 +1,146 @@
+"""One triangle mesh for everything: checked, cleaned, oriented outward, in millimetres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clamp3d import checks
+from clamp3d.core.shells import inside_out, volume
+from clamp3d.errors import InputError
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+LARGEST, SMALLEST = 1e12, 1e-9
+"""Largest coordinate and least extent in mm: beyond them products of three lengths lose their digits or vanish."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """A checked triangle mesh: ``vertices`` (n, 3) in mm, ``faces`` (m, 3), outward winding, equal vertices merged.
+
+    ``rounding`` (mm) is the largest error of a vertex from the number format; ``notes`` say what was repaired or
+    assumed on the way in.
+    """
+
+    name: str
+    vertices: Array
+    faces: IntArray
+    watertight: bool
+    rounding: float
+    notes: tuple[str, ...]
+
+
+def make_mesh(
+    vertices: ArrayLike, faces: ArrayLike, *, name: str = "mesh", scale: float = 1.0, float32: bool = False
+) -> Mesh:
+    """Check, clean and orient a mesh: ``vertices`` (n, 3), ``faces`` (m, 3); lengths are multiplied by ``scale``.
+
+    Equal vertices are merged, triangles without area and doubled triangles dropped, windings made consistent and, on a
+    closed mesh, outward, body by body. ``float32``: the coordinates passed through single precision (so they have if
+    their type says so). Raises InputError for wrong shapes, numbers that are not finite, indices out of range, no
+    triangle left or a closed surface without a volume.
+    """
+    import trimesh
+
+    checks.text("name of a mesh", name)
+    scale, float32 = checks.positive("scale", scale), checks.flag("float32", float32)
+    float32 = float32 or getattr(vertices, "dtype", None) == np.float32
+    V = checks.array(f"{name}: vertices", vertices, (None, 3), finite=False)
+    F = _indices(f"{name}: faces", faces)
+    if len(V) == 0:
+        raise InputError(f"{name}: vertices must not be empty")
+    if F.min() < 0 or F.max() >= len(V):
+        bad = int(F.max()) if F.max() >= len(V) else int(F.min())
+        raise InputError(f"{name}: face index {bad} is out of range for {len(V)} vertices")
+    used, F = np.unique(F, return_inverse=True)
+    V, F = V[used], F.reshape(-1, 3)
+    if not np.isfinite(V).all():
+        bad = int(np.flatnonzero(~np.isfinite(V).all(axis=1))[0])
+        raise InputError(f"{name}: vertex {used[bad]} is not finite: {V[bad].tolist()}")
+    with np.errstate(over="ignore", under="ignore"):
+        V = V * scale
+    if not np.abs(V).max() <= LARGEST:
+        bad = int(np.abs(V).max(axis=1).argmax())
+        raise InputError(f"{name}: vertex {used[bad]} must be within {LARGEST:g} mm, got {V[bad].tolist()}")
+
+    notes = []
+    reach = float(np.abs(V).max())
+    extent = float(np.ptp(V, axis=0).max())
+    if extent <= 0.0:
+        raise InputError(f"{name}: all vertices lie in one point")
+    if extent < SMALLEST:
+        raise InputError(f"{name}: extent must be >= {SMALLEST:g} mm, got {extent:.3g} mm; is the unit right?")
+    rounding = reach * (2.0**-24 if float32 else 2.0**-50)
+    V, F = _merge(V, F, max(4.0 * rounding, 1e-9 * extent))
+    cornered = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
+    first = np.zeros(len(F), dtype=bool)
+    first[np.unique(np.sort(F, axis=1), axis=0, return_index=True)[1]] = True
+    doubled = int((cornered & ~first).sum())
+    if doubled:
+        notes.append(f"{doubled} doubled triangles left out")
+    mesh = trimesh.Trimesh(V, F[cornered & first], process=False)
+    if len(mesh.faces) == 0:
+        raise InputError(f"{name}: no triangle with an area")
+    mesh.remove_unreferenced_vertices()
+    if not mesh.is_winding_consistent:
+        before = mesh.faces.copy()
+        trimesh.repair.fix_winding(mesh)  # type: ignore[no-untyped-call]
+        turned = int(np.any(before != np.asarray(mesh.faces), axis=1).sum())
+        notes.append(f"{turned} triangles turned to one winding")
+    watertight = bool(mesh.is_watertight)
+    if not watertight:
+        notes.append("open mesh: the material's side is taken from the winding")
+    V, F = np.asarray(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+    if watertight:
+        enclosed = volume(V, F)
+        if enclosed < 0.0:
+            F = np.ascontiguousarray(F[:, ::-1])
+            notes.append("inside out: all triangles turned")
+        for rows in inside_out(V, F):
+            F[rows] = F[rows][:, ::-1]
+            notes.append(f"a body of {len(rows)} triangles inside out: turned")
+        if not volume(V, F) > 0.0:
+            raise InputError(f"{name}: the surface encloses no volume")
+    longest = np.linalg.norm(V[F] - V[F[:, [1, 2, 0]]], axis=2).max(axis=1)
+    twice_area = np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1)
+    # Slivers go last: they close the surface, but their normals are rounding.
+    F = F[twice_area > 4.0 * rounding * longest]
+    if len(F) == 0:
+        raise InputError(f"{name}: no triangle with an area")
+    return Mesh(name, V, F, watertight, rounding, tuple(notes))
+
+
+def _indices(name: str, faces: ArrayLike) -> IntArray:
+    """Faces (m, 3), m > 0, of whole numbers."""
+    try:
+        F = np.asarray(faces)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        raise InputError(f"{name} must be an array of integers with shape (m, 3)") from None
+    if F.dtype.kind not in "iu" and F.size:
+        raise InputError(f"{name} must be integers, got {F.dtype}")
+    if F.ndim != 2 or F.shape[1:] != (3,) or len(F) == 0:
+        raise InputError(f"{name} must have shape (m, 3), got {F.shape}")
+    if F.dtype.kind == "u" and F.max() > np.iinfo(np.int64).max:
+        raise InputError(f"{name}: index {F.max()} is out of range")
+    return F.astype(np.int64)
+
+
+def _merge(V: Array, F: IntArray, tolerance: float) -> tuple[Array, IntArray]:
+    """Merge vertices closer than ``tolerance`` (a tree, not a grid: a grid parts equal points at its lines)."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    unique, inverse = np.unique(V, axis=0, return_inverse=True)
+    inverse = inverse.reshape(-1)
+    pairs = np.asarray(cKDTree(unique).query_pairs(tolerance, output_type="ndarray"))
+    if len(pairs):
+        graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(unique), len(unique)))
+        _, label = connected_components(graph, directed=False)
+        keep = np.unique(label, return_index=True)[1]
+        return unique[keep], label[inverse][F].astype(np.int64)
+    return unique, inverse[F].astype(np.int64)

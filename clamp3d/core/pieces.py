@@ -1,0 +1,60 @@
+"""Signed gaps of a groove's boundary pieces one by one, for solvers that need each as a smooth constraint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clamp3d.core.distance import as_pose, reject
+from clamp3d.core.pose import Array
+from clamp3d.core.primitives import Cylinder, SweptArc, check_shapes
+
+
+@dataclass(frozen=True, slots=True)
+class GroovePieces:
+    """Answer of ``groove_pieces``: one row per piece, in the groove's frame, mm.
+
+    Rows: 0 arc surface with its edges, 1 flat face M with its lip, 2 flat face N with its lip, 3 end face -z,
+    4 end face +z. ``distance`` (5,) signed gap, ``point_on_groove`` (5, 3), ``normal`` (5, 3) unit, from groove to
+    cylinder, ``feature`` (5,) codes of ``Feature``, ``gradient`` (5, 6) rate of the gap by the cylinder's twist (3
+    linear, 3 angular about the groove's origin); with a tilted axis inside the material it is the rate at the deepest
+    axis point.
+    """
+
+    distance: Array
+    point_on_groove: Array
+    normal: Array
+    feature: NDArray[np.int8]
+    gradient: Array
+
+
+def groove_pieces(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> GroovePieces:
+    """Signed gap of each closed boundary piece of ``groove`` to ``cylinder``; ``pose`` (4, 4): ``T_groove_cylinder``.
+
+    While the cylinder's axis is outside the material, ``min(distance)`` is ``signed_distance(...).distance``. With the
+    axis inside, the gaps of the pieces it came through stay negative and fall further, with normals that lead back
+    out; the other pieces keep their plain distance. Each gap is continuous, and smooth where its nearest point is
+    unique; the one exception is an axis that enters through an end face: there the side pieces change sign at once.
+    A cylinder along the groove that sticks out of it has its end pieces equal to the nearest side piece: take rows 0
+    to 2 alone for such cylinders. Raises InputError if ``pose`` is not a finite rigid 4x4 matrix.
+
+    >>> import numpy as np
+    >>> from clamp3d.core.pose import translation
+    >>> groove, wire = SweptArc(12.0, np.pi / 3, 50.0), Cylinder(15.0, 80.0)
+    >>> gaps = groove_pieces(groove, wire, translation(0.0, 5.0, 0.0))  # too thick: it rests on the lips
+    >>> gaps.distance[:3].round(3).tolist()
+    [0.133, 0.133, 0.133]
+    """
+    if type(groove) is not SweptArc or type(cylinder) is not Cylinder:
+        check_shapes(groove, cylinder)
+    T = as_pose(pose)
+    out = np.empty((5, 14))
+    from clamp3d.core.kernel_pieces import pieces  # compiled on first use
+
+    if not pieces(
+        T[None], groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, out
+    ):
+        reject(T, "pose")
+    return GroovePieces(out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7].astype(np.int8), out[:, 8:14])

@@ -1,0 +1,214 @@
+"""Closed outlines of straight segments and circular arcs; arcs stay arcs until somebody asks for chords.
+
+An outline runs counter-clockwise in its own right-handed plane (a, b): the material is on its left, an arc with a
+positive sweep is convex (back, shank, wire), one with a negative sweep is concave (groove, saddle).
+Chords have their ends *on* the arc. So a convex arc loses material and a groove or hole gains it: the chord error
+always lies on the inner side of the circle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from clamp3d.checks import number
+from clamp3d.core.pose import Array
+from clamp3d.errors import InputError
+
+Point: TypeAlias = tuple[float, float]
+
+MIN_MESH_ERROR = 1e-6
+"""Smallest chord error in mm: a circle of radius 24 then has some 11 000 chords."""
+
+_CLOSURE = 1e-9  # mm; the ends of neighbouring edges are computed by different formulas
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """Straight edge from ``start`` to ``end`` (a, b) in mm."""
+
+    start: Point
+    end: Point
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """Circular edge about ``centre`` (a, b) in mm from ``start_angle`` to ``end_angle`` in rad, a towards b.
+
+    ``end_angle > start_angle`` is convex, ``end_angle < start_angle`` concave; they differ by 2 pi at most.
+    """
+
+    centre: Point
+    radius: float
+    start_angle: float
+    end_angle: float
+
+    @property
+    def sweep(self) -> float:
+        """Signed angle in rad: positive where the arc is convex."""
+        return self.end_angle - self.start_angle
+
+    @property
+    def start(self) -> Point:
+        """First point (a, b) in mm."""
+        return self.at(self.start_angle)
+
+    @property
+    def end(self) -> Point:
+        """Last point (a, b) in mm."""
+        return self.at(self.end_angle)
+
+    def at(self, angle: float) -> Point:
+        """Point (a, b) in mm at ``angle`` rad."""
+        return self.centre[0] + self.radius * math.cos(angle), self.centre[1] + self.radius * math.sin(angle)
+
+    def chord_count(self, mesh_error: float) -> int:
+        """Equal chords that stay within ``mesh_error`` mm of the arc.
+
+        The count is even (a full circle: a multiple of four), so that the middle of a symmetric arc is a vertex and
+        the bounding box of the clamp's parts does not depend on the error. From sagitta = 2 R sin^2(angle / 4).
+        """
+        mesh_error = check_mesh_error(mesh_error)
+        widest = 4.0 * math.asin(min(1.0, math.sqrt(mesh_error / (2.0 * self.radius))))
+        multiple = 4 if abs(self.sweep) > 2.0 * math.pi - 1e-9 else 2
+        return multiple * max(1, math.ceil(abs(self.sweep) / widest / multiple - 1e-9))
+
+    def sagitta(self, chords: int) -> float:
+        """Largest distance in mm of ``chords`` equal chords from the arc: their chord error."""
+        return 2.0 * self.radius * math.sin(abs(self.sweep) / chords / 4.0) ** 2
+
+    def chord_area(self, chords: int) -> float:
+        """Area in mm^2 between the arc and ``chords`` equal chords: lost where convex, gained where concave."""
+        angle = abs(self.sweep) / chords
+        return 0.5 * chords * self.radius**2 * (angle - math.sin(angle))
+
+
+Edge: TypeAlias = Segment | Arc
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """A closed outline. Raises InputError if its edges do not join, or if it runs clockwise.
+
+    >>> disk = Profile.circle(2.0)
+    >>> math.isclose(disk.area, 4 * math.pi), disk.bounds
+    (True, ((-2.0, -2.0), (2.0, 2.0)))
+    """
+
+    edges: tuple[Edge, ...]
+
+    def __post_init__(self) -> None:
+        for i, edge in enumerate(self.edges):
+            before = self.edges[i - 1]
+            if math.dist(before.end, edge.start) > _CLOSURE:
+                raise InputError(
+                    f"outline must be closed: edge {i} starts at {edge.start}, the one before ends at {before.end}"
+                )
+        if not self.edges or self.area <= 0.0:
+            raise InputError("outline must run counter-clockwise and enclose an area > 0 mm^2")
+
+    @classmethod
+    def of(cls, *pieces: Point | Arc) -> Profile:
+        """Outline through points and arcs in turn; straight segments join them, none of length zero."""
+        edges: list[Edge] = []
+        for i, piece in enumerate(pieces):
+            before = pieces[i - 1]
+            start = before.end if isinstance(before, Arc) else before
+            end = piece.start if isinstance(piece, Arc) else piece
+            if math.dist(start, end) > _CLOSURE:
+                edges.append(Segment(start, end))
+            if isinstance(piece, Arc):
+                edges.append(piece)
+        return cls((*edges[1:], edges[0]) if isinstance(edges[0], Segment) else tuple(edges))
+
+    @classmethod
+    def circle(cls, radius: float, centre: Point = (0.0, 0.0)) -> Profile:
+        """Full circle of ``radius`` mm."""
+        return cls((Arc(centre, radius, 0.0, 2.0 * math.pi),))
+
+    @classmethod
+    def rectangle(cls, width: float, height: float, centre: Point = (0.0, 0.0)) -> Profile:
+        """Rectangle of ``width`` (a) and ``height`` (b) mm."""
+        a, b = centre
+        w, h = width / 2, height / 2
+        return cls.of((a - w, b - h), (a + w, b - h), (a + w, b + h), (a - w, b + h))
+
+    @classmethod
+    def hexagon(cls, across_flats: float) -> Profile:
+        """Regular hexagon about the origin, two corners on the a axis, ``across_flats`` mm along b."""
+        r = across_flats / math.sqrt(3.0)
+        h = across_flats / 2
+        return cls.of((r, 0.0), (r / 2, h), (-r / 2, h), (-r, 0.0), (-r / 2, -h), (r / 2, -h))
+
+    @property
+    def arcs(self) -> tuple[Arc, ...]:
+        """The circular edges."""
+        return tuple(edge for edge in self.edges if isinstance(edge, Arc))
+
+    @property
+    def area(self) -> float:
+        """Enclosed area in mm^2, closed form: Green's theorem, 1/2 of the integral of a db - b da along the outline."""
+        twice = 0.0
+        for edge in self.edges:
+            if isinstance(edge, Segment):
+                (a0, b0), (a1, b1) = edge.start, edge.end
+                twice += a0 * b1 - a1 * b0
+            else:
+                (a, b), R, t0, t1 = edge.centre, edge.radius, edge.start_angle, edge.end_angle
+                twice += R * R * edge.sweep
+                twice += R * (a * (math.sin(t1) - math.sin(t0)) - b * (math.cos(t1) - math.cos(t0)))
+        return 0.5 * twice
+
+    @property
+    def bounds(self) -> tuple[Point, Point]:
+        """Lower and upper corner (a, b) of the bounding box in mm, arcs taken as arcs."""
+        return (-self.support(-1.0, 0.0), -self.support(0.0, -1.0)), (self.support(1.0, 0.0), self.support(0.0, 1.0))
+
+    def support(self, da: float, db: float) -> float:
+        """Largest value of da * a + db * b over the outline, exact on arcs: how far it reaches in that direction."""
+        reach, direction = -math.inf, math.atan2(db, da)
+        for edge in self.edges:
+            reach = max(reach, *(da * a + db * b for a, b in (edge.start, edge.end)))
+            if isinstance(edge, Arc):
+                low, high = sorted((edge.start_angle, edge.end_angle))
+                turns = math.ceil((low - direction) / (2.0 * math.pi))
+                if direction + 2.0 * math.pi * turns <= high:
+                    reach = max(reach, da * edge.centre[0] + db * edge.centre[1] + edge.radius * math.hypot(da, db))
+        return reach
+
+    def polygon(self, mesh_error: float) -> Array:
+        """Vertices (n, 2) in mm, counter-clockwise: arcs as equal chords within ``mesh_error`` mm, ends on the arc.
+
+        Raises InputError if ``mesh_error`` is not a length of at least MIN_MESH_ERROR.
+        """
+        check_mesh_error(mesh_error)
+        points: list[Point] = []
+        for i, edge in enumerate(self.edges):
+            before = self.edges[i - 1]
+            points.append(before.end if isinstance(before, Segment) else edge.start)
+            if isinstance(edge, Arc):
+                n = edge.chord_count(mesh_error)
+                points += [edge.at(edge.start_angle + edge.sweep * k / n) for k in range(1, n)]
+        return np.array(points)
+
+    def chord_error(self, mesh_error: float) -> float:
+        """The chord error in mm that ``polygon(mesh_error)`` has in fact; 0 without arcs."""
+        return max((arc.sagitta(arc.chord_count(mesh_error)) for arc in self.arcs), default=0.0)
+
+    def chord_areas(self, mesh_error: float) -> tuple[float, float]:
+        """Area in mm^2 that ``polygon(mesh_error)`` lacks on convex arcs, and has too much on concave ones."""
+        lost = sum(arc.chord_area(arc.chord_count(mesh_error)) for arc in self.arcs if arc.sweep > 0)
+        gained = sum(arc.chord_area(arc.chord_count(mesh_error)) for arc in self.arcs if arc.sweep < 0)
+        return lost, gained
+
+
+def check_mesh_error(mesh_error: float) -> float:
+    """Return ``mesh_error`` if it is a usable chord error in mm, else raise InputError."""
+    rule = f"be a finite length >= {MIN_MESH_ERROR:g} mm"
+    value = number("mesh_error", mesh_error, rule=rule)
+    if not value >= MIN_MESH_ERROR:
+        raise InputError(f"mesh_error must {rule}, got {value:g}")
+    return value

@@ -1,0 +1,123 @@
+"""The five relations of Table 3 for a cylinder and a groove in any pose, and how a relative pose is formed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clamp3d.checks import number
+from clamp3d.core.distance import Feature, SignedDistance, as_pose, signed_distance
+from clamp3d.core.pose import Array, check_pose
+from clamp3d.core.primitives import Cylinder, SweptArc, check_shapes
+from clamp3d.errors import InputError
+
+
+class Relation3D(StrEnum):
+    """The five columns of Table 3, and ``UNCERTAIN`` where rounding hides which of its neighbours a contact is."""
+
+    INSIDE = "inside"
+    OUTSIDE = "outside"
+    INTERSECT = "intersect"
+    EXTERIOR_CONTACT = "exterior contact"
+    INTERIOR_CONTACT = "interior contact"
+    UNCERTAIN = "uncertain"
+
+
+@dataclass(frozen=True, slots=True)
+class GrooveRelation:
+    """Answer of ``groove_relation``: the relation, the distance it follows from, and the tolerance applied in mm."""
+
+    relation: Relation3D
+    contact: SignedDistance
+    tolerance: float
+
+
+def groove_relation(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike, *, tolerance: float) -> GrooveRelation:
+    """Relation of ``cylinder`` to ``groove`` for ``pose`` (4, 4), ``T_groove_cylinder``; the plane case is Table 3.
+
+    A distance within ``tolerance`` mm of zero is a contact, one below an intersection (Eq. 5). A contact is interior if
+    the cylinder lies on the hollow side of the surface at the point, exterior otherwise; at a lip or an end edge that
+    is the construction of Fig. 6, with the normal in place of the centre. A cylinder that is clear is inside if it has
+    a point in common with the groove's hollow, the region between arc and chord over the groove's length (Eq. 3),
+    else outside (Eq. 4). The answer is uncertain if the tolerance is below the distance's error bound and the distance
+    is so near to zero that this matters. Raises InputError for a tolerance that is negative or not less than
+    both radii, or a pose that is not rigid.
+
+    >>> import numpy as np
+    >>> from clamp3d.core.pose import translation
+    >>> groove, wire = SweptArc(7.0, np.radians(60.0), 50.0), Cylinder(6.935, 80.0)
+    >>> groove_relation(groove, wire, translation(0.0, -0.065, 0.0), tolerance=1e-9).relation.value
+    'interior contact'
+    """
+    check_shapes(groove, cylinder)
+    tolerance = number("tolerance", tolerance, rule="be >= 0 mm and less than both radii")
+    if not 0.0 <= tolerance < min(groove.radius, cylinder.radius):
+        raise InputError(f"tolerance must be >= 0 mm and less than both radii, got {tolerance}")
+    contact = signed_distance(groove, cylinder, pose)
+    return GrooveRelation(_relation(groove, cylinder, as_pose(pose), contact, tolerance), contact, tolerance)
+
+
+def _relation(groove: SweptArc, cylinder: Cylinder, T: Array, contact: SignedDistance, tolerance: float) -> Relation3D:
+    gap, bound = contact.distance, contact.error_bound
+    if tolerance < bound and abs(gap) <= tolerance + bound:
+        return Relation3D.UNCERTAIN
+    if gap < -tolerance:
+        return Relation3D.INTERSECT
+    if gap <= tolerance:
+        return Relation3D.INTERIOR_CONTACT if _hollow_side(contact) else Relation3D.EXTERIOR_CONTACT
+    return Relation3D.INSIDE if _reaches_hollow(groove, cylinder, T) else Relation3D.OUTSIDE
+
+
+def _hollow_side(contact: SignedDistance) -> bool:
+    if contact.feature in (Feature.FLAT_M, Feature.FLAT_N, Feature.END_FACE, Feature.END_EDGE_M, Feature.END_EDGE_N):
+        return False
+    q, n = contact.point_on_groove, contact.normal
+    return bool(q[0] * n[0] + q[1] * n[1] < 0.0)
+
+
+def _reaches_hollow(groove: SweptArc, cylinder: Cylinder, T: Array) -> bool:
+    """Whether the cylinder meets the hollow, given that it is clear of the material.
+
+    Hollow and material make up the block {y <= h, |z| <= H}, so it meets the one if it meets the other. The nearest
+    points of an axis and the block: a plane problem in y and z.
+    """
+    h, H = -groove.radius * math.cos(groove.half_angle), 0.5 * groove.length
+    cy, cz = T[1:3, 3].tolist()
+    dy, dz = (T[1:3, 2] / np.linalg.norm(T[:3, 2])).tolist()
+    half = 0.5 * cylinder.length
+
+    def distance(t: float) -> float:
+        return math.hypot(max(cy + t * dy - h, 0.0), max(abs(cz + t * dz) - H, 0.0))
+
+    # Convex in t: least at an end, where it meets a plane of the block, or at the foot of an edge of the block.
+    places = [-half, half]
+    n2 = dy * dy + dz * dz
+    if dy != 0.0:
+        places.append((h - cy) / dy)
+    for edge in (-H, H):
+        if dz != 0.0:
+            places.append((edge - cz) / dz)
+        if n2 > 0.0:
+            places.append((h - cy) * (dy / n2) + (edge - cz) * (dz / n2))
+    return min(distance(min(max(t, -half), half)) for t in places) < cylinder.radius
+
+
+def relative_pose(T_world_a: ArrayLike, T_world_b: ArrayLike) -> Array:
+    """``T_a_b`` (4, 4) from two world poses: offsets are subtracted before anything is multiplied.
+
+    So a common offset of both bodies costs no more than its own rounding, where the product with an inverse loses
+    1e-10 mm at an offset of 1e6 mm. Raises InputError for a pose that is not rigid.
+
+    >>> from clamp3d.core.pose import translation
+    >>> relative_pose(translation(1e6, 0.0, 0.0), translation(1e6 + 0.5, 0.0, 0.0))[:3, 3].tolist()
+    [0.5, 0.0, 0.0]
+    """
+    A, B = check_pose(T_world_a, "T_world_a"), check_pose(T_world_b, "T_world_b")
+    T = np.eye(4)
+    T[:3, :3] = A[:3, :3].T @ B[:3, :3]
+    T[:3, 3] = A[:3, :3].T @ (B[:3, 3] - A[:3, 3])
+    return T

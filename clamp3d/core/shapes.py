@@ -1,0 +1,193 @@
+"""Shapes that a scene is made of: drawn solids (cylinders, boxes, groove blocks, clamp parts) and meshes.
+
+Every drawn solid is outlines drawn along an axis, less holes that go right through, as the parts of a clamp are; equal
+shapes are equal values, so a thousand equal bolts share one model.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from clamp3d.checks import array, choice, instance, items, number, text
+from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.mesh import Mesh
+from clamp3d.core.pose import Array
+from clamp3d.core.primitives import Cylinder, SweptArc, place
+from clamp3d.core.primitives import size as _size
+from clamp3d.core.profile import Arc, Profile
+from clamp3d.errors import InputError
+
+Fit = Literal["bound", "round", "off"]
+FITS: tuple[Fit, ...] = ("bound", "round", "off")
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """Union of ``bodies`` (they touch at most) less ``holes`` (each right through); part frame, mm.
+
+    Equal outlines are equal solids, whatever they are called. ``title`` says in words what it is, ``volume`` is its
+    volume in mm^3 where a closed form is known, ``not_modelled`` what the real part has and this one has not.
+    """
+
+    name: str = field(compare=False)
+    bodies: tuple[Extrusion, ...]
+    holes: tuple[Extrusion, ...] = ()
+    title: str = field(default="", compare=False, kw_only=True)
+    volume: float | None = field(default=None, compare=False, kw_only=True)
+    not_modelled: str = field(default="", compare=False, kw_only=True)
+
+    def __post_init__(self) -> None:
+        text("name of a solid", self.name)
+        for key in ("bodies", "holes"):
+            made = items(f"{key} of solid {self.name}", getattr(self, key), "extrusions")
+            for item in made:
+                instance(f"{key} of solid {self.name}", item, Extrusion)
+            object.__setattr__(self, key, made)
+        if not self.bodies:
+            raise InputError(f"bodies of solid {self.name} must be at least one extrusion")
+
+    @property
+    def bounds(self) -> Array:
+        """Lower and upper corner (2, 3) of the bounding box in part axes, mm; arcs taken as arcs."""
+        return self.bounds_at(np.eye(4))
+
+    def bounds_at(self, T: Array) -> Array:
+        """Lower and upper corner (2, 3) of the bounding box along the target's axes, placed by ``T`` (4, 4)."""
+        reach = [[max(body.support(s * axis) for body in self.bodies) for axis in T[:3, :3]] for s in (-1.0, 1.0)]
+        return np.array([T[:3, 3] - reach[0], T[:3, 3] + reach[1]]) + 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """A round hole right through a solid along its ``axis`` y or z, centred at ``at``: (x, z) or (x, y) mm.
+
+    Raises InputError for values out of range.
+    """
+
+    radius: float
+    at: tuple[float, float] = (0.0, 0.0)
+    axis: Literal["y", "z"] = "z"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", _size("hole radius", self.radius))
+        u, v = (place("hole at", x) for x in array("hole at", self.at, (2,)))
+        object.__setattr__(self, "at", (u, v))
+        choice("hole axis", self.axis, ("y", "z"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeshShape:
+    """A closed mesh, and what to make of its round surfaces.
+
+    ``fit``: "bound" fits grooves, cylinders and holes and adds the error bound that assumes nothing between the
+    vertices; "round" assumes round surfaces through the vertices (what a CAD export is) and adds the fit's error
+    alone; "off" takes the facets as the part. Raises InputError if the mesh is not watertight.
+    """
+
+    mesh: Mesh
+    fit: Fit = "bound"
+    name: str = field(default="mesh")
+
+    def __post_init__(self) -> None:
+        instance("mesh", self.mesh, Mesh)
+        choice("fit", self.fit, FITS)
+        text("name of a mesh", self.name)
+        if not self.mesh.watertight:
+            raise InputError(f"{self.mesh.name}: mesh must be watertight to have an inside; close it or merge vertices")
+
+
+Shape: TypeAlias = Solid | MeshShape
+AnyShape: TypeAlias = Shape | Cylinder | SweptArc
+
+
+def _drill(holes: Sequence[Hole], low: Array, high: Array) -> tuple[Extrusion, ...]:
+    made = []
+    for hole in items("holes", holes, "holes"):
+        instance("hole", hole, Hole)
+        if hole.axis == "z":
+            made.append(Extrusion(Profile.circle(hole.radius, hole.at), "Z", float(low[2]), float(high[2])))
+        else:  # outlines along Y are (u, v) = (x, -z)
+            at = (hole.at[0], -hole.at[1])
+            made.append(Extrusion(Profile.circle(hole.radius, at), "Y", float(low[1]), float(high[1])))
+    return tuple(made)
+
+
+def cylinder(radius: float, length: float, *, bore: float = 0.0, name: str = "cylinder") -> Solid:
+    """Cylinder on z, centred, flat ends; ``bore`` > 0 makes it a tube. Raises InputError for sizes that are not > 0."""
+    radius, half, bore = _size("radius", radius), _size("length", length) / 2, number("bore", bore)
+    if bore != 0.0 and not 0.0 < bore < radius:
+        raise InputError(f"bore must be between 0 and radius = {radius:g} mm, got {bore}")
+    holes = (Extrusion(Profile.circle(bore), "Z", -half, half),) if bore else ()
+    return Solid(name, (Extrusion(Profile.circle(radius), "Z", -half, half),), holes)
+
+
+def box(size: Sequence[float], *, holes: Sequence[Hole] = (), name: str = "box") -> Solid:
+    """Box of ``size`` (x, y, z) mm, centred, with round holes right through it."""
+    x, y, z = (_size("size", value) for value in array("size", size, (3,)))
+    corner = np.array([x, y, z]) / 2
+    body = Extrusion(Profile.rectangle(x, y), "Z", -z / 2, z / 2)
+    return Solid(name, (body,), _drill(holes, -corner, corner))
+
+
+def groove_block(
+    groove: SweptArc,
+    width: float,
+    height: float,
+    *,
+    others: Sequence[tuple[float, float, float]] = (),
+    holes: Sequence[Hole] = (),
+    name: str = "groove block",
+) -> Solid:
+    """Block with a groove, in the groove's own frame: axis on z, arc about the origin centred on -y, mouth to +y.
+
+    ``width`` mm along x, centred on the groove; ``height`` mm from the face with the mouth down to the back. ``others``
+    are more grooves in the same face: (offset x mm, radius mm, half angle rad). Raises InputError if a groove leaves
+    the block or meets another one.
+
+    >>> block = groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 20.0)
+    >>> block.bounds.tolist()
+    [[-20.0, -23.5, -25.0], [20.0, -3.5, 25.0]]
+    """
+    instance("groove", groove, SweptArc)
+    width, height = _size("width", width), _size("height", height)
+    sides = [
+        tuple(array("others", other, (3,)).tolist()) for other in items("others", others, "(x, radius, half angle)")
+    ]
+    face = -groove.radius * math.cos(groove.half_angle)
+    arcs = []
+    for x, radius, half in sorted([(0.0, groove.radius, groove.half_angle), *sides], reverse=True):
+        SweptArc(radius, half, groove.length)
+        centre = face + radius * math.cos(half)
+        reach = radius * math.sin(min(half, math.pi / 2))
+        if abs(x) + reach >= width / 2:
+            raise InputError(f"groove at x = {x:g} mm leaves the block: width must be > {2 * (abs(x) + reach):g} mm")
+        if face - height >= centre - radius:
+            raise InputError(f"groove at x = {x:g} mm cuts the back: height must be > {face - centre + radius:g} mm")
+        arcs.append((x, reach, Arc((x, centre), radius, -math.pi / 2 + half, -math.pi / 2 - half)))
+    for (x0, r0, _), (x1, r1, _) in itertools.pairwise(arcs):
+        if x0 - r0 <= x1 + r1:
+            raise InputError(f"grooves at x = {x1:g} and {x0:g} mm meet: they must be > {r0 + r1:g} mm apart")
+    w, back, half_length = width / 2, face - height, groove.length / 2
+    outline = Profile.of((-w, face), (-w, back), (w, back), (w, face), *(arc for _, _, arc in arcs))
+    low, high = np.array([-w, back, -half_length]), np.array([w, face, half_length])
+    return Solid(name, (Extrusion(outline, "Z", -half_length, half_length),), _drill(holes, low, high))
+
+
+def as_shape(shape: AnyShape) -> Shape:
+    """The shape that a scene works on: a bare cylinder as a solid, others as they are.
+
+    Raises InputError for a `SweptArc` (it has no outer faces) and for anything that is no shape.
+    """
+    if isinstance(shape, (Solid, MeshShape)):
+        return shape
+    if isinstance(shape, Cylinder):
+        return cylinder(shape.radius, shape.length)
+    if isinstance(shape, SweptArc):
+        raise InputError("a SweptArc has no outer faces: make a part of it with groove_block(groove, width, height)")
+    raise InputError(f"a part's shape must be a Solid, MeshShape or Cylinder, got {type(shape).__name__}")

@@ -1,0 +1,90 @@
+"""The separate closed surfaces of a mesh: their volumes, what winds round what, and which of them are inside out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.core.pose import Array
+
+Faces = NDArray[np.int64]
+
+LARGEST_COORDINATE = 1e30
+"""Coordinates of a mesh must be smaller (mm), so that volumes neither overflow nor lose all digits."""
+
+_FLAT = 1e-14
+"""A volume below this part of area x extent is rounding."""
+
+_ASKED = 64
+
+
+def volume(vertices: Array, faces: Faces) -> float:
+    """Signed volume of a closed surface in mm^3, positive if its faces wind outward, 0.0 if it is flat to rounding.
+
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> 6.0 * volume(corners, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+    1.0
+    """
+    used = vertices[faces].reshape(-1, 3)
+    low, high = used.min(axis=0), used.max(axis=0)
+    # The middle as origin: far from it the volumes cancel badly.
+    a, b, c = np.moveaxis(vertices[faces] - 0.5 * (low + high), 1, 0)
+    found = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    return found if abs(found) > _FLAT * area * float((high - low).max()) else 0.0
+
+
+def corners_of(vertices: Array, faces: Faces) -> tuple[Array, Array, Array]:
+    """First, second and third corners (m, 3) of all triangles."""
+    a, b, c = (np.ascontiguousarray(vertices[faces[:, k]]) for k in range(3))
+    return a, b, c
+
+
+def winding_number(corners: tuple[Array, Array, Array], point: Array) -> float:
+    """How often a surface winds round a point (3,): 1 inside, 0 outside, -1 inside one that is inside out.
+
+    ``corners`` are those of `corners_of`. Sum of the triangles' solid angles over 4 pi (Van Oosterom and Strackee 1983,
+    doi:10.1109/TBME.1983.325207).
+    """
+    a, b, c = (x - point for x in corners)
+    la, lb, lc = (np.sqrt(np.einsum("ij,ij->i", x, x)) for x in (a, b, c))
+    triple = (
+        a[:, 0] * (b[:, 1] * c[:, 2] - b[:, 2] * c[:, 1])
+        + a[:, 1] * (b[:, 2] * c[:, 0] - b[:, 0] * c[:, 2])
+        + a[:, 2] * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
+    )
+    ab, bc, ca = (np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a)))
+    return float(np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2.0 * np.pi))
+
+
+def shells(faces: Faces, vertices: int) -> list[NDArray[np.intp]]:
+    """Rows of ``faces`` of each connected surface; ``vertices`` is how many there are."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    i, j = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
+    graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(vertices, vertices))
+    label = connected_components(graph, directed=False)[1][faces[:, 0]]
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+
+
+def inside_out(vertices: Array, faces: Faces) -> list[NDArray[np.intp]]:
+    """Rows of ``faces`` of each closed surface that winds inward and is not a cavity of another one.
+
+    A cavity lies wholly inside the rest. Its winding number there is negative: a body of no material, which a wire in
+    it would not be seen in.
+    """
+    parts = shells(faces, len(vertices))
+    found = []
+    for rows in parts:
+        if volume(vertices, faces[rows]) >= 0.0:
+            continue
+        rest = np.ones(len(faces), dtype=bool)
+        rest[rows] = False
+        asked = np.unique(faces[rows])
+        asked = asked[:: max(1, len(asked) // _ASKED)]
+        outer = corners_of(vertices, faces[rest])
+        if not rest.any() or min(winding_number(outer, vertices[k]) for k in asked) < 0.9:
+            found.append(rows)
+    return found

@@ -1,0 +1,1 @@
+"""Descriptions of scenes in files: TOML in, a validated `Scene` out."""

@@ -1,0 +1,73 @@
+"""Scene files: TOML in, a validated `Scene` out; every fault is one line with file, key, value and rule.
+
+Lengths in mm, angles in degrees (keys that end in ``_deg``). See the package's documentation for every key.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from clamp3d import checks
+from clamp3d.clamp.loader import load_clamp, parse_toml, read_text
+from clamp3d.collide.scene import Allowed, Part, Scene
+from clamp3d.core import shapes
+from clamp3d.core.validation import validate
+from clamp3d.errors import Clamp3dError, InputError
+from clamp3d.scenefile.tables import TAGS, ClampTable, MeshTable, SceneTable, clamp_source
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Read a scene file. Raises InputError for anything that is not a scene, naming file, key, value and rule."""
+    path = checks.path("scene", path)
+    return parse_scene(read_text(path), origin=str(path), folder=path.parent, name=path.stem)
+
+
+def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name: str = "scene") -> Scene:
+    """A scene from the text of a scene file; files it names are looked for in ``folder``.
+
+    >>> scene = parse_scene('''
+    ... [parts.pin]
+    ... shape = "cylinder"
+    ... diameter = 10
+    ... length = 40
+    ... pose = { translation = [0, 0, 5], rpy_deg = [90, 0, 0] }
+    ... ''')
+    >>> scene.parts[0].T_world[:3, 3].tolist()
+    [0.0, 0.0, 5.0]
+    """
+    table: SceneTable = validate(SceneTable, parse_toml(text, origin), origin, TAGS)
+    made: list[Part] = []
+    allowed: list[Allowed] = []
+    files: dict[tuple[str, str | None, str], shapes.AnyShape] = {}
+    where = ""
+    try:
+        if table.clamp is not None:
+            made, allowed = _clamp_parts(table.clamp, folder)
+        for part_name, part in table.parts.items():
+            where = f"parts.{part_name}"
+            if isinstance(part, MeshTable):  # one file is one shape, however often it is used
+                key = (part.file, part.unit, part.fit)
+                files[key] = shape = files.get(key) or part.make(folder)
+            else:
+                shape = part.make(folder)
+            made.extend(Scene().add(part_name, shape, part.pose.T()).parts)
+        where = "allowed"
+        allowed += [Allowed(*item.parts, item.overlap) for item in table.allowed]
+        where = "motions"
+        motions = tuple(m.motion(i) for i, m in enumerate(table.motions, 1))
+        where = ""
+        return Scene(tuple(made), table.contact, table.clearance, tuple(allowed), motions, name)
+    except Clamp3dError as error:
+        raise InputError(f"{origin}: {where}{': ' if where else ''}{error}") from None
+
+
+def _clamp_parts(table: ClampTable, folder: Path) -> tuple[list[Part], list[Allowed]]:
+    from clamp3d.baselines.cas import Cas
+    from clamp3d.clamp.assemble import assemble
+    from clamp3d.clamp.parts import parts
+
+    clamp = load_clamp(clamp_source(table.name, folder), line=table.line, jumper=table.jumper)
+    run = assemble(clamp, Cas())
+    T = table.pose.T()
+    made = [Part(n, shapes.as_shape(part), T @ run.T_world(n)) for n, part in parts(clamp).items()]
+    return made, [Allowed(a, b) for a, row in clamp.connections.items() for b, kind in row.items() if kind]

@@ -1,0 +1,271 @@
+"""The tables of a scene file: what keys each may hold, what they mean, and the shape or motion that comes of them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic.dataclasses import dataclass
+
+from clamp3d.clamp.conductors import conductor
+from clamp3d.clamp.dimensions import ClampPart, Length, Offset
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.collide.motion import Motion
+from clamp3d.core import shapes
+from clamp3d.core.primitives import SweptArc
+from clamp3d.errors import InputError
+from clamp3d.scenefile.pose_table import FROZEN, Angle, Number, Pose, Vector
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class HoleTable:
+    """A round hole right through, along y or z, at (x, z) or (x, y)."""
+
+    radius: Length | None = None
+    diameter: Length | None = None
+    at: tuple[Number, Number] = (0.0, 0.0)
+    axis: Literal["y", "z"] = "z"
+
+    @model_validator(mode="after")
+    def _one(self) -> HoleTable:
+        _one_of(self, "radius", "diameter")
+        return self
+
+    def hole(self) -> shapes.Hole:
+        """The hole as a shape's argument."""
+        return shapes.Hole(_half(self.radius, self.diameter), self.at, self.axis)
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class GrooveTable:
+    """A further groove of a block, ``x`` mm beside the first one."""
+
+    x: Offset
+    radius: Length
+    half_angle_deg: Annotated[float, Field(gt=0.0, lt=180.0, strict=True)]
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class _Placed:
+    pose: Pose = Field(default_factory=Pose)
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class CylinderTable(_Placed):
+    """``shape = "cylinder"``: axis on z, centred; the diameter may be a conductor's."""
+
+    TAG: ClassVar[str] = "cylinder"
+    shape: Literal["cylinder"]
+    length: Length
+    radius: Length | None = None
+    diameter: Length | None = None
+    conductor: str | None = None
+    bore_diameter: Length | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> CylinderTable:
+        _one_of(self, "radius", "diameter", "conductor")
+        if self.conductor is not None:
+            try:
+                conductor(self.conductor)
+            except InputError as error:
+                raise ValueError(f"conductor: {error}") from None
+        return self
+
+    def make(self, folder: Path) -> shapes.AnyShape:
+        """The shape."""
+        diameter = conductor(self.conductor).diameter if self.conductor is not None else self.diameter
+        return shapes.cylinder(_half(self.radius, diameter), self.length, bore=(self.bore_diameter or 0.0) / 2)
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class BoxTable(_Placed):
+    """``shape = "box"``: centred, with round holes."""
+
+    TAG: ClassVar[str] = "box"
+    shape: Literal["box"]
+    size: tuple[Length, Length, Length]
+    holes: list[HoleTable] = Field(default_factory=list)
+
+    def make(self, folder: Path) -> shapes.AnyShape:
+        """The shape."""
+        return shapes.box(self.size, holes=[h.hole() for h in self.holes])
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class GrooveBlockTable(_Placed):
+    """``shape = "groove-block"``: in the groove's frame, arc about the origin, axis on z, mouth to +y."""
+
+    TAG: ClassVar[str] = "groove-block"
+    shape: Literal["groove-block"]
+    radius: Length
+    half_angle_deg: Annotated[float, Field(gt=0.0, lt=180.0, strict=True)]
+    length: Length
+    width: Length
+    height: Length
+    grooves: list[GrooveTable] = Field(default_factory=list)
+    holes: list[HoleTable] = Field(default_factory=list)
+
+    def make(self, folder: Path) -> shapes.AnyShape:
+        """The shape."""
+        groove = SweptArc(self.radius, math.radians(self.half_angle_deg), self.length)
+        others = [(g.x, g.radius, math.radians(g.half_angle_deg)) for g in self.grooves]
+        holes = [h.hole() for h in self.holes]
+        return shapes.groove_block(groove, self.width, self.height, others=others, holes=holes)
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class ClampPartTable(_Placed):
+    """``shape = "clamp-part"``: one of the seven parts of a clamp, in its own frame."""
+
+    TAG: ClassVar[str] = "clamp-part"
+    shape: Literal["clamp-part"]
+    part: ClampPart
+    clamp: str = "reference"
+    line: str | None = None
+    jumper: str | None = None
+
+    def make(self, folder: Path) -> shapes.AnyShape:
+        """The shape."""
+        from clamp3d.clamp.parts import parts
+
+        return parts(load_clamp(clamp_source(self.clamp, folder), line=self.line, jumper=self.jumper))[self.part]
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class MeshTable(_Placed):
+    """``shape = "mesh"``: a closed mesh from a file beside the scene; see `MeshShape` for ``fit``."""
+
+    TAG: ClassVar[str] = "mesh"
+    shape: Literal["mesh"]
+    file: str
+    unit: Literal["mm", "cm", "m", "in"] | None = None
+    fit: shapes.Fit = "bound"
+
+    def make(self, folder: Path) -> shapes.AnyShape:
+        """The shape."""
+        from clamp3d.brep.mesh_file import load_mesh
+
+        return shapes.MeshShape(load_mesh(folder / self.file, unit=self.unit), self.fit, name=self.file)
+
+
+_TABLES = (CylinderTable, BoxTable, GrooveBlockTable, ClampPartTable, MeshTable)
+TAGS = {f"shape {table.TAG}": table for table in _TABLES}
+
+
+def _tag(data: Any) -> str | None:
+    tag = f"shape {data.get('shape')}" if isinstance(data, dict) else None
+    return tag if tag in TAGS else None
+
+
+PartTable = Annotated[
+    Annotated[CylinderTable, Tag("shape cylinder")]
+    | Annotated[BoxTable, Tag("shape box")]
+    | Annotated[GrooveBlockTable, Tag("shape groove-block")]
+    | Annotated[ClampPartTable, Tag("shape clamp-part")]
+    | Annotated[MeshTable, Tag("shape mesh")],
+    Discriminator(
+        _tag,
+        custom_error_type="shape",
+        custom_error_message="must have shape = one of " + ", ".join(f'"{table.TAG}"' for table in _TABLES),
+    ),
+]
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class ClampTable(_Placed):
+    """``[clamp]``: the parts P1 to P7 of a clamp as `clamp3d run` leaves them; their connections are allowed."""
+
+    name: str = "reference"
+    line: str | None = None
+    jumper: str | None = None
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class AllowedTable:
+    """``[[allowed]]``: two part names, or patterns, that may touch, and overlap by ``overlap`` mm."""
+
+    parts: tuple[str, str]
+    overlap: Annotated[float, Field(ge=0.0, strict=True)] = 0.0
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class TurnTable:
+    """A turn about an axis in the world, with travel along it: mm in all, or ``pitch`` mm a turn."""
+
+    axis: Vector
+    angle_deg: Angle
+    point: Vector = (0.0, 0.0, 0.0)
+    travel: Number | None = None
+    pitch: Number | None = None
+
+    @model_validator(mode="after")
+    def _is_turn(self) -> TurnTable:
+        if not any(self.axis):
+            raise ValueError("axis: must not have length zero")
+        if self.travel is not None and self.pitch is not None:
+            raise ValueError("pitch: give travel or pitch, not both")
+        return self
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class MotionTable:
+    """``[[motions]]``, one after another: ``parts`` move together by ``translate``, ``rotate``, ``screw`` or ``to``."""
+
+    parts: Annotated[list[str], Field(min_length=1)]
+    name: str | None = None
+    translate: Vector | None = None
+    rotate: TurnTable | None = None
+    screw: TurnTable | None = None
+    to: Pose | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> MotionTable:
+        _one_of(self, "translate", "rotate", "screw", "to")
+        if self.rotate is not None and (self.rotate.travel is not None or self.rotate.pitch is not None):
+            raise ValueError("rotate: a rotation has no travel or pitch; call it screw")
+        return self
+
+    def motion(self, number: int) -> Motion:
+        """The motion; without a name it is called by its number."""
+        name = self.name or f"motion {number}"
+        parts = tuple(self.parts)
+        if self.translate is not None:
+            return Motion.translate(parts, self.translate, name=name)
+        if self.to is not None:
+            return Motion.to_pose(parts, self.to.T(), name=name)
+        turn = self.rotate or self.screw
+        assert turn is not None
+        angle = math.radians(turn.angle_deg)
+        travel = turn.travel if turn.travel is not None else (turn.pitch or 0.0) * turn.angle_deg / 360.0
+        return Motion.screw(parts, turn.axis, angle, point=turn.point, travel=travel, name=name)
+
+
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class SceneTable:
+    """The whole file."""
+
+    unit: Literal["mm"] = "mm"
+    contact: Annotated[float, Field(gt=0.0, lt=1e3, strict=True)] = 0.01
+    clearance: Annotated[float, Field(ge=0.0, lt=1e5, strict=True)] = 0.0
+    clamp: ClampTable | None = None
+    parts: dict[str, PartTable] = Field(default_factory=dict)
+    allowed: list[AllowedTable] = Field(default_factory=list)
+    motions: list[MotionTable] = Field(default_factory=list)
+
+
+def clamp_source(name: str, folder: Path) -> str:
+    """A built-in clamp's name, or the path of a clamp file beside the scene's."""
+    return str(folder / name) if name.endswith(".toml") else name
+
+
+def _one_of(table: Any, *keys: str) -> None:
+    given = [key for key in keys if getattr(table, key) is not None]
+    if len(given) != 1:
+        raise ValueError(f"{(given or keys)[0]}: give exactly one of {', '.join(keys)}")
+
+
+def _half(radius: float | None, diameter: float | None) -> float:
+    return radius if radius is not None else 0.5 * float(diameter or 0.0)

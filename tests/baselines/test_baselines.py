@@ -1,0 +1,188 @@
+"""The models wedges, hulls and mesh against the exact groove and the independent chords of the section."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.baselines.chords import Chords
+from clamp3d.baselines.decomposition import DecompositionParameters
+from clamp3d.baselines.hulls import Hulls, intrusion
+from clamp3d.baselines.mesh import Mesh
+from clamp3d.baselines.model import ContactModel
+from clamp3d.baselines.wedges import Wedges
+from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble
+from clamp3d.clamp.block import block_pair, grooved_block
+from clamp3d.clamp.features import groove_pairs
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.parts import parts
+from clamp3d.core.meshing import mesh
+from clamp3d.core.pose import Array, rotation, translation
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.errors import InputError
+
+GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)
+PAIR = block_pair(GROOVE, Cylinder(10.5, 200.0))
+BLOCK = grooved_block(GROOVE, width=137.0, depth=30.0)
+MESH_ERROR = 0.0457
+BLOCK_MESH = mesh(BLOCK, MESH_ERROR)
+CHORD = BLOCK_MESH.metadata["chord_error"]
+
+
+def _poses(n: int, tilt: float, seed: int = 0) -> Array:
+    """Wires about the middle of the groove, some of them through its walls; the wire's axis is Y."""
+    rng = np.random.default_rng(seed)
+    out = np.empty((n, 4, 4))
+    for T in out:
+        x, y, z = rng.uniform(-1.7, 1.7, 3)
+        T[:] = translation(x, y, z) @ rotation([rng.normal(), 0.0, rng.normal()], rng.uniform(0.0, tilt))
+        T[:] = T @ rotation([0.0, 1.0, 0.0], rng.uniform(-3.0, 3.0))
+    return out
+
+
+@pytest.mark.parametrize("unit_deg", [5.0, 20.0, 40.0])
+def test_wedges_are_the_chords_of_the_section(unit_deg: float) -> None:
+    unit = math.radians(unit_deg)
+    poses = _poses(300, 0.0)
+    expected = Chords(unit).distances(PAIR, poses)
+    shallow = expected > -0.5  # beyond, a narrow wedge may be left sideways
+    found = Wedges({"P1": BLOCK}, unit).distances(PAIR, poses)
+    assert shallow.sum() > 200
+    assert (expected[shallow] < 0.0).sum() > 20
+    assert np.abs(found - expected)[shallow].max() < 1e-6
+    assert ((found < 0.0) == (expected < 0.0)).all()
+
+
+def _check_pieces(model: ContactModel, poses: Array) -> None:
+    """The least of the gaps is the distance, and each keeps the contract of points and normals."""
+    distances = model.distances(PAIR, poses)
+    for T, d in zip(poses, distances, strict=True):
+        pieces = model.pieces(PAIR, T)
+        assert pieces.distance.min() == pytest.approx(d, abs=1e-6)
+        assert len(pieces.distance) == len(pieces.point) == len(pieces.normal) == len(pieces.feature)
+        assert np.allclose(np.linalg.norm(pieces.normal, axis=1), 1.0)
+
+
+def test_wedges_of_a_fine_unit_are_the_exact_groove_at_any_tilt() -> None:
+    poses = _poses(60, 0.02)
+    exact = Cas().distances(PAIR, poses)
+    model = Wedges({"P1": BLOCK}, math.radians(2.0))
+    error = model.distances(PAIR, poses) - exact
+    chord = 24.0 * math.sin(math.radians(0.5)) ** 2
+    apart = exact > chord
+    assert apart.sum() > 10
+    assert error[apart].max() < 1e-6
+    assert error[apart].min() > -chord - 1e-6
+    _check_pieces(model, poses[:4])
+
+
+def test_mesh_is_too_tight_by_its_chord_error_at_most() -> None:
+    poses = _poses(120, 0.02, seed=1)
+    exact = Cas().distances(PAIR, poses)
+    model = Mesh({"P1": BLOCK_MESH})
+    found = model.distances(PAIR, poses)
+    apart = exact > CHORD
+    error = (found - exact)[apart]
+    assert apart.sum() > 20
+    assert error.max() < 1e-6
+    assert error.min() > -CHORD - 1e-6
+    assert (found[exact < 0.0] < 0.0).all()  # no hit is missed
+    assert any("no depth" in limit for limit in model.limits)
+    shallow = (exact < 0.0) & (exact > -0.3)
+    assert shallow.sum() > 5
+    assert np.abs(found - exact)[shallow].max() < CHORD + 1e-6
+    _check_pieces(model, poses[apart][:4])
+
+
+def test_wire_inside_the_wall_is_a_hit_for_every_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path))
+    pair = block_pair(GROOVE, Cylinder(2.0, 10.0))
+    inside = translation(40.0, 0.0, -20.0)[None]
+    models: tuple[ContactModel, ...] = (
+        Wedges({"P1": BLOCK}, 0.2),
+        Hulls({"P1": BLOCK_MESH}, DecompositionParameters(threshold=0.05, real_metric=False)),
+        Mesh({"P1": BLOCK_MESH}),
+    )
+    for model in models:
+        assert model.distances(pair, inside)[0] < -1.0
+
+
+def test_hulls_err_by_intrusion_and_uncovered_corners(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path))
+    model = Hulls({"P1": BLOCK_MESH}, DecompositionParameters(threshold=0.02, real_metric=False))
+    decomposition = model.decompositions["P1"]
+    poses = _poses(150, 0.0, seed=2)
+    exact = Cas().distances(PAIR, poses)
+    error = model.distances(PAIR, poses) - exact
+    filled = intrusion(decomposition, PAIR)
+    apart = exact > 0.0
+    assert filled > CHORD
+    assert error[apart].min() > -filled - 1e-6
+    assert error[apart].min() < -0.1  # it does fill the groove
+    assert error[apart].max() < decomposition.uncovered + 1e-6
+    _check_pieces(model, poses[:4])
+    assert Hulls({"P1": BLOCK_MESH}, model.parameters).decompositions["P1"].cached
+
+
+def test_coaxial_wire_meets_the_hulls_at_the_intrusion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path))
+    model = Hulls({"P1": BLOCK_MESH}, DecompositionParameters(threshold=0.05, real_metric=False))
+    depth = intrusion(model.decompositions["P1"], PAIR)
+    thin = block_pair(GROOVE, Cylinder(5.0, 200.0))
+    assert model.distances(thin, np.eye(4)[None])[0] == pytest.approx(7.0 - depth, abs=1e-6)
+
+
+@pytest.mark.parametrize("key", [("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7"), ("P3", "P2")])
+def test_reference_clamp_in_3d_is_its_section(key: tuple[str, str]) -> None:
+    clamp = load_clamp()
+    pair = groove_pairs(clamp)[key]  # type: ignore[index]
+    T = pair.T_a_groove @ np.linalg.inv(pair.T_b_cylinder)
+    rng = np.random.default_rng(3)
+    poses = np.array([translation(*rng.uniform(-1.0, 1.0, 3)) @ T for _ in range(40)])
+    unit = math.radians(5.0)
+    expected = Chords(unit).distances(pair, poses)
+    shallow = expected > -0.4
+    found = Wedges(parts(clamp), unit).distances(pair, poses)
+    assert np.abs(found - expected)[shallow].max() < 1e-6
+    chord = 0.005
+    surface = Mesh({pair.a: mesh(parts(clamp)[pair.a], chord)}).distances(pair, poses)
+    exact = Cas().distances(pair, poses)
+    apart = exact > chord
+    assert (surface - exact)[apart].max(initial=-1.0) < 1e-6
+    assert (surface - exact)[apart].min(initial=0.0) > -chord - 1e-6
+
+
+def test_unknown_part_and_bad_pose_are_refused() -> None:
+    model = Wedges({"P2": BLOCK}, 0.2)
+    with pytest.raises(InputError, match="unknown part 'P1'; available: P2"):
+        model.distances(PAIR, np.eye(4)[None])
+    for checked in (Wedges({"P1": BLOCK}, 0.2), Mesh({"P1": BLOCK_MESH})):
+        with pytest.raises(InputError, match="must be finite"):
+            checked.pieces(PAIR, np.full((4, 4), np.nan))
+        with pytest.raises(InputError, match="must be finite"):
+            checked.distances(PAIR, np.full((1, 4, 4), np.nan))
+
+
+@pytest.mark.parametrize(("unit_deg", "exact", "stepped"), [(20.0, 32.080, 32.196), (40.0, 32.647, 32.863)])
+def test_wedges_in_3d_assemble_the_clamp_to_the_published_distances(
+    unit_deg: float, exact: float, stepped: float
+) -> None:
+    clamp = load_clamp()
+    model = Wedges(parts(clamp), math.radians(unit_deg))
+    for solver, expected in (("exact", exact), ("stepped", stepped)):
+        result = assemble(clamp, model, solver=solver, step=STEP, tilt_step=TILT_STEP)  # type: ignore[arg-type]
+        assert result.clamped
+        assert result.distance == pytest.approx(expected, abs=2e-3)
+
+
+def test_meshes_assemble_the_clamp_to_their_chord_error() -> None:
+    clamp = load_clamp()
+    made = {name: mesh(part, 0.02) for name, part in parts(clamp).items() if name in ("P1", "P2", "P3")}
+    result = assemble(clamp, Mesh(made), solver="exact", step=STEP, tilt_step=TILT_STEP)
+    assert result.clamped
+    # Each of four grooves is too tight by the chord error at most; the wedge between wire and groove enlarges it.
+    assert 31.5298 < result.distance < 31.5298 + 4.0 * 0.02

@@ -1,0 +1,216 @@
+"""CoACD runs apart, within a time limit, once per content; what it cannot take never reaches it."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from clamp3d.baselines import cache, decomposition
+from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
+from clamp3d.baselines.hulls import intrusion
+from clamp3d.clamp.block import block_pair, grooved_block
+from clamp3d.core.closed_mesh import Solid
+from clamp3d.core.meshing import mesh
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.errors import InputError, SolverError
+
+GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)
+PAIR = block_pair(GROOVE, Cylinder(10.5, 200.0))
+COARSE = DecompositionParameters(threshold=0.05, real_metric=False)
+
+
+def _extruded(chords: int) -> tuple[np.ndarray, np.ndarray]:
+    """The block's mesh with ``chords`` equal chords, its ends triangulated without new corners."""
+    error = 24.0 * math.sin(math.radians(70.0) / chords / 2) ** 2
+    block = mesh(grooved_block(GROOVE, width=137.0, depth=30.0), error * (1.0 + 1e-9))
+    assert len(block.vertices) == 2 * (chords + 5)
+    return np.asarray(block.vertices), np.asarray(block.faces)
+
+
+V, F = _extruded(14)
+SMALL = _extruded(4)
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path / "cache"))
+
+
+@pytest.fixture
+def workers(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[str]]:
+    """Every process started."""
+    started: list[subprocess.Popen[str]] = []
+    popen = subprocess.Popen
+
+    def record(*args: object, **kwargs: object) -> subprocess.Popen[str]:
+        started.append(popen(*args, **kwargs))  # type: ignore[call-overload]
+        return started[-1]
+
+    monkeypatch.setattr(decomposition.subprocess, "Popen", record)
+    return started
+
+
+def _same(a: Decomposition, b: Decomposition) -> bool:
+    return len(a.hulls) == len(b.hulls) and all(
+        np.array_equal(x.vertices, y.vertices) and np.array_equal(x.faces, y.faces)
+        for x, y in zip(a.hulls, b.hulls, strict=True)
+    )
+
+
+def test_hulls_are_cached_by_content(workers: list[subprocess.Popen[str]]) -> None:
+    first = decompose(*SMALL, COARSE)
+    assert not first.cached
+    assert first.seconds > 0.0
+    assert first.parameters == COARSE
+    assert len(first.mesh_hash) == 64
+    second = decompose(SMALL[0].copy(), SMALL[1].astype(np.int32), COARSE)
+    assert second.cached
+    assert _same(first, second)
+    assert second.seconds == first.seconds
+    assert len(workers) == 1
+    # Another vertex, parameter or order is other content.
+    moved = decompose(SMALL[0] + [1e-9, 0.0, 0.0], SMALL[1], COARSE)
+    other = decompose(*SMALL, DecompositionParameters(threshold=0.05, real_metric=False, seed=1))
+    assert not moved.cached
+    assert not other.cached
+    assert moved.mesh_hash != first.mesh_hash
+    again = decompose(*SMALL, COARSE, cache=False)
+    assert not again.cached
+    assert _same(first, again)  # one seed, one answer
+
+
+@pytest.mark.parametrize("damage", [b"not a zip file", None])
+def test_damaged_cache_file_is_computed_anew(damage: bytes | None) -> None:
+    first = decompose(*SMALL, COARSE)
+    (file,) = cache.cache_dir().iterdir()
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2] if damage is None else damage)
+    second = decompose(*SMALL, COARSE)
+    assert not second.cached
+    assert _same(first, second)
+    assert decompose(*SMALL, COARSE).cached
+    assert [f.suffix for f in cache.cache_dir().iterdir()] == [".npz"]
+
+
+def test_unwritable_cache_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    monkeypatch.setenv("CLAMP3D_CACHE", str(blocked))
+    assert not decompose(*SMALL, COARSE).cached
+
+
+def test_time_limit_leaves_no_process(workers: list[subprocess.Popen[str]]) -> None:
+    start = time.monotonic()
+    with pytest.raises(SolverError, match=r"did not finish P1 in 2 s at threshold 0\.05; raise time_limit or thresh"):
+        decompose(*_extruded(28), DecompositionParameters(threshold=0.05), name="P1", time_limit=2.0)
+    assert time.monotonic() - start < 6.0
+    assert [worker.poll() is not None for worker in workers] == [True]
+    assert not cache.cache_dir().exists()
+
+
+def test_interrupt_leaves_no_process(workers: list[subprocess.Popen[str]], monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(decomposition, "_wait", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        decompose(V, F, COARSE)
+    assert [worker.poll() is not None for worker in workers] == [True]
+
+
+def test_worker_ends_when_its_caller_is_gone(tmp_path: Path) -> None:
+    source, target = tmp_path / "in.npz", tmp_path / "out.npz"
+    vertices, faces = _extruded(28)
+    np.savez(source, vertices=vertices, faces=faces, arguments=np.array('{"threshold": 0.001}'))
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "clamp3d.baselines.coacd_worker", str(source), str(target)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    assert worker.stdin is not None
+    assert worker.stdout is not None
+    with worker.stdout:
+        assert b"CoACD" in worker.stdout.readline()  # it runs
+        worker.stdin.close()
+        assert worker.wait(timeout=10.0) == 1
+
+
+def test_crash_of_coacd_is_an_error_not_an_end() -> None:
+    nan = Solid(np.full((8, 3), np.nan), F[:4] * 0)
+    with pytest.raises(SolverError, match="CoACD gave no hulls for mesh"):
+        decomposition._run(nan, COARSE, "mesh", 60.0, False)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "rule"),
+    [
+        (np.full_like(V, np.nan), F, "finite"),
+        (V[:0], F[:0], "empty"),
+        (V, F + 1, "must name vertices"),
+        (V, F[1:], "watertight"),
+        (V, F[:, ::-1], "volume > 0"),
+    ],
+)
+def test_bad_mesh_never_reaches_coacd(
+    vertices: np.ndarray, faces: np.ndarray, rule: str, workers: list[subprocess.Popen[str]]
+) -> None:
+    with pytest.raises(InputError, match=rule):
+        decompose(vertices, faces, COARSE)
+    assert workers == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "rule"),
+    [
+        ({"threshold": 0.0}, "threshold must be > 0, got 0"),
+        ({"threshold": math.nan}, "threshold must be > 0"),
+        ({"threshold": 2.0, "real_metric": False}, "threshold must be <= 1 without real_metric"),
+        ({"preprocess_mode": "of"}, "unknown preprocess_mode 'of'; available: auto, on, off"),
+        ({"mcts_nodes": 0}, "mcts_nodes must be from 1 to 1000, got 0"),
+        ({"seed": -1}, "seed must be from 0"),
+        ({"max_convex_hull": 0}, "max_convex_hull must be >= 1"),
+    ],
+)
+def test_parameters_are_checked(changes: dict[str, object], rule: str) -> None:
+    with pytest.raises(InputError, match=rule):
+        DecompositionParameters(**changes)  # type: ignore[arg-type]
+
+
+def test_real_metric_is_a_length_of_the_mesh() -> None:
+    # The same cut, asked for in mm and on CoACD's own scale: 1.6 t / extent.
+    normalised = decompose(V, F, DecompositionParameters(threshold=0.05, real_metric=False))
+    metric = decompose(V, F, DecompositionParameters(threshold=0.05 * 137.0 / 1.6))
+    assert _same(normalised, metric)
+    halved = decompose(0.5 * V, F, DecompositionParameters(threshold=0.05 * 137.0 / 1.6 / 2.0))
+    assert len(halved.hulls) == len(metric.hulls)
+
+
+def test_coverage_is_that_of_the_hulls() -> None:
+    found = decompose(V, F, COARSE)
+    # Independent: a point is outside a hull if adding it makes the hull's volume grow.
+    grows = [
+        min(ConvexHull(np.vstack([hull.vertices, v])).volume - ConvexHull(hull.vertices).volume for hull in found.hulls)
+        for v in V
+    ]
+    assert found.coverage == pytest.approx(np.mean(np.array(grows) < 1e-4), abs=2.0 / len(V))
+    assert 0.0 <= found.uncovered < 0.01
+    volume = sum(ConvexHull(hull.vertices).volume for hull in found.hulls)
+    assert volume > 60.0 * (137.0 * 30.0 - 72.0 * (math.radians(140.0) - math.sin(math.radians(140.0))))
+
+
+def test_known_intrusion_of_the_140_degree_groove() -> None:
+    # Known figures on coacd's own scale: 0.05: 2 hulls, 2.17 mm; 0.02: 4 hulls, 0.56 mm. The second cut moves with
+    # the tessellation (0.41 to 0.99 mm, 4 to 6 hulls, in 18 meshes of this block).
+    found = decompose(V, F, COARSE)
+    assert len(found.hulls) == 2
+    assert intrusion(found, PAIR) == pytest.approx(2.17, abs=0.03)
+    finer = decompose(V, F, DecompositionParameters(threshold=0.02, real_metric=False))
+    assert 4 <= len(finer.hulls) <= 6
+    assert 0.35 < intrusion(finer, PAIR) < 1.05

@@ -1,0 +1,327 @@
+"""Measuring methods, in this process and in their own; verdicts, front, rows for what fails; tables, chart, command."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import re
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.baselines.chords import Chords
+from clamp3d.bench.compare import jobs as compare_jobs
+from clamp3d.bench.compare import peers as compare_peers
+from clamp3d.bench.compare import run as study
+from clamp3d.bench.compare.chart import check_format, save_comparison
+from clamp3d.bench.compare.jobs import Assembled, JobError, assembled, imaged, run_job
+from clamp3d.bench.compare.measure import Band, Measured, measure, verdicts
+from clamp3d.bench.compare.methods import METHODS, Method, prepare
+from clamp3d.bench.compare.peers import PEER_METHODS, load_peer, missing_peers, prepare_peer
+from clamp3d.bench.compare.report import comparison_to_dict, comparison_to_text
+from clamp3d.bench.compare.run import LIBRARIES, Comparison, NotMeasured, compare, pareto
+from clamp3d.bench.compare.scene import chord_error, known_poses
+from clamp3d.bench.complexity import Sweep, complexity, fitted, grid_search
+from clamp3d.bench.machine import machine
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.features import wire_pairs
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.cli.compare import command
+from clamp3d.errors import InputError
+
+QUICK = 0.01
+
+
+def _row(method: str, one: float, worst: float, setting: float | None = None) -> Measured:
+    bands = tuple(Band(b, 40, 40, 0, 0) for b in (0.02, 1e-4, 1e-6))
+    label = Method(method, setting).label
+    return Measured(
+        method, setting, label, 1, 420, worst / 2, worst, None, bands, 0.1, 0.01, one, one / 2, 1.0, 10.0
+    )  # fmt: skip
+
+
+def test_cas_is_exact_to_rounding_and_never_wrong() -> None:
+    found = measure(Method("cas"), budget=QUICK)
+    assert found.poses == 420
+    assert found.worst_error < 1e-14
+    assert found.depth_error is not None
+    assert found.depth_error < 1e-14
+    assert [(b.free, b.hits, b.false_hits, b.false_misses) for b in found.bands] == [(40, 40, 0, 0)] * 3
+    assert 0.0 < found.many < found.one
+
+
+@pytest.mark.parametrize("method", [Method("chords", 5.0), Method("wedges", 10.0), Method("mesh", 0.05)])
+def test_faceted_methods_err_by_their_chords_and_only_to_the_safe_side(method: Method) -> None:
+    found = measure(method, budget=QUICK)
+    angle = {"chords": 5.0, "wedges": 10.0, "mesh": 10.0}[method.family]
+    limit = chord_error(math.radians(angle))
+    assert 0.9 * limit < found.worst_error < limit + 1e-6
+    nearest = found.bands[-1]
+    assert nearest.false_hits == nearest.free  # a chord error from contact all that is free looks like a hit
+    assert all(b.false_misses == 0 for b in found.bands)
+    assert found.poses == (210 if method.family == "chords" else 420)
+
+
+def test_verdicts_are_counted_apart() -> None:
+    poses = known_poses()
+    band = poses.group == "0.0001"
+    values = poses.distance.copy()
+    free, hit = np.flatnonzero(band & (values > 0.0)), np.flatnonzero(band & (values < 0.0))
+    values[free[:3]] *= -1.0
+    values[hit[:5]] *= -1.0
+    values[free[3]] = 0.0  # touching is a hit
+    assert verdicts(poses, values, 1e-4) == Band(1e-4, 40, 40, 4, 5)
+    assert verdicts(poses, values, 0.02) == Band(0.02, 40, 40, 0, 0)
+
+
+points = st.lists(
+    st.tuples(st.sampled_from([1.0, 2.0, 3.0, 5.0]), st.sampled_from([1e-9, 1e-3, 0.1, 1.0])), max_size=12
+)
+
+
+@given(points)
+def test_front_is_what_nothing_beats(values: list[tuple[float, float]]) -> None:
+    rows = [_row("mesh", one, worst) for one, worst in values]
+    front = {(r.one, r.worst_error) for r in pareto(rows)}
+    beaten = {p for p in values if any(q != p and q[0] <= p[0] and q[1] <= p[1] for q in values)}
+    assert front == set(values) - beaten
+    assert pareto([_row("chords", 1.0, 1.0)]) == []
+
+
+def test_methods_go_through_their_keys() -> None:
+    assert [Method.parse(m.key) for m in (*METHODS, *PEER_METHODS)] == [*METHODS, *PEER_METHODS]
+    with pytest.raises(InputError, match="unknown method 'fog'; available: cas, chords"):
+        prepare(Method("fog", 1.0))
+
+
+def test_a_job_answers_as_the_process_itself_would() -> None:
+    found = run_job("contact", "chords:40.0", time_limit=60.0)
+    here = dataclasses.asdict(measure(Method("chords", 40.0), budget=QUICK))
+    for name in ("worst_error", "median_error", "depth_error", "pieces", "label"):
+        assert found[name] == here[name]
+
+
+def test_a_job_that_fails_hangs_or_crashes_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(JobError, match="unknown method 'fog'"):
+        run_job("contact", "fog:1.0", time_limit=60.0)
+    start = time.monotonic()
+    with pytest.raises(JobError, match=re.escape("not finished in 0.2 s")):
+        run_job("contact", "wedges:1.0", time_limit=0.2)
+    assert time.monotonic() - start < 5.0
+    script = tmp_path / "python"
+    script.write_text("#!/bin/sh\necho 'terminate called' >&2\nkill -SEGV $$\n")
+    script.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(script))
+    with pytest.raises(JobError, match=re.escape("crashed (SIGSEGV): terminate called")):
+        run_job("peer", "coal:1.0", time_limit=30.0)
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="POSIX")
+def test_interrupting_a_job_leaves_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    started = []
+    popen = compare_jobs.subprocess.Popen
+
+    class Interrupted(popen):  # type: ignore[misc, valid-type]
+        def wait(self, timeout: float | None = None) -> int:
+            started.append(self)
+            if timeout is not None:
+                raise KeyboardInterrupt
+            return int(super().wait())
+
+    monkeypatch.setattr(compare_jobs.subprocess, "Popen", Interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_job("contact", "wedges:1.0", time_limit=60.0)
+    assert started[0].returncode is not None
+
+
+def test_assemblies_are_table_4() -> None:
+    exact, stepped = assembled(Method("chords", 20.0))
+    assert (exact.solver, stepped.solver) == ("exact", "stepped")
+    assert exact.distance == pytest.approx(32.080, abs=2e-3)
+    assert stepped.distance == pytest.approx(32.196, abs=2e-3)
+    assert stepped.motion_steps > 100
+    assert exact.motion_steps == 0
+
+
+def test_image_measurement_is_a_row() -> None:
+    found = imaged()
+    assert 0.5 < found.median_by_hand < 2.0
+    assert found.automatic < 0.05
+    assert len(found.first_five) == 5
+
+
+@pytest.mark.parametrize("peer", ["coal", "mujoco", "trimesh", "manifold3d", "open-cascade"])
+def test_peers_measure_the_same_groove(peer: str) -> None:
+    if peer in missing_peers():
+        pytest.skip(f"{peer} is not installed")
+    method = Method(peer) if peer == "open-cascade" else Method(peer, 5.0)
+    found = measure(method, load=load_peer, prepare=prepare_peer, budget=QUICK)
+    if peer == "open-cascade":
+        assert found.worst_error < 1e-12
+    else:  # facets of the groove, and of the wire where it has to be a mesh too
+        assert 0.9 * 0.0114 < found.worst_error < 1.02 * 0.0114
+    assert found.bands[0].false_misses == 0
+    assert (found.depth_error is None) == (peer != "mujoco")
+
+
+def test_a_missing_peer_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compare_peers.importlib.util, "find_spec", lambda name: None)
+    assert missing_peers()["coal"] == "not installed: pip install coal (or 'clamp3d[peers]')"
+    assert "cadquery-ocp-novtk" in missing_peers()["open-cascade"]
+
+
+def test_grid_search_finds_the_final_state_and_counts_as_the_paper_does() -> None:
+    run = assemble(load_clamp(), Cas())
+    for parts in (1, 2, 3):
+        found = grid_search(run, Cas(), n=7, parts=parts, grooves=4)
+        assert found.positions == 7**parts
+        assert found.tests == 4 * 7**parts
+        # The grid has the exact place (with 1e-6 mm of room) and nothing below it.
+        assert found.closing == pytest.approx(run.closing, abs=2e-6)
+    chords = Chords(math.radians(20.0))
+    found = grid_search(run, chords, n=7, parts=1, grooves=4)
+    assert found.tests == 7 * chords.segments(wire_pairs(run.clamp))
+    assert found.closing is None or found.closing > run.closing + 0.1
+
+
+def test_exponents_of_table_5() -> None:
+    sweeps = complexity(scale=0.3)
+    by = {(s.search, s.method, s.varied, s.fixed.split(",")[0]): s for s in sweeps}
+    assert by["grid", "cas", "n", "a = 2"].exponents[:2] == pytest.approx((2.0, 2.0))
+    assert by["grid", "cas", "n", "a = 3"].exponents[:2] == pytest.approx((3.0, 3.0))
+    stepped = by["stepped", "cas", "n", "a = 3"]
+    assert 0.5 < stepped.exponents[0] < 1.1  # one way, not n^3
+    exact = by["exact", "cas", "n", "no steps"]
+    assert exact.positions == (0,)
+    assert exact.tests[0] < min(stepped.tests)
+    assert all(len(s.values) == len(s.positions) == len(s.tests) == len(s.seconds) for s in sweeps)
+    assert fitted([1, 2, 4, 8], [5, 10, 20, 40]) == pytest.approx(1.0)
+
+
+def _comparison() -> Comparison:
+    contact = (
+        _row("cas", 2e-6, 3e-15),
+        _row("chords", 4e-5, 0.01, 5.0),
+        _row("wedges", 1e-4, 0.01, 5.0),
+        _row("wedges", 7e-4, 5e-4, 1.0),
+        NotMeasured("hulls", 0.01, "hulls 0.01", "not finished in 90 s"),
+    )
+    peers = (
+        _row("coal", 2e-4, 5e-4, 1.0),
+        NotMeasured("mujoco", 1.0, "mujoco 1 deg", "not installed: pip install mujoco"),
+    )
+    rows = [Assembled("cas", None, "cas", s, "clamped", 31.53, 0.0, 0.05, 864, 0) for s in ("exact", "stepped")]  # type: ignore[arg-type]
+    late = NotMeasured("hulls", 2.0, "hulls 2 mm", "not finished in 150 s")
+    sweep = Sweep("grid", "cas", "n", "a = 1", (1.0, 2.0), (1, 2), (4, 8), (0.1, 0.2), (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
+    image = dataclasses.replace(IMAGE)
+    return Comparison(machine(LIBRARIES), contact, peers, (rows[0], late), (rows[1], late), image, (sweep,), 12.0)
+
+
+IMAGE = compare_jobs.Imaged(10, 4.5, 4.0, 1.08, 7.1, (31.9, 31.1, 31.2, 30.9, 32.1), 0.006, 0.2)
+
+
+def test_tables_show_every_row_and_why_one_is_missing() -> None:
+    found = _comparison()
+    text = comparison_to_text(found)
+    for words in (
+        "hulls 0.01",
+        "not finished in 90 s",
+        "not installed: pip install mujoco",
+        "31.5300",
+        "0.0114",
+        "12 s",
+    ):
+        assert words in text
+    data = json.loads(json.dumps(comparison_to_dict(found), allow_nan=False))
+    wedge = data["contact"][2]
+    assert wedge["known"] == {"error": 0.0114, "pieces": None}
+    assert data["assembly"][0]["error"] == 0.0
+    assert data["assembly"][1]["reason"] == "not finished in 150 s"
+    failed = dataclasses.replace(
+        found, image=NotMeasured("image", None, "image", "no"), complexity=NotMeasured("c", None, "c", "no")
+    )
+    assert "no" in comparison_to_text(failed)
+    comparison_to_dict(failed)
+
+
+def test_chart_in_every_format(tmp_path: Path) -> None:
+    found = _comparison()
+    for name in ("a.svg", "a.png", "a.html"):
+        save_comparison(found, tmp_path / name, "clamp3d compare --plot a.svg")
+    svg = (tmp_path / "a.svg").read_text()
+    assert svg.count("<svg") == 1
+    page = (tmp_path / "a.html").read_text()
+    assert page.startswith("<!DOCTYPE html>")
+    assert not re.findall(r"(?:src|href)=[\"']https?:", page)
+    assert "not finished in 90 s" in page
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+    with pytest.raises(InputError, match=r"must end in \.png, \.svg, \.html, got 'a.txt'"):
+        check_format("a.txt")
+    save_comparison(
+        dataclasses.replace(found, contact=found.contact[4:], peers=()), tmp_path / "b.svg", "none measured"
+    )
+
+
+def test_compare_asks_every_job_and_keeps_going(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, str]] = []
+
+    def answer(kind: str, method: str, *, time_limit: float) -> dict[str, Any]:
+        asked.append((kind, method))
+        if kind == "contact" and method.startswith("hulls"):
+            raise JobError("crashed (SIGABRT)")
+        if kind in ("contact", "peer"):
+            m = Method.parse(method)
+            return dataclasses.asdict(_row(m.family, 1e-4, 0.1, m.setting))
+        if kind == "assembly":
+            both = _comparison()
+            return {"rows": [dataclasses.asdict(both.exact[0]), dataclasses.asdict(both.stepped[0])]}
+        if kind == "image":
+            return dataclasses.asdict(IMAGE)
+        return {"sweeps": []}
+
+    monkeypatch.setattr(study, "run_job", answer)
+    monkeypatch.setattr(study, "missing_peers", lambda: {"coal": "not installed: pip install coal"})
+    told: list[tuple[int, int]] = []
+    found = compare(peers=True, progress=lambda done, total, what: told.append((done, total)))
+    assert [row.label for row in found.contact] == [m.label for m in METHODS]
+    assert {r.reason for r in found.contact if isinstance(r, NotMeasured)} == {"crashed (SIGABRT)"}
+    assert {r.method for r in found.peers if isinstance(r, NotMeasured)} == {"coal"}
+    assert not any(method.startswith("coal") for _, method in asked)
+    assert told[-1][0] == told[-1][1]
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    assert len(found.exact) == len(found.stepped) == len(study.ASSEMBLIES)
+    asked.clear()
+    compare()
+    assert not any(kind == "peer" for kind, _ in asked)
+
+
+def test_command_refuses_before_it_measures(tmp_path: Path) -> None:
+    for arguments in (
+        ["--plot", "chart.txt"],
+        ["--json", str(tmp_path / "no" / "a.json")],
+        ["--plot", str(tmp_path / "no" / "a.svg")],
+    ):
+        start = time.monotonic()
+        result = CliRunner().invoke(command, arguments)
+        assert isinstance(result.exception, InputError)
+        assert time.monotonic() - start < 5.0
+
+
+def test_command_prints_and_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study, "compare", lambda **_: _comparison())
+    arguments = ["--json", str(tmp_path / "a.json"), "--plot", str(tmp_path / "a.svg"), "--peers"]
+    result = CliRunner().invoke(command, arguments, catch_exceptions=False)
+    assert result.exit_code == 0
+    assert "wedges 5 deg" in result.stdout
+    assert json.loads((tmp_path / "a.json").read_text())["peers"][0]["method"] == "coal"
+    assert (tmp_path / "a.svg").exists()

@@ -1,0 +1,77 @@
+"""The committed poses of the comparison: their distances by closed form, by search, and what each group promises."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+
+from clamp3d.bench.compare.scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, chord_error, in_part_frame, known_poses
+from clamp3d.core.pose import check_pose
+
+POSES = known_poses()
+
+
+def test_every_group_is_what_its_name_says() -> None:
+    assert len(POSES) == 420
+    assert POSES.parallel.sum() == 210
+    for T in POSES.T:
+        check_pose(T)
+    lean = np.abs(POSES.T[:, :2, 2]).max(axis=1)
+    assert (lean[POSES.parallel] == 0.0).all()
+    assert lean[~POSES.parallel].min() > 5e-4
+    d = POSES.distance
+    assert ((d > 1e-3) & (d < 1.0))[POSES.group == CLEAR].all()
+    assert ((d < -1e-3) & (d > -0.3))[POSES.group == OVERLAP].all()
+    for band in BANDS:
+        of = d[POSES.group == f"{band:g}"]
+        assert np.abs(of).max() <= band
+        assert (of > 0.0).sum() == (of < 0.0).sum() == 40
+        assert (np.abs(of) > band / 2).any()
+
+
+def test_parallel_distances_are_the_closed_form_at_50_digits() -> None:
+    """Centre inside the arc's sector: R - r - |centre|, the whole truth for a wire along the groove."""
+    checked = 0
+    with mpmath.workdps(50):
+        for T, d, rest in zip(POSES.T, POSES.distance, POSES.residual, strict=True):
+            x, y = (mpmath.mpf(float(v)) for v in T[:2, 3])
+            if (T[:2, 2] == 0.0).all() and mpmath.atan2(abs(x), -y) < GROOVE.half_angle:
+                exact = mpmath.mpf(GROOVE.radius) - mpmath.mpf(WIRE.radius) - mpmath.hypot(x, y)
+                assert abs(exact - mpmath.mpf(float(d)) - mpmath.mpf(float(rest))) < mpmath.mpf(10) ** -24
+                checked += 1
+    assert checked > 150
+
+
+def test_tilted_distances_are_those_of_the_search() -> None:
+    path = Path(__file__).parents[2] / "core" / "data" / "make_oracle.py"
+    spec = importlib.util.spec_from_file_location("make_oracle", path)
+    assert spec is not None
+    assert spec.loader is not None
+    oracle = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(oracle)
+    for i in np.flatnonzero(~POSES.parallel)[::52]:
+        c, d = oracle.axis_of(POSES.T[i])
+        value = oracle.exact_distance(GROOVE.radius, GROOVE.half_angle, GROOVE.length, WIRE.radius, WIRE.length, c, d)
+        known = mpmath.mpf(float(POSES.distance[i])) + mpmath.mpf(float(POSES.residual[i]))
+        assert abs(mpmath.mpf(value) - known) < mpmath.mpf(10) ** -22
+
+
+def test_error_sees_below_the_rounding_of_the_distances() -> None:
+    off = POSES.error(POSES.distance)
+    assert np.abs(off).max() < 2.0**-53
+    assert (off == -POSES.residual).all()
+
+
+def test_part_frame_has_no_rounding() -> None:
+    moved = in_part_frame(POSES.T)
+    assert (np.sort(np.abs(moved[:, :3, 3]), axis=1) == np.sort(np.abs(POSES.T[:, :3, 3]), axis=1)).all()
+
+
+@pytest.mark.parametrize(("deg", "known"), [(1.0, 0.00046), (5.0, 0.0114), (10.0, 0.0457), (20.0, 0.182)])
+def test_chord_errors_are_the_known_ones(deg: float, known: float) -> None:
+    assert chord_error(math.radians(deg)) == pytest.approx(known, rel=0.01)

@@ -1,0 +1,153 @@
+"""Whole clamps: the truth against closed forms and brute force, and the exact solver without a fault on each family."""
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.bench.stress.assemblies.clamps import MAKERS, clamp_of, open_start, random_clamp, scaled
+from clamp3d.bench.stress.assemblies.envelope import Envelope
+from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
+from clamp3d.bench.stress.assemblies.methods import EXACT
+from clamp3d.bench.stress.assemblies.minima import minima
+from clamp3d.bench.stress.run import run_family
+from clamp3d.clamp.equilibria import equilibria
+from clamp3d.clamp.final_state import solve_final_state
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.section import Section
+
+CLAMPS = 8
+
+
+@pytest.mark.parametrize("family", ASSEMBLIES)
+def test_every_answer_is_a_place_of_rest_and_every_firm_one_is_named(family):
+    (outcome,), _ = run_family(family, ["cas"], 100 * CLAMPS, 20, 60.0, 0)
+    assert (outcome.asked, outcome.answered, outcome.refused, outcome.exceptions) == (CLAMPS, CLAMPS, 0, 0)
+    assert (outcome.false_hits, outcome.false_misses, outcome.beyond_bound) == (0, 0, 0), outcome.examples
+    assert outcome.worst_error <= EXACT
+
+
+def symmetric(R=20.0, r=14.0, aside=0.0):
+    """Four equal grooves with flanks of 60 degrees, the lower ones ``aside`` mm to the right."""
+    offsets = np.array([48.0, 48.0, 48.0 - aside, 48.0 + aside])
+    return clamp_of(R, math.pi / 3, offsets, 2.0 * r)
+
+
+def straight_d(clamp, aside=0.0):
+    """Distance of a symmetric clamp closed straight: both centres 2 (R - r) apart, ``aside`` of it sideways."""
+    up, down, r = clamp.up_splint.line_groove, clamp.down_splint.line_groove, clamp.line.radius
+    return up.centre_depth - down.centre_depth - math.sqrt((2.0 * (up.radius - r)) ** 2 - aside**2)
+
+
+@pytest.mark.parametrize("aside", [0.0, 1.0, 2.0])
+def test_minima_of_a_symmetric_clamp_in_closed_form(aside):
+    clamp = symmetric(aside=aside)
+    straight = [m for m in minima(Envelope(clamp)) if abs(m.tilt) < 1e-9]
+    assert straight[0].d == pytest.approx(straight_d(clamp, aside), abs=1e-10)
+    assert straight[0].firm
+
+
+@pytest.mark.parametrize("lift", [0.0, 1e-9, 1e-6, 1e-3, 0.5])
+def test_falls_is_the_way_down_to_the_closed_form(lift):
+    clamp = symmetric()
+    y = 0.5 * (
+        clamp.up_splint.line_groove.centre_depth + straight_d(clamp) + clamp.down_splint.line_groove.centre_depth
+    )
+    middle = clamp.up_splint.width / 2
+    q = np.array([middle - 48.0, y, middle + 48.0, y, straight_d(clamp) + lift, 0.0])
+    envelope = Envelope(clamp)
+    assert envelope.falls(q) == pytest.approx(lift, abs=1e-12)
+    assert envelope.overlap(q) == pytest.approx(0.0, abs=1e-12)
+    q[4] -= 2.0 * lift
+    assert envelope.overlap(q) == pytest.approx(lift, abs=1e-12)
+
+
+def test_falls_sees_a_wire_beside_the_deepest_line_and_a_tilt_that_is_off():
+    # The wire's centre runs on circles of R - r about both arc centres: at x beside them it needs that much more room.
+    clamp, x = symmetric(), 0.01
+    rise = 6.0 - math.sqrt(6.0**2 - x**2)
+    d, middle = straight_d(clamp), clamp.up_splint.width / 2
+    y = 0.5 * (clamp.up_splint.line_groove.centre_depth + d + clamp.down_splint.line_groove.centre_depth)
+    q = np.array([middle - 48.0 + x, y, middle + 48.0, y, d + 2.0 * rise, 0.0])
+    assert Envelope(clamp).falls(q) == pytest.approx(2.0 * rise, abs=1e-9)
+    q[:6] = [middle - 48.0, y, middle + 48.0, y, d + 0.02, 0.01]
+    assert 0.015 < Envelope(clamp).falls(q) <= 0.02 + 1e-12  # tilts are sampled: never more than the truth
+
+
+def test_envelopes_of_a_wire_against_the_distance_to_the_groove():
+    """A centre on the envelope touches, by the signed distance in 3D; one beyond it overlaps."""
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        clamp = random_clamp(rng)
+        section, tilt = Section(clamp, Cas()), np.array([rng.uniform(-0.2, 0.2)])
+        for i, (name, wire) in enumerate(zip(("P6", "P7"), Envelope(clamp).wires, strict=True)):
+            x = np.array([[rng.uniform(wire.up.x - wire.up.s, wire.up.x + wire.up.s)]])
+            over, under = float(wire.over(x)[0, 0]), float(wire.under(x, tilt)[0, 0])
+            q = np.array([1e3, 1e3, 1e3, 1e3, over - under, section.lever * tilt[0]])
+            q[2 * i : 2 * i + 2] = x[0, 0], over
+            gaps = section.wire_gaps(q, name)
+            for splint in ("P1", "P2"):
+                least = min(v for v, pair in zip(gaps.value, gaps.pair, strict=True) if pair[0] == splint)
+                assert least == pytest.approx(0.0, abs=1e-9)
+
+
+def test_least_distance_is_monotone_between_its_places():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        clamp = random_clamp(rng)
+        tilt = np.array([rng.uniform(-0.2, 0.2)])
+        for wire in Envelope(clamp).wires:
+            places = wire.places(tilt)
+            ends = wire.least(places, tilt)[0]
+            x = np.sort(rng.uniform(places[0, 0], places[0, -1], (1, 2000)))
+            d, j = wire.least(x, tilt)[0], np.searchsorted(places[0], x[0])
+            assert (d >= np.minimum(ends[j - 1], ends[j]) - 1e-10).all()
+            assert (d <= np.maximum(ends[j - 1], ends[j]) + 1e-10).all()
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1e-2, 1e2])
+def test_sizes_scale_every_distance(factor):
+    clamp = random_clamp(np.random.default_rng(8))
+    other = scaled(clamp, factor)
+    for one, same in zip(minima(Envelope(clamp)), minima(Envelope(other)), strict=True):
+        assert same.d == pytest.approx(factor * one.d, abs=1e-9 * max(1.0, factor))
+    closed = [solve_final_state(Section(c, Cas())).q[4:] for c in (clamp, other)]
+    assert closed[1] == pytest.approx(factor * closed[0], abs=1e-8 * max(1.0, factor))
+
+
+def test_random_starts_lead_to_places_that_are_named():
+    rng = np.random.default_rng(6)
+    for _ in range(4):
+        section = Section(random_clamp(rng), Cas())
+        named = np.array([state.q[4] for state in equilibria(section)])
+        for _ in range(5):
+            reached = solve_final_state(section, open_start(rng, section)).q[4]
+            assert np.abs(named - reached).min() < 1e-6
+
+
+def test_a_method_that_is_wrong_is_found_wrong():
+    """The paper's search stops a step short, chords stop early by their error: no place of rest, but within bounds."""
+    (stepped, chords), _ = run_family("assembly: random clamps", ["stepped", "chords 5 deg"], 300, 1, 60.0, 0)
+    assert stepped.asked == chords.asked == 3
+    assert 1e-4 < stepped.worst_error < 3.0
+    assert chords.worst_error > 1e-4
+    assert chords.worst_ratio < 1.0
+
+
+@pytest.mark.parametrize("family", ["assembly: poor starts", "assembly: sizes"])
+def test_a_case_runs_as_python_and_prints_its_truth(family):
+    text = ASSEMBLIES[family].case(4, 0, 3)
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
+    truths = [float(word) for word in text.splitlines()[-1].replace("(shallow)", "").split("d = ")[1][:-3].split(",")]
+    reached = float(done.stdout.splitlines()[0].split()[-2])
+    assert min(abs(reached - truth) for truth in truths) < 1e-6
+
+
+def test_the_reference_clamp_has_one_equilibrium_besides_and_two_ways_to_slip():
+    truth = minima(Envelope(load_clamp()))
+    states = equilibria(Section(load_clamp(), Cas()))
+    assert [m.d for m in truth] == pytest.approx([float(state.q[4]) for state in states], abs=1e-9)
+    assert len(MAKERS) == len(ASSEMBLIES)

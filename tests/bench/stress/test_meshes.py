@@ -1,0 +1,121 @@
+"""Broken meshes are refused in words or answered rightly; good ones are answered; bare libraries do fail on them."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from clamp3d.bench.stress.meshes.cases import LEAST
+from clamp3d.bench.stress.meshes.families import MESHES
+from clamp3d.bench.stress.meshes.family import MeshFamily
+from clamp3d.bench.stress.meshes.methods import method
+from clamp3d.bench.stress.outcome import Outcome
+from clamp3d.bench.stress.poses.truth import truth, truth_50_digits
+from clamp3d.bench.stress.run import run_stress
+from clamp3d.bench.stress.worker import run_here, run_isolated
+from clamp3d.cli import group
+from clamp3d.errors import InputError
+
+ANSWERED = ("mesh: soup", "mesh: turned")
+NEVER = ("mesh: open", "mesh: empty")
+CASES = {"mesh": 100, "fit": 30, "scene": 12}
+REFUSING = 150
+
+
+def _ask(family: MeshFamily, name: str, n: int, seed: int = 7) -> Outcome:
+    cases = family.cases(n, seed)
+    return family.judge(name, cases, run_here(method(name), cases))
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("family", MESHES)
+def test_own_methods_are_never_wrong(family: str, name: str) -> None:
+    n = REFUSING if family in NEVER else CASES[name]
+    found = _ask(MESHES[family], name, n)
+    assert (found.asked, found.answered + found.refused) == (n, n)
+    assert found.wrong == 0, (found.notes, found.examples)
+    assert not found.beyond_bound, found.examples
+    if family in ANSWERED:
+        assert found.refused == 0, found.notes
+    if family in NEVER:
+        assert found.answered == 0
+
+
+def test_hulls_refuse_what_would_end_coacd(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path))
+    for family in ("mesh: open", "mesh: empty", "mesh: bad numbers", "mesh: inside out"):
+        found = _ask(MESHES[family], "hulls", 25)
+        assert (found.refused, found.wrong) == (25, 0), found.notes
+    soup = MESHES["mesh: soup"].cases(6, 18).take([2])  # CoACD is quick on its wide groove
+    found = MESHES["mesh: soup"].judge("hulls", soup, run_here(method("hulls"), soup))
+    assert (found.answered, found.wrong) == (1, 0), found.notes
+
+
+def test_bare_libraries_are_found_out() -> None:
+    """The suite tells a library that ends the interpreter, and one that is wrong without a word."""
+    numbers = MESHES["mesh: bad numbers"]
+    cases = numbers.cases(6, 20)
+    what = [cases[i].mesh.what for i in range(6)]
+    fcl = run_isolated(partial(method, "FCL alone"), cases, time_limit=60.0)
+    assert fcl.crashed == [what.index("a corner far beyond")]
+    assert fcl.failed[what.index("a corner negative")]
+    assert not fcl.refused.any()
+    assert numbers.cases(1, 57)[0].mesh.what == "a coordinate nan"
+    coacd = run_isolated(partial(method, "CoACD alone"), numbers.cases(1, 57), time_limit=60.0)
+    assert coacd.crashed == [0]
+    opened = _ask(MESHES["mesh: open"], "FCL alone", 60)
+    assert opened.false_misses > 0
+    assert opened.refused == 0
+
+
+def test_cases_are_the_same_again_and_away_from_touching() -> None:
+    family = MESHES["mesh: turned"]
+    once, again = family.cases(8, 3), family.cases(8, 3)
+    for i in range(8):
+        assert np.array_equal(once[i].mesh.vertices, again[i].mesh.vertices)
+        assert np.array_equal(once[i].mesh.faces, again[i].mesh.faces)
+        one = once.take([i])[0]
+        assert np.array_equal(one.mesh.vertices, once[i].mesh.vertices)
+        assert np.array_equal(one.T_mesh_wire, once[i].T_mesh_wire)
+    exact = np.asarray(truth(once.poses), float)
+    assert (np.abs(exact) >= 0.999 * LEAST * once.poses.shapes.R).all()
+    assert float(truth_50_digits(once.poses, 5)) == pytest.approx(exact[5], rel=1e-14)
+    assert not np.array_equal(family.cases(8, 4)[0].T_mesh_wire, once[0].T_mesh_wire)
+
+
+@pytest.mark.parametrize("family", MESHES)
+def test_every_fault_is_what_it_says(family: str) -> None:
+    """A mesh that is called good is closed, has one winding and a volume; one that is called broken has a fault."""
+    from clamp3d.core.closed_mesh import check_solid
+
+    seen = set()
+    cases = MESHES[family].cases(60, 11)
+    for i in range(60):
+        case = cases[i].mesh
+        seen.add(case.what)
+        try:
+            check_solid(case.vertices, case.faces)
+            fine = True
+        except InputError:
+            fine = False
+        assert fine or case.broken, case.what
+        if not case.what.startswith("the body twice"):  # closed twice over: no rule of a mesh is broken
+            assert fine != case.broken, case.what
+    assert len(seen) >= {"mesh: soup": 2, "mesh: turned": 1}.get(family, 4)
+
+
+def test_command_prints_a_mesh_case_that_runs(capsys) -> None:
+    result = CliRunner().invoke(group, ["stress", "--family", "mesh: soup", "--n", "1000", "--case", "2"])
+    assert result.exit_code == 0, result.output
+    exec(result.output, {})
+    assert "'verdict'" in capsys.readouterr().out
+    assert result.output.splitlines()[-1].startswith("# truth: ")
+
+
+def test_run_of_the_suite_takes_its_part_of_the_cases() -> None:
+    run = run_stress(["mesh: empty"], ["mesh", "cas"], n=400, seed=1, check=2)
+    (found,) = run.outcomes
+    assert (found.method, found.cases, found.refused, found.wrong) == ("mesh", 4, 4, 0)

@@ -1,0 +1,173 @@
+"""The motion families: truths against independent ones, cas without a fault on all of them, faults that are found."""
+
+import math
+
+import numpy as np
+import pytest
+
+import clamp3d
+from clamp3d.bench.stress.motions import methods
+from clamp3d.bench.stress.motions.cases import motions, poses
+from clamp3d.bench.stress.motions.families import MOTIONS
+from clamp3d.bench.stress.motions.truth import TRUTH_ERROR, truth
+from clamp3d.bench.stress.poses.cases import Cases, Shapes
+from clamp3d.bench.stress.poses.truth import EXTENDED_WORKS
+from clamp3d.bench.stress.poses.truth import truth as pose_truth
+from clamp3d.bench.stress.registry import FAMILIES
+from clamp3d.bench.stress.run import run_family
+from clamp3d.core import motion as motion_module
+
+CASES = 2000
+
+
+@pytest.mark.parametrize("family", MOTIONS)
+def test_cas_is_never_wrong_and_never_beyond_its_bound(family):
+    (outcome,), difference = run_family(family, ["cas"], CASES, 20, 60.0, 2)
+    assert difference < TRUTH_ERROR
+    assert (outcome.asked, outcome.answered, outcome.refused) == (CASES, CASES, 0)
+    assert (outcome.false_hits, outcome.false_misses, outcome.exceptions) == (0, 0, 0), outcome.notes
+    assert outcome.beyond_bound == 0, outcome.examples
+    assert outcome.worst_relative < 1e-9
+
+
+@pytest.mark.parametrize("family", MOTIONS)
+def test_truth_against_more_cells_and_against_the_truth_of_poses(family):
+    cases = MOTIONS[family].cases(40, 7)
+    found = truth(cases)
+    size = cases.scene()
+    more = truth(cases, cells=20_000)
+    assert (np.abs(more.distance - found.distance) <= 1e-13 * size).all()
+    # What was built is there, and no pose of a dense row is lower; at the lowest instant it is that low.
+    built = np.isfinite(cases.gap)
+    assert (found.distance[built] <= cases.gap[built] + 1e-14 * size[built]).all()
+    for i in range(0, 40, 1 if EXTENDED_WORKS else 20):
+        instants = np.append(np.linspace(0.0, 1.0, 101), found.instant[i])
+        T = poses(cases, i, instants)
+        one = Cases(cases.shapes, np.full(len(T), cases.shape[i]), T, np.full(len(T), np.nan))
+        along = np.asarray(pose_truth(one), float)
+        rounding = 4e-15 * size[i] * (1.0 + abs(cases.angle[i]))
+        assert along.min() >= found.distance[i] - rounding
+        assert along[-1] == pytest.approx(found.distance[i], abs=rounding)
+
+
+_HALF = math.radians(100.0)
+
+
+def _one(start, vector, *, R=7.0, half=_HALF, L=50.0, r=6.935, length=200.0, **more):
+    one = np.ones(1)
+    shapes = Shapes(R * one, half * one, L * one, r * one, length * one)
+    T = np.eye(4)
+    T[:3, 3] = start
+    return motions(shapes, np.zeros(1, int), T[None], travel=np.array([vector]), **more)
+
+
+_NARROW = 7.0 * math.sin(_HALF) - 6.935  # half the mouth less the radius
+
+
+@pytest.mark.parametrize(
+    ("start", "vector", "least"),
+    [
+        ((0.0, 30.0, 0.0), (0.0, -30.0, 0.0), _NARROW),  # straight in through a mouth that is too narrow
+        ((0.0, 0.0, -200.0), (0.0, 0.0, 400.0), 0.065),  # along the groove, on its axis
+        ((0.0, -0.065, -200.0), (0.0, 0.0, 400.0), 0.0),  # the same, touching its deepest line all the way
+    ],
+)
+def test_known_answers_in_a_narrow_mouth(start, vector, least):
+    cases = _one(start, vector)
+    assert float(truth(cases).distance[0]) == pytest.approx(least, abs=2e-15)
+    groove, wire, motion = cases.shapes.groove(0), cases.shapes.cylinder(0), cases.motion(0)
+    assert clamp3d.sweep(groove, wire, motion).distance == pytest.approx(least, abs=1e-14)
+    hit = clamp3d.first_contact(groove, wire, motion)
+    assert hit.touches == (least <= 0.0)
+    if least < 0.0:  # where the wire's circle first meets both lips
+        s, h = 7.0 * math.sin(math.radians(100.0)), -7.0 * math.cos(math.radians(100.0))
+        assert 30.0 - 30.0 * hit.instant == pytest.approx(h + math.sqrt(6.935**2 - s * s), abs=1e-12)
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-9, -1e-9, 1e-3, -1e-3])
+def test_known_answers_of_a_double_root(gap):
+    # On a line at 45 degrees the wire's centre passes the lip at r + gap.
+    half = math.radians(60.0)
+    s, h = 7.0 * math.sin(half), -7.0 * math.cos(half)
+    up, along = np.array([-1.0, 1.0]) / math.sqrt(2.0), np.array([1.0, 1.0]) / math.sqrt(2.0)
+    start = np.array([s, h]) + (2.0 + gap) * up - 2.0 * along
+    cases = _one((*start, 0.0), (*(8.0 * along), 0.0), half=half, r=2.0)
+    found = truth(cases)
+    assert float(found.distance[0]) == pytest.approx(gap, abs=1e-14)
+    groove, wire, motion = cases.shapes.groove(0), cases.shapes.cylinder(0), cases.motion(0)
+    assert clamp3d.first_contact(groove, wire, motion).touches == (gap <= 0.0)
+    # The least clearance does not depend on how the way is divided.
+    halves = [clamp3d.Translation(motion.pose(s), 0.5 * cases.travel[0]) for s in (0.0, 0.5)]
+    whole = clamp3d.sweep(groove, wire, motion).distance
+    assert min(clamp3d.sweep(groove, wire, part).distance for part in halves) == pytest.approx(whole, abs=1e-13)
+
+
+def test_stepped_motion_misses_what_is_thin_and_cas_does_not():
+    outcomes, _ = run_family("motion: thin and fast", ["cas", "stepped 100"], 200, 3, 60.0, 0)
+    cas, stepped = outcomes
+    assert (cas.wrong, cas.beyond_bound) == (0, 0)
+    assert stepped.false_misses > 50
+    assert stepped.false_hits == 0
+
+
+class _Broken:
+    """`sweep` and `first_contact` with one fault."""
+
+    def __init__(self, fault):
+        self.fault = fault
+
+    def sweep(self, groove, wire, motion):
+        if self.fault != "steps over thin parts":
+            return motion_module.sweep(groove, wire, motion)
+        near = [clamp3d.signed_distance(groove, wire, motion.pose(s)) for s in np.linspace(0.0, 1.0, 101)]
+        i = int(np.argmin([one.distance for one in near]))
+        return motion_module.Clearance(near[i].distance, i / 100, motion.pose(i / 100), near[i], 1e-9, 1e-12, 101)
+
+    def first_contact(self, groove, wire, motion):
+        right = motion_module.first_contact(groove, wire, motion)
+        at = {"misses": 1.0, "late": min(1.0, right.instant + 1e-4), "early": max(0.0, right.instant - 1e-4)}
+        instant = at.get(self.fault, right.instant)
+        contact = clamp3d.signed_distance(groove, wire, motion.pose(instant))
+        touches = right.touches and self.fault != "misses"
+        return motion_module.MotionContact(
+            touches, instant, motion.pose(instant), contact, right.resolution, right.error_bound, 1
+        )
+
+
+@pytest.mark.parametrize("fault", ["none", "steps over thin parts", "misses", "late", "early"])
+def test_a_wrong_sweep_or_first_contact_is_found_out(fault, monkeypatch):
+    broken = _Broken(fault)
+    monkeypatch.setattr(methods, "sweep", broken.sweep)
+    monkeypatch.setattr(methods, "first_contact", broken.first_contact)
+    (outcome,), _ = run_family("motion: thin and fast", ["cas"], 200, 3, 60.0, 0)
+    assert (outcome.wrong > 20) == (fault != "none"), outcome.notes
+    if fault == "steps over thin parts":
+        assert outcome.false_misses > 20
+        assert outcome.beyond_bound > 50
+
+
+def test_a_case_prints_as_lines_that_run(capsys):
+    for family in ("motion: screws", "motion: grazing"):
+        text = FAMILIES[family].case(30, 1, 7)
+        exec(text, {})
+        printed = capsys.readouterr().out
+        expected = float(text.split("# truth: least ")[1].split()[0])
+        assert float(printed.split("Clearance(distance=")[1].split(",")[0]) == pytest.approx(expected, abs=1e-9)
+
+
+def test_fcl_takes_a_motion_without_a_turn_for_something_else():
+    """If this fails the library has mended it: `fcl_continuous` may give every motion as a screw."""
+    fcl = pytest.importorskip("fcl")
+    instants = {}
+    for name, kind in (("translation", fcl.CCDMotionType.CCDM_TRANS), ("screw", fcl.CCDMotionType.CCDM_SCREW)):
+        wire = fcl.CollisionObject(fcl.Capsule(5.0, 80.0), fcl.Transform(np.eye(3), np.array([0.0, 20.0, 0.0])))
+        plate = fcl.CollisionObject(fcl.Box(60.0, 40.0, 50.0), fcl.Transform(np.array([0.0, -20.0, 0.0])))
+        request = fcl.ContinuousCollisionRequest(
+            ccd_motion_type=kind, ccd_solver_type=fcl.CCDSolverType.CCDC_CONSERVATIVE_ADVANCEMENT
+        )
+        result = fcl.ContinuousCollisionResult()
+        end = fcl.Transform(np.eye(3), np.array([0.0, -20.0, 0.0]))
+        fcl.continuousCollide(wire, end, plate, fcl.Transform(np.array([0.0, -20.0, 0.0])), request, result)
+        instants[name] = result.time_of_contact
+    assert instants["translation"] == pytest.approx(0.375, abs=1e-6)
+    assert abs(instants["screw"] - 0.375) > 0.1

@@ -1,0 +1,162 @@
+"""The stress families: truths checked among themselves, and cas without a fault on all of them."""
+
+import json
+import time
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from clamp3d.bench.stress.outcome import Outcome, judge
+from clamp3d.bench.stress.poses.cases import Cases, Shapes
+from clamp3d.bench.stress.poses.families import POSES
+from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, EXTENDED_WORKS, truth, truth_50_digits
+from clamp3d.bench.stress.run import run_family, run_stress
+from clamp3d.bench.stress.worker import Answers, Measured, run_isolated
+from clamp3d.cli import group
+from clamp3d.errors import InputError
+
+CASES = 2000 if EXTENDED_WORKS else 100
+
+
+@pytest.mark.parametrize("family", POSES)
+def test_cas_is_never_wrong_and_never_beyond_its_bound(family):
+    (outcome,), difference = run_family(family, ["cas"], CASES, 20, 60.0, 10)
+    assert difference < EXTENDED_ERROR
+    assert (outcome.asked, outcome.answered, outcome.refused) == (CASES, CASES, 0)
+    assert (outcome.false_hits, outcome.false_misses, outcome.exceptions, outcome.crashes) == (0, 0, 0, 0)
+    assert outcome.beyond_bound == 0, outcome.examples
+    assert outcome.worst_relative < 1e-14
+
+
+@pytest.mark.parametrize("family", ["tangency", "parallel tangency", "sizes", "metres", "nearly parallel"])
+def test_cases_built_from_an_answer_have_it(family):
+    cases = POSES[family].cases(500, 3)
+    difference = np.abs(np.asarray(truth(cases), float) - cases.gap) / cases.scene()
+    # Some wires meet another place of the groove first; the others are as far as they were put.
+    assert (difference < 1e-14).mean() > 0.5
+    assert (np.asarray(truth(cases), float) <= cases.gap + 1e-14 * cases.scene()).all()
+
+
+# A wire r 6.935 in a groove of R 7: hand-made answers.
+@pytest.mark.parametrize(
+    ("offset", "tilt", "half_angle", "gap"),
+    [
+        (0.05, 0.0, 1.0, 0.015),
+        (0.065, 0.0, 1.0, 0.0),
+        (0.0650001, 0.0, 1.0, -1e-7),
+        (0.0, np.radians(0.148915009), np.pi / 2, 0.0),  # 7 - (25 tan t + 6.935 / cos t)
+        (-10.0, 0.0, np.pi / 2, 10.0 - 0.0 + np.hypot(0, 0) - 6.935 + np.hypot(7, 10) - 10.0),
+    ],
+)
+def test_truth_of_known_cases(offset, tilt, half_angle, gap):
+    one = np.ones(1)
+    shapes = Shapes(7.0 * one, half_angle * one, 50.0 * one, 6.935 * one, 200.0 * one)
+    T = np.eye(4)
+    T[:3, :3] = [[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]]
+    T[1, 3] = -offset
+    cases = Cases(shapes, np.zeros(1, int), T[None], np.array([np.nan]))
+    assert float(truth(cases)[0]) == pytest.approx(gap, abs=2e-8 if tilt else 1e-14)
+    assert float(truth_50_digits(cases, 0)) == pytest.approx(float(truth(cases)[0]), abs=1e-15)
+
+
+def test_same_seed_same_cases_and_same_result_on_two_processes():
+    names = ["tangency", "crossed"]
+    one = run_stress(names, ["cas"], n=100, seed=5, check=2)
+    two = run_stress(names, ["cas"], n=100, seed=5, check=2, workers=2)
+    drop = lambda run: [  # noqa: E731
+        {k: v for k, v in row.items() if k != "seconds"} for row in run.to_dict()["outcomes"]
+    ]
+    assert drop(one) == drop(two)
+    other = POSES["tangency"].cases(100, 6)
+    assert not np.array_equal(POSES["tangency"].cases(100, 5).T_world_wire, other.T_world_wire)
+
+
+def test_a_wrong_method_is_found_out():
+    """The judge on answers that are off by known amounts."""
+    cases = POSES["tangency"].cases(200, 1)
+    exact = truth(cases)
+    answers = Answers.empty(200)
+    answers.asked[:] = True
+    answers.distance[:] = np.asarray(exact, float)
+    answers.bound[:] = 1e-3
+    near = np.abs(np.asarray(exact, float)) > 1e-2
+    hits, frees = np.flatnonzero(near & (exact < 0))[:3], np.flatnonzero(near & (exact > 0))[:5]
+    answers.distance[hits] = 2.0
+    answers.distance[frees] = -2.0
+    answers.distance[199], answers.failed[198] = np.nan, True
+    answers.distance[198] = np.nan
+    outcome = judge("tangency", "cas", cases.scene(), exact, answers, "depth")
+    assert (outcome.false_misses, outcome.false_hits, outcome.exceptions, outcome.beyond_bound) == (3, 5, 2, 8)
+    assert outcome.wrong == 10
+
+
+class _Fatal:
+    measures = "depth"
+
+    def measure(self, cases: Cases) -> Measured:
+        import os
+        import signal
+
+        if (np.abs(cases.gap) > 0).any() and np.round(cases.gap[0], 12) == np.round(_BAD[0], 12):
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if len(cases) > 1:
+            raise ValueError("one by one")
+        if np.round(cases.gap[0], 12) == np.round(_BAD[1], 12):
+            time.sleep(60)
+        return Measured(cases.gap, cases.gap * np.nan, np.zeros(len(cases), bool))
+
+
+_BAD = POSES["tangency"].cases(6, 0).gap[[2, 4]]
+
+
+def test_a_method_that_ends_the_interpreter_is_counted():
+    cases = POSES["tangency"].cases(6, 0)
+    answers = run_isolated(_Fatal, cases, time_limit=60.0, case_limit=3.0)
+    assert answers.crashed == [2]
+    assert answers.late == [4]
+    assert np.isfinite(answers.distance).sum() == 4
+    assert any("ended with SIGSEGV" in note for note in answers.notes)
+
+
+def test_fcl_methods_hold_their_bounds_on_clearances():
+    outcomes, _ = run_family("random", ["wedges 5 deg", "mesh"], 60, 0, 60.0, 0)
+    for outcome in outcomes:
+        assert isinstance(outcome, Outcome)
+        assert outcome.answered > 10
+        assert outcome.beyond_bound == 0
+        assert outcome.exceptions + outcome.crashes + outcome.late == 0
+
+
+def test_names_and_numbers_are_checked():
+    with pytest.raises(
+        InputError, match="unknown family 'x'; available: pose, motion, mesh, assembly, random, tangency"
+    ):
+        run_stress(["x"])
+    with pytest.raises(InputError, match="unknown method 'x'; available: cas"):
+        run_stress(methods=["x"])
+    with pytest.raises(InputError, match="n must be at least 1"):
+        run_stress(n=0)
+
+
+def test_command(tmp_path):
+    files = {name: tmp_path / name for name in ("a.json", "a.md", "a.png")}
+    arguments = ["stress", "--family", "ties", "--method", "cas", "--method", "chords 5 deg", "--n", "40"]
+    arguments += ["--json", str(files["a.json"]), "--markdown", str(files["a.md"]), "--plot", str(files["a.png"])]
+    result = CliRunner().invoke(group, arguments)
+    assert result.exit_code == 0, result.output
+    data = json.loads(files["a.json"].read_text())
+    assert data["outcomes"][0]["beyond_bound"] == 0
+    assert data["seed"] == 0
+    assert data["machine"]["cores"]
+    assert "| ties | 0 of 40 |" in files["a.md"].read_text()
+    assert files["a.png"].read_bytes()[:4] == b"\x89PNG"
+
+
+def test_command_prints_a_case_that_runs(capsys):
+    result = CliRunner().invoke(group, ["stress", "--family", "far from the origin", "--n", "40", "--case", "7"])
+    assert result.exit_code == 0
+    exec(result.output, {})
+    printed = capsys.readouterr().out
+    expected = float(result.output.split("# truth: ")[1].split()[0])
+    assert float(printed.split("distance=")[1].split(",")[0]) == pytest.approx(expected, abs=1e-12)

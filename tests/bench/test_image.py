@@ -1,0 +1,218 @@
+"""Image measurement: closed forms for marks, pixel truth for pictures, the paper's five values for the errors."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.bench.image import (
+    CALLIPER_ERROR,
+    FITTING_ERROR,
+    MARKING_ERROR,
+    PX_PER_MM,
+    calibrate_marking_error,
+    image_study,
+    marked_distances,
+    measure_image,
+)
+from clamp3d.bench.picture import BACKGROUND, PAINT, Picture, find_end_points, load_image, picture, snap_marks
+from clamp3d.bench.published import ACTUAL_DISTANCE, IMAGE_DISTANCES
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.result import Run
+from clamp3d.cli.measure_image import command
+from clamp3d.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    return assemble(load_clamp(), Cas())
+
+
+@pytest.fixture(scope="module")
+def shown(run: Run) -> Picture:
+    return picture(run, PX_PER_MM)
+
+
+def test_perfect_marks_give_the_exact_distance(run: Run, shown: Picture) -> None:
+    left, right, below = shown.end_points
+    found = measure_image([left, below], [left, right], shown.reference)
+    assert found.distance == pytest.approx(run.distance, abs=1e-12)
+    assert found.mm_per_px == pytest.approx(1.0 / PX_PER_MM, abs=1e-15)
+    # P2's corner is half a width along the splint and face_depth below its origin, tilted by 12 degrees.
+    t, down = run.poses["P2"].angle, run.clamp.down_splint
+    sideways = run.clamp.up_splint.width / 2 - (down.width / 2 * math.cos(t) - down.face_depth * math.sin(t))
+    assert found.straight == pytest.approx(math.hypot(run.distance, sideways), abs=1e-9)
+    assert found.straight - found.height == pytest.approx(0.684, abs=1e-3)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    turn=st.floats(-math.pi, math.pi),
+    scale=st.floats(0.5, 20.0),
+    shift=st.tuples(st.floats(-500, 500), st.floats(-500, 500)),
+)
+def test_measurement_does_not_depend_on_how_the_camera_is_held(
+    turn: float, scale: float, shift: tuple[float, float]
+) -> None:
+    marks = np.array([(3.0, 4.0), (10.0, 35.0), (0.0, 1.0), (137.0, 1.0)])
+    c, s = math.cos(turn), math.sin(turn)
+    seen = scale * marks @ np.array([[c, s], [-s, c]]) + shift
+    found = measure_image(seen[:2], seen[2:], 137.0)
+    assert found.height == pytest.approx(31.0, rel=1e-9)
+    assert found.straight == pytest.approx(math.hypot(7.0, 31.0), rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["height", "straight"])
+def test_uncertainty_is_the_spread_of_trials(shown: Picture, kind: str) -> None:
+    left, right, below = shown.end_points
+    for marking, calliper in ((1.0, 0.0), (0.0, 2.0), (0.5, 1.0)):
+        values = marked_distances(
+            shown,
+            100_000,
+            marking_error=marking,
+            calliper_error=calliper,
+            seed=3,
+            kind=kind,  # type: ignore[arg-type]
+        )
+        stated = measure_image(
+            [left, below],
+            [left, right],
+            137.0,
+            kind=kind,
+            marking_error=marking,
+            calliper_error=calliper,  # type: ignore[arg-type]
+        )
+        assert values.std() == pytest.approx(stated.uncertainty, rel=0.01)
+
+
+def test_default_errors_are_those_of_the_published_values(shown: Picture) -> None:
+    found = calibrate_marking_error(shown, ACTUAL_DISTANCE)
+    assert found.marking_error == pytest.approx(MARKING_ERROR, abs=0.05)
+    assert found.low < found.marking_error < found.high
+    assert (found.low, found.high) == (pytest.approx(2.8, abs=0.05), pytest.approx(11.1, abs=0.05))
+    # The scatter they produce is the published one.
+    values = marked_distances(shown, 100_000, marking_error=MARKING_ERROR, calliper_error=CALLIPER_ERROR, seed=1)
+    published = np.sqrt(np.mean((np.array(IMAGE_DISTANCES) - ACTUAL_DISTANCE) ** 2))
+    assert np.sqrt(np.mean((values - shown.distance) ** 2)) == pytest.approx(published, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("scale", "line", "jumper"), [(2.0, "LJ-630", "LJ-120"), (3.3, "LJ-500", "LJ-500"), (6.0, "LJ-240", "LJ-400")]
+)
+def test_found_end_points_are_the_drawn_ones(scale: float, line: str, jumper: str) -> None:
+    closed = assemble(load_clamp(line=line, jumper=jumper), Cas())
+    for seed in range(2):
+        drawn = picture(closed, scale, seed=seed)
+        error = find_end_points(drawn.image) - drawn.end_points
+        assert np.abs(error).max() < 0.15
+        assert error.std() < 2.0 * FITTING_ERROR
+
+
+def test_picture_has_the_parts_where_they_are(shown: Picture, run: Run) -> None:
+    """Area of the wire in pixels, and the edge of P1 where half a pixel's light says it is."""
+    sharp = picture(run, 8.0, blur=0.0, grain=0.0).image.astype(float)
+    wire = (np.abs(sharp - PAINT["P7"]).sum(-1) < 6.0).sum() / 64.0
+    r = run.clamp.jumper.radius
+    assert math.pi * (r - 0.2) ** 2 < wire < math.pi * r**2
+    left, right, _ = picture(run, 8.0, blur=0.0, grain=0.0).end_points
+    row = sharp[round(left[1]) - 40, :, 0]
+    inked = (row - BACKGROUND[0]) / (PAINT["P1"][0] - BACKGROUND[0])
+    assert inked.sum() == pytest.approx(right[0] - left[0], abs=0.02)
+
+
+def test_study(run: Run) -> None:
+    study = image_study(run, count=20_000, seed=7)
+    assert np.array_equal(study.trials, image_study(run, count=20_000, seed=7).trials)
+    assert study.trials.shape == (5,)
+    assert study.trials == pytest.approx(study.exact + study.errors[:5])
+    assert study.median_error == pytest.approx(0.6745 * study.rms_error, rel=0.03)  # normal errors
+    assert study.worst_error >= study.rms_error
+    assert abs(study.automatic.distance - run.distance) < 4.0 * study.automatic.uncertainty
+    assert study.automatic.uncertainty < 0.03
+    straight = image_study(run, count=20_000, kind="straight")
+    assert straight.errors.mean() == pytest.approx(0.684, abs=0.1)
+
+
+def test_snapping_finds_the_corner(shown: Picture) -> None:
+    rng = np.random.default_rng(5)
+    marks = shown.end_points + rng.uniform(-4.0, 4.0, (3, 2))
+    assert np.abs(snap_marks(shown.image, marks, 10.0) - shown.end_points).max() < 0.3
+    with pytest.raises(InputError, match="no corner within 5 px"):
+        snap_marks(shown.image, np.array([[10.0, 10.0]]), 5.0)
+
+
+def test_bad_values() -> None:
+    good = [(0.0, 0.0), (3.0, 4.0)]
+    for arguments, message in (
+        (([(0, 0)], good, 1.0), "points must have shape"),
+        (([(0, 0), (0, math.nan)], good, 1.0), "points must be finite"),
+        ((good, [(1, 1), (1.5, 1)], 1.0), "reference must be two marks at least 1 px apart"),
+        ((good, good, 0.0), "reference_mm must be finite and > 0, got 0.0"),
+        ((good, "ab", 1.0), "reference must be an array of numbers"),
+    ):
+        with pytest.raises(InputError, match=message):
+            measure_image(*arguments)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="marking_error"):
+        measure_image(good, good, 1.0, marking_error=-1.0)
+    with pytest.raises(InputError, match="no region of the colour of P1"):
+        find_end_points(np.full((50, 50, 3), 236, dtype=np.uint8))
+
+
+class TestCommand:
+    """``clamp3d measure-image`` on a photograph of the user's own."""
+
+    def photograph(self, shown: Picture, folder: Path) -> tuple[Path, list[str]]:
+        file = folder / "clamp.png"
+        Image.fromarray(shown.image).save(file)
+        left, right, below = ((f"{x:.3f},{y:.3f}") for x, y in shown.end_points)
+        return file, ["--points", f"{left} {below}", "--reference", f"{left} {right}", "--scale", "137"]
+
+    def test_measures(self, shown: Picture, tmp_path: Path) -> None:
+        file, options = self.photograph(shown, tmp_path)
+        out = tmp_path / "out.json"
+        result = CliRunner().invoke(command, [str(file), *options, "--json", str(out)])
+        assert result.exit_code == 0, result.output
+        assert "31.530 mm +- 1.597 mm" in result.stdout
+        data = json.loads(out.read_text())
+        assert data["distance"] == pytest.approx(shown.distance, abs=1e-3)
+        assert data["kind"] == "height"
+
+    def test_snaps_rough_marks(self, shown: Picture, tmp_path: Path) -> None:
+        file, options = self.photograph(shown, tmp_path)
+        rough = [o.replace(".", ".5", 1) if "," in o else o for o in options]
+        result = CliRunner().invoke(command, [str(file), *rough, "--snap", "8"])
+        assert result.exit_code == 0, result.output
+        value = float(result.stdout.split()[1])
+        assert value == pytest.approx(shown.distance, abs=0.08)
+
+    def test_photographs_are_read_as_a_viewer_shows_them(self, tmp_path: Path) -> None:
+        exif = Image.Exif()
+        exif[0x0112] = 6  # the camera was held upright
+        Image.new("RGB", (40, 20)).save(tmp_path / "p.jpg", exif=exif)
+        assert load_image(tmp_path / "p.jpg").shape == (40, 20, 3)
+
+    def test_bad_input_is_one_line(self, shown: Picture, tmp_path: Path) -> None:
+        file, options = self.photograph(shown, tmp_path)
+        (tmp_path / "text.png").write_text("not a picture")
+        cases = [
+            ([str(tmp_path / "none.png"), *options], "No such file"),
+            ([str(tmp_path / "text.png"), *options], "not a picture"),
+            ([str(file), *options[:1], "1,2 3", *options[2:]], "--points must be two positions"),
+            ([str(file), *options[:1], "1,2 30,99999", *options[2:]], "must lie in the picture, which is 637 x 754 px"),
+        ]
+        for arguments, message in cases:
+            result = CliRunner().invoke(command, arguments)
+            assert result.exit_code != 0
+            said = result.output + str(result.exception)
+            assert message in said
+            assert "Traceback" not in result.output

@@ -1,0 +1,85 @@
+"""More than one place of rest: each found, proven, told to the user; known cases in closed form."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from clamp3d import Cas, assemble, equilibria, load_clamp
+from clamp3d.bench.stress.assemblies.clamps import clamp_of
+from clamp3d.clamp.equilibria import describe, slipping
+from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
+from clamp3d.clamp.section import Section
+from clamp3d.cli import group
+from clamp3d.output.run_report import run_to_dict, run_to_text
+
+
+def clamp_with(radius, wire, half_angle=math.pi / 3):
+    """Four grooves and both wires alike, symmetric about the bolt."""
+    clamp = clamp_of(radius, half_angle, 45.0, 2.0 * wire)
+    assert clamp is not None
+    return clamp
+
+
+def test_oversize_wires_rest_on_all_lips():
+    # On two lips 2 s = 2 * 15 sin 60 deg apart, above and below: its centre is sqrt(18^2 - s^2) off each face.
+    clamp = clamp_with(15.0, 18.0)
+    s = 15.0 * math.sin(math.pi / 3)
+    off = math.sqrt(18.0**2 - s**2)
+    expected = clamp.up_splint.thickness - clamp.down_splint.face_depth + 2.0 * off
+    states = equilibria(Section(clamp, Cas()))
+    assert states[0].q[4] == pytest.approx(expected, abs=1e-9)
+    assert states[0].q[5] == pytest.approx(0.0, abs=1e-9)
+    assert describe(states[0]) == (
+        "power line on a lip of the up splint and the down splint, jumper on a lip of the up splint and the down splint"
+    )
+    assert not slipping(states[0])
+
+
+def test_a_symmetric_clamp_has_its_equilibria_in_mirrored_pairs():
+    states = equilibria(Section(clamp_with(15.0, 18.0), Cas()))
+    found = sorted((round(float(s.q[4]), 6), round(float(s.q[5]), 6) + 0.0) for s in states)
+    assert sorted((d, -tilt + 0.0) for d, tilt in found) == found
+    assert len({tilt for _, tilt in found}) > 1
+
+
+def test_every_equilibrium_is_proven_and_holds_when_closed_again():
+    section = Section(load_clamp(line="LJ-500", jumper="LJ-400"), Cas())
+    for state in equilibria(section):
+        assert max(state.violation, state.optimality) <= TOLERANCE
+        assert section.gaps(state.q).value.min() >= -TOLERANCE
+        opened = state.q + 1e-3 * np.array([0.0, 0.5, 0.0, 0.5, 1.0, 0.0])
+        if section.gaps(opened).value.min() >= 0.0:
+            assert solve_final_state(section, opened, 1e-4).q[4:] == pytest.approx(state.q[4:], abs=1e-8)
+
+
+def test_a_run_tells_the_others_when_asked():
+    run = assemble(clamp_with(15.0, 18.0), Cas(), others=True)
+    assert assemble(clamp_with(15.0, 18.0), Cas()).others is None
+    assert run.others
+    assert all(abs(e.closing - run.closing) > 1e-6 or abs(e.tilt - run.tilt) > 1e-6 for e in run.others)
+    text = run_to_text(run)
+    for e in run.others:
+        words = "another equilibrium:" if e.rests else "put together otherwise it ends at"
+        assert f"{words} {e.distance:.3f} mm" in text
+        assert e.rests == ("slips" not in e.detail)
+    assert len(run_to_dict(run)["other_ends"]) == len(run.others)
+
+
+def test_command_line_tells_them_unless_told_not_to(tmp_path):
+    out = tmp_path / "run.json"
+    asked = CliRunner().invoke(group, ["run", "--quiet", "--json", str(out)])
+    assert asked.exit_code == 0
+    assert (
+        "put together otherwise it ends at 34.050 mm, tilt 12.80 deg: power line slips out of its groove"
+        in asked.output
+    )
+    ends = json.loads(out.read_text())["other_ends"]
+    assert [round(e["distance_mm"], 3) for e in ends] == [34.05, 30.499, 34.033]
+    plain = CliRunner().invoke(group, ["run", "--quiet", "--no-equilibria"])
+    assert "otherwise" not in plain.output
+    refused = CliRunner().invoke(group, ["run", "--quiet", "--solver", "stepped", "--equilibria"])
+    assert refused.exit_code == 2
+    assert "--equilibria goes with --solver exact, not stepped" in refused.output

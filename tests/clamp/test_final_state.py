@@ -1,0 +1,178 @@
+"""The final state against the published figures and the independently computed distances of the reconstruction."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.baselines.chords import Chords
+from clamp3d.bench import published
+from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
+from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble
+from clamp3d.clamp.conductors import catalogue
+from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.section import Section
+from clamp3d.clamp.stepped import solve_stepped
+from clamp3d.errors import InputError, SolverError
+
+# Reference clamp, exact distances with each arc replaced by chords; computed independently to +-0.002 mm.
+EXACT_CHORDS = {1.0: 31.5314, 5.0: 31.564, 10.0: 31.660, 20.0: 32.080, 40.0: 32.647}
+
+
+@pytest.fixture(scope="module")
+def clamp():
+    return load_clamp("reference")
+
+
+def test_published_poses_to_every_printed_digit(clamp):
+    run = assemble(clamp, Cas())
+    for part, (x, y, angle_deg) in published.FINAL_STATE.items():
+        pose = run.poses[part]
+        assert round(pose.x, 3) == x, part
+        assert round(pose.y, 3) == y, part
+        assert math.degrees(pose.angle) == pytest.approx(angle_deg, abs=0.01), part
+    assert round(run.distance, 3) == published.CAS_DISTANCE
+    assert run.status == "clamped"
+    assert not run.undeclared
+    assert all(seat.seated for seat in run.seats)
+    assert run.violation is not None
+    assert run.violation < 1e-9
+    assert run.optimality is not None
+    assert run.optimality < 1e-9
+    assert run.work.meshes_built == 0
+
+
+def test_any_open_start_ends_in_the_same_state(clamp):
+    section = Section(clamp, Cas())
+    known = solve_final_state(section).q
+    rng = np.random.default_rng(20)
+    limit = clamp.down_splint.max_tilt
+    for _ in range(100):
+        start = section.open_state(section.open_distance() + rng.uniform(0.0, 60.0), rng.uniform(-limit, limit))
+        start[:4] += rng.uniform(-5.0, 5.0, 4)
+        assert section.gaps(start).value.min() > 0.0
+        assert solve_final_state(section, start).q == pytest.approx(known, abs=1e-9)
+
+
+def test_wires_lie_in_line_with_the_two_arc_centres_that_hold_them(clamp):
+    # Without friction this is the condition of equilibrium from which the reconstruction was derived.
+    section = Section(clamp, Cas())
+    q = solve_final_state(section).q
+    pose = section.down_splint(q)
+    for i, wire in enumerate(("P6", "P7")):
+        up, down = section.pairs["P1", wire].T_a_groove, section.pairs["P2", wire].T_a_groove
+        first = np.array([up[0, 3], -up[2, 3]])
+        second = np.array(pose.point(down[0, 3], -down[2, 3]))
+        centre = q[2 * i : 2 * i + 2]
+        (ax, ay), (bx, by) = second - first, centre - first
+        assert ax * by - ay * bx == pytest.approx(0.0, abs=1e-8)
+        radius = section.pairs["P1", wire].groove.radius - section.pairs["P1", wire].cylinder.radius
+        assert np.linalg.norm(centre - first) == pytest.approx(radius, abs=1e-9)
+
+
+@pytest.mark.parametrize("unit", EXACT_CHORDS)
+def test_exact_distance_with_chords(clamp, unit):
+    section = Section(clamp, Chords(math.radians(unit)))
+    assert section.splint_distance(solve_final_state(section).q) == pytest.approx(EXACT_CHORDS[unit], abs=0.002)
+
+
+@pytest.mark.parametrize("unit", [None, *published.CHORD_DISTANCES])
+def test_stepped_distance_is_table_4(clamp, unit):
+    section = Section(clamp, Cas() if unit is None else Chords(math.radians(unit)))
+    found = solve_stepped(section, step=STEP, tilt_step=TILT_STEP)
+    expected = published.CAS_DISTANCE if unit is None else published.CHORD_DISTANCES[unit]
+    assert section.splint_distance(found.q) == pytest.approx(expected, abs=0.002)
+    assert math.degrees(section.down_splint(found.q).angle) == pytest.approx(12.0)
+    assert found.motion_steps > 0
+    assert section.queries.contact > found.motion_steps
+
+
+def test_gradients_agree_with_differences(clamp):
+    rng = np.random.default_rng(3)
+    for model in (Cas(), Chords(math.radians(7.0))):
+        section = Section(clamp, model)
+        for _ in range(20):
+            q = section.open_state(26.0, 0.05) + rng.normal(size=6)
+            gaps = section.gaps(q)
+            h = 1e-6
+            numeric = [(section.gaps(q + h * e).value - section.gaps(q - h * e).value) / (2 * h) for e in np.eye(6)]
+            assert np.allclose(np.array(numeric).T, gaps.gradient, atol=1e-6)
+
+
+def test_pairs_of_conductors_end_in_a_stated_result():
+    # The thinnest, the thickest and a spread of others; the brute-force truth is a scan over tilts with chords off.
+    names = list(catalogue())[::6]
+    stated = set()
+    for line, jumper in itertools.product(names, names):
+        run = assemble(load_clamp(line=line, jumper=jumper), Cas())
+        assert run.violation <= TOLERANCE
+        assert run.optimality <= TOLERANCE
+        held = {(s.splint, s.wire) for s in run.seats if s.seated}
+        if run.status == "clamped":
+            assert len(held) == 4, (line, jumper)
+            assert not run.undeclared
+        else:
+            assert run.status.startswith("not clamped: ")
+            if "faces meet" in run.status:
+                assert any({c.a, c.b} == {"P1", "P2"} and abs(c.distance) < 1e-6 for c in run.contacts)
+                assert run.undeclared
+        stated.add(run.status.split(",")[0])
+    assert {"clamped", "not clamped: faces meet"} <= stated
+
+
+@pytest.mark.parametrize(("line", "jumper"), [("LJ-500", "LJ-150"), ("LGJ-240/40", "LGJ-95/15"), ("LJ-300", "LJ-400")])
+def test_no_closer_state_exists_by_brute_force(line, jumper):
+    # Arc against arc: a wire of radius r fits between two arcs of radius R iff their centres are <= 2 (R - r) apart.
+    clamp = load_clamp(line=line, jumper=jumper)
+    section = Section(clamp, Cas())
+    found = solve_final_state(section)
+    up, down = clamp.up_splint, clamp.down_splint
+
+    def least_d(tilt: float) -> float:
+        least = -math.inf
+        for side, wire, top, bottom in (
+            (-1, clamp.line, up.line_groove, down.line_groove),
+            (1, clamp.jumper, up.jumper_groove, down.jumper_groove),
+        ):
+            c, s = math.cos(tilt), math.sin(tilt)
+            u, v = side * bottom.offset, bottom.centre_depth
+            across = (u * c + v * s) - side * top.offset
+            reach = 2.0 * (top.radius - wire.radius)
+            # P2's arc centre stands above P1's: top.centre_depth - (d - u s + v c) <= sqrt(reach^2 - across^2)
+            least = max(least, top.centre_depth - math.sqrt(reach**2 - across**2) + u * s - v * c)
+        return least
+
+    scan = min(least_d(t) for t in np.linspace(-down.max_tilt, down.max_tilt, 20001))
+    assert found.q[4] == pytest.approx(scan, abs=2e-3)
+    assert found.q[4] <= scan + 1e-9
+
+
+def test_a_start_that_overlaps_is_refused(clamp):
+    section = Section(clamp, Cas())
+    with pytest.raises(InputError, match=r"P. and P. overlap by .* mm"):
+        solve_final_state(section, section.open_state(0.0))
+
+
+def test_steps_must_be_positive(clamp):
+    section = Section(clamp, Cas())
+    with pytest.raises(InputError, match="step must be > 0 mm, got 0"):
+        solve_stepped(section, step=0.0, tilt_step=TILT_STEP)
+    with pytest.raises(InputError, match="tilt step must be > 0 deg, got nan"):
+        solve_stepped(section, step=STEP, tilt_step=math.nan)
+
+
+def test_a_closing_that_would_take_for_ever_is_refused(monkeypatch):
+    monkeypatch.setattr("clamp3d.clamp.final_state._MOST_STRIDES", 2)
+    with pytest.raises(SolverError, match=r"closing takes more than 2 strides of .* the down splint's width"):
+        solve_final_state(Section(load_clamp(), Cas()))
+
+
+def test_a_loose_wire_in_a_sliver_is_put_down_without_overlap():
+    """The faces meet and leave the jumper 3e-7 mm of room between two arcs whose normals are nearly opposite."""
+    case = ASSEMBLIES["assembly: faces meet"].cases(17, 0).cases[16]
+    state = solve_final_state(Section(case.clamp, Cas()), case.start)
+    assert state.loose == ("P7",)
+    assert state.gaps.value.min() >= -1e-9

@@ -1,0 +1,116 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.screw import ScrewJoint
+from clamp3d.clamp.sensitivity import sensitivity
+from clamp3d.clamp.sequence import parse_sequence
+from clamp3d.errors import InputError, SolverError
+
+
+def test_the_papers_sequence():
+    steps = parse_sequence("P1|P2P3P4P5 → P7 -> P2 -> P5|P3P4")
+    assert [(s.part, s.followers) for s in steps] == [
+        ("P1", ("P2", "P3", "P4", "P5")),
+        ("P7", ()),
+        ("P2", ()),
+        ("P5", ("P3", "P4")),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "step 1"),
+        ("P1|P2P3P4P5 -> P8 -> P2 -> P5|P3P4", "unknown part 'P8'; available: P1, P2"),
+        ("P1|P2P2", "P2 is named twice"),
+        ("P1|P2P3P4P5 -> P2 -> P7 -> P5|P3P4", "got P2 where P7 is due"),
+        ("P1|P2P3P4P5 -> P7 -> P2", "4 steps"),
+        ("P1/P2", "must read like"),
+    ],
+)
+def test_a_sequence_that_closes_no_clamp_is_refused(text, message):
+    with pytest.raises(InputError, match=message):
+        parse_sequence(text)
+
+
+def test_a_third_of_a_millimetre_is_48_degrees_of_an_m20_nut():
+    joint = ScrewJoint(2.5)
+    assert math.degrees(joint.turn(1.0 / 3.0)) == pytest.approx(48.0)
+    assert joint.travel(joint.turn(7.25)) == pytest.approx(7.25, rel=1e-15)
+
+
+@pytest.mark.parametrize("pitch", [0.0, -2.5, math.nan, math.inf])
+def test_pitch_must_be_positive(pitch):
+    with pytest.raises(InputError, match="pitch must be > 0 mm"):
+        ScrewJoint(pitch)
+
+
+def test_every_step_ends_at_a_contact_that_is_declared():
+    run = assemble(load_clamp(), Cas())
+    by_step = {}
+    for event in run.events:
+        by_step.setdefault(event.step, []).append((event.a, event.b))
+    assert list(by_step) == ["P1|P2P3P4P5", "P7", "P2", "P5|P3P4"]
+    assert by_step["P1|P2P3P4P5"] == [("P1", "P6")]
+    assert by_step["P7"] == [("P1", "P7")]
+    assert {("P2", "P6"), ("P2", "P7")} <= set(by_step["P2"])
+    assert ("P2", "P3") in by_step["P5|P3P4"]
+    assert run.turns == pytest.approx((run.path[0].poses["P2"].y - run.path[0].poses["P1"].y - run.closing) / 2.5)
+
+
+def test_the_line_passes_between_the_open_splints():
+    run = assemble(load_clamp(), Cas())
+    come_in = [w.poses for w in run.path if w.step == "P1|P2P3P4P5"][:2]
+    radius = run.clamp.line.radius
+    for poses in come_in:
+        top = poses["P1"].y + run.clamp.up_splint.thickness
+        bottom = poses["P2"].y + run.clamp.down_splint.face_depth
+        assert top < -radius
+        assert bottom > radius
+    assert come_in[0]["P1"].x > radius
+    assert come_in[1]["P1"].x < 0.0
+
+
+def test_an_undeclared_meeting_is_reported():
+    run = assemble(load_clamp(line="LJ-16", jumper="LJ-16"), Cas())
+    assert [(u.a, u.b, u.declared, u.met_as) for u in run.undeclared] == [("P1", "P2", 0, 2)]
+    assert run.status == "not clamped: faces meet, P6 and P7 loose"
+    assert run.distance == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_matrix_with_a_missing_entry_is_reported():
+    clamp = load_clamp()
+    rows = {a: dict(row) for a, row in clamp.connections.items()}
+    del rows["P2"]["P7"]
+    run = assemble(replace(clamp, connections=rows), Cas())
+    assert [(u.a, u.b, u.declared, u.met_as) for u in run.undeclared] == [("P2", "P7", 0, 3)]
+
+
+def with_bolt(shank_length):
+    clamp = load_clamp()
+    return replace(clamp, bolt=replace(clamp.bolt, shank_length=shank_length))
+
+
+@pytest.mark.parametrize("lacking", [-0.01, 0.01, 30.0, 67.0])
+def test_a_bolt_that_does_not_fill_the_nut_does_not_clamp(lacking):
+    poses = assemble(load_clamp(), Cas()).poses
+    through = load_clamp().bolt.shank_length + poses["P4"].y - poses["P5"].y  # its end flush with the nut's free face
+    run = assemble(with_bolt(through - lacking), Cas())
+    if lacking < 0.0:
+        assert run.status == "clamped"
+    else:
+        assert run.status == f"not clamped: the bolt is {lacking:.4g} mm too short for the nut"
+    gaps = {(c.a, c.b): c.distance for c in run.contacts}
+    assert gaps["P4", "P5"] == pytest.approx(max(0.0, lacking - run.clamp.nut.height), abs=1e-9)
+    assert np.isfinite(list(gaps.values())).all()
+
+
+def test_a_bolt_that_is_too_short_has_no_tolerance():
+    with pytest.raises(SolverError, match=r"no sensitivity: not clamped: the bolt is 29\.99 mm too short"):
+        sensitivity(with_bolt(77.6))

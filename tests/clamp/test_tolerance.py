@@ -1,0 +1,126 @@
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp import tolerance as montecarlo
+from clamp3d.clamp.final_state import solve_final_state
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.section import Section
+from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, sensitivity, with_dimensions
+from clamp3d.clamp.tolerance import monte_carlo
+from clamp3d.errors import InputError
+
+
+def _distance(clamp, near):
+    section = Section(clamp, Cas())
+    start = section.open_state(near.q[4] + 0.5, near.q[5] / section.lever)
+    return section.splint_distance(solve_final_state(section, start).q)
+
+
+# Wires in the arcs, and a line too thick for its grooves: it rests on lips.
+@pytest.mark.parametrize(("line", "jumper"), [(None, None), ("48", "47.8")])
+def test_derivatives_are_the_solvers_differences(line, jumper):
+    clamp = load_clamp(line=line, jumper=jumper)
+    rows = {row.name: row for row in sensitivity(clamp)}
+    near = solve_final_state(Section(clamp, Cas()))
+    carrying = {f for f, force in zip(near.gaps.feature, near.force, strict=True) if force > 0.0}
+    assert any(f.startswith("lip") for f in carrying) == (line is not None)
+    h = 2e-3
+    for name in DIMENSIONS:
+        value = dimension(clamp, name)
+        wide, narrow = (
+            (
+                _distance(with_dimensions(clamp, {name: value + e}), near)
+                - _distance(with_dimensions(clamp, {name: value - e}), near)
+            )
+            / (2 * e)
+            for e in (h, h / 2)
+        )
+        derivative = rows[name].derivative if name in rows else 0.0
+        assert derivative == pytest.approx((4 * narrow - wide) / 3, rel=1e-5, abs=1e-8), name
+
+
+def test_samples_do_not_depend_on_where_they_run():
+    clamp = load_clamp()
+    alone = monte_carlo(clamp, n=52, seed=5)
+    assert monte_carlo(clamp, n=52, seed=5, processes=2).distance.tobytes() == alone.distance.tobytes()
+    assert monte_carlo(clamp, n=3, seed=5).distance.tolist() == alone.distance[:3].tolist()
+    assert monte_carlo(clamp, n=3, seed=6).distance.tolist() != alone.distance[:3].tolist()
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+    ) as cluster:
+        there = monte_carlo(clamp, n=52, seed=5, scheduler=cluster.scheduler_address)
+    assert there.distance.tobytes() == alone.distance.tobytes()
+    assert there.status == alone.status
+
+
+def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(montecarlo, "CHUNK", 4)
+    clamp, file = load_clamp(), tmp_path / "work"
+    whole = monte_carlo(clamp, n=10)
+
+    def stop(done, of):
+        if done >= 8:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        monte_carlo(clamp, n=10, resume=file, progress=stop)
+    file.write_bytes(file.read_bytes() + b"[2,[[31.")  # torn by a crash
+    solved = []
+    sample = montecarlo._sample
+    monkeypatch.setattr(montecarlo, "_sample", lambda spec, index: (solved.append(index), sample(spec, index))[1])
+    again = monte_carlo(clamp, n=10, resume=file)
+    assert solved == [8, 9]
+    assert again.distance.tobytes() == whole.distance.tobytes()
+    assert len([json.loads(line) for line in file.read_text().splitlines()]) == 4
+    with pytest.raises(InputError, match="other seed"):
+        monte_carlo(clamp, n=10, seed=1, resume=file)
+    other = tmp_path / "notes.txt"
+    other.write_text("dear diary")
+    with pytest.raises(InputError, match="not a file of finished work"):
+        monte_carlo(clamp, n=10, resume=other)
+    assert other.read_text() == "dear diary"
+
+
+def test_small_tolerances_scatter_as_the_derivatives_say():
+    clamp = load_clamp()
+    result = monte_carlo(clamp, n=20, tolerance=1e-3, wire_tolerance_percent=0.0)
+    rows = sensitivity(clamp)
+    for index, distance in enumerate(result.distance):
+        drawn = montecarlo.sample_dimensions(result.spec, index)
+        linear = sum(row.derivative * (drawn.get(row.name, row.value) - row.value) for row in rows)
+        assert distance - result.nominal == pytest.approx(linear, abs=1e-5)
+
+
+def test_what_does_not_clamp_is_counted_by_reason():
+    result = monte_carlo(load_clamp(line="48.5"), n=4)
+    assert result.nominal is None
+    assert sum(result.reasons().values()) == int(np.isnan(result.distance).sum()) == 4
+
+
+@pytest.mark.parametrize(
+    ("settings", "match"),
+    [
+        ({"n": 0}, "n must"),
+        ({"seed": -1}, "seed"),
+        ({"tolerance": float("nan")}, "tolerance"),
+        ({"wire_tolerance_percent": 80.0}, "wire tolerance"),
+        ({"distribution": "cauchy"}, "available: uniform, normal"),
+    ],
+)
+def test_bad_settings(settings, match):
+    with pytest.raises(InputError, match=match):
+        monte_carlo(load_clamp(), **settings)
+
+
+def test_an_address_without_a_scheduler_is_one_line():
+    pytest.importorskip("distributed")
+    line = [sys.executable, "-m", "clamp3d", "tolerance", "--n", "2", "--scheduler", "x"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "clamp3d: error: no Dask scheduler at 'x': missing port number in address 'x'\n"

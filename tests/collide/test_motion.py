@@ -1,0 +1,157 @@
+"""Motions in a scene against closed forms and dense sampling."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from clamp3d.collide.check import check
+from clamp3d.collide.motion import Motion
+from clamp3d.collide.scene import Scene
+from clamp3d.core import shapes
+from clamp3d.core.distance import signed_distances
+from clamp3d.core.pose import inverse, rotation, translation
+from clamp3d.core.primitives import Cylinder, SweptArc
+
+GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
+BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
+WIRE = shapes.cylinder(6.935, 80.0)
+
+
+def move(standing, moving, start, motion, **settings):
+    scene = Scene(**settings).add("still", standing).add("moving", moving, start)
+    return check(replace(scene, motions=(motion,))).motions
+
+
+def test_wire_into_the_groove_and_too_far():
+    row = move(BLOCK, WIRE, translation(0, 30, 0), Motion.translate("moving", (0, -30, 0)))[0]
+    assert row.verdict.value == "clear"
+    assert row.t == pytest.approx(1.0)
+    assert row.low <= 0.065 <= row.high + 1e-9
+    assert row.high - row.low < 0.003
+    row = move(BLOCK, WIRE, translation(0, 30, 0), Motion.translate("moving", (0, -31, 0)))[0]
+    assert row.verdict.value == "clash"
+    # Contact begins where the gap is down to the threshold of 0.01 mm.
+    assert row.contact_at == pytest.approx((30.0 + 0.055) / 31.0, abs=1e-5)
+
+
+@pytest.mark.parametrize(("aside", "verdict"), [(0.0, "clash"), (53.0, "clear"), (52.005, "contact")])
+def test_a_thin_plate_is_not_stepped_over(aside, verdict):
+    plate, pin = shapes.box((100, 100, 1)), shapes.cylinder(2, 5)
+    row = move(plate, pin, translation(aside, 0, 500), Motion.translate("moving", (0, 0, -1000)))[0]
+    assert row.verdict.value == verdict
+    if verdict != "clash":
+        assert row.low - 1e-6 <= aside - 52.0 <= row.high + 1e-6
+
+
+def test_pin_sliding_in_its_bore_keeps_its_clearance():
+    tube, pin = shapes.cylinder(9, 40, bore=5.1), shapes.cylinder(5, 60)
+    row = move(tube, pin, translation(0, 0, 120), Motion.translate("moving", (0, 0, -240)), clearance=0.05)[0]
+    assert row.verdict.value == "clear"
+    assert row.low <= 0.1 <= row.high + 1e-9
+    assert row.high - row.low < 0.005
+
+
+def test_turning_wire_against_dense_sampling():
+    start = translation(0, 1.5, 0)
+    motion = Motion.screw("moving", (1, 0, 0), math.radians(12.0), travel=2.0)
+    wire = shapes.cylinder(5.0, 80.0)
+    row = move(BLOCK, wire, start, motion)[0]
+    instants = np.linspace(0, 1, 20001)
+    poses = np.array([motion.at(t) @ start for t in instants])
+    gaps = signed_distances(GROOVE, Cylinder(5.0, 80.0), poses)
+    assert row.high <= gaps.min() + 1e-3 or row.verdict.value == "clash"
+    if row.contact_at is not None:
+        first = instants[np.argmax(gaps <= 0.01)]
+        assert row.contact_at == pytest.approx(first, abs=1e-3)
+
+
+def test_screw_to_a_pose_arrives_there():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        start, goal = (rotation(rng.normal(size=3), rng.uniform(0, 3)) for _ in range(2))
+        start[:3, 3], goal[:3, 3] = rng.normal(size=3) * 50, rng.normal(size=3) * 50
+        motion = Motion.to_pose("a", goal).from_pose(start)
+        np.testing.assert_allclose(motion.at(1.0) @ start, goal, atol=1e-9)
+        half = motion.at(0.5)
+        np.testing.assert_allclose(half @ half, motion.at(1.0), atol=1e-9)  # one and the same screw
+
+
+def test_motions_follow_one_another():
+    box, rod = shapes.box((10, 10, 10)), shapes.cylinder(1, 10)
+    scene = (
+        Scene(clearance=2.0)
+        .add("box", box)
+        .add("rod", rod, translation(30, 0, 0))
+        .add("tip", rod, translation(40, 0, 0))
+    )
+    up = Motion.translate(("rod", "tip"), (0, 20, 0), name="up")
+    over = Motion.translate(("rod", "tip"), (-60, 0, 0), name="over")
+    result = check(replace(scene, motions=(up, over)))
+    assert result.motions == ()  # passes 14 mm above the box
+    down = Motion.translate("rod", (0, -14.5, 0), name="down")
+    short = replace(over, travel=np.array([-30.0, 0, 0]))
+    result = check(replace(scene, motions=(up, short, down)))
+    assert [(r.motion, r.a, r.b, r.verdict.value) for r in result.motions] == [("down", "rod", "box", "clash")]
+    assert result.motions[0].contact_at == pytest.approx((14.0 - 0.01) / 14.5, abs=1e-4)
+
+
+def test_distance_along_a_way_is_bounded_for_polyhedra():
+    # A box turning past another one: its corner comes nearest at 45 degrees.
+    still, turning = shapes.box((10, 10, 10)), shapes.box((10, 10, 30))
+    gap = 0.3
+    start = translation(5 + 5 * math.sqrt(2) + gap, 0, 0)
+    motion = Motion.screw("moving", (0, 0, 1), math.pi / 2, point=start[:3, 3])
+    row = move(still, turning, start, motion, clearance=0.25)[0]
+    assert row.verdict.value == "clear"
+    assert row.low <= gap <= row.high + 1e-9
+    assert row.t == pytest.approx(0.5, abs=0.02)
+    assert inverse(motion.at(0.5)).shape == (4, 4)
+
+
+def test_no_instant_is_below_the_least_distance():
+    rng = np.random.default_rng(4)
+    pool = [
+        BLOCK,
+        shapes.cylinder(5, 40),
+        shapes.cylinder(8, 12, bore=4.2),
+        shapes.box((30, 12, 18)),
+        shapes.box((30, 25, 6), holes=[shapes.Hole(4.0, (3.0, 2.0))]),
+    ]
+    seen = set()
+    for _ in range(40):
+        still, moving = (pool[k] for k in rng.integers(len(pool), size=2))
+        start = rotation(rng.normal(size=3), rng.uniform(0, 6))
+        start[:3, 3] = rng.normal(size=3) * 18
+        motion = Motion.screw(
+            "moving",
+            rng.normal(size=3),
+            rng.choice([0.0, 0.3, 2.0]),
+            point=rng.normal(size=3) * 10,
+            travel=rng.normal() * 20,
+        )
+        rows = move(still, moving, start, motion, clearance=1.0)
+        scene = Scene(clearance=1.0).add("still", still).add("moving", moving, start)
+        instants = np.linspace(0, 1, 60)
+        found = []
+        for t in instants:
+            found += check(scene.moved({"moving": motion.at(t) @ start})).pairs
+        verdicts = {row.verdict.value for row in found}
+        if not rows:
+            assert verdicts <= {"clear"}
+            continue
+        row = rows[0]
+        seen.add(row.verdict.value)
+        for one in found:
+            assert row.low <= one.high + 1e-6
+        if verdicts & {"clash", "contained"}:
+            assert row.verdict.value == "clash"
+            first = next(t for t in instants if check(scene.moved({"moving": motion.at(t) @ start})).pairs
+                         and check(scene.moved({"moving": motion.at(t) @ start})).pairs[0].high < -0.01)  # fmt: skip
+            assert row.contact_at <= first + 1e-9
+        elif "clearance" in verdicts:
+            assert row.verdict.value != "clear"
+    assert seen >= {"clash", "clear"}

@@ -1,0 +1,249 @@
+"""Scenes: the clamp, broad phase, ladder against full model, allowed contacts, tables, pose sweeps."""
+
+from __future__ import annotations
+
+import importlib.machinery
+import importlib.util
+import itertools
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.parts import parts
+from clamp3d.collide.bounds import Verdict
+from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
+from clamp3d.collide.check import check, check_full
+from clamp3d.collide.model import Workshop
+from clamp3d.collide.motion import Motion
+from clamp3d.collide.scene import Scene
+from clamp3d.collide.sweep import sweep_poses
+from clamp3d.core import shapes
+from clamp3d.core.mesh import make_mesh
+from clamp3d.core.meshing import mesh
+from clamp3d.core.pose import rotation, translation
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def run():
+    return assemble(load_clamp(), Cas())
+
+
+@pytest.fixture(scope="module")
+def pack():
+    loader = importlib.machinery.SourceFileLoader("measure_scenes", str(ROOT / "scripts" / "measure-scenes"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    return module.pack
+
+
+def clamp_scene(run, **settings):
+    scene = Scene(**settings)
+    for name, part in parts(run.clamp).items():
+        scene = scene.add(name, part, run.T_world(name))
+    return scene
+
+
+TOUCHING = {
+    ("P1", "P5"),
+    ("P1", "P6"),
+    ("P1", "P7"),
+    ("P2", "P3"),
+    ("P2", "P6"),
+    ("P2", "P7"),
+    ("P3", "P4"),
+    ("P4", "P5"),
+}
+
+
+def test_closed_clamp(run):
+    scene = clamp_scene(run, clearance=0.5)
+    result = check(scene)
+    for a, b in itertools.combinations(run.poses, 2):
+        expected = Verdict.CONTACT if (a, b) in TOUCHING else Verdict.CLEAR
+        assert result.verdict(a, b) is expected, (a, b)
+    grooves = {(r.a, r.b): r for r in result.pairs}
+    for pair in (("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7"), ("P2", "P3")):
+        assert grooves[pair].method == "groove kernel"
+        assert abs(grooves[pair].distance) < 1e-6
+    full = check_full(scene, result)
+    assert full.work.triangles > result.work.triangles
+
+
+def test_clamp_from_meshes_read_back(run):
+    """Meshes with 0.05 mm chord error, fitted: the final state's contacts to within 0.01 mm and their stated bound."""
+    scene = Scene(clearance=0.5)
+    for name in ("P1", "P2", "P6", "P7"):
+        made = mesh(parts(run.clamp)[name], 0.05)
+        vertices = np.asarray(made.vertices, dtype=np.float32)  # what an STL keeps
+        shape = shapes.MeshShape(make_mesh(vertices, made.faces, float32=True), "round", name)
+        scene = scene.add(name, shape, run.T_world(name))
+    result = check(scene)
+    for pair in (("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7")):
+        assert result.verdict(*pair) is Verdict.CONTACT
+        row = next(r for r in result.pairs if (r.a, r.b) == pair)
+        assert row.method == "groove kernel"
+        assert row.low <= 0.0 <= row.high
+        assert row.high - row.low < 0.01
+    assert result.verdict("P1", "P2") is Verdict.CLEAR
+
+
+def test_ladder_equals_full_model_in_a_crowd(pack):
+    scene = pack(40, 5)
+    result = check(scene)
+    full = check_full(scene, result)  # raises at the first verdict that differs
+    assert len(full.pairs) == 40 * 39 // 2
+    assert set(result.counts) >= {"clear", "contact", "clearance"}
+    assert sum(result.counts.values()) == 780
+    assert result.work.triangles < full.work.triangles / 10
+    assert sum(result.work.queries.values()) < sum(full.work.queries.values()) / 10
+
+
+def test_a_thousand_parts_in_seconds(pack):
+    check(pack(10, 0))  # compiled kernel, imports
+    start = time.perf_counter()
+    result = check(pack(1000, 1))
+    assert time.perf_counter() - start < 10.0
+    assert sum(result.counts.values()) == 499500
+
+
+def test_full_model_refuses_a_verdict_that_differs():
+    from dataclasses import replace
+
+    from clamp3d.errors import SolverError
+
+    scene = Scene().add("a", shapes.box((10, 10, 10))).add("b", shapes.box((10, 10, 10)), translation(9, 0, 0))
+    result = check(scene)
+    wrong = replace(result, pairs=(replace(result.pairs[0], verdict=Verdict.CONTACT),))
+    with pytest.raises(SolverError, match=r"pair a:b: the ladder says contact, the full model clash"):
+        check_full(scene, wrong)
+
+
+def test_broad_phase_against_brute_force():
+    rng = np.random.default_rng(0)
+    n = 200
+    bounds = np.sort(rng.uniform(-20, 20, (n, 2, 3)) * rng.choice([0.1, 1.0, 3.0], (n, 1, 1)), axis=1)
+    T = np.array([rotation(rng.normal(size=3), rng.uniform(0, 6)) for _ in range(n)])
+    T[:, :3, 3] = rng.uniform(-150, 150, (n, 3))
+    boxes = Boxes.of(bounds, T)
+    corners = np.array(list(itertools.product((0, 1), repeat=3)))
+    world = np.array(
+        [np.where(corners == 0, b[0], b[1]) @ P[:3, :3].T + P[:3, 3] for b, P in zip(bounds, T, strict=True)]
+    )
+    low, high = world.min(axis=1), world.max(axis=1)
+    near = {
+        (i, j)
+        for i, j in itertools.combinations(range(n), 2)
+        if (np.maximum(low[i], low[j]) - np.minimum(high[i], high[j])).max() <= 2.0
+    }
+    assert {tuple(p) for p in near_pairs(boxes, 2.0).tolist()} == near
+
+
+def test_box_gaps_never_exceed_the_distance():
+    import manifold3d
+
+    rng = np.random.default_rng(1)
+    for _ in range(60):
+        size = rng.uniform(2, 20, (2, 3))
+        T = rotation(rng.normal(size=3), rng.uniform(0, 6))
+        T[:3, 3] = rng.normal(size=3) * 15
+        a, b = (manifold3d.Manifold.cube(tuple(s), True) for s in size)
+        true = a.min_gap(b.transform(np.ascontiguousarray(T[:3])), 100.0)
+        boxes = Boxes.of(np.array([[-s / 2, s / 2] for s in size]), np.array([np.eye(4), T]))
+        gap = box_gaps(boxes, np.array([[0, 1]]))[0]
+        assert gap <= true + 1e-9
+        if true > 0.0:
+            assert gap > 0.0  # the fifteen axes part any two boxes that are apart
+
+
+def test_allowed_contacts(run):
+    scene = clamp_scene(run).allow(("P1", "P6"), ("P*", "P5"))
+    result = check(scene)
+    assert result.verdict("P1", "P6") is Verdict.ALLOWED
+    assert result.verdict("P4", "P5") is Verdict.ALLOWED
+    assert result.verdict("P2", "P6") is Verdict.CONTACT
+    press = Scene().add("plate", shapes.box((40, 40, 8), holes=[shapes.Hole(5.0)])).add("pin", Cylinder(5.02, 20))
+    assert check(press).verdict("plate", "pin") is Verdict.CLASH
+    assert check(press.allow(("plate", "pin"))).verdict("plate", "pin") is Verdict.CLASH
+    assert check(press.allow(("plate", "pin"), overlap=0.03)).verdict("plate", "pin") is Verdict.ALLOWED
+    check_full(press.allow(("plate", "pin"), overlap=0.03), check(press.allow(("plate", "pin"), overlap=0.03)))
+
+
+def test_pairs_asked_for_only(run):
+    result = check(clamp_scene(run), pairs=[("P6", "P1"), ("P1", "P2")])
+    assert result.work.pairs == 2
+    assert [(r.a, r.b) for r in result.pairs] == [("P1", "P6")]
+    assert result.verdict("P1", "P2") is Verdict.CLEAR
+    with pytest.raises(InputError, match="pair P2:P6 was not checked"):
+        result.verdict("P2", "P6")
+    with pytest.raises(InputError, match=r"unknown part 'P9'; available: P1, P2"):
+        check(clamp_scene(run), pairs=[("P1", "P9")])
+
+
+def test_equal_shapes_share_one_model():
+    scene = Scene()
+    for k in range(20):
+        T = translation(11.0 * k, 0, 0) @ rotation([0, 0, 1], 0.1)
+        scene = scene.add(f"tube{k}", shapes.cylinder(6, 20, bore=4), T)
+    shop = Workshop()
+    result = check(scene, workshop=shop)
+    assert result.work.shapes == 1
+    assert result.counts == {"clash": 19, "clear": 171}
+
+
+def test_table_and_frame(run):
+    result = check(clamp_scene(run))
+    table = result.table()
+    assert {row["a"] for row in table} <= set(run.poses)
+    pandas = pytest.importorskip("pandas")
+    frame = result.frame()
+    assert isinstance(frame, pandas.DataFrame)
+    assert (frame.verdict == "contact").sum() == len(TOUCHING)
+
+
+def test_pose_sweep_equals_single_checks():
+    rng = np.random.default_rng(2)
+    block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 20.0)
+    scene = Scene(clearance=0.5).add("block", block).add("box", shapes.box((10, 10, 10)), translation(0, 20, 0))
+    scene = scene.add("wire", shapes.cylinder(6.5, 80.0))
+    poses = np.array([rotation(rng.normal(size=3), rng.normal() * 0.05) for _ in range(60)])
+    poses[:, :3, 3] = rng.normal(size=(60, 3)) * [2.0, 4.0, 5.0]
+    sweep = sweep_poses(scene, "wire", poses)
+    assert sweep.others == ("block", "box")
+    for k, T in enumerate(poses):
+        one = check(scene.moved({"wire": T}))
+        assert [one.verdict("wire", name).value for name in sweep.others] == sweep.verdict[k].tolist()
+    assert set(sweep.verdict.ravel()) >= {"clash", "clear", "clearance"}
+    with pytest.raises(InputError, match=r"poses\[1\] must be rigid"):
+        sweep_poses(scene, "wire", np.array([np.eye(4), np.diag([1, 1, -1.0, 1])]))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Scene().add("a:b", shapes.box((1, 1, 1))), "part name must not"),
+        (lambda: Scene().add("a", shapes.box((1, 1, 1))).add("a", shapes.box((1, 1, 1))), "'a' is there twice"),
+        (lambda: Scene().add("a", SweptArc(7, 1, 50)), "make a part of it with groove_block"),
+        (lambda: Scene().add("a", shapes.box((1, 1, 1)), np.eye(3)), r"pose of a must have shape \(4, 4\)"),
+        (lambda: shapes.box((1, -1, 1)), "size must be a finite length > 0 mm, got -1"),
+        (lambda: shapes.cylinder(5, 10, bore=6), "bore must be between 0 and radius = 5 mm, got 6"),
+        (lambda: shapes.groove_block(SweptArc(7, 1, 50), 10, 20), "width must be > 11.78"),
+        (lambda: shapes.groove_block(SweptArc(7, 1, 50), 40, 2), "height must be > 3.2"),
+        (lambda: Scene(clearance=0.001), "clearance must be 0 or > contact = 0.01 mm"),
+        (lambda: Motion.screw("pin", (0, 0, 1), 1.0, point=(0, 1e18, 0)), "point must be three lengths up to 1e"),
+        (lambda: Scene().add("a", shapes.box((1, 1, 1)), translation(0, 0, 2e9)), "offset of pose of a must be three"),
+        (lambda: Scene().allow(("a", "b")), "allowed: unknown part 'a'; available: none"),
+    ],
+)
+def test_bad_input(make, message):
+    with pytest.raises(InputError, match=message):
+        make()

@@ -1,0 +1,146 @@
+import math
+
+import numpy as np
+from hypothesis import given, settings
+from scipy.optimize import minimize
+
+from clamp3d.core.distance import Feature, signed_distance
+from clamp3d.core.pieces import groove_pieces
+from clamp3d.core.pose import rotation, translation
+from clamp3d.core.primitives import Cylinder, SweptArc
+from tests.core.oracle import load, surface_distance
+from tests.core.test_distance import scenes
+
+CASES = load()
+
+
+def test_least_piece_is_the_signed_distance():
+    outside = 0
+    for case in CASES:
+        a = signed_distance(case.groove, case.cylinder, case.pose)
+        p = groove_pieces(case.groove, case.cylinder, case.pose)
+        if a.axis_inside:
+            assert p.distance.min() <= a.distance + 1e-11 * case.size
+        else:
+            outside += 1
+            assert abs(p.distance.min() - a.distance) <= 1e-13 * case.size
+            assert surface_distance(case.groove, p.point_on_groove).max() <= 1e-12 * case.size
+    assert outside > 500
+
+
+@settings(max_examples=150, deadline=None)
+@given(scenes)
+def test_each_piece_is_the_distance_from_its_own_surface(scene):
+    groove, wire, T = scene
+    if signed_distance(groove, wire, T).axis_inside:
+        return
+    # Dense samples of the arc surface and of a part of the flat faces.
+    R, half, H = groove.radius, groove.half_angle, groove.length / 2
+    s, h = R * math.sin(half), -R * math.cos(half)
+    z = np.linspace(-H, H, 61)
+    phi = np.linspace(-half, half, 241)
+    arc = [np.array([R * np.sin(phi), -R * np.cos(phi)])]
+    out = s + np.geomspace(1e-3, 300.0, 240) - 1e-3
+    flats = [np.array([-out, np.full(240, h)]), np.array([out, np.full(240, h)])]
+    d = T[:3, 2] / np.linalg.norm(T[:3, 2])
+    pieces = groove_pieces(groove, wire, T)
+    for row, section in enumerate(arc + flats):
+        P = np.column_stack([np.repeat(section.T, len(z), axis=0), np.tile(z, section.shape[1])]) - T[:3, 3]
+        t = np.clip(P @ d, -wire.length / 2, wire.length / 2)
+        sampled = np.linalg.norm(P - t[:, None] * d, axis=1).min() - wire.radius
+        spacing = math.hypot(groove.length / 120, R * half / 240 if row == 0 else 9.0)
+        assert pieces.distance[row] <= sampled + 1e-10
+        assert pieces.distance[row] >= sampled - spacing
+
+
+def test_parallel_wire_gaps_are_continuous_with_their_gradients():
+    rng = np.random.default_rng(1)
+    wire = Cylinder(5.0, 100.0)
+    step = 1e-6
+    for _ in range(3000):
+        groove = SweptArc(12.0, rng.uniform(0.2, 3.0), 60.0)
+        x = rng.normal(size=2) * 14.0
+        s, h = 12.0 * math.sin(groove.half_angle), -12.0 * math.cos(groove.half_angle)
+        if min(math.hypot(x[0] - s, x[1] - h), math.hypot(x[0] + s, x[1] - h), math.hypot(*x), abs(x[0])) < 0.1:
+            continue  # on a medial axis of a piece, or on a lip
+        v = rng.normal(size=2)
+        v /= np.linalg.norm(v)
+        rows = slice(0, 3)
+        at = [groove_pieces(groove, wire, translation(*(x + k * step * v), 0.0)) for k in (-1, 0, 1)]
+        assert np.abs(at[2].distance - at[0].distance).max() < 30 * step
+        rate = at[1].gradient[rows, :2] @ v
+        change = (at[2].distance - at[0].distance)[rows] / (2 * step)
+        assert np.abs(change - rate).max() < 1e-3, (groove, x)
+
+
+def test_axis_inside_has_a_negative_gap_that_leads_out():
+    wire = Cylinder(5.0, 100.0)
+    rng = np.random.default_rng(2)
+    for _ in range(500):
+        groove = SweptArc(12.0, rng.uniform(0.3, 2.8), 60.0)
+        x, y = rng.normal(size=2) * 12.0
+        a = signed_distance(groove, wire, translation(x, y, 0.0))
+        if not a.axis_inside:
+            continue
+        p = groove_pieces(groove, wire, translation(x, y, 0.0))
+        assert p.distance[:3].min() <= a.distance + 1e-12
+        # An optimiser that follows the gaps comes out.
+        found = minimize(
+            lambda q, x, y: (q[0] - x) ** 2 + (q[1] - y) ** 2,
+            [x, y],
+            args=(x, y),
+            jac=lambda q, x, y: 2 * (q - (x, y)),
+            constraints={
+                "type": "ineq",
+                "fun": lambda q, groove: groove_pieces(groove, wire, translation(*q, 0.0)).distance[:3],
+                "jac": lambda q, groove: groove_pieces(groove, wire, translation(*q, 0.0)).gradient[:3, :2],
+                "args": (groove,),
+            },
+            method="SLSQP",
+            options={"maxiter": 200},
+        )
+        assert signed_distance(groove, wire, translation(*found.x, 0.0)).distance > -1e-6, (groove, x, y)
+
+
+def test_thick_wire_rests_on_both_lips():
+    groove, wire = SweptArc(12.0, 1.0, 50.0), Cylinder(14.0, 80.0)
+    s, h = 12.0 * math.sin(1.0), -12.0 * math.cos(1.0)
+    p = groove_pieces(groove, wire, translation(0.0, h + math.sqrt(14.0**2 - s * s), 0.0))
+    assert np.abs(p.distance[:3]).max() < 1e-14
+    assert [Feature(f) for f in p.feature[1:3]] == [Feature.LIP_M, Feature.LIP_N]
+    assert np.allclose(p.point_on_groove[1:3, :2], [[-s, h], [s, h]], atol=1e-14)
+    assert np.allclose(p.normal[1], [s / 14.0, math.sqrt(1 - (s / 14.0) ** 2), 0.0])
+
+
+def test_gradients_of_tilted_pieces():
+    rng = np.random.default_rng(3)
+    checked = 0
+    for _ in range(400):
+        groove, wire = SweptArc(12.0, rng.uniform(0.3, 2.8), 50.0), Cylinder(8.0, rng.choice([5.0, 40.0, 120.0]))
+        T = rotation(rng.normal(size=3), rng.choice([1e-3, 0.1, 1.0]))
+        T[:3, 3] = rng.normal(size=3) * [8.0, 8.0, 20.0]
+        if signed_distance(groove, wire, T).axis_inside:
+            continue
+        v = rng.normal(size=6) * [1, 1, 1, 0.05, 0.05, 0.05]
+
+        def moved(s, T=T, v=v, groove=groove, wire=wire):
+            M = rotation(v[3:], s * np.linalg.norm(v[3:]))
+            M[:3, 3] = s * v[:3]
+            return groove_pieces(groove, wire, M @ T).distance
+
+        back, here, ahead = moved(-1e-6), moved(0.0), moved(1e-6)
+        smooth = np.abs(ahead - 2 * here + back) < 1e-9
+        error = np.abs((ahead - back) / 2e-6 - groove_pieces(groove, wire, T).gradient @ v)
+        assert error[smooth].max(initial=0.0) < 1e-4
+        checked += smooth.sum()
+    assert checked > 1000
+
+
+def test_an_axis_that_ends_in_the_plane_of_an_end_face_is_outside():
+    groove, wire = SweptArc(1.0, 1.0, 1.0), Cylinder(1.0, 1.0)
+    T = translation(0.0, -2.0, 1.0)
+    assert not signed_distance(groove, wire, T).axis_inside
+    gaps = groove_pieces(groove, wire, T).distance
+    lip = math.hypot(math.sin(1.0), 2.0 - math.cos(1.0)) - 1.0  # the face's nearest point, from (0, -2)
+    assert np.allclose(gaps[:3], [0.0, lip, lip], atol=1e-12)
+    assert abs(gaps.min() + 1.0) < 1e-12

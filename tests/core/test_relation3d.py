@@ -1,0 +1,111 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from clamp3d.core.arc_circle import ArcRelation, arc_circle
+from clamp3d.core.pose import rotation, translation
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.relation3d import Relation3D, groove_relation, relative_pose
+from clamp3d.errors import InputError
+from tests.core.test_distance import scenes
+
+GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
+S, H = 7.0 * math.sin(GROOVE.half_angle), -7.0 * math.cos(GROOVE.half_angle)
+TILT = rotation((1, 0, 0), 0.01)
+
+
+@pytest.mark.parametrize(
+    ("radius", "T", "wanted"),
+    [
+        (3.0, translation(0.0, -2.0, 0.0), "inside"),
+        (3.0, translation(0.0, -2.0, 0.0) @ TILT, "inside"),
+        (3.0, translation(0.0, 0.0, 0.0), "outside"),
+        (3.0, translation(0.0, -2.0, 70.0), "outside"),
+        (3.0, translation(0.0, -4.0, 0.0), "interior contact"),
+        (3.0, translation(0.0, -4.1, 0.0), "intersect"),
+        (3.0, translation(0.0, -5.0, 0.0) @ TILT, "intersect"),
+        (3.0, translation(S + 5.0, H + 3.0, 0.0), "exterior contact"),
+        (3.0, translation(S - 3.0 * math.sin(1.0), H + 3.0 * math.cos(1.0), 0.0), "interior contact"),
+        (3.0, translation(0.0, -12.0, 68.0), "exterior contact"),
+        (9.0, translation(0.0, H + math.sqrt(81.0 - S * S), 0.0), "interior contact"),
+        (3.0, translation(0.0, H + 2.9, 0.0), "inside"),
+        (3.0, translation(0.0, H + 3.1, 0.0), "outside"),
+        (0.5, translation(0.0, -3.0, 0.0) @ rotation((0, 1, 0), math.pi / 2), "outside"),
+    ],
+)
+def test_table_3_in_any_pose(radius, T, wanted):
+    length = 4.0 if wanted == "outside" and radius == 0.5 else 80.0
+    assert groove_relation(GROOVE, Cylinder(radius, length), T, tolerance=1e-9).relation.value == wanted
+
+
+def test_lip_of_a_major_arc_is_touched_from_both_sides():
+    groove = SweptArc(7.0, math.radians(120.0), 50.0)
+    lip = np.array([7.0 * math.sin(groove.half_angle), -7.0 * math.cos(groove.half_angle)])
+    # Fig. 6: exterior if the centre is on the far side of the perpendicular to OM at M. That is 30 deg off the face's
+    # normal here.
+    for angle, wanted in (
+        (0.2, "exterior contact"),
+        (math.radians(29.9), "exterior contact"),
+        (0.6, "interior contact"),
+    ):
+        T = translation(lip[0] - 3.0 * math.sin(angle), lip[1] + 3.0 * math.cos(angle), 0.0)
+        assert groove_relation(groove, Cylinder(3.0, 80.0), T, tolerance=1e-9).relation.value == wanted
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.floats(0.2, 2.9), st.floats(0.5, 11.9), st.floats(-20.0, 20.0), st.floats(-20.0, 20.0))
+def test_parallel_wire_agrees_with_the_plane_relation(half, r, x, y):
+    # Only outside the material: the arc of the plane relation is a curve, without material behind it.
+    groove, wire = SweptArc(12.0, half, 50.0), Cylinder(r, 80.0)
+    answer = groove_relation(groove, wire, translation(x, y, 0.0), tolerance=1e-9)
+    plane = arc_circle(12.0, half, r, x, y, tolerance=1e-9)
+    if answer.contact.feature.name not in ("ARC", "LIP_M", "LIP_N") or answer.contact.axis_inside:
+        return
+    assert abs(answer.contact.distance - plane.gap) < 1e-12
+    if plane.relation is ArcRelation.INSIDE or (
+        plane.relation is ArcRelation.OUTSIDE and y >= 0.0 > -12 * math.cos(half)
+    ):
+        # a circle that covers the region of the chord only partly may reach under a flat face: then it intersects
+        assert answer.relation.value == plane.relation.value
+
+
+def test_uncertain_where_the_tolerance_is_below_the_error_bound():
+    T = translation(0.0, -4.0, 0.0) @ rotation((0, 0, 1), 0.3)
+    wire = Cylinder(3.0, 80.0)
+    assert groove_relation(GROOVE, wire, T, tolerance=0.0).relation is Relation3D.UNCERTAIN
+    assert groove_relation(GROOVE, wire, T, tolerance=1e-13).relation is Relation3D.INTERIOR_CONTACT
+    assert groove_relation(GROOVE, wire, translation(0, -2, 0), tolerance=0.0).relation is Relation3D.INSIDE
+    for tolerance in (-1.0, 3.0, math.nan):
+        with pytest.raises(InputError, match="tolerance must be >= 0 mm and less than both radii"):
+            groove_relation(GROOVE, wire, T, tolerance=tolerance)
+
+
+@settings(max_examples=150, deadline=None)
+@given(scenes)
+def test_inside_means_a_common_point_with_the_hollow(scene):
+    groove, wire, T = scene
+    tolerance = 1e-9 * min(groove.radius, wire.radius)
+    relation = groove_relation(groove, wire, T, tolerance=tolerance).relation
+    if relation not in (Relation3D.INSIDE, Relation3D.OUTSIDE):
+        return
+    h, half = -groove.radius * math.cos(groove.half_angle), groove.length / 2
+    t = np.linspace(-0.5, 0.5, 2001) * wire.length
+    P = T[:3, 3] + t[:, None] * T[:3, 2]
+    gap = np.hypot(np.maximum(P[:, 1] - h, 0.0), np.maximum(np.abs(P[:, 2]) - half, 0.0)).min() - wire.radius
+    if gap < -1e-9:
+        assert relation is Relation3D.INSIDE
+    elif gap > wire.length / 4000 + 1e-9:
+        assert relation is Relation3D.OUTSIDE
+
+
+def test_relative_pose():
+    A, B = rotation((1, 2, 3), 1.0), rotation((3, -1, 0), 0.4)
+    A[:3, 3], B[:3, 3] = (1e6, 2e6, -1e6), (1e6 + 1.0, 2e6, -1e6)
+    T = relative_pose(A, B)
+    assert np.allclose(A[:3, :3] @ T[:3, :3], B[:3, :3], atol=1e-15)
+    assert np.allclose(T[:3, 3], A[0, :3], atol=1e-15)
+    with pytest.raises(InputError, match="T_world_b must have shape"):
+        relative_pose(A, np.eye(3))
