@@ -12,7 +12,7 @@ from clamp3d.cli.progress import narrator
 from clamp3d.cli.terminal import finish, show
 
 if TYPE_CHECKING:
-    from clamp3d.clamp.result import Run
+    from clamp3d.clamp.result import Assembly
 
 
 @click.command("run")
@@ -53,7 +53,7 @@ def command(
     loaded = source.clamp()
     model = method.model(loaded, quiet=quiet)
 
-    def done(run: Run) -> None:
+    def done(run: Assembly) -> None:
         if json_file is not None:
             write_json(json_file, run_to_dict(run))
         show(run_to_text(run))
@@ -64,6 +64,6 @@ def command(
         result = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=view, done=done)
     else:
         with narrator(quiet) as tell:
-            result = assemble(loaded, model, listen=tell.waypoint, progress=tell.position, **settings)
+            result = assemble(loaded, model, on_waypoint=tell.waypoint, progress=tell.position, **settings)
         done(result)
     finish(finding=not result.clamped or bool(result.undeclared))
