@@ -26,6 +26,7 @@ _HOME: dict[str, str] = {
     "min_clearance": "clamp3d.collide.motions",
     "ArcContact": "clamp3d.core.arc_circle",
     "ArcRelation": "clamp3d.core.arc_circle",
+    "Assembly": "clamp3d.clamp.result",
     "Cas": "clamp3d.baselines.cas",
     "CheckResult": "clamp3d.collide.result",
     "Cylinder": "clamp3d.core.primitives",
