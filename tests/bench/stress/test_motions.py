@@ -76,8 +76,8 @@ def test_known_answers_in_a_narrow_mouth(start, vector, least):
     cases = _one(start, vector)
     assert float(truth(cases).distance[0]) == pytest.approx(least, abs=2e-15)
     groove, wire, motion = cases.shapes.groove(0), cases.shapes.cylinder(0), cases.motion(0)
-    assert clamp3d.sweep(groove, wire, motion).distance == pytest.approx(least, abs=1e-14)
-    hit = clamp3d.first_contact(groove, wire, motion)
+    assert clamp3d.kernel.sweep(groove, wire, motion).distance == pytest.approx(least, abs=1e-14)
+    hit = clamp3d.kernel.first_contact(groove, wire, motion)
     assert hit.touches == (least <= 0.0)
     if least < 0.0:  # where the wire's circle first meets both lips
         s, h = 7.0 * math.sin(math.radians(100.0)), -7.0 * math.cos(math.radians(100.0))
@@ -95,11 +95,11 @@ def test_known_answers_of_a_double_root(gap):
     found = truth(cases)
     assert float(found.distance[0]) == pytest.approx(gap, abs=1e-14)
     groove, wire, motion = cases.shapes.groove(0), cases.shapes.cylinder(0), cases.motion(0)
-    assert clamp3d.first_contact(groove, wire, motion).touches == (gap <= 0.0)
+    assert clamp3d.kernel.first_contact(groove, wire, motion).touches == (gap <= 0.0)
     # The least clearance does not depend on how the way is divided.
-    halves = [clamp3d.Translation(motion.pose(s), 0.5 * cases.travel[0]) for s in (0.0, 0.5)]
-    whole = clamp3d.sweep(groove, wire, motion).distance
-    assert min(clamp3d.sweep(groove, wire, part).distance for part in halves) == pytest.approx(whole, abs=1e-13)
+    halves = [clamp3d.kernel.Translation(motion.pose(s), 0.5 * cases.travel[0]) for s in (0.0, 0.5)]
+    whole = clamp3d.kernel.sweep(groove, wire, motion).distance
+    assert min(clamp3d.kernel.sweep(groove, wire, part).distance for part in halves) == pytest.approx(whole, abs=1e-13)
 
 
 def test_stepped_motion_misses_what_is_thin_and_cas_does_not():
@@ -119,7 +119,7 @@ class _Broken:
     def sweep(self, groove, wire, motion):
         if self.fault != "steps over thin parts":
             return motion_module.sweep(groove, wire, motion)
-        near = [clamp3d.signed_distance(groove, wire, motion.pose(s)) for s in np.linspace(0.0, 1.0, 101)]
+        near = [clamp3d.kernel.signed_distance(groove, wire, motion.pose(s)) for s in np.linspace(0.0, 1.0, 101)]
         i = int(np.argmin([one.distance for one in near]))
         return motion_module.Clearance(near[i].distance, i / 100, motion.pose(i / 100), near[i], 1e-9, 1e-12, 101)
 
@@ -127,7 +127,7 @@ class _Broken:
         right = motion_module.first_contact(groove, wire, motion)
         at = {"misses": 1.0, "late": min(1.0, right.instant + 1e-4), "early": max(0.0, right.instant - 1e-4)}
         instant = at.get(self.fault, right.instant)
-        contact = clamp3d.signed_distance(groove, wire, motion.pose(instant))
+        contact = clamp3d.kernel.signed_distance(groove, wire, motion.pose(instant))
         touches = right.touches and self.fault != "misses"
         return motion_module.MotionContact(
             touches, instant, motion.pose(instant), contact, right.resolution, right.error_bound, 1

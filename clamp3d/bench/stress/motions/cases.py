@@ -80,18 +80,18 @@ class Motions:
         k = int(self.shape[i])
         start = f"np.array({self.start[i].tolist()})"
         if self.angle[i] == 0.0:
-            motion = f"clamp3d.Translation({start}, {self.travel[i].tolist()})"
+            motion = f"clamp3d.kernel.Translation({start}, {self.travel[i].tolist()})"
         else:
             numbers = f"{self.point[i].tolist()}, {self.axis[i].tolist()}, {float(self.angle[i])!r}"
-            motion = f"clamp3d.Screw({start}, {numbers}, {float(self.travel[i, 0])!r})"
+            motion = f"clamp3d.kernel.Screw({start}, {numbers}, {float(self.travel[i, 0])!r})"
         lines = [
             "import numpy as np",
             "import clamp3d",
-            f"groove = clamp3d.{self.shapes.groove(k)!r}",
-            f"wire = clamp3d.{self.shapes.cylinder(k)!r}",
+            f"groove = clamp3d.kernel.{self.shapes.groove(k)!r}",
+            f"wire = clamp3d.kernel.{self.shapes.cylinder(k)!r}",
             f"motion = {motion}",
-            "print(clamp3d.sweep(groove, wire, motion))",
-            "print(clamp3d.first_contact(groove, wire, motion))",
+            "print(clamp3d.kernel.sweep(groove, wire, motion))",
+            "print(clamp3d.kernel.first_contact(groove, wire, motion))",
         ]
         return "\n".join(lines)
 
