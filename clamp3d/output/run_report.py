@@ -18,10 +18,7 @@ def run_to_text(assembly: Assembly) -> str:
 
 def _lines(assembly: Assembly) -> Iterator[str]:
     clamp, work = assembly.clamp, assembly.work
-    wires = ", ".join(
-        f"{role} {wire.label} ({2 * wire.radius:g} mm)"
-        for role, wire in (("line", clamp.line), ("jumper", clamp.jumper))
-    )
+    line, jumper = (f"{wire.label} ({2 * wire.radius:g} mm)" for wire in (clamp.line, clamp.jumper))
     limits = f" ({'; '.join(assembly.limits)})" if assembly.limits else ""
     yield f"clamp {clamp.name}: line {line}, jumper {jumper}; method {assembly.method}, {assembly.solver}{limits}"
     yield (
