@@ -70,7 +70,7 @@ def _run() -> Any:
 
 @functools.cache
 def _models() -> tuple[Any, ...]:
-    from clamp3d.baselines.mesh import Mesh
+    from clamp3d.baselines.meshes import Meshes
     from clamp3d.core.meshing import mesh
 
     solids = clamp3d.parts(_clamp())
@@ -78,7 +78,7 @@ def _models() -> tuple[Any, ...]:
         Cas(),
         Chords(0.2),
         Wedges(solids, 0.2),
-        Mesh({name: mesh(solids[name], 0.5) for name in ("P1", "P2", "P3")}),
+        Meshes({name: mesh(solids[name], 0.5) for name in ("P1", "P2", "P3")}),
     )
 
 

@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.baselines.model import ContactModel
+from clamp3d.baselines import ContactModel, contact_model
 from clamp3d.bench.stress.meshes.cases import MESH_ERROR, MeshCase, MeshCases
 from clamp3d.bench.stress.poses.methods import METHODS as POSE_METHODS
 from clamp3d.bench.stress.worker import Measured, Measures, Method
@@ -74,17 +74,11 @@ def _rounding(case: MeshCase) -> float:
 
 
 def _mesh(mesh: Arrays, radius: float) -> ContactModel:
-    from clamp3d.baselines.mesh import Mesh
-
-    return Mesh({"P1": cast(Any, mesh)})
+    return contact_model("mesh", {"P1": mesh})
 
 
 def _hulls(mesh: Arrays, radius: float) -> ContactModel:
-    from clamp3d.baselines.decomposition import DecompositionParameters
-    from clamp3d.baselines.hulls import Hulls
-
-    parameters = DecompositionParameters(threshold=_THRESHOLD * radius)
-    return Hulls({"P1": cast(Any, mesh)}, parameters, time_limit=_TIME, progress=False)
+    return contact_model("hulls", {"P1": mesh}, threshold=_THRESHOLD * radius, time_limit=_TIME, progress=False)
 
 
 def _fit(case: MeshCase) -> tuple[float, float, str]:
