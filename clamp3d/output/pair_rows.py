@@ -10,10 +10,9 @@ import numpy as np
 
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.connections import CONVEX_PAIRS, TYPES, convex_gap
-from clamp3d.clamp.contacts import CONTACT, measure_pairs
+from clamp3d.clamp.contacts import CONTACT, Contact, measure_pairs
 from clamp3d.clamp.dimensions import TITLES, Clamp, ConnectionType, PartName
 from clamp3d.clamp.outlines import outline_gap
-from clamp3d.clamp.result import Contact
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.verdict import Verdict, verdict
 from clamp3d.core.groove_pair import GroovePair
