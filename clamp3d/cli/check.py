@@ -33,8 +33,8 @@ def command(
 
     Each pair is measured only as finely as its verdict needs. Exit code 1 if parts clash.
     """
-    from clamp3d.collide.verdict import Verdict
     from clamp3d.collide.check import check, check_full
+    from clamp3d.collide.verdict import Verdict
     from clamp3d.output.files import write_json, write_text
     from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
     from clamp3d.scenefile.file import load_scene
