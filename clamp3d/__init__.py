@@ -14,6 +14,7 @@ __version__ = "0.1.0"
 _HOME: dict[str, str] = {
     "ArcContact": "clamp3d.core.arc_circle",
     "ArcRelation": "clamp3d.core.arc_circle",
+    "Assembly": "clamp3d.clamp.result",
     "Cas": "clamp3d.baselines.cas",
     "CheckResult": "clamp3d.collide.result",
     "Clearance": "clamp3d.core.motion",

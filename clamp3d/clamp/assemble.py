@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
+from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
-from clamp3d.checks import choice, function, instance, number
+from clamp3d.checks import choice, function, number
 from clamp3d.clamp.contacts import CONTACT, measure_pairs, seats, undeclared_meetings
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
 from clamp3d.clamp.equilibria import describe, equilibria, same, slipping
 from clamp3d.clamp.final_state import FinalState, solve_final_state
+from clamp3d.clamp.loader import WireSize, load_clamp
 from clamp3d.clamp.motion import travel_to_contact
-from clamp3d.clamp.result import Equilibrium, Event, Run, Solver, Waypoint, Work
+from clamp3d.clamp.result import Assembly, Equilibrium, Event, Solver, Waypoint, Work
 from clamp3d.clamp.screw import ScrewJoint
 from clamp3d.clamp.section import WIRES, D, S, Section
 from clamp3d.clamp.sequence import parse_sequence
@@ -40,57 +43,86 @@ _ROOM = 20.0
 
 @dataclass
 class _Log:
-    """What happens on the way, told to ``listen`` as it happens."""
+    """What happens on the way; ``on_waypoint(waypoint)`` is called as it happens."""
 
-    listen: Callable[[Waypoint], None] | None
+    on_waypoint: Callable[[Waypoint], None] | None
     events: list[Event] = field(default_factory=list)
     path: list[Waypoint] = field(default_factory=list)
 
     def stop(self, step: str, label: str, poses: Poses) -> None:
         self.path.append(Waypoint(step, label, dict(poses)))
-        if self.listen is not None:
-            self.listen(self.path[-1])
+        if self.on_waypoint is not None:
+            self.on_waypoint(self.path[-1])
 
 
 def assemble(
-    clamp: Clamp,
-    model: ContactModel,
+    clamp: Clamp | str | Path = "reference",
+    model: ContactModel | None = None,
     *,
+    line: WireSize | None = None,
+    jumper: WireSize | None = None,
     solver: Solver = "exact",
     step: float = STEP,
     tilt_step: float = TILT_STEP,
     open_by: float = 0.0,
     open_tilt: float = 0.0,
     others: bool = False,
-    listen: Callable[[Waypoint], None] | None = None,
+    on_waypoint: Callable[[Waypoint], None] | None = None,
     progress: Callable[[int, float], None] | None = None,
-) -> Run:
-    """Assemble ``clamp`` with its wires and measure its grooves by ``model``.
+) -> Assembly:
+    """Assemble a clamp with its wires and measure where every part ends up.
 
-    ``open_by`` mm and ``open_tilt`` rad open the clamp further than needed before it comes in. ``step`` (mm) and
-    ``tilt_step`` (rad) are the moves of the stepped solver and the first ones of bisection. ``others``: also find the
-    other states that closing can end in (exact solver only). ``listen`` is told every
-    waypoint as it is reached, ``progress`` the positions tried and the distance in mm while solvers try positions.
-    Raises InputError for bad settings or sequence and SolverError if an answer cannot be proven.
+    Parameters
+    ----------
+    clamp : Clamp, str or Path
+        A clamp, the name of a built-in one, or a clamp file.
+    model : ContactModel, optional
+        How grooves are measured; by default `Cas`, the exact arcs.
+    line, jumper : str or float, optional
+        Wires in place of the clamp's own: catalogue name, or diameter in mm.
+    solver : {"exact", "stepped", "bisection"}
+        How the closed position is found.
+    step, tilt_step : float
+        Moves of the stepped solver, and the first ones of bisection; mm and rad.
+    open_by, open_tilt : float
+        How much further than needed the clamp stands open before it comes in; mm and rad.
+    others : bool
+        Also find the other states that closing can end in (exact solver only).
+    on_waypoint : callable, optional
+        Called with every `Waypoint` as it is reached.
+    progress : callable, optional
+        Called with the number of positions tried and the distance in mm, by the solvers that try positions.
 
-    >>> from clamp3d.clamp.loader import load_clamp
-    >>> from clamp3d.baselines.cas import Cas
-    >>> run = assemble(load_clamp(), Cas())
-    >>> run.status, round(run.distance, 3)
+    Returns
+    -------
+    Assembly
+
+    Raises
+    ------
+    InputError
+        For bad settings, dimensions or sequence.
+    SolverError
+        If an answer cannot be proven.
+
+    Examples
+    --------
+    >>> assembly = assemble("reference", line="LJ-630", jumper="LJ-120")
+    >>> assembly.status, round(assembly.distance, 3)
     ('clamped', 31.53)
     """
-    instance("clamp", clamp, Clamp)
+    clamp = load_clamp(clamp, line=line, jumper=jumper)
+    model = Cas() if model is None else model
     choice("solver", solver, ("exact", "stepped", "bisection"))
     check_model(model)
     step, tilt_step = number("step", step), number("tilt step", tilt_step)
     open_by, open_tilt = number("open_by", open_by), number("open_tilt", open_tilt)
     if not 0.0 <= open_by <= _WIDEST:
         raise InputError(f"open_by must be between 0 and {_WIDEST:g} mm, got {open_by:g}")
-    function("listen", listen)
+    function("on_waypoint", on_waypoint)
     function("progress", progress)
     sequence = [str(s) for s in parse_sequence(clamp.sequence)]
     section = Section(clamp, model)
-    log = _Log(listen)
+    log = _Log(on_waypoint)
     q = section.open_state(section.open_distance() + open_by, open_tilt)
     q = _come_in(section, q, sequence[0], log)
     q = _put_in_jumper(section, q, sequence[1], log)
@@ -120,11 +152,10 @@ def assemble(
     queries = section.queries.contact  # what the run itself asked, without the other equilibria
     proof = (final.violation, final.optimality) if isinstance(final, FinalState) else (None, None)
     motion_steps = final.motion_steps if isinstance(final, SteppedState) else 0
-    return Run(
+    return Assembly(
         clamp=clamp,
-        method=model.name,
+        model=model,
         solver=solver,
-        limits=model.limits,
         status=final_status(clamp, final, resolution),
         distance=section.splint_distance(final.q),
         closing=float(final.q[D]),

@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from clamp3d.baselines.model import ContactModel
+from clamp3d.checks import instance
 from clamp3d.clamp.connections import Undeclared
 from clamp3d.clamp.dimensions import Clamp, ConnectionType, PartName
+from clamp3d.clamp.scene import clamp_scene
+from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array, SectionPose
 
 Solver = Literal["exact", "stepped", "bisection"]
@@ -55,11 +59,23 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Waypoint:
-    """Section poses of all parts at a moment of the run; between two waypoints every part moves straight and even."""
+    """Where all parts are at a moment of the assembly; between two waypoints every part moves straight and even.
+
+    Attributes
+    ----------
+    step, label : str
+        The step of the sequence, and what has been reached in words.
+    poses : dict of SectionPose
+        Each part in the section frame.
+    """
 
     step: str
     label: str
     poses: dict[PartName, SectionPose]
+
+    def T_world(self, part: PartName) -> Array:
+        """Pose (4, 4) of a part in the world, lengths in mm."""
+        return self.poses[part].T()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +91,7 @@ class Work:
 
 @dataclass(frozen=True, slots=True)
 class Equilibrium:
-    """Another state that closing the clamp can end in: ``distance``, ``closing`` (mm) and ``tilt`` (rad) as of `Run`.
+    """Another state that closing can end in: ``distance``, ``closing`` (mm) and ``tilt`` (rad) as of `Assembly`.
 
     ``status`` is that of a run; ``detail`` says what holds it where that is not the grooves' arcs. ``rests``: it is an
     equilibrium; if not, a wire slips out of its groove there.
@@ -89,20 +105,51 @@ class Equilibrium:
     rests: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+@dataclass(frozen=True, slots=True, repr=False)
+class Assembly:
     """A clamp assembled: where every part ends up, what touches, and how it came there.
 
-    ``distance`` is the height between the splints' inner edges on the line side (Table 4) in mm, ``closing`` that of
-    their origins along the bolt. ``status`` is 'clamped' or 'not clamped: ...'. ``violation`` and ``optimality`` in mm
-    prove the exact answer (None for the other solvers). ``turns`` of the nut tighten the clamp from open.
-    ``others`` are the other states that closing can end in, the one closed furthest first (None: not looked for).
+    Attributes
+    ----------
+    clamp : Clamp
+        What was assembled.
+    model : ContactModel
+        How its grooves were measured.
+    solver : str
+        How the closed position was found: "exact", "stepped" or "bisection".
+    status : str
+        "clamped", or "not clamped: ..." with the reason.
+    distance : float
+        Height between the splints' inner edges on the line side, along the bolt (Table 4); mm.
+    closing : float
+        Distance of the splints' origins along the bolt; mm.
+    tilt : float
+        Tilt of the down splint; rad.
+    turns : float
+        Turns of the nut from open to tight.
+    poses : dict of SectionPose
+        Each part in the section frame, in the final state.
+    contacts : tuple of Contact
+        How the pairs of parts stand in the final state.
+    seats : tuple of Seat
+        Whether each wire lies in each of its grooves.
+    events : tuple of Event
+        The contacts that ended or changed a motion, in order.
+    path : tuple of Waypoint
+        The way from open to final.
+    undeclared : tuple of Undeclared
+        Pairs that met otherwise than the connection matrix declares.
+    violation, optimality : float or None
+        Proof of the exact answer in mm: deepest overlap, and residual of the optimality conditions.
+    work : Work
+        What the answer took.
+    others : tuple of Equilibrium or None
+        The other states that closing can end in, the one closed furthest first; None if they were not looked for.
     """
 
     clamp: Clamp
-    method: str
+    model: ContactModel
     solver: Solver
-    limits: tuple[str, ...]
     status: str
     distance: float
     closing: float
@@ -120,10 +167,33 @@ class Run:
     others: tuple[Equilibrium, ...] | None = None
 
     @property
+    def method(self) -> str:
+        """Name of the contact model."""
+        return self.model.name
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """What the contact model cannot do, in words."""
+        return self.model.limits
+
+    @property
     def clamped(self) -> bool:
         """Whether the splints hold both wires."""
         return self.status == "clamped"
 
+    @property
+    def scene(self) -> Scene:
+        """The final state as a scene: everything that works on scenes works on it."""
+        return clamp_scene(self.clamp, {part: self.T_world(part) for part in self.poses})
+
+    def scene_at(self, waypoint: Waypoint) -> Scene:
+        """The parts at a waypoint of `path` as a scene."""
+        instance("waypoint", waypoint, Waypoint)
+        return clamp_scene(self.clamp, {part: waypoint.T_world(part) for part in waypoint.poses})
+
     def T_world(self, part: PartName) -> Array:
-        """Pose (4, 4) of a part in the world, lengths in mm."""
+        """Pose (4, 4) of a part in the world in the final state, lengths in mm."""
         return self.poses[part].T()
+
+    def __repr__(self) -> str:
+        return f"<Assembly {self.clamp.name}: {self.status}, {self.distance:.3f} mm>"

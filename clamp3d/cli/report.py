@@ -66,7 +66,7 @@ def command(
     )
 
     with narrator(quiet) as tell:
-        run = assemble(loaded, model, listen=tell.waypoint, progress=tell.position, **settings)
+        run = assemble(loaded, model, on_waypoint=tell.waypoint, progress=tell.position, **settings)
         made = report(run, model, clearance=clearance, mesh_error=outline_error)
         paths = write_report(made, output, progress=tell.status)
     for path in paths:

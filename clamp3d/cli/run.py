@@ -19,7 +19,7 @@ from clamp3d.cli.options import (
 from clamp3d.cli.progress import narrator
 
 if TYPE_CHECKING:
-    from clamp3d.clamp.result import Run
+    from clamp3d.clamp.result import Assembly
 
 
 @click.command("run")
@@ -70,7 +70,7 @@ def command(
         method, loaded, unit_angle_deg=unit_angle_deg, threshold=threshold, mesh_error=mesh_error, quiet=quiet
     )
 
-    def done(run: Run) -> None:
+    def done(run: Assembly) -> None:
         if json_file is not None:
             write_json(json_file, run_to_dict(run))
         click.echo(run_to_text(run))
@@ -81,7 +81,7 @@ def command(
         result = run_and_view(loaded, model, settings, quiet=quiet, serve=view, done=done, **viewing)
     else:
         with narrator(quiet) as tell:
-            result = assemble(loaded, model, listen=tell.waypoint, progress=tell.position, **settings)
+            result = assemble(loaded, model, on_waypoint=tell.waypoint, progress=tell.position, **settings)
         done(result)
     if not result.clamped or result.undeclared:
         raise click.exceptions.Exit(1)

@@ -13,7 +13,7 @@ import click
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.clamp.result import Run, Waypoint
+from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.cli.progress import narrator
 from clamp3d.errors import InputError
 from clamp3d.output.files import check_folder
@@ -37,8 +37,8 @@ def run_and_view(
     overlays: tuple[str, ...],
     draw_error: float,
     clearance: float,
-    done: Callable[[Run], None] = lambda run: None,
-) -> Run:
+    done: Callable[[Assembly], None] = lambda run: None,
+) -> Assembly:
     """Assemble with a viewer that shows every waypoint; call ``done`` with the result before the page is waited on.
 
     ``serve`` starts a server, unless ``url`` names one. Raises click.UsageError for options that do not go together.
@@ -75,7 +75,7 @@ def run_and_view(
                 viewer.show(waypoint)
                 tell.waypoint(waypoint)
 
-            run = assemble(clamp, model, listen=listen, progress=tell.position, **settings)
+            run = assemble(clamp, model, on_waypoint=listen, progress=tell.position, **settings)
         viewer.finish(run)
         if html_file is not None:
             viewer.write(html_file)

@@ -10,7 +10,7 @@ import numpy as np
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.result import Run
+from clamp3d.clamp.result import Assembly
 from clamp3d.core.meshing import mesh
 from clamp3d.core.pose import Array, SectionPose
 from clamp3d.core.profile import MIN_MESH_ERROR
@@ -90,11 +90,11 @@ def exploded_poses(clamp: Clamp) -> dict[PartName, SectionPose]:
     }
 
 
-def steps_figure(run: Run) -> Figure:
+def steps_figure(run: Assembly) -> Figure:
     """Each step of the sequence where it ends: in the view (upper row) and in the section (lower)."""
     from matplotlib.figure import Figure
 
-    instance("run", run, Run)
+    instance("run", run, Assembly)
     ends = step_ends(run)
     figure = Figure(figsize=(3.1 * len(ends), 7.4), layout="constrained")
     axes = figure.subplots(2, len(ends), squeeze=False, height_ratios=(1.0, 1.2))
@@ -116,7 +116,7 @@ def steps_figure(run: Run) -> Figure:
     return figure
 
 
-def step_ends(run: Run) -> list[tuple[str, int]]:
+def step_ends(run: Assembly) -> list[tuple[str, int]]:
     """Each step of the sequence with the index of its last waypoint in ``run.path``, in order."""
     return list({waypoint.step: i for i, waypoint in enumerate(run.path)}.items())
 

@@ -13,7 +13,7 @@ from clamp3d.checks import number
 from clamp3d.clamp.contacts import CONTACT, measure_pairs, seats
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.result import Contact, Run, Seat, Waypoint
+from clamp3d.clamp.result import Assembly, Contact, Seat, Waypoint
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.verdict import CLEARANCE
 from clamp3d.core.pose import SectionPose
@@ -78,7 +78,7 @@ class TighteningRow:
 class Report:
     """Everything a report says about a run. Lengths in mm."""
 
-    run: Run
+    run: Assembly
     rows: tuple[PairRow, ...]
     steps: tuple[StepRow, ...]
     tightening: tuple[TighteningRow, ...]
@@ -107,7 +107,7 @@ class Report:
         return self.run.clamped and not self.run.undeclared and all(row.severity != "error" for row in self.rows)
 
 
-def report(run: Run, model: ContactModel, *, clearance: float = CLEARANCE, mesh_error: float = 0.001) -> Report:
+def report(run: Assembly, model: ContactModel, *, clearance: float = CLEARANCE, mesh_error: float = 0.001) -> Report:
     """Measure all 21 pairs at the final state of ``run`` and every waypoint on the way to it.
 
     ``mesh_error`` mm is the chord error of the outlines that pairs without a groove are measured on. Raises InputError
@@ -173,7 +173,7 @@ def _step(section: Section, number: int, waypoint: Waypoint, first: Poses, resol
     )
 
 
-def _tightening(section: Section, run: Run) -> tuple[TighteningRow, ...]:
+def _tightening(section: Section, run: Assembly) -> tuple[TighteningRow, ...]:
     """The nut's own step in equal stages: the bolt is drawn up until the saddle meets the round back."""
     before, after = run.path[-2].poses, run.path[-1].poses
     way = _screwed(after) - _screwed(before)
@@ -194,7 +194,7 @@ def _screwed(poses: Poses) -> float:
     return poses["P5"].y - poses["P4"].y
 
 
-def _modelled(run: Run, mesh_error: float) -> tuple[str, ...]:
+def _modelled(run: Assembly, mesh_error: float) -> tuple[str, ...]:
     grooves = (
         "arcs against cylinders in closed form" if run.method == "cas" else f"as the method {run.method} sees them"
     )
@@ -225,6 +225,6 @@ def _not_modelled(clamp: Clamp) -> tuple[str, ...]:
     )
 
 
-def part_rows(run: Run) -> list[tuple[PartName, str, SectionPose]]:
+def part_rows(run: Assembly) -> list[tuple[PartName, str, SectionPose]]:
     """Each part with its title and its final pose in the section."""
     return [(name, TITLES[name], run.poses[name]) for name in PARTS]

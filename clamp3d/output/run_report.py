@@ -7,10 +7,10 @@ from typing import Any
 
 from clamp3d import __version__
 from clamp3d.clamp.dimensions import PARTS, TITLES
-from clamp3d.clamp.result import Run
+from clamp3d.clamp.result import Assembly
 
 
-def run_to_dict(run: Run) -> dict[str, Any]:
+def run_to_dict(run: Assembly) -> dict[str, Any]:
     """The run as JSON data; lengths in mm, angles in degrees, ``T_world`` as rows."""
     return {
         "clamp3d": __version__,
@@ -86,7 +86,7 @@ def run_to_dict(run: Run) -> dict[str, Any]:
     }
 
 
-def run_to_text(run: Run) -> str:
+def run_to_text(run: Assembly) -> str:
     """The run as lines for a terminal, numbers to the paper's printed digits."""
     clamp = run.clamp
     lines = [

@@ -5,7 +5,7 @@
 >>> from clamp3d.baselines.cas import Cas
 >>> clamp, model = load_clamp(), Cas()
 >>> with Viewer(clamp, model) as viewer:  # open viewer.url in a browser, if you like
-...     viewer.finish(assemble(clamp, model, listen=viewer.show))
+...     viewer.finish(assemble(clamp, model, on_waypoint=viewer.show))
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import flag, instance, text
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.clamp.result import Run, Waypoint
+from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.verdict import CLEARANCE
 from clamp3d.output.viewer_log import Command, CommandLog
 from clamp3d.output.viewer_page import write_page
@@ -78,10 +78,10 @@ class Viewer:
         return None if self._server is None else self._server.url
 
     def show(self, waypoint: Waypoint) -> None:
-        """Show a waypoint as it is reached: pass this as ``listen`` of `assemble`."""
+        """Show a waypoint as it is reached: pass this as ``on_waypoint`` of `assemble`."""
         self._scene.show(waypoint)
 
-    def finish(self, run: Run) -> None:
+    def finish(self, run: Assembly) -> None:
         """Show the result, and play the whole run once as an animation."""
         self._scene.finish(run)
 

@@ -18,7 +18,7 @@ from clamp3d.checks import number
 from clamp3d.clamp.contacts import CONTACT, measure_pairs
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.result import Contact, Run, Waypoint
+from clamp3d.clamp.result import Assembly, Contact, Waypoint
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.verdict import CLEARANCE, verdict
 from clamp3d.core.meshing import mesh
@@ -105,7 +105,7 @@ class AssemblyScene:
         self._colour_grooves(verdicts)
         self._tell(f"{waypoint.step}: {waypoint.label}")
 
-    def finish(self, run: Run) -> None:
+    def finish(self, run: Assembly) -> None:
         """Rewind to the first waypoint and play the whole run once."""
         if not self._timeline.stops:
             return
@@ -271,7 +271,7 @@ class AssemblyScene:
             )
         return rows
 
-    def _tell(self, status: str, run: Run | None = None) -> None:
+    def _tell(self, status: str, run: Assembly | None = None) -> None:
         """What the page beside the picture shows; meshcat's own page takes no notice of it."""
         clamp = self.clamp
         facts = [] if run is None else run_facts(run)
@@ -315,7 +315,7 @@ class AssemblyScene:
         self._property(path, "visible", on)
 
 
-def run_facts(run: Run) -> list[str]:
+def run_facts(run: Assembly) -> list[str]:
     """The run in a few short lines."""
     return [
         f"method {run.method}, {run.solver}",
