@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from clamp3d.cli.options import clamp_arguments
+from clamp3d.cli.options import FOLDER, UNITS, Source, clamp_argument, number
+from clamp3d.cli.terminal import show
 
 if TYPE_CHECKING:
     from clamp3d.output.export import Format, Layout
@@ -16,9 +17,9 @@ FORMATS = ("stl", "obj", "ply", "glb", "3mf", "step")
 
 
 @click.command("export")
-@clamp_arguments
+@clamp_argument
 @click.option("--format", "-f", type=click.Choice(FORMATS), required=True, help="STEP holds true arcs, not facets.")
-@click.option("--output", "-o", type=click.Path(file_okay=False, path_type=Path), required=True, metavar="DIR")
+@click.option("--output", "-o", type=FOLDER, required=True, metavar="DIR")
 @click.option(
     "--layout",
     type=click.Choice(["parts", "assembly"]),
@@ -30,13 +31,11 @@ FORMATS = ("stl", "obj", "ply", "glb", "3mf", "step")
     help="Place the parts as they stand there; a step by name or number.  [default: final for an assembly; "
     "separate parts keep their own frames]",
 )
-@click.option("--mesh-error", type=float, default=0.01, show_default=True, metavar="MM", help="Chord error of meshes.")
-@click.option("--unit", type=click.Choice(["mm", "cm", "m", "in"]), help="Unit of the file.  [default: mm; m for glb]")
+@click.option("--mesh-error", type=number, default=0.01, show_default=True, metavar="MM", help="Chord error of meshes.")
+@click.option("--unit", type=click.Choice(UNITS), help="Unit of the file.  [default: mm; m for glb]")
 @click.option("--quiet", "-q", is_flag=True, help="No messages.")
 def command(
-    clamp: str,
-    line: str | None,
-    jumper: str | None,
+    source: Source,
     format: Format,
     output: Path,
     layout: Layout | None,
@@ -50,10 +49,9 @@ def command(
     Prints the paths of the files. World axes are Z up with the wires along Y; GLB is metres and Y up, as its
     specification demands.
     """
-    from clamp3d.clamp.loader import load_clamp
     from clamp3d.output.export import default_layout, export
 
-    loaded = load_clamp(clamp, line=line, jumper=jumper)
+    loaded = source.clamp()
     layout = layout or default_layout(format)
     if state is None and layout == "assembly":
         state = "final"
@@ -68,7 +66,7 @@ def command(
         poses = {name: pose.T() for name, pose in waypoint.poses.items()}
         status = run.status
         if not quiet:
-            click.echo(f"state {state}: {waypoint.label} ({status})", err=True)
+            show(f"state {state}: {waypoint.label} ({status})", err=True)
     written = export(
         loaded,
         format=format,
@@ -81,4 +79,4 @@ def command(
         unit=unit,
     )
     for path in (*written.files, written.manifest):
-        click.echo(str(path))
+        show(str(path))
