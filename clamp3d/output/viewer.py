@@ -38,7 +38,7 @@ CLEARANCE = 5.0
 """Gap in mm from which two parts of a clamp count as clear."""
 _LISTED = 500
 """Rows of a table on the page; a result's JSON has all."""
-_MEASURED = 40
+MEASURED = 40
 """Scenes of up to so many parts are measured pair by pair, larger ones only as far as their verdicts need."""
 
 Shown = Clamp | Scene | Assembly | CheckResult
@@ -59,6 +59,8 @@ class Viewer:
         Gap that counts as clear, mm; by default the scene's own, and 5 mm for a clamp.
     overlays : dict, optional
         Convex pieces of parts to show as well, by a name: ``{name: {part: [trimesh.Trimesh, ...]}}``.
+    notes : sequence of str
+        Lines for the end of the page.
     serve : bool
         Serve the page on this machine (``host``, ``port``: the first free one from 7000); else it is only kept for
         `save_html`. No browser is opened, and none is waited for.
@@ -79,6 +81,7 @@ class Viewer:
         mesh_error: float = 0.01,
         clearance: float | None = None,
         overlays: Mapping[str, Pieces] | None = None,
+        notes: Sequence[str] = (),
         serve: bool = True,
         url: str | None = None,
         host: str = "127.0.0.1",
@@ -87,7 +90,7 @@ class Viewer:
         for name, pieces in dict(instance("overlays", overlays, Mapping) if overlays else {}).items():
             instance(f"overlay {text('name of an overlay', name)}", pieces, Mapping)
         serve = flag("serve", serve)
-        self._model, self._mesh_error = model, mesh_error
+        self._model, self._mesh_error, self._notes = model, mesh_error, list(notes)
         clamp = shown if isinstance(shown, Clamp) else getattr(shown, "clamp", None)
         self._clamp = None if clamp is None else ClampStory(clamp, CLEARANCE if clearance is None else clearance)
         self._scene = self._clamp.scene() if self._clamp is not None else _scene(shown, clearance)
@@ -153,7 +156,7 @@ class Viewer:
                 self._drawing.show(stop)
             told = {"headline": headline(result), "state": "clean" if result.clean else "found"}
             told |= {"findings": self._scene_findings(result), "pairs": _table(result.pairs)}
-            told |= {"motions": _table(result.motions), "counts": result.counts}
+            told |= {"motions": _table(result.motions)}
         self._drawing.play({} if self._clamp is None else self._clamp.shown(self._drawing))
         if self._clamp is not None:
             self._clamp.recolour(self._drawing, 0)
@@ -247,10 +250,10 @@ class Viewer:
         used = {row["verdict"] for stop in stops for row in stop["rows"]} | {"contact", "clearance", "clear"}
         if not scene.thresholds.clearance:
             used.discard("clearance")
-        empty: dict[str, Any] = {"facts": [], "findings": [], "limits": [], "pairs": [], "motions": [], "counts": {}}
         self._story = {
             **head,
-            **empty,
+            **{key: [] for key in ("facts", "findings", "limits", "pairs", "motions")},
+            "notes": self._notes,
             "headline": said,
             "state": state,
             "done": done,
@@ -309,7 +312,7 @@ def view(shown: Scene | Assembly | CheckResult, *, serve: bool = True, **options
     """
     if isinstance(shown, Scene):
         scene = _scene(shown, options.pop("clearance", None))
-        shown = check(scene, distances=len(scene.parts) <= _MEASURED)
+        shown = check(scene, distances=len(scene.parts) <= MEASURED)
     if not isinstance(shown, (Assembly, CheckResult)):
         raise InputError(f"view() takes a Scene, an Assembly or a CheckResult, got {type(shown).__name__}")
     if isinstance(shown, Assembly):
