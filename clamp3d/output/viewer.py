@@ -23,7 +23,6 @@ from clamp3d.collide.distance import measure
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.result import CheckResult
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import verdict_of
 from clamp3d.errors import InputError
 from clamp3d.output.files import write_text
 from clamp3d.output.palette import VERDICT_COLOURS, part_colours
@@ -97,12 +96,10 @@ class Viewer:
         self._cache, self._log = ModelCache(), CommandLog()
         self._waypoints: list[Waypoint] = []
         self._server: LocalServer | RemoteServer | None = None
-        self._story: dict[str, Any] = {"title": "clamp3d"}
+        self._story: dict[str, Any] = {}
         try:
             if url is not None:
                 self._server = RemoteServer(text("url", url))
-            elif serve:
-                self._server = LocalServer(lambda: live_page(self._story), self._log, host=host, port=port)
             self._drawing = SceneDrawing(
                 self._scene,
                 self._send,
@@ -113,6 +110,8 @@ class Viewer:
                 overlays=overlays,
             )
             self._tell("waiting for the first state", state="waiting")
+            if url is None and serve:
+                self._server = LocalServer(lambda: live_page(self._story), self._log, host=host, port=port)
         except BaseException:
             self.close()
             raise
@@ -190,9 +189,8 @@ class Viewer:
     def _measured(self, scene: Scene, pairs: Sequence[tuple[str, str]] | None = None) -> list[Row]:
         """Pairs of a scene as rows, by the engine that every command asks."""
         found = measure(scene, pairs, model=self._model, cache=self._cache)
-        return [
-            Row(a, b, verdict_of(d, scene.thresholds, scene.allowance(a, b)).value, d) for (a, b), d in found.items()
-        ]
+        verdict = scene.thresholds.verdict
+        return [Row(a, b, verdict(d, scene.allowance(a, b)).value, d) for (a, b), d in found.items()]
 
     def _assembly_findings(self) -> list[dict[str, Any]]:
         """Clashes at the waypoints: each pair once, where it is deepest; the deepest first."""
