@@ -86,7 +86,9 @@ class Viewer:
         host: str = "127.0.0.1",
         port: int | None = None,
     ) -> None:
-        for name, pieces in dict(instance("overlays", overlays, Mapping) if overlays else {}).items():
+        overlays = {} if overlays is None else overlays
+        instance("overlays", overlays, Mapping)
+        for name, pieces in overlays.items():
             instance(f"overlay {text('name of an overlay', name)}", pieces, Mapping)
         serve = flag("serve", serve)
         self._model, self._mesh_error, self._notes = model, mesh_error, list(notes)
@@ -151,7 +153,8 @@ class Viewer:
             told = {"headline": result.status, "state": "clean" if good else "found", "facts": facts(result)}
             told |= {"findings": self._assembly_findings(), "limits": [*result.limits]}
         else:
-            for stop in scene_stops(instance("result", result, CheckResult), self._measured):
+            instance("result", result, CheckResult)
+            for stop in scene_stops(result, self._measured):
                 self._drawing.show(stop)
             told = {"headline": headline(result), "state": "clean" if result.clean else "found"}
             told |= {"findings": self._scene_findings(result), "pairs": _table(result.pairs)}
@@ -325,7 +328,8 @@ def view(shown: Scene | Assembly | CheckResult, *, serve: bool = True, **options
 
 
 def _scene(shown: Any, clearance: float | None) -> Scene:
-    scene = instance("shown", shown.scene if isinstance(shown, CheckResult) else shown, Scene)
+    scene: Scene = shown.scene if isinstance(shown, CheckResult) else shown
+    instance("shown", scene, Scene)
     return scene if clearance is None else replace(scene, clearance=clearance)
 
 

@@ -28,7 +28,6 @@ Measured = Callable[[Scene, Sequence[tuple[str, str]]], Iterable["Row"]]
 _HOLD = 1.2  # s at each stop
 _FASTEST, _SLOWEST = 0.9, 4.0  # s between two stops
 _MOTION = 4.0  # s of a motion of a scene from t = 0 to 1
-_JUMP = 0.01  # s: back to the start for the next motion
 _TURN = math.radians(3.0)
 """Largest turn between two keys: between them the viewer moves parts along chords."""
 
@@ -146,42 +145,46 @@ class Timeline:
 
 
 def scene_stops(result: CheckResult, measured: Measured) -> Iterator[Stop]:
-    """A checked scene at rest, then each of its motions with a stop where parts first touch."""
-    scene = result.scene
-    rest = {part.name: part.T_world for part in scene.parts}
-    yield Stop("at rest", "at rest", rest, tuple(_row(row) for row in result.pairs))
-    for motion in scene.motions:
-        yield from _motion_stops(result, motion, rest, measured)
+    """A checked scene at rest, then its motions one after the other, with a stop where parts first touch."""
+    motions = result.scene.motions
+    poses: Poses = {part.name: part.T_world for part in result.scene.parts}
+    marks = [motion.name for motion in motions] + [""]
+    yield Stop("at rest", "at rest", poses, tuple(_row(row) for row in result.pairs), marks[0])
+    for motion, mark in zip(motions, marks[1:], strict=True):
+        for stop in _motion_stops(result, motion, poses, measured, mark):
+            yield stop
+            last = stop.poses
+        poses = last
 
 
-def _motion_stops(result: CheckResult, motion: Motion, rest: Poses, measured: Measured) -> Iterator[Stop]:
-    going = motion.from_pose(rest[motion.parts[0]])
+def _motion_stops(
+    result: CheckResult, motion: Motion, start: Poses, measured: Measured, next_mark: str
+) -> Iterator[Stop]:
+    """The stops of a motion: where parts first touch, where they go on to, and the end."""
+    going = motion.from_pose(start[motion.parts[0]])
     rows = [row for row in result.motions if row.motion == motion.name]
-    least = tuple(_row(row, f"least on the way, at t = {row.t:.4f}", drawn=False) for row in rows)
 
     def at(t: float) -> Poses:
         M = going.at(t)
-        return {name: M @ T if name in motion.parts else T for name, T in rest.items()}
+        return {name: M @ T if name in motion.parts else T for name, T in start.items()}
 
     def way(t0: float, t1: float) -> tuple[tuple[float, Poses], ...]:
         n = max(1, math.ceil(abs(going.angle) * (t1 - t0) / _TURN))
         moved = [(k / n, at(t0 + (t1 - t0) * k / n)) for k in range(1, n)]
         return tuple((f, {name: poses[name] for name in motion.parts}) for f, poses in moved)
 
-    contacts = first_contacts(rows)
-    yield Stop(motion.name, f"{motion.name}: start", at(0.0), least, mark=motion.name, seconds=_JUMP)
-    before = 0.0
+    contacts, before = first_contacts(rows), 0.0
     for k, (t, touching) in enumerate(contacts.items()):
         poses = at(t)
-        scene = result.scene.moved({name: poses[name] for name in motion.parts})
-        now = tuple(measured(scene, [(row.a, row.b) for row in touching]))
+        now = tuple(measured(result.scene.moved(poses), [(row.a, row.b) for row in touching]))
         label = f"{motion.name}: {'first' if k == 0 else 'next'} contact at t = {t:.4f}"
-        mark = "first contact" if k == 0 else ""
-        stop = Stop(motion.name, label, poses, now, mark, k == 0, way(before, t), _MOTION * (t - before))
-        yield stop
+        seconds = max(0.3, _MOTION * (t - before))
+        yield Stop(motion.name, label, poses, now, "" if k else "first contact", k == 0, way(before, t), seconds)
         before = t
+    least = tuple(_row(row, f"least on the way, at t = {row.t:.4f}", drawn=False) for row in rows)
     end = f"{motion.name}: end" + (", through the contact" if contacts else "")
-    yield Stop(motion.name, end, at(1.0), least, via=way(before, 1.0), seconds=max(0.2, _MOTION * (1.0 - before)))
+    seconds = max(0.3, _MOTION * (1.0 - before))
+    yield Stop(motion.name, end, at(1.0), least, next_mark, via=way(before, 1.0), seconds=seconds)
 
 
 def first_contacts(rows: Iterable[PairResult]) -> dict[float, list[PairResult]]:
