@@ -23,6 +23,7 @@ from clamp3d.collide.distance import measure
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.result import CheckResult
 from clamp3d.collide.scene import Scene
+from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
 from clamp3d.output.files import write_text
 from clamp3d.output.palette import VERDICT_COLOURS, part_colours
@@ -30,7 +31,7 @@ from clamp3d.output.viewer_clamp import UNCUT, ClampStory, facts
 from clamp3d.output.viewer_page import live_page, panel, whole_page
 from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
 from clamp3d.output.viewer_server import CommandLog, LocalServer, RemoteServer
-from clamp3d.output.viewer_timeline import Row, first_contacts, scene_stops
+from clamp3d.output.viewer_timeline import FIRST, Row, Stop, scene_stops
 from clamp3d.output.wording import BAD, circumstances, gap_text, headline, meaning, sentence, titles
 
 CLEARANCE = 5.0
@@ -192,8 +193,10 @@ class Viewer:
     def _measured(self, scene: Scene, pairs: Sequence[tuple[str, str]] | None = None) -> list[Row]:
         """Pairs of a scene as rows, by the engine that every command asks."""
         found = measure(scene, pairs, model=self._model, cache=self._cache)
-        verdict = scene.thresholds.verdict
-        return [Row(a, b, verdict(d, scene.allowance(a, b)).value, d) for (a, b), d in found.items()]
+        verdict, contact = scene.thresholds.verdict, scene.thresholds.contact
+        return [
+            Row(a, b, verdict(d, scene.allowance(a, b)).value, d, d.upper <= contact) for (a, b), d in found.items()
+        ]
 
     def _assembly_findings(self) -> list[dict[str, Any]]:
         """Clashes at the waypoints: each pair once, where it is deepest; the deepest first."""
@@ -206,39 +209,41 @@ class Viewer:
         names, stops = titles(self._scene), self._drawing.timeline.stops
         found = sorted(worst.values(), key=lambda item: item[1].distance.upper)
         return [
-            self._finding(row, number, f"{names[row.a]} and {names[row.b]} clash: {row.gap}", stops[number].label)
+            self._finding(
+                row, number, f"{names[row.a]} and {names[row.b]} clash: {row.gap}", stops[number].label, focus(row)
+            )
             for number, row in found
         ]
 
     def _scene_findings(self, result: CheckResult) -> list[dict[str, Any]]:
+        """The findings of a check, each with the stop and the place to look at: a motion's at its first contact."""
         names, stops = titles(result.scene), self._drawing.timeline.stops
-        contacts = first_contacts(result.motions)
+        meetings = {k: self._drawing.mark_meeting(k) for k, stop in enumerate(stops) if stop.halts}
         found = []
         for row in result.findings[:_LISTED]:
-            number, here = 0, Row(row.a, row.b, row.verdict.value, row.distance)
+            here = Row(row.a, row.b, row.verdict.value, row.distance, touches=True)
+            number, place = 0, focus(here)
             for k, stop in enumerate(stops):
-                of_pair = [r for r in stop.rows if {r.a, r.b} == {row.a, row.b} and r.drawn]
-                if row.motion is not None and stop.step == row.motion and (of_pair or not number):
+                if row.motion is not None and stop.step == row.motion:
                     number = k
-                    if of_pair and row.contact_at in contacts:
-                        here = of_pair[0]
+                    if any((r.a, r.b, r.what) == (row.a, row.b, FIRST) for r in stop.rows):
+                        place = meetings.get(k) or place
                         break
-            found.append(self._finding(here, number, sentence(row, names), circumstances(row), row.verdict.value))
+            found.append(self._finding(here, number, sentence(row, names), circumstances(row), place))
         return found
 
-    def _finding(self, row: Row, stop: int, said: str, where: str, verdict: str = "") -> dict[str, Any]:
-        low, high = focus(row, self._drawing.size)
-        verdict = verdict or row.verdict
+    def _finding(self, row: Row, stop: int, said: str, where: str, place: tuple[Array, Array]) -> dict[str, Any]:
+        margin = 0.1 * self._drawing.size
         return {
             "a": row.a,
             "b": row.b,
-            "verdict": verdict,
-            "colour": VERDICT_COLOURS[verdict],
+            "verdict": row.verdict,
+            "colour": row.colour,
             "text": said,
             "detail": where,
             "stop": stop,
-            "low": low.tolist(),
-            "high": high.tolist(),
+            "low": (place[0] - margin).tolist(),
+            "high": (place[1] + margin).tolist(),
         }
 
     def _tell(self, said: str, *, state: str, done: bool = False, **more: Any) -> None:
@@ -247,7 +252,10 @@ class Viewer:
         colours = part_colours([part.name for part in scene.parts])
         head = self._clamp.told() if self._clamp is not None else _told(scene)
         measured = "exactly" if self._model is None else f"by {self._model.name}"
-        stops = [_stop_data(stop) for stop in drawing.timeline.stops]
+        stops = [
+            _stop_data(stop) | dict(zip(("low", "high"), (x.tolist() for x in drawing.extent([stop.poses])), strict=True))
+            for stop in drawing.timeline.stops
+        ]
         used = {row["verdict"] for stop in stops for row in stop["rows"]} | {"contact", "clearance", "clear"}
         if not scene.thresholds.clearance:
             used.discard("clearance")
@@ -345,13 +353,9 @@ def _told(scene: Scene) -> dict[str, Any]:
     return {"title": scene.name, "subtitle": f"{n} {'part' if n == 1 else 'parts'}{moving}"}
 
 
-def _stop_data(stop: Any) -> dict[str, Any]:
+def _stop_data(stop: Stop) -> dict[str, Any]:
     keys = ("arrive", "leave", "step", "label", "mark", "halts")
-    rows = [
-        row.data() | {"gap": row.gap, "near": row.declared or row.verdict != "clear", "colour": VERDICT_COLOURS[row.verdict]}
-        for row in stop.rows[:_LISTED]
-    ]
-    return {key: getattr(stop, key) for key in keys} | {"rows": rows}
+    return {key: getattr(stop, key) for key in keys} | {"rows": [row.data() for row in stop.rows[:_LISTED]]}
 
 
 def _table(rows: Sequence[Any]) -> list[dict[str, Any]]:

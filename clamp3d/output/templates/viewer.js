@@ -107,7 +107,7 @@ function clamp3dViewer(messages) {
     const back = eye ? new V(...eye).normalize() : camera.position.clone().sub(viewer.controls.target).normalize();
     const right = new V(0, 1, 0).cross(back).normalize();
     const up = back.clone().cross(right);
-    const tall = Math.tan(camera.fov * Math.PI / 360) * 0.86;
+    const tall = Math.tan(camera.fov * Math.PI / 360) * 0.94;
     const wide = tall * Math.max(0.2, camera.aspect);
     let far = 0.05;
     for (const c of corners) {
@@ -126,8 +126,19 @@ function clamp3dViewer(messages) {
       if (f < 1) requestAnimationFrame(step);
     })();
   }
-  function home(time) {
-    if (story && story.frame) fly(story.frame.low, story.frame.high, story.frame.eye, time);
+  // Everything at a stop, or of the way to the next one.
+  let framed = "";
+  function home(time, turn) {
+    if (!story || !story.frame) return;
+    const i = Math.max(0, stop), playing = story.done && animator.playing;
+    const boxes = playing && story.stops[i + 1] ? [story.stops[i], story.stops[i + 1]] : [story.stops[i]];
+    const corner = (pick, key) => [0, 1, 2].map((k) => pick(...boxes.map((b) => b[key][k])));
+    framed = i + " " + boxes.length;
+    fly(corner(Math.min, "low"), corner(Math.max, "high"), turn ? story.frame.eye : null, time);
+  }
+  function follow() {
+    const moves = story.done && animator.playing && story.stops[stop + 1] ? 2 : 1;
+    if (!touched && stop >= 0 && framed !== stop + " " + moves) home(soft());
   }
   const soft = () => (matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : 700);
 
@@ -137,7 +148,7 @@ function clamp3dViewer(messages) {
     if (element) element.classList.add("now");
     highlight(names);
     if (low) fly(low, high, null, soft());
-    else home(soft());
+    else { touched = false; home(soft()); }
   }
   $("told").addEventListener("click", (e) => {
     const finding = e.target.closest(".finding"), row = e.target.closest(".rows tr[data-a]");
@@ -219,6 +230,7 @@ function clamp3dViewer(messages) {
     $("label").textContent = (story.stops.indexOf(at) + 1) + "/" + story.stops.length + "  " + (moving ? "on the way: " : "") + at.label;
     $("step").textContent = at.label.startsWith(at.step) ? "" : "step " + at.step;
     if (i !== stop) showStop(i);
+    follow();
   }
   (function frame() { refresh(); requestAnimationFrame(frame); })();
 
@@ -243,7 +255,7 @@ function clamp3dViewer(messages) {
     $("marks").replaceChildren(...(story.done && story.stops.length > 1 ? story.stops.map(mark) : []));
     stop = -1;
     if (story.stops.length) showStop(story.done ? 0 : story.stops.length - 1);
-    if (!touched) setTimeout(() => { viewer.set_3d_pane_size(); if (!touched) home(0); }, 30);
+    if (!touched) setTimeout(() => { viewer.set_3d_pane_size(); if (!touched) home(0, true); }, 30);
   }
 
   const handle = viewer.handle_command.bind(viewer);
