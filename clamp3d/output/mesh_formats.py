@@ -71,9 +71,9 @@ def stl(items: Sequence[Placement], title: str, unit: str) -> bytes:
                 f"{allowed:.2g} mm; bring the parts to the origin, or use glb, 3mf, step, obj or ply"
             )
     corners = np.concatenate([item.vertices[item.faces] for item in items]).astype(np.float32)
-    facets = trimesh.Trimesh(**trimesh.triangles.to_kwargs(corners.astype(np.float64)), process=False)
+    facets = trimesh.Trimesh(**trimesh.triangles.to_kwargs(corners.astype(np.float64)), process=False)  # type: ignore[no-untyped-call]
     header = f"clamp3d {title}; unit {unit}; Z up".encode("ascii", "replace")[:80].ljust(80, b" ")
-    return header + bytes(trimesh.exchange.stl.export_stl(facets))[80:]  # type: ignore[no-untyped-call]
+    return header + bytes(trimesh.exchange.stl.export_stl(facets))[80:]
 
 
 def ply(items: Sequence[Placement], title: str, unit: str) -> bytes:

@@ -17,11 +17,12 @@ def test_a_wire_is_a_number_or_a_name(line: object) -> None:
     assert load_clamp(line=line).line.radius == 8.0  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("line", [0, -1.0, np.nan, np.inf, True, None.__class__, [16], "LJ-17", b"16"])
+@pytest.mark.parametrize("line", [0, -1.0, np.nan, np.inf, True, [16], "LJ-17", b"16"])
 def test_what_is_no_wire_is_named(line: object) -> None:
     with pytest.raises(InputError) as caught:
         load_clamp(line=line)  # type: ignore[arg-type]
-    assert "\n" not in str(caught.value) and ("line" in str(caught.value) or "LJ-17" in str(caught.value))
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(("line ", "unknown conductor "))
 
 
 def test_a_clamp_is_given_by_name_by_file_or_loaded(tmp_path: Path) -> None:
