@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from clamp3d.cli.options import UNITS, Source, number, source_argument
+from clamp3d.cli.terminal import show
+
 if TYPE_CHECKING:
-    from clamp3d.clamp.dimensions import Clamp
     from clamp3d.clamp.result import Assembly
     from clamp3d.collide.scene import Scene
     from clamp3d.output.export import Format, Layout
@@ -17,12 +19,15 @@ FORMATS = ("stl", "obj", "ply", "glb", "3mf", "step")
 
 
 @click.command("export")
-@click.argument("source", metavar="[INPUT]", default="reference")
-@click.option("--line", metavar="CONDUCTOR", help="Power line of a clamp: catalogue name or diameter in mm.")
-@click.option("--jumper", metavar="CONDUCTOR", help="Jumper of a clamp: catalogue name or diameter in mm.")
-@click.option("--format", "-f", type=click.Choice(FORMATS), help="By default the suffix of a file.")
+@source_argument()
+@click.option("--format", "-f", type=click.Choice(FORMATS), help="By default the suffix of FILE.")
 @click.option(
-    "--output", "-o", type=click.Path(path_type=Path), required=True, metavar="DIR|FILE", help="A FILE by its suffix."
+    "--output",
+    "-o",
+    type=click.Path(path_type=Path),
+    required=True,
+    metavar="DIR|FILE",
+    help="A folder, or one file that ends in a format's suffix.",
 )
 @click.option(
     "--layout",
@@ -35,13 +40,11 @@ FORMATS = ("stl", "obj", "ply", "glb", "3mf", "step")
     help="Place a clamp's parts as they stand there; a step by name or number.  [default: final for an assembly; "
     "separate parts keep their own frames]",
 )
-@click.option("--mesh-error", type=float, default=0.01, show_default=True, metavar="MM", help="Chord error of meshes.")
-@click.option("--unit", type=click.Choice(["mm", "cm", "m", "in"]), help="Unit of the file.  [default: mm; m for glb]")
+@click.option("--mesh-error", type=number, default=0.01, show_default=True, metavar="MM", help="Chord error of meshes.")
+@click.option("--unit", type=click.Choice(UNITS), help="Unit of the file.  [default: mm; m for glb]")
 @click.option("--quiet", "-q", is_flag=True, help="No messages.")
 def command(
-    source: str,
-    line: str | None,
-    jumper: str | None,
+    source: Source,
     format: Format | None,
     output: Path,
     layout: Layout | None,
@@ -58,10 +61,9 @@ def command(
     """
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.output.export import default_layout, destination, export
-    from clamp3d.scenefile.load import load
 
     chosen, file = destination(output, format)
-    loaded: Clamp | Scene | Assembly = load(source, line=line, jumper=jumper)
+    loaded: Clamp | Scene | Assembly = source.load()
     whole = file is not None or (layout or default_layout(chosen)) == "assembly"
     if isinstance(loaded, Clamp) and (whole or state is not None):
         from clamp3d.clamp.assemble import assemble
@@ -71,7 +73,7 @@ def command(
         loaded = assemble(loaded)
         label = find_state(loaded, state).label
         if not quiet:
-            click.echo(f"state {state}: {label} ({loaded.status})", err=True)
+            show(f"state {state}: {label} ({loaded.status})", err=True)
     written = export(loaded, output, format=chosen, layout=layout, state=state, mesh_error=mesh_error, unit=unit)
     for path in (*written.files, written.manifest):
-        click.echo(str(path))
+        show(str(path))
