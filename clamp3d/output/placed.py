@@ -16,12 +16,10 @@ from clamp3d.core.meshing import mesh
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import MeshShape, Shape
 from clamp3d.errors import InputError
-from clamp3d.output.palette import PART_COLOURS
+from clamp3d.output.palette import part_colours
 
 if TYPE_CHECKING:
     import trimesh
-
-_COLOURS = [colour for name, colour in PART_COLOURS.items() if name not in ("P4", "P5")] + ["#99DDFF", "#BBCC33"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,13 +67,13 @@ def place(source: Clamp | Scene, names: Iterable[str] | None = None) -> tuple[Pl
 
     Raises InputError for an unknown part or none at all.
     """
+    given: list[tuple[str, Shape, Array | None]]
     if isinstance(source, Clamp):
-        found = [PlacedPart(name, solid, None, PART_COLOURS[name]) for name, solid in parts(source).items()]
+        given = [(name, solid, None) for name, solid in parts(source).items()]
     else:
-        found = [
-            PlacedPart(p.name, p.shape, p.T_world, PART_COLOURS.get(p.name, _COLOURS[i % len(_COLOURS)]))
-            for i, p in enumerate(source.parts)
-        ]
+        given = [(part.name, part.shape, part.T_world) for part in source.parts]
+    colours = part_colours([name for name, _, _ in given])
+    found = [PlacedPart(name, shape, T, colours[name]) for name, shape, T in given]
     known = [part.name for part in found]
     chosen = known if names is None else items("names", names, "part names")
     for name in chosen:

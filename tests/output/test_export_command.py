@@ -105,7 +105,7 @@ def test_other_wires_and_units(clamp3d, tmp_path: Path) -> None:
     [
         (("--state", "P9"), "unknown state 'P9'; available: open, P1|P2P3P4P5 (or 1), P7 (or 2)"),
         (("--mesh-error", "0"), "mesh_error must be a finite length >= 1e-06 mm, got 0"),
-        (("--mesh-error", "wide"), "'wide' is not a valid float"),
+        (("--mesh-error", "wide"), "must be a finite number or a fraction like 1/3, got 'wide'"),
         (("--format", "dwg"), "'dwg' is not one of"),
         (("--format", "glb", "--unit", "mm"), "unit of glb must be m"),
         (("nowhere.toml",), "nowhere.toml"),
