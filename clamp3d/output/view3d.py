@@ -27,7 +27,7 @@ _LIGHT = np.array([-0.35, 0.62, 0.70])
 
 
 @dataclass(frozen=True, slots=True)
-class Solid:
+class PosedMesh:
     """A mesh at a pose ``T`` (4, 4) in a colour "#RRGGBB"."""
 
     mesh: trimesh.Trimesh
@@ -52,14 +52,14 @@ class Camera:
         """World points (n, 3) to (right, up, depth towards the viewer) (n, 3) in mm."""
         return points @ self.axes().T
 
-    def view(self, solid: Solid) -> Array:
+    def view(self, solid: PosedMesh) -> Array:
         """The solid's vertices as `project` gives them."""
         return self.project(solid.mesh.vertices @ solid.T[:3, :3].T + solid.T[:3, 3])
 
 
 def draw_solids(
     ax: Axes,
-    solids: Sequence[Solid],
+    solids: Sequence[PosedMesh],
     camera: Camera,
     *,
     pixels: int = 1100,
@@ -122,7 +122,7 @@ def _fill(depth: Array, image: Array, triangle: Array, colour: Array) -> None:
     image[bottom:top, left:right][nearer] = colour
 
 
-def _edges(solid: Solid, camera: Camera) -> NDArray[np.int64]:
+def _edges(solid: PosedMesh, camera: Camera) -> NDArray[np.int64]:
     """Vertex pairs (n, 2) of creases and of outlines against the view."""
     mesh = solid.mesh
     towards = mesh.face_normals @ solid.T[:3, :3].T @ camera.axes()[2]

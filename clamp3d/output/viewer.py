@@ -343,7 +343,8 @@ def _told(scene: Scene) -> dict[str, Any]:
 def _stop_data(stop: Any) -> dict[str, Any]:
     keys = ("arrive", "leave", "step", "label", "mark", "halts")
     rows = [
-        row.data() | {"gap": row.gap, "near": row.declared or row.verdict != "clear", "colour": VERDICT_COLOURS[row.verdict]}
+        row.data()
+        | {"gap": row.gap, "near": row.declared or row.verdict != "clear", "colour": VERDICT_COLOURS[row.verdict]}
         for row in stop.rows[:_LISTED]
     ]
     return {key: getattr(stop, key) for key in keys} | {"rows": rows}

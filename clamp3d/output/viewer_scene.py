@@ -200,7 +200,7 @@ class SceneDrawing:
     def _draw_marks(self, number: int) -> None:
         """Dots and arrows where parts touch, red volumes where they clash, lines with their length across gaps."""
         stop, group = self.timeline.stops[number], self.timeline.group(number)
-        for row in [row for row in stop.rows if row.drawn and row.verdict != "clear" or row.declared][:_MARKED]:
+        for row in [row for row in stop.rows if (row.drawn and row.verdict != "clear") or row.declared][:_MARKED]:
             where = f"{ROOT}/{{}}/{group}/{row.a}-{row.b}"
             colour, d = VERDICT_COLOURS[row.verdict], row.distance
             if d.point_a is None or d.point_b is None:
