@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from clamp3d.baselines import METHODS
 from clamp3d.cli.terminal import STDOUT_TAKEN
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from clamp3d.collide.scene import Scene
 
 Command = Callable[..., Any]
-METHODS = ("cas", "chords", "wedges", "hulls", "mesh")
 UNITS = ("mm", "cm", "m", "in")
 
 
@@ -164,7 +164,7 @@ method_options = collect(
     Method,
     click.option(
         "--method",
-        type=click.Choice(METHODS),
+        type=click.Choice(list(METHODS)),
         default="cas",
         show_default=True,
         help="How grooves are measured: as arcs, as chords in the section, or by FCL on convex wedges, on CoACD "
@@ -244,32 +244,20 @@ def _contact_model(
     mesh_error: float | None,
     quiet: bool,
 ) -> ContactModel:
-    if method == "cas":
-        from clamp3d.baselines.cas import Cas
-
-        return Cas()
-    unit_angle = math.radians(5.0 if unit_angle_deg is None else unit_angle_deg)
-    if method == "chords":
-        from clamp3d.baselines.chords import Chords
-
-        return Chords(unit_angle)
+    """The contact model that the options name. Raises click.UsageError for options that do not go together."""
+    from clamp3d.baselines import contact_model as make
     from clamp3d.clamp.parts import parts
 
-    solids = parts(clamp)
-    if method == "wedges":
-        from clamp3d.baselines.wedges import Wedges
-
-        return Wedges(solids, unit_angle)
-    from clamp3d.baselines.polytopes import PerPart
-    from clamp3d.core.meshing import mesh
-
-    meshes = PerPart([*solids], lambda name: mesh(solids[name], 0.05 if mesh_error is None else mesh_error))
-    if method == "mesh":
-        from clamp3d.baselines.mesh import Mesh
-
-        return Mesh(meshes)
-    from clamp3d.baselines.decomposition import DecompositionParameters
-    from clamp3d.baselines.hulls import Hulls
-
-    parameters = DecompositionParameters() if threshold is None else DecompositionParameters(threshold=threshold)
-    return Hulls(meshes, parameters, progress=False if quiet else None)
+    options = {"--unit-angle-deg": unit_angle_deg, "--threshold": threshold, "--mesh-error": mesh_error}
+    for option, setting in zip(options, ("unit_angle", "threshold", "mesh_error"), strict=True):
+        methods = [name for name, settings in METHODS.items() if setting in settings]
+        if options[option] is not None and method not in methods:
+            raise click.UsageError(f"{option} goes with --method {' or '.join(methods)}, not {method}")
+    return make(
+        method,
+        parts(clamp),
+        unit_angle=None if unit_angle_deg is None else math.radians(unit_angle_deg),
+        threshold=threshold,
+        mesh_error=mesh_error,
+        progress=False if quiet else None,
+    )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from clamp3d import __version__
-from clamp3d.collide.bounds import Verdict
 from clamp3d.collide.result import CheckResult, PairResult, Work
+from clamp3d.collide.verdict import Verdict
 from clamp3d.output.palette import VERDICT_COLOURS
 
 _ORDER = {verdict: k for k, verdict in enumerate(Verdict)}
@@ -69,19 +70,19 @@ def _work(work: Work) -> dict[str, Any]:
 def distance_text(row: PairResult) -> str:
     """The distance with its error bound, or the one bound that is known.
 
-    >>> distance_text(PairResult("a", "b", Verdict.CLEAR, 2.5, float("inf"), "boxes", "bounding boxes"))
+    >>> distance_text(PairResult("a", "b", Verdict.CLEAR, Distance(2.5)))
     '> 2.5'
     """
-    if row.distance is None:
-        return (
-            f"> {row.low:.4g}" if row.low > -float("inf") else f"< {row.high:.4g}" if row.high < float("inf") else "?"
-        )
+    d = row.distance
+    if not math.isfinite(d.uncertainty):
+        return f"> {d.lower:.4g}" if d.lower > -math.inf else f"< {d.upper:.4g}" if d.upper < math.inf else "?"
+    middle, error = 0.5 * (d.lower + d.upper), 0.5 * d.uncertainty
     # As many decimals as the bound gives, no more than 1e-6 mm.
     digits = 6
-    while digits > 1 and 0.5 * 10.0**-digits < row.error_bound / 10.0:
+    while digits > 1 and 0.5 * 10.0**-digits < error / 10.0:
         digits -= 1
-    value = round(row.distance, digits) + 0.0
-    return f"{value:.{digits}f} +- {row.error_bound:.1e}" if row.error_bound > 5e-7 else f"{value:.{digits}f}"
+    value = round(middle, digits) + 0.0
+    return f"{value:.{digits}f} +- {error:.1e}" if error > 5e-7 else f"{value:.{digits}f}"
 
 
 def listed(result: CheckResult) -> list[PairResult]:
@@ -121,7 +122,7 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
 
 
 def _row_text(row: PairResult) -> tuple[str, ...]:
-    return (f"{row.a} - {row.b}", row.verdict.value, distance_text(row), row.method)
+    return (f"{row.a} - {row.b}", row.verdict.value, distance_text(row), row.distance.method)
 
 
 def _motion_text(row: PairResult) -> tuple[str, ...]:
@@ -133,7 +134,7 @@ def _motion_text(row: PairResult) -> tuple[str, ...]:
         distance_text(row),
         f"{row.t:.4f}",
         contact,
-        row.method,
+        row.distance.method,
     )
 
 

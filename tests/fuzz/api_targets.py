@@ -18,10 +18,10 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Wire
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.collide.motion import Motion
 from clamp3d.collide.scene import Allowed
 from clamp3d.core import pose as poses
 from clamp3d.core import shapes
+from clamp3d.core.motion import Motion
 from clamp3d.scenefile.file import load_scene
 from tests.fuzz import garbage
 from tests.fuzz.api_values import Rng, pose, pose_batch, rigid
@@ -34,8 +34,9 @@ RESULTS = {
     "Equilibrium",
     "ArcRelation",
     "CheckResult",
-    "Clearance",
     "CylinderFit",
+    "Distance",
+    "Distances",
     "Feature",
     "FitResult",
     "GrooveFit",
@@ -47,9 +48,9 @@ RESULTS = {
     "ImageMeasurement",
     "ImageStudy",
     "InputError",
-    "MotionContact",
+    "MotionDistance",
     "PairResult",
-    "PoseSweep",
+    "PoseVerdicts",
     "Relation3D",
     "SignedDistance",
     "SignedDistances",
@@ -70,7 +71,7 @@ def _run() -> Any:
 
 @functools.cache
 def _models() -> tuple[Any, ...]:
-    from clamp3d.baselines.mesh import Mesh
+    from clamp3d.baselines.meshes import Meshes
     from clamp3d.core.meshing import mesh
 
     solids = clamp3d.parts(_clamp())
@@ -78,7 +79,7 @@ def _models() -> tuple[Any, ...]:
         Cas(),
         Chords(0.2),
         Wedges(solids, 0.2),
-        Mesh({name: mesh(solids[name], 0.5) for name in ("P1", "P2", "P3")}),
+        Meshes({name: mesh(solids[name], 0.5) for name in ("P1", "P2", "P3")}),
     )
 
 
@@ -110,13 +111,15 @@ def _wire(rng: Rng) -> Any:
 
 
 def _motion(rng: Rng) -> Any:
-    T = poses.translation(0.0, 40.0, 0.0) @ rigid(rng, 5.0)
     way = rng.integers(3)
     if way == 0:
-        return clamp3d.Translation(T, rng.normal(size=3) * 40.0)
-    if way == 1:
-        return clamp3d.Rotation(T, rng.normal(size=3), rng.normal(size=3), float(rng.uniform(-7, 7)))
-    return clamp3d.Screw(T, rng.normal(size=3), rng.normal(size=3), float(rng.uniform(-7, 7)), 30.0)
+        return Motion.translate(rng.normal(size=3) * 40.0)
+    travel = 30.0 * float(way - 1)
+    return Motion.screw(rng.normal(size=3), float(rng.uniform(-7, 7)), point=rng.normal(size=3), travel=travel)
+
+
+def _above(rng: Rng) -> Any:
+    return poses.translation(0.0, 40.0, 0.0) @ rigid(rng, 5.0)
 
 
 def _marks(rng: Rng) -> Any:
@@ -201,22 +204,20 @@ def targets() -> dict[str, tuple[float, Make]]:
             _simple(c.groove_relation, groove=_groove, cylinder=_wire, pose=pose, tolerance=_tolerance),
         ),
         "relative_pose": (8, _simple(c.relative_pose, T_world_a=pose, T_world_b=pose)),
-        "Translation": (5, _simple(c.Translation, start=pose, vector=_three)),
-        "Rotation": (5, _simple(c.Rotation, start=pose, point=_three, axis=_three, angle=_angle)),
-        "Screw": (5, _simple(c.Screw, start=pose, point=_three, axis=_three, angle=_angle, travel=_angle)),
-        "Screw.pose": (3, lambda r, f: (_motion(r).pose, {"instant": float(r.random())})),
+        "Motion.at": (3, lambda r, f: (_motion(r).at, {"t": float(r.random())})),
         "first_contact": (
             3,
             _simple(
                 c.first_contact,
-                groove=_groove,
-                cylinder=_wire,
+                a=_groove,
+                b=_wire,
                 motion=_motion,
+                T_a_b=_above,
                 margin=_choice(0.0, 0.1, -0.1),
                 resolution=_choice(None, 1e-3),
             ),
         ),
-        "sweep": (2, _simple(c.sweep, groove=_groove, cylinder=_wire, motion=_motion, resolution=_choice(None, 1e-3))),
+        "min_clearance": (2, _simple(c.min_clearance, a=_groove, b=_wire, motion=_motion, T_a_b=_above)),
         "arc_circle": (
             8,
             _simple(
@@ -312,7 +313,7 @@ def targets() -> dict[str, tuple[float, Make]]:
         ),
         "Scene.add": (
             3,
-            lambda r, f: (_scene().add, {"name": "a", "shape": shapes.box((1, 2, 3)), "T_world": pose(r)}),
+            lambda r, f: (_scene().add, {"part": "a", "shape": shapes.box((1, 2, 3)), "T_world": pose(r)}),
         ),
         "Allowed": (2, _simple(Allowed, a=_fixed("block"), b=_fixed("w*"), overlap=_choice(0.0, 0.1))),
         "Scene.moved": (2, lambda r, f: (_scene().moved, {"poses": {"wire": pose(r)}})),
@@ -339,16 +340,17 @@ def targets() -> dict[str, tuple[float, Make]]:
                     "scene": _scene().moved({"wire": rigid(r)}),
                     "pairs": garbage.pick(r, (None, [("wire", "block")])),
                     "full": False,
+                    "distances": False,
                     "progress": None,
-                    "workshop": None,
+                    "cache": None,
                 },
             ),
         ),
-        "sweep_poses": (
+        "check_poses": (
             2,
             lambda r, f: (
-                c.sweep_poses,
-                {"scene": _scene(), "part": "wire", "others": None, "poses": _few(pose_batch(r)), "workshop": None},
+                c.check_poses,
+                {"scene": _scene(), "part": "wire", "others": None, "poses": _few(pose_batch(r)), "cache": None},
             ),
         ),
         "load_clamp": (
