@@ -96,12 +96,15 @@ def finding_figure(scene: Scene, row: PairResult) -> Figure:
 
 def _at(scene: Scene, row: PairResult) -> Scene:
     """The scene at the moment of a row: that of its least distance in a motion."""
-    if row.motion is None or row.t is None:
-        return scene
-    motion = next(m for m in scene.motions if m.name == row.motion)
-    rest = {part.name: part.T_world for part in scene.parts}
-    going = motion.resolved(rest[motion.parts[0]])
-    return scene.moved({name: going.at(row.t, rest[name]) for name in motion.parts})
+    poses = {part.name: part.T_world for part in scene.parts}
+    for motion in scene.motions if row.motion is not None else ():
+        # Each motion starts where the one before has left the parts.
+        going = motion.resolved(poses[motion.parts[0]])
+        last = motion.name == row.motion and row.t is not None
+        poses |= {name: going.at(row.t if last else 1.0, poses[name]) for name in motion.parts}
+        if last:
+            break
+    return scene.moved(poses)
 
 
 def _solids(scene: Scene, names: Sequence[str]) -> dict[str, PosedMesh]:
