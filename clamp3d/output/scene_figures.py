@@ -65,7 +65,7 @@ def finding_figure(scene: Scene, row: PairResult) -> Figure:
     common = _common(*solids) if row.distance.upper < 0.0 else None
     place = _place(row)
     if place is None and common is not None:
-        place = common.mesh.vertices.mean(axis=0)
+        place = common.T[:3, :3] @ common.mesh.center_mass + common.T[:3, 3]
     camera = _CAMERAS[0] if place is None else min(_CAMERAS, key=lambda c: _hidden(c, solids, place))
     axes = figure.subplots(1, 1 if place is None else 2, squeeze=False)[0]
     half = _ENLARGED * max(float(np.ptp(camera.view(s)[:, :2], axis=0).max()) for s in solids)
