@@ -9,7 +9,6 @@
 
 from clamp3d.core.arc_circle import ArcContact, ArcRelation, arc_circle, classify_arc_circle
 from clamp3d.core.distance import Feature, SignedDistance, SignedDistances, signed_distance, signed_distances
-from clamp3d.core.motion import Clearance, MotionContact, Rotation, Screw, Translation, first_contact, sweep
 from clamp3d.core.pieces import GroovePieces, groove_pieces
 from clamp3d.core.pose import SectionPose, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
@@ -19,26 +18,20 @@ from clamp3d.core.relation3d import GrooveRelation, Relation3D, groove_relation,
 __all__ = [
     "ArcContact",
     "ArcRelation",
-    "Clearance",
     "Cylinder",
     "Feature",
     "GroovePieces",
     "GrooveRelation",
     "HoleContact",
     "HoleRelation",
-    "MotionContact",
     "Rectangle",
     "Relation3D",
-    "Rotation",
-    "Screw",
     "SectionPose",
     "SignedDistance",
     "SignedDistances",
     "SweptArc",
-    "Translation",
     "arc_circle",
     "classify_arc_circle",
-    "first_contact",
     "groove_pieces",
     "groove_relation",
     "hole_bolt",
@@ -46,6 +39,5 @@ __all__ = [
     "rotation",
     "signed_distance",
     "signed_distances",
-    "sweep",
     "translation",
 ]

@@ -25,10 +25,10 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.placement import WireClosing
 from clamp3d.clamp.section import Section
-from clamp3d.collide.motion import Motion
+from clamp3d.collide.motions import check_poses
 from clamp3d.collide.scene import Allowed
-from clamp3d.collide.sweep import sweep_poses
 from clamp3d.core import pose as poses
+from clamp3d.core.motion import Motion
 from clamp3d.core.shapes import FITS
 from clamp3d.output.viewer import Viewer
 from clamp3d.scenefile.file import load_scene
@@ -52,8 +52,8 @@ RESULTS = {
     "Equilibrium",
     "ArcRelation",
     "CheckResult",
-    "Clearance",
     "CylinderFit",
+    "Distances",
     "Feature",
     "FitResult",
     "GrooveFit",
@@ -65,9 +65,9 @@ RESULTS = {
     "ImageMeasurement",
     "ImageStudy",
     "InputError",
-    "MotionContact",
+    "MotionDistance",
     "PairResult",
-    "PoseSweep",
+    "PoseVerdicts",
     "Relation3D",
     "SignedDistance",
     "SignedDistances",
@@ -128,13 +128,15 @@ def _wire(rng: Rng) -> Any:
 
 
 def _motion(rng: Rng) -> Any:
-    T = poses.translation(0.0, 40.0, 0.0) @ rigid(rng, 5.0)
     way = rng.integers(3)
     if way == 0:
-        return kernel.Translation(T, rng.normal(size=3) * 40.0)
-    if way == 1:
-        return kernel.Rotation(T, rng.normal(size=3), rng.normal(size=3), float(rng.uniform(-7, 7)))
-    return kernel.Screw(T, rng.normal(size=3), rng.normal(size=3), float(rng.uniform(-7, 7)), 30.0)
+        return Motion.translate(rng.normal(size=3) * 40.0)
+    travel = 30.0 * float(way - 1)
+    return Motion.screw(rng.normal(size=3), float(rng.uniform(-7, 7)), point=rng.normal(size=3), travel=travel)
+
+
+def _above(rng: Rng) -> Any:
+    return poses.translation(0.0, 40.0, 0.0) @ rigid(rng, 5.0)
 
 
 def _marks(rng: Rng) -> Any:
@@ -221,25 +223,20 @@ def targets() -> dict[str, tuple[float, Make]]:
             _simple(kernel.groove_relation, groove=_groove, cylinder=_wire, pose=pose, tolerance=_tolerance),
         ),
         "relative_pose": (8, _simple(kernel.relative_pose, T_world_a=pose, T_world_b=pose)),
-        "Translation": (5, _simple(kernel.Translation, start=pose, vector=_three)),
-        "Rotation": (5, _simple(kernel.Rotation, start=pose, point=_three, axis=_three, angle=_angle)),
-        "Screw": (5, _simple(kernel.Screw, start=pose, point=_three, axis=_three, angle=_angle, travel=_angle)),
-        "Screw.pose": (3, lambda r, f: (_motion(r).pose, {"instant": float(r.random())})),
+        "Motion.at": (3, lambda r, f: (_motion(r).at, {"t": float(r.random())})),
         "first_contact": (
             3,
             _simple(
-                kernel.first_contact,
-                groove=_groove,
-                cylinder=_wire,
+                clamp3d.first_contact,
+                a=_groove,
+                b=_wire,
                 motion=_motion,
+                T_a_b=_above,
                 margin=_choice(0.0, 0.1, -0.1),
                 resolution=_choice(None, 1e-3),
             ),
         ),
-        "sweep": (
-            2,
-            _simple(kernel.sweep, groove=_groove, cylinder=_wire, motion=_motion, resolution=_choice(None, 1e-3)),
-        ),
+        "min_clearance": (2, _simple(clamp3d.min_clearance, a=_groove, b=_wire, motion=_motion, T_a_b=_above)),
         "arc_circle": (
             8,
             _simple(
@@ -347,7 +344,7 @@ def targets() -> dict[str, tuple[float, Make]]:
         ),
         "Scene.add": (
             3,
-            lambda r, f: (_scene().add, {"name": "a", "shape": shapes.box((1, 2, 3)), "T_world": pose(r)}),
+            lambda r, f: (_scene().add, {"part": "a", "shape": shapes.box((1, 2, 3)), "T_world": pose(r)}),
         ),
         "Allowed": (2, _simple(Allowed, a=_fixed("block"), b=_fixed("w*"), overlap=_choice(0.0, 0.1))),
         "Scene.moved": (2, lambda r, f: (_scene().moved, {"poses": {"wire": pose(r)}})),
@@ -374,8 +371,9 @@ def targets() -> dict[str, tuple[float, Make]]:
                     "scene": _scene().moved({"wire": rigid(r)}),
                     "pairs": garbage.pick(r, (None, [("wire", "block")])),
                     "full": False,
+                    "distances": False,
                     "progress": None,
-                    "workshop": None,
+                    "cache": None,
                 },
             ),
         ),
@@ -394,11 +392,11 @@ def targets() -> dict[str, tuple[float, Make]]:
                 {"scene": _scene(), "pairs": garbage.pick(r, (None, [("wire", "block")])), "accuracy": 1e-3},
             ),
         ),
-        "sweep_poses": (
+        "check_poses": (
             2,
             lambda r, f: (
-                sweep_poses,
-                {"scene": _scene(), "part": "wire", "others": None, "poses": _few(pose_batch(r)), "workshop": None},
+                check_poses,
+                {"scene": _scene(), "part": "wire", "others": None, "poses": _few(pose_batch(r)), "cache": None},
             ),
         ),
         "load_clamp": (
