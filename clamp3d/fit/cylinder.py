@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.optimize import least_squares
 
-Array = NDArray[np.float64]
+from clamp3d.core.pose import Array
 
 CONFIDENCE = 0.9973
 """Probability of the covariance part of every error bound: three standard deviations of a normal distribution."""
@@ -158,12 +158,11 @@ def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> f
     Holds for the whole arc and length at once with probability ``CONFIDENCE`` (Scheffe's simultaneous band with five
     parameters and ``freedom`` degrees of freedom); the arc is centred on -y.
     """
-    a = np.linspace(-half_angle, half_angle, 49)
-    u = np.stack([np.sin(a), -np.cos(a)], axis=1)
-    worst = 0.0
-    for z in (-0.5 * length, 0.0, 0.5 * length):
-        g = np.column_stack([np.ones(len(u)), u, z * u])
-        worst = max(worst, float(np.einsum("ij,jk,ik->i", g, C, g).max()))
+    a, z = (
+        q.ravel() for q in np.meshgrid(np.linspace(-half_angle, half_angle, 49), length * np.array([-0.5, 0.0, 0.5]))
+    )
+    g = np.column_stack([np.ones_like(a), np.sin(a), -np.cos(a), z * np.sin(a), -z * np.cos(a)])
+    worst = float(np.einsum("ij,jk,ik->i", g, C, g).max())
     return float(np.sqrt(5.0 * stats.f.ppf(CONFIDENCE, 5, max(freedom, 1)) * worst))
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.brep.mesh_file import load_mesh
 from clamp3d.checks import function, instance
@@ -18,9 +17,6 @@ from clamp3d.fit.join import join
 from clamp3d.fit.measure import measure
 from clamp3d.fit.regions import find_regions
 from clamp3d.fit.surface import Surface
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

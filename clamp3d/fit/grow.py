@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from clamp3d.core.mesh import IntArray
+from clamp3d.core.pose import Array
+from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
-from clamp3d.fit.surface import MAX_FACET, Surface, facet_span, sagitta
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface, border, facet_span
 
 MIN_LINES = 4
 """Fewest lines on a surface: three always lie on some circle (a trapezoid or V groove is not an arc)."""
@@ -143,7 +141,7 @@ def accept(surface: Surface, cells: IntArray, region: Region) -> bool:
     # Every trapezoid with equal flanks lies on a circle: with three facets ask for three equal ones.
     if lines == MIN_LINES and (spans.max() > 1.02 * spans.min() or spans.max() > np.radians(30.0)):
         return False
-    if 2.0 * axis.radius * np.sin(0.25 * arc) ** 2 < 6.0 * noise or arc < 2.0 * float(np.median(spans)):
+    if sagitta(axis.radius, arc) < 6.0 * noise or arc < 2.0 * float(np.median(spans)):
         return False
     z = (V[np.unique(F[region.faces])] - axis.point) @ axis.direction
     length = float(np.ptp(z))
@@ -173,17 +171,13 @@ def _bent(local: Array, residual: Array, radius: float) -> bool:
 
 def _runs_on(surface: Surface, region: Region, length: float) -> bool:
     """True if the surface goes on smoothly past both round ends with bands as long: a ring of a sphere or torus."""
-    inside = np.zeros(len(surface.F), dtype=bool)
-    inside[region.faces] = True
-    first, second = inside[surface.pairs].T
-    border = first != second
-    ends = surface.V[surface.edges[border]] @ region.axis.direction
-    run = np.linalg.norm(np.diff(surface.V[surface.edges[border]], axis=1)[:, 0], axis=1)
-    across = np.abs(ends[:, 1] - ends[:, 0]) < 0.5 * run
-    z = ends.mean(axis=1)
+    crossing, outside, _ = border(surface, region.faces)
+    ends = surface.V[surface.edges[crossing]]
+    along = ends @ region.axis.direction
+    across = np.abs(along[:, 1] - along[:, 0]) < 0.5 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    z = along.mean(axis=1)
     z = z - 0.5 * (z.min() + z.max()) if len(z) else z
-    smooth = surface.bend[border] < 1.5 * region.span
-    outside = np.where(first, surface.pairs[:, 1], surface.pairs[:, 0])[border]
+    smooth = surface.bend[crossing] < 1.5 * region.span
     band = np.ptp(surface.V[surface.F[outside]] @ region.axis.direction, axis=1)
     both = [across & (z > 0.0), across & (z < 0.0)]
     return all(bool(e.any() and smooth[e].mean() > 0.7 and np.median(band[e]) > 0.3 * length) for e in both)

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from clamp3d.core.mesh import IntArray
+from clamp3d.core.pose import Array
+from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, patches_of, perpendicular, surface_error
 from clamp3d.fit.grow import Region
-from clamp3d.fit.surface import Surface, sagitta
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from clamp3d.fit.surface import BoolArray, Surface, angles, border, turned
 
 FULL_TURN_GAP = np.radians(30.0)
 """A surface whose largest uncovered angle is below this goes all the way round."""
@@ -22,13 +21,9 @@ FULL_TURN_GAP = np.radians(30.0)
 
 def arc(surface: Surface, axis: Axis, u: Array, w: Array, faces: IntArray) -> tuple[float, float]:
     """Middle (rad, from u towards w) and half angle of the arc that ``faces`` cover; half angle pi for a full turn."""
-    p = surface.V[surface.F[faces]] - axis.point
-    a = np.arctan2(p @ w, p @ u)
-    base = a[:, :1]
-    turned = base + (a - base + np.pi) % (2.0 * np.pi) - np.pi
-    low, high = turned.min(axis=1), turned.max(axis=1)
-    order = np.argsort(low)
-    low, high = low[order], high[order]
+    a = angles(surface, axis, faces, u, w)
+    a = a[:, :1] + turned(a, a[:, :1])
+    low, high = a[np.argsort(a.min(axis=1))].min(axis=1), a[np.argsort(a.min(axis=1))].max(axis=1)
     # Two turns of the sorted intervals make the circle a line.
     low = np.concatenate([low, low + 2.0 * np.pi])
     high = np.maximum.accumulate(np.concatenate([high, high + 2.0 * np.pi]))
@@ -67,44 +62,33 @@ class _Border:
     growth: Array
     inner_bend: float
 
-    def end(self, values: Array, side: NDArray[np.bool_]) -> _End | None:
+    def end(self, values: Array, side: BoolArray) -> _End | None:
         """Length-weighted median of ``values`` (k,) on ``side`` (k,); None without a border there."""
         if not side.any():
             return None
         v, w = values[side], self.length[side]
-        order = np.argsort(v)
-        total = np.cumsum(w[order])
-        at = float(v[order][np.searchsorted(total, 0.5 * total[-1])])
+        at = _quantile(v, w, 0.5)
         crease = np.median(self.bend[side]) > 2.0 * self.inner_bend
         sharp = bool(crease and np.median(self.growth[side]) > 4.0)
         # A few border edges belong to a corner or a pock mark: nine tenths of the border say how far it strays.
-        far = np.abs(v - at)
-        by_size = np.argsort(far)
-        stray = float(far[by_size][np.searchsorted(np.cumsum(w[by_size]), 0.9 * total[-1])])
-        return _End(at, stray, sharp)
+        return _End(at, _quantile(np.abs(v - at), w, 0.9), sharp)
+
+
+def _quantile(values: Array, weights: Array, share: float) -> float:
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, share * total[-1])])
 
 
 def _border(surface: Surface, faces: IntArray) -> _Border:
-    inside = np.zeros(len(surface.F), dtype=bool)
-    inside[faces] = True
-    first, second = inside[surface.pairs].T
-    crossing = first != second
-    F = surface.F[faces]
-    n = len(surface.V)
-    edges = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
-    key, count = np.unique(edges[:, 0] * n + edges[:, 1], return_counts=True)
-    key = key[count == 1]
-    shared = np.sort(surface.edges[crossing], axis=1)
-    shared_key = shared[:, 0] * n + shared[:, 1]
-    known = np.isin(shared_key, key)
-    at = np.searchsorted(key, shared_key[known])
-    bend, growth = np.full(len(key), np.inf), np.full(len(key), np.inf)
-    bend[at] = surface.bend[crossing][known]
-    outside = np.where(first, surface.pairs[:, 1], surface.pairs[:, 0])[crossing][known]
-    growth[at] = surface.areas[outside] / np.median(surface.areas[faces])
-    ends = surface.V[np.stack([key // n, key % n], axis=1)]
-    both = surface.bend[first & second]
-    inner = float(np.median(both[both > 1e-4])) if (both > 1e-4).any() else 0.0
+    crossing, outside, within = border(surface, faces)
+    rim = surface.rim[np.isin(surface.rim_faces, faces)]
+    ends = surface.V[np.concatenate([surface.edges[crossing], rim])]
+    beyond = np.full(len(rim), np.inf)
+    bend = np.concatenate([surface.bend[crossing], beyond])
+    growth = np.concatenate([surface.areas[outside] / np.median(surface.areas[faces]), beyond])
+    bends = surface.bend[within & (surface.bend > 1e-4)]
+    inner = float(np.median(bends)) if len(bends) else 0.0
     return _Border(ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), bend, growth, inner)
 
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from clamp3d.core.mesh import IntArray
+from clamp3d.core.pose import Array
+from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import Axis, circle, fit_axis, perpendicular
 from clamp3d.fit.grow import Region, accept, grow
-from clamp3d.fit.surface import Surface, sagitta
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from clamp3d.fit.surface import BoolArray, Surface
 
 _PATCH_SIZES = (24, 96, 384, 1536)
 _GATES = tuple(np.radians(a) for a in (12.0, 25.0, 46.0))

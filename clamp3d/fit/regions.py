@@ -14,16 +14,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clamp3d.core.mesh import IntArray
 from clamp3d.fit.cylinder import Axis, circle, perpendicular
 from clamp3d.fit.grow import Region, accept, grow
 from clamp3d.fit.patches import patches
-from clamp3d.fit.surface import MAX_FACET, Surface
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface
 
 
 def find_regions(surface: Surface, progress: Callable[[str, float], None] | None = None) -> list[Region]:
