@@ -134,6 +134,16 @@ def circle(points: Array) -> tuple[Array, float] | None:
     return m + sol[:2], float(np.sqrt(max(sol[2] + sol[0] ** 2 + sol[1] ** 2, 0.0)))
 
 
+def axis_along(direction: Array, points: Array) -> Axis | None:
+    """Cylinder along a unit ``direction`` (3,) by the circle of ``points`` (n, 3) seen along it; None if on a line."""
+    u, w = perpendicular(direction)
+    got = circle(np.column_stack([points @ u, points @ w]))
+    if got is None:
+        return None
+    centre, radius = got
+    return Axis(centre[0] * u + centre[1] * w, direction, radius)
+
+
 def covariance(local: Array, radius: float, noise: float) -> Array | None:
     """Covariance (5, 5) of (radius, x, y, tilt_x, tilt_y) for points ``local`` (n, 3) in the cylinder's own frame.
 

@@ -34,25 +34,31 @@ class Region:
     strips: bool
 
 
-def grow(
-    surface: Surface,
-    free: BoolArray,
-    cells: IntArray,
-    axis: Axis,
-    sign: int,
-    seed: IntArray,
-    tolerance: float,
-    floor: float,
-    *,
-    strips: bool,
-) -> Region | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class Search:
+    """One pass over a surface: the faces (m,) still ``free``, planar ``cells`` (m,), least tolerance ``floor`` in mm.
+
+    ``strips``: the seeds are strips of an exact tessellation.
+    """
+
+    surface: Surface
+    free: BoolArray
+    cells: IntArray
+    floor: float
+    strips: bool
+
+    def span(self, axis: Axis, faces: IntArray) -> Array:
+        """Angle (rad) about the axis of each planar cell that has some of ``faces``."""
+        return facet_span(self.surface, axis, faces, self.cells)
+
+
+def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float) -> Region | None:
     """Grow from ``seed`` faces, refit, and repeat until the faces no longer change."""
     # Voxel and remeshed surfaces put their vertices off by a good part of the facets' sagitta.
-    share = 0.0 if strips else 0.3
-    V, F = surface.V, surface.F
-    faces = seed
-    points = np.unique(F[seed])
-    span = float(facet_span(surface, axis, seed, cells).max())
+    share = 0.0 if search.strips else 0.3
+    surface, floor = search.surface, search.floor
+    V, F, faces = surface.V, surface.F, seed
+    span = float(search.span(axis, faces).max())
     for _ in range(12):
         if not 0.0 < axis.radius < 20.0 * surface.extent or span > MAX_FACET:
             return None
@@ -63,7 +69,7 @@ def grow(
         lean = np.einsum("ij,ij->i", surface.normals[faces], axis.radial(surface.centres[faces])[0])
         slack = float(np.quantile(np.arccos(np.clip(sign * lean, -1.0, 1.0)), 0.9))
         limit = np.cos(min(max(0.6 * span, 2.5 * slack, 0.02), 0.7))
-        mask: BoolArray = free & np.asarray(near[F].all(axis=1))
+        mask: BoolArray = search.free & np.asarray(near[F].all(axis=1))
         index = np.flatnonzero(mask)
         radial = axis.radial(surface.centres[index])[0]
         mask[index] = sign * np.einsum("ij,ij->i", surface.normals[index], radial) >= limit
@@ -74,7 +80,7 @@ def grow(
         names, where = np.unique(label[inside], return_inverse=True)
         main = names[np.argmax(np.bincount(where, weights=surface.areas[inside]))]
         grown = np.flatnonzero(mask & (label == main))
-        settled = len(grown) == len(faces) and bool((grown == faces).all())
+        settled = np.array_equal(grown, faces)
         faces = grown
         points = _support(surface, faces, np.abs(off) <= tolerance)
         if len(points) < 6:
@@ -84,7 +90,7 @@ def grow(
             return None
         axis = better
         tolerance = max(floor, _tolerance(axis.residual(V[points])))
-        span = float(facet_span(surface, axis, faces, cells).max())
+        span = float(search.span(axis, faces).max())
         if settled:
             break
     corners = np.unique(F[faces])
@@ -96,7 +102,7 @@ def grow(
             wider = max(floor, _tolerance(res))
             if wider <= 3.0 * tolerance and float(np.abs(res).max()) <= wider:
                 axis, points, tolerance = whole, corners, wider
-    return Region(axis, sign, faces, points, tolerance, span, strips)
+    return Region(axis, sign, faces, points, tolerance, span, search.strips)
 
 
 def _tolerance(residual: Array) -> float:
@@ -124,18 +130,16 @@ def _support(surface: Surface, faces: IntArray, on: BoolArray) -> IntArray:
     return np.asarray(inner if len(inner) >= max(50, 0.6 * len(keep)) else keep)
 
 
-def accept(surface: Surface, cells: IntArray, region: Region) -> bool:
+def accept(search: Search, region: Region) -> bool:
     """True if the region is long, round and distinct enough to be a cylinder rather than an accident."""
-    V, F = surface.V, surface.F
-    axis = region.axis
-    u, w = perpendicular(axis.direction)
-    p = V[region.points] - axis.point
-    angle = np.sort(np.arctan2(p @ w, p @ u))
+    V, axis = search.surface.V, region.axis
+    p = (V[region.points] - axis.point) @ np.stack([*perpendicular(axis.direction), axis.direction], axis=1)
+    angle = np.sort(np.arctan2(p[:, 1], p[:, 0]))
     gaps = np.diff(angle, append=angle[0] + 2.0 * np.pi)
     arc = 2.0 * np.pi - float(gaps.max())
     noise = max(region.tolerance / 4.0, 1e-12)
     lines = int((gaps > 1e-3 * max(arc, 1e-9)).sum())
-    spans = facet_span(surface, axis, region.faces, cells)
+    spans = search.span(axis, region.faces)
     if lines < MIN_LINES:
         return False
     # Every trapezoid with equal flanks lies on a circle: with three facets ask for three equal ones.
@@ -143,12 +147,8 @@ def accept(surface: Surface, cells: IntArray, region: Region) -> bool:
         return False
     if sagitta(axis.radius, arc) < 6.0 * noise or arc < 2.0 * float(np.median(spans)):
         return False
-    z = (V[np.unique(F[region.faces])] - axis.point) @ axis.direction
-    length = float(np.ptp(z))
-    if _runs_on(surface, region, length):
-        return False
-    p = p @ np.stack([u, w, axis.direction], axis=1)
-    if _bent(p, axis.residual(V[region.points]), axis.radius):
+    length = float(np.ptp(V[np.unique(search.surface.F[region.faces])] @ axis.direction))
+    if _runs_on(search.surface, region, length) or _bent(p, axis.residual(V[region.points]), axis.radius):
         return False
     return len(region.points) >= 8 and length > 0.0
 
