@@ -36,12 +36,27 @@ _SILENT = logging.NullHandler()
 
 
 def load_mesh(path: str | Path, *, unit: str | None = None) -> Mesh:
-    """Read ``path`` (STL, OBJ, PLY, GLB, GLTF, 3MF or STEP) as one mesh in mm, Z up.
+    """Read a file as one mesh in mm with Z up; several bodies become one mesh.
 
-    ``unit`` is one of ``UNITS_MM``; the default is mm for STL, OBJ and PLY (which carry no unit), the unit in the file
-    for 3MF and STEP, metres for glTF (whose Y up becomes Z up). Several bodies become one mesh.
-    Raises InputError if the file is missing, unreadable, empty, or has a number that is not finite;
-    MissingLibraryError for STEP without the extra ``step``.
+    Parameters
+    ----------
+    path : str or Path
+        STL, OBJ, PLY, GLB, GLTF, 3MF or STEP file.
+    unit : str, optional
+        Unit of the file's lengths: mm, cm, m or in. By default mm for STL, OBJ and PLY (which carry no unit), the
+        unit in the file for 3MF and STEP, metres for glTF (whose Y up becomes Z up).
+
+    Returns
+    -------
+    Mesh
+        The mesh as `make_mesh` checks and repairs it; its ``notes`` say what was assumed.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, not readable or empty, or has a number that is not finite.
+    MissingLibraryError
+        For STEP without the extra ``step``.
     """
     file = checks.path("mesh", path)
     kind = file.suffix.lower()
@@ -62,11 +77,11 @@ def load_mesh(path: str | Path, *, unit: str | None = None) -> Mesh:
         vertices = np.column_stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]])
     scale = UNITS_MM[unit or file_unit or "mm"]
     mesh = make_mesh(vertices, faces, name=file.name, scale=scale, float32=kind not in _STEP)
-    notes = list(mesh.notes)
-    if unit is None and file_unit is None:
-        size = float(np.ptp(mesh.vertices, axis=0).max())
-        notes.insert(0, f"{kind[1:].upper()} carries no unit: taken as mm (largest extent {size:.6g} mm)")
-    return replace(mesh, notes=tuple(notes))
+    if unit or file_unit:
+        return mesh
+    size = float(np.ptp(mesh.vertices, axis=0).max())
+    note = f"{kind[1:].upper()} carries no unit: taken as mm (largest extent {size:.6g} mm)"
+    return replace(mesh, notes=(note, *mesh.notes))
 
 
 def _read(file: Path, kind: str) -> tuple[Array, IntArray, str | None]:

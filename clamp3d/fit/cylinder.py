@@ -157,9 +157,8 @@ def covariance(local: Array, radius: float, noise: float) -> Array | None:
     values, vectors = np.linalg.eigh(J.T @ J)
     if values[0] < 1e-10 * values[-1]:
         return None
-    C: Array = (vectors / values) @ vectors.T * noise**2
-    unscale = np.array([1.0, 1.0, 1.0, 1.0 / size, 1.0 / size])
-    return C * np.outer(unscale, unscale)
+    vectors[3:] /= size
+    return np.asarray((vectors / values) @ vectors.T * noise**2)
 
 
 def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> float:
