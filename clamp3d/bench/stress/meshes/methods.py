@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,9 +102,9 @@ def _fit(case: MeshCase) -> tuple[float, float, str]:
 
 def _scene(case: MeshCase) -> tuple[float, float, str]:
     """A scene of the mesh and the wire, checked: what the mesh is for a user who wants a verdict."""
-    from clamp3d.collide.bounds import Verdict
     from clamp3d.collide.check import check
     from clamp3d.collide.scene import Scene
+    from clamp3d.collide.verdict import Verdict
     from clamp3d.core.mesh import make_mesh
     from clamp3d.core.shapes import MeshShape
 
@@ -119,8 +119,8 @@ def _scene(case: MeshCase) -> tuple[float, float, str]:
     if row.verdict is Verdict.UNCERTAIN:
         return math.nan, math.nan, "scene: uncertain"
     if row.verdict in (Verdict.CLASH, Verdict.CONTAINED):
-        return row.high, math.nan, ""
-    return cast(float, row.distance), row.error_bound + _rounding(case), ""
+        return row.distance.upper, math.nan, ""
+    return row.distance.value, row.distance.uncertainty + _rounding(case), ""
 
 
 def _fcl_alone(case: MeshCase) -> tuple[float, float, str]:
