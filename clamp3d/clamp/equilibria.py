@@ -63,11 +63,6 @@ def same(a: FinalState, b: FinalState) -> bool:
 
 def describe(state: FinalState) -> str:
     """What holds a state beside the grooves' arcs: 'jumper on a lip of the down splint, at the tilt limit'."""
-    held = [
-        (pair, feature)
-        for pair, feature, f in zip(state.gaps.pair, state.gaps.feature, state.multipliers, strict=True)
-        if f
-    ]
     words = []
     for wire in WIRES:
         lips = [TITLES[pair[0]] for pair, feature in state.active if pair[1] == wire and feature.startswith(OFF_ARC)]
@@ -77,9 +72,9 @@ def describe(state: FinalState) -> str:
             words.append(f"{TITLES[wire]} on a lip of the {' and the '.join(dict.fromkeys(lips))}")
         elif wire in state.loose:
             words.append(f"{TITLES[wire]} loose")
-    if any(pair == ("P1", "P2") for pair, _ in held):
+    if any(pair == ("P1", "P2") for pair, _ in state.active):
         words.append("faces meet")
-    if any(feature == "tilt limit" for _, feature in held):
+    if any(feature == "tilt limit" for _, feature in state.active):
         words.append("at the tilt limit")
     return ", ".join(words)
 
