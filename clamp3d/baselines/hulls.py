@@ -3,27 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
 from clamp3d.baselines.fcl_shapes import convex
-from clamp3d.baselines.model import Pieces, pose_of, poses_of
-from clamp3d.baselines.polytopes import PerPart, Polytopes, Wires
+from clamp3d.baselines.polytopes import PartOrMesh, PerPart, PolytopeModel, Polytopes, part_mesh
+from clamp3d.checks import instance
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.pose import Array, inverse
-
-if TYPE_CHECKING:
-    import trimesh
+from clamp3d.core.pose import inverse
 
 
-class Hulls:
-    """CoACD hulls of the parts' meshes (mm, watertight), measured by FCL; any pose.
+class Hulls(PolytopeModel):
+    """CoACD hulls of the parts' meshes, measured by FCL; any pose.
 
     A hull fills in what it spans, so the groove is too tight by the intrusion (`intrusion`), which follows CoACD's
     threshold loosely and can exceed it. Hulls may also leave the part's own corners out (`Decomposition.uncovered`).
     ``decompositions[part]`` is made (or read from the cache) when a part is first measured.
+
+    Parameters
+    ----------
+    parts : mapping of str to Solid or mesh
+        Grooved parts by name, mm. A solid is meshed when it is first measured; a mesh must be closed.
+    parameters : DecompositionParameters, optional
+        CoACD's settings.
+    mesh_error : float
+        Chord error in mm of the meshes made of solids.
+    time_limit, progress, cache
+        See `decompose`.
     """
 
     name = "hulls"
@@ -35,39 +42,29 @@ class Hulls:
 
     def __init__(
         self,
-        meshes: Mapping[str, trimesh.Trimesh],
+        parts: Mapping[str, PartOrMesh],
         parameters: DecompositionParameters | None = None,
         *,
+        mesh_error: float = 0.05,
         time_limit: float = 300.0,
         progress: bool | None = None,
         cache: bool = True,
     ) -> None:
+        instance("parts", parts, Mapping)
         self.parameters = parameters or DecompositionParameters()
 
         def decomposed(name: str) -> Decomposition:
-            m = meshes[name]
-            return decompose(
-                m.vertices, m.faces, self.parameters, name=name, time_limit=time_limit, progress=progress, cache=cache
-            )
+            mesh = part_mesh(parts[name], mesh_error)
+            settings = {"name": name, "time_limit": time_limit, "progress": progress, "cache": cache}
+            return decompose(mesh.vertices, mesh.faces, self.parameters, **settings)  # type: ignore[arg-type]
 
-        self.decompositions: PerPart[Decomposition] = PerPart([*meshes], decomposed)
-        self.parts = PerPart([*meshes], lambda name: _polytopes(name, self.decompositions[name]))
-        self._wires = Wires()
+        self.decompositions: PerPart[Decomposition] = PerPart([*parts], decomposed)
+        super().__init__(PerPart([*parts], lambda name: _polytopes(name, self.decompositions[name])))
 
     @property
     def meshes_built(self) -> int:
         """How many parts had to be meshed so far."""
-        return self.decompositions.made
-
-    def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
-        """Gaps to every hull of part a; see `ContactModel`."""
-        T_a_b = pose_of(pair, T_a_b)
-        return self.parts[pair.a].pieces(self._wires.of(pair), T_a_b @ pair.T_b_cylinder)
-
-    def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
-        """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
-        T_a_b = poses_of(pair, T_a_b)
-        return self.parts[pair.a].distances(self._wires.of(pair), T_a_b @ pair.T_b_cylinder)
+        return len(self.decompositions)
 
 
 def intrusion(decomposition: Decomposition, pair: GroovePair) -> float:

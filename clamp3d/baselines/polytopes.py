@@ -1,23 +1,38 @@
-"""A part as a set of convex polytopes, each an `fcl.Convex`: what the models `wedges` and `hulls` share."""
+"""Parts as sets of shapes that FCL measures: what the models wedges, hulls and mesh share."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 
 from clamp3d.baselines.fcl_shapes import Shape, Wire, check_poses, distance, measure
-from clamp3d.baselines.model import Pieces
+from clamp3d.baselines.model import Pieces, pose_of, poses_of
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array
+from clamp3d.core.primitives import Cylinder
+from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
 
 _T = TypeVar("_T")
 
 
+class TriangleMesh(Protocol):
+    """Vertices (n, 3) mm and faces (m, 3): what `trimesh.Trimesh` and `core.mesh.Mesh` have."""
+
+    @property
+    def vertices(self) -> Any: ...  # noqa: D102
+
+    @property
+    def faces(self) -> Any: ...  # noqa: D102
+
+
+PartOrMesh = Solid | TriangleMesh
+
+
 class Polytopes:
-    """Named convex shapes of one part; wires are measured against each of them.
+    """Named shapes of one part; wires are measured against each of them.
 
     Depth is that of the deepest single polytope: exact for a wire that reaches into one face, and never more than
     the true way out of the union.
@@ -64,39 +79,55 @@ class Polytopes:
         return out
 
 
-class Wires:
-    """FCL cylinders by size, made once."""
+class PerPart(dict[str, _T]):
+    """Something made for a part when it is first asked for; the dictionary holds what was made so far.
 
-    def __init__(self) -> None:
-        self._made: dict[object, Wire] = {}
+    Raises InputError for a part that is not there.
+    """
 
-    def of(self, pair: GroovePair) -> Wire:
-        """The wire of a pair."""
-        if pair.cylinder not in self._made:
-            self._made[pair.cylinder] = Wire(pair.cylinder)
-        return self._made[pair.cylinder]
+    def __init__(self, names: Iterable[str], make: Callable[[str], _T]) -> None:
+        super().__init__()
+        self._names, self._make = tuple(names), make
+
+    def __missing__(self, name: str) -> _T:
+        if name not in self._names:
+            raise InputError(f"unknown part {name!r}; available: {', '.join(self._names)}")
+        made = self[name] = self._make(name)
+        return made
 
 
-class PerPart(Mapping[str, _T]):
-    """Something made for a part when it is first asked for. Raises InputError for a part that is not there."""
+class PolytopeModel:
+    """What wedges, hulls and meshes share: parts as `Polytopes`, made when they are first measured.
 
-    def __init__(self, names: Sequence[str], make: Callable[[str], _T]) -> None:
-        self._names, self._make, self._made = tuple(names), make, dict[str, _T]()
+    ``parts`` answer distances; ``pieces_of`` are their pieces where those are other shapes (the facets of a mesh).
+    """
 
-    @property
-    def made(self) -> int:
-        """How many have been asked for so far."""
-        return len(self._made)
+    def __init__(self, parts: PerPart[Polytopes], pieces_of: PerPart[Polytopes] | None = None) -> None:
+        self.parts = parts
+        self._pieces_of = parts if pieces_of is None else pieces_of
+        self._wires: dict[Cylinder, Wire] = {}
 
-    def __getitem__(self, name: str) -> _T:
-        if name not in self._made:
-            if name not in self._names:
-                raise InputError(f"unknown part {name!r}; available: {', '.join(self._names)}")
-            self._made[name] = self._make(name)
-        return self._made[name]
+    def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
+        """Gaps to every piece of part a; see `ContactModel`."""
+        T_a_b = pose_of(pair, T_a_b)
+        return self._pieces_of[pair.a].pieces(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)
 
-    def __iter__(self):  # type: ignore[no-untyped-def]
-        return iter(self._names)
+    def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
+        """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
+        T_a_b = poses_of(pair, T_a_b)
+        return self.parts[pair.a].distances(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)
 
-    def __len__(self) -> int:
-        return len(self._names)
+    def _wire(self, cylinder: Cylinder) -> Wire:
+        """FCL's cylinder of this size, made once."""
+        if cylinder not in self._wires:
+            self._wires[cylinder] = Wire(cylinder)
+        return self._wires[cylinder]
+
+
+def part_mesh(part: PartOrMesh, mesh_error: float) -> TriangleMesh:
+    """The mesh of a part within ``mesh_error`` mm, or the mesh itself if it is one."""
+    if not isinstance(part, Solid):
+        return part
+    from clamp3d.core.meshing import mesh
+
+    return cast(TriangleMesh, mesh(part, mesh_error))

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.polygon import orient
 
 from clamp3d.baselines.fcl_shapes import convex
-from clamp3d.baselines.model import Pieces, check_unit_angle, pose_of, poses_of
-from clamp3d.baselines.polytopes import PerPart, Polytopes, Wires
+from clamp3d.baselines.model import check_unit_angle
+from clamp3d.baselines.polytopes import PerPart, PolytopeModel, Polytopes
 from clamp3d.checks import instance
-from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc, Segment
 from clamp3d.core.shapes import Solid
@@ -42,34 +44,30 @@ class Wedge:
         return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
-class Wedges:
-    """Each groove arc as ``ceil(arc / unit_angle)`` convex prisms and two beside it; unit angle in rad.
+class Wedges(PolytopeModel):
+    """Each groove arc as ``ceil(arc / unit_angle)`` convex prisms and two beside it, measured by FCL; any pose.
 
-    The pieces are measured by FCL, so any pose will do (`chords` is the same model in the section). The part is its
-    outline with equal chords in place of the arcs, drawn along its length: the groove is too tight by up to
-    R (1 - cos(unit_angle / 2)), and the bolt hole is filled, which no wire in a groove reaches.
+    `chords` is the same model in the section. The part is its outline with equal chords in place of the arcs, drawn
+    along its length: the groove is too tight by up to R (1 - cos(unit_angle / 2)), and the bolt hole is filled, which
+    no wire in a groove reaches.
+
+    Parameters
+    ----------
+    parts : mapping of str to Solid
+        Grooved parts by name, mm. A part is cut into wedges when it is first measured.
+    unit_angle : float
+        Largest angle of a wedge in rad.
     """
 
     name = "wedges"
     limits = ("groove too tight by the chord error", "bolt hole filled", "depth of single wedges")
     meshes_built = 0
 
-    def __init__(self, parts: Mapping[str, Solid], unit_angle: float) -> None:
+    def __init__(self, parts: Mapping[str, Solid], unit_angle: float = math.radians(5.0)) -> None:
         unit_angle = check_unit_angle(unit_angle)
         instance("parts", parts, Mapping)
         self.unit_angle = unit_angle
-        self.parts = PerPart([*parts], lambda name: _polytopes(parts[name], unit_angle))
-        self._wires = Wires()
-
-    def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
-        """Gaps to every wedge of part a; see `ContactModel`."""
-        T_a_b = pose_of(pair, T_a_b)
-        return self.parts[pair.a].pieces(self._wires.of(pair), T_a_b @ pair.T_b_cylinder)
-
-    def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
-        """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
-        T_a_b = poses_of(pair, T_a_b)
-        return self.parts[pair.a].distances(self._wires.of(pair), T_a_b @ pair.T_b_cylinder)
+        super().__init__(PerPart([*parts], lambda name: _polytopes(parts[name], unit_angle)))
 
 
 def part_wedges(part: Solid, unit_angle: float) -> list[Wedge]:
@@ -87,69 +85,53 @@ def part_wedges(part: Solid, unit_angle: float) -> list[Wedge]:
         raise InputError(f"part {part.name} must have a groove to be cut into wedges")
     if any(abs(math.cos(0.5 * (arc.start_angle + arc.end_angle))) > _SAME for arc in grooves):
         raise InputError(f"part {part.name} must have grooves that open up or down to be cut into wedges")
-    filled = _filled(edges)
+    corners = _filled(edges)
+    filled = shapely.Polygon(corners)
+    left, bottom, right, top = filled.bounds
     between = [0.5 * (_mouth(a)[1] + _mouth(b)[0]) for a, b in pairwise(grooves)]
-    cuts = sorted({*between, *_inward_corners(filled)})
-    limits = [-math.inf, *cuts, math.inf]
+    limits = sorted({left, right, *between, *_inward_corners(corners)})
     out: list[Wedge] = []
     for low, high in pairwise(limits):
-        cell = filled
-        if math.isfinite(low):
-            cell = clip(cell, np.array([-1.0, 0.0]), -low)
-        if math.isfinite(high):
-            cell = clip(cell, np.array([1.0, 0.0]), high)
+        cell = shapely.intersection(filled, shapely.box(low, bottom, high, top))
         owner = sum(b <= low for b in between)
         prefix = f"groove {owner + 1} " if len(grooves) > 1 else ""
         out += [Wedge(prefix + w.name, w.polygon) for w in _sectors(cell, grooves[owner], unit_angle)]
     return out
 
 
-def prism(polygon: Array, start: float, end: float) -> tuple[Array, Array]:
-    """Vertices (2k, 3) and outward triangles (4k - 4, 3) of a convex polygon (k, 2) drawn from z = start to end."""
-    k = len(polygon)
-    vertices = np.vstack([np.column_stack([polygon, np.full(k, z)]) for z in (start, end)])
-    i = np.arange(k)
-    j = np.roll(i, -1)
-    fan = np.column_stack([np.zeros(k - 2, dtype=np.int64), i[1:-1], i[2:]])
-    faces = [fan[:, ::-1], fan + k, np.column_stack([i, j, j + k]), np.column_stack([i, j + k, i + k])]
-    return vertices, np.concatenate(faces)
+def prism(polygon: Array, start: float, end: float) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (2k, 3) and outward triangles (4k - 4, 3) of a polygon (k, 2) drawn from z = start to end."""
+    from trimesh.creation import extrude_polygon
+
+    made = extrude_polygon(shapely.Polygon(polygon), end - start)
+    return made.vertices + np.array([0.0, 0.0, start]), np.asarray(made.faces, dtype=np.int64)
 
 
-def clip(polygon: Array, normal: Array, offset: float) -> Array:
-    """The part of a polygon (k, 2) where ``normal . x <= offset`` (Sutherland and Hodgman 1974)."""
-    height = polygon @ normal - offset
-    out: list[Array] = []
-    for p, q, a, b in zip(polygon, np.roll(polygon, -1, axis=0), height, np.roll(height, -1), strict=True):
-        if a <= 0.0:
-            out.append(p)
-        if (a < 0.0 < b) or (b < 0.0 < a):
-            out.append(p + (q - p) * (a / (a - b)))
-    kept = [p for i, p in enumerate(out) if np.abs(p - out[i - 1]).max() > _SAME]
-    return np.array(kept) if len(kept) > 2 else np.empty((0, 2))
-
-
-def _sectors(cell: Array, arc: Arc, unit_angle: float) -> list[Wedge]:
+def _sectors(cell: shapely.Polygon, arc: Arc, unit_angle: float) -> list[Wedge]:
     """The cell less the groove: a wedge behind each chord, and what lies beside the first and the last ray."""
     m = max(1, math.ceil(-arc.sweep / unit_angle - 1e-9))
     angles = np.linspace(arc.end_angle, arc.start_angle, m + 1)
     centre = np.array(arc.centre)
-    inner = arc.radius * math.cos(-arc.sweep / m / 2)
-
-    def side(angle: float, sign: int) -> tuple[Array, float]:
-        normal = sign * np.array([-math.sin(angle), math.cos(angle)])
-        return normal, float(normal @ centre)
-
-    out: list[Wedge] = []
-    for i in range(m):
-        outward = np.array([math.cos(0.5 * (angles[i] + angles[i + 1])), math.sin(0.5 * (angles[i] + angles[i + 1]))])
-        piece = clip(cell, -outward, -float(outward @ centre) - inner)
-        for normal, offset in (side(angles[i], -1), side(angles[i + 1], 1)):
-            piece = clip(piece, normal, offset) if len(piece) else piece
-        out.append(Wedge(f"wedge {i + 1}", piece))
+    ray = np.column_stack([np.cos(angles), np.sin(angles)])
+    size = float(shapely.hausdorff_distance(cell, shapely.Point(centre)))
+    # The far side of each sector lies beyond the cell.
+    chord, far = centre + arc.radius * ray, centre + 2.0 * size / math.cos(0.5 * -arc.sweep / m) * ray
+    sectors = {f"wedge {i + 1}": [chord[i], far[i], far[i + 1], chord[i + 1]] for i in range(m)}
     if -arc.sweep < math.pi:  # else the rays leave the part at the mouth and nothing lies beside them
-        out.append(Wedge("first side", clip(cell, *side(angles[0], 1))))
-        out.append(Wedge("last side", clip(cell, *side(angles[-1], -1))))
-    return [wedge for wedge in out if len(wedge.polygon) and wedge.area > _SLIVER]
+        for name, k, sign in (("first side", 0, 1.0), ("last side", m, -1.0)):
+            along, beside = 2.0 * size * ray[k], 2.0 * size * sign * np.array([ray[k, 1], -ray[k, 0]])
+            ends = [centre - along, centre + along]
+            sectors[name] = [*ends, ends[1] + beside, ends[0] + beside]
+    wedges = [Wedge(name, _common(cell, corners)) for name, corners in sectors.items()]
+    return [wedge for wedge in wedges if len(wedge.polygon) and wedge.area > _SLIVER]
+
+
+def _common(cell: shapely.Polygon, corners: list[Array]) -> Array:
+    """What two convex polygons share (k, 2), counter-clockwise; empty if that is no polygon."""
+    common = shapely.remove_repeated_points(shapely.intersection(cell, shapely.Polygon(corners)), _SAME)
+    if not isinstance(common, shapely.Polygon) or common.is_empty:
+        return np.empty((0, 2))
+    return np.asarray(orient(common).exterior.coords)[:-1]
 
 
 def _filled(edges: tuple[Segment | Arc, ...]) -> Array:

@@ -22,7 +22,7 @@ from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.result import Run, Solver
+from clamp3d.clamp.result import Assembly, Solver
 from clamp3d.clamp.section import Section
 from clamp3d.core.pose import Array, SectionPose, inverse
 
@@ -59,7 +59,7 @@ class Searched:
     tests: int
 
 
-def grid_search(run: Run, model: ContactModel, *, n: int, parts: int, grooves: int) -> Searched:
+def grid_search(run: Assembly, model: ContactModel, *, n: int, parts: int, grooves: int) -> Searched:
     """Try every combination of ``n`` positions for each of 1 to 3 moving parts; the paper's search.
 
     The parts are the down splint (along the bolt), the jumper and the line (both up and down), each within 12 mm of
@@ -106,7 +106,7 @@ def complexity(progress: Callable[[str], None] = lambda message: None, *, scale:
 
     def solved(model: ContactModel, solver: Solver, step: float) -> Callable[[], tuple[int, int]]:
         def run() -> tuple[int, int]:
-            done: Run = assemble(clamp, model, solver=solver, step=step, tilt_step=TILT_STEP)
+            done: Assembly = assemble(clamp, model, solver=solver, step=step, tilt_step=TILT_STEP)
             return done.work.motion_steps, done.work.contact_queries * _mean_segments(model, clamp)
 
         return run

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from clamp3d.bench.picture import Picture, find_end_points, picture
 from clamp3d.bench.published import IMAGE_DISTANCES
 from clamp3d.checks import array, choice, instance, number, whole
-from clamp3d.clamp.result import Run
+from clamp3d.clamp.result import Assembly
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
 
@@ -163,7 +163,7 @@ def marked_distances(
 
 
 def image_study(
-    run: Run,
+    run: Assembly,
     *,
     count: int = 100_000,
     px_per_mm: float = PX_PER_MM,
@@ -176,7 +176,7 @@ def image_study(
 
     The first five trials are those to lay beside the paper's. Raises InputError for settings out of range.
     """
-    instance("run", run, Run)
+    instance("run", run, Assembly)
     count, seed = whole("count of trials", count, least=1, most=100_000_000), whole("seed", seed, least=0)
     px_per_mm = _check("px_per_mm", px_per_mm, above=0.0)
     shown = picture(run, px_per_mm, seed=seed)

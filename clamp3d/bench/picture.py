@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.result import Run
+from clamp3d.clamp.result import Assembly
 from clamp3d.core.pose import Array, SectionPose
 from clamp3d.errors import InputError
 
@@ -57,7 +57,7 @@ class Picture:
     distance: float
 
 
-def picture(run: Run, px_per_mm: float, *, blur: float = 1.0, grain: float = 3.0, seed: int = 0) -> Picture:
+def picture(run: Assembly, px_per_mm: float, *, blur: float = 1.0, grain: float = 3.0, seed: int = 0) -> Picture:
     """The final state of ``run`` at ``px_per_mm``, with ``blur`` in px and ``grain`` in grey levels (one sigma each).
 
     Raises InputError for a scale that makes no usable picture or negative blur or grain.
@@ -217,7 +217,7 @@ def _rgb(paint: tuple[float, float, float]) -> tuple[float, float, float]:
     return r, g, b
 
 
-def _outlines(run: Run, name: PartName) -> list[Array]:
+def _outlines(run: Assembly, name: PartName) -> list[Array]:
     """Outlines (n, 2) of the part's bodies in section coordinates (u, v), seen along the wires."""
     found = []
     for body in parts(run.clamp)[name].bodies:
@@ -229,7 +229,7 @@ def _outlines(run: Run, name: PartName) -> list[Array]:
     return found
 
 
-def _end_points(run: Run) -> list[tuple[float, float]]:
+def _end_points(run: Assembly) -> list[tuple[float, float]]:
     up, down = run.clamp.up_splint, run.clamp.down_splint
     p1: SectionPose = run.poses["P1"]
     return [

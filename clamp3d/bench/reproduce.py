@@ -12,11 +12,10 @@ from clamp3d.baselines.chords import Chords
 from clamp3d.bench import published
 from clamp3d.bench.image import image_study
 from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.connections import GEOMETRY, PAIRS
 from clamp3d.clamp.dimensions import ConnectionType, PartName
 from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.result import Run, Solver
+from clamp3d.clamp.result import Assembly, Solver
 from clamp3d.core.arc_circle import arc_circle
 from clamp3d.core.rectangle import Rectangle, hole_bolt
 
@@ -97,7 +96,7 @@ class Reproduction:
 def reproduce(progress: Callable[[str], None] = lambda message: None) -> Reproduction:
     """Compute everything; ``progress`` is told what comes next."""
     clamp = load_clamp("reference")
-    runs: list[tuple[float | None, Run, int]] = []
+    runs: list[tuple[float | None, Assembly, int]] = []
     solvers: tuple[Solver, ...] = ("stepped", "exact")
     for solver, unit in itertools.product(solvers, (None, *published.CHORD_DISTANCES)):
         progress(f"Table 4: {'cas' if unit is None else f'chords of {unit:g} deg'}, {solver}")
@@ -134,14 +133,8 @@ def reproduce(progress: Callable[[str], None] = lambda message: None) -> Reprodu
     )
 
 
-def _table1(run: Run) -> tuple[ConnectionRow, ...]:
-    gaps = {(c.a, c.b): c.distance for c in run.contacts}
-    return tuple(
-        ConnectionRow(
-            a, b, published.TABLE_1.get((a, b), 0), GEOMETRY.get((a, b), 2) if (a, b) in gaps else 0, gaps.get((a, b))
-        )
-        for a, b in PAIRS
-    )
+def _table1(run: Assembly) -> tuple[ConnectionRow, ...]:
+    return tuple(ConnectionRow(c.a, c.b, published.TABLE_1.get((c.a, c.b), 0), c.type, c.gap) for c in run.contacts)
 
 
 def _table2() -> tuple[RelationRow, ...]:

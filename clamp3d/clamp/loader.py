@@ -8,12 +8,16 @@ import typing
 from dataclasses import fields
 from importlib import resources
 from pathlib import Path
+from typing import TypeAlias
 
 from clamp3d import checks
 from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import SMALLEST, Clamp, Wire
 from clamp3d.core.validation import validate
 from clamp3d.errors import InputError
+
+WireSize: TypeAlias = str | float
+"""A wire by catalogue name, or by diameter in mm."""
 
 
 def builtin_clamps() -> list[str]:
@@ -26,35 +30,54 @@ def builtin_clamps() -> list[str]:
     return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
-def load_clamp(source: str | Path = "reference", *, line: str | None = None, jumper: str | None = None) -> Clamp:
+def load_clamp(
+    source: Clamp | str | Path = "reference", *, line: WireSize | None = None, jumper: WireSize | None = None
+) -> Clamp:
     """Load a clamp by built-in name or file path; ``line`` and ``jumper`` replace its wires.
 
-    A wire is a catalogue designation or a diameter in mm ("21.6"). Raises InputError for anything that is not a
-    clamp, naming file, key, value and rule.
+    Parameters
+    ----------
+    source : str, Path or Clamp
+        Name of a built-in clamp, a clamp file, or a clamp already loaded.
+    line, jumper : str or float, optional
+        A catalogue name, or a diameter in mm as a number or as text.
 
-    >>> load_clamp(jumper="21.6").jumper.radius
-    10.8
+    Raises
+    ------
+    InputError
+        For anything that is not a clamp or a wire, with file, key, value and rule.
+
+    Examples
+    --------
+    >>> load_clamp(line=16, jumper="LJ-120").line.radius
+    8.0
     """
-    text, origin = _read(checks.path("clamp", source))
-    clamp: Clamp = validate(Clamp, parse_toml(text, origin), origin)
+    if isinstance(source, Clamp):
+        clamp, origin = source, source.name
+    else:
+        text, origin = _read(checks.path("clamp", source))
+        clamp = validate(Clamp, parse_toml(text, origin), origin)
     wires = {key: wire(given, key) for key, given in (("line", line), ("jumper", jumper)) if given is not None}
     if wires:
         clamp = validate(Clamp, {f.name: getattr(clamp, f.name) for f in fields(clamp)} | wires, origin)
     return clamp
 
 
-def wire(text: str, name: str = "wire") -> Wire:
-    """A wire from what a user types: a designation, or a diameter in mm. Raises InputError."""
-    checks.text(name, text)
-    try:
-        diameter = float(text)
-    except ValueError:
-        return Wire(conductor=conductor(text).designation)
+def wire(given: WireSize, name: str = "wire") -> Wire:
+    """A wire by catalogue name, or by its diameter in mm as a number or as text. Raises InputError."""
+    diameter = checks.real(given)
+    if diameter is None:
+        if not isinstance(given, str):
+            raise InputError(f"{name} must be a conductor's name or a diameter in mm, got {checks.shown(given)}")
+        try:
+            diameter = float(given)
+        except ValueError:
+            return Wire(conductor=conductor(given).designation)
     try:
         return Wire(diameter=diameter)
     except InputError:
         raise InputError(
-            f"{name} diameter must be > 0 (at least {SMALLEST:g}) and < 100000 mm, got {checks.short(text, 40)}"
+            f"{name} diameter must be > 0 (at least {SMALLEST:g}) and < 100000 mm, got {checks.short(str(given), 40)}"
         ) from None
 
 

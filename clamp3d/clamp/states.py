@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from clamp3d.clamp.result import Run, Waypoint
+from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.errors import InputError
 
 
-def state_names(run: Run) -> list[str]:
+def state_names(run: Assembly) -> list[str]:
     """What `state` understands: ``open``, the sequence's steps (each also by its number from 1), ``final``."""
     return ["open", *_steps(run), "final"]
 
 
-def state(run: Run, name: str) -> Waypoint:
+def state(run: Assembly, name: str) -> Waypoint:
     """The waypoint of a state: ``open`` is where the run begins, a step is where it ends, ``final`` the run's end.
 
     Raises InputError for a name that is none of `state_names`, with the choices.
@@ -35,5 +35,5 @@ def state(run: Run, name: str) -> Waypoint:
     return next(waypoint for waypoint in reversed(run.path) if waypoint.step == step)
 
 
-def _steps(run: Run) -> list[str]:
+def _steps(run: Assembly) -> list[str]:
     return list(dict.fromkeys(waypoint.step for waypoint in run.path))

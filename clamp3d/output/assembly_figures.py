@@ -10,14 +10,14 @@ import numpy as np
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.result import Run
+from clamp3d.clamp.result import Assembly
 from clamp3d.core.meshing import mesh
 from clamp3d.core.pose import Array, SectionPose
 from clamp3d.core.profile import MIN_MESH_ERROR
 from clamp3d.output.figures import near, same_scale, title
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
 from clamp3d.output.section import Poses, balloon, draw_section, part_anchor, spread
-from clamp3d.output.view3d import Camera, Solid, draw_solids
+from clamp3d.output.view3d import Camera, PosedMesh, draw_solids
 
 if TYPE_CHECKING:
     import trimesh
@@ -40,7 +40,7 @@ def exploded_figure(clamp: Clamp) -> Figure:
     camera = Camera()
     poses = exploded_poses(clamp)
     solids = _solids(clamp)
-    draw_solids(ax, [Solid(solids[n], poses[n].T(), PART_COLOURS[n]) for n in PARTS], camera)
+    draw_solids(ax, [PosedMesh(solids[n], poses[n].T(), PART_COLOURS[n]) for n in PARTS], camera)
     x0, x1 = ax.get_xlim()
     width = x1 - x0
     points = {}
@@ -90,11 +90,11 @@ def exploded_poses(clamp: Clamp) -> dict[PartName, SectionPose]:
     }
 
 
-def steps_figure(run: Run) -> Figure:
+def steps_figure(run: Assembly) -> Figure:
     """Each step of the sequence where it ends: in the view (upper row) and in the section (lower)."""
     from matplotlib.figure import Figure
 
-    instance("run", run, Run)
+    instance("run", run, Assembly)
     ends = step_ends(run)
     figure = Figure(figsize=(3.1 * len(ends), 7.4), layout="constrained")
     axes = figure.subplots(2, len(ends), squeeze=False, height_ratios=(1.0, 1.2))
@@ -103,7 +103,7 @@ def steps_figure(run: Run) -> Figure:
     for i, (step, stop) in enumerate(ends):
         waypoint = run.path[stop]
         poses = near(run.clamp, waypoint.poses)
-        shown = [Solid(solids[n], p.T(), PART_COLOURS[n]) for n, p in poses.items()]
+        shown = [PosedMesh(solids[n], p.T(), PART_COLOURS[n]) for n, p in poses.items()]
         draw_solids(axes[0, i], shown, Camera(), pixels=600)
         title(axes[0, i], f"{i + 1}   {step}", waypoint.label)
         draw_section(axes[1, i], run.clamp, poses)
@@ -116,7 +116,7 @@ def steps_figure(run: Run) -> Figure:
     return figure
 
 
-def step_ends(run: Run) -> list[tuple[str, int]]:
+def step_ends(run: Assembly) -> list[tuple[str, int]]:
     """Each step of the sequence with the index of its last waypoint in ``run.path``, in order."""
     return list({waypoint.step: i for i, waypoint in enumerate(run.path)}.items())
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from clamp3d.checks import instance, whole
 from clamp3d.checks import path as checked_path
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.clamp.result import Contact, Run, Waypoint
+from clamp3d.clamp.result import Assembly, Contact, Waypoint
 from clamp3d.errors import InputError
 from clamp3d.output.files import whole_file
 from clamp3d.output.palette import INK
@@ -54,11 +54,11 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
     return path
 
 
-def section_figure(run: Run, waypoint: Waypoint | None = None) -> Figure:
+def section_figure(run: Assembly, waypoint: Waypoint | None = None) -> Figure:
     """The section at ``waypoint`` (by default the final state) to scale: names, dimensions, contact points."""
     from matplotlib.figure import Figure
 
-    instance("run", run, Run)
+    instance("run", run, Assembly)
     if waypoint is not None:
         instance("waypoint", waypoint, Waypoint)
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
@@ -73,11 +73,11 @@ def section_figure(run: Run, waypoint: Waypoint | None = None) -> Figure:
     return figure
 
 
-def states_figure(run: Run) -> Figure:
+def states_figure(run: Assembly) -> Figure:
     """Initial and final state side by side at one scale, as in Fig. 2 of the paper."""
     from matplotlib.figure import Figure
 
-    instance("run", run, Run)
+    instance("run", run, Assembly)
     figure = Figure(figsize=(11.5, 5.8), layout="constrained")
     axes = figure.subplots(1, 2)
     names = ("(a) initial state", "(b) final state")
@@ -93,11 +93,11 @@ def states_figure(run: Run) -> Figure:
     return figure
 
 
-def contacts_figure(run: Run) -> Figure:
+def contacts_figure(run: Assembly) -> Figure:
     """The concave arc contacts in the section, as in Fig. 5, and each enlarged with its relation and gap."""
     from matplotlib.figure import Figure
 
-    instance("run", run, Run)
+    instance("run", run, Assembly)
     figure = Figure(figsize=(11.5, 5.8), layout="constrained")
     contacts = _arc_contacts(run)
     rows = max(1, (len(contacts) + 1) // 2)
@@ -116,11 +116,11 @@ def contacts_figure(run: Run) -> Figure:
     return figure
 
 
-def contact_figure(run: Run, contact: Contact) -> Figure:
+def contact_figure(run: Assembly, contact: Contact) -> Figure:
     """One contact of ``run``: where it is in the section, dimensioned, and enlarged with relation, gap and normal."""
     from matplotlib.figure import Figure
 
-    instance("run", run, Run)
+    instance("run", run, Assembly)
     instance("contact", contact, Contact)
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     overview, close = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
@@ -132,7 +132,7 @@ def contact_figure(run: Run, contact: Contact) -> Figure:
     return figure
 
 
-def _enlarge(ax: Axes, run: Run, contact: Contact, number: str = "") -> None:
+def _enlarge(ax: Axes, run: Assembly, contact: Contact, number: str = "") -> None:
     """The two parts about their contact point; grooves in the section beside the bolt, where they are whole."""
     half = 0.045 * run.clamp.up_splint.width
     mark = _mark(contact)
@@ -176,7 +176,7 @@ def same_scale(axes: Sequence[Axes]) -> None:
         ax.set_ylim(bottom, top)
 
 
-def _arc_contacts(run: Run) -> list[Contact]:
+def _arc_contacts(run: Assembly) -> list[Contact]:
     return [contact for contact in run.contacts if contact.type == 3]
 
 

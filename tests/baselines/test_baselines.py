@@ -12,7 +12,7 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
 from clamp3d.baselines.decomposition import DecompositionParameters
 from clamp3d.baselines.hulls import Hulls, intrusion
-from clamp3d.baselines.mesh import Mesh
+from clamp3d.baselines.meshes import Meshes
 from clamp3d.baselines.model import ContactModel
 from clamp3d.baselines.wedges import Wedges
 from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble
@@ -83,7 +83,7 @@ def test_wedges_of_a_fine_unit_are_the_exact_groove_at_any_tilt() -> None:
 def test_mesh_is_too_tight_by_its_chord_error_at_most() -> None:
     poses = _poses(120, 0.02, seed=1)
     exact = Cas().distances(PAIR, poses)
-    model = Mesh({"P1": BLOCK_MESH})
+    model = Meshes({"P1": BLOCK_MESH})
     found = model.distances(PAIR, poses)
     apart = exact > CHORD
     error = (found - exact)[apart]
@@ -105,7 +105,7 @@ def test_wire_inside_the_wall_is_a_hit_for_every_model(tmp_path: Path, monkeypat
     models: tuple[ContactModel, ...] = (
         Wedges({"P1": BLOCK}, 0.2),
         Hulls({"P1": BLOCK_MESH}, DecompositionParameters(threshold=0.05, real_metric=False)),
-        Mesh({"P1": BLOCK_MESH}),
+        Meshes({"P1": BLOCK_MESH}),
     )
     for model in models:
         assert model.distances(pair, inside)[0] < -1.0
@@ -149,7 +149,7 @@ def test_reference_clamp_in_3d_is_its_section(key: tuple[str, str]) -> None:
     found = Wedges(parts(clamp), unit).distances(pair, poses)
     assert np.abs(found - expected)[shallow].max() < 1e-6
     chord = 0.005
-    surface = Mesh({pair.a: mesh(parts(clamp)[pair.a], chord)}).distances(pair, poses)
+    surface = Meshes({pair.a: mesh(parts(clamp)[pair.a], chord)}).distances(pair, poses)
     exact = Cas().distances(pair, poses)
     apart = exact > chord
     assert (surface - exact)[apart].max(initial=-1.0) < 1e-6
@@ -160,7 +160,7 @@ def test_unknown_part_and_bad_pose_are_refused() -> None:
     model = Wedges({"P2": BLOCK}, 0.2)
     with pytest.raises(InputError, match="unknown part 'P1'; available: P2"):
         model.distances(PAIR, np.eye(4)[None])
-    for checked in (Wedges({"P1": BLOCK}, 0.2), Mesh({"P1": BLOCK_MESH})):
+    for checked in (Wedges({"P1": BLOCK}, 0.2), Meshes({"P1": BLOCK_MESH})):
         with pytest.raises(InputError, match="must be finite"):
             checked.pieces(PAIR, np.full((4, 4), np.nan))
         with pytest.raises(InputError, match="must be finite"):
@@ -182,7 +182,7 @@ def test_wedges_in_3d_assemble_the_clamp_to_the_published_distances(
 def test_meshes_assemble_the_clamp_to_their_chord_error() -> None:
     clamp = load_clamp()
     made = {name: mesh(part, 0.02) for name, part in parts(clamp).items() if name in ("P1", "P2", "P3")}
-    result = assemble(clamp, Mesh(made), solver="exact", step=STEP, tilt_step=TILT_STEP)
+    result = assemble(clamp, Meshes(made), solver="exact", step=STEP, tilt_step=TILT_STEP)
     assert result.clamped
     # Each of four grooves is too tight by the chord error at most; the wedge between wire and groove enlarges it.
     assert 31.5298 < result.distance < 31.5298 + 4.0 * 0.02

@@ -28,22 +28,22 @@ from clamp3d.bench.picture import BACKGROUND, PAINT, Picture, find_end_points, l
 from clamp3d.bench.published import ACTUAL_DISTANCE, IMAGE_DISTANCES
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.result import Run
+from clamp3d.clamp.result import Assembly
 from clamp3d.cli.measure_image import command
 from clamp3d.errors import InputError
 
 
 @pytest.fixture(scope="module")
-def run() -> Run:
+def run() -> Assembly:
     return assemble(load_clamp(), Cas())
 
 
 @pytest.fixture(scope="module")
-def shown(run: Run) -> Picture:
+def shown(run: Assembly) -> Picture:
     return picture(run, PX_PER_MM)
 
 
-def test_perfect_marks_give_the_exact_distance(run: Run, shown: Picture) -> None:
+def test_perfect_marks_give_the_exact_distance(run: Assembly, shown: Picture) -> None:
     left, right, below = shown.end_points
     found = measure_image([left, below], [left, right], shown.reference)
     assert found.distance == pytest.approx(run.distance, abs=1e-12)
@@ -118,7 +118,7 @@ def test_found_end_points_are_the_drawn_ones(scale: float, line: str, jumper: st
         assert error.std() < 2.0 * FITTING_ERROR
 
 
-def test_picture_has_the_parts_where_they_are(shown: Picture, run: Run) -> None:
+def test_picture_has_the_parts_where_they_are(shown: Picture, run: Assembly) -> None:
     """Area of the wire in pixels, and the edge of P1 where half a pixel's light says it is."""
     sharp = picture(run, 8.0, blur=0.0, grain=0.0).image.astype(float)
     wire = (np.abs(sharp - PAINT["P7"]).sum(-1) < 6.0).sum() / 64.0
@@ -130,7 +130,7 @@ def test_picture_has_the_parts_where_they_are(shown: Picture, run: Run) -> None:
     assert inked.sum() == pytest.approx(right[0] - left[0], abs=0.02)
 
 
-def test_study(run: Run) -> None:
+def test_study(run: Assembly) -> None:
     study = image_study(run, count=20_000, seed=7)
     assert np.array_equal(study.trials, image_study(run, count=20_000, seed=7).trials)
     assert study.trials.shape == (5,)

@@ -17,7 +17,7 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.result import Run
+from clamp3d.clamp.result import Assembly
 from clamp3d.core.pose import SectionPose
 from clamp3d.errors import InputError
 from clamp3d.output.assembly_figures import exploded_figure, exploded_poses, steps_figure
@@ -27,7 +27,7 @@ from clamp3d.output.section import arc_path, draw_dimensions, draw_section, edge
 
 
 @pytest.fixture(scope="module")
-def run() -> Run:
+def run() -> Assembly:
     return assemble(load_clamp(), Cas())
 
 
@@ -56,7 +56,7 @@ def test_outline_encloses_the_area_of_the_part() -> None:
         assert area == pytest.approx(profile.area, rel=1e-6)
 
 
-def test_drawing_is_to_scale_and_where_the_parts_are(run: Run) -> None:
+def test_drawing_is_to_scale_and_where_the_parts_are(run: Assembly) -> None:
     """The wires' outlines on the canvas: round, of one scale, y down."""
     figure = Figure(figsize=(6.0, 6.0))
     ax = figure.add_subplot()
@@ -75,14 +75,14 @@ def test_drawing_is_to_scale_and_where_the_parts_are(run: Run) -> None:
     assert (jumper.y0 + jumper.y1 - line.y0 - line.y1) / 2 == pytest.approx(-scale * run.poses["P7"].y, rel=1e-6)
 
 
-def test_dimensions_are_the_published_ones(run: Run) -> None:
+def test_dimensions_are_the_published_ones(run: Assembly) -> None:
     assert {"31.530", "3.046", "12.00°"} <= set(texts(section_figure(run)))
     left, right = edge_openings(run.clamp, run.poses)
     assert left == pytest.approx(31.530, abs=5e-4)
     assert left - right == pytest.approx(137.0 * math.sin(math.radians(12.0)), abs=1e-3)
 
 
-def test_dimensions_follow_the_poses(run: Run) -> None:
+def test_dimensions_follow_the_poses(run: Assembly) -> None:
     ax = Figure().add_subplot()
     down = SectionPose(45.172, -10.374)
     draw_dimensions(ax, run.clamp, {**run.poses, "P2": down})
@@ -91,7 +91,7 @@ def test_dimensions_follow_the_poses(run: Run) -> None:
     assert shown == [f"{expected:.3f}", f"{expected:.3f}", "parallel"]
 
 
-def test_figures_name_what_they_show(run: Run) -> None:
+def test_figures_name_what_they_show(run: Assembly) -> None:
     assert set(PARTS) <= set(texts(states_figure(run)))
     enlarged = [t for t in texts(contacts_figure(run)) if "interior contact" in t]
     assert len(enlarged) == 5

@@ -35,7 +35,7 @@ def recorded():
     commands = []
     scene = AssemblyScene(load_clamp(), Cas(), commands.append, mesh_error=0.1)
     before_run = len(commands)
-    run = assemble(load_clamp(), Cas(), listen=scene.show)
+    run = assemble(load_clamp(), Cas(), on_waypoint=scene.show)
     scene.finish(run)
     return commands, run, before_run
 

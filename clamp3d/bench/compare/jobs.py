@@ -104,7 +104,7 @@ def run_job(kind: Kind, method: str, *, time_limit: float) -> dict[str, Any]:
 
 def assembled(method: Method, *, time_limit: float = 300.0) -> tuple[Assembled, Assembled]:
     """Assemble the reference clamp by both solvers, exact first; quick ones several times, the median counts."""
-    from clamp3d.bench.compare.methods import assembly_model, load
+    from clamp3d.bench.compare.methods import assembly_model, coacd_seconds, load
     from clamp3d.clamp.assemble import assemble
     from clamp3d.clamp.loader import load_clamp
 
@@ -113,9 +113,7 @@ def assembled(method: Method, *, time_limit: float = 300.0) -> tuple[Assembled, 
     assemble(clamp, assembly_model(Method("cas"), clamp))  # compiles and loads what all share
     start = time.process_time()
     model = assembly_model(method, clamp, time_limit=time_limit)
-    setup = time.process_time() - start
-    if method.family == "hulls":
-        setup += sum(d.seconds for d in model.decompositions.values())  # type: ignore[attr-defined]
+    setup = time.process_time() - start + coacd_seconds(model)
 
     def solved(solver: Solver) -> Assembled:
         times: list[float] = []

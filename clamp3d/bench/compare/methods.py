@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clamp3d.baselines.model import ContactModel
+from clamp3d.baselines import ContactModel, contact_model
 from clamp3d.bench.compare.scene import GROOVE, WIRE, block, chord_error, in_part_frame, pair
-from clamp3d.core.pose import Array
-from clamp3d.errors import InputError
+from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.pose import Array, inverse
 
 if TYPE_CHECKING:
     from clamp3d.clamp.dimensions import Clamp
@@ -105,8 +105,7 @@ def prepare(method: Method, *, time_limit: float = 300.0) -> Prepared:
     """
     if method.family == "cas":
         return _cas()
-    model, pieces, elsewhere = _model(method, time_limit)
-    groove = pair()
+    model, groove = _block_model(method, time_limit), pair()
 
     def many(poses: Array) -> Array:
         return model.distances(groove, in_part_frame(poses))
@@ -115,7 +114,13 @@ def prepare(method: Method, *, time_limit: float = 300.0) -> Prepared:
         return float(many(pose[None])[0])
 
     many(np.eye(4)[None])
-    return Prepared(one, many, pieces, parallel_only=method.family == "chords", elsewhere=elsewhere)
+    return Prepared(
+        one,
+        many,
+        _piece_count(model, groove),
+        parallel_only=model.name == "chords",
+        elsewhere=coacd_seconds(model),
+    )
 
 
 def assembly_model(method: Method, clamp: Clamp, *, time_limit: float = 300.0) -> ContactModel:
@@ -123,37 +128,12 @@ def assembly_model(method: Method, clamp: Clamp, *, time_limit: float = 300.0) -
     from clamp3d.clamp.features import groove_pairs
     from clamp3d.clamp.parts import parts
 
-    setting = method.setting or 0.0
-    if method.family == "cas":
-        from clamp3d.baselines.cas import Cas
-
-        return Cas()
-    if method.family == "chords":
-        from clamp3d.baselines.chords import Chords
-
-        return Chords(math.radians(setting))
-    model: ContactModel
-    if method.family == "wedges":
-        from clamp3d.baselines.wedges import Wedges
-
-        model = Wedges(parts(clamp), math.radians(setting))
-    else:
-        from clamp3d.core.meshing import mesh
-
-        error = setting if method.family == "mesh" else 0.01
-        grooved = {p.a for p in groove_pairs(clamp).values()}
-        meshes = {name: mesh(part, error) for name, part in parts(clamp).items() if name in grooved}
-        if method.family == "mesh":
-            from clamp3d.baselines.mesh import Mesh
-
-            model = Mesh(meshes)
-        else:
-            from clamp3d.baselines.decomposition import DecompositionParameters
-            from clamp3d.baselines.hulls import Hulls
-
-            model = Hulls(meshes, DecompositionParameters(threshold=setting), time_limit=time_limit, progress=False)
+    settings = _settings(method)
+    if method.family == "hulls":
+        settings |= {"threshold": method.setting, "mesh_error": 0.01}
+    model = contact_model(method.family, parts(clamp), **settings, time_limit=time_limit, progress=False)
     for groove in groove_pairs(clamp).values():  # models make their pieces when they are first asked
-        model.pieces(groove, groove.T_a_groove)
+        model.pieces(groove, groove.T_a_groove @ inverse(groove.T_b_cylinder))
     return model
 
 
@@ -168,31 +148,34 @@ def _cas() -> Prepared:
     )
 
 
-def _model(method: Method, time_limit: float) -> tuple[ContactModel, int, float]:
-    """The contact model for the block, how many pieces it has, and seconds that another process spent on it."""
-    setting = method.setting or 0.0
-    if method.family == "chords":
-        from clamp3d.baselines.chords import Chords
+def _block_model(method: Method, time_limit: float) -> ContactModel:
+    """The contact model for the block; hull thresholds are on CoACD's own scale here."""
+    from clamp3d.baselines.decomposition import DecompositionParameters
 
-        return Chords(math.radians(setting)), math.ceil(2.0 * GROOVE.half_angle / math.radians(setting) - 1e-9), 0.0
-    if method.family == "wedges":
-        from clamp3d.baselines.wedges import Wedges
-
-        wedges = Wedges({"P1": block()}, math.radians(setting))
-        return wedges, len(wedges.parts["P1"].shapes), 0.0
-    from clamp3d.core.meshing import mesh
-
-    if method.family == "mesh":
-        from clamp3d.baselines.mesh import Mesh
-
-        made = mesh(block(), setting)
-        return Mesh({"P1": made}), len(made.faces), 0.0
+    settings = _settings(method)
     if method.family == "hulls":
-        from clamp3d.baselines.decomposition import DecompositionParameters
-        from clamp3d.baselines.hulls import Hulls
+        settings["threshold"] = DecompositionParameters(threshold=method.setting or 0.0, real_metric=False)
+        settings["mesh_error"] = chord_error(math.radians(HULLS_CHORD_DEG)) * (1.0 + 1e-9)
+    return contact_model(method.family, {"P1": block()}, **settings, time_limit=time_limit, progress=False)
 
-        made = mesh(block(), chord_error(math.radians(HULLS_CHORD_DEG)) * (1.0 + 1e-9))
-        parameters = DecompositionParameters(threshold=setting, real_metric=False)
-        hulls = Hulls({"P1": made}, parameters, time_limit=time_limit, progress=False)
-        return hulls, len(hulls.parts["P1"].shapes), hulls.decompositions["P1"].seconds
-    raise InputError(f"unknown method {method.family!r}; available: cas, {', '.join(UNITS)}")
+
+def _settings(method: Method) -> dict[str, Any]:
+    """The setting of chords, wedges and mesh as `contact_model` takes it."""
+    if method.setting is None:
+        return {}
+    if method.family in ("chords", "wedges"):
+        return {"unit_angle": math.radians(method.setting)}
+    return {"mesh_error": method.setting} if method.family == "mesh" else {}
+
+
+def _piece_count(model: Any, groove: GroovePair) -> int:
+    """Chords, wedges, hulls or triangles of the groove's part."""
+    if model.name == "chords":
+        return int(model.segments([groove]))
+    shapes = model.parts[groove.a].shapes
+    return len(shapes[0].solid.faces) if model.name == "mesh" else len(shapes)
+
+
+def coacd_seconds(model: Any) -> float:
+    """Seconds that CoACD took in processes of its own, also when its answer was cached."""
+    return sum(made.seconds for made in model.decompositions.values()) if model.name == "hulls" else 0.0

@@ -7,12 +7,12 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.baselines.model import ContactModel
+from clamp3d.baselines import ContactModel, contact_model
 from clamp3d.bench.stress.meshes.cases import MESH_ERROR, MeshCase, MeshCases
 from clamp3d.bench.stress.poses.methods import METHODS as POSE_METHODS
 from clamp3d.bench.stress.worker import Measured, Measures, Method
@@ -74,17 +74,11 @@ def _rounding(case: MeshCase) -> float:
 
 
 def _mesh(mesh: Arrays, radius: float) -> ContactModel:
-    from clamp3d.baselines.mesh import Mesh
-
-    return Mesh({"P1": cast(Any, mesh)})
+    return contact_model("mesh", {"P1": mesh})
 
 
 def _hulls(mesh: Arrays, radius: float) -> ContactModel:
-    from clamp3d.baselines.decomposition import DecompositionParameters
-    from clamp3d.baselines.hulls import Hulls
-
-    parameters = DecompositionParameters(threshold=_THRESHOLD * radius)
-    return Hulls({"P1": cast(Any, mesh)}, parameters, time_limit=_TIME, progress=False)
+    return contact_model("hulls", {"P1": mesh}, threshold=_THRESHOLD * radius, time_limit=_TIME, progress=False)
 
 
 def _fit(case: MeshCase) -> tuple[float, float, str]:
@@ -108,9 +102,9 @@ def _fit(case: MeshCase) -> tuple[float, float, str]:
 
 def _scene(case: MeshCase) -> tuple[float, float, str]:
     """A scene of the mesh and the wire, checked: what the mesh is for a user who wants a verdict."""
-    from clamp3d.collide.bounds import Verdict
     from clamp3d.collide.check import check
     from clamp3d.collide.scene import Scene
+    from clamp3d.collide.verdict import Verdict
     from clamp3d.core.mesh import make_mesh
     from clamp3d.core.shapes import MeshShape
 
@@ -125,8 +119,8 @@ def _scene(case: MeshCase) -> tuple[float, float, str]:
     if row.verdict is Verdict.UNCERTAIN:
         return math.nan, math.nan, "scene: uncertain"
     if row.verdict in (Verdict.CLASH, Verdict.CONTAINED):
-        return row.high, math.nan, ""
-    return cast(float, row.distance), row.error_bound + _rounding(case), ""
+        return row.distance.upper, math.nan, ""
+    return row.distance.value, row.distance.uncertainty + _rounding(case), ""
 
 
 def _fcl_alone(case: MeshCase) -> tuple[float, float, str]:

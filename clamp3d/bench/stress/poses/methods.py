@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from clamp3d.baselines.model import ContactModel
+from clamp3d.baselines import ContactModel, contact_model
 from clamp3d.bench.stress.poses.cases import Cases
 from clamp3d.bench.stress.worker import Measured, Measures, Method
 from clamp3d.core.distance import SignedDistances, signed_distances
@@ -61,9 +61,7 @@ class ChordsMethod:
     measures: Measures = "clearance"
 
     def __init__(self, unit_angle: float) -> None:
-        from clamp3d.baselines.chords import Chords
-
-        self.model, self.unit_angle = Chords(unit_angle), unit_angle
+        self.model, self.unit_angle = contact_model("chords", unit_angle=unit_angle), unit_angle
 
     def measure(self, cases: Cases) -> Measured:
         """See `Method`. It works in the section: wires beside the groove's length are none of its business."""
@@ -123,56 +121,46 @@ def _chord_error(cases: Cases, unit_angle: float) -> Array:
     return np.full(len(cases), 2.0 * R * math.sin(0.25 * chord) ** 2)
 
 
-def _wedges(unit_angle: float) -> SolidMethod:
-    def build(part: Solid, radius: float) -> ContactModel:
-        from clamp3d.baselines.wedges import Wedges
-
-        return Wedges({"P1": part}, unit_angle)
-
-    return SolidMethod(build, lambda cases: _chord_error(cases, unit_angle) + _FCL)
-
-
 _MESH_ERROR = 1.0 / 2400.0
 """Chord error of meshes in parts of the groove's radius: 0.01 mm for the reference clamp."""
 
 _THRESHOLD = 1.0 / 12.0
 """Threshold of CoACD in parts of the groove's radius: 2 mm for the reference clamp, the command line's default."""
 
-
-def _mesh() -> SolidMethod:
-    def build(part: Solid, radius: float) -> ContactModel:
-        from clamp3d.baselines.mesh import Mesh
-        from clamp3d.core.meshing import mesh
-
-        return Mesh({"P1": mesh(part, _MESH_ERROR * radius)})
-
-    return SolidMethod(build, lambda cases: _MESH_ERROR * cases.shapes.R[cases.shape] + _FCL)
+_UNIT = math.radians(5.0)
 
 
-def _hulls() -> SolidMethod:
-    def build(part: Solid, radius: float) -> ContactModel:
-        from clamp3d.baselines.decomposition import DecompositionParameters
-        from clamp3d.baselines.hulls import Hulls
-        from clamp3d.core.meshing import mesh
+def _wedges(part: Solid, radius: float) -> ContactModel:
+    return contact_model("wedges", {"P1": part}, unit_angle=_UNIT)
 
-        parameters = DecompositionParameters(threshold=_THRESHOLD * radius)
-        return Hulls({"P1": mesh(part, _MESH_ERROR * radius)}, parameters, time_limit=60.0, progress=False)
 
-    return SolidMethod(build, lambda cases: np.full(len(cases), np.nan))
+def _mesh(part: Solid, radius: float) -> ContactModel:
+    return contact_model("mesh", {"P1": part}, mesh_error=_MESH_ERROR * radius)
+
+
+def _hulls(part: Solid, radius: float) -> ContactModel:
+    sizes = {"threshold": _THRESHOLD * radius, "mesh_error": _MESH_ERROR * radius}
+    return contact_model("hulls", {"P1": part}, **sizes, time_limit=60.0, progress=False)
 
 
 METHODS: dict[str, tuple[str, Callable[[], Method]]] = {
     "cas": ("closed forms of the arc groove; its bound is that of rounding", CasMethod),
     "chords 5 deg": (
         "convex partitioning in the section, chords of 5 degrees; its bound is the chord error",
-        lambda: ChordsMethod(math.radians(5.0)),
+        lambda: ChordsMethod(_UNIT),
     ),
     "wedges 5 deg": (
         "convex partitioning in 3D: python-fcl on exact wedges of 5 degrees; its bound is the chord error",
-        lambda: _wedges(math.radians(5.0)),
+        lambda: SolidMethod(_wedges, lambda cases: _chord_error(cases, _UNIT) + _FCL),
     ),
-    "mesh": ("python-fcl's triangle mesh, chord error R / 2400, which is its bound", _mesh),
-    "hulls": ("CoACD's hulls of that mesh at a threshold of R / 12, each convex in python-fcl; no bound", _hulls),
+    "mesh": (
+        "python-fcl's triangle mesh, chord error R / 2400, which is its bound",
+        lambda: SolidMethod(_mesh, lambda cases: _MESH_ERROR * cases.shapes.R[cases.shape] + _FCL),
+    ),
+    "hulls": (
+        "CoACD's hulls of that mesh at a threshold of R / 12, each convex in python-fcl; no bound",
+        lambda: SolidMethod(_hulls, lambda cases: np.full(len(cases), np.nan)),
+    ),
 }
 """Name -> what it is, and how it is made."""
 

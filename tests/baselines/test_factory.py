@@ -1,0 +1,64 @@
+"""The one factory of contact models: what goes with which method, and that nothing is made before it is asked for."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from clamp3d import baselines
+from clamp3d.clamp.block import block_pair, grooved_block
+from clamp3d.core.meshing import mesh
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.errors import InputError
+
+GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)
+PAIR = block_pair(GROOVE, Cylinder(10.5, 200.0))
+BLOCK = grooved_block(GROOVE, width=137.0, depth=30.0)
+MESHES = {"hulls", "mesh"}
+
+
+@pytest.mark.parametrize("name", baselines.METHODS)
+def test_every_method_is_made_and_makes_nothing_before_it_is_asked(name: str) -> None:
+    model = baselines.contact_model(name, {"P1": BLOCK}, progress=False)
+    assert model.name == name
+    assert model.meshes_built == 0
+    if name != "hulls":  # CoACD takes seconds
+        assert abs(model.distances(PAIR, np.eye(4)[None])[0] - 1.5) < 0.06  # 12 - 10.5 less the chord error
+        assert model.meshes_built == (1 if name == "mesh" else 0)
+
+
+@pytest.mark.parametrize("name", baselines.METHODS)
+@pytest.mark.parametrize(("setting", "value"), [("unit_angle", 0.1), ("threshold", 1.0), ("mesh_error", 0.1)])
+def test_a_setting_goes_with_its_methods_only(name: str, setting: str, value: float) -> None:
+    if setting in baselines.METHODS[name]:
+        baselines.contact_model(name, {"P1": BLOCK}, **{setting: value})  # type: ignore[arg-type]
+    else:
+        with pytest.raises(InputError, match=f"{setting} goes with method .*got method '{name}'"):
+            baselines.contact_model(name, {"P1": BLOCK}, **{setting: value})  # type: ignore[arg-type]
+
+
+def test_what_is_wrong_is_said_in_one_line() -> None:
+    with pytest.raises(InputError, match="unknown method 'fog'; available: cas, chords, wedges, hulls, mesh"):
+        baselines.contact_model("fog")
+    with pytest.raises(InputError, match="method 'wedges' needs the parts"):
+        baselines.contact_model("wedges")
+    with pytest.raises(InputError, match="parts must be"):
+        baselines.contact_model("mesh", [BLOCK])  # type: ignore[arg-type]
+
+
+def test_a_mesh_is_taken_as_it_is_and_a_solid_is_meshed_to_the_error() -> None:
+    for error in (0.01, 0.2):
+        own = baselines.Meshes({"P1": mesh(BLOCK, error)})
+        made = baselines.contact_model("mesh", {"P1": BLOCK}, mesh_error=error)
+        assert own.distances(PAIR, np.eye(4)[None]) == made.distances(PAIR, np.eye(4)[None])
+
+
+def test_names_are_loaded_lazily() -> None:
+    heavy = "{'fcl', 'trimesh', 'coacd', 'shapely'}"
+    code = f"import sys, clamp3d.baselines as b; b.Cas; assert not {heavy} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+    assert {"Cas", "Chords", "Wedges", "Hulls", "Meshes", "contact_model"} <= set(dir(baselines))
