@@ -6,6 +6,15 @@ LONGEST = 900
 """Characters of a message: what a user gave may be longer."""
 
 
+def escaped(text: str, *, keep: str = "") -> str:
+    r"""A text with its control characters, which a terminal would obey, as escape sequences; those in ``keep`` stay.
+
+    >>> escaped("red: \x1b[31m")
+    'red: \\x1b[31m'
+    """
+    return "".join(c if c.isprintable() or c in keep else c.encode("unicode_escape").decode() for c in text)
+
+
 def one_line(message: str) -> str:
     r"""A message on one short line, whatever the names and values in it hold.
 
@@ -14,7 +23,7 @@ def one_line(message: str) -> str:
     """
     if len(message) > LONGEST:
         message = f"{message[: LONGEST // 2]} ... {message[-LONGEST // 2 :]}"
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
+    return escaped(message)
 
 
 class Clamp3dError(Exception):

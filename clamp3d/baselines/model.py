@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from clamp3d.checks import array, instance, number, shown
+from clamp3d.core.contact_model import ContactModel as ContactModel
+from clamp3d.core.contact_model import Pieces as Pieces
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array, check_pose
 from clamp3d.core.primitives import LARGEST
@@ -16,49 +16,6 @@ from clamp3d.errors import InputError
 
 FINEST_DEG = 0.01
 """Smallest angle of a chord: a full circle then has 36 000."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pieces:
-    """Signed gaps (k,) mm from each piece of a grooved part to the cylinder, in the frame of the grooved part.
-
-    A model cuts the groove into pieces (an arc and two faces, chords, hulls); the least is the pair's distance.
-    ``point`` (k, 3) mm lies on the groove, ``normal`` (k, 3) is unit from groove to cylinder, ``feature``
-    names the piece.
-    Each gap is continuous in the pose, so a solver takes every piece as a constraint of its own.
-    """
-
-    distance: Array
-    point: Array
-    normal: Array
-    feature: tuple[str, ...]
-
-
-class ContactModel(Protocol):
-    """One way to measure a `GroovePair`; all models answer the same questions on the same parts."""
-
-    @property
-    def name(self) -> str:
-        """What the user calls it: 'cas', 'chords', ..."""
-        ...
-
-    @property
-    def limits(self) -> tuple[str, ...]:
-        """What the model cannot do, in words for the user: 'no depth', 'surface only', ..."""
-        ...
-
-    @property
-    def meshes_built(self) -> int:
-        """How many parts had to be meshed so far."""
-        ...
-
-    def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
-        """Gaps of all pieces of ``pair`` with part b at ``T_a_b`` (4, 4) in part a's frame."""
-        ...
-
-    def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
-        """Signed distances (n,) mm for poses (n, 4, 4)."""
-        ...
 
 
 def check_model(model: object) -> None:

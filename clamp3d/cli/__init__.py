@@ -1,6 +1,7 @@
 """The command line: parse, call, print. Data on stdout, progress and messages on stderr.
 
-Exit codes: 0 clean, 1 a finding (clash, not clamped), 2 bad input, 130 interrupted.
+Exit codes: 0 clean, 1 a finding (clash, not clamped), 2 bad input, 3 undecided (a verdict that is not certain),
+4 failed inside (a fault of the program, or a solver that could not prove its answer), 130 interrupted.
 """
 
 from __future__ import annotations
@@ -8,11 +9,13 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+import traceback
 
 import click
 
 import clamp3d
-from clamp3d.errors import Clamp3dError, one_line
+from clamp3d.cli.terminal import ExitCode, tolerate_closed_pipes
+from clamp3d.errors import Clamp3dError, SolverError, one_line
 
 # Name -> (module, one line for the list of commands). A command's module is loaded when it is called.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -71,28 +74,39 @@ def group() -> None:
 
 
 def main() -> None:
-    """Entry point: one line for every fault of input, never a traceback; CLAMP3D_DEBUG=1 shows it."""
+    """Entry point: one line for every fault, never a traceback; CLAMP3D_DEBUG=1 shows it."""
+    tolerate_closed_pipes()
     try:
         status = group.main(prog_name="clamp3d", standalone_mode=False)
-    except click.exceptions.Exit as stop:
-        status = stop.exit_code
     except click.ClickException as error:
         where = getattr(error, "ctx", None)
         hint = f" (see {where.command_path} --help)" if where is not None else ""
-        status = _fail(error.format_message().replace("\n", " ") + hint)
+        status = _fail(error.format_message().replace("\n", " ") + hint, ExitCode.BAD_INPUT)
     except (KeyboardInterrupt, click.Abort):
         print("clamp3d: interrupted", file=sys.stderr)
-        status = 130
-    except BrokenPipeError:  # the reader of stdout went away: nothing left to say
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        status = 0
-    except (Clamp3dError, OSError) as error:
+        status = ExitCode.INTERRUPTED
+    except Exception as error:
         if os.environ.get("CLAMP3D_DEBUG"):
-            raise
-        status = _fail(str(error))
-    sys.exit(status if isinstance(status, int) else 0)
+            traceback.print_exc()
+        if isinstance(error, SolverError):
+            status = _fail(str(error), ExitCode.FAILED)
+        elif isinstance(error, (Clamp3dError, OSError)):
+            status = _fail(str(error), ExitCode.BAD_INPUT)
+        else:
+            status = _fail(f"inside clamp3d: {_place(error)}; CLAMP3D_DEBUG=1 shows the traceback", ExitCode.FAILED)
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:
+            stream.flush()
+    sys.exit(int(status) if isinstance(status, int) else 0)
 
 
-def _fail(message: str) -> int:
+def _place(error: Exception) -> str:
+    """Type and message of an unexpected error, and the line of this package that it came through last."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if "clamp3d" in f.filename]
+    where = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""
+    return f"{type(error).__name__}: {error}{where}"
+
+
+def _fail(message: str, code: ExitCode) -> ExitCode:
     print(f"clamp3d: error: {one_line(message)}", file=sys.stderr)
-    return 2
+    return code

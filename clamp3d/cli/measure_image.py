@@ -6,14 +6,15 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import FILE, OUTPUT
+from clamp3d.cli.options import INPUT_FILE, JSON, number
+from clamp3d.cli.terminal import show
 
 
 @click.command("measure-image")
-@click.argument("image", type=FILE)
+@click.argument("image", type=INPUT_FILE)
 @click.option("--points", required=True, metavar="'X,Y X,Y'", help="The two end points in px from the top left.")
 @click.option("--reference", required=True, metavar="'X,Y X,Y'", help="The two ends of a measured length, in px.")
-@click.option("--scale", required=True, type=float, metavar="MM", help="That length, by calliper.")
+@click.option("--scale", required=True, type=number, metavar="MM", help="That length, by calliper.")
 @click.option(
     "--measure",
     "kind",
@@ -22,17 +23,17 @@ from clamp3d.cli.options import FILE, OUTPUT
     show_default=True,
     help="Square to the reference line, or straight from point to point.",
 )
-@click.option("--snap", type=float, metavar="PX", help="Move each mark to the strongest corner within PX pixels.")
-@click.option("--marking-error", type=float, metavar="PX", help="Of a mark, one sigma.  [default: 4.5; 0.5 snapped]")
+@click.option("--snap", type=number, metavar="PX", help="Move each mark to the strongest corner within PX pixels.")
+@click.option("--marking-error", type=number, metavar="PX", help="Of a mark, one sigma.  [default: 4.5; 0.5 snapped]")
 @click.option(
     "--calliper-error",
-    type=float,
+    type=number,
     default=0.02,
     show_default=True,
     metavar="MM",
     help="Standard deviation of a reading.",
 )
-@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write the result as JSON.")
+@JSON
 def command(
     image: Path,
     points: str,
@@ -73,12 +74,10 @@ def command(
     )
     if json_file is not None:
         write_json(json_file, {"image": str(image), "kind": kind, "marks": marks.tolist(), **asdict(found)})
-    click.echo(f"distance     {found.distance:.3f} mm +- {found.uncertainty:.3f} mm ({kind}; one standard deviation)")
-    click.echo(f"height       {found.height:.3f} mm, straight {found.straight:.3f} mm")
-    click.echo(
-        f"scale        {found.mm_per_px:.6f} mm/px, marks +- {marking_error:g} px, reading +- {calliper_error:g} mm"
-    )
-    click.echo(f"marks        {', '.join(f'({x:.2f}, {y:.2f})' for x, y in marks)}")
+    show(f"distance     {found.distance:.3f} mm +- {found.uncertainty:.3f} mm ({kind}; one standard deviation)")
+    show(f"height       {found.height:.3f} mm, straight {found.straight:.3f} mm")
+    show(f"scale        {found.mm_per_px:.6f} mm/px, marks +- {marking_error:g} px, reading +- {calliper_error:g} mm")
+    show(f"marks        {', '.join(f'({x:.2f}, {y:.2f})' for x, y in marks)}")
 
 
 def _marks(option: str, text: str) -> list[tuple[float, float]]:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from clamp3d.errors import escaped
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.status import Status
@@ -22,12 +24,14 @@ class Narrator:
     def line(self, text: str) -> None:
         """A line that stays."""
         if self._console is not None:
-            self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+            self._console.print(escaped(text), markup=False, highlight=False, soft_wrap=True)
 
     def status(self, text: str) -> None:
         """What is going on now; not shown where stderr is a file."""
         if self._status is not None:
-            self._status.update(text)
+            from rich.text import Text
+
+            self._status.update(Text(escaped(text)))
 
     def waypoint(self, waypoint: Waypoint) -> None:
         """What a run has reached."""
@@ -55,17 +59,17 @@ def narrator(quiet: bool) -> Iterator[Narrator]:
 
 
 @contextmanager
-def bar(what: str, quiet: bool) -> Iterator[Callable[[int, int, str], None]]:
-    """A function ``report(done, of, text)`` that moves a bar labelled ``what``; silent if stderr is no terminal."""
+def bar(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
+    """A function ``report(stage, done, of)`` that moves a bar; it is silent if stderr is no terminal."""
     import sys
 
     if quiet or not sys.stderr.isatty():
-        yield lambda done, of, text: None
+        yield lambda stage, done, of: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("{task.fields[text]}"), console=Console(stderr=True), transient=True) as shown:
-        task = shown.add_task(what, total=None, text="")
-        yield lambda done, of, text: shown.update(task, completed=done, total=of, text=text)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+        task = shown.add_task("", total=None)
+        yield lambda stage, done, of: shown.update(task, description=escaped(stage), completed=done, total=of)

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import OUTPUT
+from clamp3d.cli.options import JSON, QUIET
+from clamp3d.cli.terminal import show
 
 
 @click.command("reproduce")
-@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write the tables as JSON.")
-@click.option("--quiet", "-q", is_flag=True, help="No progress.")
+@JSON
+@QUIET
 def command(json_file: Path | None, quiet: bool) -> None:
     """Print Tables 1-5 of the paper beside this program's values, with the difference of each."""
     from clamp3d.bench.reproduce import reproduce
@@ -21,4 +22,4 @@ def command(json_file: Path | None, quiet: bool) -> None:
     found = reproduce(lambda message: None if quiet else click.echo(message, err=True))
     if json_file is not None:
         write_json(json_file, reproduction_to_dict(found))
-    click.echo(reproduction_to_text(found))
+    show(reproduction_to_text(found))

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import OUTPUT
+from clamp3d.cli.options import JSON, OUTPUT, PICTURE, QUIET
+from clamp3d.cli.terminal import finish, show
 
 
 @click.command("stress")
@@ -34,10 +35,10 @@ from clamp3d.cli.options import OUTPUT
 @click.option(
     "--case", type=click.IntRange(0), metavar="I", help="Print case I of the family as Python, with its truth."
 )
-@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write the result as JSON.")
+@JSON
 @click.option("--markdown", "markdown_file", type=OUTPUT, metavar="FILE", help="Write the result as Markdown.")
-@click.option("--plot", "plot_file", type=OUTPUT, metavar="FILE", help="Draw the matrix (.png, .svg, .pdf).")
-@click.option("--quiet", "-q", is_flag=True, help="No progress.")
+@click.option("--plot", "plot_file", type=PICTURE, metavar="FILE", help="Draw the matrix (.png, .svg, .pdf).")
+@QUIET
 def command(
     families: tuple[str, ...],
     methods: tuple[str, ...],
@@ -64,9 +65,9 @@ def command(
 
     if show_list:
         for each in FAMILIES.values():
-            click.echo(f"{each.name:28s} {each.about}")
+            show(f"{each.name:28s} {each.about}")
         for name, about in METHODS.items():
-            click.echo(f"{name:28s} (method) {about}")
+            show(f"{name:28s} (method) {about}")
         return
     if case is not None:
         if len(families) != 1 or families[0] not in FAMILIES:
@@ -75,13 +76,13 @@ def command(
         n = max(1, int(n * family.part))
         if case >= n:
             raise InputError(f"--case must be less than the number of cases, {n}, got {case}")
-        click.echo(family.case(n, seed, case))
+        show(family.case(n, seed, case))
         return
 
     from clamp3d.cli.progress import bar
     from clamp3d.output.files import write_json, write_text
 
-    with bar("families", quiet) as report:
+    with bar(quiet) as report:
         result = run_stress(
             families or None,
             methods or None,
@@ -90,7 +91,7 @@ def command(
             check=check,
             time_limit=time_limit,
             workers=workers,
-            progress=lambda family, done, of: report(done, of, family),
+            progress=report,
         )
     if json_file is not None:
         write_json(json_file, _clean(result.to_dict()))
@@ -101,10 +102,9 @@ def command(
         from clamp3d.bench.stress.plot import plot
 
         plot(result, plot_file)
-    click.echo(table(result))
+    show(table(result))
     own = [o for o in result.outcomes if o.method == "cas"]
-    if any(o.wrong or o.beyond_bound for o in own):
-        raise click.exceptions.Exit(1)
+    finish(finding=any(o.wrong or o.beyond_bound for o in own))
 
 
 def _clean(value: object) -> object:

@@ -7,32 +7,29 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import OUTPUT, clamp_arguments
-
-PICTURES = (".png", ".svg", ".pdf")
+from clamp3d.cli.options import JSON, PICTURE, Source, clamp_argument, number
+from clamp3d.cli.terminal import show
 
 
 @click.command("sweep")
-@clamp_arguments
+@clamp_argument
 @click.option("--wire", type=click.Choice(["P6", "P7"]), default="P6", show_default=True, help="Line or jumper.")
-@click.option("--offset", type=float, default=15.0, show_default=True, metavar="MM", help="Half range across the wire.")
-@click.option("--height", type=float, metavar="MM", help="Half range along the bolt.  [default: not varied]")
-@click.option("--yaw-deg", type=float, default=6.0, show_default=True, metavar="A", help="Half range about the bolt.")
+@click.option("--offset", type=number, default=15.0, show_default=True, metavar="MM", help="Half range across.")
+@click.option("--height", type=number, metavar="MM", help="Half range along the bolt.  [default: not varied]")
+@click.option("--yaw-deg", type=number, default=6.0, show_default=True, metavar="A", help="Half range about the bolt.")
 @click.option(
-    "--pitch-deg", type=float, default=3.0, show_default=True, metavar="A", help="Half range about the cross axis."
+    "--pitch-deg", type=number, default=3.0, show_default=True, metavar="A", help="Half range about the cross axis."
 )
-@click.option("--seat-tolerance", type=float, metavar="MM", help="Opening that still counts as closed.  [default: 0.5]")
+@click.option("--seat-tolerance", type=number, metavar="MM", help="Opening that counts as closed.  [default: 0.5]")
 @click.option("--steps", type=click.IntRange(3, 1001), default=121, show_default=True, help="Grid points per freedom.")
 @click.option(
     "--random", "count", type=click.IntRange(1, 10_000_000), metavar="N", help="Also try N random misplacements."
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random ones.")
-@click.option("--map", "map_file", type=OUTPUT, metavar="FILE", help="Draw the map (PNG, SVG or PDF).")
-@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write all points as JSON.")
+@click.option("--map", "map_file", type=PICTURE, metavar="FILE", help="Draw the map (PNG, SVG or PDF).")
+@JSON
 def command(
-    clamp: str,
-    line: str | None,
-    jumper: str | None,
+    source: Source,
     wire: str,
     offset: float,
     height: float | None,
@@ -50,7 +47,6 @@ def command(
     The wire is held where it is while the splints close along the bolt. Closes: both touch it in their grooves with
     little opening. Touches wrongly: on a lip, or too far open. Cannot seat: on a face beside the groove.
     """
-    from clamp3d.clamp.loader import load_clamp
     from clamp3d.clamp.placement import FREEDOMS, SEAT_TOLERANCE, Freedom, WireClosing
     from clamp3d.errors import InputError
     from clamp3d.output.files import write_json
@@ -65,12 +61,10 @@ def command(
             raise InputError(f"{name}: half range must be < 90 deg, got {math.degrees(value):g}")
     if not ranges:
         raise InputError("nothing to vary: give --offset, --height, --yaw-deg or --pitch-deg")
-    if map_file is not None and map_file.suffix.lower() not in PICTURES:
-        raise InputError(f"{map_file}: the map's name must end in one of {', '.join(PICTURES)}")
     if map_file is not None and len(ranges) < 2:
         raise InputError("a map needs two freedoms with a range")
     closing = WireClosing(
-        load_clamp(clamp, line=line, jumper=jumper),
+        source.clamp(),
         "P6" if wire == "P6" else "P7",
         seat_tolerance=SEAT_TOLERANCE if seat_tolerance is None else seat_tolerance,
     )
@@ -82,7 +76,7 @@ def command(
         write_json(json_file, sweep_to_dict(closing, tolerances, grids, cloud))
     if map_file is not None:
         draw_map(map_file, closing, tolerances, grids, ranges)
-    click.echo(sweep_to_text(closing, tolerances, cloud))
+    show(sweep_to_text(closing, tolerances, cloud))
 
 
 def _angle(degrees: float) -> float:

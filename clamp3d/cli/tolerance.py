@@ -6,18 +6,17 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import OUTPUT, clamp_arguments
-
-PICTURES = (".png", ".svg", ".pdf")
+from clamp3d.cli.options import JSON, OUTPUT, PICTURE, QUIET, Source, clamp_argument, number
+from clamp3d.cli.terminal import show
 
 
 @click.command("tolerance")
-@clamp_arguments
+@clamp_argument
 @click.option("--n", type=click.IntRange(1, 100_000_000), default=1000, show_default=True, help="Clamps to assemble.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the dimensions.")
-@click.option("--tolerance", type=float, metavar="MM", help="Either way, each dimension.  [default: ISO 2768-1 m]")
+@click.option("--tolerance", type=number, metavar="MM", help="Either way, each dimension.  [default: ISO 2768-1 m]")
 @click.option(
-    "--wire-tolerance-percent", type=float, default=1.0, show_default=True, metavar="P", help="Of the diameters."
+    "--wire-tolerance-percent", type=number, default=1.0, show_default=True, metavar="P", help="Of the diameters."
 )
 @click.option(
     "--distribution",
@@ -29,13 +28,11 @@ PICTURES = (".png", ".svg", ".pdf")
 @click.option("--processes", type=click.IntRange(1, 1024), default=1, show_default=True, help="Processes.")
 @click.option("--scheduler", metavar="ADDRESS", help="Spread over this Dask cluster (extra 'cluster').")
 @click.option("--resume", type=OUTPUT, metavar="FILE", help="Keep finished work here; go on from it if it exists.")
-@click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write all samples as JSON.")
-@click.option("--plot", "plot_file", type=OUTPUT, metavar="FILE", help="Draw the histogram (.png, .svg, .pdf).")
-@click.option("--quiet", "-q", is_flag=True, help="No progress.")
+@JSON
+@click.option("--plot", "plot_file", type=PICTURE, metavar="FILE", help="Draw the histogram (.png, .svg, .pdf).")
+@QUIET
 def command(
-    clamp: str,
-    line: str | None,
-    jumper: str | None,
+    source: Source,
     n: int,
     seed: int,
     tolerance: float | None,
@@ -52,26 +49,20 @@ def command(
 
     The same seed gives the same clamps and distances, however the work is spread.
     """
-    from clamp3d.clamp.loader import load_clamp
     from clamp3d.clamp.sensitivity import sensitivity
     from clamp3d.clamp.tolerance import monte_carlo
     from clamp3d.cli.progress import bar
-    from clamp3d.errors import InputError, SolverError
-    from clamp3d.output.files import check_writable, write_json
+    from clamp3d.errors import SolverError
+    from clamp3d.output.files import write_json
     from clamp3d.output.tolerance_report import draw_histogram, tolerance_to_dict, tolerance_to_text
 
-    if plot_file is not None and plot_file.suffix.lower() not in PICTURES:
-        raise InputError(f"{plot_file}: the plot's name must end in one of {', '.join(PICTURES)}")
-    for path in (json_file, plot_file):
-        if path is not None:
-            check_writable(path)
-    loaded = load_clamp(clamp, line=line, jumper=jumper)
+    loaded = source.clamp()
     note = ""
     try:
         rows = sensitivity(loaded)
     except SolverError as error:
         rows, note = (), str(error)
-    with bar("clamps", quiet) as report:
+    with bar(quiet) as report:
         result = monte_carlo(
             loaded,
             n=n,
@@ -82,10 +73,10 @@ def command(
             processes=processes,
             scheduler=scheduler,
             resume=resume,
-            progress=lambda done, of: report(done, of, ""),
+            progress=lambda done, of: report("clamps", done, of),
         )
     if json_file is not None:
         write_json(json_file, tolerance_to_dict(result, rows))
     if plot_file is not None:
         draw_histogram(plot_file, result)
-    click.echo(tolerance_to_text(result, rows, note))
+    show(tolerance_to_text(result, rows, note))

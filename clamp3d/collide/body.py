@@ -1,6 +1,6 @@
 """A body in closed form: the common part of convex pieces, less grooves, round holes and slots.
 
-Bounds of two bodies come from pieces that hold them (each gives a distance that is never too large) and from points
+Distance of two bodies come from pieces that hold them (each gives a distance that is never too large) and from points
 that both really have (each gives one that is never too small). Where the nearest point of the exact groove lies on
 the body the two agree, and the distance is exact; the body's outer faces are among the pieces.
 """
@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from clamp3d.collide.bounds import Bounds
-from clamp3d.collide.convex import MEMBER, Convex, Rod, convex_bounds
-from clamp3d.core.distance import signed_distance
+from clamp3d.collide.answer import Distance
+from clamp3d.collide.convex import MEMBER, Convex, Rod, convex_distance
+from clamp3d.core.distance import SignedDistance, signed_distance
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.primitives import Cylinder, SweptArc
 
@@ -51,7 +51,7 @@ class Slot:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Body:
+class ClosedForm:
     """The points that lie in all ``outers`` and in no bore or slot; part frame, mm.
 
     ``error`` (mm): the true surface is this near the stated one (0 for designed parts, the bound of a fit otherwise).
@@ -77,90 +77,74 @@ class Body:
         return np.asarray(found)
 
 
-def bodies_bounds(a: Body, b: Body, T: Array, enough: Callable[[Bounds], bool]) -> tuple[Bounds, str]:
-    """Bounds of the signed distance of ``b`` at ``T`` (4, 4) in a's frame, and the method that gave the last word.
-
-    Stops asking as soon as ``enough`` says so.
-    """
-    found, method = Bounds(), "closed form"
+def bodies_distance(a: ClosedForm, b: ClosedForm, T: Array, enough: Callable[[Distance], bool]) -> Distance:
+    """Signed distance of ``b`` at ``T`` (4, 4) in a's frame; stops asking as soon as ``enough`` says so."""
+    found, back = Distance(), inverse(T)
+    error = a.error + b.error
     here = np.eye(4)
-    back = inverse(T)
-    doubt = a.error + b.error
     for first, second, swapped in ((a, b, False), (b, a, True)):
         place = back if swapped else T
         rods = [piece for piece in second.outers if isinstance(piece, Rod)]
         for bore in first.bores:
             for rod in rods:
-                new = _attested(bore_rod(bore, rod, place), first, second, place)
-                found, method = _better(found, method, turned(new, back) if swapped else new, "groove kernel")
-                if enough(found.widened(doubt)):
-                    return found.widened(doubt), method
+                new = _with_witnesses(bore_rod(bore, rod, place), first, second, place)
+                found = found.meet(new.moved(T).swapped() if swapped else new)
+                if enough(found.widened(error)):
+                    return found.widened(error)
     for piece in a.outers:
         for other in b.outers:
-            raw = convex_bounds(piece, here, other, T)
-            new = _attested(raw, a, b, T)
-            dear = a.surface is not None or b.surface is not None
-            if new.high == math.inf and raw.normal is not None and (raw.low > -0.01 or not dear):
+            raw = convex_distance(piece, here, other, T)
+            new = _with_witnesses(raw, a, b, T)
+            expensive = a.surface is not None or b.surface is not None
+            if new.upper == math.inf and raw.normal is not None and (raw.lower > -0.01 or not expensive):
                 new = _face_to_face(raw, piece, other, a, b, T)
-            closed = isinstance(piece, Rod) and isinstance(other, Rod) and new.high - new.low < 1e-9
-            found, method = _better(found, method, new, "cylinders" if closed else "convex (GJK)")
-            if enough(found.widened(doubt)):
-                return found.widened(doubt), method
+            found = found.meet(new)
+            if enough(found.widened(error)):
+                return found.widened(error)
     for first, second, swapped in ((a, b, False), (b, a, True)):
         place = back if swapped else T
         for slot in first.slots:
             for piece in second.outers:
-                new = _attested(_slot_convex(slot, piece, place), first, second, place)
-                found, method = _better(found, method, turned(new, back) if swapped else new, "slot")
-                if enough(found.widened(doubt)):
-                    return found.widened(doubt), method
-    return found.widened(doubt), method
+                new = _with_witnesses(_slot_convex(slot, piece, place), first, second, place)
+                found = found.meet(new.moved(T).swapped() if swapped else new)
+                if enough(found.widened(error)):
+                    return found.widened(error)
+    return found.widened(error)
 
 
-def _better(old: Bounds, method: str, new: Bounds, name: str) -> tuple[Bounds, str]:
-    met = old.meet(new)
-    return met, name if (met.low, met.high) != (old.low, old.high) else method
+def kernel_distance(answer: SignedDistance, error: float = 0.0) -> Distance:
+    """The kernel's answer as a `Distance` in the groove's frame, with ``error`` mm more uncertainty."""
+    d, e = answer.distance, answer.error_bound + error
+    p, q = answer.point_on_groove, answer.point_on_cylinder
+    return Distance(d - e, d + e, p, q, answer.normal, None, "features", "groove kernel")
 
 
-def turned(bounds: Bounds, T: Array) -> Bounds:
-    """Bounds of the second part against the first, placed by ``T`` (4, 4) in the second's frame, the other way round.
-
-    Their points are in the second's frame before and in the first's after.
-    """
-    if bounds.point_a is None or bounds.point_b is None:
-        return Bounds(bounds.low, bounds.high)
-    R, t = inverse(T)[:3, :3], inverse(T)[:3, 3]
-    return Bounds(bounds.low, bounds.high, R @ bounds.point_b + t, R @ bounds.point_a + t)
-
-
-def bore_rod(bore: Bore, rod: Rod, T: Array) -> Bounds:
+def bore_rod(bore: Bore, rod: Rod, T: Array) -> Distance:
     """The kernel's answer for a bore of the first body and a rod of the second, placed by ``T``."""
     answers = [
         (signed_distance(groove, Cylinder(rod.radius, rod.length), inverse(place) @ T @ rod.T), place)
         for groove, place in bore.covers()
     ]
     if len(answers) > 1 and any(answer.axis_inside for answer, _ in answers):
-        return Bounds()  # in the material the two halves' depths end where they meet, that of the whole does not
+        return Distance()  # in the material the two halves' depths end where they meet, that of the whole does not
     answer, place = min(answers, key=lambda found: found[0].distance)
-    R, t = place[:3, :3], place[:3, 3]
-    d, e = answer.distance, answer.error_bound
-    return Bounds(d - e, d + e, R @ answer.point_on_groove + t, R @ answer.point_on_cylinder + t)
+    return kernel_distance(answer).moved(place)
 
 
-def _slot_convex(slot: Slot, piece: Convex, T: Array) -> Bounds:
+def _slot_convex(slot: Slot, piece: Convex, T: Array) -> Distance:
     """All around a slot are half-spaces; the body lies in their union."""
-    found = Bounds(np.inf, np.inf)
+    found = Distance(np.inf, np.inf)
     for plane in slot.planes:
         n = plane[:3]
         q = T[:3, :3] @ piece.support(T[:3, :3].T @ n) + T[:3, 3]
         gap = -float(n @ q + plane[3])
         slack = 4.0 * 2.0**-52 * (float(np.abs(q).sum()) + abs(float(plane[3])))
-        new = Bounds(gap - slack, gap + slack, q + gap * n, q)
+        new = Distance(gap - slack, gap + slack, q + gap * n, q, -n, None, "features", "slot")
         found = found.union(new)
     return found
 
 
-def _attested(bounds: Bounds, a: Body, b: Body, T: Array) -> Bounds:
+def _with_witnesses(bounds: Distance, a: ClosedForm, b: ClosedForm, T: Array) -> Distance:
     """``bounds`` with its upper side kept only if points that both bodies have attest it; ``T`` places b, points in a.
 
     Apart, the two witnesses must lie on the bodies. Overlapping, a point that lies in both attests the depth it has
@@ -168,18 +152,18 @@ def _attested(bounds: Bounds, a: Body, b: Body, T: Array) -> Bounds:
     """
     p, q = bounds.point_a, bounds.point_b
     if p is None or q is None:
-        return Bounds(bounds.low)
+        return Distance(bounds.lower, normal=bounds.normal, method=bounds.method)
     slack = MEMBER * (1.0 + float(max(np.abs(p).max(), np.abs(q).max())))
     # The two may be slid along a cylinder together: of a line of contact the named point may not be on the body.
     shifts = np.vstack(
         [np.zeros((1, 3)), *(_along(piece, None) for piece in a.outers), *(_along(w, T) for w in b.outers)]
     )
-    if bounds.high >= 0.0:
+    if bounds.upper >= 0.0:
         for s in (shifts[:1], *np.array_split(shifts[1:], max(1, len(shifts) // 8))):
             k = _first_on_both(a, b, T, p + s, q + s, slack)
             if k is not None:
-                return Bounds(bounds.low, bounds.high + 2.0 * slack, p + s[k], q + s[k])
-        return Bounds(bounds.low)
+                return replace(bounds, upper=bounds.upper + 2.0 * slack, point_a=p + s[k], point_b=q + s[k])
+        return Distance(bounds.lower, normal=bounds.normal, method=bounds.method)
     if a.surface is not None or b.surface is not None:
         shifts = shifts[:1]
     trials = np.vstack([x + shifts for x in (p, q, 0.5 * (p + q))])
@@ -187,11 +171,11 @@ def _attested(bounds: Bounds, a: Body, b: Body, T: Array) -> Bounds:
     both = np.where(np.minimum(in_a, in_b) >= -slack, np.maximum(in_a, in_b), -np.inf)
     k = int(np.argmax(both))
     if both[k] == -np.inf:
-        return Bounds(bounds.low)
-    return Bounds(bounds.low, min(0.0, slack - float(both[k])), trials[k], trials[k])
+        return Distance(bounds.lower, normal=bounds.normal, method=bounds.method)
+    return replace(bounds, upper=min(0.0, slack - float(both[k])), point_a=trials[k], point_b=trials[k])
 
 
-def _first_on_both(a: Body, b: Body, T: Array, p: Array, q: Array, slack: float) -> int | None:
+def _first_on_both(a: ClosedForm, b: ClosedForm, T: Array, p: Array, q: Array, slack: float) -> int | None:
     """First row of which ``p`` (k, 3) lies on a and ``q`` (k, 3) on b, both in a's frame; the cheap body goes first."""
     index = np.arange(len(p))
     tests = [(a, p), (b, (q - T[:3, 3]) @ T[:3, :3])]
@@ -202,7 +186,7 @@ def _first_on_both(a: Body, b: Body, T: Array, p: Array, q: Array, slack: float)
     return int(index[0]) if len(index) else None
 
 
-def _face_to_face(bounds: Bounds, piece: Convex, other: Convex, a: Body, b: Body, T: Array) -> Bounds:
+def _face_to_face(bounds: Distance, piece: Convex, other: Convex, a: ClosedForm, b: ClosedForm, T: Array) -> Distance:
     """``bounds`` with points of the two faces that look at each other across its planes, where both bodies have them.
 
     A hole or the mouth of a groove may take the solver's own points away.
@@ -210,7 +194,7 @@ def _face_to_face(bounds: Bounds, piece: Convex, other: Convex, a: Body, b: Body
     n, R, t = bounds.normal, T[:3, :3], T[:3, 3]
     assert n is not None
     p, q = piece.face(n), other.face(-n @ R) @ R.T + t
-    gap = bounds.low
+    gap = bounds.lower
     p, q = np.vstack([p, q - gap * n]), np.vstack([p + gap * n, q])
     slack = MEMBER * (1.0 + float(np.abs(p).max()))
     if gap < 0.0:
@@ -219,13 +203,13 @@ def _face_to_face(bounds: Bounds, piece: Convex, other: Convex, a: Body, b: Body
     in_a, in_b = a.depth(p), b.depth((q - t) @ R)
     good = (in_a >= -slack) & (in_b >= -slack)
     if not good.any():
-        return Bounds(bounds.low)
+        return Distance(bounds.lower, normal=bounds.normal, method=bounds.method)
     if gap >= 0.0:
         k = int(np.argmax(good))
-        return Bounds(bounds.low, gap + 2.0 * slack, p[k], q[k])
+        return replace(bounds, upper=gap + 2.0 * slack, point_a=p[k], point_b=q[k])
     reached = np.where(good, np.maximum(in_a, in_b), -np.inf)
     k = int(np.argmax(reached))
-    return Bounds(bounds.low, min(0.0, slack - float(reached[k])), p[k], q[k])
+    return replace(bounds, upper=min(0.0, slack - float(reached[k])), point_a=p[k], point_b=q[k])
 
 
 def _along(piece: Convex, T: Array | None) -> Array:

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from clamp3d.collide.bounds import Bounds
+from clamp3d.collide.answer import Distance
 from clamp3d.core.pose import Array
 
 MEMBER = 1e-9
@@ -165,17 +165,17 @@ def closest_on_axes(a: Rod, Ta: Array, b: Rod, Tb: Array) -> tuple[Array, Array,
     return x, y, abs(float(d @ u)) <= slack and abs(float(d @ v)) <= slack
 
 
-def convex_bounds(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Bounds:
-    """Bounds of the signed distance of two convex pieces placed by ``Ta``, ``Tb`` (4, 4); witnesses in that frame."""
-    found = Bounds()
+def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
+    """Distance of the signed distance of two convex pieces placed by ``Ta``, ``Tb`` (4, 4); witnesses in that frame."""
+    found = Distance()
     if isinstance(a, Rod) and isinstance(b, Rod):
-        found = _rods(a, Ta, b, Tb)
-        if found.high - found.low < 1e-9:
+        found = _rods(a, Ta, b, Tb).labelled("features", "cylinders")
+        if found.upper - found.lower < 1e-9:
             return found
-    return found.meet(_gjk(a, Ta, b, Tb))
+    return found.meet(_gjk(a, Ta, b, Tb).labelled("features", "convex (GJK)"))
 
 
-def _rods(a: Rod, Ta: Array, b: Rod, Tb: Array) -> Bounds:
+def _rods(a: Rod, Ta: Array, b: Rod, Tb: Array) -> Distance:
     """Two cylinders side by side in closed form; with rounded ends in place of flat ones it is a lower bound."""
     x, y, square = closest_on_axes(a, Ta, b, Tb)
     d = y - x
@@ -183,24 +183,24 @@ def _rods(a: Rod, Ta: Array, b: Rod, Tb: Array) -> Bounds:
     gap = apart - (a.radius + b.radius)
     slack = 8.0 * 2.0**-52 * (float(np.abs(x).max() + np.abs(y).max()) + a.radius + b.radius)
     if not square or apart <= 1e-9 * (a.radius + b.radius):
-        return Bounds(gap - slack)
+        return Distance(gap - slack)
     n = d / apart
     if gap >= 0.0:
-        return Bounds(gap - slack, gap + slack, x + a.radius * n, y - b.radius * n)
+        return Distance(gap - slack, gap + slack, x + a.radius * n, y - b.radius * n)
     return _deepest(a, Ta, b, Tb, [x + a.radius * n, y - b.radius * n, x, y], gap - slack, slack)
 
 
-def _deepest(a: Convex, Ta: Array, b: Convex, Tb: Array, trials: list[Array], low: float, slack: float) -> Bounds:
-    """Bounds of an overlap: the deepest of the ``trials`` (3,) that lie in both pieces, beside a known ``low``."""
+def _deepest(a: Convex, Ta: Array, b: Convex, Tb: Array, trials: list[Array], low: float, slack: float) -> Distance:
+    """Distance of an overlap: the deepest of the ``trials`` (3,) that lie in both pieces, beside a known ``low``."""
     depths = [(_depth(a, Ta, x), _depth(b, Tb, x)) for x in trials]
     inside = [max(pair) if min(pair) >= -slack else -np.inf for pair in depths]
     k = int(np.argmax(inside))
     if inside[k] == -np.inf:
-        return Bounds(low)
-    return Bounds(low, slack - inside[k], trials[k], trials[k])
+        return Distance(low)
+    return Distance(low, slack - inside[k], trials[k], trials[k])
 
 
-def _gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Bounds:
+def _gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
     import fcl
 
     oa, ob = _object(a, Ta), _object(b, Tb)
@@ -214,14 +214,14 @@ def _gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Bounds:
         if 0.0 < size < np.inf:
             low, m = _slab(a, Ta, b, Tb, n / size)
             outside = max(0.0, -_depth(a, Ta, p), -_depth(b, Tb, q))
-            found = Bounds(low, size + 2.0 * outside, p, q, m)
+            found = Distance(low, size + 2.0 * outside, p, q, m)
             # The direction of a short distance is mostly rounding.
             return found if size - low < 1e-5 else found.meet(_touching(a, Ta, b, Tb))
     contacts = fcl.CollisionResult()
     request = fcl.CollisionRequest(num_max_contacts=4, enable_contact=True, gjk_solver_type=libccd)
     if not fcl.collide(oa, ob, request, contacts):
         return _touching(a, Ta, b, Tb)  # neither apart nor in each other: a hair's breadth either way
-    found = Bounds()
+    found = Distance()
     for contact in contacts.contacts:
         n, at = np.asarray(contact.normal, dtype=np.float64), np.asarray(contact.pos, dtype=np.float64)
         size = float(np.linalg.norm(n))
@@ -231,12 +231,12 @@ def _gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Bounds:
         reach = abs(float(contact.penetration_depth))
         trials = [at + s * reach * n / size for s in (0.0, -0.5, 0.5, -0.25, 0.25)]
         new = _deepest(a, Ta, b, Tb, trials, low, MEMBER * (1.0 + float(np.abs(at).max())))
-        found = found.meet(Bounds(new.low, new.high, new.point_a, new.point_b, m))
-    shallow = found.high > -1e-3 or found.low > -1e-3
+        found = found.meet(Distance(new.lower, new.upper, new.point_a, new.point_b, m))
+    shallow = found.upper > -1e-3 or found.lower > -1e-3
     return found.meet(_touching(a, Ta, b, Tb)) if shallow else found
 
 
-def _touching(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Bounds:
+def _touching(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
     """Lower bound from all faces of both pieces."""
     best, normal = -np.inf, None
     for piece, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
@@ -245,7 +245,7 @@ def _touching(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Bounds:
             gap, m = _slab(a, Ta, b, Tb, n)
             if gap > best:
                 best, normal = gap, m
-    return Bounds(best, normal=normal)
+    return Distance(best, normal=normal)
 
 
 def _depth(piece: Convex, T: Array, x: Array) -> float:

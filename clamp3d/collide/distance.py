@@ -4,91 +4,81 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clamp3d.collide.bounds import Bounds, Thresholds
-from clamp3d.collide.broad import Boxes, box_gaps
-from clamp3d.collide.ladder import climb
-from clamp3d.collide.model import Workshop
-from clamp3d.collide.scene import Scene
+from clamp3d.checks import array, instance, positive
+from clamp3d.collide.answer import Distance, Distances
+from clamp3d.collide.model import ModelCache
+from clamp3d.collide.refine import ACCURACY, from_boxes, measured, refine, with_normal
+from clamp3d.collide.scene import Scene, name_pairs
+from clamp3d.collide.verdict import Thresholds
+from clamp3d.core.contact_model import ContactModel
 from clamp3d.core.pose import Array, check_pose, inverse
-from clamp3d.core.shapes import AnyShape, as_shape
+from clamp3d.core.shapes import AnyShape, Shape, as_shape
 
-ACCURACY = 1e-7
-"""Width (mm) of the interval at which a distance counts as known."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Distance:
-    """Signed distance of two bodies, between proven bounds.
-
-    Attributes
-    ----------
-    lower, upper : float
-        The distance lies between these, mm; positive apart, negative inside. Infinite where nothing is known.
-    point_a, point_b : ndarray (3,) or None
-        Points on the two bodies that attest ``upper``; None where it is infinite.
-    normal : ndarray (3,) or None
-        Unit vector from a to b, ``point_b = point_a + upper * normal``; None where no direction is known.
-    unique : bool or None
-        Whether the nearest points are the only ones; None where that is not known.
-    level, method : str
-        The refinement level and the method that gave the last word.
-    """
-
-    lower: float
-    upper: float
-    point_a: Array | None
-    point_b: Array | None
-    normal: Array | None
-    unique: bool | None
-    level: str
-    method: str
-
-    @property
-    def value(self) -> float:
-        """The distance in mm: the upper bound, which the witness points attest."""
-        return self.upper
-
-    @property
-    def uncertainty(self) -> float:
-        """How far ``value`` can be off, mm."""
-        return self.upper - self.lower
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON; unknown numbers are None."""
-        return {
-            "distance_mm": _finite(self.value),
-            "error_bound_mm": _finite(self.uncertainty),
-            "at_least_mm": _finite(self.lower),
-            "at_most_mm": _finite(self.upper),
-            "point_a": _list(self.point_a),
-            "point_b": _list(self.point_b),
-            "normal": _list(self.normal),
-            "unique": self.unique,
-            "level": self.level,
-            "method": self.method,
-        }
-
-
-def _finite(x: float) -> float | None:
-    return float(x) if np.isfinite(x) else None
-
-
-def _list(x: Array | None) -> list[float] | None:
-    return None if x is None else [float(v) for v in x]
+__all__ = ["ACCURACY", "Distance", "Distances", "distance", "distances", "measure"]
 
 
 def distance(
-    a: AnyShape, b: AnyShape, T_a_b: ArrayLike | None = None, *, accuracy: float = ACCURACY, model: Any = None
+    a: AnyShape,
+    b: AnyShape,
+    T_a_b: ArrayLike | None = None,
+    *,
+    accuracy: float = ACCURACY,
+    model: ContactModel | None = None,
+    cache: ModelCache | None = None,
 ) -> Distance:
-    """Signed distance of body ``b``, placed by ``T_a_b`` (4, 4) in the frame of body ``a``; points in that frame."""
+    """Signed distance of two bodies of any kind.
+
+    Parameters
+    ----------
+    a, b : Solid, MeshShape or Cylinder
+        The bodies; a cylinder has flat ends.
+    T_a_b : array_like (4, 4), optional
+        Pose of b in the frame of a; the same frame by default.
+    accuracy : float
+        The distance is refined until its bounds are this close, mm, or until the models have no more to say. Of an
+        overlap only what closed forms tell is asked: its depth may have an upper bound alone.
+    model : ContactModel, optional
+        Answers in place of the exact engine where one body has a groove and the other a cylinder.
+    cache : ModelCache, optional
+        Keeps what is made of the shapes from one call to the next.
+
+    Returns
+    -------
+    Distance
+        Points and normal in the frame of a.
+
+    Raises
+    ------
+    InputError
+        For anything that is no shape or no rigid pose.
+
+    Examples
+    --------
+    >>> from clamp3d.core import shapes
+    >>> from clamp3d.core.pose import translation
+    >>> found = distance(shapes.box((10, 10, 10)), shapes.cylinder(3, 10), translation(0, 0, 12))
+    >>> round(found.value, 9), found.normal.tolist()
+    (2.0, [0.0, 0.0, 1.0])
+    """
     T = np.eye(4) if T_a_b is None else check_pose(T_a_b, "T_a_b")
-    return _measured(Workshop(), as_shape(a), as_shape(b), T, accuracy)
+    return _measured(cache or ModelCache(), as_shape(a), as_shape(b), T, positive("accuracy", accuracy), model)
+
+
+def distances(a: AnyShape, b: AnyShape, T_a_b: ArrayLike, *, model: ContactModel | None = None) -> Distances:
+    """Signed distances of two bodies for many poses ``T_a_b`` (n, 4, 4) of b in the frame of a.
+
+    The same as `distance` for each of them.
+    """
+    T = array("T_a_b", T_a_b, (None, 4, 4), finite=False)
+    cache = ModelCache()
+    x, y = as_shape(a), as_shape(b)
+    return Distances.of(
+        [_measured(cache, x, y, check_pose(pose, f"T_a_b[{k}]"), ACCURACY, model) for k, pose in enumerate(T)]
+    )
 
 
 def measure(
@@ -96,36 +86,40 @@ def measure(
     pairs: Iterable[tuple[str, str]] | None = None,
     *,
     accuracy: float = ACCURACY,
-    model: Any = None,
-    workshop: Workshop | None = None,
+    model: ContactModel | None = None,
+    cache: ModelCache | None = None,
 ) -> dict[tuple[str, str], Distance]:
-    """Distances of all pairs of a scene (or of ``pairs``), points and normals in the world; first part first."""
-    shop = workshop or Workshop()
-    parts = {part.name: part for part in scene.parts}
-    asked = itertools.combinations(parts, 2) if pairs is None else pairs
+    """Distances of the pairs of a scene, each as `distance` gives it, points and normals in the world.
+
+    Parameters
+    ----------
+    scene : Scene
+        Parts at their poses.
+    pairs : iterable of (str, str), optional
+        Names; all pairs in the order of the parts by default.
+    accuracy, model, cache
+        As for `distance`.
+
+    Returns
+    -------
+    dict
+        From (a, b) to `Distance`.
+    """
+    instance("scene", scene, Scene)
+    cache = cache or ModelCache()
+    asked = (
+        itertools.combinations([part.name for part in scene.parts], 2) if pairs is None else name_pairs("pairs", pairs)
+    )
     found = {}
     for a, b in asked:
-        T_a, T_b = parts[a].T_world, parts[b].T_world
-        local = _measured(shop, parts[a].shape, parts[b].shape, inverse(T_a) @ T_b, accuracy)
-        found[a, b] = _moved(local, T_a)
+        first, second = (scene.parts[scene.index(name)] for name in (a, b))
+        T = inverse(first.T_world) @ second.T_world
+        found[a, b] = _measured(cache, first.shape, second.shape, T, accuracy, model).moved(first.T_world)
     return found
 
 
-def _measured(shop: Workshop, a: Any, b: Any, T: Array, accuracy: float) -> Distance:
-    x, y = shop.model(a), shop.model(b)
-    boxes = Boxes.of(np.array([x.bounds, y.bounds]), np.array([np.eye(4), T]))
-    start = Bounds(float(box_gaps(boxes, np.array([[0, 1]]))[0]))
-    answer = climb(x, y, T, start, Thresholds(), lambda known: known.high - known.low <= accuracy, shop.ledger)
-    low, high = answer.bounds.low, answer.bounds.high
-    p, q = answer.bounds.point_a, answer.bounds.point_b
-    normal = answer.bounds.normal
-    if p is not None and q is not None and high > 1e-6:
-        normal = (q - p) / np.linalg.norm(q - p)
-    return Distance(low, high, p, q, normal, None, answer.rung, answer.method)
-
-
-def _moved(d: Distance, T: Array) -> Distance:
-    R, t = T[:3, :3], T[:3, 3]
-    p, q = (None if x is None else R @ x + t for x in (d.point_a, d.point_b))
-    n = None if d.normal is None else R @ d.normal
-    return Distance(d.lower, d.upper, p, q, n, d.unique, d.level, d.method)
+def _measured(cache: ModelCache, a: Shape, b: Shape, T: Array, accuracy: float, model: ContactModel | None) -> Distance:
+    x, y = cache.model(a), cache.model(b)
+    start = from_boxes(x, y, T)
+    found = refine(x, y, T, start, Thresholds(), lambda known: measured(known, accuracy))
+    return with_normal(found)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from clamp3d.collide.body import Body, Bore, Slot
+from clamp3d.collide.body import Bore, ClosedForm, Slot
 from clamp3d.collide.convex import Convex, Rod, hull
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array
@@ -16,13 +16,13 @@ from clamp3d.core.shapes import Solid
 _FLAT = 1e-9
 
 
-def bodies_of(solid: Solid) -> tuple[Body, ...] | None:
+def bodies_of(solid: Solid) -> tuple[ClosedForm, ...] | None:
     """Bodies whose union is the solid; None if an outline is of a kind that has no closed form here.
 
     An outline is taken apart at the chords of its arcs: what remains must be convex. Each convex arc adds the segment
     between it and its chord, each concave one is a groove.
     """
-    found: list[Body] = []
+    found: list[ClosedForm] = []
     for body in solid.bodies:
         pieces = _pieces(body)
         if pieces is None:
@@ -37,7 +37,7 @@ def bodies_of(solid: Solid) -> tuple[Body, ...] | None:
                     bores.append(hollow)
                 else:
                     slots.append(hollow)
-            found.append(Body(outers, tuple(bores), tuple(slots)))
+            found.append(ClosedForm(outers, tuple(bores), tuple(slots)))
     return tuple(found)
 
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.collide.body import Body
-from clamp3d.collide.bounds import Bounds
+from clamp3d.collide.answer import Distance
+from clamp3d.collide.body import ClosedForm
 from clamp3d.collide.convex import Rod
-from clamp3d.collide.trimodel import TriModel
+from clamp3d.collide.surface import Surface
 from clamp3d.core.pose import Array
 
 _WIDTH = 1e-9
@@ -26,18 +26,18 @@ _WIDTH = 1e-9
 class Facets:
     """A closed mesh in groups of triangles: (tree, error mm) of the flat and of the round ones."""
 
-    whole: TriModel
+    whole: Surface
     groups: tuple[tuple[Any, float], ...]
 
     @classmethod
-    def of(cls, mesh: TriModel, round_faces: NDArray[np.int64], error: float) -> Facets:
+    def of(cls, mesh: Surface, round_faces: NDArray[np.int64], error: float) -> Facets:
         """Groups of ``mesh``; ``round_faces`` lie within ``error`` mm of the true surface, the others on it."""
         is_round = np.zeros(len(mesh.faces), dtype=bool)
         is_round[round_faces] = True
         groups = []
         for mask, doubt in ((~is_round, 0.0), (is_round, error)):
             if mask.any():
-                groups.append((TriModel(mesh.vertices, mesh.faces[mask], doubt).bvh, doubt))
+                groups.append((Surface(mesh.vertices, mesh.faces[mask], doubt).bvh, doubt))
         return cls(mesh, tuple(groups))
 
 
@@ -46,11 +46,11 @@ def _axis(rod: Rod) -> Any:
     half, T = 0.5 * rod.length, rod.T
     ends = T[:3, 3] + np.outer([-half, half, half], T[:3, 2])
     ends[2] += _WIDTH * T[:3, 0]
-    return TriModel(ends, np.array([[0, 1, 2]]), 0.0).bvh
+    return Surface(ends, np.array([[0, 1, 2]]), 0.0).bvh
 
 
-def rod_bounds(facets: Facets, body: Body, T: Array) -> Bounds:
-    """Bounds of the signed distance of a ``body`` with a rod around it, at ``T`` (4, 4) in the mesh's frame."""
+def rod_distance(facets: Facets, body: ClosedForm, T: Array) -> Distance:
+    """Distance of the signed distance of a ``body`` with a rod around it, at ``T`` (4, 4) in the mesh's frame."""
     rod = next(piece for piece in body.outers if isinstance(piece, Rod))
     distance, low, p, a = _to_axis(facets, rod, T)
     slack = 1e-12 * (facets.whole.scale + float(np.abs(T[:3, 3]).max()) + rod.length) + _WIDTH
@@ -59,7 +59,7 @@ def rod_bounds(facets: Facets, body: Body, T: Array) -> Bounds:
     axis = T[:3, :3] @ rod.T[:3, 2]
     if facets.whole.contains(T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
         return _axis_inside(facets, body, T, distance)
-    bounds = Bounds(low - rod.radius - slack)
+    bounds = Distance(low - rod.radius - slack)
     n = (p - a) / distance
     q = a + rod.radius * n
     R, t = T[:3, :3], T[:3, 3]
@@ -67,11 +67,11 @@ def rod_bounds(facets: Facets, body: Body, T: Array) -> Bounds:
     if distance >= rod.radius:
         # Square to the axis the nearest point is on the side, which flat ends share with round ones.
         if abs(float(n @ axis)) < 1e-7 and body.depth(((q - t) @ R)[None])[0] >= -slack:
-            return Bounds(bounds.low - body.error, distance - rod.radius + error + slack + body.error, p, q)
+            return Distance(bounds.lower - body.error, distance - rod.radius + error + slack + body.error, p, q)
         return bounds.widened(body.error)
     deep = float(body.depth(((p - t) @ R)[None])[0])
     high = slack + error - deep if deep >= -slack else np.inf
-    return Bounds(bounds.low, high, p, p).widened(body.error)
+    return Distance(bounds.lower, high, p, p).widened(body.error)
 
 
 def axis_gap(facets: Facets, rod: Rod, T: Array) -> float:
@@ -82,7 +82,7 @@ def axis_gap(facets: Facets, rod: Rod, T: Array) -> float:
     return low - rod.radius - _WIDTH - 1e-12 * (facets.whole.scale + rod.length + float(np.abs(T[:3, 3]).max()))
 
 
-def _axis_inside(facets: Facets, body: Body, T: Array, distance: float) -> Bounds:
+def _axis_inside(facets: Facets, body: ClosedForm, T: Array, distance: float) -> Distance:
     """The axis passes through the material or lies in it: points of the body on a grid say how deep at least."""
     rod = next(piece for piece in body.outers if isinstance(piece, Rod))
     turn = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
@@ -96,9 +96,9 @@ def _axis_inside(facets: Facets, body: Body, T: Array, distance: float) -> Bound
     both = np.where((in_body >= 0.0) & (in_mesh >= 0.0), np.maximum(in_body, in_mesh), -np.inf)
     k = int(np.argmax(both))
     if both[k] == -np.inf:
-        return Bounds()
+        return Distance()
     error = max(doubt for _, doubt in facets.groups) + body.error
-    return Bounds(-np.inf, error - float(both[k]), world[k], world[k])
+    return Distance(-np.inf, error - float(both[k]), world[k], world[k])
 
 
 def _to_axis(facets: Facets, rod: Rod, T: Array) -> tuple[float, float, Array, Array]:

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.collide.body import Body, Bore
+from clamp3d.collide.body import Bore, ClosedForm
 from clamp3d.collide.convex import Rod, hull
-from clamp3d.collide.trimodel import TriModel
+from clamp3d.collide.surface import Surface
 from clamp3d.core.pose import Array
 from clamp3d.fit.features import FittedSurface
 from clamp3d.fit.fit import FitResult
@@ -22,7 +22,7 @@ def fit_error(feature: FittedSurface, round_: bool) -> float:
     return feature.fit_error if round_ else feature.error_bound
 
 
-def bodies_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[tuple[Body, ...], float]:
+def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[tuple[ClosedForm, ...], float]:
     """Bodies around the fitted mesh, and the error (mm) of the mesh itself: largest chord error and that of the fit.
 
     A groove or hole counts where no part of the mesh lies in its circle, over the whole length of the mesh; else the
@@ -65,8 +65,8 @@ def bodies_of_fit(result: FitResult, model: TriModel, *, round_: bool) -> tuple[
 
     bores = tuple(used)
     rods, rest = _rods(result, V, F)
-    made = [Body((rod,), bores, error=error) for rod in rods]
-    made += [Body((hull(points[index]),), bores, error=error, surface=depth) for index in rest]
+    made = [ClosedForm((rod,), bores, error=error) for rod in rods]
+    made += [ClosedForm((hull(points[index]),), bores, error=error, surface=depth) for index in rest]
     return tuple(made), mesh_error
 
 

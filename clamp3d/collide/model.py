@@ -11,11 +11,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.collide.body import Body
+from clamp3d.collide.body import ClosedForm
 from clamp3d.collide.convex import Hull, hull
 from clamp3d.collide.drawn import bodies_of
 from clamp3d.collide.facets import Facets
-from clamp3d.collide.trimodel import TriModel
+from clamp3d.collide.surface import Surface
 from clamp3d.core.meshing import chord_error, mesh
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import MeshShape, Shape, Solid
@@ -28,7 +28,7 @@ FINEST = 0.001
 
 
 @dataclass
-class Ledger:
+class Counters:
     """What a check has built and asked so far."""
 
     meshes: int = 0
@@ -40,12 +40,12 @@ class Ledger:
 
 
 class Model:
-    """All that can be known of one shape; ``ledger`` is told what is built."""
+    """All that can be known of one shape; ``counters`` is told what is built."""
 
-    def __init__(self, shape: Shape, ledger: Ledger) -> None:
+    def __init__(self, shape: Shape, counters: Counters) -> None:
         self.shape = shape
-        self.ledger = ledger
-        self._meshes: dict[float, TriModel] = {}
+        self.counters = counters
+        self._meshes: dict[float, Surface] = {}
         self._fit_error = 0.0
         self._round_faces: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 
@@ -64,21 +64,21 @@ class Model:
         return np.array([V.min(axis=0) - reach, V.max(axis=0) + reach])
 
     @cached_property
-    def bodies(self) -> tuple[Body, ...] | None:
+    def bodies(self) -> tuple[ClosedForm, ...] | None:
         """The shape in closed form; None if it has none."""
         start = time.perf_counter()
         found = self._bodies()
-        self.ledger.seconds["models"] += time.perf_counter() - start
+        self.counters.seconds["models"] += time.perf_counter() - start
         return found
 
-    def _bodies(self) -> tuple[Body, ...] | None:
+    def _bodies(self) -> tuple[ClosedForm, ...] | None:
         if isinstance(self.shape, Solid):
             return bodies_of(self.shape)
         if self.shape.fit != "off":
             from clamp3d.collide.fitted import bodies_of_fit
             from clamp3d.fit.fit import fit_mesh
 
-            self.ledger.fits += 1
+            self.counters.fits += 1
             result = fit_mesh(self.shape.mesh)
             if result.features:
                 self._round_faces = np.concatenate([feature.faces for feature in result.features])
@@ -87,11 +87,11 @@ class Model:
         raw = self.raw
         volume = float(raw.manifold.volume())
         if abs(float(raw.manifold.hull().volume()) - volume) <= 1e-9 * volume:
-            return (Body((self._hull(self.shape.mesh.vertices),)),)
+            return (ClosedForm((self._hull(self.shape.mesh.vertices),)),)
         return None
 
     @property
-    def forms(self) -> tuple[Body, ...]:
+    def forms(self) -> tuple[ClosedForm, ...]:
         """The closed form, or the hull in place of it."""
         return self.bodies if self.bodies is not None else (self.hull_body,)
 
@@ -104,13 +104,13 @@ class Model:
         return Facets.of(self.raw, self._round_faces, self._fit_error)
 
     @cached_property
-    def hull_body(self) -> Body:
+    def hull_body(self) -> ClosedForm:
         """Convex hull of the part, with its mesh to tell what of it is material."""
         made = self.mesh(0.5)
-        return Body((self._hull(made.vertices),), error=made.error, surface=made.depth)
+        return ClosedForm((self._hull(made.vertices),), error=made.error, surface=made.depth)
 
     def _hull(self, points: Array) -> Hull:
-        self.ledger.hulls += 1
+        self.counters.hulls += 1
         return hull(points)
 
     @property
@@ -119,15 +119,15 @@ class Model:
         return isinstance(self.shape, Solid) and any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes))
 
     @property
-    def raw(self) -> TriModel:
+    def raw(self) -> Surface:
         """The facets of a mesh shape as they are."""
         assert isinstance(self.shape, MeshShape)
         if 0.0 not in self._meshes:
             source = self.shape.mesh
-            self._meshes[0.0] = self._counted(TriModel(source.vertices, source.faces, 0.0))
+            self._meshes[0.0] = self._counted(Surface(source.vertices, source.faces, 0.0))
         return self._meshes[0.0]
 
-    def mesh(self, error: float) -> TriModel:
+    def mesh(self, error: float) -> Surface:
         """Mesh within ``error`` mm, or as near as the shape allows; its own ``error`` says how near."""
         if isinstance(self.shape, MeshShape):
             raw = self.raw
@@ -142,10 +142,10 @@ class Model:
             made = mesh(self.shape, error)
             # Where two curved surfaces cross, the edge strays further than either.
             factor = 2.0 if self.shape.holes else 1.0
-            model = TriModel(np.array(made.vertices), np.array(made.faces, dtype=np.int64), 0.0)
+            model = Surface(np.array(made.vertices), np.array(made.faces, dtype=np.int64), 0.0)
             model.error = factor * chord_error(self.shape, error)
             self._meshes[key] = self._counted(model)
-            self.ledger.seconds["models"] += time.perf_counter() - start
+            self.counters.seconds["models"] += time.perf_counter() - start
         return self._meshes[key]
 
     def triangles_at(self, error: float) -> int:
@@ -155,9 +155,9 @@ class Model:
         body = sum(4 * len(e.profile.polygon(error)) - 4 for e in self.shape.bodies)
         return body + sum(4 * len(e.profile.polygon(error)) + 4 for e in self.shape.holes)
 
-    def _counted(self, made: TriModel) -> TriModel:
-        self.ledger.meshes += 1
-        self.ledger.triangles += len(made.faces)
+    def _counted(self, made: Surface) -> Surface:
+        self.counters.meshes += 1
+        self.counters.triangles += len(made.faces)
         return made
 
 
@@ -174,17 +174,17 @@ def _bulge(shape: MeshShape) -> float:
     return float((0.5 * wide * np.tan(0.25 * angles))[smooth].max(initial=0.0))
 
 
-class Workshop:
+class ModelCache:
     """The models of a scene's shapes, shared by equal shapes, kept as long as it lives."""
 
     def __init__(self) -> None:
-        self.ledger = Ledger()
+        self.counters = Counters()
         self._models: dict[Shape, Model] = {}
 
     def model(self, shape: Shape) -> Model:
         """The one model of a shape and its equals."""
         if shape not in self._models:
-            self._models[shape] = Model(shape, self.ledger)
+            self._models[shape] = Model(shape, self.counters)
         return self._models[shape]
 
     @property

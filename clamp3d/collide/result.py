@@ -2,71 +2,52 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from html import escape
 from typing import Any
 
-from clamp3d.collide.bounds import Thresholds, Verdict
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.scene import Scene, unknown_part
-from clamp3d.core.pose import Array
+from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.errors import InputError
 
 BAD = (Verdict.CLASH, Verdict.CONTAINED)
+"""Verdicts that make a scene not clean."""
+_HTML_ROWS = 30
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairResult:
-    """A pair that the boxes could not part: its signed distance lies from ``low`` to ``high`` mm (positive apart).
+    """One pair of a checked scene, at rest or in a motion.
 
-    A pair that climbed no further than its verdict needed has wide bounds. ``rung`` and ``method`` gave the last word.
-    ``point_a``, ``point_b`` (3,) in the world attest ``high``; None where it is infinite. For a motion, ``motion``
-    names it, ``t`` (0 to 1) is the instant of the least distance and ``contact_at`` the first one of contact.
+    Attributes
+    ----------
+    a, b : str
+        Names of the parts.
+    verdict : Verdict
+        What the distance means under the scene's thresholds.
+    distance : Distance
+        The signed distance between its bounds, points in the world. A pair that was refined no further than its
+        verdict needed has wide bounds. In a motion: the least distance.
+    motion : str or None
+        Name of the motion; None at rest.
+    t, contact_at : float or None
+        In a motion: normalised time of the least distance, and of the first contact.
     """
 
     a: str
     b: str
     verdict: Verdict
-    low: float
-    high: float
-    rung: str
-    method: str
-    point_a: Array | None = None
-    point_b: Array | None = None
+    distance: Distance
     motion: str | None = None
     t: float | None = None
     contact_at: float | None = None
 
-    @property
-    def distance(self) -> float | None:
-        """Middle of the bounds in mm; None if only one is known."""
-        return 0.5 * (self.low + self.high) if math.isfinite(self.low) and math.isfinite(self.high) else None
-
-    @property
-    def error_bound(self) -> float:
-        """How far ``distance`` can be off, mm; infinite if only one bound is known."""
-        return 0.5 * (self.high - self.low) if self.distance is not None else math.inf
-
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: unknown bounds are None."""
-
-        def finite(x: float) -> float | None:
-            return x if math.isfinite(x) else None
-
-        row: dict[str, Any] = {
-            "a": self.a,
-            "b": self.b,
-            "verdict": self.verdict.value,
-            "distance_mm": self.distance,
-            "error_bound_mm": finite(self.error_bound),
-            "at_least_mm": finite(self.low),
-            "at_most_mm": finite(self.high),
-            "rung": self.rung,
-            "method": self.method,
-            "point_a": None if self.point_a is None else self.point_a.tolist(),
-            "point_b": None if self.point_b is None else self.point_b.tolist(),
-        }
+        row = {"a": self.a, "b": self.b, "verdict": self.verdict.value, **self.distance.to_dict()}
         if self.motion is not None:
             row |= {"motion": self.motion, "t": self.t, "contact_at": self.contact_at}
         return row
@@ -76,7 +57,7 @@ class PairResult:
 class Work:
     """What an answer took. ``fixed_...``: what one fixed fidelity (all meshes at ``fixed_error`` mm, every pair) takes.
 
-    ``queries`` by rung; ``decided`` pairs by the rung that gave the verdict. ``fixed_triangles`` is counted from the
+    ``queries`` by level; ``decided`` pairs by the level that gave the verdict. ``fixed_triangles`` is counted from the
     outlines unless the full model was built.
     """
 
@@ -123,15 +104,22 @@ class CheckResult:
 
     @property
     def clean(self) -> bool:
-        """Whether nothing clashes."""
+        """Whether nothing clashes, at rest or in motion."""
         return not any(row.verdict in BAD for row in self.rows)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of pairs at rest by verdict, the clear ones that never came near included."""
-        found = Counter(row.verdict.value for row in self.pairs)
+        """Number of rows by verdict, worst first, with the clear pairs that never came near."""
+        found = Counter(row.verdict.value for row in self.rows)
         found[Verdict.CLEAR.value] += self.work.pairs - len(self.pairs)
         return {v.value: found[v.value] for v in Verdict if found[v.value]}
+
+    @property
+    def findings(self) -> tuple[PairResult, ...]:
+        """Rows that ask for attention, at rest and in motion, worst first: all but the clear and the allowed ones."""
+        found = [row for row in self.rows if row.verdict not in (Verdict.CLEAR, Verdict.ALLOWED)]
+        order = {verdict: k for k, verdict in enumerate(Verdict)}
+        return tuple(sorted(found, key=lambda row: (order[row.verdict], row.distance.upper)))
 
     def verdict(self, a: str, b: str) -> Verdict:
         """Verdict of a pair at rest, in either order. Raises InputError for unknown names and pairs not asked for."""
@@ -146,6 +134,19 @@ class CheckResult:
                 return row.verdict
         return Verdict.CLEAR
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; lengths in mm. Pairs that are not listed are clear."""
+        return {
+            "scene": self.scene.name,
+            "thresholds": {"contact_mm": self.thresholds.contact, "clearance_mm": self.thresholds.clearance},
+            "clean": self.clean,
+            "counts": self.counts,
+            "findings": [row.to_dict() for row in self.findings],
+            "parts": {part.name: {"T_world": part.T_world.tolist()} for part in self.scene.parts},
+            "pairs": [row.to_dict() for row in self.pairs],
+            "motions": [row.to_dict() for row in self.motions],
+        }
+
     def table(self) -> list[dict[str, Any]]:
         """One dict per row: ``pandas.DataFrame(result.table())`` makes a frame of it."""
         return [row.to_dict() for row in self.rows]
@@ -159,3 +160,18 @@ class CheckResult:
 
             raise MissingLibraryError("frame() needs pandas: pip install pandas; table() does without") from None
         return pandas.DataFrame(self.table())
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{count} {name}" for name, count in self.counts.items()) or "no pairs"
+        return f"CheckResult({self.scene.name!r}: {'clean' if self.clean else 'not clean'}; {counts})"
+
+    def _repr_html_(self) -> str:
+        head = "".join(f"<th>{name}</th>" for name in ("pair", "motion", "verdict", "distance mm", "by"))
+        body = "".join(
+            f"<tr><td>{escape(row.a)} - {escape(row.b)}</td><td>{escape(row.motion or '')}</td>"
+            f"<td>{row.verdict.value}</td><td>{row.distance.value:.6g}</td><td>{escape(row.distance.method)}</td></tr>"
+            for row in self.findings[:_HTML_ROWS]
+        )
+        more = len(self.findings) - _HTML_ROWS
+        foot = f"<p>and {more} more</p>" if more > 0 else ""
+        return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>{foot}"

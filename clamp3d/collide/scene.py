@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from copy import copy
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 
@@ -10,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.checks import instance, items, number, shown, text
-from clamp3d.collide.bounds import Thresholds
-from clamp3d.collide.motion import Motion, scene_pose
+from clamp3d.collide.verdict import Thresholds
+from clamp3d.core.motion import Motion, scene_pose
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import AnyShape, Shape, as_shape
 from clamp3d.errors import InputError
@@ -19,11 +20,22 @@ from clamp3d.errors import InputError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A part and where it stands: ``T_world`` (4, 4)."""
+    """A part and where it stands: ``T_world`` (4, 4), the origin by default.
+
+    Raises InputError for an empty name or one with a space or one of ``: , * ?``, for what is no shape, and for a pose
+    that is not rigid.
+    """
 
     name: str
     shape: Shape
-    T_world: Array
+    T_world: Array = field(default_factory=lambda: np.eye(4))
+
+    def __post_init__(self) -> None:
+        text("name of a part", self.name)
+        if not self.name or any(c in self.name for c in ":,*? \t\n"):
+            raise InputError(f"part name must not be empty or hold a space or one of : , * ?, got {shown(self.name)}")
+        object.__setattr__(self, "shape", as_shape(self.shape))
+        object.__setattr__(self, "T_world", scene_pose(self.T_world, f"pose of {self.name}"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +70,7 @@ class Scene:
     >>> scene = scene.add("wire", shapes.cylinder(6.935, 80.0))
     >>> from clamp3d.collide.check import check
     >>> row = check(scene).pairs[0]
-    >>> row.verdict.value, round(row.distance, 6), row.method
+    >>> row.verdict.value, round(row.distance.value, 6), row.distance.method
     ('clearance', 0.065, 'groove kernel')
     """
 
@@ -89,6 +101,8 @@ class Scene:
                 if not any(fnmatchcase(part, name) for part in seen):
                     raise InputError(f"allowed: {unknown_part(name, seen)}")
         for motion in self.motions:
+            if not motion.parts:
+                raise InputError(f"motion {motion.name!r} must name at least one part")
             for name in motion.parts:
                 if name not in seen:
                     raise InputError(f"motion {motion.name!r}: {unknown_part(name, seen)}")
@@ -102,12 +116,24 @@ class Scene:
         for name, value in parts.items():
             if not (isinstance(value, (tuple, list)) and len(value) == 2):
                 raise InputError(f"part {shown(name)} must be a pair (shape, T_world), got {shown(value)}")
-        made = tuple(_part(name, shape, T) for name, (shape, T) in parts.items())
+        made = tuple(Part(name, as_shape(shape), T) for name, (shape, T) in parts.items())  # type: ignore[arg-type]
         return cls(made, clearance=clearance, contact=contact)
 
-    def add(self, name: str, shape: AnyShape, T_world: ArrayLike | None = None) -> Scene:
-        """The scene with one more part. Raises InputError for a bad name, shape or pose."""
-        return replace(self, parts=(*self.parts, _part(name, shape, np.eye(4) if T_world is None else T_world)))
+    def add(self, part: Part | str, shape: AnyShape | None = None, T_world: ArrayLike | None = None) -> Scene:
+        """The scene with one more part: a `Part`, or a name, a shape and a pose (4, 4; the origin by default).
+
+        Raises InputError for a bad name, shape or pose, and for a name that is taken.
+        """
+        if not isinstance(part, Part):
+            part = Part(part, as_shape(shape), np.eye(4) if T_world is None else T_world)  # type: ignore[arg-type]
+        elif shape is not None or T_world is not None:
+            raise InputError("add() takes a Part alone, or a name with a shape and a pose")
+        if part.name in {p.name for p in self.parts}:
+            raise InputError(f"part {part.name!r} is there twice; names must differ")
+        # What is in the scene was checked when it came in.
+        scene = copy(self)
+        object.__setattr__(scene, "parts", (*self.parts, part))
+        return scene
 
     def allow(self, *pairs: tuple[str, str], overlap: float = 0.0) -> Scene:
         """The scene with contact of these pairs allowed, and overlap up to ``overlap`` mm."""
@@ -118,7 +144,10 @@ class Scene:
         instance("poses", poses, Mapping)
         for name in poses:
             self.index(name)
-        parts = tuple(_part(p.name, p.shape, poses[p.name]) if p.name in poses else p for p in self.parts)
+        parts = tuple(
+            Part(p.name, p.shape, poses[p.name]) if p.name in poses else p  # type: ignore[arg-type]
+            for p in self.parts
+        )
         return replace(self, parts=parts)
 
     def index(self, name: str) -> int:
@@ -151,10 +180,3 @@ def unknown_part(name: str, names: Iterable[str]) -> str:
     known = sorted(names)
     listed = ", ".join(known[:12]) + (f", ... ({len(known)} in all)" if len(known) > 12 else "")
     return f"unknown part {shown(name)}; available: {listed or 'none'}"
-
-
-def _part(name: str, shape: AnyShape, T_world: ArrayLike) -> Part:
-    text("name of a part", name)
-    if not name or any(c in name for c in ":,*? \t\n"):
-        raise InputError(f"part name must not be empty or hold a space or one of : , * ?, got {shown(name)}")
-    return Part(name, as_shape(shape), scene_pose(T_world, f"pose of {name}"))

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from clamp3d.collide.body import Body, bore_rod
-from clamp3d.collide.convex import Convex, Rod, convex_bounds, hull
+from clamp3d.collide.body import ClosedForm, bore_rod
+from clamp3d.collide.convex import Convex, Rod, convex_distance, hull
 from clamp3d.collide.facets import axis_gap
 from clamp3d.collide.model import Model
 from clamp3d.core.pose import Array, inverse
 
 
-def swept_low(a: Model, b: Model, before: Array, middle: Array, after: Array, *, angle: float) -> float:
+def swept_lower(a: Model, b: Model, before: Array, middle: Array, after: Array, *, angle: float) -> float:
     """Distance (mm) that ``b`` certainly keeps from ``a`` while it goes from ``before`` over ``middle`` to ``after``.
 
     All three (4, 4) in a's frame, evenly spaced on one screw that turns by ``angle`` (rad) between two of them. Minus
@@ -44,26 +44,26 @@ def swept_low(a: Model, b: Model, before: Array, middle: Array, after: Array, *,
     return float(best)
 
 
-def _one_way(still: Body, moving: Body, poses: tuple[Array, ...], angle: float) -> float:
+def _one_way(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angle: float) -> float:
     best = _bores(still, moving, poses, angle)
     for piece in still.outers:
         for other in moving.outers:
             if isinstance(other, Rod):
                 swept: Convex = _swept_rod(other, poses, angle)
-                best = max(best, convex_bounds(piece, np.eye(4), swept, poses[1]).low)
+                best = max(best, convex_distance(piece, np.eye(4), swept, poses[1]).lower)
             else:
                 ways = np.array([other.vertices @ T[:3, :3].T + T[:3, 3] for T in poses])
                 around = hull((ways if angle else ways[::2]).reshape(-1, 3))
-                best = max(best, convex_bounds(piece, np.eye(4), around, np.eye(4)).low - _sagitta(ways, angle))
+                best = max(best, convex_distance(piece, np.eye(4), around, np.eye(4)).lower - _sagitta(ways, angle))
     return best
 
 
-def _bores(still: Body, moving: Body, poses: tuple[Array, ...], angle: float) -> float:
+def _bores(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angle: float) -> float:
     best = -np.inf
     for bore in still.bores:
         for piece in moving.outers:
             if isinstance(piece, Rod):
-                best = max(best, bore_rod(bore, _swept_rod(piece, poses, angle), poses[1]).low)
+                best = max(best, bore_rod(bore, _swept_rod(piece, poses, angle), poses[1]).lower)
     return best
 
 

@@ -20,9 +20,21 @@ _FRAMES = {
 
 @dataclass(frozen=True, slots=True)
 class Extrusion:
-    """An outline drawn along part axis Y or Z from ``start`` to ``end`` mm.
+    """An outline drawn along a part axis.
 
-    Along Y the outline's coordinates are (u, v), u = X and v = -Z; along Z they are (X, Y).
+    Attributes
+    ----------
+    profile : Profile
+        The outline. Its coordinates are (X, Y) along Z; along Y they are (u, v) with u = X and v = -Z.
+    axis : {"Y", "Z"}
+        Part axis that it is drawn along.
+    start, end : float
+        Coordinates of the ends on that axis in mm.
+
+    Examples
+    --------
+    >>> Extrusion(Profile.rectangle(2.0, 3.0), "Z", -5.0, 5.0).volume
+    60.0
     """
 
     profile: Profile
@@ -46,6 +58,17 @@ class Extrusion:
         return self.profile.area * self.length
 
     def support(self, direction: ArrayLike) -> float:
-        """Largest dot product of ``direction`` (3,) in part axes with a point of the body, mm; exact on arcs."""
+        """Support function of the body, exact on arcs.
+
+        Parameters
+        ----------
+        direction : array_like of shape (3,)
+            Direction in part axes, of any length.
+
+        Returns
+        -------
+        float
+            Largest dot product of ``direction`` with a point of the body, in mm.
+        """
         da, db, along = (float(d) for d in np.asarray(direction) @ _FRAMES[self.axis])
         return self.profile.support(da, db) + max(along * self.start, along * self.end)

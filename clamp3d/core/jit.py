@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import sys
-import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import event
 
 # IEEE arithmetic as written (no re-association), and division by zero gives inf instead of a Python exception.
 _OPTIONS: dict[str, Any] = {"fastmath": False, "error_model": "numpy", "nogil": True}
@@ -19,11 +20,6 @@ formula = numba.njit(**_OPTIONS)
 
 inlined = numba.njit(forceinline=True, **_OPTIONS)
 """The same for a small formula: built into each caller, which drops what it does not use."""
-
-NOTICE_AFTER = 1.0
-"""Seconds after which a build that is still running is announced on stderr."""
-
-_announced = False
 
 
 def source_stamp() -> str:
@@ -38,25 +34,39 @@ def source_stamp() -> str:
     return digest.hexdigest()
 
 
-def _announce() -> None:
-    global _announced
-    if not _announced:
-        _announced = True
-        text = "clamp3d: compiling the contact kernel, once for this machine (a few seconds) ..."
-        print(text, file=sys.stderr, flush=True)
+class _Notice(event.Listener):
+    """One line on stderr when numba begins to compile; what it reads from the cache makes no such event."""
+
+    def __init__(self) -> None:
+        self.given = False
+
+    def on_start(self, event: object) -> None:
+        if not self.given:
+            self.given = True
+            text = "clamp3d: compiling the contact kernel, once for this machine (a few seconds) ..."
+            print(text, file=sys.stderr, flush=True)
+
+    def on_end(self, event: object) -> None:
+        pass
+
+
+_notice = _Notice()
 
 
 def entry(function: Callable[..., Any], signature: str) -> Any:
     """Compile an entry point for one signature, from the disk cache if it is there.
 
-    Without a writable cache folder (read-only installation and home, full disk) it is compiled in memory.
+    Damaged cache files (cut short by a crash or a full disk) are written anew. Without a writable cache folder
+    (read-only installation and home, full disk) the function is compiled in memory.
     """
-    timer = threading.Timer(NOTICE_AFTER, _announce)
-    timer.daemon = True
-    timer.start()
-    try:
-        return numba.njit(signature, cache=True, **_OPTIONS)(function)
-    except (OSError, RuntimeError):
+    with event.install_listener("numba:compile", _notice):
+        with suppress(OSError, RuntimeError):  # no place for the cache, or none left
+            cached = numba.njit(cache=True, **_OPTIONS)(function)
+            try:
+                cached.compile(signature)
+            except Exception:  # unpickling a damaged file can raise anything
+                cached._cache.flush()
+                cached.compile(signature)
+            cached.disable_compile()
+            return cached
         return numba.njit(signature, **_OPTIONS)(function)
-    finally:
-        timer.cancel()

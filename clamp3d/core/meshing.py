@@ -109,19 +109,19 @@ def _solid(part: Drawn, mesh_error: float) -> Any:
 
 
 def _extrude(shape: Extrusion, mesh_error: float, overlap: float = 0.0) -> Any:
-    """Closed prism: two caps by constrained triangulation, quads between them."""
+    """Closed prism over the outline, caps without new vertices."""
     import manifold3d
+    import trimesh
+    from shapely import Polygon
 
     outline = shape.profile.polygon(mesh_error)
-    n = len(outline)
-    cap = np.asarray(manifold3d.triangulate([outline]), dtype=np.uint64)
-    i = np.arange(n, dtype=np.uint64)
-    j = np.roll(i, -1)
-    faces = np.concatenate([cap[:, ::-1], cap + n, np.stack([i, j, j + n], 1), np.stack([i, j + n, i + n], 1)])
-    ends = [np.full((n, 1), shape.start - overlap), np.full((n, 1), shape.end + overlap)]
-    points = np.concatenate([np.hstack([outline, end]) for end in ends]) @ shape.frame.T
+    # trimesh merges vertices within 1e-8 of any unit; a power of two changes no digit.
+    scale = 2.0 ** np.frexp(np.abs(outline).max())[1]
+    prism = trimesh.creation.extrude_polygon(Polygon(outline / scale), 1.0, engine="manifold")
+    points = prism.vertices * scale
+    # The ends as they are stated, to the bit: bodies that touch share them.
+    points[:, 2] = np.where(prism.vertices[:, 2] > 0.5, shape.end + overlap, shape.start - overlap)
+    # Not trimesh.boolean: it rounds the vertices to single precision.
     return manifold3d.Manifold(
-        manifold3d.Mesh64(
-            vert_properties=np.ascontiguousarray(points), tri_verts=np.ascontiguousarray(faces, np.uint64)
-        )
+        manifold3d.Mesh64(vert_properties=points @ shape.frame.T, tri_verts=prism.faces.astype(np.uint64))
     )

@@ -26,9 +26,82 @@ MIN_MESH_ERROR = 1e-6
 _CLOSURE = 1e-9  # mm; the ends of neighbouring edges are computed by different formulas
 
 
+def sagitta(radius: float, angle: float) -> float:
+    """Largest distance of a chord from its arc: R (1 - cos(angle / 2)), in a form that keeps the digits of small ones.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the arc in mm.
+    angle : float
+        Angle in rad that the chord spans.
+
+    Returns
+    -------
+    float
+        Sagitta in mm.
+
+    Examples
+    --------
+    >>> round(sagitta(10.0, math.pi), 12)
+    10.0
+    """
+    return 2.0 * radius * math.sin(0.25 * angle) ** 2
+
+
+def chord_angle(radius: float, error: float) -> float:
+    """Angle of the widest chord whose sagitta is at most ``error``: the inverse of `sagitta`.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the arc in mm.
+    error : float
+        Largest sagitta in mm.
+
+    Returns
+    -------
+    float
+        Angle in rad, at most 2 pi.
+
+    Examples
+    --------
+    >>> round(sagitta(10.0, chord_angle(10.0, 0.01)), 12)
+    0.01
+    """
+    return 4.0 * math.asin(min(1.0, math.sqrt(error / (2.0 * radius))))
+
+
+def chord_count(angle: float, widest: float) -> int:
+    """Least number of equal chords, none wider than ``widest``, on an arc of ``angle``.
+
+    Parameters
+    ----------
+    angle, widest : float
+        Angles in rad; the sign of ``angle`` does not matter. A quotient within 1e-9 of a whole number is that number.
+
+    Returns
+    -------
+    int
+        Number of chords, at least 1.
+
+    Examples
+    --------
+    >>> chord_count(math.radians(140.0), math.radians(20.0)), chord_count(-1.0, 0.4)
+    (7, 3)
+    """
+    return max(1, math.ceil(abs(angle) / widest - 1e-9))
+
+
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """Straight edge from ``start`` to ``end`` (a, b) in mm."""
+    """Straight edge of an outline.
+
+    Attributes
+    ----------
+    start, end : tuple of float
+        Its ends (a, b) in mm.
+    """
 
     start: Point
     end: Point
@@ -36,9 +109,17 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """Circular edge about ``centre`` (a, b) in mm from ``start_angle`` to ``end_angle`` in rad, a towards b.
+    """Circular edge of an outline.
 
-    ``end_angle > start_angle`` is convex, ``end_angle < start_angle`` concave; they differ by 2 pi at most.
+    Attributes
+    ----------
+    centre : tuple of float
+        Centre (a, b) in mm.
+    radius : float
+        Radius in mm.
+    start_angle, end_angle : float
+        Angles in rad, from a towards b. ``end_angle > start_angle`` is convex, ``end_angle < start_angle`` concave;
+        they differ by 2 pi at most.
     """
 
     centre: Point
@@ -66,19 +147,17 @@ class Arc:
         return self.centre[0] + self.radius * math.cos(angle), self.centre[1] + self.radius * math.sin(angle)
 
     def chord_count(self, mesh_error: float) -> int:
-        """Equal chords that stay within ``mesh_error`` mm of the arc.
+        """Number of equal chords that stay within ``mesh_error`` mm of the arc.
 
-        The count is even (a full circle: a multiple of four), so that the middle of a symmetric arc is a vertex and
-        the bounding box of the clamp's parts does not depend on the error. From sagitta = 2 R sin^2(angle / 4).
+        It is even (a full circle: a multiple of four), so that the middle of a symmetric arc is a vertex and the
+        bounding box of the clamp's parts does not depend on the error.
         """
-        mesh_error = check_mesh_error(mesh_error)
-        widest = 4.0 * math.asin(min(1.0, math.sqrt(mesh_error / (2.0 * self.radius))))
         multiple = 4 if abs(self.sweep) > 2.0 * math.pi - 1e-9 else 2
-        return multiple * max(1, math.ceil(abs(self.sweep) / widest / multiple - 1e-9))
+        return multiple * chord_count(self.sweep / multiple, chord_angle(self.radius, check_mesh_error(mesh_error)))
 
     def sagitta(self, chords: int) -> float:
         """Largest distance in mm of ``chords`` equal chords from the arc: their chord error."""
-        return 2.0 * self.radius * math.sin(abs(self.sweep) / chords / 4.0) ** 2
+        return sagitta(self.radius, abs(self.sweep) / chords)
 
     def chord_area(self, chords: int) -> float:
         """Area in mm^2 between the arc and ``chords`` equal chords: lost where convex, gained where concave."""
@@ -91,8 +170,20 @@ Edge: TypeAlias = Segment | Arc
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """A closed outline. Raises InputError if its edges do not join, or if it runs clockwise.
+    """A closed outline, counter-clockwise.
 
+    Parameters
+    ----------
+    edges : tuple of Segment or Arc
+        Edges in turn; each starts where the one before ends.
+
+    Raises
+    ------
+    InputError
+        If the edges do not join, or the outline runs clockwise.
+
+    Examples
+    --------
     >>> disk = Profile.circle(2.0)
     >>> math.isclose(disk.area, 4 * math.pi), disk.bounds
     (True, ((-2.0, -2.0), (2.0, 2.0)))
@@ -112,7 +203,23 @@ class Profile:
 
     @classmethod
     def of(cls, *pieces: Point | Arc) -> Profile:
-        """Outline through points and arcs in turn; straight segments join them, none of length zero."""
+        """Outline through points and arcs in turn; straight segments join them, none of length zero.
+
+        Parameters
+        ----------
+        *pieces : tuple of float or Arc
+            Corners (a, b) in mm, and arcs.
+
+        Returns
+        -------
+        Profile
+            The closed outline.
+
+        Examples
+        --------
+        >>> Profile.of((0.0, 0.0), (3.0, 0.0), (0.0, 4.0)).area
+        6.0
+        """
         edges: list[Edge] = []
         for i, piece in enumerate(pieces):
             before = pieces[i - 1]
@@ -168,7 +275,18 @@ class Profile:
         return (-self.support(-1.0, 0.0), -self.support(0.0, -1.0)), (self.support(1.0, 0.0), self.support(0.0, 1.0))
 
     def support(self, da: float, db: float) -> float:
-        """Largest value of da * a + db * b over the outline, exact on arcs: how far it reaches in that direction."""
+        """Support function: the largest ``da * a + db * b`` of the outline's points (a, b), exact on arcs.
+
+        Parameters
+        ----------
+        da, db : float
+            Direction, of any length.
+
+        Returns
+        -------
+        float
+            The reach in mm times the direction's length.
+        """
         reach, direction = -math.inf, math.atan2(db, da)
         for edge in self.edges:
             reach = max(reach, *(da * a + db * b for a, b in (edge.start, edge.end)))
@@ -180,9 +298,27 @@ class Profile:
         return reach
 
     def polygon(self, mesh_error: float) -> Array:
-        """Vertices (n, 2) in mm, counter-clockwise: arcs as equal chords within ``mesh_error`` mm, ends on the arc.
+        """The outline with its arcs as equal chords, whose ends lie on the arc.
 
-        Raises InputError if ``mesh_error`` is not a length of at least MIN_MESH_ERROR.
+        Parameters
+        ----------
+        mesh_error : float
+            Largest distance in mm between an arc and its chords.
+
+        Returns
+        -------
+        ndarray of shape (n, 2)
+            Vertices (a, b) in mm, counter-clockwise.
+
+        Raises
+        ------
+        InputError
+            If ``mesh_error`` is not a length of at least ``MIN_MESH_ERROR``.
+
+        Examples
+        --------
+        >>> len(Profile.circle(2.0).polygon(0.1))
+        12
         """
         check_mesh_error(mesh_error)
         points: list[Point] = []
@@ -206,7 +342,13 @@ class Profile:
 
 
 def check_mesh_error(mesh_error: float) -> float:
-    """Return ``mesh_error`` if it is a usable chord error in mm, else raise InputError."""
+    """Return a chord error in mm as a float.
+
+    Raises
+    ------
+    InputError
+        If it is not a finite length of at least ``MIN_MESH_ERROR``.
+    """
     rule = f"be a finite length >= {MIN_MESH_ERROR:g} mm"
     value = number("mesh_error", mesh_error, rule=rule)
     if not value >= MIN_MESH_ERROR:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -14,20 +15,31 @@ from typing import Any
 from clamp3d.checks import short
 from clamp3d.errors import InputError
 
+STDOUT = Path("-")
+"""As the path of a file to write: standard output."""
+
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """A temporary path beside ``path`` that takes its place when the block ends well, and is removed when not.
 
-    A link stays, its target is written; what is neither a file nor a folder (a device, a pipe) is written into.
-    Raises InputError if the folder does not exist or cannot be written to.
+    A link stays, its target is written; what is neither a file nor a folder (a device, a pipe) is written into, and
+    so is standard output for the path ``-``. Raises InputError if the folder does not exist or cannot be written to.
     """
+    if path == STDOUT:
+        with tempfile.TemporaryDirectory() as folder:
+            temporary = Path(folder, "stdout")
+            yield temporary
+            sys.stdout.flush()
+            sys.stdout.buffer.write(temporary.read_bytes())
+            sys.stdout.buffer.flush()
+        return
     target = _target(path)
     with ExitStack() as stack:
         try:
             aside = stack.enter_context(tempfile.TemporaryDirectory()) if _special(target) else None
-            folder = target.parent if aside is None else Path(aside)
-            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=folder)
+            beside = target.parent if aside is None else Path(aside)
+            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=beside)
         except OSError as error:
             raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
         os.close(handle)
@@ -48,6 +60,8 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 def check_writable(path: Path) -> None:
     """Raise InputError if a file ``path`` cannot be written: to ask before long work."""
+    if path == STDOUT:
+        return
     target = _target(path)
     if _special(target):
         return

@@ -6,6 +6,8 @@ none of them a verdict's; bolt and nut are greys. Each part also carries its nam
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from clamp3d.clamp.dimensions import PartName
 
 PART_COLOURS: dict[PartName, str] = {
@@ -39,3 +41,17 @@ def darker(colour: str, factor: float = 0.62) -> str:
     '#804000'
     """
     return "#" + "".join(f"{round(int(colour[i : i + 2], 16) * factor):02X}" for i in (1, 3, 5))
+
+
+_CYCLE = ("#77AADD", "#44BB99", "#EEDD88", "#BBCC33", "#AAAA00", "#99DDFF", "#FFAABB", "#EE8866", "#DDDDDD")
+"""The whole light scheme, blue first, for parts that have no colour of their own."""
+
+
+def part_colours(names: Sequence[str]) -> dict[str, str]:
+    """A colour for each part: its own where it is a clamp's, else one of the cycle.
+
+    >>> part_colours(["P1", "pin"])
+    {'P1': '#77AADD', 'pin': '#44BB99'}
+    """
+    fixed: Mapping[str, str] = dict(PART_COLOURS)
+    return {name: fixed.get(name, _CYCLE[k % len(_CYCLE)]) for k, name in enumerate(names)}

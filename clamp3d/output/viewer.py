@@ -1,73 +1,120 @@
-"""The viewer: a run streamed to meshcat while it goes on, and kept as one page.
+"""The viewer: a clamp while it is assembled, an assembly, or a scene with its motions, in a browser or as one page.
 
 >>> from clamp3d.clamp.assemble import assemble
->>> from clamp3d.clamp.loader import load_clamp
->>> from clamp3d.baselines.cas import Cas
->>> clamp, model = load_clamp(), Cas()
->>> with Viewer(clamp, model) as viewer:  # open viewer.url in a browser, if you like
-...     viewer.finish(assemble(clamp, model, on_waypoint=viewer.show))
+>>> with view(assemble("reference"), serve=False) as viewer:  # with serve=True: open viewer.url in a browser
+...     viewer.stops
+8
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from clamp3d.baselines.model import ContactModel, check_model
+from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import flag, instance, text
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly, Waypoint
-from clamp3d.clamp.verdict import CLEARANCE
-from clamp3d.output.viewer_log import Command, CommandLog
-from clamp3d.output.viewer_page import write_page
-from clamp3d.output.viewer_scene import AssemblyScene, Overlay
-from clamp3d.output.viewer_server import LocalServer, RemoteServer
+from clamp3d.collide.check import check
+from clamp3d.collide.distance import measure
+from clamp3d.collide.model import ModelCache
+from clamp3d.collide.result import CheckResult
+from clamp3d.collide.scene import Scene
+from clamp3d.core.pose import Array
+from clamp3d.errors import InputError
+from clamp3d.output.files import write_text
+from clamp3d.output.palette import VERDICT_COLOURS, part_colours
+from clamp3d.output.viewer_clamp import UNCUT, ClampStory, facts
+from clamp3d.output.viewer_page import live_page, panel, whole_page
+from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
+from clamp3d.output.viewer_server import CommandLog, LocalServer, RemoteServer
+from clamp3d.output.viewer_timeline import FIRST, Row, Stop, scene_stops
+from clamp3d.output.wording import BAD, circumstances, gap_text, headline, meaning, sentence, titles
+
+CLEARANCE = 5.0
+"""Gap in mm from which two parts of a clamp count as clear."""
+_LISTED = 500
+"""Rows of a table on the page; a result's JSON has all."""
+MEASURED = 40
+"""Scenes of up to so many parts are measured pair by pair, larger ones only as far as their verdicts need."""
+
+Shown = Clamp | Scene | Assembly | CheckResult
 
 
 class Viewer:
-    """Shows a clamp at ``url`` from the start; `show` takes each waypoint of its run, `finish` the run.
+    """Shows a clamp or a scene at ``url`` from the start; `show` adds a waypoint, `finish` the result.
 
-    By default a server is started on this machine (``host``, ``port``: the first free one from 7000); ``url`` names
-    a running meshcat server instead (its zmq_url); with ``serve=False`` nothing is served and the scene is only kept
-    for `write`. ``mesh_error`` mm is the chord error of the drawn facets, ``clearance`` mm the gap that counts as
-    clear, ``overlays`` convex pieces of parts by a name. No browser is opened and none is waited for.
-    Raises InputError for a bad mesh error, clearance, address or port.
+    Parameters
+    ----------
+    shown : Clamp, Scene, Assembly or CheckResult
+        What to draw. `view` also tells what was found.
+    model : ContactModel, optional
+        How grooves are measured; by default exactly.
+    mesh_error : float
+        Chord error of the drawn facets, mm. What is measured is not measured on them.
+    clearance : float, optional
+        Gap that counts as clear, mm; by default the scene's own, and 5 mm for a clamp.
+    overlays : dict, optional
+        Convex pieces of parts to show as well, by a name: ``{name: {part: [trimesh.Trimesh, ...]}}``.
+    notes : sequence of str
+        Lines for the end of the page.
+    serve : bool
+        Serve the page on this machine (``host``, ``port``: the first free one from 7000); else it is only kept for
+        `save_html`. No browser is opened, and none is waited for.
+    url : str, optional
+        A running meshcat server in place of our own: its zmq_url.
+
+    Raises
+    ------
+    InputError
+        For a bad mesh error, clearance, address or port.
     """
 
     def __init__(
         self,
-        clamp: Clamp,
-        model: ContactModel,
+        shown: Shown,
         *,
+        model: ContactModel | None = None,
         mesh_error: float = 0.01,
-        clearance: float = CLEARANCE,
-        overlays: Mapping[str, Overlay] | None = None,
+        clearance: float | None = None,
+        overlays: Mapping[str, Pieces] | None = None,
+        notes: Sequence[str] = (),
         serve: bool = True,
         url: str | None = None,
         host: str = "127.0.0.1",
         port: int | None = None,
     ) -> None:
-        instance("clamp", clamp, Clamp)
-        check_model(model)
+        overlays = {} if overlays is None else overlays
+        instance("overlays", overlays, Mapping)
+        for name, pieces in overlays.items():
+            instance(f"overlay {text('name of an overlay', name)}", pieces, Mapping)
         serve = flag("serve", serve)
-        if overlays is not None:
-            instance("overlays", overlays, Mapping)
-            for name, overlay in overlays.items():
-                instance(f"overlay {text('name of an overlay', name)}", overlay, Mapping)
-        if url is not None:
-            text("url", url)
-        self._log = CommandLog()
-        self._title = f"{clamp.name} clamp"
+        self._model, self._mesh_error, self._notes = model, mesh_error, list(notes)
+        clamp = shown if isinstance(shown, Clamp) else getattr(shown, "clamp", None)
+        self._clamp = None if clamp is None else ClampStory(clamp, CLEARANCE if clearance is None else clearance)
+        self._scene = self._clamp.scene() if self._clamp is not None else _scene(shown, clearance)
+        self._cache, self._log = ModelCache(), CommandLog()
+        self._waypoints: list[Waypoint] = []
         self._server: LocalServer | RemoteServer | None = None
-        if url is not None:
-            self._server = RemoteServer(url)
-        elif serve:
-            self._server = LocalServer(host=host, port=port)
+        self._story: dict[str, Any] = {}
         try:
-            self._scene = AssemblyScene(
-                clamp, model, self._send, mesh_error=mesh_error, clearance=clearance, overlays=overlays
+            if url is not None:
+                self._server = RemoteServer(text("url", url))
+            self._drawing = SceneDrawing(
+                self._scene,
+                self._send,
+                mesh_error=mesh_error,
+                cut_y=0.0 if self._clamp is not None else _cut(self._scene),
+                uncut=UNCUT if self._clamp is not None else (),
+                anchors=None if self._clamp is None else self._clamp.anchors(),
+                overlays=overlays,
             )
+            self._tell("waiting for the first state", state="waiting")
+            if url is None and serve:
+                self._server = LocalServer(lambda: live_page(self._story), self._log, host=host, port=port)
         except BaseException:
             self.close()
             raise
@@ -77,17 +124,54 @@ class Viewer:
         """Where to look with a browser; None if nothing is served."""
         return None if self._server is None else self._server.url
 
+    @property
+    def stops(self) -> int:
+        """Number of stops on the time line."""
+        return len(self._drawing.timeline.stops)
+
+    @property
+    def story(self) -> dict[str, Any]:
+        """What the page tells, as data: stops with their rows (distances in mm), findings, parts."""
+        return self._story
+
     def show(self, waypoint: Waypoint) -> None:
-        """Show a waypoint as it is reached: pass this as ``on_waypoint`` of `assemble`."""
-        self._scene.show(waypoint)
+        """Show a waypoint of the clamp as it is reached: pass this as ``on_waypoint`` of `assemble`."""
+        instance("waypoint", waypoint, Waypoint)
+        if self._clamp is None:
+            raise InputError("show() goes with the viewer of a clamp; a scene is shown by finish(check(scene))")
+        scene = self._clamp.scene(waypoint)
+        self._waypoints.append(waypoint)
+        self._drawing.show(self._clamp.stop(waypoint, scene, self._measured(scene)))
+        self._clamp.decorate(self._drawing, self.stops - 1, waypoint, self._mesh_error)
+        self._tell(f"{waypoint.step}: {waypoint.label}", state="running")
 
-    def finish(self, run: Assembly) -> None:
-        """Show the result, and play the whole run once as an animation."""
-        self._scene.finish(run)
+    def finish(self, result: Assembly | CheckResult) -> None:
+        """Tell the result, and play the whole time line once."""
+        if isinstance(result, Assembly):
+            for waypoint in result.path[len(self._waypoints) :]:
+                self.show(waypoint)
+            good = result.clamped and not result.undeclared
+            told = {"headline": result.status, "state": "clean" if good else "found", "facts": facts(result)}
+            told |= {"findings": self._assembly_findings(), "limits": [*result.limits]}
+        else:
+            instance("result", result, CheckResult)
+            for stop in scene_stops(result, self._measured):
+                self._drawing.show(stop)
+            told = {"headline": headline(result), "state": "clean" if result.clean else "found"}
+            told |= {"findings": self._scene_findings(result), "pairs": _table(result.pairs)}
+            told |= {"motions": _table(result.motions)}
+        self._drawing.play({} if self._clamp is None else self._clamp.shown(self._drawing))
+        if self._clamp is not None:
+            self._clamp.recolour(self._drawing, 0)
+        self._tell(told.pop("headline"), done=True, **told)
 
-    def write(self, path: str | Path) -> None:
-        """Write the scene with its animation as one HTML page. Raises InputError if the file cannot be written."""
-        write_page(Path(path), self._log, self._title)
+    def html(self) -> str:
+        """The scene with its animation as one HTML page that needs nothing else."""
+        return whole_page(self._story, self._log.messages())
+
+    def save_html(self, path: str | Path) -> None:
+        """Write `html` to a file. Raises InputError if it cannot be written."""
+        write_text(Path(path), self.html())
 
     def wait(self, timeout: float | None = None) -> None:
         """Keep serving for ``timeout`` s, or until interrupted."""
@@ -106,7 +190,188 @@ class Viewer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _measured(self, scene: Scene, pairs: Sequence[tuple[str, str]] | None = None) -> list[Row]:
+        """Pairs of a scene as rows, by the engine that every command asks."""
+        found = measure(scene, pairs, model=self._model, cache=self._cache)
+        verdict, contact = scene.thresholds.verdict, scene.thresholds.contact
+        return [
+            Row(a, b, verdict(d, scene.allowance(a, b)).value, d, d.upper <= contact) for (a, b), d in found.items()
+        ]
+
+    def _assembly_findings(self) -> list[dict[str, Any]]:
+        """Clashes at the waypoints: each pair once, where it is deepest; the deepest first."""
+        worst: dict[tuple[str, str], tuple[int, Row]] = {}
+        for number, stop in enumerate(self._drawing.timeline.stops):
+            for row in stop.rows:
+                known = worst.get((row.a, row.b))
+                if row.verdict in BAD and (known is None or row.distance.upper < known[1].distance.upper):
+                    worst[row.a, row.b] = number, row
+        names, stops = titles(self._scene), self._drawing.timeline.stops
+        found = sorted(worst.values(), key=lambda item: item[1].distance.upper)
+        return [
+            self._finding(
+                row, number, f"{names[row.a]} and {names[row.b]} clash: {row.gap}", stops[number].label, focus(row)
+            )
+            for number, row in found
+        ]
+
+    def _scene_findings(self, result: CheckResult) -> list[dict[str, Any]]:
+        """The findings of a check, each with the stop and the place to look at: a motion's at its first contact."""
+        names, stops = titles(result.scene), self._drawing.timeline.stops
+        meetings = {k: self._drawing.mark_meeting(k) for k, stop in enumerate(stops) if stop.halts}
+        found = []
+        for row in result.findings[:_LISTED]:
+            here = Row(row.a, row.b, row.verdict.value, row.distance, touches=True)
+            number, place = 0, focus(here)
+            for k, stop in enumerate(stops):
+                if row.motion is not None and stop.step == row.motion:
+                    number = k
+                    if any((r.a, r.b, r.what) == (row.a, row.b, FIRST) for r in stop.rows):
+                        place = meetings.get(k) or place
+                        break
+            found.append(self._finding(here, number, sentence(row, names), circumstances(row), place))
+        return found
+
+    def _finding(self, row: Row, stop: int, said: str, where: str, place: tuple[Array, Array]) -> dict[str, Any]:
+        margin = 0.1 * self._drawing.size
+        return {
+            "a": row.a,
+            "b": row.b,
+            "verdict": row.verdict,
+            "colour": row.colour,
+            "text": said,
+            "detail": where,
+            "stop": stop,
+            "low": (place[0] - margin).tolist(),
+            "high": (place[1] + margin).tolist(),
+        }
+
+    def _tell(self, said: str, *, state: str, done: bool = False, **more: Any) -> None:
+        """What the page beside the picture shows; meshcat's own page takes no notice of it."""
+        scene, drawing = self._scene, self._drawing
+        colours = part_colours([part.name for part in scene.parts])
+        head = self._clamp.told() if self._clamp is not None else _told(scene)
+        measured = "exactly" if self._model is None else f"by {self._model.name}"
+        stops = [
+            _stop_data(stop) | dict(zip(("low", "high"), (x.tolist() for x in drawing.extent([stop.poses])), strict=True))
+            for stop in drawing.timeline.stops
+        ]
+        used = {row["verdict"] for stop in stops for row in stop["rows"]} | {"contact", "clearance", "clear"}
+        if not scene.thresholds.clearance:
+            used.discard("clearance")
+        self._story = {
+            **head,
+            **{key: [] for key in ("facts", "findings", "limits", "pairs", "motions")},
+            "notes": self._notes,
+            "headline": said,
+            "state": state,
+            "done": done,
+            "accuracy": f"Drawn with facets within {self._mesh_error:g} mm; measured {measured}, not on the facets.",
+            "parts": [{"name": n, "title": t, "colour": colours[n]} for n, t in titles(scene).items()],
+            "nodes": {part.name: drawing.paths(part.name) for part in scene.parts},
+            "verdicts": [
+                {"name": name, "colour": colour, "meaning": meaning(name, scene)}
+                for name, colour in VERDICT_COLOURS.items()
+                if name in used
+            ],
+            "overlays": [{"name": name, "path": f"{ROOT}/overlay {name}"} for name in drawing.overlays],
+            "cut": drawing.cut,
+            "cut_open": self._clamp is not None,
+            "stops": stops,
+            "frame": drawing.frame() if drawing.timeline.stops else None,
+            **more,
+        }
+        drawing.property(ROOT, "story", self._story | {"panel": panel(self._story)})
+
     def _send(self, command: Command) -> None:
-        self._log.add(command)
+        message = self._log.add(command)
         if self._server is not None:
-            self._server.send(command)
+            self._server.send(command, message)
+
+
+def view(shown: Scene | Assembly | CheckResult, *, serve: bool = True, **options: Any) -> Viewer:
+    """Show a scene, checked, with its motions, or an assembly, in a browser or as a page.
+
+    Parameters
+    ----------
+    shown : Scene, Assembly or CheckResult
+        A scene is checked first; a result of `check` is shown as it is.
+    serve : bool
+        Serve the page at ``viewer.url`` until ``viewer.close()``.
+    **options
+        As for `Viewer`.
+
+    Returns
+    -------
+    Viewer
+        With the whole story in it: ``.url``, ``.save_html(path)``.
+
+    Raises
+    ------
+    InputError
+        For what is neither, and as `Viewer`.
+
+    Examples
+    --------
+    >>> from clamp3d.core import shapes
+    >>> scene = Scene(name="two balls").add("a", shapes.cylinder(5.0, 10.0)).add("b", shapes.cylinder(4.0, 10.0))
+    >>> with view(scene, serve=False) as viewer:
+    ...     viewer.story["findings"][0]["verdict"]
+    'clash'
+    """
+    if isinstance(shown, Scene):
+        scene = _scene(shown, options.pop("clearance", None))
+        shown = check(scene, distances=len(scene.parts) <= MEASURED)
+    if not isinstance(shown, (Assembly, CheckResult)):
+        raise InputError(f"view() takes a Scene, an Assembly or a CheckResult, got {type(shown).__name__}")
+    if isinstance(shown, Assembly):
+        options.setdefault("model", shown.model)
+    viewer = Viewer(shown, serve=serve, **options)
+    try:
+        viewer.finish(shown)
+    except BaseException:
+        viewer.close()
+        raise
+    return viewer
+
+
+def _scene(shown: Any, clearance: float | None) -> Scene:
+    scene: Scene = shown.scene if isinstance(shown, CheckResult) else shown
+    instance("shown", scene, Scene)
+    return scene if clearance is None else replace(scene, clearance=clearance)
+
+
+def _cut(scene: Scene) -> float | None:
+    """The height on Y of the plane that a scene is cut at: through the middle of its parts' origins."""
+    ys = [float(part.T_world[1, 3]) for part in scene.parts]
+    return 0.5 * (min(ys) + max(ys)) if ys else None
+
+
+def _told(scene: Scene) -> dict[str, Any]:
+    n = len(scene.parts)
+    moving = f", {len(scene.motions)} motions" if len(scene.motions) > 1 else ", 1 motion" if scene.motions else ""
+    return {"title": scene.name, "subtitle": f"{n} {'part' if n == 1 else 'parts'}{moving}"}
+
+
+def _stop_data(stop: Stop) -> dict[str, Any]:
+    keys = ("arrive", "leave", "step", "label", "mark", "halts")
+    return {key: getattr(stop, key) for key in keys} | {"rows": [row.data() for row in stop.rows[:_LISTED]]}
+
+
+def _table(rows: Sequence[Any]) -> list[dict[str, Any]]:
+    order = list(VERDICT_COLOURS)
+    worst = sorted(rows, key=lambda row: (order.index(row.verdict.value), row.distance.upper))
+    return [
+        {
+            "motion": row.motion,
+            "a": row.a,
+            "b": row.b,
+            "verdict": row.verdict.value,
+            "colour": VERDICT_COLOURS[row.verdict.value],
+            "gap": gap_text(row.distance.lower, row.distance.upper),
+            "t": row.t,
+            "contact_at": row.contact_at,
+            "method": row.distance.method,
+        }
+        for row in worst[:_LISTED]
+    ]

@@ -1,43 +1,36 @@
-"""Objects for the meshcat viewer as three.js JSON: shaded solids, edges, dots, arrows, lines and labels.
-
-The viewer takes three.js' own object format, packed as msgpack with typed arrays; each function here returns one such
-object. Everything is given as vertices, so no shape depends on three.js' habit of laying cylinders along y.
-"""
+"""Objects of the viewer, made with meshcat's own classes: shaded solids, edges, dots, arrows, lines and labels."""
 
 from __future__ import annotations
 
-import base64
 import io
 import math
-import uuid
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from clamp3d.core.pose import Array
 from clamp3d.output.palette import INK
 
 if TYPE_CHECKING:
     import trimesh
-
-Object = dict[str, Any]
+    from meshcat.geometry import Material, Object
 
 _CREASE = math.radians(25.0)
 """Faces that meet at less are shaded as one round surface; sharper edges are drawn as lines."""
-_FLOAT32, _UINT32 = 0x17, 0x16  # msgpack extension types of the viewer's typed arrays
-_FRONT = 10  # render order of lines that are drawn over the solids; labels come after them
+_FRONT = 10
+"""Render order of what is drawn over the solids; labels come after it."""
 
 
-def solid(mesh: trimesh.Trimesh, colour: str, *, opacity: float = 1.0) -> Object:
+def solid(mesh: trimesh.Trimesh, colour: str) -> Object:
     """A mesh with smooth round faces and sharp edges, in mm of its part's frame."""
     import trimesh
+    from meshcat.geometry import Mesh, TriangularMeshGeometry
 
     smooth = trimesh.graph.smooth_shade(mesh, angle=_CREASE)
-    geometry = _geometry(position=smooth.vertices, normal=smooth.vertex_normals, index=smooth.faces)
-    return _object("Mesh", geometry, _phong(colour, opacity))
+    return Mesh(TriangularMeshGeometry(smooth.vertices, smooth.faces), _phong(colour))
 
 
 def edges(mesh: trimesh.Trimesh, colour: str) -> Object:
@@ -46,32 +39,42 @@ def edges(mesh: trimesh.Trimesh, colour: str) -> Object:
     return segments(mesh.vertices[mesh.face_adjacency_edges[sharp]].reshape(-1, 3), colour)
 
 
-def facets(vertices: ArrayLike, faces: ArrayLike, colour: str, *, opacity: float = 1.0, lit: bool = True) -> Object:
-    """Flat facets seen from both sides; ``vertices`` (n, 3) mm, ``faces`` (m, 3). Without light the colour is as is."""
-    corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces, dtype=np.int64)].reshape(-1, 3)
-    triangles = corners.reshape(-1, 3, 3)
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal = np.repeat(normal / np.where(length > 0.0, length, 1.0), 3, axis=0)
-    material = _phong(colour, opacity) if lit else {"type": "MeshBasicMaterial", "color": _number(colour), "side": 2}
-    return _object("Mesh", _geometry(position=corners, normal=normal), material)
+def facets(
+    mesh: trimesh.Trimesh, colour: str, *, opacity: float = 1.0, lit: bool = True, on_top: bool = False
+) -> Object:
+    """Flat facets seen from both sides. Without light the colour is as is."""
+    from meshcat.geometry import Mesh, MeshBasicMaterial, TriangularMeshGeometry
+
+    geometry = TriangularMeshGeometry(mesh.vertices, mesh.faces)
+    if not lit:
+        return Mesh(geometry, MeshBasicMaterial(color=_number(colour)))
+    seen = {"depthTest": False, "transparent": True} if on_top else {}
+    return _ordered(
+        Mesh(geometry, _phong(colour, flatShading=True, opacity=opacity, depthWrite=opacity == 1.0, **seen)), on_top
+    )
 
 
 def segments(points: ArrayLike, colour: str, *, on_top: bool = False) -> Object:
     """Straight lines between the points (2 n, 3) two by two."""
-    material: Object = {"type": "LineBasicMaterial", "color": _number(colour), "depthTest": not on_top}
-    if on_top:
-        material["transparent"] = True  # three.js draws what is transparent after the solids
-    return _object("LineSegments", _geometry(position=points), material, order=_FRONT if on_top else 0)
+    from meshcat.geometry import LineBasicMaterial, LineSegments, PointsGeometry
+
+    # three.js draws what is transparent after the solids
+    material = LineBasicMaterial(color=_number(colour), depthTest=not on_top, transparent=on_top)
+    return _ordered(LineSegments(PointsGeometry(np.asarray(points, dtype=np.float32).T), material), on_top)
+
+
+def box(low: Array, high: Array, colour: str) -> Object:
+    """The twelve edges of a box from corner to corner, drawn over the solids."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    pairs = [(i, j) for i in range(8) for j in range(i) if np.abs(corners[i] - corners[j]).sum() == 1]
+    return segments(low + corners[np.array(pairs).ravel()] * (high - low), colour, on_top=True)
 
 
 def dot(radius: float, colour: str) -> Object:
-    """A ball of ``radius`` mm about the origin."""
-    import trimesh
+    """A ball of ``radius`` mm about the origin, drawn over the solids."""
+    from meshcat.geometry import Mesh, Sphere
 
-    ball = trimesh.creation.icosphere(subdivisions=2, radius=radius)
-    geometry = _geometry(position=ball.vertices, normal=ball.vertices / radius, index=ball.faces)
-    return _object("Mesh", geometry, _phong(colour, 1.0))
+    return _ordered(Mesh(Sphere(radius), _phong(colour, depthTest=False, transparent=True)), True)
 
 
 def arrow(start: Array, direction: Array, length: float, colour: str) -> Object:
@@ -83,47 +86,45 @@ def arrow(start: Array, direction: Array, length: float, colour: str) -> Object:
     tip = trimesh.creation.cone(3.0 * radius, head, sections=24)
     tip.apply_translation([0.0, 0.0, length - head])
     both = joined([shaft, tip])
-    return facets(both.vertices @ _upright(direction).T + start, both.faces, colour)
+    both.apply_transform(trimesh.geometry.align_vectors([0.0, 0.0, 1.0], direction))
+    both.apply_translation(start)
+    return facets(both, colour)
 
 
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
-    """Several meshes as one, their vertices apart."""
+    """Several meshes as one."""
     import trimesh
 
-    first = np.cumsum([0, *(len(m.vertices) for m in meshes)])
-    faces = np.vstack([m.faces + k for m, k in zip(meshes, first[:-1], strict=True)])
-    return trimesh.Trimesh(np.vstack([m.vertices for m in meshes]), faces, process=False)
+    return trimesh.util.concatenate(list(meshes))
 
 
 def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str = INK) -> Object:
     """A text on a rounded ground that always faces the viewer and keeps its size on the screen; ``at`` (3,) mm."""
+    from meshcat.geometry import GenericMaterial, ImageTexture, Object, PngImage, Sphere
+
+    class Sprite(Object):  # type: ignore[misc]
+        _type = "Sprite"
+
+        def lower(self) -> dict[str, Any]:
+            data: dict[str, Any] = super().lower()
+            data["geometries"].clear()
+            del data["object"]["geometry"]
+            data["object"] |= {"matrix": matrix.T.ravel().tolist(), "renderOrder": _FRONT + 1}
+            return data
+
+    class SpriteMaterial(GenericMaterial):  # type: ignore[misc]
+        _type = "SpriteMaterial"
+
     png, aspect = _text_image(text, colour, ink)
-    image, texture = _name(), _name()
-    material: Object = {
-        "type": "SpriteMaterial",
-        "map": texture,
-        "transparent": True,
-        "depthTest": False,
-        "depthWrite": False,
-        "sizeAttenuation": False,
-    }
     # Without size attenuation a sprite of scale 1 is as high as the camera is far; 100 undoes the scene's mm.
     height = 100.0 * 0.014 * size
     matrix = np.diag([height * aspect, height, 1.0, 1.0])
     matrix[:3, 3] = at
-    out = _object("Sprite", None, material, order=_FRONT + 1)
-    out["object"]["matrix"] = matrix.T.ravel().tolist()
-    out["images"] = [{"uuid": image, "url": "data:image/png;base64," + base64.b64encode(png).decode("ascii")}]
-    out["textures"] = [{"uuid": texture, "image": image, "wrap": [1001, 1001], "repeat": [1, 1]}]
-    return out
-
-
-def _upright(direction: Array) -> Array:
-    """A rotation (3, 3) that takes Z to the unit ``direction``."""
-    side = np.eye(3)[int(np.argmin(np.abs(direction)))]
-    x = np.cross(side, direction)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(direction, x), direction])
+    picture = ImageTexture(PngImage(png))
+    return Sprite(
+        Sphere(1.0),  # not sent
+        SpriteMaterial(map=picture, transparent=True, depthTest=False, depthWrite=False, sizeAttenuation=False),
+    )
 
 
 @lru_cache(maxsize=256)
@@ -144,55 +145,26 @@ def _text_image(text: str, colour: str, ink: str) -> tuple[bytes, float]:
     return out.getvalue(), width / height
 
 
-def _geometry(**arrays: ArrayLike) -> Object:
-    data: dict[str, Any] = {"attributes": {}}
-    for name, values in arrays.items():
-        if name == "index":
-            data["index"] = _typed(np.asarray(values, dtype=np.uint32), "Uint32Array", _UINT32)
-        else:
-            data["attributes"][name] = _typed(np.asarray(values, dtype=np.float32), "Float32Array", _FLOAT32)
-    return {"uuid": _name(), "type": "BufferGeometry", "data": data}
+def _phong(colour: str, **properties: Any) -> Material:
+    from meshcat.geometry import MeshPhongMaterial
+
+    # Seen from both sides (meshcat's default): the inside of cut tubes and of overlays.
+    return MeshPhongMaterial(color=_number(colour), specular=0x222222, shininess=25, **properties)
 
 
-def _typed(values: NDArray[Any], kind: str, code: int) -> dict[str, Any]:
-    """Rows (n, 3) as a typed array of the viewer."""
-    import umsgpack
+def _ordered(made: Object, on_top: bool) -> Object:
+    """The same, drawn after the solids if it is to be seen through them."""
+    if on_top:
+        plain = made.lower
 
-    flat = np.ascontiguousarray(values).tobytes()
-    return {"itemSize": values.shape[1], "type": kind, "array": umsgpack.Ext(code, flat), "normalized": False}
+        def lower() -> dict[str, Any]:
+            data: dict[str, Any] = plain()
+            data["object"]["renderOrder"] = _FRONT
+            return data
 
-
-def _phong(colour: str, opacity: float) -> Object:
-    return {
-        "type": "MeshPhongMaterial",
-        "color": _number(colour),
-        "specular": 0x222222,
-        "shininess": 25,
-        "side": 2,  # both sides: inside of cut wires and overlays
-        "transparent": opacity < 1.0,
-        "opacity": opacity,
-        "depthWrite": opacity == 1.0,
-    }
-
-
-def _object(kind: str, geometry: Object | None, material: Object, *, order: int = 0) -> Object:
-    material["uuid"] = _name()
-    body: Object = {"uuid": _name(), "type": kind, "material": material["uuid"]}
-    if geometry is not None:
-        body["geometry"] = geometry["uuid"]
-    if order:
-        body["renderOrder"] = order
-    return {
-        "metadata": {"version": 4.5, "type": "Object"},
-        "geometries": [] if geometry is None else [geometry],
-        "materials": [material],
-        "object": body,
-    }
+        made.lower = lower
+    return made
 
 
 def _number(colour: str) -> int:
     return int(colour.lstrip("#"), 16)
-
-
-def _name() -> str:
-    return str(uuid.uuid4())

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import base64
 import importlib.util
+from collections.abc import Sequence
+from functools import cache
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
+from clamp3d import __version__
 from clamp3d.errors import MissingLibraryError
-from clamp3d.output.files import write_text
-from clamp3d.output.viewer_log import CommandLog
 
 
 def viewer_files() -> Path:
@@ -20,34 +22,50 @@ def viewer_files() -> Path:
     return Path(spec.submodule_search_locations[0]) / "viewer" / "dist"
 
 
-def live_page() -> str:
+def panel(story: dict[str, Any]) -> str:
+    """What the page says beside the picture, as HTML that can be read without any script."""
+    return _templates().get_template("viewer.panel.html").render(story, version=__version__)
+
+
+def live_page(story: dict[str, Any]) -> str:
     """The page that our own server serves: it connects back and shows what comes."""
-    return _page(title="clamp3d", meshcat='<script src="main.min.js"></script>', messages=[])
+    return _page(story, meshcat='<script src="main.min.js"></script>', messages=())
 
 
-def write_page(path: Path, log: CommandLog, title: str) -> None:
-    """Write the scene as one page that needs nothing else, not even a network. Raises InputError if it cannot."""
+def whole_page(story: dict[str, Any], messages: Sequence[bytes]) -> str:
+    """The scene as one page that needs nothing else, not even a network."""
     folder = viewer_files()
     script = (folder / "main.min.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
     notices = folder / "main.min.js.LICENSE.txt"
     licence = notices.read_text(encoding="utf-8").replace("--", "- -") if notices.exists() else ""
     meshcat = f"<!-- MeshCat viewer and three.js (MIT licence)\n{licence}-->\n<script>{script}</script>"
-    messages = [base64.b64encode(message).decode("ascii") for message in log.messages()]
-    write_text(path, _page(title=title, meshcat=meshcat, messages=messages))
+    return _page(story, meshcat=meshcat, messages=[base64.b64encode(m).decode("ascii") for m in messages])
 
 
-def _page(*, title: str, meshcat: str, messages: list[str]) -> str:
+def _page(story: dict[str, Any], *, meshcat: str, messages: Sequence[str]) -> str:
+    folder = resources.files("clamp3d.output").joinpath("templates")
+    return (
+        _templates()
+        .get_template("viewer.html")
+        .render(
+            title=story["title"],
+            panel=panel(story),
+            style=folder.joinpath("viewer.css").read_text(encoding="utf-8"),
+            script=folder.joinpath("viewer.js").read_text(encoding="utf-8"),
+            meshcat=meshcat,
+            messages=list(messages),
+        )
+    )
+
+
+@cache
+def _templates() -> Any:
     import jinja2
 
-    folder = resources.files("clamp3d.output").joinpath("templates")
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    template = environment.from_string(folder.joinpath("viewer.html").read_text(encoding="utf-8"))
-    return template.render(
-        title=title,
-        style=folder.joinpath("viewer.css").read_text(encoding="utf-8"),
-        script=folder.joinpath("viewer.js").read_text(encoding="utf-8"),
-        meshcat=meshcat,
-        messages=messages,
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("clamp3d.output", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
     )

@@ -1,325 +1,291 @@
-"""A clamp and its run as a meshcat scene: parts, grooves by verdict, contacts, gaps, labels, and the animation.
+"""A scene and its stops as meshcat commands: parts, marks where they touch or clash, gaps, labels, animation.
 
 The tree, all of it in mm under ``/clamp3d``: ``whole`` and ``cutaway`` hold the parts (one of the two is seen),
-``contacts`` and ``gaps`` a group for each waypoint, ``labels`` the names, ``overlay ...`` convex pieces of a baseline.
+``contacts`` and ``gaps`` a group for each stop, ``labels`` the names, ``overlay ...`` convex pieces of a baseline.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from clamp3d.baselines.model import ContactModel
-from clamp3d.checks import number
-from clamp3d.clamp.contacts import CONTACT, measure_pairs
-from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
-from clamp3d.clamp.parts import parts
-from clamp3d.clamp.result import Assembly, Contact, Waypoint
-from clamp3d.clamp.section import Section
-from clamp3d.clamp.verdict import CLEARANCE, verdict
+from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.meshing import mesh
-from clamp3d.core.pose import Array, SectionPose
+from clamp3d.core.pose import Array
+from clamp3d.core.shapes import MeshShape
 from clamp3d.output import viewer_objects as draw
-from clamp3d.output.pair_rows import beside_part
-from clamp3d.output.palette import INK, PART_COLOURS, VERDICT_COLOURS, darker
-from clamp3d.output.section import edge_openings, part_anchor, section_extent
-from clamp3d.output.viewer_cut import cut_open, groove_surface
-from clamp3d.output.viewer_log import Command, Send
-from clamp3d.output.viewer_motion import Timeline
+from clamp3d.output.palette import INK, VERDICT_COLOURS, darker, part_colours
+from clamp3d.output.viewer_cut import cut_open, overlap
+from clamp3d.output.viewer_timeline import FIRST, Row, Stop, Timeline
+from clamp3d.output.wording import BAD, part_title
+
+if TYPE_CHECKING:
+    import trimesh
+    from meshcat.geometry import Object
 
 ROOT = "/clamp3d"
-_UNIT = 0.01
-"""Viewer units a mm: meshcat's camera and lights are made for scenes of a few units."""
+Command = dict[str, Any]
+Send = Callable[[Command], None]
+Pieces = Mapping[str, Sequence["trimesh.Trimesh"]]
+"""Convex pieces of a baseline by part, each in its part's frame."""
+
+_SIZE = 2.5
+"""The scene's extent in the viewer's units: meshcat's camera and lights are made for scenes of a few units."""
 _FIELD_OF_VIEW = 25.0  # deg
-_TREES = ("whole", "cutaway")
+_FRONT, _CORNER = (0.2, 0.24, 1.0), (0.55, 0.5, 1.0)
+"""Where the camera stands: to the right, up, and towards the viewer."""
+_CUTTABLE, _MARKED = 60, 200
+"""So many parts are also drawn cut open, and so many pairs marked at a stop; a scene of more is slow to look at."""
 _OVERLAY_COLOURS = ("#4477AA", "#EE6677", "#228833", "#CCBB44", "#66CCEE", "#AA3377")  # Tol's bright scheme
 
 
-class ConvexPiece(Protocol):
-    """A convex piece of a baseline: ``vertices`` (n, 3) mm in its part's frame, ``faces`` (m, 3) triangles."""
+def part_mesh(part: Part, mesh_error: float) -> trimesh.Trimesh:
+    """A part's mesh in its own frame: its own facets, or facets within ``mesh_error`` mm of what is drawn."""
+    import trimesh
 
-    @property
-    def vertices(self) -> Array: ...  # noqa: D102
-
-    @property
-    def faces(self) -> NDArray[Any]: ...  # noqa: D102
-
-
-Overlay = Mapping[PartName, Sequence[ConvexPiece]]
+    if isinstance(part.shape, MeshShape):
+        return trimesh.Trimesh(part.shape.mesh.vertices, part.shape.mesh.faces, process=False)
+    return mesh(part.shape, mesh_error)
 
 
-class AssemblyScene:
-    """Sends a clamp to ``send`` at once, each waypoint of its run when told, and the animation at the end.
+class SceneDrawing:
+    """Sends a scene's parts to ``send`` at once, each stop of its time line when told, and the animation at the end.
 
-    ``mesh_error`` mm is the chord error of what is drawn; what is measured is measured by ``model``. ``clearance``
-    mm parts clear from clearance.
+    ``cut_y`` is the world's plane Y that parts are cut at where they stand (None: not), but not those of ``uncut``;
+    ``anchors`` (3,) are where labels stand in the frames of their parts.
     """
 
     def __init__(
         self,
-        clamp: Clamp,
-        model: ContactModel,
+        scene: Scene,
         send: Send,
         *,
         mesh_error: float = 0.01,
-        clearance: float = CLEARANCE,
-        overlays: Mapping[str, Overlay] | None = None,
+        cut_y: float | None = None,
+        uncut: Sequence[str] = (),
+        anchors: Mapping[str, ArrayLike] | None = None,
+        overlays: Mapping[str, Pieces] | None = None,
     ) -> None:
-        clearance = number("clearance", clearance)
-        verdict(0.0, contact=CONTACT, clearance=clearance)  # a bad one is told now, not during the run
-        self.clamp = clamp
-        self.mesh_error = mesh_error
-        self.clearance = clearance
-        self._bodies = parts(clamp)
-        self._section = Section(clamp, model)
         self._send = send
-        self._overlays = dict(overlays or {})
-        self._timeline = Timeline(clamp, {name: self._followers(name) for name in PARTS})
-        self._shown: dict[str, str] = {}  # groove's path -> verdict that is seen
-        self._made: set[str] = set()
+        self._meshes = {part.name: part_mesh(part, mesh_error) for part in scene.parts}
+        self._colours = part_colours(list(self._meshes))
+        self.cut = cut_y is not None and len(scene.parts) <= _CUTTABLE
+        self._trees = ("whole", "cutaway") if self.cut else ("whole",)
+        self.overlays = dict(overlays or {})
+        self._keys = {part.name: part_title(part).replace("/", " ") for part in scene.parts}
+        low, high = self.extent([{part.name: part.T_world for part in scene.parts}])
+        self.size = float((high - low).max())
+        self._unit = _SIZE / self.size
+        self.timeline = Timeline(self.size)
         self._stage()
-        self._send_parts()
-        for name, pieces in self._overlays.items():
-            self._send_overlay(name, pieces)
-        self._tell("waiting for the run")
+        for part in scene.parts:
+            self._draw_part(part, cut_y, part.name in uncut)
+            middle = self._meshes[part.name].bounds.mean(axis=0)
+            anchor = middle if anchors is None else anchors[part.name]
+            self._label(f"{ROOT}/labels/{part.name}", part.name, anchor, self._colours[part.name], 0.85)
+        for name, pieces in self.overlays.items():
+            self._draw_overlay(f"{ROOT}/overlay {name}", pieces)
 
-    def show(self, waypoint: Waypoint) -> None:
-        """Move the parts to ``waypoint`` and show what touches there and how far the rest is apart."""
-        pairs = measure_pairs(self._section, waypoint.poses, CONTACT)
-        contacts = [c for c in pairs if self.clamp.connection(c.a, c.b) or c.distance <= CONTACT]
-        verdicts = {f"{c.a}-{c.b}": self._verdict(c) for c in contacts}
-        if not self._timeline.stops:
-            self._frame([waypoint.poses])
-        number = self._timeline.add(waypoint, self._rows(contacts, waypoint), verdicts)
-        for path, T in self._timeline.poses(number).items():
-            self._transform(path, T)
-        for group in ("contacts", "gaps"):
-            if number > 0:
-                self._visible(f"{ROOT}/{group}/{self._timeline.name(number - 1)}", False)
-        self._send_contacts(f"{ROOT}/contacts/{self._timeline.name(number)}", contacts)
-        self._send_gaps(f"{ROOT}/gaps/{self._timeline.name(number)}", contacts, waypoint)
-        self._colour_grooves(verdicts)
-        self._tell(f"{waypoint.step}: {waypoint.label}")
+    def paths(self, part: str) -> list[str]:
+        """The nodes of the scene that move with a part."""
+        trees = [f"{ROOT}/{tree}/{self._keys[part]}" for tree in self._trees]
+        over = [f"{ROOT}/overlay {name}/{part}" for name, pieces in self.overlays.items() if part in pieces]
+        return [*trees, f"{ROOT}/labels/{part}", *over]
 
-    def finish(self, run: Assembly) -> None:
-        """Rewind to the first waypoint and play the whole run once."""
-        if not self._timeline.stops:
-            return
-        self._frame([stop.waypoint.poses for stop in self._timeline.stops])
-        # The state at rest is the animation's first, so that it does not matter which of the two a page reads first.
-        for path, T in self._timeline.poses(0).items():
-            self._transform(path, T)
-        for index in range(len(self._timeline.stops)):
+    def extent(self, states: Sequence[Mapping[str, Array]]) -> tuple[Array, Array]:
+        """Lower and upper corner (3,) of a box around the parts at some states, in the world."""
+        corners = []
+        for poses in states:
+            for name, T in poses.items():
+                ends = np.array(list(itertools.product(*self._meshes[name].bounds.T)))
+                corners.append(ends @ T[:3, :3].T + T[:3, 3])
+        points = np.vstack(corners or [np.zeros((1, 3)), np.ones((1, 3))])
+        return points.min(axis=0), points.max(axis=0)
+
+    def show(self, stop: Stop) -> None:
+        """Add a stop to the time line and go there."""
+        number = self.timeline.add(stop)
+        if number == 0:
+            self.frame()
+        self._draw_marks(number)
+        self.go(number)
+
+    def go(self, number: int) -> None:
+        """Parts and marks as they are at a stop."""
+        for name, T in self.timeline.stops[number].poses.items():
+            for path in self.paths(name):
+                self.transform(path, T)
+        for k in range(len(self.timeline.stops)):
             for group in ("contacts", "gaps"):
-                self._visible(f"{ROOT}/{group}/{self._timeline.name(index)}", index == 0)
-        self._colour_grooves(self._timeline.stops[0].verdicts)
-        self._tell(run.status, run)
-        self._send(self._timeline.animation(ROOT, self._made))
+                self.visible(f"{ROOT}/{group}/{self.timeline.group(k)}", k == number)
+
+    def play(self, shown: Mapping[str, list[bool]]) -> None:
+        """Rewind and play all stops once; ``shown`` has paths that are seen at some stops only."""
+        from meshcat.commands import SetAnimation
+
+        self.frame()
+        self.go(0)  # so that it does not matter whether a page reads this or the animation first
+        followers = {name: self.paths(name) for name in self._meshes}
+        groups = [f"{ROOT}/contacts", f"{ROOT}/gaps"]
+        moving = len(self.timeline.stops) > 1
+        if moving:
+            self._send(SetAnimation(self.timeline.animation(followers, groups, shown)).lower())
+
+    def frame(self) -> dict[str, Any]:
+        """Put the camera in front of all stops; what it is aimed at."""
+        low, high = self.extent([stop.poses for stop in self.timeline.stops])
+        eye = np.array(_FRONT if self.cut else _CORNER)
+        reach = 0.5 * max(high[2] - low[2], (high[0] - low[0]) / 1.6, (high[1] - low[1]) / 1.6) * self._unit
+        far = 1.2 * reach / math.tan(math.radians(_FIELD_OF_VIEW / 2)) + 0.5 * (high[1] - low[1]) * self._unit
+        camera = "/Cameras/default/rotated/<object>"  # its axes: right, up, towards the viewer
+        self.property(camera, "fov", _FIELD_OF_VIEW)
+        self.property(camera, "zoom", 1.0)
+        self.property(camera, "position", (far * eye / np.linalg.norm(eye)).tolist())
+        T = np.diag([self._unit] * 3 + [1.0])
+        T[:3, 3] = -0.5 * self._unit * (low + high)
+        self.transform(ROOT, T)
+        return {"low": low.tolist(), "high": high.tolist(), "eye": eye.tolist(), "unit": self._unit}
+
+    def groove(self, part: str, name: str, whole: trimesh.Trimesh, half: trimesh.Trimesh, colour: str) -> None:
+        """A coloured surface of a part, below ``name``; ``half`` is what the cutaway shows."""
+        for tree in self._trees:
+            shape = half if tree == "cutaway" else whole
+            self.put(f"{ROOT}/{tree}/{self._keys[part]}/{name}", draw.facets(shape, colour))
+
+    def groove_paths(self, part: str, name: str) -> list[str]:
+        """The nodes of such a surface."""
+        return [f"{ROOT}/{tree}/{self._keys[part]}/{name}" for tree in self._trees]
 
     def _stage(self) -> None:
         """Light background, softer light, no grid."""
-        self._send({"type": "delete", "path": ROOT})
+        from meshcat.commands import Delete
+        from meshcat.path import Path
+
+        self._send(Delete(Path().append(ROOT.lstrip("/"))).lower())
         for key, colour in (("top_color", [0.93, 0.95, 0.97]), ("bottom_color", [1.0, 1.0, 1.0])):
-            self._property("/Background", key, colour)
-        self._visible("/Grid", False)
-        self._visible("/Axes", False)
+            self.property("/Background", key, colour)
+        self.visible("/Grid", False)
+        self.visible("/Axes", False)
         for light, intensity in (("AmbientLight", 0.5), ("FillLight", 0.25)):
-            self._property(f"/Lights/{light}/<object>", "intensity", intensity)
+            self.property(f"/Lights/{light}/<object>", "intensity", intensity)
 
-    def _frame(self, states: Sequence[Mapping[PartName, SectionPose]]) -> None:
-        """The camera in front of all ``states``, a little from above and from the right."""
-        boxes = [section_extent(self.clamp, poses) for poses in states]
-        (left, right), (top, bottom) = ((min(b[i][0] for b in boxes), max(b[i][1] for b in boxes)) for i in (0, 1))
-        # The height counts: a window is wide, and what waits beside the clamp may stand at its edge.
-        reach = 0.5 * max(bottom - top, (right - left) / 1.6) * _UNIT
-        distance = 1.18 * reach / math.tan(math.radians(_FIELD_OF_VIEW / 2)) + 0.5 * self.clamp.up_splint.length * _UNIT
-        eye = distance * np.array([0.2, 0.24, 1.0]) / np.linalg.norm([0.2, 0.24, 1.0])
-        camera = "/Cameras/default/rotated/<object>"  # its axes: right, up, towards the viewer
-        self._property(camera, "fov", _FIELD_OF_VIEW)
-        self._property(camera, "zoom", 1.0)
-        self._property(camera, "position", eye.tolist())
-        middle = np.array([0.5 * (left + right), 0.0, -0.5 * (top + bottom) - 0.05 * (bottom - top)])
-        T = np.diag([_UNIT, _UNIT, _UNIT, 1.0])
-        T[:3, 3] = -_UNIT * middle
-        self._transform(ROOT, T)
-        below = np.array([middle[0], 0.0, -bottom - 0.04 * (bottom - top)])
-        self._object(f"{ROOT}/caption", draw.label(self._accuracy(), "#FFFFFF", below, size=0.8))
+    def _draw_part(self, part: Part, cut_y: float | None, uncut: bool) -> None:
+        whole, colour, key = self._meshes[part.name], self._colours[part.name], self._keys[part.name]
+        edge = darker(colour, 0.4)
+        halves = cut_open(whole, part.T_world, cut_y) if self.cut and not uncut and cut_y is not None else (whole, None)
+        for tree, (body, cap) in zip(self._trees, ((whole, None), halves), strict=False):
+            if body is not None:
+                self.put(f"{ROOT}/{tree}/{key}/solid", draw.solid(body, colour))
+                self.put(f"{ROOT}/{tree}/{key}/edges", draw.edges(body, edge))
+            if cap is not None:
+                self.put(f"{ROOT}/{tree}/{key}/cut", draw.facets(cap, colour, lit=False))
+        if self.cut:
+            self.visible(f"{ROOT}/whole", False)
 
-    def _accuracy(self) -> str:
-        model = self._section.model
-        return f"drawn with facets within {self.mesh_error:g} mm; measured by {model.name}, not on the facets"
-
-    def _followers(self, part: PartName) -> list[str]:
-        """The nodes of the scene that move with a part."""
-        trees = [f"{ROOT}/{tree}/{part} {TITLES[part]}" for tree in _TREES]
-        return [
-            *trees,
-            f"{ROOT}/labels/{part}",
-            *(f"{ROOT}/overlay {o}/{part}" for o, p in self._overlays.items() if part in p),
-        ]
-
-    def _send_parts(self) -> None:
-        clamp, error = self.clamp, self.mesh_error
-        self._visible(f"{ROOT}/whole", False)
-        for name, part in self._bodies.items():
-            colour, edge = PART_COLOURS[name], darker(PART_COLOURS[name], 0.4)
-            whole = mesh(part, error)
-            path = f"{ROOT}/whole/{name} {TITLES[name]}"
-            self._object(f"{path}/solid", draw.solid(whole, colour))
-            self._object(f"{path}/edges", draw.edges(whole, edge))
-            path = f"{ROOT}/cutaway/{name} {TITLES[name]}"
-            if name in ("P4", "P5"):  # bolts and nuts are not cut lengthwise in drawings (ISO 128)
-                self._object(f"{path}/solid", draw.solid(whole, colour))
-                self._object(f"{path}/edges", draw.edges(whole, edge))
-            else:
-                half, cap = cut_open(whole)
-                self._object(f"{path}/solid", draw.solid(half, colour))
-                self._object(f"{path}/cut", draw.facets(cap.vertices, cap.faces, colour, lit=False))
-                self._object(f"{path}/edges", draw.edges(half, edge))
-            u, v = part_anchor(clamp, name)
-            self._object(f"{ROOT}/labels/{name}", draw.label(name, colour, (u, 0.0, -v), size=0.85))
-
-    def _send_overlay(self, name: str, overlay: Overlay) -> None:
-        import trimesh
-
-        path = f"{ROOT}/overlay {name}"
-        self._visible(path, False)
-        for part, pieces in overlay.items():
-            meshes = [trimesh.Trimesh(piece.vertices, piece.faces) for piece in pieces]
+    def _draw_overlay(self, path: str, pieces: Pieces) -> None:
+        self.visible(path, False)
+        for part, meshes in pieces.items():
             for i, colour in enumerate(_OVERLAY_COLOURS):  # neighbours differ; a part may have hundreds of pieces
                 some = meshes[i :: len(_OVERLAY_COLOURS)]
                 if some:
                     joined = draw.joined(some)
-                    solid = draw.facets(joined.vertices, joined.faces, colour, opacity=0.35)
-                    self._object(f"{path}/{part}/pieces {i + 1}", solid)
-                    self._object(f"{path}/{part}/edges {i + 1}", draw.edges(joined, darker(colour, 0.6)))
+                    self.put(f"{path}/{part}/pieces {i + 1}", draw.facets(joined, colour, opacity=0.35))
+                    self.put(f"{path}/{part}/edges {i + 1}", draw.edges(joined, darker(colour, 0.6)))
 
-    def _send_contacts(self, path: str, contacts: Sequence[Contact]) -> None:
-        self._visible(path, True)
-        for c in contacts:
-            if c.distance > CONTACT:
+    def _draw_marks(self, number: int) -> None:
+        """Dots and arrows where parts touch, red volumes where they clash, lines with their length across gaps."""
+        stop, group = self.timeline.stops[number], self.timeline.group(number)
+        for row in [row for row in stop.rows if row.drawn and row.near][:_MARKED]:
+            d, where = row.distance, f"{ROOT}/{'contacts' if row.touches else 'gaps'}/{group}/{row.a}-{row.b}"
+            if row.verdict in BAD:
+                self._clash(where, row, stop.poses)
+            elif d.point_a is None or d.point_b is None:
                 continue
-            colour = VERDICT_COLOURS[self._verdict(c)]
-            T = np.eye(4)
-            T[:3, 3] = c.point
-            where = f"{path}/{c.a}-{c.b}"
-            self._object(f"{where}/point", draw.dot(0.011 * self.clamp.up_splint.width, colour))
-            self._transform(f"{where}/point", T)
-            if c.type != 1:
-                length = 0.11 * self.clamp.up_splint.width
-                self._object(f"{where}/normal", draw.arrow(c.point, c.normal, length, darker(colour, 0.55)))
+            elif not row.touches:
+                self._gap(where, d.point_a, d.point_b, row.gap, row.colour)
+            elif d.upper <= d.lower + 0.01 * self.size:  # else it is only known that they touch, not where
+                self._dot(f"{where}/point", 0.5 * (d.point_a + d.point_b), row.colour)
+                if d.normal is not None and not row.what.startswith("screw"):
+                    arrow = draw.arrow(d.point_a, d.normal, 0.06 * self.size, darker(row.colour, 0.55))
+                    self.put(f"{where}/normal", arrow)
 
-    def _send_gaps(self, path: str, contacts: Sequence[Contact], waypoint: Waypoint) -> None:
-        self._visible(path, True)
-        for c in contacts:
-            if c.relation == "none" and c.feature == "box":  # its normal is not that of the nearest points
-                continue
-            if abs(c.distance) <= CONTACT or beside_part(c, self._bodies[c.a], waypoint.poses[c.a]):
-                continue
-            self._gap(f"{path}/{c.a}-{c.b}", c.point, c.point + c.distance * c.normal, c.distance, self._verdict(c))
-        opening = edge_openings(self.clamp, waypoint.poses)[0]
-        corner = waypoint.poses["P1"].point(0.0, self.clamp.up_splint.thickness)
-        top = np.array([corner[0], 0.0, -corner[1]])
-        self._gap(f"{path}/splints", top, top - [0.0, 0.0, opening], opening, None)
+    def mark_meeting(self, number: int) -> tuple[Array, Array] | None:
+        """Box in red where parts meet that first touch at a stop: where their facets overlap soon after it."""
+        stops, row = self.timeline.stops, self.timeline.stops[number].rows[0]
+        for _, moved in stops[number + 1].via:
+            poses = {**stops[number].poses, **moved}
+            common = overlap(self._meshes[row.a], poses[row.a], self._meshes[row.b], poses[row.b])
+            if common is not None:
+                common.apply_transform(poses[row.a])
+                low, high = common.bounds
+                path = f"{ROOT}/contacts/{self.timeline.group(number)}/{row.a}-{row.b}"
+                self._box(path, low, high, FIRST)
+                return low, high
+        return None
 
-    def _gap(self, path: str, a: Array, b: Array, value: float, found: str | None) -> None:
-        """A line from ``a`` to ``b`` and its value beside it, so that the value does not hide a small gap."""
-        colour = INK if found is None else darker(VERDICT_COLOURS[found], 0.7)
-        width, middle = self.clamp.up_splint.width, 0.5 * (a + b)
+    def _clash(self, path: str, row: Row, poses: Mapping[str, Array]) -> None:
+        red, (a, b) = VERDICT_COLOURS["clash"], (row.a, row.b)
+        for name, point in (("point a", row.distance.point_a), ("point b", row.distance.point_b)):
+            if point is not None:
+                self._dot(f"{path}/{name}", point, red)
+        common = overlap(self._meshes[a], poses[a], self._meshes[b], poses[b])
+        low, high = focus(row)
+        if common is not None:
+            common.apply_transform(poses[a])
+            self.put(f"{path}/overlap", draw.facets(common, red, opacity=0.6, on_top=True))
+            low, high = common.bounds
+        if common is not None or row.distance.point_a is not None:
+            self._box(path, low, high, row.gap)
+
+    def _box(self, path: str, low: Array, high: Array, text: str) -> None:
+        margin = 0.01 * self.size
+        self.put(f"{path}/box", draw.box(low - margin, high + margin, VERDICT_COLOURS["clash"]))
+        self._label(f"{path}/value", text, high + margin, "#FFFFFF", 0.7)
+
+    def _dot(self, path: str, point: Array, colour: str) -> None:
+        T = np.eye(4)
+        T[:3, 3] = point
+        self.put(path, draw.dot(0.006 * self.size, colour))
+        self.transform(path, T)
+
+    def _gap(self, path: str, a: Array, b: Array, text: str, colour: str = INK) -> None:
+        """A line from ``a`` to ``b`` and its length beside it, so that the text does not hide a small gap."""
+        middle = 0.5 * (a + b)
         upright = abs(b[2] - a[2]) >= abs(b[0] - a[0])
-        beside = middle + ([-0.15 * width, 0.0, 0.0] if upright else [-0.15 * width, 0.0, 0.1 * width])
-        self._object(f"{path}/line", draw.segments(np.array([a, b, middle, beside]), colour, on_top=True))
-        text = f"{'splints ' if found is None else ''}{value:.3f} mm"
-        self._object(f"{path}/value", draw.label(text, "#FFFFFF", beside, size=0.7))
+        beside = middle + 0.08 * self.size * np.array([-1.0, 0.0, 0.0] if upright else [-1.0, 0.0, 0.7])
+        self.put(f"{path}/line", draw.segments([a, b, middle, beside], darker(colour, 0.7), on_top=True))
+        self._label(f"{path}/value", text.removeprefix("gap "), beside, "#FFFFFF", 0.7)
 
-    def _colour_grooves(self, verdicts: Mapping[str, str]) -> None:
-        for (a, b), pair in self._section.pairs.items():
-            found = verdicts.get(f"{a}-{b}") or verdicts.get(f"{b}-{a}") or "clear"
-            for tree in _TREES:
-                path = f"{ROOT}/{tree}/{a} {TITLES[a]}/groove {b}"
-                if self._shown.get(path) == found:
-                    continue
-                if path in self._shown:
-                    self._visible(f"{path}/{self._shown[path]}", False)
-                self._shown[path] = found
-                if f"{path}/{found}" not in self._made:
-                    self._made.add(f"{path}/{found}")
-                    strip = groove_surface(pair.groove, pair.T_a_groove, self.mesh_error, half=tree == "cutaway")
-                    self._object(f"{path}/{found}", draw.facets(*strip, VERDICT_COLOURS[found]))
-                self._visible(f"{path}/{found}", True)
+    def _label(self, path: str, text: str, at: ArrayLike, colour: str, size: float) -> None:
+        self.put(path, draw.label(text, colour, at, size=0.01 * size / self._unit))
 
-    def _verdict(self, c: Contact) -> str:
-        return verdict(c.distance, contact=CONTACT, clearance=self.clearance)
+    def dimension(self, number: int, name: str, a: Array, b: Array, text: str) -> None:
+        """One more length at a stop, from ``a`` to ``b``."""
+        self._gap(f"{ROOT}/gaps/{self.timeline.group(number)}/{name}", a, b, text)
 
-    def _rows(self, contacts: Sequence[Contact], waypoint: Waypoint) -> list[dict[str, str]]:
-        """The contacts of a waypoint for the page's list, the arc contacts first."""
-        rows = []
-        for c in sorted(contacts, key=lambda c: (c.type != 3, c.a, c.b)):
-            gap = 0.0 if abs(c.distance) <= CONTACT else c.distance
-            beside = beside_part(c, self._bodies[c.a], waypoint.poses[c.a])
-            rows.append(
-                {
-                    "pair": f"{c.a}\N{EN DASH}{c.b}",
-                    "what": "beside the groove" if beside else c.relation if c.relation != "none" else c.feature,
-                    "gap": "" if c.type == 1 else f"{'over ' if beside else ''}{gap:.3f} mm",
-                    "verdict": self._verdict(c),
-                }
-            )
-        return rows
+    def put(self, path: str, what: Object) -> None:
+        """Set the object at a path."""
+        self._send({"type": "set_object", "path": path, "object": what.lower()})
 
-    def _tell(self, status: str, run: Assembly | None = None) -> None:
-        """What the page beside the picture shows; meshcat's own page takes no notice of it."""
-        clamp = self.clamp
-        facts = [] if run is None else run_facts(run)
-        self._property(
-            ROOT,
-            "userData",
-            {
-                "title": f"{clamp.name} clamp",
-                "wires": f"line {clamp.line.label}, jumper {clamp.jumper.label}",
-                "status": status,
-                "facts": facts,
-                "accuracy": self._accuracy(),
-                "limits": list(self._section.model.limits),
-                "parts": [{"name": n, "title": TITLES[n], "colour": PART_COLOURS[n]} for n in PARTS],
-                "verdicts": [
-                    {"name": name, "colour": VERDICT_COLOURS[name], "meaning": meaning}
-                    for name, meaning in (
-                        ("clash", "parts overlap"),
-                        ("contact", "parts touch"),
-                        ("clearance", f"gap up to {self.clearance:g} mm"),
-                        ("clear", f"gap over {self.clearance:g} mm"),
-                    )
-                ],
-                "overlays": [{"name": name, "path": f"{ROOT}/overlay {name}"} for name in self._overlays],
-                "sequence": clamp.sequence,
-                "stops": self._timeline.data(),
-                "done": run is not None,
-            },
-        )
-
-    def _object(self, path: str, what: Command) -> None:
-        self._send({"type": "set_object", "path": path, "object": what})
-
-    def _transform(self, path: str, T: Array) -> None:
+    def transform(self, path: str, T: Array) -> None:
+        """Set the pose (4, 4) of a path."""
         self._send({"type": "set_transform", "path": path, "matrix": T.T.ravel().tolist()})
 
-    def _property(self, path: str, key: str, value: object) -> None:
+    def property(self, path: str, key: str, value: object) -> None:
+        """Set a property of a path."""
         self._send({"type": "set_property", "path": path, "property": key, "value": value})
 
-    def _visible(self, path: str, on: bool) -> None:
-        self._property(path, "visible", on)
+    def visible(self, path: str, on: bool) -> None:
+        """Show or hide a path."""
+        self.property(path, "visible", on)
 
 
-def run_facts(run: Assembly) -> list[str]:
-    """The run in a few short lines."""
-    return [
-        f"method {run.method}, {run.solver}",
-        f"distance between splints {run.distance:.3f} mm",
-        f"tilt of the down splint {abs(math.degrees(run.tilt)):.2f}\N{DEGREE SIGN}",
-        f"nut turned {run.turns:.2f} times from open",
-    ]
+def focus(row: Row) -> tuple[Array, Array]:
+    """Corners of a box around the witness points of a row; empty where it has none."""
+    points = [p for p in (row.distance.point_a, row.distance.point_b) if p is not None] or [np.zeros(3)]
+    return np.min(points, axis=0), np.max(points, axis=0)

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import ipaddress
 import socket
 import threading
 import weakref
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from clamp3d.checks import shown, text, whole
 from clamp3d.errors import Clamp3dError, InputError
-from clamp3d.output.viewer_log import Command, CommandLog
-from clamp3d.output.viewer_page import live_page, viewer_files
+from clamp3d.output.viewer_page import viewer_files
 
 if TYPE_CHECKING:
     import tornado.web
@@ -29,14 +30,53 @@ _PATIENCE = 10.0  # s for a server that is said to be running
 _FAREWELL = 0.5  # s for the pages when we close
 
 
-class LocalServer:
-    """A page with the scene at ``url``, for any number of browsers, now or later. Use as a context, or `close`.
+Command = dict[str, Any]
 
+
+class CommandLog:
+    """The commands that still matter, in order: a later one replaces an earlier one of the same kind at its place.
+
+    >>> log = CommandLog()
+    >>> for x in (1.0, 2.0):
+    ...     _ = log.add({"type": "set_property", "path": "/a", "property": "scale", "value": [x, x, x]})
+    >>> len(log.messages())
+    1
+    """
+
+    def __init__(self) -> None:
+        self._messages: dict[tuple[str, str, str], bytes] = {}
+
+    def add(self, command: Command) -> bytes:
+        """Keep ``command`` and return it as the message (msgpack) that the viewer reads."""
+        import umsgpack
+
+        message: bytes = umsgpack.packb(command)
+        kind, path = command["type"], command.get("path", "")
+        if kind == "delete":
+            below = path.rstrip("/") + "/"
+            self._messages = {k: m for k, m in self._messages.items() if k[1] != path and not k[1].startswith(below)}
+            return message
+        key = (kind, path, command.get("property", ""))
+        self._messages.pop(key, None)
+        self._messages[key] = message
+        return message
+
+    def messages(self) -> list[bytes]:
+        """All messages that build the scene, oldest first."""
+        return list(self._messages.values())
+
+
+class LocalServer:
+    """What ``page()`` returns at ``url``, and the scene, for any number of browsers. Use as a context, or `close`.
+
+    A request under a foreign name is refused: a page elsewhere whose name is made to point here may not read along.
     Raises InputError if a ``port`` that was asked for, or every port from 7000 on, is taken, or ``host`` is not ours.
     """
 
-    def __init__(self, *, host: str = "127.0.0.1", port: int | None = None) -> None:
-        self._log = CommandLog()
+    def __init__(
+        self, page: Callable[[], str], log: CommandLog, *, host: str = "127.0.0.1", port: int | None = None
+    ) -> None:
+        self._page, self._log = page, log
         self._clients: set[Any] = set()
         self._streams: weakref.WeakSet[Any] = weakref.WeakSet()
         self._loop = asyncio.new_event_loop()
@@ -54,9 +94,9 @@ class LocalServer:
         """Address of the page."""
         return f"http://{self.host}:{self.port}/"
 
-    def send(self, command: Command) -> None:
-        """Pass a command to every page that is open and keep it for those to come; never waits for a browser."""
-        self._loop.call_soon_threadsafe(self._publish, command)
+    def send(self, command: Command, message: bytes) -> None:
+        """Pass a command to every page that is open; never waits for a browser."""
+        self._loop.call_soon_threadsafe(self._publish, message)
 
     def close(self) -> None:
         """Stop listening, drop the pages, end the thread. A second call does nothing."""
@@ -70,8 +110,7 @@ class LocalServer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _publish(self, command: Command) -> None:
-        message = self._log.add(command)
+    def _publish(self, message: bytes) -> None:
         for client in list(self._clients):
             client.push(message)
 
@@ -123,9 +162,14 @@ class LocalServer:
         import tornado.web
         import tornado.websocket
 
-        owner, page = self, live_page()
+        owner = self
 
-        class Scene(tornado.websocket.WebSocketHandler):
+        class Own(tornado.web.RequestHandler):
+            def prepare(self) -> None:
+                if not owner._ours(self.request.host_name):
+                    raise tornado.web.HTTPError(403)
+
+        class Scene(Own, tornado.websocket.WebSocketHandler):
             def open(self, *_: str) -> None:
                 owner._clients.add(self)
                 for message in owner._log.messages():
@@ -141,19 +185,28 @@ class LocalServer:
             def on_close(self) -> None:
                 owner._clients.discard(self)
 
-        class Page(tornado.web.RequestHandler):
+        class File(Own, tornado.web.StaticFileHandler):
+            pass
+
+        class Page(Own):
             def get(self) -> None:
                 self.set_header("Cache-Control", "no-store")
-                self.finish(page)
+                self.finish(owner._page())
 
         return tornado.web.Application(
             [
                 ("/scene", Scene),
-                ("/(main.min.js)", tornado.web.StaticFileHandler, {"path": str(viewer_files())}),
+                ("/(main.min.js)", File, {"path": str(viewer_files())}),
                 ("/(?:index.html)?", Page),
             ],
             log_function=lambda _: None,
         )
+
+    def _ours(self, name: str) -> bool:
+        """Whether a request's Host is an address or a name of this machine."""
+        with contextlib.suppress(ValueError):
+            return bool(ipaddress.ip_address(name.strip("[]")))
+        return name.lower() in {"localhost", self.host.lower(), socket.gethostname().lower(), socket.getfqdn().lower()}
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
@@ -203,11 +256,9 @@ class RemoteServer:
             self.close()
             raise
 
-    def send(self, command: Command) -> None:
+    def send(self, command: Command, message: bytes) -> None:
         """Pass a command on. Raises Clamp3dError if the server has gone."""
-        import umsgpack
-
-        self._ask(command["type"].encode(), command["path"].encode(), umsgpack.packb(command))
+        self._ask(command["type"].encode(), command["path"].encode(), message)
 
     def close(self) -> None:
         """Leave the server to itself. A second call does nothing."""

@@ -12,8 +12,8 @@ from pydantic.dataclasses import dataclass
 from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import ClampPart, Length, Offset
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.collide.motion import Motion
 from clamp3d.core import shapes
+from clamp3d.core.motion import Motion
 from clamp3d.core.primitives import SweptArc
 from clamp3d.errors import InputError
 from clamp3d.scenefile.pose_table import FROZEN, Angle, Number, Pose, Vector
@@ -233,14 +233,14 @@ class MotionTable:
         name = self.name or f"motion {number}"
         parts = tuple(self.parts)
         if self.translate is not None:
-            return Motion.translate(parts, self.translate, name=name)
+            return Motion.translate(self.translate, parts=parts, name=name)
         if self.to is not None:
-            return Motion.to_pose(parts, self.to.T(), name=name)
+            return Motion.to_pose(self.to.T(), parts=parts, name=name)
         turn = self.rotate or self.screw
         assert turn is not None
         angle = math.radians(turn.angle_deg)
         travel = turn.travel if turn.travel is not None else (turn.pitch or 0.0) * turn.angle_deg / 360.0
-        return Motion.screw(parts, turn.axis, angle, point=turn.point, travel=travel, name=name)
+        return Motion.screw(turn.axis, angle, point=turn.point, travel=travel, parts=parts, name=name)
 
 
 @dataclass(frozen=True, config=FROZEN, kw_only=True)

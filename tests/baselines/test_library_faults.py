@@ -29,9 +29,9 @@ from clamp3d.baselines.decomposition import decompose
 from clamp3d.baselines.fcl_shapes import Wire, bvh, check_poses, convex, distance
 from clamp3d.baselines.wedges import prism
 from clamp3d.clamp.block import grooved_block
-from clamp3d.collide.motion import Motion
 from clamp3d.core import shapes
 from clamp3d.core.meshing import mesh
+from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
@@ -85,7 +85,7 @@ def test_depth_of_two_bare_meshes() -> None:
 
 
 def test_depth_of_two_meshes_in_a_scene_is_the_depth() -> None:
-    cube = clamp3d.MeshShape(clamp3d.make_mesh(*_cube(100.0)), "off")
+    cube = clamp3d.shapes.MeshShape(clamp3d.shapes.make_mesh(*_cube(100.0)), "off")
     scene = clamp3d.Scene.of({"a": (cube, np.eye(4)), "b": (cube, translation(99.5, 0.0, 0.0))})
     (row,) = clamp3d.check(scene).pairs
     assert row.verdict is clamp3d.Verdict.CLASH
@@ -215,12 +215,12 @@ def test_bare_motion_that_turns() -> None:
 def test_motion_through_a_thin_plate_and_a_turn_are_seen() -> None:
     plate, ball = shapes.box([100.0, 1.0, 100.0]), shapes.cylinder(0.1, 0.2)
     scene = clamp3d.Scene.of({"plate": (plate, np.eye(4)), "ball": (ball, translation(0.0, -50.0, 0.0))})
-    fly = Motion.translate("ball", (0.0, 103.7, 0.0))
+    fly = Motion.translate((0.0, 103.7, 0.0), parts="ball")
     (row,) = clamp3d.check(clamp3d.Scene(scene.parts, motions=(fly,))).motions
     assert row.verdict is clamp3d.Verdict.CLASH
     bar, still = shapes.box([20.0, 0.2, 0.2]), shapes.cylinder(0.5, 0.2)
     scene = clamp3d.Scene.of({"bar": (bar, np.eye(4)), "still": (still, translation(0.0, 9.0, 0.0))})
-    turn = Motion.screw("bar", (0.0, 0.0, 1.0), 0.9 * math.pi)
+    turn = Motion.screw((0.0, 0.0, 1.0), parts="bar", angle=0.9 * math.pi)
     (row,) = clamp3d.check(clamp3d.Scene(scene.parts, motions=(turn,))).motions
     assert row.verdict is clamp3d.Verdict.CLASH
 
@@ -241,7 +241,7 @@ def test_bodies_of_a_scene_far_from_the_origin() -> None:
     places = translation(1e5, 0.0, 0.0), translation(1e5 + 3.004, 0.0, 0.0)
     scene = clamp3d.Scene.of(dict(zip("ab", ((box, T) for T in places), strict=True)), clearance=10.0)
     (row,) = clamp3d.check(scene).pairs
-    assert row.distance == pytest.approx(2.004, abs=row.error_bound + 1e-9)
+    assert row.distance.value == pytest.approx(2.004, abs=row.distance.uncertainty + 1e-9)
 
 
 @mended("trimesh", "the volume of a flat mesh divides by zero with a warning", "contact.shells.volume in make_mesh")
@@ -254,7 +254,7 @@ def test_volume_of_a_flat_mesh_by_trimesh() -> None:
 
 def test_flat_mesh_is_refused() -> None:
     with pytest.raises(InputError, match="encloses no volume"):
-        clamp3d.make_mesh(BOX[0] * [1.0, 0.0, 1.0], BOX[1])
+        clamp3d.shapes.make_mesh(BOX[0] * [1.0, 0.0, 1.0], BOX[1])
 
 
 # --- what ends or hangs the interpreter: each in a child --------------------------------------------------------------

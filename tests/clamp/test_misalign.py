@@ -94,7 +94,7 @@ def test_touch_as_the_scene_check_sees_it(closing):
             scene = Scene(contact=1e-3).add(name, shapes[name], T).add("P6", shapes["P6"], pose)
             row = check(scene).pairs[0]
             assert row.verdict.value == "contact"
-            assert abs(row.high) < 1e-5
+            assert abs(row.distance.upper) < 1e-5
 
 
 def test_outcomes_by_mouth(closing):

@@ -21,9 +21,9 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 def _expect(row, expected):
     assert row.verdict.value == expected["verdict"]
     if "distance" in expected:
-        assert row.low - 1e-6 <= expected["distance"] <= row.high + 1e-6
+        assert row.distance.lower - 1e-6 <= expected["distance"] <= row.distance.upper + 1e-6
         # No bound so wide that anything fits: the meshes' chord errors are 0.05 mm together, doubled on a way.
-        assert row.high - row.low <= 0.21
+        assert row.distance.upper - row.distance.lower <= 0.21
 
 
 @pytest.mark.parametrize("name", ["pipe-clip", "v-block", "hinge"])

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clamp3d.collide.bounds import Verdict
 from clamp3d.collide.check import check
+from clamp3d.collide.verdict import Verdict
 from clamp3d.errors import InputError
 from clamp3d.scenefile.file import load_scene, parse_scene
 
@@ -104,7 +104,7 @@ parts = ["cube", "pla*"]
     assert result.verdict("cube", "plate") is Verdict.ALLOWED
     assert result.counts == {"clearance": 2, "allowed": 1, "clear": 18}
     row = next(r for r in result.pairs if r.a == "line")
-    assert row.distance == pytest.approx(32.9 / 2 - 32.67 / 2, abs=1e-6)
+    assert row.distance.value == pytest.approx(32.9 / 2 - 32.67 / 2, abs=1e-6)
 
 
 def test_whole_clamp_with_its_own_connections():

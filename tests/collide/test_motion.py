@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from clamp3d.collide.check import check
-from clamp3d.collide.motion import Motion
 from clamp3d.collide.scene import Scene
 from clamp3d.core import shapes
 from clamp3d.core.distance import signed_distances
+from clamp3d.core.motion import Motion
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 
@@ -27,12 +27,12 @@ def move(standing, moving, start, motion, **settings):
 
 
 def test_wire_into_the_groove_and_too_far():
-    row = move(BLOCK, WIRE, translation(0, 30, 0), Motion.translate("moving", (0, -30, 0)))[0]
+    row = move(BLOCK, WIRE, translation(0, 30, 0), Motion.translate((0, -30, 0), parts="moving"))[0]
     assert row.verdict.value == "clear"
     assert row.t == pytest.approx(1.0)
-    assert row.low <= 0.065 <= row.high + 1e-9
-    assert row.high - row.low < 0.003
-    row = move(BLOCK, WIRE, translation(0, 30, 0), Motion.translate("moving", (0, -31, 0)))[0]
+    assert row.distance.lower <= 0.065 <= row.distance.upper + 1e-9
+    assert row.distance.upper - row.distance.lower < 0.003
+    row = move(BLOCK, WIRE, translation(0, 30, 0), Motion.translate((0, -31, 0), parts="moving"))[0]
     assert row.verdict.value == "clash"
     # Contact begins where the gap is down to the threshold of 0.01 mm.
     assert row.contact_at == pytest.approx((30.0 + 0.055) / 31.0, abs=1e-5)
@@ -41,29 +41,29 @@ def test_wire_into_the_groove_and_too_far():
 @pytest.mark.parametrize(("aside", "verdict"), [(0.0, "clash"), (53.0, "clear"), (52.005, "contact")])
 def test_a_thin_plate_is_not_stepped_over(aside, verdict):
     plate, pin = shapes.box((100, 100, 1)), shapes.cylinder(2, 5)
-    row = move(plate, pin, translation(aside, 0, 500), Motion.translate("moving", (0, 0, -1000)))[0]
+    row = move(plate, pin, translation(aside, 0, 500), Motion.translate((0, 0, -1000), parts="moving"))[0]
     assert row.verdict.value == verdict
     if verdict != "clash":
-        assert row.low - 1e-6 <= aside - 52.0 <= row.high + 1e-6
+        assert row.distance.lower - 1e-6 <= aside - 52.0 <= row.distance.upper + 1e-6
 
 
 def test_pin_sliding_in_its_bore_keeps_its_clearance():
     tube, pin = shapes.cylinder(9, 40, bore=5.1), shapes.cylinder(5, 60)
-    row = move(tube, pin, translation(0, 0, 120), Motion.translate("moving", (0, 0, -240)), clearance=0.05)[0]
+    row = move(tube, pin, translation(0, 0, 120), Motion.translate((0, 0, -240), parts="moving"), clearance=0.05)[0]
     assert row.verdict.value == "clear"
-    assert row.low <= 0.1 <= row.high + 1e-9
-    assert row.high - row.low < 0.005
+    assert row.distance.lower <= 0.1 <= row.distance.upper + 1e-9
+    assert row.distance.upper - row.distance.lower < 0.005
 
 
 def test_turning_wire_against_dense_sampling():
     start = translation(0, 1.5, 0)
-    motion = Motion.screw("moving", (1, 0, 0), math.radians(12.0), travel=2.0)
+    motion = Motion.screw((1, 0, 0), parts="moving", angle=math.radians(12.0), travel=2.0)
     wire = shapes.cylinder(5.0, 80.0)
     row = move(BLOCK, wire, start, motion)[0]
     instants = np.linspace(0, 1, 20001)
     poses = np.array([motion.at(t) @ start for t in instants])
     gaps = signed_distances(GROOVE, Cylinder(5.0, 80.0), poses)
-    assert row.high <= gaps.min() + 1e-3 or row.verdict.value == "clash"
+    assert row.distance.upper <= gaps.min() + 1e-3 or row.verdict.value == "clash"
     if row.contact_at is not None:
         first = instants[np.argmax(gaps <= 0.01)]
         assert row.contact_at == pytest.approx(first, abs=1e-3)
@@ -74,7 +74,7 @@ def test_screw_to_a_pose_arrives_there():
     for _ in range(20):
         start, goal = (rotation(rng.normal(size=3), rng.uniform(0, 3)) for _ in range(2))
         start[:3, 3], goal[:3, 3] = rng.normal(size=3) * 50, rng.normal(size=3) * 50
-        motion = Motion.to_pose("a", goal).from_pose(start)
+        motion = Motion.to_pose(goal, parts="a").resolved(start)
         np.testing.assert_allclose(motion.at(1.0) @ start, goal, atol=1e-9)
         half = motion.at(0.5)
         np.testing.assert_allclose(half @ half, motion.at(1.0), atol=1e-9)  # one and the same screw
@@ -88,11 +88,11 @@ def test_motions_follow_one_another():
         .add("rod", rod, translation(30, 0, 0))
         .add("tip", rod, translation(40, 0, 0))
     )
-    up = Motion.translate(("rod", "tip"), (0, 20, 0), name="up")
-    over = Motion.translate(("rod", "tip"), (-60, 0, 0), name="over")
+    up = Motion.translate((0, 20, 0), parts=("rod", "tip"), name="up")
+    over = Motion.translate((-60, 0, 0), parts=("rod", "tip"), name="over")
     result = check(replace(scene, motions=(up, over)))
     assert result.motions == ()  # passes 14 mm above the box
-    down = Motion.translate("rod", (0, -14.5, 0), name="down")
+    down = Motion.translate((0, -14.5, 0), parts="rod", name="down")
     short = replace(over, travel=np.array([-30.0, 0, 0]))
     result = check(replace(scene, motions=(up, short, down)))
     assert [(r.motion, r.a, r.b, r.verdict.value) for r in result.motions] == [("down", "rod", "box", "clash")]
@@ -104,10 +104,10 @@ def test_distance_along_a_way_is_bounded_for_polyhedra():
     still, turning = shapes.box((10, 10, 10)), shapes.box((10, 10, 30))
     gap = 0.3
     start = translation(5 + 5 * math.sqrt(2) + gap, 0, 0)
-    motion = Motion.screw("moving", (0, 0, 1), math.pi / 2, point=start[:3, 3])
+    motion = Motion.screw((0, 0, 1), parts="moving", angle=math.pi / 2, point=start[:3, 3])
     row = move(still, turning, start, motion, clearance=0.25)[0]
     assert row.verdict.value == "clear"
-    assert row.low <= gap <= row.high + 1e-9
+    assert row.distance.lower <= gap <= row.distance.upper + 1e-9
     assert row.t == pytest.approx(0.5, abs=0.02)
     assert inverse(motion.at(0.5)).shape == (4, 4)
 
@@ -127,9 +127,9 @@ def test_no_instant_is_below_the_least_distance():
         start = rotation(rng.normal(size=3), rng.uniform(0, 6))
         start[:3, 3] = rng.normal(size=3) * 18
         motion = Motion.screw(
-            "moving",
             rng.normal(size=3),
             rng.choice([0.0, 0.3, 2.0]),
+            parts="moving",
             point=rng.normal(size=3) * 10,
             travel=rng.normal() * 20,
         )
@@ -146,11 +146,11 @@ def test_no_instant_is_below_the_least_distance():
         row = rows[0]
         seen.add(row.verdict.value)
         for one in found:
-            assert row.low <= one.high + 1e-6
+            assert row.distance.lower <= one.distance.upper + 1e-6
         if verdicts & {"clash", "contained"}:
             assert row.verdict.value == "clash"
             first = next(t for t in instants if check(scene.moved({"moving": motion.at(t) @ start})).pairs
-                         and check(scene.moved({"moving": motion.at(t) @ start})).pairs[0].high < -0.01)  # fmt: skip
+                         and check(scene.moved({"moving": motion.at(t) @ start})).pairs[0].distance.upper < -0.01)  # fmt: skip
             assert row.contact_at <= first + 1e-9
         elif "clearance" in verdicts:
             assert row.verdict.value != "clear"

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from clamp3d.collide.bounds import Bounds, Thresholds, Verdict
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.check import check, check_full
 from clamp3d.collide.scene import Scene
+from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core import shapes
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import SweptArc
@@ -47,14 +48,14 @@ def test_wire_at_block_is_exact_all_around(T, distance):
     measured, common, bound = gap(BLOCK, WIRE, T)
     if distance is None:
         distance = measured
-        assert row.low - bound <= distance <= row.high + bound
+        assert row.distance.lower - bound <= distance <= row.distance.upper + bound
     elif distance > 0.0:
         assert abs(measured - distance) <= bound  # the oracle agrees with the closed form of the test
-        assert row.low - 1e-6 <= distance <= row.high + 1e-6
+        assert row.distance.lower - 1e-6 <= distance <= row.distance.upper + 1e-6
     if distance < -1e-9:
         assert common > 0.0
-        assert row.low - 1e-6 <= distance <= row.high + 1e-6
-    assert row.verdict is scene.thresholds.verdict(Bounds(distance, distance))
+        assert row.distance.lower - 1e-6 <= distance <= row.distance.upper + 1e-6
+    assert row.verdict is scene.thresholds.verdict(Distance(distance, distance))
 
 
 @pytest.mark.parametrize(
@@ -80,11 +81,13 @@ def test_verdicts(b, T, verdict):
 def test_bolt_in_hole_and_tube_on_pin_are_measured_across_the_gap():
     plate = shapes.box((40, 30, 8), holes=[shapes.Hole(5.5, (4.0, 3.0))])
     _, result = pair(plate, shapes.cylinder(5.0, 35.0), translation(4.2, 3.0, 6.0), clearance=1.0)
-    assert result.pairs[0].distance == pytest.approx(0.3, abs=1e-6)
-    assert result.pairs[0].method == "groove kernel"
+    assert result.pairs[0].distance.value == pytest.approx(0.3, abs=1e-6)
+    assert result.pairs[0].distance.method == "groove kernel"
     _, result = pair(shapes.cylinder(8, 20, bore=5.05), shapes.cylinder(5, 30), rotation([1, 0, 0], 0.002), clearance=1)
     # A pin that leans by t in a bore of length L: R - (L / 2 tan t + r / cos t).
-    assert result.pairs[0].distance == pytest.approx(5.05 - (10 * math.tan(0.002) + 5 / math.cos(0.002)), abs=1e-6)
+    assert result.pairs[0].distance.value == pytest.approx(
+        5.05 - (10 * math.tan(0.002) + 5 / math.cos(0.002)), abs=1e-6
+    )
 
 
 def test_crossed_cylinders_of_equal_radius():
@@ -92,7 +95,7 @@ def test_crossed_cylinders_of_equal_radius():
     for r, depth, angle in ((7.0, 0.001, 30.0), (5.0, 0.1, 90.0), (7.0, 0.02, 90.0)):
         T = translation(0, 2 * r - depth, 0) @ rotation([0, 1, 0], math.radians(angle))
         _, result = pair(shapes.cylinder(r, 60), shapes.cylinder(r, 60), T)
-        assert result.pairs[0].distance == pytest.approx(-depth, abs=1e-7)
+        assert result.pairs[0].distance.value == pytest.approx(-depth, abs=1e-7)
         assert result.pairs[0].verdict is (Verdict.CONTACT if depth < 0.01 else Verdict.CLASH)
 
 
@@ -101,7 +104,7 @@ def test_boxes_half_a_millimetre_deep_have_that_depth():
     _, result = pair(shapes.box((100, 100, 20)), shapes.box((100, 100, 20)), translation(0, 0, 19.5))
     row = result.pairs[0]
     assert row.verdict is Verdict.CLASH
-    assert row.low - 1e-9 <= -0.5 <= row.high + 1e-9
+    assert row.distance.lower - 1e-9 <= -0.5 <= row.distance.upper + 1e-9
 
 
 _ANGLE = st.floats(0.0, 2.0 * math.pi)
@@ -137,10 +140,10 @@ def test_any_pair_against_manifold(a, b, axis, angle, at):
     measured, common, bound = gap(a, b, T)
     row = full.pairs[0]
     if common > 1e-6:
-        assert row.low <= 0.0
+        assert row.distance.lower <= 0.0
     elif measured > bound:
-        assert row.low <= measured + bound
-        assert measured - bound <= row.high
+        assert row.distance.lower <= measured + bound
+        assert measured - bound <= row.distance.upper
         if result.verdict("a", "b") is Verdict.CLEAR:
             assert measured + bound >= 1.0
         if result.verdict("a", "b") is Verdict.CLEARANCE:
@@ -162,17 +165,17 @@ def test_a_rigid_motion_of_both_changes_nothing():
 def test_witnesses_attest_the_distance():
     _, result = pair(BLOCK, WIRE, translation(0.3, 2.0, 4.0), clearance=5.0)
     row = result.pairs[0]
-    assert np.linalg.norm(row.point_b - row.point_a) == pytest.approx(row.high, abs=1e-6)
-    assert np.hypot(*row.point_a[:2]) == pytest.approx(7.0, abs=1e-9)
+    assert np.linalg.norm(row.distance.point_b - row.distance.point_a) == pytest.approx(row.distance.upper, abs=1e-6)
+    assert np.hypot(*row.distance.point_a[:2]) == pytest.approx(7.0, abs=1e-9)
 
 
 def test_thresholds():
     t = Thresholds(contact=0.01, clearance=1.0)
     cases = {-0.02: "clash", -0.01: "contact", 0.01: "contact", 0.02: "clearance", 1.0: "clear", 2.0: "clear"}
-    assert {d: t.verdict(Bounds(d, d)).value for d in cases} == cases
-    assert t.verdict(Bounds(-0.02, 0.0)) is Verdict.UNCERTAIN
-    assert t.verdict(Bounds(1.0 - 1e-9, 1.0 + 1e-9)) is Verdict.CLEAR
-    assert t.verdict(Bounds(-math.inf, -0.02)) is Verdict.CLASH
+    assert {d: t.verdict(Distance(d, d)).value for d in cases} == cases
+    assert t.verdict(Distance(-0.02, 0.0)) is Verdict.UNCERTAIN
+    assert t.verdict(Distance(1.0 - 1e-9, 1.0 + 1e-9)) is Verdict.CLEAR
+    assert t.verdict(Distance(-math.inf, -0.02)) is Verdict.CLASH
 
 
 @pytest.mark.parametrize("full", [False, True])
@@ -192,4 +195,4 @@ def test_a_part_that_is_there_twice_clashes(make, shift, full):
     scene = Scene().add("a", make(), T).add("b", make(), T @ translation(shift, 0.0, 0.0))
     (row,) = check(scene, full=full).pairs
     assert row.verdict in (Verdict.CLASH, Verdict.CONTAINED)
-    assert row.high < -1.0
+    assert row.distance.upper < -1.0

@@ -16,16 +16,16 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.collide.bounds import Verdict
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check import check, check_full
-from clamp3d.collide.model import Workshop
-from clamp3d.collide.motion import Motion
+from clamp3d.collide.model import ModelCache
+from clamp3d.collide.motions import check_poses
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.sweep import sweep_poses
+from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.meshing import mesh
+from clamp3d.core.motion import Motion
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
@@ -73,8 +73,8 @@ def test_closed_clamp(run):
         assert result.verdict(a, b) is expected, (a, b)
     grooves = {(r.a, r.b): r for r in result.pairs}
     for pair in (("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7"), ("P2", "P3")):
-        assert grooves[pair].method == "groove kernel"
-        assert abs(grooves[pair].distance) < 1e-6
+        assert grooves[pair].distance.method == "groove kernel"
+        assert abs(grooves[pair].distance.value) < 1e-6
     full = check_full(scene, result)
     assert full.work.triangles > result.work.triangles
 
@@ -91,9 +91,9 @@ def test_clamp_from_meshes_read_back(run):
     for pair in (("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7")):
         assert result.verdict(*pair) is Verdict.CONTACT
         row = next(r for r in result.pairs if (r.a, r.b) == pair)
-        assert row.method == "groove kernel"
-        assert row.low <= 0.0 <= row.high
-        assert row.high - row.low < 0.01
+        assert row.distance.method == "groove kernel"
+        assert row.distance.lower <= 0.0 <= row.distance.upper
+        assert row.distance.upper - row.distance.lower < 0.01
     assert result.verdict("P1", "P2") is Verdict.CLEAR
 
 
@@ -124,7 +124,7 @@ def test_full_model_refuses_a_verdict_that_differs():
     scene = Scene().add("a", shapes.box((10, 10, 10))).add("b", shapes.box((10, 10, 10)), translation(9, 0, 0))
     result = check(scene)
     wrong = replace(result, pairs=(replace(result.pairs[0], verdict=Verdict.CONTACT),))
-    with pytest.raises(SolverError, match=r"pair a:b: the ladder says contact, the full model clash"):
+    with pytest.raises(SolverError, match=r"pair a:b: the check says contact, the full model clash"):
         check_full(scene, wrong)
 
 
@@ -194,8 +194,8 @@ def test_equal_shapes_share_one_model():
     for k in range(20):
         T = translation(11.0 * k, 0, 0) @ rotation([0, 0, 1], 0.1)
         scene = scene.add(f"tube{k}", shapes.cylinder(6, 20, bore=4), T)
-    shop = Workshop()
-    result = check(scene, workshop=shop)
+    shop = ModelCache()
+    result = check(scene, cache=shop)
     assert result.work.shapes == 1
     assert result.counts == {"clash": 19, "clear": 171}
 
@@ -217,14 +217,14 @@ def test_pose_sweep_equals_single_checks():
     scene = scene.add("wire", shapes.cylinder(6.5, 80.0))
     poses = np.array([rotation(rng.normal(size=3), rng.normal() * 0.05) for _ in range(60)])
     poses[:, :3, 3] = rng.normal(size=(60, 3)) * [2.0, 4.0, 5.0]
-    sweep = sweep_poses(scene, "wire", poses)
+    sweep = check_poses(scene, "wire", poses)
     assert sweep.others == ("block", "box")
     for k, T in enumerate(poses):
         one = check(scene.moved({"wire": T}))
         assert [one.verdict("wire", name).value for name in sweep.others] == sweep.verdict[k].tolist()
     assert set(sweep.verdict.ravel()) >= {"clash", "clear", "clearance"}
     with pytest.raises(InputError, match=r"poses\[1\] must be rigid"):
-        sweep_poses(scene, "wire", np.array([np.eye(4), np.diag([1, 1, -1.0, 1])]))
+        check_poses(scene, "wire", np.array([np.eye(4), np.diag([1, 1, -1.0, 1])]))
 
 
 @pytest.mark.parametrize(
@@ -239,7 +239,10 @@ def test_pose_sweep_equals_single_checks():
         (lambda: shapes.groove_block(SweptArc(7, 1, 50), 10, 20), "width must be > 11.78"),
         (lambda: shapes.groove_block(SweptArc(7, 1, 50), 40, 2), "height must be > 3.2"),
         (lambda: Scene(clearance=0.001), "clearance must be 0 or > contact = 0.01 mm"),
-        (lambda: Motion.screw("pin", (0, 0, 1), 1.0, point=(0, 1e18, 0)), "point must be three lengths up to 1e"),
+        (
+            lambda: Motion.screw((0, 0, 1), parts="pin", angle=1.0, point=(0, 1e18, 0)),
+            "point must be three lengths up to 1e",
+        ),
         (lambda: Scene().add("a", shapes.box((1, 1, 1)), translation(0, 0, 2e9)), "offset of pose of a must be three"),
         (lambda: Scene().allow(("a", "b")), "allowed: unknown part 'a'; available: none"),
     ],

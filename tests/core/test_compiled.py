@@ -11,7 +11,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "clamp3d"
 CALL = (
-    "import time, sys; t = time.process_time(); import numpy as np; from clamp3d import *;"
+    "import time, sys; t = time.process_time(); import numpy as np; from clamp3d.kernel import *;"
     "print(signed_distance(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.eye(4)).distance);"
     "print(time.process_time() - t)"
 )
@@ -37,6 +37,30 @@ def test_cold_and_warm_start(tmp_path):
     assert said.count("compiling the contact kernel") == 1
     assert silent == ""
     assert float(warm[1]) < 0.5 * float(cold[1])  # seconds of CPU: 0.5 and 4.5 on an idle machine
+
+
+@pytest.mark.parametrize(
+    "damage", [lambda b: b"", lambda b: b[: len(b) // 2], lambda b: b[::-1]], ids=["empty", "cut short", "garbage"]
+)
+def test_damaged_cache_files_are_written_anew(tmp_path, damage):
+    cache = str(tmp_path)
+    run(CALL, PACKAGE.parent, NUMBA_CACHE_DIR=cache)
+    index, data = sorted(tmp_path.rglob("*.nbi"))[0], sorted(tmp_path.rglob("*.nbc"))[-1]  # of two functions
+    for file in (index, data):
+        file.write_bytes(damage(file.read_bytes()))
+    out, said = run(CALL, PACKAGE.parent, NUMBA_CACHE_DIR=cache)
+    assert out[0] == "1.5"
+    assert said.count("\n") == 1
+    assert "compiling the contact kernel" in said
+    assert run(CALL, PACKAGE.parent, NUMBA_CACHE_DIR=cache)[1] == ""
+
+
+def test_reading_the_cache_is_not_announced_however_slow_it_is(tmp_path):
+    slow = (
+        "import time, pickle; load = pickle.loads; pickle.loads = lambda *a, **k: (time.sleep(1.2), load(*a, **k))[1];"
+    )
+    run(CALL, PACKAGE.parent, NUMBA_CACHE_DIR=str(tmp_path))
+    assert run(slow + CALL, PACKAGE.parent, NUMBA_CACHE_DIR=str(tmp_path))[1] == ""
 
 
 def test_a_changed_formula_is_compiled_again(tmp_path):

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from clamp3d.collide.motions import first_contact, min_clearance
 from clamp3d.core.distance import Feature, signed_distance, signed_distances
-from clamp3d.core.motion import Rotation, Screw, Translation, first_contact, sweep
+from clamp3d.core.motion import Motion
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
@@ -16,40 +17,40 @@ S, H = 12.0 * math.sin(GROOVE.half_angle), -12.0 * math.cos(GROOVE.half_angle)
 
 
 def test_drop_into_the_groove():
-    hit = first_contact(GROOVE, WIRE, Translation(translation(0.0, 20.0, 0.0), (0.0, -40.0, 0.0)))
+    hit = first_contact(GROOVE, WIRE, Motion.translate((0.0, -40.0, 0.0)), translation(0.0, 20.0, 0.0))
     assert hit.touches
-    assert hit.instant == pytest.approx(21.5 / 40.0, abs=1e-15)
+    assert hit.t == pytest.approx(21.5 / 40.0, abs=1e-15)
     assert hit.contact.feature is Feature.ARC
-    early = first_contact(GROOVE, WIRE, Translation(translation(0.0, 20.0, 0.0), (0.0, -40.0, 0.0)), margin=0.25)
-    assert early.instant == pytest.approx(21.25 / 40.0, abs=1e-14)
-    assert early.contact.distance == pytest.approx(0.25, abs=1e-13)
+    early = first_contact(GROOVE, WIRE, Motion.translate((0.0, -40.0, 0.0)), translation(0.0, 20.0, 0.0), margin=0.25)
+    assert early.t == pytest.approx(21.25 / 40.0, abs=1e-12)
+    assert early.distance.value == pytest.approx(0.25, abs=1e-12)
 
 
 def test_swing_about_an_end_reaches_the_end_edge():
     # Turning about x through the middle: (R - L/2 tan t) cos t = r
-    hit = first_contact(GROOVE, WIRE, Rotation(np.eye(4), (0, 0, 0), (1, 0, 0), 0.5))
-    t = hit.instant * 0.5
-    assert (12.0 - 25.0 * math.tan(t)) * math.cos(t) == pytest.approx(10.5, abs=1e-13)
+    hit = first_contact(GROOVE, WIRE, Motion.screw((1, 0, 0), 0.5))
+    t = hit.t * 0.5
+    assert (12.0 - 25.0 * math.tan(t)) * math.cos(t) == pytest.approx(10.5, abs=1e-12)
     assert hit.contact.feature is Feature.END_ARC
 
 
 def test_turn_about_the_groove_axis_keeps_the_gap():
     gap = 1e-6
-    least = first_contact(GROOVE, WIRE, Rotation(translation(0.0, -1.5 + gap, 0.0), (0, 0, 0), (0, 0, 1), 1.0))
+    least = first_contact(GROOVE, WIRE, Motion.screw((0, 0, 1), 1.0), translation(0.0, -1.5 + gap, 0.0))
     assert not least.touches
-    assert least.contact.distance == pytest.approx(gap, abs=1e-14)
+    assert least.distance.value == pytest.approx(gap, abs=1e-12)
 
 
 def test_sliding_near_a_surface_is_proven_quickly():
     slides = [
-        Translation(translation(0.0, -1.5 + 1e-9, -200.0), (0.0, 0.0, 400.0)),  # through the groove
-        Translation(translation(-200.0, H + 10.5 + 1e-9, 0.0), (170.0, 0.0, 0.0)),  # along a flat face
-        Translation(translation(0.0, -30.0, 65.0 + 10.5 + 1e-9), (5.0, -60.0, 0.0)),  # in front of an end face
+        (translation(0.0, -1.5 + 1e-9, -200.0), (0.0, 0.0, 400.0)),  # through the groove
+        (translation(-200.0, H + 10.5 + 1e-9, 0.0), (170.0, 0.0, 0.0)),  # along a flat face
+        (translation(0.0, -30.0, 65.0 + 10.5 + 1e-9), (5.0, -60.0, 0.0)),  # in front of an end face
     ]
-    for slide in slides:
-        least = first_contact(GROOVE, WIRE, slide)
+    for start, way in slides:
+        least = first_contact(GROOVE, WIRE, Motion.translate(way), start)
         assert not least.touches
-        assert least.contact.distance == pytest.approx(1e-9, abs=1e-13)
+        assert least.distance.value == pytest.approx(1e-9, abs=1e-12)
         assert least.evaluations < 20_000
 
 
@@ -60,14 +61,14 @@ def test_grazing_a_lip(offset):
     u, v = np.array([1.0, 1.0]) / math.sqrt(2.0), np.array([-1.0, 1.0]) / math.sqrt(2.0)
     lip = np.array([S, H])
     start = lip + (2.0 + offset) * v - 3.0 * u
-    path = Translation(translation(*start, 0.0), (*(7.0 * u), 0.0))
-    hit = first_contact(groove, wire, path)
+    path, T = Motion.translate((*(7.0 * u), 0.0)), translation(*start, 0.0)
+    hit = first_contact(groove, wire, path, T)
     assert hit.touches == (offset <= 0.0)
     wanted = 3.0 - math.sqrt(max(0.0, 4.0 - (2.0 + offset) ** 2))
     tolerance = 1e-6 if offset == 0.0 else 1e-10  # a double root is known to the square root of the rounding
-    assert hit.instant * 7.0 == pytest.approx(wanted, abs=1e-6 if offset > 0.0 else tolerance)
+    assert hit.t * 7.0 == pytest.approx(wanted, abs=1e-6 if offset > 0.0 else tolerance)
     assert hit.contact.feature is Feature.LIP_N
-    assert sweep(groove, wire, path).distance == pytest.approx(offset, abs=1e-13)
+    assert min_clearance(groove, wire, path, T).distance.value == pytest.approx(offset, abs=1e-12)
 
 
 def test_grazing_a_flat_face_on_a_circle():
@@ -75,27 +76,27 @@ def test_grazing_a_flat_face_on_a_circle():
     wire = Cylinder(3.0, 20.0)
     centre = np.array([30.0, H + 3.0 + 5.0, 0.0])
     start = translation(centre[0] - 5.0, centre[1], 0.0)
-    hit = first_contact(GROOVE, wire, Rotation(start, centre, (0, 0, 1), math.pi))
+    hit = first_contact(GROOVE, wire, Motion.screw((0, 0, 1), math.pi, point=centre), start)
     assert hit.touches
-    assert hit.instant == pytest.approx(0.5, abs=1e-7)
+    assert hit.t == pytest.approx(0.5, abs=1e-7)
 
 
 def test_thin_wire_through_a_thin_sheet_is_not_missed():
     # 1e-3 mm against 1e-3 mm on a path of 2 m: no sampling of practical density sees it.
     sheet, needle = SweptArc(10.0, 1.0, 1e-3), Cylinder(1e-3, 1e-3)
-    hit = first_contact(sheet, needle, Translation(translation(30.0, -30.0, -1000.0), (0.0, 0.0, 2000.0)))
+    hit = first_contact(sheet, needle, Motion.translate((0.0, 0.0, 2000.0)), translation(30.0, -30.0, -1000.0))
     assert hit.touches
-    assert hit.instant * 2000.0 == pytest.approx(1000.0 - 0.5e-3 - 0.5e-3 - 1e-3, abs=1e-9)
+    assert hit.t * 2000.0 == pytest.approx(1000.0 - 0.5e-3 - 0.5e-3 - 1e-3, abs=1e-9)
     assert hit.contact.feature is Feature.END_FACE
 
 
 def test_start_in_contact_and_motion_of_no_length():
-    hit = first_contact(GROOVE, WIRE, Translation(translation(0.0, -3.0, 0.0), (0.0, 30.0, 0.0)))
+    hit = first_contact(GROOVE, WIRE, Motion.translate((0.0, 30.0, 0.0)), translation(0.0, -3.0, 0.0))
     assert hit.touches
-    assert hit.instant == 0.0
-    rest = first_contact(GROOVE, WIRE, Translation(np.eye(4), (0.0, 0.0, 0.0)))
+    assert hit.t == 0.0
+    rest = first_contact(GROOVE, WIRE, Motion.translate((0.0, 0.0, 0.0)), np.eye(4))
     assert not rest.touches
-    assert rest.contact.distance == pytest.approx(1.5, abs=1e-14)
+    assert rest.distance.value == pytest.approx(1.5, abs=1e-12)
 
 
 vectors = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 0.05)
@@ -116,37 +117,37 @@ def test_against_dense_sampling(half, length, about, tilt, place, axis, angle, t
     groove, wire = SweptArc(12.0, half, 40.0), Cylinder(6.0, length)
     T = rotation(about, tilt)
     T[:3, 3] = 40.0 * np.array(place)
-    motion = Screw(T, 10.0 * np.array(place)[::-1], axis, angle, travel)
+    motion = Motion.screw(axis, angle, point=10.0 * np.array(place)[::-1], travel=travel)
     samples = np.linspace(0.0, 1.0, 2001)
-    values = signed_distances(groove, wire, np.array([motion.pose(s) for s in samples]))
-    least = sweep(groove, wire, motion)
-    assert least.distance <= values.min() + 1e-9
+    values = signed_distances(groove, wire, np.array([motion.at(s, T) for s in samples]))
+    least = min_clearance(groove, wire, motion, T)
+    assert least.distance.lower <= values.min() + 1e-9
     speed = math.hypot(abs(angle) * (60.0 + length), travel)
-    assert least.distance >= values.min() - speed / 4000
-    hit = first_contact(groove, wire, motion)
-    assert hit.touches == (least.distance <= hit.contact.error_bound)
+    assert least.distance.value >= values.min() - speed / 4000
+    hit = first_contact(groove, wire, motion, T)
+    assert hit.touches == (least.contact.distance <= hit.contact.error_bound)
     below = np.flatnonzero(values <= 0.0)
     if hit.touches:
-        assert hit.instant == 0.0 or abs(hit.contact.distance) < 1e-9
-        assert not len(below) or hit.instant <= samples[below[0]] + 1e-12
-        assert (values[samples < hit.instant - 1e-9] > 0.0).all()
-    assert np.abs(hit.pose - motion.pose(hit.instant)).max() == 0.0
+        assert hit.t == 0.0 or abs(hit.distance.value) < 1e-9
+        assert not len(below) or hit.t <= samples[below[0]] + 1e-12
+        assert (values[samples < hit.t - 1e-9] > 0.0).all()
+    assert np.abs(hit.pose - motion.at(hit.t, T)).max() == 0.0
     assert signed_distance(groove, wire, hit.pose).distance == hit.contact.distance
 
 
 def test_bad_motions_are_named():
     with pytest.raises(InputError, match="axis must not be zero"):
-        Rotation(np.eye(4), (0, 0, 0), (0, 0, 0), 1.0)
-    with pytest.raises(InputError, match="vector must be finite, got nan"):
-        Translation(np.eye(4), (0, np.nan, 0))
-    with pytest.raises(InputError, match="start must be rigid"):
-        Translation(2.0 * np.diag([1, 1, 1, 0.5]), (0, 0, 1))
+        Motion.screw((0, 0, 0), 1.0)
+    with pytest.raises(InputError, match="by must be finite, got nan"):
+        Motion.translate((0, np.nan, 0))
+    with pytest.raises(InputError, match="T_a_b must be rigid"):
+        first_contact(GROOVE, WIRE, Motion.translate((0, 0, 1)), 2.0 * np.diag([1, 1, 1, 0.5]))
     with pytest.raises(InputError, match="angle must be a finite number"):
-        Screw(np.eye(4), (0, 0, 0), (0, 0, 1), math.inf, 1.0)
+        Motion.screw((0, 0, 1), math.inf, travel=1.0)
     with pytest.raises(InputError, match="margin must be a finite number"):
-        first_contact(GROOVE, WIRE, Translation(np.eye(4), (0, 0, 1)), margin=math.nan)
-    with pytest.raises(InputError, match="motion must be a Translation, Rotation or Screw, got int"):
-        sweep(GROOVE, WIRE, 3)
+        first_contact(GROOVE, WIRE, Motion.translate((0, 0, 1)), margin=math.nan)
+    with pytest.raises(InputError, match="motion must be a Motion"):
+        min_clearance(GROOVE, WIRE, 3)
 
 
 def test_a_wire_that_crosses_an_end_edge_at_level_distance_is_answered_quickly():
@@ -159,8 +160,8 @@ def test_a_wire_that_crosses_an_end_edge_at_level_distance_is_answered_quickly()
     T[:3, 1] = np.cross(T[:3, 2], T[:3, 0])
     for gap in (1e-10, -1e-10):
         T[:3, 3] = np.array([40.0, H, 25.0]) + (2.0 + gap) * normal
-        path = Translation(T, (20.0, 0.0, 0.0))
-        least, hit = sweep(groove, wire, path), first_contact(groove, wire, path)
-        assert least.distance == pytest.approx(gap, abs=1e-13)
+        path = Motion.translate((20.0, 0.0, 0.0))
+        least, hit = min_clearance(groove, wire, path, T), first_contact(groove, wire, path, T)
+        assert least.distance.value == pytest.approx(gap, abs=1e-12)
         assert hit.touches == (gap < 0.0)
         assert least.evaluations + hit.evaluations < 5000

@@ -1,11 +1,13 @@
 """The motion families: truths against independent ones, cas without a fault on all of them, faults that are found."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
 import clamp3d
+import clamp3d.collide.motions as collide_motions
 from clamp3d.bench.stress.motions import methods
 from clamp3d.bench.stress.motions.cases import motions, poses
 from clamp3d.bench.stress.motions.families import MOTIONS
@@ -15,7 +17,6 @@ from clamp3d.bench.stress.poses.truth import EXTENDED_WORKS
 from clamp3d.bench.stress.poses.truth import truth as pose_truth
 from clamp3d.bench.stress.registry import FAMILIES
 from clamp3d.bench.stress.run import run_family
-from clamp3d.core import motion as motion_module
 
 CASES = 2000
 
@@ -76,12 +77,12 @@ def test_known_answers_in_a_narrow_mouth(start, vector, least):
     cases = _one(start, vector)
     assert float(truth(cases).distance[0]) == pytest.approx(least, abs=2e-15)
     groove, wire, motion = cases.shapes.groove(0), cases.shapes.cylinder(0), cases.motion(0)
-    assert clamp3d.sweep(groove, wire, motion).distance == pytest.approx(least, abs=1e-14)
-    hit = clamp3d.first_contact(groove, wire, motion)
+    assert clamp3d.min_clearance(groove, wire, motion, cases.start[0]).distance.value == pytest.approx(least, abs=1e-12)
+    hit = clamp3d.first_contact(groove, wire, motion, cases.start[0])
     assert hit.touches == (least <= 0.0)
     if least < 0.0:  # where the wire's circle first meets both lips
         s, h = 7.0 * math.sin(math.radians(100.0)), -7.0 * math.cos(math.radians(100.0))
-        assert 30.0 - 30.0 * hit.instant == pytest.approx(h + math.sqrt(6.935**2 - s * s), abs=1e-12)
+        assert 30.0 - 30.0 * hit.t == pytest.approx(h + math.sqrt(6.935**2 - s * s), abs=1e-12)
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-9, -1e-9, 1e-3, -1e-3])
@@ -95,11 +96,13 @@ def test_known_answers_of_a_double_root(gap):
     found = truth(cases)
     assert float(found.distance[0]) == pytest.approx(gap, abs=1e-14)
     groove, wire, motion = cases.shapes.groove(0), cases.shapes.cylinder(0), cases.motion(0)
-    assert clamp3d.first_contact(groove, wire, motion).touches == (gap <= 0.0)
+    assert clamp3d.first_contact(groove, wire, motion, cases.start[0]).touches == (gap <= 0.0)
     # The least clearance does not depend on how the way is divided.
-    halves = [clamp3d.Translation(motion.pose(s), 0.5 * cases.travel[0]) for s in (0.0, 0.5)]
-    whole = clamp3d.sweep(groove, wire, motion).distance
-    assert min(clamp3d.sweep(groove, wire, part).distance for part in halves) == pytest.approx(whole, abs=1e-13)
+    half_way = clamp3d.Motion.translate(0.5 * cases.travel[0])
+    starts = [motion.at(s, cases.start[0]) for s in (0.0, 0.5)]
+    whole = clamp3d.min_clearance(groove, wire, motion, cases.start[0]).distance.value
+    parts = [clamp3d.min_clearance(groove, wire, half_way, T).distance.value for T in starts]
+    assert min(parts) == pytest.approx(whole, abs=1e-13)
 
 
 def test_stepped_motion_misses_what_is_thin_and_cas_does_not():
@@ -111,33 +114,32 @@ def test_stepped_motion_misses_what_is_thin_and_cas_does_not():
 
 
 class _Broken:
-    """`sweep` and `first_contact` with one fault."""
+    """`min_clearance` and `first_contact` with one fault."""
 
     def __init__(self, fault):
         self.fault = fault
 
-    def sweep(self, groove, wire, motion):
+    def min_clearance(self, groove, wire, motion, start):
+        right = collide_motions.min_clearance(groove, wire, motion, start)
         if self.fault != "steps over thin parts":
-            return motion_module.sweep(groove, wire, motion)
-        near = [clamp3d.signed_distance(groove, wire, motion.pose(s)) for s in np.linspace(0.0, 1.0, 101)]
+            return right
+        near = [clamp3d.kernel.signed_distance(groove, wire, motion.at(s, start)) for s in np.linspace(0.0, 1.0, 101)]
         i = int(np.argmin([one.distance for one in near]))
-        return motion_module.Clearance(near[i].distance, i / 100, motion.pose(i / 100), near[i], 1e-9, 1e-12, 101)
+        return dataclasses.replace(right, t=i / 100, distance=clamp3d.Distance(near[i].distance, near[i].distance))
 
-    def first_contact(self, groove, wire, motion):
-        right = motion_module.first_contact(groove, wire, motion)
-        at = {"misses": 1.0, "late": min(1.0, right.instant + 1e-4), "early": max(0.0, right.instant - 1e-4)}
-        instant = at.get(self.fault, right.instant)
-        contact = clamp3d.signed_distance(groove, wire, motion.pose(instant))
+    def first_contact(self, groove, wire, motion, start):
+        right = collide_motions.first_contact(groove, wire, motion, start)
+        at = {"misses": 1.0, "late": min(1.0, right.t + 1e-4), "early": max(0.0, right.t - 1e-4)}
+        t = at.get(self.fault, right.t)
+        contact = clamp3d.kernel.signed_distance(groove, wire, motion.at(t, start)).distance
         touches = right.touches and self.fault != "misses"
-        return motion_module.MotionContact(
-            touches, instant, motion.pose(instant), contact, right.resolution, right.error_bound, 1
-        )
+        return dataclasses.replace(right, touches=touches, t=t, distance=clamp3d.Distance(contact, contact))
 
 
 @pytest.mark.parametrize("fault", ["none", "steps over thin parts", "misses", "late", "early"])
-def test_a_wrong_sweep_or_first_contact_is_found_out(fault, monkeypatch):
+def test_a_wrong_min_clearance_or_first_contact_is_found_out(fault, monkeypatch):
     broken = _Broken(fault)
-    monkeypatch.setattr(methods, "sweep", broken.sweep)
+    monkeypatch.setattr(methods, "min_clearance", broken.min_clearance)
     monkeypatch.setattr(methods, "first_contact", broken.first_contact)
     (outcome,), _ = run_family("motion: thin and fast", ["cas"], 200, 3, 60.0, 0)
     assert (outcome.wrong > 20) == (fault != "none"), outcome.notes
@@ -152,7 +154,7 @@ def test_a_case_prints_as_lines_that_run(capsys):
         exec(text, {})
         printed = capsys.readouterr().out
         expected = float(text.split("# truth: least ")[1].split()[0])
-        assert float(printed.split("Clearance(distance=")[1].split(",")[0]) == pytest.approx(expected, abs=1e-9)
+        assert float(printed.split("distance=Distance(")[1].split(" mm")[0]) == pytest.approx(expected, abs=1e-9)
 
 
 def test_fcl_takes_a_motion_without_a_turn_for_something_else():

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,9 +96,9 @@ def _fit(case: MeshCase) -> Answer:
 
 def _scene(case: MeshCase) -> Answer:
     """A scene of the mesh and the wire, checked: what the mesh is for a user who wants a verdict."""
-    from clamp3d.collide.bounds import Verdict
     from clamp3d.collide.check import check
     from clamp3d.collide.scene import Scene
+    from clamp3d.collide.verdict import Verdict
     from clamp3d.core.mesh import make_mesh
     from clamp3d.core.shapes import MeshShape
 
@@ -113,8 +113,8 @@ def _scene(case: MeshCase) -> Answer:
     if row.verdict is Verdict.UNCERTAIN:
         return Answer(math.nan, why="scene: uncertain")
     if row.verdict in (Verdict.CLASH, Verdict.CONTAINED):
-        return Answer(row.high)
-    return Answer(cast(float, row.distance), row.error_bound + _rounding(case))
+        return Answer(row.distance.upper)
+    return Answer(row.distance.value, row.distance.uncertainty + _rounding(case))
 
 
 def _fcl_alone(case: MeshCase) -> Answer:

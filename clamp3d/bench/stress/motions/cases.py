@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.bench.stress.poses.cases import Shapes
 from clamp3d.bench.stress.worker import Rows
-from clamp3d.core.motion import Screw, Translation
+from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 
 
@@ -19,8 +19,8 @@ from clamp3d.core.pose import Array
 class Motions(Rows):
     """n motions: ``shape`` (n,) row of ``shapes``; a turn by ``angle`` (n,) rad and a ``travel`` (n, 3) mm from 0 to 1.
 
-    ``start`` (n, 4, 4) is ``T_groove_wire`` at instant 0. Where ``angle`` is 0 the motion is a `Translation`; else a
-    `Screw` about ``axis`` (n, 3) through ``point`` (n, 3), and ``travel`` is along the axis: its first number is the
+    ``start`` (n, 4, 4) is ``T_groove_wire`` at instant 0. Where ``angle`` is 0 the motion is a translation; else a
+    screw about ``axis`` (n, 3) through ``point`` (n, 3), and ``travel`` is along the axis: its first number is the
     length. ``gap`` (n,) mm is the least distance that the case was built for, NaN if it was built from none, and
     ``instant`` (n,) where; another place may come nearer. ``number`` (n,) tells the cases apart when some are taken.
     """
@@ -36,11 +36,12 @@ class Motions(Rows):
     instant: Array
     number: NDArray[np.intp]
 
-    def motion(self, i: int) -> Screw:
+    def motion(self, i: int) -> Motion:
         """Case i as the project's own motion."""
         if self.angle[i] == 0.0:
-            return Translation(self.start[i], self.travel[i])
-        return Screw(self.start[i], self.point[i], self.axis[i], float(self.angle[i]), float(self.travel[i, 0]))
+            return Motion.translate(self.travel[i])
+        angle, travel = float(self.angle[i]), float(self.travel[i, 0])
+        return Motion.screw(self.axis[i], angle, point=self.point[i], travel=travel)
 
     def vector(self) -> Array:
         """Travel (n, 3) mm as a vector, as long doubles."""
@@ -63,18 +64,19 @@ class Motions(Rows):
         k = int(self.shape[i])
         start = f"np.array({self.start[i].tolist()})"
         if self.angle[i] == 0.0:
-            motion = f"clamp3d.Translation({start}, {self.travel[i].tolist()})"
+            motion = f"clamp3d.Motion.translate({self.travel[i].tolist()})"
         else:
-            numbers = f"{self.point[i].tolist()}, {self.axis[i].tolist()}, {float(self.angle[i])!r}"
-            motion = f"clamp3d.Screw({start}, {numbers}, {float(self.travel[i, 0])!r})"
+            numbers = f"{self.axis[i].tolist()}, {float(self.angle[i])!r}, point={self.point[i].tolist()}"
+            motion = f"clamp3d.Motion.screw({numbers}, travel={float(self.travel[i, 0])!r})"
         lines = [
             "import numpy as np",
             "import clamp3d",
-            f"groove = clamp3d.{self.shapes.groove(k)!r}",
-            f"wire = clamp3d.{self.shapes.cylinder(k)!r}",
+            f"groove = clamp3d.kernel.{self.shapes.groove(k)!r}",
+            f"wire = clamp3d.kernel.{self.shapes.cylinder(k)!r}",
             f"motion = {motion}",
-            "print(clamp3d.sweep(groove, wire, motion))",
-            "print(clamp3d.first_contact(groove, wire, motion))",
+            f"start = {start}",
+            "print(clamp3d.min_clearance(groove, wire, motion, start))",
+            "print(clamp3d.first_contact(groove, wire, motion, start))",
         ]
         return "\n".join(lines)
 

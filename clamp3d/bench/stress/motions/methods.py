@@ -11,13 +11,13 @@ from clamp3d.bench.stress.family import Methods
 from clamp3d.bench.stress.motions.cases import Motions, poses
 from clamp3d.bench.stress.motions.fcl_continuous import FclMethod
 from clamp3d.bench.stress.worker import Measured, Measures
+from clamp3d.collide.motions import first_contact, min_clearance
 from clamp3d.core.distance import signed_distances
-from clamp3d.core.motion import first_contact, sweep
 from clamp3d.core.pose import Array
 
 
 class CasMethod:
-    """`sweep` for the least distance and `first_contact`, whose answers are kept for `first_contacts`.
+    """`min_clearance` for the least distance and `first_contact`, whose answers are kept for `first_contacts`.
 
     The bound is that of rounding (distance and pose) and the resolution of the search.
     """
@@ -34,17 +34,18 @@ class CasMethod:
         groove, wire = cases.shapes.groove(k), cases.shapes.cylinder(k)
         distance, bound = np.empty(len(cases)), np.empty(len(cases))
         for i in range(len(cases)):
-            motion = cases.motion(i)
-            least = sweep(groove, wire, motion)
-            first = first_contact(groove, wire, motion)
-            distance[i] = least.distance
-            bound[i] = max(least.error_bound, first.error_bound) + max(least.resolution, first.resolution)
-            self._lowest[int(cases.number[i])] = least.instant
-            self._first[int(cases.number[i])] = (first.touches, first.instant, first.contact.distance)
+            motion, start = cases.motion(i), cases.start[i]
+            least = min_clearance(groove, wire, motion, start)
+            first = first_contact(groove, wire, motion, start)
+            distance[i] = least.distance.value
+            rounding = max(least.distance.uncertainty, first.distance.uncertainty)
+            bound[i] = rounding + max(least.resolution, first.resolution)
+            self._lowest[int(cases.number[i])] = least.t
+            self._first[int(cases.number[i])] = (first.touches, first.t, first.distance.value)
         return Measured(distance, bound)
 
     def instants(self, n: int) -> Array:
-        """Instants (n, 1) that `sweep` named, -1 where it was not asked."""
+        """Instants (n, 1) that `min_clearance` named, -1 where it was not asked."""
         out = np.full((n, 1), -1.0)
         out[list(self._lowest), 0] = list(self._lowest.values())
         return out

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.collide.bounds import Bounds
+from clamp3d.collide.answer import Distance
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.shells import corners_of, shells, winding_number
 
@@ -25,7 +25,7 @@ _INNER = 40
 
 
 @dataclass(eq=False)
-class TriModel:
+class Surface:
     """A closed mesh, ``vertices`` (n, 3) mm, ``faces`` (m, 3) outward; within ``error`` mm of the true surface."""
 
     vertices: Array
@@ -61,7 +61,7 @@ class TriModel:
         )
 
     @cached_property
-    def heads(self) -> Array:
+    def shell_points(self) -> Array:
         """One vertex (k, 3) of each connected shell."""
         return self.vertices[[self.faces[rows[0], 0] for rows in shells(self.faces, len(self.vertices))]]
 
@@ -103,8 +103,8 @@ class TriModel:
         return np.where([self.contains(x) for x in points], d, -d)
 
 
-def tri_bounds(a: TriModel, b: TriModel, T: Array, *, contact: float) -> Bounds:
-    """Bounds of the signed distance of ``b`` at ``T`` (4, 4) in a's frame; ``contact`` mm is the depth that matters."""
+def surface_distance(a: Surface, b: Surface, T: Array, *, contact: float) -> Distance:
+    """Signed distance of ``b`` at ``T`` (4, 4) in a's frame; ``contact`` mm is the depth that matters."""
     import fcl
 
     doubt = a.error + b.error
@@ -119,20 +119,20 @@ def tri_bounds(a: TriModel, b: TriModel, T: Array, *, contact: float) -> Bounds:
         return _overlap(a, b, T, contact, rounding).widened(doubt + rounding)
     p, q = (np.asarray(x, dtype=np.float64) for x in answer.nearest_points)
     R, t = T[:3, :3], T[:3, 3]
-    for outer, heads, points in (
-        (a, b.heads @ R.T + t, b.vertices @ R.T + t),
-        (b, (a.heads - t) @ R, (a.vertices - t) @ R),
+    for outer, shell_points, points in (
+        (a, b.shell_points @ R.T + t, b.vertices @ R.T + t),
+        (b, (a.shell_points - t) @ R, (a.vertices - t) @ R),
     ):
-        if any(outer.contains(x) for x in heads):  # no surface in common: that shell lies inside as a whole
+        if any(outer.contains(x) for x in shell_points):  # no surface in common: that shell lies inside as a whole
             deepest = float(outer.distance(points[:: max(1, len(points) // 50)]).max())
-            return Bounds(-np.inf, -max(d, deepest if len(heads) == 1 else d)).widened(doubt)
-    return Bounds(d, d, p, q).widened(doubt + rounding)
+            return Distance(-np.inf, -max(d, deepest if len(shell_points) == 1 else d)).widened(doubt)
+    return Distance(d, d, p, q).widened(doubt + rounding)
 
 
-def clearance_of_shells(shells: tuple[tuple[Any, float], ...], still: TriModel, T: Array, heads: Array) -> float:
+def clearance_of_shells(shells: tuple[tuple[Any, float], ...], still: Surface, T: Array, shell_points: Array) -> float:
     """Gap (mm) that is left of a moving mesh's distance after each shell's travel: (tree, travel mm) at ``T`` (4, 4).
 
-    ``heads`` (k, 3), one vertex of each connected shell in the moving frame, tell a mesh inside the other.
+    ``shell_points`` (k, 3), one vertex of each connected shell in the moving frame, tell a mesh inside the other.
     """
     import fcl
 
@@ -143,11 +143,11 @@ def clearance_of_shells(shells: tuple[tuple[Any, float], ...], still: TriModel, 
         if d <= 0.0:
             return -np.inf
         low = min(low, d - travel)
-    inside_ = any(still.contains(x) for x in heads @ T[:3, :3].T + T[:3, 3])
+    inside_ = any(still.contains(x) for x in shell_points @ T[:3, :3].T + T[:3, 3])
     return -np.inf if inside_ else float(low)
 
 
-def inside(inner: TriModel, outer: TriModel, T: Array, slack: float) -> bool:
+def inside(inner: Surface, outer: Surface, T: Array, slack: float) -> bool:
     """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer`` or within ``slack`` mm of it."""
     outside = inner.manifold.transform(np.ascontiguousarray(T[:3])) - outer.manifold
     if outside.is_empty():
@@ -155,11 +155,11 @@ def inside(inner: TriModel, outer: TriModel, T: Array, slack: float) -> bool:
     return bool(outer.distance(np.asarray(outside.to_mesh64().vert_properties)[:, :3]).max() <= slack)
 
 
-def _overlap(a: TriModel, b: TriModel, T: Array, contact: float, rounding: float) -> Bounds:
+def _overlap(a: Surface, b: Surface, T: Array, contact: float, rounding: float) -> Distance:
     """Depth of two meshes whose surfaces meet."""
     common = a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3]))
     if common.is_empty():
-        return Bounds(0.0, 0.0)
+        return Distance(0.0, 0.0)
     raw = common.to_mesh64()
     V = np.asarray(raw.vert_properties)[:, :3]
     F = np.asarray(raw.tri_verts, dtype=np.int64)
@@ -170,20 +170,20 @@ def _overlap(a: TriModel, b: TriModel, T: Array, contact: float, rounding: float
         some = points[:: max(1, len(points) // 60)]
         high = min(high, -float(model.distance(some).max()))
         if high < -2.0 * contact - a.error - b.error:
-            return Bounds(-np.inf, high)
+            return Distance(-np.inf, high)
         deepest, limit = _deepest(model, points[F], contact, rounding)
         low, high = min(low, -limit), min(high, -deepest)
         if high < -2.0 * contact - a.error - b.error:
-            return Bounds(-np.inf, high)
+            return Distance(-np.inf, high)
     # What has nearly the same surface as both, as a part that is there twice has, is deep inside only.
     inner = _inner_points(V[F], 4.0 * (contact + a.error + b.error))
-    overlap = TriModel(V, F, 0.0)
+    overlap = Surface(V, F, 0.0)
     inner = inner[[overlap.contains(x) for x in inner]]
     if len(inner):
         deepest = max(a.distance(inner).max(), b.distance(inner @ back[:3, :3].T + back[:3, 3]).max())
         if deepest > -high:
-            return Bounds(-np.inf, -float(deepest))
-    return Bounds(low, high)
+            return Distance(-np.inf, -float(deepest))
+    return Distance(low, high)
 
 
 def _inner_points(triangles: Array, least: float) -> Array:
@@ -202,7 +202,7 @@ def _inner_points(triangles: Array, least: float) -> Array:
     return np.concatenate([middle - h * normal for h in (2.0 * volume / max(float(size.sum()), 1e-300), least)])
 
 
-def _deepest(model: TriModel, triangles: Array, contact: float, rounding: float) -> tuple[float, float]:
+def _deepest(model: Surface, triangles: Array, contact: float, rounding: float) -> tuple[float, float]:
     """Deepest point of the ``triangles`` (k, 3, 3), which lie in the model: a depth that is reached, and a limit.
 
     The distance from one flat piece of the model's surface is a convex function, so over a triangle it is largest at

@@ -1,0 +1,65 @@
+"""What commands say to the terminal and to the shell: text on stdout, exit codes, a reader that goes away."""
+
+from __future__ import annotations
+
+import io
+import sys
+from enum import IntEnum
+
+import click
+
+from clamp3d.errors import escaped
+
+
+class ExitCode(IntEnum):
+    """What a command tells the shell."""
+
+    CLEAN = 0
+    FINDING = 1
+    BAD_INPUT = 2
+    UNDECIDED = 3
+    FAILED = 4
+    INTERRUPTED = 130
+
+
+def show(text: str, *, err: bool = False) -> None:
+    """Print ``text`` for people: on stdout, or on stderr if ``err`` or if a FILE option took stdout (``-``).
+
+    Control characters, which names in files may hold, are printed as escape sequences.
+    """
+    context = click.get_current_context(silent=True)
+    taken = context is not None and STDOUT_TAKEN in context.meta
+    click.echo(escaped(text, keep="\n"), err=err or taken)
+
+
+def finish(*, finding: bool, undecided: bool = False) -> None:
+    """End the command with the exit code of its verdict; a finding counts more than what is undecided."""
+    code = ExitCode.FINDING if finding else ExitCode.UNDECIDED if undecided else ExitCode.CLEAN
+    if code:
+        raise click.exceptions.Exit(code)
+
+
+STDOUT_TAKEN = "clamp3d.stdout"
+"""Key of the context's ``meta`` under which the option stands that writes its file to stdout."""
+
+
+class _Tolerant(io.FileIO):
+    """A file descriptor whose reader may go away: what is written from then on is lost, which is no error."""
+
+    def write(self, data: object) -> int:
+        try:
+            return super().write(data)  # type: ignore[arg-type]
+        except BrokenPipeError:
+            return memoryview(data).nbytes  # type: ignore[arg-type]
+
+
+def tolerate_closed_pipes() -> None:
+    """Let ``clamp3d ... | head`` keep the exit code of its verdict. Streams that a test put in place stay."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is not None and stream is getattr(sys, f"__{name}__"):
+            raw = io.BufferedWriter(_Tolerant(stream.fileno(), "wb", closefd=False))
+            wrapped = io.TextIOWrapper(
+                raw, stream.encoding, "backslashreplace", line_buffering=stream.line_buffering or name == "stderr"
+            )
+            setattr(sys, name, wrapped)

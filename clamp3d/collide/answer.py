@@ -1,0 +1,171 @@
+"""The signed distance of two bodies between proven bounds: one result type for every pair, model and command.
+
+The signed distance of two bodies is their distance where they are apart. Where they overlap it is minus the depth: the
+greatest distance that a point of one lies inside the other. For a groove and a cylinder whose axis is outside the
+material this is the kernel's signed distance.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.core.pose import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Distance:
+    """Signed distance of two bodies, between proven bounds.
+
+    Attributes
+    ----------
+    lower, upper : float
+        The distance lies between these, mm; positive apart, negative inside. Infinite where nothing is known.
+    point_a, point_b : ndarray (3,) or None
+        Points on the two bodies that attest ``upper``; None where it is infinite.
+    normal : ndarray (3,) or None
+        Unit vector from a to b, ``point_b = point_a + value * normal``; None where no direction is known.
+    unique : bool or None
+        Whether the nearest points are the only ones; None where that is not known.
+    level, method : str
+        The refinement level and the method that gave the last word.
+    """
+
+    lower: float = -math.inf
+    upper: float = math.inf
+    point_a: Array | None = None
+    point_b: Array | None = None
+    normal: Array | None = None
+    unique: bool | None = None
+    level: str = ""
+    method: str = ""
+
+    @property
+    def value(self) -> float:
+        """The distance in mm: the upper bound, which the witness points attest."""
+        return self.upper
+
+    @property
+    def uncertainty(self) -> float:
+        """How far ``value`` can be off, mm."""
+        return self.upper - self.lower
+
+    def meet(self, other: Distance) -> Distance:
+        """Both at once: the tighter of the bounds on either side."""
+        if other.lower <= self.lower and other.upper >= self.upper:
+            return self if self.normal is not None else replace(self, normal=other.normal)
+        best = self if self.upper <= other.upper else other
+        by = (self if self.lower >= other.lower else other).normal
+        normal = best.normal if by is None else by
+        return replace(best, lower=max(self.lower, other.lower), normal=normal, level=other.level, method=other.method)
+
+    def union(self, other: Distance) -> Distance:
+        """Bounds for the nearer of two pieces."""
+        best, rest = (self, other) if (self.upper, self.lower) <= (other.upper, other.lower) else (other, self)
+        normal = (self if self.lower <= other.lower else other).normal
+        unique = best.unique if rest.lower > best.upper else None
+        return replace(best, lower=min(self.lower, other.lower), normal=normal, unique=unique)
+
+    def ordered(self) -> Distance:
+        """Bounds that rounding has crossed put in order again."""
+        return self if self.lower <= self.upper else replace(self, lower=self.upper, upper=self.lower)
+
+    def widened(self, error: float) -> Distance:
+        """The interval enlarged by ``error`` mm on both sides."""
+        if error == 0.0:
+            return self
+        return replace(self, lower=self.lower - error, upper=self.upper + error)
+
+    def labelled(self, level: str, method: str) -> Distance:
+        """The same, said to come from ``method`` at ``level``."""
+        return replace(self, level=level, method=method)
+
+    def moved(self, T: Array) -> Distance:
+        """The same with points and normal taken along by ``T`` (4, 4)."""
+        R, t = T[:3, :3], T[:3, 3]
+        p, q = (None if x is None else R @ x + t for x in (self.point_a, self.point_b))
+        return replace(self, point_a=p, point_b=q, normal=None if self.normal is None else R @ self.normal)
+
+    def swapped(self) -> Distance:
+        """The distance of b and a in place of a and b."""
+        normal = None if self.normal is None else -self.normal
+        return replace(self, point_a=self.point_b, point_b=self.point_a, normal=normal)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; unknown numbers are None."""
+        return {
+            "distance_mm": _finite(self.value),
+            "error_bound_mm": _finite(self.uncertainty),
+            "at_least_mm": _finite(self.lower),
+            "at_most_mm": _finite(self.upper),
+            "point_a": _list(self.point_a),
+            "point_b": _list(self.point_b),
+            "normal": _list(self.normal),
+            "unique": self.unique,
+            "level": self.level,
+            "method": self.method,
+        }
+
+    def __repr__(self) -> str:
+        return f"Distance({self.value:.12g} mm, uncertainty {self.uncertainty:.1e}, {self.method!r})"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Distances:
+    """The same for n poses: the fields of `Distance` as arrays, ``method`` for all of them.
+
+    ``lower``, ``upper`` (n,); ``point_a``, ``point_b``, ``normal`` (n, 3), NaN where unknown.
+    """
+
+    lower: Array
+    upper: Array
+    point_a: Array
+    point_b: Array
+    normal: Array
+    method: tuple[str, ...]
+
+    @property
+    def value(self) -> Array:
+        """The distances (n,) in mm: the upper bounds."""
+        return self.upper
+
+    @property
+    def uncertainty(self) -> Array:
+        """How far each of ``value`` can be off, (n,) mm."""
+        return self.upper - self.lower
+
+    def __len__(self) -> int:
+        return len(self.upper)
+
+    def __repr__(self) -> str:
+        least = f", least {self.upper.min():.9g} mm" if len(self) else ""
+        return f"Distances({len(self)} poses{least})"
+
+    @classmethod
+    def of(cls, found: list[Distance]) -> Distances:
+        """From single distances."""
+
+        def rows(name: str) -> NDArray[np.float64]:
+            given = [getattr(d, name) for d in found]
+            return np.array([np.full(3, np.nan) if x is None else x for x in given]).reshape(-1, 3)
+
+        return cls(
+            np.array([d.lower for d in found]),
+            np.array([d.upper for d in found]),
+            rows("point_a"),
+            rows("point_b"),
+            rows("normal"),
+            tuple(d.method for d in found),
+        )
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if math.isfinite(x) else None
+
+
+def _list(x: Array | None) -> list[float] | None:
+    return None if x is None else [float(v) for v in x]

@@ -1,0 +1,169 @@
+"""Refine a pair until it is known well enough: boxes, closed forms or hulls, facets, meshes, each only if needed.
+
+This is the one place where pairs of shapes are handed to the methods that measure them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from clamp3d.collide.answer import Distance
+from clamp3d.collide.body import bodies_distance
+from clamp3d.collide.broad import Boxes, box_gaps
+from clamp3d.collide.convex import Rod
+from clamp3d.collide.facets import rod_distance
+from clamp3d.collide.model import FINEST, Model
+from clamp3d.collide.surface import inside, surface_distance
+from clamp3d.collide.verdict import Thresholds
+from clamp3d.core.pose import Array, inverse
+from clamp3d.errors import SolverError
+
+COARSEST = 0.512
+"""First chord error (mm) of a pair that needs meshes; each further one is a whole power of two finer."""
+CONTAINED_ERROR = 0.064
+"""Chord error (mm) of the meshes that containment is asked with."""
+
+Enough = Callable[[Distance], bool]
+
+
+def from_boxes(a: Model, b: Model, T: Array) -> Distance:
+    """What the boxes of two shapes say, ``b`` at ``T`` (4, 4) in a's frame."""
+    pair = Boxes.of(np.array([a.bounds, b.bounds]), np.array([np.eye(4), T]))
+    return Distance(float(box_gaps(pair, np.array([[0, 1]]))[0]), level="boxes", method="bounding boxes")
+
+
+def refine(
+    a: Model, b: Model, T: Array, start: Distance, thresholds: Thresholds, enough: Enough, *, forms: bool = True
+) -> Distance:
+    """Distance of ``b`` at ``T`` (4, 4) in a's frame, from ``start`` (what the boxes said), until ``enough``.
+
+    Without ``forms`` the closed forms are left out: a caller that asks often may know that they say nothing here.
+    """
+    found = start
+    if enough(found):
+        return found
+    for level in (_features, _facets) if forms else (_facets,):
+        new = level(a, b, T, lambda x, known=found: enough(known.meet(x)))  # type: ignore[misc]
+        if new is not None:
+            found = _agreed(found, new)
+            if enough(found):
+                return found
+    error = COARSEST
+    while True:
+        found = _agreed(found, _meshes(a, b, T, error, thresholds))
+        uncertainty = a.mesh(error).error + b.mesh(error).error
+        if enough(found) or error <= FINEST or uncertainty <= 1e-9 or not (a.refines or b.refines):
+            return found
+        # The middle of the bounds guesses how far the nearest threshold is: go there, not step by step.
+        middle = 0.5 * (found.lower + found.upper)
+        margin = thresholds.margin(middle) if abs(middle) < 1e300 else 0.0
+        wanted = min(0.5 * error, max(0.25 * margin, error / 16.0))
+        while error > max(wanted, FINEST):
+            error = max(0.5 * error, FINEST)
+
+
+def every_level(a: Model, b: Model, T: Array, start: Distance, thresholds: Thresholds) -> Distance:
+    """The same from all models at their finest, whatever the first ones say; raises SolverError if they disagree."""
+    never: Enough = lambda _: False  # noqa: E731
+    hulls = bodies_distance(a.hull_body, b.hull_body, T, never).labelled("hulls", "convex hulls")
+    a.counters.queries["hulls"] += 1
+    found = start
+    for new in (
+        _features(a, b, T, never),
+        hulls,
+        _facets(a, b, T, never),
+        _meshes(a, b, T, FINEST, thresholds),
+    ):
+        if new is not None:
+            found = _agreed(found, new)
+    return found
+
+
+def contained(a: Model, b: Model, T: Array, thresholds: Thresholds) -> bool:
+    """Whether one of two overlapping parts lies wholly in the other, within the contact threshold."""
+    for inner, outer, place in ((b, a, T), (a, b, inverse(T))):
+        middle, half = inner.bounds.mean(axis=0), 0.5 * (inner.bounds[1] - inner.bounds[0])
+        R = place[:3, :3]
+        centre, reach = R @ middle + place[:3, 3], abs(R) @ half
+        box = outer.bounds
+        # The box of the inner one touches the outer's on six sides: one outside by more than its own corners can be
+        # is enough to say no, and cheap.
+        if (centre + 0.5 * reach < box[0]).any() or (centre - 0.5 * reach > box[1]).any():
+            continue
+        if ((box[1] - box[0]).max() * 1.7321 + thresholds.contact) < 2.0 * half.max():
+            continue
+        a.counters.queries["containment"] += 1
+        small, large = inner.mesh(CONTAINED_ERROR), outer.mesh(CONTAINED_ERROR)
+        if inside(small, large, place, thresholds.contact + small.error + large.error):
+            return True
+    return False
+
+
+def _agreed(old: Distance, new: Distance) -> Distance:
+    met = old.meet(new)
+    if met.lower > met.upper + 1e-7 + 1e-9 * abs(met.upper):
+        raise SolverError(
+            f"{new.level} ({new.method}) and {old.level} ({old.method}) disagree: "
+            f"[{new.lower:.9g}, {new.upper:.9g}] and [{old.lower:.9g}, {old.upper:.9g}] mm"
+        )
+    return met.ordered()
+
+
+def _features(a: Model, b: Model, T: Array, enough: Enough) -> Distance:
+    """Closed forms of both; the convex hull of a part that has none stands in for it."""
+    level = "hulls" if a.bodies is None or b.bodies is None else "features"
+    single = len(a.forms) == len(b.forms) == 1
+    found = Distance(np.inf, np.inf)
+    for x in a.forms:
+        for y in b.forms:
+            a.counters.queries[level] += 1
+            found = found.union(bodies_distance(x, y, T, enough if single else lambda _: False))
+    return found.labelled(level, f"{found.method} on hulls" if level == "hulls" else found.method)
+
+
+def _facets(a: Model, b: Model, T: Array, enough: Enough) -> Distance | None:
+    """Exact cylinders of one part against the mesh of the other, where that comes as a mesh."""
+    found = None
+    for first, second, place, swapped in ((a, b, T, False), (b, a, inverse(T), True)):
+        if first.facets is None or second.bodies is None:
+            continue
+        if not all(any(isinstance(piece, Rod) for piece in body.outers) for body in second.bodies):
+            continue
+        new = Distance(np.inf, np.inf)
+        for body in second.bodies:
+            a.counters.queries["facets"] += 1
+            new = new.union(rod_distance(first.facets, body, place))
+        new = new.moved(T).swapped() if swapped else new
+        found = new if found is None else found.meet(new)
+        if enough(found):
+            break
+    return None if found is None else found.labelled("facets", "cylinder on facets (FCL)")
+
+
+def _meshes(a: Model, b: Model, T: Array, error: float, thresholds: Thresholds) -> Distance:
+    a.counters.queries["meshes"] += 1
+    x, y = a.mesh(error), b.mesh(error)
+    found = surface_distance(x, y, T, contact=thresholds.contact)
+    chord = x.error + y.error
+    return found.labelled("meshes", f"meshes (FCL), chord error {chord:.2g} mm" if chord > 0.0 else "meshes (FCL)")
+
+
+ACCURACY = 1e-7
+"""Width (mm) of the interval at which a distance counts as known."""
+
+
+def measured(known: Distance, accuracy: float = ACCURACY) -> bool:
+    """Whether a distance is known to ``accuracy`` mm, or certainly an overlap, whose depth meshes do not tell."""
+    return known.upper - known.lower <= accuracy or known.upper < -1e-6
+
+
+def with_normal(found: Distance) -> Distance:
+    """``found`` with the normal that its points give, where they are apart."""
+    p, q = found.point_a, found.point_b
+    if p is None or q is None or not found.upper > 1e-6:
+        return found
+    size = float(np.linalg.norm(q - p))
+    return replace(found, normal=(q - p) / size) if size > 1e-6 else found

@@ -1,0 +1,94 @@
+"""What a distance means for a pair of parts: verdicts from absolute thresholds, given once they are certain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from clamp3d.checks import number, positive
+from clamp3d.collide.answer import Distance
+from clamp3d.errors import InputError
+
+RESOLUTION = 1e-6
+"""Bounds closer than this (mm) count as one number, and a gap that misses a threshold by less as meeting it."""
+
+
+class Verdict(StrEnum):
+    """How a pair of parts stands, from worst to best."""
+
+    CONTAINED = "contained"
+    CLASH = "clash"
+    UNCERTAIN = "uncertain"
+    CONTACT = "contact"
+    CLEARANCE = "clearance"
+    ALLOWED = "allowed"
+    CLEAR = "clear"
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """Overlap or gap up to ``contact`` mm is contact; a larger gap below ``clearance`` mm is too small a clearance.
+
+    Raises InputError unless 0 < contact and clearance is 0 (not asked for) or more than contact.
+    """
+
+    contact: float = 0.01
+    clearance: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "contact", positive("contact", self.contact))
+        rule = f"be 0 or > contact = {self.contact:g} mm"
+        object.__setattr__(self, "clearance", number("clearance", self.clearance, rule=rule))
+        if not (self.clearance == 0.0 or self.clearance > self.contact):
+            raise InputError(f"clearance must be 0 or > contact = {self.contact:g} mm, got {self.clearance}")
+
+    @property
+    def reach(self) -> float:
+        """Pairs further apart than this (mm) are clear."""
+        return max(self.contact, self.clearance)
+
+    def verdict(self, distance: Distance, allowance: float | None = None) -> Verdict:
+        """The verdict that all distances between the bounds of ``distance`` share, else uncertain.
+
+        Parameters
+        ----------
+        distance : Distance
+            The bounds of the pair's signed distance, mm.
+        allowance : float, optional
+            Overlap in mm up to which the pair's contact is meant; None if contact is not meant.
+
+        Examples
+        --------
+        >>> Thresholds(clearance=1.0).verdict(Distance(0.2, 0.9)).value
+        'clearance'
+        >>> Thresholds(clearance=1.0).verdict(Distance(0.9, 1.1)).value
+        'uncertain'
+        >>> Thresholds().verdict(Distance(-0.3, -0.2), allowance=0.5).value
+        'allowed'
+        """
+        lower, upper = distance.lower, distance.upper
+        if upper - lower <= 2.0 * RESOLUTION:
+            lower = upper = 0.5 * (lower + upper)
+        plain = self._of(lower) if self._of(lower) is self._of(upper) else Verdict.UNCERTAIN
+        if allowance is None or plain is Verdict.CLEAR:
+            return plain
+        limit = -max(allowance, self.contact)
+        if distance.lower >= limit - RESOLUTION:
+            if distance.lower >= self.reach:
+                return Verdict.CLEAR
+            return Verdict.ALLOWED if distance.upper < self.reach else Verdict.UNCERTAIN
+        return Verdict.CLASH if distance.upper < limit else Verdict.UNCERTAIN
+
+    def _of(self, distance: float) -> Verdict:
+        if distance < -self.contact - RESOLUTION:
+            return Verdict.CLASH
+        if distance <= self.contact + RESOLUTION:
+            return Verdict.CONTACT
+        return Verdict.CLEARANCE if distance < self.clearance - RESOLUTION else Verdict.CLEAR
+
+    def margin(self, distance: float) -> float:
+        """How far ``distance`` is from the nearest threshold, mm."""
+        marks = [-self.contact, self.contact]
+        if self.clearance > 0.0:
+            marks.append(self.clearance)
+        return min(abs(distance - mark) for mark in marks)

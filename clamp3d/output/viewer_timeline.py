@@ -1,0 +1,227 @@
+"""A time line of stops: the waypoints of an assembly, or a scene at rest and its motions up to their contacts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from clamp3d.collide.distance import Distance
+from clamp3d.collide.result import CheckResult, PairResult
+from clamp3d.collide.scene import Scene
+from clamp3d.core.motion import Motion
+from clamp3d.core.pose import Array
+from clamp3d.output.palette import VERDICT_COLOURS
+from clamp3d.output.wording import BAD, gap_text
+
+if TYPE_CHECKING:
+    from meshcat.animation import Animation
+
+Poses = Mapping[str, Array]
+Shown = Mapping[str, list[bool]]
+Measured = Callable[[Scene, Sequence[tuple[str, str]]], Iterable["Row"]]
+"""Measures pairs of a scene, as `clamp3d.collide.distance.measure` does, with their verdicts."""
+
+FIRST = "first contact"
+_HOLD = 1.2  # s at each stop
+_FASTEST, _SLOWEST = 0.9, 4.0  # s between two stops
+_MOTION = 4.0  # s of a motion of a scene from t = 0 to 1
+_TURN = math.radians(3.0)
+"""Largest turn between two keys: between them the viewer moves parts along chords."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """How a pair stands at a stop; ``drawn`` where the points are those of this very moment.
+
+    ``touches`` is whether the distance is within the scene's contact threshold; contact that is allowed need not be.
+    """
+
+    a: str
+    b: str
+    verdict: str
+    distance: Distance
+    touches: bool
+    what: str = ""
+    declared: bool = False
+    drawn: bool = True
+
+    @property
+    def gap(self) -> str:
+        """The distance in words."""
+        if self.touches and (self.what == FIRST or abs(self.distance.upper) < 5e-5):
+            return "touching"
+        return gap_text(self.distance.lower, self.distance.upper, digits=4)
+
+    @property
+    def colour(self) -> str:
+        """The verdict's colour; allowed contact that is not there has that of a gap."""
+        return VERDICT_COLOURS["clearance" if self.verdict == "allowed" and not self.touches else self.verdict]
+
+    @property
+    def near(self) -> bool:
+        """Whether the pair is worth a mark."""
+        return self.declared or self.verdict != "clear"
+
+    def data(self) -> dict[str, Any]:
+        """The row as JSON data."""
+        said = {"gap": self.gap, "near": self.near, "colour": self.colour}
+        names = {"a": self.a, "b": self.b, "verdict": self.verdict, "what": self.what}
+        return names | self.distance.to_dict() | said
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A moment on the time line: reached at ``arrive`` s, left at ``leave`` s.
+
+    ``poses`` are where the parts are drawn, ``via`` fractions of the way here with the poses of parts that do not go
+    straight. Playing halts at a stop that ``halts``; ``mark`` is what the time line says there.
+    """
+
+    step: str
+    label: str
+    poses: Poses
+    rows: tuple[Row, ...] = ()
+    mark: str = ""
+    halts: bool = False
+    via: tuple[tuple[float, Poses], ...] = ()
+    seconds: float | None = None
+    arrive: float = 0.0
+    leave: float = 0.0
+
+
+@dataclass
+class Timeline:
+    """Stops as they come, each with its time; ``size`` mm is how far a part goes in about two seconds."""
+
+    size: float
+    stops: list[Stop] = field(default_factory=list)
+
+    def add(self, stop: Stop) -> int:
+        """Append a stop and return its number."""
+        arrive = 0.0
+        if self.stops:
+            before = self.stops[-1]
+            way = max(np.linalg.norm(T[:3, 3] - before.poses[name][:3, 3]) for name, T in stop.poses.items())
+            seconds = min(_SLOWEST, max(_FASTEST, 2.0 * float(way) / self.size))
+            arrive = before.leave + (seconds if stop.seconds is None else stop.seconds)
+        self.stops.append(replace(stop, arrive=arrive, leave=arrive + _HOLD))
+        return len(self.stops) - 1
+
+    def group(self, number: int) -> str:
+        """What the marks of a stop are called in the scene."""
+        return f"{number + 1} {self.stops[number].label}".replace("/", " ")
+
+    def animation(self, followers: Mapping[str, Iterable[str]], groups: Iterable[str], shown: Shown) -> Animation:
+        """The animation that plays all stops once.
+
+        ``followers`` are the scene's paths that move with a part; the marks of a stop are below each of ``groups`` and
+        show while the parts rest; ``shown`` has paths that are seen only at some stops.
+        """
+        from meshcat.animation import Animation, AnimationClip
+        from meshcat.path import Path
+
+        clips: dict[Path, AnimationClip] = {}
+
+        def clip(path: str) -> AnimationClip:
+            return clips.setdefault(Path().append(path.lstrip("/")), AnimationClip(fps=1))
+
+        for part, paths in followers.items():
+            times, poses = self._keys(part)
+            turns = Rotation.from_matrix(np.array([T[:3, :3] for T in poses])).as_quat()
+            for path in paths:
+                for time, T, q in zip(times, poses, turns.tolist(), strict=True):
+                    clip(path).set_property(time, "position", "vector3", T[:3, 3].tolist())
+                    clip(path).set_property(time, "quaternion", "quaternion", q)
+        for k, stop in enumerate(self.stops):
+            for group in groups:
+                marks = clip(f"{group}/{self.group(k)}")
+                for j, other in enumerate(self.stops):
+                    marks.set_property(other.arrive, "visible", "bool", j == k)
+                    if j + 1 < len(self.stops):
+                        marks.set_property(other.leave, "visible", "bool", False)
+                marks.set_property(self.stops[-1].leave, "visible", "bool", k == len(self.stops) - 1)
+        for path, seen in shown.items():
+            for stop, on in zip(self.stops, seen, strict=True):
+                clip(path).set_property(stop.arrive, "visible", "bool", on)
+            clip(path).set_property(self.stops[-1].leave, "visible", "bool", seen[-1])
+        return Animation(clips)
+
+    def _keys(self, part: str) -> tuple[list[float], list[Array]]:
+        times, poses = [], []
+        for k, stop in enumerate(self.stops):
+            start = self.stops[k - 1].leave
+            for fraction, on_the_way in stop.via:
+                if part in on_the_way:
+                    times.append(start + fraction * (stop.arrive - start))
+                    poses.append(on_the_way[part])
+            times += [stop.arrive, stop.leave]
+            poses += [stop.poses[part]] * 2
+        return times, poses
+
+
+def scene_stops(result: CheckResult, measured: Measured) -> Iterator[Stop]:
+    """A checked scene at rest, then its motions one after the other, with a stop where parts first touch."""
+    motions = result.scene.motions
+    poses: Poses = {part.name: part.T_world for part in result.scene.parts}
+    marks = [motion.name for motion in motions] + [""]
+    yield Stop("at rest", "at rest", poses, tuple(_row(result, row) for row in result.pairs), marks[0])
+    for motion, mark in zip(motions, marks[1:], strict=True):
+        for stop in _motion_stops(result, motion, poses, measured, mark):
+            yield stop
+            last = stop.poses
+        poses = last
+
+
+def _motion_stops(
+    result: CheckResult, motion: Motion, start: Poses, measured: Measured, next_mark: str
+) -> Iterator[Stop]:
+    """The stops of a motion: where parts first touch, where they go on to, and the end."""
+    going = motion.resolved(start[motion.parts[0]])
+    rows = [row for row in result.motions if row.motion == motion.name]
+
+    def at(t: float) -> Poses:
+        return {name: going.at(t, T) if name in motion.parts else T for name, T in start.items()}
+
+    def way(t0: float, t1: float) -> tuple[tuple[float, Poses], ...]:
+        n = max(1, math.ceil(abs(going.angle) * (t1 - t0) / _TURN))
+        moved = [(k / n, at(t0 + (t1 - t0) * k / n)) for k in range(1, n)]
+        return tuple((f, {name: poses[name] for name in motion.parts}) for f, poses in moved)
+
+    contacts, before = first_contacts(rows), 0.0
+    for k, (t, touching) in enumerate(contacts.items()):
+        poses = at(t)
+        # The engine knows the moment; the distance right there may be known to its contact threshold only.
+        found = measured(result.scene.moved(poses), [(row.a, row.b) for row in touching])
+        now = tuple(replace(row, verdict="contact", what=FIRST, touches=True) for row in found)
+        label = f"{motion.name}: {'first' if k == 0 else 'next'} contact at t = {t:.4f}"
+        seconds = max(0.3, _MOTION * (t - before))
+        yield Stop(motion.name, label, poses, now, "" if k else FIRST, k == 0, way(before, t), seconds)
+        before = t
+    least = tuple(
+        replace(_row(result, row), what=f"least, at t = {row.t:.4f}", drawn=row.t == 1.0 and row.verdict in BAD)
+        for row in rows
+    )
+    end = f"{motion.name}: end" + (", through the contact" if contacts else "")
+    seconds = max(0.3, _MOTION * (1.0 - before))
+    yield Stop(motion.name, end, at(1.0), least, next_mark, via=way(before, 1.0), seconds=seconds)
+
+
+def first_contacts(rows: Iterable[PairResult]) -> dict[float, list[PairResult]]:
+    """The pairs that come to touch during a motion where they are not meant to, by the moment; the first dozen."""
+    found: dict[float, list[PairResult]] = {}
+    for row in sorted((r for r in rows if r.contact_at and r.verdict in ("contact", "clash", "contained")), key=_first):
+        found.setdefault(_first(row), []).append(row)
+    return dict(list(found.items())[:12])
+
+
+def _first(row: PairResult) -> float:
+    return row.contact_at or 0.0
+
+
+def _row(result: CheckResult, row: PairResult) -> Row:
+    return Row(row.a, row.b, row.verdict.value, row.distance, row.distance.upper <= result.thresholds.contact)

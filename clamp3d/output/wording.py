@@ -1,0 +1,133 @@
+"""Distances, verdicts and findings in words: the terminal, the page and the viewer say the same."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
+
+from clamp3d.collide.result import CheckResult, PairResult
+from clamp3d.collide.scene import Part, Scene
+
+BAD = ("contained", "clash")
+OPEN = ("uncertain",)
+
+
+def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
+    """The signed distance between two bounds (mm) as a gap or an overlap, with no digit that is not certain.
+
+    >>> gap_text(-0.0707106782, -0.0707106781), gap_text(-110.0, -56.2341), gap_text(2.5, math.inf)
+    ('overlap 0.070711 mm', 'overlap at least 56.23 mm', 'gap at least 2.5 mm')
+    >>> gap_text(0.0, 0.0), gap_text(-0.02, 0.003), gap_text(-math.inf, 0.25)
+    ('gap 0.000000 mm', 'gap or overlap at most 0.02 mm', 'gap at most 0.25 mm')
+    """
+    if math.isfinite(lower) and math.isfinite(upper):
+        for places in range(digits, 0, -1):
+            low, high = round(lower, places) + 0.0, round(upper, places) + 0.0
+            if low == high and (high != 0.0 or places == digits or upper - lower <= 2e-6):
+                return f"{'overlap' if high < 0.0 else 'gap'} {abs(high):.{places}f} mm"
+    if upper < 0.0:
+        return f"overlap at least {_rounded(-upper, ROUND_FLOOR)} mm"
+    if lower > 0.0:
+        return f"gap at least {_rounded(lower, ROUND_FLOOR)} mm"
+    if math.isfinite(upper) and math.isfinite(lower):
+        return f"gap or overlap at most {_rounded(max(upper, -lower), ROUND_CEILING)} mm"
+    return f"gap at most {_rounded(upper, ROUND_CEILING)} mm" if math.isfinite(upper) else "not known"
+
+
+def _rounded(value: float, rounding: str) -> str:
+    """Four significant digits, rounded to the safe side."""
+    exact = Decimal(value)
+    digits = max(0, 3 - exact.adjusted()) if exact else 0
+    return f"{float(exact.quantize(Decimal(1).scaleb(-digits), rounding=rounding)):.10g}"
+
+
+def part_title(part: Part) -> str:
+    """A part's name with what it is, where the name does not say it.
+
+    >>> from clamp3d.core import shapes
+    >>> part_title(Scene().add("wire", shapes.cylinder(6.5, 80.0)).parts[0])
+    'wire'
+    """
+    title = getattr(part.shape, "title", "")
+    return part.name if not title or title.lower() in part.name.lower() else f"{part.name} {title}"
+
+
+def titles(scene: Scene) -> dict[str, str]:
+    """`part_title` of every part."""
+    return {part.name: part_title(part) for part in scene.parts}
+
+
+def meaning(verdict: str, scene: Scene) -> str:
+    """What a verdict means in this scene."""
+    contact, clearance = scene.thresholds.contact, scene.thresholds.clearance
+    return {
+        "contained": "one part lies inside the other",
+        "clash": f"parts overlap by more than {contact:g} mm",
+        "uncertain": "could not be decided",
+        "contact": f"parts touch (within {contact:g} mm)",
+        "clearance": f"gap smaller than {clearance:g} mm",
+        "allowed": "contact that is meant to be",
+        "clear": f"gap larger than {max(contact, clearance):g} mm",
+    }[verdict]
+
+
+def headline(result: CheckResult) -> str:
+    """The result in one line: what was found, or what is clean."""
+    found = result.findings
+    clashes = [row for row in found if row.verdict in BAD]
+    others = [
+        f"{n} {words}" if n == 1 else f"{n} {plural}"
+        for verdict, words, plural in (
+            ("uncertain", "pair undecided", "pairs undecided"),
+            ("clearance", "gap too small", "gaps too small"),
+            ("contact", "contact", "contacts"),
+        )
+        if (n := sum(row.verdict == verdict for row in found))
+    ]
+    if clashes:
+        deepest = min(clashes, key=lambda row: row.distance.upper).distance
+        moving = sum(row.motion is not None for row in clashes)
+        where = "" if not moving else " in motion" if moving == len(clashes) else f" ({moving} in motion)"
+        depth = gap_text(deepest.lower, deepest.upper).removeprefix("overlap ")
+        said = f", deepest {depth}" if deepest.upper < 0.0 else ""
+        others.insert(0, f"{len(clashes)} {'clash' if len(clashes) == 1 else 'clashes'}{where}{said}")
+    checked = f"{result.work.pairs} {'pair' if result.work.pairs == 1 else 'pairs'}"
+    if result.scene.motions:
+        checked += f" and {len(result.scene.motions)} {'motion' if len(result.scene.motions) == 1 else 'motions'}"
+    if not clashes and not any(row.verdict in OPEN for row in found):
+        return f"Clean: {checked} checked, nothing clashes" + "".join(f"; {text}" for text in others)
+    return "; ".join(others) + f" ({checked} checked)"
+
+
+def sentence(row: PairResult, names: dict[str, str]) -> str:
+    """A finding in words."""
+    a, b, d = names[row.a], names[row.b], row.distance
+    gap = gap_text(d.lower, d.upper)
+    said = {
+        "contained": f"{a} and {b}: one lies inside the other, {gap}",
+        "clash": f"{a} and {b} clash: {gap}",
+        "uncertain": f"{a} and {b}: undecided, {gap}",
+        "contact": f"{a} and {b} touch: {gap}",
+        "clearance": f"{a} and {b} are too close: {gap}",
+    }
+    return said.get(row.verdict.value, f"{a} and {b}: {gap}")
+
+
+def circumstances(row: PairResult) -> str:
+    """Where on a motion a finding is; empty for one at rest."""
+    if row.motion is None:
+        return ""
+    first = "" if row.contact_at is None else f"first contact at t = {row.contact_at:.4f}, "
+    return f"in motion {row.motion!r}: {first}{'deepest' if row.verdict in BAD else 'nearest'} at t = {row.t:.4f}"
+
+
+def counts_text(result: CheckResult) -> str:
+    """How many pairs have which verdict, in words."""
+    return ", ".join(f"{count} {name}" for name, count in result.counts.items()) or "no pairs"
+
+
+def most_severe(rows: Sequence[PairResult]) -> str:
+    """The worst verdict of some rows, "clear" where there is none."""
+    order = [*BAD, *OPEN, "clearance", "contact", "allowed", "clear"]
+    return min((row.verdict.value for row in rows), key=order.index, default="clear")
