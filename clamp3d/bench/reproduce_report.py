@@ -162,7 +162,7 @@ def _table5(found: Reproduction) -> str:
             "  Orders of growth, published and fitted to counts; a moving parts:",
             text_table(["search", "a", "count", "published", "measured", ""], orders, indent=4),
             "  grid: the paper's search, every combination of places of the parts: the segments of an arc do not add",
-            "  to its positions, so the contact tests grow with m and not with m^a. stepped: this program's search, one",
+            "  to its positions, so the contact tests grow with m and not with m^a. stepped: this program's, one",
             "  way along the bolt on which the wires settle: the steps of the parts do not multiply either.",
         ]
     )

@@ -303,7 +303,9 @@ def _described(name: str, shape: object) -> str:
 
 def _motions(scene: Scene) -> str:
     n = len(scene.motions)
-    return f"{n or 'no'} {'motion' if n == 1 else 'motions'} of rigid parts" + (", followed without a gap in time" * bool(n))
+    return f"{n or 'no'} {'motion' if n == 1 else 'motions'} of rigid parts" + (
+        ", followed without a gap in time" * bool(n)
+    )
 
 
 def _clamp_modelled(assembly: Assembly) -> tuple[str, ...]:
