@@ -17,7 +17,7 @@ from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.result import Assembly
 from clamp3d.collide.check import check
 from clamp3d.collide.distance import Distance
-from clamp3d.collide.result import BAD, CheckResult, PairResult
+from clamp3d.collide.result import BAD, PairResult
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core.shapes import MeshShape
@@ -303,7 +303,9 @@ def _described(name: str, shape: object) -> str:
 
 def _motions(scene: Scene) -> str:
     n = len(scene.motions)
-    return f"{n or 'no'} {'motion' if n == 1 else 'motions'} of rigid parts" + (", followed without a gap in time" * bool(n))
+    return f"{n or 'no'} {'motion' if n == 1 else 'motions'} of rigid parts" + (
+        ", followed without a gap in time" * bool(n)
+    )
 
 
 def _clamp_modelled(assembly: Assembly) -> tuple[str, ...]:
