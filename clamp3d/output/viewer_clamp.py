@@ -13,7 +13,6 @@ from clamp3d.clamp.dimensions import TITLES, Clamp
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import clamp_scene
-from clamp3d.clamp.screw import ScrewJoint
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array, rotation
 from clamp3d.output.palette import VERDICT_COLOURS
@@ -53,7 +52,7 @@ class ClampStory:
         poses = {part.name: part.T_world for part in scene.parts}
         on = float(poses["P4"][2, 3] - poses["P5"][2, 3])  # up to a constant
         self._first = on if self._first is None else self._first
-        before, self._turn = self._turn, -ScrewJoint(self.clamp.bolt.pitch).turn(on - self._first)  # clockwise
+        before, self._turn = self._turn, -self.clamp.bolt.turn(on - self._first)  # clockwise
         nut = poses["P5"]
         poses["P5"] = nut @ rotation((0.0, 0.0, 1.0), self._turn)
         n = math.ceil(abs(self._turn - before) / _TURN)
