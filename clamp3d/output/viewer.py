@@ -32,7 +32,7 @@ from clamp3d.output.viewer_page import live_page, panel, whole_page
 from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
 from clamp3d.output.viewer_server import CommandLog, LocalServer, RemoteServer
 from clamp3d.output.viewer_timeline import FIRST, Row, Stop, scene_stops
-from clamp3d.output.wording import BAD, circumstances, gap_text, headline, meaning, sentence, titles
+from clamp3d.output.wording import BAD, circumstances, gap_text, headline, meaning, sentence, severity, titles
 
 CLEARANCE = 5.0
 """Gap in mm from which two parts of a clamp count as clear."""
@@ -157,7 +157,7 @@ class Viewer:
             instance("result", result, CheckResult)
             for stop in scene_stops(result, self._measured):
                 self._drawing.show(stop)
-            told = {"headline": headline(result), "state": "clean" if result.clean else "found"}
+            told = {"headline": headline(result), "state": severity(result)}
             told |= {"findings": self._scene_findings(result), "pairs": _table(result.pairs)}
             told |= {"motions": _table(result.motions)}
         self._drawing.play({} if self._clamp is None else self._clamp.shown(self._drawing))
@@ -253,7 +253,8 @@ class Viewer:
         head = self._clamp.told() if self._clamp is not None else _told(scene)
         measured = "exactly" if self._model is None else f"by {self._model.name}"
         stops = [
-            _stop_data(stop) | dict(zip(("low", "high"), (x.tolist() for x in drawing.extent([stop.poses])), strict=True))
+            _stop_data(stop)
+            | dict(zip(("low", "high"), (x.tolist() for x in drawing.extent([stop.poses])), strict=True))
             for stop in drawing.timeline.stops
         ]
         used = {row["verdict"] for stop in stops for row in stop["rows"]} | {"contact", "clearance", "clear"}

@@ -113,4 +113,3 @@ def facts(assembly: Assembly) -> list[str]:
         f"nut turned {assembly.turns:.2f} times from open",
         f"method {assembly.method}, {assembly.solver} solver",
     ]
-

@@ -47,9 +47,7 @@ def overlap(a: trimesh.Trimesh, T_a: Array, b: trimesh.Trimesh, T_b: Array) -> t
     return _mesh(_manifold(a) ^ placed)
 
 
-def groove_surface(
-    groove: SweptArc, T_part_groove: Array, mesh_error: float, *, half: bool = False
-) -> trimesh.Trimesh:
+def groove_surface(groove: SweptArc, T_part_groove: Array, mesh_error: float, *, half: bool = False) -> trimesh.Trimesh:
     """A groove's arc surface in its part's frame, a hair towards the axis; with ``half`` only its end on +Y."""
     import trimesh
 

@@ -33,7 +33,9 @@ def overlay(clamp: Clamp, text: str) -> tuple[str, dict[str, list[trimesh.Trimes
     """
     kind, _, size = text.partition("=")
     if kind not in _KINDS:
-        raise InputError(f"unknown overlay {text!r}; available: {', '.join(f'{k}[={v[0]}]' for k, v in _KINDS.items())}")
+        raise InputError(
+            f"unknown overlay {text!r}; available: {', '.join(f'{k}[={v[0]}]' for k, v in _KINDS.items())}"
+        )
     unit, value = _KINDS[kind]
     try:
         value = float(size) if size else value

@@ -10,11 +10,11 @@ function clamp3dViewer(messages) {
     viewer = new MeshCat.Viewer(pane);
   } catch (error) {
     // Without WebGL the panel is the page; what it says is in the HTML already.
-    document.body.classList.add("no3d");
     $("no3d").hidden = false;
     if (live) setTimeout(() => location.reload(), 3000);
     return;
   }
+  document.body.classList.remove("no3d");
   window.viewer = viewer;
   const animator = viewer.animator;
   const size = viewer.set_3d_pane_size.bind(viewer);
