@@ -5,13 +5,15 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from clamp3d.clamp.connections import CONVEX_PAIRS, GEOMETRY, PAIRS, Undeclared, convex_gap
-from clamp3d.clamp.dimensions import Clamp, PartName
-from clamp3d.clamp.result import Contact, Event, Seat, Waypoint
+from clamp3d.clamp.contact import Seat
+from clamp3d.clamp.dimensions import Clamp, ConnectionType, PartName
+from clamp3d.clamp.result import Event, Waypoint
 from clamp3d.clamp.section import SPLINTS, WIRES, Section
 from clamp3d.core.arc_circle import classify_arc_circle
 from clamp3d.core.pose import Array, SectionPose, inverse
@@ -22,6 +24,25 @@ CONTACT = 1e-6
 
 OFF_ARC = ("face ", "flat", "lip", "end", "corner")
 """How the names of features begin that are not of a groove's arc."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """How a declared pair stands: ``distance`` mm (positive apart), ``point`` (3,) and ``normal`` (3,) in the world.
+
+    ``relation`` is a column of Table 3 (type 3), a row of Table 2 or 'seat' (type 2), or 'screw joint' (type 1);
+    ``feature`` names the piece of the groove. ``point`` lies on part a, ``normal`` is unit from a to b.
+    """
+
+    a: PartName
+    b: PartName
+    type: ConnectionType
+    relation: str
+    distance: float
+    point: Array
+    normal: Array
+    feature: str
+
 
 Poses = dict[PartName, SectionPose]
 

@@ -1,48 +1,24 @@
-"""What a run answers: frozen dataclasses, no behaviour beyond reading them."""
+"""What an assembly answers: frozen dataclasses, no behaviour beyond reading them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+import math
+from dataclasses import asdict, dataclass
+from html import escape
+from typing import Any, Literal
 
+from clamp3d import __version__
 from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import instance
-from clamp3d.clamp.connections import Undeclared
-from clamp3d.clamp.dimensions import Clamp, ConnectionType, PartName
+from clamp3d.clamp.contact import Contact, Seat, measure_contacts, overlap
+from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
+from clamp3d.clamp.matrix import Difference, Pair, differences
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array, SectionPose
+from clamp3d.errors import MissingLibraryError
 
 Solver = Literal["exact", "stepped", "bisection"]
-
-
-@dataclass(frozen=True, slots=True)
-class Contact:
-    """How a declared pair stands: ``distance`` mm (positive apart), ``point`` (3,) and ``normal`` (3,) in the world.
-
-    ``relation`` is a column of Table 3 (type 3), a row of Table 2 or 'seat' (type 2), or 'screw joint' (type 1);
-    ``feature`` names the piece of the groove. ``point`` lies on part a, ``normal`` is unit from a to b.
-    """
-
-    a: PartName
-    b: PartName
-    type: ConnectionType
-    relation: str
-    distance: float
-    point: Array
-    normal: Array
-    feature: str
-
-
-@dataclass(frozen=True, slots=True)
-class Seat:
-    """A wire in a groove: ``seated`` if it touches the groove's arc; ``gap`` in mm; ``detail`` in words."""
-
-    splint: PartName
-    wire: PartName
-    seated: bool
-    gap: float
-    detail: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +29,7 @@ class Event:
     a: PartName
     b: PartName
     relation: str
-    point: Array
+    point: Array | None
     travel: float
 
 
@@ -91,10 +67,18 @@ class Work:
 
 @dataclass(frozen=True, slots=True)
 class Equilibrium:
-    """Another state that closing can end in: ``distance``, ``closing`` (mm) and ``tilt`` (rad) as of `Assembly`.
+    """Another state that closing the clamp can end in.
 
-    ``status`` is that of a run; ``detail`` says what holds it where that is not the grooves' arcs. ``rests``: it is an
-    equilibrium; if not, a wire slips out of its groove there.
+    Attributes
+    ----------
+    distance, closing, tilt : float
+        As of `Assembly`; mm, mm, rad.
+    status : str
+        As of `Assembly`.
+    detail : str
+        What holds the state where that is not the grooves' arcs.
+    rests : bool
+        Whether it is an equilibrium; if not, a wire slips out of its groove there.
     """
 
     distance: float
@@ -103,6 +87,37 @@ class Equilibrium:
     status: str
     detail: str
     rests: bool
+
+    def __str__(self) -> str:
+        where = f"{self.distance:.3f} mm, tilt {math.degrees(self.tilt):z.2f} deg"
+        if self.rests:
+            return f"another equilibrium: {where}" + (f": {self.detail}" if self.detail else "")
+        return f"also ends at {where} (no equilibrium: {self.detail})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "distance_mm": self.distance,
+            "closing_mm": self.closing,
+            "tilt_deg": math.degrees(self.tilt),
+            "status": self.status,
+            "detail": self.detail,
+            "rests": self.rests,
+        }
+
+
+Severity = Literal["error", "warning", "note"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something a reviewer has to know: ``text`` in words, and how grave it is."""
+
+    severity: Severity
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.severity}: {self.text}"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -130,15 +145,17 @@ class Assembly:
     poses : dict of SectionPose
         Each part in the section frame, in the final state.
     contacts : tuple of Contact
-        How the pairs of parts stand in the final state.
+        How all 21 pairs of parts stand in the final state, in the order of the connection matrix.
     seats : tuple of Seat
         Whether each wire lies in each of its grooves.
     events : tuple of Event
         The contacts that ended or changed a motion, in order.
     path : tuple of Waypoint
         The way from open to final.
-    undeclared : tuple of Undeclared
-        Pairs that met otherwise than the connection matrix declares.
+    undeclared : tuple of Difference
+        Pairs that met, on the way or in the end, though the connection matrix declares no connection.
+    resolution : float
+        Gaps up to this count as closed: the solver cannot close further; mm.
     violation, optimality : float or None
         Proof of the exact answer in mm: deepest overlap, and residual of the optimality conditions.
     work : Work
@@ -160,7 +177,8 @@ class Assembly:
     seats: tuple[Seat, ...]
     events: tuple[Event, ...]
     path: tuple[Waypoint, ...]
-    undeclared: tuple[Undeclared, ...]
+    undeclared: tuple[Difference, ...]
+    resolution: float
     violation: float | None
     optimality: float | None
     work: Work
@@ -191,9 +209,101 @@ class Assembly:
         instance("waypoint", waypoint, Waypoint)
         return clamp_scene(self.clamp, {part: waypoint.T_world(part) for part in waypoint.poses})
 
+    def contacts_at(self, waypoint: Waypoint) -> tuple[Contact, ...]:
+        """How all 21 pairs stand at a waypoint of `path`."""
+        instance("waypoint", waypoint, Waypoint)
+        return measure_contacts(self.clamp, waypoint.poses, self.model)
+
+    @property
+    def matrix(self) -> dict[Pair, Contact]:
+        """The connection matrix as measured: the pairs that touch in the final state, with type and place."""
+        return {(c.a, c.b): c for c in self.contacts if c.type}
+
+    @property
+    def matrix_differences(self) -> tuple[Difference, ...]:
+        """Where `matrix` differs from the declared one, in both directions."""
+        return differences(self.contacts, self.resolution)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What a reviewer has to know, the worst first; every report prints this list."""
+        errors = [] if self.clamped else [self.status]
+        errors += [text for c in self.contacts if (text := overlap(c)) and not self.status.endswith(text)]
+        errors += [str(d) for d in self.undeclared]
+        rest = [d for d in self.matrix_differences if d.declared != 0]
+        warnings = [str(d) for d in rest if d.declared == 3 or d.measured]
+        notes = [str(d) for d in rest if d.declared != 3 and not d.measured]
+        notes += [str(e) for e in self.others or ()]
+        listed: list[tuple[Severity, list[str]]] = [("error", errors), ("warning", warnings), ("note", notes)]
+        return tuple(Finding(severity, text) for severity, texts in listed for text in texts)
+
     def T_world(self, part: PartName) -> Array:
         """Pose (4, 4) of a part in the world in the final state, lengths in mm."""
         return self.poses[part].T()
 
     def __repr__(self) -> str:
         return f"<Assembly {self.clamp.name}: {self.status}, {self.distance:.3f} mm>"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{c.a}-{c.b}</td><td>{c.declared}</td><td>{c.type}</td><td>{c.relation}</td>"
+            f"<td style='text-align:right'>{c.gap:.6f}</td></tr>"
+            for c in self.contacts
+        )
+        head = "".join(f"<th>{name}</th>" for name in ("pair", "declared", "measured", "relation", "gap (mm)"))
+        return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{rows}</table>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON, as ``clamp3d run --json`` writes it; lengths in mm, angles in degrees."""
+        return {
+            "clamp3d": __version__,
+            "clamp": self.clamp.name,
+            "line": self.clamp.line.label,
+            "jumper": self.clamp.jumper.label,
+            "method": self.method,
+            "solver": self.solver,
+            "limits": list(self.limits),
+            "status": self.status,
+            "distance_mm": self.distance,
+            "closing_mm": self.closing,
+            "tilt_deg": math.degrees(self.tilt),
+            "nut_turns": self.turns,
+            "parts": {
+                name: {
+                    "title": TITLES[name],
+                    "T_world": self.T_world(name).tolist(),
+                    "section": {"x": pose.x, "y": pose.y, "angle_deg": math.degrees(pose.angle)},
+                }
+                for name, pose in self.poses.items()
+            },
+            "contacts": [c.to_dict() for c in self.contacts],
+            "seats": [
+                {"splint": s.splint, "wire": s.wire, "seated": s.seated, "gap_mm": s.gap, "detail": s.detail}
+                for s in self.seats
+            ],
+            "events": [
+                {
+                    "step": e.step,
+                    "a": e.a,
+                    "b": e.b,
+                    "relation": e.relation,
+                    "point": None if e.point is None else e.point.tolist(),
+                    "travel_mm": e.travel,
+                }
+                for e in self.events
+            ],
+            "undeclared": [str(d) for d in self.undeclared],
+            "matrix_differences": [d.to_dict() for d in self.matrix_differences],
+            "findings": [asdict(finding) for finding in self.findings],
+            "residuals": {"largest_violated_gap_mm": self.violation, "optimality_mm": self.optimality},
+            "other_ends": None if self.others is None else [e.to_dict() for e in self.others],
+            "work": asdict(self.work),
+        }
+
+    def frame(self) -> Any:
+        """The contacts as a pandas DataFrame, a row for each pair. Raises MissingLibraryError without pandas."""
+        try:
+            import pandas  # type: ignore[import-untyped,unused-ignore]
+        except ImportError:
+            raise MissingLibraryError("frame() needs pandas: pip install pandas; contacts does without") from None
+        return pandas.DataFrame([c.to_dict() for c in self.contacts])

@@ -39,6 +39,7 @@ def command(
     from clamp3d.clamp.assemble import assemble
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.collide.check import check, check_full
+    from clamp3d.collide.verdict import Verdict
     from clamp3d.output.files import write_json, write_text
     from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
 
@@ -56,7 +57,7 @@ def command(
     if html_file is not None:
         write_text(html_file, check_to_html(result, complete))
     show(check_to_text(result, complete))
-    finish(finding=not result.clean, undecided="uncertain" in result.counts)
+    finish(finding=not result.clean, undecided=any(row.verdict is Verdict.UNCERTAIN for row in result.rows))
 
 
 def _pairs(text: str) -> list[tuple[str, str]]:

@@ -7,28 +7,37 @@ from typing import TYPE_CHECKING
 
 import click
 
-from clamp3d.cli.options import FOLDER, UNITS, Source, clamp_argument, number
+from clamp3d.cli.options import UNITS, Source, number, source_argument
 from clamp3d.cli.terminal import show
 
 if TYPE_CHECKING:
+    from clamp3d.clamp.result import Assembly
+    from clamp3d.collide.scene import Scene
     from clamp3d.output.export import Format, Layout
 
 FORMATS = ("stl", "obj", "ply", "glb", "3mf", "step")
 
 
 @click.command("export")
-@clamp_argument
-@click.option("--format", "-f", type=click.Choice(FORMATS), required=True, help="STEP holds true arcs, not facets.")
-@click.option("--output", "-o", type=FOLDER, required=True, metavar="DIR")
+@source_argument()
+@click.option("--format", "-f", type=click.Choice(FORMATS), help="By default the suffix of FILE.")
+@click.option(
+    "--output",
+    "-o",
+    type=click.Path(path_type=Path),
+    required=True,
+    metavar="DIR|FILE",
+    help="A folder, or one file that ends in a format's suffix.",
+)
 @click.option(
     "--layout",
     type=click.Choice(["parts", "assembly"]),
-    help="One file per part, or one for all.  [default: assembly for glb, 3mf, step; else parts]",
+    help="One file per part, or one for all.  [default: assembly for a FILE and for glb, 3mf, step; else parts]",
 )
 @click.option(
     "--state",
     metavar="open|final|STEP",
-    help="Place the parts as they stand there; a step by name or number.  [default: final for an assembly; "
+    help="Place a clamp's parts as they stand there; a step by name or number.  [default: final for an assembly; "
     "separate parts keep their own frames]",
 )
 @click.option("--mesh-error", type=number, default=0.01, show_default=True, metavar="MM", help="Chord error of meshes.")
@@ -36,7 +45,7 @@ FORMATS = ("stl", "obj", "ply", "glb", "3mf", "step")
 @click.option("--quiet", "-q", is_flag=True, help="No messages.")
 def command(
     source: Source,
-    format: Format,
+    format: Format | None,
     output: Path,
     layout: Layout | None,
     state: str | None,
@@ -44,39 +53,27 @@ def command(
     unit: str | None,
     quiet: bool,
 ) -> None:
-    """Write the parts of CLAMP (a built-in name or a TOML file) for CAD review, with a manifest beside them.
+    """Write the parts of INPUT for CAD review, with a manifest beside them.
 
-    Prints the paths of the files. World axes are Z up with the wires along Y; GLB is metres and Y up, as its
-    specification demands.
+    INPUT is a clamp (a built-in name or a TOML file), a scene file, a mesh or a STEP file. Prints the paths of the
+    files. World axes are Z up, a clamp's wires along Y; GLB is metres and Y up, as its specification demands. STEP
+    holds true arcs, not facets.
     """
-    from clamp3d.output.export import default_layout, export
+    from clamp3d.clamp.dimensions import Clamp
+    from clamp3d.output.export import default_layout, destination, export
 
-    loaded = source.clamp()
-    layout = layout or default_layout(format)
-    if state is None and layout == "assembly":
-        state = "final"
-    poses = status = None
-    if state is not None:
-        from clamp3d.baselines.cas import Cas
+    chosen, file = destination(output, format)
+    loaded: Clamp | Scene | Assembly = source.load()
+    whole = file is not None or (layout or default_layout(chosen)) == "assembly"
+    if isinstance(loaded, Clamp) and (whole or state is not None):
         from clamp3d.clamp.assemble import assemble
         from clamp3d.clamp.states import state as find_state
 
-        run = assemble(loaded, Cas())
-        waypoint = find_state(run, state)
-        poses = {name: pose.T() for name, pose in waypoint.poses.items()}
-        status = run.status
+        state = state or "final"
+        loaded = assemble(loaded)
+        label = find_state(loaded, state).label
         if not quiet:
-            show(f"state {state}: {waypoint.label} ({status})", err=True)
-    written = export(
-        loaded,
-        format=format,
-        output=output,
-        poses=poses,
-        state=state,
-        status=status,
-        layout=layout,
-        mesh_error=mesh_error,
-        unit=unit,
-    )
+            show(f"state {state}: {label} ({loaded.status})", err=True)
+    written = export(loaded, output, format=chosen, layout=layout, state=state, mesh_error=mesh_error, unit=unit)
     for path in (*written.files, written.manifest):
         show(str(path))

@@ -6,50 +6,56 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import CLEARANCE, FOLDER, QUIET, Method, Source, clamp_argument, method_options, number
+from clamp3d.cli.options import FOLDER, QUIET, Method, Source, method_options, number, source_argument
 from clamp3d.cli.progress import narrator
 from clamp3d.cli.terminal import finish, show
 
 
 @click.command("report")
-@clamp_argument
+@source_argument()
 @method_options
-@CLEARANCE
 @click.option(
-    "--outline-error", type=number, default=0.001, show_default=True, metavar="MM", help="Chord error of outlines."
+    "--clearance", type=number, metavar="MM", help="Gap that parts must keep.  [default: 5 for a clamp; the scene's own]"
 )
+@click.option("--outline-error", type=number, hidden=True, help="No longer needed: pairs are measured as solids.")
 @click.option("--output", "-o", type=FOLDER, required=True, metavar="DIR")
 @QUIET
 def command(
     source: Source,
     method: Method,
-    clearance: float,
-    outline_error: float,
+    clearance: float | None,
+    outline_error: float | None,
     output: Path,
     quiet: bool,
 ) -> None:
-    """Assemble CLAMP and write a report for an assembly reviewer into DIR: report.html, report.json, pairs.csv.
+    """Write a report for a reviewer into DIR: report.html, report.json, pairs.csv.
 
-    Prints the paths of the files. Exit code 1 if the clamp does not close on both wires, or parts meet that should not.
+    INPUT is a clamp (a built-in name or a TOML file), which is assembled first, a scene file, a mesh or a STEP file;
+    --method and --solver go with a clamp. Prints the paths of the files. Exit code 1 if parts clash, or a clamp does
+    not close on both wires or parts meet that should not.
     """
     settings = method.settings()
     from clamp3d.clamp.assemble import assemble
-    from clamp3d.clamp.contacts import CONTACT
-    from clamp3d.clamp.verdict import verdict
-    from clamp3d.core.profile import check_mesh_error
+    from clamp3d.clamp.dimensions import Clamp
+    from clamp3d.clamp.scene import CONTACT
+    from clamp3d.collide.verdict import Thresholds
     from clamp3d.output.files import check_folder
-    from clamp3d.output.report import report
+    from clamp3d.output.report import make_report
     from clamp3d.output.report_page import write_report
 
     check_folder(output)
-    check_mesh_error(outline_error)
-    verdict(0.0, contact=CONTACT, clearance=clearance)
-    loaded = source.clamp()
-    model = method.model(loaded, quiet=quiet)
-
+    Thresholds(CONTACT, clearance or 0.0)
+    loaded = source.load()
     with narrator(quiet) as tell:
-        run = assemble(loaded, model, on_waypoint=tell.waypoint, progress=tell.position, **settings)
-        made = report(run, model, clearance=clearance, mesh_error=outline_error)
+        if isinstance(loaded, Clamp):
+            model = method.model(loaded, quiet=quiet)
+            others = method.method == "cas" and settings["solver"] == "exact"
+            subject = assemble(
+                loaded, model, others=others, on_waypoint=tell.waypoint, progress=tell.position, **settings
+            )
+            made = make_report(subject, clearance=clearance, progress=tell.status)
+        else:
+            made = make_report(loaded, clearance=clearance, progress=tell.status)
         paths = write_report(made, output, progress=tell.status)
     for path in paths:
         show(str(path))

@@ -48,14 +48,14 @@ def command(
     )
     from clamp3d.clamp.assemble import assemble
     from clamp3d.output.files import write_json
-    from clamp3d.output.run_report import run_to_dict, run_to_text
+    from clamp3d.output.run_report import run_to_text
 
     loaded = source.clamp()
     model = method.model(loaded, quiet=quiet)
 
     def done(run: Assembly) -> None:
         if json_file is not None:
-            write_json(json_file, run_to_dict(run))
+            write_json(json_file, run.to_dict())
         show(run_to_text(run))
 
     if view or viewing.html_file is not None or viewing.url is not None:

@@ -17,7 +17,7 @@ from clamp3d.core.profile import MIN_MESH_ERROR
 from clamp3d.output.figures import near, same_scale, title
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
 from clamp3d.output.section import Poses, balloon, draw_section, part_anchor, spread
-from clamp3d.output.view3d import Camera, Solid, draw_solids
+from clamp3d.output.view3d import Camera, PosedMesh, draw_solids
 
 if TYPE_CHECKING:
     import trimesh
@@ -40,7 +40,7 @@ def exploded_figure(clamp: Clamp) -> Figure:
     camera = Camera()
     poses = exploded_poses(clamp)
     solids = _solids(clamp)
-    draw_solids(ax, [Solid(solids[n], poses[n].T(), PART_COLOURS[n]) for n in PARTS], camera)
+    draw_solids(ax, [PosedMesh(solids[n], poses[n].T(), PART_COLOURS[n]) for n in PARTS], camera)
     x0, x1 = ax.get_xlim()
     width = x1 - x0
     points = {}
@@ -103,7 +103,7 @@ def steps_figure(run: Assembly) -> Figure:
     for i, (step, stop) in enumerate(ends):
         waypoint = run.path[stop]
         poses = near(run.clamp, waypoint.poses)
-        shown = [Solid(solids[n], p.T(), PART_COLOURS[n]) for n, p in poses.items()]
+        shown = [PosedMesh(solids[n], p.T(), PART_COLOURS[n]) for n, p in poses.items()]
         draw_solids(axes[0, i], shown, Camera(), pixels=600)
         title(axes[0, i], f"{i + 1}   {step}", waypoint.label)
         draw_section(axes[1, i], run.clamp, poses)

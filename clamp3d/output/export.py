@@ -1,17 +1,20 @@
-"""Export of a clamp's parts for CAD review: STL, OBJ, PLY, GLB, 3MF and STEP, with a manifest."""
+"""Export of parts for CAD review: STL, OBJ, PLY, GLB, 3MF and STEP, with a manifest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, cast, get_args
 
-from numpy.typing import ArrayLike
+import numpy as np
 
-from clamp3d.checks import choice, instance, path, shown, text
-from clamp3d.clamp.dimensions import Clamp, PartName
-from clamp3d.clamp.parts import parts
+from clamp3d import checks
+from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.result import Assembly
+from clamp3d.clamp.states import state as find_state
+from clamp3d.collide.scene import Scene
+from clamp3d.core.pose import Array
 from clamp3d.core.profile import check_mesh_error
 from clamp3d.errors import InputError
 from clamp3d.output import mesh_formats
@@ -32,10 +35,27 @@ DEFAULT_MESH_ERROR = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """What `export` wrote: ``files`` in the order P1 to P7 (or the assembly), and the ``manifest`` beside them."""
+    """What `export` wrote: ``files`` in the order of the parts (or the assembly), and the ``manifest`` beside them."""
 
     files: tuple[Path, ...]
     manifest: Path
+
+
+def destination(path: str | Path, format: str | None) -> tuple[Format, Path | None]:
+    """Format of an export, and the file if ``path`` names one: by its suffix. None: ``path`` is a folder.
+
+    Raises InputError if neither says what format it shall be, or they contradict each other.
+    """
+    path = checks.path("output", path)
+    suffix = {"stp": "step"}.get(path.suffix.lower()[1:], path.suffix.lower()[1:])
+    is_file = suffix in FORMATS and not path.is_dir()
+    if format is None and not is_file:
+        raise InputError(f"output must end in one of {', '.join(FORMATS)}, or be a folder with a format; got {path}")
+    chosen = suffix if format is None else format
+    checks.choice("format", chosen, FORMATS)
+    if is_file and chosen != suffix:
+        raise InputError(f"output {path.name} and format {chosen} contradict each other")
+    return cast("Format", chosen), path if is_file else None
 
 
 def default_layout(format: Format) -> Layout:
@@ -43,76 +63,128 @@ def default_layout(format: Format) -> Layout:
     return "assembly" if format in ("glb", "3mf", "step") else "parts"
 
 
-def default_unit(format: Format) -> str:
-    """Metres for GLB, as its specification demands; millimetres for the others."""
-    return "m" if format == "glb" else "mm"
-
-
 def export(
-    clamp: Clamp,
+    source: Clamp | Scene | Assembly,
+    path: str | Path,
     *,
-    format: Format,
-    output: str | Path,
-    poses: Mapping[PartName, ArrayLike] | None = None,
-    state: str | None = None,
-    status: str | None = None,
+    format: Format | None = None,
     layout: Layout | None = None,
+    state: str | None = None,
     mesh_error: float = DEFAULT_MESH_ERROR,
     unit: str | None = None,
-    names: Iterable[PartName] | None = None,
+    names: Iterable[str] | None = None,
 ) -> Export:
-    """Write parts of ``clamp`` into the folder ``output``, and a manifest ``manifest-<format>.json`` beside them.
+    """Write parts into a file or a folder, and a manifest beside them.
 
-    ``poses`` maps part names to ``T_world_part`` (4, 4) in mm; without it every part stays in its own frame, which
-    only the layout "parts" can have. ``state`` and ``status`` of the run they come from go into the manifest.
-    ``mesh_error`` is the largest distance in mm of an arc from its chord (STEP has true arcs and ignores it).
-    ``unit`` is one of mm, cm, m, in.
-    World axes are Z up; GLB is turned to Y up. Files are written whole or not at all.
+    Parameters
+    ----------
+    source
+        A scene, or an assembled clamp at one of its states; the parts of a clamp as such stay in their own frames.
+    path
+        A file, whose suffix is the format (``out.step``), or a folder, which needs ``format``.
+    format
+        One of stl, obj, ply, glb, 3mf, step.
+    layout
+        "parts": a file for each part; "assembly": one file. By default an assembly for a named file and for glb, 3mf
+        and step, whose files hold a tree of named parts.
+    state
+        Of an assembly: "open", "final" (default) or a step of its sequence by name or number.
+    mesh_error
+        Largest distance of an arc from its chord, mm. STEP has true arcs and ignores it, a mesh keeps its facets.
+    unit
+        Unit of the file: mm, cm, m or in. Default mm; glb is in metres, as its specification demands.
+    names
+        Names of the parts to write; all by default.
 
-    Raises InputError for a value out of range or a folder that cannot be written, MissingLibraryError if the format
-    is STEP and Open CASCADE is not installed.
+    Returns
+    -------
+    Export
+        The paths written. World axes are Z up; GLB is turned to Y up.
+
+    Raises
+    ------
+    InputError
+        For a value out of range, a mesh in STEP, or a place that cannot be written to. Nothing is written then.
+    MissingLibraryError
+        For STEP without Open CASCADE.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from clamp3d.collide.scene import Scene
+    >>> from clamp3d.core import shapes
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     written = export(Scene().add("pin", shapes.cylinder(5.0, 40.0)), folder + "/pin.stl")
+    ...     [path.name for path in (*written.files, written.manifest)]
+    ['pin.stl', 'pin.stl.manifest.json']
     """
-    instance("clamp", clamp, Clamp)
-    choice("format", format, FORMATS)
-    layout = default_layout(format) if layout is None else layout
-    choice("layout", layout, LAYOUTS)
-    unit = default_unit(format) if unit is None else unit
-    if format == "glb" and not (isinstance(unit, str) and unit == "m"):
-        raise InputError(f"unit of glb must be m, as glTF 2.0 demands, got {shown(unit)}")
-    choice("unit", unit, MILLIMETRES)
+    checks.instance("source", source, Clamp, Scene, Assembly)
+    chosen, file = destination(path, format)
+    layout = layout or ("assembly" if file else default_layout(chosen))
+    checks.choice("layout", layout, LAYOUTS)
+    unit = unit or ("m" if chosen == "glb" else "mm")
+    if chosen == "glb" and unit != "m":
+        raise InputError(f"unit of glb must be m, as glTF 2.0 demands, got {checks.shown(unit)}")
+    checks.choice("unit", unit, MILLIMETRES)
     mesh_error = check_mesh_error(mesh_error)
-    for key, value in (("state", state), ("status", status)):
-        if value is not None:
-            text(key, value)
-    folder = path("output", output)
-    if layout == "assembly" and poses is None:
-        raise InputError("layout 'assembly' needs poses: without them all parts would lie on one origin")
+    if file is not None and layout == "parts":
+        raise InputError(f"layout parts needs a folder, got the file {file}")
+    if layout == "assembly" and isinstance(source, Clamp):
+        raise InputError("layout assembly needs poses: assemble the clamp first, or its parts would lie on one origin")
+    if state is not None and not isinstance(source, Assembly):
+        raise InputError("state goes with an assembled clamp")
 
-    title = "".join(c if c.isprintable() else " " for c in clamp.name)
-    placed = place(parts(clamp), poses, names)
-    meshed = [] if format == "step" else placements(placed, mesh_error, unit)
+    settings: dict[str, Any] = {"format": chosen, "layout": layout}
+    if isinstance(source, Assembly):
+        state = state or "final"
+        settings = {"clamp": source.clamp.name, **settings, "state": state, "status": source.status}
+        scene = source.scene_at(find_state(source, state))
+        placed = place(replace(scene, parts=tuple(replace(p, T_world=_rounded(p.T_world)) for p in scene.parts)), names)
+        name = source.clamp.name
+    else:
+        kind = "clamp" if isinstance(source, Clamp) else "scene"
+        settings = {kind: source.name, **settings, "state": None, "status": None}
+        placed, name = place(source, names), source.name
+    settings |= {"unit": unit, "up": "Y" if chosen == "glb" else "Z"}
+    settings["mesh_error_mm"] = None if chosen == "step" else mesh_error
+
+    title = "".join(c if c.isprintable() else " " for c in name)
+    meshed = [] if chosen == "step" else placements(placed, mesh_error, unit)
     files: dict[str, tuple[bytes, Sequence[str]]] = {}
     if layout == "assembly":
-        for name, data in _render(format, placed, meshed, file_stem(clamp.name), title, unit, mesh_error).items():
-            files[name] = data, [item.part.name for item in placed]
+        stem = file.stem if file else file_stem(name)
+        for key, data in _render(chosen, placed, meshed, stem, title, unit, mesh_error).items():
+            files[key if file is None or len(files) else file.name] = data, [item.name for item in placed]
     else:
-        for i, item in enumerate(placed):
-            one = _render(format, [item], meshed[i : i + 1], item.stem, f"{title} {item.label}", unit, mesh_error)
-            files |= {name: (data, [item.part.name]) for name, data in one.items()}
-    settings = {
-        "clamp": clamp.name,
-        "format": format,
-        "layout": layout,
-        "state": state,
-        "status": status,
-        "unit": unit,
-        "up": "Y" if format == "glb" else "Z",
-        "mesh_error_mm": None if format == "step" else mesh_error,
-    }
-    contents = {name: data for name, (data, _) in files.items()}
-    contents[f"manifest-{format}.json"] = manifest(clamp, placed, meshed, files, settings)
-    *paths, listing = write_files(folder, contents)
-    return Export(tuple(paths), listing)
+        for i, (item, stem) in enumerate(zip(placed, _stems(placed), strict=True)):
+            one = _render(chosen, [item], meshed[i : i + 1], stem, f"{title} {item.label}", unit, mesh_error)
+            files |= {key: (data, [item.name]) for key, data in one.items()}
+    contents = {key: data for key, (data, _) in files.items()}
+    listing = f"{file.name}.manifest.json" if file else f"manifest-{chosen}.json"
+    clamp = source.clamp if isinstance(source, Assembly) else source if isinstance(source, Clamp) else None
+    contents[listing] = manifest(placed, meshed, files, settings, clamp)
+    *paths, listed = write_files(file.parent if file else Path(path), contents)
+    return Export(tuple(paths), listed)
+
+
+def _rounded(T: Array) -> Array:
+    """The last bits of an optimum differ between machines: equal clamps are equal files, to 1e-9 mm and 1e-12 rad."""
+    T = np.array(T)
+    T[:3, :3], T[:3, 3] = np.round(T[:3, :3], 12), np.round(T[:3, 3], 9)
+    return T + 0.0
+
+
+def _stems(placed: Sequence[PlacedPart]) -> list[str]:
+    """File names of the parts, told apart by a number where two would be the same."""
+    out: list[str] = []
+    for item in placed:
+        stem = name = file_stem(item.label)
+        count = 1
+        while name.lower() in (other.lower() for other in out):
+            count += 1
+            name = f"{stem}-{count}"
+        out.append(name)
+    return out
 
 
 def _render(
@@ -126,15 +198,16 @@ def _render(
 ) -> dict[str, bytes]:
     """Contents of one exported file by its name (OBJ has two)."""
     name = f"{base}.{format}"
-    if format == "stl":
-        return {name: mesh_formats.stl(meshed, title, unit)}
-    if format == "ply":
-        return {name: mesh_formats.ply(meshed, title, unit)}
-    if format == "obj":
-        model, materials = mesh_formats.obj(meshed, title, unit, f"{base}.mtl")
-        return {name: model, f"{base}.mtl": materials}
-    if format == "glb":
-        return {name: mesh_formats.glb(meshed, title, {"unit": "m", "mesh_error_mm": mesh_error})}
-    if format == "3mf":
-        return {name: mesh_formats.three_mf(meshed, title, unit, f"chord error {mesh_error:g} mm at most")}
+    match format:
+        case "stl":
+            return {name: mesh_formats.stl(meshed, title, unit)}
+        case "ply":
+            return {name: mesh_formats.ply(meshed, title, unit)}
+        case "obj":
+            model, materials = mesh_formats.obj(meshed, title, unit, f"{base}.mtl")
+            return {name: model, f"{base}.mtl": materials}
+        case "glb":
+            return {name: mesh_formats.glb(meshed, title, {"unit": "m", "mesh_error_mm": mesh_error})}
+        case "3mf":
+            return {name: mesh_formats.three_mf(meshed, title, unit, f"chord error {mesh_error:g} mm at most")}
     return {name: step(placed, title, unit)}

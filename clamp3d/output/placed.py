@@ -1,70 +1,84 @@
-"""What goes into a file: each part with its name, pose and colour, in the order P1 to P7."""
+"""What goes into a file or a picture: each part with its name, shape, pose and colour."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from clamp3d.checks import instance, items
-from clamp3d.clamp.dimensions import PARTS, PartName
-from clamp3d.clamp.parts import check_part_name
-from clamp3d.core.pose import Array, check_pose
-from clamp3d.core.shapes import Solid
+from clamp3d.checks import items
+from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.parts import parts
+from clamp3d.collide.scene import Scene, unknown_part
+from clamp3d.core.meshing import mesh
+from clamp3d.core.pose import Array
+from clamp3d.core.shapes import MeshShape, Shape
 from clamp3d.errors import InputError
-from clamp3d.output.palette import PART_COLOURS
+from clamp3d.output.palette import part_colours
+
+if TYPE_CHECKING:
+    import trimesh
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PlacedPart:
-    """A part, and ``T_world_part`` (4, 4) in mm; without a pose it stays in its own frame."""
+    """A part, its pose ``T_world_part`` (4, 4) in mm (None: it stays in its own frame) and its ``colour`` "#RRGGBB"."""
 
-    part: Solid
+    name: str
+    shape: Shape
     T_world_part: Array | None
+    colour: str
 
     @property
     def label(self) -> str:
         """Name and title as files show it, e.g. ``P1 up splint``."""
-        return f"{self.part.name} {self.part.title}"
+        title = getattr(self.shape, "title", "")
+        return f"{self.name} {title}" if title and self.shape.name == self.name else self.name
 
     @property
-    def stem(self) -> str:
-        """The label as part of a file name."""
-        return self.label.replace(" ", "-")
-
-    @property
-    def colour(self) -> tuple[int, int, int]:
-        """Colour of the part in sRGB, 0 to 255."""
-        text = PART_COLOURS[self.part.name]
-        return int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16)
+    def rgb(self) -> tuple[int, int, int]:
+        """Colour in sRGB, 0 to 255."""
+        return int(self.colour[1:3], 16), int(self.colour[3:5], 16), int(self.colour[5:7], 16)
 
     @property
     def T(self) -> Array:
         """The pose, the identity where there is none."""
         return np.eye(4) if self.T_world_part is None else self.T_world_part
 
+    def mesh(self, mesh_error: float) -> trimesh.Trimesh:
+        """Triangles in the part's own frame, mm; arcs within ``mesh_error`` mm, the facets of a mesh as they are.
 
-def place(
-    parts: Mapping[PartName, Solid], poses: Mapping[PartName, ArrayLike] | None, names: Iterable[str] | None = None
-) -> tuple[PlacedPart, ...]:
-    """Pair the chosen parts (all by default) with their poses; ``poses=None`` leaves each in its own frame.
+        ``metadata`` holds ``mesh_error`` and ``chord_error``: what was asked for and what it is, mm.
+        """
+        import trimesh
 
-    Raises InputError for an unknown part, a part without a pose, or a pose that is not rigid.
+        if not isinstance(self.shape, MeshShape):
+            return mesh(self.shape, mesh_error)
+        facets = self.shape.mesh
+        return trimesh.Trimesh(
+            facets.vertices, facets.faces, process=False, metadata={"mesh_error": 0.0, "chord_error": 0.0}
+        )
+
+
+def place(source: Clamp | Scene, names: Iterable[str] | None = None) -> tuple[PlacedPart, ...]:
+    """The parts of a scene at their poses, or those of a clamp in their own frames; all, or those of ``names``.
+
+    Raises InputError for an unknown part or none at all.
     """
-    if poses is not None:
-        instance("poses", poses, Mapping)
-    for name in poses or ():
-        check_part_name(name)
-    chosen = set(PARTS if names is None else map(check_part_name, items("names", names, "part names")))
+    given: list[tuple[str, Shape, Array | None]]
+    if isinstance(source, Clamp):
+        given = [(name, solid, None) for name, solid in parts(source).items()]
+    else:
+        given = [(part.name, part.shape, part.T_world) for part in source.parts]
+    colours = part_colours([name for name, _, _ in given])
+    found = [PlacedPart(name, shape, T, colours[name]) for name, shape, T in given]
+    known = [part.name for part in found]
+    chosen = known if names is None else items("names", names, "part names")
+    for name in chosen:
+        if name not in known:
+            raise InputError(unknown_part(name, known))
     if not chosen:
-        raise InputError(f"parts must name at least one of {', '.join(PARTS)}")
-    missing = [name for name in PARTS if poses is not None and name in chosen and name not in poses]
-    if missing:
-        raise InputError(f"poses must hold every exported part, missing: {', '.join(missing)}")
-    return tuple(
-        PlacedPart(parts[name], None if poses is None else check_pose(poses[name], f"pose of {name}"))
-        for name in PARTS
-        if name in chosen
-    )
+        raise InputError(f"names must name at least one part, available: {', '.join(known) or 'none'}")
+    return tuple(part for part in found if part.name in chosen)

@@ -1,230 +1,323 @@
-"""A report for an assembly reviewer: what was measured at the final state, and how the clamp came there.
+"""A report for a reviewer, of a checked scene or of an assembled clamp: report.html, report.json and pairs.csv.
 
-The facts are gathered here; `report_page` turns them into a page, JSON and CSV.
+What was found is gathered here, all distances and verdicts from the engine; `report_page` writes it down.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
 
-from clamp3d.baselines.model import ContactModel
-from clamp3d.checks import number
-from clamp3d.clamp.contacts import CONTACT, measure_pairs, seats
-from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
-from clamp3d.clamp.parts import parts
-from clamp3d.clamp.result import Assembly, Contact, Seat, Waypoint
-from clamp3d.clamp.section import Section
-from clamp3d.clamp.verdict import CLEARANCE
-from clamp3d.core.pose import SectionPose
-from clamp3d.output.pair_rows import PairRow, pair_rows
-from clamp3d.output.section import edge_openings
+from clamp3d.checks import function, instance
+from clamp3d.checks import path as checked_path
+from clamp3d.clamp.contact import Contact
+from clamp3d.clamp.dimensions import TITLES
+from clamp3d.clamp.result import Assembly
+from clamp3d.collide.check import check
+from clamp3d.collide.distance import Distance
+from clamp3d.collide.result import BAD, CheckResult, PairResult
+from clamp3d.collide.scene import Scene
+from clamp3d.collide.verdict import Verdict
+from clamp3d.core.shapes import MeshShape
+from clamp3d.output.assembly_steps import StepRow, TighteningRow, step_rows, tightening_rows
+from clamp3d.output.wording import circumstances, headline, sentence, titles
 
-Poses = dict[PartName, SectionPose]
+Severity = Literal["error", "warning", "note", "ok"]
 
-TIGHTENING_STAGES = 4
-_PARALLEL = math.radians(0.005)  # the angle that prints as 0.00 deg
+CLEARANCE = 5.0
+"""Gap in mm up to which two parts of a clamp are told to be near, if none is chosen."""
+MEASURED_PAIRS = 400
+"""Of a scene with more pairs only those are measured whose boxes come near; the others are clear."""
+
+SEVERITIES: dict[Severity, str] = {
+    "error": "must be mended",
+    "warning": "to be looked at: undecided within the error bound, or apart though declared to touch in an arc",
+    "note": "worth knowing",
+    "ok": "as it should be",
+}
+_NOT_MODELLED = (
+    "friction, deformation and forces: the parts are rigid, and no torque and no clamping force follow from this report",
+    "tolerances of manufacture and wear",
+)
 
 
-@dataclass(frozen=True, slots=True)
-class StepRow:
-    """The state at the end of a motion, as a line worker checks it; lengths in mm, tilt in rad.
+@dataclass(frozen=True, slots=True, eq=False)
+class PairRow:
+    """A pair as a reviewer reads of it: the engine's row, what it amounts to, and what a clamp knows beyond it."""
 
-    ``opening_line`` and ``opening_jumper`` are the heights between the splints' inner edges on either side,
-    ``turns`` those of the nut from open. ``seats`` say for each groove whether its wire lies in it, ``outside`` which
-    wires are not between the splints yet.
-    """
-
-    number: int
-    step: str
-    label: str
-    waypoint: Waypoint
-    opening_line: float
-    opening_jumper: float
-    tilt: float
-    turns: float
-    seats: tuple[Seat, ...]
-    outside: tuple[PartName, ...]
+    result: PairResult
+    titles: str
+    severity: Severity
+    remark: str = ""
+    contact: Contact | None = None
 
     @property
-    def parallel(self) -> bool:
-        """Whether the splints are parallel, to the printed digits."""
-        return abs(self.tilt) < _PARALLEL
+    def name(self) -> str:
+        """Short name of the pair."""
+        return f"{self.result.a}-{self.result.b}"
 
-    def seat(self, wire: PartName) -> str:
-        """A wire's place in words."""
-        if wire in self.outside:
-            return "not in the clamp yet"
-        own = [s for s in self.seats if s.wire == wire]
-        held = [s.splint for s in own if s.seated]
-        if len(held) == len(own):
-            return "fully in both grooves"
-        rests = [f"{s.splint}: {s.detail}" for s in own if not s.seated and s.detail != "loose"]
-        words = [f"in {' and '.join(held)}'s groove"] if held else []
-        loose = [f"{s.gap:.1f} mm from {s.splint}" for s in own if s.detail == "loose"]
-        return "; ".join([*words, *rests, *loose])
+    @property
+    def verdict(self) -> str:
+        """The verdict's name."""
+        return self.result.verdict.value
+
+    @property
+    def distance(self) -> Distance:
+        """The signed distance between its bounds."""
+        return self.result.distance
 
 
 @dataclass(frozen=True, slots=True)
-class TighteningRow:
-    """A stage of the tightening: ``turns`` of the nut in it, ``way`` mm the bolt is drawn up, gap of the saddle."""
+class Finding:
+    """What a reviewer has to look at: ``text`` in words, and the pair that it is about, if it is about one."""
 
-    turns: float
-    way: float
-    saddle_gap: float
+    severity: Severity
+    text: str
+    row: PairRow | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Report:
-    """Everything a report says about a run. Lengths in mm."""
+    """Everything that a report says.
 
-    run: Assembly
+    Attributes
+    ----------
+    scene : Scene
+        Parts, thresholds and motions.
+    headline : str
+        What was found, in one line.
+    passed : bool
+        Whether nothing must be mended.
+    findings : tuple of Finding
+        The worst first.
+    rows, motions : tuple of PairRow
+        The pairs at rest and in motion.
+    n_pairs : int
+        Number of all pairs; those without a row are clear, parted by their boxes.
+    modelled, not_modelled : tuple of str
+        What the numbers stand on, and what they leave out.
+    settings : dict
+        What was asked for, in words.
+    assembly : Assembly or None
+        The clamp and its way together, with ``steps`` and ``tightening``.
+    """
+
+    scene: Scene
+    headline: str
+    passed: bool
+    findings: tuple[Finding, ...]
     rows: tuple[PairRow, ...]
-    steps: tuple[StepRow, ...]
-    tightening: tuple[TighteningRow, ...]
+    motions: tuple[PairRow, ...]
+    n_pairs: int
     modelled: tuple[str, ...]
     not_modelled: tuple[str, ...]
-    clearance: float
-    mesh_error: float
-
-    @property
-    def findings(self) -> tuple[str, ...]:
-        """What a reviewer has to look at, the worst first; empty if all is as it should be."""
-        out = [] if self.run.clamped else [self.run.status]
-        for severity in ("error", "warning"):
-            out += [
-                f"{row.name} ({row.titles}): {row.verdict}" + (f"; {row.remark}" if row.remark else "")
-                for row in self.rows
-                if row.severity == severity
-            ]
-        named = {row.name for row in self.rows if row.severity == "error"}
-        out += [str(u) for u in self.run.undeclared if f"{u.a}-{u.b}" not in named]
-        return tuple(out)
-
-    @property
-    def passed(self) -> bool:
-        """Whether the clamp holds both wires and nothing meets that should not."""
-        return self.run.clamped and not self.run.undeclared and all(row.severity != "error" for row in self.rows)
+    settings: dict[str, str]
+    assembly: Assembly | None = None
+    steps: tuple[StepRow, ...] = ()
+    tightening: tuple[TighteningRow, ...] = ()
 
 
-def report(run: Assembly, model: ContactModel, *, clearance: float = CLEARANCE, mesh_error: float = 0.001) -> Report:
-    """Measure all 21 pairs at the final state of ``run`` and every waypoint on the way to it.
+def report(
+    source: Scene | Assembly,
+    folder: str | Path,
+    *,
+    clearance: float | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> list[Path]:
+    """Measure all pairs and write a report: a page with pictures, its data as JSON, and the pairs as CSV.
 
-    ``mesh_error`` mm is the chord error of the outlines that pairs without a groove are measured on. Raises InputError
-    for a bad clearance or mesh error.
+    Parameters
+    ----------
+    source : Scene or Assembly
+        What to report on.
+    folder : str or Path
+        Where report.html, report.json and pairs.csv go; all of them or none.
+    clearance : float, optional
+        Gap in mm that parts must keep; by default the scene's own, 5 mm for a clamp.
+    progress : callable, optional
+        Is told what is being done.
+
+    Returns
+    -------
+    list of Path
+        The three files.
+
+    Raises
+    ------
+    InputError
+        For a bad clearance, or a folder that cannot be written to.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from clamp3d.core import shapes
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     [path.name for path in report(Scene().add("pin", shapes.cylinder(5.0, 40.0)), folder)]
+    ['report.html', 'report.json', 'pairs.csv']
+    """
+    from clamp3d.output.report_page import write_report
+
+    folder = checked_path("folder", folder)
+    tell = progress or (lambda what: None)
+    return write_report(make_report(source, clearance=clearance, progress=tell), folder, progress=tell)
+
+
+def make_report(
+    source: Scene | Assembly,
+    *,
+    clearance: float | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Report:
+    """What `report` writes down.
 
     >>> from clamp3d.clamp.assemble import assemble
-    >>> from clamp3d.clamp.loader import load_clamp
-    >>> from clamp3d.baselines.cas import Cas
-    >>> found = report(assemble(load_clamp(), Cas()), Cas())
-    >>> len(found.rows), found.passed, found.findings
-    (21, True, ())
+    >>> found = make_report(assemble())
+    >>> len(found.rows), found.passed
+    (21, True)
     """
-    clearance = number("clearance", clearance)
-    clamp, bodies = run.clamp, parts(run.clamp)
-    rows = pair_rows(clamp, bodies, model, run.poses, clearance=clearance, mesh_error=mesh_error)
-    section = Section(clamp, model)
-    first = run.path[0].poses
-    # A solver that tries positions leaves small gaps; what it counted as seated is seated here.
-    resolution = max([CONTACT, *(s.gap for s in run.seats if s.seated)])
-    steps = tuple(_step(section, number, waypoint, first, resolution) for number, waypoint in enumerate(run.path, 1))
-    model_limits = [f"method {run.method}: {limit}" for limit in run.limits]
+    instance("source", source, Scene, Assembly)
+    function("progress", progress)
+    if isinstance(source, Assembly):
+        scene = replace(source.scene, clearance=CLEARANCE if clearance is None else clearance)
+        return _of_assembly(source, scene)
+    scene = source if clearance is None else replace(source, clearance=clearance)
+    return _of_scene(scene, progress)
+
+
+def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
+    few = len(scene.parts) * (len(scene.parts) - 1) // 2 <= MEASURED_PAIRS
+    tell = None if progress is None else lambda stage, done, of: progress(f"{stage}: {done} of {of}")
+    result = check(scene, distances=few, progress=tell)
+    names = titles(scene)
+
+    def row(pair: PairResult) -> PairRow:
+        return PairRow(pair, f"{names[pair.a]}, {names[pair.b]}", _severity(pair.verdict))
+
+    rows = {id(pair): row(pair) for pair in result.rows}
+    findings = []
+    for pair in result.findings:
+        where = circumstances(pair)
+        text = sentence(pair, names) + (f"; {where}" if where else "")
+        findings.append(Finding(rows[id(pair)].severity, text, rows[id(pair)]))
     return Report(
-        run=run,
+        scene=scene,
+        headline=headline(result),
+        passed=result.clean,
+        findings=tuple(findings),
+        rows=tuple(rows[id(pair)] for pair in result.pairs),
+        motions=tuple(rows[id(pair)] for pair in result.motions),
+        n_pairs=result.work.pairs,
+        modelled=(*(_described(part.name, part.shape) for part in scene.parts[:MEASURED_PAIRS]), _motions(scene)),
+        not_modelled=(
+            *_NOT_MODELLED,
+            *(() if scene.motions else ("motions: the parts stand where the scene puts them",)),
+        ),
+        settings=_thresholds(scene),
+    )
+
+
+def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
+    different = {(d.a, d.b) for d in assembly.matrix_differences if not d.measured}
+    rows = tuple(_contact_row(scene, contact, (contact.a, contact.b) in different) for contact in assembly.contacts)
+    findings = [
+        Finding(f.severity, f.text, next((row for row in rows if f.text.startswith(f"{row.name} ")), None))
+        for f in assembly.findings
+    ]
+    told = {finding.row for finding in findings}
+    names = titles(scene)
+    findings += [
+        Finding(row.severity, sentence(row.result, names), row)
+        for row in sorted(rows, key=lambda row: row.distance.upper)
+        if row.severity != "ok" and row not in told
+    ]
+    findings.sort(key=lambda finding: list(SEVERITIES).index(finding.severity))
+    passed = assembly.clamped and not any(finding.severity == "error" for finding in findings)
+    line = "Clamped: both wires are held and nothing meets that should not."
+    if not passed:
+        line = f"Not passed: {'see the findings' if assembly.clamped else assembly.status}."
+    elif any(f.severity == "warning" for f in findings):
+        line += " Some verdicts are uncertain: see the findings."
+    return Report(
+        scene=scene,
+        headline=line,
+        passed=passed,
+        findings=tuple(findings),
         rows=rows,
-        steps=steps,
-        tightening=_tightening(section, run),
-        modelled=_modelled(run, mesh_error),
-        not_modelled=(*_not_modelled(clamp), *model_limits),
-        clearance=clearance,
-        mesh_error=mesh_error,
+        motions=(),
+        n_pairs=len(rows),
+        modelled=_clamp_modelled(assembly),
+        not_modelled=(
+            *(f"{p.name} {p.shape.title}: {p.shape.not_modelled}" for p in scene.parts if p.shape.not_modelled),
+            *_NOT_MODELLED,
+            "motions out of the section: wires that are bent, turned or shifted along the clamp",
+            *(f"method {assembly.method}: {limit}" for limit in assembly.limits),
+        ),
+        settings={"method": assembly.method, "solver": assembly.solver, **_thresholds(scene)},
+        assembly=assembly,
+        steps=step_rows(assembly),
+        tightening=tightening_rows(assembly),
     )
 
 
-def saddle_gap(section: Section, poses: Poses) -> float:
-    """Gap in mm between the saddle and the round back."""
-    pair = next(c for c in measure_pairs(section, poses, CONTACT) if (c.a, c.b) == ("P2", "P3"))
-    return pair.distance
+def _contact_row(scene: Scene, contact: Contact, apart: bool) -> PairRow:
+    """A pair of a clamp: the engine's verdict; ``apart`` if it is declared to touch and does not."""
+    a, b = contact.a, contact.b
+    verdict = scene.thresholds.verdict(contact.distance, scene.allowance(a, b))
+    if verdict is Verdict.CLASH:
+        verdict = check(scene, pairs=[(a, b)]).verdict(a, b)
+    severity, remark = _severity(verdict), ""
+    if verdict is Verdict.CONTACT:
+        severity, remark = "error", "touch though the connection matrix declares no connection"
+    elif apart and severity == "ok":
+        severity, remark = "warning" if contact.declared == 3 else "note", "declared to touch, and do not"
+    return PairRow(PairResult(a, b, verdict, contact.distance), f"{TITLES[a]}, {TITLES[b]}", severity, remark, contact)
 
 
-def contacts_to_draw(rows: tuple[PairRow, ...]) -> list[Contact]:
-    """Every pair that touches, overlaps, or is declared to: those get a picture. A thread has nothing to show."""
-    return [row.contact for row in rows if row.declared > 1 or (row.declared == 0 and row.distance <= CONTACT)]
+def _severity(verdict: Verdict) -> Severity:
+    if verdict in BAD:
+        return "error"
+    if verdict is Verdict.UNCERTAIN:
+        return "warning"
+    return "note" if verdict in (Verdict.CONTACT, Verdict.CLEARANCE) else "ok"
 
 
-def _step(section: Section, number: int, waypoint: Waypoint, first: Poses, resolution: float) -> StepRow:
-    poses = waypoint.poses
-    line, jumper = edge_openings(section.clamp, poses)
-    pairs = measure_pairs(section, poses, CONTACT)
-    up = poses["P1"].x
-    wires: tuple[PartName, ...] = ("P6", "P7")
-    outside = tuple(w for w in wires if not up < poses[w].x < up + section.clamp.up_splint.width)
-    return StepRow(
-        number=number,
-        step=waypoint.step,
-        label=waypoint.label,
-        waypoint=waypoint,
-        opening_line=line,
-        opening_jumper=jumper,
-        tilt=poses["P2"].angle - poses["P1"].angle,
-        turns=round((_screwed(poses) - _screwed(first)) / section.clamp.bolt.pitch, 9) + 0.0,
-        seats=seats(pairs, resolution),
-        outside=outside,
-    )
+def _thresholds(scene: Scene) -> dict[str, str]:
+    t = scene.thresholds
+    clearance = f"{t.clearance:g} mm" if t.clearance else "not asked for"
+    return {"contact": f"gap or overlap up to {t.contact:g} mm", "clearance": clearance}
 
 
-def _tightening(section: Section, run: Assembly) -> tuple[TighteningRow, ...]:
-    """The nut's own step in equal stages: the bolt is drawn up until the saddle meets the round back."""
-    before, after = run.path[-2].poses, run.path[-1].poses
-    way = _screwed(after) - _screwed(before)
-    rows = []
-    for stage in range(TIGHTENING_STAGES + 1):
-        f = stage / TIGHTENING_STAGES
-        poses = {
-            name: SectionPose(p.x + f * (after[name].x - p.x), p.y + f * (after[name].y - p.y), after[name].angle)
-            for name, p in before.items()
-        }
-        gap = saddle_gap(section, poses)
-        rows.append(TighteningRow(f * way / run.clamp.bolt.pitch, f * way, 0.0 if abs(gap) <= CONTACT else gap))
-    return tuple(rows)
+def _described(name: str, shape: object) -> str:
+    if not isinstance(shape, MeshShape):
+        return f"{name}: drawn with true arcs, measured in closed form where one is known, else on ever finer meshes"
+    how = {
+        "bound": "its facets, with the error bound of the surfaces fitted to them",
+        "round": "round surfaces through its vertices where they fit",
+        "off": "its facets",
+    }[shape.fit]
+    notes = "".join(f"; {note}" for note in shape.mesh.notes)
+    return f"{name}: mesh {shape.name} of {len(shape.mesh.faces)} triangles, taken as {how}{notes}"
 
 
-def _screwed(poses: Poses) -> float:
-    """Height of the nut's free face below the bolt's free end in mm: by how much it is screwed on, up to a constant."""
-    return poses["P5"].y - poses["P4"].y
+def _motions(scene: Scene) -> str:
+    n = len(scene.motions)
+    return f"{n or 'no'} {'motion' if n == 1 else 'motions'} of rigid parts" + (", followed without a gap in time" * bool(n))
 
 
-def _modelled(run: Assembly, mesh_error: float) -> tuple[str, ...]:
-    grooves = (
-        "arcs against cylinders in closed form" if run.method == "cas" else f"as the method {run.method} sees them"
-    )
+def _clamp_modelled(assembly: Assembly) -> tuple[str, ...]:
+    exact = assembly.method == "cas"
+    grooves = "arcs against cylinders in closed form" if exact else f"as the method {assembly.method} sees them"
     solver = {
         "exact": "least distance along the bolt with both wires free, proven",
         "stepped": "first position in steps along the bolt that fits",
         "bisection": "least distance along the bolt that fits, by bisection",
-    }[run.solver]
+    }[assembly.solver]
     return (
         "seven rigid parts of nominal dimensions that move in the section: along x and y, the down splint also tilts",
         f"the five concave arc contacts (each splint with each wire, saddle with round back), {grooves}",
-        "bolt in its two holes (relations of Table 2), nut and bolt head on their seats, nut and bolt as a screw joint",
-        f"the pairs that nothing joins, on their outlines with a chord error of {mesh_error:g} mm",
-        f"final state by the {run.solver} solver: {solver}",
+        "all other pairs as solids in 3D, between bounds that are stated for each; nut and bolt as a screw joint",
+        f"final state by the {assembly.solver} solver: {solver}",
         "wires as round cylinders of the conductor's outer diameter",
     )
-
-
-def _not_modelled(clamp: Clamp) -> tuple[str, ...]:
-    left_out = [
-        f"{name} {TITLES[name]}: {part.not_modelled}" for name, part in parts(clamp).items() if part.not_modelled
-    ]
-    return (
-        *left_out,
-        "friction, deformation and forces: no torque and no clamping force follow from this report",
-        "tolerances of manufacture and wear",
-        "motions out of the section: wires that are bent, turned or shifted along the clamp",
-    )
-
-
-def part_rows(run: Assembly) -> list[tuple[PartName, str, SectionPose]]:
-    """Each part with its title and its final pose in the section."""
-    return [(name, TITLES[name], run.poses[name]) for name in PARTS]

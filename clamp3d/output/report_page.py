@@ -1,4 +1,4 @@
-"""The report as a self-contained page, as JSON and as CSV."""
+"""A report as a self-contained page, as JSON and as CSV."""
 
 from __future__ import annotations
 
@@ -12,40 +12,30 @@ import math
 import os
 import platform
 from collections.abc import Callable
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clamp3d import __version__
-from clamp3d.clamp.contacts import CONTACT
-from clamp3d.clamp.dimensions import PARTS, TITLES
-from clamp3d.clamp.verdict import VERDICTS
+from clamp3d.collide.verdict import Verdict
 from clamp3d.output.files import write_files
-from clamp3d.output.pair_rows import SEVERITIES, PairRow
-from clamp3d.output.palette import PART_COLOURS, VERDICT_COLOURS
-from clamp3d.output.report import Report, StepRow, contacts_to_draw
-from clamp3d.output.run_report import run_to_dict
+from clamp3d.output.palette import VERDICT_COLOURS, part_colours
+from clamp3d.output.report import MEASURED_PAIRS, SEVERITIES, PairRow, Report
+from clamp3d.output.wording import gap_text, meaning, titles
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from clamp3d.output.assembly_steps import StepRow
+
 LIBRARIES = ("numpy", "scipy", "numba", "matplotlib")
 FILES = ("report.html", "report.json", "pairs.csv")
-
-MEANINGS = {
-    "clash": "parts overlap",
-    "contained": "one part lies inside the other",
-    "uncertain": "the error bound reaches over a threshold",
-    "contact": "parts touch that are not declared to",
-    "allowed": "parts touch as the connection matrix declares",
-    "clearance": "gap up to the clearance",
-    "clear": "gap larger than the clearance",
-}
+PICTURES = 24
+"""Findings of a scene that get a picture, the worst ones."""
+MATRIX = 30
+"""Parts that the page's matrix shows at most."""
 
 
-def write_report(
-    report: Report, folder: str | Path, *, progress: Callable[[str], None] = lambda what: None
-) -> list[Path]:
+def write_report(report: Report, folder: Path, *, progress: Callable[[str], None] = lambda what: None) -> list[Path]:
     """Write report.html, report.json and pairs.csv into ``folder``, all or none; ``progress`` hears of each picture.
 
     Raises InputError if the folder cannot be written to.
@@ -53,23 +43,24 @@ def write_report(
     page = report_html(report, progress=progress)
     data = json.dumps(report_to_dict(report), indent=2, allow_nan=False) + "\n"
     files = dict(zip(FILES, (page, data, report_csv(report)), strict=True))
-    return write_files(Path(folder), {name: text.encode("utf-8") for name, text in files.items()})
+    return write_files(folder, {name: text.encode("utf-8") for name, text in files.items()})
 
 
 def report_to_dict(report: Report) -> dict[str, Any]:
-    """The report as JSON data: the run's own, and all pairs and steps; lengths in mm, angles in degrees."""
-    return run_to_dict(report.run) | {
-        "made": made_at(),
-        "versions": versions(),
-        "settings": settings(report),
-        "passed": report.passed,
-        "findings": list(report.findings),
-        "pairs": [_pair_to_dict(row) for row in report.rows],
-        "steps": [
+    """The report as JSON data; lengths in mm, angles in degrees. A clamp's holds what ``run --json`` does."""
+    scene = report.scene
+    data: dict[str, Any] = {
+        "scene": scene.name,
+        "parts": {part.name: {"T_world": part.T_world.tolist()} for part in scene.parts},
+        "thresholds": {"contact_mm": scene.thresholds.contact, "clearance_mm": scene.thresholds.clearance},
+    }
+    if report.assembly is not None:
+        data |= report.assembly.to_dict()
+        data["steps"] = [
             {
                 "number": s.number,
-                "step": s.step,
-                "label": s.label,
+                "step": s.waypoint.step,
+                "label": s.waypoint.label,
                 "opening_line_mm": s.opening_line,
                 "opening_jumper_mm": s.opening_jumper,
                 "tilt_deg": math.degrees(s.tilt),
@@ -78,20 +69,38 @@ def report_to_dict(report: Report) -> dict[str, Any]:
                 "seats": [{"splint": x.splint, "wire": x.wire, "seated": x.seated, "gap_mm": x.gap} for x in s.seats],
             }
             for s in report.steps
-        ],
-        "tightening": [
+        ]
+        data["tightening"] = [
             {"nut_turns": t.turns, "way_mm": t.way, "saddle_gap_mm": t.saddle_gap} for t in report.tightening
-        ],
+        ]
+    return data | {
+        "made": made_at(),
+        "versions": versions(),
+        "settings": report.settings,
+        "headline": report.headline,
+        "passed": report.passed,
+        "findings": [{"severity": f.severity, "text": f.text} for f in report.findings],
+        "pairs": [_pair_to_dict(row) for row in report.rows],
+        "motions": [_pair_to_dict(row) for row in report.motions],
         "modelled": list(report.modelled),
         "not_modelled": list(report.not_modelled),
     }
 
 
 def report_csv(report: Report) -> str:
-    """One line for each pair, with a header; lengths in mm."""
-    rows = [_flat(row) for row in report.rows]
+    """One line for each pair at rest, then those in motion, with a header; lengths in mm, vectors as three columns."""
+    rows = []
+    for row in (*report.rows, *report.motions):
+        flat: dict[str, Any] = {}
+        for key, value in _pair_to_dict(row).items():
+            if key in ("point", "point_a", "point_b", "normal"):
+                flat |= {f"{key}_{axis}": v for axis, v in zip("xyz", value or ("", "", ""), strict=True)}
+            else:
+                flat[key] = "" if value is None else value
+        rows.append(flat)
     out = io.StringIO()
-    writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
+    head = max(rows, key=len, default={"a": "", "b": "", "verdict": "", "distance_mm": "", "error_bound_mm": ""})
+    writer = csv.DictWriter(out, list(head), restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     return out.getvalue()
@@ -101,49 +110,43 @@ def report_html(report: Report, *, progress: Callable[[str], None] = lambda what
     """The report as one HTML page with its pictures inside."""
     import jinja2
 
-    folder = resources.files("clamp3d.output").joinpath("templates")
     environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+        loader=jinja2.PackageLoader("clamp3d.output", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
     )
     environment.filters |= {
-        "mm": _mm,
-        "bound": _bound,
-        "vector": _vector,
-        "deg": lambda rad: f"{math.degrees(rad) + 0.0:.2f}",
+        "mm": lambda value: f"{value:z.3f}",
+        "deg": lambda rad: f"{math.degrees(rad):z.2f}",
+        "bound": lambda value: f"{value:.1e}" if value is not None and math.isfinite(value) else "not known",
+        "gap": lambda distance, digits=6: gap_text(distance.lower, distance.upper, digits=digits),
+        "vector": lambda v: "" if v is None else ", ".join(f"{x:z.3f}" if abs(x) >= 5e-4 else "0" for x in v),
     }
-    template = environment.from_string(folder.joinpath("report.html").read_text(encoding="utf-8"))
-    by_pair = {(row.a, row.b): row for row in report.rows}
-    return template.render(
+    cells = {(row.result.a, row.result.b): row for row in report.rows}
+    names = [part.name for part in report.scene.parts]
+    if len(names) > MATRIX:
+        seen = {n for row in report.rows if row.verdict != "clear" for n in (row.result.a, row.result.b)}
+        names = [name for name in names if name in seen][:MATRIX]
+    return environment.get_template("report.html").render(
         report=report,
-        run=report.run,
-        clamp=report.run.clamp,
+        scene=report.scene,
+        assembly=report.assembly,
         made=made_at(),
         versions=versions(),
-        settings=settings(report),
-        style=folder.joinpath("report.css").read_text(encoding="utf-8"),
+        style=environment.get_template("report.css").render(),
         pictures=_pictures(report, progress),
-        names=PARTS,
-        titles=TITLES,
-        colours=PART_COLOURS,
+        shown=[row for row in report.rows if len(report.rows) <= MEASURED_PAIRS or row.verdict != "clear"],
+        names=names,
+        titles=titles(report.scene),
+        colours=part_colours([part.name for part in report.scene.parts]),
         verdict_colours=VERDICT_COLOURS,
-        verdicts=[(name, MEANINGS[name]) for name in VERDICTS],
+        verdicts=[(verdict.value, meaning(verdict.value, report.scene)) for verdict in Verdict],
         severities=SEVERITIES,
-        cell=lambda a, b: by_pair.get((a, b)),
+        cell=lambda a, b: cells.get((a, b)),
         checks=_checks,
-        contact=CONTACT,
     )
-
-
-def settings(report: Report) -> dict[str, str]:
-    """What the run and the report were asked for."""
-    run = report.run
-    return {
-        "method": run.method,
-        "solver": run.solver,
-        "contact tolerance": f"{CONTACT:g} mm",
-        "clearance": f"{report.clearance:g} mm",
-        "mesh error": f"{report.mesh_error:g} mm (outlines of pairs without a groove; grooves and pictures: true arcs)",
-    }
 
 
 def versions() -> dict[str, str]:
@@ -160,19 +163,29 @@ def made_at() -> str:
     return now.strftime("%Y-%m-%d %H:%M UTC")
 
 
-def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, str]:
-    """Pictures as data addresses: 'states', 'steps', and one for each pair that touches or is declared to."""
+def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list[tuple[str, PairRow | None]]]:
+    """Pictures as data addresses, each with the pair that it shows: 'overview', 'pairs' and, of a clamp, 'steps'."""
     from clamp3d.output.assembly_figures import steps_figure
     from clamp3d.output.figures import contact_figure, states_figure
+    from clamp3d.output.scene_figures import finding_figure, scene_figure
 
-    run = report.run
-    out = {}
-    for name, draw in (("states", states_figure), ("steps", steps_figure)):
-        progress(f"picture of the {name}")
-        out[name] = _data_address(draw(run))
-    for contact in contacts_to_draw(report.rows):
-        progress(f"picture of {contact.a}-{contact.b}")
-        out[f"{contact.a}-{contact.b}"] = _data_address(contact_figure(run, contact))
+    scene, assembly = report.scene, report.assembly
+    jobs: list[tuple[str, str, Callable[[], Figure], PairRow | None]] = []
+    if assembly is not None:
+        jobs.append(("overview", "the states", lambda: states_figure(assembly), None))
+        jobs.append(("steps", "the steps", lambda: steps_figure(assembly), None))
+        # Every pair that touches, overlaps, or is declared to; a thread has nothing to show.
+        drawn = [row for row in report.rows if row.contact and (row.contact.type or row.contact.declared) > 1]
+        jobs += [("pairs", row.name, lambda c=row.contact: contact_figure(assembly, c), row) for row in drawn]
+    elif scene.parts:
+        found = [finding.row for finding in report.findings if finding.row is not None]
+        marks = [(number, row.result) for number, row in enumerate(found, 1)]
+        jobs.append(("overview", "the scene", lambda: scene_figure(scene, marks[:PICTURES]), None))
+        jobs += [("pairs", row.name, lambda r=row.result: finding_figure(scene, r), row) for row in found[:PICTURES]]
+    out: dict[str, list[tuple[str, PairRow | None]]] = {"overview": [], "steps": [], "pairs": []}
+    for kind, name, draw, row in jobs:
+        progress(f"picture of {name}")
+        out[kind].append((_data_address(draw()), row))
     return out
 
 
@@ -185,61 +198,22 @@ def _data_address(figure: Figure) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(out.getvalue()).decode("ascii")
 
 
-def _checks(step: StepRow, last: bool) -> list[tuple[str, str, str]]:
-    """What a line worker looks at after a step: (what, value, state), state 'good', 'bad' or '' while under way."""
-    both = all(s.seated for s in step.seats)
-    state = ("good" if both else "bad") if last else ""
+def _checks(step: StepRow, last: bool) -> list[tuple[str, str]]:
+    """What a line worker looks at after a step: (value, state), state 'good', 'bad' or '' while under way."""
     splints = "parallel" if step.parallel else f"tilted {abs(math.degrees(step.tilt)):.2f}\N{DEGREE SIGN}"
-    return [
-        ("power line", step.seat("P6"), state and ("good" if _seated(step, "P6") else "bad")),
-        ("jumper", step.seat("P7"), state and ("good" if _seated(step, "P7") else "bad")),
-        ("splints", splints, ""),
-        ("gap left, right", f"{step.opening_line:.2f}, {step.opening_jumper:.2f} mm", ""),
-        ("nut", f"{step.turns:.2f} turns", ""),
-    ]
-
-
-def _seated(step: StepRow, wire: str) -> bool:
-    return all(s.seated for s in step.seats if s.wire == wire)
+    wires = [(step.seat(w), ("good" if step.seated(w) else "bad") if last else "") for w in ("P6", "P7")]
+    opening = f"{step.opening_line:.2f}, {step.opening_jumper:.2f} mm"
+    return [*wires, (splints, ""), (opening, ""), (f"{step.turns:.2f} turns", "")]
 
 
 def _pair_to_dict(row: PairRow) -> dict[str, Any]:
-    return {
-        "a": row.a,
-        "b": row.b,
-        "declared": row.declared,
-        "verdict": row.verdict,
+    data = row.result.to_dict() | {
         "severity": row.severity,
-        "relation": row.relation,
-        "feature": row.feature,
-        "distance_mm": row.distance,
-        "lower_bound": row.lower_bound,
-        "error_bound_mm": row.error_bound,
-        "point": row.point.tolist(),
-        "normal": row.normal.tolist(),
-        "method": row.method,
+        "lower_bound": not math.isfinite(row.distance.upper),
         "remark": row.remark,
+        "point": None if row.distance.point_a is None else row.distance.point_a.tolist(),
     }
-
-
-def _flat(row: PairRow) -> dict[str, Any]:
-    """The pair as one line: vectors as three columns."""
-    out: dict[str, Any] = {}
-    for key, value in _pair_to_dict(row).items():
-        if isinstance(value, list):
-            out |= {f"{key}_{axis}": v for axis, v in zip("xyz", value, strict=True)}
-        else:
-            out[key] = "" if value is None else value
-    return out
-
-
-def _mm(value: float) -> str:
-    return "0" if abs(value) <= CONTACT else f"{value:.3f}"
-
-
-def _bound(value: float | None) -> str:
-    return "not stated" if value is None else f"{value:.1e}"
-
-
-def _vector(values: Any) -> str:
-    return ", ".join(f"{v:.3f}" if abs(v) >= 5e-4 else "0" for v in values)
+    if row.contact is not None:
+        c = row.contact
+        data |= {"declared": c.declared, "measured": c.type, "relation": c.relation, "feature": c.feature}
+    return data

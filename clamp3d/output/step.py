@@ -31,8 +31,8 @@ _THROUGH = 1.0  # mm by which a hole's tool stands out at both ends
 def step(placed: Sequence[PlacedPart], title: str, unit: str) -> bytes:
     """The parts as one STEP file: an assembly ``title`` if they have poses or are several, else the part alone.
 
-    Its time stamp is the environment's SOURCE_DATE_EPOCH (seconds since 1970), if set. Raises MissingLibraryError
-    without Open CASCADE, Clamp3dError if that fails.
+    Its time stamp is the environment's SOURCE_DATE_EPOCH (seconds since 1970), if set. Raises InputError for a part
+    that is a mesh, MissingLibraryError without Open CASCADE, Clamp3dError if that fails.
     """
     _require()
     from OCP.IFSelect import IFSelect_ReturnStatus
@@ -145,9 +145,11 @@ def _document(placed: Sequence[PlacedPart], title: str) -> Any:
     if tree:
         name(root, title)
     for item in placed:
-        label = shapes.AddShape(solid(item.part), False)
+        if not isinstance(item.shape, Solid):
+            raise InputError(f"{item.name} is a mesh: STEP holds true faces, not facets; use stl, obj, ply, glb or 3mf")
+        label = shapes.AddShape(solid(item.shape), False)
         name(label, item.label)
-        r, g, b = (channel / 255 for channel in item.colour)
+        r, g, b = (channel / 255 for channel in item.rgb)
         colour = Quantity_Color(r, g, b, Quantity_TypeOfColor.Quantity_TOC_sRGB)
         colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorGen)
         if tree:

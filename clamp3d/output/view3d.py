@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 
 _CREASE = math.radians(25.0)
 """Edges sharper than this are drawn; below it the facets stand for one round surface."""
+_LIGHT = np.array([-0.35, 0.62, 0.70])
 
 
 @dataclass(frozen=True, slots=True)
-class Solid:
+class PosedMesh:
     """A mesh at a pose ``T`` (4, 4) in a colour "#RRGGBB"."""
 
     mesh: trimesh.Trimesh
@@ -51,34 +52,54 @@ class Camera:
         """World points (n, 3) to (right, up, depth towards the viewer) (n, 3) in mm."""
         return points @ self.axes().T
 
+    def view(self, solid: PosedMesh) -> Array:
+        """The solid's vertices as `project` gives them."""
+        return self.project(solid.mesh.vertices @ solid.T[:3, :3].T + solid.T[:3, 3])
 
-def draw_solids(ax: Axes, solids: Sequence[Solid], camera: Camera, *, pixels: int = 1100) -> None:
-    """Draw the solids with shading and their visible edges, ``pixels`` along the longer side; axes in mm."""
+
+def draw_solids(
+    ax: Axes,
+    solids: Sequence[PosedMesh],
+    camera: Camera,
+    *,
+    pixels: int = 1100,
+    window: tuple[Array, Array] | None = None,
+    zorder: float = 1.0,
+) -> None:
+    """Draw the solids with shading and their visible edges, ``pixels`` along the longer side; axes in mm.
+
+    ``window`` ((2,) least, (2,) largest, mm to the right and up) is what to show, if not all.
+    """
     from matplotlib.collections import LineCollection
 
-    views = [camera.project(s.mesh.vertices @ s.T[:3, :3].T + s.T[:3, 3]) for s in solids]
-    low, high = np.min([v.min(0) for v in views], axis=0)[:2], np.max([v.max(0) for v in views], axis=0)[:2]
-    pixels_per_mm = pixels / float((high - low).max())
-    low, high = low - 5.0 / pixels_per_mm, high + 5.0 / pixels_per_mm
+    views = [camera.view(s) for s in solids]
+    if window is None:
+        low, high = np.min([v.min(0) for v in views], axis=0)[:2], np.max([v.max(0) for v in views], axis=0)[:2]
+        margin = 5.0 * float((high - low).max()) / pixels
+        low, high = low - margin, high + margin
+    else:
+        low, high = window
+        margin = 0.0
+    pixels_per_mm = pixels / float((high - low).max() - 2.0 * margin)
     size = np.ceil((high - low) * pixels_per_mm).astype(int)
     high = low + size / pixels_per_mm
     depth = np.full((size[1], size[0]), -np.inf)
     image = np.zeros((size[1], size[0], 4))
-    light = np.array([-0.35, 0.62, 0.70])
     for solid, view in zip(solids, views, strict=True):
         normals = solid.mesh.face_normals @ solid.T[:3, :3].T @ camera.axes().T
         rgb = np.array([int(solid.colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
-        points = (view - [*low, 0.0]) * [pixels_per_mm, pixels_per_mm, 1.0]
-        for face, normal in zip(solid.mesh.faces, normals, strict=True):
-            if normal[2] > 1e-9:
-                shade = 0.62 + 0.43 * max(0.0, float(normal @ light))
-                _fill(depth, image, points[face], np.append(np.minimum(rgb * shade, 1.0), 1.0))
+        shades = np.minimum(rgb * (0.62 + 0.43 * np.maximum(0.0, normals @ _LIGHT))[:, None], 1.0)
+        corners = ((view - [*low, 0.0]) * [pixels_per_mm, pixels_per_mm, 1.0])[solid.mesh.faces]
+        inside = (corners[..., :2].max(1) >= 0.0).all(1) & (corners[..., :2].min(1) <= size).all(1)
+        for i in np.flatnonzero((normals[:, 2] > 1e-9) & inside):
+            _fill(depth, image, corners[i], np.append(shades[i], 1.0))
     ax.set_aspect("equal")
     ax.set_axis_off()
-    ax.imshow(image, extent=(low[0], high[0], low[1], high[1]), origin="lower", interpolation="antialiased", zorder=1)
+    extent = (low[0], high[0], low[1], high[1])
+    ax.imshow(image, extent=extent, origin="lower", interpolation="antialiased", zorder=zorder)
     for solid, view in zip(solids, views, strict=True):
         lines = _visible(_edges(solid, camera), view, depth, low, pixels_per_mm)
-        ax.add_collection(LineCollection(lines, colors=darker(solid.colour, 0.4), linewidths=0.6, zorder=2))
+        ax.add_collection(LineCollection(lines, colors=darker(solid.colour, 0.4), linewidths=0.6, zorder=zorder + 1))
     ax.set_xlim(low[0], high[0])
     ax.set_ylim(low[1], high[1])
 
@@ -101,7 +122,7 @@ def _fill(depth: Array, image: Array, triangle: Array, colour: Array) -> None:
     image[bottom:top, left:right][nearer] = colour
 
 
-def _edges(solid: Solid, camera: Camera) -> NDArray[np.int64]:
+def _edges(solid: PosedMesh, camera: Camera) -> NDArray[np.int64]:
     """Vertex pairs (n, 2) of creases and of outlines against the view."""
     mesh = solid.mesh
     towards = mesh.face_normals @ solid.T[:3, :3].T @ camera.axes()[2]
@@ -127,6 +148,7 @@ def _visible(edges: NDArray[np.int64], view: Array, depth: Array, low: Array, pi
                 c = np.clip(column + dx, 0, depth.shape[1] - 1)
                 around = np.minimum(around, depth[r, c])
         seen = points[:, 2] >= around - 0.25 / pixels_per_mm
+        seen &= (column >= 0) & (row >= 0) & (column <= depth.shape[1]) & (row <= depth.shape[0])
         starts = np.flatnonzero(seen & ~np.append(False, seen[:-1]))
         ends = np.flatnonzero(seen & ~np.append(seen[1:], False))
         stretches += [points[[s, e], :2] for s, e in zip(starts, ends, strict=True) if e > s]

@@ -1,4 +1,4 @@
-"""More than one place of rest: each found, proven, told to the user; known cases in closed form."""
+"""More than one equilibrium: each found, proven, told to the user; known cases in closed form."""
 
 import json
 import math
@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from clamp3d import Cas, assemble, equilibria, load_clamp
+from clamp3d import assemble, load_clamp
+from clamp3d.baselines.cas import Cas
 from clamp3d.bench.stress.assemblies.clamps import clamp_of
-from clamp3d.clamp.equilibria import describe, slipping
+from clamp3d.clamp.equilibria import describe, equilibria, slipping
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.section import Section
 from clamp3d.cli import group
-from clamp3d.output.run_report import run_to_dict, run_to_text
+from clamp3d.output.run_report import run_to_text
 
 
 def clamp_with(radius, wire, half_angle=math.pi / 3):
@@ -62,24 +63,22 @@ def test_a_run_tells_the_others_when_asked():
     assert all(abs(e.closing - run.closing) > 1e-6 or abs(e.tilt - run.tilt) > 1e-6 for e in run.others)
     text = run_to_text(run)
     for e in run.others:
-        words = "another equilibrium:" if e.rests else "put together otherwise it ends at"
+        words = "another equilibrium:" if e.rests else "also ends at"
         assert f"{words} {e.distance:.3f} mm" in text
+        assert str(e) in [finding.text for finding in run.findings if finding.severity == "note"]
         assert e.rests == ("slips" not in e.detail)
-    assert len(run_to_dict(run)["other_ends"]) == len(run.others)
+    assert len(run.to_dict()["other_ends"]) == len(run.others)
 
 
 def test_command_line_tells_them_unless_told_not_to(tmp_path):
     out = tmp_path / "run.json"
     asked = CliRunner().invoke(group, ["run", "--quiet", "--json", str(out)])
     assert asked.exit_code == 0
-    assert (
-        "put together otherwise it ends at 34.050 mm, tilt 12.80 deg: power line slips out of its groove"
-        in asked.output
-    )
+    assert "also ends at 34.050 mm, tilt 12.80 deg (no equilibrium: power line slips out of its groove" in asked.output
     ends = json.loads(out.read_text())["other_ends"]
     assert [round(e["distance_mm"], 3) for e in ends] == [34.05, 30.499, 34.033]
     plain = CliRunner().invoke(group, ["run", "--quiet", "--no-equilibria"])
-    assert "otherwise" not in plain.output
+    assert "also ends" not in plain.output
     refused = CliRunner().invoke(group, ["run", "--quiet", "--solver", "stepped", "--equilibria"])
     assert refused.exit_code == 2
     assert "--equilibria goes with --solver exact, not stepped" in refused.output

@@ -117,7 +117,7 @@ def test_pairs_of_conductors_end_in_a_stated_result():
         else:
             assert run.status.startswith("not clamped: ")
             if "faces meet" in run.status:
-                assert any({c.a, c.b} == {"P1", "P2"} and abs(c.distance) < 1e-6 for c in run.contacts)
+                assert any({c.a, c.b} == {"P1", "P2"} and abs(c.gap) < 1e-6 for c in run.contacts)
                 assert run.undeclared
         stated.add(run.status.split(",")[0])
     assert {"clamped", "not clamped: faces meet"} <= stated

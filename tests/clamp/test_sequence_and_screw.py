@@ -79,7 +79,7 @@ def test_the_line_passes_between_the_open_splints():
 
 def test_an_undeclared_meeting_is_reported():
     run = assemble(load_clamp(line="LJ-16", jumper="LJ-16"), Cas())
-    assert [(u.a, u.b, u.declared, u.met_as) for u in run.undeclared] == [("P1", "P2", 0, 2)]
+    assert [(u.a, u.b, u.declared, u.measured) for u in run.undeclared] == [("P1", "P2", 0, 2)]
     assert run.status == "not clamped: faces meet, P6 and P7 loose"
     assert run.distance == pytest.approx(0.0, abs=1e-9)
 
@@ -89,7 +89,7 @@ def test_a_matrix_with_a_missing_entry_is_reported():
     rows = {a: dict(row) for a, row in clamp.connections.items()}
     del rows["P2"]["P7"]
     run = assemble(replace(clamp, connections=rows), Cas())
-    assert [(u.a, u.b, u.declared, u.met_as) for u in run.undeclared] == [("P2", "P7", 0, 3)]
+    assert [(u.a, u.b, u.declared, u.measured) for u in run.undeclared] == [("P2", "P7", 0, 3)]
 
 
 def with_bolt(shank_length):
@@ -106,8 +106,8 @@ def test_a_bolt_that_does_not_fill_the_nut_does_not_clamp(lacking):
         assert run.status == "clamped"
     else:
         assert run.status == f"not clamped: the bolt is {lacking:.4g} mm too short for the nut"
-    gaps = {(c.a, c.b): c.distance for c in run.contacts}
-    assert gaps["P4", "P5"] == pytest.approx(max(0.0, lacking - run.clamp.nut.height), abs=1e-9)
+    gaps = {(c.a, c.b): c.gap for c in run.contacts}
+    assert gaps["P4", "P5"] == pytest.approx(max(0.0, lacking - run.clamp.nut.height), abs=1e-6)
     assert np.isfinite(list(gaps.values())).all()
 
 

@@ -5,6 +5,8 @@ import pytest
 
 from clamp3d.clamp.dimensions import PARTS, Clamp
 from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.scene import clamp_scene
+from clamp3d.collide.scene import Scene
 
 
 @pytest.fixture(scope="session")
@@ -23,3 +25,9 @@ def odd_poses() -> dict[str, np.ndarray]:
         T[:3, :3], T[:3, 3] = Q * np.linalg.det(Q), generator.normal(size=3) * 200
         poses[name] = T
     return poses
+
+
+@pytest.fixture(scope="session")
+def odd_scene(reference: Clamp, odd_poses: dict[str, np.ndarray]) -> Scene:
+    """The seven parts at those poses."""
+    return clamp_scene(reference, odd_poses)

@@ -54,6 +54,7 @@ def test_final_state_is_exported_where_it_is_published(clamp3d, tmp_path: Path, 
         np.testing.assert_allclose(T[:3, 3], [x, 0.0, -y], atol=6e-4)
         assert np.degrees(np.arctan2(T[2, 0], T[0, 0])) == pytest.approx(degrees, abs=0.01)
     assert (listing["state"], listing["status"]) == ("final", "clamped")
+    assert listing["parameters"]["saddle"]["radius"] == 49.230
     # As a reader sees it: metres, Y up; the nut's top face 67.774 mm above the line, the bolt's end 120.184 mm.
     scene = trimesh.load(tmp_path / "reference.glb")
     assert scene.bounds[1][1] == pytest.approx(0.120184, abs=1e-6)
@@ -73,6 +74,23 @@ def test_parts_keep_their_own_frames_unless_a_state_is_named(clamp3d, tmp_path: 
     assert listing["mesh_error_mm"] == 0.1
 
 
+def test_scenes_and_meshes_are_exported_too(clamp3d, tmp_path: Path, capfd) -> None:
+    hinge = ROOT / "examples" / "hinge"
+    assert clamp3d("export", hinge / "scene.toml", "-o", tmp_path / "hinge.3mf") == 0
+    meshes = [trimesh.load(hinge / f"{name}.stl") for name in ("leaf-a", "leaf-b", "pin")]
+    expected = trimesh.util.concatenate(meshes).bounds
+    assert trimesh.load(tmp_path / "hinge.3mf").bounds == pytest.approx(expected, abs=1e-5)
+    assert clamp3d("export", hinge / "pin.stl", "-f", "obj", "-o", tmp_path / "pin") == 0
+    assert (tmp_path / "pin" / "pin.obj").is_file()
+    capfd.readouterr()
+    assert clamp3d("export", hinge / "scene.toml", "-o", tmp_path / "hinge.step") == 2
+    assert "leaf-a is a mesh: STEP holds true faces" in capfd.readouterr().err
+    assert clamp3d("export", hinge / "pin.stl", "-o", tmp_path / "a.glb", "--state", "open") == 2
+    assert "state goes with an assembled clamp" in capfd.readouterr().err
+    assert clamp3d("export", "-o", tmp_path / "final.step", "-q") == 0
+    assert capfd.readouterr().out.split() == [str(tmp_path / f"final.step{s}") for s in ("", ".manifest.json")]
+
+
 def test_other_wires_and_units(clamp3d, tmp_path: Path) -> None:
     arguments = ("--jumper", "21.6", "--line", "LJ-500", "--layout", "assembly", "--unit", "in", "-q")
     assert clamp3d("export", "--format", "obj", "--output", tmp_path, *arguments) == 0
@@ -87,7 +105,7 @@ def test_other_wires_and_units(clamp3d, tmp_path: Path) -> None:
     [
         (("--state", "P9"), "unknown state 'P9'; available: open, P1|P2P3P4P5 (or 1), P7 (or 2)"),
         (("--mesh-error", "0"), "mesh_error must be a finite length >= 1e-06 mm, got 0"),
-        (("--mesh-error", "wide"), "'wide' is not a valid float"),
+        (("--mesh-error", "wide"), "must be a finite number or a fraction like 1/3, got 'wide'"),
         (("--format", "dwg"), "'dwg' is not one of"),
         (("--format", "glb", "--unit", "mm"), "unit of glb must be m"),
         (("nowhere.toml",), "nowhere.toml"),

@@ -16,7 +16,12 @@ import trimesh
 
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
 from clamp3d.clamp.parts import parts
+from clamp3d.clamp.scene import clamp_scene
+from clamp3d.collide.scene import Scene
+from clamp3d.core import shapes
+from clamp3d.core.mesh import make_mesh
 from clamp3d.core.meshing import volume_bounds
+from clamp3d.core.pose import translation
 from clamp3d.errors import InputError
 from clamp3d.output.export import FORMATS, export
 from clamp3d.output.palette import PART_COLOURS
@@ -62,7 +67,7 @@ def read_stl(path: Path) -> np.ndarray:
 
 @pytest.mark.parametrize("unit", ["mm", "in"])
 def test_stl_parts_are_in_their_own_frames(reference: Clamp, tmp_path: Path, unit: str) -> None:
-    written = export(reference, format="stl", output=tmp_path, mesh_error=MESH_ERROR, unit=unit)
+    written = export(reference, tmp_path, format="stl", mesh_error=MESH_ERROR, unit=unit)
     assert [p.name for p in written.files] == [f"{n}-{TITLES[n].replace(' ', '-')}.stl" for n in PARTS]
     for name, path in zip(PARTS, written.files, strict=True):
         assert f"unit {unit}".encode() in path.read_bytes()[:80]
@@ -72,10 +77,8 @@ def test_stl_parts_are_in_their_own_frames(reference: Clamp, tmp_path: Path, uni
         )
 
 
-def test_stl_assembly_is_in_the_world(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
-    written = export(
-        reference, format="stl", output=tmp_path, layout="assembly", poses=odd_poses, mesh_error=MESH_ERROR
-    )
+def test_stl_assembly_is_in_the_world(reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path) -> None:
+    written = export(odd_scene, tmp_path, format="stl", layout="assembly", mesh_error=MESH_ERROR)
     assert [p.name for p in written.files] == ["reference.stl"]
     whole = trimesh.load(written.files[0])
     low = np.min([parts(reference)[n].bounds_at(odd_poses[n])[0] for n in PARTS], axis=0)
@@ -86,22 +89,20 @@ def test_stl_assembly_is_in_the_world(reference: Clamp, odd_poses: dict, tmp_pat
 def test_stl_that_would_lose_accuracy_is_refused(reference: Clamp, tmp_path: Path) -> None:
     far = np.eye(4)
     far[0, 3] = 1e6
-    poses = dict.fromkeys(PARTS, far)
+    scene = clamp_scene(reference, dict.fromkeys(PARTS, far))
     with pytest.raises(InputError, match=r"stl holds 32-bit numbers: the pose of P1 would lose 0\.03"):
-        export(reference, format="stl", output=tmp_path / "stl", poses=poses)
+        export(scene, tmp_path / "stl", format="stl")
     assert not (tmp_path / "stl").exists()
     # The others hold the same place exactly.
-    for format in ("ply", "obj"):
-        written = export(reference, format=format, output=tmp_path, poses=poses, mesh_error=MESH_ERROR, names=["P1"])
+    for format, rounding in (("ply", 1e-9), ("obj", 1e-9), ("3mf", 1e-5)):
+        written = export(scene, tmp_path, format=format, mesh_error=MESH_ERROR, names=["P1"])
         solid = trimesh.load(written.files[0], process=False, force="mesh")
-        np.testing.assert_allclose(solid.bounds - [1e6, 0, 0], parts(reference)["P1"].bounds, atol=1e-9)
+        np.testing.assert_allclose(solid.bounds - [1e6, 0, 0], parts(reference)["P1"].bounds, atol=rounding)
 
 
 @pytest.mark.parametrize("layout", ["parts", "assembly"])
-def test_ply(reference: Clamp, odd_poses: dict, tmp_path: Path, layout: str) -> None:
-    written = export(
-        reference, format="ply", output=tmp_path, poses=odd_poses, layout=layout, mesh_error=MESH_ERROR, unit="m"
-    )
+def test_ply(reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path, layout: str) -> None:
+    written = export(odd_scene, tmp_path, format="ply", layout=layout, mesh_error=MESH_ERROR, unit="m")
     seen = []
     for path in written.files:
         header = path.read_bytes().split(b"end_header")[0].decode("ascii")
@@ -116,10 +117,8 @@ def test_ply(reference: Clamp, odd_poses: dict, tmp_path: Path, layout: str) -> 
     assert seen == list(PARTS)
 
 
-def test_obj_has_named_coloured_objects(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
-    written = export(
-        reference, format="obj", output=tmp_path, poses=odd_poses, layout="assembly", mesh_error=MESH_ERROR
-    )
+def test_obj_has_named_coloured_objects(reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path) -> None:
+    written = export(odd_scene, tmp_path, format="obj", layout="assembly", mesh_error=MESH_ERROR)
     model, materials = written.files
     assert (model.name, materials.name) == ("reference.obj", "reference.mtl")
     text = model.read_text()
@@ -158,8 +157,10 @@ def accessor(tree: dict, buffer: bytes, index: int) -> np.ndarray:
     return values
 
 
-def test_glb_is_metres_and_y_up_with_local_coordinates(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
-    written = export(reference, format="glb", output=tmp_path, poses=odd_poses, mesh_error=MESH_ERROR)
+def test_glb_is_metres_and_y_up_with_local_coordinates(
+    reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path
+) -> None:
+    written = export(odd_scene, tmp_path, format="glb", mesh_error=MESH_ERROR)
     tree, buffer = read_glb(written.files[0])
     assert tree["asset"]["version"] == "2.0"
     assert tree["asset"]["extras"] == {"unit": "m", "mesh_error_mm": MESH_ERROR}
@@ -190,11 +191,11 @@ _CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 
 
 @pytest.mark.parametrize("unit", ["mm", "in"])
-def test_3mf_xml(reference: Clamp, odd_poses: dict, tmp_path: Path, unit: str) -> None:
-    written = export(reference, format="3mf", output=tmp_path, poses=odd_poses, mesh_error=MESH_ERROR, unit=unit)
+def test_3mf_xml(reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path, unit: str) -> None:
+    written = export(odd_scene, tmp_path, format="3mf", mesh_error=MESH_ERROR, unit=unit)
     with zipfile.ZipFile(written.files[0]) as package:
         assert package.testzip() is None
-        assert package.namelist()[0] == "[Content_Types].xml"
+        assert "[Content_Types].xml" in package.namelist()
         root = ElementTree.fromstring(package.read("3D/3dmodel.model"))
     assert root.get("unit") == {"mm": "millimeter", "in": "inch"}[unit]
     objects = {o.get("id"): o for o in root.iter(f"{_CORE}object")}
@@ -208,17 +209,17 @@ def test_3mf_xml(reference: Clamp, odd_poses: dict, tmp_path: Path, unit: str) -
     for name, component in zip(PARTS, components, strict=True):
         leaf = objects[component.get("objectid")]
         assert leaf.get("name") == f"{name} {TITLES[name]}"
-        assert bases[int(leaf.get("pindex", "-1"))].get("displaycolor") == PART_COLOURS[name].upper()
+        assert bases[int(leaf.get("pindex", "-1"))].get("displaycolor") == f"{PART_COLOURS[name].upper()}FF"
         vertices = np.array([[float(v.get(k, "nan")) for k in "xyz"] for v in leaf.iter(f"{_CORE}vertex")])
         faces = np.array([[int(t.get(k, "-1")) for k in ("v1", "v2", "v3")] for t in leaf.iter(f"{_CORE}triangle")])
         M = np.array([float(x) for x in component.get("transform", "").split()]).reshape(4, 3)  # row vectors: v M
         world = (np.hstack([vertices, np.ones((len(vertices), 1))]) @ M) * MM[unit]
-        check_solid(name, reference, world, faces, odd_poses[name], 1e-8)
+        check_solid(name, reference, world, faces, odd_poses[name], 2e-5)
 
 
-def test_3mf_by_lib3mf(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
+def test_3mf_by_lib3mf(reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path) -> None:
     lib3mf = pytest.importorskip("lib3mf", reason="lib3mf is not installed")
-    written = export(reference, format="3mf", output=tmp_path, poses=odd_poses, mesh_error=MESH_ERROR)
+    written = export(odd_scene, tmp_path, format="3mf", mesh_error=MESH_ERROR)
     model = lib3mf.get_wrapper().CreateModel()
     reader = model.QueryReader("3mf")
     reader.SetStrictModeActive(True)
@@ -233,7 +234,7 @@ def test_3mf_by_lib3mf(reference: Clamp, odd_poses: dict, tmp_path: Path) -> Non
         names.append(item.GetName())
         box = item.GetOutbox()
         seen = [list(box.MinCoordinate), list(box.MaxCoordinate)]
-        np.testing.assert_allclose(seen, parts(reference)[names[-1][:2]].bounds, atol=2e-5)
+        np.testing.assert_allclose(seen, parts(reference)[names[-1][:2]].bounds, atol=1e-3)  # six digits of the pose
     assert names == [f"{n} {TITLES[n]}" for n in PARTS]
     trees = model.GetComponentsObjects()
     assert trees.MoveNext()
@@ -242,14 +243,11 @@ def test_3mf_by_lib3mf(reference: Clamp, odd_poses: dict, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("format", FACETED)
 def test_same_input_gives_the_same_bytes_and_the_manifest_tells_of_them(
-    reference: Clamp, odd_poses: dict, tmp_path: Path, format: str
+    reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path, format: str
 ) -> None:
     import hashlib
 
-    runs = [
-        export(reference, format=format, output=tmp_path / str(i), poses=odd_poses, mesh_error=MESH_ERROR, state="odd")
-        for i in range(2)
-    ]
+    runs = [export(odd_scene, tmp_path / str(i), format=format, mesh_error=MESH_ERROR) for i in range(2)]
     for a, b in zip((*runs[0].files, runs[0].manifest), (*runs[1].files, runs[1].manifest), strict=True):
         assert a.read_bytes() == b.read_bytes()
     listing = json.loads(runs[0].manifest.read_text())
@@ -260,8 +258,7 @@ def test_same_input_gives_the_same_bytes_and_the_manifest_tells_of_them(
         assert entry["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
     assert listing["unit"] == ("m" if format == "glb" else "mm")
     assert listing["up"] == ("Y" if format == "glb" else "Z")
-    assert (listing["state"], listing["mesh_error_mm"]) == ("odd", MESH_ERROR)
-    assert listing["parameters"]["saddle"]["radius"] == 49.230
+    assert (listing["scene"], listing["mesh_error_mm"]) == ("reference", MESH_ERROR)
     for name in PARTS:
         entry = listing["parts"][name]
         assert 0.0 < entry["chord_error_mm"] <= MESH_ERROR
@@ -278,23 +275,22 @@ def test_same_input_gives_the_same_bytes_and_the_manifest_tells_of_them(
         np.testing.assert_allclose(loaded.bounds, expected, atol=1e-4 if listing["unit"] == "mm" else 1e-7)
 
 
-def test_bad_settings_are_one_clear_line_and_leave_no_file(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
-    scaled = {**odd_poses, "P3": np.diag([2.0, 2.0, 2.0, 1.0])}
-    some = {name: odd_poses[name] for name in ("P1", "P2")}
-    for arguments, message in [
-        ({"format": "dxf"}, "format must be one of stl, obj, ply, glb, 3mf, step, got 'dxf'"),
-        ({"format": "glb", "unit": "mm", "poses": odd_poses}, "unit of glb must be m, as glTF 2.0 demands, got 'mm'"),
-        ({"format": "stl", "unit": "ft"}, "unit must be one of mm, cm, m, in, got 'ft'"),
-        ({"format": "stl", "layout": "zip"}, "layout must be one of parts, assembly, got 'zip'"),
-        ({"format": "stl", "mesh_error": math.nan}, "mesh_error must be a finite length"),
-        ({"format": "3mf"}, "layout 'assembly' needs poses"),
-        ({"format": "3mf", "poses": scaled}, "pose of P3 must be rigid"),
-        ({"format": "3mf", "poses": some}, "missing: P3, P4, P5, P6, P7"),
-        ({"format": "stl", "poses": {"P8": np.eye(4)}}, "unknown part 'P8'"),
-        ({"format": "stl", "names": []}, "parts must name at least one of P1"),
+def test_bad_settings_are_one_clear_line_and_leave_no_file(reference: Clamp, odd_scene: Scene, tmp_path: Path) -> None:
+    for source, arguments, message in [
+        (reference, {"format": "dxf"}, "format must be one of stl, obj, ply, glb, 3mf, step, got 'dxf'"),
+        (reference, {}, "output must end in one of stl, obj, ply, glb, 3mf, step, or be a folder with a format"),
+        (odd_scene, {"format": "glb", "unit": "mm"}, "unit of glb must be m, as glTF 2.0 demands, got 'mm'"),
+        (reference, {"format": "stl", "unit": "ft"}, "unit must be one of mm, cm, m, in, got 'ft'"),
+        (reference, {"format": "stl", "layout": "zip"}, "layout must be one of parts, assembly, got 'zip'"),
+        (reference, {"format": "stl", "mesh_error": math.nan}, "mesh_error must be a finite length"),
+        (reference, {"format": "3mf"}, "layout assembly needs poses"),
+        (odd_scene, {"format": "stl", "state": "final"}, "state goes with an assembled clamp"),
+        (odd_scene, {"format": "stl", "names": ["P8"]}, "unknown part 'P8'; available: P1"),
+        (odd_scene, {"format": "stl", "names": []}, "names must name at least one part, available: P1"),
+        (parts(reference), {"format": "stl"}, "source must be a Clamp or Scene or Assembly, got dict"),
     ]:
         with pytest.raises(InputError, match="^.*" + message.replace("(", r"\(")):
-            export(reference, output=tmp_path / "none", **arguments)
+            export(source, tmp_path / "none", **arguments)
     assert not (tmp_path / "none").exists()
 
 
@@ -302,18 +298,66 @@ def test_files_are_written_whole_or_not_at_all(reference: Clamp, tmp_path: Path)
     (tmp_path / "P7-jumper.stl").mkdir()
     (tmp_path / "P1-up-splint.stl").write_text("mine")
     with pytest.raises(InputError, match=r"cannot write .*P7-jumper\.stl: it is a folder"):
-        export(reference, format="stl", output=tmp_path)
+        export(reference, tmp_path, format="stl")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["P1-up-splint.stl", "P7-jumper.stl"]
     assert (tmp_path / "P1-up-splint.stl").read_text() == "mine"
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"cannot write into .*file"):
-        export(reference, format="stl", output=tmp_path / "file")
+        export(reference, tmp_path / "file", format="stl")
 
 
-def test_any_name_of_a_clamp_gives_readable_files(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
-    odd = replace(reference, name='Überklemme <5>/"a"\nnext\x01')
-    for format in ("glb", "3mf", "obj", "ply", "stl"):
-        written = export(odd, format=format, output=tmp_path, poses=odd_poses, layout="assembly", mesh_error=0.5)
+def test_any_name_gives_readable_files(odd_scene: Scene, tmp_path: Path) -> None:
+    odd = replace(odd_scene, name='Überklemme <5>/"a"\nnext\x01')
+    for format in FACETED:
+        written = export(odd, tmp_path, format=format, layout="assembly", mesh_error=0.5)
         assert written.files[0].name == f"berklemme-5-a-next.{format}"
         loaded = trimesh.load(written.files[0])
         assert loaded.extents.max() > 0.1
+
+
+@pytest.mark.parametrize("name", ["world", "root", "P1 up splint", "part 0", "P3"])
+def test_names_of_a_file_and_its_parts_are_apart_from_those_of_the_writer(
+    odd_scene: Scene, tmp_path: Path, name: str
+) -> None:
+    """A clamp called "world" became trimesh's own root: its parts lost the turn to Y up."""
+    plain, odd = (
+        trimesh.load(export(replace(odd_scene, name=n), tmp_path / f"{i}.glb", mesh_error=0.5).files[0])
+        for i, n in enumerate(("reference", name))
+    )
+    np.testing.assert_array_equal(odd.bounds, plain.bounds)
+    tree, _ = read_glb(tmp_path / "1.glb")
+    (root,) = (tree["nodes"][i] for i in tree["scenes"][tree["scene"]]["nodes"])
+    assert root["name"] == name
+    assert [tree["nodes"][i]["name"] for i in root["children"]] == [f"{n} {TITLES[n]}" for n in PARTS]
+    clashing = Scene().add("world", shapes.box((1, 2, 3))).add("root", shapes.cylinder(1, 9))
+    tree, _ = read_glb(export(clashing, tmp_path / "clashing.glb").files[0])
+    assert [m["name"] for m in tree["meshes"]] == ["world", "root"]
+
+
+def test_a_scene_of_drawn_solids_and_meshes(tmp_path: Path) -> None:
+    """A named file by its suffix; a mesh keeps its facets; volumes without a closed form lie between bounds."""
+    block = trimesh.creation.box((4.0, 6.0, 8.0))
+    tube = shapes.cylinder(5.0, 40.0, bore=3.0)
+    scene = Scene(name="pair").add("tube", tube, translation(0, 0, 7))
+    scene = scene.add("a/b", shapes.MeshShape(make_mesh(block.vertices, block.faces))).add("a-b", shapes.box((1, 1, 1)))
+    written = export(scene, tmp_path / "pair.STL", mesh_error=0.2)
+    assert [p.name for p in (*written.files, written.manifest)] == ["pair.STL", "pair.STL.manifest.json"]
+    listing = json.loads(written.manifest.read_text())
+    assert list(listing["files"]) == ["pair.STL"]
+    entry = listing["parts"]["tube"]
+    low, high = entry["volume_bounds_mm3"]
+    assert low < math.pi * (25.0 - 9.0) * 40.0 < high
+    assert low <= entry["mesh_volume_mm3"] <= high
+    assert listing["parts"]["a/b"]["mesh_volume_mm3"] == 192.0
+    assert listing["parts"]["a/b"]["chord_error_mm"] == 0.0
+    assert listing["parts"]["tube"]["bounds"][1][2] == 27.0
+    names = [p.name for p in export(scene, tmp_path, format="ply").files]
+    assert names == ["tube.ply", "a-b.ply", "a-b-2.ply"]
+    solid = trimesh.load(tmp_path / "a-b.ply", process=False)
+    np.testing.assert_array_equal(solid.bounds, [[-2, -3, -4], [2, 3, 4]])
+    with pytest.raises(InputError, match="a/b is a mesh: STEP holds true faces"):
+        export(scene, tmp_path / "pair.step")
+    with pytest.raises(InputError, match=r"output pair\.glb and format stl contradict each other"):
+        export(scene, tmp_path / "pair.glb", format="stl")
+    with pytest.raises(InputError, match="layout parts needs a folder"):
+        export(scene, tmp_path / "pair.glb", layout="parts")

@@ -16,6 +16,7 @@ import trimesh
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.parts import parts
+from clamp3d.collide.scene import Scene
 from clamp3d.core.meshing import volume_bounds
 from clamp3d.core.pose import inverse
 from clamp3d.errors import InputError
@@ -158,8 +159,8 @@ def surfaces(shape: Any) -> list[Any]:
 
 
 @pytest.mark.parametrize("unit", ["mm", "in", "m"])
-def test_step_assembly(reference: Clamp, odd_poses: dict, tmp_path: Path, unit: str) -> None:
-    written = export(reference, format="step", output=tmp_path, poses=odd_poses, unit=unit)
+def test_step_assembly(reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path, unit: str) -> None:
+    written = export(odd_scene, tmp_path, format="step", unit=unit)
     text = written.files[0].read_text()
     assert {"mm": "SI_UNIT(.MILLI.,.METRE.)", "in": "CONVERSION_BASED_UNIT('INCH'", "m": "SI_UNIT($,.METRE.)"}[
         unit
@@ -176,7 +177,7 @@ def test_step_assembly(reference: Clamp, odd_poses: dict, tmp_path: Path, unit: 
 
 
 def test_step_keeps_cylinders_as_cylinders_and_planes_as_planes(reference: Clamp, tmp_path: Path) -> None:
-    written = export(reference, format="step", output=tmp_path, layout="parts")
+    written = export(reference, tmp_path, format="step", layout="parts")
     radii: dict[str, Counter[float]] = {}
     for name, path in zip(PARTS, written.files, strict=True):
         root, (product,) = read_step(path)
@@ -195,9 +196,11 @@ def test_step_keeps_cylinders_as_cylinders_and_planes_as_planes(reference: Clamp
     }
 
 
-def test_step_grooves_lie_where_the_contact_features_do(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
+def test_step_grooves_lie_where_the_contact_features_do(
+    reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path
+) -> None:
     """Axis and radius of every groove as read in the world, against the feature that the contact model measures."""
-    written = export(reference, format="step", output=tmp_path, poses=odd_poses)
+    written = export(odd_scene, tmp_path, format="step")
     _, found = read_step(written.files[0])
     for (a, _), pair in groove_pairs(reference).items():
         product = found[PARTS.index(a)]
@@ -216,12 +219,13 @@ def test_step_grooves_lie_where_the_contact_features_do(reference: Clamp, odd_po
 def test_step_same_input_same_bytes_and_manifest(
     reference: Clamp,
     odd_poses: dict,
+    odd_scene: Scene,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
-    runs = [export(reference, format="step", output=tmp_path / str(i), poses=odd_poses, state="odd") for i in range(3)]
+    runs = [export(odd_scene, tmp_path / str(i), format="step") for i in range(3)]
     assert len({run.files[0].read_bytes() for run in runs}) == 1
     assert b"'1970-01-02T00:00:00'" in runs[0].files[0].read_bytes()
     assert capfd.readouterr().out == ""  # stdout is for data
@@ -235,16 +239,18 @@ def test_step_same_input_same_bytes_and_manifest(
         np.testing.assert_allclose(entry["bounds"], bounds(product.shape), atol=2e-6)
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "today")
     with pytest.raises(InputError, match="SOURCE_DATE_EPOCH must be whole seconds since 1970, got 'today'"):
-        export(reference, format="step", output=tmp_path, poses=odd_poses)
+        export(odd_scene, tmp_path, format="step")
 
 
-def test_glb_comes_back_in_millimetres_and_z_up(reference: Clamp, odd_poses: dict, tmp_path: Path) -> None:
+def test_glb_comes_back_in_millimetres_and_z_up(
+    reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path
+) -> None:
     from OCP.Message import Message_ProgressRange
     from OCP.RWGltf import RWGltf_CafReader
     from OCP.RWMesh import RWMesh_CoordinateSystem
     from OCP.TCollection import TCollection_AsciiString
 
-    written = export(reference, format="glb", output=tmp_path, poses=odd_poses, mesh_error=0.02)
+    written = export(odd_scene, tmp_path, format="glb", mesh_error=0.02)
     document = new_document()
     reader = RWGltf_CafReader()
     reader.SetDocument(document)

@@ -11,12 +11,12 @@ import trimesh
 from matplotlib.figure import Figure
 
 from clamp3d.core.pose import translation
-from clamp3d.output.view3d import Camera, Solid, draw_solids
+from clamp3d.output.view3d import Camera, PosedMesh, draw_solids
 
 FRONT = Camera(azimuth=0.0, elevation=0.0)  # looks along +Y: right is X, up is Z, near is -Y
 
 
-def scene(solids: list[Solid], camera: Camera = FRONT) -> tuple[np.ndarray, list[np.ndarray]]:
+def scene(solids: list[PosedMesh], camera: Camera = FRONT) -> tuple[np.ndarray, list[np.ndarray]]:
     """The picture, 10 pixels a mm, and the lines drawn on it."""
     points = np.concatenate([camera.project(s.mesh.vertices + s.T[:3, 3]) for s in solids])
     ax = Figure().add_subplot()
@@ -24,8 +24,8 @@ def scene(solids: list[Solid], camera: Camera = FRONT) -> tuple[np.ndarray, list
     return np.asarray(ax.images[0].get_array()), [c.get_segments() for c in ax.collections]
 
 
-def block(size: tuple[float, float, float], at: tuple[float, float, float], colour: str) -> Solid:
-    return Solid(trimesh.creation.box(size), translation(*at), colour)
+def block(size: tuple[float, float, float], at: tuple[float, float, float], colour: str) -> PosedMesh:
+    return PosedMesh(trimesh.creation.box(size), translation(*at), colour)
 
 
 def test_axes_are_right_handed_and_face_the_viewer() -> None:
@@ -68,7 +68,7 @@ def test_an_edge_that_goes_behind_something_ends_there() -> None:
 
 def test_round_surfaces_have_no_facet_lines() -> None:
     """A cylinder seen from the side: two ends and two outlines."""
-    pin = Solid(trimesh.creation.cylinder(radius=3.0, height=10.0, sections=64), np.eye(4), "#808080")
+    pin = PosedMesh(trimesh.creation.cylinder(radius=3.0, height=10.0, sections=64), np.eye(4), "#808080")
     image, (lines,) = scene([pin])
     upright = [s for s in lines if abs(s[0, 0] - s[1, 0]) < 0.05 and abs(s[0, 1] - s[1, 1]) > 5.0]
     assert sorted(round(float(s[0, 0])) for s in upright) == [-3, 3]

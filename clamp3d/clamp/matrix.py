@@ -1,0 +1,106 @@
+"""The connection matrix: what it declares (Table 1 of the paper) beside what is measured."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from clamp3d.clamp.dimensions import PARTS, TITLES, ConnectionType, PartName
+from clamp3d.core.pose import Array
+
+if TYPE_CHECKING:
+    from clamp3d.clamp.contact import Contact
+
+TYPES: dict[ConnectionType, str] = {
+    0: "no connection",
+    1: "screw joint",
+    2: "convex object collision",
+    3: "concave arc surface collision",
+}
+"""Eq. 1 of the paper."""
+
+Pair = tuple[PartName, PartName]
+
+PAIRS: tuple[Pair, ...] = tuple(itertools.combinations(PARTS, 2))
+"""All pairs of parts, in the order of the matrix."""
+
+ARC_PAIRS: tuple[Pair, ...] = (("P1", "P6"), ("P1", "P7"), ("P2", "P3"), ("P2", "P6"), ("P2", "P7"))
+"""The pairs in which a cylinder lies in a concave arc (Fig. 5)."""
+
+SCREW: Pair = ("P4", "P5")
+
+
+def contact_type(pair: Pair) -> ConnectionType:
+    """Type of a contact of two parts, by their shapes.
+
+    >>> contact_type(("P1", "P6")), contact_type(("P4", "P5")), contact_type(("P1", "P2"))
+    (3, 1, 2)
+    """
+    return 3 if pair in ARC_PAIRS else 1 if pair == SCREW else 2
+
+
+def gap_text(gap: float) -> str:
+    """A gap in mm for people: three digits, more where it is smaller than they show, and 0 for rounding.
+
+    >>> gap_text(1.0), gap_text(-2.5e-5), gap_text(3e-15)
+    ('1.000', '-2.5e-05', '0')
+    """
+    return "0" if abs(gap) < 5e-10 else f"{gap:.3g}" if abs(gap) < 1e-3 else f"{gap:.3f}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Difference:
+    """A pair whose measured contact is not the declared one.
+
+    Attributes
+    ----------
+    a, b : str
+        The two parts.
+    declared, measured : int
+        Types of the connection matrix; 0 is no contact.
+    gap : float or None
+        Signed distance of the two in the final state, mm; None for a meeting on the way.
+    place : ndarray (3,) or None
+        Where it is measured, on part a in the world, mm.
+    where : str
+        When it was seen: "the final state", or a step of the sequence.
+    """
+
+    a: PartName
+    b: PartName
+    declared: ConnectionType
+    measured: ConnectionType
+    gap: float | None
+    place: Array | None
+    where: str = "the final state"
+
+    def __str__(self) -> str:
+        pair = f"{self.a}-{self.b} ({TITLES[self.a]}, {TITLES[self.b]})"
+        declared = f"declared {self.declared} ({TYPES[self.declared]})"
+        if self.gap is not None and self.measured == 0:
+            return f"{pair} {declared} but does not touch: {gap_text(self.gap)} mm apart in {self.where}"
+        return f"{pair} {declared} but met as {self.measured} ({TYPES[self.measured]}) in {self.where}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "a": self.a,
+            "b": self.b,
+            "declared": self.declared,
+            "measured": self.measured,
+            "gap_mm": self.gap,
+            "point": None if self.place is None else self.place.tolist(),
+            "where": self.where,
+            "text": str(self),
+        }
+
+
+def differences(contacts: Iterable[Contact], tolerance: float) -> tuple[Difference, ...]:
+    """Where measured contacts differ from the matrix, in both directions; gaps up to ``tolerance`` mm may touch."""
+    return tuple(
+        Difference(c.a, c.b, c.declared, c.type, c.gap, c.point)
+        for c in contacts
+        if c.type != c.declared and not (c.type == 0 and c.gap <= tolerance)
+    )

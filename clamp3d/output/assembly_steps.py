@@ -1,0 +1,115 @@
+"""How a clamp comes together, as a line worker checks it: the state after each motion, and the nut's own step."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from clamp3d.clamp.contact import Seat, measure_contacts, seats
+from clamp3d.clamp.dimensions import PartName
+from clamp3d.clamp.result import Assembly, Waypoint
+from clamp3d.clamp.scene import CONTACT
+from clamp3d.core.pose import SectionPose
+from clamp3d.output.section import edge_openings
+
+TIGHTENING_STAGES = 4
+_PARALLEL = math.radians(0.005)  # the angle that prints as 0.00 deg
+_WIRES: tuple[PartName, ...] = ("P6", "P7")
+
+
+@dataclass(frozen=True, slots=True)
+class StepRow:
+    """The state at the end of a motion, as a line worker checks it; lengths in mm, tilt in rad.
+
+    ``opening_line`` and ``opening_jumper`` are the heights between the splints' inner edges on either side,
+    ``turns`` those of the nut from open. ``seats`` say for each groove whether its wire lies in it, ``outside`` which
+    wires are not between the splints yet.
+    """
+
+    number: int
+    waypoint: Waypoint
+    opening_line: float
+    opening_jumper: float
+    tilt: float
+    turns: float
+    seats: tuple[Seat, ...]
+    outside: tuple[PartName, ...]
+
+    @property
+    def parallel(self) -> bool:
+        """Whether the splints are parallel, to the printed digits."""
+        return abs(self.tilt) < _PARALLEL
+
+    def seated(self, wire: PartName) -> bool:
+        """Whether a wire lies in both its grooves."""
+        return all(s.seated for s in self.seats if s.wire == wire)
+
+    def seat(self, wire: PartName) -> str:
+        """A wire's place in words."""
+        if wire in self.outside:
+            return "not in the clamp yet"
+        if self.seated(wire):
+            return "fully in both grooves"
+        own = [s for s in self.seats if s.wire == wire]
+        held = [s.splint for s in own if s.seated]
+        rests = [f"{s.splint}: {s.detail}" for s in own if not s.seated and s.detail != "loose"]
+        words = [f"in {' and '.join(held)}'s groove"] if held else []
+        loose = [f"{s.gap:.1f} mm from {s.splint}" for s in own if s.detail == "loose"]
+        return "; ".join([*words, *rests, *loose])
+
+
+@dataclass(frozen=True, slots=True)
+class TighteningRow:
+    """A stage of the tightening: ``turns`` of the nut in it, ``way`` mm the bolt is drawn up, gap of the saddle."""
+
+    turns: float
+    way: float
+    saddle_gap: float
+
+
+def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
+    """The state at every waypoint of an assembly."""
+    clamp, first = assembly.clamp, assembly.path[0].poses
+    # A solver that tries positions leaves small gaps; what it counted as seated is seated here.
+    tolerance = max([CONTACT, *(s.gap for s in assembly.seats if s.seated)])
+    pairs: list[tuple[PartName, PartName]] = [("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7")]
+    rows = []
+    for number, waypoint in enumerate(assembly.path, 1):
+        poses = waypoint.poses
+        line, jumper = edge_openings(clamp, poses)
+        left = poses["P1"].x
+        rows.append(
+            StepRow(
+                number=number,
+                waypoint=waypoint,
+                opening_line=line,
+                opening_jumper=jumper,
+                tilt=poses["P2"].angle - poses["P1"].angle,
+                turns=round((_screwed(poses) - _screwed(first)) / clamp.bolt.pitch, 9) + 0.0,
+                seats=seats(measure_contacts(clamp, poses, assembly.model, pairs=pairs), tolerance),
+                outside=tuple(w for w in _WIRES if not left < poses[w].x < left + clamp.up_splint.width),
+            )
+        )
+    return tuple(rows)
+
+
+def tightening_rows(assembly: Assembly) -> tuple[TighteningRow, ...]:
+    """The nut's own step in equal stages: the bolt is drawn up until the saddle meets the round back."""
+    before, after = assembly.path[-2].poses, assembly.path[-1].poses
+    way = _screwed(after) - _screwed(before)
+    rows = []
+    for stage in range(TIGHTENING_STAGES + 1):
+        f = stage / TIGHTENING_STAGES
+        poses = {
+            name: SectionPose(p.x + f * (after[name].x - p.x), p.y + f * (after[name].y - p.y), after[name].angle)
+            for name, p in before.items()
+        }
+        (saddle,) = measure_contacts(assembly.clamp, poses, assembly.model, pairs=[("P2", "P3")])
+        gap = 0.0 if abs(saddle.gap) <= CONTACT else saddle.gap
+        rows.append(TighteningRow(f * way / assembly.clamp.bolt.pitch, f * way, gap))
+    return tuple(rows)
+
+
+def _screwed(poses: dict[PartName, SectionPose]) -> float:
+    """Height of the nut's free face below the bolt's free end in mm: by how much it is screwed on, up to a constant."""
+    return poses["P5"].y - poses["P4"].y

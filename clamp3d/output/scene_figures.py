@@ -1,0 +1,167 @@
+"""Pictures of a checked scene: all its parts with the findings numbered, and each finding by itself, enlarged."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from clamp3d.collide.result import PairResult
+from clamp3d.collide.scene import Scene
+from clamp3d.core.pose import Array
+from clamp3d.core.profile import MIN_MESH_ERROR
+from clamp3d.core.shapes import Solid
+from clamp3d.errors import Clamp3dError
+from clamp3d.output.palette import INK, VERDICT_COLOURS
+from clamp3d.output.placed import place
+from clamp3d.output.view3d import Camera, PosedMesh, draw_solids
+from clamp3d.output.viewer_cut import overlap
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MESH_ERROR = 3e-4
+"""Chord error of drawn solids, in parts of the scene's extent: below a pixel."""
+_CAMERAS = [
+    Camera(math.radians(azimuth), math.radians(elevation))
+    for elevation, azimuth in itertools.product((24.0, 55.0, -24.0), (32.0, -32.0, 122.0, 212.0))
+]
+"""Where a finding is looked at from, the usual one first."""
+_ENLARGED = 0.12
+"""Half the width of an enlargement, in parts of the extent of the two parts."""
+
+
+def scene_figure(scene: Scene, marks: Sequence[tuple[int, PairResult]] = ()) -> Figure:
+    """All parts of a scene where they stand, with the findings at rest as dots with their numbers."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 5.6), layout="constrained")
+    ax = figure.add_subplot()
+    camera = _CAMERAS[0]
+    solids = _solids(scene, [part.name for part in scene.parts])
+    draw_solids(ax, list(solids.values()), camera)
+    for number, row in marks:
+        place = _place(row)
+        if place is not None and row.motion is None:
+            _mark(ax, camera.project(place[None])[0], row, str(number))
+    _legend(ax, solids)
+    return figure
+
+
+def finding_figure(scene: Scene, row: PairResult) -> Figure:
+    """The two parts of a finding, where they stand at its moment: whole, and enlarged about the place.
+
+    What the two have in common is drawn in red over them.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 4.4), layout="constrained")
+    shown = _solids(_at(scene, row), [row.a, row.b])
+    solids = [shown[row.a], shown[row.b]]
+    common = _common(*solids) if row.distance.upper < 0.0 else None
+    place = _place(row)
+    if place is None and common is not None:
+        place = common.T[:3, :3] @ common.mesh.center_mass + common.T[:3, 3]
+    camera = _CAMERAS[0] if place is None else min(_CAMERAS, key=lambda c: _hidden(c, solids, place))
+    axes = figure.subplots(1, 1 if place is None else 2, squeeze=False)[0]
+    half = _ENLARGED * max(float(np.ptp(camera.view(s)[:, :2], axis=0).max()) for s in solids)
+    if common is not None and place is not None:
+        half = max(half, 0.6 * float(np.ptp(camera.view(common)[:, :2], axis=0).max()))
+    for i, ax in enumerate(axes):
+        window = None
+        if i and place is not None:
+            at = camera.project(place[None])[0, :2]
+            reach = np.array([1.2, 1.0]) * half
+            window = at - reach, at + reach
+        draw_solids(ax, solids, camera, pixels=800, window=window)
+        if common is not None:
+            limits = ax.get_xlim(), ax.get_ylim()
+            draw_solids(ax, [common], camera, pixels=500, window=window, zorder=10.0)
+            ax.set_xlim(limits[0])
+            ax.set_ylim(limits[1])
+        if place is not None:
+            _mark(ax, camera.project(place[None])[0], row)
+        if i:
+            ax.set_axis_on()
+            ax.set_xticks([])
+            ax.set_yticks([])
+            ax.set_title("enlarged", fontsize=8, loc="left", color=INK)
+    _legend(axes[0], shown)
+    return figure
+
+
+def _at(scene: Scene, row: PairResult) -> Scene:
+    """The scene at the moment of a row: that of its least distance in a motion."""
+    poses = {part.name: part.T_world for part in scene.parts}
+    for motion in scene.motions if row.motion is not None else ():
+        # Each motion starts where the one before has left the parts.
+        going = motion.resolved(poses[motion.parts[0]])
+        last = motion.name == row.motion and row.t is not None
+        poses |= {name: going.at(row.t if last else 1.0, poses[name]) for name in motion.parts}
+        if last:
+            break
+    return scene.moved(poses)
+
+
+def _solids(scene: Scene, names: Sequence[str]) -> dict[str, PosedMesh]:
+    found = {}
+    for item in place(scene, names):
+        extent = float(np.ptp(item.shape.bounds, axis=0).max()) if isinstance(item.shape, Solid) else 0.0
+        found[item.name] = PosedMesh(item.mesh(max(MIN_MESH_ERROR, _MESH_ERROR * extent)), item.T, item.colour)
+    return found
+
+
+def _place(row: PairResult) -> Array | None:
+    """The middle between the two witness points."""
+    p, q = row.distance.point_a, row.distance.point_b
+    return None if p is None or q is None else 0.5 * (p + q)
+
+
+def _common(a: PosedMesh, b: PosedMesh) -> PosedMesh | None:
+    """What two overlapping parts have in common; None where their facets do not meet or cannot be cut."""
+    try:
+        found = overlap(a.mesh, a.T, b.mesh, b.T)
+    except (Clamp3dError, RuntimeError, ValueError):
+        return None
+    return None if found is None else PosedMesh(found, a.T, VERDICT_COLOURS["clash"])
+
+
+def _hidden(camera: Camera, solids: Sequence[PosedMesh], place: Array) -> int:
+    """How many triangles lie between a place and the viewer."""
+    x, y, z = camera.project(place[None])[0]
+    count = 0
+    for solid in solids:
+        a, b, c = np.moveaxis(camera.view(solid)[solid.mesh.faces], 1, 0)
+        sides = [
+            (q[:, 0] - p[:, 0]) * (y - p[:, 1]) - (q[:, 1] - p[:, 1]) * (x - p[:, 0])
+            for p, q in ((a, b), (b, c), (c, a))
+        ]
+        inside = (np.array(sides) > 0.0).all(0) | (np.array(sides) < 0.0).all(0)
+        total = np.sum(sides, axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depth = (sides[1] * a[:, 2] + sides[2] * b[:, 2] + sides[0] * c[:, 2]) / total
+        count += int((inside & (depth > z + 1e-3)).sum())
+    return count
+
+
+def _mark(ax: Axes, at: Array, row: PairResult, text: str = "") -> None:
+    colour = VERDICT_COLOURS[row.verdict.value]
+    ax.plot([at[0]], [at[1]], "o", ms=13, mfc="none", mec="white", mew=3.2, zorder=40)
+    ax.plot([at[0]], [at[1]], "o", ms=13, mfc="none", mec=colour, mew=1.8, zorder=41)
+    if text:
+        box = {"boxstyle": "circle,pad=0.2", "fc": "white", "ec": colour, "lw": 1.4}
+        style = {"ha": "center", "va": "center", "fontsize": 8, "fontweight": "bold", "zorder": 42, "color": INK}
+        ax.annotate(text, at[:2], (14, 14), textcoords="offset points", bbox=box, **style)
+
+
+def _legend(ax: Axes, solids: dict[str, PosedMesh]) -> None:
+    """Names of the parts by their colours; of many, none: the colours repeat."""
+    from matplotlib.patches import Patch
+
+    if len(solids) <= 12:
+        handles = [Patch(fc=solid.colour, ec=INK, lw=0.5, label=name) for name, solid in solids.items()]
+        ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=4, frameon=False, fontsize=8)

@@ -1,0 +1,246 @@
+"""Contacts: measured in 3D by the engine, on the parts, and compared with the declared matrix in both directions."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.dimensions import Clamp, GrooveDimensions
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.matrix import PAIRS
+from clamp3d.clamp.parts import parts
+from clamp3d.clamp.result import Assembly
+from clamp3d.cli import group
+from clamp3d.collide.distance import measure
+from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.pose import Array, inverse
+from clamp3d.core.profile import Arc
+from clamp3d.core.shapes import Solid
+
+WIRES = [
+    ("LJ-630", "LJ-120"),
+    ("LJ-500", "LJ-150"),
+    ("LJ-240", "LJ-240"),
+    ("LGJ-240/40", "LGJ-95/15"),
+    ("LJ-300", "LJ-400"),
+    ("LJ-16", "LJ-16"),
+    (20.0, 30.0),
+    (35.0, 35.0),
+    (46.0, 14.0),
+    ("LJ-500", "LJ-400"),
+    (9.0, 40.0),
+]
+
+
+@pytest.fixture(scope="module", params=WIRES, ids=lambda wires: f"{wires[0]} {wires[1]}".replace("/", "-"))
+def assembly(request: pytest.FixtureRequest) -> Assembly:
+    line, jumper = request.param
+    return assemble(line=line, jumper=jumper)
+
+
+def planar_distance(body: Extrusion, a: float, b: float) -> float:
+    """Signed distance of (a, b) from an outline: negative inside. Written anew here, from the outline's edges alone."""
+    least, crossings = math.inf, 0.0
+    for edge in body.profile.edges:
+        if isinstance(edge, Arc):
+            centre = complex(*edge.centre)
+            turn = np.linspace(edge.start_angle, edge.end_angle, 201)
+            around = centre + edge.radius * np.exp(1j * turn)
+            points = np.column_stack([around.real, around.imag])
+            w = (complex(a, b) - centre) * np.exp(-0.5j * (edge.start_angle + edge.end_angle))  # its middle on a
+            if abs(np.angle(w)) <= 0.5 * abs(edge.sweep):
+                least = min(least, abs(abs(w) - edge.radius))
+            least = min(least, math.dist(points[0], (a, b)), math.dist(points[-1], (a, b)))
+        else:
+            points = np.array([edge.start, edge.end])
+            along = points[1] - points[0]
+            s = float(np.clip(((a, b) - points[0]) @ along / (along @ along), 0.0, 1.0))
+            least = min(least, math.dist(points[0] + s * along, (a, b)))
+        angles = np.unwrap(np.arctan2(points[:, 1] - b, points[:, 0] - a))
+        crossings += (angles[-1] - angles[0]) / (2.0 * math.pi)
+    return -least if round(crossings) else least
+
+
+def outside(solid: Solid, point: Array) -> float:
+    """How far a point is from the material at least, mm: outside of every body, or inside a hole."""
+    bodies, holes = [], []
+    for body in solid.bodies:
+        a, b, along = point @ body.frame
+        bodies.append(max(planar_distance(body, a, b), body.start - along, along - body.end))
+    for hole in solid.holes:  # right through: its ends are not walls
+        a, b, _ = point @ hole.frame
+        holes.append(-planar_distance(hole, a, b))
+    return max(0.0, min(bodies), *holes)
+
+
+def test_the_membership_test_itself() -> None:
+    splint = parts(load_clamp())["P1"]
+    for point, expected in (
+        ((68.5, 0.0, -10.0), 11.0),  # middle of the hole
+        ((68.5, 11.0, -10.0), 0.0),
+        ((68.5, 12.0, -10.0), 0.0),
+        ((22.4651, 0.0, -48.7901 + 23.8012), 0.0),  # apex of the line's groove
+        ((22.4651, 0.0, -48.7901 + 23.7), 0.1012),  # below it
+        ((-3.0, 0.0, -10.0), 3.0),
+        ((10.0, 32.0, -10.0), 2.0),
+    ):
+        assert outside(splint, np.array(point)) == pytest.approx(expected, abs=1e-4), point
+
+
+def test_nearest_points_lie_on_both_parts_and_are_the_distance_apart(assembly: Assembly) -> None:
+    solids = parts(assembly.clamp)
+    assert [(c.a, c.b) for c in assembly.contacts] == list(PAIRS)
+    for c in assembly.contacts:
+        d = c.distance
+        assert d.point_a is not None
+        assert d.point_b is not None
+        for part, point in ((c.a, d.point_a), (c.b, d.point_b)):
+            local = inverse(assembly.T_world(part)) @ [*point, 1.0]
+            assert outside(solids[part], local[:3]) <= 1e-6, (c.a, c.b, part)
+        if c.gap >= 0.0:
+            assert np.linalg.norm(d.point_b - d.point_a) == pytest.approx(c.gap, abs=1e-6), (c.a, c.b)
+        if d.normal is not None:
+            assert np.linalg.norm(d.normal) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_every_way_to_ask_gives_the_same_distance(assembly: Assembly, tmp_path: Path) -> None:
+    out = tmp_path / "run.json"
+    clamp = assembly.clamp
+    wires = [w.conductor or f"{w.diameter}" for w in (clamp.line, clamp.jumper)]
+    CliRunner().invoke(
+        group, ["run", "-q", "--no-equilibria", "--line", wires[0], "--jumper", wires[1], "--json", str(out)]
+    )
+    rows = {(row["a"], row["b"]): row for row in json.loads(out.read_text())["contacts"]}
+    measured = measure(assembly.scene)
+    assert list(rows) == list(measured) == list(PAIRS)
+    for c in assembly.contacts:
+        assert rows[c.a, c.b]["distance_mm"] == pytest.approx(c.gap, abs=1e-9)
+        assert measured[c.a, c.b].value == pytest.approx(c.gap, abs=1e-9)
+
+
+def test_distances_of_the_reference_are_those_in_space() -> None:
+    """Measured on the exported STEP by Open CASCADE: 3.729354 and 1.000000 (the slot is 1 mm longer than the bolt)."""
+    gaps = {(c.a, c.b): c for c in assemble().contacts}
+    assert gaps["P1", "P2"].gap == pytest.approx(3.729354, abs=1e-6)
+    for pair in (("P1", "P4"), ("P2", "P4")):
+        assert gaps[pair].gap == pytest.approx(1.0, abs=1e-6)
+        assert gaps[pair].type == 0
+        assert gaps[pair].feature == "hole"
+
+
+def test_reference_differs_from_its_matrix_where_the_bolt_has_play() -> None:
+    assembly = assemble()
+    assert [(d.a, d.b, d.declared, d.measured) for d in assembly.matrix_differences] == [
+        ("P1", "P4", 2, 0),
+        ("P2", "P4", 2, 0),
+    ]
+    assert "P1-P4 (up splint, bolt) declared 2 (convex object collision) but does not touch: 1.000 mm apart" in str(
+        assembly.matrix_differences[0]
+    )
+    assert {pair: c.type for pair, c in assembly.matrix.items()} == {
+        ("P1", "P5"): 2, ("P1", "P6"): 3, ("P1", "P7"): 3, ("P2", "P3"): 3,
+        ("P2", "P6"): 3, ("P2", "P7"): 3, ("P3", "P4"): 2, ("P4", "P5"): 1,
+    }  # fmt: skip
+    relations = {(c.a, c.b): c.relation for c in assembly.contacts}
+    assert relations["P1", "P5"] == relations["P3", "P4"] == "seat"
+    assert relations["P4", "P5"] == "screw joint"
+    assert relations["P1", "P4"] == "none"
+    assert CliRunner().invoke(group, ["run", "-q"]).exit_code == 0
+
+
+def with_matrix(**rows: dict[str, int]) -> Clamp:
+    clamp = load_clamp()
+    merged = {a: {**clamp.connections.get(a, {}), **rows.get(a, {})} for a in {*clamp.connections, *rows}}
+    return replace(clamp, connections=merged)
+
+
+def test_declared_contacts_that_are_not_there_are_named() -> None:
+    assembly = assemble(with_matrix(P1={"P3": 2}, P2={"P5": 2}))
+    found = {(d.a, d.b): d for d in assembly.matrix_differences}
+    assert set(found) == {("P1", "P3"), ("P1", "P4"), ("P2", "P4"), ("P2", "P5")}
+    assert "does not touch: 36.085 mm apart" in str(found["P1", "P3"])
+    assert "does not touch: 41.490 mm apart" in str(found["P2", "P5"])
+    assert all(d.measured == 0 for d in found.values())
+    assert assembly.clamped
+    assert not assembly.undeclared
+
+
+def test_contacts_that_are_not_declared_are_named_and_a_finding() -> None:
+    clamp = load_clamp()
+    rows = {a: {b: kind for b, kind in row.items() if (a, b) != ("P3", "P4")} for a, row in clamp.connections.items()}
+    assembly = assemble(replace(clamp, connections=rows))
+    (undeclared,) = assembly.undeclared
+    assert (undeclared.a, undeclared.b, undeclared.declared, undeclared.measured) == ("P3", "P4", 0, 2)
+    assert (undeclared.a, undeclared.b) in {(d.a, d.b) for d in assembly.matrix_differences}
+    assert assembly.findings[0].severity == "error"
+    assert assembly.findings[0].text == str(undeclared)
+
+
+def test_a_type_that_is_not_the_declared_one_is_a_difference() -> None:
+    assembly = assemble(with_matrix(P2={"P7": 2}))
+    found = {(d.a, d.b): (d.declared, d.measured) for d in assembly.matrix_differences}
+    assert found["P2", "P7"] == (2, 3)
+    assert "warning" in {f.severity for f in assembly.findings if "P2-P7" in f.text}
+
+
+def through_the_bolt() -> Clamp:
+    """Thick wires on narrow grooves near the bolt: they reach 6 mm into its shank."""
+    clamp = load_clamp(line=52, jumper=52)
+
+    def grooves(depth: float) -> dict[str, GrooveDimensions]:
+        groove = GrooveDimensions(radius=15.0, offset=30.0, centre_depth=depth)
+        return {"line_groove": groove, "jumper_groove": groove}
+
+    up, down = clamp.up_splint, clamp.down_splint
+    return replace(
+        clamp,
+        up_splint=replace(up, **grooves(up.thickness + 5.0)),
+        down_splint=replace(down, **grooves(down.face_depth - 5.0), slot_width=30.0, max_tilt_deg=5.0),
+        bolt=replace(clamp.bolt, shank_length=220.0),
+    )
+
+
+def test_wires_through_the_bolt_are_not_clamped() -> None:
+    assembly = assemble(through_the_bolt())
+    assert assembly.status == "not clamped: P4 overlaps P6 by 6 mm"
+    texts = [f.text for f in assembly.findings if f.severity == "error"]
+    assert texts[:2] == ["not clamped: P4 overlaps P6 by 6 mm", "P4 overlaps P7 by 6 mm"]
+    assert {(d.a, d.b) for d in assembly.undeclared} == {("P4", "P6"), ("P4", "P7")}
+
+
+def test_an_overlap_counts_though_contact_is_declared() -> None:
+    clamp = through_the_bolt()
+    rows = {**clamp.connections, "P4": {"P5": 1, "P6": 2, "P7": 2}}
+    assembly = assemble(replace(clamp, connections=rows))
+    assert assembly.status == "not clamped: P4 overlaps P6 by 6 mm"
+    assert not assembly.undeclared
+    assert not assembly.clamped
+
+
+def test_seven_parts_meet_on_the_way_only_where_they_may() -> None:
+    """Pairs sampled densely along the path: what `undeclared` leaves out never comes near."""
+    assembly = assemble(line=20, jumper=30)
+    assert not assembly.undeclared
+    pairs = [pair for pair in PAIRS if assembly.clamp.connection(*pair) == 0]
+    for waypoint in assembly.path:
+        assert min(d.lower for d in measure(assembly.scene_at(waypoint), pairs).values()) > 1.0
+
+
+def test_plain_data_and_frame() -> None:
+    pandas = pytest.importorskip("pandas")
+    assembly = assemble()
+    data = json.loads(json.dumps(assembly.to_dict(), allow_nan=False))
+    assert len(data["contacts"]) == 21
+    assert {"status", "distance_mm", "parts", "contacts", "seats", "events", "residuals", "work"} <= set(data)
+    assert data["parts"]["P2"]["T_world"][0][3] == pytest.approx(assembly.poses["P2"].x)
+    frame = assembly.frame()
+    assert isinstance(frame, pandas.DataFrame)
+    assert frame["distance_mm"].tolist() == [c.gap for c in assembly.contacts]
+    assert "P1-P2" in assembly._repr_html_()
