@@ -157,7 +157,7 @@ function clamp3dViewer(messages) {
     else if (finding) {
       const f = story.findings[Number(finding.dataset.k)];
       if (!$("timeline").hidden) go(f.stop);
-      pick(finding, [f.a, f.b], f.low, f.high);
+      pick(finding, f.a ? [f.a, f.b] : null, f.low, f.high);
       if (innerWidth <= 760) $("stage").scrollIntoView({ block: "start" });
     } else if (row) {
       const r = story.stops[Number(row.closest(".stop").dataset.stop)].rows.find((r) => r.a === row.dataset.a && r.b === row.dataset.b);
