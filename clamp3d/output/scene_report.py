@@ -54,7 +54,8 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
     moving = f" at rest and {len(result.motions)} in motion" if result.motions else ""
     lines = [
         f"{result.scene.name}: {headline(result)}",
-        f"{n} parts, {result.work.pairs} pairs{moving}: {counts_text(result)}; contact up to {t.contact:g} mm, {clearance}",
+        f"{n} parts, {result.work.pairs} pairs{moving}: {counts_text(result)}; "
+        f"contact up to {t.contact:g} mm, {clearance}",
     ]
     for row in result.findings[:_ROWS]:
         where = circumstances(row)

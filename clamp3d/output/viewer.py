@@ -203,9 +203,10 @@ class Viewer:
         for row in self._drawing.timeline.stops[number].rows:
             if {row.a, row.b} == set(names[:2]):
                 return self._finding(replace(row, verdict=verdict), number, finding.text, "", focus(row))
-        anywhere = Row(*(names + ["P1", "P2"])[:2], verdict, self._drawing.timeline.stops[number].rows[0].distance, 0.0)
-        place = self._drawing.extent([self._drawing.timeline.stops[number].poses])
-        return self._finding(anywhere, number, finding.text, "", place) | {"a": "", "b": ""}
+        stop = self._drawing.timeline.stops[number]
+        place = self._drawing.extent([stop.poses])
+        anywhere = replace(stop.rows[0], a="", b="", verdict=verdict)
+        return self._finding(anywhere, number, finding.text, "", place)
 
     def _scene_findings(self, result: CheckResult) -> list[dict[str, Any]]:
         """The findings of a check, each with the stop and the place to look at: a motion's at its first contact."""
@@ -241,7 +242,9 @@ class Viewer:
     def _tell(self, said: str, *, state: str, done: bool = False, **more: Any) -> None:
         """What the page beside the picture shows; meshcat's own page takes no notice of it."""
         scene, drawing = self._scene, self._drawing
-        measured = "exactly" if self._model is None else f"by {self._model.name}"
+        measured = "exactly" if self._model is None or self._model.name == "cas" else f"by {self._model.name}"
+        accuracy = f"Drawn with facets within {self._mesh_error:g} mm; measured {measured}, not on the facets."
+        drawing.caption(accuracy)
         stops = [_stop_data(stop, *drawing.extent([stop.poses])) for stop in drawing.timeline.stops]
         used = {row["verdict"] for stop in stops for row in stop["rows"]} | {"contact", "clearance", "clear"}
         if not scene.thresholds.clearance:
@@ -254,7 +257,7 @@ class Viewer:
             "headline": said,
             "state": state,
             "done": done,
-            "accuracy": f"Drawn with facets within {self._mesh_error:g} mm; measured {measured}, not on the facets.",
+            "accuracy": accuracy,
             "parts": [{"name": n, "title": t, "colour": drawing.colours[n]} for n, t in titles(scene).items()],
             "nodes": {part.name: drawing.paths(part.name) for part in scene.parts},
             "verdicts": [

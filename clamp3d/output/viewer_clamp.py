@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.baselines.model import ContactModel
-from clamp3d.clamp.contact import measure_contacts
+from clamp3d.clamp.contact import NONE, Contact, measure_contacts
 from clamp3d.clamp.dimensions import TITLES, Clamp
 from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import clamp_scene
@@ -70,6 +70,10 @@ class ClampStory:
 
     def _verdict(self, a: str, b: str, distance: Any) -> str:
         return self.scene.thresholds.verdict(distance, self.scene.allowance(a, b)).value
+
+
+def _said(contact: Contact) -> str:
+    return "" if contact.relation == NONE else contact.relation
 
 
 def _about_z(angle: float) -> Array:

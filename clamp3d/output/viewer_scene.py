@@ -245,6 +245,12 @@ class SceneDrawing:
     def _label(self, path: str, text: str, at: ArrayLike, colour: str, size: float) -> None:
         self.put(path, draw.label(text, colour, at, size=0.01 * size / self._unit))
 
+    def caption(self, text: str) -> None:
+        """A line below everything, for meshcat's own page; ours says it in its panel."""
+        if self.timeline.stops:
+            low, high = self.extent([stop.poses for stop in self.timeline.stops])
+            self._label(f"{ROOT}/caption", text, [*(0.5 * (low + high))[:2], low[2] - 0.05 * self.size], "#FFFFFF", 0.8)
+
     def dimension(self, number: int, name: str, a: Array, b: Array, text: str) -> None:
         """One more length at a stop, from ``a`` to ``b``."""
         self._gap(f"{ROOT}/gaps/{self.timeline.group(number)}/{name}", a, b, text)
