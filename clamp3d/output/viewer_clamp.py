@@ -50,7 +50,7 @@ class ClampStory:
                 c.relation,
                 c.declared != 0,
             )
-            for c in measure_contacts(self.clamp, waypoint.poses, self._model, workshop=self._cache)
+            for c in measure_contacts(self.clamp, waypoint.poses, self._model, cache=self._cache)
         ]
         rows.sort(key=lambda row: not row.declared)
         on = float(poses["P4"][2, 3] - poses["P5"][2, 3])  # up to a constant
