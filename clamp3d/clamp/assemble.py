@@ -123,7 +123,7 @@ def assemble(
     log.reach(sequence[2], "splints closed", section_poses(section, final.q, saddle_d=d_open))
     poses = section_poses(section, final.q)
     log.reach(sequence[3], "nut tightened", poses)
-    contacts = measure_contacts(clamp, poses, model, workshop=log.workshop)
+    contacts = measure_contacts(clamp, poses, model, cache=log.cache)
     resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
     for drawn_by_nut, by in ((False, sequence[2]), (True, sequence[3])):
         for c in contacts:
@@ -173,7 +173,7 @@ def _undeclared(clamp: Clamp, contacts: Sequence[Contact], log: Log) -> tuple[Di
         if c.declared == 0 and c.type
     }
     waiting = [pair for pair in PAIRS if clamp.connection(*pair) == 0 and pair not in touching]
-    met = meetings(clamp, log.path, waiting, log.workshop)
+    met = meetings(clamp, log.path, waiting, log.cache)
     on_the_way = (Difference(*pair, 0, contact_type(pair), None, None, where) for pair, where in met.items())
     return (*touching.values(), *on_the_way)
 

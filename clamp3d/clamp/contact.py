@@ -18,7 +18,7 @@ from clamp3d.clamp.parts import parts
 from clamp3d.clamp.scene import CONTACT, clamp_scene
 from clamp3d.clamp.section import SPLINTS, WIRES
 from clamp3d.collide.distance import Distance, measure
-from clamp3d.collide.model import Workshop
+from clamp3d.collide.model import ModelCache
 from clamp3d.core.arc_circle import classify_arc_circle
 from clamp3d.core.pose import Array, SectionPose, inverse
 from clamp3d.core.profile import Arc, Edge
@@ -112,7 +112,7 @@ def measure_contacts(
     model: ContactModel | None = None,
     *,
     pairs: Iterable[Pair] = PAIRS,
-    workshop: Workshop | None = None,
+    cache: ModelCache | None = None,
 ) -> tuple[Contact, ...]:
     """Measure pairs of a clamp's parts and name how they touch.
 
@@ -125,7 +125,7 @@ def measure_contacts(
         How a groove and a wire are measured; by default the exact arcs.
     pairs : iterable of (str, str), optional
         Which pairs; by default all 21, in the order of the connection matrix.
-    workshop : Workshop, optional
+    cache : ModelCache, optional
         Keeps models of the parts from one call to the next.
 
     Examples
@@ -138,7 +138,7 @@ def measure_contacts(
     scene = clamp_scene(clamp, {part: pose.T() for part, pose in poses.items()})
     solids = parts(clamp)
     found = []
-    for (a, b), d in measure(scene, pairs, model=model, workshop=workshop).items():
+    for (a, b), d in measure(scene, pairs, model=model, cache=cache).items():
         relation = _relation(clamp, poses, (a, b), d)
         kind: ConnectionType = contact_type((a, b)) if d.value <= CONTACT and relation != NONE else 0
         names = [

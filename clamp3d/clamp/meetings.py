@@ -13,21 +13,21 @@ from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.scene import CONTACT, clamp_scene
-from clamp3d.collide.bounds import Verdict
+from clamp3d.collide.verdict import Verdict
 from clamp3d.collide.check import check
-from clamp3d.collide.model import Workshop
+from clamp3d.collide.model import ModelCache
 from clamp3d.core.pose import Array, SectionPose
 
 _MEET = (Verdict.CONTACT, Verdict.CLASH, Verdict.CONTAINED)
 
 
-def meetings(clamp: Clamp, path: Sequence[Waypoint], pairs: Sequence[Pair], workshop: Workshop) -> dict[Pair, str]:
+def meetings(clamp: Clamp, path: Sequence[Waypoint], pairs: Sequence[Pair], cache: ModelCache) -> dict[Pair, str]:
     """Those of ``pairs`` that touch or overlap anywhere on ``path``, with the step in which each does so first."""
     waiting = list(pairs)
     reach = {name: float(np.linalg.norm(np.abs(part.bounds).max(axis=0))) for name, part in parts(clamp).items()}
     found: dict[Pair, str] = {}
     for before, after in itertools.pairwise(path):
-        for pair in _meet(clamp, before, after, waiting, reach, workshop):
+        for pair in _meet(clamp, before, after, waiting, reach, cache):
             found[pair] = f"{after.step} ({after.label})"
         waiting = [pair for pair in waiting if pair not in found]
     return found
@@ -39,7 +39,7 @@ def _meet(
     after: Waypoint,
     pairs: Sequence[Pair],
     reach: dict[PartName, float],
-    workshop: Workshop,
+    cache: ModelCache,
 ) -> Iterator[Pair]:
     """Those of ``pairs`` that meet between two waypoints.
 
@@ -55,7 +55,7 @@ def _meet(
         for way in {ways[pair] for pair in near}:
             asked = [pair for pair in near if ways[pair] == way]
             scene = clamp_scene(clamp, _between(before, after, middle), clearance=way * half + 2.0 * CONTACT)
-            result = check(scene, pairs=asked, workshop=workshop)
+            result = check(scene, pairs=asked, cache=cache)
             for pair in asked:
                 verdict = result.verdict(*pair)
                 if verdict in _MEET or (verdict is not Verdict.CLEAR and way * half < CONTACT):

@@ -13,7 +13,7 @@ from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.motion import travel_to_contact
 from clamp3d.clamp.result import Event, Waypoint
 from clamp3d.clamp.section import WIRES, D, Section
-from clamp3d.collide.model import Workshop
+from clamp3d.collide.model import ModelCache
 from clamp3d.core.pose import Array, SectionPose
 
 Poses = dict[PartName, SectionPose]
@@ -29,7 +29,7 @@ class Log:
     on_waypoint: Callable[[Waypoint], None] | None
     events: list[Event] = field(default_factory=list)
     path: list[Waypoint] = field(default_factory=list)
-    workshop: Workshop = field(default_factory=Workshop)
+    cache: ModelCache = field(default_factory=ModelCache)
 
     def reach(self, step: str, label: str, poses: Poses) -> None:
         """Add a waypoint."""
@@ -42,7 +42,7 @@ class Log:
         assert pair is not None  # every motion here ends at a groove
         section = self.section
         (c,) = measure_contacts(
-            section.clamp, section_poses(section, q), section.model, pairs=[pair], workshop=self.workshop
+            section.clamp, section_poses(section, q), section.model, pairs=[pair], cache=self.cache
         )
         self.events.append(Event(step, c.a, c.b, c.relation, c.point, travel))
 

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.pose import Array, SectionPose
+from clamp3d.core.pose import SectionPose
 from clamp3d.core.profile import Arc, Point, Profile
 from clamp3d.core.shapes import Solid
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, VERDICT_COLOURS, darker
@@ -38,38 +39,21 @@ class Mark:
 
     x: float
     y: float
-    label: str
     verdict: str = "contact"
 
 
-def section_pose(T_world_part: Array) -> SectionPose:
-    """Where a pose (4, 4) puts its part in the section; what leaves the section (yaw, pitch, Y) is not seen in it.
-
-    >>> section_pose(SectionPose(1.0, 2.0, 0.25).T(along=7.0))
-    SectionPose(x=1.0, y=2.0, angle=0.25)
-    """
-    T = T_world_part
-    return SectionPose(float(T[0, 3]), float(-T[2, 3]), math.atan2(float(T[2, 0]), float(T[0, 0])))
-
-
 def arc_path(profile: Profile) -> MplPath:
-    """The outline as a closed path; each arc as cubic curves of at most 15 degrees, within 1e-8 radii of the arc."""
+    """The outline as a closed path; each arc as cubic curves of at most 10 degrees, within 1e-8 radii of the arc."""
     from matplotlib.path import Path
 
-    vertices: list[tuple[float, float]] = [profile.edges[0].start]
+    vertices: list[ArrayLike] = [profile.edges[0].start]
     codes = [int(Path.MOVETO)]
     for edge in profile.edges:
         if isinstance(edge, Arc):
-            n = max(1, math.ceil(abs(edge.sweep) / math.radians(15.0)))
-            step = edge.sweep / n
-            handle = 4.0 / 3.0 * math.tan(step / 4.0)  # the usual cubic: tangent at both ends, middle on the arc
-            for k in range(n):
-                t0, t1 = edge.start_angle + k * step, edge.start_angle + (k + 1) * step
-                (x0, y0), (x1, y1) = edge.at(t0), edge.at(t1)
-                r = handle * edge.radius
-                vertices += [(x0 - r * math.sin(t0), y0 + r * math.cos(t0))]
-                vertices += [(x1 + r * math.sin(t1), y1 - r * math.cos(t1)), (x1, y1)]
-                codes += [int(Path.CURVE4)] * 3
+            low, high = sorted((math.degrees(edge.start_angle), math.degrees(edge.end_angle)))
+            curve = Path.arc(low, high, max(1, math.ceil((high - low) / 10.0))).vertices
+            vertices += [*(edge.centre + edge.radius * (curve if edge.sweep > 0.0 else curve[::-1])[1:])]
+            codes += [int(Path.CURVE4)] * (len(curve) - 1)
         else:
             vertices.append(edge.end)
             codes.append(int(Path.LINETO))
@@ -141,30 +125,10 @@ def balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> Non
 
 
 def draw_marks(ax: Axes, marks: Iterable[Mark], *, size: float = 6.0) -> None:
-    """Contact points as dots in the colour of their verdict, with their labels."""
+    """Contact points as dots in the colour of their verdict."""
     for mark in marks:
-        ax.plot(
-            [mark.x],
-            [mark.y],
-            "o",
-            ms=size,
-            mec=INK,
-            mew=0.7,
-            mfc=VERDICT_COLOURS[mark.verdict],
-            zorder=40,
-            clip_on=False,
-        )
-        if mark.label:
-            ax.annotate(
-                mark.label,
-                (mark.x, mark.y),
-                (6, -3),
-                textcoords="offset points",
-                fontsize=7,
-                color=INK,
-                zorder=41,
-                bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85},
-            )
+        style = {"ms": size, "mec": INK, "mew": 0.7, "mfc": VERDICT_COLOURS[mark.verdict]}
+        ax.plot([mark.x], [mark.y], "o", **style, zorder=40, clip_on=False)
 
 
 def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int] = (-1, 1)) -> None:
