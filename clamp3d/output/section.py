@@ -92,7 +92,7 @@ def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
     """Names of the parts: a column of balloons on the right, each with a line to its part; wires carry theirs."""
     label_wires(ax, poses)
     points = {name: poses[name].point(*part_anchor(clamp, name)) for name in PARTS if name in poses}
-    (left, edge), (low, high) = section_extent(clamp, poses)
+    (left, low), (edge, high) = ax.dataLim.get_points()
     column = edge + 0.27 * (edge - left)
     order = sorted(points, key=lambda name: points[name][1])
     heights = spread([points[name][1] for name in order], min((high - low) / len(order), 0.1 * (high - low)))
@@ -285,30 +285,13 @@ def _pale(colour: str) -> str:
     return "#" + "".join(f"{round(255 - 0.4 * (255 - int(colour[i : i + 2], 16))):02X}" for i in (1, 3, 5))
 
 
-def section_extent(clamp: Clamp, poses: Poses) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Least and largest x, and y, of the parts at their poses (from their bounding boxes)."""
-    xs, ys = [], []
-    for name, part in parts(clamp).items():
-        if name in poses:
-            (x0, _, z0), (x1, _, z1) = part.bounds
-            for u, v in ((x0, -z0), (x0, -z1), (x1, -z0), (x1, -z1)):
-                x, y = poses[name].point(float(u), float(v))
-                xs.append(x)
-                ys.append(y)
-    return (min(xs), max(xs)), (min(ys), max(ys))
-
-
 def spread(values: list[float], spacing: float) -> list[float]:
-    """The ascending ``values`` moved apart to at least ``spacing``, as little as a few sweeps allow."""
-    out = list(values)
-    for _ in range(200):
-        moved = False
-        for i in range(len(out) - 1):
-            lack = spacing - (out[i + 1] - out[i])
-            if lack > 1e-6:
-                out[i] -= lack / 2
-                out[i + 1] += lack / 2
-                moved = True
-        if not moved:
-            break
-    return out
+    """The ascending ``values`` moved apart to at least ``spacing``, in all as little as can be (least squares).
+
+    >>> spread([0.0, 1.0, 10.0], 3.0)
+    [-1.0, 2.0, 10.0]
+    """
+    from scipy.optimize import isotonic_regression
+
+    even = spacing * np.arange(len(values))
+    return (isotonic_regression(np.array(values) - even).x + even).tolist()  # type: ignore[no-any-return]

@@ -20,6 +20,7 @@ import pytest
 import clamp3d
 from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.contact import measure_contacts
 from clamp3d.clamp.matrix import PAIRS
 from clamp3d.collide.distance import measure
 from clamp3d.collide.scene import Scene
@@ -155,12 +156,15 @@ def test_a_wire_through_the_bolt_is_a_clash_not_a_pass(reference):
     assembly = reference.assembly
     poses = dict(assembly.poses)
     poses["P7"] = replace(poses["P7"], x=poses["P4"].x, y=poses["P4"].y + 60.0)
-    path = (*assembly.path[:-1], replace(assembly.path[-1], poses=poses))
-    scene = replace(assembly, poses=poses, path=path).scene
-    found = make_report(replace(scene, clearance=5.0))
-    row = next(r for r in found.rows if r.name == "P4-P7")
+    contacts = measure_contacts(assembly.clamp, poses)
+    found = make_report(replace(assembly, poses=poses, contacts=contacts))
+    (row,) = (r for r in found.rows if r.name == "P4-P7")
     assert row.verdict in ("clash", "contained")
+    assert row.severity == "error"
+    assert row.distance.upper < 0.0
     assert not found.passed
+    assert found.headline == "Not passed: see the findings."
+    assert any(f.row is row and f.severity == "error" for f in found.findings)
 
 
 def test_clamp_that_does_not_close_fails_with_its_reasons(loose):
