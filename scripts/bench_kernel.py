@@ -163,7 +163,7 @@ def start_up() -> tuple[float, float]:
     import tempfile
 
     code = (
-        "import time; t = time.process_time(); import numpy as np; from clamp3d import *;"
+        "import time; t = time.process_time(); import numpy as np; from clamp3d.kernel import *;"
         "signed_distance(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.eye(4)); print(time.process_time() - t)"
     )
     with tempfile.TemporaryDirectory() as folder:

@@ -4,9 +4,7 @@ import os
 
 from hypothesis import settings
 
-from clamp3d import Cylinder, SweptArc, signed_distance
-from clamp3d.core.pieces import groove_pieces
-from clamp3d.core.pose import translation
+from clamp3d.kernel import Cylinder, SweptArc, groove_pieces, signed_distance, translation
 
 # A run that decides about a change repeats the same examples; a run at the desk looks for new ones.
 settings.register_profile("ci", derandomize=True)

@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from clamp3d.baselines.model import ContactModel
 from clamp3d.errors import InputError
 
 if TYPE_CHECKING:
     from clamp3d.baselines.decomposition import DecompositionParameters
+    from clamp3d.baselines.model import ContactModel
     from clamp3d.baselines.polytopes import PartOrMesh
 
 METHODS: dict[str, tuple[str, ...]] = {

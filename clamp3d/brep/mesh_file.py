@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +66,7 @@ def load_mesh(path: str | Path, *, unit: str | None = None) -> Mesh:
     if unit is None and file_unit is None:
         size = float(np.ptp(mesh.vertices, axis=0).max())
         notes.insert(0, f"{kind[1:].upper()} carries no unit: taken as mm (largest extent {size:.6g} mm)")
-    return Mesh(mesh.name, mesh.vertices, mesh.faces, mesh.watertight, mesh.rounding, tuple(notes))
+    return replace(mesh, notes=tuple(notes))
 
 
 def _read(file: Path, kind: str) -> tuple[Array, IntArray, str | None]:

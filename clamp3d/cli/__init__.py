@@ -97,7 +97,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:
             stream.flush()
-    sys.exit(int(status) if isinstance(status, int) else ExitCode.CLEAN)
+    sys.exit(int(status) if isinstance(status, int) else 0)
 
 
 def _place(error: Exception) -> str:

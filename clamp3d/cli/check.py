@@ -7,50 +7,57 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import JSON, OUTPUT, QUIET, number
+from clamp3d.cli.options import JSON, OUTPUT, QUIET, Source, number, source_argument
 from clamp3d.cli.progress import bar
 from clamp3d.cli.terminal import finish, show
 
 
 @click.command("check")
-@click.argument("scene", metavar="SCENE.toml", type=click.Path(path_type=Path))
+@source_argument("INPUT", required=True)
 @click.option("--pairs", metavar="A:B,...", help="Only these pairs, for instance P1:P6,P2:P7.")
 @click.option("--clearance", type=number, metavar="MM", help="Gap that parts must keep; replaces the file's.")
+@click.option("--distances", is_flag=True, help="Measure every pair, not only as finely as its verdict needs.")
 @click.option("--full", is_flag=True, help="Also ask every model at its finest for every pair, and compare (slow).")
 @JSON
-@click.option("--html", "html_file", type=OUTPUT, metavar="FILE", help="Write the result as a page.")
+@click.option("--html", "html_file", type=OUTPUT, metavar="FILE", help="Write a page in 3D; - is stdout.")
 @QUIET
 def command(
-    scene: Path,
+    source: Source,
     pairs: str | None,
     clearance: float | None,
+    distances: bool,
     full: bool,
     json_file: Path | None,
     html_file: Path | None,
     quiet: bool,
 ) -> None:
-    """Check which parts of a scene clash, touch or keep their clearance, at rest and in motion.
+    """Check which parts of INPUT clash, touch or keep their clearance, at rest and in motion.
 
-    Each pair is measured only as finely as its verdict needs. Exit code 1 if parts clash.
+    INPUT is a scene file, a mesh, a STEP file, or a clamp (a built-in name or a TOML file), which is assembled first
+    and measured in all its pairs. Exit code 1 if parts clash, 3 if a pair cannot be decided.
     """
+    from clamp3d.clamp.assemble import assemble
+    from clamp3d.clamp.dimensions import Clamp
     from clamp3d.collide.check import check, check_full
+    from clamp3d.collide.verdict import Verdict
     from clamp3d.output.files import write_json, write_text
     from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
-    from clamp3d.scenefile.file import load_scene
 
-    loaded = load_scene(scene)
-    if clearance is not None:
-        loaded = replace(loaded, clearance=clearance)
     asked = _pairs(pairs) if pairs is not None else None
+    loaded = source.load()
+    is_clamp = isinstance(loaded, Clamp)
+    scene = assemble(loaded).scene if isinstance(loaded, Clamp) else loaded
+    if clearance is not None:
+        scene = replace(scene, clearance=clearance)
     with bar(quiet) as report:
-        result = check(loaded, pairs=asked, progress=report)
-        complete = check_full(loaded, result, progress=report) if full else None
+        result = check(scene, pairs=asked, distances=distances or is_clamp, progress=report)
+        complete = check_full(scene, result, progress=report) if full else None
     if json_file is not None:
         write_json(json_file, check_to_dict(result, complete))
     if html_file is not None:
         write_text(html_file, check_to_html(result, complete))
     show(check_to_text(result, complete))
-    finish(finding=not result.clean, undecided="uncertain" in result.counts)
+    finish(finding=not result.clean, undecided=any(row.verdict is Verdict.UNCERTAIN for row in result.rows))
 
 
 def _pairs(text: str) -> list[tuple[str, str]]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from clamp3d.baselines import METHODS
+from clamp3d.baselines import METHODS, contact_model
 from clamp3d.cli.terminal import STDOUT_TAKEN
 
 if TYPE_CHECKING:
@@ -142,20 +142,21 @@ class Method:
 
     def model(self, clamp: Clamp, *, quiet: bool = False) -> ContactModel:
         """The contact model. Raises click.UsageError for options that do not go together."""
-        for name, value, methods in (
-            ("--unit-angle-deg", self.unit_angle_deg, ("chords", "wedges")),
-            ("--threshold", self.threshold, ("hulls",)),
-            ("--mesh-error", self.mesh_error, ("hulls", "mesh")),
-        ):
-            if value is not None and self.method not in methods:
-                raise click.UsageError(f"{name} goes with --method {' or '.join(methods)}, not {self.method}")
-        return _contact_model(
+        from clamp3d.clamp.parts import parts
+
+        angle = None if self.unit_angle_deg is None else math.radians(self.unit_angle_deg)
+        given = {"unit_angle": angle, "threshold": self.threshold, "mesh_error": self.mesh_error}
+        for option, setting in zip(("--unit-angle-deg", "--threshold", "--mesh-error"), given, strict=True):
+            takers = [name for name, settings in METHODS.items() if setting in settings]
+            if given[setting] is not None and self.method not in takers:
+                raise click.UsageError(f"{option} goes with --method {' or '.join(takers)}, not {self.method}")
+        return contact_model(
             self.method,
-            clamp,
-            unit_angle_deg=self.unit_angle_deg,
+            parts(clamp),
+            unit_angle=angle,
             threshold=self.threshold,
             mesh_error=self.mesh_error,
-            quiet=quiet,
+            progress=False if quiet else None,
         )
 
 
@@ -233,31 +234,3 @@ viewer_options = collect(
     CLEARANCE,
 )
 """``--html --url --host --port ...`` as ``viewing: Viewing``."""
-
-
-def _contact_model(
-    method: str,
-    clamp: Clamp,
-    *,
-    unit_angle_deg: float | None,
-    threshold: float | None,
-    mesh_error: float | None,
-    quiet: bool,
-) -> ContactModel:
-    """The contact model that the options name. Raises click.UsageError for options that do not go together."""
-    from clamp3d.baselines import contact_model as make
-    from clamp3d.clamp.parts import parts
-
-    options = {"--unit-angle-deg": unit_angle_deg, "--threshold": threshold, "--mesh-error": mesh_error}
-    for option, setting in zip(options, ("unit_angle", "threshold", "mesh_error"), strict=True):
-        methods = [name for name, settings in METHODS.items() if setting in settings]
-        if options[option] is not None and method not in methods:
-            raise click.UsageError(f"{option} goes with --method {' or '.join(methods)}, not {method}")
-    return make(
-        method,
-        parts(clamp),
-        unit_angle=None if unit_angle_deg is None else math.radians(unit_angle_deg),
-        threshold=threshold,
-        mesh_error=mesh_error,
-        progress=False if quiet else None,
-    )

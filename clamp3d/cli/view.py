@@ -4,30 +4,34 @@ from __future__ import annotations
 
 import click
 
-from clamp3d.cli.options import Method, Source, Viewing, clamp_argument, method_options, viewer_options
+from clamp3d.cli.options import Method, Source, Viewing, method_options, source_argument, viewer_options
 from clamp3d.cli.terminal import finish
 
 
 @click.command("view")
-@clamp_argument
+@source_argument()
 @method_options
 @viewer_options
 @click.option("--quiet", "-q", is_flag=True, help="No progress; the page's address is printed all the same.")
-def command(
-    source: Source,
-    method: Method,
-    viewing: Viewing,
-    quiet: bool,
-) -> None:
-    """Assemble CLAMP (a built-in name or a TOML file) before your eyes, step by step, in a browser.
+def command(source: Source, method: Method, viewing: Viewing, quiet: bool) -> None:
+    """Show INPUT in a browser: a clamp is assembled before your eyes, a scene is checked and its motions played.
 
-    Prints the page's address and serves it until Ctrl-C (or --timeout). With --html the page is written to a file
-    instead; with --url the scene goes to a meshcat server, which keeps it. Exit code 1 as for run.
+    INPUT is a clamp (a built-in name or a TOML file), a scene file, a mesh or a STEP file. Prints the page's address
+    and serves it until Ctrl-C (or --timeout). With --html the page is written to a file instead; with --url the scene
+    goes to a meshcat server, which keeps it. Exit code 1 if a clamp does not close as it should, or parts clash.
     """
-    from clamp3d.cli.viewing import run_and_view
+    from clamp3d.clamp.dimensions import Clamp
+    from clamp3d.cli.viewing import check_and_view, run_and_view
 
     settings = method.settings()
-    loaded = source.clamp()
-    model = method.model(loaded, quiet=quiet)
-    run = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=viewing.html_file is None)
-    finish(finding=not run.clamped or bool(run.undeclared))
+    loaded = source.load()
+    serve = viewing.html_file is None
+    if isinstance(loaded, Clamp):
+        model = method.model(loaded, quiet=quiet)
+        run = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=serve)
+        finish(finding=not run.clamped or bool(run.undeclared))
+    else:
+        if method.method != "cas" or settings != {"solver": "exact"}:
+            raise click.UsageError("--method and --solver go with a clamp, not with a scene")
+        result = check_and_view(loaded, viewing, quiet=quiet, serve=serve)
+        finish(finding=not result.clean, undecided="uncertain" in result.counts)

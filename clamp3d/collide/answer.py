@@ -66,9 +66,11 @@ class Distance:
     def union(self, other: Distance) -> Distance:
         """Bounds for the nearer of two pieces."""
         best, rest = (self, other) if (self.upper, self.lower) <= (other.upper, other.lower) else (other, self)
-        normal = (self if self.lower <= other.lower else other).normal
-        unique = best.unique if rest.lower > best.upper else None
-        return replace(best, lower=min(self.lower, other.lower), normal=normal, unique=unique)
+        unique = best.unique
+        if rest.lower <= best.upper + 1e-9:  # the other may be as near, at another place
+            apart = rest.point_a is not None and best.point_a is not None and rest.upper <= best.upper + 1e-9
+            unique = False if apart and np.abs(rest.point_a - best.point_a).max() > 1e-6 else None
+        return replace(best, lower=min(self.lower, other.lower), unique=unique)
 
     def ordered(self) -> Distance:
         """Bounds that rounding has crossed put in order again."""

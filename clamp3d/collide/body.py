@@ -1,6 +1,6 @@
-"""A body in closed form: the common part of convex pieces, less grooves, round holes and slots.
+"""A body in closed form: the common part of convex pieces, less grooves and round holes.
 
-Distance of two bodies come from pieces that hold them (each gives a distance that is never too large) and from points
+Bounds of two bodies come from pieces that hold them (each gives a distance that is never too large) and from points
 that both really have (each gives one that is never too small). Where the nearest point of the exact groove lies on
 the body the two agree, and the distance is exact; the body's outer faces are among the pieces.
 """
@@ -10,16 +10,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.convex import MEMBER, Convex, Rod, convex_distance
+from clamp3d.collide.convex import MEMBER, Convex, Hull, Rod, convex_distance
+from clamp3d.collide.nearest import segment_pairs, to_faces
 from clamp3d.core.distance import SignedDistance, signed_distance
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.primitives import Cylinder, SweptArc
 
 _TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
+_THIN = 1e-30
+_SHIFTS = 33
+"""Places along a cylinder's axis where a point of a line of contact is looked for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,16 +48,9 @@ class Bore:
         return ((half, self.T), (half, self.T @ _TURN))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Slot:
-    """Straight-sided hollow right through a body: side ``planes`` (m, 4), outward normals, normal . x + d <= 0."""
-
-    planes: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """The points that lie in all ``outers`` and in no bore or slot; part frame, mm.
+    """The points that lie in all ``outers`` and in no bore; part frame, mm.
 
     ``error`` (mm): the true surface is this near the stated one (0 for designed parts, the bound of a fit otherwise).
     ``surface`` replaces the membership test of a body whose pieces only enclose it: depth (k,) of points (k, 3).
@@ -60,7 +58,6 @@ class ClosedForm:
 
     outers: tuple[Convex, ...]
     bores: tuple[Bore, ...] = ()
-    slots: tuple[Slot, ...] = ()
     error: float = 0.0
     surface: Callable[[Array], Array] | None = None
 
@@ -72,44 +69,58 @@ class ClosedForm:
         for bore in self.bores:
             local = (points - bore.T[:3, 3]) @ bore.T[:3, :3]
             found = np.minimum(found, np.hypot(local[:, 0], local[:, 1]) - bore.radius)
-        for slot in self.slots:
-            found = np.minimum(found, (points @ slot.planes[:, :3].T + slot.planes[:, 3]).max(axis=1))
         return np.asarray(found)
+
+    @cached_property
+    def ball(self) -> tuple[Array, float]:
+        """Centre (3,) and radius of a ball that holds the body."""
+        found = []
+        for piece in self.outers:
+            if isinstance(piece, Rod):
+                found.append((piece.T[:3, 3], math.hypot(piece.radius, 0.5 * piece.length)))
+            else:
+                middle = 0.5 * (piece.vertices.min(axis=0) + piece.vertices.max(axis=0))
+                found.append((middle, float(np.linalg.norm(piece.vertices - middle, axis=1).max())))
+        return min(found, key=lambda ball: ball[1])
 
 
 def bodies_distance(a: ClosedForm, b: ClosedForm, T: Array, enough: Callable[[Distance], bool]) -> Distance:
-    """Signed distance of ``b`` at ``T`` (4, 4) in a's frame; stops asking as soon as ``enough`` says so."""
-    found, back = Distance(), inverse(T)
+    """Signed distance of ``b`` at ``T`` (4, 4) in a's frame; stops asking as soon as ``enough`` says so.
+
+    One question for each pair of pieces: grooves and holes with cylinders, convex pieces, grooves with polyhedra.
+    """
+    back, here = inverse(T), np.eye(4)
     error = a.error + b.error
-    here = np.eye(4)
-    for first, second, swapped in ((a, b, False), (b, a, True)):
-        place = back if swapped else T
-        rods = [piece for piece in second.outers if isinstance(piece, Rod)]
-        for bore in first.bores:
-            for rod in rods:
-                new = _with_witnesses(bore_rod(bore, rod, place), first, second, place)
-                found = found.meet(new.moved(T).swapped() if swapped else new)
-                if enough(found.widened(error)):
-                    return found.widened(error)
-    for piece in a.outers:
-        for other in b.outers:
-            raw = convex_distance(piece, here, other, T)
-            new = _with_witnesses(raw, a, b, T)
-            expensive = a.surface is not None or b.surface is not None
-            if new.upper == math.inf and raw.normal is not None and (raw.lower > -0.01 or not expensive):
-                new = _face_to_face(raw, piece, other, a, b, T)
-            found = found.meet(new)
-            if enough(found.widened(error)):
-                return found.widened(error)
-    for first, second, swapped in ((a, b, False), (b, a, True)):
-        place = back if swapped else T
-        for slot in first.slots:
-            for piece in second.outers:
-                new = _with_witnesses(_slot_convex(slot, piece, place), first, second, place)
-                found = found.meet(new.moved(T).swapped() if swapped else new)
-                if enough(found.widened(error)):
-                    return found.widened(error)
+    found = Distance()
+    for kind in ("bore and cylinder", "convex", "bore and polyhedron"):
+        if kind == "convex":
+            for piece in a.outers:
+                for other in b.outers:
+                    found = found.meet(_convex(piece, other, a, b, here, T))
+                    if enough(found.widened(error)):
+                        return found.widened(error)
+            continue
+        ask = _bore_rod if kind == "bore and cylinder" else _bore_hull
+        for first, second, swapped in ((a, b, False), (b, a, True)):
+            place = back if swapped else T
+            for bore in first.bores:
+                for piece in second.outers:
+                    if isinstance(piece, Rod) is not (ask is _bore_rod) or second.surface is not None:
+                        continue
+                    new = _with_witnesses(ask(bore, piece, place), first, second, place)
+                    found = found.meet(new.moved(T).swapped() if swapped else new)
+                    if enough(found.widened(error)):
+                        return found.widened(error)
     return found.widened(error)
+
+
+def _convex(piece: Convex, other: Convex, a: ClosedForm, b: ClosedForm, here: Array, T: Array) -> Distance:
+    raw = convex_distance(piece, here, other, T)
+    new = _with_witnesses(raw, a, b, T)
+    expensive = a.surface is not None or b.surface is not None
+    if new.upper - raw.lower > 1e-10 and raw.normal is not None and (raw.lower > -0.01 or not expensive):
+        return new.meet(_face_to_face(raw, piece, other, a, b, T))
+    return new
 
 
 def kernel_distance(answer: SignedDistance, error: float = 0.0) -> Distance:
@@ -120,101 +131,160 @@ def kernel_distance(answer: SignedDistance, error: float = 0.0) -> Distance:
 
 
 def bore_rod(bore: Bore, rod: Rod, T: Array) -> Distance:
-    """The kernel's answer for a bore of the first body and a rod of the second, placed by ``T``."""
+    """The kernel's answer for a bore of the first body and a rod of the second, placed by ``T``.
+
+    The kernel's cylinder has rounded ends: where the nearest axis point is an end it gives a lower bound, and its
+    point need not be on the rod.
+    """
     answers = [
         (signed_distance(groove, Cylinder(rod.radius, rod.length), inverse(place) @ T @ rod.T), place)
         for groove, place in bore.covers()
     ]
-    if len(answers) > 1 and any(answer.axis_inside for answer, _ in answers):
+    if len(answers) > 1 and any(answer.distance <= answer.error_bound - rod.radius for answer, _ in answers):
         return Distance()  # in the material the two halves' depths end where they meet, that of the whole does not
     answer, place = min(answers, key=lambda found: found[0].distance)
-    return kernel_distance(answer).moved(place)
+    found = kernel_distance(answer).moved(place)
+    tilt = np.linalg.norm(np.cross(bore.T[:3, 2], T[:3, :3] @ rod.T[:3, 2]))
+    return replace(found, unique=False) if tilt < 1e-12 else found
 
 
-def _slot_convex(slot: Slot, piece: Convex, T: Array) -> Distance:
-    """All around a slot are half-spaces; the body lies in their union."""
+def _bore_rod(bore: Bore, piece: Convex, T: Array) -> Distance:
+    assert isinstance(piece, Rod)
+    return bore_rod(bore, piece, T)
+
+
+def _bore_hull(bore: Bore, piece: Convex, T: Array) -> Distance:
+    """A groove or hole and a polyhedron that lie apart.
+
+    The hollow side of the arc bends away from every flat face, so a nearest point lies on an edge of the polyhedron
+    (a thin cylinder for the kernel), or on a lip or an end edge of the groove. That these lines all lie apart proves
+    that the bodies do: where a face alone cut the material, the cut would have a corner on one of them, or no end.
+    """
+    assert isinstance(piece, Hull)
     found = Distance(np.inf, np.inf)
-    for plane in slot.planes:
-        n = plane[:3]
-        q = T[:3, :3] @ piece.support(T[:3, :3].T @ n) + T[:3, 3]
-        gap = -float(n @ q + plane[3])
-        slack = 4.0 * 2.0**-52 * (float(np.abs(q).sum()) + abs(float(plane[3])))
-        new = Distance(gap - slack, gap + slack, q + gap * n, q, -n, None, "features", "slot")
-        found = found.union(new)
-    return found
+    corners, edges, triangles = (x @ T[:3, :3].T + T[:3, 3] for x in piece.near(None))
+    if len(corners) > 64:
+        return Distance()
+    for groove, place in bore.covers():
+        R, t = place[:3, :3], place[:3, 3]
+        E, V = (edges - t) @ R, (corners - t) @ R
+        for start, end in E:
+            P = np.eye(4)
+            length = float(np.linalg.norm(end - start))
+            z = (end - start) / length
+            x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+            P[:3, 2], P[:3, 0] = z, x / np.linalg.norm(x)
+            P[:3, 1], P[:3, 3] = np.cross(z, P[:3, 0]), 0.5 * (start + end)
+            answer = signed_distance(groove, Cylinder(_THIN, length), P)
+            if answer.distance < found.upper:
+                found = kernel_distance(answer).moved(place)
+        s, h = groove.radius * math.sin(groove.half_angle), -groove.radius * math.cos(groove.half_angle)
+        H, far = 0.5 * groove.length, s + float(np.abs(V).max()) + groove.length
+        lines = [[(x, h, -H), (x, h, H)] for x in (-s, s)]
+        lines += [[(x, h, z), (math.copysign(far, x), h, z)] for x in (-s, s) for z in (-H, H)]
+        L = np.array(lines)
+        if any(_meets(line, piece, inverse(T) @ place) for line in L):
+            return Distance()
+        for d, p, q in (segment_pairs(L, E), to_faces(L.reshape(-1, 3), (triangles - t) @ R)):
+            if 0.0 < d < found.upper:
+                e = 8.0 * 2.0**-52 * float(np.abs(V).max() + groove.radius + H)
+                n = (q - p) / d
+                found = Distance(d - e, d + e, p, q, n, None, "features", "groove kernel").moved(place)
+    return found if found.lower > 0.0 else Distance()
 
 
-def _with_witnesses(bounds: Distance, a: ClosedForm, b: ClosedForm, T: Array) -> Distance:
-    """``bounds`` with its upper side kept only if points that both bodies have attest it; ``T`` places b, points in a.
+def _meets(line: Array, piece: Hull, T: Array) -> bool:
+    ends = line @ T[:3, :3].T + T[:3, 3]
+    h = ends @ piece.planes[:, :3].T + piece.planes[:, 3]
+    if ((h > 0.0).all(axis=0)).any():
+        return False
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cut = h[0] / (h[0] - h[1])
+    low = cut[h[0] > 0.0].max(initial=0.0)
+    high = cut[h[1] > 0.0].min(initial=1.0)
+    return bool(low <= high)
+
+
+def _with_witnesses(known: Distance, a: ClosedForm, b: ClosedForm, T: Array) -> Distance:
+    """``known`` with its upper side kept only if points that both bodies have attest it; ``T`` places b, points in a.
 
     Apart, the two witnesses must lie on the bodies. Overlapping, a point that lies in both attests the depth it has
     in either; tried at the witnesses and between them.
     """
-    p, q = bounds.point_a, bounds.point_b
+    p, q = known.point_a, known.point_b
     if p is None or q is None:
-        return Distance(bounds.lower, normal=bounds.normal, method=bounds.method)
-    slack = MEMBER * (1.0 + float(max(np.abs(p).max(), np.abs(q).max())))
+        return replace(known, upper=math.inf, point_a=None, point_b=None)
     # The two may be slid along a cylinder together: of a line of contact the named point may not be on the body.
-    shifts = np.vstack(
-        [np.zeros((1, 3)), *(_along(piece, None) for piece in a.outers), *(_along(w, T) for w in b.outers)]
-    )
-    if bounds.upper >= 0.0:
-        for s in (shifts[:1], *np.array_split(shifts[1:], max(1, len(shifts) // 8))):
-            k = _first_on_both(a, b, T, p + s, q + s, slack)
-            if k is not None:
-                return replace(bounds, upper=bounds.upper + 2.0 * slack, point_a=p + s[k], point_b=q + s[k])
-        return Distance(bounds.lower, normal=bounds.normal, method=bounds.method)
-    if a.surface is not None or b.surface is not None:
-        shifts = shifts[:1]
+    lines = [_along(piece, None) for piece in a.outers] + [_along(piece, T) for piece in b.outers]
+    none = np.zeros((1, 3))
+    if known.upper >= 0.0:
+        first = _attested(known, a, b, T, p[None], q[None])
+        if first.upper < math.inf or not any(len(line) for line in lines):
+            return first
+        shifts = np.vstack(lines)
+        return _attested(known, a, b, T, p + shifts, q + shifts)
+    shifts = none if a.surface is not None or b.surface is not None else np.vstack([none, *lines])
     trials = np.vstack([x + shifts for x in (p, q, 0.5 * (p + q))])
+    slack = MEMBER * (1.0 + float(np.abs(trials).max()))
     in_a, in_b = a.depth(trials), b.depth((trials - T[:3, 3]) @ T[:3, :3])
     both = np.where(np.minimum(in_a, in_b) >= -slack, np.maximum(in_a, in_b), -np.inf)
     k = int(np.argmax(both))
     if both[k] == -np.inf:
-        return Distance(bounds.lower, normal=bounds.normal, method=bounds.method)
-    return replace(bounds, upper=min(0.0, slack - float(both[k])), point_a=trials[k], point_b=trials[k])
+        return replace(known, upper=math.inf, point_a=None, point_b=None)
+    outside = max(0.0, -float(min(in_a[k], in_b[k])))
+    upper = min(0.0, 4.0 * outside - float(both[k]))
+    if upper <= known.upper + slack and k % len(shifts) == 0 and known.normal is not None:
+        return replace(known, upper=max(upper, known.upper))
+    return replace(known, upper=max(upper, known.lower), point_a=trials[k], point_b=trials[k])
 
 
-def _first_on_both(a: ClosedForm, b: ClosedForm, T: Array, p: Array, q: Array, slack: float) -> int | None:
-    """First row of which ``p`` (k, 3) lies on a and ``q`` (k, 3) on b, both in a's frame; the cheap body goes first."""
-    index = np.arange(len(p))
+def _attested(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array, q: Array) -> Distance:
+    """``known`` with the first of the pairs ``p``, ``q`` (k, 3) that lie on the bodies, or without points.
+
+    What they are measured to lie outside is added; the cheap body is asked first.
+    """
+    slack = MEMBER * (1.0 + float(max(np.abs(p).max(), np.abs(q).max())))
+    index, outside = np.arange(len(p)), np.zeros(len(p))
     tests = [(a, p), (b, (q - T[:3, 3]) @ T[:3, :3])]
     for body, points in sorted(tests, key=lambda test: test[0].surface is not None):
+        depth = body.depth(points[index])
+        on = depth >= -slack
+        index, depth = index[on], depth[on]
+        outside[index] += slack if body.surface is not None else np.maximum(0.0, -4.0 * depth)
         if not len(index):
-            return None
-        index = index[body.depth(points[index]) >= -slack]
-    return int(index[0]) if len(index) else None
+            return replace(known, upper=math.inf, point_a=None, point_b=None)
+    k = int(index[0])
+    return replace(known, upper=known.upper + float(outside[k]), point_a=p[k], point_b=q[k])
 
 
-def _face_to_face(bounds: Distance, piece: Convex, other: Convex, a: ClosedForm, b: ClosedForm, T: Array) -> Distance:
-    """``bounds`` with points of the two faces that look at each other across its planes, where both bodies have them.
+def _face_to_face(known: Distance, piece: Convex, other: Convex, a: ClosedForm, b: ClosedForm, T: Array) -> Distance:
+    """``known`` with points of the two faces that look at each other across its planes, where both bodies have them.
 
     A hole or the mouth of a groove may take the solver's own points away.
     """
-    n, R, t = bounds.normal, T[:3, :3], T[:3, 3]
+    n, R, t = known.normal, T[:3, :3], T[:3, 3]
     assert n is not None
     p, q = piece.face(n), other.face(-n @ R) @ R.T + t
-    gap = bounds.lower
+    gap = known.lower
     p, q = np.vstack([p, q - gap * n]), np.vstack([p + gap * n, q])
-    slack = MEMBER * (1.0 + float(np.abs(p).max()))
-    if gap < 0.0:
-        trials = 0.5 * (p + q)
-        p, q = np.vstack([p, q, trials]), np.vstack([p, q, trials])
-    in_a, in_b = a.depth(p), b.depth((q - t) @ R)
-    good = (in_a >= -slack) & (in_b >= -slack)
-    if not good.any():
-        return Distance(bounds.lower, normal=bounds.normal, method=bounds.method)
     if gap >= 0.0:
-        k = int(np.argmax(good))
-        return replace(bounds, upper=gap + 2.0 * slack, point_a=p[k], point_b=q[k])
-    reached = np.where(good, np.maximum(in_a, in_b), -np.inf)
+        return _attested(replace(known, upper=gap, method="convex"), a, b, T, p, q)
+    trials = 0.5 * (p + q)
+    p, q = np.vstack([p, q, trials]), np.vstack([p, q, trials])
+    slack = MEMBER * (1.0 + float(np.abs(p).max()))
+    in_a, in_b = a.depth(p), b.depth((q - t) @ R)
+    reached = np.where((in_a >= -slack) & (in_b >= -slack), np.maximum(in_a, in_b), -np.inf)
     k = int(np.argmax(reached))
-    return replace(bounds, upper=min(0.0, slack - float(reached[k])), point_a=p[k], point_b=q[k])
+    if reached[k] == -np.inf:
+        return replace(known, upper=math.inf, point_a=None, point_b=None)
+    outside = max(0.0, -float(min(in_a[k], in_b[k])))
+    upper = max(known.lower, min(0.0, 4.0 * outside - float(reached[k])))
+    return replace(known, upper=upper, point_a=p[k], point_b=q[k], method="convex")
 
 
 def _along(piece: Convex, T: Array | None) -> Array:
-    """Shifts (k, 3) along a rod's axis in steps of a 32nd of its length; none for other pieces."""
+    """Shifts (k, 3) along a rod's axis in equal steps; none for other pieces."""
     if not isinstance(piece, Rod):
         return np.empty((0, 3))
     axis = piece.T[:3, 2] if T is None else T[:3, :3] @ piece.T[:3, 2]
-    return np.outer(np.arange(-32, 33) / 32.0 * piece.length, axis)
+    return np.outer(np.linspace(-1.0, 1.0, 2 * _SHIFTS - 1) * piece.length, axis)

@@ -1,27 +1,32 @@
 """Convex pieces, and the signed distance of two of them between proven bounds.
 
-FCL's answer is never taken at its word: its two points must lie in the pieces, which bounds the distance from above,
-and the width of the slab between the pieces along any normal (support functions, closed form) bounds it from below.
-So a wrong answer of the solver costs sharpness, not truth. Depth likewise: a translation that parts the pieces bounds
-it from above, a point inside both from below.
+Nearest points are found among corners, edges, faces, axes and rims in closed form, for large hulls near the place that
+FCL names. No answer is taken at its word: its two points must lie in the pieces, which bounds the distance from above,
+and the width of the slab between the pieces along a normal (support functions, closed form) bounds it from below. So a
+wrong answer costs sharpness, not truth. Depth likewise: a translation that parts the pieces bounds it from above, a
+point inside both from below.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distance
-from clamp3d.core.pose import Array
+from clamp3d.collide.nearest import rim_minimum, segment_pairs, to_faces
+from clamp3d.core.pose import Array, inverse
 
 MEMBER = 1e-9
 """Relative to the size of the parts: a point this far outside still counts as on the surface."""
-
 _FLAT = 1e-8
 """Sine of the angle below which a face or line counts as square to a direction."""
+_SMALL = 40
+"""Hulls with more corners are searched only where FCL finds the nearest points."""
+_EPS = 2.0**-52
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +61,13 @@ class Rod:
             return self.support(n)[None]
         return np.asarray(local @ self.T[:3, :3].T + self.T[:3, 3])
 
+    def flatness(self, n: Array) -> tuple[int, Array | None]:
+        """Dimension of what lies furthest along ``n`` (3,), and its direction if it is a line."""
+        m = n @ self.T[:3, :3]
+        if float(np.hypot(m[0], m[1])) < _FLAT:
+            return 2, None
+        return (1, self.T[:3, 2]) if abs(m[2]) < _FLAT else (0, None)
+
     def depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""
         local = (points - self.T[:3, 3]) @ self.T[:3, :3]
@@ -72,25 +84,61 @@ class Rod:
         found = [np.copysign(1.0, along) * axis]
         return [*found, across / size] if size > 1e-9 else found
 
+    def closest(self, points: Array) -> Array:
+        """The points of the rod (k, 3) that are nearest to ``points`` (k, 3)."""
+        local = (points - self.T[:3, 3]) @ self.T[:3, :3]
+        out = np.hypot(local[:, 0], local[:, 1])
+        local[:, :2] *= np.minimum(1.0, self.radius / np.maximum(out, 1e-300))[:, None]
+        local[:, 2] = np.clip(local[:, 2], -0.5 * self.length, 0.5 * self.length)
+        return np.asarray(local @ self.T[:3, :3].T + self.T[:3, 3])
 
-@dataclass(frozen=True, slots=True, eq=False)
+    @property
+    def ends(self) -> Array:
+        """Both ends (2, 3) of the axis."""
+        return np.asarray(self.T[:3, 3] + np.outer([-0.5 * self.length, 0.5 * self.length], self.T[:3, 2]))
+
+
+@dataclass(frozen=True, eq=False)
 class Hull:
     """A convex polyhedron: ``vertices`` (n, 3), ``planes`` (m, 4) with outward unit normals, normal . x + d <= 0."""
 
     vertices: Array
     planes: Array
-    faces: Any = field(repr=False)
+    faces: NDArray[np.int64] = field(repr=False)
+
+    @cached_property
+    def edges(self) -> NDArray[np.int64]:
+        """Corner numbers (k, 2) of the edges; those between two triangles of one flat face are left out."""
+        F, V = self.faces, self.vertices
+        normal = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+        both = np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        order = np.lexsort((both[:, 1], both[:, 0]))
+        pairs, owner = both[order].reshape(-1, 4)[:, :2], (order // 3).reshape(-1, 2)
+        bent = np.linalg.norm(np.cross(normal[owner[:, 0]], normal[owner[:, 1]]), axis=1) > 1e-10
+        return np.asarray(pairs[bent])
 
     def support(self, n: Array) -> Array:
         """The vertex (3,) that lies furthest along ``n`` (3,)."""
         return np.asarray(self.vertices[int(np.argmax(self.vertices @ n))])
 
+    def _highest(self, n: Array) -> Array:
+        height = self.vertices @ n
+        return np.asarray(self.vertices[height >= height.max() - _FLAT * (1.0 + float(np.ptp(height)))][:24])
+
     def face(self, n: Array) -> Array:
         """Points (k, 3) of what lies furthest along ``n`` (3,): corners, and the middles between each two of them."""
-        height = self.vertices @ n
-        corners = self.vertices[height >= height.max() - _FLAT * (1.0 + float(np.ptp(height)))][:24]
+        corners = self._highest(n)
         i, j = np.triu_indices(len(corners))
         return np.asarray(0.5 * (corners[i] + corners[j]))
+
+    def flatness(self, n: Array) -> tuple[int, Array | None]:
+        """Dimension of what lies furthest along ``n`` (3,), and its direction if it is a line."""
+        corners = self._highest(n)
+        if len(corners) == 2:
+            along = corners[1] - corners[0]
+            return 1, along / np.linalg.norm(along)
+        return (0, None) if len(corners) == 1 else (2, None)
 
     def depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""
@@ -99,6 +147,40 @@ class Hull:
     def normals(self, n: Array) -> list[Array]:
         """The face normal nearest to ``n`` (3,)."""
         return [np.asarray(self.planes[int(np.argmax(self.planes[:, :3] @ n)), :3])]
+
+    def near(self, n: Array | None) -> tuple[Array, Array, Array]:
+        """Corners (k, 3), edges (k, 2, 3) and triangles (k, 3, 3), of a large hull only those that face ``n`` (3,)."""
+        V = self.vertices
+        if n is None or len(V) <= _SMALL:
+            return V, V[self.edges], V[self.faces]
+        height = V @ n
+        high = height >= height.max() - 0.01 * float(np.ptp(height))
+        return V[high], V[self.edges[high[self.edges].any(axis=1)]], V[self.faces[high[self.faces].any(axis=1)]]
+
+    def closest(self, points: Array) -> Array:
+        """The points of the surface (k, 3) that are nearest to ``points`` (k, 3), which lie outside."""
+        _V, edges, triangles = self.near(None)
+        found = []
+        for x in points:
+            _, _, on_edge = segment_pairs(x[None, None].repeat(2, axis=1), edges)
+            _, _, on_face = to_faces(x[None], triangles)
+            found.append(min((on_edge, on_face), key=lambda y: float(np.linalg.norm(y - x))))
+        return np.array(found)
+
+    def clipped(self, plane: Array) -> Hull | None:
+        """What of it lies in the half-space plane[:3] . x + plane[3] >= 0; None if it has no volume."""
+        V = self.vertices
+        height = V @ plane[:3] + plane[3]
+        slack = MEMBER * (1.0 + float(np.abs(V).max()))
+        if height.min() >= -slack:
+            return self
+        if height.max() <= slack:
+            return None
+        a, b = self.edges.T
+        crossed = height[a] * height[b] < 0.0
+        a, b = a[crossed], b[crossed]
+        share = (height[a] / (height[a] - height[b]))[:, None]
+        return hull(np.vstack([V[height >= 0.0], V[a] + share * (V[b] - V[a])]))
 
 
 Convex: TypeAlias = Rod | Hull
@@ -112,35 +194,120 @@ def hull(points: Array) -> Hull:
     planes = np.asarray(found.equations, dtype=np.float64)
     faces = found.simplices
     a, b, c = (points[faces[:, k]] for k in range(3))
-    turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), planes[:, :3]) < 0.0
-    faces = np.where(turned[:, None], faces[:, ::-1], faces)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), planes[:, :3]) < 0.0
+    faces = np.where(inward[:, None], faces[:, ::-1], faces)
     used, index = np.unique(faces, return_inverse=True)
-    return Hull(points[used], np.unique(planes.round(14), axis=0), index.reshape(faces.shape))
+    return Hull(points[used], np.unique(planes.round(14), axis=0), index.reshape(faces.shape).astype(np.int64))
 
 
-def box(low: Array, high: Array) -> Hull:
-    """Box between two corners (3,)."""
-    i = np.indices((2, 2, 2)).reshape(3, -1).T
-    return hull(np.where(i == 0, low, high).astype(np.float64))
+def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
+    """Signed distance of two convex pieces placed by ``Ta``, ``Tb`` (4, 4); points and normal in that frame.
+
+    One row for each pair of shapes: closed forms first; what they leave open goes to FCL, whose answer is polished.
+    """
+    if isinstance(a, Rod) and isinstance(b, Rod):
+        found = _rods(a, Ta, b, Tb)
+    elif isinstance(a, Rod):
+        found = _rod_hull(a, Ta, b, Tb, None)  # type: ignore[arg-type]
+    elif isinstance(b, Rod):
+        found = _rod_hull(b, Tb, a, Ta, None).swapped()
+    else:
+        found = _hulls(a, Ta, b, Tb, None)
+    if found.upper - found.lower > 1e-10:
+        found = found.meet(_by_gjk(a, Ta, b, Tb))
+    return replace(found, unique=_unique(a, Ta, b, Tb, found))
 
 
-@lru_cache(maxsize=4096)
-def _geometry(piece: Convex) -> tuple[Any, Array]:
-    """FCL's shape and the pose it has in the part's frame."""
-    import fcl
+def _unique(a: Convex, Ta: Array, b: Convex, Tb: Array, found: Distance) -> bool | None:
+    """Whether the nearest points are the only ones, from what of either piece lies furthest along the normal."""
+    n = found.normal
+    if n is None or found.upper - found.lower > 1e-9 or found.upper < -1e-9:
+        return None
+    (i, u), (j, v) = a.flatness(n @ Ta[:3, :3]), b.flatness(-n @ Tb[:3, :3])
+    if i == 0 or j == 0:
+        return True
+    if u is not None and v is not None:
+        return bool(np.linalg.norm(np.cross(Ta[:3, :3] @ u, Tb[:3, :3] @ v)) > _FLAT)
+    return False
 
-    if isinstance(piece, Rod):
-        return fcl.Cylinder(piece.radius, piece.length), piece.T
-    flat = np.column_stack([np.full(len(piece.faces), 3), piece.faces]).ravel()
-    return fcl.Convex(piece.vertices, len(piece.faces), flat), np.eye(4)
+
+def _placed(points: Array, T: Array) -> Array:
+    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
 
 
-def _object(piece: Convex, T: Array) -> Any:
-    import fcl
+def _hulls(a: Hull, Ta: Array, b: Hull, Tb: Array, n: Array | None) -> Distance:
+    """Two polyhedra: corners against faces and edges against edges; of large ones what looks along ``n``."""
+    if n is None and max(len(a.vertices), len(b.vertices)) > _SMALL:
+        return Distance()
+    Va, Ea, Fa = (_placed(x, Ta) for x in a.near(None if n is None else n @ Ta[:3, :3]))
+    Vb, Eb, Fb = (_placed(x, Tb) for x in b.near(None if n is None else -n @ Tb[:3, :3]))
+    trials = [segment_pairs(Ea, Eb), to_faces(Va, Fb)]
+    d, q, p = to_faces(Vb, Fa)
+    d, p, q = min([*trials, (d, p, q)], key=lambda found: found[0])
+    return _proven(a, Ta, b, Tb, p, q, d)
 
-    shape, own = _geometry(piece)
-    P = T @ own
-    return fcl.CollisionObject(shape, fcl.Transform(P[:3, :3], P[:3, 3]))
+
+def _proven(a: Convex, Ta: Array, b: Convex, Tb: Array, p: Array, q: Array, d: float) -> Distance:
+    """Points ``p``, ``q`` of two pieces that are ``d`` mm apart, with what the slab between the pieces proves."""
+    if not 0.0 < d < np.inf:
+        return Distance()
+    low, normal = _slab(a, Ta, b, Tb, (q - p) / d)
+    if d - low > 1e-5 * (1.0 + d):  # they overlap, or another place is nearer
+        return Distance(low, normal=normal)
+    return Distance(low, d, p, q, normal, None, "features", "convex")
+
+
+def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None) -> Distance:
+    """A cylinder and a polyhedron: its axis against edges and faces, less the radius; then its rims."""
+    if n is None and len(b.vertices) > _SMALL:
+        return Distance()
+    _V, E, F = (_placed(x, Tb) for x in b.near(None if n is None else -n @ Tb[:3, :3]))
+    ends = _placed(a.ends, Ta)
+    d, x, q = min([segment_pairs(ends[None], E), to_faces(ends, F)], key=lambda found: found[0])
+    if not d > 1e-9 * a.radius or _pierced(ends, b, Tb):
+        return Distance()
+    m = (q - x) / d
+    axis = Ta[:3, :3] @ a.T[:3, 2]
+    found = Distance()
+    if abs(float(m @ axis)) <= _FLAT:  # square to the axis: on the side
+        p = x + a.radius * m
+        low, normal = _slab(a, Ta, b, Tb, m)
+        if d >= a.radius:
+            found = Distance(low, d - a.radius, p, q, normal, None, "features", "convex")
+        else:
+            found = _deepest(a, Ta, b, Tb, [q, p, 0.5 * (p + q)], low, 0.0)
+            found = replace(found, normal=normal, point_a=p, point_b=q) if found.upper < np.inf else found
+    if found.upper - found.lower > 1e-10 and len(b.vertices) <= _SMALL:
+        found = found.meet(_rims(a, Ta, b, Tb))
+    return found
+
+
+def _pierced(ends: Array, b: Hull, Tb: Array) -> bool:
+    """Whether the segment between ``ends`` (2, 3) meets the polyhedron."""
+    h = (ends - Tb[:3, 3]) @ Tb[:3, :3] @ b.planes[:, :3].T + b.planes[:, 3]
+    low, high = 0.0, 1.0
+    for h0, h1 in h.T.tolist():
+        if h0 > 0.0 and h1 > 0.0:
+            return False
+        if h0 > 0.0:
+            low = max(low, h0 / (h0 - h1))
+        elif h1 > 0.0:
+            high = min(high, h0 / (h0 - h1))
+    return low <= high
+
+
+def _rims(a: Rod, Ta: Array, b: Convex, Tb: Array) -> Distance:
+    """The rims of a cylinder against another piece."""
+    back = inverse(Tb)
+    found = Distance()
+    for end in a.ends:
+        T = Ta @ a.T
+        T[:3, 3] = _placed(end, Ta)
+        rim = rim_minimum(lambda x: _placed(b.closest(_placed(x, back)), Tb), T, a.radius)
+        if rim is not None:
+            p, q = rim
+            found = found.meet(_proven(a, Ta, b, Tb, p, q, float(np.linalg.norm(q - p))))
+    return found
 
 
 def closest_on_axes(a: Rod, Ta: Array, b: Rod, Tb: Array) -> tuple[Array, Array, bool]:
@@ -165,42 +332,64 @@ def closest_on_axes(a: Rod, Ta: Array, b: Rod, Tb: Array) -> tuple[Array, Array,
     return x, y, abs(float(d @ u)) <= slack and abs(float(d @ v)) <= slack
 
 
-def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
-    """Distance of the signed distance of two convex pieces placed by ``Ta``, ``Tb`` (4, 4); witnesses in that frame."""
-    found = Distance()
-    if isinstance(a, Rod) and isinstance(b, Rod):
-        found = _rods(a, Ta, b, Tb).labelled("features", "cylinders")
-        if found.upper - found.lower < 1e-9:
-            return found
-    return found.meet(_gjk(a, Ta, b, Tb).labelled("features", "convex (GJK)"))
-
-
 def _rods(a: Rod, Ta: Array, b: Rod, Tb: Array) -> Distance:
     """Two cylinders side by side in closed form; with rounded ends in place of flat ones it is a lower bound."""
     x, y, square = closest_on_axes(a, Ta, b, Tb)
     d = y - x
     apart = float(np.linalg.norm(d))
     gap = apart - (a.radius + b.radius)
-    slack = 8.0 * 2.0**-52 * (float(np.abs(x).max() + np.abs(y).max()) + a.radius + b.radius)
-    if not square or apart <= 1e-9 * (a.radius + b.radius):
+    slack = 8.0 * _EPS * (float(np.abs(x).max() + np.abs(y).max()) + a.radius + b.radius)
+    if apart <= 1e-9 * (a.radius + b.radius):
         return Distance(gap - slack)
+    if not square:
+        found = Distance(gap - slack)
+        if gap > 0.0:
+            found = found.meet(_rims(a, Ta, b, Tb))
+            if found.upper - found.lower > 1e-10:
+                found = found.meet(_rims(b, Tb, a, Ta).swapped())
+        return found
     n = d / apart
+    p, q = x + a.radius * n, y - b.radius * n
     if gap >= 0.0:
-        return Distance(gap - slack, gap + slack, x + a.radius * n, y - b.radius * n)
-    return _deepest(a, Ta, b, Tb, [x + a.radius * n, y - b.radius * n, x, y], gap - slack, slack)
+        return Distance(gap - slack, gap + slack, p, q, n, None, "features", "cylinders")
+    found = _deepest(a, Ta, b, Tb, [p, q, x, y], gap - slack, slack)
+    return replace(found, normal=n, method="cylinders")
 
 
 def _deepest(a: Convex, Ta: Array, b: Convex, Tb: Array, trials: list[Array], low: float, slack: float) -> Distance:
-    """Distance of an overlap: the deepest of the ``trials`` (3,) that lie in both pieces, beside a known ``low``."""
+    """Distance in an overlap: the deepest of the ``trials`` (3,) that lie in both pieces, beside a known ``low``."""
     depths = [(_depth(a, Ta, x), _depth(b, Tb, x)) for x in trials]
-    inside = [max(pair) if min(pair) >= -slack else -np.inf for pair in depths]
+    allowed = slack + 16.0 * _EPS * (1.0 + max(float(np.abs(x).max()) for x in trials))
+    inside = [max(pair) if min(pair) >= -allowed else -np.inf for pair in depths]
     k = int(np.argmax(inside))
     if inside[k] == -np.inf:
         return Distance(low)
-    return Distance(low, slack - inside[k], trials[k], trials[k])
+    outside = max(0.0, -min(depths[k]))
+    upper = 4.0 * outside - max(0.0, inside[k])
+    return Distance(low, max(low, upper), trials[k], trials[k], None, None, "features", "convex")
 
 
-def _gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
+@lru_cache(maxsize=4096)
+def _geometry(piece: Convex) -> tuple[Any, Array]:
+    """FCL's shape and the pose it has in the part's frame."""
+    import fcl
+
+    if isinstance(piece, Rod):
+        return fcl.Cylinder(piece.radius, piece.length), piece.T
+    flat = np.column_stack([np.full(len(piece.faces), 3), piece.faces]).ravel()
+    return fcl.Convex(piece.vertices, len(piece.faces), flat), np.eye(4)
+
+
+def _object(piece: Convex, T: Array) -> Any:
+    import fcl
+
+    shape, own = _geometry(piece)
+    P = T @ own
+    return fcl.CollisionObject(shape, fcl.Transform(P[:3, :3], P[:3, 3]))
+
+
+def _by_gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
+    """FCL's answer, proven from both sides and polished near the points it names."""
     import fcl
 
     oa, ob = _object(a, Ta), _object(b, Tb)
@@ -209,18 +398,25 @@ def _gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
     fcl.distance(oa, ob, fcl.DistanceRequest(enable_nearest_points=True, gjk_solver_type=libccd), answer)
     if answer.min_distance > 0.0:
         p, q = (np.asarray(x, dtype=np.float64) for x in answer.nearest_points)
-        n = q - p
-        size = float(np.linalg.norm(n))
+        size = float(np.linalg.norm(q - p))
         if 0.0 < size < np.inf:
-            low, m = _slab(a, Ta, b, Tb, n / size)
+            n = (q - p) / size
+            low, m = _slab(a, Ta, b, Tb, n)
             outside = max(0.0, -_depth(a, Ta, p), -_depth(b, Tb, q))
-            found = Distance(low, size + 2.0 * outside, p, q, m)
+            found = Distance(low, size + 2.0 * outside, p, q, m, None, "features", "convex (GJK)")
+            if found.upper - found.lower > 1e-10:
+                if isinstance(a, Hull) and isinstance(b, Hull):
+                    found = found.meet(_hulls(a, Ta, b, Tb, n))
+                elif isinstance(a, Rod) and isinstance(b, Hull):
+                    found = found.meet(_rod_hull(a, Ta, b, Tb, n))
+                elif isinstance(b, Rod) and isinstance(a, Hull):
+                    found = found.meet(_rod_hull(b, Tb, a, Ta, -n).swapped())
             # The direction of a short distance is mostly rounding.
             return found if size - low < 1e-5 else found.meet(_touching(a, Ta, b, Tb))
     contacts = fcl.CollisionResult()
     request = fcl.CollisionRequest(num_max_contacts=4, enable_contact=True, gjk_solver_type=libccd)
     if not fcl.collide(oa, ob, request, contacts):
-        return _touching(a, Ta, b, Tb)  # neither apart nor in each other: a hair's breadth either way
+        return _touching(a, Ta, b, Tb)  # touching within rounding
     found = Distance()
     for contact in contacts.contacts:
         n, at = np.asarray(contact.normal, dtype=np.float64), np.asarray(contact.pos, dtype=np.float64)
@@ -231,7 +427,7 @@ def _gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
         reach = abs(float(contact.penetration_depth))
         trials = [at + s * reach * n / size for s in (0.0, -0.5, 0.5, -0.25, 0.25)]
         new = _deepest(a, Ta, b, Tb, trials, low, MEMBER * (1.0 + float(np.abs(at).max())))
-        found = found.meet(Distance(new.lower, new.upper, new.point_a, new.point_b, m))
+        found = found.meet(replace(new, normal=m, method="convex (GJK)"))
     shallow = found.upper > -1e-3 or found.lower > -1e-3
     return found.meet(_touching(a, Ta, b, Tb)) if shallow else found
 
@@ -245,7 +441,7 @@ def _touching(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
             gap, m = _slab(a, Ta, b, Tb, n)
             if gap > best:
                 best, normal = gap, m
-    return Distance(best, normal=normal)
+    return Distance(best, normal=normal, method="convex")
 
 
 def _depth(piece: Convex, T: Array, x: Array) -> float:
@@ -262,7 +458,7 @@ def _slab(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array) -> tuple[float, 
         if float(m @ n) > 0.5:
             ma, mb = m @ Ra, m @ Rb
             gap = float(m @ offset + mb @ b.support(-mb) - ma @ a.support(ma))
-            gap -= 4.0 * 2.0**-52 * float(np.abs(offset).sum() + abs(gap))
+            gap -= 4.0 * _EPS * float(np.abs(offset).sum() + abs(gap))
             if gap > best:
                 best, normal = gap, m
     return best, normal

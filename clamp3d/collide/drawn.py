@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from clamp3d.collide.body import Bore, ClosedForm, Slot
-from clamp3d.collide.convex import Convex, Rod, hull
+from clamp3d.collide.body import Bore, ClosedForm
+from clamp3d.collide.convex import Convex, Hull, Rod, hull
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.core.shapes import Solid
 
 _FLAT = 1e-9
+_TANGENTS = 12
 
 
 def bodies_of(solid: Solid) -> tuple[ClosedForm, ...] | None:
@@ -27,17 +29,13 @@ def bodies_of(solid: Solid) -> tuple[ClosedForm, ...] | None:
         pieces = _pieces(body)
         if pieces is None:
             return None
-        for outers, grooves in pieces:
-            bores, slots = list(grooves), list[Slot]()
-            for hole in solid.holes:
-                hollow = _hollow(hole, outers)
-                if hollow is None:
-                    return None
-                if isinstance(hollow, Bore):
-                    bores.append(hollow)
-                else:
-                    slots.append(hollow)
-            found.append(ClosedForm(outers, tuple(bores), tuple(slots)))
+        made = [ClosedForm(outers, tuple(grooves)) for outers, grooves in pieces]
+        for hole in solid.holes:
+            cut = [_less(piece, hole) for piece in made]
+            if any(one is None for one in cut):
+                return None
+            made = [piece for one in cut if one is not None for piece in one]
+        found += made
     return tuple(found)
 
 
@@ -88,27 +86,25 @@ def _prism(body: Extrusion, corners: Array) -> Array:
     return np.vstack(ends) @ body.frame.T
 
 
-def _beyond_chord(body: Extrusion, arc: Arc) -> Convex:
-    """Prism around the segment between a convex arc and its chord."""
-    middle, half = 0.5 * (arc.start_angle + arc.end_angle), 0.5 * arc.sweep
-    out = np.array([math.cos(middle), math.sin(middle)])
-    side = np.array([-out[1], out[0]])
-    low, high = arc.radius * math.cos(half), arc.radius
-    wide = arc.radius * (1.0 if half > 0.5 * math.pi else math.sin(half))
-    corners = [np.array(arc.centre) + d * out + w * side for d in (low, high) for w in (-wide, wide)]
-    return hull(_prism(body, np.array(corners)))
+def _beyond_chord(body: Extrusion, arc: Arc) -> Hull:
+    """Prism around the segment between a convex arc and its chord: tangents in place of the arc."""
+    step = arc.sweep / _TANGENTS
+    angles = [arc.start_angle, *(arc.start_angle + (k + 0.5) * step for k in range(_TANGENTS)), arc.end_angle]
+    radii = [arc.radius, *[arc.radius / math.cos(0.5 * step)] * _TANGENTS, arc.radius]
+    around = np.column_stack([np.cos(angles), np.sin(angles)]) * np.array(radii)[:, None]
+    return hull(_prism(body, np.array(arc.centre) + around))
 
 
-def _hollow(hole: Extrusion, outers: tuple[Convex, ...]) -> Bore | Slot | None:
-    """A round hole or a slot, as long as the body it goes through."""
+def _less(body: ClosedForm, hole: Extrusion) -> list[ClosedForm] | None:
+    """The body less a round hole, or in pieces: one for each wall of a straight-sided slot, beyond that wall."""
     circle = _circle(hole.profile)
     if circle is not None:
         T = _pose(hole, circle.centre)
         z, middle = T[:3, 2], T[:3, 3]
-        low = max(float(z @ (piece.support(-z) - middle)) for piece in outers)
-        high = min(float(z @ (piece.support(z) - middle)) for piece in outers)
+        low = max(float(z @ (piece.support(-z) - middle)) for piece in body.outers)
+        high = min(float(z @ (piece.support(z) - middle)) for piece in body.outers)
         T[:3, 3] = middle + 0.5 * (low + high) * z
-        return Bore(circle.radius, math.pi, max(high - low, 1e-6), T)
+        return [replace(body, bores=(*body.bores, Bore(circle.radius, math.pi, max(high - low, 1e-6), T)))]
     if hole.profile.arcs:
         return None
     corners = np.array([edge.start for edge in hole.profile.edges])
@@ -118,4 +114,42 @@ def _hollow(hole: Extrusion, outers: tuple[Convex, ...]) -> Bore | Slot | None:
     if ((corners @ normals.T + offsets) > _FLAT * (1.0 + np.abs(corners).max())).any():
         return None
     planes = np.column_stack([np.column_stack([normals, 0.0 * offsets]) @ hole.frame.T, offsets])
-    return Slot(planes)
+    return [piece for plane in planes if (piece := _beyond(body, plane)) is not None]
+
+
+def _beyond(body: ClosedForm, plane: Array) -> ClosedForm | None:
+    """What of a body lies in the half-space plane[:3] . x + plane[3] >= 0; None for nothing."""
+    outers: list[Convex] = []
+    for piece in body.outers:
+        if isinstance(piece, Hull):
+            clipped = piece.clipped(plane)
+            if clipped is None:
+                return None
+            outers.append(clipped)
+        else:
+            outers.append(piece)
+    rods = [piece for piece in outers if isinstance(piece, Rod)]
+    if len(rods) == len(outers):
+        rod = rods[0]
+        sides = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+        box = hull(sides * (rod.radius, rod.radius, 0.5 * rod.length) @ rod.T[:3, :3].T + rod.T[:3, 3])
+        around = box.clipped(plane)
+        if around is None:
+            return None
+        outers.append(around)
+    for rod in rods:
+        offset = -float(plane[:3] @ rod.T[:3, 3] + plane[3])
+        if abs(float(plane[:3] @ rod.T[:3, 2])) < _FLAT and abs(offset) < rod.radius:
+            # Where the wall leaves the round side there is a corner: the tangents there make it one of the hull.
+            outers = [_tangential(piece, rod, plane[:3], offset) for piece in outers]
+    return replace(body, outers=tuple(outers))
+
+
+def _tangential(piece: Convex, rod: Rod, wall: Array, offset: float) -> Convex:
+    """A hull around a rod cut by the tangent planes where a ``wall`` parallel to the rod's axis meets its side."""
+    across = np.cross(rod.T[:3, 2], wall)
+    for side in (-1.0, 1.0):
+        if isinstance(piece, Hull):
+            out = (offset * wall + side * math.sqrt(rod.radius**2 - offset**2) * across) / rod.radius
+            piece = piece.clipped(np.array([*-out, rod.radius + float(out @ rod.T[:3, 3])])) or piece
+    return piece

@@ -115,13 +115,26 @@ def _agreed(old: Distance, new: Distance) -> Distance:
 def _features(a: Model, b: Model, T: Array, enough: Enough) -> Distance:
     """Closed forms of both; the convex hull of a part that has none stands in for it."""
     level = "hulls" if a.bodies is None or b.bodies is None else "features"
-    single = len(a.forms) == len(b.forms) == 1
-    found = Distance(np.inf, np.inf)
+    pairs = []
     for x in a.forms:
         for y in b.forms:
-            a.counters.queries[level] += 1
-            found = found.union(bodies_distance(x, y, T, enough if single else lambda _: False))
+            (p, r), (q, s) = x.ball, y.ball
+            gap = float(np.linalg.norm(T[:3, :3] @ q + T[:3, 3] - p)) - r - s - x.error - y.error
+            pairs.append((gap, len(pairs), x, y))
+    found = Distance(np.inf, np.inf)
+    for gap, _, x, y in sorted(pairs):
+        if gap > found.upper:  # of these and all that follow
+            break
+        a.counters.queries[level] += 1
+        found = found.union(bodies_distance(x, y, T, enough if len(pairs) == 1 else _known))
+    if len(pairs) > 1 and found.lower < -1e-6:
+        # Where two pieces of a body meet, neither knows how deep a point lies in both together.
+        found = replace(found, lower=-np.inf)
     return found.labelled(level, f"{found.method} on hulls" if level == "hulls" else found.method)
+
+
+def _known(distance: Distance) -> bool:
+    return distance.upper - distance.lower <= 1e-10
 
 
 def _facets(a: Model, b: Model, T: Array, enough: Enough) -> Distance | None:

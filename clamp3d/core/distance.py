@@ -14,13 +14,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import IntEnum
 from types import ModuleType
-from typing import Literal, NoReturn, overload
+from typing import Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, flag, whole
-from clamp3d.core.pose import RIGID_TOLERANCE, Array, check_pose
+from clamp3d.core.pose import Array, check_pose, check_poses
 from clamp3d.core.primitives import LARGEST, Cylinder, SweptArc, check_shapes
 from clamp3d.errors import InputError
 
@@ -107,12 +107,17 @@ def as_pose(pose: ArrayLike) -> Array:
     return np.require(check_pose(pose), np.float64, ["C", "A", "W"])
 
 
-def reject(T: Array, name: str) -> NoReturn:
-    """Raise the InputError for a pose that the kernel refused."""
-    check_pose(T, name)
-    if np.abs(T[:3, 3]).sum() >= LARGEST:
-        raise InputError(f"{name} must have an offset below {LARGEST:g} mm, got {T[:3, 3].tolist()}")
-    raise InputError(f"{name} must be rigid within the tolerance of {RIGID_TOLERANCE:g}")
+def repaired(T: Array, name: str) -> Array:
+    """The poses (n, 4, 4) or the pose (4, 4) that the kernel refused, without their rounding errors.
+
+    Raises InputError if one is not rigid, or its offset is too large; PoseWarning says what was mended.
+    """
+    T = check_pose(T, name) if T.ndim == 2 else check_poses(T, name)
+    far = np.flatnonzero(np.atleast_1d(np.abs(T[..., :3, 3]).sum(axis=-1)) >= LARGEST)
+    if len(far):
+        where, offset = (name, T[:3, 3]) if T.ndim == 2 else (f"{name}[{far[0]}]", T[far[0], :3, 3])
+        raise InputError(f"{where} must have an offset below {LARGEST:g} mm, got {offset.tolist()}")
+    return T
 
 
 _kernel: ModuleType | None = None
@@ -132,7 +137,8 @@ def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Si
     """Signed distance of ``cylinder`` from ``groove`` with witnesses; ``pose`` (4, 4) is ``T_groove_cylinder``.
 
     Only the cylinder's position and axis direction matter, so ``pose`` enters as its last column and its third,
-    normalised. Raises InputError if ``pose`` is not a finite rigid 4x4 matrix.
+    normalised. Raises InputError if ``pose`` is not a finite rigid 4x4 matrix; rounding errors are mended as
+    ``check_pose`` says.
 
     >>> import numpy as np
     >>> from clamp3d.core.primitives import LARGEST, Cylinder, SweptArc
@@ -148,7 +154,7 @@ def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Si
     run = (_kernel or kernel()).records
     half, along = 0.5 * groove.length, 0.5 * cylinder.length
     if run(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, record) >= 0:
-        reject(T, "pose")
+        return signed_distance(groove, cylinder, repaired(T, "pose"))
     out = record[0]
     values = out.tolist()
     distance = values[0]
@@ -206,9 +212,9 @@ def signed_distances(
         cuts = [n * i // threads for i in range(threads + 1)]
         with ThreadPoolExecutor(threads) as pool:
             found = list(pool.map(part, cuts[:-1], cuts[1:]))
-    bad = [i for i in found if i >= 0]
-    if bad:
-        reject(T[bad[0]], f"poses[{bad[0]}]")
+    if max(found) >= 0:
+        mended = repaired(T, "poses")
+        return signed_distances(groove, cylinder, mended, full=full, workers=workers)  # type: ignore[call-overload, no-any-return]
     if not full:
         return out
     return SignedDistances(

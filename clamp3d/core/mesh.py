@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,10 +20,22 @@ LARGEST, SMALLEST = 1e12, 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """A checked triangle mesh: ``vertices`` (n, 3) in mm, ``faces`` (m, 3), outward winding, equal vertices merged.
+    """A checked triangle mesh, wound outward, equal vertices merged.
 
-    ``rounding`` (mm) is the largest error of a vertex from the number format; ``notes`` say what was repaired or
-    assumed on the way in.
+    Attributes
+    ----------
+    name : str
+        Name for messages.
+    vertices : ndarray of shape (n, 3)
+        Coordinates in mm.
+    faces : ndarray of shape (m, 3)
+        Vertices of each triangle.
+    watertight : bool
+        Whether every edge has two triangles, which run along it in opposite directions.
+    rounding : float
+        Largest error in mm of a vertex from the number format.
+    notes : tuple of str
+        What was repaired or assumed on the way in.
     """
 
     name: str
@@ -33,16 +45,54 @@ class Mesh:
     rounding: float
     notes: tuple[str, ...]
 
+    @property
+    def slivers(self) -> NDArray[np.bool_]:
+        """Triangles (m,) without a normal: no higher than the rounding of their corners."""
+        corners = self.vertices[self.faces]
+        sides = np.roll(corners, -1, axis=1) - corners
+        longest = np.linalg.norm(sides, axis=2).max(axis=1)
+        twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 2]), axis=1)
+        return np.asarray(twice_area <= 4.0 * self.rounding * longest)
+
 
 def make_mesh(
     vertices: ArrayLike, faces: ArrayLike, *, name: str = "mesh", scale: float = 1.0, float32: bool = False
 ) -> Mesh:
-    """Check, clean and orient a mesh: ``vertices`` (n, 3), ``faces`` (m, 3); lengths are multiplied by ``scale``.
+    """Check, clean and orient a mesh.
 
-    Equal vertices are merged, triangles without area and doubled triangles dropped, windings made consistent and, on a
-    closed mesh, outward, body by body. ``float32``: the coordinates passed through single precision (so they have if
-    their type says so). Raises InputError for wrong shapes, numbers that are not finite, indices out of range, no
-    triangle left or a closed surface without a volume.
+    Equal vertices are merged, triangles with two equal corners and doubled triangles dropped, windings made
+    consistent and, on a closed mesh, outward, body by body. Slivers stay where they close a surface; of an open mesh
+    they are dropped.
+
+    Parameters
+    ----------
+    vertices : array_like of shape (n, 3)
+        Coordinates.
+    faces : array_like of shape (m, 3)
+        Integer indices of each triangle's vertices.
+    name : str
+        Name for messages.
+    scale : float
+        Millimetres in one unit of the coordinates.
+    float32 : bool
+        Whether the coordinates passed through single precision; so they have if their type says so.
+
+    Returns
+    -------
+    Mesh
+        The mesh in mm; its ``notes`` say what was repaired.
+
+    Raises
+    ------
+    InputError
+        For wrong shapes, numbers that are not finite, indices out of range, no triangle left, or a closed surface
+        without a volume.
+
+    Examples
+    --------
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> make_mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]).watertight
+    True
     """
     import trimesh
 
@@ -91,7 +141,7 @@ def make_mesh(
         trimesh.repair.fix_winding(mesh)  # type: ignore[no-untyped-call]
         turned = int(np.any(before != np.asarray(mesh.faces), axis=1).sum())
         notes.append(f"{turned} triangles turned to one winding")
-    watertight = bool(mesh.is_watertight)
+    watertight = bool(mesh.is_watertight and mesh.is_winding_consistent)
     if not watertight:
         notes.append("open mesh: the material's side is taken from the winding")
     V, F = np.asarray(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
@@ -105,13 +155,11 @@ def make_mesh(
             notes.append(f"a body of {len(rows)} triangles inside out: turned")
         if not volume(V, F) > 0.0:
             raise InputError(f"{name}: the surface encloses no volume")
-    longest = np.linalg.norm(V[F] - V[F[:, [1, 2, 0]]], axis=2).max(axis=1)
-    twice_area = np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1)
-    # Slivers go last: they close the surface, but their normals are rounding.
-    F = F[twice_area > 4.0 * rounding * longest]
-    if len(F) == 0:
+    made = Mesh(name, V, F, watertight, rounding, tuple(notes))
+    slivers = made.slivers
+    if slivers.all():
         raise InputError(f"{name}: no triangle with an area")
-    return Mesh(name, V, F, watertight, rounding, tuple(notes))
+    return made if watertight else replace(made, faces=F[~slivers])
 
 
 def _indices(name: str, faces: ArrayLike) -> IntArray:

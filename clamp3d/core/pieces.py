@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.core.distance import as_pose, reject
+from clamp3d.core.distance import as_pose, repaired
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder, SweptArc, check_shapes
 
@@ -56,5 +56,5 @@ def groove_pieces(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Groo
     if not pieces(
         T[None], groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, out
     ):
-        reject(T, "pose")
+        return groove_pieces(groove, cylinder, repaired(T, "pose"))
     return GroovePieces(out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7].astype(np.int8), out[:, 8:14])

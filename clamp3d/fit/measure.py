@@ -168,7 +168,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         "chord_error": sagitta(axis.radius, region.span),
         "arc_error": arc_error,
         "length_error": length_error,
-        "faces": region.faces,
+        "faces": surface.rows[region.faces],
     }
 
 

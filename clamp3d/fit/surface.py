@@ -19,13 +19,18 @@ MAX_FACET = np.radians(46.0)
 
 
 class Surface:
-    """A mesh with what region growing asks for: normals, areas, neighbours, coplanar cells."""
+    """A mesh less its slivers with what region growing asks for: normals, areas, neighbours, coplanar cells.
+
+    ``rows`` (m,): the rows of the mesh's faces that ``F`` (m, 3) holds.
+    """
 
     def __init__(self, mesh: Mesh) -> None:
         import trimesh
 
         self.mesh = mesh
-        self.V, self.F = mesh.vertices, mesh.faces
+        # The normals of slivers are rounding.
+        self.rows = np.flatnonzero(~mesh.slivers)
+        self.V, self.F = mesh.vertices, mesh.faces[self.rows]
         tm = trimesh.Trimesh(self.V, self.F, process=False)
         self.normals = np.asarray(tm.face_normals)
         self.areas = np.asarray(tm.area_faces)

@@ -23,7 +23,7 @@ from clamp3d.collide.distance import measure
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.result import CheckResult
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import verdict_of
+from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
 from clamp3d.output.files import write_text
 from clamp3d.output.palette import VERDICT_COLOURS, part_colours
@@ -31,14 +31,14 @@ from clamp3d.output.viewer_clamp import UNCUT, ClampStory, facts
 from clamp3d.output.viewer_page import live_page, panel, whole_page
 from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
 from clamp3d.output.viewer_server import CommandLog, LocalServer, RemoteServer
-from clamp3d.output.viewer_timeline import Row, first_contacts, scene_stops
+from clamp3d.output.viewer_timeline import FIRST, Row, Stop, scene_stops
 from clamp3d.output.wording import BAD, circumstances, gap_text, headline, meaning, sentence, titles
 
 CLEARANCE = 5.0
 """Gap in mm from which two parts of a clamp count as clear."""
 _LISTED = 500
 """Rows of a table on the page; a result's JSON has all."""
-_MEASURED = 40
+MEASURED = 40
 """Scenes of up to so many parts are measured pair by pair, larger ones only as far as their verdicts need."""
 
 Shown = Clamp | Scene | Assembly | CheckResult
@@ -59,6 +59,8 @@ class Viewer:
         Gap that counts as clear, mm; by default the scene's own, and 5 mm for a clamp.
     overlays : dict, optional
         Convex pieces of parts to show as well, by a name: ``{name: {part: [trimesh.Trimesh, ...]}}``.
+    notes : sequence of str
+        Lines for the end of the page.
     serve : bool
         Serve the page on this machine (``host``, ``port``: the first free one from 7000); else it is only kept for
         `save_html`. No browser is opened, and none is waited for.
@@ -79,27 +81,28 @@ class Viewer:
         mesh_error: float = 0.01,
         clearance: float | None = None,
         overlays: Mapping[str, Pieces] | None = None,
+        notes: Sequence[str] = (),
         serve: bool = True,
         url: str | None = None,
         host: str = "127.0.0.1",
         port: int | None = None,
     ) -> None:
-        for name, pieces in dict(instance("overlays", overlays, Mapping) if overlays else {}).items():
+        overlays = {} if overlays is None else overlays
+        instance("overlays", overlays, Mapping)
+        for name, pieces in overlays.items():
             instance(f"overlay {text('name of an overlay', name)}", pieces, Mapping)
         serve = flag("serve", serve)
-        self._model, self._mesh_error = model, mesh_error
+        self._model, self._mesh_error, self._notes = model, mesh_error, list(notes)
         clamp = shown if isinstance(shown, Clamp) else getattr(shown, "clamp", None)
         self._clamp = None if clamp is None else ClampStory(clamp, CLEARANCE if clearance is None else clearance)
         self._scene = self._clamp.scene() if self._clamp is not None else _scene(shown, clearance)
         self._cache, self._log = ModelCache(), CommandLog()
         self._waypoints: list[Waypoint] = []
         self._server: LocalServer | RemoteServer | None = None
-        self._story: dict[str, Any] = {"title": "clamp3d"}
+        self._story: dict[str, Any] = {}
         try:
             if url is not None:
                 self._server = RemoteServer(text("url", url))
-            elif serve:
-                self._server = LocalServer(lambda: live_page(self._story), self._log, host=host, port=port)
             self._drawing = SceneDrawing(
                 self._scene,
                 self._send,
@@ -110,6 +113,8 @@ class Viewer:
                 overlays=overlays,
             )
             self._tell("waiting for the first state", state="waiting")
+            if url is None and serve:
+                self._server = LocalServer(lambda: live_page(self._story), self._log, host=host, port=port)
         except BaseException:
             self.close()
             raise
@@ -149,11 +154,12 @@ class Viewer:
             told = {"headline": result.status, "state": "clean" if good else "found", "facts": facts(result)}
             told |= {"findings": self._assembly_findings(), "limits": [*result.limits]}
         else:
-            for stop in scene_stops(instance("result", result, CheckResult), self._measured):
+            instance("result", result, CheckResult)
+            for stop in scene_stops(result, self._measured):
                 self._drawing.show(stop)
             told = {"headline": headline(result), "state": "clean" if result.clean else "found"}
             told |= {"findings": self._scene_findings(result), "pairs": _table(result.pairs)}
-            told |= {"motions": _table(result.motions), "counts": result.counts}
+            told |= {"motions": _table(result.motions)}
         self._drawing.play({} if self._clamp is None else self._clamp.shown(self._drawing))
         if self._clamp is not None:
             self._clamp.recolour(self._drawing, 0)
@@ -187,8 +193,9 @@ class Viewer:
     def _measured(self, scene: Scene, pairs: Sequence[tuple[str, str]] | None = None) -> list[Row]:
         """Pairs of a scene as rows, by the engine that every command asks."""
         found = measure(scene, pairs, model=self._model, cache=self._cache)
+        verdict, contact = scene.thresholds.verdict, scene.thresholds.contact
         return [
-            Row(a, b, verdict_of(d, scene.thresholds, scene.allowance(a, b)).value, d) for (a, b), d in found.items()
+            Row(a, b, verdict(d, scene.allowance(a, b)).value, d, d.upper <= contact) for (a, b), d in found.items()
         ]
 
     def _assembly_findings(self) -> list[dict[str, Any]]:
@@ -202,39 +209,41 @@ class Viewer:
         names, stops = titles(self._scene), self._drawing.timeline.stops
         found = sorted(worst.values(), key=lambda item: item[1].distance.upper)
         return [
-            self._finding(row, number, f"{names[row.a]} and {names[row.b]} clash: {row.gap}", stops[number].label)
+            self._finding(
+                row, number, f"{names[row.a]} and {names[row.b]} clash: {row.gap}", stops[number].label, focus(row)
+            )
             for number, row in found
         ]
 
     def _scene_findings(self, result: CheckResult) -> list[dict[str, Any]]:
+        """The findings of a check, each with the stop and the place to look at: a motion's at its first contact."""
         names, stops = titles(result.scene), self._drawing.timeline.stops
-        contacts = first_contacts(result.motions)
+        meetings = {k: self._drawing.mark_meeting(k) for k, stop in enumerate(stops) if stop.halts}
         found = []
         for row in result.findings[:_LISTED]:
-            number, here = 0, Row(row.a, row.b, row.verdict.value, row.distance)
+            here = Row(row.a, row.b, row.verdict.value, row.distance, touches=True)
+            number, place = 0, focus(here)
             for k, stop in enumerate(stops):
-                of_pair = [r for r in stop.rows if {r.a, r.b} == {row.a, row.b} and r.drawn]
-                if row.motion is not None and stop.step == row.motion and (of_pair or not number):
+                if row.motion is not None and stop.step == row.motion:
                     number = k
-                    if of_pair and row.contact_at in contacts:
-                        here = of_pair[0]
+                    if any((r.a, r.b, r.what) == (row.a, row.b, FIRST) for r in stop.rows):
+                        place = meetings.get(k) or place
                         break
-            found.append(self._finding(here, number, sentence(row, names), circumstances(row), row.verdict.value))
+            found.append(self._finding(here, number, sentence(row, names), circumstances(row), place))
         return found
 
-    def _finding(self, row: Row, stop: int, said: str, where: str, verdict: str = "") -> dict[str, Any]:
-        low, high = focus(row, self._drawing.size)
-        verdict = verdict or row.verdict
+    def _finding(self, row: Row, stop: int, said: str, where: str, place: tuple[Array, Array]) -> dict[str, Any]:
+        margin = 0.1 * self._drawing.size
         return {
             "a": row.a,
             "b": row.b,
-            "verdict": verdict,
-            "colour": VERDICT_COLOURS[verdict],
+            "verdict": row.verdict,
+            "colour": row.colour,
             "text": said,
             "detail": where,
             "stop": stop,
-            "low": low.tolist(),
-            "high": high.tolist(),
+            "low": (place[0] - margin).tolist(),
+            "high": (place[1] + margin).tolist(),
         }
 
     def _tell(self, said: str, *, state: str, done: bool = False, **more: Any) -> None:
@@ -243,14 +252,17 @@ class Viewer:
         colours = part_colours([part.name for part in scene.parts])
         head = self._clamp.told() if self._clamp is not None else _told(scene)
         measured = "exactly" if self._model is None else f"by {self._model.name}"
-        stops = [_stop_data(stop) for stop in drawing.timeline.stops]
+        stops = [
+            _stop_data(stop) | dict(zip(("low", "high"), (x.tolist() for x in drawing.extent([stop.poses])), strict=True))
+            for stop in drawing.timeline.stops
+        ]
         used = {row["verdict"] for stop in stops for row in stop["rows"]} | {"contact", "clearance", "clear"}
         if not scene.thresholds.clearance:
             used.discard("clearance")
-        empty: dict[str, Any] = {"facts": [], "findings": [], "limits": [], "pairs": [], "motions": [], "counts": {}}
         self._story = {
             **head,
-            **empty,
+            **{key: [] for key in ("facts", "findings", "limits", "pairs", "motions")},
+            "notes": self._notes,
             "headline": said,
             "state": state,
             "done": done,
@@ -309,7 +321,7 @@ def view(shown: Scene | Assembly | CheckResult, *, serve: bool = True, **options
     """
     if isinstance(shown, Scene):
         scene = _scene(shown, options.pop("clearance", None))
-        shown = check(scene, distances=len(scene.parts) <= _MEASURED)
+        shown = check(scene, distances=len(scene.parts) <= MEASURED)
     if not isinstance(shown, (Assembly, CheckResult)):
         raise InputError(f"view() takes a Scene, an Assembly or a CheckResult, got {type(shown).__name__}")
     if isinstance(shown, Assembly):
@@ -324,7 +336,8 @@ def view(shown: Scene | Assembly | CheckResult, *, serve: bool = True, **options
 
 
 def _scene(shown: Any, clearance: float | None) -> Scene:
-    scene = instance("shown", shown.scene if isinstance(shown, CheckResult) else shown, Scene)
+    scene: Scene = shown.scene if isinstance(shown, CheckResult) else shown
+    instance("shown", scene, Scene)
     return scene if clearance is None else replace(scene, clearance=clearance)
 
 
@@ -340,14 +353,9 @@ def _told(scene: Scene) -> dict[str, Any]:
     return {"title": scene.name, "subtitle": f"{n} {'part' if n == 1 else 'parts'}{moving}"}
 
 
-def _stop_data(stop: Any) -> dict[str, Any]:
+def _stop_data(stop: Stop) -> dict[str, Any]:
     keys = ("arrive", "leave", "step", "label", "mark", "halts")
-    rows = [
-        row.data()
-        | {"gap": row.gap, "near": row.declared or row.verdict != "clear", "colour": VERDICT_COLOURS[row.verdict]}
-        for row in stop.rows[:_LISTED]
-    ]
-    return {key: getattr(stop, key) for key in keys} | {"rows": rows}
+    return {key: getattr(stop, key) for key in keys} | {"rows": [row.data() for row in stop.rows[:_LISTED]]}
 
 
 def _table(rows: Sequence[Any]) -> list[dict[str, Any]]:

@@ -21,7 +21,7 @@ from clamp3d.core.shapes import MeshShape
 from clamp3d.output import viewer_objects as draw
 from clamp3d.output.palette import INK, VERDICT_COLOURS, darker, part_colours
 from clamp3d.output.viewer_cut import cut_open, overlap
-from clamp3d.output.viewer_timeline import Row, Stop, Timeline
+from clamp3d.output.viewer_timeline import FIRST, Row, Stop, Timeline
 from clamp3d.output.wording import BAD, part_title
 
 if TYPE_CHECKING:
@@ -200,34 +200,52 @@ class SceneDrawing:
     def _draw_marks(self, number: int) -> None:
         """Dots and arrows where parts touch, red volumes where they clash, lines with their length across gaps."""
         stop, group = self.timeline.stops[number], self.timeline.group(number)
-        for row in [row for row in stop.rows if (row.drawn and row.verdict != "clear") or row.declared][:_MARKED]:
-            where = f"{ROOT}/{{}}/{group}/{row.a}-{row.b}"
-            colour, d = VERDICT_COLOURS[row.verdict], row.distance
-            if d.point_a is None or d.point_b is None:
+        for row in [row for row in stop.rows if row.drawn and row.near][:_MARKED]:
+            d, where = row.distance, f"{ROOT}/{'contacts' if row.touches else 'gaps'}/{group}/{row.a}-{row.b}"
+            if row.verdict in BAD:
+                self._clash(where, row, stop.poses)
+            elif d.point_a is None or d.point_b is None:
                 continue
-            if row.verdict in ("contact", "allowed"):
-                self._dot(where.format("contacts") + "/point", 0.5 * (d.point_a + d.point_b), colour)
+            elif not row.touches:
+                self._gap(where, d.point_a, d.point_b, row.gap, row.colour)
+            elif d.upper <= d.lower + 0.01 * self.size:  # else it is only known that they touch, not where
+                self._dot(f"{where}/point", 0.5 * (d.point_a + d.point_b), row.colour)
                 if d.normal is not None and not row.what.startswith("screw"):
-                    arrow = draw.arrow(d.point_a, d.normal, 0.06 * self.size, darker(colour, 0.55))
-                    self.put(where.format("contacts") + "/normal", arrow)
-            elif row.verdict in BAD:
-                self._clash(where.format("contacts"), row, stop.poses)
-            else:
-                self._gap(where.format("gaps"), d.point_a, d.point_b, row.gap, colour)
+                    arrow = draw.arrow(d.point_a, d.normal, 0.06 * self.size, darker(row.colour, 0.55))
+                    self.put(f"{where}/normal", arrow)
+
+    def mark_meeting(self, number: int) -> tuple[Array, Array] | None:
+        """Box in red where parts meet that first touch at a stop: where their facets overlap soon after it."""
+        stops, row = self.timeline.stops, self.timeline.stops[number].rows[0]
+        for _, moved in stops[number + 1].via:
+            poses = {**stops[number].poses, **moved}
+            common = overlap(self._meshes[row.a], poses[row.a], self._meshes[row.b], poses[row.b])
+            if common is not None:
+                common.apply_transform(poses[row.a])
+                low, high = common.bounds
+                path = f"{ROOT}/contacts/{self.timeline.group(number)}/{row.a}-{row.b}"
+                self._box(path, low, high, FIRST)
+                return low, high
+        return None
 
     def _clash(self, path: str, row: Row, poses: Mapping[str, Array]) -> None:
         red, (a, b) = VERDICT_COLOURS["clash"], (row.a, row.b)
         for name, point in (("point a", row.distance.point_a), ("point b", row.distance.point_b)):
-            self._dot(f"{path}/{name}", point, red)
+            if point is not None:
+                self._dot(f"{path}/{name}", point, red)
         common = overlap(self._meshes[a], poses[a], self._meshes[b], poses[b])
-        low, high = focus(row, self.size)
+        low, high = focus(row)
         if common is not None:
             common.apply_transform(poses[a])
             self.put(f"{path}/overlap", draw.facets(common, red, opacity=0.6, on_top=True))
             low, high = common.bounds
+        if common is not None or row.distance.point_a is not None:
+            self._box(path, low, high, row.gap)
+
+    def _box(self, path: str, low: Array, high: Array, text: str) -> None:
         margin = 0.01 * self.size
-        self.put(f"{path}/box", draw.box(low - margin, high + margin, red))
-        self._label(f"{path}/value", row.gap, high + margin, "#FFFFFF", 0.7)
+        self.put(f"{path}/box", draw.box(low - margin, high + margin, VERDICT_COLOURS["clash"]))
+        self._label(f"{path}/value", text, high + margin, "#FFFFFF", 0.7)
 
     def _dot(self, path: str, point: Array, colour: str) -> None:
         T = np.eye(4)
@@ -267,9 +285,7 @@ class SceneDrawing:
         self.property(path, "visible", on)
 
 
-def focus(row: Row, size: float) -> tuple[Array, Array]:
-    """Corners of a box around the place that a row speaks of, of a few hundredths of the scene's ``size`` at least."""
-    d = row.distance
-    points = np.array([p for p in (d.point_a, d.point_b) if p is not None])
-    least = 0.02 * size
-    return points.min(axis=0) - least, points.max(axis=0) + least
+def focus(row: Row) -> tuple[Array, Array]:
+    """Corners of a box around the witness points of a row; empty where it has none."""
+    points = [p for p in (row.distance.point_a, row.distance.point_b) if p is not None] or [np.zeros(3)]
+    return np.min(points, axis=0), np.max(points, axis=0)

@@ -11,11 +11,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from clamp3d.collide.distance import Distance
-from clamp3d.collide.motion import Motion
 from clamp3d.collide.result import CheckResult, PairResult
 from clamp3d.collide.scene import Scene
+from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
-from clamp3d.output.wording import gap_text
+from clamp3d.output.palette import VERDICT_COLOURS
+from clamp3d.output.wording import BAD, gap_text
 
 if TYPE_CHECKING:
     from meshcat.animation import Animation
@@ -25,22 +26,26 @@ Shown = Mapping[str, list[bool]]
 Measured = Callable[[Scene, Sequence[tuple[str, str]]], Iterable["Row"]]
 """Measures pairs of a scene, as `clamp3d.collide.distance.measure` does, with their verdicts."""
 
+FIRST = "first contact"
 _HOLD = 1.2  # s at each stop
 _FASTEST, _SLOWEST = 0.9, 4.0  # s between two stops
 _MOTION = 4.0  # s of a motion of a scene from t = 0 to 1
-_JUMP = 0.01  # s: back to the start for the next motion
 _TURN = math.radians(3.0)
 """Largest turn between two keys: between them the viewer moves parts along chords."""
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """How a pair stands at a stop; ``drawn`` where the points are those of this very moment."""
+    """How a pair stands at a stop; ``drawn`` where the points are those of this very moment.
+
+    ``touches`` is whether the distance is within the scene's contact threshold; contact that is allowed need not be.
+    """
 
     a: str
     b: str
     verdict: str
     distance: Distance
+    touches: bool
     what: str = ""
     declared: bool = False
     drawn: bool = True
@@ -48,11 +53,25 @@ class Row:
     @property
     def gap(self) -> str:
         """The distance in words."""
+        if self.touches and (self.what == FIRST or abs(self.distance.upper) < 5e-5):
+            return "touching"
         return gap_text(self.distance.lower, self.distance.upper, digits=4)
+
+    @property
+    def colour(self) -> str:
+        """The verdict's colour; allowed contact that is not there has that of a gap."""
+        return VERDICT_COLOURS["clearance" if self.verdict == "allowed" and not self.touches else self.verdict]
+
+    @property
+    def near(self) -> bool:
+        """Whether the pair is worth a mark."""
+        return self.declared or self.verdict != "clear"
 
     def data(self) -> dict[str, Any]:
         """The row as JSON data."""
-        return {"a": self.a, "b": self.b, "verdict": self.verdict, "what": self.what} | self.distance.to_dict()
+        said = {"gap": self.gap, "near": self.near, "colour": self.colour}
+        names = {"a": self.a, "b": self.b, "verdict": self.verdict, "what": self.what}
+        return names | self.distance.to_dict() | said
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,42 +165,50 @@ class Timeline:
 
 
 def scene_stops(result: CheckResult, measured: Measured) -> Iterator[Stop]:
-    """A checked scene at rest, then each of its motions with a stop where parts first touch."""
-    scene = result.scene
-    rest = {part.name: part.T_world for part in scene.parts}
-    yield Stop("at rest", "at rest", rest, tuple(_row(row) for row in result.pairs))
-    for motion in scene.motions:
-        yield from _motion_stops(result, motion, rest, measured)
+    """A checked scene at rest, then its motions one after the other, with a stop where parts first touch."""
+    motions = result.scene.motions
+    poses: Poses = {part.name: part.T_world for part in result.scene.parts}
+    marks = [motion.name for motion in motions] + [""]
+    yield Stop("at rest", "at rest", poses, tuple(_row(result, row) for row in result.pairs), marks[0])
+    for motion, mark in zip(motions, marks[1:], strict=True):
+        for stop in _motion_stops(result, motion, poses, measured, mark):
+            yield stop
+            last = stop.poses
+        poses = last
 
 
-def _motion_stops(result: CheckResult, motion: Motion, rest: Poses, measured: Measured) -> Iterator[Stop]:
-    going = motion.from_pose(rest[motion.parts[0]])
+def _motion_stops(
+    result: CheckResult, motion: Motion, start: Poses, measured: Measured, next_mark: str
+) -> Iterator[Stop]:
+    """The stops of a motion: where parts first touch, where they go on to, and the end."""
+    going = motion.resolved(start[motion.parts[0]])
     rows = [row for row in result.motions if row.motion == motion.name]
-    least = tuple(_row(row, f"least on the way, at t = {row.t:.4f}", drawn=False) for row in rows)
 
     def at(t: float) -> Poses:
-        M = going.at(t)
-        return {name: M @ T if name in motion.parts else T for name, T in rest.items()}
+        return {name: going.at(t, T) if name in motion.parts else T for name, T in start.items()}
 
     def way(t0: float, t1: float) -> tuple[tuple[float, Poses], ...]:
         n = max(1, math.ceil(abs(going.angle) * (t1 - t0) / _TURN))
         moved = [(k / n, at(t0 + (t1 - t0) * k / n)) for k in range(1, n)]
         return tuple((f, {name: poses[name] for name in motion.parts}) for f, poses in moved)
 
-    contacts = first_contacts(rows)
-    yield Stop(motion.name, f"{motion.name}: start", at(0.0), least, mark=motion.name, seconds=_JUMP)
-    before = 0.0
+    contacts, before = first_contacts(rows), 0.0
     for k, (t, touching) in enumerate(contacts.items()):
         poses = at(t)
-        scene = result.scene.moved({name: poses[name] for name in motion.parts})
-        now = tuple(measured(scene, [(row.a, row.b) for row in touching]))
+        # The engine knows the moment; the distance right there may be known to its contact threshold only.
+        found = measured(result.scene.moved(poses), [(row.a, row.b) for row in touching])
+        now = tuple(replace(row, verdict="contact", what=FIRST, touches=True) for row in found)
         label = f"{motion.name}: {'first' if k == 0 else 'next'} contact at t = {t:.4f}"
-        mark = "first contact" if k == 0 else ""
-        stop = Stop(motion.name, label, poses, now, mark, k == 0, way(before, t), _MOTION * (t - before))
-        yield stop
+        seconds = max(0.3, _MOTION * (t - before))
+        yield Stop(motion.name, label, poses, now, "" if k else FIRST, k == 0, way(before, t), seconds)
         before = t
+    least = tuple(
+        replace(_row(result, row), what=f"least, at t = {row.t:.4f}", drawn=row.t == 1.0 and row.verdict in BAD)
+        for row in rows
+    )
     end = f"{motion.name}: end" + (", through the contact" if contacts else "")
-    yield Stop(motion.name, end, at(1.0), least, via=way(before, 1.0), seconds=max(0.2, _MOTION * (1.0 - before)))
+    seconds = max(0.3, _MOTION * (1.0 - before))
+    yield Stop(motion.name, end, at(1.0), least, next_mark, via=way(before, 1.0), seconds=seconds)
 
 
 def first_contacts(rows: Iterable[PairResult]) -> dict[float, list[PairResult]]:
@@ -196,5 +223,5 @@ def _first(row: PairResult) -> float:
     return row.contact_at or 0.0
 
 
-def _row(row: PairResult, what: str = "", *, drawn: bool = True) -> Row:
-    return Row(row.a, row.b, row.verdict.value, row.distance, what, drawn=drawn)
+def _row(result: CheckResult, row: PairResult) -> Row:
+    return Row(row.a, row.b, row.verdict.value, row.distance, row.distance.upper <= result.thresholds.contact)

@@ -17,9 +17,14 @@ from clamp3d.scenefile.tables import TAGS, ClampTable, MeshTable, SceneTable, cl
 
 
 def load_scene(path: str | Path) -> Scene:
-    """Read a scene file. Raises InputError for anything that is not a scene, naming file, key, value and rule."""
+    """Read a scene file. Raises InputError for anything that is not a scene, naming file, key, value and rule.
+
+    The scene is named after the file; one called ``scene.toml`` after its folder.
+    """
     path = checks.path("scene", path)
-    return parse_scene(read_text(path), origin=str(path), folder=path.parent, name=path.stem)
+    text = read_text(path)
+    name = (path.resolve().parent.name if path.stem == "scene" else "") or path.stem
+    return parse_scene(text, origin=str(path), folder=path.parent, name=name)
 
 
 def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name: str = "scene") -> Scene:

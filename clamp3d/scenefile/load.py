@@ -63,7 +63,7 @@ def load(
         _refuse_wires(path, "a mesh", wires)
         return _one_part(path, unit)
     if str(path) in builtin_clamps() or _is_clamp(path):
-        return load_clamp(path, **wires)
+        return load_clamp(path, line=line, jumper=jumper)
     _refuse_wires(path, "a scene", wires)
     return load_scene(path)
 

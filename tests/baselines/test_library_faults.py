@@ -85,7 +85,7 @@ def test_depth_of_two_bare_meshes() -> None:
 
 
 def test_depth_of_two_meshes_in_a_scene_is_the_depth() -> None:
-    cube = clamp3d.MeshShape(clamp3d.make_mesh(*_cube(100.0)), "off")
+    cube = clamp3d.shapes.MeshShape(clamp3d.shapes.make_mesh(*_cube(100.0)), "off")
     scene = clamp3d.Scene.of({"a": (cube, np.eye(4)), "b": (cube, translation(99.5, 0.0, 0.0))})
     (row,) = clamp3d.check(scene).pairs
     assert row.verdict is clamp3d.Verdict.CLASH
@@ -254,7 +254,7 @@ def test_volume_of_a_flat_mesh_by_trimesh() -> None:
 
 def test_flat_mesh_is_refused() -> None:
     with pytest.raises(InputError, match="encloses no volume"):
-        clamp3d.make_mesh(BOX[0] * [1.0, 0.0, 1.0], BOX[1])
+        clamp3d.shapes.make_mesh(BOX[0] * [1.0, 0.0, 1.0], BOX[1])
 
 
 # --- what ends or hangs the interpreter: each in a child --------------------------------------------------------------

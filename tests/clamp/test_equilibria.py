@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from clamp3d import Cas, assemble, equilibria, load_clamp
+from clamp3d import assemble, load_clamp
+from clamp3d.baselines.cas import Cas
 from clamp3d.bench.stress.assemblies.clamps import clamp_of
-from clamp3d.clamp.equilibria import describe, slipping
+from clamp3d.clamp.equilibria import describe, equilibria, slipping
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.section import Section
 from clamp3d.cli import group

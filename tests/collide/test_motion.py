@@ -150,7 +150,7 @@ def test_no_instant_is_below_the_least_distance():
         if verdicts & {"clash", "contained"}:
             assert row.verdict.value == "clash"
             first = next(t for t in instants if check(scene.moved({"moving": motion.at(t) @ start})).pairs
-                         and check(scene.moved({"moving": motion.at(t) @ start})).pairs[0].upper < -0.01)  # fmt: skip
+                         and check(scene.moved({"moving": motion.at(t) @ start})).pairs[0].distance.upper < -0.01)  # fmt: skip
             assert row.contact_at <= first + 1e-9
         elif "clearance" in verdicts:
             assert row.verdict.value != "clear"

@@ -11,7 +11,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "clamp3d"
 CALL = (
-    "import time, sys; t = time.process_time(); import numpy as np; from clamp3d import *;"
+    "import time, sys; t = time.process_time(); import numpy as np; from clamp3d.kernel import *;"
     "print(signed_distance(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.eye(4)).distance);"
     "print(time.process_time() - t)"
 )

@@ -294,7 +294,7 @@ def test_deeper_is_lower():
         (lambda T: T.__setitem__((1, 3), -np.inf), "finite"),
         (lambda T: T.__setitem__((0, 0), -1.0), "reflects"),
         (lambda T: T.__setitem__((slice(0, 3), slice(0, 3)), 1.001 * np.eye(3)), "rigid"),
-        (lambda T: T.__setitem__((0, 1), 1e-6), "rigid"),
+        (lambda T: T.__setitem__((0, 1), 1.1e-4), "rigid"),
         (lambda T: T.__setitem__((3, 0), 1e-3), "last row"),
         (lambda T: T.__setitem__((3, 3), np.nan), "finite"),
         (lambda T: T.__setitem__((1, 3), 1e200), "offset below 1e"),

@@ -2,6 +2,7 @@
 
 import sys
 
+import manifold3d
 import numpy as np
 import pytest
 import trimesh
@@ -10,7 +11,7 @@ from fit_shapes import RADIUS, splint
 from clamp3d.brep.mesh_file import load_mesh
 from clamp3d.core.mesh import make_mesh
 from clamp3d.errors import InputError, MissingLibraryError
-from clamp3d.fit.fit import fit_file
+from clamp3d.fit.fit import fit_file, fit_mesh
 
 
 @pytest.fixture(scope="module")
@@ -124,3 +125,62 @@ def test_repairs_are_noted():
     assert mesh.watertight
     assert trimesh.Trimesh(mesh.vertices, mesh.faces).volume > 0.0
     assert mesh.notes == ("1 doubled triangles left out", "inside out: all triangles turned")
+
+
+def with_slivers(mesh, edges, height):
+    """``mesh`` with the middle of ``edges`` as new vertices: one side is split there, a sliver closes the other."""
+    V, F = mesh.vertices.tolist(), mesh.faces.tolist()
+    for k in edges:
+        a, b, c = F[k]
+        m = len(V)
+        V.append((0.5 * (mesh.vertices[a] + mesh.vertices[b]) + height).tolist())
+        F[k] = [a, m, c]
+        F += [[m, b, c], [a, b, m]]
+    return np.array(V), np.array(F)
+
+
+def status(mesh):
+    return manifold3d.Manifold(
+        manifold3d.Mesh64(vert_properties=mesh.vertices, tri_verts=mesh.faces.astype(np.uint64))
+    ).status()
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-15, 1e-7, 1e-5, 1e-3])
+@pytest.mark.parametrize("float32", [False, True])
+def test_watertight_is_true_of_what_is_returned(part, height, float32):
+    """manifold3d takes every mesh that says so, slivers of any height among its triangles."""
+    box = trimesh.creation.box([30.0, 20.0, 10.0])
+    for source, edges in ((part, [3, 40, 77]), (box, range(0, 12, 3))):
+        V, F = with_slivers(source, edges, height)
+        V = V.astype(np.float32) if float32 else V
+        mesh = make_mesh(V, F)
+        assert mesh.watertight
+        assert status(mesh) == manifold3d.Error.NoError
+        assert mesh.slivers.any() or height > 1e-8
+        result = fit_mesh(mesh)
+        assert len(result.grooves) == (2 if source is part else 0)
+        for feature in result.features:  # rows of the mesh, slivers left out
+            area = trimesh.triangles.area(mesh.vertices[mesh.faces[feature.faces]]).sum()
+            assert area == pytest.approx(feature.covered_area, rel=1e-9)
+            assert not mesh.slivers[feature.faces].any()
+
+
+def test_open_meshes_say_so():
+    box = trimesh.creation.box([1.0, 1.0, 1.0])
+    mesh = make_mesh(box.vertices, box.faces[1:])
+    assert not mesh.watertight
+    assert status(mesh) != manifold3d.Error.NoError
+    V, F = with_slivers(box, [0], 0.0)
+    mesh = make_mesh(V, np.delete(F, 5, axis=0))  # of an open mesh slivers are dropped
+    assert not mesh.watertight
+    assert not mesh.slivers.any()
+    # A strip with half a turn has a rim, and no consistent winding.
+    n = 12
+    ring = np.arange(2 * n).reshape(n, 2)
+    ahead = np.concatenate([ring[1:], ring[:1, ::-1]])
+    a, b, c, d = ring[:, 0], ring[:, 1], ahead[:, 0], ahead[:, 1]
+    t = np.linspace(0.0, 2 * np.pi, n, endpoint=False)
+    side = np.array([-0.3, 0.3])
+    r = 2.0 + np.cos(t / 2)[:, None] * side
+    V = np.stack([r * np.cos(t)[:, None], r * np.sin(t)[:, None], np.sin(t / 2)[:, None] * side], axis=2)
+    assert not make_mesh(V.reshape(-1, 3), np.concatenate([np.c_[a, c, b], np.c_[b, c, d]])).watertight

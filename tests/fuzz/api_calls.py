@@ -101,10 +101,10 @@ def _right(name: str, arguments: dict[str, Any], result: Any) -> None:
     """Checks of answers where one is at hand: plain float64 inputs must give the same."""
     if name in ("signed_distance", "groove_pieces") and "pose" in arguments:
         plain = np.array(arguments["pose"], dtype=np.float64)
-        if _off(plain) > 1e-8:
+        if _off(plain) > 2e-4:
             raise FindingError(f"answered for a pose that is not rigid by {_off(plain):.3g}")
         groove, wire = arguments["groove"], arguments["cylinder"]
-        again = clamp3d.signed_distance(groove, wire, plain)
+        again = clamp3d.kernel.signed_distance(groove, wire, plain)
         if name == "signed_distance" and again.distance != result.distance:
             raise FindingError(f"distance {result.distance!r}, for the same numbers in float64 {again.distance!r}")
         if name == "signed_distance":
@@ -118,9 +118,9 @@ def _right(name: str, arguments: dict[str, Any], result: Any) -> None:
         if len(found) != len(plain):
             raise FindingError(f"{len(found)} answers for {len(plain)} poses")
         for k in range(0, len(plain), max(1, len(plain) // 3)):
-            if _off(plain[k]) > 1e-8:
+            if _off(plain[k]) > 2e-4:
                 raise FindingError(f"answered for a pose that is not rigid by {_off(plain[k]):.3g}")
-            one = clamp3d.signed_distance(arguments["groove"], arguments["cylinder"], plain[k])
+            one = clamp3d.kernel.signed_distance(arguments["groove"], arguments["cylinder"], plain[k])
             if one.distance != found[k]:
                 raise FindingError(f"poses[{k}]: {found[k]!r} in the batch, {one.distance!r} alone")
     elif name in ("check_pose", "relative_pose") and _off(result) > 1e-8:

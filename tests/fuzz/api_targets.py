@@ -11,17 +11,26 @@ from typing import Any
 import numpy as np
 
 import clamp3d
+from clamp3d import figures, kernel, shapes
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
 from clamp3d.baselines.wedges import Wedges
+from clamp3d.bench.image import image_study, measure_image
+from clamp3d.bench.legends import table2_figure, table3_figure
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Wire
+from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.parts import parts
+from clamp3d.clamp.placement import WireClosing
+from clamp3d.clamp.section import Section
+from clamp3d.collide.motions import check_poses
 from clamp3d.collide.scene import Allowed
 from clamp3d.core import pose as poses
-from clamp3d.core import shapes
 from clamp3d.core.motion import Motion
+from clamp3d.core.shapes import FITS
+from clamp3d.output.viewer import Viewer
 from clamp3d.scenefile.file import load_scene
 from tests.fuzz import garbage
 from tests.fuzz.api_values import Rng, pose, pose_batch, rigid
@@ -30,12 +39,20 @@ Make = Callable[[Rng, Path], tuple[Callable[..., Any], dict[str, Any]]]
 
 RESULTS = {
     "ArcContact",
+    "Assembly",
     "Cas",
+    "Clamp",
+    "Distance",
+    "Mesh",
+    "baselines",
+    "bench",
+    "figures",
+    "kernel",
+    "shapes",
     "Equilibrium",
     "ArcRelation",
     "CheckResult",
     "CylinderFit",
-    "Distance",
     "Distances",
     "Feature",
     "FitResult",
@@ -74,7 +91,7 @@ def _models() -> tuple[Any, ...]:
     from clamp3d.baselines.meshes import Meshes
     from clamp3d.core.meshing import mesh
 
-    solids = clamp3d.parts(_clamp())
+    solids = parts(_clamp())
     return (
         Cas(),
         Chords(0.2),
@@ -85,7 +102,7 @@ def _models() -> tuple[Any, ...]:
 
 @functools.cache
 def _scene() -> Any:
-    block = shapes.groove_block(clamp3d.SweptArc(7.0, 1.0, 50.0), 40.0, 20.0)
+    block = shapes.groove_block(kernel.SweptArc(7.0, 1.0, 50.0), 40.0, 20.0)
     return clamp3d.Scene(clearance=0.5).add("block", block).add("wire", shapes.cylinder(6.5, 80.0))
 
 
@@ -94,7 +111,7 @@ _TETRAHEDRON = ([[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]], [[0, 2, 1], [0,
 
 @functools.cache
 def _mesh() -> Any:
-    return clamp3d.make_mesh(*_TETRAHEDRON)
+    return shapes.make_mesh(*_TETRAHEDRON)
 
 
 def size(rng: Rng) -> float:
@@ -103,11 +120,11 @@ def size(rng: Rng) -> float:
 
 
 def _groove(rng: Rng) -> Any:
-    return clamp3d.SweptArc(size(rng), float(rng.uniform(0.05, 3.1)), size(rng))
+    return kernel.SweptArc(size(rng), float(rng.uniform(0.05, 3.1)), size(rng))
 
 
 def _wire(rng: Rng) -> Any:
-    return clamp3d.Cylinder(size(rng), size(rng))
+    return kernel.Cylinder(size(rng), size(rng))
 
 
 def _motion(rng: Rng) -> Any:
@@ -176,21 +193,23 @@ def _choice(*values: Any) -> Callable[[Rng], Any]:
 
 
 def _rectangle(rng: Rng) -> Any:
-    return clamp3d.Rectangle(*rng.normal(size=2), size(rng), size(rng), float(rng.normal(0, 0.3)))
+    return kernel.Rectangle(*rng.normal(size=2), size(rng), size(rng), float(rng.normal(0, 0.3)))
 
 
 def targets() -> dict[str, tuple[float, Make]]:
     """Everything callable with how often it is called, by name."""
-    c = clamp3d
     vertices, faces = _TETRAHEDRON
     return {
-        "SweptArc": (5, _simple(c.SweptArc, radius=size, half_angle=lambda r: float(r.uniform(0, 3.2)), length=size)),
-        "Cylinder": (3, _simple(c.Cylinder, radius=size, length=size)),
-        "signed_distance": (20, _simple(c.signed_distance, groove=_groove, cylinder=_wire, pose=pose)),
+        "SweptArc": (
+            5,
+            _simple(kernel.SweptArc, radius=size, half_angle=lambda r: float(r.uniform(0, 3.2)), length=size),
+        ),
+        "Cylinder": (3, _simple(kernel.Cylinder, radius=size, length=size)),
+        "signed_distance": (20, _simple(kernel.signed_distance, groove=_groove, cylinder=_wire, pose=pose)),
         "signed_distances": (
             20,
             _simple(
-                c.signed_distances,
+                kernel.signed_distances,
                 groove=_groove,
                 cylinder=_wire,
                 poses=pose_batch,
@@ -198,17 +217,17 @@ def targets() -> dict[str, tuple[float, Make]]:
                 workers=_choice(None, 1, 2),
             ),
         ),
-        "groove_pieces": (10, _simple(c.groove_pieces, groove=_groove, cylinder=_wire, pose=pose)),
+        "groove_pieces": (10, _simple(kernel.groove_pieces, groove=_groove, cylinder=_wire, pose=pose)),
         "groove_relation": (
             10,
-            _simple(c.groove_relation, groove=_groove, cylinder=_wire, pose=pose, tolerance=_tolerance),
+            _simple(kernel.groove_relation, groove=_groove, cylinder=_wire, pose=pose, tolerance=_tolerance),
         ),
-        "relative_pose": (8, _simple(c.relative_pose, T_world_a=pose, T_world_b=pose)),
+        "relative_pose": (8, _simple(kernel.relative_pose, T_world_a=pose, T_world_b=pose)),
         "Motion.at": (3, lambda r, f: (_motion(r).at, {"t": float(r.random())})),
         "first_contact": (
             3,
             _simple(
-                c.first_contact,
+                clamp3d.first_contact,
                 a=_groove,
                 b=_wire,
                 motion=_motion,
@@ -217,11 +236,11 @@ def targets() -> dict[str, tuple[float, Make]]:
                 resolution=_choice(None, 1e-3),
             ),
         ),
-        "min_clearance": (2, _simple(c.min_clearance, a=_groove, b=_wire, motion=_motion, T_a_b=_above)),
+        "min_clearance": (2, _simple(clamp3d.min_clearance, a=_groove, b=_wire, motion=_motion, T_a_b=_above)),
         "arc_circle": (
             8,
             _simple(
-                c.arc_circle,
+                kernel.arc_circle,
                 arc_radius=size,
                 half_angle=lambda r: float(r.uniform(0, 3.2)),
                 circle_radius=size,
@@ -233,7 +252,7 @@ def targets() -> dict[str, tuple[float, Make]]:
         "classify_arc_circle": (
             4,
             _simple(
-                c.classify_arc_circle,
+                kernel.classify_arc_circle,
                 gap=_angle,
                 arc_radius=size,
                 half_angle=_fixed(1.0),
@@ -243,8 +262,11 @@ def targets() -> dict[str, tuple[float, Make]]:
                 tolerance=_tolerance,
             ),
         ),
-        "Rectangle": (4, _simple(c.Rectangle, x=_angle, y=_angle, half_width=size, half_height=size, angle=_angle)),
-        "hole_bolt": (5, _simple(c.hole_bolt, hole=_rectangle, bolt=_rectangle, tolerance=_tolerance)),
+        "Rectangle": (
+            4,
+            _simple(kernel.Rectangle, x=_angle, y=_angle, half_width=size, half_height=size, angle=_angle),
+        ),
+        "hole_bolt": (5, _simple(kernel.hole_bolt, hole=_rectangle, bolt=_rectangle, tolerance=_tolerance)),
         "check_pose": (5, _simple(poses.check_pose, pose=pose)),
         "rotation": (4, _simple(poses.rotation, axis=_three, angle=_angle)),
         "translation": (3, _simple(poses.translation, x=_angle, y=_angle, z=_angle)),
@@ -254,12 +276,12 @@ def targets() -> dict[str, tuple[float, Make]]:
         "Chords": (1, _simple(Chords, unit_angle=lambda r: float(r.uniform(0, 3.2)))),
         "Wedges": (
             1,
-            _simple(Wedges, parts=_fixed(c.parts(_clamp())), unit_angle=lambda r: float(r.uniform(0.1, 3.2))),
+            _simple(Wedges, parts=_fixed(parts(_clamp())), unit_angle=lambda r: float(r.uniform(0.1, 3.2))),
         ),
         "make_mesh": (
             8,
             _simple(
-                c.make_mesh,
+                shapes.make_mesh,
                 vertices=lambda r: (np.array(vertices) * size(r)).tolist(),
                 faces=_fixed(faces),
                 name=_fixed("m"),
@@ -267,11 +289,20 @@ def targets() -> dict[str, tuple[float, Make]]:
                 float32=_choice(True, False),
             ),
         ),
-        "load_mesh": (1, lambda r, f: (c.load_mesh, {"path": _stl(f), "unit": garbage.pick(r, (None, "mm", "in"))})),
-        "fit_file": (1, lambda r, f: (c.fit_file, {"path": _stl(f), "unit": None, "progress": None})),
-        "fit_mesh": (2, _simple(c.fit_mesh, mesh=_fixed(_mesh()), progress=_fixed(None))),
-        "MeshShape": (3, _simple(c.MeshShape, mesh=_fixed(_mesh()), fit=_choice(*shapes.FITS), name=_fixed("m"))),
-        "Solid": (2, _simple(c.Solid, name=_fixed("s"), bodies=_fixed(shapes.box((1, 2, 3)).bodies), holes=_fixed(()))),
+        "load_mesh": (
+            1,
+            lambda r, f: (shapes.load_mesh, {"path": _stl(f), "unit": garbage.pick(r, (None, "mm", "in"))}),
+        ),
+        "fit_file": (1, lambda r, f: (clamp3d.fit_file, {"path": _stl(f), "unit": None, "progress": None})),
+        "fit_mesh": (2, _simple(clamp3d.fit_mesh, mesh=_fixed(_mesh()), progress=_fixed(None))),
+        "MeshShape": (
+            3,
+            _simple(shapes.MeshShape, mesh=_fixed(_mesh()), fit=_choice(*FITS), name=_fixed("m")),
+        ),
+        "Solid": (
+            2,
+            _simple(shapes.Solid, name=_fixed("s"), bodies=_fixed(shapes.box((1, 2, 3)).bodies), holes=_fixed(())),
+        ),
         "shapes.Hole": (
             2,
             lambda r, f: (shapes.Hole, {"radius": 3.0, "at": (1.0, 2.0), "axis": garbage.pick(r, ("y", "z"))}),
@@ -295,7 +326,7 @@ def targets() -> dict[str, tuple[float, Make]]:
         "Scene": (
             4,
             _simple(
-                c.Scene,
+                clamp3d.Scene,
                 parts=_fixed(_scene().parts),
                 contact=_tolerance,
                 clearance=_choice(0.0, 0.5),
@@ -307,7 +338,7 @@ def targets() -> dict[str, tuple[float, Make]]:
         "Scene.of": (
             2,
             lambda r, f: (
-                c.Scene.of,
+                clamp3d.Scene.of,
                 {"parts": {"a": (shapes.box((1, 2, 3)), pose(r))}, "clearance": 0.0, "contact": 0.01},
             ),
         ),
@@ -335,7 +366,7 @@ def targets() -> dict[str, tuple[float, Make]]:
         "check": (
             2,
             lambda r, f: (
-                c.check,
+                clamp3d.check,
                 {
                     "scene": _scene().moved({"wire": rigid(r)}),
                     "pairs": garbage.pick(r, (None, [("wire", "block")])),
@@ -346,10 +377,25 @@ def targets() -> dict[str, tuple[float, Make]]:
                 },
             ),
         ),
+        "Part": (3, lambda r, f: (clamp3d.Part, {"name": "a", "shape": shapes.box((1, 2, 3)), "T_world": pose(r)})),
+        "distance": (
+            2,
+            lambda r, f: (
+                clamp3d.distance,
+                {"a": _scene().parts[0].shape, "b": shapes.cylinder(6.5, 80.0), "T_a_b": rigid(r), "accuracy": 1e-3},
+            ),
+        ),
+        "measure": (
+            1,
+            lambda r, f: (
+                clamp3d.measure,
+                {"scene": _scene(), "pairs": garbage.pick(r, (None, [("wire", "block")])), "accuracy": 1e-3},
+            ),
+        ),
         "check_poses": (
             2,
             lambda r, f: (
-                c.check_poses,
+                check_poses,
                 {"scene": _scene(), "part": "wire", "others": None, "poses": _few(pose_batch(r)), "cache": None},
             ),
         ),
@@ -377,16 +423,45 @@ def targets() -> dict[str, tuple[float, Make]]:
                 open_tilt=_choice(0.0, 0.05),
             ),
         ),
+        "load": (
+            2,
+            lambda r, f: (
+                clamp3d.load,
+                {
+                    "source": garbage.pick(r, ("reference", _stl(f))),
+                    "line": garbage.pick(r, (None, "LJ-500")),
+                    "jumper": None,
+                    "unit": garbage.pick(r, (None, "in")),
+                },
+            ),
+        ),
+        "sensitivity": (0.2, _simple(clamp3d.sensitivity, clamp=_fixed(_clamp()))),
+        "monte_carlo": (
+            0.2,
+            _simple(
+                clamp3d.monte_carlo,
+                clamp=_fixed(_clamp()),
+                n=_choice(1, 2),
+                seed=_fixed(0),
+                tolerance=_choice(None, 0.1),
+                wire_tolerance_percent=_fixed(1.0),
+                distribution=_choice("uniform", "normal"),
+                processes=_fixed(1),
+            ),
+        ),
         "Wire": (1, lambda r, f: (Wire, {"diameter": float(r.uniform(5.0, 50.0))})),
         "replace": (3, _changed_clamp),
-        "Section": (2, _simple(c.Section, clamp=_fixed(_clamp()), model=_choice(*_models()))),
-        "equilibria": (0.1, _simple(c.equilibria, section=_fixed(c.Section(_clamp(), Cas())))),
-        "parts": (2, _simple(c.parts, clamp=_fixed(_clamp()))),
-        "mesh": (2, _simple(c.mesh, part=_choice(*c.parts(_clamp()).values()), mesh_error=_choice(0.5, 0.1))),
+        "Section": (2, _simple(Section, clamp=_fixed(_clamp()), model=_choice(*_models()))),
+        "equilibria": (0.1, _simple(equilibria, section=_fixed(Section(_clamp(), Cas())))),
+        "parts": (2, _simple(parts, clamp=_fixed(_clamp()))),
+        "mesh": (
+            2,
+            _simple(shapes.mesh, part=_choice(*parts(_clamp()).values()), mesh_error=_choice(0.5, 0.1)),
+        ),
         "export": (
             2,
             lambda r, f: (
-                c.export,
+                clamp3d.export,
                 {
                     "clamp": _clamp(),
                     "format": garbage.pick(r, ("stl", "obj", "ply", "glb", "3mf")),
@@ -403,7 +478,7 @@ def targets() -> dict[str, tuple[float, Make]]:
         ),
         "WireClosing": (
             1,
-            _simple(c.WireClosing, clamp=_fixed(_clamp()), wire=_choice("P6", "P7"), seat_tolerance=size),
+            _simple(WireClosing, clamp=_fixed(_clamp()), wire=_choice("P6", "P7"), seat_tolerance=size),
         ),
         "WireClosing.close": (1, lambda r, f: (_closing().close, {"misplacement": 0.1 * r.normal(size=(3, 4))})),
         "WireClosing.cloud": (1, lambda r, f: (_closing().cloud, {"ranges": {"offset": 1.0}, "count": 5, "seed": 0})),
@@ -411,7 +486,7 @@ def targets() -> dict[str, tuple[float, Make]]:
         "measure_image": (
             4,
             _simple(
-                c.measure_image,
+                measure_image,
                 points=_marks,
                 reference=_marks,
                 reference_mm=size,
@@ -423,7 +498,7 @@ def targets() -> dict[str, tuple[float, Make]]:
         "image_study": (
             0.3,
             _simple(
-                c.image_study,
+                image_study,
                 run=_fixed(_run()),
                 count=_fixed(5),
                 px_per_mm=_fixed(4.0),
@@ -434,7 +509,7 @@ def targets() -> dict[str, tuple[float, Make]]:
         "Viewer": (
             0.2,
             _simple(
-                c.Viewer,
+                Viewer,
                 clamp=_fixed(_clamp()),
                 model=_fixed(Cas()),
                 mesh_error=_fixed(1.0),
@@ -444,15 +519,24 @@ def targets() -> dict[str, tuple[float, Make]]:
                 url=_fixed(None),
             ),
         ),
-        "save_figure": (0.2, lambda r, f: (c.save_figure, {"figure": _figure(), "path": f / "x.svg", "dpi": 50})),
-        "section_figure": (0.2, _simple(c.section_figure, run=_fixed(_run()), waypoint=_choice(None, _run().path[1]))),
-        "states_figure": (0.1, _simple(c.states_figure, run=_fixed(_run()))),
-        "contacts_figure": (0.1, _simple(c.contacts_figure, run=_fixed(_run()))),
-        "contact_figure": (0.1, _simple(c.contact_figure, run=_fixed(_run()), contact=_fixed(_run().contacts[0]))),
-        "exploded_figure": (0.1, _simple(c.exploded_figure, clamp=_fixed(_clamp()))),
-        "steps_figure": (0.1, _simple(c.steps_figure, run=_fixed(_run()))),
-        "table2_figure": (0.05, _simple(c.table2_figure)),
-        "table3_figure": (0.05, _simple(c.table3_figure)),
+        "save_figure": (
+            0.2,
+            lambda r, f: (figures.save_figure, {"figure": _figure(), "path": f / "x.svg", "dpi": 50}),
+        ),
+        "section_figure": (
+            0.2,
+            _simple(figures.section_figure, run=_fixed(_run()), waypoint=_choice(None, _run().path[1])),
+        ),
+        "states_figure": (0.1, _simple(figures.states_figure, run=_fixed(_run()))),
+        "contacts_figure": (0.1, _simple(figures.contacts_figure, run=_fixed(_run()))),
+        "contact_figure": (
+            0.1,
+            _simple(figures.contact_figure, run=_fixed(_run()), contact=_fixed(_run().contacts[0])),
+        ),
+        "exploded_figure": (0.1, _simple(figures.exploded_figure, clamp=_fixed(_clamp()))),
+        "steps_figure": (0.1, _simple(figures.steps_figure, run=_fixed(_run()))),
+        "table2_figure": (0.05, _simple(table2_figure)),
+        "table3_figure": (0.05, _simple(table3_figure)),
     }
 
 
@@ -474,9 +558,9 @@ def _few(value: Any) -> Any:
 
 @functools.cache
 def _closing() -> Any:
-    return clamp3d.WireClosing(_clamp())
+    return WireClosing(_clamp())
 
 
 @functools.cache
 def _figure() -> Any:
-    return clamp3d.table2_figure()
+    return table2_figure()

@@ -58,12 +58,12 @@ def make(rng: np.random.Generator, folder: Path) -> tuple[str, Callable[[], bool
     def ask() -> bool:
         called = call(args)
         check_outputs(called, folder, old, written)
-        if called.code != 2 and "result.json" in args and args[0] == "run":
+        if not called.refused and "result.json" in args and args[0] == "run":
             exact = same and not {"--method", "--solver"} & {*args}
             _plausible(json.loads(Path(folder, "result.json").read_text(encoding="utf-8")), exact)
         if same and called.code != 0:
             raise FindingError(f"the same clamp in other words: exit code {called.code}: {called.stderr[:200]}")
-        return called.code != 2
+        return not called.refused
 
     return f"{what} | {' '.join(args)}", ask
 

@@ -33,6 +33,11 @@ class Called:
     stdout: str
     stderr: str
 
+    @property
+    def refused(self) -> bool:
+        """Whether it ended with a clear line in place of an answer."""
+        return self.code in (2, 4)
+
 
 def call(args: list[str]) -> Called:
     """Run ``clamp3d ARGS`` here. Raises whatever the command lets out, and FindingError for a broken rule."""
@@ -68,19 +73,20 @@ def call(args: list[str]) -> Called:
 
 def held_to_rules(called: Called) -> Called:
     """``called``; raises FindingError if its exit code or its messages break a rule."""
-    if called.code not in (0, 1, 2):
+    proof = called.code == 4 and "inside clamp3d" not in called.stderr
+    if called.code not in (0, 1, 2, 3) and not proof:  # 4: a solver that cannot prove its answer may say so
         raise FindingError(f"exit code {called.code}: {called.stderr[-300:]}")
     if "Traceback (most recent call last)" in called.stderr:
         raise FindingError(f"traceback: {called.stderr[-500:]}")
     # Not splitlines: it also parts at characters that a terminal does not take for a line's end.
     lines = called.stderr.removesuffix("\n").split("\n") if called.stderr else []
     errors = [line for line in lines if line.startswith("clamp3d: error: ")]
-    if called.code != 2:
+    if not called.refused:
         if errors:
             raise FindingError(f"exit code {called.code} with an error: {errors[0][:200]}")
         return called
     if len(errors) != 1 or lines[-1] != errors[0]:
-        raise FindingError(f"exit code 2 needs one line, the last: {called.stderr[-400:]!r}")
+        raise FindingError(f"exit code {called.code} needs one line, the last: {called.stderr[-400:]!r}")
     message = errors[0].removeprefix("clamp3d: error: ")
     if len(message) > _LONGEST:
         raise FindingError(f"message of {len(message)} characters: {message[:200]}")
@@ -107,12 +113,12 @@ def check_outputs(called: Called, folder: Path, old: list[Path], written: list[P
     for path in old:
         if not path.is_file():
             raise FindingError(f"{path} was there before and is gone")
-        if called.code == 2 and path.read_bytes() == OLD:
+        if called.refused and path.read_bytes() == OLD:
             continue
         if path.read_bytes() != OLD:
             _whole(path)
     for path in written:
-        if called.code != 2 and not path.is_file():
+        if not called.refused and not path.is_file():
             raise FindingError(f"exit code {called.code} without {path.name}")
         if path.is_file() and path not in old:
             _whole(path)

@@ -120,7 +120,7 @@ def make(rng: np.random.Generator, folder: Path) -> tuple[str, Callable[[], bool
     def ask() -> bool:
         called = _in_a_process(args) if child else call(args)
         check_outputs(called, folder, old, [])
-        return called.code != 2
+        return not called.refused
 
     return " ".join(map(repr, args))[:500], ask
 

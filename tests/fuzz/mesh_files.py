@@ -82,11 +82,11 @@ def make(rng: np.random.Generator, folder: Path) -> tuple[str, Callable[[], bool
     def ask() -> bool:
         called = call(args)
         check_outputs(called, folder, old, written)
-        if whole and called.code == 2:
+        if whole and called.refused:
             raise FindingError(f"a whole file is refused: {called.stderr[-200:]}")
         if whole and args[0] == "fit" and "groove" not in called.stdout:
             raise FindingError("the groove of a whole file is not found")
-        return called.code != 2
+        return not called.refused
 
     return f"{form}: {what} | {' '.join(args)}", ask
 

@@ -162,11 +162,11 @@ def make(rng: np.random.Generator, folder: Path) -> tuple[str, Callable[[], bool
     def ask() -> bool:
         called = call(args)
         check_outputs(called, folder, old, written)
-        if same and called.code == 2:
+        if same and called.refused:
             raise FindingError(f"the same scene in other words is refused: {called.stderr[-200:]}")
-        if called.code != 2 and "c.json" in args:
+        if not called.refused and "c.json" in args:
             _plausible(called, json.loads(Path(folder, "c.json").read_text(encoding="utf-8")))
-        return called.code != 2
+        return not called.refused
 
     return f"{what} | {' '.join(args)[:300]}", ask
 
@@ -174,11 +174,12 @@ def make(rng: np.random.Generator, folder: Path) -> tuple[str, Callable[[], bool
 def _plausible(called: Called, data: dict[str, Any]) -> None:
     """The exit code says what the verdicts say."""
     rows = [*data.get("pairs", []), *data.get("motions", [])]
-    clash = any(row.get("verdict") in ("clash", "contained") for row in rows)
-    if clash and called.code != 1:
-        raise FindingError(f"a clash with exit code {called.code}")
+    verdicts = {row["verdict"] for row in rows}
+    code = 1 if verdicts & {"clash", "contained"} else 3 if "uncertain" in verdicts else 0
+    if called.code != code:
+        raise FindingError(f"verdicts {sorted(verdicts)} with exit code {called.code}")
     for row in rows:
-        low, high = row.get("low"), row.get("high")
+        low, high = row["at_least_mm"], row["at_most_mm"]
         if low is not None and high is not None and not low <= high + 1e-9 * max(1.0, abs(low)):
             raise FindingError(f"bounds {low!r} to {high!r}")
 

@@ -1,177 +1,284 @@
 "use strict";
-// Panel and time line around meshcat's viewer. What they show comes as userData of the node /clamp3d.
+// Time line, camera and switches around meshcat's viewer. What they show comes as `story` of the node /clamp3d; what
+// the panel says is HTML in it.
 function clamp3dViewer(messages) {
   const $ = (id) => document.getElementById(id);
-  const viewer = new MeshCat.Viewer($("meshcat-pane"));
+  const pane = $("meshcat-pane");
+  const live = !messages.length;
+  let viewer;
+  try {
+    viewer = new MeshCat.Viewer(pane);
+  } catch (error) {
+    // Without WebGL the panel is the page; what it says is in the HTML already.
+    document.body.classList.add("no3d");
+    $("no3d").hidden = false;
+    if (live) setTimeout(() => location.reload(), 3000);
+    return;
+  }
   window.viewer = viewer;
   const animator = viewer.animator;
-  let data = null;
+  const size = viewer.set_3d_pane_size.bind(viewer);
+  viewer.set_3d_pane_size = (w, h) => size(w || pane.clientWidth || 1, h || pane.clientHeight || 1);
+  new ResizeObserver(() => viewer.set_3d_pane_size()).observe(pane);
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  function background() {
+    const [top, bottom] = dark.matches ? [[0.13, 0.16, 0.19], [0.08, 0.1, 0.12]] : [[0.93, 0.95, 0.97], [1, 1, 1]];
+    viewer.set_property(["Background"], "top_color", top);
+    viewer.set_property(["Background"], "bottom_color", bottom);
+  }
+  dark.addEventListener("change", background);
+
+  let story = null;
   let stop = -1;
+  let before = 0;
+  let touched = false;  // whether the user has moved the camera or picked a finding
 
   // Unlike scene_tree.find, this makes no node that is not there.
-  const node = (path) => path.split("/").filter((x) => x).reduce((n, name) => n && n.children[name], viewer.scene_tree);
+  const split = (path) => path.split("/").filter((x) => x);
+  const node = (path) => split(path).reduce((n, name) => n && n.children[name], viewer.scene_tree);
   const show = (path, on) => {
     const n = node(path);
     if (n) { n.set_property("visible", on); viewer.set_dirty(); }
   };
 
+  // Switches
   const switches = {};
-  function addSwitch(name, label, on, set) {
-    if (switches[name]) return;
+  function addSwitch(name, on, set) {
+    if (!switches[name]) switches[name] = { on, touched: false };
+    const own = switches[name];
     const box = document.createElement("input");
     box.type = "checkbox";
     box.id = "switch-" + name.replace(/\W+/g, "-");
-    box.checked = on;
-    const text = document.createElement("label");
-    text.append(box, " " + label);
-    $("switches").append(text);
-    const own = { touched: false, apply: () => set(box.checked) };
-    switches[name] = own;
-    box.addEventListener("change", () => { own.touched = true; own.apply(); });
+    box.checked = own.on;
+    own.apply = () => set(own.on);
+    box.addEventListener("change", () => { own.on = box.checked; own.touched = true; own.apply(); });
+    const label = document.createElement("label");
+    label.append(box, " " + name);
+    $("switches").append(label);
+    own.apply();
   }
-  addSwitch("cutaway", "cutaway", true, (on) => { show("/clamp3d/cutaway", on); show("/clamp3d/whole", !on); });
-  addSwitch("labels", "labels", true, (on) => show("/clamp3d/labels", on));
-  addSwitch("contacts", "contacts", true, (on) => show("/clamp3d/contacts", on));
-  addSwitch("gaps", "gaps", true, (on) => show("/clamp3d/gaps", on));
-
-  function list(id, items, row) {
-    $(id).replaceChildren(...items.map(row));
-  }
-  function legend(item, text, label) {
-    const li = document.createElement("li");
-    const chip = document.createElement("span");
-    chip.className = "chip";
-    chip.style.background = item.colour;
-    chip.textContent = label;
-    const words = document.createElement("span");
-    words.textContent = text;
-    li.append(chip, words);
-    return li;
-  }
-  const plain = (text) => { const li = document.createElement("li"); li.textContent = text; return li; };
-
-  function tell(told) {
-    data = told;
-    $("title").textContent = data.title;
-    $("wires").textContent = data.wires;
-    $("status").textContent = data.status;
-    document.title = data.title + " - clamp3d";
-    list("facts", data.facts, plain);
-    list("parts", data.parts, (p) => legend(p, p.title, p.name));
-    list("verdicts", data.verdicts, (v) => legend(v, v.name + ": " + v.meaning, "\u00a0"));
-    $("accuracy").textContent = [data.accuracy, ...data.limits].join("; ") + ".";
-    for (const o of data.overlays) addSwitch("overlay " + o.name, o.name, false, (on) => show(o.path, on));
-    $("timeline").hidden = !(data.done && data.stops.length);
-    list("marks", data.done ? data.stops : [], mark);
-    stop = -1;
-    if (!data.done && data.stops.length) rows(data.stops[data.stops.length - 1]);
-    // The panel says it already; the caption is for meshcat's own page.
-    viewer.scene_tree.find(["clamp3d", "caption"]).set_property("visible", false);
+  function addSwitches() {
+    if (story.cut) addSwitch("cutaway", story.cut_open, (on) => { show("/clamp3d/cutaway", on); show("/clamp3d/whole", !on); });
+    addSwitch("labels", true, (on) => show("/clamp3d/labels", on));
+    addSwitch("contacts", true, (on) => show("/clamp3d/contacts", on));
+    addSwitch("gaps", true, (on) => show("/clamp3d/gaps", on));
+    for (const o of story.overlays) addSwitch(o.name, false, (on) => show(o.path, on));
+    addSwitch("scene tree", false, (on) => $("stage").classList.toggle("tree", on));
   }
 
+  // Parts that a finding speaks of stand out: the others are seen through.
+  function highlight(names) {
+    for (const [name, paths] of Object.entries(story.nodes)) {
+      const faint = names && !names.includes(name);
+      for (const path of paths.filter((p) => !p.startsWith("/clamp3d/labels"))) {
+        const n = node(path);
+        if (n) n.object.traverse((o) => {
+          if (!o.material) return;
+          if (!o.plain) o.plain = { opacity: o.material.opacity, transparent: o.material.transparent, depthWrite: o.material.depthWrite };
+          Object.assign(o.material, faint ? { opacity: 0.13 * o.plain.opacity, transparent: true, depthWrite: false } : o.plain);
+          o.material.needsUpdate = true;
+        });
+      }
+      show("/clamp3d/labels/" + name, !faint);
+    }
+    for (const group of ["contacts", "gaps"]) {
+      const n = node("/clamp3d/" + group);
+      for (const marks of n ? Object.values(n.children) : []) {
+        for (const [pair, mark] of Object.entries(marks.children)) {
+          mark.object.visible = !names || pair === names.join("-") || pair === [...names].reverse().join("-");
+        }
+      }
+    }
+    $("home").hidden = !names;
+    viewer.set_dirty();
+  }
+
+  // Camera: fly so that a box (corners in mm of the scene) fills the picture, without turning unless told how.
+  let flight = 0;
+  function fly(low, high, eye, time) {
+    const V = MeshCat.THREE.Vector3;
+    const root = viewer.scene_tree.find(["clamp3d"]).object;
+    const camera = viewer.camera;
+    viewer.scene.updateMatrixWorld(true);
+    const local = (x, y, z) => camera.parent.worldToLocal(new V(x, y, z).applyMatrix4(root.matrixWorld));
+    const corners = [];
+    for (const x of [low[0], high[0]]) for (const y of [low[1], high[1]]) for (const z of [low[2], high[2]]) corners.push(local(x, y, z));
+    const target = local((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
+    const back = eye ? new V(...eye).normalize() : camera.position.clone().sub(viewer.controls.target).normalize();
+    const right = new V(0, 1, 0).cross(back).normalize();
+    const up = back.clone().cross(right);
+    const tall = Math.tan(camera.fov * Math.PI / 360) * 0.94;
+    const wide = tall * Math.max(0.2, camera.aspect);
+    let far = 0.05;
+    for (const c of corners) {
+      const d = c.clone().sub(target);
+      far = Math.max(far, Math.abs(d.dot(right)) / wide + d.dot(back), Math.abs(d.dot(up)) / tall + d.dot(back));
+    }
+    const to = target.clone().addScaledVector(back, far);
+    const from = camera.position.clone(), aim = viewer.controls.target.clone(), start = performance.now(), own = ++flight;
+    (function step() {
+      if (own !== flight) return;
+      const f = time ? Math.min(1, (performance.now() - start) / time) : 1;
+      const s = f * f * (3 - 2 * f);
+      camera.position.lerpVectors(from, to, s);
+      viewer.controls.target.lerpVectors(aim, target, s);
+      viewer.set_dirty();
+      if (f < 1) requestAnimationFrame(step);
+    })();
+  }
+  // Everything at a stop, or of the way to the next one.
+  let framed = "";
+  function home(time, turn) {
+    if (!story || !story.frame) return;
+    const i = Math.max(0, stop), playing = story.done && animator.playing;
+    const boxes = playing && story.stops[i + 1] ? [story.stops[i], story.stops[i + 1]] : [story.stops[i]];
+    const corner = (pick, key) => [0, 1, 2].map((k) => pick(...boxes.map((b) => b[key][k])));
+    framed = i + " " + boxes.length;
+    fly(corner(Math.min, "low"), corner(Math.max, "high"), turn ? story.frame.eye : null, time);
+  }
+  function follow() {
+    const moves = story.done && animator.playing && story.stops[stop + 1] ? 2 : 1;
+    if (!touched && stop >= 0 && framed !== stop + " " + moves) home(soft());
+  }
+  const soft = () => (matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : 700);
+
+  function pick(element, names, low, high) {
+    for (const e of document.querySelectorAll(".finding.now, .rows tr.now")) e.classList.remove("now");
+    touched = true;
+    if (element) element.classList.add("now");
+    highlight(names);
+    if (low) fly(low, high, null, soft());
+    else { touched = false; home(soft()); }
+  }
+  $("told").addEventListener("click", (e) => {
+    const finding = e.target.closest(".finding"), row = e.target.closest(".rows tr[data-a]");
+    const again = (finding || row) && (finding || row).classList.contains("now");
+    if (again) pick(null);
+    else if (finding) {
+      const f = story.findings[Number(finding.dataset.k)];
+      if (!$("timeline").hidden) go(f.stop);
+      pick(finding, [f.a, f.b], f.low, f.high);
+      if (innerWidth <= 760) $("stage").scrollIntoView({ block: "start" });
+    } else if (row) {
+      const r = story.stops[Number(row.closest(".stop").dataset.stop)].rows.find((r) => r.a === row.dataset.a && r.b === row.dataset.b);
+      const points = [r.point_a, r.point_b].filter((p) => p);
+      const margin = 0.05 * Math.max(...story.frame.high.map((x, i) => x - story.frame.low[i]));
+      const corner = (pick, sign) => [0, 1, 2].map((i) => pick(...points.map((p) => p[i])) + sign * margin);
+      if (points.length) pick(row, [r.a, r.b], corner(Math.min, -1), corner(Math.max, 1));
+      else pick(row, [r.a, r.b], story.frame.low, story.frame.high);
+    }
+  });
+  $("home").addEventListener("click", () => pick(null));
+  pane.addEventListener("pointerdown", () => { touched = true; flight++; });
+  pane.addEventListener("wheel", () => { touched = true; flight++; }, { passive: true });
+
+  // Time line
+  const end = () => story.stops[story.stops.length - 1].leave;
   function mark(s, i) {
-    const a = document.createElement("a");
-    a.textContent = s.step === (data.stops[i - 1] || {}).step ? "" : s.step;
-    a.title = s.step + ": " + s.label;
+    const a = document.createElement("button");
+    a.textContent = s.mark && s.mark === (story.stops[i - 1] || {}).mark ? "" : s.mark;
+    a.title = s.label;
+    a.classList.toggle("halts", s.halts);
+    a.classList.toggle("end", s.arrive > 0.92 * end());
     a.style.left = 100 * s.arrive / end() + "%";
     a.addEventListener("click", () => go(i));
     return a;
   }
-  const end = () => data.stops[data.stops.length - 1].leave;
-
-  function rows(s) {
-    const colour = Object.fromEntries(data.verdicts.map((v) => [v.name, v.colour]));
-    $("rows").tBodies[0].replaceChildren(...s.rows.map((r) => {
-      const tr = document.createElement("tr");
-      for (const [text, name] of [["\u00a0", "chip"], [r.pair, ""], [r.what, ""], [r.gap, "gap"]]) {
-        const td = document.createElement("td");
-        if (name === "chip") {
-          const chip = document.createElement("span");
-          chip.className = "chip";
-          chip.style.background = colour[r.verdict];
-          chip.title = r.verdict;
-          chip.textContent = text;
-          td.append(chip);
-        } else {
-          td.className = name;
-          td.textContent = text;
-        }
-        tr.append(td);
-      }
-      return tr;
-    }));
-  }
-
   function seek(t) {
     animator.pause();
     animator.seek(t);
     animator.display_progress(t);
+    before = t;
     refresh();
   }
   function go(i) {
     // A moment later: three.js keeps key times as 32-bit floats, so the exact time may count as before.
-    seek(data.stops[Math.max(0, Math.min(data.stops.length - 1, i))].arrive + 0.005);
+    seek(story.stops[Math.max(0, Math.min(story.stops.length - 1, i))].arrive + 0.005);
   }
   function current(t) {
     let i = 0;
-    while (i + 1 < data.stops.length && data.stops[i + 1].arrive <= t + 1e-6) i++;
+    while (i + 1 < story.stops.length && story.stops[i + 1].arrive <= t + 1e-6) i++;
     return i;
   }
   function toggle() {
     if (animator.playing) animator.pause();
     else {
-      if (animator.time >= end() - 1e-3) animator.reset();
+      if (animator.time >= end() - 1e-3) { animator.reset(); before = 0; }
       animator.play();
     }
     refresh();
   }
-
+  function showStop(i) {
+    stop = i;
+    for (const e of document.querySelectorAll(".stop")) e.hidden = Number(e.dataset.stop) !== i;
+    [...$("marks").children].forEach((a, k) => a.classList.toggle("now", k === i));
+  }
   function refresh() {
-    if (!data || !data.done || !data.stops.length) return;
+    if (!story || !story.done || $("timeline").hidden) return;
     const t = animator.time;
-    const i = current(t);
-    const s = data.stops[i];
-    const next = data.stops[i + 1];
+    if (animator.playing) {
+      const halt = story.stops.find((s) => s.halts && before < s.arrive && s.arrive <= t);
+      if (halt) return seek(halt.arrive + 0.005);
+      before = t;
+    }
+    const i = current(t), s = story.stops[i], next = story.stops[i + 1];
     $("time").max = end();
     if (document.activeElement !== $("time") || animator.playing) $("time").value = t;
     $("play").firstElementChild.firstElementChild.setAttribute("d", animator.playing ? "M3 2h4v12H3zM9 2h4v12H9z" : "M3 1l11 7-11 7z");
     const moving = next && t > s.leave + 1e-6;
     const at = moving ? next : s;
-    $("label").textContent = (data.stops.indexOf(at) + 1) + "/" + data.stops.length + "  " + (moving ? "on the way: " : "") + at.label;
-    $("step").textContent = "step " + at.step;
-    if (i !== stop) {
-      stop = i;
-      rows(s);
-      [...$("marks").children].forEach((a, k) => a.classList.toggle("now", k === i));
-    }
+    $("label").textContent = (story.stops.indexOf(at) + 1) + "/" + story.stops.length + "  " + (moving ? "on the way: " : "") + at.label;
+    $("step").textContent = at.label.startsWith(at.step) ? "" : "step " + at.step;
+    if (i !== stop) showStop(i);
+    follow();
   }
   (function frame() { refresh(); requestAnimationFrame(frame); })();
 
   $("time").addEventListener("input", () => seek(Number($("time").value)));
   $("play").addEventListener("click", toggle);
-  $("back").addEventListener("click", () => go(animator.time > data.stops[current(animator.time)].arrive + 0.05 ? current(animator.time) : current(animator.time) - 1));
+  $("back").addEventListener("click", () => { const i = current(animator.time); go(animator.time > story.stops[i].arrive + 0.05 ? i : i - 1); });
   $("forward").addEventListener("click", () => go(current(animator.time) + 1));
   document.addEventListener("keydown", (e) => {
+    if (e.key === "h" || e.key === "Escape") pick(null);
     if ($("timeline").hidden || e.target.tagName === "INPUT" && e.target.type !== "checkbox") return;
     if (e.key === "ArrowRight") $("forward").click();
     else if (e.key === "ArrowLeft") $("back").click();
-    else if (e.key === " " && e.target.tagName !== "BUTTON" && e.target.tagName !== "INPUT") { toggle(); e.preventDefault(); }
+    else if (e.key === " " && !["BUTTON", "INPUT", "SUMMARY"].includes(e.target.tagName)) { toggle(); e.preventDefault(); }
   });
+
+  function tell(told) {
+    story = told;
+    $("told").innerHTML = story.panel;
+    document.title = story.title + " - clamp3d";
+    addSwitches();
+    $("timeline").hidden = !(story.done && story.stops.length > 1);
+    $("marks").replaceChildren(...(story.done && story.stops.length > 1 ? story.stops.map(mark) : []));
+    stop = -1;
+    if (story.stops.length) showStop(story.done ? 0 : story.stops.length - 1);
+    if (!touched) setTimeout(() => { viewer.set_3d_pane_size(); if (!touched) home(0, true); }, 30);
+  }
 
   const handle = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
+    if (command.type === "set_property" && command.path === "/Background") return background();
     handle(command);
-    if (command.type === "set_property" && command.property === "userData" && command.path === "/clamp3d") tell(command.value);
+    if (command.type === "set_property" && command.property === "story" && command.path === "/clamp3d") tell(command.value);
     else if (command.type === "set_property" && command.property === "visible") {
       // A switch that the user has set outlasts what the program sends.
       for (const s of Object.values(switches)) if (s.touched) s.apply();
     }
   };
 
-  if (messages.length) {
-    for (const m of messages) viewer.handle_command_bytearray(Uint8Array.from(atob(m), (c) => c.charCodeAt(0)));
-  } else {
+  if (live) {
     viewer.connect("ws://" + location.host + "/scene");
-    viewer.connection.onclose = () => { $("status").textContent = (data ? data.status + " \u2014 " : "") + "the program has ended; this picture stays"; };
+    viewer.connection.onclose = () => {
+      const note = document.createElement("p");
+      note.className = "small";
+      note.id = "ended";
+      note.textContent = "The program has ended; this picture stays.";
+      if ($("headline")) $("headline").after(note);
+    };
+  } else {
+    for (const m of messages) viewer.handle_command_bytearray(Uint8Array.from(atob(m), (c) => c.charCodeAt(0)));
   }
 }

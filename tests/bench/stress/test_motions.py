@@ -123,7 +123,7 @@ class _Broken:
         right = collide_motions.min_clearance(groove, wire, motion, start)
         if self.fault != "steps over thin parts":
             return right
-        near = [clamp3d.signed_distance(groove, wire, motion.at(s, start)) for s in np.linspace(0.0, 1.0, 101)]
+        near = [clamp3d.kernel.signed_distance(groove, wire, motion.at(s, start)) for s in np.linspace(0.0, 1.0, 101)]
         i = int(np.argmin([one.distance for one in near]))
         return dataclasses.replace(right, t=i / 100, distance=clamp3d.Distance(near[i].distance, near[i].distance))
 
@@ -131,7 +131,7 @@ class _Broken:
         right = collide_motions.first_contact(groove, wire, motion, start)
         at = {"misses": 1.0, "late": min(1.0, right.t + 1e-4), "early": max(0.0, right.t - 1e-4)}
         t = at.get(self.fault, right.t)
-        contact = clamp3d.signed_distance(groove, wire, motion.at(t, start)).distance
+        contact = clamp3d.kernel.signed_distance(groove, wire, motion.at(t, start)).distance
         touches = right.touches and self.fault != "misses"
         return dataclasses.replace(right, touches=touches, t=t, distance=clamp3d.Distance(contact, contact))
 

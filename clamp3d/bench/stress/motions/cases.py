@@ -88,8 +88,8 @@ class Motions:
         lines = [
             "import numpy as np",
             "import clamp3d",
-            f"groove = clamp3d.{self.shapes.groove(k)!r}",
-            f"wire = clamp3d.{self.shapes.cylinder(k)!r}",
+            f"groove = clamp3d.kernel.{self.shapes.groove(k)!r}",
+            f"wire = clamp3d.kernel.{self.shapes.cylinder(k)!r}",
             f"motion = {motion}",
             f"start = {start}",
             "print(clamp3d.min_clearance(groove, wire, motion, start))",

@@ -98,15 +98,15 @@ class Cases:
         lines = [
             "import numpy as np",
             "import clamp3d",
-            f"groove = clamp3d.{self.shapes.groove(k)!r}",
-            f"wire = clamp3d.{self.shapes.cylinder(k)!r}",
+            f"groove = clamp3d.kernel.{self.shapes.groove(k)!r}",
+            f"wire = clamp3d.kernel.{self.shapes.cylinder(k)!r}",
             f"T_world_wire = np.array({self.T_world_wire[i].tolist()})",
         ]
         pose = "T_world_wire"
         if self.T_world_groove is not None:
             lines.append(f"T_world_groove = np.array({self.T_world_groove[i].tolist()})")
-            pose = "clamp3d.relative_pose(T_world_groove, T_world_wire)"
-        return "\n".join([*lines, f"print(clamp3d.signed_distance(groove, wire, {pose}))"])
+            pose = "clamp3d.kernel.relative_pose(T_world_groove, T_world_wire)"
+        return "\n".join([*lines, f"print(clamp3d.kernel.signed_distance(groove, wire, {pose}))"])
 
 
 def signed_powers(rng: np.random.Generator, n: int, low: float, high: float, zeros: float = 0.1) -> Array:

@@ -1,0 +1,33 @@
+from . import baselines as baselines
+from . import bench as bench
+from . import figures as figures
+from . import kernel as kernel
+from . import shapes as shapes
+from .clamp.assemble import assemble as assemble
+from .clamp.dimensions import Clamp as Clamp
+from .clamp.loader import load_clamp as load_clamp
+from .clamp.result import Assembly as Assembly
+from .clamp.sensitivity import sensitivity as sensitivity
+from .clamp.tolerance import monte_carlo as monte_carlo
+from .collide.answer import Distance as Distance
+from .collide.answer import Distances as Distances
+from .collide.check import check as check
+from .collide.distance import distance as distance
+from .collide.distance import distances as distances
+from .collide.distance import measure as measure
+from .collide.motions import check_poses as check_poses
+from .collide.motions import first_contact as first_contact
+from .collide.motions import min_clearance as min_clearance
+from .collide.result import CheckResult as CheckResult
+from .collide.scene import Part as Part
+from .collide.scene import Scene as Scene
+from .collide.verdict import Verdict as Verdict
+from .core.motion import Motion as Motion
+from .errors import InputError as InputError
+from .fit.fit import fit_file as fit_file
+from .fit.fit import fit_mesh as fit_mesh
+from .output.export import export as export
+from .scenefile.file import load_scene as load_scene
+from .scenefile.load import load as load
+
+__version__: str

@@ -1,0 +1,43 @@
+"""The closed forms: a groove and a cylinder in 3D, an arc and a circle in a section, single poses, batches and motions.
+
+>>> import math
+>>> from clamp3d.core.pose import translation
+>>> groove, wire = SweptArc(12.0, math.radians(70), 60.0), Cylinder(10.5, 200.0)
+>>> signed_distance(groove, wire, translation(0.0, -1.0, 0.0)).distance
+0.5
+"""
+
+from clamp3d.core.arc_circle import ArcContact, ArcRelation, arc_circle, classify_arc_circle
+from clamp3d.core.distance import Feature, SignedDistance, SignedDistances, signed_distance, signed_distances
+from clamp3d.core.pieces import GroovePieces, groove_pieces
+from clamp3d.core.pose import SectionPose, rotation, translation
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.rectangle import HoleContact, HoleRelation, Rectangle, hole_bolt
+from clamp3d.core.relation3d import GrooveRelation, Relation3D, groove_relation, relative_pose
+
+__all__ = [
+    "ArcContact",
+    "ArcRelation",
+    "Cylinder",
+    "Feature",
+    "GroovePieces",
+    "GrooveRelation",
+    "HoleContact",
+    "HoleRelation",
+    "Rectangle",
+    "Relation3D",
+    "SectionPose",
+    "SignedDistance",
+    "SignedDistances",
+    "SweptArc",
+    "arc_circle",
+    "classify_arc_circle",
+    "groove_pieces",
+    "groove_relation",
+    "hole_bolt",
+    "relative_pose",
+    "rotation",
+    "signed_distance",
+    "signed_distances",
+    "translation",
+]

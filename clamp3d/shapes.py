@@ -1,0 +1,27 @@
+"""Bodies that a part can be made of.
+
+>>> import math
+>>> block = groove_block(SweptArc(7.0, math.radians(60), 50.0), width=40.0, height=20.0)
+>>> wire = cylinder(6.5, 80.0)
+"""
+
+from clamp3d.brep.mesh_file import load_mesh
+from clamp3d.core.mesh import Mesh, make_mesh
+from clamp3d.core.meshing import mesh
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.shapes import Hole, MeshShape, Solid, box, cylinder, groove_block
+
+__all__ = [
+    "Cylinder",
+    "Hole",
+    "Mesh",
+    "MeshShape",
+    "Solid",
+    "SweptArc",
+    "box",
+    "cylinder",
+    "groove_block",
+    "load_mesh",
+    "make_mesh",
+    "mesh",
+]

@@ -1,0 +1,109 @@
+"""`load`: one rule for what a name or a file is."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+import trimesh
+
+import clamp3d
+from clamp3d import Clamp, InputError, Scene, load
+from clamp3d.cli.options import Source
+
+ROOT = Path(__file__).parents[2]
+REFERENCE = Path(clamp3d.__file__).parent / "clamp" / "data" / "reference.toml"
+
+
+@pytest.mark.parametrize("source", ["reference", REFERENCE, str(REFERENCE)])
+def test_a_clamp_by_name_or_file(source):
+    clamp = load(source, line="LJ-500")
+    assert isinstance(clamp, Clamp)
+    assert clamp.line.conductor == "LJ-500"
+
+
+def test_a_clamp_file_needs_no_ending(tmp_path):
+    shutil.copy(REFERENCE, tmp_path / "mine")
+    assert isinstance(load(tmp_path / "mine"), Clamp)
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("[clamp]", ["P1", "P2", "P3", "P4", "P5", "P6", "P7"]),
+        ("clearance = 1.0", []),
+        ('[parts.a]\nshape = "box"\nsize = [1, 2, 3]', ["a"]),
+    ],
+)
+def test_a_scene_by_its_tables(text, parts, tmp_path):
+    path = tmp_path / "some.toml"
+    path.write_text(text)
+    scene = load(path)
+    assert isinstance(scene, Scene)
+    assert ([part.name for part in scene.parts], scene.name) == (parts, "some")
+
+
+def test_a_scene_file_called_scene_is_named_after_its_folder():
+    assert load(ROOT / "examples" / "hinge" / "scene.toml").name == "hinge"
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".obj", ".ply", ".glb", ".3mf", ".STL"])
+def test_a_mesh_is_one_part(suffix, tmp_path):
+    path = tmp_path / f"my part, v2{suffix}"
+    trimesh.creation.box((10.0, 20.0, 30.0)).export(path, file_type=suffix[1:].lower())
+    scene = load(path, unit="mm")
+    assert isinstance(scene, Scene)
+    (part,) = scene.parts
+    assert part.name == "my-part-v2"
+    assert sorted((part.shape.mesh.vertices.max(axis=0) - part.shape.mesh.vertices.min(axis=0)).round(4)) == [
+        10.0,
+        20.0,
+        30.0,
+    ]
+
+
+def test_the_unit_of_a_mesh(tmp_path):
+    path = tmp_path / "cube.stl"
+    trimesh.creation.box((1.0, 1.0, 1.0)).export(path)
+    assert load(path, unit="in").parts[0].shape.mesh.vertices.max() == pytest.approx(12.7)
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "message"),
+    [
+        (
+            "nothing",
+            {},
+            "unknown clamp or file 'nothing'; built in: reference; or give a clamp or scene file (.toml), or",
+        ),
+        ("no.toml", {}, "no.toml: cannot be read: No such file or directory"),
+        ("no.stl", {}, "no.stl: no such file"),
+        ("empty.toml", {}, "empty.toml: neither a clamp ([up_splint], [line], ...) nor a scene ([parts.NAME], [clamp]"),
+        (
+            "text.md",
+            {},
+            "text.md: unknown kind of file; built in: reference; or give a clamp or scene file (.toml), or",
+        ),
+        ("bad.toml", {}, "bad.toml: not valid TOML: "),
+        ("folder", {}, "unknown clamp or file 'folder'"),
+        ("scene.toml", {"line": "LJ-500"}, "line goes with a clamp; scene.toml is a scene"),
+        ("cube.stl", {"jumper": "16"}, "jumper goes with a clamp; cube.stl is a mesh"),
+        ("reference", {"unit": "mm"}, "unit goes with a mesh or STEP file, not with reference"),
+        (3, {}, "source must be a path, got 3"),
+    ],
+)
+def test_anything_else_is_one_clear_line(source, options, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, text in {"empty.toml": "", "text.md": "A *text*", "bad.toml": "a = ", "scene.toml": "[clamp]"}.items():
+        Path(name).write_text(text)
+    Path("folder").mkdir()
+    trimesh.creation.box((1.0, 1.0, 1.0)).export("cube.stl")
+    with pytest.raises(InputError) as error:
+        load(source, **options)
+    assert str(error.value).startswith(message)
+    assert "\n" not in str(error.value)
+
+
+def test_the_command_lines_argument_is_the_same():
+    assert Source("reference", "LJ-500", None).load() == load("reference", line="LJ-500")
+    with pytest.raises(InputError, match="line goes with a clamp"):
+        Source(str(ROOT / "examples" / "hinge" / "scene.toml"), "LJ-500", None).load()
