@@ -12,7 +12,6 @@ from clamp3d.baselines.chords import Chords
 from clamp3d.bench import published
 from clamp3d.bench.image import image_study
 from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.connections import GEOMETRY, PAIRS
 from clamp3d.clamp.dimensions import ConnectionType, PartName
 from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
@@ -135,13 +134,7 @@ def reproduce(progress: Callable[[str], None] = lambda message: None) -> Reprodu
 
 
 def _table1(run: Assembly) -> tuple[ConnectionRow, ...]:
-    gaps = {(c.a, c.b): c.distance for c in run.contacts}
-    return tuple(
-        ConnectionRow(
-            a, b, published.TABLE_1.get((a, b), 0), GEOMETRY.get((a, b), 2) if (a, b) in gaps else 0, gaps.get((a, b))
-        )
-        for a, b in PAIRS
-    )
+    return tuple(ConnectionRow(c.a, c.b, published.TABLE_1.get((c.a, c.b), 0), c.type, c.gap) for c in run.contacts)
 
 
 def _table2() -> tuple[RelationRow, ...]:

@@ -32,16 +32,32 @@ FORMATS: dict[str, str | None] = {
 """Readable formats; the value is the unit that the format itself fixes (None: the file does not say)."""
 
 _STEP = (".step", ".stp")
+_UNITS_3MF = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "meter": 1000.0, "inch": 25.4, "foot": 304.8}
 _SILENT = logging.NullHandler()
 
 
 def load_mesh(path: str | Path, *, unit: str | None = None) -> Mesh:
-    """Read ``path`` (STL, OBJ, PLY, GLB, GLTF, 3MF or STEP) as one mesh in mm, Z up.
+    """Read a file as one mesh in mm with Z up; several bodies become one mesh.
 
-    ``unit`` is one of ``UNITS_MM``; the default is mm for STL, OBJ and PLY (which carry no unit), the unit in the file
-    for 3MF and STEP, metres for glTF (whose Y up becomes Z up). Several bodies become one mesh.
-    Raises InputError if the file is missing, unreadable, empty, or has a number that is not finite;
-    MissingLibraryError for STEP without the extra ``step``.
+    Parameters
+    ----------
+    path : str or Path
+        STL, OBJ, PLY, GLB, GLTF, 3MF or STEP file.
+    unit : str, optional
+        Unit of the file's lengths: mm, cm, m or in. By default mm for STL, OBJ and PLY (which carry no unit), the
+        unit in the file for 3MF and STEP, metres for glTF (whose Y up becomes Z up).
+
+    Returns
+    -------
+    Mesh
+        The mesh as `make_mesh` checks and repairs it; its ``notes`` say what was assumed.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, not readable or empty, or has a number that is not finite.
+    MissingLibraryError
+        For STEP without the extra ``step``.
     """
     file = checks.path("mesh", path)
     kind = file.suffix.lower()
@@ -54,22 +70,23 @@ def load_mesh(path: str | Path, *, unit: str | None = None) -> Mesh:
     if kind in _STEP:
         from clamp3d.brep.step_file import read_step
 
-        file_unit: str | None = "mm"
         vertices, faces = read_step(file)
+        own: float | None = 1.0
     else:
-        vertices, faces, file_unit = _read(file, kind)
+        vertices, faces, own = _read(file, kind)
     if kind in (".glb", ".gltf"):
         vertices = np.column_stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]])
-    scale = UNITS_MM[unit or file_unit or "mm"]
+    scale = UNITS_MM[unit] if unit else own or 1.0
     mesh = make_mesh(vertices, faces, name=file.name, scale=scale, float32=kind not in _STEP)
-    notes = list(mesh.notes)
-    if unit is None and file_unit is None:
-        size = float(np.ptp(mesh.vertices, axis=0).max())
-        notes.insert(0, f"{kind[1:].upper()} carries no unit: taken as mm (largest extent {size:.6g} mm)")
-    return replace(mesh, notes=tuple(notes))
+    if unit or own:
+        return mesh
+    size = float(np.ptp(mesh.vertices, axis=0).max())
+    note = f"{kind[1:].upper()} carries no unit: taken as mm (largest extent {size:.6g} mm)"
+    return replace(mesh, notes=(note, *mesh.notes))
 
 
-def _read(file: Path, kind: str) -> tuple[Array, IntArray, str | None]:
+def _read(file: Path, kind: str) -> tuple[Array, IntArray, float | None]:
+    """Vertices (n, 3) and faces (m, 3) of all bodies, and millimetres in the file's unit if it says one."""
     import trimesh
 
     # What it logs about a file goes to who has asked for logs, not on stderr.
@@ -82,7 +99,6 @@ def _read(file: Path, kind: str) -> tuple[Array, IntArray, str | None]:
         with np.errstate(all="ignore"):  # numbers that are none are looked for below
             scene = trimesh.load_scene(file, file_type=kind[1:], **options)
             parts = [g for g in scene.dump() if isinstance(g, trimesh.Trimesh)]
-        file_unit = scene.units
     except Clamp3dError:
         raise
     except Exception as error:  # trimesh raises whatever its parsers meet
@@ -94,12 +110,9 @@ def _read(file: Path, kind: str) -> tuple[Array, IntArray, str | None]:
     offsets = np.cumsum([0, *(len(p.vertices) for p in parts)])
     vertices = np.concatenate([np.asarray(p.vertices, dtype=np.float64) for p in parts])
     faces = np.concatenate([np.asarray(p.faces, dtype=np.int64) + o for p, o in zip(parts, offsets, strict=False)])
-    names = {"millimeter": "mm", "millimeters": "mm", "centimeter": "cm", "meter": "m", "meters": "m", "inch": "in"}
-    if kind in (".glb", ".gltf"):
-        return vertices, faces, "m"
-    if kind != ".3mf":
-        return vertices, faces, None
-    file_unit = names.get(str(file_unit), str(file_unit)) if file_unit else "mm"
-    if file_unit not in UNITS_MM:
-        raise InputError(f"{file}: unknown unit {file_unit!r} in the file; give one: {', '.join(UNITS_MM)}")
-    return vertices, faces, file_unit
+    own = UNITS_MM.get(FORMATS[kind] or "")
+    if kind == ".3mf":
+        own = _UNITS_3MF.get(str(scene.units).removesuffix("s"))  # where the file says none it is "millimeters"
+        if own is None:
+            raise InputError(f"{file}: unit must be one of {', '.join(_UNITS_3MF)}, got {scene.units!r}")
+    return vertices, faces, own

@@ -187,7 +187,7 @@ def _others(section: Section, final: FinalState) -> tuple[Equilibrium, ...]:
             tilt=float(state.q[S]) / section.lever,
             status=final_status(section.clamp, state, CONTACT),
             detail=describe(state),
-            rests=not slipping(state),
+            is_equilibrium=not slipping(state),
         )
         for state in equilibria(section)
         if not same(state, final)

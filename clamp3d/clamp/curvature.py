@@ -1,4 +1,4 @@
-"""Second derivatives of the closed gaps at a final state: whether the distance falls on a way that opens nothing.
+"""Second derivatives of the active gaps at a final state: whether the distance falls along a feasible motion.
 
 The second-order condition of a constrained minimum [Nocedal & Wright, Numerical Optimization, 2nd ed., section 12.5].
 """
@@ -17,14 +17,15 @@ _TURNED = 1e-5
 """Largest residual that may come from rounded normals: the distance is off by its square times some 10 mm, 1e-9 mm."""
 
 
-def least_curvature(section: Section, q: Array, gaps: Gaps, force: Array, tolerance: float) -> float:
+def least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array, tolerance: float) -> float:
     """Least second derivative of the Lagrangian by unit motions of the critical cone.
 
-    These keep what carries closed and turn no other gap that is closed to ``tolerance`` mm into overlap. The cone has
-    one or two dimensions here (a plane is looked at degree by degree); more are looked at by random directions.
+    The critical cone keeps the strongly active gaps (multiplier > 0) closed and lets no weakly active one (closed to
+    ``tolerance`` mm, multiplier 0) overlap. It has one or two dimensions here (a plane is looked at degree by degree);
+    more are looked at by random directions.
     """
-    carrying = np.flatnonzero(force)
-    A = gaps.gradient[carrying]
+    strong = np.flatnonzero(multipliers)
+    A = gaps.gradient[strong]
     free = np.flatnonzero(np.abs(A).max(axis=0, initial=0.0) > 0.0)
     if not len(free):
         return np.inf
@@ -32,11 +33,11 @@ def least_curvature(section: Section, q: Array, gaps: Gaps, force: Array, tolera
     tangent = rows[int((sizes > 1e-9).sum()) :]
     if not len(tangent):
         return np.inf
-    hessian = lagrangian_hessian(section, q, carrying, force[carrying])[np.ix_(free, free)]
+    hessian = lagrangian_hessian(section, q, strong, multipliers[strong])[np.ix_(free, free)]
     reduced = tangent @ hessian @ tangent.T
     least = float(np.linalg.eigvalsh(reduced).min())
-    closed = np.flatnonzero((np.abs(gaps.value) <= tolerance) & (force == 0.0))
-    if least >= -LEVEL or not len(closed):
+    weak = np.flatnonzero((np.abs(gaps.value) <= tolerance) & (multipliers == 0.0))
+    if least >= -LEVEL or not len(weak):
         return least
     m = len(tangent)
     if m == 1:
@@ -47,24 +48,24 @@ def least_curvature(section: Section, q: Array, gaps: Gaps, force: Array, tolera
     else:
         motions = np.random.default_rng(0).normal(size=(20_000, m))
         motions /= np.linalg.norm(motions, axis=1)[:, None]
-    opens = gaps.gradient[np.ix_(closed, free)] @ tangent.T @ motions.T
+    opens = gaps.gradient[np.ix_(weak, free)] @ tangent.T @ motions.T
     motions = motions[(opens >= -1e-7).all(axis=0)]
     return float(np.einsum("ni,ij,nj->n", motions, reduced, motions).min(initial=np.inf))
 
 
-def lagrangian_hessian(section: Section, q: Array, rows: NDArray[np.intp], force: Array) -> Array:
-    """Second derivatives (6, 6) of goal - force . gaps by central differences of the closed-form gradients."""
+def lagrangian_hessian(section: Section, q: Array, rows: NDArray[np.intp], multipliers: Array) -> Array:
+    """Second derivatives (6, 6) of goal - multipliers . gaps by central differences of the closed-form gradients."""
     # A wire that nearly fills its groove turns its normal within R - r: the step must be short beside that.
     h = min(1e-4, max(1e-8, 0.03 * _slack(section)))
     H = np.empty((6, 6))
     for j in range(6):
         e = np.zeros(6)
         e[j] = h
-        H[j] = -(force @ (section.gaps(q + e).gradient[rows] - section.gaps(q - e).gradient[rows])) / (2.0 * h)
+        H[j] = -(multipliers @ (section.gaps(q + e).gradient[rows] - section.gaps(q - e).gradient[rows])) / (2.0 * h)
     return 0.5 * (H + H.T)
 
 
-def normals_turned(section: Section, q: Array) -> float:
+def rounding_of_normals(section: Section, q: Array) -> float:
     """How far rounding of the coordinates turns the normal of the wire that fills its groove best, rad."""
     return min(_TURNED, 4.0 * float(np.spacing(np.abs(q).max())) / max(_slack(section), 1e-300))
 

@@ -1,31 +1,32 @@
-"""All the states a clamp can come to rest in: local minima of the distance between the splints."""
+"""All equilibria of a clamp: the local minima of the distance between the splints."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from clamp3d.checks import instance
-from clamp3d.clamp.contacts import OFF_ARC
 from clamp3d.clamp.dimensions import TITLES, PartName
 from clamp3d.clamp.final_state import FinalState, solve_final_state
-from clamp3d.clamp.landscape import resting_starts
+from clamp3d.clamp.landscape import initial_guesses
 from clamp3d.clamp.section import MOUTH, WIRES, D, S, Section
 from clamp3d.errors import SolverError
 
+OFF_ARC = ("face ", "flat", "lip", "end", "corner")
+"""How the names of features begin that are not of a groove's arc."""
 SAME = 1e-6
 """States whose distance, tilt and held wires agree to this many mm are one."""
-_STRIDE = 0.004
-"""Longest move of a descent that begins just above a place of rest, in parts of the down splint's half width."""
+_TRUST_RADIUS = 0.004
+"""Longest move of a descent that begins just above an equilibrium, in parts of the down splint's half width."""
 
 
 def equilibria(section: Section) -> tuple[FinalState, ...]:
     """Every final state found, each with its proof; the one closed furthest first.
 
-    Starts are taken just above every place of rest of the sampled distance (`landscape`). A clamp in which a wire can
-    rest on a lip as well as in its groove has more than one state; which one it comes to depends on how it is put
+    Starts are taken just above every local minimum of the sampled distance (`landscape`). A clamp in which a wire can
+    rest on a lip as well as in its groove has more than one equilibrium; which one it ends in depends on how it is put
     together. States in which a wire is about to slip out of its mouth are among them, for there the closing ends too.
-    A place so shallow that opening by 1.5e-4 of the down splint's half width (0.01 mm of the reference clamp) lets the
-    clamp slide on may be missing.
+    A minimum so shallow that opening by 1.5e-4 of the down splint's half width (0.01 mm of the reference clamp) lets
+    the clamp slide on may be missing.
     Raises SolverError if no start leads to a proven state.
 
     >>> from clamp3d.clamp.loader import load_clamp
@@ -37,9 +38,9 @@ def equilibria(section: Section) -> tuple[FinalState, ...]:
     instance("section", section, Section)
     found: list[FinalState] = []
     last: SolverError | None = None
-    for start in resting_starts(section):
+    for start in initial_guesses(section):
         try:
-            state = solve_final_state(section, start, _STRIDE)
+            state = solve_final_state(section, start, _TRUST_RADIUS)
         except SolverError as error:
             last = error
             continue
@@ -62,30 +63,23 @@ def same(a: FinalState, b: FinalState) -> bool:
 
 def describe(state: FinalState) -> str:
     """What holds a state beside the grooves' arcs: 'jumper on a lip of the down splint, at the tilt limit'."""
-    held = [
-        (pair, feature) for pair, feature, f in zip(state.gaps.pair, state.gaps.feature, state.force, strict=True) if f
-    ]
     words = []
     for wire in WIRES:
-        lips = [TITLES[pair[0]] for pair, feature in held if pair[1] == wire and feature.startswith(OFF_ARC)]
+        lips = [TITLES[pair[0]] for pair, feature in state.active if pair[1] == wire and feature.startswith(OFF_ARC)]
         if wire in slipping(state):
             words.append(f"{TITLES[wire]} slips out of its groove")
         elif lips:
             words.append(f"{TITLES[wire]} on a lip of the {' and the '.join(dict.fromkeys(lips))}")
         elif wire in state.loose:
             words.append(f"{TITLES[wire]} loose")
-    if any(pair == ("P1", "P2") for pair, _ in held):
+    if any(pair == ("P1", "P2") for pair, _ in state.active):
         words.append("faces meet")
-    if any(feature == "tilt limit" for _, feature in held):
+    if any(feature == "tilt limit" for _, feature in state.active):
         words.append("at the tilt limit")
     return ", ".join(words)
 
 
 def slipping(state: FinalState) -> tuple[PartName, ...]:
-    """The wires that nothing but the end of the mouth keeps in it: the state is where closing ends, but no rest."""
-    out = {
-        pair[1]
-        for pair, feature, f in zip(state.gaps.pair, state.gaps.feature, state.force, strict=True)
-        if f and feature == MOUTH
-    }
+    """The wires that nothing but the end of the mouth keeps in it: closing ends there, but it is no equilibrium."""
+    out = {pair[1] for pair, feature in state.active if feature == MOUTH}
     return tuple(wire for wire in WIRES if wire in out)

@@ -1,9 +1,9 @@
-"""Roughly where a clamp can come to rest: the distance that its parts allow, sampled over tilts and the wires' places.
+"""Initial guesses of the equilibria: the feasible distance, sampled over tilts and positions of the wires.
 
 For each groove the curve on which the wire's centre runs when it touches is found point by point, moving the wire by
 its distance until that is small (conservative advancement: no step can pass through). The two curves of a wire,
-turned against each other, tell how close the splints can come with the wire at a place; the larger of both wires'
-distances and of the faces' is what a state allows, and each state no higher than those beside it is worth a start.
+turned against each other, tell how close the splints can come with the wire at a position. The feasible distance is the
+maximum over both wires and the faces; its grid-local minima are the initial guesses.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from clamp3d.clamp.section import WIRES, D, S, Section
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array
 
-_TILTS, _PLACES = 481, 961
+_TILTS, _POSITIONS = 481, 961
 _ADVANCES = 80
 _CLEAR = 1e-3
-"""Room in parts of the wire's radius that a start leaves to what it would touch."""
+"""Gap in parts of the wire's radius that a start leaves to what it would touch."""
 
 
-def resting_starts(section: Section) -> list[Array]:
-    """Open states q (6,), each just above a place where the clamp may come to rest; the lowest first."""
+def initial_guesses(section: Section) -> list[Array]:
+    """Open states q (6,), each just above a local minimum of the feasible distance; the lowest first."""
     limit, lever = section.clamp.down_splint.max_tilt, section.lever
     tilts = np.linspace(-limit, limit, _TILTS)
     faces = np.array([_faces(section, tilt) for tilt in tilts])
-    wires = [_Valleys(section, i, tilts) for i in range(len(WIRES))]
+    wires = [_Minima(section, i, tilts) for i in range(len(WIRES))]
     found: list[Array] = []
     for k, tilt in enumerate(tilts):
         left, right = max(k - 1, 0), min(k + 1, _TILTS - 1)
@@ -39,19 +39,19 @@ def resting_starts(section: Section) -> list[Array]:
                 continue
             q = np.zeros(6)
             q[D], q[S] = here, lever * tilt
-            for i, w, valley in ((0, wires[0], a), (2, wires[1], b)):
-                place = w.place[valley]
-                q[i : i + 2] = w.x[place], 0.5 * (w.over[place] + here + w.under[k, place])
+            for i, w, minimum in ((0, wires[0], a), (2, wires[1], b)):
+                at = w.position[minimum]
+                q[i : i + 2] = w.x[at], 0.5 * (w.over[at] + here + w.under[k, at])
             found.append(q)
     found.sort(key=lambda q: float(q[D]))
     return [opened for q in found if (opened := _open(section, q)) is not None]
 
 
-class _Valleys:
-    """The valleys of the distance d that one wire allows, all tilts after another.
+class _Minima:
+    """Local minima, over a wire's position, of the distance d that the wire allows, all tilts after another.
 
-    ``place`` (v,) is where the wire lies in each, ``beside`` (v, 3) the distance there, in the middle, and where the
-    wire slides to when the splint is tilted by one step less and one more.
+    ``position`` (v,) is the index of the wire's position at each, ``beside`` (v, 3) the distance there, in the middle,
+    and that of the minimum it slides to when the splint is tilted by one step less and one more.
     """
 
     def __init__(self, section: Section, i: int, tilts: Array) -> None:
@@ -59,13 +59,13 @@ class _Valleys:
         up, down = section.pairs["P1", wire], section.pairs["P2", wire]
         r, (low, high) = up.cylinder.radius, section.bounds()[2 * i]
         face = section.clamp.down_splint.face_depth
-        self.x = np.linspace(low, high, _PLACES)
+        self.x = np.linspace(low, high, _POSITIONS)
         self.over = _curve(section, up, self.x, section.clamp.up_splint.thickness + 1.01 * r, -1.0)
         deep = max(abs(face - 1.01 * r), abs(-float(down.T_a_groove[2, 3]) + down.groove.radius))
         aside, c = deep * math.sin(tilts[-1]), math.cos(tilts[-1])
-        u = np.linspace((low - bolt - aside) / c, (high - bolt + aside) / c, _PLACES)
+        u = np.linspace((low - bolt - aside) / c, (high - bolt + aside) / c, _POSITIONS)
         v = _curve(section, down, u, face - 1.01 * r, 1.0)
-        self.under = np.empty((len(tilts), _PLACES))
+        self.under = np.empty((len(tilts), _POSITIONS))
         for k, tilt in enumerate(tilts):
             c, s = math.cos(tilt), math.sin(tilt)
             self.under[k] = np.interp(self.x, np.maximum.accumulate(bolt + u * c + v * s), v * c - u * s)
@@ -73,24 +73,24 @@ class _Valleys:
         walled = np.pad(least, ((0, 0), (1, 1)), constant_values=np.inf)
         to_left, to_right = walled[:, :-2], walled[:, 2:]
         step = np.where((to_right < least) & (to_right <= to_left), 1, np.where(to_left < least, -1, 0))
-        row, self.place = np.nonzero(step == 0)
-        key = row * _PLACES + self.place
+        row, self.position = np.nonzero(step == 0)
+        key = row * _POSITIONS + self.position
         self.beside = np.empty((len(key), 3))
         for column, shift in enumerate((-1, 0, 1)):
             rows = np.clip(row + shift, 0, len(tilts) - 1)
-            # Downhill there is the next valley on that side.
-            after = np.searchsorted(key, rows * _PLACES + self.place, side="left")
-            end = key[np.where(step[rows, self.place] < 0, after - 1, after)]
-            self.beside[:, column] = least[rows, end % _PLACES]
+            # Downhill there is the next minimum on that side.
+            after = np.searchsorted(key, rows * _POSITIONS + self.position, side="left")
+            end = key[np.where(step[rows, self.position] < 0, after - 1, after)]
+            self.beside[:, column] = least[rows, end % _POSITIONS]
         self._first = np.searchsorted(row, np.arange(len(tilts) + 1))
 
     def at(self, k: int) -> range:
-        """The valleys at tilt k."""
+        """The minima at tilt k."""
         return range(self._first[k], self._first[k + 1])
 
 
 def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: float) -> Array:
-    """How deep (n,) a wire's centre gets into a groove at places u (n,), from depth ``start`` in the sense ``sign``."""
+    """How deep (n,) a wire's centre gets into a groove at positions u (n,), from depth ``start`` in sense ``sign``."""
     T = np.tile(np.eye(4), (len(u), 1, 1))
     T[:, 0, 3], T[:, 2, 3] = u, -start
     moving = np.arange(len(u))

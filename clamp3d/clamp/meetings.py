@@ -13,9 +13,9 @@ from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.scene import CONTACT, clamp_scene
-from clamp3d.collide.verdict import Verdict
 from clamp3d.collide.check import check
 from clamp3d.collide.model import ModelCache
+from clamp3d.collide.verdict import Verdict
 from clamp3d.core.pose import Array, SectionPose
 
 _MEET = (Verdict.CONTACT, Verdict.CLASH, Verdict.CONTAINED)

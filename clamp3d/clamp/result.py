@@ -77,8 +77,8 @@ class Equilibrium:
         As of `Assembly`.
     detail : str
         What holds the state where that is not the grooves' arcs.
-    rests : bool
-        Whether it is an equilibrium; if not, a wire slips out of its groove there.
+    is_equilibrium : bool
+        If it is not one, a wire slips out of its groove there.
     """
 
     distance: float
@@ -86,11 +86,11 @@ class Equilibrium:
     tilt: float
     status: str
     detail: str
-    rests: bool
+    is_equilibrium: bool
 
     def __str__(self) -> str:
         where = f"{self.distance:.3f} mm, tilt {math.degrees(self.tilt):z.2f} deg"
-        if self.rests:
+        if self.is_equilibrium:
             return f"another equilibrium: {where}" + (f": {self.detail}" if self.detail else "")
         return f"also ends at {where} (no equilibrium: {self.detail})"
 
@@ -102,7 +102,7 @@ class Equilibrium:
             "tilt_deg": math.degrees(self.tilt),
             "status": self.status,
             "detail": self.detail,
-            "rests": self.rests,
+            "rests": self.is_equilibrium,
         }
 
 

@@ -1,7 +1,7 @@
 """How much the splint distance changes with each dimension: closed-form derivatives at the exact final state.
 
 The final state x(p) with its contact forces l(p) solves the Karush-Kuhn-Tucker conditions of "least d, no gap
-negative": F = [grad_x (d - l . g), g] = 0 over the carrying gaps g. The implicit function theorem gives
+negative": F = [grad_x (d - l . g), g] = 0 over the strongly active gaps g. The implicit function theorem gives
 dx/dp = -(dF/d(x, l))^-1 dF/dp [Fiacco, Introduction to Sensitivity and Stability Analysis in Nonlinear Programming,
 1983, section 3.2]; one solve with the transposed matrix (the adjoint) serves all dimensions at once. The distance of
 Table 4 is not d itself: the tilt moves it too.
@@ -95,8 +95,8 @@ def with_dimensions(clamp: Clamp, values: Mapping[str, float]) -> Clamp:
 def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
     """Derivatives of the splint distance by each of `DIMENSIONS` that it depends on, largest effect first.
 
-    Exact while the same contacts carry. Raises SolverError if the final state cannot be proven, does not hold both
-    wires, or is not an isolated one (the derivative then does not exist).
+    Exact while the active set stays the same. Raises SolverError if the final state cannot be proven, does not hold
+    both wires, or is not an isolated one (the derivative then does not exist).
 
     >>> from clamp3d.clamp.loader import load_clamp
     >>> {s.name: round(s.derivative, 4) for s in sensitivity(load_clamp())}["line.diameter"]
@@ -127,17 +127,17 @@ def _derivatives(section: Section, final: FinalState) -> Array:
     """Splint distance by `DIMENSIONS` (n,), through the adjoint of the KKT system."""
     clamp, gaps = section.clamp, final.gaps
     tilt = float(final.q[S]) / section.lever
-    carrying = np.flatnonzero(final.force)
-    k, n = len(carrying), len(DIMENSIONS)
+    active = np.flatnonzero(final.multipliers)
+    k, n = len(active), len(DIMENSIONS)
     A, hessian, mixed, by_p = np.zeros((k, 6)), np.zeros((6, 6)), np.zeros((6, n)), np.zeros((k, n))
-    for row, i in enumerate(carrying):
+    for row, i in enumerate(active):
         splint, wire = gaps.pair[i]
         if wire not in WIRES or not (gaps.feature[i] == "arc" or gaps.feature[i].startswith("lip")):
-            raise SolverError(f"no sensitivity: {splint} and {wire} carry on {gaps.feature[i]}")
+            raise SolverError(f"no sensitivity: the contact of {splint} and {wire} is on a {gaps.feature[i]}")
         at, by_point, by_local, second = _gap(section, final, int(i))
         A[row, at] = by_point
-        hessian[np.ix_(at, at)] -= final.force[i] * second[:4, :4]
-        mixed[at] -= final.force[i] * (second[:4, 4:] @ by_local[:2])
+        hessian[np.ix_(at, at)] -= final.multipliers[i] * second[:4, :4]
+        mixed[at] -= final.multipliers[i] * (second[:4, 4:] @ by_local[:2])
         by_p[row] = by_local[2]
     kkt = np.block([[hessian, -A.T], [A, np.zeros((k, k))]])
     sizes = np.linalg.svd(kkt, compute_uv=False)

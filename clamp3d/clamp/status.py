@@ -17,7 +17,7 @@ def final_status(clamp: Clamp, final: FinalState | SteppedState, resolution: flo
     """
     gaps = final.gaps
     if isinstance(final, FinalState):
-        stops = {(p, f) for p, f, force in zip(gaps.pair, gaps.feature, final.force, strict=True) if force > 0.0}
+        stops = set(final.active)
         loose = set(final.loose)
     else:
         near = [v <= resolution for v in gaps.value]
@@ -28,8 +28,8 @@ def final_status(clamp: Clamp, final: FinalState | SteppedState, resolution: flo
     if slipping:
         return f"not clamped: {' and '.join(slipping)} slips out of its groove"
     if not loose:
-        lacking = bolt_lacking(clamp, float(final.q[D]))
-        return CLAMPED if lacking <= 0.0 else f"not clamped: the bolt is {lacking:.4g} mm too short for the nut"
+        shortfall = bolt_shortfall(clamp, float(final.q[D]))
+        return CLAMPED if shortfall <= 0.0 else f"not clamped: the bolt is {shortfall:.4g} mm too short for the nut"
     reasons = []
     if any(pair == ("P1", "P2") for pair, _ in stops):
         reasons.append("faces meet")
@@ -40,7 +40,7 @@ def final_status(clamp: Clamp, final: FinalState | SteppedState, resolution: flo
     return f"not clamped: {' and '.join(reasons)}, {' and '.join(sorted(loose))} loose"
 
 
-def bolt_lacking(clamp: Clamp, d: float) -> float:
+def bolt_shortfall(clamp: Clamp, d: float) -> float:
     """How far the bolt's end lies below the nut's free face, mm, with the down splint at ``d``; negative: stands out.
 
     The round back rests in the saddle's apex at any tilt, so that bolt and saddle follow ``d``.

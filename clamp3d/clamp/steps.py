@@ -41,9 +41,7 @@ class Log:
         """Add the event of a motion that ended at state ``q``, where ``pair`` touches."""
         assert pair is not None  # every motion here ends at a groove
         section = self.section
-        (c,) = measure_contacts(
-            section.clamp, section_poses(section, q), section.model, pairs=[pair], cache=self.cache
-        )
+        (c,) = measure_contacts(section.clamp, section_poses(section, q), section.model, pairs=[pair], cache=self.cache)
         self.events.append(Event(step, c.a, c.b, c.relation, c.point, travel))
 
 

@@ -179,16 +179,11 @@ def _indices(name: str, faces: ArrayLike) -> IntArray:
 
 def _merge(V: Array, F: IntArray, tolerance: float) -> tuple[Array, IntArray]:
     """Merge vertices closer than ``tolerance`` (a tree, not a grid: a grid parts equal points at its lines)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
+    from trimesh.graph import connected_component_labels
 
     unique, inverse = np.unique(V, axis=0, return_inverse=True)
-    inverse = inverse.reshape(-1)
-    pairs = np.asarray(cKDTree(unique).query_pairs(tolerance, output_type="ndarray"))
-    if len(pairs):
-        graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(unique), len(unique)))
-        _, label = connected_components(graph, directed=False)
-        keep = np.unique(label, return_index=True)[1]
-        return unique[keep], label[inverse][F].astype(np.int64)
-    return unique, inverse[F].astype(np.int64)
+    pairs = cKDTree(unique).query_pairs(tolerance, output_type="ndarray")
+    label = connected_component_labels(pairs, len(unique))  # type: ignore[no-untyped-call]
+    keep = np.unique(label, return_index=True)[1]
+    return unique[keep], label[inverse.reshape(-1)][F].astype(np.int64)

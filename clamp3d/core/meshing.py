@@ -41,11 +41,29 @@ class Drawn(Protocol):
 
 
 def mesh(part: Drawn, mesh_error: float = 0.01) -> trimesh.Trimesh:
-    """Watertight mesh of a part in its own frame, mm, oriented outward.
+    """Watertight triangle mesh of a part in its own frame, wound outward.
 
-    ``mesh_error`` is the largest distance in mm between an arc and its chord. ``mesh.metadata`` holds ``units``
-    ("mm"), ``part``, ``mesh_error`` as asked for and ``chord_error`` as it is. Raises InputError for a bad error.
+    Parameters
+    ----------
+    part : Drawn
+        Part of a clamp, or another solid of outlines drawn along an axis.
+    mesh_error : float
+        Largest distance in mm between an arc and its chord.
 
+    Returns
+    -------
+    trimesh.Trimesh
+        The mesh in mm; its ``metadata`` hold ``part``, ``mesh_error`` as asked for and ``chord_error`` as it is.
+
+    Raises
+    ------
+    InputError
+        For a bad error, or what is no drawn solid.
+    Clamp3dError
+        If one of the part's sizes vanishes beside the others.
+
+    Examples
+    --------
     >>> from clamp3d.clamp.loader import load_clamp
     >>> from clamp3d.clamp.parts import parts
     >>> nut = mesh(parts(load_clamp())["P5"], 0.1)

@@ -9,13 +9,14 @@ shallow arc, whose centre is hardly known, stays a well scaled problem, and a pl
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 from scipy.optimize import least_squares
 
-Array = NDArray[np.float64]
+from clamp3d.core.pose import Array
 
 CONFIDENCE = 0.9973
 """Probability of the covariance part of every error bound: three standard deviations of a normal distribution."""
@@ -74,53 +75,38 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
     e = inward / reach if reach > 1e-6 * size else perpendicular(w)[0]
     f = np.cross(w, e)
     local = (points - centroid) @ np.stack([e, f, w], axis=1)
-    k0 = 1.0 / start.radius
     scale = np.array([1.0, 1.0, 1.0 / size, 1.0 / size, 1.0 / size**2])
 
-    def parts(x: Array) -> tuple[Array, Array, Array, float, float]:
+    def cylinder(x: Array) -> Axis:
         h, g, a, b, k = x * scale
         radius = 1.0 / k if abs(k) > 1e-12 / size else 1e12 * size
-        n = np.sqrt(1.0 + a * a + b * b)
-        d = np.array([a, b, 1.0]) / n
-        p = local - np.array([h + radius, g, 0.0])
-        t = p @ d
-        q = p - t[:, None] * d
-        return q, t, np.sqrt(np.einsum("ij,ij->i", q, q)), radius, float(n)
+        return Axis(np.array([h + radius, g, 0.0]), np.array([a, b, 1.0]) / np.sqrt(1.0 + a * a + b * b), radius)
 
     def residual(x: Array) -> Array:
-        _, _, r, radius, _ = parts(x)
-        return np.asarray(r - abs(radius))
+        axis = cylinder(x)
+        return np.asarray(axis.radial(local)[1] - abs(axis.radius))
 
     def jacobian(x: Array) -> Array:
-        q, t, r, radius, n = parts(x)
-        u = q / np.maximum(r, 1e-300)[:, None]
-        J = np.empty((len(local), 5))
-        J[:, 0] = -u[:, 0]
-        J[:, 1] = -u[:, 1]
-        J[:, 2] = -t * u[:, 0] / n
-        J[:, 3] = -t * u[:, 1] / n
+        axis = cylinder(x)
+        u = axis.radial(local)[0]
+        tilt = -((local - axis.point) @ axis.direction) * axis.direction[2]
         # The centre moves away as the radius grows: 1 + u.e is 1 - cos(angle from the arc's middle), tiny on an arc.
-        J[:, 4] = radius * radius * (np.sign(radius) + u[:, 0])
-        return np.asarray(J * scale)
+        bend = axis.radius * axis.radius * (np.sign(axis.radius) + u[:, 0])
+        return np.asarray(np.column_stack([-u[:, :2], tilt[:, None] * u[:, :2], bend]) * scale)
 
-    x0 = np.array([reach - start.radius, 0.0, 0.0, 0.0, k0]) / scale
-    tiny = 1e-13
+    first = np.array([reach - start.radius, 0.0, 0.0, 0.0, 1.0 / start.radius])
+    options: dict[str, Any] = {"method": "lm", "xtol": 1e-13, "ftol": 1e-13, "gtol": 1e-13, "max_nfev": 60}
+    if robust_scale is not None:
+        options = {"method": "trf", "loss": "cauchy", "f_scale": robust_scale, "max_nfev": 25}
     try:
-        if robust_scale is None:
-            got = least_squares(residual, x0, jacobian, method="lm", xtol=tiny, ftol=tiny, gtol=tiny, max_nfev=60)
-        else:
-            got = least_squares(residual, x0, jacobian, method="trf", loss="cauchy", f_scale=robust_scale, max_nfev=25)
+        x = least_squares(residual, first / scale, jacobian, **options).x
     except (ValueError, np.linalg.LinAlgError):
         return None
-    h, g, a, b, k = got.x * scale
-    if not np.isfinite(got.x).all() or k * size < 1e-3:
+    if not np.isfinite(x).all() or x[4] * scale[4] * size < 1e-3:
         return None
-    radius = 1.0 / k
-    d = np.array([a, b, 1.0]) / np.sqrt(1.0 + a * a + b * b)
-    to_world = np.stack([e, f, w])
-    c = np.array([h + radius, g, 0.0])
-    c = c - (c @ d) * d
-    return Axis(point=centroid + c @ to_world, direction=d @ to_world, radius=float(radius))
+    axis, to_world = cylinder(x), np.stack([e, f, w])
+    middle = axis.point - (axis.point @ axis.direction) * axis.direction
+    return Axis(centroid + middle @ to_world, axis.direction @ to_world, float(axis.radius))
 
 
 def circle(points: Array) -> tuple[Array, float] | None:
@@ -132,6 +118,16 @@ def circle(points: Array) -> tuple[Array, float] | None:
     if rank < 3:
         return None
     return m + sol[:2], float(np.sqrt(max(sol[2] + sol[0] ** 2 + sol[1] ** 2, 0.0)))
+
+
+def axis_along(direction: Array, points: Array) -> Axis | None:
+    """Cylinder along a unit ``direction`` (3,) by the circle of ``points`` (n, 3) seen along it; None if on a line."""
+    u, w = perpendicular(direction)
+    got = circle(np.column_stack([points @ u, points @ w]))
+    if got is None:
+        return None
+    centre, radius = got
+    return Axis(centre[0] * u + centre[1] * w, direction, radius)
 
 
 def covariance(local: Array, radius: float, noise: float) -> Array | None:
@@ -147,9 +143,8 @@ def covariance(local: Array, radius: float, noise: float) -> Array | None:
     values, vectors = np.linalg.eigh(J.T @ J)
     if values[0] < 1e-10 * values[-1]:
         return None
-    C: Array = (vectors / values) @ vectors.T * noise**2
-    unscale = np.array([1.0, 1.0, 1.0, 1.0 / size, 1.0 / size])
-    return C * np.outer(unscale, unscale)
+    vectors[3:] /= size
+    return np.asarray((vectors / values) @ vectors.T * noise**2)
 
 
 def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> float:
@@ -158,12 +153,11 @@ def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> f
     Holds for the whole arc and length at once with probability ``CONFIDENCE`` (Scheffe's simultaneous band with five
     parameters and ``freedom`` degrees of freedom); the arc is centred on -y.
     """
-    a = np.linspace(-half_angle, half_angle, 49)
-    u = np.stack([np.sin(a), -np.cos(a)], axis=1)
-    worst = 0.0
-    for z in (-0.5 * length, 0.0, 0.5 * length):
-        g = np.column_stack([np.ones(len(u)), u, z * u])
-        worst = max(worst, float(np.einsum("ij,jk,ik->i", g, C, g).max()))
+    a, z = (
+        q.ravel() for q in np.meshgrid(np.linspace(-half_angle, half_angle, 49), length * np.array([-0.5, 0.0, 0.5]))
+    )
+    g = np.column_stack([np.ones_like(a), np.sin(a), -np.cos(a), z * np.sin(a), -z * np.cos(a)])
+    worst = float(np.einsum("ij,jk,ik->i", g, C, g).max())
     return float(np.sqrt(5.0 * stats.f.ppf(CONFIDENCE, 5, max(freedom, 1)) * worst))
 
 
@@ -171,13 +165,12 @@ def patches_of(local: Array) -> list[NDArray[np.intp]]:
     """Points ``local`` (n, 3) of a cylinder's own frame in patches of 25 to 49, by halving along the longer side."""
     angle = np.arctan2(local[:, 0], -local[:, 1])
     flat = np.column_stack([angle * np.hypot(local[:, 0], local[:, 1]).mean(), local[:, 2]])
-    todo, done = [np.arange(len(local))], []
-    while todo:
-        index = todo.pop()
+
+    def halved(index: NDArray[np.intp]) -> list[NDArray[np.intp]]:
         if len(index) < 50:
-            done.append(index)
-            continue
+            return [index]
         part = flat[index]
-        order = np.argsort(part[:, int(np.argmax(np.ptp(part, axis=0)))], kind="stable")
-        todo += [index[order[: len(index) // 2]], index[order[len(index) // 2 :]]]
-    return done
+        index = index[np.argsort(part[:, int(np.argmax(np.ptp(part, axis=0)))], kind="stable")]
+        return [*halved(index[: len(index) // 2]), *halved(index[len(index) // 2 :])]
+
+    return halved(np.arange(len(local)))

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clamp3d.core.mesh import IntArray
+from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder, SweptArc
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

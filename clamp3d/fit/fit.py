@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.brep.mesh_file import load_mesh
 from clamp3d.checks import function, instance
@@ -19,15 +18,25 @@ from clamp3d.fit.measure import measure
 from clamp3d.fit.regions import find_regions
 from clamp3d.fit.surface import Surface
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitResult:
-    """What was found in ``mesh``: features sorted by covered area, largest first, and ``notes`` for the reader.
+    """What was found in a mesh.
 
-    ``feature_area`` and ``area`` (mm^2): area of all features and of the mesh.
+    Attributes
+    ----------
+    mesh : Mesh
+        The mesh that was fitted.
+    grooves : tuple of GrooveFit
+        Concave arcs, largest covered area first.
+    cylinders : tuple of CylinderFit
+        Convex cylinders and arcs, largest covered area first.
+    holes : tuple of HoleFit
+        Concave cylinders all the way round, largest covered area first.
+    area : float
+        Area of the mesh in mm^2.
+    notes : tuple of str
+        What was repaired, assumed, or not found.
     """
 
     mesh: Mesh
@@ -58,9 +67,7 @@ class FitResult:
             "bounds_mm": [low.tolist(), high.tolist()],
             "area_mm2": self.area,
             "feature_area_mm2": self.feature_area,
-            "grooves": [f.to_dict() for f in self.grooves],
-            "cylinders": [f.to_dict() for f in self.cylinders],
-            "holes": [f.to_dict() for f in self.holes],
+            **{kind: [f.to_dict() for f in getattr(self, kind)] for kind in ("grooves", "cylinders", "holes")},
             "notes": list(self.notes),
         }
 
@@ -68,14 +75,61 @@ class FitResult:
 def fit_file(
     path: str | Path, *, unit: str | None = None, progress: Callable[[str, float], None] | None = None
 ) -> FitResult:
-    """Fit the mesh in ``path``; see ``load_mesh`` for formats, units and errors."""
+    """Find the grooves, cylinders and holes of the mesh in a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        STL, OBJ, PLY, GLB, GLTF, 3MF or STEP file; see `load_mesh`.
+    unit : str, optional
+        Unit of the file's lengths: mm, cm, m or in.
+    progress : callable, optional
+        ``progress(stage, fraction)`` is called while it works.
+
+    Returns
+    -------
+    FitResult
+        Surfaces with their errors; lengths in mm.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, not readable, or holds no surface.
+    MissingLibraryError
+        For STEP without the extra ``step``.
+    """
     return fit_mesh(load_mesh(path, unit=unit), progress=progress)
 
 
 def fit_mesh(mesh: Mesh, *, progress: Callable[[str, float], None] | None = None) -> FitResult:
-    """Find the concave grooves, convex cylinders and holes of ``mesh`` (from ``load_mesh`` or ``make_mesh``).
+    """Find the concave grooves, convex cylinders and holes of a mesh.
 
-    ``progress(stage, fraction)`` is called while it works.
+    Parameters
+    ----------
+    mesh : Mesh
+        From `load_mesh` or `make_mesh`; it may be open.
+    progress : callable, optional
+        ``progress(stage, fraction)`` is called while it works.
+
+    Returns
+    -------
+    FitResult
+        Surfaces with their errors; lengths in mm.
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong type.
+
+    Examples
+    --------
+    >>> from clamp3d.core import shapes
+    >>> from clamp3d.core.mesh import make_mesh
+    >>> from clamp3d.core.meshing import mesh
+    >>> wire = mesh(shapes.cylinder(6.5, 80.0))
+    >>> (found,) = fit_mesh(make_mesh(wire.vertices, wire.faces)).cylinders
+    >>> round(found.radius, 9), round(found.length, 9), found.full
+    (6.5, 80.0, True)
     """
     instance("mesh", mesh, Mesh)
     function("progress", progress)
@@ -111,11 +165,10 @@ def fit_mesh(mesh: Mesh, *, progress: Callable[[str, float], None] | None = None
 def _open_ended(surface: Surface, values: dict[str, Any]) -> bool:
     """True if nothing closes either end: from the middle, no face crosses the axis up to a radius past the ends."""
     T, reach = values["T_part_feature"], 0.5 * values["length"] + values["radius"]
-    a, b, c = ((surface.V[surface.F[:, k]] - T[:3, 3]) @ T[:3, :3] for k in range(3))
+    x, y, z = np.moveaxis((surface.V[surface.F] - T[:3, 3]) @ T[:3, :3], -1, 0)
     # A face meets the axis if the origin lies in its projection along z: all three edge functions of one sign.
-    e = [p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((b, c), (c, a), (a, b))]
-    hit = ((e[0] >= 0) & (e[1] >= 0) & (e[2] >= 0)) | ((e[0] <= 0) & (e[1] <= 0) & (e[2] <= 0))
-    total = e[0] + e[1] + e[2]
-    hit &= total != 0.0
-    z = (e[0] * a[:, 2] + e[1] * b[:, 2] + e[2] * c[:, 2])[hit] / total[hit]
+    e = np.roll(x, -1, axis=1) * np.roll(y, -2, axis=1) - np.roll(y, -1, axis=1) * np.roll(x, -2, axis=1)
+    total = e.sum(axis=1)
+    hit = ((e >= 0).all(axis=1) | (e <= 0).all(axis=1)) & (total != 0.0)
+    z = (e * z).sum(axis=1)[hit] / total[hit]
     return not bool((np.abs(z) <= reach).any())

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from clamp3d.core.mesh import IntArray
+from clamp3d.core.pose import Array
+from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
-from clamp3d.fit.surface import MAX_FACET, Surface, facet_span, sagitta
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface, border, facet_span
 
 MIN_LINES = 4
 """Fewest lines on a surface: three always lie on some circle (a trapezoid or V groove is not an arc)."""
@@ -36,25 +34,31 @@ class Region:
     strips: bool
 
 
-def grow(
-    surface: Surface,
-    free: BoolArray,
-    cells: IntArray,
-    axis: Axis,
-    sign: int,
-    seed: IntArray,
-    tolerance: float,
-    floor: float,
-    *,
-    strips: bool,
-) -> Region | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class Search:
+    """One pass over a surface: the faces (m,) still ``free``, planar ``cells`` (m,), least tolerance ``floor`` in mm.
+
+    ``strips``: the seeds are strips of an exact tessellation.
+    """
+
+    surface: Surface
+    free: BoolArray
+    cells: IntArray
+    floor: float
+    strips: bool
+
+    def span(self, axis: Axis, faces: IntArray) -> Array:
+        """Angle (rad) about the axis of each planar cell that has some of ``faces``."""
+        return facet_span(self.surface, axis, faces, self.cells)
+
+
+def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float) -> Region | None:
     """Grow from ``seed`` faces, refit, and repeat until the faces no longer change."""
     # Voxel and remeshed surfaces put their vertices off by a good part of the facets' sagitta.
-    share = 0.0 if strips else 0.3
-    V, F = surface.V, surface.F
-    faces = seed
-    points = np.unique(F[seed])
-    span = float(facet_span(surface, axis, seed, cells).max())
+    share = 0.0 if search.strips else 0.3
+    surface, floor = search.surface, search.floor
+    V, F, faces = surface.V, surface.F, seed
+    span = float(search.span(axis, faces).max())
     for _ in range(12):
         if not 0.0 < axis.radius < 20.0 * surface.extent or span > MAX_FACET:
             return None
@@ -65,7 +69,7 @@ def grow(
         lean = np.einsum("ij,ij->i", surface.normals[faces], axis.radial(surface.centres[faces])[0])
         slack = float(np.quantile(np.arccos(np.clip(sign * lean, -1.0, 1.0)), 0.9))
         limit = np.cos(min(max(0.6 * span, 2.5 * slack, 0.02), 0.7))
-        mask: BoolArray = free & np.asarray(near[F].all(axis=1))
+        mask: BoolArray = search.free & np.asarray(near[F].all(axis=1))
         index = np.flatnonzero(mask)
         radial = axis.radial(surface.centres[index])[0]
         mask[index] = sign * np.einsum("ij,ij->i", surface.normals[index], radial) >= limit
@@ -76,7 +80,7 @@ def grow(
         names, where = np.unique(label[inside], return_inverse=True)
         main = names[np.argmax(np.bincount(where, weights=surface.areas[inside]))]
         grown = np.flatnonzero(mask & (label == main))
-        settled = len(grown) == len(faces) and bool((grown == faces).all())
+        settled = np.array_equal(grown, faces)
         faces = grown
         points = _support(surface, faces, np.abs(off) <= tolerance)
         if len(points) < 6:
@@ -86,7 +90,7 @@ def grow(
             return None
         axis = better
         tolerance = max(floor, _tolerance(axis.residual(V[points])))
-        span = float(facet_span(surface, axis, faces, cells).max())
+        span = float(search.span(axis, faces).max())
         if settled:
             break
     corners = np.unique(F[faces])
@@ -98,7 +102,7 @@ def grow(
             wider = max(floor, _tolerance(res))
             if wider <= 3.0 * tolerance and float(np.abs(res).max()) <= wider:
                 axis, points, tolerance = whole, corners, wider
-    return Region(axis, sign, faces, points, tolerance, span, strips)
+    return Region(axis, sign, faces, points, tolerance, span, search.strips)
 
 
 def _tolerance(residual: Array) -> float:
@@ -126,31 +130,25 @@ def _support(surface: Surface, faces: IntArray, on: BoolArray) -> IntArray:
     return np.asarray(inner if len(inner) >= max(50, 0.6 * len(keep)) else keep)
 
 
-def accept(surface: Surface, cells: IntArray, region: Region) -> bool:
+def accept(search: Search, region: Region) -> bool:
     """True if the region is long, round and distinct enough to be a cylinder rather than an accident."""
-    V, F = surface.V, surface.F
-    axis = region.axis
-    u, w = perpendicular(axis.direction)
-    p = V[region.points] - axis.point
-    angle = np.sort(np.arctan2(p @ w, p @ u))
+    V, axis = search.surface.V, region.axis
+    p = (V[region.points] - axis.point) @ np.stack([*perpendicular(axis.direction), axis.direction], axis=1)
+    angle = np.sort(np.arctan2(p[:, 1], p[:, 0]))
     gaps = np.diff(angle, append=angle[0] + 2.0 * np.pi)
     arc = 2.0 * np.pi - float(gaps.max())
     noise = max(region.tolerance / 4.0, 1e-12)
     lines = int((gaps > 1e-3 * max(arc, 1e-9)).sum())
-    spans = facet_span(surface, axis, region.faces, cells)
+    spans = search.span(axis, region.faces)
     if lines < MIN_LINES:
         return False
     # Every trapezoid with equal flanks lies on a circle: with three facets ask for three equal ones.
     if lines == MIN_LINES and (spans.max() > 1.02 * spans.min() or spans.max() > np.radians(30.0)):
         return False
-    if 2.0 * axis.radius * np.sin(0.25 * arc) ** 2 < 6.0 * noise or arc < 2.0 * float(np.median(spans)):
+    if sagitta(axis.radius, arc) < 6.0 * noise or arc < 2.0 * float(np.median(spans)):
         return False
-    z = (V[np.unique(F[region.faces])] - axis.point) @ axis.direction
-    length = float(np.ptp(z))
-    if _runs_on(surface, region, length):
-        return False
-    p = p @ np.stack([u, w, axis.direction], axis=1)
-    if _bent(p, axis.residual(V[region.points]), axis.radius):
+    length = float(np.ptp(V[np.unique(search.surface.F[region.faces])] @ axis.direction))
+    if _runs_on(search.surface, region, length) or _bent(p, axis.residual(V[region.points]), axis.radius):
         return False
     return len(region.points) >= 8 and length > 0.0
 
@@ -173,17 +171,13 @@ def _bent(local: Array, residual: Array, radius: float) -> bool:
 
 def _runs_on(surface: Surface, region: Region, length: float) -> bool:
     """True if the surface goes on smoothly past both round ends with bands as long: a ring of a sphere or torus."""
-    inside = np.zeros(len(surface.F), dtype=bool)
-    inside[region.faces] = True
-    first, second = inside[surface.pairs].T
-    border = first != second
-    ends = surface.V[surface.edges[border]] @ region.axis.direction
-    run = np.linalg.norm(np.diff(surface.V[surface.edges[border]], axis=1)[:, 0], axis=1)
-    across = np.abs(ends[:, 1] - ends[:, 0]) < 0.5 * run
-    z = ends.mean(axis=1)
+    crossing, outside, _ = border(surface, region.faces)
+    ends = surface.V[surface.edges[crossing]]
+    along = ends @ region.axis.direction
+    across = np.abs(along[:, 1] - along[:, 0]) < 0.5 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    z = along.mean(axis=1)
     z = z - 0.5 * (z.min() + z.max()) if len(z) else z
-    smooth = surface.bend[border] < 1.5 * region.span
-    outside = np.where(first, surface.pairs[:, 1], surface.pairs[:, 0])[border]
+    smooth = surface.bend[crossing] < 1.5 * region.span
     band = np.ptp(surface.V[surface.F[outside]] @ region.axis.direction, axis=1)
     both = [across & (z > 0.0), across & (z < 0.0)]
     return all(bool(e.any() and smooth[e].mean() > 0.7 and np.median(band[e]) > 0.3 * length) for e in both)

@@ -14,39 +14,31 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from clamp3d.fit.cylinder import Axis, circle, perpendicular
-from clamp3d.fit.grow import Region, accept, grow
+from clamp3d.core.mesh import IntArray
+from clamp3d.fit.cylinder import axis_along
+from clamp3d.fit.grow import Region, Search, accept, grow
 from clamp3d.fit.patches import patches
 from clamp3d.fit.surface import MAX_FACET, Surface
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 def find_regions(surface: Surface, progress: Callable[[str, float], None] | None = None) -> list[Region]:
     """All cylinders on the mesh, none overlapping; ``progress(stage, fraction)`` is called as it goes."""
     free = np.ones(len(surface.F), dtype=bool)
     found: list[Region] = []
-    tell = progress or (lambda stage, fraction: None)
-    for floor in (surface.floor, 40.0 * max(surface.mesh.rounding, surface.extent * 2.0**-24)):
-        cells = surface.cells(floor)
-        for region in _strips(surface, free, cells, floor, tell):
+    coarse = 40.0 * max(surface.mesh.rounding, surface.extent * 2.0**-24)
+    for floor, seeds in ((surface.floor, strips), (coarse, strips), (surface.floor, patches)):
+        search = Search(surface, free, surface.cells(floor), floor, seeds is strips)
+        for region in seeds(search, progress or (lambda stage, fraction: None)):
             free[region.faces] = False
             found.append(region)
-    cells = surface.cells(surface.floor)
-    for region in patches(surface, free, cells, tell):
-        free[region.faces] = False
-        found.append(region)
     return found
 
 
-def _strips(
-    surface: Surface, free: BoolArray, cells: IntArray, floor: float, tell: Callable[[str, float], None]
-) -> Iterator[Region]:
-    V, F = surface.V, surface.F
+def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Region]:
+    """Cylinders of an exact tessellation among the free faces; the caller takes what is found off them."""
+    surface, cells, floor = search.surface, search.cells, search.floor
+    V = surface.V
     ridge = (surface.step > floor) & (surface.bend > 1e-5) & (surface.bend < MAX_FACET)
     ridge &= cells[surface.pairs[:, 0]] != cells[surface.pairs[:, 1]]
     # A whole strip has four corners, so two triangles at least: this spares dense meshes the search.
@@ -60,7 +52,7 @@ def _strips(
     cell = np.concatenate([cells[surface.pairs[split]], cells[surface.rim_faces][:, None].repeat(2, axis=1)])
     vector = V[ends[:, 1]] - V[ends[:, 0]]
     vector /= np.maximum(np.linalg.norm(vector, axis=1), 1e-300)[:, None]
-    members = _groups(np.arange(len(F)), cells)
+    members = _groups(np.arange(len(cells)), cells)
     lines = _groups(np.tile(np.arange(len(ends)), 2), cell.T.reshape(-1))
     fails = np.zeros(cells.max() + 1, dtype=np.int64)
     for n, k in enumerate(order):
@@ -68,7 +60,7 @@ def _strips(
             tell("strips", n / len(order))
         i, j = surface.pairs[k]
         a, b = cells[i], cells[j]
-        if not (free[i] and free[j]) or fails[a] > 2 or fails[b] > 2:
+        if not (search.free[i] and search.free[j]) or fails[a] > 2 or fails[b] > 2:
             continue
         fails[[a, b]] += 1
         d = V[surface.edges[k, 1]] - V[surface.edges[k, 0]]
@@ -77,18 +69,12 @@ def _strips(
         own = np.concatenate([lines[a], lines[b]])
         own = own[np.abs(vector[own] @ d) > 0.9999]
         corners = np.unique(ends[own])
-        u, w = perpendicular(d)
-        flat = np.column_stack([V[corners] @ u, V[corners] @ w])
-        got = circle(flat)
-        if got is None:
-            continue
-        centre, radius = got
+        axis = axis_along(d, V[corners])
         # Slack for the axis: a direction from one edge is only as good as its ends.
         loose = 3.0 * floor
-        if radius > 20.0 * surface.extent or np.abs(np.hypot(*(flat - centre).T) - radius).max() > loose:
+        if axis is None or axis.radius > 20.0 * surface.extent or np.abs(axis.residual(V[corners])).max() > loose:
             continue
-        axis = Axis(centre[0] * u + centre[1] * w, d, radius)
-        # Two strips always lie on a circle: a third one must agree before the dear growing starts.
+        # Two strips always lie on a circle: a third one must agree before the expensive growing starts.
         beyond = np.setdiff1d(cell[own], (a, b))
         third = np.concatenate([lines[c] for c in beyond]) if len(beyond) else np.empty(0, dtype=np.int64)
         far = ends[np.setdiff1d(third[np.abs(vector[third] @ d) > 0.9999], own)]
@@ -96,10 +82,10 @@ def _strips(
             continue
         seed = np.concatenate([members[a], members[b]])
         sign = 1 if surface.normals[i] @ axis.radial(surface.centres[i : i + 1])[0][0] > 0.0 else -1
-        region = grow(surface, free, cells, axis, sign, seed, loose, floor, strips=True)
+        region = grow(search, axis, sign, seed, loose)
         if region is None or region.tolerance > 4.0 * floor:
             continue
-        if accept(surface, cells, region):
+        if accept(search, region):
             yield region
         else:  # its other strips would only grow the same again
             fails[np.unique(cells[region.faces])] += 3

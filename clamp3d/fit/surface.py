@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy import ndimage
 
-from clamp3d.core.mesh import Mesh
+from clamp3d.core.mesh import Array, IntArray, Mesh
 from clamp3d.fit.cylinder import Axis, perpendicular
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 MAX_FACET = np.radians(46.0)
@@ -39,9 +36,8 @@ class Surface:
         self.edges = np.asarray(tm.face_adjacency_edges, dtype=np.int64).reshape(-1, 2)
         n1, n2 = self.normals[self.pairs[:, 0]], self.normals[self.pairs[:, 1]]
         self.bend = np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
-        sides = np.sort(self.F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        _, first, count = np.unique(sides[:, 0] * len(self.V) + sides[:, 1], return_index=True, return_counts=True)
-        self.rim, self.rim_faces = sides[first[count == 1]], first[count == 1] // 3
+        alone = trimesh.grouping.group_rows(tm.edges_sorted, require_count=1)  # type: ignore[no-untyped-call]
+        self.rim, self.rim_faces = tm.edges_sorted[alone], tm.edges_face[alone]
         opposite = np.asarray(tm.face_adjacency_unshared, dtype=np.int64).reshape(-1, 2)
         # Off-plane distance of each far corner: unlike an angle it does not blow up on slivers.
         on_edge = self.V[self.edges[:, 0]]
@@ -55,29 +51,39 @@ class Surface:
 
     def labels(self, keep: BoolArray) -> IntArray:
         """Component (m,) of each face when only the neighbour pairs ``keep`` (p,) connect."""
-        p = self.pairs[keep]
-        graph = coo_array((np.ones(len(p), dtype=np.int8), (p[:, 0], p[:, 1])), shape=(len(self.F),) * 2)
-        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+        from trimesh.graph import connected_component_labels
+
+        label = connected_component_labels(self.pairs[keep], len(self.F))  # type: ignore[no-untyped-call]
+        return np.asarray(label, dtype=np.int64)
 
     def cells(self, tolerance: float) -> IntArray:
         """Label (m,) of the planar cell of each face; neighbours within ``tolerance`` of one plane share a cell."""
         return self.labels((self.step <= tolerance) & (self.bend < MAX_FACET))
 
 
+def border(surface: Surface, faces: IntArray) -> tuple[BoolArray, IntArray, BoolArray]:
+    """Which neighbour pairs (p,) part ``faces`` from the rest, the faces outside (k,), and which pairs lie within."""
+    inside = np.isin(np.arange(len(surface.F)), faces)
+    first, second = inside[surface.pairs].T
+    crossing = first != second
+    return crossing, np.where(first, surface.pairs[:, 1], surface.pairs[:, 0])[crossing], first & second
+
+
+def angles(surface: Surface, axis: Axis, faces: IntArray, u: Array, w: Array) -> Array:
+    """Angles (k, 3) of the corners of ``faces`` (k,) about the axis, rad from u towards w."""
+    p = surface.V[surface.F[faces]] - axis.point
+    return np.asarray(np.arctan2(p @ w, p @ u))
+
+
+def turned(angle: Array, base: Array) -> Array:
+    """Angles from ``base``, in [-pi, pi)."""
+    return np.asarray((angle - base + np.pi) % (2.0 * np.pi) - np.pi)
+
+
 def facet_span(surface: Surface, axis: Axis, faces: IntArray, cells: IntArray) -> Array:
     """Angle (rad) about the axis of each planar cell that has some of ``faces``, counting those faces only."""
-    u, w = perpendicular(axis.direction)
-    p = surface.V[surface.F[faces]] - axis.point
-    angle = np.arctan2(p @ w, p @ u)
-    _, first, cell = np.unique(cells[faces], return_index=True, return_inverse=True)
-    base = angle[first, 0][cell][:, None]
-    turned = (angle - base + np.pi) % (2.0 * np.pi) - np.pi
-    low, high = np.zeros(len(first)), np.zeros(len(first))
-    np.minimum.at(low, cell, turned.min(axis=1))
-    np.maximum.at(high, cell, turned.max(axis=1))
-    return np.asarray(high - low)
-
-
-def sagitta(radius: float, span: float) -> float:
-    """Distance between an arc of ``span`` rad and its chord."""
-    return float(2.0 * radius * np.sin(0.25 * span) ** 2)
+    angle = angles(surface, axis, faces, *perpendicular(axis.direction))
+    names, first, cell = np.unique(cells[faces], return_index=True, return_inverse=True)
+    about = turned(angle, angle[first, :1][cell])
+    index = np.arange(len(names))
+    return np.asarray(ndimage.maximum(about.max(axis=1), cell, index) - ndimage.minimum(about.min(axis=1), cell, index))

@@ -63,10 +63,10 @@ def test_a_run_tells_the_others_when_asked():
     assert all(abs(e.closing - run.closing) > 1e-6 or abs(e.tilt - run.tilt) > 1e-6 for e in run.others)
     text = run_to_text(run)
     for e in run.others:
-        words = "another equilibrium:" if e.rests else "also ends at"
+        words = "another equilibrium:" if e.is_equilibrium else "also ends at"
         assert f"{words} {e.distance:.3f} mm" in text
         assert str(e) in [finding.text for finding in run.findings if finding.severity == "note"]
-        assert e.rests == ("slips" not in e.detail)
+        assert e.is_equilibrium == ("slips" not in e.detail)
     assert len(run.to_dict()["other_ends"]) == len(run.others)
 
 

@@ -165,8 +165,8 @@ def test_steps_must_be_positive(clamp):
 
 
 def test_a_closing_that_would_take_for_ever_is_refused(monkeypatch):
-    monkeypatch.setattr("clamp3d.clamp.final_state._MOST_STRIDES", 2)
-    with pytest.raises(SolverError, match=r"closing takes more than 2 strides of .* the down splint's width"):
+    monkeypatch.setattr("clamp3d.clamp.final_state._MAX_DESCENTS", 2)
+    with pytest.raises(SolverError, match=r"closing takes more than 2 descents of .* the down splint's width"):
         solve_final_state(Section(load_clamp(), Cas()))
 
 

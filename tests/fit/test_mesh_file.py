@@ -1,6 +1,7 @@
 """Reading: units, axes, repairs, and one line for every kind of bad file."""
 
 import sys
+import zipfile
 
 import manifold3d
 import numpy as np
@@ -36,6 +37,22 @@ def test_gltf_is_metres_and_y_up(part, tmp_path):
     mesh = load_mesh(tmp_path / "part.glb")
     assert np.allclose(mesh.vertices.min(axis=0), part.vertices.min(axis=0), atol=1e-4)
     assert np.allclose(mesh.vertices.max(axis=0), part.vertices.max(axis=0), atol=1e-4)
+
+
+@pytest.mark.parametrize(("unit", "size"), [("micron", 0.137), ("foot", 137 * 304.8), ("inch", 137 * 25.4)])
+def test_units_of_the_3mf_specification(part, tmp_path, unit, size):
+    part.export(tmp_path / "part.3mf")
+    with zipfile.ZipFile(tmp_path / "part.3mf") as made:
+        files = {name: made.read(name) for name in made.namelist()}
+    for written, expected in ((unit, size), ("cubit", None)):
+        with zipfile.ZipFile(tmp_path / "other.3mf", "w") as out:
+            for name, content in files.items():
+                out.writestr(name, content.replace(b'unit="millimeter"', f'unit="{written}"'.encode()))
+        if expected is None:
+            with pytest.raises(InputError, match=r"unit must be one of micron, .*, got 'cubit'"):
+                load_mesh(tmp_path / "other.3mf")
+        else:
+            assert np.isclose(np.ptp(load_mesh(tmp_path / "other.3mf").vertices[:, 0]), expected, rtol=1e-6)
 
 
 def test_unit_option(part, tmp_path):

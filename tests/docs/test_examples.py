@@ -1,0 +1,99 @@
+"""Every example of README and docs/ is run, and what it prints is compared.
+
+```python   is executed; lines with >>> are doctests. Blocks of one page share their names.
+```console  lines after `$` are run in bash, the lines below are what stdout must hold (... stands for anything).
+```toml     a block that begins with the comment `# NAME.toml` is that file for the examples below it; all must be TOML.
+```sh       is too long or too interactive to run: every clamp3d in it must be a command with options that exist.
+"""
+
+import doctest
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import click
+import pytest
+from sybil import Sybil
+from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser
+
+from clamp3d import cli
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+BASH = f'clamp3d() {{ {shlex.quote(sys.executable)} -m clamp3d "$@"; }}; python() {{ {shlex.quote(sys.executable)} "$@"; }}\n'
+
+
+def console(example):
+    """Run each command of a console block, and compare what it prints."""
+    for session in re.split(r"^\$ ", example.parsed, flags=re.MULTILINE)[1:]:
+        command, _, wanted = session.partition("\n")
+        done = subprocess.run(
+            ["bash", "-c", BASH + command], capture_output=True, text=True, timeout=300, env=ENVIRONMENT, check=False
+        )
+        if done.returncode not in (0, 1, 3):
+            return f"{command}\nexit code {done.returncode}: {done.stderr}"
+        wanted = "\n".join(line.rstrip() for line in wanted.strip("\n").split("\n")) + "\n"
+        got = "\n".join(line.rstrip() for line in done.stdout.strip("\n").split("\n")) + "\n"
+        if wanted.strip() and not doctest.OutputChecker().check_output(wanted, got, doctest.ELLIPSIS):
+            return f"{command}\nwanted:\n{wanted}\ngot:\n{got}\nstderr:\n{done.stderr}"
+    return None
+
+
+def toml(example):
+    """A file of the reader's, if its first line is its name."""
+    tomllib.loads(example.parsed)
+    if name := re.match(r"# ([\w-]+\.toml)\n", example.parsed):
+        Path(name[1]).write_text(example.parsed, encoding="utf-8")
+
+
+def shell(example):
+    """Commands and options of a block that is not run."""
+    for line in example.parsed.replace("\\\n", " ").splitlines():
+        words = shlex.split(line, comments=True)
+        if words[:1] == ["clamp3d"]:
+            command = cli.group.get_command(click.Context(cli.group), words[1])
+            if command is None:
+                return f"no such command: {line}"
+            known = {name for option in command.params for name in (*option.opts, *option.secondary_opts)}
+            unknown = [w for w in words[2:] if w.startswith("-") and w != "-" and w.split("=")[0] not in known]
+            if unknown:
+                return f"{line}: unknown {unknown}"
+    return None
+
+
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "120"}
+SYBIL = Sybil(
+    parsers=[
+        PythonCodeBlockParser(doctest_optionflags=doctest.ELLIPSIS),
+        CodeBlockParser("console", console),
+        CodeBlockParser("toml", toml),
+        CodeBlockParser("sh", shell),
+    ],
+    path=str(ROOT),
+)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_examples(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for folder in ("examples", "meshes", "docs"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    for example in SYBIL.parse(page).examples():
+        example.evaluate()
+
+
+def test_a_wrong_number_is_seen(tmp_path):
+    page = tmp_path / "page.md"
+    for text in (
+        "```python\n>>> 1 + 1\n3\n```\n",
+        "```console\n$ echo 2\n3\n```\n",
+        "```sh\nclamp3d run --nonsense\n```\n",
+    ):
+        page.write_text(text)
+        with pytest.raises(Exception, match="3|nonsense"):
+            for example in SYBIL.parse(page).examples():
+                example.evaluate()
