@@ -20,7 +20,7 @@ from clamp3d.collide.distance import Distance
 from clamp3d.collide.result import BAD, PairResult
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Verdict
-from clamp3d.core.shapes import MeshShape
+from clamp3d.core.shapes import MeshShape, Solid
 from clamp3d.output.assembly_steps import StepRow, TighteningRow, step_rows, tightening_rows
 from clamp3d.output.wording import circumstances, gap_text, headline, sentence, titles
 
@@ -211,6 +211,7 @@ def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
         n_pairs=result.work.pairs,
         modelled=(*(_described(part.name, part.shape) for part in scene.parts[:MEASURED_PAIRS]), _motions(scene)),
         not_modelled=(
+            *_left_out(scene),
             *_NOT_MODELLED,
             *(() if scene.motions else ("motions: the parts stand where the scene puts them",)),
         ),
@@ -256,7 +257,7 @@ def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
         n_pairs=len(rows),
         modelled=_clamp_modelled(assembly),
         not_modelled=(
-            *(f"{p.name} {p.shape.title}: {p.shape.not_modelled}" for p in scene.parts if p.shape.not_modelled),
+            *_left_out(scene),
             *_NOT_MODELLED,
             "motions out of the section: wires that are bent, turned or shifted along the clamp",
             *(f"method {assembly.method}: {limit}" for limit in assembly.limits),
@@ -306,6 +307,12 @@ def _described(name: str, shape: object) -> str:
     }[shape.fit]
     notes = "".join(f"; {note}" for note in shape.mesh.notes)
     return f"{name}: mesh {shape.name} of {len(shape.mesh.faces)} triangles, taken as {how}{notes}"
+
+
+def _left_out(scene: Scene) -> list[str]:
+    names = titles(scene)
+    drawn = {part.name: part.shape for part in scene.parts if isinstance(part.shape, Solid)}
+    return [f"{names[name]}: {solid.not_modelled}" for name, solid in drawn.items() if solid.not_modelled]
 
 
 def _motions(scene: Scene) -> str:

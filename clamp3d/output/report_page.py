@@ -10,6 +10,7 @@ import json
 import math
 import platform
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -148,20 +149,21 @@ def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list
     scene, assembly = report.scene, report.assembly
     jobs: list[tuple[str, str, Callable[[], Figure], PairRow | None]] = []
     if assembly is not None:
-        jobs.append(("overview", "the states", lambda: states_figure(assembly), None))
-        jobs.append(("steps", "the steps", lambda: steps_figure(assembly), None))
-        # Every pair that touches, overlaps, or is declared to; a thread has nothing to show.
-        drawn = [row for row in report.rows if row.contact and (row.contact.type or row.contact.declared) > 1]
-        jobs += [("pairs", row.name, lambda c=row.contact: contact_figure(assembly, c), row) for row in drawn]
+        jobs.append(("overview", "the states", partial(states_figure, assembly), None))
+        jobs.append(("steps", "the steps", partial(steps_figure, assembly), None))
+        for row in report.rows:
+            # Every pair that touches, overlaps, or is declared to; a thread has nothing to show.
+            if row.contact is not None and (row.contact.type or row.contact.declared) > 1:
+                jobs.append(("pairs", row.name, partial(contact_figure, assembly, row.contact), row))
     elif scene.parts:
         found = [finding.row for finding in report.findings if finding.row is not None]
         marks = [(number, row.result) for number, row in enumerate(found, 1)]
-        jobs.append(("overview", "the scene", lambda: scene_figure(scene, marks[:PICTURES]), None))
-        jobs += [("pairs", row.name, lambda r=row.result: finding_figure(scene, r), row) for row in found[:PICTURES]]
+        jobs.append(("overview", "the scene", partial(scene_figure, scene, marks[:PICTURES]), None))
+        jobs += [("pairs", row.name, partial(finding_figure, scene, row.result), row) for row in found[:PICTURES]]
     out: dict[str, list[tuple[str, PairRow | None]]] = {"overview": [], "steps": [], "pairs": []}
-    for kind, name, draw, row in jobs:
+    for kind, name, draw, pair in jobs:
         progress(f"picture of {name}")
-        out[kind].append((_data_address(draw()), row))
+        out[kind].append((_data_address(draw()), pair))
     return out
 
 

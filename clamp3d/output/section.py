@@ -51,8 +51,8 @@ def arc_path(profile: Profile) -> MplPath:
     for edge in profile.edges:
         if isinstance(edge, Arc):
             low, high = sorted((math.degrees(edge.start_angle), math.degrees(edge.end_angle)))
-            curve = Path.arc(low, high, max(1, math.ceil((high - low) / 10.0))).vertices
-            vertices += [*(edge.centre + edge.radius * (curve if edge.sweep > 0.0 else curve[::-1])[1:])]
+            curve = np.asarray(Path.arc(low, high, max(1, math.ceil((high - low) / 10.0))).vertices, dtype=float)
+            vertices += [*(edge.radius * (curve if edge.sweep > 0.0 else curve[::-1])[1:] + edge.centre)]
             codes += [int(Path.CURVE4)] * (len(curve) - 1)
         else:
             vertices.append(edge.end)
@@ -127,7 +127,7 @@ def balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> Non
 def draw_marks(ax: Axes, marks: Iterable[Mark], *, size: float = 6.0) -> None:
     """Contact points as dots in the colour of their verdict."""
     for mark in marks:
-        style = {"ms": size, "mec": INK, "mew": 0.7, "mfc": VERDICT_COLOURS[mark.verdict]}
+        style: dict[str, Any] = {"ms": size, "mec": INK, "mew": 0.7, "mfc": VERDICT_COLOURS[mark.verdict]}
         ax.plot([mark.x], [mark.y], "o", **style, zorder=40, clip_on=False)
 
 
