@@ -253,7 +253,8 @@ class Viewer:
         head = self._clamp.told() if self._clamp is not None else _told(scene)
         measured = "exactly" if self._model is None else f"by {self._model.name}"
         stops = [
-            _stop_data(stop) | dict(zip(("low", "high"), (x.tolist() for x in drawing.extent([stop.poses])), strict=True))
+            _stop_data(stop)
+            | dict(zip(("low", "high"), (x.tolist() for x in drawing.extent([stop.poses])), strict=True))
             for stop in drawing.timeline.stops
         ]
         used = {row["verdict"] for stop in stops for row in stop["rows"]} | {"contact", "clearance", "clear"}
