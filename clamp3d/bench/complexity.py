@@ -68,7 +68,7 @@ def grid_search(run: Assembly, model: ContactModel, *, n: int, parts: int, groov
     """Try every combination of ``n`` positions for each of 1 to 3 moving parts; the paper's search.
 
     The parts are the down splint (along the bolt), the jumper and the line (both up and down), each within 12 mm of
-    its place in ``run``; those that do not move stand at it, with 1e-6 mm of room. ``grooves`` (1 to 4) are tested.
+    its place in ``run``; those that do not move stand at it, 1e-6 mm apart. ``grooves`` (1 to 4) are tested.
     """
     section = Section(run.clamp, model)
     up, down = run.poses["P1"], run.poses["P2"]

@@ -117,7 +117,7 @@ def open_start(rng: np.random.Generator, section: Section) -> Array:
         q = section.open_state(section.open_distance() + rng.choice([0.0, 1.0, 100.0]) * rng.random(), tilt)
         for i in (0, 2):
             low, high = bounds[i]
-            # A lip itself, a hair inside it, or anywhere in the mouth.
+            # A lip itself, a little inside it, or anywhere in the mouth.
             place = rng.choice([0.0, 10.0 ** rng.uniform(-9.0, -2.0), rng.random()])
             q[i] = low + place * (high - low) if rng.random() < 0.5 else high - place * (high - low)
             q[i + 1] += rng.uniform(-5.0, 5.0)
@@ -136,7 +136,10 @@ def _poor(rng: np.random.Generator) -> Case:
     return Case(clamp, open_start(rng, Section(clamp, Cas())))
 
 
-@_family("equal clearances", "grooves and wires equal, or equal up to 1e-12 ... 1e-3: which contact carries is a hair")
+@_family(
+    "equal clearances",
+    "grooves and wires equal, or up to 1e-12 ... 1e-3: rounding decides which contacts are active",
+)
 def _equal(rng: np.random.Generator) -> Clamp | None:
     R, half, offset = _RADIUS * rng.uniform(0.5, 1.2), rng.uniform(0.3, 1.3), _OFFSET * rng.uniform(0.85, 1.15)
     wire = 2.0 * R * rng.uniform(0.3, 1.3)
