@@ -53,7 +53,7 @@ def workers(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[str]]:
         started.append(popen(*args, **kwargs))  # type: ignore[call-overload]
         return started[-1]
 
-    monkeypatch.setattr(decomposition.subprocess, "Popen", record)
+    monkeypatch.setattr(subprocess, "Popen", record)
     return started
 
 
@@ -119,7 +119,7 @@ def test_interrupt_leaves_no_process(workers: list[subprocess.Popen[str]], monke
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(decomposition, "_wait", interrupted)
+    monkeypatch.setattr(decomposition, "_stage", interrupted)
     with pytest.raises(KeyboardInterrupt):
         decompose(V, F, COARSE)
     assert [worker.poll() is not None for worker in workers] == [True]
