@@ -94,6 +94,8 @@ def headline(result: CheckResult) -> str:
     checked = f"{result.work.pairs} {'pair' if result.work.pairs == 1 else 'pairs'}"
     if result.scene.motions:
         checked += f" and {len(result.scene.motions)} {'motion' if len(result.scene.motions) == 1 else 'motions'}"
+    if not result.work.pairs:
+        return "Clean: no two parts to check"
     if not found:
         return f"Clean: {checked} checked, nothing clashes"
     return ("" if clashes else "No clash: ") + "; ".join(others) + f" ({checked} checked)"
