@@ -15,7 +15,10 @@ from clamp3d.cli.terminal import finish, show
 @source_argument()
 @method_options
 @click.option(
-    "--clearance", type=number, metavar="MM", help="Gap that parts must keep.  [default: 5 for a clamp; the scene's own]"
+    "--clearance",
+    type=number,
+    metavar="MM",
+    help="Gap that parts must keep.  [default: 5 for a clamp; the scene's own]",
 )
 @click.option("--outline-error", type=number, hidden=True, help="No longer needed: pairs are measured as solids.")
 @click.option("--output", "-o", type=FOLDER, required=True, metavar="DIR")

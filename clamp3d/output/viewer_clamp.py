@@ -12,7 +12,6 @@ from clamp3d.clamp.contact import NONE, Contact, measure_contacts
 from clamp3d.clamp.dimensions import TITLES, Clamp
 from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import clamp_scene
-from clamp3d.clamp.screw import ScrewJoint
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array, rotation
@@ -55,7 +54,7 @@ class ClampStory:
         rows.sort(key=lambda row: not row.declared)
         on = float(poses["P4"][2, 3] - poses["P5"][2, 3])  # up to a constant
         self._first = on if self._first is None else self._first
-        before, self._turn = self._turn, -ScrewJoint(self.clamp.bolt.pitch).turn(on - self._first)  # clockwise
+        before, self._turn = self._turn, -self.clamp.bolt.turn(on - self._first)  # clockwise
         n = math.ceil(abs(self._turn - before) / _TURN)
         nut, turns = poses["P5"], np.linspace(before, self._turn, n + 1)
         via = [(k / n, {"P5": nut @ _about_z(turn)}) for k, turn in enumerate(turns[1:-1], 1)]
