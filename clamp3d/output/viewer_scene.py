@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clamp3d.collide.distance import Distance
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.pose import Array
 from clamp3d.output import viewer_objects as draw
@@ -215,7 +216,7 @@ class SceneDrawing:
             if point is not None:
                 self._dot(f"{path}/{name}", point, red)
         common = overlap(self._meshes[a], poses[a], self._meshes[b], poses[b])
-        low, high = focus(row)
+        low, high = focus(row.distance)
         if common is not None:
             common.apply_transform(poses[a])
             self.put(f"{path}/overlap", draw.facets(common, red, opacity=0.6, on_top=True))
@@ -272,7 +273,7 @@ class SceneDrawing:
         self.property(path, "visible", on)
 
 
-def focus(row: Row) -> tuple[Array, Array]:
-    """Corners of a box around the witness points of a row; empty where it has none."""
-    points = [p for p in (row.distance.point_a, row.distance.point_b) if p is not None] or [np.zeros(3)]
+def focus(d: Distance) -> tuple[Array, Array]:
+    """Corners of a box around the witness points of a distance."""
+    points = [p for p in (d.point_a, d.point_b) if p is not None] or [np.zeros(3)]
     return np.min(points, axis=0), np.max(points, axis=0)
