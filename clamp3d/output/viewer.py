@@ -199,8 +199,7 @@ class Viewer:
 
     def _measured(self, scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[Row]:
         """Pairs of a scene as rows, by the engine that every command asks."""
-        found, verdict = measure(scene, pairs, cache=self._cache), scene.thresholds.verdict
-        return [Row(a, b, verdict(d, scene.allowance(a, b)).value, d, scene.contact) for (a, b), d in found.items()]
+        return [Row.of(scene, *pair, d) for pair, d in measure(scene, pairs, cache=self._cache).items()]
 
     def _assembly_finding(self, finding: Finding) -> dict[str, Any]:
         """A finding with the place to look at: where the pair that it names is at the end, else the whole clamp."""

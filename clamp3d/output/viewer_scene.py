@@ -124,8 +124,7 @@ class SceneDrawing:
         self.go(0)  # so that it does not matter whether a page reads this or the animation first
         followers = {name: self.paths(name) for name in self._meshes}
         groups = [f"{ROOT}/contacts", f"{ROOT}/gaps"]
-        moving = len(self.timeline.stops) > 1
-        if moving:
+        if len(self.timeline.stops) > 1:
             self._send(SetAnimation(self.timeline.animation(followers, groups)).lower())
 
     def frame(self) -> dict[str, Any]:
@@ -145,10 +144,7 @@ class SceneDrawing:
 
     def _stage(self) -> None:
         """Light background, softer light, no grid."""
-        from meshcat.commands import Delete
-        from meshcat.path import Path
-
-        self._send(Delete(Path().append(ROOT.lstrip("/"))).lower())
+        self._send({"type": "delete", "path": ROOT})
         for key, colour in (("top_color", [0.93, 0.95, 0.97]), ("bottom_color", [1.0, 1.0, 1.0])):
             self.property("/Background", key, colour)
         self.visible("/Grid", False)
@@ -240,7 +236,7 @@ class SceneDrawing:
         middle = 0.5 * (a + b)
         upright = abs(b[2] - a[2]) >= abs(b[0] - a[0])
         beside = middle + 0.08 * self.size * np.array([-1.0, 0.0, 0.0] if upright else [-1.0, 0.0, 0.7])
-        self.put(f"{path}/line", draw.segments([a, b, middle, beside], darker(colour, 0.7), on_top=True))
+        self.put(f"{path}/line", draw.segments([a, b, middle, beside], darker(colour, 0.85), on_top=True))
         self._label(f"{path}/value", text.removeprefix("gap "), beside, "#FFFFFF", 0.7)
 
     def _label(self, path: str, text: str, at: ArrayLike, colour: str, size: float) -> None:
