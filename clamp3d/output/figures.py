@@ -139,7 +139,8 @@ def _enlarge(ax: Axes, run: Assembly, contact: Contact, number: str = "") -> Non
     """The two parts about their contact point; grooves in the section beside the bolt, where they are whole."""
     half = 0.045 * run.clamp.up_splint.width
     below = gap_text(contact.distance.lower, contact.distance.upper)
-    if contact.point is not None and abs(contact.point[1]) > CONTACT:
+    in_arc = 3 in (contact.declared, contact.type)  # along a line, the section too
+    if contact.point is not None and abs(contact.point[1]) > CONTACT and not in_arc:
         below += f", {abs(contact.point[1]):.1f} mm {'before' if contact.point[1] < 0.0 else 'behind'} the section"
     if contact.normal is not None and abs(contact.normal[1]) > 0.7:
         half *= 4.0  # nearest across the section: a bolt in its hole, which is seen whole
@@ -149,8 +150,8 @@ def _enlarge(ax: Axes, run: Assembly, contact: Contact, number: str = "") -> Non
     ax.set_yticks([])
     for mark in _marks([contact]):
         window = (mark.x - 1.5 * half, mark.y - half), (mark.x + 1.5 * half, mark.y + half)
-        holes = 3 not in (contact.declared, contact.type)
-        draw_section(ax, run.clamp, run.poses, only=(contact.a, contact.b), holes=holes, line_width=1.6, window=window)
+        pair = contact.a, contact.b
+        draw_section(ax, run.clamp, run.poses, only=pair, holes=not in_arc, line_width=1.6, window=window)
         draw_marks(ax, [mark], size=7.0)
         if contact.normal is not None:
             tip = {
