@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import SectionPose
 from clamp3d.core.profile import Arc, Point, Profile
 from clamp3d.core.shapes import Solid
-from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, VERDICT_COLOURS, darker
+from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, darker
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,15 +39,6 @@ _ARROW: dict[str, Any] = {
     "shrinkB": 0.0,
 }
 _ORDER: tuple[PartName, ...] = ("P6", "P7", "P1", "P2", "P3", "P4", "P5")
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """A point of the section worth a dot: a contact. ``x``, ``y`` in mm; ``verdict`` picks the colour."""
-
-    x: float
-    y: float
-    verdict: str = "contact"
 
 
 def arc_path(profile: Profile) -> MplPath:
@@ -131,13 +121,6 @@ def balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> Non
     """The name of a part in a circle of its colour."""
     box = {"boxstyle": "circle,pad=0.2", "fc": PART_COLOURS[name], "ec": INK, "lw": 0.7}
     ax.annotate(name, (x, y), ha="center", va="center", fontsize=size, fontweight="bold", zorder=31, bbox=box)
-
-
-def draw_marks(ax: Axes, marks: Iterable[Mark], *, size: float = 6.0) -> None:
-    """Contact points as dots in the colour of their verdict."""
-    for mark in marks:
-        style: dict[str, Any] = {"ms": size, "mec": INK, "mew": 0.7, "mfc": VERDICT_COLOURS[mark.verdict]}
-        ax.plot([mark.x], [mark.y], "o", **style, zorder=40, clip_on=False)
 
 
 def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int] = (-1, 1)) -> None:
