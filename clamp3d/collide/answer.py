@@ -33,6 +33,8 @@ class Distance:
         Whether the nearest points are the only ones; None where that is not known.
     level, method : str
         The refinement level and the method that gave the last word.
+    estimate : float or None
+        What a contact model says, mm; None for the exact engine, whose ``value`` is ``upper``.
     """
 
     lower: float = -math.inf
@@ -43,16 +45,17 @@ class Distance:
     unique: bool | None = None
     level: str = ""
     method: str = ""
+    estimate: float | None = None
 
     @property
     def value(self) -> float:
-        """The distance in mm: the upper bound, which the witness points attest."""
-        return self.upper
+        """The distance in mm: the upper bound, which the witness points attest, or what a contact model says."""
+        return self.upper if self.estimate is None else self.estimate
 
     @property
     def uncertainty(self) -> float:
         """How far ``value`` can be off, mm."""
-        return self.upper - self.lower
+        return max(self.upper - self.value, self.value - self.lower)
 
     def meet(self, other: Distance) -> Distance:
         """Both at once: the tighter of the bounds on either side."""
@@ -68,8 +71,9 @@ class Distance:
         best, rest = (self, other) if (self.upper, self.lower) <= (other.upper, other.lower) else (other, self)
         unique = best.unique
         if rest.lower <= best.upper + 1e-9:  # the other may be as near, at another place
-            apart = rest.point_a is not None and best.point_a is not None and rest.upper <= best.upper + 1e-9
-            unique = False if apart and np.abs(rest.point_a - best.point_a).max() > 1e-6 else None
+            unique = None
+            if rest.point_a is not None and best.point_a is not None and rest.upper <= best.upper + 1e-9:
+                unique = False if np.abs(rest.point_a - best.point_a).max() > 1e-6 else best.unique
         return replace(best, lower=min(self.lower, other.lower), unique=unique)
 
     def ordered(self) -> Distance:

@@ -8,15 +8,18 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clamp3d.checks import array, instance, positive
+from clamp3d.checks import instance, positive
 from clamp3d.collide.answer import Distance, Distances
+from clamp3d.collide.batch import by_kernel
 from clamp3d.collide.model import ModelCache
+from clamp3d.collide.modelled import modelled
 from clamp3d.collide.refine import ACCURACY, from_boxes, measured, refine, with_normal
 from clamp3d.collide.scene import Scene, name_pairs
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.contact_model import ContactModel
-from clamp3d.core.pose import Array, check_pose, inverse
-from clamp3d.core.shapes import AnyShape, Shape, as_shape
+from clamp3d.core.pose import Array, check_pose, check_pose_array, inverse
+from clamp3d.core.primitives import SweptArc
+from clamp3d.core.shapes import AnyShape, Shape, as_shape, groove_block
 
 __all__ = ["ACCURACY", "Distance", "Distances", "distance", "distances", "measure"]
 
@@ -34,8 +37,8 @@ def distance(
 
     Parameters
     ----------
-    a, b : Solid, MeshShape or Cylinder
-        The bodies; a cylinder has flat ends.
+    a, b : Solid, MeshShape, Cylinder or SweptArc
+        The bodies; a cylinder has flat ends, a bare groove no faces beside those of `SweptArc`.
     T_a_b : array_like (4, 4), optional
         Pose of b in the frame of a; the same frame by default.
     accuracy : float
@@ -65,20 +68,64 @@ def distance(
     (2.0, [0.0, 0.0, 1.0])
     """
     T = np.eye(4) if T_a_b is None else check_pose(T_a_b, "T_a_b")
-    return _measured(cache or ModelCache(), as_shape(a), as_shape(b), T, positive("accuracy", accuracy), model)
+    x, y = _bounded(a, b, T[None])
+    return _measured(cache or ModelCache(), x, y, T, positive("accuracy", accuracy), model)
 
 
-def distances(a: AnyShape, b: AnyShape, T_a_b: ArrayLike, *, model: ContactModel | None = None) -> Distances:
-    """Signed distances of two bodies for many poses ``T_a_b`` (n, 4, 4) of b in the frame of a.
+def distances(
+    a: AnyShape,
+    b: AnyShape,
+    T_a_b: ArrayLike,
+    *,
+    model: ContactModel | None = None,
+    cache: ModelCache | None = None,
+) -> Distances:
+    """Signed distances of two bodies for many poses: the same as `distance` for each of them.
 
-    The same as `distance` for each of them.
+    Where grooves or holes of one body and a cylinder decide, all poses are measured at once.
+
+    Parameters
+    ----------
+    a, b : Solid, MeshShape, Cylinder or SweptArc
+        The bodies.
+    T_a_b : array_like (n, 4, 4)
+        Poses of b in the frame of a.
+    model, cache
+        As for `distance`.
+
+    Returns
+    -------
+    Distances
+        Arrays of n; points and normals in the frame of a.
+
+    Examples
+    --------
+    >>> from clamp3d.core import shapes
+    >>> from clamp3d.core.pose import translation
+    >>> block, wire = shapes.groove_block(SweptArc(7, 1.0, 50), 40, 20), shapes.cylinder(6.5, 80)
+    >>> distances(block, wire, [translation(0, y, 0) for y in (0.0, -0.2)]).value.round(9).tolist()
+    [0.5, 0.3]
     """
-    T = array("T_a_b", T_a_b, (None, 4, 4), finite=False)
-    cache = ModelCache()
-    x, y = as_shape(a), as_shape(b)
+    T = check_pose_array(T_a_b, "T_a_b")
+    cache = cache or ModelCache()
+    shapes = _bounded(a, b, T)
+    x, y = (cache.model(shape) for shape in shapes)
+    found: list[Distance | None] = [None] * len(T) if model is not None else by_kernel(x, y, T)
     return Distances.of(
-        [_measured(cache, x, y, check_pose(pose, f"T_a_b[{k}]"), ACCURACY, model) for k, pose in enumerate(T)]
+        [_measured(cache, *shapes, T[k], ACCURACY, model) if d is None else d for k, d in enumerate(found)]
     )
+
+
+def _bounded(a: AnyShape, b: AnyShape, T: Array) -> tuple[Shape, Shape]:
+    """Both as shapes of a scene: a bare groove in a block whose other faces are too far away to matter at ``T``."""
+    if isinstance(a, SweptArc) == isinstance(b, SweptArc):
+        return as_shape(a), as_shape(b)
+    groove, other = (a, as_shape(b)) if isinstance(a, SweptArc) else (b, as_shape(a))
+    assert isinstance(groove, SweptArc)
+    reach = np.linalg.norm(ModelCache().model(other).bounds, axis=1).max() + np.abs(T[:, :3, 3]).max(initial=0.0)
+    far = 8.0 * (float(reach) + groove.radius + groove.length)
+    block = groove_block(groove, far, far)
+    return (block, other) if groove is a else (other, block)
 
 
 def measure(
@@ -121,5 +168,5 @@ def measure(
 def _measured(cache: ModelCache, a: Shape, b: Shape, T: Array, accuracy: float, model: ContactModel | None) -> Distance:
     x, y = cache.model(a), cache.model(b)
     start = from_boxes(x, y, T)
-    found = refine(x, y, T, start, Thresholds(), lambda known: measured(known, accuracy))
-    return with_normal(found)
+    found = with_normal(refine(x, y, T, start, Thresholds(), lambda known: measured(known, accuracy)))
+    return found if model is None else modelled(x, y, T, found, model)

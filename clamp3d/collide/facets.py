@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm
-from clamp3d.collide.convex import Rod
+from clamp3d.collide.convex import Hull, Rod
 from clamp3d.collide.surface import Surface
 from clamp3d.core.pose import Array
 
@@ -80,6 +80,20 @@ def axis_gap(facets: Facets, rod: Rod, T: Array) -> float:
     if distance <= 1e-9 or facets.whole.contains(T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
         return -np.inf
     return low - rod.radius - _WIDTH - 1e-12 * (facets.whole.scale + rod.length + float(np.abs(T[:3, 3]).max()))
+
+
+def hull_gap(facets: Facets, around: Hull) -> float:
+    """Lower bound (mm) of the gap between the mesh and a polyhedron in its frame; minus infinity if they meet."""
+    import fcl
+
+    other = Surface(around.vertices, around.faces, 0.0)
+    low = np.inf
+    for tree, error in facets.groups:
+        request, result = fcl.DistanceRequest(), fcl.DistanceResult()
+        d = float(fcl.distance(fcl.CollisionObject(tree), fcl.CollisionObject(other.bvh), request, result))
+        low = min(low, d - error) if d > 0.0 else -np.inf
+    inside = facets.whole.contains(around.vertices[0]) or (around.depth(facets.whole.shell_points) > 0.0).any()
+    return -np.inf if inside else low - 1e-12 * (facets.whole.scale + other.scale)
 
 
 def _axis_inside(facets: Facets, body: ClosedForm, T: Array, distance: float) -> Distance:

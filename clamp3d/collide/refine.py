@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.body import bodies_distance
+from clamp3d.collide.body import ClosedForm, bodies_distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.convex import Rod
 from clamp3d.collide.facets import rod_distance
@@ -115,7 +115,7 @@ def _agreed(old: Distance, new: Distance) -> Distance:
 def _features(a: Model, b: Model, T: Array, enough: Enough) -> Distance:
     """Closed forms of both; the convex hull of a part that has none stands in for it."""
     level = "hulls" if a.bodies is None or b.bodies is None else "features"
-    pairs = []
+    pairs: list[tuple[float, int, ClosedForm, ClosedForm]] = []
     for x in a.forms:
         for y in b.forms:
             (p, r), (q, s) = x.ball, y.ball

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from clamp3d.collide.body import ClosedForm, bore_rod
-from clamp3d.collide.convex import Convex, Rod, convex_distance, hull
-from clamp3d.collide.facets import axis_gap
+from clamp3d.collide.convex import Convex, Hull, Rod, convex_distance, hull
+from clamp3d.collide.facets import axis_gap, hull_gap
 from clamp3d.collide.model import Model
 from clamp3d.core.pose import Array, inverse
 
@@ -35,12 +35,13 @@ def swept_lower(a: Model, b: Model, before: Array, middle: Array, after: Array, 
             lows = []
             for body in moving.bodies:
                 rods = [piece for piece in body.outers if isinstance(piece, Rod)]
-                if not rods:
-                    break
-                rod = _swept_rod(rods[0], poses, angle)
-                lows.append(axis_gap(still.facets, rod, poses[1]) - body.error)
-            else:
-                best = max(best, min(lows))
+                if rods:
+                    low = axis_gap(still.facets, _swept_rod(rods[0], poses, angle), poses[1])
+                else:
+                    around, sag = _swept_hull(body.outers[0], poses, angle)
+                    low = hull_gap(still.facets, around) - sag
+                lows.append(low - body.error)
+            best = max(best, min(lows))
     return float(best)
 
 
@@ -52,9 +53,8 @@ def _one_way(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], an
                 swept: Convex = _swept_rod(other, poses, angle)
                 best = max(best, convex_distance(piece, np.eye(4), swept, poses[1]).lower)
             else:
-                ways = np.array([other.vertices @ T[:3, :3].T + T[:3, 3] for T in poses])
-                around = hull((ways if angle else ways[::2]).reshape(-1, 3))
-                best = max(best, convex_distance(piece, np.eye(4), around, np.eye(4)).lower - _sagitta(ways, angle))
+                around, sag = _swept_hull(other, poses, angle)
+                best = max(best, convex_distance(piece, np.eye(4), around, np.eye(4)).lower - sag)
     return best
 
 
@@ -65,6 +65,13 @@ def _bores(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angl
             if isinstance(piece, Rod):
                 best = max(best, bore_rod(bore, _swept_rod(piece, poses, angle), poses[1]).lower)
     return best
+
+
+def _swept_hull(piece: Convex, poses: tuple[Array, ...], angle: float) -> tuple[Hull, float]:
+    """Hull of a polyhedron at all three poses, in the standing part's frame, and how far arcs leave it."""
+    assert isinstance(piece, Hull)
+    ways = np.array([piece.vertices @ T[:3, :3].T + T[:3, 3] for T in poses])
+    return hull((ways if angle else ways[::2]).reshape(-1, 3)), _sagitta(ways, angle)
 
 
 def _swept_rod(rod: Rod, poses: tuple[Array, ...], angle: float) -> Rod:

@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from clamp3d.checks import instance, whole
 from clamp3d.checks import path as checked_path
+from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.clamp.result import Assembly, Contact, Waypoint
+from clamp3d.clamp.result import Assembly, Waypoint
+from clamp3d.clamp.scene import CONTACT
+from clamp3d.collide.verdict import Thresholds
 from clamp3d.errors import InputError
 from clamp3d.output.files import whole_file
 from clamp3d.output.palette import INK
@@ -26,13 +29,13 @@ from clamp3d.output.section import (
     edge_openings,
     label_wires,
 )
+from clamp3d.output.wording import gap_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FORMATS = (".svg", ".png", ".pdf")
-_TOUCHING = 1e-6  # mm
 
 
 def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
@@ -68,7 +71,7 @@ def section_figure(run: Assembly, waypoint: Waypoint | None = None) -> Figure:
     draw_labels(ax, run.clamp, poses)
     draw_dimensions(ax, run.clamp, poses)
     if waypoint is None:
-        draw_marks(ax, [_mark(contact) for contact in _arc_contacts(run)])
+        draw_marks(ax, _marks(_arc_contacts(run)))
     title(ax, "final state" if waypoint is None else waypoint.label, f"{run.clamp.name} clamp, section to scale, mm")
     return figure
 
@@ -88,7 +91,7 @@ def states_figure(run: Assembly) -> Figure:
         title(ax, name, f"distance between the splints {edge_openings(run.clamp, poses)[0]:.3f} mm")
     label_wires(axes[0], near(run.clamp, run.path[0].poses))
     draw_labels(axes[1], run.clamp, run.poses)
-    draw_marks(axes[1], [_mark(contact) for contact in _arc_contacts(run)])
+    draw_marks(axes[1], _marks(_arc_contacts(run)))
     same_scale(axes)
     return figure
 
@@ -108,10 +111,10 @@ def contacts_figure(run: Assembly) -> Figure:
         overview, "concave arc contacts", f"{run.clamp.name} clamp, final state; dot: contact point, arrow: its normal"
     )
     for i, contact in enumerate(contacts):
-        mark = _mark(contact)
-        draw_marks(overview, [mark], size=5.0)
-        side = 1 if i % 2 else -1
-        _number(overview, i + 1, mark, mark.x + side * 0.09 * run.clamp.up_splint.width)
+        for mark in _marks([contact]):
+            draw_marks(overview, [mark], size=5.0)
+            side = 1 if i % 2 else -1
+            _number(overview, i + 1, mark, mark.x + side * 0.09 * run.clamp.up_splint.width)
         _enlarge(figure.add_subplot(grid[i // 2, 1 + i % 2]), run, contact, f"{i + 1}  ")
     return figure
 
@@ -127,7 +130,7 @@ def contact_figure(run: Assembly, contact: Contact) -> Figure:
     draw_section(overview, run.clamp, run.poses)
     label_wires(overview, run.poses)
     draw_dimensions(overview, run.clamp, run.poses)
-    draw_marks(overview, [_mark(contact)])
+    draw_marks(overview, _marks([contact]))
     _enlarge(close, run, contact)
     return figure
 
@@ -135,21 +138,33 @@ def contact_figure(run: Assembly, contact: Contact) -> Figure:
 def _enlarge(ax: Axes, run: Assembly, contact: Contact, number: str = "") -> None:
     """The two parts about their contact point; grooves in the section beside the bolt, where they are whole."""
     half = 0.045 * run.clamp.up_splint.width
-    mark = _mark(contact)
-    window = (mark.x - 1.5 * half, mark.y - half), (mark.x + 1.5 * half, mark.y + half)
-    pair, holes = (contact.a, contact.b), contact.type != 3
-    draw_section(ax, run.clamp, run.poses, only=pair, holes=holes, line_width=1.6, window=window)
-    draw_marks(ax, [mark], size=7.0)
-    tip = {"arrowstyle": "-|>,head_width=0.2,head_length=0.5", "color": INK, "lw": 1.2, "shrinkA": 3, "shrinkB": 0}
-    end = mark.x + 0.6 * half * float(contact.normal[0]), mark.y - 0.6 * half * float(contact.normal[2])
-    ax.annotate("", end, (mark.x, mark.y), arrowprops=tip, zorder=42)
-    ax.set_axis_on()
+    below = gap_text(contact.distance.lower, contact.distance.upper)
+    if contact.point is not None and abs(contact.point[1]) > CONTACT:
+        below += f", {abs(contact.point[1]):.1f} mm {'before' if contact.point[1] < 0.0 else 'behind'} the section"
+    if contact.normal is not None and abs(contact.normal[1]) > 0.7:
+        half *= 4.0  # nearest across the section: a bolt in its hole, which is seen whole
+    heading = f"{number}{contact.a} and {contact.b}: {contact.relation.replace('none', 'apart')}"
+    ax.set_title(f"{heading}\n{below}", fontsize=8, loc="left", color=INK)
     ax.set_xticks([])
     ax.set_yticks([])
-    ax.set_xlim(mark.x - 1.5 * half, mark.x + 1.5 * half)
-    ax.set_ylim(mark.y + half, mark.y - half)
-    heading = f"{number}{contact.a} and {contact.b}: {contact.relation}\ngap {_zero(contact.distance):.6f} mm"
-    ax.set_title(heading, fontsize=8, loc="left", color=INK)
+    for mark in _marks([contact]):
+        window = (mark.x - 1.5 * half, mark.y - half), (mark.x + 1.5 * half, mark.y + half)
+        holes = 3 not in (contact.declared, contact.type)
+        draw_section(ax, run.clamp, run.poses, only=(contact.a, contact.b), holes=holes, line_width=1.6, window=window)
+        draw_marks(ax, [mark], size=7.0)
+        if contact.normal is not None:
+            tip = {
+                "arrowstyle": "-|>,head_width=0.2,head_length=0.5",
+                "color": INK,
+                "lw": 1.2,
+                "shrinkA": 3,
+                "shrinkB": 0,
+            }
+            end = mark.x + 0.6 * half * float(contact.normal[0]), mark.y - 0.6 * half * float(contact.normal[2])
+            ax.annotate("", end, (mark.x, mark.y), arrowprops=tip, zorder=42)
+        ax.set_axis_on()
+        ax.set_xlim(window[0][0], window[1][0])
+        ax.set_ylim(window[1][1], window[0][1])
 
 
 def title(ax: Axes, text: str, below: str = "") -> None:
@@ -177,21 +192,16 @@ def same_scale(axes: Sequence[Axes]) -> None:
 
 
 def _arc_contacts(run: Assembly) -> list[Contact]:
-    return [contact for contact in run.contacts if contact.type == 3]
+    return [contact for contact in run.contacts if 3 in (contact.declared, contact.type)]
 
 
-def _mark(contact: Contact) -> Mark:
-    d = contact.distance
-    verdict = "contact" if abs(d) <= _TOUCHING else "clear" if d > 0.0 else "clash"
-    return Mark(float(contact.point[0]), -float(contact.point[2]), "", verdict)
+def _marks(contacts: Sequence[Contact]) -> list[Mark]:
+    """Dots at the contacts' points; none where no point is known."""
+    verdict = Thresholds(contact=CONTACT).verdict
+    return [Mark(float(c.point[0]), -float(c.point[2]), verdict(c.distance)) for c in contacts if c.point is not None]
 
 
 def _number(ax: Axes, number: int, mark: Mark, x: float) -> None:
     ax.plot([mark.x, x], [mark.y, mark.y], color=INK, lw=0.8, zorder=45)
     box = {"boxstyle": "circle,pad=0.25", "fc": "white", "ec": INK, "lw": 1.0}
     ax.annotate(str(number), (x, mark.y), ha="center", va="center", fontsize=9, fontweight="bold", zorder=46, bbox=box)
-
-
-def _zero(value: float) -> float:
-    """No -0.000000 in print."""
-    return 0.0 if abs(value) < 5e-7 else value

@@ -51,9 +51,11 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
     """The result as lines for a terminal: the headline, the findings, the matrix, all pairs."""
     t, n, names = result.thresholds, len(result.scene.parts), titles(result.scene)
     clearance = f"clearance {t.clearance:g} mm" if t.clearance else "no clearance asked for"
+    moving = f" at rest and {len(result.motions)} in motion" if result.motions else ""
     lines = [
         f"{result.scene.name}: {headline(result)}",
-        f"{n} parts, {result.work.pairs} pairs: {counts_text(result)}; contact up to {t.contact:g} mm, {clearance}",
+        f"{n} parts, {result.work.pairs} pairs{moving}: {counts_text(result)}; "
+        f"contact up to {t.contact:g} mm, {clearance}",
     ]
     for row in result.findings[:_ROWS]:
         where = circumstances(row)

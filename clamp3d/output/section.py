@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.pose import Array, SectionPose
+from clamp3d.core.pose import SectionPose
 from clamp3d.core.profile import Arc, Point, Profile
 from clamp3d.core.shapes import Solid
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, VERDICT_COLOURS, darker
@@ -38,38 +39,21 @@ class Mark:
 
     x: float
     y: float
-    label: str
     verdict: str = "contact"
 
 
-def section_pose(T_world_part: Array) -> SectionPose:
-    """Where a pose (4, 4) puts its part in the section; what leaves the section (yaw, pitch, Y) is not seen in it.
-
-    >>> section_pose(SectionPose(1.0, 2.0, 0.25).T(along=7.0))
-    SectionPose(x=1.0, y=2.0, angle=0.25)
-    """
-    T = T_world_part
-    return SectionPose(float(T[0, 3]), float(-T[2, 3]), math.atan2(float(T[2, 0]), float(T[0, 0])))
-
-
 def arc_path(profile: Profile) -> MplPath:
-    """The outline as a closed path; each arc as cubic curves of at most 15 degrees, within 1e-8 radii of the arc."""
+    """The outline as a closed path; each arc as cubic curves of at most 10 degrees, within 1e-8 radii of the arc."""
     from matplotlib.path import Path
 
-    vertices: list[tuple[float, float]] = [profile.edges[0].start]
+    vertices: list[ArrayLike] = [profile.edges[0].start]
     codes = [int(Path.MOVETO)]
     for edge in profile.edges:
         if isinstance(edge, Arc):
-            n = max(1, math.ceil(abs(edge.sweep) / math.radians(15.0)))
-            step = edge.sweep / n
-            handle = 4.0 / 3.0 * math.tan(step / 4.0)  # the usual cubic: tangent at both ends, middle on the arc
-            for k in range(n):
-                t0, t1 = edge.start_angle + k * step, edge.start_angle + (k + 1) * step
-                (x0, y0), (x1, y1) = edge.at(t0), edge.at(t1)
-                r = handle * edge.radius
-                vertices += [(x0 - r * math.sin(t0), y0 + r * math.cos(t0))]
-                vertices += [(x1 + r * math.sin(t1), y1 - r * math.cos(t1)), (x1, y1)]
-                codes += [int(Path.CURVE4)] * 3
+            low, high = sorted((math.degrees(edge.start_angle), math.degrees(edge.end_angle)))
+            curve = np.asarray(Path.arc(low, high, max(1, math.ceil((high - low) / 10.0))).vertices, dtype=float)
+            vertices += [*(edge.radius * (curve if edge.sweep > 0.0 else curve[::-1])[1:] + edge.centre)]
+            codes += [int(Path.CURVE4)] * (len(curve) - 1)
         else:
             vertices.append(edge.end)
             codes.append(int(Path.LINETO))
@@ -108,7 +92,7 @@ def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
     """Names of the parts: a column of balloons on the right, each with a line to its part; wires carry theirs."""
     label_wires(ax, poses)
     points = {name: poses[name].point(*part_anchor(clamp, name)) for name in PARTS if name in poses}
-    (left, edge), (low, high) = section_extent(clamp, poses)
+    (left, low), (edge, high) = ax.dataLim.get_points()
     column = edge + 0.27 * (edge - left)
     order = sorted(points, key=lambda name: points[name][1])
     heights = spread([points[name][1] for name in order], min((high - low) / len(order), 0.1 * (high - low)))
@@ -141,30 +125,10 @@ def balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> Non
 
 
 def draw_marks(ax: Axes, marks: Iterable[Mark], *, size: float = 6.0) -> None:
-    """Contact points as dots in the colour of their verdict, with their labels."""
+    """Contact points as dots in the colour of their verdict."""
     for mark in marks:
-        ax.plot(
-            [mark.x],
-            [mark.y],
-            "o",
-            ms=size,
-            mec=INK,
-            mew=0.7,
-            mfc=VERDICT_COLOURS[mark.verdict],
-            zorder=40,
-            clip_on=False,
-        )
-        if mark.label:
-            ax.annotate(
-                mark.label,
-                (mark.x, mark.y),
-                (6, -3),
-                textcoords="offset points",
-                fontsize=7,
-                color=INK,
-                zorder=41,
-                bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85},
-            )
+        style: dict[str, Any] = {"ms": size, "mec": INK, "mew": 0.7, "mfc": VERDICT_COLOURS[mark.verdict]}
+        ax.plot([mark.x], [mark.y], "o", **style, zorder=40, clip_on=False)
 
 
 def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int] = (-1, 1)) -> None:
@@ -321,30 +285,13 @@ def _pale(colour: str) -> str:
     return "#" + "".join(f"{round(255 - 0.4 * (255 - int(colour[i : i + 2], 16))):02X}" for i in (1, 3, 5))
 
 
-def section_extent(clamp: Clamp, poses: Poses) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Least and largest x, and y, of the parts at their poses (from their bounding boxes)."""
-    xs, ys = [], []
-    for name, part in parts(clamp).items():
-        if name in poses:
-            (x0, _, z0), (x1, _, z1) = part.bounds
-            for u, v in ((x0, -z0), (x0, -z1), (x1, -z0), (x1, -z1)):
-                x, y = poses[name].point(float(u), float(v))
-                xs.append(x)
-                ys.append(y)
-    return (min(xs), max(xs)), (min(ys), max(ys))
-
-
 def spread(values: list[float], spacing: float) -> list[float]:
-    """The ascending ``values`` moved apart to at least ``spacing``, as little as a few sweeps allow."""
-    out = list(values)
-    for _ in range(200):
-        moved = False
-        for i in range(len(out) - 1):
-            lack = spacing - (out[i + 1] - out[i])
-            if lack > 1e-6:
-                out[i] -= lack / 2
-                out[i + 1] += lack / 2
-                moved = True
-        if not moved:
-            break
-    return out
+    """The ascending ``values`` moved apart to at least ``spacing``, in all as little as can be (least squares).
+
+    >>> spread([0.0, 1.0, 10.0], 3.0)
+    [-1.0, 2.0, 10.0]
+    """
+    from scipy.optimize import isotonic_regression
+
+    even = spacing * np.arange(len(values))
+    return (isotonic_regression(np.array(values) - even).x + even).tolist()  # type: ignore[no-any-return]

@@ -8,6 +8,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +19,7 @@ from typing import Any
 from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import flag, instance, text
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.clamp.result import Assembly, Waypoint
+from clamp3d.clamp.result import Assembly, Finding, Waypoint
 from clamp3d.collide.check import check
 from clamp3d.collide.distance import measure
 from clamp3d.collide.model import ModelCache
@@ -26,13 +28,13 @@ from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
 from clamp3d.output.files import write_text
-from clamp3d.output.palette import VERDICT_COLOURS, part_colours
+from clamp3d.output.palette import VERDICT_COLOURS
 from clamp3d.output.viewer_clamp import UNCUT, ClampStory, facts
 from clamp3d.output.viewer_page import live_page, panel, whole_page
 from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
 from clamp3d.output.viewer_server import CommandLog, LocalServer, RemoteServer
 from clamp3d.output.viewer_timeline import FIRST, Row, Stop, scene_stops
-from clamp3d.output.wording import BAD, circumstances, gap_text, headline, meaning, sentence, titles
+from clamp3d.output.wording import circumstances, gap_text, headline, meaning, sentence, severity, titles
 
 CLEARANCE = 5.0
 """Gap in mm from which two parts of a clamp count as clear."""
@@ -94,8 +96,9 @@ class Viewer:
         serve = flag("serve", serve)
         self._model, self._mesh_error, self._notes = model, mesh_error, list(notes)
         clamp = shown if isinstance(shown, Clamp) else getattr(shown, "clamp", None)
-        self._clamp = None if clamp is None else ClampStory(clamp, CLEARANCE if clearance is None else clearance)
-        self._scene = self._clamp.scene() if self._clamp is not None else _scene(shown, clearance)
+        wide = CLEARANCE if clearance is None else clearance
+        self._clamp = None if clamp is None else ClampStory(clamp, model, wide)
+        self._scene = self._clamp.scene if self._clamp is not None else _scene(shown, clearance)
         self._cache, self._log = ModelCache(), CommandLog()
         self._waypoints: list[Waypoint] = []
         self._server: LocalServer | RemoteServer | None = None
@@ -109,7 +112,7 @@ class Viewer:
                 mesh_error=mesh_error,
                 cut_y=0.0 if self._clamp is not None else _cut(self._scene),
                 uncut=UNCUT if self._clamp is not None else (),
-                anchors=None if self._clamp is None else self._clamp.anchors(),
+                anchors=None if self._clamp is None else self._clamp.anchors,
                 overlays=overlays,
             )
             self._tell("waiting for the first state", state="waiting")
@@ -139,31 +142,29 @@ class Viewer:
         instance("waypoint", waypoint, Waypoint)
         if self._clamp is None:
             raise InputError("show() goes with the viewer of a clamp; a scene is shown by finish(check(scene))")
-        scene = self._clamp.scene(waypoint)
         self._waypoints.append(waypoint)
-        self._drawing.show(self._clamp.stop(waypoint, scene, self._measured(scene)))
-        self._clamp.decorate(self._drawing, self.stops - 1, waypoint, self._mesh_error)
+        self._drawing.show(self._clamp.stop(waypoint))
+        self._drawing.dimension(self.stops - 1, "splints", *self._clamp.opening(waypoint))
         self._tell(f"{waypoint.step}: {waypoint.label}", state="running")
 
     def finish(self, result: Assembly | CheckResult) -> None:
         """Tell the result, and play the whole time line once."""
+        told: dict[str, Any]
         if isinstance(result, Assembly):
             for waypoint in result.path[len(self._waypoints) :]:
                 self.show(waypoint)
-            good = result.clamped and not result.undeclared
-            told = {"headline": result.status, "state": "clean" if good else "found", "facts": facts(result)}
-            told |= {"findings": self._assembly_findings(), "limits": [*result.limits]}
+            worst = {finding.severity for finding in result.findings}
+            state = "found" if "error" in worst else "note" if "warning" in worst else "clean"
+            told = {"said": result.status, "state": state, "facts": facts(result), "limits": [*result.limits]}
+            told["findings"] = [self._assembly_finding(finding) for finding in result.findings]
         else:
             instance("result", result, CheckResult)
             for stop in scene_stops(result, self._measured):
                 self._drawing.show(stop)
-            told = {"headline": headline(result), "state": "clean" if result.clean else "found"}
-            told |= {"findings": self._scene_findings(result), "pairs": _table(result.pairs)}
-            told |= {"motions": _table(result.motions)}
-        self._drawing.play({} if self._clamp is None else self._clamp.shown(self._drawing))
-        if self._clamp is not None:
-            self._clamp.recolour(self._drawing, 0)
-        self._tell(told.pop("headline"), done=True, **told)
+            told = {"said": headline(result), "state": severity(result), "findings": self._scene_findings(result)}
+            told |= {"pairs": _table(result.pairs), "motions": _table(result.motions)}
+        self._drawing.play()
+        self._tell(**told, done=True)
 
     def html(self) -> str:
         """The scene with its animation as one HTML page that needs nothing else."""
@@ -190,30 +191,22 @@ class Viewer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _measured(self, scene: Scene, pairs: Sequence[tuple[str, str]] | None = None) -> list[Row]:
+    def _measured(self, scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[Row]:
         """Pairs of a scene as rows, by the engine that every command asks."""
-        found = measure(scene, pairs, model=self._model, cache=self._cache)
-        verdict, contact = scene.thresholds.verdict, scene.thresholds.contact
-        return [
-            Row(a, b, verdict(d, scene.allowance(a, b)).value, d, d.upper <= contact) for (a, b), d in found.items()
-        ]
+        found, verdict = measure(scene, pairs, cache=self._cache), scene.thresholds.verdict
+        return [Row(a, b, verdict(d, scene.allowance(a, b)).value, d, scene.contact) for (a, b), d in found.items()]
 
-    def _assembly_findings(self) -> list[dict[str, Any]]:
-        """Clashes at the waypoints: each pair once, where it is deepest; the deepest first."""
-        worst: dict[tuple[str, str], tuple[int, Row]] = {}
-        for number, stop in enumerate(self._drawing.timeline.stops):
-            for row in stop.rows:
-                known = worst.get((row.a, row.b))
-                if row.verdict in BAD and (known is None or row.distance.upper < known[1].distance.upper):
-                    worst[row.a, row.b] = number, row
-        names, stops = titles(self._scene), self._drawing.timeline.stops
-        found = sorted(worst.values(), key=lambda item: item[1].distance.upper)
-        return [
-            self._finding(
-                row, number, f"{names[row.a]} and {names[row.b]} clash: {row.gap}", stops[number].label, focus(row)
-            )
-            for number, row in found
-        ]
+    def _assembly_finding(self, finding: Finding) -> dict[str, Any]:
+        """A finding with the place to look at: where the pair that it names is at the end, else the whole clamp."""
+        number, names = self.stops - 1, re.findall(r"\bP[1-7]\b", finding.text)
+        verdict = {"error": "clash", "warning": "contact", "note": "clear"}[finding.severity]
+        for row in self._drawing.timeline.stops[number].rows:
+            if {row.a, row.b} == set(names[:2]):
+                return self._finding(replace(row, verdict=verdict), number, finding.text, "", focus(row))
+        stop = self._drawing.timeline.stops[number]
+        place = self._drawing.extent([stop.poses])
+        anywhere = replace(stop.rows[0], a="", b="", verdict=verdict)
+        return self._finding(anywhere, number, finding.text, "", place)
 
     def _scene_findings(self, result: CheckResult) -> list[dict[str, Any]]:
         """The findings of a check, each with the stop and the place to look at: a motion's at its first contact."""
@@ -221,7 +214,7 @@ class Viewer:
         meetings = {k: self._drawing.mark_meeting(k) for k, stop in enumerate(stops) if stop.halts}
         found = []
         for row in result.findings[:_LISTED]:
-            here = Row(row.a, row.b, row.verdict.value, row.distance, touches=True)
+            here = Row(row.a, row.b, row.verdict.value, row.distance, math.inf)
             number, place = 0, focus(here)
             for k, stop in enumerate(stops):
                 if row.motion is not None and stop.step == row.motion:
@@ -249,26 +242,23 @@ class Viewer:
     def _tell(self, said: str, *, state: str, done: bool = False, **more: Any) -> None:
         """What the page beside the picture shows; meshcat's own page takes no notice of it."""
         scene, drawing = self._scene, self._drawing
-        colours = part_colours([part.name for part in scene.parts])
-        head = self._clamp.told() if self._clamp is not None else _told(scene)
-        measured = "exactly" if self._model is None else f"by {self._model.name}"
-        stops = [
-            _stop_data(stop)
-            | dict(zip(("low", "high"), (x.tolist() for x in drawing.extent([stop.poses])), strict=True))
-            for stop in drawing.timeline.stops
-        ]
+        measured = "exactly" if self._model is None or self._model.name == "cas" else f"by {self._model.name}"
+        accuracy = f"Drawn with facets within {self._mesh_error:g} mm; measured {measured}, not on the facets."
+        drawing.caption(accuracy)
+        stops = [_stop_data(stop, *drawing.extent([stop.poses])) for stop in drawing.timeline.stops]
         used = {row["verdict"] for stop in stops for row in stop["rows"]} | {"contact", "clearance", "clear"}
         if not scene.thresholds.clearance:
             used.discard("clearance")
         self._story = {
-            **head,
+            **_told(scene),
+            **({} if self._clamp is None else {"title": self._clamp.title, "subtitle": self._clamp.subtitle}),
             **{key: [] for key in ("facts", "findings", "limits", "pairs", "motions")},
             "notes": self._notes,
             "headline": said,
             "state": state,
             "done": done,
-            "accuracy": f"Drawn with facets within {self._mesh_error:g} mm; measured {measured}, not on the facets.",
-            "parts": [{"name": n, "title": t, "colour": colours[n]} for n, t in titles(scene).items()],
+            "accuracy": accuracy,
+            "parts": [{"name": n, "title": t, "colour": drawing.colours[n]} for n, t in titles(scene).items()],
             "nodes": {part.name: drawing.paths(part.name) for part in scene.parts},
             "verdicts": [
                 {"name": name, "colour": colour, "meaning": meaning(name, scene)}
@@ -354,9 +344,10 @@ def _told(scene: Scene) -> dict[str, Any]:
     return {"title": scene.name, "subtitle": f"{n} {'part' if n == 1 else 'parts'}{moving}"}
 
 
-def _stop_data(stop: Stop) -> dict[str, Any]:
+def _stop_data(stop: Stop, low: Array, high: Array) -> dict[str, Any]:
     keys = ("arrive", "leave", "step", "label", "mark", "halts")
-    return {key: getattr(stop, key) for key in keys} | {"rows": [row.data() for row in stop.rows[:_LISTED]]}
+    rows = [row.data() for row in stop.rows[:_LISTED]]
+    return {key: getattr(stop, key) for key in keys} | {"low": low.tolist(), "high": high.tolist(), "rows": rows}
 
 
 def _table(rows: Sequence[Any]) -> list[dict[str, Any]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import importlib.util
 from collections.abc import Sequence
-from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ def viewer_files() -> Path:
 
 def panel(story: dict[str, Any]) -> str:
     """What the page says beside the picture, as HTML that can be read without any script."""
-    return _templates().get_template("viewer.panel.html").render(story, version=__version__)
+    return _render("viewer.panel.html", **story, version=__version__)
 
 
 def live_page(story: dict[str, Any]) -> str:
@@ -42,30 +41,20 @@ def whole_page(story: dict[str, Any], messages: Sequence[bytes]) -> str:
     return _page(story, meshcat=meshcat, messages=[base64.b64encode(m).decode("ascii") for m in messages])
 
 
-def _page(story: dict[str, Any], *, meshcat: str, messages: Sequence[str]) -> str:
+def _page(story: dict[str, Any], **more: Any) -> str:
     folder = resources.files("clamp3d.output").joinpath("templates")
-    return (
-        _templates()
-        .get_template("viewer.html")
-        .render(
-            title=story["title"],
-            panel=panel(story),
-            style=folder.joinpath("viewer.css").read_text(encoding="utf-8"),
-            script=folder.joinpath("viewer.js").read_text(encoding="utf-8"),
-            meshcat=meshcat,
-            messages=list(messages),
-        )
-    )
+    style, script = (folder.joinpath(f"viewer.{kind}").read_text(encoding="utf-8") for kind in ("css", "js"))
+    return _render("viewer.html", title=story["title"], panel=panel(story), style=style, script=script, **more)
 
 
-@cache
-def _templates() -> Any:
+def _render(template: str, **values: Any) -> str:
     import jinja2
 
-    return jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.PackageLoader("clamp3d.output", "templates"),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
+    return environment.get_template(template).render(values)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 
 from clamp3d.collide.result import CheckResult, PairResult
 from clamp3d.collide.scene import Part, Scene
 
 BAD = ("contained", "clash")
-OPEN = ("uncertain",)
 
 
 def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
@@ -36,10 +34,11 @@ def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
 
 
 def _rounded(value: float, rounding: str) -> str:
-    """Four significant digits, rounded to the safe side."""
+    """Four significant digits, six decimals at most, rounded to the safe side."""
     exact = Decimal(value)
-    digits = max(0, 3 - exact.adjusted()) if exact else 0
-    return f"{float(exact.quantize(Decimal(1).scaleb(-digits), rounding=rounding)):.10g}"
+    digits = min(6, max(0, 3 - exact.adjusted())) if exact else 0
+    text = f"{exact.quantize(Decimal(1).scaleb(-digits), rounding=rounding):f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def part_title(part: Part) -> str:
@@ -95,9 +94,14 @@ def headline(result: CheckResult) -> str:
     checked = f"{result.work.pairs} {'pair' if result.work.pairs == 1 else 'pairs'}"
     if result.scene.motions:
         checked += f" and {len(result.scene.motions)} {'motion' if len(result.scene.motions) == 1 else 'motions'}"
-    if not clashes and not any(row.verdict in OPEN for row in found):
-        return f"Clean: {checked} checked, nothing clashes" + "".join(f"; {text}" for text in others)
-    return "; ".join(others) + f" ({checked} checked)"
+    if not found:
+        return f"Clean: {checked} checked, nothing clashes"
+    return ("" if clashes else "No clash: ") + "; ".join(others) + f" ({checked} checked)"
+
+
+def severity(result: CheckResult) -> str:
+    """How a result is to be read: "found" (not clean), "note" (clean, with findings) or "clean"."""
+    return "found" if not result.clean else "note" if result.findings else "clean"
 
 
 def sentence(row: PairResult, names: dict[str, str]) -> str:
@@ -125,9 +129,3 @@ def circumstances(row: PairResult) -> str:
 def counts_text(result: CheckResult) -> str:
     """How many pairs have which verdict, in words."""
     return ", ".join(f"{count} {name}" for name, count in result.counts.items()) or "no pairs"
-
-
-def most_severe(rows: Sequence[PairResult]) -> str:
-    """The worst verdict of some rows, "clear" where there is none."""
-    order = [*BAD, *OPEN, "clearance", "contact", "allowed", "clear"]
-    return min((row.verdict.value for row in rows), key=order.index, default="clear")

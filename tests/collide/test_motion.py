@@ -149,8 +149,8 @@ def test_no_instant_is_below_the_least_distance():
             assert row.distance.lower <= one.distance.upper + 1e-6
         if verdicts & {"clash", "contained"}:
             assert row.verdict.value == "clash"
-            first = next(t for t in instants if check(scene.moved({"moving": motion.at(t) @ start})).pairs
-                         and check(scene.moved({"moving": motion.at(t) @ start})).pairs[0].distance.upper < -0.01)  # fmt: skip
+            there = {t: check(scene.moved({"moving": motion.at(t, start)})).pairs for t in instants}
+            first = next(t for t, pairs in there.items() if pairs and pairs[0].distance.upper < -0.01)
             assert row.contact_at <= first + 1e-9
         elif "clearance" in verdicts:
             assert row.verdict.value != "clear"

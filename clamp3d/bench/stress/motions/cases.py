@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.bench.stress.poses.cases import Shapes
+from clamp3d.bench.stress.worker import Rows
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Motions:
+class Motions(Rows):
     """n motions: ``shape`` (n,) row of ``shapes``; a turn by ``angle`` (n,) rad and a ``travel`` (n, 3) mm from 0 to 1.
 
     ``start`` (n, 4, 4) is ``T_groove_wire`` at instant 0. Where ``angle`` is 0 the motion is a translation; else a
@@ -33,25 +35,6 @@ class Motions:
     gap: Array
     instant: Array
     number: NDArray[np.intp]
-
-    def __len__(self) -> int:
-        return len(self.shape)
-
-    def take(self, rows: ArrayLike) -> Motions:
-        """The named cases."""
-        i = np.asarray(rows, dtype=np.intp)
-        return Motions(
-            self.shapes,
-            self.shape[i],
-            self.start[i],
-            self.point[i],
-            self.axis[i],
-            self.angle[i],
-            self.travel[i],
-            self.gap[i],
-            self.instant[i],
-            self.number[i],
-        )
 
     def motion(self, i: int) -> Motion:
         """Case i as the project's own motion."""
@@ -133,18 +116,27 @@ def motions(
     )
 
 
+def turned(x: NDArray[Any], axis: NDArray[Any], angle: NDArray[Any]) -> NDArray[Any]:
+    """Vectors x turned by ``angle`` (n,) rad about unit axes, (n, 3) in the numbers that are given.
+
+    Rodrigues' formula; x and axis are (n, 3) or (3,).
+    """
+    once = np.cross(axis, x)
+    sine, versine = np.sin(angle)[:, None], 2 * np.sin(angle / 2)[:, None] ** 2
+    return np.asarray(x + sine * once + versine * np.cross(axis, once))
+
+
 def poses(cases: Motions, i: int, instants: Array) -> Array:
-    """Poses (m, 4, 4) of case i at some instants, by the matrices of its turns."""
+    """Poses (m, 4, 4) of case i at some instants."""
     s = instants[:, None]
-    start = cases.start[i]
-    T = np.repeat(start[None], len(s), 0)
+    T = np.repeat(cases.start[i][None], len(s), 0)
     if cases.angle[i] == 0.0:
-        T[:, :3, 3] = start[:3, 3] + s * cases.travel[i]
+        T[:, :3, 3] += s * cases.travel[i]
         return T
-    u = cases.axis[i] / math.sqrt(float(cases.axis[i] @ cases.axis[i]))
-    K = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
-    angle = (instants * cases.angle[i])[:, None, None]
-    less_one = np.sin(angle) * K + 2.0 * np.sin(0.5 * angle) ** 2 * (K @ K)
-    T[:, :3, :3] += less_one @ start[:3, :3]
-    T[:, :3, 3] += less_one @ (start[:3, 3] - cases.point[i]) + s * (cases.travel[i, 0] * u)
+    axis = cases.axis[i] / math.sqrt(float(cases.axis[i] @ cases.axis[i]))
+    angle = instants * cases.angle[i]
+    arm = T[0, :3, 3] - cases.point[i]
+    T[:, :3, 3] += (turned(arm, axis, angle) - arm) + s * (cases.travel[i, 0] * axis)
+    for k in range(3):
+        T[:, :3, k] = turned(cases.start[i, :3, k], axis, angle)
     return T

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.bench.stress.motions.cases import Motions, motions
+from clamp3d.bench.stress.motions.cases import Motions, motions, turned
 from clamp3d.bench.stress.poses.cases import Cases, Contact, Extended, Shapes, contact_on, place
 from clamp3d.core.pose import Array
 
@@ -40,34 +40,17 @@ def moved(T: Array, by: NDArray[Any]) -> Array:
     return out
 
 
-def turned(
-    T: Array, point: NDArray[np.longdouble], axis: NDArray[np.longdouble], angle: NDArray[np.longdouble]
-) -> Array:
-    """Poses turned by ``angle`` (n,) about axes (n, 3), rounded once."""
-    sine, versine = np.sin(angle)[:, None], 2 * np.sin(angle / 2)[:, None] ** 2
-
-    def turn(x: NDArray[np.longdouble]) -> NDArray[np.longdouble]:
-        once = np.cross(axis, x)
-        return np.asarray(x + sine * once + versine * np.cross(axis, once))
-
-    out = T.copy()
-    wide = T.astype(Extended)
-    for j in range(3):
-        out[:, :3, j] = turn(wide[:, :3, j])
-    out[:, :3, 3] = point + turn(wide[:, :3, 3] - point)
-    return out
-
-
-def screws_through(
-    cases: Cases, point: Array, axis: Array, angle: Array, travel: Array, instant: Array, *, built: bool = True
-) -> Motions:
+def screws_through(cases: Cases, point: Array, axis: Array, angle: Array, travel: Array, instant: Array) -> Motions:
     """Screws that are at the poses of ``cases`` at ``instant`` (n,)."""
     point, axis = np.asarray(point, np.float64), np.asarray(axis, np.float64)
     p, u = point.astype(Extended), axis.astype(Extended)
     u = u / np.sqrt((u * u).sum(1))[:, None]
     s = instant.astype(Extended)
-    start = turned(cases.T_world_wire, p, u, -s * angle)
+    start, back = cases.T_world_wire.copy(), -s * angle
+    for column in range(4):  # turned back about the axis, rounded once
+        x = cases.T_world_wire[:, :3, column].astype(Extended)
+        foot = p if column == 3 else 0.0
+        start[:, :3, column] = foot + turned(x - foot, u, back)
     start = moved(start, -(s * travel)[:, None] * u)
-    gap = cases.gap if built else np.nan
-    return motions(cases.shapes, cases.shape, start, travel=travel, angle=angle, point=point, axis=axis, gap=gap,
-                   instant=instant)  # fmt: skip
+    turn = {"travel": travel, "angle": angle, "point": point, "axis": axis}
+    return motions(cases.shapes, cases.shape, start, **turn, gap=cases.gap, instant=instant)

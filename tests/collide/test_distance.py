@@ -1,0 +1,180 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from clamp3d.baselines.chords import Chords
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.parts import parts
+from clamp3d.collide.check import check
+from clamp3d.collide.distance import distance, distances, measure
+from clamp3d.collide.motions import first_contact, min_clearance
+from clamp3d.collide.result import CheckResult
+from clamp3d.collide.scene import Part, Scene
+from clamp3d.collide.verdict import Verdict
+from clamp3d.core import shapes
+from clamp3d.core.distance import signed_distance
+from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.mesh import make_mesh
+from clamp3d.core.meshing import mesh
+from clamp3d.core.motion import Motion
+from clamp3d.core.pose import inverse, rotation, translation
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.profile import Profile
+from clamp3d.errors import InputError
+from tests.collide.oracle import gap
+
+GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
+BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
+
+
+def test_a_cylinder_has_flat_ends_and_the_kernel_a_lower_bound_of_them():
+    groove, wire, T = SweptArc(12.0, math.radians(70.0), 60.0), Cylinder(10.5, 80.0), translation(0.0, -3.0, 73.0)
+    d = distance(groove, wire, T)
+    assert d.value == pytest.approx(3.0, abs=1e-9)
+    assert d.uncertainty < 1e-9
+    assert signed_distance(groove, wire, T).distance < d.value
+    assert distance(wire, groove, inverse(T)).value == pytest.approx(3.0, abs=1e-9)
+    assert distance(shapes.groove_block(groove, 60.0, 40.0), shapes.cylinder(10.5, 80.0), T).value == pytest.approx(3.0)
+
+
+def test_many_poses_are_measured_as_one_by_one():
+    wire = shapes.cylinder(6.5, 80.0)
+    T = np.array([translation(0.0, y, 0.0) @ rotation([1, 0, 0], 0.001 * k) for k, y in enumerate((0, -0.2, -0.6, 9))])
+    together = distances(BLOCK, wire, T)
+    assert len(together) == 4
+    for k, pose in enumerate(T):
+        one = distance(BLOCK, wire, pose)
+        assert together.value[k] == pytest.approx(one.value, abs=1e-9)
+        assert together.lower[k] <= one.upper
+        assert one.lower <= together.upper[k]
+    assert distances(wire, BLOCK, inverse(T)).value == pytest.approx(together.value, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "T", "unique"),
+    [
+        (shapes.box((10, 10, 10)), shapes.box((10, 10, 10)), translation(12, 3, 0), False),
+        (shapes.box((10, 10, 10)), shapes.box((10, 10, 10)), translation(12, 0, 0) @ rotation([1, 1, 0], 0.3), True),
+        (shapes.cylinder(3, 20), shapes.cylinder(3, 20), translation(9, 0, 0), False),
+        (shapes.cylinder(3, 20), shapes.cylinder(3, 20), translation(9, 0, 0) @ rotation([1, 0, 0], 1.0), True),
+        (BLOCK, shapes.cylinder(6.5, 80), translation(0, -0.2, 0), False),
+    ],
+)
+def test_nearest_points_that_are_not_the_only_ones_are_told(a, b, T, unique):
+    found = distance(a, b, T)
+    assert found.unique is unique
+    assert found.point_a + found.value * found.normal == pytest.approx(found.point_b, abs=1e-9)
+    # Moved together along the normal they touch.
+    closer = T.copy()
+    closer[:3, 3] -= found.value * found.normal
+    assert distance(a, b, closer).value == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_bolt_whose_axis_lies_in_the_plane_between_the_halves_of_a_hole():
+    clamp = assemble()
+    splint, bolt = parts(clamp.clamp)["P1"], parts(clamp.clamp)["P4"]
+    found = distance(bolt, splint, inverse(clamp.scene.parts[3].T_world))
+    assert found.lower <= found.upper < -1.0
+
+
+def test_contact_models_answer_where_a_groove_is_nearest():
+    scene = assemble().scene
+    model = Chords(math.radians(5.0))
+    exact, asked = measure(scene), measure(scene, model=model)
+    grooves = {pair for pair, d in asked.items() if d.method == "chords"}
+    assert grooves == {("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7"), ("P2", "P3")}
+    for pair, d in asked.items():
+        if pair in grooves:  # the chords lie in the hollow: never too wide
+            assert d.lower - 1e-9 <= exact[pair].value <= d.upper + 1e-9
+            assert d.value < exact[pair].value + 1e-9
+            assert d.point_a + d.value * d.normal == pytest.approx(d.point_b, abs=1e-9)
+        else:
+            assert d.value == exact[pair].value
+    assert "chords" in asked["P1", "P6"].to_dict()["method"]
+
+
+def test_parts_check_themselves_and_scenes_take_them():
+    part = Part("block", BLOCK)
+    assert Scene().add(part).parts[0].T_world.tolist() == np.eye(4).tolist()
+    assert Scene((part,)).add("wire", Cylinder(1.0, 2.0)).parts[1].shape.name == "cylinder"
+    for bad, message in (
+        (lambda: Part("a b", BLOCK), "part name must not be empty or hold a space"),
+        (lambda: Part("a", 3), "a part's shape must be a Solid, MeshShape or Cylinder, got int"),
+        (lambda: Part("a", BLOCK, np.diag([2.0, 1, 1, 1])), "pose of a must be rigid"),
+        (lambda: Scene((part,)).add(part), "part 'block' is there twice"),
+        (lambda: Scene().add(part, BLOCK), "takes a Part alone"),
+    ):
+        with pytest.raises(InputError, match=message):
+            bad()
+
+
+def test_a_clash_in_a_motion_is_in_counts_findings_and_data_alike():
+    drop = Motion.translate((0.0, -31.0, 0.0), parts="wire", name="drop")
+    scene = Scene((Part("block", BLOCK), Part("wire", Cylinder(6.935, 80.0), translation(0, 30, 0))), motions=(drop,))
+    result = check(scene)
+    assert isinstance(result, CheckResult)
+    assert not result.clean
+    assert result.counts == {"clash": 1, "clear": 1}
+    (row,) = result.findings
+    assert (row.motion, row.verdict) == ("drop", Verdict.CLASH)
+    assert [f["motion"] for f in result.to_dict()["findings"]] == ["drop"]
+    assert repr(result) == "CheckResult('scene': not clean; 1 clash, 1 clear)"
+    assert "<td>drop</td>" in result._repr_html_()
+
+
+def floor_with_bead():
+    floor = shapes.box((400, 40, 10))
+    bead = Extrusion(Profile.circle(5.0, (-53.25, -1.0)), "Y", -20.0, 20.0)
+    return shapes.Solid("floor", (*floor.bodies, bead))
+
+
+def test_sliding_close_above_a_floor_is_no_contact_before_the_bead():
+    # The block's edge is 0.02 mm above the floor and meets the bead, which stands out 1 mm.
+    reach = math.sqrt(25.0 - 4.02**2)
+    hit = first_contact(
+        floor_with_bead(),
+        shapes.box((20, 20, 20)),
+        Motion.translate((250, 0, 0)),
+        translation(-53.25 - reach - 10.0 - 0.115 * 250.0, 0, 15.02),
+    )
+    assert hit.touches
+    assert hit.t <= 0.115 + 1e-12
+    assert hit.t == pytest.approx(0.115, abs=2e-6)
+
+
+def test_the_same_above_a_mesh():
+    floor = mesh(shapes.groove_block(GROOVE, 40.0, 20.0), 0.05)
+    faceted = shapes.MeshShape(make_mesh(floor.vertices, floor.faces), "off")
+    wall = shapes.box((4, 4, 4))
+    hit = first_contact(faceted, wall, Motion.translate((0, 0, -100)), translation(0, -3.5 - 2.0 - 5.0, 80.0))
+    assert hit.touches
+    assert hit.t == pytest.approx(0.53, abs=1e-5)
+    assert hit.t <= 0.53
+
+
+SOME = [
+    shapes.box((20, 12, 8)),
+    shapes.cylinder(4, 30),
+    shapes.cylinder(8, 12, bore=4.2),
+    shapes.groove_block(SweptArc(5.0, 1.0, 20.0), 16.0, 9.0),
+]
+unit = st.floats(-1.0, 1.0)
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.sampled_from(SOME), st.sampled_from(SOME), st.tuples(unit, unit, unit, unit, unit, unit), st.floats(0.0, 3.0))
+def test_no_time_before_the_first_contact_has_an_overlap(a, b, numbers, angle):
+    axis, way = np.add(numbers[:3], (0.0, 0.0, 1.1)), 40.0 * np.array(numbers[3:])
+    start = rotation(axis, angle)
+    start[:3, 3] = 30.0 * axis / np.linalg.norm(axis)
+    motion = Motion.translate(-1.5 * start[:3, 3] + 0.3 * way)
+    hit, least = first_contact(a, b, motion, start), min_clearance(a, b, motion, start)
+    for t in np.linspace(0.0, hit.t, 12)[:-1] if hit.touches else np.linspace(0.0, 1.0, 12):
+        d = distance(a, b, motion.at(t, start))
+        assert d.upper > -1e-6, (t, d)
+        assert d.upper >= least.distance.lower - 1e-6
+        common = gap(a, b, motion.at(t, start), 0.02)[1]
+        assert common < 1.0, (t, common)
