@@ -17,7 +17,7 @@ from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.errors import InputError
-from clamp3d.output.files import whole_file
+from clamp3d.output.files import STDOUT, whole_file
 from clamp3d.output.palette import INK
 from clamp3d.output.section import (
     Mark,
@@ -39,7 +39,7 @@ FORMATS = (".svg", ".png", ".pdf")
 
 
 def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
-    """Write ``figure`` to ``path`` by its suffix, whole or not at all; equal figures give equal files.
+    """Write ``figure`` to ``path`` by its suffix (``-``: SVG), whole or not at all; equal figures give equal files.
 
     Raises InputError for a suffix other than .svg, .png, .pdf and for a folder that cannot be written.
     """
@@ -48,12 +48,12 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
 
     instance("figure", figure, Figure)
     path, dpi = checked_path("figure file", path), whole("dpi", dpi, least=1)
-    suffix = path.suffix.lower()
+    suffix = ".svg" if path == STDOUT else path.suffix.lower()
     if suffix not in FORMATS:
         raise InputError(f"figure file must end in {', '.join(FORMATS)}, got {path.name!r}")
     metadata: dict[str, Any] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix, {})
     with whole_file(path) as temporary, mpl.rc_context({"svg.hashsalt": "clamp3d"}):
-        figure.savefig(temporary, dpi=dpi, metadata=metadata)
+        figure.savefig(temporary, format=suffix[1:], dpi=dpi, metadata=metadata)
     return path
 
 
