@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from functools import lru_cache
 
@@ -10,8 +9,9 @@ import numpy as np
 
 from clamp3d.baselines.model import Pieces, check_unit_angle, pose_of, poses_of
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.pose import Array, check_pose, inverse
+from clamp3d.core.pose import Array, check_pose, check_pose_array, inverse
 from clamp3d.core.primitives import SweptArc
+from clamp3d.core.profile import chord_count
 from clamp3d.errors import InputError
 
 _PARALLEL = 1e-9
@@ -51,9 +51,7 @@ class Chords:
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
-        poses = poses_of(pair, T_a_b)
-        for i, pose in enumerate(poses):
-            check_pose(pose, f"T_a_b[{i}]")
+        poses = check_pose_array(poses_of(pair, T_a_b), "T_a_b")
         T = inverse(pair.T_a_groove) @ poses @ pair.T_b_cylinder
         starts, ends, _ = _polyline(pair.groove, self.unit_angle)
         signed = [_signed(centre, starts, ends)[0].min() for centre in _section_point(T)]
@@ -63,8 +61,7 @@ class Chords:
 @lru_cache(maxsize=64)
 def _polyline(groove: SweptArc, unit_angle: float) -> tuple[Array, Array, tuple[str, ...]]:
     """Starts and ends (m + 2, 2) of the segments from left to right, hollow on their left side."""
-    # A whole number of units must not gain a chord by rounding.
-    m = max(1, math.ceil(2.0 * groove.half_angle / unit_angle - 1e-9))
+    m = chord_count(2.0 * groove.half_angle, unit_angle)
     phi = np.linspace(-groove.half_angle, groove.half_angle, m + 1)
     on_arc = groove.radius * np.column_stack([np.sin(phi), -np.cos(phi)])
     far = np.array([_FACE * groove.radius, 0.0])

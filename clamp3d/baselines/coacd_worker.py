@@ -7,22 +7,17 @@ caller reads the progress. The process ends itself when its stdin closes, that i
 from __future__ import annotations
 
 import json
-import os
 import sys
-import threading
 import time
 
 import numpy as np
 
-
-def _end_with_caller() -> None:
-    sys.stdin.buffer.read()
-    os._exit(1)
+from clamp3d.baselines.child import end_with_caller
 
 
 def main(source: str, target: str) -> None:
     """Decompose the mesh in ``source`` with the keyword arguments in its note; hulls and seconds go to ``target``."""
-    threading.Thread(target=_end_with_caller, daemon=True).start()
+    end_with_caller()
     import coacd
 
     with np.load(source, allow_pickle=False) as file:

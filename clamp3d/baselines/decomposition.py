@@ -24,22 +24,17 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
-import subprocess
-import sys
 import tempfile
-import threading
-import time
-from collections import deque
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import IO, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.baselines import cache as disk
+from clamp3d.baselines.child import run_child
 from clamp3d.core.closed_mesh import Solid, check_solid
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, MissingLibraryError, SolverError
@@ -206,33 +201,27 @@ def _outside(points: Array, hulls: tuple[Solid, ...]) -> Array:
 def _run(
     solid: Solid, parameters: DecompositionParameters, name: str, time_limit: float, progress: bool | None
 ) -> tuple[tuple[Solid, ...], float]:
-    with tempfile.TemporaryDirectory(prefix="clamp3d-") as folder:
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    shown = console.is_terminal if progress is None else progress
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with (
+        tempfile.TemporaryDirectory(prefix="clamp3d-") as folder,
+        Progress(*columns, console=console, transient=True, disable=not shown) as bar,
+    ):
         source, target = Path(folder) / "in.npz", Path(folder) / "out.npz"
         arguments = np.array(json.dumps(asdict(parameters)))
         np.savez(source, vertices=solid.vertices, faces=solid.faces, arguments=arguments)
-        # A session of its own keeps Ctrl-C with the caller, who then ends the worker.
-        worker = subprocess.Popen(
-            [sys.executable, "-m", "clamp3d.baselines.coacd_worker", str(source), str(target)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
-            start_new_session=True,
+        task = bar.add_task(f"CoACD {name}", total=None)
+        code, said = run_child(
+            "clamp3d.baselines.coacd_worker",
+            str(source),
+            str(target),
+            time_limit=time_limit,
+            watch=lambda log: bar.update(task, description=f"CoACD {name}: {_stage(log)}"),
         )
-        log: deque[str] = deque(maxlen=50)
-        reader = threading.Thread(target=_read, args=(worker.stdout, log), daemon=True)
-        reader.start()
-        try:
-            code = _wait(worker, log, name, time_limit, progress)
-        finally:
-            worker.kill()
-            worker.wait()
-            reader.join()
-            for pipe in (worker.stdin, worker.stdout):
-                if pipe is not None:
-                    pipe.close()
         if code is None:
             raise SolverError(
                 f"CoACD did not finish {name} in {time_limit:g} s at threshold {parameters.threshold:g}; "
@@ -242,36 +231,8 @@ def _run(
             with np.load(target, allow_pickle=False) as file:
                 return _hulls(file), float(file["seconds"])
         except (OSError, ValueError, KeyError) as error:
-            said = next((line for line in reversed(log) if line.strip()), "nothing") if code else str(error)
-            raise SolverError(f"CoACD gave no hulls for {name} (exit code {code}): {said.strip()}") from None
-
-
-def _read(stream: IO[str], log: deque[str]) -> None:
-    for line in stream:
-        log.append(line)
-
-
-def _wait(
-    worker: subprocess.Popen[str], log: deque[str], name: str, time_limit: float, progress: bool | None
-) -> int | None:
-    """Exit code of the worker, None if it has not ended in time; shows what CoACD's log says meanwhile."""
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    shown = console.is_terminal if progress is None else progress
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    deadline = time.monotonic() + time_limit
-    with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
-        task = bar.add_task(f"CoACD {name}", total=None)
-        while True:
-            try:
-                return worker.wait(timeout=min(0.1, max(0.0, deadline - time.monotonic())))
-            except subprocess.TimeoutExpired:
-                if time.monotonic() >= deadline:
-                    return None
-            if shown:
-                bar.update(task, description=f"CoACD {name}: {_stage(list(log))}")
+            why = (said or ["nothing"])[-1] if code else str(error)
+            raise SolverError(f"CoACD gave no hulls for {name} (exit code {code}): {why}") from None
 
 
 def _stage(log: list[str]) -> str:

@@ -24,9 +24,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clamp3d.checks import array
 from clamp3d.core.closed_mesh import Solid, check_solid
-from clamp3d.core.pose import Array, check_pose
+from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder
 from clamp3d.core.shells import corners_of, winding_number
 from clamp3d.errors import InputError, MissingLibraryError
@@ -135,7 +134,7 @@ class Wire:
         self.collision_object = _fcl().CollisionObject(shape, transform(self.T))
 
     def place(self, T_a_wire: Array) -> None:
-        """Put the wire at a pose (4, 4) that has passed `check_pose` or `check_poses`."""
+        """Put the wire at a pose (4, 4) that has passed `check_pose` or `check_pose_array`."""
         self.T = T_a_wire
         self.collision_object.setTransform(transform(T_a_wire))
 
@@ -143,19 +142,6 @@ class Wire:
 def transform(T: Array) -> Any:
     """`fcl.Transform` (float64) of a checked pose (4, 4) in mm."""
     return _fcl().Transform(T[:3, :3], T[:3, 3] * UNIT)
-
-
-def check_poses(poses: ArrayLike, name: str = "poses") -> Array:
-    """Return ``poses`` as (n, 4, 4) float64 if every one is rigid, else raise InputError naming the first bad one."""
-    T = array(name, poses, (None, 4, 4), finite=False)
-    R = T[:, :3, :3]
-    with np.errstate(over="ignore", invalid="ignore"):
-        bent = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
-        good = np.isfinite(T).all(axis=(1, 2)) & (bent <= 1e-10) & (np.linalg.det(R) > 0.0)
-    good &= (T[:, 3] == (0.0, 0.0, 0.0, 1.0)).all(axis=1)
-    for i in np.flatnonzero(~good):
-        check_pose(T[i], f"{name}[{i}]")
-    return T
 
 
 def distance(shape: Shape, wire: Wire) -> float:

@@ -7,10 +7,10 @@ from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 
-from clamp3d.baselines.fcl_shapes import Shape, Wire, check_poses, distance, measure
+from clamp3d.baselines.fcl_shapes import Shape, Wire, distance, measure
 from clamp3d.baselines.model import Pieces, pose_of, poses_of
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.pose import Array
+from clamp3d.core.pose import Array, check_pose_array
 from clamp3d.core.primitives import Cylinder
 from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
@@ -46,7 +46,7 @@ class Polytopes:
 
     def pieces(self, wire: Wire, T_a_wire: Array) -> Pieces:
         """One gap per polytope, with the wire at a pose (4, 4) in the part's frame."""
-        wire.place(check_poses(T_a_wire[None])[0])
+        wire.place(check_pose_array(T_a_wire[None])[0])
         found = [measure(shape, wire) for shape in self.shapes]
         return Pieces(
             np.array([m.distance for m in found]),
@@ -60,7 +60,7 @@ class Polytopes:
 
         FCL's own broadphase answers the same and takes as long here: a wire's box covers most of a groove.
         """
-        poses = check_poses(T_a_wire)
+        poses = check_pose_array(T_a_wire)
         # Box of the cylinder: half extents |axis| L/2 + r sqrt(1 - axis^2) per coordinate.
         axis, middle = poses[:, :3, 2], poses[:, :3, 3]
         reach = np.abs(axis) * wire.cylinder.length / 2 + wire.cylinder.radius * np.sqrt(np.maximum(0.0, 1.0 - axis**2))

@@ -18,7 +18,6 @@ from clamp3d.clamp.matrix import PAIRS, Difference, Pair, contact_type
 from clamp3d.clamp.meetings import meetings
 from clamp3d.clamp.result import Assembly, Equilibrium, Event, Solver, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
-from clamp3d.clamp.screw import ScrewJoint
 from clamp3d.clamp.section import D, S, Section
 from clamp3d.clamp.sequence import parse_sequence
 from clamp3d.clamp.status import CLAMPED, final_status
@@ -140,7 +139,7 @@ def assemble(
         distance=section.splint_distance(final.q),
         closing=float(final.q[D]),
         tilt=float(final.q[S]) / section.lever,
-        turns=ScrewJoint(clamp.bolt.pitch).turn(travel) / (2.0 * math.pi),
+        turns=clamp.bolt.turn(travel) / (2.0 * math.pi),
         poses=poses,
         contacts=contacts,
         seats=seats(contacts, resolution),

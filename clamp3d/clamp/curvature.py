@@ -56,7 +56,7 @@ def least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array, 
 def lagrangian_hessian(section: Section, q: Array, rows: NDArray[np.intp], multipliers: Array) -> Array:
     """Second derivatives (6, 6) of goal - multipliers . gaps by central differences of the closed-form gradients."""
     # A wire that nearly fills its groove turns its normal within R - r: the step must be short beside that.
-    h = min(1e-4, max(1e-8, 0.03 * _slack(section)))
+    h = min(1e-4, max(1e-8, 0.03 * section.least_slack))
     H = np.empty((6, 6))
     for j in range(6):
         e = np.zeros(6)
@@ -67,9 +67,4 @@ def lagrangian_hessian(section: Section, q: Array, rows: NDArray[np.intp], multi
 
 def rounding_of_normals(section: Section, q: Array) -> float:
     """How far rounding of the coordinates turns the normal of the wire that fills its groove best, rad."""
-    return min(_TURNED, 4.0 * float(np.spacing(np.abs(q).max())) / max(_slack(section), 1e-300))
-
-
-def _slack(section: Section) -> float:
-    """Least difference of a wire's and its groove's radius in mm."""
-    return min(abs(p.groove.radius - p.cylinder.radius) for p in section.pairs.values() if p.a != "P3")
+    return min(_TURNED, 4.0 * float(np.spacing(np.abs(q).max())) / max(section.least_slack, 1e-300))

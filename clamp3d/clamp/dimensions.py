@@ -198,6 +198,15 @@ class Bolt:
     head_across_flats: Length
     head_height: Length
 
+    def turn(self, travel: float) -> float:
+        """Turn of the nut in rad that moves it by ``travel`` mm: the thread has a single start.
+
+        >>> bolt = Bolt(diameter=20.0, pitch=2.5, shank_length=160.0, head_across_flats=30.0, head_height=12.5)
+        >>> round(math.degrees(bolt.turn(1 / 3)), 9)
+        48.0
+        """
+        return 2.0 * math.pi * travel / self.pitch
+
 
 @one_line_errors
 @dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)

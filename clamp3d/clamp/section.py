@@ -84,6 +84,11 @@ class Section:
         """P2 seen from P1."""
         return SectionPose(self.bolt_x, float(q[D]), float(q[S]) / self.lever)
 
+    @property
+    def least_slack(self) -> float:
+        """Least difference of a wire's and its groove's radius in mm."""
+        return min(abs(p.groove.radius - p.cylinder.radius) for p in self.pairs.values() if p.a != "P3")
+
     def bounds(self) -> list[tuple[float, float]]:
         """Limits of q: each wire stays in the mouth it was put into (a longer way out exists, but no wire takes it)."""
         limits = [(-np.inf, np.inf)] * 6

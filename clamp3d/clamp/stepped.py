@@ -47,43 +47,36 @@ def solve_stepped(
 
     Raises InputError for moves that are not positive, SolverError if the open clamp already overlaps.
     """
-    for name, value, unit in (("step", step, "mm"), ("tilt step", math.degrees(tilt_step), "deg")):
+    down, start = section.clamp.down_splint, section.open_distance()
+    for name, value, reach, unit in (
+        ("step", step, start, "mm"),
+        ("tilt step", math.degrees(tilt_step), down.max_tilt_deg, "deg"),
+    ):
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(f"{name} must be > 0 {unit}, got {value:g}")
-    for name, value, reach, unit in (
-        ("step", step, section.open_distance(), "mm"),
-        ("tilt step", math.degrees(tilt_step), section.clamp.down_splint.max_tilt_deg, "deg"),
-    ):
         if not value * _MOVES >= reach:
             raise InputError(f"{name} must be >= {reach / _MOVES:.4g} {unit} here, got {value:g}")
-    limit = int(section.clamp.down_splint.max_tilt / tilt_step + 1e-9)
-    k = math.ceil(section.open_distance() / step)
-    q = section.open_state(k * step)
-    tried, tilt, found = 0, 0, False
-    while True:
-        for candidate in sorted(range(-limit, limit + 1), key=lambda i: (abs(i - tilt), abs(i))):
+    limit = int(down.max_tilt / tilt_step + 1e-9)
+    tilts = range(-limit, limit + 1)
+    first = math.ceil(start / step)
+    q, tilt, tried = section.open_state(first * step), 0, 0
+    for k in range(first, -_MOVES, -1):
+        found = None
+        for candidate in sorted(tilts, key=lambda i: (abs(i - tilt), abs(i))):
             tried += 1
-            placed = _place(section, q, k * step, candidate * tilt_step)
-            if placed is not None:
-                q, tilt, found = placed, candidate, True
+            found = _place(section, q, k * step, candidate * tilt_step)
+            if found is not None:
                 break
-        else:
+        if found is None:
             break
+        q, tilt = found, candidate
         if progress is not None:
             progress(tried, k * step)
-        k -= 1
-    if not found:
+    if k == first:
         raise SolverError(f"the open clamp overlaps at a distance of {k * step:.4g} mm: nothing to close")
     # Of the tilts that are free at the last distance, the one that leaves the wires most room.
-    q = max(
-        (
-            p
-            for i in range(-limit, limit + 1)
-            if (p := _place(section, q, q[D], i * tilt_step, settle=True)) is not None
-        ),
-        key=lambda p: float(section.gaps(p).value.min()),
-        default=q,
-    )
+    free = [p for i in tilts if (p := _place(section, q, q[D], i * tilt_step, settle=True)) is not None]
+    q = max(free, key=lambda p: float(section.gaps(p).value.min()), default=q)
     return SteppedState(q, section.gaps(q), tried)
 
 
@@ -106,20 +99,18 @@ def solve_bisection(
     limit = section.clamp.down_splint.max_tilt
     while step > resolution:
         step, tilt_step = 0.5 * step, 0.5 * tilt_step
-        closer = True
-        while closer:
-            closer = False
+        found: Array | None = q
+        while found is not None:
+            q, found = found, None
             tilt = float(q[S]) / section.lever
             for candidate in (tilt, tilt + tilt_step, tilt - tilt_step):
-                if abs(candidate) > limit:
-                    continue
-                tried += 1
-                placed = _place(section, q, float(q[D]) - step, candidate, settle=True)
-                if placed is not None:
-                    q, closer = placed, True
-                    break
-            if closer and progress is not None:
-                progress(tried, float(q[D]))
+                if abs(candidate) <= limit:
+                    tried += 1
+                    found = _place(section, q, float(q[D]) - step, candidate, settle=True)
+                    if found is not None:
+                        break
+            if found is not None and progress is not None:
+                progress(tried, float(found[D]))
     return SteppedState(q, section.gaps(q), tried)
 
 

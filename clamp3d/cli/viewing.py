@@ -78,7 +78,7 @@ def _viewer(shown: Clamp | Scene, viewing: Viewing, serve: bool, quiet: bool, **
         raise click.UsageError("--open goes with a page that is served, not with --html alone")
     if viewing.url is not None and (viewing.port is not None or viewing.timeout is not None):
         raise click.UsageError("--port and --timeout go with a page served here, not with --url")
-    place = {"serve": serve, "url": viewing.url, "host": viewing.host, "port": viewing.port}
+    place: dict[str, Any] = {"serve": serve, "url": viewing.url, "host": viewing.host, "port": viewing.port}
     with Viewer(shown, mesh_error=viewing.draw_error, **place, **more) as viewer:
         if viewer.url is not None:
             show(viewer.url)

@@ -448,9 +448,8 @@ def check_poses(
     )
     if i in rest:
         raise InputError(f"others must not hold {part!r} itself")
-    T = array("poses", poses, (None, 4, 4), finite=False)
-    for k, pose in enumerate(T):
-        scene_pose(pose, f"poses[{k}]")
+    given = array("poses", poses, (None, 4, 4), finite=False)
+    T = np.array([scene_pose(pose, f"poses[{k}]") for k, pose in enumerate(given)]).reshape(-1, 4, 4)
     n = len(T)
     lower, upper = np.full((n, len(rest)), np.inf), np.full((n, len(rest)), np.inf)
     verdict = np.full((n, len(rest)), Verdict.CLEAR.value, dtype=object)

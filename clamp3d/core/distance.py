@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, flag, whole
-from clamp3d.core.pose import Array, check_pose, check_poses
+from clamp3d.core.pose import Array, check_pose, check_pose_array
 from clamp3d.core.primitives import LARGEST, Cylinder, SweptArc, check_shapes
 from clamp3d.errors import InputError
 
@@ -112,7 +112,7 @@ def repaired(T: Array, name: str) -> Array:
 
     Raises InputError if one is not rigid, or its offset is too large; PoseWarning says what was mended.
     """
-    T = check_pose(T, name) if T.ndim == 2 else check_poses(T, name)
+    T = check_pose(T, name) if T.ndim == 2 else check_pose_array(T, name)
     far = np.flatnonzero(np.atleast_1d(np.abs(T[..., :3, 3]).sum(axis=-1)) >= LARGEST)
     if len(far):
         where, offset = (name, T[:3, 3]) if T.ndim == 2 else (f"{name}[{far[0]}]", T[far[0], :3, 3])

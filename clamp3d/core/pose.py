@@ -85,7 +85,7 @@ def check_pose(pose: ArrayLike, name: str = "pose") -> Array:
     return nearest_rigid(T)
 
 
-def check_poses(poses: ArrayLike, name: str = "poses") -> Array:
+def check_pose_array(poses: ArrayLike, name: str = "poses") -> Array:
     """Check many poses as `check_pose` does, with one warning for all that were mended.
 
     Parameters

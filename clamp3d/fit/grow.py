@@ -66,13 +66,11 @@ def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float
         depth = sagitta(axis.radius, span)
         tolerance = max(tolerance, share * depth)
         near = (off <= tolerance) & (off >= -1.02 * depth - tolerance)
-        lean = np.einsum("ij,ij->i", surface.normals[faces], axis.radial(surface.centres[faces])[0])
-        slack = float(np.quantile(np.arccos(np.clip(sign * lean, -1.0, 1.0)), 0.9))
+        slack = float(np.quantile(np.arccos(np.clip(sign * surface.lean(axis, faces), -1.0, 1.0)), 0.9))
         limit = np.cos(min(max(0.6 * span, 2.5 * slack, 0.02), 0.7))
         mask: BoolArray = search.free & np.asarray(near[F].all(axis=1))
         index = np.flatnonzero(mask)
-        radial = axis.radial(surface.centres[index])[0]
-        mask[index] = sign * np.einsum("ij,ij->i", surface.normals[index], radial) >= limit
+        mask[index] = sign * surface.lean(axis, index) >= limit
         if not mask[faces].any():
             return None
         label = surface.labels(np.asarray(mask[surface.pairs].all(axis=1)))
@@ -80,8 +78,7 @@ def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float
         names, where = np.unique(label[inside], return_inverse=True)
         main = names[np.argmax(np.bincount(where, weights=surface.areas[inside]))]
         grown = np.flatnonzero(mask & (label == main))
-        settled = np.array_equal(grown, faces)
-        faces = grown
+        settled, faces = np.array_equal(grown, faces), grown
         points = _support(surface, faces, np.abs(off) <= tolerance)
         if len(points) < 6:
             return None

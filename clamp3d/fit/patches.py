@@ -159,11 +159,11 @@ def _from_normals(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] 
     axis = axis_along(d, points)
     if axis is None:
         return None
-    lean = np.einsum("ij,ij->i", N, axis.radial(surface.centres[patch])[0]) @ surface.areas[patch]
+    sign = 1 if surface.lean(axis, patch) @ surface.areas[patch] > 0.0 else -1
     scatter = float(np.sqrt(np.mean(axis.residual(points) ** 2)))
     # Along the arc at the middle of the points; round a full turn any direction serves.
     across = np.cross(d, points.mean(axis=0) - axis.point)
     size = float(np.linalg.norm(across))
     across = across / size if size > 0.0 else perpendicular(d)[0]
     reach = min(float(np.ptp(points @ across)) / axis.radius, np.pi)
-    return None if sagitta(axis.radius, reach) < 6.0 * scatter else (axis, 1 if lean > 0.0 else -1, scatter)
+    return None if sagitta(axis.radius, reach) < 6.0 * scatter else (axis, sign, scatter)

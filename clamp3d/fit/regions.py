@@ -81,7 +81,7 @@ def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regio
         if not (np.abs(axis.residual(V[far.reshape(-1)])).reshape(-1, 2) <= 4.0 * loose).all(axis=1).any():
             continue
         seed = np.concatenate([members[a], members[b]])
-        sign = 1 if surface.normals[i] @ axis.radial(surface.centres[i : i + 1])[0][0] > 0.0 else -1
+        sign = 1 if surface.lean(axis, np.array([i]))[0] > 0.0 else -1
         region = grow(search, axis, sign, seed, loose)
         if region is None or region.tolerance > 4.0 * floor:
             continue

@@ -49,6 +49,10 @@ class Surface:
         self.extent = float(np.ptp(self.V[np.unique(self.F)], axis=0).max())
         self.floor = max(4.0 * mesh.rounding, 1e-9 * self.extent)
 
+    def lean(self, axis: Axis, faces: IntArray) -> Array:
+        """Cosine (k,) of the angle between the normals of ``faces`` (k,) and the direction away from the axis."""
+        return np.asarray(np.einsum("ij,ij->i", self.normals[faces], axis.radial(self.centres[faces])[0]))
+
     def labels(self, keep: BoolArray) -> IntArray:
         """Component (m,) of each face when only the neighbour pairs ``keep`` (p,) connect."""
         from trimesh.graph import connected_component_labels

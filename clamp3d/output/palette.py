@@ -43,8 +43,8 @@ def darker(colour: str, factor: float = 0.62) -> str:
     return "#" + "".join(f"{round(int(colour[i : i + 2], 16) * factor):02X}" for i in (1, 3, 5))
 
 
-_CYCLE = ("#77AADD", "#44BB99", "#EEDD88", "#BBCC33", "#AAAA00", "#99DDFF", "#FFAABB", "#EE8866", "#DDDDDD")
-"""The whole light scheme, blue first, for parts that have no colour of their own."""
+_CYCLE = ("#77AADD", "#44BB99", "#EEDD88", "#99DDFF", "#FFAABB", "#BBCC33", "#EE8866", "#DDDDDD")
+"""The light scheme, blue first, for parts that have no colour of their own."""
 
 
 def part_colours(names: Sequence[str]) -> dict[str, str]:

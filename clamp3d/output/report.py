@@ -20,9 +20,9 @@ from clamp3d.collide.distance import Distance
 from clamp3d.collide.result import BAD, PairResult
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Verdict
-from clamp3d.core.shapes import MeshShape
+from clamp3d.core.shapes import MeshShape, Solid
 from clamp3d.output.assembly_steps import StepRow, TighteningRow, step_rows, tightening_rows
-from clamp3d.output.wording import circumstances, headline, sentence, titles
+from clamp3d.output.wording import circumstances, gap_text, headline, sentence, titles
 
 Severity = Literal["error", "warning", "note", "ok"]
 
@@ -38,7 +38,7 @@ SEVERITIES: dict[Severity, str] = {
     "ok": "as it should be",
 }
 _NOT_MODELLED = (
-    "friction, deformation and forces: the parts are rigid, and no torque and no clamping force follow from this report",
+    "friction, deformation and forces: the parts are rigid, no torque and no clamping force follow from this report",
     "tolerances of manufacture and wear",
 )
 
@@ -209,8 +209,9 @@ def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
         rows=tuple(rows[id(pair)] for pair in result.pairs),
         motions=tuple(rows[id(pair)] for pair in result.motions),
         n_pairs=result.work.pairs,
-        modelled=(*(_described(part.name, part.shape) for part in scene.parts[:MEASURED_PAIRS]), _motions(scene)),
+        modelled=_modelled(scene),
         not_modelled=(
+            *_left_out(scene),
             *_NOT_MODELLED,
             *(() if scene.motions else ("motions: the parts stand where the scene puts them",)),
         ),
@@ -227,8 +228,15 @@ def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
     ]
     told = {finding.row for finding in findings}
     names = titles(scene)
+
+    def told_of(row: PairRow) -> str:
+        a, b, d = names[row.result.a], names[row.result.b], row.distance
+        if row.result.verdict is not Verdict.CLEARANCE:
+            return sentence(row.result, names)
+        return f"{a} and {b}, which nothing joins, are nearer than {scene.clearance:g} mm: {gap_text(d.lower, d.upper)}"
+
     findings += [
-        Finding(row.severity, sentence(row.result, names), row)
+        Finding(row.severity, told_of(row), row)
         for row in sorted(rows, key=lambda row: row.distance.upper)
         if row.severity != "ok" and row not in told
     ]
@@ -249,7 +257,7 @@ def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
         n_pairs=len(rows),
         modelled=_clamp_modelled(assembly),
         not_modelled=(
-            *(f"{p.name} {p.shape.title}: {p.shape.not_modelled}" for p in scene.parts if p.shape.not_modelled),
+            *_left_out(scene),
             *_NOT_MODELLED,
             "motions out of the section: wires that are bent, turned or shifted along the clamp",
             *(f"method {assembly.method}: {limit}" for limit in assembly.limits),
@@ -289,16 +297,33 @@ def _thresholds(scene: Scene) -> dict[str, str]:
     return {"contact": f"gap or overlap up to {t.contact:g} mm", "clearance": clearance}
 
 
-def _described(name: str, shape: object) -> str:
-    if not isinstance(shape, MeshShape):
-        return f"{name}: drawn with true arcs, measured in closed form where one is known, else on ever finer meshes"
-    how = {
+def _modelled(scene: Scene) -> tuple[str, ...]:
+    taken = {
         "bound": "its facets, with the error bound of the surfaces fitted to them",
         "round": "round surfaces through its vertices where they fit",
         "off": "its facets",
-    }[shape.fit]
-    notes = "".join(f"; {note}" for note in shape.mesh.notes)
-    return f"{name}: mesh {shape.name} of {len(shape.mesh.faces)} triangles, taken as {how}{notes}"
+    }
+    alike: dict[str, list[str]] = {}
+    for part in scene.parts:
+        how = "drawn with true arcs, measured in closed form where one is known, else on ever finer meshes"
+        if isinstance(part.shape, MeshShape):
+            facets = part.shape.mesh
+            how = f"mesh {part.shape.name} of {len(facets.faces)} triangles, taken as {taken[part.shape.fit]}"
+            how += "".join(f"; {note}" for note in facets.notes)
+        alike.setdefault(how, []).append(part.name)
+    lines = [
+        f"{', '.join(names[:20])}{f' and {len(names) - 20} more' * (len(names) > 20)}: {how}"
+        for how, names in alike.items()
+    ]
+    if scene.motions:
+        lines.append("motions of rigid parts, each from where the one before has ended, followed without a gap in time")
+    return tuple(lines)
+
+
+def _left_out(scene: Scene) -> list[str]:
+    names = titles(scene)
+    drawn = {part.name: part.shape for part in scene.parts if isinstance(part.shape, Solid)}
+    return [f"{names[name]}: {solid.not_modelled}" for name, solid in drawn.items() if solid.not_modelled]
 
 
 def _motions(scene: Scene) -> str:

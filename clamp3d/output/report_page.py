@@ -4,28 +4,26 @@ from __future__ import annotations
 
 import base64
 import csv
-import datetime
 import importlib.metadata
 import io
 import json
 import math
-import os
 import platform
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clamp3d import __version__
 from clamp3d.collide.verdict import Verdict
 from clamp3d.output.files import write_files
+from clamp3d.output.pages import now, render
 from clamp3d.output.palette import VERDICT_COLOURS, part_colours
 from clamp3d.output.report import MEASURED_PAIRS, SEVERITIES, PairRow, Report
 from clamp3d.output.wording import gap_text, meaning, titles
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from clamp3d.output.assembly_steps import StepRow
 
 LIBRARIES = ("numpy", "scipy", "numba", "matplotlib")
 FILES = ("report.html", "report.json", "pairs.csv")
@@ -74,7 +72,7 @@ def report_to_dict(report: Report) -> dict[str, Any]:
             {"nut_turns": t.turns, "way_mm": t.way, "saddle_gap_mm": t.saddle_gap} for t in report.tightening
         ]
     return data | {
-        "made": made_at(),
+        "made": f"{now():%Y-%m-%d %H:%M} UTC",
         "versions": versions(),
         "settings": report.settings,
         "headline": report.headline,
@@ -108,44 +106,31 @@ def report_csv(report: Report) -> str:
 
 def report_html(report: Report, *, progress: Callable[[str], None] = lambda what: None) -> str:
     """The report as one HTML page with its pictures inside."""
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("clamp3d.output", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters |= {
-        "mm": lambda value: f"{value:z.3f}",
-        "deg": lambda rad: f"{math.degrees(rad):z.2f}",
-        "bound": lambda value: f"{value:.1e}" if value is not None and math.isfinite(value) else "not known",
-        "gap": lambda distance, digits=6: gap_text(distance.lower, distance.upper, digits=digits),
-        "vector": lambda v: "" if v is None else ", ".join(f"{x:z.3f}" if abs(x) >= 5e-4 else "0" for x in v),
-    }
     cells = {(row.result.a, row.result.b): row for row in report.rows}
     names = [part.name for part in report.scene.parts]
     if len(names) > MATRIX:
         seen = {n for row in report.rows if row.verdict != "clear" for n in (row.result.a, row.result.b)}
         names = [name for name in names if name in seen][:MATRIX]
-    return environment.get_template("report.html").render(
+    return render(
+        "report.html",
         report=report,
         scene=report.scene,
         assembly=report.assembly,
-        made=made_at(),
+        made=f"{now():%Y-%m-%d %H:%M} UTC",
         versions=versions(),
-        style=environment.get_template("report.css").render(),
+        gap=_gap,
+        bound=lambda value: f"{value:.1e}" if math.isfinite(value) else "not known",
+        vector=lambda v: "" if v is None else ", ".join(f"{x:z.3f}" if abs(x) >= 5e-4 else "0" for x in v),
+        degrees=math.degrees,
         pictures=_pictures(report, progress),
         shown=[row for row in report.rows if len(report.rows) <= MEASURED_PAIRS or row.verdict != "clear"],
         names=names,
         titles=titles(report.scene),
         colours=part_colours([part.name for part in report.scene.parts]),
         verdict_colours=VERDICT_COLOURS,
-        verdicts=[(verdict.value, meaning(verdict.value, report.scene)) for verdict in Verdict],
+        verdicts={verdict.value: meaning(verdict.value, report.scene) for verdict in Verdict},
         severities=SEVERITIES,
         cell=lambda a, b: cells.get((a, b)),
-        checks=_checks,
     )
 
 
@@ -153,14 +138,6 @@ def versions() -> dict[str, str]:
     """Versions of what computed the report."""
     own = {"clamp3d": __version__, "Python": platform.python_version()}
     return own | {name: importlib.metadata.version(name) for name in LIBRARIES}
-
-
-def made_at() -> str:
-    """The time in UTC; SOURCE_DATE_EPOCH, if set, so that equal reports can be equal files."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    zone = datetime.UTC
-    now = datetime.datetime.fromtimestamp(int(epoch), zone) if epoch else datetime.datetime.now(zone)
-    return now.strftime("%Y-%m-%d %H:%M UTC")
 
 
 def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list[tuple[str, PairRow | None]]]:
@@ -172,20 +149,21 @@ def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list
     scene, assembly = report.scene, report.assembly
     jobs: list[tuple[str, str, Callable[[], Figure], PairRow | None]] = []
     if assembly is not None:
-        jobs.append(("overview", "the states", lambda: states_figure(assembly), None))
-        jobs.append(("steps", "the steps", lambda: steps_figure(assembly), None))
-        # Every pair that touches, overlaps, or is declared to; a thread has nothing to show.
-        drawn = [row for row in report.rows if row.contact and (row.contact.type or row.contact.declared) > 1]
-        jobs += [("pairs", row.name, lambda c=row.contact: contact_figure(assembly, c), row) for row in drawn]
+        jobs.append(("overview", "the states", partial(states_figure, assembly), None))
+        jobs.append(("steps", "the steps", partial(steps_figure, assembly), None))
+        for row in report.rows:
+            # Every pair that touches, overlaps, or is declared to; a thread has nothing to show.
+            if row.contact is not None and (row.contact.type or row.contact.declared) > 1:
+                jobs.append(("pairs", row.name, partial(contact_figure, assembly, row.contact), row))
     elif scene.parts:
         found = [finding.row for finding in report.findings if finding.row is not None]
         marks = [(number, row.result) for number, row in enumerate(found, 1)]
-        jobs.append(("overview", "the scene", lambda: scene_figure(scene, marks[:PICTURES]), None))
-        jobs += [("pairs", row.name, lambda r=row.result: finding_figure(scene, r), row) for row in found[:PICTURES]]
+        jobs.append(("overview", "the scene", partial(scene_figure, scene, marks[:PICTURES]), None))
+        jobs += [("pairs", row.name, partial(finding_figure, scene, row.result), row) for row in found[:PICTURES]]
     out: dict[str, list[tuple[str, PairRow | None]]] = {"overview": [], "steps": [], "pairs": []}
-    for kind, name, draw, row in jobs:
+    for kind, name, draw, pair in jobs:
         progress(f"picture of {name}")
-        out[kind].append((_data_address(draw()), row))
+        out[kind].append((_data_address(draw()), pair))
     return out
 
 
@@ -198,12 +176,8 @@ def _data_address(figure: Figure) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(out.getvalue()).decode("ascii")
 
 
-def _checks(step: StepRow, last: bool) -> list[tuple[str, str]]:
-    """What a line worker looks at after a step: (value, state), state 'good', 'bad' or '' while under way."""
-    splints = "parallel" if step.parallel else f"tilted {abs(math.degrees(step.tilt)):.2f}\N{DEGREE SIGN}"
-    wires = [(step.seat(w), ("good" if step.seated(w) else "bad") if last else "") for w in ("P6", "P7")]
-    opening = f"{step.opening_line:.2f}, {step.opening_jumper:.2f} mm"
-    return [*wires, (splints, ""), (opening, ""), (f"{step.turns:.2f} turns", "")]
+def _gap(row: PairRow, digits: int = 6) -> str:
+    return gap_text(row.distance.lower, row.distance.upper, digits=digits)
 
 
 def _pair_to_dict(row: PairRow) -> dict[str, Any]:

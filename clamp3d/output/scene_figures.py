@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -100,9 +100,9 @@ def _at(scene: Scene, row: PairResult) -> Scene:
     for motion in scene.motions if row.motion is not None else ():
         # Each motion starts where the one before has left the parts.
         going = motion.resolved(poses[motion.parts[0]])
-        last = motion.name == row.motion and row.t is not None
-        poses |= {name: going.at(row.t if last else 1.0, poses[name]) for name in motion.parts}
-        if last:
+        t = row.t if motion.name == row.motion and row.t is not None else 1.0
+        poses |= {name: going.at(t, poses[name]) for name in motion.parts}
+        if motion.name == row.motion:
             break
     return scene.moved(poses)
 
@@ -131,20 +131,13 @@ def _common(a: PosedMesh, b: PosedMesh) -> PosedMesh | None:
 
 
 def _hidden(camera: Camera, solids: Sequence[PosedMesh], place: Array) -> int:
-    """How many triangles lie between a place and the viewer."""
-    x, y, z = camera.project(place[None])[0]
+    """How many faces lie between a place and the viewer."""
     count = 0
     for solid in solids:
-        a, b, c = np.moveaxis(camera.view(solid)[solid.mesh.faces], 1, 0)
-        sides = [
-            (q[:, 0] - p[:, 0]) * (y - p[:, 1]) - (q[:, 1] - p[:, 1]) * (x - p[:, 0])
-            for p, q in ((a, b), (b, c), (c, a))
-        ]
-        inside = (np.array(sides) > 0.0).all(0) | (np.array(sides) < 0.0).all(0)
-        total = np.sum(sides, axis=0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            depth = (sides[1] * a[:, 2] + sides[2] * b[:, 2] + sides[0] * c[:, 2]) / total
-        count += int((inside & (depth > z + 1e-3)).sum())
+        R = solid.T[:3, :3]
+        towards = camera.axes()[2]
+        origin = R.T @ (place + 1e-3 * towards - solid.T[:3, 3])
+        count += len(solid.mesh.ray.intersects_location(origin[None], (R.T @ towards)[None])[0])
     return count
 
 
@@ -154,8 +147,8 @@ def _mark(ax: Axes, at: Array, row: PairResult, text: str = "") -> None:
     ax.plot([at[0]], [at[1]], "o", ms=13, mfc="none", mec=colour, mew=1.8, zorder=41)
     if text:
         box = {"boxstyle": "circle,pad=0.2", "fc": "white", "ec": colour, "lw": 1.4}
-        style = {"ha": "center", "va": "center", "fontsize": 8, "fontweight": "bold", "zorder": 42, "color": INK}
-        ax.annotate(text, at[:2], (14, 14), textcoords="offset points", bbox=box, **style)
+        style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, "fontweight": "bold", "zorder": 42}
+        ax.annotate(text, (at[0], at[1]), (14, 14), textcoords="offset points", bbox=box, color=INK, **style)
 
 
 def _legend(ax: Axes, solids: dict[str, PosedMesh]) -> None:

@@ -8,7 +8,16 @@ from clamp3d import __version__
 from clamp3d.collide.result import CheckResult, Work
 from clamp3d.collide.verdict import Verdict
 from clamp3d.output.tables import text_table
-from clamp3d.output.wording import circumstances, counts_text, gap_text, headline, meaning, sentence, titles
+from clamp3d.output.wording import (
+    circumstances,
+    counts_text,
+    gap_text,
+    headline,
+    meaning,
+    sentence,
+    titles,
+    worst_first,
+)
 
 _MATRIX = 14
 """More parts than this and the matrix no longer fits a terminal."""
@@ -51,9 +60,11 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
     """The result as lines for a terminal: the headline, the findings, the matrix, all pairs."""
     t, n, names = result.thresholds, len(result.scene.parts), titles(result.scene)
     clearance = f"clearance {t.clearance:g} mm" if t.clearance else "no clearance asked for"
+    moving = f" at rest and {len(result.motions)} in motion" if result.motions else ""
     lines = [
         f"{result.scene.name}: {headline(result)}",
-        f"{n} parts, {result.work.pairs} pairs: {counts_text(result)}; contact up to {t.contact:g} mm, {clearance}",
+        f"{n} parts, {result.work.pairs} pairs{moving}: {counts_text(result)}; "
+        f"contact up to {t.contact:g} mm, {clearance}",
     ]
     for row in result.findings[:_ROWS]:
         where = circumstances(row)
@@ -62,8 +73,7 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
         lines.append(f"  ... and {len(result.findings) - _ROWS} more (--json or --html lists all)")
     if 2 <= n <= _MATRIX and result.asked is None:
         lines += ["", *_matrix(result)]
-    order = list(Verdict)
-    pairs = sorted(result.pairs, key=lambda row: order.index(row.verdict))[: _ROWS // 2]
+    pairs = worst_first(result.pairs)[: _ROWS // 2]
     if pairs:
         table = [(f"{r.a} - {r.b}", r.verdict.value, _gap(r.distance), r.distance.method) for r in pairs]
         lines += ["", text_table(("pair", "verdict", "distance", "by"), table, indent=2)]

@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.pose import Array, SectionPose
+from clamp3d.core.pose import SectionPose
 from clamp3d.core.profile import Arc, Point, Profile
 from clamp3d.core.shapes import Solid
-from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, VERDICT_COLOURS, darker
+from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, darker
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,47 +29,30 @@ Poses = Mapping[PartName, SectionPose]
 
 _HATCH: dict[PartName, str] = {"P1": "////", "P2": "\\\\\\\\", "P3": "////"}
 WIRES: tuple[PartName, ...] = ("P6", "P7")
+_LINE: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
+_NUMBER: dict[str, Any] = {"color": DIMENSION, "fontsize": 9, "zorder": 26}
+_ARROW: dict[str, Any] = {
+    "arrowstyle": "-|>,head_width=0.18,head_length=0.45",
+    "color": DIMENSION,
+    "lw": 0.8,
+    "shrinkA": 0.0,
+    "shrinkB": 0.0,
+}
 _ORDER: tuple[PartName, ...] = ("P6", "P7", "P1", "P2", "P3", "P4", "P5")
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """A point of the section worth a dot: a contact. ``x``, ``y`` in mm; ``verdict`` picks the colour."""
-
-    x: float
-    y: float
-    label: str
-    verdict: str = "contact"
-
-
-def section_pose(T_world_part: Array) -> SectionPose:
-    """Where a pose (4, 4) puts its part in the section; what leaves the section (yaw, pitch, Y) is not seen in it.
-
-    >>> section_pose(SectionPose(1.0, 2.0, 0.25).T(along=7.0))
-    SectionPose(x=1.0, y=2.0, angle=0.25)
-    """
-    T = T_world_part
-    return SectionPose(float(T[0, 3]), float(-T[2, 3]), math.atan2(float(T[2, 0]), float(T[0, 0])))
-
-
 def arc_path(profile: Profile) -> MplPath:
-    """The outline as a closed path; each arc as cubic curves of at most 15 degrees, within 1e-8 radii of the arc."""
+    """The outline as a closed path; each arc as cubic curves of at most 10 degrees, within 1e-8 radii of the arc."""
     from matplotlib.path import Path
 
-    vertices: list[tuple[float, float]] = [profile.edges[0].start]
+    vertices: list[ArrayLike] = [profile.edges[0].start]
     codes = [int(Path.MOVETO)]
     for edge in profile.edges:
         if isinstance(edge, Arc):
-            n = max(1, math.ceil(abs(edge.sweep) / math.radians(15.0)))
-            step = edge.sweep / n
-            handle = 4.0 / 3.0 * math.tan(step / 4.0)  # the usual cubic: tangent at both ends, middle on the arc
-            for k in range(n):
-                t0, t1 = edge.start_angle + k * step, edge.start_angle + (k + 1) * step
-                (x0, y0), (x1, y1) = edge.at(t0), edge.at(t1)
-                r = handle * edge.radius
-                vertices += [(x0 - r * math.sin(t0), y0 + r * math.cos(t0))]
-                vertices += [(x1 + r * math.sin(t1), y1 - r * math.cos(t1)), (x1, y1)]
-                codes += [int(Path.CURVE4)] * 3
+            low, high = sorted((math.degrees(edge.start_angle), math.degrees(edge.end_angle)))
+            curve = np.asarray(Path.arc(low, high, max(1, math.ceil((high - low) / 10.0))).vertices, dtype=float)
+            vertices += [*(edge.radius * (curve if edge.sweep > 0.0 else curve[::-1])[1:] + edge.centre)]
+            codes += [int(Path.CURVE4)] * (len(curve) - 1)
         else:
             vertices.append(edge.end)
             codes.append(int(Path.LINETO))
@@ -108,7 +91,7 @@ def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
     """Names of the parts: a column of balloons on the right, each with a line to its part; wires carry theirs."""
     label_wires(ax, poses)
     points = {name: poses[name].point(*part_anchor(clamp, name)) for name in PARTS if name in poses}
-    (left, edge), (low, high) = section_extent(clamp, poses)
+    (left, low), (edge, high) = ax.dataLim.get_points()
     column = edge + 0.27 * (edge - left)
     order = sorted(points, key=lambda name: points[name][1])
     heights = spread([points[name][1] for name in order], min((high - low) / len(order), 0.1 * (high - low)))
@@ -140,40 +123,13 @@ def balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> Non
     ax.annotate(name, (x, y), ha="center", va="center", fontsize=size, fontweight="bold", zorder=31, bbox=box)
 
 
-def draw_marks(ax: Axes, marks: Iterable[Mark], *, size: float = 6.0) -> None:
-    """Contact points as dots in the colour of their verdict, with their labels."""
-    for mark in marks:
-        ax.plot(
-            [mark.x],
-            [mark.y],
-            "o",
-            ms=size,
-            mec=INK,
-            mew=0.7,
-            mfc=VERDICT_COLOURS[mark.verdict],
-            zorder=40,
-            clip_on=False,
-        )
-        if mark.label:
-            ax.annotate(
-                mark.label,
-                (mark.x, mark.y),
-                (6, -3),
-                textcoords="offset points",
-                fontsize=7,
-                color=INK,
-                zorder=41,
-                bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85},
-            )
-
-
 def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int] = (-1, 1)) -> None:
     """Distance between the splints at the edges (-1 line side, 1 jumper side), and the tilt of the down splint."""
     edges = _inner_edges(clamp, poses)
     for side in sides:
         above, below = edges[side > 0]
         x = (min if side < 0 else max)(above[0], below[0]) + side * 0.09 * clamp.up_splint.width
-        dimension(ax, above, below, x, f"{below[1] - above[1]:.3f}", side)
+        _dimension(ax, above, below, x, side)
     _draw_tilt(ax, clamp, poses["P2"])
 
 
@@ -191,45 +147,34 @@ def _inner_edges(clamp: Clamp, poses: Poses) -> list[tuple[Point, Point]]:
     ]
 
 
-def dimension(ax: Axes, a: tuple[float, float], b: tuple[float, float], x: float, text: str, side: int) -> None:
-    """A vertical dimension at ``x`` between the heights of ``a`` and ``b``; small ones get their arrows outside."""
-    style: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
-    for px, py in (a, b):
-        ax.plot([px + 1.5 * side, x + 2.0 * side], [py, py], **style)
-    y0, y1 = sorted((a[1], b[1]))
-    arrow: dict[str, Any] = {"color": DIMENSION, "lw": 0.8, "shrinkA": 0.0, "shrinkB": 0.0}
-    if y1 - y0 > 9.0:
-        ax.annotate("", (x, y0), (x, y1), arrowprops={"arrowstyle": "<|-|>,head_width=0.18,head_length=0.45", **arrow})
-    else:
-        for tip, tail in ((y0, y0 - 9.0), (y1, y1 + 9.0)):
-            ax.annotate(
-                "", (x, tip), (x, tail), arrowprops={"arrowstyle": "-|>,head_width=0.18,head_length=0.45", **arrow}
-            )
-    ax.annotate(
-        text,
-        (x + 2.0 * side, 0.5 * (y0 + y1)),
-        (3 * side, 0),
-        textcoords="offset points",
-        ha="right" if side < 0 else "left",
-        va="center",
-        fontsize=9,
-        color=DIMENSION,
-        zorder=26,
-    )
+def _dimension(ax: Axes, above: Point, below: Point, x: float, side: int) -> None:
+    """A vertical dimension at ``x`` between the heights of two points; small ones get their arrows outside."""
+    for px, py in (above, below):
+        ax.plot([px + 1.5 * side, x + 2.0 * side], [py, py], **_LINE)
+    top, bottom = sorted((above[1], below[1]))
+    reach = 9.0 if bottom - top <= 9.0 else 0.5 * (top - bottom)
+    for tip, tail in ((top, top - reach), (bottom, bottom + reach)):
+        ax.annotate("", (x, tip), (x, tail), arrowprops=_ARROW)
+    at = (x + 2.0 * side, 0.5 * (top + bottom))
+    text, align = f"{below[1] - above[1]:.3f}", "right" if side < 0 else "left"
+    ax.annotate(text, at, (3 * side, 0), textcoords="offset points", ha=align, va="center", **_NUMBER)
 
 
-def part_anchor(clamp: Clamp, name: PartName) -> tuple[float, float]:
-    """A point (u, v) well inside the part, towards the right, for its balloon's line."""
-    up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
-    return {
-        "P1": (0.94 * up.width, 0.3 * up.thickness),
-        "P2": (0.46 * down.width, 0.5 * (down.face_depth + down.underside_depth)),
-        "P3": (0.42 * saddle.width, saddle.radius + 0.6 * saddle.apex_thickness),
-        "P4": (0.25 * clamp.bolt.diameter, 0.08 * clamp.bolt.shank_length),
-        "P5": (0.4 * clamp.nut.across_flats, 0.5 * clamp.nut.height),
-        "P6": (0.0, 0.0),
-        "P7": (0.0, 0.0),
-    }[name]
+def part_anchor(clamp: Clamp, name: PartName, *, right: bool = True) -> tuple[float, float]:
+    """A point (u, v) in the part's material as the section shows it, for its name; ``right``: near its right end."""
+    import shapely
+
+    part = parts(clamp)[name]
+    shapes = [body.profile if body.axis == "Y" else _silhouette(body) for body in part.bodies]
+    area = shapely.union_all([shapely.Polygon(shape.polygon(0.01 * clamp.bolt.diameter)) for shape in shapes])
+    for hole in part.holes:
+        (u0, _), (u1, _) = hole.profile.bounds
+        area = area.difference(shapely.box(u0, -hole.end, u1, -hole.start))
+    u0, v0, u1, v1 = area.bounds
+    if right and name not in WIRES:
+        area = shapely.clip_by_rect(area, u1 - 0.15 * (u1 - u0), v0, u1, v1)
+    point = area.representative_point()
+    return float(point.x), float(point.y)
 
 
 def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
@@ -237,28 +182,19 @@ def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
     degrees = math.degrees(pose.angle)
     inward = 1.0 if pose.angle >= 0.0 else -1.0  # the lower corner is on the left if the tilt is positive
     corner = pose.point(-inward * down.width / 2, down.underside_depth)
-    style: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
     reach = inward * 0.19 * down.width
     if abs(degrees) < 5e-3:
-        ax.annotate("parallel", corner, (0, -11), textcoords="offset points", fontsize=9, color=DIMENSION, va="center")
+        ax.annotate("parallel", corner, (0, -11), textcoords="offset points", va="center", **_NUMBER)
         return
-    ax.plot([corner[0] - 0.06 * reach, corner[0] + reach * 1.15], [corner[1]] * 2, ls=(0, (8, 2, 1, 2)), **style)
+    ax.plot([corner[0] - 0.06 * reach, corner[0] + reach * 1.15], [corner[1]] * 2, ls=(0, (8, 2, 1, 2)), **_LINE)
     t = np.linspace(0.0, pose.angle, 30)
     xs, ys = corner[0] + reach * np.cos(t), corner[1] - reach * np.sin(t)
-    ax.plot(xs, ys, **style)
-    head: dict[str, Any] = {"arrowstyle": "-|>,head_width=0.18,head_length=0.45", "color": DIMENSION, "lw": 0.8}
+    ax.plot(xs, ys, **_LINE)
     for tip, tail in ((0, 3), (-1, -4)):
-        ax.annotate("", (xs[tip], ys[tip]), (xs[tail], ys[tail]), arrowprops={**head, "shrinkA": 0, "shrinkB": 0})
-    ax.annotate(
-        f"{abs(degrees):.2f}\N{DEGREE SIGN}",
-        (corner[0] + 0.45 * reach, max(corner[1], ys.max())),
-        (0, -10),
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        fontsize=9,
-        color=DIMENSION,
-    )
+        ax.annotate("", (xs[tip], ys[tip]), (xs[tail], ys[tail]), arrowprops=_ARROW)
+    at = (corner[0] + 0.45 * reach, max(corner[1], float(ys.max())))
+    text = f"{abs(degrees):.2f}\N{DEGREE SIGN}"
+    ax.annotate(text, at, (0, -10), textcoords="offset points", ha="center", va="center", **_NUMBER)
 
 
 def _draw_part(
@@ -321,30 +257,13 @@ def _pale(colour: str) -> str:
     return "#" + "".join(f"{round(255 - 0.4 * (255 - int(colour[i : i + 2], 16))):02X}" for i in (1, 3, 5))
 
 
-def section_extent(clamp: Clamp, poses: Poses) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Least and largest x, and y, of the parts at their poses (from their bounding boxes)."""
-    xs, ys = [], []
-    for name, part in parts(clamp).items():
-        if name in poses:
-            (x0, _, z0), (x1, _, z1) = part.bounds
-            for u, v in ((x0, -z0), (x0, -z1), (x1, -z0), (x1, -z1)):
-                x, y = poses[name].point(float(u), float(v))
-                xs.append(x)
-                ys.append(y)
-    return (min(xs), max(xs)), (min(ys), max(ys))
-
-
 def spread(values: list[float], spacing: float) -> list[float]:
-    """The ascending ``values`` moved apart to at least ``spacing``, as little as a few sweeps allow."""
-    out = list(values)
-    for _ in range(200):
-        moved = False
-        for i in range(len(out) - 1):
-            lack = spacing - (out[i + 1] - out[i])
-            if lack > 1e-6:
-                out[i] -= lack / 2
-                out[i + 1] += lack / 2
-                moved = True
-        if not moved:
-            break
-    return out
+    """The ascending ``values`` moved apart to at least ``spacing``, in all as little as can be (least squares).
+
+    >>> spread([0.0, 1.0, 10.0], 3.0)
+    [-1.0, 2.0, 10.0]
+    """
+    from scipy.optimize import isotonic_regression
+
+    even = spacing * np.arange(len(values))
+    return (isotonic_regression(np.array(values) - even).x + even).tolist()  # type: ignore[no-any-return]

@@ -6,9 +6,7 @@ Needs the extra ``step`` (cadquery-ocp-novtk); imported when a file is written.
 from __future__ import annotations
 
 import contextlib
-import datetime
 import itertools
-import os
 import re
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -20,6 +18,7 @@ from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc
 from clamp3d.core.shapes import Solid
 from clamp3d.errors import Clamp3dError, InputError, MissingLibraryError
+from clamp3d.output.pages import now
 from clamp3d.output.placed import PlacedPart
 
 UNITS = {"mm": "MM", "cm": "CM", "m": "M", "in": "INCH"}
@@ -39,7 +38,7 @@ def step(placed: Sequence[PlacedPart], title: str, unit: str) -> bytes:
     from OCP.Interface import Interface_Static
     from OCP.STEPCAFControl import STEPCAFControl_Writer
 
-    stamp = _time_stamp()
+    stamp = f"{now():%Y-%m-%dT%H:%M:%S}"
     document = _document(placed, title)
     writer = STEPCAFControl_Writer()
     writer.SetNameMode(True)
@@ -222,14 +221,3 @@ def _header(writer: Any, title: str, stamp: str) -> None:
     header.SetOrganizationValue(1, TCollection_HAsciiString(""))
     header.SetTimeStamp(TCollection_HAsciiString(stamp))
     header.SetOriginatingSystem(TCollection_HAsciiString("clamp3d"))
-
-
-def _time_stamp() -> str:
-    epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    if epoch is None:
-        return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%S")
-    try:
-        moment = datetime.datetime.fromtimestamp(int(epoch), datetime.UTC)
-    except (ValueError, OverflowError, OSError):
-        raise InputError(f"SOURCE_DATE_EPOCH must be whole seconds since 1970, got {epoch!r}") from None
-    return moment.strftime("%Y-%m-%dT%H:%M:%S")

@@ -46,4 +46,4 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, indent:
     console = Console(file=io.StringIO(), width=10_000, color_system=None, markup=False, emoji=False, highlight=False)
     with console.capture() as text:
         console.print(table)
-    return "\n".join(" " * indent + line.rstrip() for line in text.get().splitlines())
+    return "\n".join((" " * indent + line).rstrip() for line in text.get().splitlines())

@@ -1,21 +1,15 @@
-"""Surfaces for the viewer that are no part's own mesh: parts cut open, grooves' arcs, overlaps of two parts."""
+"""Parts cut open, and overlaps of two parts, of the meshes that are drawn."""
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clamp3d.core.pose import Array, inverse
-from clamp3d.core.primitives import SweptArc
-from clamp3d.core.profile import Arc
 
 if TYPE_CHECKING:
     import trimesh
-
-_LIFT = 0.05
-"""How far in mm a groove's coloured surface stands off the part, so that the two do not flicker."""
 
 
 def cut_open(
@@ -42,26 +36,9 @@ def cut_open(
 
 
 def overlap(a: trimesh.Trimesh, T_a: Array, b: trimesh.Trimesh, T_b: Array) -> trimesh.Trimesh | None:
-    """What two parts at their world poses have in common, in the frame of ``a``; None where their facets do not meet."""
+    """What two parts at their poses have in common, in the frame of ``a``; None where their facets do not meet."""
     placed = _manifold(b).transform((inverse(T_a) @ T_b)[:3])
     return _mesh(_manifold(a) ^ placed)
-
-
-def groove_surface(groove: SweptArc, T_part_groove: Array, mesh_error: float, *, half: bool = False) -> trimesh.Trimesh:
-    """A groove's arc surface in its part's frame, a hair towards the axis; with ``half`` only its end on +Y."""
-    import trimesh
-
-    arc = Arc((0.0, 0.0), groove.radius, -math.pi / 2 - groove.half_angle, -math.pi / 2 + groove.half_angle)
-    n = arc.chord_count(mesh_error)
-    t = np.linspace(arc.start_angle, arc.end_angle, n + 1)
-    r = groove.radius - _LIFT
-    outline = np.column_stack([r * np.cos(t), r * np.sin(t)])
-    end = math.copysign(groove.length / 2, T_part_groove[1, 2])  # the end on the part's +Y
-    vertices = np.vstack([np.column_stack([outline, np.full(n + 1, z)]) for z in (0.0 if half else -end, end)])
-    i = np.arange(n)
-    j = i + n + 1
-    faces = np.vstack([np.column_stack([i, i + 1, j]), np.column_stack([i + 1, j + 1, j])])
-    return trimesh.Trimesh(vertices @ T_part_groove[:3, :3].T + T_part_groove[:3, 3], faces, process=False)
 
 
 def _manifold(mesh: trimesh.Trimesh) -> Any:

@@ -86,7 +86,8 @@ def arrow(start: Array, direction: Array, length: float, colour: str) -> Object:
     tip = trimesh.creation.cone(3.0 * radius, head, sections=24)
     tip.apply_translation([0.0, 0.0, length - head])
     both = joined([shaft, tip])
-    both.apply_transform(trimesh.geometry.align_vectors([0.0, 0.0, 1.0], direction))
+    turn: Array = trimesh.geometry.align_vectors([0.0, 0.0, 1.0], direction)  # type: ignore[no-untyped-call]
+    both.apply_transform(turn)
     both.apply_translation(start)
     return facets(both, colour)
 
@@ -95,7 +96,8 @@ def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
     """Several meshes as one."""
     import trimesh
 
-    return trimesh.util.concatenate(list(meshes))
+    made: trimesh.Trimesh = trimesh.util.concatenate(list(meshes))  # type: ignore[assignment]
+    return made
 
 
 def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str = INK) -> Object:

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clamp3d.collide.distance import Distance
 from clamp3d.collide.scene import Part, Scene
-from clamp3d.core.meshing import mesh
 from clamp3d.core.pose import Array
-from clamp3d.core.shapes import MeshShape
 from clamp3d.output import viewer_objects as draw
-from clamp3d.output.palette import INK, VERDICT_COLOURS, darker, part_colours
+from clamp3d.output.palette import INK, VERDICT_COLOURS, darker
+from clamp3d.output.placed import place
 from clamp3d.output.viewer_cut import cut_open, overlap
 from clamp3d.output.viewer_timeline import FIRST, Row, Stop, Timeline
 from clamp3d.output.wording import BAD, part_title
@@ -44,15 +44,6 @@ _CUTTABLE, _MARKED = 60, 200
 _OVERLAY_COLOURS = ("#4477AA", "#EE6677", "#228833", "#CCBB44", "#66CCEE", "#AA3377")  # Tol's bright scheme
 
 
-def part_mesh(part: Part, mesh_error: float) -> trimesh.Trimesh:
-    """A part's mesh in its own frame: its own facets, or facets within ``mesh_error`` mm of what is drawn."""
-    import trimesh
-
-    if isinstance(part.shape, MeshShape):
-        return trimesh.Trimesh(part.shape.mesh.vertices, part.shape.mesh.faces, process=False)
-    return mesh(part.shape, mesh_error)
-
-
 class SceneDrawing:
     """Sends a scene's parts to ``send`` at once, each stop of its time line when told, and the animation at the end.
 
@@ -72,8 +63,9 @@ class SceneDrawing:
         overlays: Mapping[str, Pieces] | None = None,
     ) -> None:
         self._send = send
-        self._meshes = {part.name: part_mesh(part, mesh_error) for part in scene.parts}
-        self._colours = part_colours(list(self._meshes))
+        placed = place(scene)
+        self._meshes = {part.name: part.mesh(mesh_error) for part in placed}
+        self.colours = {part.name: part.colour for part in placed}
         self.cut = cut_y is not None and len(scene.parts) <= _CUTTABLE
         self._trees = ("whole", "cutaway") if self.cut else ("whole",)
         self.overlays = dict(overlays or {})
@@ -87,7 +79,7 @@ class SceneDrawing:
             self._draw_part(part, cut_y, part.name in uncut)
             middle = self._meshes[part.name].bounds.mean(axis=0)
             anchor = middle if anchors is None else anchors[part.name]
-            self._label(f"{ROOT}/labels/{part.name}", part.name, anchor, self._colours[part.name], 0.85)
+            self._label(f"{ROOT}/labels/{part.name}", part.name, anchor, self.colours[part.name], 0.85)
         for name, pieces in self.overlays.items():
             self._draw_overlay(f"{ROOT}/overlay {name}", pieces)
 
@@ -124,17 +116,16 @@ class SceneDrawing:
             for group in ("contacts", "gaps"):
                 self.visible(f"{ROOT}/{group}/{self.timeline.group(k)}", k == number)
 
-    def play(self, shown: Mapping[str, list[bool]]) -> None:
-        """Rewind and play all stops once; ``shown`` has paths that are seen at some stops only."""
+    def play(self) -> None:
+        """Rewind and play all stops once."""
         from meshcat.commands import SetAnimation
 
         self.frame()
         self.go(0)  # so that it does not matter whether a page reads this or the animation first
         followers = {name: self.paths(name) for name in self._meshes}
         groups = [f"{ROOT}/contacts", f"{ROOT}/gaps"]
-        moving = len(self.timeline.stops) > 1
-        if moving:
-            self._send(SetAnimation(self.timeline.animation(followers, groups, shown)).lower())
+        if len(self.timeline.stops) > 1:
+            self._send(SetAnimation(self.timeline.animation(followers, groups)).lower())
 
     def frame(self) -> dict[str, Any]:
         """Put the camera in front of all stops; what it is aimed at."""
@@ -151,22 +142,9 @@ class SceneDrawing:
         self.transform(ROOT, T)
         return {"low": low.tolist(), "high": high.tolist(), "eye": eye.tolist(), "unit": self._unit}
 
-    def groove(self, part: str, name: str, whole: trimesh.Trimesh, half: trimesh.Trimesh, colour: str) -> None:
-        """A coloured surface of a part, below ``name``; ``half`` is what the cutaway shows."""
-        for tree in self._trees:
-            shape = half if tree == "cutaway" else whole
-            self.put(f"{ROOT}/{tree}/{self._keys[part]}/{name}", draw.facets(shape, colour))
-
-    def groove_paths(self, part: str, name: str) -> list[str]:
-        """The nodes of such a surface."""
-        return [f"{ROOT}/{tree}/{self._keys[part]}/{name}" for tree in self._trees]
-
     def _stage(self) -> None:
         """Light background, softer light, no grid."""
-        from meshcat.commands import Delete
-        from meshcat.path import Path
-
-        self._send(Delete(Path().append(ROOT.lstrip("/"))).lower())
+        self._send({"type": "delete", "path": ROOT})
         for key, colour in (("top_color", [0.93, 0.95, 0.97]), ("bottom_color", [1.0, 1.0, 1.0])):
             self.property("/Background", key, colour)
         self.visible("/Grid", False)
@@ -175,7 +153,7 @@ class SceneDrawing:
             self.property(f"/Lights/{light}/<object>", "intensity", intensity)
 
     def _draw_part(self, part: Part, cut_y: float | None, uncut: bool) -> None:
-        whole, colour, key = self._meshes[part.name], self._colours[part.name], self._keys[part.name]
+        whole, colour, key = self._meshes[part.name], self.colours[part.name], self._keys[part.name]
         edge = darker(colour, 0.4)
         halves = cut_open(whole, part.T_world, cut_y) if self.cut and not uncut and cut_y is not None else (whole, None)
         for tree, (body, cap) in zip(self._trees, ((whole, None), halves), strict=False):
@@ -234,7 +212,7 @@ class SceneDrawing:
             if point is not None:
                 self._dot(f"{path}/{name}", point, red)
         common = overlap(self._meshes[a], poses[a], self._meshes[b], poses[b])
-        low, high = focus(row)
+        low, high = focus(row.distance)
         if common is not None:
             common.apply_transform(poses[a])
             self.put(f"{path}/overlap", draw.facets(common, red, opacity=0.6, on_top=True))
@@ -258,11 +236,17 @@ class SceneDrawing:
         middle = 0.5 * (a + b)
         upright = abs(b[2] - a[2]) >= abs(b[0] - a[0])
         beside = middle + 0.08 * self.size * np.array([-1.0, 0.0, 0.0] if upright else [-1.0, 0.0, 0.7])
-        self.put(f"{path}/line", draw.segments([a, b, middle, beside], darker(colour, 0.7), on_top=True))
+        self.put(f"{path}/line", draw.segments([a, b, middle, beside], darker(colour, 0.85), on_top=True))
         self._label(f"{path}/value", text.removeprefix("gap "), beside, "#FFFFFF", 0.7)
 
     def _label(self, path: str, text: str, at: ArrayLike, colour: str, size: float) -> None:
         self.put(path, draw.label(text, colour, at, size=0.01 * size / self._unit))
+
+    def caption(self, text: str) -> None:
+        """A line below everything, for meshcat's own page; ours says it in its panel."""
+        if self.timeline.stops:
+            low, high = self.extent([stop.poses for stop in self.timeline.stops])
+            self._label(f"{ROOT}/caption", text, [*(0.5 * (low + high))[:2], low[2] - 0.05 * self.size], "#FFFFFF", 0.8)
 
     def dimension(self, number: int, name: str, a: Array, b: Array, text: str) -> None:
         """One more length at a stop, from ``a`` to ``b``."""
@@ -285,7 +269,7 @@ class SceneDrawing:
         self.property(path, "visible", on)
 
 
-def focus(row: Row) -> tuple[Array, Array]:
-    """Corners of a box around the witness points of a row; empty where it has none."""
-    points = [p for p in (row.distance.point_a, row.distance.point_b) if p is not None] or [np.zeros(3)]
+def focus(d: Distance) -> tuple[Array, Array]:
+    """Corners of a box around the witness points of a distance."""
+    points = [p for p in (d.point_a, d.point_b) if p is not None] or [np.zeros(3)]
     return np.min(points, axis=0), np.max(points, axis=0)

@@ -1,8 +1,7 @@
 """Where a scene goes: a web server of our own in a thread, or a meshcat server that is already running.
 
-Our own server speaks meshcat's protocol to its viewer (three.js, from the meshcat package) and lives in a thread of
-this process: it ends with it, however that ends, and nothing is left behind. It listens on this machine only unless
-asked otherwise.
+Our own server speaks meshcat's protocol to its viewer (three.js, from the meshcat package). Meshcat's is a process that
+shows its own page, to every page that asks; ours shows our page, checks who asks, and ends with this process.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ import contextlib
 import ipaddress
 import socket
 import threading
-import weakref
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -27,8 +25,7 @@ PORT = 7000
 """First port tried, meshcat's own; the next free one is taken unless the user named it."""
 _PORTS = 200
 _PATIENCE = 10.0  # s for a server that is said to be running
-_FAREWELL = 0.5  # s for the pages when we close
-
+_FAREWELL = 0.1  # s for the pages when we close
 
 Command = dict[str, Any]
 
@@ -50,16 +47,10 @@ class CommandLog:
         """Keep ``command`` and return it as the message (msgpack) that the viewer reads."""
         import umsgpack
 
-        message: bytes = umsgpack.packb(command)
-        kind, path = command["type"], command.get("path", "")
-        if kind == "delete":
-            below = path.rstrip("/") + "/"
-            self._messages = {k: m for k, m in self._messages.items() if k[1] != path and not k[1].startswith(below)}
-            return message
-        key = (kind, path, command.get("property", ""))
+        key = (command["type"], command["path"], command.get("property", ""))
         self._messages.pop(key, None)
-        self._messages[key] = message
-        return message
+        self._messages[key] = umsgpack.packb(command)
+        return self._messages[key]
 
     def messages(self) -> list[bytes]:
         """All messages that build the scene, oldest first."""
@@ -76,32 +67,25 @@ class LocalServer:
     def __init__(
         self, page: Callable[[], str], log: CommandLog, *, host: str = "127.0.0.1", port: int | None = None
     ) -> None:
-        self._page, self._log = page, log
+        self._page, self._log, self.host = page, log, text("host", host)
         self._clients: set[Any] = set()
-        self._streams: weakref.WeakSet[Any] = weakref.WeakSet()
-        self._loop = asyncio.new_event_loop()
-        try:
-            self._server, self.port = self._listen(host, port)
-        except BaseException:
-            self._loop.close()
-            raise
-        self.host = host
-        self._thread = threading.Thread(target=self._run, name="clamp3d viewer", daemon=True)
+        sockets = _bind(host, port)
+        self.port: int = sockets[0].getsockname()[1]
+        self.url = f"http://{host}:{self.port}/"
+        self._ready, self._loop = threading.Event(), asyncio.new_event_loop()
+        self._end = asyncio.Event()
+        self._thread = threading.Thread(target=self._run, args=(sockets,), name="clamp3d viewer", daemon=True)
         self._thread.start()
-
-    @property
-    def url(self) -> str:
-        """Address of the page."""
-        return f"http://{self.host}:{self.port}/"
+        self._ready.wait()
 
     def send(self, command: Command, message: bytes) -> None:
         """Pass a command to every page that is open; never waits for a browser."""
-        self._loop.call_soon_threadsafe(self._publish, message)
+        self._loop.call_soon_threadsafe(lambda: [client.push(message) for client in list(self._clients)])
 
     def close(self) -> None:
         """Stop listening, drop the pages, end the thread. A second call does nothing."""
         if self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._loop.call_soon_threadsafe(self._end.set)
             self._thread.join(timeout=10.0)
 
     def __enter__(self) -> LocalServer:
@@ -110,53 +94,24 @@ class LocalServer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _publish(self, message: bytes) -> None:
-        for client in list(self._clients):
-            client.push(message)
+    def _run(self, sockets: list[socket.socket]) -> None:
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            runner.run(self._serve(sockets))
 
-    async def _all_gone(self) -> None:
-        while self._clients:
-            await asyncio.sleep(0.01)
-
-    def _listen(self, host: str, port: int | None) -> tuple[Any, int]:
+    async def _serve(self, sockets: list[socket.socket]) -> None:
         import tornado.httpserver
-        import tornado.netutil
 
-        streams = self._streams
-
-        class Server(tornado.httpserver.HTTPServer):
-            def handle_stream(self, stream: Any, address: tuple[Any, ...]) -> None:
-                streams.add(stream)
-                super().handle_stream(stream, address)
-
-        text("host", host)
-        if port is not None and not 0 <= whole("port", port, least=0) <= 65535:
-            raise InputError(f"port must be from 0 to 65535, got {port}")
-        try:  # once, not for every port
-            socket.getaddrinfo(host or "(none)", None)
-        except (OSError, ValueError):
-            raise InputError(f"host must be the name or an address of this machine, got {shown(host)}") from None
-        ports = range(PORT, PORT + _PORTS) if port is None else (port,)
-        for candidate in ports:
-            try:
-                sockets = tornado.netutil.bind_sockets(candidate, address=host)
-            except (OSError, OverflowError) as error:
-                failed = error
-                continue
-            asyncio.set_event_loop(self._loop)
-            try:
-                server = Server(self._application())
-                server.add_sockets(sockets)
-            finally:
-                asyncio.set_event_loop(None)
-            return server, sockets[0].getsockname()[1]
-        if port is None:
-            raise InputError(
-                f"no free port for the viewer on {host} from {PORT} to {PORT + _PORTS - 1}: {_why(failed)}"
-            )
-        raise InputError(
-            f"cannot serve the viewer on {host} port {port}: {_why(failed)}; leave --port out to take a free one"
-        )
+        server = tornado.httpserver.HTTPServer(self._application())
+        server.add_sockets(sockets)
+        self._ready.set()
+        await self._end.wait()
+        server.stop()
+        for client in list(self._clients):
+            client.close()
+        await asyncio.sleep(_FAREWELL)  # a page answers the closing of its socket, or not
+        await server.close_all_connections()
+        for client in list(self._clients):
+            client.ws_connection.stream.close()
 
     def _application(self) -> tornado.web.Application:
         import tornado.web
@@ -193,46 +148,44 @@ class LocalServer:
                 self.set_header("Cache-Control", "no-store")
                 self.finish(owner._page())
 
-        return tornado.web.Application(
-            [
-                ("/scene", Scene),
-                ("/(main.min.js)", File, {"path": str(viewer_files())}),
-                ("/(?:index.html)?", Page),
-            ],
-            log_function=lambda _: None,
-        )
+        routes: list[Any] = [
+            ("/scene", Scene),
+            ("/(main.min.js)", File, {"path": str(viewer_files())}),
+            ("/(?:index.html)?", Page),
+        ]
+        return tornado.web.Application(routes, log_function=lambda _: None)
 
     def _ours(self, name: str) -> bool:
         """Whether a request's Host is an address or a name of this machine."""
         with contextlib.suppress(ValueError):
             return bool(ipaddress.ip_address(name.strip("[]")))
-        return name.lower() in {"localhost", self.host.lower(), socket.gethostname().lower(), socket.getfqdn().lower()}
+        return name.lower() in {"localhost", self.host.lower(), socket.gethostname().lower()}
 
-    def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
+
+def _bind(host: str, port: int | None) -> list[socket.socket]:
+    """Sockets on ``port``, or on the first free one. Raises InputError if there is none."""
+    import tornado.netutil
+
+    if port is not None and not 0 <= whole("port", port, least=0) <= 65535:
+        raise InputError(f"port must be from 0 to 65535, got {port}")
+    try:  # once, not for every port
+        socket.getaddrinfo(host or "(none)", None)
+    except (OSError, ValueError):
+        raise InputError(f"host must be the name or an address of this machine, got {shown(host)}") from None
+    for candidate in range(PORT, PORT + _PORTS) if port is None else (port,):
         try:
-            self._loop.run_forever()
-        finally:
-            self._server.stop()
-            for client in list(self._clients):
-                client.close()
-            # A page answers the closing of its socket, or not: it gets a moment, and then its connection is dropped.
-            with contextlib.suppress(asyncio.TimeoutError):
-                self._loop.run_until_complete(asyncio.wait_for(self._all_gone(), _FAREWELL))
-            for stream in self._streams:
-                stream.close()
-            self._loop.run_until_complete(asyncio.sleep(0))
-            pending = asyncio.all_tasks(self._loop)
-            for task in pending:
-                task.cancel()
-            self._loop.run_until_complete(asyncio.gather(*pending, return_exceptions=True))
-            self._loop.close()
+            return tornado.netutil.bind_sockets(candidate, address=host)
+        except (OSError, OverflowError) as error:
+            why = getattr(error, "strerror", None) or str(error)
+    if port is None:
+        raise InputError(f"no free port for the viewer on {host} from {PORT} to {PORT + _PORTS - 1}: {why}")
+    raise InputError(f"cannot serve the viewer on {host} port {port}: {why}; leave --port out to take a free one")
 
 
 class RemoteServer:
     """A meshcat server that somebody else runs; ``zmq_url`` is what ``meshcat-server`` prints, tcp://HOST:PORT.
 
-    It keeps the scene when we leave. Raises InputError if the address is not one, or nobody answers there.
+    It keeps the scene when we leave. Raises InputError if the address is not one, Clamp3dError if nobody answers.
     """
 
     def __init__(self, zmq_url: str) -> None:
@@ -240,15 +193,13 @@ class RemoteServer:
 
         if not zmq_url.startswith(("tcp://", "ipc://")):
             raise InputError(f"--url must be the zmq_url that meshcat-server prints (tcp://HOST:PORT), got {zmq_url!r}")
-        self.zmq_url = zmq_url
-        self._context = zmq.Context()
+        self.zmq_url, self._context = zmq_url, zmq.Context()
         self._socket = self._context.socket(zmq.REQ)
-        self._socket.setsockopt(zmq.LINGER, 0)
-        self._socket.setsockopt(zmq.RCVTIMEO, int(1000 * _PATIENCE))
-        self._socket.setsockopt(zmq.SNDTIMEO, int(1000 * _PATIENCE))
+        for option in (zmq.RCVTIMEO, zmq.SNDTIMEO):
+            self._socket.setsockopt(option, int(1000 * _PATIENCE))
         try:
             self._socket.connect(zmq_url)
-            self.url = self._ask(b"url").decode("utf-8", "replace")
+            self.url = self._ask(b"url")
         except zmq.ZMQError as error:
             self.close()
             raise InputError(f"--url {zmq_url}: {error}") from None
@@ -264,25 +215,14 @@ class RemoteServer:
         """Leave the server to itself. A second call does nothing."""
         self._context.destroy(linger=0)
 
-    def __enter__(self) -> RemoteServer:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def _ask(self, *frames: bytes) -> bytes:
+    def _ask(self, *frames: bytes) -> str:
         import zmq
 
         try:
             self._socket.send_multipart(frames)
-            answer: bytes = self._socket.recv()
+            answer: str = self._socket.recv().decode("utf-8", "replace")
         except zmq.Again:
             raise Clamp3dError(f"no meshcat server answers at {self.zmq_url} (waited {_PATIENCE:g} s)") from None
-        if answer.startswith(b"error"):
-            raise Clamp3dError(f"meshcat server at {self.zmq_url}: {answer.decode('utf-8', 'replace')}")
+        if answer.startswith("error"):
+            raise Clamp3dError(f"meshcat server at {self.zmq_url}: {answer}")
         return answer
-
-
-def _why(error: Exception) -> str:
-    """What the system says, without its number."""
-    return getattr(error, "strerror", None) or str(error)

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from meshcat.animation import Animation
 
 Poses = Mapping[str, Array]
-Shown = Mapping[str, list[bool]]
 Measured = Callable[[Scene, Sequence[tuple[str, str]]], Iterable["Row"]]
 """Measures pairs of a scene, as `clamp3d.collide.distance.measure` does, with their verdicts."""
 
@@ -38,17 +37,28 @@ _TURN = math.radians(3.0)
 class Row:
     """How a pair stands at a stop; ``drawn`` where the points are those of this very moment.
 
-    ``touches`` is whether the distance is within the scene's contact threshold; contact that is allowed need not be.
+    ``contact`` is the scene's threshold, mm: an allowed contact may be open.
     """
 
     a: str
     b: str
     verdict: str
     distance: Distance
-    touches: bool
+    contact: float
     what: str = ""
     declared: bool = False
     drawn: bool = True
+
+    @classmethod
+    def of(cls, scene: Scene, a: str, b: str, distance: Distance, what: str = "", *, declared: bool = False) -> Row:
+        """A pair with the verdict that its distance has in a scene."""
+        verdict = scene.thresholds.verdict(distance, scene.allowance(a, b)).value
+        return cls(a, b, verdict, distance, scene.contact, what, declared)
+
+    @property
+    def touches(self) -> bool:
+        """Whether the parts are in contact, or overlap."""
+        return self.what == FIRST or self.distance.upper <= self.contact
 
     @property
     def gap(self) -> str:
@@ -116,11 +126,11 @@ class Timeline:
         """What the marks of a stop are called in the scene."""
         return f"{number + 1} {self.stops[number].label}".replace("/", " ")
 
-    def animation(self, followers: Mapping[str, Iterable[str]], groups: Iterable[str], shown: Shown) -> Animation:
+    def animation(self, followers: Mapping[str, Iterable[str]], groups: Iterable[str]) -> Animation:
         """The animation that plays all stops once.
 
         ``followers`` are the scene's paths that move with a part; the marks of a stop are below each of ``groups`` and
-        show while the parts rest; ``shown`` has paths that are seen only at some stops.
+        show while the parts rest.
         """
         from meshcat.animation import Animation, AnimationClip
         from meshcat.path import Path
@@ -137,7 +147,7 @@ class Timeline:
                 for time, T, q in zip(times, poses, turns.tolist(), strict=True):
                     clip(path).set_property(time, "position", "vector3", T[:3, 3].tolist())
                     clip(path).set_property(time, "quaternion", "quaternion", q)
-        for k, stop in enumerate(self.stops):
+        for k in range(len(self.stops)):
             for group in groups:
                 marks = clip(f"{group}/{self.group(k)}")
                 for j, other in enumerate(self.stops):
@@ -145,10 +155,6 @@ class Timeline:
                     if j + 1 < len(self.stops):
                         marks.set_property(other.leave, "visible", "bool", False)
                 marks.set_property(self.stops[-1].leave, "visible", "bool", k == len(self.stops) - 1)
-        for path, seen in shown.items():
-            for stop, on in zip(self.stops, seen, strict=True):
-                clip(path).set_property(stop.arrive, "visible", "bool", on)
-            clip(path).set_property(self.stops[-1].leave, "visible", "bool", seen[-1])
         return Animation(clips)
 
     def _keys(self, part: str) -> tuple[list[float], list[Array]]:
@@ -197,7 +203,7 @@ def _motion_stops(
         poses = at(t)
         # The engine knows the moment; the distance right there may be known to its contact threshold only.
         found = measured(result.scene.moved(poses), [(row.a, row.b) for row in touching])
-        now = tuple(replace(row, verdict="contact", what=FIRST, touches=True) for row in found)
+        now = tuple(replace(row, verdict="contact", what=FIRST) for row in found)
         label = f"{motion.name}: {'first' if k == 0 else 'next'} contact at t = {t:.4f}"
         seconds = max(0.3, _MOTION * (t - before))
         yield Stop(motion.name, label, poses, now, "" if k else FIRST, k == 0, way(before, t), seconds)
@@ -224,4 +230,4 @@ def _first(row: PairResult) -> float:
 
 
 def _row(result: CheckResult, row: PairResult) -> Row:
-    return Row(row.a, row.b, row.verdict.value, row.distance, row.distance.upper <= result.thresholds.contact)
+    return Row(row.a, row.b, row.verdict.value, row.distance, result.thresholds.contact)

@@ -8,9 +8,9 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 
 from clamp3d.collide.result import CheckResult, PairResult
 from clamp3d.collide.scene import Part, Scene
+from clamp3d.collide.verdict import Verdict
 
 BAD = ("contained", "clash")
-OPEN = ("uncertain",)
 
 
 def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
@@ -36,10 +36,11 @@ def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
 
 
 def _rounded(value: float, rounding: str) -> str:
-    """Four significant digits, rounded to the safe side."""
+    """Four significant digits, six decimals at most, rounded to the safe side."""
     exact = Decimal(value)
-    digits = max(0, 3 - exact.adjusted()) if exact else 0
-    return f"{float(exact.quantize(Decimal(1).scaleb(-digits), rounding=rounding)):.10g}"
+    digits = min(6, max(0, 3 - exact.adjusted())) if exact else 0
+    text = f"{exact.quantize(Decimal(1).scaleb(-digits), rounding=rounding):f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def part_title(part: Part) -> str:
@@ -95,9 +96,16 @@ def headline(result: CheckResult) -> str:
     checked = f"{result.work.pairs} {'pair' if result.work.pairs == 1 else 'pairs'}"
     if result.scene.motions:
         checked += f" and {len(result.scene.motions)} {'motion' if len(result.scene.motions) == 1 else 'motions'}"
-    if not clashes and not any(row.verdict in OPEN for row in found):
-        return f"Clean: {checked} checked, nothing clashes" + "".join(f"; {text}" for text in others)
-    return "; ".join(others) + f" ({checked} checked)"
+    if not result.work.pairs:
+        return "Clean: no two parts to check"
+    if not found:
+        return f"Clean: {checked} checked, nothing clashes"
+    return ("" if clashes else "No clash: ") + "; ".join(others) + f" ({checked} checked)"
+
+
+def severity(result: CheckResult) -> str:
+    """How a result is to be read: "found" (not clean), "note" (clean, with findings) or "clean"."""
+    return "found" if not result.clean else "note" if result.findings else "clean"
 
 
 def sentence(row: PairResult, names: dict[str, str]) -> str:
@@ -127,7 +135,14 @@ def counts_text(result: CheckResult) -> str:
     return ", ".join(f"{count} {name}" for name, count in result.counts.items()) or "no pairs"
 
 
-def most_severe(rows: Sequence[PairResult]) -> str:
-    """The worst verdict of some rows, "clear" where there is none."""
-    order = [*BAD, *OPEN, "clearance", "contact", "allowed", "clear"]
-    return min((row.verdict.value for row in rows), key=order.index, default="clear")
+def contents(scene: Scene) -> str:
+    """How many parts and motions a scene has."""
+    parts, motions = len(scene.parts), len(scene.motions)
+    moving = f", {motions} {'motion' if motions == 1 else 'motions'}" if motions else ""
+    return f"{parts} {'part' if parts == 1 else 'parts'}{moving}"
+
+
+def worst_first(rows: Sequence[PairResult]) -> list[PairResult]:
+    """Rows by verdict, then by distance."""
+    order = list(Verdict)
+    return sorted(rows, key=lambda row: (order.index(row.verdict), row.distance.upper))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from clamp3d import checks
-from clamp3d.clamp.loader import load_clamp, parse_toml, read_text
+from clamp3d.clamp.loader import parse_toml, read_text
 from clamp3d.collide.scene import Allowed, Part, Scene
 from clamp3d.core import shapes
 from clamp3d.core.validation import validate
@@ -41,13 +41,14 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
     [0.0, 0.0, 5.0]
     """
     table: SceneTable = validate(SceneTable, parse_toml(text, origin), origin, TAGS)
-    made: list[Part] = []
+    parts: list[Part] = []
     allowed: list[Allowed] = []
     files: dict[tuple[str, str | None, str], shapes.AnyShape] = {}
     where = ""
     try:
         if table.clamp is not None:
-            made, allowed = _clamp_parts(table.clamp, folder)
+            clamp = _clamp_scene(table.clamp, folder)
+            parts, allowed = [*clamp.parts], [*clamp.allowed]
         for part_name, part in table.parts.items():
             where = f"parts.{part_name}"
             if isinstance(part, MeshTable):  # one file is one shape, however often it is used
@@ -55,24 +56,20 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
                 files[key] = shape = files.get(key) or part.make(folder)
             else:
                 shape = part.make(folder)
-            made.extend(Scene().add(part_name, shape, part.pose.T()).parts)
+            parts.append(Part(part_name, shapes.as_shape(shape), part.pose.T()))
         where = "allowed"
         allowed += [Allowed(*item.parts, item.overlap) for item in table.allowed]
         where = "motions"
         motions = tuple(m.motion(i) for i, m in enumerate(table.motions, 1))
         where = ""
-        return Scene(tuple(made), table.contact, table.clearance, tuple(allowed), motions, name)
+        return Scene(tuple(parts), table.contact, table.clearance, tuple(allowed), motions, name)
     except Clamp3dError as error:
         raise InputError(f"{origin}: {where}{': ' if where else ''}{error}") from None
 
 
-def _clamp_parts(table: ClampTable, folder: Path) -> tuple[list[Part], list[Allowed]]:
-    from clamp3d.baselines.cas import Cas
+def _clamp_scene(table: ClampTable, folder: Path) -> Scene:
     from clamp3d.clamp.assemble import assemble
-    from clamp3d.clamp.parts import parts
 
-    clamp = load_clamp(clamp_source(table.name, folder), line=table.line, jumper=table.jumper)
-    run = assemble(clamp, Cas())
+    scene = assemble(clamp_source(table.name, folder), line=table.line, jumper=table.jumper).scene
     T = table.pose.T()
-    made = [Part(n, shapes.as_shape(part), T @ run.T_world(n)) for n, part in parts(clamp).items()]
-    return made, [Allowed(a, b) for a, row in clamp.connections.items() for b, kind in row.items() if kind]
+    return scene.moved({part.name: T @ part.T_world for part in scene.parts})

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
-from clamp3d.core.pose import Array, unit
+from clamp3d.core.pose import Array, nearest_rigid, unit
 
 FROZEN = ConfigDict(extra="forbid")
 """Of every table: a key that is not known is an error."""
@@ -66,38 +66,20 @@ class Pose:
 
         T = np.eye(4)
         T[:3, 3] = self.translation
+        if self.matrix is not None:
+            T[:3] = self.matrix[:3]
+            nearest = nearest_rigid(T)
+            # Exact input stays exact: a product of factors is not.
+            return T if np.abs(nearest - T).max() < 1e-14 else nearest
         if self.rpy_deg is not None:
-            T[:3, :3] = _quarter_turns(self.rpy_deg)
+            turn = Rotation.from_euler("xyz", self.rpy_deg, degrees=True)
         elif self.axis is not None and self.angle_deg is not None:
-            axis = unit(np.array(self.axis))
-            T[:3, :3] = _tidy(Rotation.from_rotvec(math.radians(self.angle_deg) * axis).as_matrix())
-        elif self.quaternion is not None:
-            q = np.array(self.quaternion) / max(map(abs, self.quaternion))  # its square neither overflows nor vanishes
-            T[:3, :3] = _tidy(Rotation.from_quat(q).as_matrix())
-        elif self.matrix is not None:
-            rows = np.array(self.matrix[:3])
-            u, _, vt = np.linalg.svd(rows[:, :3])
-            nearest = u @ vt
-            # Exact input stays exact: a product of SVD factors is not.
-            T[:3, :3] = rows[:, :3] if np.abs(nearest - rows[:, :3]).max() < 1e-14 else nearest
-            T[:3, 3] = rows[:, 3]
+            turn = Rotation.from_rotvec(math.radians(self.angle_deg) * unit(np.array(self.axis)))
+        elif self.quaternion is not None:  # its square neither overflows nor vanishes
+            turn = Rotation.from_quat(np.array(self.quaternion) / max(map(abs, self.quaternion)))
+        else:
+            return T
+        R = turn.as_matrix()
+        # Without the rounding of zeros and ones: quarter turns are exact.
+        T[:3, :3] = np.where(np.abs(R - R.round()) < 1e-14, R.round(), R)
         return T
-
-
-def _quarter_turns(rpy_deg: tuple[float, float, float]) -> Array:
-    """Rotation (3, 3) of roll, pitch, yaw in degrees; multiples of 90 exactly."""
-    R = np.eye(3)
-    for k, angle in enumerate(rpy_deg):
-        c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-        if angle % 90.0 == 0.0:
-            c, s = round(c), round(s)
-        i, j = (k + 1) % 3, (k + 2) % 3
-        turn = np.eye(3)
-        turn[[i, i, j, j], [i, j, i, j]] = (c, -s, s, c)
-        R = turn @ R
-    return R
-
-
-def _tidy(R: Array) -> Array:
-    """A rotation with the rounding of its zeros and ones taken away."""
-    return np.where(np.abs(R - R.round()) < 4e-16, R.round(), R)

@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 from clamp3d.baselines import cache, decomposition
 from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
 from clamp3d.baselines.hulls import intrusion
-from clamp3d.clamp.block import block_pair, grooved_block
+from clamp3d.bench.compare.block import block_pair, grooved_block
 from clamp3d.core.closed_mesh import Solid
 from clamp3d.core.meshing import mesh
 from clamp3d.core.primitives import Cylinder, SweptArc
@@ -53,7 +53,7 @@ def workers(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[str]]:
         started.append(popen(*args, **kwargs))  # type: ignore[call-overload]
         return started[-1]
 
-    monkeypatch.setattr(decomposition.subprocess, "Popen", record)
+    monkeypatch.setattr(subprocess, "Popen", record)
     return started
 
 
@@ -119,7 +119,7 @@ def test_interrupt_leaves_no_process(workers: list[subprocess.Popen[str]], monke
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(decomposition, "_wait", interrupted)
+    monkeypatch.setattr(decomposition, "_stage", interrupted)
     with pytest.raises(KeyboardInterrupt):
         decompose(V, F, COARSE)
     assert [worker.poll() is not None for worker in workers] == [True]

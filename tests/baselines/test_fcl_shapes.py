@@ -10,9 +10,9 @@ import trimesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from clamp3d.baselines.fcl_shapes import Wire, bvh, check_poses, contained, convex, distance, facets, measure
+from clamp3d.baselines.fcl_shapes import Wire, bvh, contained, convex, distance, facets, measure
 from clamp3d.baselines.wedges import prism
-from clamp3d.core.pose import Array, inverse, rotation, translation
+from clamp3d.core.pose import Array, check_pose_array, inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder
 from clamp3d.errors import InputError
 
@@ -169,13 +169,13 @@ def test_shallow_overlap_of_a_mesh_is_the_deepest_triangle_not_any() -> None:
 def test_bad_pose_is_refused(pose: Array, rule: str) -> None:
     good = np.eye(len(pose))
     with pytest.raises(InputError, match=rule):
-        check_poses(np.array([good, pose]), "wire poses")
+        check_pose_array(np.array([good, pose]), "wire poses")
 
 
 def test_good_poses_pass_unchanged() -> None:
     poses = np.array([translation(1.0, 2.0, 3.0) @ rotation([1.0, 2.0, 3.0], t) for t in (0.0, 1.0, 3.0)])
-    assert np.array_equal(check_poses(poses), poses)
-    assert check_poses(np.empty((0, 4, 4))).shape == (0, 4, 4)
+    assert np.array_equal(check_pose_array(poses), poses)
+    assert check_pose_array(np.empty((0, 4, 4))).shape == (0, 4, 4)
     assert np.allclose(poses @ inverse(poses), np.eye(4))
 
 

@@ -26,13 +26,13 @@ from scipy.spatial import ConvexHull
 
 import clamp3d
 from clamp3d.baselines.decomposition import decompose
-from clamp3d.baselines.fcl_shapes import Wire, bvh, check_poses, convex, distance
+from clamp3d.baselines.fcl_shapes import Wire, bvh, convex, distance
 from clamp3d.baselines.wedges import prism
-from clamp3d.clamp.block import grooved_block
+from clamp3d.bench.compare.block import grooved_block
 from clamp3d.core import shapes
 from clamp3d.core.meshing import mesh
 from clamp3d.core.motion import Motion
-from clamp3d.core.pose import Array, rotation, translation
+from clamp3d.core.pose import Array, check_pose_array, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
 
@@ -89,7 +89,7 @@ def test_depth_of_two_meshes_in_a_scene_is_the_depth() -> None:
     scene = clamp3d.Scene.of({"a": (cube, np.eye(4)), "b": (cube, translation(99.5, 0.0, 0.0))})
     (row,) = clamp3d.check(scene).pairs
     assert row.verdict is clamp3d.Verdict.CLASH
-    assert row.low - 1e-6 <= -0.5 <= row.high + 1e-6
+    assert row.distance.lower - 1e-6 <= -0.5 <= row.distance.upper + 1e-6
 
 
 @mended("FCL", "a signed distance is asked of a mesh and -1 comes back", "contact.fcl_shapes' thinner cores of wires")
@@ -121,7 +121,7 @@ def test_depth_of_crossed_cylinders_in_a_scene() -> None:
     crossed = translation(9.9, 0.0, 0.0) @ rotation([1.0, 0.0, 0.0], math.pi / 2)
     (row,) = clamp3d.check(clamp3d.Scene.of({"a": (wire, np.eye(4)), "b": (wire, crossed)})).pairs
     assert row.verdict is clamp3d.Verdict.CLASH
-    assert row.low - 1e-6 <= -0.1 <= row.high + 1e-6
+    assert row.distance.lower - 1e-6 <= -0.1 <= row.distance.upper + 1e-6
 
 
 @mended("FCL", "tolerances are absolute, made for no unit", "UNIT and MIN_SIZE in contact.fcl_shapes")
@@ -160,13 +160,13 @@ def test_questions_to_one_shape_do_not_remember_each_other() -> None:
 # --- FCL: values that are none ----------------------------------------------------------------------------------------
 
 
-@mended("FCL", "a pose that is not a number is 'no collision'", "geometry.pose.check_pose, contact.check_poses")
+@mended("FCL", "a pose that is not a number is 'no collision'", "core.pose.check_pose, check_pose_array")
 def test_bare_pose_that_is_no_number() -> None:
     nowhere = at(fcl.Cylinder(7.0, 50.0), np.full((4, 4), np.nan))
     assert _refused(lambda: depths(at(fcl.Cylinder(7.0, 50.0)), nowhere))
 
 
-@mended("FCL", "a scaled rotation is taken as it is", "geometry.pose.check_pose, contact.check_poses")
+@mended("FCL", "a scaled rotation is taken as it is", "core.pose.check_pose, check_pose_array")
 def test_bare_pose_that_is_not_rigid() -> None:
     scaled = translation(13.0, 0.0, 0.0) @ np.diag([1.5, 1.5, 1.5, 1.0])
     assert _refused(lambda: bare_distance(at(fcl.Box(10.0, 10.0, 10.0)), at(fcl.Cylinder(7.0, 50.0), scaled)))
@@ -182,7 +182,7 @@ def test_values_that_are_none_are_refused() -> None:
         Cylinder(-7.0, 50.0)
     for pose, rule in ((np.full((4, 4), np.nan), "finite"), (np.diag([1.5, 1.5, 1.5, 1.0]), "rigid")):
         with pytest.raises(InputError, match=rule):
-            check_poses(pose[None], "wire poses")
+            check_pose_array(pose[None], "wire poses")
         with pytest.raises(InputError, match=rule):
             clamp3d.Scene.of({"wire": (Cylinder(7.0, 50.0), pose)})
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 import re
@@ -20,21 +21,117 @@ def clamp3d(*arguments, cwd=None):
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, check=False)
 
 
+def page_text(page):
+    """What a page says, without its scripts and styles."""
+    return html.unescape(re.sub(r"<[^>]*>", " ", re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL)))
+
+
 def test_check_writes_all_outputs(tmp_path):
     page, data = tmp_path / "page.html", tmp_path / "data.json"
     done = clamp3d("check", EXAMPLES / "v-block" / "scene.toml", "--full", "--json", data, "--html", page)
     assert done.returncode == 1, done.stderr
     assert done.stderr == ""
-    assert "block-3 and bar-low clash: overlap 0.0707 mm" in done.stdout
+    assert re.search(r"block-3 - bar-low +clash +overlap 0\.0707", done.stdout)
     assert "agrees in all 15 verdicts" in done.stdout
     found = json.loads(data.read_text())
     verdicts = {(p["a"], p["b"]): p["verdict"] for p in found["pairs"]}
     assert verdicts[("block-3", "bar-low")] == "clash"
     assert found["counts"] == {"clash": 1, "contact": 1, "clearance": 1, "clear": 12}
+    assert {"a", "b", "verdict", "at_least_mm", "at_most_mm"} <= set(found["pairs"][0])
     assert found["full"]["work"]["full"] is True
-    html = page.read_text()
-    assert "block-3" in html
-    assert not re.search(r"""(src|href)=["'](?!data:|#)|url\(["']?http""", html)
+    text = re.sub(r"<script>.*?</script>", "", page.read_text(), count=1, flags=re.DOTALL)
+    assert not re.search(r"""(src|href)=["'](?!data:)""", text)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        ([EXAMPLES / "v-block" / "scene.toml"], 1),
+        ([EXAMPLES / "hinge" / "scene.toml"], 1),  # the clash is in a motion only
+        ([EXAMPLES / "pipe-clip" / "scene.toml"], None),
+        (["reference", "--clearance", "5"], 0),
+        ([EXAMPLES / "hinge" / "pin.stl"], 0),
+    ],
+)
+def test_text_json_page_and_exit_code_tell_one_story(arguments, code, tmp_path):
+    page, data = tmp_path / "page.html", tmp_path / "data.json"
+    done = clamp3d("check", *arguments, "--json", data, "--html", page)
+    found, said = json.loads(data.read_text()), page_text(page.read_text())
+    assert done.returncode == (0 if found["clean"] else 1)
+    assert code is None or done.returncode == code
+    clashes = [row for row in found["findings"] if row["verdict"] in ("clash", "contained")]
+    assert found["clean"] == (not clashes)
+    first = done.stdout.splitlines()[0]
+    assert found["headline"] in first
+    assert found["headline"] in " ".join(said.split())
+    assert (re.search(r"\d+ clash", first) is None) == (not clashes)
+    order = [f"{row['a']}" for row in found["findings"]]
+    listed = [line for line in done.stdout.splitlines()[2 : 2 + len(order)]]
+    for row, line in zip(found["findings"], listed, strict=True):
+        assert row["a"] in line
+        assert row["b"] in line
+        assert line.split(";")[0].strip() in " ".join(said.split())
+    assert "+-" not in done.stdout
+    assert "\N{PLUS-MINUS SIGN}" not in said
+
+
+def test_depth_known_as_a_bound_only_is_told_as_one(tmp_path):
+    done = clamp3d("check", EXAMPLES / "hinge" / "scene.toml")
+    clash = next(
+        line for line in done.stdout.splitlines() if "leaf-b and leaf-a" in line or "leaf-a and leaf-b" in line
+    )
+    assert "overlap at least" in clash
+    assert "first contact at t = " in clash
+    # By hand: plate and web meet 140 degrees past flat, of 320 in all, after the fold has taken half a turn.
+    t = float(re.search(r"first contact at t = ([\d.]+)", clash)[1])
+    assert 0.85 < t < 0.9
+
+
+def test_check_of_a_clamp_measures_all_21_pairs_as_run_does(tmp_path):
+    a, b = tmp_path / "check.json", tmp_path / "run.json"
+    assert clamp3d("check", "reference", "--json", a).returncode == 0
+    assert clamp3d("run", "reference", "--json", b).returncode == 0
+    checked, ran = json.loads(a.read_text())["pairs"], json.loads(b.read_text())["contacts"]
+    assert len(checked) == 21
+    distances = {(c["a"], c["b"]): c["distance_mm"] for c in ran}
+    for pair in checked:
+        assert pair["distance_mm"] == pytest.approx(distances[pair["a"], pair["b"]], abs=1e-9)
+
+
+def test_check_takes_wires_for_a_clamp_only(tmp_path):
+    assert clamp3d("check", "reference", "--line", "LJ-500", "-q").returncode == 0
+    done = clamp3d("check", EXAMPLES / "hinge" / "scene.toml", "--line", "LJ-500")
+    assert done.returncode == 2
+    assert "line goes with a clamp" in done.stderr
+
+
+def test_distances_measures_pairs_that_a_verdict_does_not_need(tmp_path):
+    data = tmp_path / "data.json"
+    scene = EXAMPLES / "v-block" / "scene.toml"
+    clamp3d("check", scene, "--json", data)
+    few = json.loads(data.read_text())["pairs"]
+    clamp3d("check", scene, "--distances", "--json", data)
+    every = json.loads(data.read_text())["pairs"]
+    assert len(few) < len(every) == 15
+    assert all(pair["at_most_mm"] - pair["at_least_mm"] < 0.1 for pair in every)
+
+
+def test_page_on_stdout_is_nothing_but_the_page():
+    done = clamp3d("check", EXAMPLES / "v-block" / "scene.toml", "--html", "-")
+    assert done.returncode == 1
+    assert done.stdout.startswith("<!DOCTYPE html>")
+    assert done.stdout.rstrip().endswith("</html>")
+    assert "block-3 and bar-low clash" in done.stderr
+
+
+@pytest.mark.parametrize("source", [EXAMPLES / "hinge" / "scene.toml", EXAMPLES / "hinge" / "pin.stl"])
+def test_view_takes_what_check_takes(source, tmp_path):
+    page = tmp_path / "page.html"
+    done = clamp3d("view", source, "--html", page)
+    assert done.returncode == (1 if source.suffix == ".toml" else 0), done.stderr
+    said = page_text(page.read_text())
+    assert ("1 clash in motion" in said) == (source.suffix == ".toml")
+    assert ("Clean: no two parts to check" in said) == (source.suffix == ".stl")
 
 
 def test_check_of_some_pairs_is_clean(tmp_path):

@@ -6,9 +6,14 @@ import mpmath
 import numpy as np
 import pytest
 
+from clamp3d.baselines.chords import Chords
+from clamp3d.collide.motions import check_poses
+from clamp3d.collide.scene import Scene
+from clamp3d.core import shapes
 from clamp3d.core.distance import signed_distance, signed_distances
+from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pieces import groove_pieces
-from clamp3d.core.pose import PoseWarning, check_pose, check_poses, inverse, nearest_rigid, rotation, translation
+from clamp3d.core.pose import PoseWarning, check_pose, check_pose_array, inverse, nearest_rigid, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
 
@@ -81,8 +86,8 @@ def test_every_call_mends_in_the_same_way(size):
     others = np.arange(50) != 20
     assert np.array_equal(found[others], signed_distances(GROOVE, WIRE, good)[others])
     with pytest.warns(PoseWarning):
-        assert np.array_equal(check_poses(rough)[others], good[others])
-    assert np.array_equal(check_poses(good), good)
+        assert np.array_equal(check_pose_array(rough)[others], good[others])
+    assert np.array_equal(check_pose_array(good), good)
 
 
 @pytest.mark.parametrize(
@@ -100,6 +105,22 @@ def test_what_is_worse_than_rounding_is_refused(bad, rule):
     with pytest.raises(InputError, match=rule):
         check_pose(bad)
     with pytest.raises(InputError, match=rf"poses\[1\].*{rule}"):
-        check_poses(np.array([np.eye(4), bad, bad]))
+        check_pose_array(np.array([np.eye(4), bad, bad]))
     with pytest.raises(InputError, match=rule):
         signed_distance(GROOVE, WIRE, bad)
+
+
+def test_batches_of_other_layers_measure_the_mended_poses():
+    rough = np.tile(np.eye(4), (2, 1, 1))
+    rough[1, :3, :3] = rotation((0, 0, 1), 0.3)[:3, :3] * (1.0 + 4e-5)
+    mended = nearest_rigid(rough)
+    pair = GroovePair("a", "b", GROOVE, np.eye(4), WIRE, np.eye(4))
+    scene = Scene().add("box", shapes.box((4.0, 6.0, 8.0))).add("pin", shapes.cylinder(1.0, 30.0, name="pin"))
+    rough[:, 0, 3] = mended[:, 0, 3] = 20.0
+    for measured in (
+        lambda T: Chords(0.1).distances(pair, T),
+        lambda T: check_poses(scene, "pin", T).upper,
+    ):
+        with pytest.warns(PoseWarning):
+            found = measured(rough)
+        assert np.array_equal(found, measured(mended))

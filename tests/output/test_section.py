@@ -98,7 +98,8 @@ def test_figures_name_what_they_show(run: Assembly) -> None:
     assert all("gap 0.000000 mm" in t for t in enlarged)
     for contact in run.contacts:
         shown = texts(contact_figure(run, contact))
-        assert f"{contact.a} and {contact.b}: {contact.relation}" in "".join(shown)
+        relation = "apart" if contact.relation == "none" else contact.relation
+        assert f"{contact.a} and {contact.b}: {relation}\n" in "".join(shown)
         assert "31.530" in shown
     assert set(PARTS) <= set(texts(exploded_figure(run.clamp)))
     steps = " ".join(texts(steps_figure(run)))

@@ -6,18 +6,18 @@ beside its curve, so the chart reads in grey.
 
 from __future__ import annotations
 
-import html
 import math
 import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clamp3d.bench.compare.jobs import Imaged
+from clamp3d.bench.compare.assemblies import Imaged
 from clamp3d.bench.compare.measure import Measured
 from clamp3d.bench.compare.report import comparison_to_text
 from clamp3d.bench.compare.run import Comparison, pareto
 from clamp3d.bench.compare.scene import chord_error
+from clamp3d.bench.pages import render
 from clamp3d.errors import InputError
 from clamp3d.output.figures import save_figure
 from clamp3d.output.files import write_text
@@ -58,6 +58,8 @@ _LABELS: dict[str, tuple[int, float, float, str]] = {
 """Where a family's name stands: at its least (0) or greatest (-1) error, offset in points, alignment."""
 
 _QUIET = "#6B7480"
+_SMALL: dict[str, Any] = {"fontsize": 8, "color": _QUIET}
+_TEXT: dict[str, Any] = {"fontsize": 10, "color": INK}
 _BREAK = 1e-9
 """mm: the error axis is broken here; methods with facets lie far above, exact ones far below."""
 _SMALLEST = 1e-17
@@ -90,51 +92,50 @@ def comparison_figure(found: Comparison, command: str) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.5, 8.2))
-    axes = figure.subplots(
-        2, 2, sharex="col", sharey="row", gridspec_kw={"width_ratios": (2.7, 1.0), "height_ratios": (3.1, 1.0)}
-    )
+    grid = {"width_ratios": (2.7, 1.0), "height_ratios": (3.1, 1.0)}
+    axes = figure.subplots(2, 2, sharex="col", sharey="row", gridspec_kw=grid)
     figure.subplots_adjust(left=0.08, right=0.985, top=0.875, bottom=0.185, wspace=0.05, hspace=0.07)
     rows = found.measured
-    faceted = [r.worst_error for r in rows if r.worst_error > _BREAK] or [1e-3, 1.0]
-    exact = [max(r.worst_error, _SMALLEST) for r in rows if r.worst_error <= _BREAK] or [1e-15]
-    left = min((min(r.one, r.many) for r in rows), default=1e-7) * 1e6
-    right = max((r.one for r in rows), default=1e-2) * 1e6
-    for (time, setup), low, high in (
-        (axes[0], min(faceted) / 8.0, max(faceted) * 3.0),
-        (axes[1], min(exact) / 8.0, max(exact) * 15.0),
-    ):
-        for ax in (time, setup):
-            _plain(ax)
-        time.set_ylim(low, high)
-        time.set_xlim(left / 3.0, right * 4.0)
-        setup.set_xlim(4e-4, max((r.setup for r in rows), default=1.0) * 4.0)
+    _limits(axes, rows)
+    for ax in axes.flat:
+        _plain(ax)
+    for time, _ in axes:
         _front(time, rows)
-        for family in dict.fromkeys(row.method for row in rows):
-            members = sorted((r for r in rows if r.method == family), key=lambda r: r.worst_error)
-            _curve(time, members, [r.one * 1e6 for r in members])
-            _curve(setup, members, [max(r.setup, 1e-3) for r in members])
-    _break_marks(axes)
     for family in dict.fromkeys(row.method for row in rows):
         members = sorted((r for r in rows if r.method == family), key=lambda r: r.worst_error)
+        for time, setup in axes:
+            _curve(time, members, [r.one * 1e6 for r in members])
+            _curve(setup, members, [max(r.setup, 1e-3) for r in members])
         _label(axes[0 if members[0].worst_error > _BREAK else 1][0], members)
+    _break_marks(axes)
     _batch(axes[1][0], rows)
     _levels(axes[0][0])
     if isinstance(found.image, Imaged):
         _images(axes[0][0], found.image)
-    axes[1][0].set_xlabel("time per query, microseconds (CPU time of one call from Python)", fontsize=10, color=INK)
-    axes[1][1].set_xlabel("set-up, seconds", fontsize=10, color=INK)
-    figure.text(0.018, 0.53, "largest error of the distance, mm", fontsize=10, color=INK, rotation=90, va="center")
-    figure.text(0.08, 0.95, "How exact, how fast: a wire in a round groove", fontsize=15, fontweight="bold", color=INK)
-    figure.text(
-        0.08,
-        0.912,
+    axes[1][0].set_xlabel("time per query, microseconds (CPU time of one call from Python)", **_TEXT)
+    axes[1][1].set_xlabel("set-up, seconds", **_TEXT)
+    figure.text(0.018, 0.53, "largest error of the distance, mm", rotation=90, va="center", **_TEXT)
+    title: dict[str, Any] = {"fontsize": 15, "fontweight": "bold", "color": INK}
+    figure.text(0.08, 0.95, "How exact, how fast: a wire in a round groove", **title)
+    subtitle = (
         "Each mark is a method at one setting: lower is more exact, further left is faster. "
-        "140 degree groove of R 12 mm, wire of 10.5 mm.",
-        fontsize=10,
-        color=INK,
+        "140 degree groove of R 12 mm, wire of 10.5 mm."
     )
+    figure.text(0.08, 0.912, subtitle, **_TEXT)
     figure.text(0.08, 0.018, _note(found, command), fontsize=7.5, color="#4A525C", va="bottom", linespacing=1.45)
     return figure
+
+
+def _limits(axes: Any, rows: Sequence[Measured]) -> None:
+    """Errors of methods with facets above, of exact ones below; times and set-up times of all."""
+    faceted = [r.worst_error for r in rows if r.worst_error > _BREAK] or [1e-3, 1.0]
+    exact = [max(r.worst_error, _SMALLEST) for r in rows if r.worst_error <= _BREAK] or [1e-15]
+    fastest = min((min(r.one, r.many) for r in rows), default=1e-7) * 1e6
+    slowest = max((r.one for r in rows), default=1e-2) * 1e6
+    for (time, setup), errors, spare in ((axes[0], faceted, 3.0), (axes[1], exact, 15.0)):
+        time.set_ylim(min(errors) / 8.0, max(errors) * spare)
+        time.set_xlim(fastest / 3.0, slowest * 4.0)
+        setup.set_xlim(4e-4, max((r.setup for r in rows), default=1.0) * 4.0)
 
 
 def _plain(ax: Axes) -> None:
@@ -143,19 +144,17 @@ def _plain(ax: Axes) -> None:
     ax.grid(True, which="major", color="#E3E6EA", lw=0.7)
     ax.set_axisbelow(True)
     ax.minorticks_off()
-    for side in ("top", "right"):
-        ax.spines[side].set_visible(False)
+    ax.spines[["top", "right"]].set_visible(False)
 
 
 def _break_marks(axes: Any) -> None:
     """Between the upper and the lower panels nothing was measured: the error axis is broken there."""
+    slash = {"marker": [(-1, -0.6), (1, 0.6)], "ms": 9, "color": INK, "mew": 1.0, "clip_on": False}
     for upper, lower in axes.T:
         upper.spines["bottom"].set_visible(False)
         upper.tick_params(axis="x", length=0)
-        for ax, y in ((upper, 0.0), (lower, 1.0)):
-            ax.plot(
-                [0], [y], marker=[(-1, -0.6), (1, 0.6)], ms=9, color=INK, mew=1.0, transform=ax.transAxes, clip_on=False
-            )
+        upper.plot([0], [0.0], transform=upper.transAxes, **slash)
+        lower.plot([0], [1.0], transform=lower.transAxes, **slash)
 
 
 def _curve(ax: Axes, members: Sequence[Measured], x: Sequence[float]) -> None:
@@ -163,19 +162,17 @@ def _curve(ax: Axes, members: Sequence[Measured], x: Sequence[float]) -> None:
     family = members[0].method
     colour, marker, _ = _STYLE.get(family, ("#444444", "o", family))
     y = [max(r.worst_error, _SMALLEST) for r in members]
-    exact = family == "cas"
-    ax.plot(
-        x,
-        y,
-        ":" if family == "chords" else "-",
-        color=colour,
-        marker=marker,
-        ms=18 if exact else 7.5,
-        lw=1.3,
-        mec="white",
-        mew=0.7,
-        zorder=6 if exact else 4,
-    )
+    size, order = (18, 6) if family == "cas" else (7.5, 4)
+    marks: dict[str, Any] = {
+        "color": colour,
+        "marker": marker,
+        "ms": size,
+        "lw": 1.3,
+        "mec": "white",
+        "mew": 0.7,
+        "zorder": order,
+    }
+    ax.plot(x, y, ":" if family == "chords" else "-", **marks)
 
 
 def _label(ax: Axes, members: Sequence[Measured]) -> None:
@@ -184,40 +181,17 @@ def _label(ax: Axes, members: Sequence[Measured]) -> None:
     which, dx, dy, align = _LABELS.get(family, (0, 10.0, 0.0, "left"))
     row = members[which]
     leader = {"arrowstyle": "-", "color": colour, "lw": 0.8, "shrinkA": 1, "shrinkB": 5}
-    ax.annotate(
-        name,
-        (row.one * 1e6, max(row.worst_error, _SMALLEST)),
-        (dx, dy),
-        textcoords="offset points",
-        fontsize=11 if family == "cas" else 9.5,
-        fontweight="bold",
-        color=colour,
-        ha=align,
-        va="center",
-        linespacing=1.1,
-        zorder=8,
-        arrowprops=leader if math.hypot(dx, dy) > 19.0 else None,
-    )
+    style: dict[str, Any] = {"color": colour, "ha": align, "va": "center", "linespacing": 1.1, "zorder": 8}
+    style |= {"fontsize": 11 if family == "cas" else 9.5, "fontweight": "bold", "textcoords": "offset points"}
+    at = (row.one * 1e6, max(row.worst_error, _SMALLEST))
+    ax.annotate(name, at, (dx, dy), arrowprops=leader if math.hypot(dx, dy) > 19.0 else None, **style)
 
 
 def _levels(ax: Axes) -> None:
     """Chord errors of three unit angles, on the right edge: methods with chords of one size are equally exact."""
-    from matplotlib.transforms import blended_transform_factory
-
-    across = blended_transform_factory(ax.transAxes, ax.transData)
     for degrees in (1.0, 5.0, 20.0):
-        value = chord_error(math.radians(degrees))
-        ax.text(
-            1.0,
-            value,
-            f"{degrees:g}° chords",
-            transform=across,
-            fontsize=8,
-            color=_QUIET,
-            ha="right",
-            va="center",
-            zorder=1,
-        )
+        value, across = chord_error(math.radians(degrees)), ax.get_yaxis_transform()
+        ax.text(1.0, value, f"{degrees:g}° chords", transform=across, ha="right", va="center", zorder=1, **_SMALL)
 
 
 def _batch(ax: Axes, rows: Iterable[Measured]) -> None:
@@ -225,68 +199,48 @@ def _batch(ax: Axes, rows: Iterable[Measured]) -> None:
     for row in rows:
         if row.method == "cas":
             colour, marker, _ = _STYLE[row.method]
-            x, y = row.many * 1e6, max(row.worst_error, _SMALLEST)
-            ax.plot([x, row.one * 1e6], [y, y], color=colour, lw=1.3, zorder=3)
-            ax.plot([x], [y], marker=marker, ms=18, mfc="white", mec=colour, mew=1.4, zorder=6)
-            words = (("in a batch", x), ("one call", row.one * 1e6))
-            for text, at in words:
-                ax.annotate(
-                    text,
-                    (at, y),
-                    (0, -17),
-                    textcoords="offset points",
-                    fontsize=8.5,
-                    color=colour,
-                    ha="center",
-                    zorder=8,
-                )
+            one, many, y = row.one * 1e6, row.many * 1e6, max(row.worst_error, _SMALLEST)
+            ax.plot([many, one], [y, y], color=colour, lw=1.3, zorder=3)
+            ax.plot([many], [y], marker=marker, ms=18, mfc="white", mec=colour, mew=1.4, zorder=6)
+            style: dict[str, Any] = {
+                "textcoords": "offset points",
+                "fontsize": 8.5,
+                "color": colour,
+                "ha": "center",
+                "zorder": 8,
+            }
+            ax.annotate("in a batch", (many, y), (0, -17), **style)
+            ax.annotate("one call", (one, y), (0, -17), **style)
 
 
 def _front(ax: Axes, rows: Sequence[Measured]) -> None:
     """Pareto front of all methods, and of all but clamp3d's own exact one."""
-    others = [r for r in rows if r.method != "cas"]
-    for name, front, line in (
-        ("Pareto front: nothing is both\nleft of it and below it", pareto(rows), "-"),
-        ("", pareto(others), "--"),
-    ):
-        if not front:
-            continue
-        x, y = [front[0].one * 1e6], [1e9]
-        for row, after in zip(front, [*front[1:], None], strict=True):
-            level = max(row.worst_error, _SMALLEST)
-            x += [row.one * 1e6, after.one * 1e6 if after else 1e9]
-            y += [level, level]
-        ax.plot(x, y, line, color="#A7AFB9", lw=3.0 if line == "-" else 1.3, zorder=2)
-        if name and y[1] < ax.get_ylim()[0]:
-            ax.annotate(
-                name,
-                (x[0], math.sqrt(ax.get_ylim()[0] * 1e-3)),
-                (-7, 0),
-                textcoords="offset points",
-                fontsize=8,
-                color=_QUIET,
-                ha="right",
-                va="center",
-            )
+    for front, line, width in ((pareto(rows), "-", 3.0), (pareto([r for r in rows if r.method != "cas"]), "--", 1.3)):
+        if front:
+            x = [r.one * 1e6 for r in front]
+            y = [max(r.worst_error, _SMALLEST) for r in front]
+            ax.step([x[0], *x, 1e9], [1e9, *y, y[-1]], line, where="post", color="#A7AFB9", lw=width, zorder=2)
+    front, bottom = pareto(rows), ax.get_ylim()[0]
+    if front and front[0].worst_error < bottom:
+        words = "Pareto front: nothing is both\nleft of it and below it"
+        at = (front[0].one * 1e6, math.sqrt(bottom * 1e-3))
+        ax.annotate(words, at, (-7, 0), textcoords="offset points", ha="right", va="center", **_SMALL)
 
 
 def _images(ax: Axes, image: Imaged) -> None:
     """Image measurement has no poses: its error of the assembled clamp as lines across."""
-    from matplotlib.transforms import blended_transform_factory
-
-    across = blended_transform_factory(ax.transAxes, ax.transData)
     for value, words in (
         (image.median_by_hand, "finished clamp measured\nin a picture, by hand"),
         (image.automatic, "same picture, automatically"),
     ):
         ax.axhline(value, color=_QUIET, lw=1.0, ls=(0, (1, 2)), zorder=1)
-        ax.text(0.008, value * 1.15, words, transform=across, fontsize=8, color=_QUIET, va="bottom", zorder=1)
+        ax.text(0.008, value * 1.15, words, transform=ax.get_yaxis_transform(), va="bottom", zorder=1, **_SMALL)
 
 
 def _note(found: Comparison, command: str) -> str:
     text = (
-        "Errors: 120 poses with up to 1 mm of room, parallel and tilted by up to 1.7 degrees, against distances found "
-        "at 50 digits; nothing lies in the gap of the axis. Grey dashes: Pareto front without clamp3d. "
+        "Errors: 120 poses with up to 1 mm of clearance, parallel and tilted by up to 1.7 degrees, against distances "
+        "found at 50 digits; nothing lies in the gap of the axis. Grey dashes: Pareto front without clamp3d. "
         "Set-up: meshing, decomposing, building trees, with libraries already loaded; below 1 ms drawn at 1 ms; "
         f"CoACD by the clock. {found.machine}. Made by: {command}"
     )
@@ -303,11 +257,4 @@ def _page(found: Comparison, figure: Figure) -> str:
     with mpl.rc_context({"svg.hashsalt": "clamp3d"}):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     svg = buffer.getvalue()
-    svg = svg[svg.index("<svg") :]
-    style = "body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem;color:#20262E}"
-    style += "svg{width:100%;height:auto}pre{overflow-x:auto;font-size:13px}"
-    return (
-        "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><title>clamp3d compare</title>"
-        "<meta name='viewport' content='width=device-width'>"
-        f"<style>{style}</style></head><body>\n{svg}\n<pre>{html.escape(comparison_to_text(found))}</pre>\n</body></html>\n"
-    )
+    return render("compare.html", svg=svg[svg.index("<svg") :], tables=comparison_to_text(found))

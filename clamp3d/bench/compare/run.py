@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from clamp3d.bench.compare.jobs import Assembled, Imaged, JobError, Kind, run_job
-from clamp3d.bench.compare.measure import Band, Measured
+from clamp3d.bench.compare.assemblies import Assembled, Imaged
+from clamp3d.bench.compare.jobs import JobError, Kind, run_job
+from clamp3d.bench.compare.measure import Measured
 from clamp3d.bench.compare.methods import CLAMP_THRESHOLD, METHODS, Method
 from clamp3d.bench.compare.peers import PEER_METHODS, missing_peers
 from clamp3d.bench.complexity import Sweep
@@ -87,44 +88,32 @@ def compare(
     total = 3 + len(METHODS) + len(ASSEMBLIES) + len(peer_methods)
     done = 0
 
-    def job(kind: Kind, method: Method, make: Callable[[dict[str, Any]], Any], limit: float, what: str) -> Any:
+    def job(kind: Kind, method: Method, limit: float, what: str) -> Any:
         nonlocal done
         progress(done, total, what)
+        done += 1
+        if method.family in absent:
+            return NotMeasured(method.family, method.setting, method.label, absent[method.family])
         try:
-            return make(run_job(kind, method.key, time_limit=limit))
+            return run_job(kind, method.key, time_limit=limit)
         except JobError as error:
             return NotMeasured(method.family, method.setting, method.label, str(error))
-        finally:
-            done += 1
-
-    def row(data: dict[str, Any]) -> Measured:
-        return Measured(**data | {"bands": tuple(Band(**band) for band in data["bands"])})
 
     # The first process pays for compiling the kernel on a machine that has not done so.
-    job("assembly", Method("cas"), dict, ASSEMBLY_LIMIT, "warming up")
-    contact = [job("contact", m, row, CONTACT_LIMIT, f"{m.label} on known poses") for m in METHODS]
-    beside: list[Measured | NotMeasured] = []
-    for m in peer_methods:
-        if m.family in absent:
-            beside.append(NotMeasured(m.family, m.setting, m.label, absent[m.family]))
-            done += 1
-        else:
-            beside.append(job("peer", m, row, CONTACT_LIMIT, f"{m.label} on known poses"))
-    exact: list[Assembled | NotMeasured] = []
-    stepped: list[Assembled | NotMeasured] = []
-    for m in ASSEMBLIES:
-        both = job("assembly", m, _both, ASSEMBLY_LIMIT, f"assembly by {m.label}")
-        for rows, found in zip((exact, stepped), both if isinstance(both, tuple) else (both, both), strict=True):
-            rows.append(found)
-    image = job("image", Method("image"), _imaged, ASSEMBLY_LIMIT, "measuring in a picture")
-    sweeps = job("complexity", Method("complexity"), _sweeps, ASSEMBLY_LIMIT, "counting work for Table 5")
+    job("assembly", Method("cas"), ASSEMBLY_LIMIT, "warming up")
+    contact = [job("contact", m, CONTACT_LIMIT, f"{m.label} on known poses") for m in METHODS]
+    beside = [job("peer", m, CONTACT_LIMIT, f"{m.label} on known poses") for m in peer_methods]
+    both = [job("assembly", m, ASSEMBLY_LIMIT, f"assembly by {m.label}") for m in ASSEMBLIES]
+    pairs = [found if isinstance(found, tuple) else (found, found) for found in both]
+    image = job("image", Method("image"), ASSEMBLY_LIMIT, "measuring in a picture")
+    sweeps = job("complexity", Method("complexity"), ASSEMBLY_LIMIT, "counting work for Table 5")
     progress(total, total, "done")
     return Comparison(
         machine((*LIBRARIES, *(PEER_LIBRARIES if peers else ()))),
         tuple(contact),
         tuple(beside),
-        tuple(exact),
-        tuple(stepped),
+        tuple(exact for exact, _ in pairs),
+        tuple(stepped for _, stepped in pairs),
         image,
         sweeps,
         time.monotonic() - start,
@@ -149,20 +138,3 @@ def pareto(rows: Sequence[Measured]) -> list[Measured]:
         if not front or row.worst_error < front[-1].worst_error:
             front.append(row)
     return front
-
-
-def _both(data: dict[str, Any]) -> tuple[Assembled, Assembled]:
-    exact, stepped = (Assembled(**row) for row in data["rows"])
-    return exact, stepped
-
-
-def _imaged(data: dict[str, Any]) -> Imaged:
-    return Imaged(**data | {"first_five": tuple(data["first_five"])})
-
-
-def _sweeps(data: dict[str, Any]) -> tuple[Sweep, ...]:
-    def sweep(fields: dict[str, Any]) -> Sweep:
-        values: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in fields.items()}
-        return Sweep(**values)
-
-    return tuple(sweep(fields) for fields in data["sweeps"])

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.clamp.block import block_pair, grooved_block
+from clamp3d.bench.compare.block import block_pair, grooved_block
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.primitives import Cylinder, SweptArc
@@ -107,7 +107,7 @@ def pose(origin: list[float], turn: list[float]) -> Array:
 
 
 def block() -> Solid:
-    """The grooved block in its part frame (`clamp3d.clamp.block`)."""
+    """The grooved block in its part frame (`clamp3d.bench.compare.block`)."""
     return grooved_block(GROOVE, width=WIDTH, depth=DEPTH)
 
 

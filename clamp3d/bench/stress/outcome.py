@@ -1,7 +1,7 @@
-"""What one method made of one family: counts of right and wrong, errors, and the worst cases.
+"""Score of one method on one family: verdicts, errors, failures, and the worst cases.
 
 A verdict is the sign of the distance: below 0 is a hit. It is wrong where the truth has the other sign; truths nearer
-to 0 than 1e-12 of the scene (for the project's own method: than its own bound) touch, and no verdict on them is wrong.
+to 0 than 1e-12 of the scene (for the reference method: than its own bound) touch, and no verdict on them is wrong.
 Errors are taken over all distances of methods that give depths, over the clearances of those that do not, and not at
 all of methods that only say whether there is a hit. What the counts mean for whole clamps, `assemblies.family` says.
 """
@@ -12,16 +12,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.bench.stress.worker import Answers, Measures
 from clamp3d.core.pose import Array
 
+Mask = NDArray[np.bool_]
+
 TOUCHING = 1e-12
 """Distance from 0, in parts of the scene, up to which a case touches."""
 
-OWN = "cas"
-"""The project's own method."""
+REFERENCE = "cas"
+"""The exact method of this package."""
 
 EXAMPLES = 3
 
@@ -36,12 +38,20 @@ class Example:
     answer: float
 
 
+def examples(what: str, rows: ArrayLike, truth: ArrayLike, answer: ArrayLike = np.nan) -> list[Example]:
+    """The first few of ``rows``, with ``truth`` and ``answer`` of all cases, or one number for all."""
+    rows = np.asarray(rows, np.intp)[:EXAMPLES]
+    n = int(rows.max(initial=0)) + 1
+    told, said = (np.broadcast_to(x, n) if np.ndim(x) == 0 else np.asarray(x) for x in (truth, answer))
+    return [Example(int(i), what, float(told[i]), float(said[i])) for i in rows]
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """One method on one family; counts of cases, errors in mm, ``worst_relative`` in parts of the scene's size.
+    """Score of one method on one family; counts of cases, errors in mm, ``worst_relative`` in parts of the scene.
 
-    ``refused``: the method says in words that it cannot; ``exceptions``, ``crashes`` (interpreter ended) and ``late``
-    are failures. ``beyond_bound`` counts errors larger than the method's own bound (None without one) and
+    ``refused``: the method says in words that it cannot; ``exceptions``, ``crashes`` (interpreter ended) and
+    ``timeouts`` are failures. ``beyond_bound`` counts errors larger than the method's own bound (None without one) and
     ``worst_ratio`` is the largest error in parts of it.
     """
 
@@ -60,21 +70,70 @@ class Outcome:
     worst_ratio: float | None
     exceptions: int
     crashes: int
-    late: int
+    timeouts: int
     seconds: float
     notes: tuple[str, ...]
     examples: tuple[Example, ...]
 
     @property
+    def failures(self) -> dict[str, int]:
+        """What can go wrong, in words, with how often it did."""
+        return {
+            "false hits": self.false_hits,
+            "false misses": self.false_misses,
+            "exceptions": self.exceptions,
+            "crashes of the interpreter": self.crashes,
+            "without an answer in time": self.timeouts,
+        }
+
+    @property
     def wrong(self) -> int:
         """False hits, false misses, exceptions, crashes and questions without an answer in time."""
-        return self.false_hits + self.false_misses + self.exceptions + self.crashes + self.late
+        return sum(self.failures.values())
 
     @property
     def failure_rate(self) -> float | None:
         """Share of the cases that went wrong among those it took on; None if it took on none."""
         taken = self.asked - self.refused
         return self.wrong / taken if taken else None
+
+
+def score(
+    family: str,
+    method: str,
+    answers: Answers,
+    error: Array,
+    size: Array,
+    false_hit: Mask,
+    false_miss: Mask,
+    beyond: Mask,
+    found: list[Example],
+) -> Outcome:
+    """Add up masks (n,) of what is wrong, and ``error`` (n,) mm, NaN where it does not count."""
+    bounded = np.isfinite(error) & np.isfinite(answers.bound)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        relative, ratio = error / size, np.where(bounded, error / answers.bound, np.nan)
+    return Outcome(
+        family=family,
+        method=method,
+        cases=len(error),
+        asked=int(answers.asked.sum()),
+        answered=int(np.isfinite(answers.distance).sum()),
+        refused=int(answers.refused.sum()),
+        false_hits=int(false_hit.sum()),
+        false_misses=int(false_miss.sum()),
+        beyond_bound=int(beyond.sum()) if bounded.any() else None,
+        worst_error=_of(np.max, error),
+        median_error=_of(np.median, error),
+        worst_relative=_of(np.max, relative),
+        worst_ratio=_of(np.max, ratio),
+        exceptions=int(answers.failed.sum()),
+        crashes=len(answers.crashed),
+        timeouts=len(answers.timeouts),
+        seconds=answers.seconds,
+        notes=tuple(answers.notes),
+        examples=tuple(found),
+    )
 
 
 def judge(
@@ -87,52 +146,32 @@ def judge(
     *,
     band: Array | None = None,
 ) -> Outcome:
-    """Count what ``answers`` has of right and wrong; ``exact`` (n,) long doubles, ``size`` (n,) of each scene in mm.
+    """Score distances; ``exact`` (n,) are long doubles, ``size`` (n,) the size of each scene in mm.
 
     ``band`` (n,) mm is the distance from 0 up to which a case touches; by default as the module says.
     """
     have = np.isfinite(answers.distance)
     # An answer that is not a number is no answer and no refusal.
-    failed = answers.failed | (answers.asked & ~have & ~answers.refused)
-    failed[answers.crashed + answers.late] = False
-    signed = np.asarray(answers.distance - exact, np.float64)
-    error = np.abs(signed)
+    answers.failed |= answers.asked & ~have & ~answers.refused
+    answers.failed[answers.crashed + answers.timeouts] = False
+    error = np.abs(np.asarray(answers.distance - exact, np.float64))
     if band is None:
-        band = answers.bound if name == OWN else TOUCHING * size
+        band = answers.bound if name == REFERENCE else TOUCHING * size
     decided = have & (np.abs(np.asarray(exact, np.float64)) > band)
     hit, overlap = answers.distance < 0.0, np.asarray(exact < 0, bool)
     false_hit, false_miss = decided & hit & ~overlap, decided & ~hit & overlap
-    numbers = have & (measures != "verdict") & (np.asarray(exact >= 0, bool) | (measures == "depth"))
-    bounded = numbers & np.isfinite(answers.bound)
-    over = bounded & (error > answers.bound)
-    examples: list[Example] = []
-    for what, mask in (("false hit", false_hit), ("false miss", false_miss), ("beyond bound", over)):
+    counts = have & (measures != "verdict") & (np.asarray(exact >= 0, bool) | (measures == "depth"))
+    beyond = counts & (error > answers.bound)
+    found: list[Example] = []
+    for what, mask in (("false hit", false_hit), ("false miss", false_miss), ("beyond bound", beyond)):
         rows = np.flatnonzero(mask)
-        for i in rows[np.argsort(-error[rows], kind="stable")][:EXAMPLES]:
-            examples.append(Example(int(i), what, float(exact[i]), float(answers.distance[i])))
-    for what, lost in (("crash", answers.crashed), ("no answer in time", answers.late)):
-        examples += [Example(i, what, float(exact[i]), float("nan")) for i in lost[:EXAMPLES]]
-    rows = np.flatnonzero(failed)[:EXAMPLES]
-    examples += [Example(int(i), "exception", float(exact[i]), float("nan")) for i in rows]
-    some = bool(numbers.any())
-    return Outcome(
-        family=family,
-        method=name,
-        cases=len(exact),
-        asked=int(answers.asked.sum()),
-        answered=int(have.sum()),
-        refused=int(answers.refused.sum()),
-        false_hits=int(false_hit.sum()),
-        false_misses=int(false_miss.sum()),
-        beyond_bound=int(over.sum()) if bounded.any() else None,
-        worst_error=float(error[numbers].max()) if some else None,
-        median_error=float(np.median(error[numbers])) if some else None,
-        worst_relative=float((error / size)[numbers].max()) if some else None,
-        worst_ratio=float((error / answers.bound)[bounded].max()) if bounded.any() else None,
-        exceptions=int(failed.sum()),
-        crashes=len(answers.crashed),
-        late=len(answers.late),
-        seconds=answers.seconds,
-        notes=tuple(answers.notes),
-        examples=tuple(examples),
-    )
+        found += examples(what, rows[np.argsort(-error[rows], kind="stable")], exact, answers.distance)
+    found += examples("crash", answers.crashed, exact) + examples("no answer in time", answers.timeouts, exact)
+    found += examples("exception", np.flatnonzero(answers.failed), exact)
+    error = np.where(counts, error, np.nan)
+    return score(family, name, answers, error, size, false_hit, false_miss, beyond, found)
+
+
+def _of(what: Any, values: Array) -> float | None:
+    values = values[~np.isnan(values)]
+    return float(what(values)) if len(values) else None

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.family import Family
-from clamp3d.bench.stress.meshes.families import MESHES
+from clamp3d.bench.stress.meshes.family import MESHES
 from clamp3d.bench.stress.motions.families import MOTIONS
 from clamp3d.bench.stress.poses.families import POSES
 
@@ -15,7 +15,7 @@ KINDS: dict[str, Mapping[str, Family]] = {"pose": POSES, "motion": MOTIONS, "mes
 
 FAMILIES: dict[str, Family] = {name: family for kind in KINDS.values() for name, family in kind.items()}
 
-METHODS: dict[str, str] = {name: about for family in FAMILIES.values() for name, about in family.methods.items()}
+METHODS: dict[str, str] = {name: about for f in FAMILIES.values() for name, (about, _) in f.methods.items()}
 """Name -> what it is."""
 
 

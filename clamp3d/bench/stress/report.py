@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from clamp3d.bench.pages import render
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES, COUNTS
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.registry import FAMILIES, METHODS
 from clamp3d.bench.stress.run import StressRun
+from clamp3d.output.tables import text_table
 
 
 def _length(x: float | None) -> str:
@@ -43,31 +45,33 @@ def _each(outcome: Outcome) -> str:
     return next(f"{seconds * k:.3g} {unit}" for k, unit in ((1e6, "us"), (1e3, "ms"), (1.0, "s")) if seconds * k < 1e3)
 
 
-def _trouble(outcome: Outcome) -> str:
-    parts = [f"{n} {what}" for n, what in ((outcome.exceptions, "raised"), (outcome.crashes, "crashed")) if n]
-    if outcome.late:
-        parts.append(f"{outcome.late} late")
-    return ", ".join(parts)
+_MATRICES = (
+    (
+        "Share of wrong verdicts (false hits, false misses, exceptions, crashes, no answer in time) among the "
+        "cases that the method takes on:",
+        _rate,
+    ),
+    ("Largest and median error in mm (largest in parts of the method's own bound):", _errors),
+    ("Time a case, set-up of the shapes included:", _each),
+)
+"""Title and cell of the matrices of families and methods."""
 
 
 def table(run: StressRun) -> str:
     """One line per family and method, fixed width."""
-    head = (
-        f"{'family':28s} {'method':14s} {'asked':>7s} {'refused':>7s} {'false hit':>9s} {'false miss':>10s} "
-        f"{'> bound':>7s} {'worst mm':>9s} {'median':>9s} {'us each':>8s}  failures"
-    )
-    lines = [head, "-" * len(head)]
+    head = ["family", "method", "asked", "refused", "false hit", "false miss", "> bound", "worst mm", "median"]
+    rows = []
     for o in run.outcomes:
-        each = 1e6 * o.seconds / o.asked if o.asked else 0.0
-        beyond = "-" if o.beyond_bound is None else str(o.beyond_bound)
-        lines.append(
-            f"{o.family:28s} {o.method:14s} {o.asked:7d} {o.refused:7d} {o.false_hits:9d} {o.false_misses:10d} "
-            f"{beyond:>7s} {_length(o.worst_error):>9s} {_length(o.median_error):>9s} {each:8.1f}  {_trouble(o)}"
-        )
-    lines.append(
+        troubles = ((o.exceptions, "raised"), (o.crashes, "crashed"), (o.timeouts, "timed out"))
+        failures = ", ".join(f"{count} {what}" for count, what in troubles if count)
+        row = (o.family, o.method, o.asked, o.refused, o.false_hits, o.false_misses, o.beyond_bound)
+        each = f"{1e6 * o.seconds / max(o.asked, 1):.1f}"
+        rows.append([*row, _length(o.worst_error), _length(o.median_error), each, failures])
+    lines = [
+        text_table([*head, "us each", "failures"], rows),
         f"seed {run.seed}, {run.n} cases a family; {run.checked_50_digits} truths a family of poses worked out again "
-        f"at 50 digits: largest difference {run.worst_truth_difference:.1g} of the scene"
-    )
+        f"at 50 digits: largest difference {run.worst_truth_difference:.1g} of the scene",
+    ]
     if any(o.family in ASSEMBLIES for o in run.outcomes):
         lines.append(f"assemblies: {COUNTS}")
     return "\n".join(lines)
@@ -75,62 +79,32 @@ def table(run: StressRun) -> str:
 
 def markdown(run: StressRun, command: str) -> str:
     """The matrix of failure rates, what each family is, and the worst case of each method with its reproducer."""
-    methods = list(dict.fromkeys(o.method for o in run.outcomes))
     families = list(dict.fromkeys(o.family for o in run.outcomes))
-    by = {(o.family, o.method): o for o in run.outcomes}
-    lines = [
-        f"Made by `{command}`: {run.n} cases a family, seed {run.seed}; {run.checked_50_digits} truths a family of "
-        "poses worked out a second time at 50 digits "
-        f"(largest difference {run.worst_truth_difference:.1g} of the scene).",
-        "",
-        f"Machine: {run.machine}.",
-        "",
-    ]
-    for title, cell in (
-        (
-            "Share of wrong verdicts (false hits, false misses, exceptions, crashes, no answer in time) among the "
-            "cases that the method takes on:",
-            _rate,
-        ),
-        ("Largest and median error in mm (largest in parts of the method's own bound):", _errors),
-        ("Time a case, set-up of the shapes included:", _each),
-    ):
-        lines += [title, "", "| family | " + " | ".join(methods) + " |", "|---|" + "---|" * len(methods)]
-        for f in families:
-            cells = [cell(by[f, m]) if (f, m) in by else "" for m in methods]
-            lines.append(f"| {f} | " + " | ".join(cells) + " |")
-        lines.append("")
-    lines += ["The families:", ""]
-    lines += [f"- **{f}**: {FAMILIES[f].about}" for f in families]
-    if any(f in ASSEMBLIES for f in families):
-        lines += ["", f"Of assemblies: {COUNTS}."]
-    findings = [finding(o, run) for o in run.outcomes if o.examples]
-    if findings:
-        lines += ["", "What was found, one line each, worst case first; the command prints the case as Python:", ""]
-        lines += findings
-    lines += ["", "The methods:", ""]
-    lines += [f"- **{m}**: {METHODS[m]}" for m in methods]
-    return "\n".join(lines) + "\n"
+    return render(
+        "stress.md",
+        run=run,
+        command=command,
+        matrices=_MATRICES,
+        methods=list(dict.fromkeys(o.method for o in run.outcomes)),
+        families=families,
+        by={(o.family, o.method): o for o in run.outcomes},
+        family_about={name: family.about for name, family in FAMILIES.items()},
+        method_about=METHODS,
+        counts=COUNTS if any(f in ASSEMBLIES for f in families) else "",
+        findings=[finding(o, run) for o in run.outcomes if o.examples],
+    )
 
 
 def finding(o: Outcome, run: StressRun) -> str:
     """One line: what a method got wrong in a family, and how to see it."""
     first = o.examples[0]
-    counts = [
-        f"{n} {what}"
-        for n, what in (
-            (o.false_hits, "false hits"),
-            (o.false_misses, "false misses"),
-            (o.beyond_bound or 0, "errors beyond its bound"),
-            (o.exceptions, "exceptions"),
-            (o.crashes, "crashes of the interpreter"),
-            (o.late, "without an answer in time"),
-        )
-        if n
-    ]
+    failures = o.failures
+    if o.beyond_bound:
+        failures["errors beyond its bound"] = o.beyond_bound
+    counts = ", ".join(f"{n} {what}" for what, n in failures.items() if n)
     answer = "none" if first.answer != first.answer else f"{first.answer:.6g} mm"
     return (
-        f"- {o.method}, {o.family}: {', '.join(counts)} of {o.asked - o.refused}; {first.what}: truth "
+        f"- {o.method}, {o.family}: {counts} of {o.asked - o.refused}; {first.what}: truth "
         f"{first.truth:.6g} mm, answer {answer} "
         f'(`clamp3d stress --family "{o.family}" --n {run.n} --seed {run.seed} --case {first.case}`)'
     )

@@ -8,10 +8,10 @@ import multiprocessing
 import signal
 import time
 import traceback
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
 from multiprocessing.connection import Connection
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,7 @@ from clamp3d.core.pose import Array
 from clamp3d.errors import Clamp3dError, without_numbers
 
 _MAX_DEATHS = 5
+_START_LIMIT = 120.0  # s
 _IMPORTED = ("scipy.optimize", "scipy.spatial", "trimesh", "fcl")
 """Loaded in a child before the clock runs."""
 
@@ -27,17 +28,26 @@ Measures = Literal["depth", "clearance", "verdict"]
 """What a method's answers are good for: signed distances, distances while apart, or their sign alone."""
 
 
-class Cases(Protocol):
-    """Cases of any kind, ``shape`` (n,) the number of the shapes that each is about."""
+class Rows:
+    """Cases as a dataclass of columns, arrays (n, ...); ``shape`` (n,) is the number of the shapes each is about."""
 
-    @property
-    def shape(self) -> NDArray[np.intp]: ...  # noqa: D102
+    __slots__ = ()
+    shape: NDArray[np.intp]
 
-    def __len__(self) -> int: ...
+    def __len__(self) -> int:
+        return len(self.shape)
 
-    def take(self, rows: ArrayLike) -> Any:
+    def take(self, rows: ArrayLike) -> Self:
         """The named cases."""
-        ...
+        i = np.asarray(rows, dtype=np.intp)
+        taken: dict[str, Any] = {}
+        for f in fields(self):  # type: ignore[arg-type]
+            column = getattr(self, f.name)
+            if isinstance(column, Rows):
+                taken[f.name] = column.take(i)
+            elif isinstance(column, np.ndarray):
+                taken[f.name] = column[i]
+        return replace(self, **taken)  # type: ignore[type-var]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +59,7 @@ class Measured:
 
     distance: Array
     bound: Array
-    unfit: NDArray[np.bool_]
+    unfit: NDArray[np.bool_] | Literal[False] = False
     why: str = ""
 
 
@@ -68,8 +78,8 @@ class Method(Protocol):
 class Answers:
     """What came back: ``distance`` and ``bound`` (n,) NaN where nothing did; ``refused``: said why; ``failed``: raised.
 
-    ``crashed`` lists the cases that ended the interpreter, ``late`` those that it did not answer in time, ``notes`` one
-    message per kind of failure; ``left`` cases were not asked any more when the time was over.
+    ``crashed`` lists the cases that ended the interpreter, ``timeouts`` those that it did not answer in time, ``notes``
+    one message per kind of failure. Cases that are not ``asked`` were skipped when the time was over.
     """
 
     distance: Array
@@ -79,7 +89,7 @@ class Answers:
     asked: NDArray[np.bool_]
     seconds: float = 0.0
     crashed: list[int] = field(default_factory=list)
-    late: list[int] = field(default_factory=list)
+    timeouts: list[int] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     @classmethod
@@ -94,45 +104,62 @@ class Answers:
             self.notes.append(text)
 
 
-def _groups(cases: Cases) -> list[NDArray[np.intp]]:
+@dataclass(frozen=True, slots=True)
+class _Reply:
+    """What a method said to some rows: its answer, or why there is none."""
+
+    rows: NDArray[np.intp]
+    found: Measured | None
+    why: str
+    seconds: float
+
+
+def _measure(asked: Method, cases: Any, rows: NDArray[np.intp]) -> _Reply:
+    """Ask for some rows of one shape; a refusal in the package's own words begins with 'refused: '."""
+    found, why = None, ""
+    start = time.perf_counter()
+    try:
+        found = asked.measure(cases.take(rows))
+    except Clamp3dError as error:
+        why = f"refused: {str(error).splitlines()[0]}"
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        why = f"{type(error).__name__}: {error} ({place.name})"
+    return _Reply(rows, found, why, time.perf_counter() - start)
+
+
+def _replies(asked: Method, cases: Any, rows: NDArray[np.intp]) -> list[_Reply]:
+    """Ask for all rows at once, and one by one if that gives no answer."""
+    reply = _measure(asked, cases, rows)
+    if reply.found is not None or len(rows) == 1:
+        return [reply]
+    return [_measure(asked, cases, rows[k : k + 1]) for k in range(len(rows))]
+
+
+def _record(answers: Answers, reply: _Reply) -> None:
+    rows, found = reply.rows, reply.found
+    answers.asked[rows] = True
+    answers.seconds += reply.seconds
+    if found is not None:
+        answers.distance[rows] = np.where(found.unfit, np.nan, found.distance)
+        answers.bound[rows] = found.bound
+        answers.refused[rows] = found.unfit
+        if np.any(found.unfit):
+            answers.note(f"refused: {found.why}")
+    else:
+        refused = reply.why.startswith("refused: ")
+        (answers.refused if refused else answers.failed)[rows] = True
+        answers.note(without_numbers(reply.why))
+
+
+def _groups(cases: Any) -> list[NDArray[np.intp]]:
     """Rows of each shape."""
     order = np.argsort(cases.shape, kind="stable")
     cuts = np.flatnonzero(np.diff(cases.shape[order])) + 1
     return np.split(order, cuts)
 
 
-def _measure(asked: Method, cases: Cases, rows: NDArray[np.intp]) -> tuple[Measured | None, str, float]:
-    """Answer, or why there is none: 'refused: ...' in the project's own words, or the exception's name."""
-    start = time.perf_counter()
-    try:
-        found: Measured | None = asked.measure(cases.take(rows))
-        why = ""
-    except Clamp3dError as error:
-        found, why = None, f"refused: {str(error).splitlines()[0]}"
-    except Exception as error:
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        found, why = None, f"{type(error).__name__}: {error} ({place.name})"
-    return found, why, time.perf_counter() - start
-
-
-def _record(answers: Answers, rows: NDArray[np.intp], found: Measured | None, why: str, seconds: float) -> None:
-    answers.asked[rows] = True
-    answers.seconds += seconds
-    if found is not None:
-        answers.distance[rows] = np.where(found.unfit, np.nan, found.distance)
-        answers.bound[rows] = found.bound
-        answers.refused[rows] = found.unfit
-        if found.unfit.any():
-            answers.note(f"refused: {found.why}")
-    elif why.startswith("refused: "):
-        answers.refused[rows] = True
-        answers.note(without_numbers(why))
-    else:
-        answers.failed[rows] = True
-        answers.note(without_numbers(why))
-
-
-def run_here(asked: Method, cases: Cases, time_limit: float | None = None) -> Answers:
+def run_here(asked: Method, cases: Any, time_limit: float | None = None) -> Answers:
     """Put ``cases`` to a method in this process; groups of one shape at a time, singly where a group has no answer."""
     answers = Answers.empty(len(cases))
     groups = _groups(cases)
@@ -142,102 +169,106 @@ def run_here(asked: Method, cases: Cases, time_limit: float | None = None) -> An
     for rows in groups:
         if time_limit is not None and time.monotonic() - start > time_limit:
             break
-        for part in _parts(asked, cases, rows):
-            _record(answers, *part)
+        for reply in _replies(asked, cases, rows):
+            _record(answers, reply)
     return answers
 
 
-def _parts(
-    asked: Method, cases: Cases, rows: NDArray[np.intp]
-) -> Iterator[tuple[NDArray[np.intp], Measured | None, str, float]]:
-    found, why, seconds = _measure(asked, cases, rows)
-    if found is not None or len(rows) == 1:
-        yield rows, found, why, seconds
-        return
-    for row in rows:
-        yield np.array([row]), *_measure(asked, cases, np.array([row]))
-
-
-def _serve(pipe: Connection, make: Callable[[], Method], cases: Cases) -> None:
+def _serve(pipe: Connection, make: Callable[[], Method], cases: Any) -> None:
     """Child: answer the rows that are sent, until the parent closes the pipe."""
     asked = make()
     for name in _IMPORTED:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
     pipe.send("ready")
-    try:
+    with contextlib.suppress(EOFError, BrokenPipeError, KeyboardInterrupt):  # the parent has no more questions
         while True:
-            pipe.send(list(_parts(asked, cases, pipe.recv())))
-    except (EOFError, BrokenPipeError, KeyboardInterrupt):  # the parent has no more questions
-        return
+            pipe.send(_replies(asked, cases, pipe.recv()))
 
 
-def run_isolated(make: Callable[[], Method], cases: Cases, *, time_limit: float, case_limit: float = 20.0) -> Answers:
+class _Child:
+    """A process that answers rows of ``cases`` by the method that ``make`` returns."""
+
+    def __init__(self, make: Callable[[], Method], cases: Any) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, other = context.Pipe()
+        self._process = context.Process(target=_serve, args=(other, make, cases), daemon=True)
+        self._process.start()
+        other.close()
+
+    def receive(self, seconds: float) -> Any:
+        """What it sends. Raises TimeoutError, or EOFError when the interpreter has ended."""
+        try:
+            if not self._pipe.poll(seconds):
+                raise TimeoutError
+            return self._pipe.recv()
+        except ConnectionResetError:
+            raise EOFError from None
+
+    def ask(self, rows: NDArray[np.intp], seconds: float) -> list[_Reply]:
+        """Replies to some rows; raises as `receive` does."""
+        try:
+            self._pipe.send(rows)
+        except (BrokenPipeError, ConnectionResetError):
+            raise EOFError from None
+        return cast(list[_Reply], self.receive(seconds))
+
+    def end_code(self) -> str:
+        """How the process ended, in words."""
+        self._process.join(5.0)
+        code = self._process.exitcode
+        return signal.Signals(-code).name if code is not None and code < 0 else f"exit code {code}"
+
+    def end(self) -> None:
+        """End the process."""
+        self._pipe.close()
+        if self._process.is_alive():
+            self._process.kill()
+        self._process.join()
+
+
+def run_isolated(make: Callable[[], Method], cases: Any, *, time_limit: float, case_limit: float = 20.0) -> Answers:
     """Put ``cases`` to the method that ``make`` (which must pickle) returns, in a child process that may die.
 
-    A group on which the child dies or is silent for ``case_limit`` seconds is asked again case by case; after
-    some deaths the family is left. ``time_limit`` seconds are for the whole family.
+    A group on which the child dies or is silent for ``case_limit`` seconds is asked again case by case; after some
+    deaths the rest of the family is skipped. ``time_limit`` seconds are for the whole family.
     """
     answers = Answers.empty(len(cases))
     queue: list[NDArray[np.intp]] = _groups(cases)[::-1]
     end = time.monotonic() + time_limit
-    child: Any = None
-    pipe: Any = None
+    child: _Child | None = None
     deaths = 0
-    context = multiprocessing.get_context("spawn")
     try:
         while queue and time.monotonic() < end and deaths < _MAX_DEATHS:
             if child is None:
-                pipe, other = context.Pipe()
-                child = context.Process(target=_serve, args=(other, make, cases), daemon=True)
-                child.start()
-                other.close()
-                if not pipe.poll(120.0):
-                    answers.note("refused: the method did not start within 120 s")
-                    break
+                child = _Child(make, cases)
                 try:
-                    pipe.recv()
+                    child.receive(_START_LIMIT)
+                except TimeoutError:
+                    answers.note(f"refused: the method did not start within {_START_LIMIT:g} s")
+                    break
                 except EOFError:
-                    answers.note(f"the interpreter ended with {_code(child)} at start")
+                    answers.note(f"the interpreter ended with {child.end_code()} at start")
                     break
             rows = queue.pop()
             try:
-                pipe.send(rows)
-                in_time = pipe.poll(case_limit)
-                parts = pipe.recv() if in_time else None
-            except (EOFError, BrokenPipeError, ConnectionResetError):
-                in_time, parts = True, None
-            if parts is not None:
-                for part in parts:
-                    _record(answers, *part)
+                for reply in child.ask(rows, case_limit):
+                    _record(answers, reply)
                 continue
-            deaths += 1
+            except TimeoutError:
+                lost, why = answers.timeouts, f"no answer within {case_limit:g} s"
+            except EOFError:
+                lost, why = answers.crashed, f"the interpreter ended with {child.end_code()}"
             if len(rows) > 1:
                 queue += [np.array([row]) for row in rows[::-1]]
-                deaths -= 1  # counted when the case itself is found
             else:
+                deaths += 1
                 answers.asked[rows] = True
-                (answers.crashed if in_time else answers.late).append(int(rows[0]))
-                answers.note(
-                    f"the interpreter ended with {_code(child)}" if in_time else f"no answer within {case_limit:g} s"
-                )
-            _end(child, pipe)
+                lost.append(int(rows[0]))
+                answers.note(why)
+            child.end()
             child = None
     finally:
         if child is not None:
-            _end(child, pipe)
+            child.end()
     return answers
-
-
-def _code(child: Any) -> str:
-    """How a child ended, in words."""
-    child.join(5.0)
-    code: int | None = child.exitcode
-    return signal.Signals(-code).name if code is not None and code < 0 else f"exit code {code}"
-
-
-def _end(child: Any, pipe: Any) -> None:
-    pipe.close()
-    if child.is_alive():
-        child.kill()
-    child.join()

@@ -10,11 +10,11 @@ function clamp3dViewer(messages) {
     viewer = new MeshCat.Viewer(pane);
   } catch (error) {
     // Without WebGL the panel is the page; what it says is in the HTML already.
-    document.body.classList.add("no3d");
     $("no3d").hidden = false;
     if (live) setTimeout(() => location.reload(), 3000);
     return;
   }
+  document.body.classList.remove("no3d");
   window.viewer = viewer;
   const animator = viewer.animator;
   const size = viewer.set_3d_pane_size.bind(viewer);
@@ -157,7 +157,7 @@ function clamp3dViewer(messages) {
     else if (finding) {
       const f = story.findings[Number(finding.dataset.k)];
       if (!$("timeline").hidden) go(f.stop);
-      pick(finding, [f.a, f.b], f.low, f.high);
+      pick(finding, f.a ? [f.a, f.b] : null, f.low, f.high);
       if (innerWidth <= 760) $("stage").scrollIntoView({ block: "start" });
     } else if (row) {
       const r = story.stops[Number(row.closest(".stop").dataset.stop)].rows.find((r) => r.a === row.dataset.a && r.b === row.dataset.b);
@@ -255,6 +255,8 @@ function clamp3dViewer(messages) {
     $("marks").replaceChildren(...(story.done && story.stops.length > 1 ? story.stops.map(mark) : []));
     stop = -1;
     if (story.stops.length) showStop(story.done ? 0 : story.stops.length - 1);
+    // The panel says it; the caption is for meshcat's own page.
+    viewer.scene_tree.find(["clamp3d", "caption"]).set_property("visible", false);
     if (!touched) setTimeout(() => { viewer.set_3d_pane_size(); if (!touched) home(0, true); }, 30);
   }
 

@@ -7,6 +7,7 @@ import json
 import math
 import os
 import re
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -20,11 +21,11 @@ from hypothesis import strategies as st
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
-from clamp3d.bench.compare import jobs as compare_jobs
 from clamp3d.bench.compare import peers as compare_peers
 from clamp3d.bench.compare import run as study
+from clamp3d.bench.compare.assemblies import Assembled, Imaged, assembled, imaged
 from clamp3d.bench.compare.chart import check_format, save_comparison
-from clamp3d.bench.compare.jobs import Assembled, JobError, assembled, imaged, run_job
+from clamp3d.bench.compare.jobs import JobError, run_job
 from clamp3d.bench.compare.measure import Band, Measured, measure, verdicts
 from clamp3d.bench.compare.methods import METHODS, Method, prepare
 from clamp3d.bench.compare.peers import PEER_METHODS, load_peer, missing_peers, prepare_peer
@@ -108,7 +109,7 @@ def test_a_job_answers_as_the_process_itself_would() -> None:
     found = run_job("contact", "chords:40.0", time_limit=60.0)
     here = dataclasses.asdict(measure(Method("chords", 40.0), budget=QUICK))
     for name in ("worst_error", "median_error", "depth_error", "pieces", "label"):
-        assert found[name] == here[name]
+        assert getattr(found, name) == here[name]
 
 
 def test_a_job_that_fails_hangs_or_crashes_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,7 +130,7 @@ def test_a_job_that_fails_hangs_or_crashes_says_so(tmp_path: Path, monkeypatch: 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="POSIX")
 def test_interrupting_a_job_leaves_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     started = []
-    popen = compare_jobs.subprocess.Popen
+    popen = subprocess.Popen
 
     class Interrupted(popen):  # type: ignore[misc, valid-type]
         def wait(self, timeout: float | None = None) -> int:
@@ -138,7 +139,7 @@ def test_interrupting_a_job_leaves_no_process(tmp_path: Path, monkeypatch: pytes
                 raise KeyboardInterrupt
             return int(super().wait())
 
-    monkeypatch.setattr(compare_jobs.subprocess, "Popen", Interrupted)
+    monkeypatch.setattr(subprocess, "Popen", Interrupted)
     with pytest.raises(KeyboardInterrupt):
         run_job("contact", "wedges:1.0", time_limit=60.0)
     assert started[0].returncode is not None
@@ -227,7 +228,7 @@ def _comparison() -> Comparison:
     return Comparison(machine(LIBRARIES), contact, peers, (rows[0], late), (rows[1], late), image, (sweep,), 12.0)
 
 
-IMAGE = compare_jobs.Imaged(10, 4.5, 4.0, 1.08, 7.1, (31.9, 31.1, 31.2, 30.9, 32.1), 0.006, 0.2)
+IMAGE = Imaged(10, 4.5, 4.0, 1.08, 7.1, (31.9, 31.1, 31.2, 30.9, 32.1), 0.006, 0.2)
 
 
 def test_tables_show_every_row_and_why_one_is_missing() -> None:
@@ -275,19 +276,19 @@ def test_chart_in_every_format(tmp_path: Path) -> None:
 def test_compare_asks_every_job_and_keeps_going(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[str, str]] = []
 
-    def answer(kind: str, method: str, *, time_limit: float) -> dict[str, Any]:
+    def answer(kind: str, method: str, *, time_limit: float) -> Any:
         asked.append((kind, method))
         if kind == "contact" and method.startswith("hulls"):
             raise JobError("crashed (SIGABRT)")
         if kind in ("contact", "peer"):
             m = Method.parse(method)
-            return dataclasses.asdict(_row(m.family, 1e-4, 0.1, m.setting))
+            return _row(m.family, 1e-4, 0.1, m.setting)
         if kind == "assembly":
             both = _comparison()
-            return {"rows": [dataclasses.asdict(both.exact[0]), dataclasses.asdict(both.stepped[0])]}
+            return both.exact[0], both.stepped[0]
         if kind == "image":
-            return dataclasses.asdict(IMAGE)
-        return {"sweeps": []}
+            return IMAGE
+        return ()
 
     monkeypatch.setattr(study, "run_job", answer)
     monkeypatch.setattr(study, "missing_peers", lambda: {"coal": "not installed: pip install coal"})

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from clamp3d.bench.stress.meshes.cases import LEAST
-from clamp3d.bench.stress.meshes.families import MESHES
-from clamp3d.bench.stress.meshes.family import MeshFamily
-from clamp3d.bench.stress.meshes.methods import method
+from clamp3d.bench.stress.meshes.family import MESHES, MeshFamily
+from clamp3d.bench.stress.meshes.methods import METHODS
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.poses.truth import truth, truth_50_digits
 from clamp3d.bench.stress.run import run_stress
@@ -27,7 +24,7 @@ REFUSING = 150
 
 def _ask(family: MeshFamily, name: str, n: int, seed: int = 7) -> Outcome:
     cases = family.cases(n, seed)
-    return family.judge(name, cases, run_here(method(name), cases))
+    return family.judge(name, cases, truth(cases.poses), run_here(METHODS[name][1](), cases))
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -50,7 +47,7 @@ def test_hulls_refuse_what_would_end_coacd(tmp_path, monkeypatch) -> None:
         found = _ask(MESHES[family], "hulls", 25)
         assert (found.refused, found.wrong) == (25, 0), found.notes
     soup = MESHES["mesh: soup"].cases(6, 18).take([2])  # CoACD is quick on its wide groove
-    found = MESHES["mesh: soup"].judge("hulls", soup, run_here(method("hulls"), soup))
+    found = MESHES["mesh: soup"].judge("hulls", soup, truth(soup.poses), run_here(METHODS["hulls"][1](), soup))
     assert (found.answered, found.wrong) == (1, 0), found.notes
 
 
@@ -59,12 +56,12 @@ def test_bare_libraries_are_found_out() -> None:
     numbers = MESHES["mesh: bad numbers"]
     cases = numbers.cases(6, 20)
     what = [cases[i].mesh.what for i in range(6)]
-    fcl = run_isolated(partial(method, "FCL alone"), cases, time_limit=60.0)
+    fcl = run_isolated(METHODS["FCL alone"][1], cases, time_limit=60.0)
     assert fcl.crashed == [what.index("a corner far beyond")]
     assert fcl.failed[what.index("a corner negative")]
     assert not fcl.refused.any()
     assert numbers.cases(1, 57)[0].mesh.what == "a coordinate nan"
-    coacd = run_isolated(partial(method, "CoACD alone"), numbers.cases(1, 57), time_limit=60.0)
+    coacd = run_isolated(METHODS["CoACD alone"][1], numbers.cases(1, 57), time_limit=60.0)
     assert coacd.crashed == [0]
     opened = _ask(MESHES["mesh: open"], "FCL alone", 60)
     assert opened.false_misses > 0

@@ -114,7 +114,7 @@ def test_a_method_that_ends_the_interpreter_is_counted():
     cases = POSES["tangency"].cases(6, 0)
     answers = run_isolated(_Fatal, cases, time_limit=60.0, case_limit=3.0)
     assert answers.crashed == [2]
-    assert answers.late == [4]
+    assert answers.timeouts == [4]
     assert np.isfinite(answers.distance).sum() == 4
     assert any("ended with SIGSEGV" in note for note in answers.notes)
 
@@ -125,7 +125,7 @@ def test_fcl_methods_hold_their_bounds_on_clearances():
         assert isinstance(outcome, Outcome)
         assert outcome.answered > 10
         assert outcome.beyond_bound == 0
-        assert outcome.exceptions + outcome.crashes + outcome.late == 0
+        assert outcome.exceptions + outcome.crashes + outcome.timeouts == 0
 
 
 def test_names_and_numbers_are_checked():

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from clamp3d.baselines.cas import Cas
-from clamp3d.baselines.chords import Chords
+from clamp3d.baselines import Cas, Chords
 from clamp3d.bench.stress.assemblies.clamps import Case
-from clamp3d.bench.stress.worker import Measured, Measures
+from clamp3d.bench.stress.worker import Measured, Measures, Rows
 from clamp3d.clamp.assemble import STEP, TILT_STEP
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.equilibria import equilibria
@@ -21,7 +19,6 @@ from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.stepped import solve_stepped
 from clamp3d.core.pose import Array
-from clamp3d.errors import InputError
 
 EXACT = 1e-8
 """Bound in mm of the exact solver's answers: ten times the residuals that it proves, and of a clamp of usual size."""
@@ -38,39 +35,16 @@ class Rest:
 
 
 @dataclass(frozen=True)
-class Assemblies:
-    """Cases, each of a shape of its own; ``numbers`` (n,) are their places in the family."""
+class Assemblies(Rows):
+    """Cases, each of a shape of its own: ``shape`` (n,) are their places in the family."""
 
     cases: Sequence[Case]
-    numbers: NDArray[np.intp]
-
-    @property
-    def shape(self) -> NDArray[np.intp]:
-        """See `worker.Cases`."""
-        return self.numbers
-
-    def __len__(self) -> int:
-        return len(self.numbers)
-
-    def take(self, rows: ArrayLike) -> Assemblies:
-        """See `worker.Cases`."""
-        return Assemblies(self.cases, self.numbers[np.asarray(rows)])
+    shape: NDArray[np.intp]
 
 
-class Solver(Protocol):
-    """A `worker.Method` that keeps what it found, by the number of the case."""
+class Solver:
+    """A method that keeps what it found: ``rests``, by the number of the case."""
 
-    rests: dict[int, Rest]
-
-    @property
-    def measures(self) -> Measures: ...  # noqa: D102
-
-    def measure(self, cases: Assemblies) -> Measured:
-        """Distances between the splints."""
-        ...
-
-
-class _Solver:
     measures: Measures = "depth"
 
     def __init__(self, solve: Callable[[Case], Rest], bound: Callable[[Clamp], float]) -> None:
@@ -78,14 +52,14 @@ class _Solver:
         self.rests: dict[int, Rest] = {}
 
     def measure(self, cases: Assemblies) -> Measured:
-        """See `Solver`."""
+        """Distances between the splints."""
         distance, bound = np.empty(len(cases)), np.empty(len(cases))
-        for k, number in enumerate(cases.numbers):
+        for k, number in enumerate(cases.shape):
             case = cases.cases[number]
             self.rests[int(number)] = rest = self._solve(case)
             distance[k] = Section(case.clamp, Cas()).splint_distance(rest.q)
             bound[k] = self._bound(case.clamp)
-        return Measured(distance, bound, np.zeros(len(cases), bool))
+        return Measured(distance, bound)
 
 
 def _exact(case: Case) -> Rest:
@@ -121,22 +95,14 @@ def _chord_bound(clamp: Clamp) -> float:
 METHODS: dict[str, tuple[str, Callable[[], Solver]]] = {
     "cas": (
         "closed forms of the arc groove; its bound is that of rounding; of a clamp the exact solver, 1e-8 mm",
-        lambda: _Solver(_exact, lambda clamp: EXACT),
+        lambda: Solver(_exact, lambda clamp: EXACT),
     ),
     "chords 5 deg": (
         "convex partitioning in the section, chords of 5 degrees; its bound is the chord error",
-        lambda: _Solver(_chords, _chord_bound),
+        lambda: Solver(_chords, _chord_bound),
     ),
     "stepped": (
         "of a clamp the paper's search: the down splint moves by 1/3 mm and 1 degree; its bound is the step",
-        lambda: _Solver(_stepped, lambda clamp: STEP),
+        lambda: Solver(_stepped, lambda clamp: STEP),
     ),
 }
-"""Name -> what it is, and how it is made."""
-
-
-def method(name: str) -> Solver:
-    """The method of that name. Raises InputError naming the choices."""
-    if name not in METHODS:
-        raise InputError(f"unknown method {name!r}; available: {', '.join(METHODS)}")
-    return METHODS[name][1]()

@@ -19,17 +19,15 @@ from clamp3d.bench.stress.poses.cases import (
     Cases,
     Shapes,
     contact_on,
+    free,
     place,
-    poses_from_axes,
     random_shapes,
 )
-from clamp3d.bench.stress.poses.methods import block
+from clamp3d.bench.stress.poses.methods import MESH_ERROR, block
+from clamp3d.bench.stress.worker import Rows
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder, SweptArc
-
-MESH_ERROR = 1.0 / 2400.0
-"""Chord error of the meshes in parts of the groove's radius."""
 
 LEAST = 0.02
 """No case is nearer to touching than this, in parts of the groove's radius."""
@@ -67,37 +65,28 @@ class MeshCase:
 
 
 @dataclass(frozen=True, slots=True)
-class MeshCases:
+class MeshCases(Rows):
     """n cases; every mesh is made when it is asked for, from the case's own random numbers.
 
-    ``poses`` are the wires in their grooves' frames, ``number`` (n,) the numbers of the cases, which their meshes are
-    drawn from with ``family``, ``seed`` and ``fault``.
+    ``poses`` are the wires in their grooves' frames, ``shape`` (n,) the numbers of the cases, each with a mesh of its
+    own, which is drawn with ``family``, ``seed`` and ``fault``.
     """
 
     family: str
     seed: int
     fault: Fault
     poses: Cases
-    number: NDArray[np.intp]
+    shape: NDArray[np.intp]
 
-    @property
-    def shape(self) -> NDArray[np.intp]:
-        """A mesh for each case."""
-        return self.number
-
-    def __len__(self) -> int:
-        return len(self.number)
-
-    def take(self, rows: ArrayLike) -> MeshCases:
-        """The named cases."""
-        i = np.asarray(rows, dtype=np.intp)
-        return MeshCases(self.family, self.seed, self.fault, self.poses.take(i), self.number[i])
+    def scene(self) -> Array:
+        """Largest length of each case (n,), mm."""
+        return self.poses.scene()
 
     def __getitem__(self, i: int) -> MeshCase:
         k = int(self.poses.shape[i])
         groove, wire, T = self.poses.shapes.groove(k), self.poses.shapes.cylinder(k), self.poses.T_world_wire[i]
         vertices, faces = good_mesh(groove, wire, T)
-        rng = np.random.default_rng([*generator(self.family, self.seed).integers(2**32, size=2), self.number[i]])
+        rng = np.random.default_rng([*generator(self.family, self.seed).integers(2**32, size=2), self.shape[i]])
         mesh = self.fault(rng, vertices, faces, groove.radius)
         return MeshCase(mesh, groove, wire, mesh.T_mesh_groove @ T)
 
@@ -166,4 +155,4 @@ def _contained(rng: np.random.Generator, m: int) -> Cases:
     out = shapes.R + shapes.r * rng.uniform(1.5, 3.0, m)
     centre = np.stack([out * np.sin(side), -out * np.cos(side), shapes.L * rng.uniform(-0.1, 0.1, m)], 1)
     axis = np.tile([0.0, 0.0, 1.0], (m, 1))
-    return Cases(shapes, np.arange(m, dtype=np.intp), poses_from_axes(rng, centre, axis), np.full(m, np.nan))
+    return free(rng, shapes, np.arange(m, dtype=np.intp), centre, axis)

@@ -1,67 +1,65 @@
-"""A family of meshes: how its truths are found, and how methods are put to it."""
+"""Families of meshes: broken ones, and good ones that are hard to read. `MESHES` maps name -> `MeshFamily`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from clamp3d.bench.stress.family import Family
+from clamp3d.bench.stress.meshes import faults
 from clamp3d.bench.stress.meshes.cases import Fault, MeshCases, make_cases
-from clamp3d.bench.stress.meshes.methods import METHODS, method
+from clamp3d.bench.stress.meshes.methods import METHODS
 from clamp3d.bench.stress.outcome import TOUCHING, Outcome, judge
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, truth, truth_50_digits
-from clamp3d.bench.stress.worker import Answers, run_isolated
-from clamp3d.core.pose import Array
+from clamp3d.bench.stress.worker import Answers
 
 
 def _millimetre(rng: np.random.Generator) -> float:
     return 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class MeshFamily:
-    """A kind of fault: ``fault`` makes the mesh of a case, ``unit`` draws the size of its millimetre. See `Family`."""
+def _any_unit(rng: np.random.Generator) -> float:
+    return float(rng.choice([1e-3, 1.0, 1000.0 / 25.4, 1e3]))
 
-    name: str
-    about: str
-    fault: Fault
-    unit: Callable[[np.random.Generator], float] = _millimetre
-    part: float = 0.01
-    truth_error: float = EXTENDED_ERROR
 
-    @property
-    def methods(self) -> Mapping[str, str]:
-        """See `Family`."""
-        return {name: about for name, (about, _) in METHODS.items()}
+class MeshFamily(Family):
+    """A kind of fault: ``make`` spoils the mesh of a case, ``unit`` draws the size of its millimetre.
+
+    Every method works in a child process: the libraries under them end it.
+    """
+
+    methods = METHODS
+    part = 0.01
+    truth_error = EXTENDED_ERROR
+
+    def __init__(
+        self, name: str, about: str, make: Fault, unit: Callable[[np.random.Generator], float] = _millimetre
+    ) -> None:
+        super().__init__(name, about, lambda rng, n: None)
+        self._fault, self._unit = make, unit
 
     def cases(self, n: int, seed: int) -> MeshCases:
-        """The n cases for a seed: always the same ones."""
-        return make_cases(self.name, seed, n, self.fault, self.unit)
+        """See `Family`."""
+        return make_cases(self.name, seed, n, self._fault, self._unit)
 
-    def run(
-        self, methods: Sequence[str], n: int, seed: int, time_limit: float, check: int
-    ) -> tuple[list[Outcome], float]:
-        """See `Family`. Every method works in a child process: the libraries under them end it."""
-        cases = self.cases(n, seed)
-        exact = truth(cases.poses)
-        size = cases.poses.scene()
-        worst = 0.0
-        for i in np.linspace(0, n - 1, min(check, n)).astype(int):
-            difference = abs(float(truth_50_digits(cases.poses, int(i)) - float(exact[i])))
-            worst = max(worst, (difference - 2e-16 * abs(float(exact[i]))) / float(size[i]))
-        outcomes = []
-        for name in methods:
-            answers = run_isolated(partial(method, name), cases, time_limit=time_limit)
-            outcomes.append(self.judge(name, cases, answers))
-        return outcomes, worst
+    def truths(self, cases: MeshCases) -> NDArray[Any]:
+        """See `Family`."""
+        return truth(cases.poses)
 
-    def judge(self, name: str, cases: MeshCases, answers: Answers) -> Outcome:
-        """Count right and wrong; a verdict within the method's own bound of touching is not wrong."""
-        size: Array = cases.poses.scene()
-        band = np.maximum(TOUCHING * size, np.nan_to_num(answers.bound, nan=0.0))
-        return judge(self.name, name, size, truth(cases.poses), answers, method(name).measures, band=band)
+    def difference(self, cases: MeshCases, truths: NDArray[Any], i: int) -> float:
+        """See `Family`."""
+        exact = float(truths[i])
+        difference = abs(float(truth_50_digits(cases.poses, i) - exact))
+        return max(0.0, difference - 2e-16 * abs(exact)) / float(cases.scene()[i])
+
+    def judge(self, name: str, cases: MeshCases, truths: NDArray[Any], answers: Answers) -> Outcome:
+        """See `Family`; a verdict within the method's own bound of touching is not wrong."""
+        band = np.maximum(TOUCHING * cases.scene(), np.nan_to_num(answers.bound, nan=0.0))
+        measures = self.methods[name][1]().measures
+        return judge(self.name, name, cases.scene(), truths, answers, measures, band=band)
 
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
@@ -81,3 +79,21 @@ class MeshFamily:
             '    print("refused:", error)',
         ]
         return "\n".join([*lines, f"# truth: {float(truth_50_digits(cases.poses, i))!r} mm"])
+
+
+_ALL = (
+    MeshFamily("mesh: open", "faces removed from a block with a groove, or a corner torn off", faults.opened),
+    MeshFamily("mesh: inside out", "windings turned: of all faces, of some, of one body of two", faults.inside_out),
+    MeshFamily("mesh: doubled", "faces, vertices or the whole body twice", faults.doubled),
+    MeshFamily("mesh: empty", "no faces, no vertices, or none with an area or a volume", faults.empty),
+    MeshFamily(
+        "mesh: bad numbers", "coordinates nan or infinite, face indices negative or out of range", faults.bad_numbers
+    ),
+    MeshFamily("mesh: soup", "vertices not merged, as in an STL: a good mesh that must be answered", faults.soup),
+    MeshFamily("mesh: turned", "random order of vertices and faces, random rotation: must be answered", faults.turned),
+    MeshFamily(
+        "mesh: scaled", "metres, inches, microns, up to 1e6 sizes from the origin: good meshes", faults.far, _any_unit
+    ),
+)
+
+MESHES: dict[str, MeshFamily] = {family.name: family for family in _ALL}

@@ -1,4 +1,4 @@
-"""The methods that read meshes: the project's own, and the bare libraries as one would call them without its guards."""
+"""The methods that read meshes: this package's, and the bare libraries as one would call them without its guards."""
 
 from __future__ import annotations
 
@@ -7,28 +7,50 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.baselines import ContactModel, contact_model
-from clamp3d.bench.stress.meshes.cases import MESH_ERROR, MeshCase, MeshCases
+from clamp3d.bench.stress.family import Methods
+from clamp3d.bench.stress.meshes.cases import MeshCase, MeshCases
+from clamp3d.bench.stress.poses.methods import FCL_ERROR, MESH_ERROR, THRESHOLD, fcl_model
 from clamp3d.bench.stress.poses.methods import METHODS as POSE_METHODS
-from clamp3d.bench.stress.worker import Measured, Measures, Method
+from clamp3d.bench.stress.worker import Measured, Measures
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import inverse
-from clamp3d.errors import InputError
-
-_FCL = 2e-6
-"""Error of FCL's own distance in mm (see `contact.fcl_shapes`), rounded up."""
-
-_THRESHOLD = 1.0 / 12.0
-"""CoACD's threshold in parts of the groove's radius."""
 
 _TIME = 15.0
 """Seconds for CoACD in method hulls: less than a child may be silent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Distance and its bound in mm, NaN where there is none; ``why`` it does not hold."""
+
+    distance: float
+    bound: float = math.nan
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class OneByOne:
+    """A method that answers one mesh at a time."""
+
+    ask: Callable[[MeshCase], Answer]
+    measures: Measures = "clearance"
+
+    def measure(self, cases: MeshCases) -> Measured:
+        """See `Method`."""
+        found = [self.ask(cases[i]) for i in range(len(cases))]
+        return Measured(
+            np.array([answer.distance for answer in found]),
+            np.array([answer.bound for answer in found]),
+            np.array([bool(answer.why) for answer in found]),
+            next((answer.why for answer in found if answer.why), ""),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,33 +61,13 @@ class Arrays:
     faces: NDArray[Any]
 
 
-@dataclass(frozen=True, slots=True)
-class OneByOne:
-    """A method that answers one mesh at a time: ``ask`` gives the distance, its bound, and why it does not hold."""
-
-    ask: Callable[[MeshCase], tuple[float, float, str]]
-    measures: Measures
-
-    def measure(self, cases: MeshCases) -> Measured:
-        """See `Method`."""
-        found = [self.ask(cases[i]) for i in range(len(cases))]
-        unfit = np.array([bool(why) for *_, why in found])
-        return Measured(
-            np.array([d for d, *_ in found]),
-            np.array([b for _, b, _ in found]),
-            unfit,
-            next((why for *_, why in found if why), ""),
-        )
-
-
-def _model(build: Callable[[Arrays, float], ContactModel], bound: float) -> Callable[[MeshCase], Any]:
-    def ask(case: MeshCase) -> tuple[float, float, str]:
-        model = build(Arrays(case.mesh.vertices, case.mesh.faces), case.groove.radius)
-        pair = GroovePair("P1", "P6", case.groove, case.mesh.T_mesh_groove, case.wire, np.eye(4))
-        d = float(model.distances(pair, case.T_mesh_wire[None])[0])
-        return d, bound * case.groove.radius + _FCL + _rounding(case), ""
-
-    return ask
+def _fcl_model(name: str, bound: float, case: MeshCase) -> Answer:
+    """A contact model made of the mesh as it is; ``bound`` in parts of the groove's radius."""
+    settings = {"threshold": THRESHOLD} if name == "hulls" else {}
+    model = fcl_model(name, Arrays(case.mesh.vertices, case.mesh.faces), case.groove, settings, _TIME)
+    pair = GroovePair("P1", "P6", case.groove, case.mesh.T_mesh_groove, case.wire, np.eye(4))
+    distance = float(model.distances(pair, case.T_mesh_wire[None])[0])
+    return Answer(distance, bound * case.groove.radius + FCL_ERROR + _rounding(case))
 
 
 def _rounding(case: MeshCase) -> float:
@@ -73,34 +75,26 @@ def _rounding(case: MeshCase) -> float:
     return 1e-15 * float(np.abs(case.T_mesh_wire[:3, 3]).max())
 
 
-def _mesh(mesh: Arrays, radius: float) -> ContactModel:
-    return contact_model("mesh", {"P1": mesh})
-
-
-def _hulls(mesh: Arrays, radius: float) -> ContactModel:
-    return contact_model("hulls", {"P1": mesh}, threshold=_THRESHOLD * radius, time_limit=_TIME, progress=False)
-
-
-def _fit(case: MeshCase) -> tuple[float, float, str]:
+def _fit(case: MeshCase) -> Answer:
     """Groove fitted to the mesh, wire in it by the kernel; what the fit says of its own errors is the bound."""
     from clamp3d.core.mesh import make_mesh
     from clamp3d.fit.fit import fit_mesh
 
     mesh = make_mesh(case.mesh.vertices, case.mesh.faces)
     if not mesh.watertight:
-        return math.nan, math.nan, f"fit: {next(note for note in mesh.notes if 'open' in note)}"
+        return Answer(math.nan, why=f"fit: {next(note for note in mesh.notes if 'open' in note)}")
     result = fit_mesh(mesh)
     if not result.grooves:
-        return math.nan, math.nan, f"fit: {result.notes[-1]}"
+        return Answer(math.nan, why=f"fit: {result.notes[-1]}")
     groove = result.grooves[0]
     T = np.ascontiguousarray(inverse(groove.T_part_feature) @ case.T_mesh_wire)
     found = signed_distances(groove.shape, case.wire, T[None], full=True, workers=1)
     ends = groove.radius * groove.arc_error + groove.length_error
     bound = float(found.error_bound[0]) + groove.fit_error + ends + mesh.rounding
-    return float(found.distance[0]), bound, ""
+    return Answer(float(found.distance[0]), bound)
 
 
-def _scene(case: MeshCase) -> tuple[float, float, str]:
+def _scene(case: MeshCase) -> Answer:
     """A scene of the mesh and the wire, checked: what the mesh is for a user who wants a verdict."""
     from clamp3d.collide.check import check
     from clamp3d.collide.scene import Scene
@@ -117,13 +111,13 @@ def _scene(case: MeshCase) -> tuple[float, float, str]:
     )
     (row,) = check(scene).pairs
     if row.verdict is Verdict.UNCERTAIN:
-        return math.nan, math.nan, "scene: uncertain"
+        return Answer(math.nan, why="scene: uncertain")
     if row.verdict in (Verdict.CLASH, Verdict.CONTAINED):
-        return row.distance.upper, math.nan, ""
-    return row.distance.value, row.distance.uncertainty + _rounding(case), ""
+        return Answer(row.distance.upper)
+    return Answer(row.distance.value, row.distance.uncertainty + _rounding(case))
 
 
-def _fcl_alone(case: MeshCase) -> tuple[float, float, str]:
+def _fcl_alone(case: MeshCase) -> Answer:
     import fcl
 
     V, F = case.mesh.vertices, case.mesh.faces
@@ -132,10 +126,10 @@ def _fcl_alone(case: MeshCase) -> tuple[float, float, str]:
         model.beginModel(len(V), len(F))
         model.addSubModel(V, F)
         model.endModel()
-        return _fcl_distance([fcl.CollisionObject(model, fcl.Transform())], case), math.nan, ""
+        return Answer(_fcl_distance([fcl.CollisionObject(model, fcl.Transform())], case))
 
 
-def _coacd_alone(case: MeshCase) -> tuple[float, float, str]:
+def _coacd_alone(case: MeshCase) -> Answer:
     import coacd
     import fcl
 
@@ -146,7 +140,7 @@ def _coacd_alone(case: MeshCase) -> tuple[float, float, str]:
     for V, F in parts:
         encoded = np.column_stack([np.full(len(F), 3), F]).ravel()
         objects.append(fcl.CollisionObject(fcl.Convex(np.asarray(V, np.float64), len(F), encoded), fcl.Transform()))
-    return _fcl_distance(objects, case), math.nan, ""
+    return Answer(_fcl_distance(objects, case))
 
 
 @contextmanager
@@ -173,31 +167,23 @@ def _fcl_distance(objects: list[Any], case: MeshCase) -> float:
     return float(min(fcl.distance(each, wire, fcl.DistanceRequest(), fcl.DistanceResult()) for each in objects))
 
 
-METHODS: dict[str, tuple[str, Callable[[], Method]]] = {
-    "mesh": (POSE_METHODS["mesh"][0], lambda: OneByOne(_model(_mesh, MESH_ERROR), "clearance")),
-    "hulls": (POSE_METHODS["hulls"][0], lambda: OneByOne(_model(_hulls, math.nan), "clearance")),
+METHODS: Methods = {
+    "mesh": (POSE_METHODS["mesh"][0], partial(OneByOne, partial(_fcl_model, "mesh", MESH_ERROR))),
+    "hulls": (POSE_METHODS["hulls"][0], partial(OneByOne, partial(_fcl_model, "hulls", math.nan))),
     "fit": (
         "groove fitted to the mesh (clamp3d.fit), the wire in it by closed forms; its bound is that of the fit",
-        lambda: OneByOne(_fit, "depth"),
+        partial(OneByOne, _fit, "depth"),
     ),
     "scene": (
         "the mesh in a scene (clamp3d.check), its round surfaces fitted; its bound is that of the scene's answer",
-        lambda: OneByOne(_scene, "clearance"),
+        partial(OneByOne, _scene),
     ),
     "FCL alone": (
         "python-fcl's triangle mesh made of the arrays as they are, in millimetres, without the project's guards",
-        lambda: OneByOne(_fcl_alone, "clearance"),
+        partial(OneByOne, _fcl_alone),
     ),
     "CoACD alone": (
         "CoACD's hulls of the arrays as they are at its default threshold, each convex in python-fcl, without guards",
-        lambda: OneByOne(_coacd_alone, "clearance"),
+        partial(OneByOne, _coacd_alone),
     ),
 }
-"""Name -> what it is, and how it is made."""
-
-
-def method(name: str) -> Method:
-    """The method of that name. Raises InputError naming the choices."""
-    if name not in METHODS:
-        raise InputError(f"unknown method {name!r}; available: {', '.join(METHODS)}")
-    return METHODS[name][1]()

@@ -1,20 +1,22 @@
-"""Cases of the motion families: shapes, the motion of the wire in the groove's frame, and what it was built from."""
+"""Cases of the motion families: the motion of the wire in the groove's frame, built backwards from a contact."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.bench.stress.poses.cases import Shapes
+from clamp3d.bench.stress.poses.cases import Cases, Contact, Extended, Shapes, contact_on, place
+from clamp3d.bench.stress.worker import Rows
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Motions:
+class Motions(Rows):
     """n motions: ``shape`` (n,) row of ``shapes``; a turn by ``angle`` (n,) rad and a ``travel`` (n, 3) mm from 0 to 1.
 
     ``start`` (n, 4, 4) is ``T_groove_wire`` at instant 0. Where ``angle`` is 0 the motion is a translation; else a
@@ -34,27 +36,8 @@ class Motions:
     instant: Array
     number: NDArray[np.intp]
 
-    def __len__(self) -> int:
-        return len(self.shape)
-
-    def take(self, rows: ArrayLike) -> Motions:
-        """The named cases."""
-        i = np.asarray(rows, dtype=np.intp)
-        return Motions(
-            self.shapes,
-            self.shape[i],
-            self.start[i],
-            self.point[i],
-            self.axis[i],
-            self.angle[i],
-            self.travel[i],
-            self.gap[i],
-            self.instant[i],
-            self.number[i],
-        )
-
     def motion(self, i: int) -> Motion:
-        """Case i as the project's own motion."""
+        """Case i as a `Motion`."""
         if self.angle[i] == 0.0:
             return Motion.translate(self.travel[i])
         angle, travel = float(self.angle[i]), float(self.travel[i, 0])
@@ -133,18 +116,71 @@ def motions(
     )
 
 
+def turned(x: NDArray[Any], axis: NDArray[Any], angle: NDArray[Any]) -> NDArray[Any]:
+    """Vectors x turned by ``angle`` (n,) rad about unit axes, (n, 3) in the numbers that are given.
+
+    Rodrigues' formula; x and axis are (n, 3) or (3,).
+    """
+    once = np.cross(axis, x)
+    sine, versine = np.sin(angle)[:, None], 2 * np.sin(angle / 2)[:, None] ** 2
+    return np.asarray(x + sine * once + versine * np.cross(axis, once))
+
+
 def poses(cases: Motions, i: int, instants: Array) -> Array:
-    """Poses (m, 4, 4) of case i at some instants, by the matrices of its turns."""
+    """Poses (m, 4, 4) of case i at some instants."""
     s = instants[:, None]
-    start = cases.start[i]
-    T = np.repeat(start[None], len(s), 0)
+    T = np.repeat(cases.start[i][None], len(s), 0)
     if cases.angle[i] == 0.0:
-        T[:, :3, 3] = start[:3, 3] + s * cases.travel[i]
+        T[:, :3, 3] += s * cases.travel[i]
         return T
-    u = cases.axis[i] / math.sqrt(float(cases.axis[i] @ cases.axis[i]))
-    K = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
-    angle = (instants * cases.angle[i])[:, None, None]
-    less_one = np.sin(angle) * K + 2.0 * np.sin(0.5 * angle) ** 2 * (K @ K)
-    T[:, :3, :3] += less_one @ start[:3, :3]
-    T[:, :3, 3] += less_one @ (start[:3, 3] - cases.point[i]) + s * (cases.travel[i, 0] * u)
+    axis = cases.axis[i] / math.sqrt(float(cases.axis[i] @ cases.axis[i]))
+    angle = instants * cases.angle[i]
+    arm = T[0, :3, 3] - cases.point[i]
+    T[:, :3, 3] += (turned(arm, axis, angle) - arm) + s * (cases.travel[i, 0] * axis)
+    for k in range(3):
+        T[:, :3, k] = turned(cases.start[i, :3, k], axis, angle)
     return T
+
+
+def touching(
+    rng: np.random.Generator, shapes: Shapes, shape: NDArray[np.intp], feature: NDArray[np.str_], gap: Array
+) -> tuple[Cases, NDArray[np.longdouble]]:
+    """Poses at a contact, a third of them along the groove, and the unit normals (n, 3) there."""
+    contact = contact_on(rng, shapes, shape, feature)
+    tilt = np.where(rng.random(len(shape)) < 0.33, 0.0, rng.uniform(-1.5, 1.5, len(shape)))
+    return place(rng, shapes, shape, contact, gap, tilt=tilt), unit(contact)
+
+
+def unit(contact: Contact) -> NDArray[np.longdouble]:
+    """Unit normals (n, 3) there."""
+    return np.asarray(contact.normal / np.sqrt((contact.normal**2).sum(1))[:, None])
+
+
+def square_to(rng: np.random.Generator, normal: NDArray[np.longdouble]) -> NDArray[np.longdouble]:
+    """Random unit vectors (n, 3) square to ``normal``."""
+    v = rng.normal(size=normal.shape).astype(Extended)
+    v = np.cross(normal, v)
+    return np.asarray(v / np.sqrt((v * v).sum(1))[:, None])
+
+
+def moved(T: Array, by: NDArray[Any]) -> Array:
+    """Poses moved by (n, 3) mm, rounded once."""
+    out = T.copy()
+    out[:, :3, 3] = T[:, :3, 3].astype(Extended) + by
+    return out
+
+
+def screws_through(cases: Cases, point: Array, axis: Array, angle: Array, travel: Array, instant: Array) -> Motions:
+    """Screws that are at the poses of ``cases`` at ``instant`` (n,)."""
+    point, axis = np.asarray(point, np.float64), np.asarray(axis, np.float64)
+    p, u = point.astype(Extended), axis.astype(Extended)
+    u = u / np.sqrt((u * u).sum(1))[:, None]
+    s = instant.astype(Extended)
+    start, back = cases.T_world_wire.copy(), -s * angle
+    for column in range(4):  # turned back about the axis, rounded once
+        x = cases.T_world_wire[:, :3, column].astype(Extended)
+        foot = p if column == 3 else 0.0
+        start[:, :3, column] = foot + turned(x - foot, u, back)
+    start = moved(start, -(s * travel)[:, None] * u)
+    turn = {"travel": travel, "angle": angle, "point": point, "axis": axis}
+    return motions(cases.shapes, cases.shape, start, **turn, gap=cases.gap, instant=instant)

@@ -7,14 +7,15 @@ poses, then a motion through it whose clearance is least there. `MOTIONS` maps n
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.bench.stress.motions.cases import Motions, motions
-from clamp3d.bench.stress.motions.contacts import moved, screws_through, square_to, touching
-from clamp3d.bench.stress.motions.family import Generator, MotionFamily
+from clamp3d.bench.stress.family import into
+from clamp3d.bench.stress.motions.cases import Motions, motions, moved, screws_through, square_to, touching, turned
+from clamp3d.bench.stress.motions.family import MotionFamily
 from clamp3d.bench.stress.poses.cases import (
     FEATURES,
     Extended,
@@ -28,24 +29,22 @@ from clamp3d.bench.stress.poses.cases import (
 )
 from clamp3d.core.pose import Array
 
-MOTIONS: dict[str, MotionFamily] = {}
+Make = Callable[[np.random.Generator, int], Motions]
 
 _CONVEX = ("lip", "end arc", "end edge", "corner")
 """Features that a wire passes on a tangent."""
 
 
-def _family(name: str, about: str, *, choose: bool = False) -> Callable[[Generator], Generator]:
-    """Register a generator; ``choose`` from three times as many cases, mostly those that touch first where built to."""
-
-    def register(make: Generator) -> Generator:
-        name_ = f"motion: {name}"
-        MOTIONS[name_] = MotionFamily(name_, about, (lambda rng, n: _best(rng, n, make)) if choose else make)
-        return make
-
-    return register
+def _built(name: str, about: str, make: Make, *, choose: bool = False) -> MotionFamily:
+    """A family; ``choose`` from three times as many cases, mostly those that touch first where they were built to."""
+    return MotionFamily(f"motion: {name}", about, (lambda rng, n: _best(rng, n, make)) if choose else make)
 
 
-def _best(rng: np.random.Generator, n: int, make: Generator) -> Motions:
+MOTIONS: dict[str, MotionFamily] = {}
+_family = into(MOTIONS, _built)
+
+
+def _best(rng: np.random.Generator, n: int, make: Make) -> Motions:
     """Of 3 n cases n, in their order: those that stand as they were built before those that do not, by and large."""
     cases = make(rng, 3 * n)
     rank = np.where(_spoilt(cases), 1.0, 0.0) + rng.random(3 * n) * 1.2
@@ -63,8 +62,9 @@ def _spoilt(cases: Motions) -> NDArray[np.bool_]:
     gap = np.where(np.isfinite(cases.gap), cases.gap, -np.inf)
     t = np.linspace(-1.0, 1.0, 9) * half
     for u in np.linspace(0.0, 1.0, 33):
-        centre = cases.point + _rotated(axis, c - cases.point, u * cases.angle) + u * vector
-        points = centre[:, None, :] + t[:, :, None] * _rotated(axis, d, u * cases.angle)[:, None, :]
+        angle = u * cases.angle
+        centre = cases.point + turned(c - cases.point, axis, angle) + u * vector
+        points = centre[:, None, :] + t[:, :, None] * turned(d, axis, angle)[:, None, :]
         x, y, z = np.abs(points[..., 0]), points[..., 1], np.abs(points[..., 2])
         rho, lip = np.hypot(x, y), np.hypot(x - R * np.sin(a), y + R * np.cos(a))
         arc = np.where(x * np.cos(a) + y * np.sin(a) <= 0.0, np.abs(R - rho), lip)
@@ -73,13 +73,6 @@ def _spoilt(cases: Motions) -> NDArray[np.bool_]:
         low = np.hypot(g, np.maximum(z - H, 0.0)).min(1)
         out |= low - s.r[k] < gap - 1e-9 * s.R[k]
     return out
-
-
-def _rotated(axis: Array, x: Array, angle: Array) -> Array:
-    once = np.cross(axis, x)
-    return np.asarray(
-        x + np.sin(angle)[:, None] * once + 2.0 * np.sin(0.5 * angle)[:, None] ** 2 * np.cross(axis, once)
-    )
 
 
 @_family(
@@ -115,8 +108,8 @@ def _turning_screws(rng: np.random.Generator, n: int, turns: Array, pitch: Array
     cases, normal = touching(rng, shapes, shape, feature, gap)
     # In the hollow a circle narrower than it, square to the groove.
     hollow = np.isin(feature, ["arc", "end arc"])
-    room = (shapes.R - shapes.r)[shape]
-    radius = np.where(hollow, room * rng.uniform(0.1, 0.9, n), shapes.R[shape] * 10.0 ** rng.uniform(-1, 1, n))
+    clearance = (shapes.R - shapes.r)[shape]
+    radius = np.where(hollow, clearance * rng.uniform(0.1, 0.9, n), shapes.R[shape] * 10.0 ** rng.uniform(-1, 1, n))
     axis = square_to(rng, normal)
     along = (feature == "arc") | (rng.random(n) < 0.33) & (np.abs(normal[:, 2]) < 1e-9)
     axis = np.where(along[:, None], [[0.0, 0.0, 1.0]], axis)
@@ -152,12 +145,12 @@ def _screws(rng: np.random.Generator, n: int) -> Motions:
 def _choose(first: NDArray[np.bool_], a: Motions, b: Motions) -> Motions:
     """Row by row one of two of the same shapes."""
 
-    def pick(x: Array, y: Array) -> Array:
-        return np.where(first.reshape(-1, *[1] * (x.ndim - 1)), x, y)
-
-    return Motions(a.shapes, a.shape, pick(a.start, b.start), pick(a.point, b.point), pick(a.axis, b.axis),
-                   pick(a.angle, b.angle), pick(a.travel, b.travel), pick(a.gap, b.gap), pick(a.instant, b.instant),
-                   a.number)  # fmt: skip
+    picked: dict[str, Any] = {}
+    for f in fields(a):
+        x, y = getattr(a, f.name), getattr(b, f.name)
+        if isinstance(x, np.ndarray):
+            picked[f.name] = np.where(first.reshape(-1, *[1] * (x.ndim - 1)), x, y)
+    return replace(a, **picked)
 
 
 @_family("thin and fast", "a thin groove or a thin short wire crossed in 1e-6 ... 1e-2 of the motion")

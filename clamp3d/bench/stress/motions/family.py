@@ -1,76 +1,63 @@
-"""A family of hard motions: how its truths are found, and how methods are put to it."""
+"""Families of hard motions: how their truths are found, and what is asked of the first contacts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
-from clamp3d.bench.stress.family import generator
+from clamp3d.bench.stress.family import Family
 from clamp3d.bench.stress.motions.cases import Motions, poses
-from clamp3d.bench.stress.motions.methods import METHODS, CasMethod, method
+from clamp3d.bench.stress.motions.methods import METHODS, CasMethod
 from clamp3d.bench.stress.motions.truth import TRUTH_ERROR, Least, truth, truth_50_digits
-from clamp3d.bench.stress.outcome import OWN, Outcome, judge
+from clamp3d.bench.stress.outcome import REFERENCE, Outcome
 from clamp3d.bench.stress.poses.cases import Cases
 from clamp3d.bench.stress.poses.truth import truth_50_digits as pose_truth
-from clamp3d.bench.stress.worker import Answers, run_here, run_isolated
-
-Generator = Callable[[np.random.Generator, int], Motions]
+from clamp3d.bench.stress.worker import Answers, run_here
 
 _MOST_DECIDED = 500
 
 
 @dataclass(frozen=True, slots=True)
-class MotionFamily:
-    """A kind of difficulty of motions: ``make(rng, n)`` builds n cases. See `Family`.
+class Truths:
+    """The least distances of all cases, and what the reference method said: the truths look at its places too."""
 
-    The truth of a case is its least distance; a hit is one below 0.
-    """
+    least: Least
+    reference: CasMethod
+    answers: Answers
 
-    name: str
-    about: str
-    make: Generator
-    part: float = 1.0
-    truth_error: float = TRUTH_ERROR
 
-    @property
-    def methods(self) -> Mapping[str, str]:
+class MotionFamily(Family):
+    """A kind of difficulty of motions. The truth of a case is its least distance; a hit is one below 0."""
+
+    methods = METHODS
+    truth_error = TRUTH_ERROR
+
+    def truths(self, cases: Motions) -> Truths:
+        """Where `sweep` is lower, the pose that it names decides, at 50 digits: the search can miss a minimum."""
+        reference = CasMethod()
+        answers = run_here(reference, cases)
+        named = reference.instants(len(cases))
+        least = truth(cases, hints=named)
+        for i in np.flatnonzero(answers.distance < least.distance - answers.bound)[:_MOST_DECIDED]:
+            least.distance[i] = min(least.distance[i], _at(cases, int(i), float(named[i, 0])))
+        return Truths(least, reference, answers)
+
+    def difference(self, cases: Motions, truths: Truths, i: int) -> float:
         """See `Family`."""
-        return {name: about for name, (about, _) in METHODS.items()}
+        difference = float(truth_50_digits(cases, i, truths.least) - truths.least.distance[i])
+        return abs(difference) / float(cases.scene()[i])
 
-    def cases(self, n: int, seed: int) -> Motions:
-        """The n cases for a seed: always the same ones.
+    def ask(self, name: str, cases: Motions, truths: Truths, time_limit: float) -> Answers:
+        """See `Family`; the reference has answered already, and its first contacts are judged too."""
+        if name != REFERENCE:
+            return super().ask(name, cases, truths, time_limit)
+        check_first_contacts(cases, truths.least, truths.reference, truths.answers)
+        return truths.answers
 
-        >>> from clamp3d.bench.stress.motions.families import MOTIONS
-        >>> bool((MOTIONS["motion: grazing"].cases(3, 0).start == MOTIONS["motion: grazing"].cases(3, 0).start).all())
-        True
-        """
-        return self.make(generator(self.name, seed), n)
-
-    def run(
-        self, methods: Sequence[str], n: int, seed: int, time_limit: float, check: int
-    ) -> tuple[list[Outcome], float]:
-        """See `Family`. `cas` answers in this process, its first contacts are judged too; others work in children."""
-        cases = self.cases(n, seed)
-        # What the project's own method takes for the lowest instant is looked at by the truth's own means.
-        own = CasMethod()
-        answers = run_here(own, cases)
-        exact = _exact(cases, own, answers)
-        size = cases.scene()
-        worst = 0.0
-        for i in np.linspace(0, n - 1, min(check, n)).astype(int):
-            difference = float(truth_50_digits(cases, int(i), exact) - exact.distance[i])
-            worst = max(worst, abs(difference) / float(size[i]))
-        outcomes = []
-        for name in methods:
-            if name == OWN:
-                check_first_contacts(cases, exact, own, answers)
-            else:
-                answers = run_isolated(partial(method, name), cases, time_limit=time_limit)
-            outcomes.append(judge(self.name, name, size, exact.distance, answers, method(name).measures))
-        return outcomes, worst
+    def judge(self, name: str, cases: Motions, truths: Truths, answers: Answers) -> Outcome:
+        """See `Family`."""
+        return super().judge(name, cases, truths.least.distance, answers)
 
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
@@ -79,15 +66,6 @@ class MotionFamily:
         found = truth(one)
         least = float(truth_50_digits(one, 0, found))
         return f"{cases.snippet(i)}\n# truth: least {least!r} mm at instant {float(found.instant[0])!r}"
-
-
-def _exact(cases: Motions, own: CasMethod, answers: Answers) -> Least:
-    """Truths. Where `sweep` is lower, the pose that it names decides, at 50 digits: the search can miss a minimum."""
-    named = own.instants(len(cases))
-    exact = truth(cases, hints=named)
-    for i in np.flatnonzero(answers.distance < exact.distance - answers.bound)[:_MOST_DECIDED]:
-        exact.distance[i] = min(exact.distance[i], _at(cases, int(i), float(named[i, 0])))
-    return exact
 
 
 def _at(cases: Motions, i: int, instant: float) -> float:

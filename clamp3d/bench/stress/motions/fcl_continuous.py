@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from clamp3d.baselines.wedges import part_wedges, prism
 from clamp3d.bench.stress.motions.cases import Motions, poses
-from clamp3d.bench.stress.poses.methods import block
+from clamp3d.bench.stress.poses.methods import UNIT, block, chord_error
 from clamp3d.bench.stress.worker import Measured, Measures
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import SweptArc
@@ -32,17 +32,16 @@ _QUARTER = 0.5 * math.pi
 
 
 class FclMethod:
-    """Wedges of ``unit_angle`` rad around the groove against a capsule. It is tight by the chord error."""
+    """Wedges of 5 degrees around the groove against a capsule. It is tight by the chord error."""
 
     measures: Measures = "verdict"
 
-    def __init__(self, unit_angle: float) -> None:
+    def __init__(self) -> None:
         try:
             import fcl
         except ImportError:
             raise MissingLibraryError("FCL continuous needs python-fcl: pip install python-fcl") from None
         self._fcl: Any = fcl
-        self.unit_angle = unit_angle
 
     def measure(self, cases: Motions) -> Measured:
         """See `Method`: -1 where FCL finds contact, 1 where it does not."""
@@ -53,8 +52,7 @@ class FclMethod:
         reach = np.array([_reach(way, wire.length) + wire.radius for way in ways])
         small = min(groove.radius, groove.length, wire.radius, wire.length) < _SMALLEST
         unfit = (reach.max(1) > _LARGEST) | small
-        chord = 2.0 * groove.half_angle / math.ceil(2.0 * groove.half_angle / self.unit_angle - 1e-9)
-        bound = np.full(n, 2.0 * groove.radius * math.sin(0.25 * chord) ** 2)
+        bound = np.full(n, chord_error(groove))
         distance = np.full(n, np.nan)
         if not unfit.all():
             pieces = self._pieces(groove, reach[~unfit].max(0))
@@ -69,7 +67,7 @@ class FclMethod:
         part = block(groove, np.array([[reach[0], -reach[1], 0.0]]))
         body = part.bodies[0]
         out = []
-        for wedge in part_wedges(part, self.unit_angle):
+        for wedge in part_wedges(part, UNIT):
             vertices, faces = prism(wedge.polygon, body.start, body.end)
             encoded = np.column_stack([np.full(len(faces), 3), faces]).ravel()
             shape = self._fcl.Convex(vertices @ body.frame.T, len(faces), encoded)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.bench.stress.family import Methods
 from clamp3d.bench.stress.motions.cases import Motions, poses
-from clamp3d.bench.stress.worker import Measured, Measures, Method
+from clamp3d.bench.stress.motions.fcl_continuous import FclMethod
+from clamp3d.bench.stress.worker import Measured, Measures
 from clamp3d.collide.motions import first_contact, min_clearance
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.pose import Array
-from clamp3d.errors import InputError
 
 
 class CasMethod:
@@ -38,12 +38,11 @@ class CasMethod:
             least = min_clearance(groove, wire, motion, start)
             first = first_contact(groove, wire, motion, start)
             distance[i] = least.distance.value
-            bound[i] = max(least.distance.uncertainty, first.distance.uncertainty) + max(
-                least.resolution, first.resolution
-            )
+            rounding = max(least.distance.uncertainty, first.distance.uncertainty)
+            bound[i] = rounding + max(least.resolution, first.resolution)
             self._lowest[int(cases.number[i])] = least.t
             self._first[int(cases.number[i])] = (first.touches, first.t, first.distance.value)
-        return Measured(distance, bound, np.zeros(len(cases), bool))
+        return Measured(distance, bound)
 
     def instants(self, n: int) -> Array:
         """Instants (n, 1) that `min_clearance` named, -1 where it was not asked."""
@@ -71,34 +70,19 @@ class SteppedMethod:
         """See `Method`."""
         k = int(cases.shape[0])
         groove, wire = cases.shapes.groove(k), cases.shapes.cylinder(k)
-        least = np.empty(len(cases))
-        for i in range(len(cases)):
-            least[i] = signed_distances(groove, wire, poses(cases, i, self.instants), workers=1).min()
-        return Measured(least, np.full(len(cases), np.nan), np.zeros(len(cases), bool))
+        ways = (poses(cases, i, self.instants) for i in range(len(cases)))
+        least = np.array([signed_distances(groove, wire, way, workers=1).min() for way in ways])
+        return Measured(least, np.full(len(cases), np.nan))
 
 
-def _fcl() -> Method:
-    from clamp3d.bench.stress.motions.fcl_continuous import FclMethod
-
-    return FclMethod(math.radians(5.0))
-
-
-METHODS: dict[str, tuple[str, Callable[[], Method]]] = {
+METHODS: Methods = {
     "cas": ("closed forms of the arc groove; its bound is that of rounding", CasMethod),
     "stepped 100": (
         "exact distances at 101 evenly spaced poses of a motion, the usual practice; no bound",
-        lambda: SteppedMethod(100),
+        partial(SteppedMethod, 100),
     ),
     "FCL continuous": (
         "python-fcl's continuous collision of wedges of 5 degrees, conservative advancement; verdicts only",
-        _fcl,
+        FclMethod,
     ),
 }
-"""Name -> what it is, and how it is made."""
-
-
-def method(name: str) -> Method:
-    """The method of that name. Raises InputError naming the choices."""
-    if name not in METHODS:
-        raise InputError(f"unknown method {name!r}; available: {', '.join(METHODS)}")
-    return METHODS[name][1]()

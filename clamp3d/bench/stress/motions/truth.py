@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.bench.stress.digits import fifty_digits, golden, point_distance
-from clamp3d.bench.stress.motions.cases import Motions
+from clamp3d.bench.stress.motions.cases import Motions, turned
 from clamp3d.core.pose import Array
 
 TRUTH_ERROR = 2e-13
@@ -64,17 +63,12 @@ def _numbers(cases: Motions, base: Array) -> Array:
     d = d / np.sqrt((d * d).sum(1))[:, None]
     u, p, v = cases.unit_axis(), cases.point.astype(wide), cases.vector()
     b = base.astype(wide)[:, None]
-    theta = b * cases.angle.astype(wide)[:, None]
-    sine, versine = np.sin(theta), 2 * np.sin(theta / 2) ** 2
-
-    def turned(x: NDArray[Any]) -> NDArray[Any]:
-        once = np.cross(u, x)
-        return np.asarray(x + sine * once + versine * np.cross(u, once))
-
-    c = np.where(theta == 0, c, p + turned(c - p)) + b * v
+    theta = b[:, 0] * cases.angle.astype(wide)
+    c = np.where(theta[:, None] == 0, c, p + turned(c - p, u, theta)) + b * v
+    d = turned(d, u, theta)
     # The axis' point nearest to the wire: a point far away on the axis would cost digits.
     p = p + u * ((c - p) * u).sum(1)[:, None]
-    return np.ascontiguousarray(np.concatenate([c, turned(d), p, u, v, cases.angle[:, None]], 1), dtype=np.float64)
+    return np.ascontiguousarray(np.concatenate([c, d, p, u, v, cases.angle[:, None]], 1), dtype=np.float64)
 
 
 def truth_50_digits(cases: Motions, i: int, found: Least) -> Any:
@@ -85,7 +79,8 @@ def truth_50_digits(cases: Motions, i: int, found: Least) -> Any:
     """
     mp = fifty_digits()
     k = int(cases.shape[i])
-    R, a, L, r, length = (mp.mpf(float(v[k])) for v in _columns(cases))
+    s = cases.shapes
+    R, a, L, r, length = (mp.mpf(float(v[k])) for v in (s.R, s.half_angle, s.L, s.r, s.length))
     half, sdf = length / 2, point_distance(mp, R, a, L)
 
     def vector(values: Array) -> Any:
@@ -133,8 +128,3 @@ def truth_50_digits(cases: Motions, i: int, found: Least) -> Any:
     around = span / mp.mpf(speed) if speed else mp.mpf(0)
     lo, hi = max(mp.mpf(0), s0 - around), min(mp.mpf(1), s0 + around)
     return (least(at, lo, hi, around * mp.mpf(10) ** -12) if hi > lo else at(lo)) - r
-
-
-def _columns(cases: Motions) -> tuple[Array, ...]:
-    s = cases.shapes
-    return s.R, s.half_angle, s.L, s.r, s.length

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clamp3d.bench.stress.worker import Rows
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder, SweptArc
@@ -44,6 +45,11 @@ class Shapes:
         """Largest length of each (k,), mm."""
         return np.asarray(np.maximum.reduce([self.R, self.L, self.r, self.length]))
 
+    def lips(self, shape: NDArray[np.intp]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Half the mouth and height of the lips (n,) of the grooves of n cases, as long doubles."""
+        R, a = (np.asarray(v, Extended) for v in (self.R, self.half_angle))
+        return (R * np.sin(a))[shape], (-R * np.cos(a))[shape]
+
     def groove(self, k: int) -> SweptArc:
         """Groove of row k."""
         return SweptArc(float(self.R[k]), float(self.half_angle[k]), float(self.L[k]))
@@ -56,13 +62,9 @@ class Shapes:
         """Row k as a pair that a contact model takes; both parts have their feature's own frame."""
         return GroovePair("P1", "P6", self.groove(k), np.eye(4), self.cylinder(k), np.eye(4))
 
-    def take(self, rows: NDArray[np.intp]) -> Shapes:
-        """The named rows as new shapes."""
-        return Shapes(self.R[rows], self.half_angle[rows], self.L[rows], self.r[rows], self.length[rows])
-
 
 @dataclass(frozen=True, slots=True)
-class Cases:
+class Cases(Rows):
     """n cases: ``shape`` (n,) row of ``shapes``, poses (n, 4, 4), and ``gap`` (n,) mm that each was built for.
 
     ``T_world_groove`` and ``T_world_wire`` place both bodies in the world; where the first is None the groove stands
@@ -76,21 +78,12 @@ class Cases:
     gap: Array
     T_world_groove: Array | None = None
 
-    def __len__(self) -> int:
-        return len(self.shape)
-
     def scene(self) -> Array:
         """Largest length of each case (n,), mm: sizes, and the distance of the two bodies' origins."""
         apart = self.T_world_wire[:, :3, 3]
         if self.T_world_groove is not None:
             apart = apart - self.T_world_groove[:, :3, 3]
         return np.asarray(np.maximum(self.shapes.size()[self.shape], np.abs(apart).max(axis=1)))
-
-    def take(self, rows: ArrayLike) -> Cases:
-        """The named cases."""
-        i = np.asarray(rows, dtype=np.intp)
-        world = None if self.T_world_groove is None else self.T_world_groove[i]
-        return Cases(self.shapes, self.shape[i], self.T_world_wire[i], self.gap[i], world)
 
     def snippet(self, i: int) -> str:
         """Python lines that ask for case i alone, bit by bit the same numbers."""
@@ -139,6 +132,14 @@ def shape_count(n: int) -> int:
     return max(1, n // 20)
 
 
+def setting(
+    rng: np.random.Generator, n: int, features: tuple[str, ...] = FEATURES, **given: ArrayLike
+) -> tuple[Shapes, NDArray[np.intp], NDArray[np.str_]]:
+    """Random shapes, the shape (n,) of each case, and the feature (n,) that it touches."""
+    shapes = random_shapes(rng, shape_count(n), **given)
+    return shapes, spread(n, len(shapes)), rng.choice(features, n)
+
+
 def poses_from_axes(rng: np.random.Generator, centre: Any, direction: Any) -> Array:
     """Poses (n, 4, 4) with origin ``centre`` and z axis ``direction`` (n, 3), turned at random about it."""
     d = np.asarray(direction, Extended)
@@ -153,6 +154,11 @@ def poses_from_axes(rng: np.random.Generator, centre: Any, direction: Any) -> Ar
     T[:, :3, 0], T[:, :3, 1], T[:, :3, 2] = c * x + s * y, c * y - s * x, d
     T[:, :3, 3], T[:, 3, 3] = centre, 1.0
     return T
+
+
+def free(rng: np.random.Generator, shapes: Shapes, shape: NDArray[np.intp], centre: Any, direction: Any) -> Cases:
+    """Cases that were built from no answer: wires with their middles and axes (n, 3) as given."""
+    return Cases(shapes, shape, poses_from_axes(rng, centre, direction), np.full(len(shape), np.nan))
 
 
 @dataclass
@@ -262,3 +268,23 @@ def place(
     axis_point = contact.q + (r + np.asarray(gap, Extended))[:, None] * nrm
     centre = axis_point - t[:, None] * d
     return Cases(shapes, shape, poses_from_axes(rng, centre, flip[:, None] * d), np.asarray(gap, np.float64))
+
+
+def touching(
+    rng: np.random.Generator,
+    n: int,
+    shapes: Shapes,
+    gap: tuple[float, float],
+    *,
+    features: tuple[str, ...] = FEATURES,
+    tilt: tuple[float, ...] | None = None,
+) -> Cases:
+    """n cases on any of ``features``, at gaps of +-10^u of the wire's radius with u in ``gap``, or 0.
+
+    ``tilt`` are the arguments of `signed_powers` for the lean in rad, None for any lean.
+    """
+    shape, feature = spread(n, len(shapes)), rng.choice(features, n)
+    off = shapes.r[shape] * signed_powers(rng, n, *gap)
+    contact = contact_on(rng, shapes, shape, feature)
+    lean = None if tilt is None else signed_powers(rng, n, *tilt)
+    return place(rng, shapes, shape, contact, off, tilt=lean)

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
+
 import numpy as np
 
+from clamp3d.bench.stress.family import into
 from clamp3d.bench.stress.poses.cases import (
     FEATURES,
     PARALLEL_FEATURES,
     Cases,
     Extended,
-    Shapes,
     contact_on,
+    free,
     place,
     poses_from_axes,
     random_shapes,
+    setting,
     shape_count,
     signed_powers,
     spread,
+    touching,
 )
-from clamp3d.bench.stress.poses.family import PoseFamily, into, setting
+from clamp3d.bench.stress.poses.family import PoseFamily
 from clamp3d.core.pose import Array
 
 FAMILIES: dict[str, PoseFamily] = {}
-_family = into(FAMILIES)
+_family = into(FAMILIES, PoseFamily)
 
 
 @_family("random", "any pose of any groove: parallel, tilted, crossing, clear, touching, deep")
@@ -32,14 +37,12 @@ def _random(rng: np.random.Generator, n: int) -> Cases:
     size = (shapes.R + 0.3 * shapes.L)[shape][:, None]
     centre = rng.uniform(-1.5, 1.5, (n, 3)) * size
     direction = rng.normal(size=(n, 3)) * np.array([1.0, 1.0, 2.0])
-    return Cases(shapes, shape, poses_from_axes(rng, centre, direction), np.full(n, np.nan))
+    return free(rng, shapes, shape, centre, direction)
 
 
 @_family("tangency", "gaps of 0 and +-1e-15 to 1e-1 of the radius on every feature, any tilt")
 def _tangency(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, feature = setting(rng, n)
-    gap = shapes.r[shape] * signed_powers(rng, n, -15, -1)
-    return place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap)
+    return touching(rng, n, random_shapes(rng, shape_count(n)), (-15, -1))
 
 
 @_family("parallel tangency", "the same with the wire along the groove: contact along a line")
@@ -54,21 +57,13 @@ def _parallel_tangency(rng: np.random.Generator, n: int) -> Cases:
 @_family("equal radii", "wire radius = groove radius (1 +- 1e-3 ... 1e-15) and equal to the last bit, nearly coaxial")
 def _equal_radii(rng: np.random.Generator, n: int) -> Cases:
     k = shape_count(n)
-    shapes = random_shapes(rng, k)
-    shapes = random_shapes(
-        rng,
-        k,
-        R=shapes.R,
-        half_angle=shapes.half_angle,
-        L=shapes.L,
-        length=shapes.length,
-        r=shapes.R * (1.0 + signed_powers(rng, k, -16, -3)),
-    )
-    shape = spread(n, k)
+    given = asdict(random_shapes(rng, k))
+    given["r"] = given["R"] * (1.0 + signed_powers(rng, k, -16, -3))
+    shapes, shape = random_shapes(rng, k, **given), spread(n, k)
     R = shapes.R[shape]
     offset = R[:, None] * np.stack([signed_powers(rng, n, -16, -3) for _ in range(3)], 1)
     tilt = np.stack([signed_powers(rng, n, -16, -3, 0.5) for _ in range(2)] + [np.ones(n)], 1)
-    return Cases(shapes, shape, poses_from_axes(rng, offset, tilt), np.full(n, np.nan))
+    return free(rng, shapes, shape, offset, tilt)
 
 
 @_family("oversize wire", "wire larger than the groove: rests on both lips, level or tilted")
@@ -79,8 +74,7 @@ def _oversize(rng: np.random.Generator, n: int) -> Cases:
         rng, k, R=R, half_angle=rng.uniform(0.2, 1.57, k), r=R * (1.0 + 10.0 ** rng.uniform(-6, 1, k))
     )
     shape = spread(n, k)
-    s = (np.asarray(shapes.R, Extended) * np.sin(np.asarray(shapes.half_angle, Extended)))[shape]
-    h = -(np.asarray(shapes.R, Extended) * np.cos(np.asarray(shapes.half_angle, Extended)))[shape]
+    s, h = shapes.lips(shape)
     r = np.asarray(shapes.r, Extended)[shape]
     gap = shapes.r[shape] * signed_powers(rng, n, -15, -2)
     reach = r + np.asarray(gap, Extended)
@@ -111,10 +105,7 @@ def _arc_ends(rng: np.random.Generator, n: int) -> Cases:
 
 @_family("nearly parallel", "axes 1e-18 ... 1e-3 rad off parallel, contacts on every feature")
 def _near_parallel(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, feature = setting(rng, n)
-    gap = shapes.r[shape] * signed_powers(rng, n, -15, -2)
-    contact = contact_on(rng, shapes, shape, feature)
-    return place(rng, shapes, shape, contact, gap, tilt=signed_powers(rng, n, -18, -3, 0.05))
+    return touching(rng, n, random_shapes(rng, shape_count(n)), (-15, -2), tilt=(-18, -3, 0.05))
 
 
 @_family("nearly coaxial", "axis through the arc's centre to 1e-300 ... 1e-3, tilts 1e-18 ... 1e-1")
@@ -125,7 +116,7 @@ def _near_coaxial(rng: np.random.Generator, n: int) -> Cases:
     offset = np.stack([signed_powers(rng, n, -18, -3, 0.3) for _ in range(2)], 1) * R[:, None] + tiny
     z = rng.uniform(-1, 1, n) * shapes.L[shape] * rng.choice([0.0, 1.0], n)
     d = np.stack([signed_powers(rng, n, -18, -1, 0.3) for _ in range(2)] + [rng.choice([-1.0, 1.0], n)], 1)
-    return Cases(shapes, shape, poses_from_axes(rng, np.column_stack([offset, z]), d), np.full(n, np.nan))
+    return free(rng, shapes, shape, np.column_stack([offset, z]), d)
 
 
 @_family("wire ends", "the wire ends where the groove ends: faces level to 0, 1e-15 ... 1e-2")
@@ -139,7 +130,7 @@ def _wire_ends(rng: np.random.Generator, n: int) -> Cases:
     tilt = np.stack([signed_powers(rng, n, -15, -1, 0.4) for _ in range(2)] + [np.ones(n)], 1)
     lift = shapes.R[shape] * signed_powers(rng, n, -15, -3)
     centre = np.stack([rho * np.sin(angle), -rho * np.cos(angle) + lift, z], 1)
-    return Cases(shapes, shape, poses_from_axes(rng, centre, tilt), np.full(n, np.nan))
+    return free(rng, shapes, shape, centre, tilt)
 
 
 @_family("narrow mouth", "arcs over 180 deg: mouth narrower than the wire; inside free, in the mouth not")
@@ -150,8 +141,7 @@ def _narrow_mouth(rng: np.random.Generator, n: int) -> Cases:
     shapes = random_shapes(rng, k, R=R, half_angle=a, r=R * (1.0 - 10.0 ** rng.uniform(-6, -0.1, k)))
     shape = spread(n, k)
     gap = shapes.r[shape] * signed_powers(rng, n, -14, -1)
-    s = (np.asarray(shapes.R, Extended) * np.sin(np.asarray(shapes.half_angle, Extended)))[shape]
-    h = -(np.asarray(shapes.R, Extended) * np.cos(np.asarray(shapes.half_angle, Extended)))[shape]
+    s, h = shapes.lips(shape)
     reach = np.asarray(shapes.r[shape], Extended) + np.asarray(gap, Extended)
     fits = reach >= s  # rests on both lips from inside (-) or outside (+)
     y = h + rng.choice([-1.0, 1.0], n) * np.sqrt(np.maximum(reach * reach - s * s, 0))
@@ -161,7 +151,7 @@ def _narrow_mouth(rng: np.random.Generator, n: int) -> Cases:
     x = np.where(at_lips, 0.0, inside * np.sin(angle))
     y = np.where(at_lips, y, -inside * np.cos(angle))
     tilt = np.stack([signed_powers(rng, n, -12, -1, 0.7) for _ in range(2)] + [np.ones(n)], 1)
-    return Cases(shapes, shape, poses_from_axes(rng, np.stack([x, y, 0 * x], 1), tilt), np.full(n, np.nan))
+    return free(rng, shapes, shape, np.stack([x, y, 0 * x], 1), tilt)
 
 
 @_family("half turn", "contacts and offsets at +-180 deg from the deepest line and at +-0, where atan2 jumps")
@@ -175,18 +165,14 @@ def _half_turn(rng: np.random.Generator, n: int) -> Cases:
     x = np.where(rng.random(n) < 0.3, rng.choice([0.0, -0.0, 5e-324, -5e-324], n), x)
     y = np.where(rng.random(n) < 0.1, rng.choice([0.0, -0.0], n), y)
     d = np.stack([signed_powers(rng, n, -15, -1, 0.6) for _ in range(2)] + [rng.choice([-1.0, 1.0], n)], 1)
-    T = poses_from_axes(rng, np.stack([x, y, rng.choice([0.0, -0.0], n)], 1), d)
-    return Cases(shapes, shape, T, np.full(n, np.nan))
+    return free(rng, shapes, shape, np.stack([x, y, rng.choice([0.0, -0.0], n)], 1), d)
 
 
 @_family("embedded", "wires wholly inside the material, or their axis inside it: contained is a hit")
 def _embedded(rng: np.random.Generator, n: int) -> Cases:
     k = shape_count(n)
-    base = random_shapes(rng, k)
-    shapes = Shapes(
-        base.R, base.half_angle, base.L, base.R * rng.uniform(0.01, 0.5, k), base.R * rng.uniform(0.1, 3, k)
-    )
-    shape = spread(n, k)
+    base, shape = random_shapes(rng, k), spread(n, k)
+    shapes = replace(base, r=base.R * rng.uniform(0.01, 0.5, k), length=base.R * rng.uniform(0.1, 3, k))
     R, H = shapes.R[shape], shapes.L[shape] / 2
     depth = R * 10.0 ** rng.uniform(-3, 0.5, n)
     beside = rng.random(n) < 0.5
@@ -194,8 +180,7 @@ def _embedded(rng: np.random.Generator, n: int) -> Cases:
     y = np.where(beside, -R * np.cos(shapes.half_angle[shape]) - depth, -R - depth)
     d = rng.normal(size=(n, 3)) * np.where(rng.random((n, 3)) < 0.2, 1e-9, 1.0)
     d[:, 2] += np.where((d**2).sum(1) < 1e-12, 1.0, 0.0)
-    T = poses_from_axes(rng, np.stack([x, y, H * rng.uniform(-1, 1, n)], 1), d)
-    return Cases(shapes, shape, T, np.full(n, np.nan))
+    return free(rng, shapes, shape, np.stack([x, y, H * rng.uniform(-1, 1, n)], 1), d)
 
 
 @_family("ties", "two features equally near to 0, 1e-16 ... 1e-6: both lips, both walls, arc and lip")
@@ -212,7 +197,7 @@ def _ties(rng: np.random.Generator, n: int) -> Cases:
     angle = rng.choice([0.0, np.pi / 2, np.pi / 4, 1.0], n)
     lean = rng.choice([0.0, 1e-9, 1e-3, 0.3, 1.5707963267948966], n) + signed_powers(rng, n, -16, -9)
     d = np.stack([np.sin(lean) * np.cos(angle), np.sin(lean) * np.sin(angle), np.cos(lean)], 1)
-    return Cases(shapes, shape, poses_from_axes(rng, np.stack([off(), y, z + off()], 1), d), np.full(n, np.nan))
+    return free(rng, shapes, shape, np.stack([off(), y, z + off()], 1), d)
 
 
 @_family("tilted in the groove", "wire turned in the groove's bottom plane until its ends meet the walls")
@@ -231,7 +216,7 @@ def _tilted(rng: np.random.Generator, n: int) -> Cases:
     turn = rng.choice([0.0, 0.0, 0.5, 1.0], n) * rng.uniform(-np.pi, np.pi, n)
     d = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)], 1)
     centre = np.stack([Rn * signed_powers(rng, n, -12, -3, 0.6) for _ in range(3)], 1)
-    return Cases(shapes, shape, poses_from_axes(rng, centre, d), np.full(n, np.nan))
+    return free(rng, shapes, shape, centre, d)
 
 
 @_family("crossed", "wire square to the groove, across its lips or end edges, in the plane of a face to 1e-16")
@@ -248,7 +233,7 @@ def _crossed(rng: np.random.Generator, n: int) -> Cases:
     z = np.where(over, rng.choice([-1, 0, 1], n) * H, rng.choice([-1, 1], n) * (H + r)) + small()
     x = R * rng.uniform(-2, 2, n)
     d = np.stack([np.ones(n), *(signed_powers(rng, n, -16, -2, 0.4) for _ in range(2))], 1)
-    return Cases(shapes, shape, poses_from_axes(rng, np.stack([x, y, z], 1), d), np.full(n, np.nan))
+    return free(rng, shapes, shape, np.stack([x, y, z], 1), d)
 
 
 @_family(
@@ -274,7 +259,7 @@ def _in_plane(rng: np.random.Generator, n: int) -> Cases:
     h = -R * np.cos(a)
     d = np.stack([u, np.where(in_end, v, out), np.where(in_end, out, v)], 1)
     centre = np.stack([x - t * u, np.where(in_end, y - t * v, h + off), np.where(in_end, end + off, z - t * v)], 1)
-    return Cases(shapes, shape, poses_from_axes(rng, centre, d), np.full(n, np.nan))
+    return free(rng, shapes, shape, centre, d)
 
 
 @_family(
@@ -292,4 +277,4 @@ def _two_points(rng: np.random.Generator, n: int) -> Cases:
     norm = np.sqrt((d * d).sum(1))[:, None]
     ahead = np.where(rng.random(n) < 0.3, 0.5, rng.uniform(-0.5, 0.5, n)) * shapes.length[shape]
     centre = p + ahead.astype(Extended)[:, None] * d / norm
-    return Cases(shapes, shape, poses_from_axes(rng, centre, d), np.full(n, np.nan))
+    return free(rng, shapes, shape, centre, d)

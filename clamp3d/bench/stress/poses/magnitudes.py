@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from clamp3d.bench.stress.family import into
 from clamp3d.bench.stress.poses.cases import (
     FEATURES,
     Cases,
     Extended,
-    Shapes,
     contact_on,
     place,
     poses_from_axes,
@@ -16,11 +18,12 @@ from clamp3d.bench.stress.poses.cases import (
     shape_count,
     signed_powers,
     spread,
+    touching,
 )
-from clamp3d.bench.stress.poses.family import PoseFamily, into, setting
+from clamp3d.bench.stress.poses.family import PoseFamily
 
 FAMILIES: dict[str, PoseFamily] = {}
-_family = into(FAMILIES)
+_family = into(FAMILIES, PoseFamily)
 
 
 @_family("full and tiny arcs", "half angles of 1e-12 ... 1e-2 rad and of pi less that")
@@ -28,10 +31,7 @@ def _extreme_arcs(rng: np.random.Generator, n: int) -> Cases:
     k = shape_count(n)
     small = 10.0 ** rng.uniform(-12, -2, k)
     shapes = random_shapes(rng, k, half_angle=np.where(rng.random(k) < 0.5, small, np.pi - small))
-    shape, feature = spread(n, k), rng.choice(FEATURES, n)
-    gap = shapes.r[shape] * signed_powers(rng, n, -14, -1)
-    contact = contact_on(rng, shapes, shape, feature)
-    return place(rng, shapes, shape, contact, gap, tilt=signed_powers(rng, n, -9, 0, 0.5))
+    return touching(rng, n, shapes, (-14, -1), tilt=(-9, 0, 0.5))
 
 
 @_family("sizes", "all lengths times 1e-6 ... 1e6, gaps of 0 and 1e-15 ... 1e-1 of the radius")
@@ -39,10 +39,8 @@ def _sizes(rng: np.random.Generator, n: int) -> Cases:
     k = shape_count(n)
     scale = 10.0 ** rng.uniform(-6, 6, k)
     base = random_shapes(rng, k)
-    shapes = Shapes(base.R * scale, base.half_angle, base.L * scale, base.r * scale, base.length * scale)
-    shape, feature = spread(n, k), rng.choice(FEATURES, n)
-    gap = shapes.r[shape] * signed_powers(rng, n, -15, -1)
-    return place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap)
+    shapes = replace(base, R=base.R * scale, L=base.L * scale, r=base.r * scale, length=base.length * scale)
+    return touching(rng, n, shapes, (-15, -1))
 
 
 @_family("metres", "a clamp in metres in place of millimetres: R 5e-3 ... 5e-2, gaps of 1e-7 ... 1e-4")
@@ -70,24 +68,19 @@ def _mixed_sizes(rng: np.random.Generator, n: int) -> Cases:
 
 @_family("far from the origin", "both bodies turned and 1e3 ... 1e9 mm from the world's origin")
 def _far(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, feature = setting(rng, n)
-    gap = shapes.r[shape] * signed_powers(rng, n, -9, -1)
-    near = place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap)
+    near = touching(rng, n, random_shapes(rng, shape_count(n)), (-9, -1))
     away = rng.normal(size=(n, 3))
     away *= (10.0 ** rng.uniform(3, 9, n) / np.sqrt((away**2).sum(1)))[:, None]
     world = poses_from_axes(rng, away, rng.normal(size=(n, 3)))
     exact = np.asarray(world, Extended) @ np.asarray(near.T_world_wire, Extended)
-    return Cases(shapes, shape, np.asarray(exact, np.float64), np.full(n, np.nan), world)
+    return replace(near, T_world_wire=np.asarray(exact, np.float64), gap=np.full(n, np.nan), T_world_groove=world)
 
 
 @_family("far wire", "a long wire whose middle is 1e3 ... 1e6 mm away and whose side still touches")
 def _far_wire(rng: np.random.Generator, n: int) -> Cases:
     k = shape_count(n)
     shapes = random_shapes(rng, k, length=10.0 ** rng.uniform(3, 6.3, k))
-    shape, feature = spread(n, k), rng.choice(FEATURES, n)
-    gap = shapes.r[shape] * signed_powers(rng, n, -9, -1)
-    contact = contact_on(rng, shapes, shape, feature)
-    return place(rng, shapes, shape, contact, gap, tilt=signed_powers(rng, n, -6, 0.5, 0.1))
+    return touching(rng, n, shapes, (-9, -1), tilt=(-6, 0.5, 0.1))
 
 
 @_family("vanishing sizes", "groove length, wire length or wire radius down to 1e-12 of the rest")
@@ -97,13 +90,8 @@ def _vanishing(rng: np.random.Generator, n: int) -> Cases:
     which = rng.integers(3, size=k)
     tiny = R * 10.0 ** rng.uniform(-12, -3, k)
     base = random_shapes(rng, k, R=R)
-    shapes = Shapes(
-        R,
-        base.half_angle,
-        np.where(which == 0, tiny, base.L),
-        np.where(which == 1, tiny, base.r),
-        np.where(which == 2, tiny, base.length),
-    )
+    shrunk = {name: np.where(which == i, tiny, getattr(base, name)) for i, name in enumerate(("L", "r", "length"))}
+    shapes = replace(base, **shrunk)
     shape, feature = spread(n, k), rng.choice(FEATURES, n)
     gap = shapes.R[shape] * signed_powers(rng, n, -12, -1)
     gap = np.where(gap < -0.5 * shapes.r[shape], -gap, gap)
@@ -112,9 +100,7 @@ def _vanishing(rng: np.random.Generator, n: int) -> Cases:
 
 @_family("poses barely rigid", "rotations off by up to 1e-9, as products of many poses are")
 def _barely_rigid(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, feature = setting(rng, n)
-    gap = shapes.r[shape] * signed_powers(rng, n, -15, -1)
-    cases = place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap)
+    cases = touching(rng, n, random_shapes(rng, shape_count(n)), (-15, -1))
     T = cases.T_world_wire.copy()
     T[:, :3, :3] += rng.uniform(-1.0, 1.0, (n, 3, 3)) * 10.0 ** rng.uniform(-16, -9.8, n)[:, None, None]
-    return Cases(shapes, shape, T, np.full(n, np.nan))
+    return replace(cases, T_world_wire=T, gap=np.full(n, np.nan))

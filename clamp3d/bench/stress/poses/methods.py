@@ -3,28 +3,38 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from clamp3d.baselines import ContactModel, contact_model
+from clamp3d.baselines.polytopes import PartOrMesh
+from clamp3d.bench.stress.family import Methods
 from clamp3d.bench.stress.poses.cases import Cases
-from clamp3d.bench.stress.worker import Measured, Measures, Method
+from clamp3d.bench.stress.worker import Measured, Measures
 from clamp3d.core.distance import SignedDistances, signed_distances
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import SweptArc
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.core.relation3d import relative_pose
 from clamp3d.core.shapes import Solid
-from clamp3d.errors import InputError
 
 _WORLD = 5e-16
 """Rounding of a position by `relative_pose`, in parts of the distance between the two origins."""
 
-_FCL = 2e-6
-"""Error of FCL's own distance in mm, as measured in `contact.fcl_shapes` (worst of 600 000), rounded up."""
+FCL_ERROR = 2e-6
+"""Error of FCL's own distance in mm, as measured in `baselines.fcl_shapes` (worst of 600 000), rounded up."""
+
+MESH_ERROR = 1.0 / 2400.0
+"""Chord error of meshes in parts of the groove's radius: 0.01 mm for the reference clamp."""
+
+THRESHOLD = 1.0 / 12.0
+"""Threshold of CoACD in parts of the groove's radius: 2 mm for the reference clamp, the command line's default."""
+
+UNIT = math.radians(5.0)
 
 
 def poses(cases: Cases) -> Array:
@@ -40,7 +50,7 @@ def _by_kernel(cases: Cases, T: Array) -> SignedDistances:
 
 
 class CasMethod:
-    """The project's kernel, with its error bound; what `relative_pose` rounds is added to it."""
+    """The kernel, with its error bound; what `relative_pose` rounds is added to it."""
 
     measures: Measures = "depth"
 
@@ -52,53 +62,59 @@ class CasMethod:
             apart = cases.T_world_wire[:, :3, 3] - cases.T_world_groove[:, :3, 3]
             reach = np.sqrt((apart**2).sum(1)) + 0.5 * cases.shapes.length[cases.shape[0]]
             bound = bound + 2.0 * _WORLD * reach
-        return Measured(found.distance, bound, np.zeros(len(cases), bool))
+        return Measured(found.distance, bound)
 
 
 class ChordsMethod:
-    """The paper's convex partitioning at ``unit_angle`` rad; its bound is the chord error."""
+    """The paper's convex partitioning; its bound is the chord error."""
 
     measures: Measures = "clearance"
-
-    def __init__(self, unit_angle: float) -> None:
-        self.model, self.unit_angle = contact_model("chords", unit_angle=unit_angle), unit_angle
 
     def measure(self, cases: Cases) -> Measured:
         """See `Method`. It works in the section: wires beside the groove's length are none of its business."""
         k = int(cases.shape[0])
         T = poses(cases)
-        distance = self.model.distances(cases.shapes.pair(k), T)
+        distance = contact_model("chords", unit_angle=UNIT).distances(cases.shapes.pair(k), T)
         beside = np.abs(T[:, 2, 3]) > 0.5 * (cases.shapes.L[k] + cases.shapes.length[k])
-        bound = _chord_error(cases, self.unit_angle) + 2e-9 * cases.scene()  # 1e-9 rad counts as parallel
+        bound = chord_error(cases.shapes.groove(k)) + 2e-9 * cases.scene()  # 1e-9 rad counts as parallel
         return Measured(distance, bound, beside, "method 'chords' knows no end faces: the wire must overlap the groove")
 
 
+@dataclass(frozen=True)
 class SolidMethod:
-    """A model that measures a finite block with the groove: ``build(part, groove radius)`` makes it.
+    """A model by FCL, which measures a finite block with the groove; ``bound(groove)`` is the error of its pieces, mm.
 
-    The block reaches beyond every nearest point, so its distance is that of the endless material. FCL's cylinder has
-    flat ends and the truth's wire has round ones: only cases whose nearest place is on the wire's side count.
+    ``settings`` of `contact_model` are in parts of the groove's radius, except for the angle. The block reaches beyond
+    every nearest point, so its distance is that of the endless material. FCL's cylinder has flat ends and the truth's
+    wire has round ones: only cases whose nearest place is on the wire's side count.
     """
 
+    name: str
+    bound: Callable[[SweptArc], float]
+    settings: Mapping[str, float] = field(default_factory=dict)
     measures: Measures = "clearance"
-
-    def __init__(self, build: Callable[[Solid, float], ContactModel], bound: Callable[[Cases], Array]) -> None:
-        self._build, self._bound = build, bound
 
     def measure(self, cases: Cases) -> Measured:
         """See `Method`."""
         k = int(cases.shape[0])
         T = poses(cases)
-        groove, cylinder = cases.shapes.groove(k), cases.shapes.cylinder(k)
+        pair = cases.shapes.pair(k)
         exact = _by_kernel(cases, T)
         ended = np.abs(np.einsum("ni,ni->n", exact.normal, T[:, :3, 2])) > 1e-9
-        q = exact.point_on_groove[~ended]
-        model = self._build(block(groove, q), groove.radius)
+        part = block(pair.groove, exact.point_on_groove[~ended])
         distance = np.full(len(cases), np.nan)
-        pair = GroovePair("P1", "P6", groove, np.eye(4), cylinder, np.eye(4))
         if not ended.all():
-            distance[~ended] = model.distances(pair, T[~ended])
-        return Measured(distance, self._bound(cases), ended, "the wire's end is nearest, which is flat in FCL")
+            distance[~ended] = fcl_model(self.name, part, pair.groove, self.settings).distances(pair, T[~ended])
+        bound = np.full(len(cases), self.bound(pair.groove) + FCL_ERROR)
+        return Measured(distance, bound, ended, "the wire's end is nearest, which is flat in FCL")
+
+
+def fcl_model(
+    name: str, part: PartOrMesh, groove: SweptArc, settings: Mapping[str, float], time_limit: float = 60.0
+) -> ContactModel:
+    """The model of a part; ``settings`` but the angle in parts of the groove's radius."""
+    sizes = {key: value * (1.0 if key == "unit_angle" else groove.radius) for key, value in settings.items()}
+    return contact_model(name, {"P1": part}, **sizes, time_limit=time_limit, progress=False)
 
 
 def block(groove: SweptArc, points: Array) -> Solid:
@@ -113,60 +129,38 @@ def block(groove: SweptArc, points: Array) -> Solid:
     return Solid("P1", (body,), title="block with a groove", volume=body.volume)
 
 
-def _chord_error(cases: Cases, unit_angle: float) -> Array:
-    """Largest distance (n,) in mm of the chords from the arc."""
-    k = int(cases.shape[0])
-    R, half = float(cases.shapes.R[k]), float(cases.shapes.half_angle[k])
-    chord = 2.0 * half / max(1, math.ceil(2.0 * half / unit_angle - 1e-9))
-    return np.full(len(cases), 2.0 * R * math.sin(0.25 * chord) ** 2)
+def chord_error(groove: SweptArc) -> float:
+    """Largest distance in mm of chords of `UNIT` from the arc."""
+    chord = 2.0 * groove.half_angle / max(1, math.ceil(2.0 * groove.half_angle / UNIT - 1e-9))
+    return 2.0 * groove.radius * math.sin(0.25 * chord) ** 2
 
 
-_MESH_ERROR = 1.0 / 2400.0
-"""Chord error of meshes in parts of the groove's radius: 0.01 mm for the reference clamp."""
-
-_THRESHOLD = 1.0 / 12.0
-"""Threshold of CoACD in parts of the groove's radius: 2 mm for the reference clamp, the command line's default."""
-
-_UNIT = math.radians(5.0)
+def mesh_error(groove: SweptArc) -> float:
+    """Chord error of meshes in mm."""
+    return MESH_ERROR * groove.radius
 
 
-def _wedges(part: Solid, radius: float) -> ContactModel:
-    return contact_model("wedges", {"P1": part}, unit_angle=_UNIT)
+def no_bound(groove: SweptArc) -> float:
+    """The bound of a method that has none."""
+    return math.nan
 
 
-def _mesh(part: Solid, radius: float) -> ContactModel:
-    return contact_model("mesh", {"P1": part}, mesh_error=_MESH_ERROR * radius)
-
-
-def _hulls(part: Solid, radius: float) -> ContactModel:
-    sizes = {"threshold": _THRESHOLD * radius, "mesh_error": _MESH_ERROR * radius}
-    return contact_model("hulls", {"P1": part}, **sizes, time_limit=60.0, progress=False)
-
-
-METHODS: dict[str, tuple[str, Callable[[], Method]]] = {
+METHODS: Methods = {
     "cas": ("closed forms of the arc groove; its bound is that of rounding", CasMethod),
     "chords 5 deg": (
         "convex partitioning in the section, chords of 5 degrees; its bound is the chord error",
-        lambda: ChordsMethod(_UNIT),
+        ChordsMethod,
     ),
     "wedges 5 deg": (
         "convex partitioning in 3D: python-fcl on exact wedges of 5 degrees; its bound is the chord error",
-        lambda: SolidMethod(_wedges, lambda cases: _chord_error(cases, _UNIT) + _FCL),
+        partial(SolidMethod, "wedges", chord_error, {"unit_angle": UNIT}),
     ),
     "mesh": (
         "python-fcl's triangle mesh, chord error R / 2400, which is its bound",
-        lambda: SolidMethod(_mesh, lambda cases: _MESH_ERROR * cases.shapes.R[cases.shape] + _FCL),
+        partial(SolidMethod, "mesh", mesh_error, {"mesh_error": MESH_ERROR}),
     ),
     "hulls": (
         "CoACD's hulls of that mesh at a threshold of R / 12, each convex in python-fcl; no bound",
-        lambda: SolidMethod(_hulls, lambda cases: np.full(len(cases), np.nan)),
+        partial(SolidMethod, "hulls", no_bound, {"threshold": THRESHOLD, "mesh_error": MESH_ERROR}),
     ),
 }
-"""Name -> what it is, and how it is made."""
-
-
-def method(name: str) -> Method:
-    """The method of that name. Raises InputError naming the choices."""
-    if name not in METHODS:
-        raise InputError(f"unknown method {name!r}; available: {', '.join(METHODS)}")
-    return METHODS[name][1]()

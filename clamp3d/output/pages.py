@@ -1,0 +1,42 @@
+"""Pages from the templates of this package; every page is one file that needs no other."""
+
+from __future__ import annotations
+
+import datetime
+import os
+from functools import cache
+from typing import Any
+
+from clamp3d.errors import InputError
+
+
+def render(template: str, /, **values: Any) -> str:
+    """Fill in one of the files in ``templates``; texts are escaped, and a value that is missing is an error."""
+    return str(_environment().get_template(template).render(**values))
+
+
+def now() -> datetime.datetime:
+    """The time in UTC, or the environment's SOURCE_DATE_EPOCH, so that equal results can be equal files.
+
+    Raises InputError if that is set to anything but seconds since 1970.
+    """
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    if not epoch:
+        return datetime.datetime.now(datetime.UTC)
+    try:
+        return datetime.datetime.fromtimestamp(int(epoch), datetime.UTC)
+    except (ValueError, OverflowError, OSError):
+        raise InputError(f"SOURCE_DATE_EPOCH must be whole seconds since 1970, got {epoch!r}") from None
+
+
+@cache
+def _environment() -> Any:
+    import jinja2
+
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("clamp3d.output", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )

@@ -1,0 +1,93 @@
+"""The paper's tables: the connection matrix is measured and echoes nothing, errors and orders are what they say."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from clamp3d.bench import published
+from clamp3d.bench.reproduce import ConnectionRow, Reproduction, connection_rows, reproduce
+from clamp3d.bench.reproduce_report import reproduction_to_dict, reproduction_to_text
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.loader import load_clamp
+
+
+@pytest.fixture(scope="module")
+def found() -> Reproduction:
+    return reproduce()
+
+
+def _by_pair(rows: tuple[ConnectionRow, ...]) -> dict[tuple[str, str], ConnectionRow]:
+    return {(row.a, row.b): row for row in rows}
+
+
+def test_measured_types_do_not_follow_the_declaration() -> None:
+    clamp = load_clamp()
+    connections = {a: dict(row) for a, row in clamp.connections.items()}
+    connections["P1"]["P3"] = connections["P2"]["P5"] = 2
+    lied = replace(clamp, connections=connections)
+    honest, rows = (_by_pair(connection_rows(assemble(c))) for c in (clamp, lied))
+    for pair, gap in ((("P1", "P3"), 36.0), (("P2", "P5"), 41.0)):
+        assert (rows[pair].declared, rows[pair].measured) == (2, 0)
+        assert rows[pair].distance.lower > gap
+        assert "declared 2, but does not touch" in rows[pair].difference
+    assert {pair: row.measured for pair, row in rows.items()} == {pair: row.measured for pair, row in honest.items()}
+
+
+def test_the_bolt_touches_no_splint_and_the_table_says_so(found: Reproduction) -> None:
+    rows = _by_pair(found.table1)
+    assert len(rows) == 21
+    different = {pair for pair, row in rows.items() if row.difference}
+    assert different == {("P1", "P4"), ("P2", "P4")}
+    text = reproduction_to_text(found).splitlines()
+    for pair in ("P1-P4", "P2-P4"):
+        assert rows[tuple(pair.split("-"))].distance.upper > 0.99  # type: ignore[index]
+        (line,) = [line for line in text if line.startswith(f"  {pair} ")]
+        assert line.split()[1:4] == ["2", "2", "0"]
+        assert "does not touch" in line
+    (gap,) = {rows["P1", "P4"].distance.value}
+    assert gap == pytest.approx(1.0, abs=1e-6)
+
+
+def test_errors_of_table_4_are_those_that_the_paper_prints(found: Reproduction) -> None:
+    printed = {None: 0.100, 1.0: 0.233, 5.0: 0.233, 10.0: 0.233, 20.0: 0.566, 40.0: 1.233}
+    for row in found.table4:
+        assert row.published_error == pytest.approx(printed[row.unit_angle_deg], abs=1e-9)
+        if row.solver == "stepped":
+            assert row.error == pytest.approx(printed[row.unit_angle_deg], abs=2e-3)
+    image = [0.904, 2.042, 2.483, 0.820, 0.989]
+    assert [abs(v - published.ACTUAL_DISTANCE) for v in published.IMAGE_DISTANCES] == pytest.approx(image)
+    text = reproduction_to_text(found)
+    assert all(f"{error:.3f}" in text for error in (*printed.values(), *image))
+
+
+def test_six_matrices_in_both_conventions(found: Reproduction) -> None:
+    """The digits of Section 4.1, and the same points by the program's poses: y down there, Z up here."""
+    for row in found.final_state:
+        ours, theirs = row.matrices
+        assert np.abs(ours - theirs).max() < 5e-4
+    down = next(row for row in found.final_state if row.part == "P2")
+    assert down.matrices[1][:2].round(3).tolist() == [[0.978, -0.208, 45.172], [0.208, 0.978, -20.374]]
+    for row in found.final_state:
+        x, y, angle = row.found
+        T = row.T_line_part
+        assert (T[0, 3], -T[2, 3]) == pytest.approx((x, y), abs=1e-12)
+        assert math.degrees(math.atan2(T[2, 0], T[0, 0])) == pytest.approx(angle, abs=1e-12)
+    assert reproduction_to_text(found).count("T_P6_part") == 2
+
+
+def test_orders_that_the_counts_refute(found: Reproduction) -> None:
+    refuted = {(o.search, o.variable, o.quantity.split(",")[0]): o.refuted for o in found.orders}
+    assert refuted == {
+        ("grid", "n", "positions M"): False,
+        ("grid", "m", "positions M"): True,
+        ("grid", "m", "contact tests M C"): True,
+        ("stepped", "n", "positions M"): True,
+        ("stepped", "m", "positions M"): True,
+        ("stepped", "m", "contact tests M C"): True,
+    }
+    data = reproduction_to_dict(found)
+    assert [row["refuted"] for row in data["table5_orders"]] == list(refuted.values())
