@@ -96,9 +96,13 @@ def bodies_distance(a: ClosedForm, b: ClosedForm, T: Array, enough: Callable[[Di
         if kind == "convex":
             for piece in a.outers:
                 for other in b.outers:
-                    found = found.meet(_convex(piece, other, a, b, here, T))
-                    if enough(found.widened(error)):
-                        return found.widened(error)
+                    for rims in (False, True):
+                        new = _convex(piece, other, a, b, here, T, rims)
+                        found = found.meet(new)
+                        if enough(found.widened(error)):
+                            return found.widened(error)
+                        if new.upper - new.lower <= 1e-10 or not (isinstance(piece, Rod) or isinstance(other, Rod)):
+                            break
             continue
         ask = _bore_rod if kind == "bore and cylinder" else _bore_hull
         for first, second, swapped in ((a, b, False), (b, a, True)):
@@ -114,8 +118,8 @@ def bodies_distance(a: ClosedForm, b: ClosedForm, T: Array, enough: Callable[[Di
     return found.widened(error)
 
 
-def _convex(piece: Convex, other: Convex, a: ClosedForm, b: ClosedForm, here: Array, T: Array) -> Distance:
-    raw = convex_distance(piece, here, other, T)
+def _convex(piece: Convex, other: Convex, a: ClosedForm, b: ClosedForm, here: Array, T: Array, rims: bool) -> Distance:
+    raw = convex_distance(piece, here, other, T, rims=rims)
     new = _with_witnesses(raw, a, b, T)
     expensive = a.surface is not None or b.surface is not None
     if new.upper - raw.lower > 1e-10 and raw.normal is not None and (raw.lower > -0.01 or not expensive):

@@ -209,17 +209,18 @@ def hull(points: Array) -> Hull:
     return Hull(points[used], np.unique(planes.round(14), axis=0), index.reshape(faces.shape).astype(np.int64))
 
 
-def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
+def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, rims: bool = True) -> Distance:
     """Signed distance of two convex pieces placed by ``Ta``, ``Tb`` (4, 4); points and normal in that frame.
 
     One row for each pair of shapes: closed forms first; what they leave open goes to FCL, whose answer is polished.
+    Without ``rims`` the rims of cylinders, which take long, are left to FCL.
     """
     if isinstance(a, Rod) and isinstance(b, Rod):
-        found = _rods(a, Ta, b, Tb)
+        found = _rods(a, Ta, b, Tb, rims)
     elif isinstance(a, Rod):
-        found = _rod_hull(a, Ta, b, Tb, None)  # type: ignore[arg-type]
+        found = _rod_hull(a, Ta, b, Tb, None, rims)  # type: ignore[arg-type]
     elif isinstance(b, Rod):
-        found = _rod_hull(b, Tb, a, Ta, None).swapped()
+        found = _rod_hull(b, Tb, a, Ta, None, rims).swapped()
     else:
         found = _hulls(a, Ta, b, Tb, None)
     if found.upper - found.lower > 1e-10:
@@ -266,7 +267,7 @@ def _proven(a: Convex, Ta: Array, b: Convex, Tb: Array, p: Array, q: Array, d: f
     return Distance(low, d, p, q, normal, None, "features", "convex")
 
 
-def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None) -> Distance:
+def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None, rims: bool) -> Distance:
     """A cylinder and a polyhedron: its axis against edges and faces, less the radius; then its rims."""
     if n is None and len(b.vertices) > _SMALL:
         return Distance()
@@ -286,7 +287,7 @@ def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None) -> Distanc
         else:
             found = _deepest(a, Ta, b, Tb, [q, p, 0.5 * (p + q)], low, 0.0)
             found = replace(found, normal=normal, point_a=p, point_b=q) if found.upper < np.inf else found
-    if found.upper - found.lower > 1e-10 and len(b.vertices) <= _SMALL:
+    if rims and found.upper - found.lower > 1e-10 and len(b.vertices) <= _SMALL:
         found = found.meet(_rims(a, Ta, b, Tb))
     return found
 
@@ -327,7 +328,7 @@ def closest_on_axes(a: Rod, Ta: Array, b: Rod, Tb: Array) -> tuple[Array, Array,
     return x, y, abs(float(d @ u)) <= slack and abs(float(d @ v)) <= slack
 
 
-def _rods(a: Rod, Ta: Array, b: Rod, Tb: Array) -> Distance:
+def _rods(a: Rod, Ta: Array, b: Rod, Tb: Array, rims: bool) -> Distance:
     """Two cylinders side by side in closed form; with rounded ends in place of flat ones it is a lower bound."""
     x, y, square = closest_on_axes(a, Ta, b, Tb)
     d = y - x
@@ -338,7 +339,7 @@ def _rods(a: Rod, Ta: Array, b: Rod, Tb: Array) -> Distance:
         return Distance(gap - slack)
     if not square:
         found = Distance(gap - slack)
-        if gap > 0.0:
+        if rims and gap > 0.0:
             found = found.meet(_rims(a, Ta, b, Tb))
             if found.upper - found.lower > 1e-10:
                 found = found.meet(_rims(b, Tb, a, Ta).swapped())
@@ -403,9 +404,9 @@ def _by_gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
                 if isinstance(a, Hull) and isinstance(b, Hull):
                     found = found.meet(_hulls(a, Ta, b, Tb, n))
                 elif isinstance(a, Rod) and isinstance(b, Hull):
-                    found = found.meet(_rod_hull(a, Ta, b, Tb, n))
+                    found = found.meet(_rod_hull(a, Ta, b, Tb, n, False))
                 elif isinstance(b, Rod) and isinstance(a, Hull):
-                    found = found.meet(_rod_hull(b, Tb, a, Ta, -n).swapped())
+                    found = found.meet(_rod_hull(b, Tb, a, Ta, -n, False).swapped())
             # The direction of a short distance is mostly rounding.
             return found if size - low < 1e-5 else found.meet(_touching(a, Ta, b, Tb))
     contacts = fcl.CollisionResult()
