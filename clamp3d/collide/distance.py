@@ -17,7 +17,7 @@ from clamp3d.collide.refine import ACCURACY, from_boxes, measured, refine, with_
 from clamp3d.collide.scene import Scene, name_pairs
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.contact_model import ContactModel
-from clamp3d.core.pose import Array, check_pose, check_poses, inverse
+from clamp3d.core.pose import Array, check_pose, check_pose_array, inverse
 from clamp3d.core.primitives import SweptArc
 from clamp3d.core.shapes import AnyShape, Shape, as_shape, groove_block
 
@@ -106,7 +106,7 @@ def distances(
     >>> distances(block, wire, [translation(0, y, 0) for y in (0.0, -0.2)]).value.round(9).tolist()
     [0.5, 0.3]
     """
-    T = check_poses(T_a_b, "T_a_b")
+    T = check_pose_array(T_a_b, "T_a_b")
     cache = cache or ModelCache()
     shapes = _bounded(a, b, T)
     x, y = (cache.model(shape) for shape in shapes)
