@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp, GrooveDimensions
 from clamp3d.clamp.loader import load_clamp
@@ -246,3 +247,13 @@ def test_plain_data_and_frame() -> None:
     assert isinstance(frame, pandas.DataFrame)
     assert frame["distance_mm"].tolist() == [c.gap for c in assembly.contacts]
     assert "P1-P2" in assembly._repr_html_()
+
+
+@pytest.mark.parametrize("unit_deg", [5.0, 20.0])
+def test_a_contact_model_measures_its_own_contacts(unit_deg: float) -> None:
+    assembly = assemble(model=Chords(math.radians(unit_deg)))
+    assert assembly.clamped
+    assert {(d.a, d.b) for d in assembly.matrix_differences} == {("P1", "P4"), ("P2", "P4")}
+    arcs = [c for c in assembly.contacts if c.declared == 3]
+    assert all(abs(c.gap) <= 1e-9 and c.distance.method == "chords" for c in arcs)
+    assert all(c.distance.lower <= c.gap <= c.distance.upper for c in arcs)
