@@ -8,7 +8,16 @@ from clamp3d import __version__
 from clamp3d.collide.result import CheckResult, Work
 from clamp3d.collide.verdict import Verdict
 from clamp3d.output.tables import text_table
-from clamp3d.output.wording import circumstances, counts_text, gap_text, headline, meaning, sentence, titles
+from clamp3d.output.wording import (
+    circumstances,
+    counts_text,
+    gap_text,
+    headline,
+    meaning,
+    sentence,
+    titles,
+    worst_first,
+)
 
 _MATRIX = 14
 """More parts than this and the matrix no longer fits a terminal."""
@@ -64,8 +73,7 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
         lines.append(f"  ... and {len(result.findings) - _ROWS} more (--json or --html lists all)")
     if 2 <= n <= _MATRIX and result.asked is None:
         lines += ["", *_matrix(result)]
-    order = list(Verdict)
-    pairs = sorted(result.pairs, key=lambda row: order.index(row.verdict))[: _ROWS // 2]
+    pairs = worst_first(result.pairs)[: _ROWS // 2]
     if pairs:
         table = [(f"{r.a} - {r.b}", r.verdict.value, _gap(r.distance), r.distance.method) for r in pairs]
         lines += ["", text_table(("pair", "verdict", "distance", "by"), table, indent=2)]

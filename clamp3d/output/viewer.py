@@ -2,15 +2,14 @@
 
 >>> from clamp3d.clamp.assemble import assemble
 >>> with view(assemble("reference"), serve=False) as viewer:  # with serve=True: open viewer.url in a browser
-...     viewer.stops
+...     len(viewer.story["stops"])
 8
 """
 
 from __future__ import annotations
 
-import math
 import re
-import time
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -34,12 +33,23 @@ from clamp3d.output.viewer_page import live_page, panel, whole_page
 from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
 from clamp3d.output.viewer_server import CommandLog, LocalServer, RemoteServer
 from clamp3d.output.viewer_timeline import FIRST, Row, Stop, scene_stops
-from clamp3d.output.wording import circumstances, gap_text, headline, meaning, sentence, severity, titles
+from clamp3d.output.wording import (
+    circumstances,
+    contents,
+    headline,
+    meaning,
+    sentence,
+    severity,
+    titles,
+    worst_first,
+)
 
 CLEARANCE = 5.0
 """Gap in mm from which two parts of a clamp count as clear."""
 _LISTED = 500
 """Rows of a table on the page; a result's JSON has all."""
+_SEVERITY = {"error": "clash", "warning": "contact", "note": "clear"}
+"""The verdict whose colour a finding of an assembly has."""
 MEASURED = 40
 """Scenes of up to so many parts are measured pair by pair, larger ones only as far as their verdicts need."""
 
@@ -103,6 +113,7 @@ class Viewer:
         self._waypoints: list[Waypoint] = []
         self._server: LocalServer | RemoteServer | None = None
         self._story: dict[str, Any] = {}
+        self._panel = ""
         try:
             if url is not None:
                 self._server = RemoteServer(text("url", url))
@@ -117,7 +128,9 @@ class Viewer:
             )
             self._tell("waiting for the first state", state="waiting")
             if url is None and serve:
-                self._server = LocalServer(lambda: live_page(self._story), self._log, host=host, port=port)
+                self._server = LocalServer(
+                    lambda: live_page(self._story["title"], self._panel), self._log, host=host, port=port
+                )
         except BaseException:
             self.close()
             raise
@@ -126,11 +139,6 @@ class Viewer:
     def url(self) -> str | None:
         """Where to look with a browser; None if nothing is served."""
         return None if self._server is None else self._server.url
-
-    @property
-    def stops(self) -> int:
-        """Number of stops on the time line."""
-        return len(self._drawing.timeline.stops)
 
     @property
     def story(self) -> dict[str, Any]:
@@ -144,7 +152,7 @@ class Viewer:
             raise InputError("show() goes with the viewer of a clamp; a scene is shown by finish(check(scene))")
         self._waypoints.append(waypoint)
         self._drawing.show(self._clamp.stop(waypoint))
-        self._drawing.dimension(self.stops - 1, "splints", *self._clamp.opening(waypoint))
+        self._drawing.dimension(len(self._waypoints) - 1, "splints", *self._clamp.opening(waypoint))
         self._tell(f"{waypoint.step}: {waypoint.label}", state="running")
 
     def finish(self, result: Assembly | CheckResult) -> None:
@@ -162,13 +170,13 @@ class Viewer:
             for stop in scene_stops(result, self._measured):
                 self._drawing.show(stop)
             told = {"said": headline(result), "state": severity(result), "findings": self._scene_findings(result)}
-            told |= {"pairs": _table(result.pairs), "motions": _table(result.motions)}
+            told |= {"pairs": worst_first(result.pairs)[:_LISTED], "motions": worst_first(result.motions)[:_LISTED]}
         self._drawing.play()
         self._tell(**told, done=True)
 
     def html(self) -> str:
         """The scene with its animation as one HTML page that needs nothing else."""
-        return whole_page(self._story, self._log.messages())
+        return whole_page(self._story["title"], self._panel, self._log.messages())
 
     def save_html(self, path: str | Path) -> None:
         """Write `html` to a file. Raises InputError if it cannot be written."""
@@ -176,9 +184,7 @@ class Viewer:
 
     def wait(self, timeout: float | None = None) -> None:
         """Keep serving for ``timeout`` s, or until interrupted."""
-        end = None if timeout is None else time.monotonic() + timeout
-        while end is None or time.monotonic() < end:
-            time.sleep(0.2 if end is None else min(0.2, max(0.0, end - time.monotonic())))
+        threading.Event().wait(timeout)
 
     def close(self) -> None:
         """End our own server; a foreign one keeps the scene. A second call does nothing."""
@@ -193,20 +199,16 @@ class Viewer:
 
     def _measured(self, scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[Row]:
         """Pairs of a scene as rows, by the engine that every command asks."""
-        found, verdict = measure(scene, pairs, cache=self._cache), scene.thresholds.verdict
-        return [Row(a, b, verdict(d, scene.allowance(a, b)).value, d, scene.contact) for (a, b), d in found.items()]
+        return [Row.of(scene, *pair, d) for pair, d in measure(scene, pairs, cache=self._cache).items()]
 
     def _assembly_finding(self, finding: Finding) -> dict[str, Any]:
         """A finding with the place to look at: where the pair that it names is at the end, else the whole clamp."""
-        number, names = self.stops - 1, re.findall(r"\bP[1-7]\b", finding.text)
-        verdict = {"error": "clash", "warning": "contact", "note": "clear"}[finding.severity]
-        for row in self._drawing.timeline.stops[number].rows:
-            if {row.a, row.b} == set(names[:2]):
-                return self._finding(replace(row, verdict=verdict), number, finding.text, "", focus(row))
-        stop = self._drawing.timeline.stops[number]
-        place = self._drawing.extent([stop.poses])
-        anywhere = replace(stop.rows[0], a="", b="", verdict=verdict)
-        return self._finding(anywhere, number, finding.text, "", place)
+        number, names = len(self._waypoints) - 1, re.findall(r"\bP[1-7]\b", finding.text)[:2]
+        stop, verdict = self._drawing.timeline.stops[number], _SEVERITY[finding.severity]
+        row = next((row for row in stop.rows if {row.a, row.b} == set(names)), None)
+        if row is None:
+            return self._finding("", "", verdict, finding.text, "", number, self._drawing.extent([stop.poses]))
+        return self._finding(row.a, row.b, verdict, finding.text, "", number, focus(row.distance))
 
     def _scene_findings(self, result: CheckResult) -> list[dict[str, Any]]:
         """The findings of a check, each with the stop and the place to look at: a motion's at its first contact."""
@@ -214,65 +216,56 @@ class Viewer:
         meetings = {k: self._drawing.mark_meeting(k) for k, stop in enumerate(stops) if stop.halts}
         found = []
         for row in result.findings[:_LISTED]:
-            here = Row(row.a, row.b, row.verdict.value, row.distance, math.inf)
-            number, place = 0, focus(here)
-            for k, stop in enumerate(stops):
-                if row.motion is not None and stop.step == row.motion:
-                    number = k
-                    if any((r.a, r.b, r.what) == (row.a, row.b, FIRST) for r in stop.rows):
-                        place = meetings.get(k) or place
-                        break
-            found.append(self._finding(here, number, sentence(row, names), circumstances(row), place))
+            of_motion = [k for k, stop in enumerate(stops) if row.motion and stop.step == row.motion]
+            first = [k for k in of_motion if any((r.a, r.b, r.what) == (row.a, row.b, FIRST) for r in stops[k].rows)]
+            number = ([*first, *of_motion[-1:], 0])[0]
+            place = meetings.get(number) or focus(row.distance)
+            said = sentence(row, names), circumstances(row)
+            found.append(self._finding(row.a, row.b, row.verdict.value, *said, number, place))
         return found
 
-    def _finding(self, row: Row, stop: int, said: str, where: str, place: tuple[Array, Array]) -> dict[str, Any]:
+    def _finding(
+        self, a: str, b: str, verdict: str, said: str, where: str, stop: int, place: tuple[Array, Array]
+    ) -> dict[str, Any]:
         margin = 0.1 * self._drawing.size
-        return {
-            "a": row.a,
-            "b": row.b,
-            "verdict": row.verdict,
-            "colour": row.colour,
-            "text": said,
-            "detail": where,
-            "stop": stop,
-            "low": (place[0] - margin).tolist(),
-            "high": (place[1] + margin).tolist(),
-        }
+        corners = {"low": (place[0] - margin).tolist(), "high": (place[1] + margin).tolist()}
+        return {"a": a, "b": b, "verdict": verdict, "text": said, "detail": where, "stop": stop, **corners}
 
     def _tell(self, said: str, *, state: str, done: bool = False, **more: Any) -> None:
         """What the page beside the picture shows; meshcat's own page takes no notice of it."""
-        scene, drawing = self._scene, self._drawing
+        scene, drawing, clamp = self._scene, self._drawing, self._clamp
         measured = "exactly" if self._model is None or self._model.name == "cas" else f"by {self._model.name}"
         accuracy = f"Drawn with facets within {self._mesh_error:g} mm; measured {measured}, not on the facets."
         drawing.caption(accuracy)
-        stops = [_stop_data(stop, *drawing.extent([stop.poses])) for stop in drawing.timeline.stops]
-        used = {row["verdict"] for stop in stops for row in stop["rows"]} | {"contact", "clearance", "clear"}
-        if not scene.thresholds.clearance:
-            used.discard("clearance")
         self._story = {
-            **_told(scene),
-            **({} if self._clamp is None else {"title": self._clamp.title, "subtitle": self._clamp.subtitle}),
-            **{key: [] for key in ("facts", "findings", "limits", "pairs", "motions")},
-            "notes": self._notes,
+            "title": scene.name if clamp is None else clamp.title,
             "headline": said,
-            "state": state,
             "done": done,
-            "accuracy": accuracy,
-            "parts": [{"name": n, "title": t, "colour": drawing.colours[n]} for n, t in titles(scene).items()],
+            "stops": [_stop_data(stop, *drawing.extent([stop.poses])) for stop in drawing.timeline.stops],
+            "findings": more.pop("findings", []),
             "nodes": {part.name: drawing.paths(part.name) for part in scene.parts},
-            "verdicts": [
-                {"name": name, "colour": colour, "meaning": meaning(name, scene)}
-                for name, colour in VERDICT_COLOURS.items()
-                if name in used
-            ],
             "overlays": [{"name": name, "path": f"{ROOT}/overlay {name}"} for name in drawing.overlays],
             "cut": drawing.cut,
-            "cut_open": self._clamp is not None,
-            "stops": stops,
+            "cut_open": clamp is not None,
             "frame": drawing.frame() if drawing.timeline.stops else None,
-            **more,
         }
-        drawing.property(ROOT, "story", self._story | {"panel": panel(self._story)})
+        used = {row["verdict"] for stop in self._story["stops"] for row in stop["rows"]}
+        self._panel = panel(
+            self._story
+            | dict.fromkeys(("facts", "limits", "pairs", "motions"), ())
+            | {
+                "subtitle": contents(scene) if clamp is None else clamp.subtitle,
+                "state": state,
+                "accuracy": accuracy,
+                "notes": self._notes,
+                "parts": titles(scene),
+                "part_colours": drawing.colours,
+                "colours": VERDICT_COLOURS,
+                "meanings": {name: meaning(name, scene) for name in VERDICT_COLOURS if name in used},
+            }
+            | more
+        )
+        drawing.property(ROOT, "story", self._story | {"panel": self._panel})
 
     def _send(self, command: Command) -> None:
         message = self._log.add(command)
@@ -338,32 +331,7 @@ def _cut(scene: Scene) -> float | None:
     return 0.5 * (min(ys) + max(ys)) if ys else None
 
 
-def _told(scene: Scene) -> dict[str, Any]:
-    n = len(scene.parts)
-    moving = f", {len(scene.motions)} motions" if len(scene.motions) > 1 else ", 1 motion" if scene.motions else ""
-    return {"title": scene.name, "subtitle": f"{n} {'part' if n == 1 else 'parts'}{moving}"}
-
-
 def _stop_data(stop: Stop, low: Array, high: Array) -> dict[str, Any]:
     keys = ("arrive", "leave", "step", "label", "mark", "halts")
     rows = [row.data() for row in stop.rows[:_LISTED]]
     return {key: getattr(stop, key) for key in keys} | {"low": low.tolist(), "high": high.tolist(), "rows": rows}
-
-
-def _table(rows: Sequence[Any]) -> list[dict[str, Any]]:
-    order = list(VERDICT_COLOURS)
-    worst = sorted(rows, key=lambda row: (order.index(row.verdict.value), row.distance.upper))
-    return [
-        {
-            "motion": row.motion,
-            "a": row.a,
-            "b": row.b,
-            "verdict": row.verdict.value,
-            "colour": VERDICT_COLOURS[row.verdict.value],
-            "gap": gap_text(row.distance.lower, row.distance.upper),
-            "t": row.t,
-            "contact_at": row.contact_at,
-            "method": row.distance.method,
-        }
-        for row in worst[:_LISTED]
-    ]

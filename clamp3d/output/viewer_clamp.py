@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from clamp3d.baselines.model import ContactModel
-from clamp3d.clamp.contact import NONE, Contact, measure_contacts
+from clamp3d.clamp.contact import NONE, measure_contacts
 from clamp3d.clamp.dimensions import TITLES, Clamp
 from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import clamp_scene
@@ -40,15 +39,7 @@ class ClampStory:
         """A waypoint with its 21 pairs; the nut is drawn turned by as much as it has been screwed on."""
         poses = {name: waypoint.T_world(name) for name in TITLES}
         rows = [
-            Row(
-                c.a,
-                c.b,
-                self._verdict(c.a, c.b, c.distance),
-                c.distance,
-                self.scene.contact,
-                c.relation,
-                c.declared != 0,
-            )
+            Row.of(self.scene, c.a, c.b, c.distance, "" if c.relation == NONE else c.relation, declared=c.declared != 0)
             for c in measure_contacts(self.clamp, waypoint.poses, self._model, cache=self._cache)
         ]
         rows.sort(key=lambda row: not row.declared)
@@ -66,13 +57,6 @@ class ClampStory:
         height = edge_openings(self.clamp, waypoint.poses)[0]
         top = (waypoint.T_world("P1") @ [0.0, 0.0, -self.clamp.up_splint.thickness, 1.0])[:3]
         return top, top - [0.0, 0.0, height], f"splints {height:.3f} mm"
-
-    def _verdict(self, a: str, b: str, distance: Any) -> str:
-        return self.scene.thresholds.verdict(distance, self.scene.allowance(a, b)).value
-
-
-def _said(contact: Contact) -> str:
-    return "" if contact.relation == NONE else contact.relation
 
 
 def _about_z(angle: float) -> Array:

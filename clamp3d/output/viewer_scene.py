@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clamp3d.collide.distance import Distance
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.pose import Array
 from clamp3d.output import viewer_objects as draw
@@ -123,8 +124,7 @@ class SceneDrawing:
         self.go(0)  # so that it does not matter whether a page reads this or the animation first
         followers = {name: self.paths(name) for name in self._meshes}
         groups = [f"{ROOT}/contacts", f"{ROOT}/gaps"]
-        moving = len(self.timeline.stops) > 1
-        if moving:
+        if len(self.timeline.stops) > 1:
             self._send(SetAnimation(self.timeline.animation(followers, groups)).lower())
 
     def frame(self) -> dict[str, Any]:
@@ -144,10 +144,7 @@ class SceneDrawing:
 
     def _stage(self) -> None:
         """Light background, softer light, no grid."""
-        from meshcat.commands import Delete
-        from meshcat.path import Path
-
-        self._send(Delete(Path().append(ROOT.lstrip("/"))).lower())
+        self._send({"type": "delete", "path": ROOT})
         for key, colour in (("top_color", [0.93, 0.95, 0.97]), ("bottom_color", [1.0, 1.0, 1.0])):
             self.property("/Background", key, colour)
         self.visible("/Grid", False)
@@ -215,7 +212,7 @@ class SceneDrawing:
             if point is not None:
                 self._dot(f"{path}/{name}", point, red)
         common = overlap(self._meshes[a], poses[a], self._meshes[b], poses[b])
-        low, high = focus(row)
+        low, high = focus(row.distance)
         if common is not None:
             common.apply_transform(poses[a])
             self.put(f"{path}/overlap", draw.facets(common, red, opacity=0.6, on_top=True))
@@ -239,7 +236,7 @@ class SceneDrawing:
         middle = 0.5 * (a + b)
         upright = abs(b[2] - a[2]) >= abs(b[0] - a[0])
         beside = middle + 0.08 * self.size * np.array([-1.0, 0.0, 0.0] if upright else [-1.0, 0.0, 0.7])
-        self.put(f"{path}/line", draw.segments([a, b, middle, beside], darker(colour, 0.7), on_top=True))
+        self.put(f"{path}/line", draw.segments([a, b, middle, beside], darker(colour, 0.85), on_top=True))
         self._label(f"{path}/value", text.removeprefix("gap "), beside, "#FFFFFF", 0.7)
 
     def _label(self, path: str, text: str, at: ArrayLike, colour: str, size: float) -> None:
@@ -272,7 +269,7 @@ class SceneDrawing:
         self.property(path, "visible", on)
 
 
-def focus(row: Row) -> tuple[Array, Array]:
-    """Corners of a box around the witness points of a row; empty where it has none."""
-    points = [p for p in (row.distance.point_a, row.distance.point_b) if p is not None] or [np.zeros(3)]
+def focus(d: Distance) -> tuple[Array, Array]:
+    """Corners of a box around the witness points of a distance."""
+    points = [p for p in (d.point_a, d.point_b) if p is not None] or [np.zeros(3)]
     return np.min(points, axis=0), np.max(points, axis=0)

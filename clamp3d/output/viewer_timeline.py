@@ -49,6 +49,12 @@ class Row:
     declared: bool = False
     drawn: bool = True
 
+    @classmethod
+    def of(cls, scene: Scene, a: str, b: str, distance: Distance, what: str = "", *, declared: bool = False) -> Row:
+        """A pair with the verdict that its distance has in a scene."""
+        verdict = scene.thresholds.verdict(distance, scene.allowance(a, b)).value
+        return cls(a, b, verdict, distance, scene.contact, what, declared)
+
     @property
     def touches(self) -> bool:
         """Whether the parts are in contact, or overlap."""

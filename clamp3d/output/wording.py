@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 
 from clamp3d.collide.result import CheckResult, PairResult
 from clamp3d.collide.scene import Part, Scene
+from clamp3d.collide.verdict import Verdict
 
 BAD = ("contained", "clash")
 
@@ -94,6 +96,8 @@ def headline(result: CheckResult) -> str:
     checked = f"{result.work.pairs} {'pair' if result.work.pairs == 1 else 'pairs'}"
     if result.scene.motions:
         checked += f" and {len(result.scene.motions)} {'motion' if len(result.scene.motions) == 1 else 'motions'}"
+    if not result.work.pairs:
+        return "Clean: no two parts to check"
     if not found:
         return f"Clean: {checked} checked, nothing clashes"
     return ("" if clashes else "No clash: ") + "; ".join(others) + f" ({checked} checked)"
@@ -129,3 +133,16 @@ def circumstances(row: PairResult) -> str:
 def counts_text(result: CheckResult) -> str:
     """How many pairs have which verdict, in words."""
     return ", ".join(f"{count} {name}" for name, count in result.counts.items()) or "no pairs"
+
+
+def contents(scene: Scene) -> str:
+    """How many parts and motions a scene has."""
+    parts, motions = len(scene.parts), len(scene.motions)
+    moving = f", {motions} {'motion' if motions == 1 else 'motions'}" if motions else ""
+    return f"{parts} {'part' if parts == 1 else 'parts'}{moving}"
+
+
+def worst_first(rows: Sequence[PairResult]) -> list[PairResult]:
+    """Rows by verdict, then by distance."""
+    order = list(Verdict)
+    return sorted(rows, key=lambda row: (order.index(row.verdict), row.distance.upper))

@@ -130,7 +130,8 @@ def test_view_takes_what_check_takes(source, tmp_path):
     done = clamp3d("view", source, "--html", page)
     assert done.returncode == (1 if source.suffix == ".toml" else 0), done.stderr
     said = page_text(page.read_text())
-    assert ("clash" in said.split("Parts")[0]) == (source.suffix == ".toml")
+    assert ("1 clash in motion" in said) == (source.suffix == ".toml")
+    assert ("Clean: no two parts to check" in said) == (source.suffix == ".stl")
 
 
 def test_check_of_some_pairs_is_clean(tmp_path):
@@ -154,7 +155,7 @@ def test_check_of_some_pairs_is_clean(tmp_path):
         (["sweep", "--yaw-deg", "95"], "yaw: half range must be < 90 deg, got 95"),
         (["sweep", "--offset", "-1"], "offset: half range must be > 0"),
         (["sweep", "--offset", "0", "--yaw-deg", "0", "--pitch-deg", "0"], "nothing to vary"),
-        (["sweep", "--map", "map.bmp"], "the map's name must end in one of .png, .svg, .pdf"),
+        (["sweep", "--map", "map.bmp"], "the name must end in one of .png, .svg, .pdf"),
         (["sweep", "--seat-tolerance", "0"], "seat tolerance must be a finite length > 0 mm"),
     ],
 )

@@ -255,7 +255,8 @@ function clamp3dViewer(messages) {
     $("marks").replaceChildren(...(story.done && story.stops.length > 1 ? story.stops.map(mark) : []));
     stop = -1;
     if (story.stops.length) showStop(story.done ? 0 : story.stops.length - 1);
-    show("/clamp3d/caption", false);  // the panel says it; it is for meshcat's own page
+    // The panel says it; the caption is for meshcat's own page.
+    viewer.scene_tree.find(["clamp3d", "caption"]).set_property("visible", false);
     if (!touched) setTimeout(() => { viewer.set_3d_pane_size(); if (!touched) home(0, true); }, 30);
   }
 
