@@ -18,13 +18,17 @@ from clamp3d.clamp.dimensions import Clamp, GrooveDimensions
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.matrix import PAIRS
 from clamp3d.clamp.parts import parts
+from clamp3d.clamp.placement import placement
 from clamp3d.clamp.result import Assembly
+from clamp3d.clamp.sensitivity import sensitivity
+from clamp3d.clamp.tolerance import monte_carlo
 from clamp3d.cli import group
 from clamp3d.collide.distance import measure
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.profile import Arc
 from clamp3d.core.shapes import Solid
+from clamp3d.errors import Clamp3dError
 
 WIRES = [
     ("LJ-630", "LJ-120"),
@@ -216,6 +220,16 @@ def test_wires_through_the_bolt_are_not_clamped() -> None:
     assert texts[0] == assembly.status
     assert texts[1] == assembly.status.removeprefix("not clamped: ").replace("P6", "P7")
     assert {(d.a, d.b) for d in assembly.undeclared} == {("P4", "P6"), ("P4", "P7")}
+
+
+def test_no_command_calls_wires_through_the_bolt_clamped() -> None:
+    clamp = through_the_bolt()
+    result = monte_carlo(clamp, n=2, tolerance=0.01)
+    assert result.nominal is None
+    assert all("overlaps" in status for status in result.status)
+    for refuses in (lambda: sensitivity(clamp), lambda: placement(clamp)):
+        with pytest.raises(Clamp3dError, match="not clamped: P4 overlaps P6"):
+            refuses()
 
 
 def test_an_overlap_counts_though_contact_is_declared() -> None:
