@@ -33,7 +33,7 @@ RESOLUTION = 1e-3
 """Where bisection stops, mm."""
 
 _WIDEST = 1000.0
-"""The most that a clamp is opened further than it needs, mm: it closes by small strides."""
+"""The most that a clamp is opened further than it needs, mm: descents are short."""
 _DRAWN: tuple[Pair, ...] = (("P2", "P3"), ("P1", "P5"), ("P3", "P4"))
 """Pairs that the nut closes; the down splint closes all others."""
 
