@@ -12,18 +12,23 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp, GrooveDimensions
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.matrix import PAIRS
 from clamp3d.clamp.parts import parts
+from clamp3d.clamp.placement import placement
 from clamp3d.clamp.result import Assembly
+from clamp3d.clamp.sensitivity import sensitivity
+from clamp3d.clamp.tolerance import monte_carlo
 from clamp3d.cli import group
 from clamp3d.collide.distance import measure
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.profile import Arc
 from clamp3d.core.shapes import Solid
+from clamp3d.errors import Clamp3dError
 
 WIRES = [
     ("LJ-630", "LJ-120"),
@@ -217,6 +222,16 @@ def test_wires_through_the_bolt_are_not_clamped() -> None:
     assert {(d.a, d.b) for d in assembly.undeclared} == {("P4", "P6"), ("P4", "P7")}
 
 
+def test_no_command_calls_wires_through_the_bolt_clamped() -> None:
+    clamp = through_the_bolt()
+    result = monte_carlo(clamp, n=2, tolerance=0.01)
+    assert result.nominal is None
+    assert all("overlaps" in status for status in result.status)
+    for refuses in (lambda: sensitivity(clamp), lambda: placement(clamp)):
+        with pytest.raises(Clamp3dError, match="not clamped: P4 overlaps P6"):
+            refuses()
+
+
 def test_an_overlap_counts_though_contact_is_declared() -> None:
     clamp = through_the_bolt()
     rows = {**clamp.connections, "P4": {"P5": 1, "P6": 2, "P7": 2}}
@@ -246,3 +261,13 @@ def test_plain_data_and_frame() -> None:
     assert isinstance(frame, pandas.DataFrame)
     assert frame["distance_mm"].tolist() == [c.gap for c in assembly.contacts]
     assert "P1-P2" in assembly._repr_html_()
+
+
+@pytest.mark.parametrize("unit_deg", [5.0, 20.0])
+def test_a_contact_model_measures_its_own_contacts(unit_deg: float) -> None:
+    assembly = assemble(model=Chords(math.radians(unit_deg)))
+    assert assembly.clamped
+    assert {(d.a, d.b) for d in assembly.matrix_differences} == {("P1", "P4"), ("P2", "P4")}
+    arcs = [c for c in assembly.contacts if c.declared == 3]
+    assert all(abs(c.gap) <= 1e-9 and c.distance.method == "chords" for c in arcs)
+    assert all(c.distance.lower <= c.gap <= c.distance.upper for c in arcs)
