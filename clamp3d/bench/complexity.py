@@ -30,6 +30,11 @@ _OPEN = 12.0
 """mm through which each moving part of the grid search goes."""
 
 
+Run = Callable[[], tuple[int, int]]
+"""A search, which answers how many positions and contact tests it took."""
+Exponents = tuple[float, float, float]
+
+
 @dataclass(frozen=True, slots=True)
 class Sweep:
     """One count varied: ``positions`` (M) and ``tests`` (C in all: a groove's arc or one of its chords against a
@@ -63,7 +68,7 @@ def grid_search(run: Assembly, model: ContactModel, *, n: int, parts: int, groov
     """Try every combination of ``n`` positions for each of 1 to 3 moving parts; the paper's search.
 
     The parts are the down splint (along the bolt), the jumper and the line (both up and down), each within 12 mm of
-    its place in ``run``; those that do not move stand at it, with 1e-6 mm of room. ``grooves`` (1 to 4) are tested.
+    its place in ``run``; those that do not move stand at it, 1e-6 mm apart. ``grooves`` (1 to 4) are tested.
     """
     section = Section(run.clamp, model)
     up, down = run.poses["P1"], run.poses["P2"]
@@ -92,62 +97,59 @@ def complexity(progress: Callable[[str], None] = lambda message: None, *, scale:
     """All sweeps on the reference clamp; ``scale`` below 1 makes the searches smaller."""
     clamp = load_clamp("reference")
     final = assemble(clamp, Cas())
-    sweeps: list[Sweep] = []
+    cas = Cas()
 
-    def sized(values: Sequence[int]) -> list[int]:
+    def sized(*values: int) -> list[int]:
         return sorted({max(3, round(v * scale)) for v in values})
 
-    def grid(model: ContactModel, n: int, a: int, b: int) -> Callable[[], tuple[int, int]]:
+    def grid(model: ContactModel, n: int, a: int, b: int) -> Run:
         def run() -> tuple[int, int]:
             found = grid_search(final, model, n=n, parts=a, grooves=b)
             return found.positions, found.tests
 
         return run
 
-    def solved(model: ContactModel, solver: Solver, step: float) -> Callable[[], tuple[int, int]]:
+    def solved(model: ContactModel, solver: Solver, step: float = STEP) -> Run:
         def run() -> tuple[int, int]:
-            done: Assembly = assemble(clamp, model, solver=solver, step=step, tilt_step=TILT_STEP)
-            return done.work.motion_steps, done.work.contact_queries * _mean_segments(model, clamp)
+            work = assemble(clamp, model, solver=solver, step=step, tilt_step=TILT_STEP).work
+            return work.motion_steps, work.contact_queries * _mean_segments(model, clamp)
 
         return run
 
-    steps = {1: sized((3000, 10000, 30000, 100000)), 2: sized((56, 100, 180, 320)), 3: sized((15, 22, 32, 46))}
-    for a, values in steps.items():
-        progress(f"Table 5: {a} moving parts in n steps each")
-        runs = [grid(Cas(), n, a, 4) for n in values]
-        sweeps.append(_sweep("grid", "cas", "n", f"a = {a}, b = 4", values, runs, (a, a, a)))
-    n = sized((46,))[0]
-    progress("Table 5: number of moving parts")
-    parts = [1, 2, 3]
-    runs = [grid(Cas(), n, a, 4) for a in parts]
-    sweeps.append(_sweep("grid", "cas", "n^a", f"n = {n}, b = 4", [n**a for a in parts], runs, (1.0, 1.0, 1.0)))
-    progress("Table 5: number of grooves")
-    n = sized((30000,))[0]
-    runs = [grid(Cas(), n, 1, b) for b in (1, 2, 3, 4)]
-    sweeps.append(_sweep("grid", "cas", "b", f"n = {n}, a = 1", [1, 2, 3, 4], runs, (0.0, 1.0, 1.0)))
-    angles = [math.radians(d) for d in (20.0, 10.0, 5.0, 2.5, 1.25)]
-    chords = [Chords(angle) for angle in angles]
+    chords = [Chords(math.radians(d)) for d in (20.0, 10.0, 5.0, 2.5, 1.25)]
     m = [model.segments(wire_pairs(clamp)) / 4.0 for model in chords]
-    progress("Table 5: segments per arc")
-    n = sized((300,))[0]
-    runs = [grid(model, n, 1, 4) for model in chords]
-    sweeps.append(_sweep("grid", "chords", "m", f"n = {n}, a = 1, b = 4", m, runs, (0.0, 1.0, 1.0)))
-    n = sized((17,))[0]
-    runs = [grid(model, n, 2, 4) for model in chords]
-    sweeps.append(_sweep("grid", "chords", "m", f"n = {n}, a = 2, b = 4", m, runs, (1.0, 2.0, 2.0)))
-    progress("Table 5: the stepped solver")
+    plans: list[tuple[str, str, str, str, Sequence[float], list[Run], Exponents | None]] = []
+    for a, steps in ((1, (3000, 10000, 30000, 100000)), (2, (56, 100, 180, 320)), (3, (15, 22, 32, 46))):
+        values = sized(*steps)
+        plans.append(("grid", "cas", "n", f"a = {a}, b = 4", values, [grid(cas, n, a, 4) for n in values], (a, a, a)))
+    (n,), parts = sized(46), [1, 2, 3]
+    runs = [grid(cas, n, a, 4) for a in parts]
+    plans.append(("grid", "cas", "n^a", f"n = {n}, b = 4", [n**a for a in parts], runs, (1.0, 1.0, 1.0)))
+    (n,), grooves = sized(30000), [1, 2, 3, 4]
+    plans.append(
+        ("grid", "cas", "b", f"n = {n}, a = 1", grooves, [grid(cas, n, 1, b) for b in grooves], (0.0, 1.0, 1.0))
+    )
+    for a, most, published in ((1, 300, (0.0, 1.0, 1.0)), (2, 17, (1.0, 2.0, 2.0))):
+        (n,) = sized(most)
+        plans.append(
+            ("grid", "chords", "m", f"n = {n}, a = {a}, b = 4", m, [grid(c, n, a, 4) for c in chords], published)
+        )
     finer = [1, 2, 4, 8] if scale >= 1.0 else [1, 2]
-    runs = [solved(Cas(), "stepped", STEP / k) for k in finer]
-    way = Section(clamp, Cas()).open_distance() - final.closing
-    moves = [way * k / STEP for k in finer]
-    sweeps.append(_sweep("stepped", "cas", "n", "a = 3, b = 4", moves, runs, (3.0, 3.0, 3.0)))
-    runs = [solved(model, "stepped", STEP) for model in chords]
-    sweeps.append(_sweep("stepped", "chords", "m", "a = 3, b = 4, step 1/3 mm", m, runs, (2.0, 3.0, 3.0)))
-    progress("Table 5: the exact solver")
-    runs = [solved(Cas(), "exact", STEP)]
-    sweeps.append(_sweep("exact", "cas", "n", "no steps", [1.0], runs, None))
-    runs = [solved(model, "exact", STEP) for model in chords]
-    sweeps.append(_sweep("exact", "chords", "m", "no steps", m, runs, None))
+    way = Section(clamp, cas).open_distance() - final.closing
+    runs = [solved(cas, "stepped", STEP / k) for k in finer]
+    plans.append(("stepped", "cas", "n", "a = 3, b = 4", [way * k / STEP for k in finer], runs, (3.0, 3.0, 3.0)))
+    runs = [solved(model, "stepped") for model in chords]
+    plans.append(("stepped", "chords", "m", "a = 3, b = 4, step 1/3 mm", m, runs, (2.0, 3.0, 3.0)))
+    plans.append(("exact", "cas", "n", "no steps", [1.0], [solved(cas, "exact")], None))
+    plans.append(("exact", "chords", "m", "no steps", m, [solved(model, "exact") for model in chords], None))
+    sweeps = []
+    for search, method, varied, fixed, at, searches, theirs in plans:
+        progress(f"Table 5: {search} search, {method}, {varied} varied")
+        counts, seconds = zip(*map(_timed, searches), strict=True)
+        positions, tests = zip(*counts, strict=True)
+        exponents = (fitted(at, positions), fitted(at, tests), fitted(at, seconds))
+        x = tuple(float(v) for v in at)
+        sweeps.append(Sweep(search, method, varied, fixed, x, positions, tests, seconds, exponents, theirs))
     return tuple(sweeps)
 
 
@@ -162,39 +164,14 @@ def fitted(values: Sequence[float], counts: Sequence[float]) -> float:
     return float(np.polyfit(np.log(values), np.log(counts), 1)[0])
 
 
-def _sweep(
-    search: str,
-    method: str,
-    varied: str,
-    fixed: str,
-    values: Sequence[float],
-    runs: Sequence[Callable[[], tuple[int, int]]],
-    published: tuple[float, float, float] | None,
-) -> Sweep:
-    """Each of ``runs`` answers (positions, tests); of quick ones the least of three times counts: load only adds."""
-    positions, tests, seconds = [], [], []
-    for run in runs:
-        times: list[float] = []
-        while not times or (len(times) < 3 and sum(times) < 0.3):
-            start = time.process_time()
-            counted = run()
-            times.append(time.process_time() - start)
-        positions.append(counted[0])
-        tests.append(counted[1])
-        seconds.append(min(times))
-    exponents = (fitted(values, positions), fitted(values, tests), fitted(values, seconds))
-    return Sweep(
-        search,
-        method,
-        varied,
-        fixed,
-        tuple(float(v) for v in values),
-        tuple(positions),
-        tuple(tests),
-        tuple(seconds),
-        exponents,
-        published,
-    )
+def _timed(run: Run) -> tuple[tuple[int, int], float]:
+    """What a search answers, and its CPU time; of a quick one the least of three counts: load only adds."""
+    times: list[float] = []
+    while not times or (len(times) < 3 and sum(times) < 0.3):
+        start = time.process_time()
+        counted = run()
+        times.append(time.process_time() - start)
+    return counted, min(times)
 
 
 def _segments(model: ContactModel, half_angle: float) -> int:

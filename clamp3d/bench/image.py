@@ -8,7 +8,6 @@ clamp). Height is the quantity of Table 4 and the default here.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.bench.picture import Picture, find_end_points, picture
-from clamp3d.bench.published import IMAGE_DISTANCES
 from clamp3d.checks import array, choice, instance, number, whole
 from clamp3d.clamp.result import Assembly
 from clamp3d.core.pose import Array
@@ -30,7 +28,7 @@ MARKING_ERROR = 4.5
 """Chosen: standard deviation in px of each coordinate of a mark.
 
 The five published values scatter about the actual distance by 1.60 mm rms; at the chosen scale and geometry that is a
-marking error of 4.5 px (`calibrate_marking_error`), and five values leave 2.8 to 11.1 px open (95 %).
+marking error of 4.5 px (the tests work it out), and five values leave 2.8 to 11.1 px open (95 %).
 """
 FITTING_ERROR = 0.05
 """Measured on drawn pictures: standard deviation in px of an automatic end point (largest of all: 0.1 px)."""
@@ -91,15 +89,6 @@ class ImageStudy:
         return float(np.abs(self.errors).max())
 
 
-@dataclass(frozen=True, slots=True)
-class Calibration:
-    """Marking error in px (standard deviation per coordinate) that explains a scatter, and its 95 % interval."""
-
-    marking_error: float
-    low: float
-    high: float
-
-
 def measure_image(
     points: ArrayLike,
     reference: ArrayLike,
@@ -128,14 +117,12 @@ def measure_image(
     choice("kind", kind, ("height", "straight"))
     value = _distance(marks, reference_mm, kind)
     unique, place = np.unique(marks.reshape(4, 2), axis=0, return_inverse=True)
-    step = 1e-3
-    variance = (value / reference_mm * calliper_error) ** 2
-    for i in range(len(unique)):
-        for axis in range(2):
-            shift = np.zeros_like(unique)
-            shift[i, axis] = step
-            ends = [_distance((unique + sign * shift)[place].reshape(2, 2, 2), reference_mm, kind) for sign in (1, -1)]
-            variance += ((ends[0] - ends[1]) / (2.0 * step) * marking_error) ** 2
+    # Central differences by each coordinate of each mark.
+    shifts = 1e-3 * np.eye(unique.size).reshape(unique.size, -1, 2)
+    moved = [(unique + sign * shifts)[:, place].reshape(-1, 2, 2, 2) for sign in (1, -1)]
+    ahead, behind = (_distance(marks, reference_mm, kind) for marks in moved)
+    slopes = (ahead - behind) / 2e-3
+    variance = (value / reference_mm * calliper_error) ** 2 + ((slopes * marking_error) ** 2).sum()
     return ImageMeasurement(
         distance=float(value),
         uncertainty=float(np.sqrt(variance)),
@@ -202,22 +189,6 @@ def image_study(
         errors=values - shown.distance,
         automatic=found,
     )
-
-
-def calibrate_marking_error(
-    shown: Picture, actual: float, values: Sequence[float] = IMAGE_DISTANCES, *, kind: Kind = "height"
-) -> Calibration:
-    """Marking error that gives ``values`` their rms error about ``actual`` (mm) here, with chi-squared interval."""
-    from scipy.stats import chi2
-
-    rms = math.sqrt(math.fsum((v - actual) ** 2 for v in values) / len(values))
-    left, right, below = shown.end_points
-    per_pixel = measure_image(
-        [left, below], [left, right], shown.reference, kind=kind, marking_error=1.0, calliper_error=0.0
-    ).uncertainty
-    n = len(values)
-    low, high = (rms * math.sqrt(n / chi2.ppf(q, n)) / per_pixel for q in (0.975, 0.025))
-    return Calibration(rms / per_pixel, low, high)
 
 
 def _distance(marks: Array, reference_mm: float | Array, kind: Kind) -> Array:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _TOLERANCE = 1e-9
+_TITLE: dict[str, Any] = {"x": 0.01, "ha": "left", "fontsize": 11, "fontweight": "bold", "color": INK}
+_SMALL: dict[str, Any] = {"fontsize": 8, "color": INK}
 _R, _r = 10.0, 3.6
 _MINOR, _MAJOR = math.radians(62.0), math.radians(128.0)
 _BOLT = Rectangle(0.0, 0.0, 5.0, 15.0)
@@ -52,9 +54,7 @@ def table2_figure() -> Figure:
     figure = Figure(figsize=(11.0, 3.6), layout="constrained")
     for ax, hole in zip(figure.subplots(1, len(holes)), holes, strict=True):
         _hole_cell(ax, hole, hole_bolt(hole, _BOLT, tolerance=_TOLERANCE))
-    figure.suptitle(
-        "bolt hole of a splint against the bolt", x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK
-    )
+    figure.suptitle("bolt hole of a splint against the bolt", **_TITLE)
     return figure
 
 
@@ -77,20 +77,15 @@ def table3_figure() -> Figure:
         _frame(ax, (m[0] - 8.5, m[0] + 11.5), (m[1] - 9.0, m[1] + 10.0))
     for ax in axes[2, :3]:
         ax.set_axis_off()
-    legend = axes[2, 0].annotate(
+    words = (
         "Contact at the end point M (Fig. 6): RM is the tangent in M.\n"
         "Centre on the arc PR: exterior; on the arc RQ: interior.\n\n"
         "shaded: region of the arc, closed by the chord MN (dashed)\n"
-        "dot: nearest point of the arc; cross: centre of the circle",
-        (0.0, 0.55),
-        xycoords="axes fraction",
-        va="center",
-        fontsize=9,
-        color=INK,
-        annotation_clip=False,
+        "dot: nearest point of the arc; cross: centre of the circle"
     )
-    legend.set_in_layout(False)
-    figure.suptitle("arc against small circle", x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
+    style: dict[str, Any] = {"xycoords": "axes fraction", "va": "center", "annotation_clip": False}
+    axes[2, 0].annotate(words, (0.0, 0.55), fontsize=9, color=INK, **style).set_in_layout(False)
+    figure.suptitle("arc against small circle", **_TITLE)
     return figure
 
 
@@ -98,13 +93,10 @@ def _hole_cell(ax: Axes, hole: Rectangle, contact: HoleContact) -> None:
     from matplotlib.patches import Polygon
 
     green, grey = PART_COLOURS["P2"], PART_COLOURS["P4"]
+    W, H = hole.half_width, hole.half_height
     for side in (-1, 1):
-        wall = [
-            hole.point(side * hole.half_width, -hole.half_height),
-            hole.point(side * hole.half_width, hole.half_height),
-        ]
-        far = [hole.point(side * 13.0, hole.half_height), hole.point(side * 13.0, -hole.half_height)]
-        patch = Polygon(wall + far, fc=green, ec=darker(green, 0.45), hatch="////", hatch_linewidth=0.45, lw=1.0)
+        wall = [hole.point(u, v) for u, v in ((side * W, -H), (side * W, H), (side * 13.0, H), (side * 13.0, -H))]
+        patch = Polygon(wall, fc=green, ec=darker(green, 0.45), hatch="////", hatch_linewidth=0.45, lw=1.0)
         patch.set_hatchcolor(darker(green, 0.75))
         ax.add_patch(patch)
     w, h = _BOLT.half_width, _BOLT.half_height
@@ -113,52 +105,45 @@ def _hole_cell(ax: Axes, hole: Rectangle, contact: HoleContact) -> None:
     for x, y in contact.points:
         _dot(ax, x, y, "contact")
     if contact.relation is HoleRelation.OVERLAP:
-        c, s = math.cos(hole.angle), math.sin(hole.angle)
         for side in (-1, 1):  # the corner that is deepest in the bolt
-            v = -side * math.copysign(hole.half_height, hole.angle)
-            x, y = hole.x + side * hole.half_width * c + v * s, hole.y - side * hole.half_width * s + v * c
+            x, y = hole.point(side * W, -side * math.copysign(H, hole.angle))
             if side * x < w:
                 _dot(ax, x, y, "clash")
     _frame(ax, (-17.0, 17.0), (20.5, -16.5))
-    ax.set_title(contact.relation.value, fontsize=9.5, color=INK)
-    gaps = f"gap left {contact.gap_left + 0.0:.2f}, right {contact.gap_right + 0.0:.2f}".replace("-0.00", "0.00")
-    ax.annotate(gaps, (0.5, 0.0), xycoords="axes fraction", ha="center", va="bottom", fontsize=8, color=INK)
+    gaps = f"gap left {contact.gap_left:z.2f}, right {contact.gap_right:z.2f}"
+    _caption(ax, contact.relation.value, gaps)
 
 
 def _arc_cell(ax: Axes, half_angle: float, x: float, y: float, *, fig_6: bool = False) -> None:
-    from matplotlib.patches import Arc, Circle, PathPatch
-    from matplotlib.path import Path
+    from matplotlib.patches import Arc, Circle
 
     blue, yellow = PART_COLOURS["P1"], PART_COLOURS["P6"]
     found = arc_circle(_R, half_angle, _r, x, y, tolerance=_TOLERANCE)
-    degrees = math.degrees(half_angle)
-    region = Path.arc(270.0 - degrees, 270.0 + degrees)
-    ax.add_patch(PathPatch(Path(np.asarray(region.vertices) * _R, region.codes), fc=blue, alpha=0.18, ec="none"))
+    ends = (270.0 - math.degrees(half_angle), 270.0 + math.degrees(half_angle))
     m = np.array([-_R * math.sin(half_angle), -_R * math.cos(half_angle)])
+    _region(ax, ends, blue)
     ax.plot([m[0], -m[0]], [m[1], m[1]], color=darker(blue), lw=0.8, ls="--")
-    ax.add_patch(
-        Arc((0, 0), 2 * _R, 2 * _R, theta1=270.0 - degrees, theta2=270.0 + degrees, ec=darker(blue, 0.5), lw=2.2)
-    )
+    ax.add_patch(Arc((0, 0), 2 * _R, 2 * _R, theta1=ends[0], theta2=ends[1], ec=darker(blue, 0.5), lw=2.2))
     ax.add_patch(Circle((x, y), _r, fc=yellow, ec=darker(yellow, 0.45), lw=1.0, alpha=0.8))
     ax.plot([x], [y], "+", color=INK, ms=6, mew=0.8)
     for point, name, side in (((m[0], m[1]), "M", -1), ((-m[0], m[1]), "N", 1)):
         offset = (11, -3) if fig_6 and name == "M" else (6 * side, 5)
-        ax.annotate(name, point, offset, textcoords="offset points", ha="center", fontsize=8, color=INK)
+        ax.annotate(name, point, offset, textcoords="offset points", ha="center", **_SMALL)
     if fig_6:
         _construction(ax, m)
     if found.relation in (ArcRelation.EXTERIOR_CONTACT, ArcRelation.INTERIOR_CONTACT, ArcRelation.INTERSECT):
         for px, py in found.points:
             _dot(ax, px, py, _VERDICT[found.relation])
-    ax.set_title(found.relation.value, fontsize=9.5, color=INK)
-    ax.annotate(
-        f"gap {found.gap + 0.0:.2f}".replace("-0.00", "0.00"),
-        (0.5, 0.0),
-        xycoords="axes fraction",
-        ha="center",
-        va="bottom",
-        fontsize=8,
-        color=INK,
-    )
+    _caption(ax, found.relation.value, f"gap {found.gap:z.2f}")
+
+
+def _region(ax: Axes, ends: tuple[float, float], colour: str) -> None:
+    """The area between an arc and its chord; angles in degrees."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    arc = Path.arc(*ends)
+    ax.add_patch(PathPatch(Path(np.asarray(arc.vertices) * _R, arc.codes), fc=colour, alpha=0.18, ec="none"))
 
 
 def _construction(ax: Axes, m: Any) -> None:
@@ -171,23 +156,20 @@ def _construction(ax: Axes, m: Any) -> None:
     points = {"P": m + _r * out, "Q": m - _r * out, "R": m + _r * off}
     ax.plot([0.0, points["P"][0]], [0.0, points["P"][1]], color=INK, lw=0.6)
     ax.plot([m[0], points["R"][0]], [m[1], points["R"][1]], color=INK, lw=0.6)
-    ax.annotate("O", (0.0, 0.0), (4, 2), textcoords="offset points", fontsize=8, color=INK)
+    ax.annotate("O", (0.0, 0.0), (4, 2), textcoords="offset points", **_SMALL)
     for name, point in points.items():
         ax.plot(*point, ".", color=INK, ms=3)
-        away = point - m
-        ax.annotate(
-            name,
-            point + 1.3 * away / np.hypot(*away),
-            ha="center",
-            va="center",
-            fontsize=8,
-            fontweight="bold",
-            color=INK,
-        )
+        place = point + 1.3 * (point - m) / _r
+        ax.annotate(name, place, ha="center", va="center", fontweight="bold", **_SMALL)
 
 
 def _dot(ax: Axes, x: float, y: float, verdict: str) -> None:
     ax.plot([x], [y], "o", ms=6, mec=INK, mew=0.7, mfc=VERDICT_COLOURS[verdict], zorder=10)
+
+
+def _caption(ax: Axes, title: str, foot: str) -> None:
+    ax.set_title(title, fontsize=9.5, color=INK)
+    ax.annotate(foot, (0.5, 0.0), xycoords="axes fraction", ha="center", va="bottom", **_SMALL)
 
 
 def _frame(ax: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:

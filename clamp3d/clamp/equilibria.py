@@ -20,19 +20,34 @@ _TRUST_RADIUS = 0.004
 
 
 def equilibria(section: Section) -> tuple[FinalState, ...]:
-    """Every final state found, each with its proof; the one closed furthest first.
+    """All final states of a clamp that are found, each with its proof; the one closed furthest first.
 
     Starts are taken just above every local minimum of the sampled distance (`landscape`). A clamp in which a wire can
     rest on a lip as well as in its groove has more than one equilibrium; which one it ends in depends on how it is put
     together. States in which a wire is about to slip out of its mouth are among them, for there the closing ends too.
     A minimum so shallow that opening by 1.5e-4 of the down splint's half width (0.01 mm of the reference clamp) lets
     the clamp slide on may be missing.
-    Raises SolverError if no start leads to a proven state.
 
+    Parameters
+    ----------
+    section : Section
+        The clamp and how its grooves are measured.
+
+    Returns
+    -------
+    tuple of FinalState
+
+    Raises
+    ------
+    SolverError
+        If no start leads to a proven state.
+
+    Examples
+    --------
     >>> from clamp3d.clamp.loader import load_clamp
     >>> from clamp3d.baselines.cas import Cas
-    >>> [round(section.splint_distance(state.q), 3) for section in [Section(load_clamp(), Cas())]
-    ...  for state in equilibria(section)]
+    >>> section = Section(load_clamp(), Cas())
+    >>> [round(section.splint_distance(state.q), 3) for state in equilibria(section)]
     [31.53, 34.05, 30.499, 34.033]
     """
     instance("section", section, Section)

@@ -1,24 +1,24 @@
-"""How far a wire may be misplaced before a clamp no longer closes on it: outcomes, and the tolerance per freedom.
+"""Tolerance of a wire's placement: how far it may be misplaced before the clamp no longer closes on it.
 
-The wire is held where it is, the two splints close on it along the bolt from either side, in the tilt they end in,
-until each touches. What they then lack of the closed clamp is the opening. Lifting the wire lifts one splint and
-lowers the other, so the clamp as a whole may float along the bolt; a real clamp also pulls the wire straight, so the
-tolerances are on the safe side.
+The wire is held where it is while the two splints, in the tilt they end in, close on it along the bolt until each
+touches. What they then lack of the closed clamp is the opening. Lifting the wire lifts one splint and lowers the other,
+so the clamp as a whole may float along the bolt; a real clamp also pulls the wire straight, so the tolerances are on
+the safe side. The command is ``clamp3d sweep``.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.baselines.cas import Cas
 from clamp3d.checks import array, choice, instance, number, positive, whole
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp, PartName
@@ -39,6 +39,8 @@ _TOUCH = 1e-7
 _FARTHEST = 1e6  # mm; a wire further off is not misplaced but elsewhere
 _ITERATIONS = 400
 _STRAIGHT = 1e-5
+_ROUNDS, _STEPS = 5, 64
+"""A limit is narrowed 64-fold in each round, to 1e-9 of its range."""
 
 
 class Outcome(IntEnum):
@@ -60,10 +62,18 @@ _FACES = (Feature.FLAT_M, Feature.FLAT_N, Feature.END_EDGE_M, Feature.END_EDGE_N
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcomes:
-    """Answers for n misplacements: ``outcome`` (n,) codes of `Outcome`, ``opening`` (n,) mm, ``feature`` (n, 2) codes.
+    """Outcomes of closing on n misplaced wires.
 
-    ``feature`` is the `Feature` of the up and the down splint that touches first; ``opening`` is infinite where a
-    splint never meets the wire.
+    Attributes
+    ----------
+    misplacement : ndarray (n, 4)
+        Offset, height (mm), yaw, pitch (rad).
+    outcome : ndarray (n,)
+        Codes of `Outcome`.
+    opening : ndarray (n,)
+        What the splints lack of the closed clamp, mm; infinite where one never meets the wire.
+    feature : ndarray (n, 2)
+        Codes of the `Feature` of the up and the down splint that touches first.
     """
 
     misplacement: Array
@@ -74,7 +84,7 @@ class Outcomes:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Tolerance of one freedom with the others at nominal: closes from ``low`` to ``high`` (mm or rad).
+    """Tolerance of one freedom, the others at nominal: the clamp closes from ``low`` to ``high`` (mm or rad).
 
     ``low_open``, ``high_open``: it still closed at the end of the range that was searched.
     """
@@ -87,11 +97,21 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tolerances:
-    """Tolerances of a clamp for one wire: each freedom alone, and all at once.
+class PlacementTolerance:
+    """How far a wire may be misplaced, in each freedom alone and in all at once.
 
-    With every freedom anywhere within ``together`` times its own limits at once the clamp still closes: proven on the
-    corners and ``samples`` random points of that box.
+    Attributes
+    ----------
+    wire : str
+        The wire, P6 or P7.
+    seat_tolerance : float
+        Opening up to which the clamp counts as closed, mm.
+    limits : tuple of Limits
+        Each freedom alone.
+    together : float
+        The clamp still closes with every freedom anywhere within this share of its own limits at once, as tried at
+        the corners and at ``samples`` random points of that box.
+    samples : int
     """
 
     wire: PartName
@@ -101,26 +121,65 @@ class Tolerances:
     samples: int
 
 
-class WireClosing:
-    """A clamp in its final state, ready to be closed on one of its wires in other poses.
+def placement(
+    clamp: Clamp | str | Path = "reference",
+    ranges: Mapping[Freedom, float] | None = None,
+    *,
+    wire: PartName = "P6",
+    seat_tolerance: float = SEAT_TOLERANCE,
+    samples: int = 4000,
+    seed: int = 0,
+) -> PlacementTolerance:
+    """How far a wire may be misplaced before a clamp no longer closes on it.
 
-    Raises InputError for a part that is no wire, or a clamp that does not close on its wires at all.
+    Parameters
+    ----------
+    clamp : Clamp, str or Path
+        A clamp, the name of a built-in one, or a clamp file.
+    ranges : dict, optional
+        Half range that is searched for each freedom: offset, height (mm), yaw, pitch (rad).
+    wire : {"P6", "P7"}
+        Power line or jumper.
+    seat_tolerance : float
+        Opening up to which the clamp counts as closed, mm.
+    samples, seed : int
+        Random points at which the share of the limits that holds at once is tried.
+
+    Raises
+    ------
+    InputError
+        For bad values, or a clamp that does not close on its wires at all.
+
+    Examples
+    --------
+    >>> [limits] = placement(ranges={"yaw": 0.1}, samples=0).limits
+    >>> round(math.degrees(limits.high), 2)
+    2.18
     """
+    closing = Placement(clamp, wire, seat_tolerance=seat_tolerance)
+    chosen: Mapping[Freedom, float] = {"offset": 15.0, "yaw": 0.1, "pitch": 0.05} if ranges is None else ranges
+    return closing.tolerance(chosen, samples=samples, seed=seed)
 
-    def __init__(self, clamp: Clamp, wire: PartName = "P6", *, seat_tolerance: float = SEAT_TOLERANCE) -> None:
-        instance("clamp", clamp, Clamp)
+
+class Placement:
+    """A clamp in its final state, ready to be closed on one of its wires in other poses; see `placement`."""
+
+    def __init__(
+        self, clamp: Clamp | str | Path, wire: PartName = "P6", *, seat_tolerance: float = SEAT_TOLERANCE
+    ) -> None:
         choice("wire", wire, ("P6", "P7"))
         seat_tolerance = positive("seat tolerance", seat_tolerance)
-        run = assemble(clamp, Cas())
-        if not run.clamped:
-            raise InputError(f"clamp {clamp.name} with {clamp.line.label} and {clamp.jumper.label}: {run.status}")
-        self.clamp, self.wire, self.seat_tolerance = clamp, wire, seat_tolerance
-        self._nominal = run.T_world(wire)
-        pairs = groove_pairs(clamp)
+        final = assemble(clamp)
+        self.clamp, self.wire, self.seat_tolerance = final.clamp, wire, seat_tolerance
+        if not final.clamped:
+            wires = f"{self.clamp.line.label} and {self.clamp.jumper.label}"
+            raise InputError(f"clamp {self.clamp.name} with {wires}: {final.status}")
+        self._nominal = final.T_world(wire)
+        pairs = groove_pairs(self.clamp)
         self._splints: list[tuple[GroovePair, Array, Array]] = []
         for splint, up in (("P1", 1.0), ("P2", -1.0)):
             pair = pairs[splint, wire]
-            world = run.T_world(splint) @ pair.T_a_groove
+            world = final.T_world(splint) @ pair.T_a_groove
             self._splints.append((pair, inverse(world), np.array([0.0, 0.0, up])))
 
     def poses(self, misplacement: Array) -> Array:
@@ -176,24 +235,10 @@ class WireClosing:
             m[:, column] = values
             return np.asarray(self.close(m).outcome == Outcome.CLOSES)
 
-        found = []
-        for sign in (-1.0, 1.0):
-            low, high = 0.0, reach
-            for _ in range(8):  # each round narrows 64-fold
-                steps = np.linspace(low, high, 65)
-                good = closes(sign * steps)
-                first = int(np.argmin(good)) if not good.all() else len(steps)
-                if first == len(steps):
-                    low = high
-                    break
-                low, high = float(steps[max(first - 1, 0)]), float(steps[first])
-                if first == 0 or high - low < 1e-9 * reach:
-                    break
-            found.append((sign * low, bool(low >= reach)))
-        (below, below_open), (above, above_open) = found
-        return Limits(freedom, below + 0.0, above, below_open, above_open)
+        low, high = (_limit(lambda steps, sign=sign: closes(sign * steps), reach) for sign in (-1.0, 1.0))  # type: ignore[misc]
+        return Limits(freedom, 0.0 - low, high, low >= reach, high >= reach)
 
-    def tolerances(self, ranges: Mapping[Freedom, float], *, samples: int = 4000, seed: int = 0) -> Tolerances:
+    def tolerance(self, ranges: Mapping[Freedom, float], *, samples: int = 4000, seed: int = 0) -> PlacementTolerance:
         """Limits of each freedom in ``ranges`` (half ranges, mm or rad), and the share of them that holds at once."""
         limits = tuple(self.limits(freedom, reach) for freedom, reach in _ranges(ranges).items())
         samples, rng = whole("samples", samples, least=0), np.random.default_rng(whole("seed", seed, least=0))
@@ -207,14 +252,25 @@ class WireClosing:
             m[:, columns] = share * (low + unit * (high - low))
             return bool((self.close(m).outcome == Outcome.CLOSES).all())
 
-        inside, outside = 0.0, 1.0
-        if all_close(1.0):
-            inside = 1.0
-        else:
-            for _ in range(20):
-                middle = 0.5 * (inside + outside)
-                inside, outside = (middle, outside) if all_close(middle) else (inside, middle)
-        return Tolerances(self.wire, self.seat_tolerance, limits, inside, samples)
+        inside, outside = (1.0, 1.0) if all_close(1.0) else (0.0, 1.0)
+        while outside - inside > 1e-6:
+            middle = 0.5 * (inside + outside)
+            inside, outside = (middle, outside) if all_close(middle) else (inside, middle)
+        return PlacementTolerance(self.wire, self.seat_tolerance, limits, inside, samples)
+
+
+def _limit(closes: Callable[[Array], NDArray[np.bool_]], reach: float) -> float:
+    """The largest value up to ``reach`` below which all values close."""
+    low, high = 0.0, reach
+    for _ in range(_ROUNDS):
+        steps = np.linspace(low, high, _STEPS + 1)
+        failing = np.flatnonzero(~closes(steps))
+        if not len(failing):
+            return high
+        if failing[0] == 0:
+            return low
+        low, high = float(steps[failing[0] - 1]), float(steps[failing[0]])
+    return low
 
 
 def _ranges(ranges: Mapping[Freedom, float]) -> dict[Freedom, float]:

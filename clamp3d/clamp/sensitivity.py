@@ -94,9 +94,16 @@ def with_dimensions(clamp: Clamp, values: Mapping[str, float]) -> Clamp:
 def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
     """Derivatives of the splint distance by each of `DIMENSIONS` that it depends on, largest effect first.
 
-    Exact while the active set stays the same. Raises SolverError if the final state cannot be proven, does not hold
-    both wires, or is not an isolated one (the derivative then does not exist).
+    They hold while the active set stays the same.
 
+    Raises
+    ------
+    SolverError
+        If the final state cannot be proven, does not hold both wires, or is not an isolated one (the derivative then
+        does not exist).
+
+    Examples
+    --------
     >>> from clamp3d.clamp.loader import load_clamp
     >>> {s.name: round(s.derivative, 4) for s in sensitivity(load_clamp())}["line.diameter"]
     1.2144

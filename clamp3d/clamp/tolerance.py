@@ -51,7 +51,19 @@ _TOP = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Spec:
-    """What is sampled: ``tolerance`` (n,) mm either way of each of `DIMENSIONS`; ``start`` is (d, tilt) in mm, rad."""
+    """What is sampled.
+
+    Attributes
+    ----------
+    clamp : Clamp
+        The nominal clamp.
+    seed : int
+    distribution : str
+    tolerance : tuple of float
+        Mm either way, for each of `DIMENSIONS`.
+    start : (float, float) or None
+        Down splint's distance (mm) and tilt (rad) of the nominal final state; None if it has none.
+    """
 
     clamp: Clamp
     seed: int
@@ -62,9 +74,18 @@ class Spec:
 
 @dataclass(frozen=True, slots=True)
 class MonteCarlo:
-    """``distance`` (n,) mm, NaN where the clamp does not hold both wires; ``status`` (n,) says why.
+    """Splint distances of n clamps within their tolerances.
 
-    ``nominal`` is the nominal clamp's distance in mm (None if it does not clamp).
+    Attributes
+    ----------
+    spec : Spec
+        What was sampled.
+    nominal : float or None
+        The nominal clamp's distance in mm; None if it does not clamp.
+    distance : ndarray (n,)
+        Mm; NaN where the clamp does not hold both wires.
+    status : tuple of str
+        "clamped", or why not.
     """
 
     spec: Spec
@@ -112,15 +133,44 @@ def monte_carlo(
     resume: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> MonteCarlo:
-    """Assemble ``n`` clamps whose dimensions and wires scatter independently about their nominal sizes.
+    """Assemble clamps whose dimensions and wires scatter independently about their nominal sizes.
 
-    ``tolerance`` is mm either way for every dimension of the splints (None: ISO 2768-1 m by its size),
-    ``wire_tolerance_percent`` that of the wires' diameters; uniform within them, or normal with 3 sigma = tolerance.
-    ``processes`` share the work, or the Dask cluster at the address ``scheduler``. ``resume`` names a file that keeps
-    what is finished; a run with the same settings (n may differ) goes on from it. ``progress(done, n)`` is told
-    samples. Raises InputError for settings out of range, MissingLibraryError without dask.distributed, and SolverError
-    if a worker dies.
+    Parameters
+    ----------
+    clamp : Clamp
+        The nominal clamp.
+    n, seed : int
+        Number of clamps, and the seed of their dimensions.
+    tolerance : float, optional
+        Mm either way for every dimension of the splints; by default ISO 2768-1 m by its size.
+    wire_tolerance_percent : float
+        Of the wires' diameters, either way.
+    distribution : {"uniform", "normal"}
+        Within the tolerance, or normal with 3 sigma = tolerance.
+    processes : int
+        How many share the work.
+    scheduler : str, optional
+        Address of a Dask cluster that shares the work.
+    resume : Path, optional
+        File that keeps what is finished; a run with the same settings (n may differ) goes on from it.
+    progress : callable, optional
+        Called with the samples done and ``n``.
 
+    Returns
+    -------
+    MonteCarlo
+
+    Raises
+    ------
+    InputError
+        For settings out of range.
+    MissingLibraryError
+        For a scheduler without dask.distributed.
+    SolverError
+        If a worker dies.
+
+    Examples
+    --------
     >>> from clamp3d.clamp.loader import load_clamp
     >>> result = monte_carlo(load_clamp(), n=3, tolerance=0.01, wire_tolerance_percent=0.0)
     >>> result.status, bool(abs(result.distance - result.nominal).max() < 0.1)
@@ -132,9 +182,7 @@ def monte_carlo(
             raise InputError(f"{name} must be >= 1, got {value}")
     header = {"monte_carlo": 1, **asdict(spec), "chunk": CHUNK}
     with Journal(resume, header) if resume is not None else nullcontext() as journal:
-        kept: dict[int, list[Sample]] = {}
-        for k, piece in (journal.pieces if journal is not None else {}).items():
-            kept[k] = [(distance, status) for distance, status in piece]
+        kept: dict[int, list[Sample]] = {} if journal is None else dict(journal.pieces)
         sizes = {k: min(CHUNK, n - k * CHUNK) for k in range(math.ceil(n / CHUNK))}
         waiting = [(spec, k, size) for k, size in sizes.items() if len(kept.get(k, ())) < size]
         done = n - sum(size for _, _, size in waiting)

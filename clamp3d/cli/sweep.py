@@ -47,28 +47,23 @@ def command(
     The wire is held where it is while the splints close along the bolt. Closes: both touch it in their grooves with
     little opening. Touches wrongly: on a lip, or too far open. Cannot seat: on a face beside the groove.
     """
-    from clamp3d.clamp.placement import FREEDOMS, SEAT_TOLERANCE, Freedom, WireClosing
+    from clamp3d.clamp.placement import FREEDOMS, SEAT_TOLERANCE, Freedom, Placement
     from clamp3d.errors import InputError
     from clamp3d.output.files import write_json
     from clamp3d.output.placement_report import draw_map, grid, planes, sweep_to_dict, sweep_to_text
 
-    given = {"offset": offset, "height": height, "yaw": _angle(yaw_deg), "pitch": _angle(pitch_deg)}
-    ranges: dict[Freedom, float] = {f: value for f in FREEDOMS if (value := given[f]) is not None and value != 0.0}
-    for name, value in ranges.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(f"{name}: half range must be > 0 (or 0: not varied), got {value:g}")
-        if name in ("yaw", "pitch") and value >= math.pi / 2:
-            raise InputError(f"{name}: half range must be < 90 deg, got {math.degrees(value):g}")
+    given = {"offset": offset, "height": height, "yaw": math.radians(yaw_deg), "pitch": math.radians(pitch_deg)}
+    ranges: dict[Freedom, float] = {f: value for f in FREEDOMS if (value := given[f])}
     if not ranges:
         raise InputError("nothing to vary: give --offset, --height, --yaw-deg or --pitch-deg")
     if map_file is not None and len(ranges) < 2:
         raise InputError("a map needs two freedoms with a range")
-    closing = WireClosing(
+    closing = Placement(
         source.clamp(),
-        "P6" if wire == "P6" else "P7",
+        wire,
         seat_tolerance=SEAT_TOLERANCE if seat_tolerance is None else seat_tolerance,
     )
-    tolerances = closing.tolerances(ranges, seed=seed)
+    tolerances = closing.tolerance(ranges, seed=seed)
     cloud = closing.cloud(ranges, count, seed=seed) if count is not None else None
     wanted = planes(ranges) if map_file is not None or json_file is not None else []
     grids = {(x, y): grid(closing, x, y, ranges, steps) for x, y in wanted}
@@ -77,7 +72,3 @@ def command(
     if map_file is not None:
         draw_map(map_file, closing, tolerances, grids, ranges)
     show(sweep_to_text(closing, tolerances, cloud))
-
-
-def _angle(degrees: float) -> float:
-    return math.radians(degrees)

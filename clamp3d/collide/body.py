@@ -183,7 +183,8 @@ def _bore_hull(bore: Bore, piece: Convex, T: Array) -> Distance:
         lines = [[(x, h, -H), (x, h, H)] for x in (-s, s)]
         lines += [[(x, h, z), (math.copysign(far, x), h, z)] for x in (-s, s) for z in (-H, H)]
         L = np.array(lines)
-        if any(_meets(line, piece, inverse(T) @ place) for line in L):
+        M = inverse(T) @ place
+        if any(piece.crossed_by(line @ M[:3, :3].T + M[:3, 3]) for line in L):
             return Distance()
         for d, p, q in (segment_pairs(L, E), to_faces(L.reshape(-1, 3), (triangles - t) @ R)):
             if 0.0 < d < found.upper:
@@ -191,18 +192,6 @@ def _bore_hull(bore: Bore, piece: Convex, T: Array) -> Distance:
                 n = (q - p) / d
                 found = Distance(d - e, d + e, p, q, n, None, "features", "groove kernel").moved(place)
     return found if found.lower > 0.0 else Distance()
-
-
-def _meets(line: Array, piece: Hull, T: Array) -> bool:
-    ends = line @ T[:3, :3].T + T[:3, 3]
-    h = ends @ piece.planes[:, :3].T + piece.planes[:, 3]
-    if ((h > 0.0).all(axis=0)).any():
-        return False
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cut = h[0] / (h[0] - h[1])
-    low = cut[h[0] > 0.0].max(initial=0.0)
-    high = cut[h[1] > 0.0].min(initial=1.0)
-    return bool(low <= high)
 
 
 def _with_witnesses(known: Distance, a: ClosedForm, b: ClosedForm, T: Array) -> Distance:
@@ -225,6 +214,14 @@ def _with_witnesses(known: Distance, a: ClosedForm, b: ClosedForm, T: Array) -> 
         return _attested(known, a, b, T, p + shifts, q + shifts)
     shifts = none if a.surface is not None or b.surface is not None else np.vstack([none, *lines])
     trials = np.vstack([x + shifts for x in (p, q, 0.5 * (p + q))])
+    found = _deepest_common(known, a, b, T, trials)
+    if found.upper <= known.upper + MEMBER and found.point_a is not None and known.normal is not None:
+        return replace(found, point_a=p, point_b=q) if np.abs(found.point_a - p).max() == 0.0 else found
+    return found
+
+
+def _deepest_common(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, trials: Array) -> Distance:
+    """``known`` with the deepest of ``trials`` (k, 3) that lie in both bodies as its witness, or without points."""
     slack = MEMBER * (1.0 + float(np.abs(trials).max()))
     in_a, in_b = a.depth(trials), b.depth((trials - T[:3, 3]) @ T[:3, :3])
     both = np.where(np.minimum(in_a, in_b) >= -slack, np.maximum(in_a, in_b), -np.inf)
@@ -232,10 +229,8 @@ def _with_witnesses(known: Distance, a: ClosedForm, b: ClosedForm, T: Array) -> 
     if both[k] == -np.inf:
         return replace(known, upper=math.inf, point_a=None, point_b=None)
     outside = max(0.0, -float(min(in_a[k], in_b[k])))
-    upper = min(0.0, 4.0 * outside - float(both[k]))
-    if upper <= known.upper + slack and k % len(shifts) == 0 and known.normal is not None:
-        return replace(known, upper=max(upper, known.upper))
-    return replace(known, upper=max(upper, known.lower), point_a=trials[k], point_b=trials[k])
+    upper = max(known.lower, min(0.0, 4.0 * outside - float(both[k])))
+    return replace(known, upper=upper, point_a=trials[k], point_b=trials[k])
 
 
 def _attested(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array, q: Array) -> Distance:
@@ -269,17 +264,8 @@ def _face_to_face(known: Distance, piece: Convex, other: Convex, a: ClosedForm, 
     p, q = np.vstack([p, q - gap * n]), np.vstack([p + gap * n, q])
     if gap >= 0.0:
         return _attested(replace(known, upper=gap, method="convex"), a, b, T, p, q)
-    trials = 0.5 * (p + q)
-    p, q = np.vstack([p, q, trials]), np.vstack([p, q, trials])
-    slack = MEMBER * (1.0 + float(np.abs(p).max()))
-    in_a, in_b = a.depth(p), b.depth((q - t) @ R)
-    reached = np.where((in_a >= -slack) & (in_b >= -slack), np.maximum(in_a, in_b), -np.inf)
-    k = int(np.argmax(reached))
-    if reached[k] == -np.inf:
-        return replace(known, upper=math.inf, point_a=None, point_b=None)
-    outside = max(0.0, -float(min(in_a[k], in_b[k])))
-    upper = max(known.lower, min(0.0, 4.0 * outside - float(reached[k])))
-    return replace(known, upper=upper, point_a=p[k], point_b=q[k], method="convex")
+    found = _deepest_common(known, a, b, T, np.vstack([p, q, 0.5 * (p + q)]))
+    return replace(found, method="convex")
 
 
 def _along(piece: Convex, T: Array | None) -> Array:

@@ -167,6 +167,15 @@ class Hull:
             found.append(min((on_edge, on_face), key=lambda y: float(np.linalg.norm(y - x))))
         return np.array(found)
 
+    def crossed_by(self, ends: Array) -> bool:
+        """Whether the segment between ``ends`` (2, 3) meets the polyhedron."""
+        h, k = ends @ self.planes[:, :3].T + self.planes[:, 3]
+        if ((h > 0.0) & (k > 0.0)).any():
+            return False
+        enters, leaves = h > 0.0, k > 0.0
+        low = (h[enters] / (h - k)[enters]).max(initial=0.0)
+        return bool(low <= (h[leaves] / (h - k)[leaves]).min(initial=1.0))
+
     def clipped(self, plane: Array) -> Hull | None:
         """What of it lies in the half-space plane[:3] . x + plane[3] >= 0; None if it has no volume."""
         V = self.vertices
@@ -221,7 +230,7 @@ def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
 def _unique(a: Convex, Ta: Array, b: Convex, Tb: Array, found: Distance) -> bool | None:
     """Whether the nearest points are the only ones, from what of either piece lies furthest along the normal."""
     n = found.normal
-    if n is None or found.upper - found.lower > 1e-9 or found.upper < -1e-9:
+    if n is None or found.lower < -1e-9:
         return None
     (i, u), (j, v) = a.flatness(n @ Ta[:3, :3]), b.flatness(-n @ Tb[:3, :3])
     if i == 0 or j == 0:
@@ -264,7 +273,7 @@ def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None) -> Distanc
     _V, E, F = (_placed(x, Tb) for x in b.near(None if n is None else -n @ Tb[:3, :3]))
     ends = _placed(a.ends, Ta)
     d, x, q = min([segment_pairs(ends[None], E), to_faces(ends, F)], key=lambda found: found[0])
-    if not d > 1e-9 * a.radius or _pierced(ends, b, Tb):
+    if not d > 1e-9 * a.radius or b.crossed_by(_placed(ends, inverse(Tb))):
         return Distance()
     m = (q - x) / d
     axis = Ta[:3, :3] @ a.T[:3, 2]
@@ -280,20 +289,6 @@ def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None) -> Distanc
     if found.upper - found.lower > 1e-10 and len(b.vertices) <= _SMALL:
         found = found.meet(_rims(a, Ta, b, Tb))
     return found
-
-
-def _pierced(ends: Array, b: Hull, Tb: Array) -> bool:
-    """Whether the segment between ``ends`` (2, 3) meets the polyhedron."""
-    h = (ends - Tb[:3, 3]) @ Tb[:3, :3] @ b.planes[:, :3].T + b.planes[:, 3]
-    low, high = 0.0, 1.0
-    for h0, h1 in h.T.tolist():
-        if h0 > 0.0 and h1 > 0.0:
-            return False
-        if h0 > 0.0:
-            low = max(low, h0 / (h0 - h1))
-        elif h1 > 0.0:
-            high = min(high, h0 / (h0 - h1))
-    return low <= high
 
 
 def _rims(a: Rod, Ta: Array, b: Convex, Tb: Array) -> Distance:

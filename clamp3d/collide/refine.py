@@ -175,6 +175,8 @@ def measured(known: Distance, accuracy: float = ACCURACY) -> bool:
 
 def with_normal(found: Distance) -> Distance:
     """``found`` with the normal that its points give, where they are apart."""
+    if found.upper - found.lower > 1e-6:
+        found = replace(found, unique=None)
     p, q = found.point_a, found.point_b
     if p is None or q is None or not found.upper > 1e-6:
         return found

@@ -40,14 +40,14 @@ def exploded_figure(clamp: Clamp) -> Figure:
     camera = Camera()
     poses = exploded_poses(clamp)
     solids = _solids(clamp)
-    draw_solids(ax, [PosedMesh(solids[n], poses[n].T(), PART_COLOURS[n]) for n in PARTS], camera)
+    drawn = {name: PosedMesh(solids[name], poses[name].T(), PART_COLOURS[name]) for name in PARTS}
+    draw_solids(ax, list(drawn.values()), camera)
     x0, x1 = ax.get_xlim()
     width = x1 - x0
     points = {}
-    for name in PARTS:
-        T = poses[name].T()
-        u, y, v = _outer_point(clamp, name)
-        points[name] = camera.project((T[:3, :3] @ (u, y, -v) + T[:3, 3])[None])[0, :2]
+    for name, shown in drawn.items():
+        outline = camera.view(shown)
+        points[name] = outline[outline[:, 0].argmin() if name == "P6" else outline[:, 0].argmax(), :2]
     order = sorted((name for name in PARTS if name != "P6"), key=lambda name: float(points[name][1]))
     heights = dict(zip(order, spread([float(points[n][1]) for n in order], 0.085 * width), strict=True))
     for name, (px, py) in points.items():
@@ -108,7 +108,7 @@ def steps_figure(run: Assembly) -> Figure:
         title(axes[0, i], f"{i + 1}   {step}", waypoint.label)
         draw_section(axes[1, i], run.clamp, poses)
         for name, pose in poses.items():
-            balloon(axes[1, i], name, *pose.point(*_middle(run.clamp, name)), size=6.0)
+            balloon(axes[1, i], name, *pose.point(*part_anchor(run.clamp, name, right=False)), size=6.0)
         _arrows(axes[1, i], run.clamp, [w.poses for w in run.path[start : stop + 1]], poses)
         start = stop
     same_scale([*axes[1]])
@@ -155,31 +155,3 @@ def _same_window(axes: list[Axes]) -> None:
 def _solids(clamp: Clamp) -> dict[PartName, trimesh.Trimesh]:
     error = max(MIN_MESH_ERROR, _MESH_ERROR * clamp.up_splint.width)
     return {name: mesh(part, error) for name, part in parts(clamp).items()}
-
-
-def _middle(clamp: Clamp, name: PartName) -> tuple[float, float]:
-    """A point (u, v) in the middle of the part's material, beside the bolt, for its name."""
-    up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
-    return {
-        "P1": (0.27 * up.width, 0.45 * up.thickness),
-        "P2": (-0.21 * down.width, 0.5 * (down.face_depth + down.underside_depth)),
-        "P3": (-0.37 * saddle.width, saddle.radius + 0.3 * saddle.apex_thickness),
-        "P4": (0.0, clamp.bolt.shank_length + 0.5 * clamp.bolt.head_height),
-        "P5": (0.0, 0.5 * clamp.nut.height),
-        "P6": (0.0, 0.0),
-        "P7": (0.0, 0.0),
-    }[name]
-
-
-def _outer_point(clamp: Clamp, name: PartName) -> tuple[float, float, float]:
-    """A point (u, along, v) on the right of the part's near face, for its name's line."""
-    up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
-    return {
-        "P1": (up.width, -0.1 * up.length, 0.5 * up.thickness),
-        "P2": (down.width / 2, -0.1 * down.length, 0.5 * (down.face_depth + down.underside_depth)),
-        "P3": (saddle.width / 2, -0.1 * saddle.length, saddle.radius + 0.6 * saddle.apex_thickness),
-        "P4": (0.4 * clamp.bolt.diameter, 0.0, clamp.bolt.shank_length + 0.5 * clamp.bolt.head_height),
-        "P5": (0.4 * clamp.nut.across_flats, 0.0, 0.5 * clamp.nut.height),
-        "P6": (0.0, -0.5 * clamp.wire_length, 0.0),
-        "P7": (0.0, 0.45 * clamp.wire_length, 0.0),
-    }[name]

@@ -197,17 +197,14 @@ def _render(
     mesh_error: float,
 ) -> dict[str, bytes]:
     """Contents of one exported file by its name (OBJ has two)."""
-    name = f"{base}.{format}"
-    match format:
-        case "stl":
-            return {name: mesh_formats.stl(meshed, title, unit)}
-        case "ply":
-            return {name: mesh_formats.ply(meshed, title, unit)}
-        case "obj":
-            model, materials = mesh_formats.obj(meshed, title, unit, f"{base}.mtl")
-            return {name: model, f"{base}.mtl": materials}
-        case "glb":
-            return {name: mesh_formats.glb(meshed, title, {"unit": "m", "mesh_error_mm": mesh_error})}
-        case "3mf":
-            return {name: mesh_formats.three_mf(meshed, title, unit, f"chord error {mesh_error:g} mm at most")}
-    return {name: step(placed, title, unit)}
+    if format == "obj":
+        model, materials = mesh_formats.obj(meshed, title, unit, f"{base}.mtl")
+        return {f"{base}.obj": model, f"{base}.mtl": materials}
+    content = {
+        "stl": lambda: mesh_formats.stl(meshed, title, unit),
+        "ply": lambda: mesh_formats.ply(meshed, title, unit),
+        "glb": lambda: mesh_formats.glb(meshed, title, mesh_error),
+        "3mf": lambda: mesh_formats.three_mf(meshed, title, unit, mesh_error),
+        "step": lambda: step(placed, title, unit),
+    }[format]()
+    return {f"{base}.{format}": content}

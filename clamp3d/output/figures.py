@@ -17,14 +17,12 @@ from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.errors import InputError
-from clamp3d.output.files import whole_file
-from clamp3d.output.palette import INK
+from clamp3d.output.files import STDOUT, whole_file
+from clamp3d.output.palette import INK, VERDICT_COLOURS
 from clamp3d.output.section import (
-    Mark,
     Poses,
     draw_dimensions,
     draw_labels,
-    draw_marks,
     draw_section,
     edge_openings,
     label_wires,
@@ -39,7 +37,7 @@ FORMATS = (".svg", ".png", ".pdf")
 
 
 def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
-    """Write ``figure`` to ``path`` by its suffix, whole or not at all; equal figures give equal files.
+    """Write ``figure`` to ``path`` by its suffix (``-``: SVG), whole or not at all; equal figures give equal files.
 
     Raises InputError for a suffix other than .svg, .png, .pdf and for a folder that cannot be written.
     """
@@ -48,12 +46,12 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
 
     instance("figure", figure, Figure)
     path, dpi = checked_path("figure file", path), whole("dpi", dpi, least=1)
-    suffix = path.suffix.lower()
+    suffix = ".svg" if path == STDOUT else path.suffix.lower()
     if suffix not in FORMATS:
         raise InputError(f"figure file must end in {', '.join(FORMATS)}, got {path.name!r}")
     metadata: dict[str, Any] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix, {})
     with whole_file(path) as temporary, mpl.rc_context({"svg.hashsalt": "clamp3d"}):
-        figure.savefig(temporary, dpi=dpi, metadata=metadata)
+        figure.savefig(temporary, format=suffix[1:], dpi=dpi, metadata=metadata)
     return path
 
 
@@ -71,7 +69,7 @@ def section_figure(run: Assembly, waypoint: Waypoint | None = None) -> Figure:
     draw_labels(ax, run.clamp, poses)
     draw_dimensions(ax, run.clamp, poses)
     if waypoint is None:
-        draw_marks(ax, _marks(_arc_contacts(run)))
+        _draw_points(ax, _arc_contacts(run))
     title(ax, "final state" if waypoint is None else waypoint.label, f"{run.clamp.name} clamp, section to scale, mm")
     return figure
 
@@ -91,7 +89,7 @@ def states_figure(run: Assembly) -> Figure:
         title(ax, name, f"distance between the splints {edge_openings(run.clamp, poses)[0]:.3f} mm")
     label_wires(axes[0], near(run.clamp, run.path[0].poses))
     draw_labels(axes[1], run.clamp, run.poses)
-    draw_marks(axes[1], _marks(_arc_contacts(run)))
+    _draw_points(axes[1], _arc_contacts(run))
     same_scale(axes)
     return figure
 
@@ -111,10 +109,11 @@ def contacts_figure(run: Assembly) -> Figure:
         overview, "concave arc contacts", f"{run.clamp.name} clamp, final state; dot: contact point, arrow: its normal"
     )
     for i, contact in enumerate(contacts):
-        for mark in _marks([contact]):
-            draw_marks(overview, [mark], size=5.0)
+        _draw_points(overview, [contact], size=5.0)
+        if contact.point is not None:
             side = 1 if i % 2 else -1
-            _number(overview, i + 1, mark, mark.x + side * 0.09 * run.clamp.up_splint.width)
+            x, y = float(contact.point[0]), -float(contact.point[2])
+            _number(overview, i + 1, (x, y), x + side * 0.09 * run.clamp.up_splint.width)
         _enlarge(figure.add_subplot(grid[i // 2, 1 + i % 2]), run, contact, f"{i + 1}  ")
     return figure
 
@@ -130,7 +129,7 @@ def contact_figure(run: Assembly, contact: Contact) -> Figure:
     draw_section(overview, run.clamp, run.poses)
     label_wires(overview, run.poses)
     draw_dimensions(overview, run.clamp, run.poses)
-    draw_marks(overview, _marks([contact]))
+    _draw_points(overview, [contact])
     _enlarge(close, run, contact)
     return figure
 
@@ -139,7 +138,8 @@ def _enlarge(ax: Axes, run: Assembly, contact: Contact, number: str = "") -> Non
     """The two parts about their contact point; grooves in the section beside the bolt, where they are whole."""
     half = 0.045 * run.clamp.up_splint.width
     below = gap_text(contact.distance.lower, contact.distance.upper)
-    if contact.point is not None and abs(contact.point[1]) > CONTACT:
+    in_arc = 3 in (contact.declared, contact.type)  # along a line, the section too
+    if contact.point is not None and abs(contact.point[1]) > CONTACT and not in_arc:
         below += f", {abs(contact.point[1]):.1f} mm {'before' if contact.point[1] < 0.0 else 'behind'} the section"
     if contact.normal is not None and abs(contact.normal[1]) > 0.7:
         half *= 4.0  # nearest across the section: a bolt in its hole, which is seen whole
@@ -147,24 +147,20 @@ def _enlarge(ax: Axes, run: Assembly, contact: Contact, number: str = "") -> Non
     ax.set_title(f"{heading}\n{below}", fontsize=8, loc="left", color=INK)
     ax.set_xticks([])
     ax.set_yticks([])
-    for mark in _marks([contact]):
-        window = (mark.x - 1.5 * half, mark.y - half), (mark.x + 1.5 * half, mark.y + half)
-        holes = 3 not in (contact.declared, contact.type)
-        draw_section(ax, run.clamp, run.poses, only=(contact.a, contact.b), holes=holes, line_width=1.6, window=window)
-        draw_marks(ax, [mark], size=7.0)
-        if contact.normal is not None:
-            tip = {
-                "arrowstyle": "-|>,head_width=0.2,head_length=0.5",
-                "color": INK,
-                "lw": 1.2,
-                "shrinkA": 3,
-                "shrinkB": 0,
-            }
-            end = mark.x + 0.6 * half * float(contact.normal[0]), mark.y - 0.6 * half * float(contact.normal[2])
-            ax.annotate("", end, (mark.x, mark.y), arrowprops=tip, zorder=42)
-        ax.set_axis_on()
-        ax.set_xlim(window[0][0], window[1][0])
-        ax.set_ylim(window[1][1], window[0][1])
+    if contact.point is None:
+        return
+    x, y = float(contact.point[0]), -float(contact.point[2])
+    window = (x - 1.5 * half, y - half), (x + 1.5 * half, y + half)
+    pair = contact.a, contact.b
+    draw_section(ax, run.clamp, run.poses, only=pair, holes=not in_arc, line_width=1.6, window=window)
+    _draw_points(ax, [contact], size=7.0)
+    if contact.normal is not None:
+        tip = {"arrowstyle": "-|>,head_width=0.2,head_length=0.5", "color": INK, "lw": 1.2, "shrinkB": 0}
+        end = x + 0.6 * half * float(contact.normal[0]), y - 0.6 * half * float(contact.normal[2])
+        ax.annotate("", end, (x, y), arrowprops=tip, zorder=42)
+    ax.set_axis_on()
+    ax.set_xlim(window[0][0], window[1][0])
+    ax.set_ylim(window[1][1], window[0][1])
 
 
 def title(ax: Axes, text: str, below: str = "") -> None:
@@ -195,13 +191,18 @@ def _arc_contacts(run: Assembly) -> list[Contact]:
     return [contact for contact in run.contacts if 3 in (contact.declared, contact.type)]
 
 
-def _marks(contacts: Sequence[Contact]) -> list[Mark]:
-    """Dots at the contacts' points; none where no point is known."""
-    verdict = Thresholds(contact=CONTACT).verdict
-    return [Mark(float(c.point[0]), -float(c.point[2]), verdict(c.distance)) for c in contacts if c.point is not None]
+def _draw_points(ax: Axes, contacts: Sequence[Contact], *, size: float = 6.0) -> None:
+    """Dots at the contacts' points, in the colours of their verdicts."""
+    for contact in contacts:
+        if contact.point is not None:
+            verdict = Thresholds(contact=CONTACT).verdict(contact.distance)
+            style: dict[str, Any] = {"ms": size, "mec": INK, "mew": 0.7, "mfc": VERDICT_COLOURS[verdict]}
+            ax.plot([contact.point[0]], [-contact.point[2]], "o", **style, zorder=40, clip_on=False)
 
 
-def _number(ax: Axes, number: int, mark: Mark, x: float) -> None:
-    ax.plot([mark.x, x], [mark.y, mark.y], color=INK, lw=0.8, zorder=45)
+def _number(ax: Axes, number: int, point: tuple[float, float], x: float) -> None:
+    ax.plot([point[0], x], [point[1]] * 2, color=INK, lw=0.8, zorder=45)
     box = {"boxstyle": "circle,pad=0.25", "fc": "white", "ec": INK, "lw": 1.0}
-    ax.annotate(str(number), (x, mark.y), ha="center", va="center", fontsize=9, fontweight="bold", zorder=46, bbox=box)
+    ax.annotate(
+        str(number), (x, point[1]), ha="center", va="center", fontsize=9, fontweight="bold", zorder=46, bbox=box
+    )

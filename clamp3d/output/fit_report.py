@@ -49,8 +49,8 @@ def fit_to_text(result: FitResult) -> str:
             f"{f.radius_std:.1e}",
             _arc(f),
             f"{f.length:.3f}",
-            _vector(f.T_part_feature[:3, 3], 4),
-            _vector(f.T_part_feature[:3, 2], 5),
+            _point(f),
+            _direction(f),
             f"{f.residual_rms:.1e}",
             f"{f.error_bound:.4f}",
         )
@@ -92,7 +92,8 @@ def fit_to_html(result: FitResult) -> str:
         extent=_vector(high - low, 2),
         kind=kind,
         arc=_arc,
-        vector=_vector,
+        point=_point,
+        direction=_direction,
         short=_short,
         degrees=math.degrees,
         data=json.dumps(data),
@@ -116,6 +117,14 @@ def _arc(f: FittedSurface) -> str:
 
 def _vector(values: np.ndarray[tuple[int], np.dtype[np.float64]], digits: int) -> str:
     return ", ".join(f"{v:z.{digits}f}" for v in values)
+
+
+def _point(f: FittedSurface) -> str:
+    return _vector(f.T_part_feature[:3, 3], 4)
+
+
+def _direction(f: FittedSurface) -> str:
+    return _vector(f.T_part_feature[:3, 2], 5)
 
 
 def _short(value: float) -> str:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, MissingLibraryError
@@ -70,40 +71,44 @@ def stl(items: Sequence[Placement], title: str, unit: str) -> bytes:
                 f"stl holds 32-bit numbers: the pose of {item.placed.name} would lose {rounding:.2g} mm, allowed "
                 f"{allowed:.2g} mm; bring the parts to the origin, or use glb, 3mf, step, obj or ply"
             )
-    corners = np.concatenate([item.vertices[item.faces] for item in items]).astype(np.float32)
-    facets = trimesh.Trimesh(**trimesh.triangles.to_kwargs(corners.astype(np.float64)), process=False)  # type: ignore[no-untyped-call]
+    vertices, faces = _joined(items)
+    rounded = trimesh.Trimesh(vertices.astype(np.float32), faces, process=False)
     header = f"clamp3d {title}; unit {unit}; Z up".encode("ascii", "replace")[:80].ljust(80, b" ")
-    return header + bytes(trimesh.exchange.stl.export_stl(facets))[80:]
+    return header + bytes(trimesh.exchange.stl.export_stl(rounded))[80:]
 
 
 def ply(items: Sequence[Placement], title: str, unit: str) -> bytes:
     """Binary PLY with double coordinates, a colour per vertex, and name, unit and axes as comments."""
-    vertices = np.zeros(sum(len(i.vertices) for i in items), dtype=[("position", "<f8", 3), ("colour", "u1", 3)])
-    faces = np.zeros(sum(len(i.faces) for i in items), dtype=[("n", "u1"), ("corners", "<i4", 3)])
-    faces["n"] = 3
-    v = f = 0
-    for item in items:
-        n, m = len(item.vertices), len(item.faces)
-        vertices["position"][v : v + n] = item.vertices
-        vertices["colour"][v : v + n] = item.placed.rgb
-        faces["corners"][f : f + m] = item.faces + v
-        v, f = v + n, f + m
-    header = "\n".join(
-        [
-            "ply",
-            "format binary_little_endian 1.0",
-            f"comment clamp3d {title}",
-            f"comment unit {unit}, Z up",
-            *(f"comment part {item.placed.label}" for item in items),
-            f"element vertex {len(vertices)}",
-            *(f"property double {axis}" for axis in "xyz"),
-            *(f"property uchar {colour}" for colour in ("red", "green", "blue")),
-            f"element face {len(faces)}",
-            "property list uchar int vertex_indices",
-            "end_header\n",
-        ]
-    )
+    points, corners = _joined(items)
+    vertices = np.zeros(len(points), dtype=[("position", "<f8", 3), ("colour", "u1", 3)])
+    vertices["position"] = points
+    vertices["colour"] = np.repeat([i.placed.rgb for i in items], [len(i.vertices) for i in items], axis=0)
+    faces = np.zeros(len(corners), dtype=[("n", "u1"), ("corners", "<i4", 3)])
+    faces["n"], faces["corners"] = 3, corners
+    parts = "".join(f"comment part {item.placed.label}\n" for item in items)
+    header = f"""ply
+format binary_little_endian 1.0
+comment clamp3d {title}
+comment unit {unit}, Z up
+{parts}element vertex {len(vertices)}
+property double x
+property double y
+property double z
+property uchar red
+property uchar green
+property uchar blue
+element face {len(faces)}
+property list uchar int vertex_indices
+end_header
+"""
     return header.encode("ascii", "replace") + vertices.tobytes() + faces.tobytes()
+
+
+def _joined(items: Sequence[Placement]) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (n, 3) and faces (m, 3) of all meshes as one."""
+    starts = np.cumsum([0, *(len(item.vertices) for item in items)])
+    faces = [item.faces + start for item, start in zip(items, starts[:-1], strict=True)]
+    return np.concatenate([item.vertices for item in items]), np.concatenate(faces)
 
 
 def obj(items: Sequence[Placement], title: str, unit: str, mtl_name: str) -> tuple[bytes, bytes]:
@@ -124,7 +129,7 @@ def obj(items: Sequence[Placement], title: str, unit: str, mtl_name: str) -> tup
     return model, material
 
 
-def glb(items: Sequence[Placement], title: str, extras: dict[str, Any]) -> bytes:
+def glb(items: Sequence[Placement], title: str, mesh_error: float) -> bytes:
     """Binary glTF 2.0: metres and Y up (the root node turns Z up to it), local coordinates, named nodes, materials."""
     import trimesh
 
@@ -145,7 +150,7 @@ def glb(items: Sequence[Placement], title: str, extras: dict[str, Any]) -> bytes
         )
 
     def finish(tree: dict[str, Any]) -> None:
-        tree["asset"] = {"version": "2.0", "generator": "clamp3d", "extras": extras}
+        tree["asset"] = {"version": "2.0", "generator": "clamp3d", "extras": {"unit": "m", "mesh_error_mm": mesh_error}}
         tree["materials"] = []
         for item, entry in zip(items, tree["meshes"], strict=True):
             colour = [*(round(_linear(c), 6) for c in item.placed.rgb), 1.0]
@@ -161,7 +166,7 @@ def glb(items: Sequence[Placement], title: str, extras: dict[str, Any]) -> bytes
     return bytes(data)
 
 
-def three_mf(items: Sequence[Placement], title: str, unit: str, description: str) -> bytes:
+def three_mf(items: Sequence[Placement], title: str, unit: str, mesh_error: float) -> bytes:
     """3MF core: the unit declared, one named and coloured object per part, joined as components of one build item.
 
     Same input, same bytes: the identifiers that lib3mf draws are replaced by ones of the names. Raises
@@ -178,7 +183,8 @@ def three_mf(items: Sequence[Placement], title: str, unit: str, description: str
     wrapper = lib3mf.get_wrapper()
     model = wrapper.CreateModel()
     model.SetUnit(getattr(lib3mf.ModelUnit, _3MF_UNITS[unit]))
-    for key, text in (("Title", title), ("Application", "clamp3d"), ("Description", description)):
+    described = f"chord error {mesh_error:g} mm at most"
+    for key, text in (("Title", title), ("Application", "clamp3d"), ("Description", described)):
         model.GetMetaDataGroup().AddMetaData("", key, text, "xs:string", True)
     materials = model.AddBaseMaterialGroup()
     leaves = []

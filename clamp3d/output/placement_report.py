@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from clamp3d import __version__
-from clamp3d.clamp.placement import FREEDOMS, Freedom, Limits, Outcome, Outcomes, Tolerances, WireClosing
+from clamp3d.clamp.placement import FREEDOMS, Freedom, Limits, Outcome, Outcomes, Placement, PlacementTolerance
 from clamp3d.core.distance import Feature
-from clamp3d.output.files import whole_file
+from clamp3d.output.figures import save_figure
 from clamp3d.output.palette import INK
 
 ANGLES: tuple[Freedom, ...] = ("yaw", "pitch")
@@ -40,8 +40,8 @@ def limits_text(limit: Limits) -> str:
     return f"{limit.freedom:8s} {below}{low:+.3f} to {above}{high:+.3f} {unit}"
 
 
-def sweep_to_text(closing: WireClosing, tolerances: Tolerances, cloud: Outcomes | None) -> str:
-    """Tolerances, and the shares of a random cloud if there is one."""
+def sweep_to_text(closing: Placement, tolerances: PlacementTolerance, cloud: Outcomes | None) -> str:
+    """PlacementTolerance, and the shares of a random cloud if there is one."""
     clamp = closing.clamp
     wire = clamp.line if closing.wire == "P6" else clamp.jumper
     lines = [
@@ -60,7 +60,10 @@ def sweep_to_text(closing: WireClosing, tolerances: Tolerances, cloud: Outcomes 
 
 
 def sweep_to_dict(
-    closing: WireClosing, tolerances: Tolerances, grids: dict[tuple[Freedom, Freedom], Outcomes], cloud: Outcomes | None
+    closing: Placement,
+    tolerances: PlacementTolerance,
+    grids: dict[tuple[Freedom, Freedom], Outcomes],
+    cloud: Outcomes | None,
 ) -> dict[str, Any]:
     """The sweep as JSON data; lengths in mm, angles in degrees."""
     data: dict[str, Any] = {
@@ -99,7 +102,7 @@ def _points(outcomes: Outcomes) -> dict[str, Any]:
     return columns
 
 
-def grid(closing: WireClosing, x: Freedom, y: Freedom, ranges: dict[Freedom, float], steps: int) -> Outcomes:
+def grid(closing: Placement, x: Freedom, y: Freedom, ranges: dict[Freedom, float], steps: int) -> Outcomes:
     """Outcomes (steps * steps) over two freedoms, y slowest, the others at nominal."""
     m = np.zeros((steps * steps, len(FREEDOMS)))
     a, b = (np.linspace(-ranges[f], ranges[f], steps) for f in (x, y))
@@ -114,8 +117,8 @@ def planes(ranges: dict[Freedom, float]) -> list[tuple[Freedom, Freedom]]:
 
 def draw_map(
     path: Path,
-    closing: WireClosing,
-    tolerances: Tolerances,
+    closing: Placement,
+    tolerances: PlacementTolerance,
     grids: dict[tuple[Freedom, Freedom], Outcomes],
     ranges: dict[Freedom, float],
 ) -> None:
@@ -132,31 +135,19 @@ def draw_map(
         axes = figure.add_subplot(1, len(grids), k + 1)
         steps = math.isqrt(len(outcomes.outcome))
         a, b = shown(x, ranges[x]), shown(y, ranges[y])
-        field = outcomes.outcome.reshape(steps, steps)
-        edge = (a * (1 + 1 / (steps - 1)), b * (1 + 1 / (steps - 1)))
-        axes.imshow(
-            field, origin="lower", extent=(-edge[0], edge[0], -edge[1], edge[1]), aspect="auto", cmap=colours, norm=norm
-        )
-        axes.contourf(
-            np.linspace(-a, a, steps),
-            np.linspace(-b, b, steps),
-            field == Outcome.TOUCHES_WRONGLY,
-            levels=[0.5, 1.5],
-            colors="none",
-            hatches=["///"],
-        )
-        opening = np.where(np.isfinite(outcomes.opening), outcomes.opening, np.nan).reshape(steps, steps)
+        across, along = np.linspace(-a, a, steps), np.linspace(-b, b, steps)
+        field, opening = outcomes.outcome.reshape(steps, steps), outcomes.opening.reshape(steps, steps)
+        axes.pcolormesh(across, along, field, cmap=colours, norm=norm, shading="nearest")
+        wrong = field == Outcome.TOUCHES_WRONGLY
+        axes.contourf(across, along, wrong, levels=[0.5, 1.5], colors="none", hatches=["///"])
+        opening = np.where(np.isfinite(opening), opening, np.nan)
         levels = [v for v in (0.1, 0.25, 1.0, 2.0, 5.0, 10.0) if v < np.nanmax(opening)]
-        grid_a, grid_b = np.linspace(-a, a, steps), np.linspace(-b, b, steps)
-        lines = axes.contour(grid_a, grid_b, opening, levels=levels, colors="white", linewidths=0.9)
+        lines = axes.contour(across, along, opening, levels=levels, colors="white", linewidths=0.9)
         axes.clabel(lines, fmt="%g mm", fontsize=7)
-        for freedom, mark in ((x, axes.axvline), (y, axes.axhline)):
-            for value, is_open in (
-                (limits[freedom].low, limits[freedom].low_open),
-                (limits[freedom].high, limits[freedom].high_open),
-            ):
+        for limit, mark in ((limits[x], axes.axvline), (limits[y], axes.axhline)):
+            for value, is_open in ((limit.low, limit.low_open), (limit.high, limit.high_open)):
                 if not is_open:
-                    mark(shown(freedom, value), color=INK, linewidth=0.9, linestyle=(0, (4, 3)))
+                    mark(shown(limit.freedom, value), color=INK, linewidth=0.9, linestyle=(0, (4, 3)))
         axes.set_xlim(-a, a)
         axes.set_ylim(-b, b)
         axes.set_xlabel(_TITLES[x])
@@ -178,7 +169,4 @@ def draw_map(
         "White lines: opening. Dashed: limit of one freedom alone.",
         title_fontsize=8,
     )
-    kind = path.suffix.lower().lstrip(".") or "png"
-    metadata = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, format=kind, dpi=130, metadata=metadata)
+    save_figure(figure, path)

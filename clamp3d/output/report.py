@@ -209,7 +209,7 @@ def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
         rows=tuple(rows[id(pair)] for pair in result.pairs),
         motions=tuple(rows[id(pair)] for pair in result.motions),
         n_pairs=result.work.pairs,
-        modelled=(*(_described(part.name, part.shape) for part in scene.parts[:MEASURED_PAIRS]), _motions(scene)),
+        modelled=_modelled(scene),
         not_modelled=(
             *_left_out(scene),
             *_NOT_MODELLED,
@@ -297,16 +297,27 @@ def _thresholds(scene: Scene) -> dict[str, str]:
     return {"contact": f"gap or overlap up to {t.contact:g} mm", "clearance": clearance}
 
 
-def _described(name: str, shape: object) -> str:
-    if not isinstance(shape, MeshShape):
-        return f"{name}: drawn with true arcs, measured in closed form where one is known, else on ever finer meshes"
-    how = {
+def _modelled(scene: Scene) -> tuple[str, ...]:
+    taken = {
         "bound": "its facets, with the error bound of the surfaces fitted to them",
         "round": "round surfaces through its vertices where they fit",
         "off": "its facets",
-    }[shape.fit]
-    notes = "".join(f"; {note}" for note in shape.mesh.notes)
-    return f"{name}: mesh {shape.name} of {len(shape.mesh.faces)} triangles, taken as {how}{notes}"
+    }
+    alike: dict[str, list[str]] = {}
+    for part in scene.parts:
+        how = "drawn with true arcs, measured in closed form where one is known, else on ever finer meshes"
+        if isinstance(part.shape, MeshShape):
+            facets = part.shape.mesh
+            how = f"mesh {part.shape.name} of {len(facets.faces)} triangles, taken as {taken[part.shape.fit]}"
+            how += "".join(f"; {note}" for note in facets.notes)
+        alike.setdefault(how, []).append(part.name)
+    lines = [
+        f"{', '.join(names[:20])}{f' and {len(names) - 20} more' * (len(names) > 20)}: {how}"
+        for how, names in alike.items()
+    ]
+    if scene.motions:
+        lines.append("motions of rigid parts, each from where the one before has ended, followed without a gap in time")
+    return tuple(lines)
 
 
 def _left_out(scene: Scene) -> list[str]:

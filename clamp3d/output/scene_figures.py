@@ -131,20 +131,13 @@ def _common(a: PosedMesh, b: PosedMesh) -> PosedMesh | None:
 
 
 def _hidden(camera: Camera, solids: Sequence[PosedMesh], place: Array) -> int:
-    """How many triangles lie between a place and the viewer."""
-    x, y, z = camera.project(place[None])[0]
+    """How many faces lie between a place and the viewer."""
     count = 0
     for solid in solids:
-        a, b, c = np.moveaxis(camera.view(solid)[solid.mesh.faces], 1, 0)
-        sides = [
-            (q[:, 0] - p[:, 0]) * (y - p[:, 1]) - (q[:, 1] - p[:, 1]) * (x - p[:, 0])
-            for p, q in ((a, b), (b, c), (c, a))
-        ]
-        inside = (np.array(sides) > 0.0).all(0) | (np.array(sides) < 0.0).all(0)
-        total = np.sum(sides, axis=0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            depth = (sides[1] * a[:, 2] + sides[2] * b[:, 2] + sides[0] * c[:, 2]) / total
-        count += int((inside & (depth > z + 1e-3)).sum())
+        R = solid.T[:3, :3]
+        towards = camera.axes()[2]
+        origin = R.T @ (place + 1e-3 * towards - solid.T[:3, 3])
+        count += len(solid.mesh.ray.intersects_location(origin[None], (R.T @ towards)[None])[0])
     return count
 
 

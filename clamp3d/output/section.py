@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import SectionPose
 from clamp3d.core.profile import Arc, Point, Profile
 from clamp3d.core.shapes import Solid
-from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, VERDICT_COLOURS, darker
+from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, darker
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,16 +29,16 @@ Poses = Mapping[PartName, SectionPose]
 
 _HATCH: dict[PartName, str] = {"P1": "////", "P2": "\\\\\\\\", "P3": "////"}
 WIRES: tuple[PartName, ...] = ("P6", "P7")
+_LINE: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
+_NUMBER: dict[str, Any] = {"color": DIMENSION, "fontsize": 9, "zorder": 26}
+_ARROW: dict[str, Any] = {
+    "arrowstyle": "-|>,head_width=0.18,head_length=0.45",
+    "color": DIMENSION,
+    "lw": 0.8,
+    "shrinkA": 0.0,
+    "shrinkB": 0.0,
+}
 _ORDER: tuple[PartName, ...] = ("P6", "P7", "P1", "P2", "P3", "P4", "P5")
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """A point of the section worth a dot: a contact. ``x``, ``y`` in mm; ``verdict`` picks the colour."""
-
-    x: float
-    y: float
-    verdict: str = "contact"
 
 
 def arc_path(profile: Profile) -> MplPath:
@@ -124,20 +123,13 @@ def balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> Non
     ax.annotate(name, (x, y), ha="center", va="center", fontsize=size, fontweight="bold", zorder=31, bbox=box)
 
 
-def draw_marks(ax: Axes, marks: Iterable[Mark], *, size: float = 6.0) -> None:
-    """Contact points as dots in the colour of their verdict."""
-    for mark in marks:
-        style: dict[str, Any] = {"ms": size, "mec": INK, "mew": 0.7, "mfc": VERDICT_COLOURS[mark.verdict]}
-        ax.plot([mark.x], [mark.y], "o", **style, zorder=40, clip_on=False)
-
-
 def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int] = (-1, 1)) -> None:
     """Distance between the splints at the edges (-1 line side, 1 jumper side), and the tilt of the down splint."""
     edges = _inner_edges(clamp, poses)
     for side in sides:
         above, below = edges[side > 0]
         x = (min if side < 0 else max)(above[0], below[0]) + side * 0.09 * clamp.up_splint.width
-        dimension(ax, above, below, x, f"{below[1] - above[1]:.3f}", side)
+        _dimension(ax, above, below, x, side)
     _draw_tilt(ax, clamp, poses["P2"])
 
 
@@ -155,45 +147,34 @@ def _inner_edges(clamp: Clamp, poses: Poses) -> list[tuple[Point, Point]]:
     ]
 
 
-def dimension(ax: Axes, a: tuple[float, float], b: tuple[float, float], x: float, text: str, side: int) -> None:
-    """A vertical dimension at ``x`` between the heights of ``a`` and ``b``; small ones get their arrows outside."""
-    style: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
-    for px, py in (a, b):
-        ax.plot([px + 1.5 * side, x + 2.0 * side], [py, py], **style)
-    y0, y1 = sorted((a[1], b[1]))
-    arrow: dict[str, Any] = {"color": DIMENSION, "lw": 0.8, "shrinkA": 0.0, "shrinkB": 0.0}
-    if y1 - y0 > 9.0:
-        ax.annotate("", (x, y0), (x, y1), arrowprops={"arrowstyle": "<|-|>,head_width=0.18,head_length=0.45", **arrow})
-    else:
-        for tip, tail in ((y0, y0 - 9.0), (y1, y1 + 9.0)):
-            ax.annotate(
-                "", (x, tip), (x, tail), arrowprops={"arrowstyle": "-|>,head_width=0.18,head_length=0.45", **arrow}
-            )
-    ax.annotate(
-        text,
-        (x + 2.0 * side, 0.5 * (y0 + y1)),
-        (3 * side, 0),
-        textcoords="offset points",
-        ha="right" if side < 0 else "left",
-        va="center",
-        fontsize=9,
-        color=DIMENSION,
-        zorder=26,
-    )
+def _dimension(ax: Axes, above: Point, below: Point, x: float, side: int) -> None:
+    """A vertical dimension at ``x`` between the heights of two points; small ones get their arrows outside."""
+    for px, py in (above, below):
+        ax.plot([px + 1.5 * side, x + 2.0 * side], [py, py], **_LINE)
+    top, bottom = sorted((above[1], below[1]))
+    reach = 9.0 if bottom - top <= 9.0 else 0.5 * (top - bottom)
+    for tip, tail in ((top, top - reach), (bottom, bottom + reach)):
+        ax.annotate("", (x, tip), (x, tail), arrowprops=_ARROW)
+    at = (x + 2.0 * side, 0.5 * (top + bottom))
+    text, align = f"{below[1] - above[1]:.3f}", "right" if side < 0 else "left"
+    ax.annotate(text, at, (3 * side, 0), textcoords="offset points", ha=align, va="center", **_NUMBER)
 
 
-def part_anchor(clamp: Clamp, name: PartName) -> tuple[float, float]:
-    """A point (u, v) well inside the part, towards the right, for its balloon's line."""
-    up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
-    return {
-        "P1": (0.94 * up.width, 0.3 * up.thickness),
-        "P2": (0.46 * down.width, 0.5 * (down.face_depth + down.underside_depth)),
-        "P3": (0.42 * saddle.width, saddle.radius + 0.6 * saddle.apex_thickness),
-        "P4": (0.25 * clamp.bolt.diameter, 0.08 * clamp.bolt.shank_length),
-        "P5": (0.4 * clamp.nut.across_flats, 0.5 * clamp.nut.height),
-        "P6": (0.0, 0.0),
-        "P7": (0.0, 0.0),
-    }[name]
+def part_anchor(clamp: Clamp, name: PartName, *, right: bool = True) -> tuple[float, float]:
+    """A point (u, v) in the part's material as the section shows it, for its name; ``right``: near its right end."""
+    import shapely
+
+    part = parts(clamp)[name]
+    shapes = [body.profile if body.axis == "Y" else _silhouette(body) for body in part.bodies]
+    area = shapely.union_all([shapely.Polygon(shape.polygon(0.01 * clamp.bolt.diameter)) for shape in shapes])
+    for hole in part.holes:
+        (u0, _), (u1, _) = hole.profile.bounds
+        area = area.difference(shapely.box(u0, -hole.end, u1, -hole.start))
+    u0, v0, u1, v1 = area.bounds
+    if right and name not in WIRES:
+        area = shapely.clip_by_rect(area, u1 - 0.15 * (u1 - u0), v0, u1, v1)
+    point = area.representative_point()
+    return float(point.x), float(point.y)
 
 
 def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
@@ -201,28 +182,19 @@ def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
     degrees = math.degrees(pose.angle)
     inward = 1.0 if pose.angle >= 0.0 else -1.0  # the lower corner is on the left if the tilt is positive
     corner = pose.point(-inward * down.width / 2, down.underside_depth)
-    style: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
     reach = inward * 0.19 * down.width
     if abs(degrees) < 5e-3:
-        ax.annotate("parallel", corner, (0, -11), textcoords="offset points", fontsize=9, color=DIMENSION, va="center")
+        ax.annotate("parallel", corner, (0, -11), textcoords="offset points", va="center", **_NUMBER)
         return
-    ax.plot([corner[0] - 0.06 * reach, corner[0] + reach * 1.15], [corner[1]] * 2, ls=(0, (8, 2, 1, 2)), **style)
+    ax.plot([corner[0] - 0.06 * reach, corner[0] + reach * 1.15], [corner[1]] * 2, ls=(0, (8, 2, 1, 2)), **_LINE)
     t = np.linspace(0.0, pose.angle, 30)
     xs, ys = corner[0] + reach * np.cos(t), corner[1] - reach * np.sin(t)
-    ax.plot(xs, ys, **style)
-    head: dict[str, Any] = {"arrowstyle": "-|>,head_width=0.18,head_length=0.45", "color": DIMENSION, "lw": 0.8}
+    ax.plot(xs, ys, **_LINE)
     for tip, tail in ((0, 3), (-1, -4)):
-        ax.annotate("", (xs[tip], ys[tip]), (xs[tail], ys[tail]), arrowprops={**head, "shrinkA": 0, "shrinkB": 0})
-    ax.annotate(
-        f"{abs(degrees):.2f}\N{DEGREE SIGN}",
-        (corner[0] + 0.45 * reach, max(corner[1], ys.max())),
-        (0, -10),
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        fontsize=9,
-        color=DIMENSION,
-    )
+        ax.annotate("", (xs[tip], ys[tip]), (xs[tail], ys[tail]), arrowprops=_ARROW)
+    at = (corner[0] + 0.45 * reach, max(corner[1], float(ys.max())))
+    text = f"{abs(degrees):.2f}\N{DEGREE SIGN}"
+    ax.annotate(text, at, (0, -10), textcoords="offset points", ha="center", va="center", **_NUMBER)
 
 
 def _draw_part(

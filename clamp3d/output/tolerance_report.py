@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,9 @@ from typing import Any
 from clamp3d import __version__
 from clamp3d.clamp.sensitivity import DIMENSIONS, Sensitivity
 from clamp3d.clamp.tolerance import MonteCarlo
-from clamp3d.output.files import whole_file
+from clamp3d.output.figures import save_figure
 from clamp3d.output.palette import INK
+from clamp3d.output.tables import text_table
 
 PERCENTILES = (0.1, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 99.9)
 _SHARE = {"uniform": 1.0 / 3.0, "normal": 1.0 / 9.0}  # variance by the square of the tolerance
@@ -25,28 +27,41 @@ def shares(result: MonteCarlo, rows: tuple[Sensitivity, ...]) -> dict[str, float
 
 def tolerance_to_text(result: MonteCarlo, rows: tuple[Sensitivity, ...], note: str = "") -> str:
     """Table of sensitivities, percentiles, and what does not clamp; ``note`` stands where there are no ``rows``."""
+    return "\n".join(_lines(result, rows, note))
+
+
+def _lines(result: MonteCarlo, rows: tuple[Sensitivity, ...], note: str) -> Iterator[str]:
     tolerance = dict(zip(DIMENSIONS, result.spec.tolerance, strict=True))
     variance = shares(result, rows)
     total = sum(variance.values())
     n, m = len(result.status), len(result.clamped)
     nominal = "does not clamp" if result.nominal is None else f"{result.nominal:.4f} mm"
-    lines = [f"clamp {result.spec.clamp.name}: splint distance {nominal}"]
-    if rows:
-        lines.append(f"{'dimension':40s} {'mm':>9s} {'+-mm':>7s} {'mm per mm':>10s} {'variance':>9s}")
-    else:
-        lines.append(note)
-    for row in rows:
-        share = f"{100 * variance[row.name] / total:.1f} %" if total > 0.0 else "-"
-        lines.append(f"{row.name:40s} {row.value:9.4f} {tolerance[row.name]:7.4f} {row.derivative:+10.5f} {share:>9s}")
-    lines.append(f"{n} clamps within these tolerances (chosen, {result.spec.distribution}), seed {result.spec.seed}:")
+    yield f"clamp {result.spec.clamp.name}: splint distance {nominal}"
+    yield (
+        note
+        if not rows
+        else text_table(
+            ("dimension", "mm", "+-mm", "mm per mm", "variance"),
+            [
+                (
+                    row.name,
+                    f"{row.value:.4f}",
+                    f"{tolerance[row.name]:.4f}",
+                    f"{row.derivative:+.5f}",
+                    f"{100 * variance[row.name] / total:.1f} %" if total > 0.0 else None,
+                )
+                for row in rows
+            ],
+        )
+    )
+    yield f"{n} clamps within these tolerances (chosen, {result.spec.distribution}), seed {result.spec.seed}:"
     if m:
         spread = f"mean {result.clamped.mean():.4f} mm, standard deviation {result.clamped.std():.4f} mm"
-        lines.append(spread + (f" (linear: {math.sqrt(total):.4f} mm)" if rows else ""))
-        values = result.percentiles(PERCENTILES)
-        lines += [f"  {p:5.1f} %  {v:9.4f} mm" for p, v in zip(PERCENTILES, values, strict=True)]
-    lines.append(f"not clamped: {n - m} of {n} ({100 * (n - m) / n:.2f} %)")
-    lines += [f"  {count:6d}  {reason}" for reason, count in result.reasons().items()]
-    return "\n".join(lines)
+        yield spread + (f" (linear: {math.sqrt(total):.4f} mm)" if rows else "")
+        values = zip(PERCENTILES, result.percentiles(PERCENTILES), strict=True)
+        yield text_table(("percentile", "mm"), [(f"{p:.1f} %", f"{v:.4f}") for p, v in values], indent=2)
+    yield f"not clamped: {n - m} of {n} ({100 * (n - m) / n:.2f} %)"
+    yield from (f"  {count:6d}  {reason}" for reason, count in result.reasons().items())
 
 
 def tolerance_to_dict(result: MonteCarlo, rows: tuple[Sensitivity, ...]) -> dict[str, Any]:
@@ -104,6 +119,4 @@ def draw_histogram(path: Path, result: MonteCarlo) -> None:
         f"{result.spec.clamp.name}: {n} clamps within tolerances, {n - m} not clamped (seed {result.spec.seed})",
         fontsize=10,
     )
-    kind = path.suffix.lower().lstrip(".")
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, format=kind, dpi=130)
+    save_figure(figure, path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from scipy.stats import chi2
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.bench.image import (
@@ -19,7 +21,6 @@ from clamp3d.bench.image import (
     FITTING_ERROR,
     MARKING_ERROR,
     PX_PER_MM,
-    calibrate_marking_error,
     image_study,
     marked_distances,
     measure_image,
@@ -95,11 +96,22 @@ def test_uncertainty_is_the_spread_of_trials(shown: Picture, kind: str) -> None:
         assert values.std() == pytest.approx(stated.uncertainty, rel=0.01)
 
 
+def _calibrated(shown: Picture, actual: float, values: Sequence[float]) -> tuple[float, float, float]:
+    """Marking error in px that gives ``values`` their rms error about ``actual`` mm, and its 95 % interval."""
+    rms = math.sqrt(math.fsum((v - actual) ** 2 for v in values) / len(values))
+    left, right, below = shown.end_points
+    marks = ([left, below], [left, right], shown.reference)
+    per_pixel = measure_image(*marks, marking_error=1.0, calliper_error=0.0).uncertainty
+    n = len(values)
+    low, high = (rms * math.sqrt(n / chi2.ppf(q, n)) / per_pixel for q in (0.975, 0.025))
+    return rms / per_pixel, low, high
+
+
 def test_default_errors_are_those_of_the_published_values(shown: Picture) -> None:
-    found = calibrate_marking_error(shown, ACTUAL_DISTANCE)
-    assert found.marking_error == pytest.approx(MARKING_ERROR, abs=0.05)
-    assert found.low < found.marking_error < found.high
-    assert (found.low, found.high) == (pytest.approx(2.8, abs=0.05), pytest.approx(11.1, abs=0.05))
+    error, low, high = _calibrated(shown, ACTUAL_DISTANCE, IMAGE_DISTANCES)
+    assert error == pytest.approx(MARKING_ERROR, abs=0.05)
+    assert low < error < high
+    assert (low, high) == (pytest.approx(2.8, abs=0.05), pytest.approx(11.1, abs=0.05))
     # The scatter they produce is the published one.
     values = marked_distances(shown, 100_000, marking_error=MARKING_ERROR, calliper_error=CALLIPER_ERROR, seed=1)
     published = np.sqrt(np.mean((np.array(IMAGE_DISTANCES) - ACTUAL_DISTANCE) ** 2))

@@ -13,7 +13,7 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.placement import FREEDOMS, Outcome, WireClosing
+from clamp3d.clamp.placement import FREEDOMS, Outcome, Placement
 from clamp3d.collide.check import check
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import translation
@@ -22,7 +22,7 @@ from clamp3d.errors import InputError
 
 @pytest.fixture(scope="module")
 def closing():
-    return WireClosing(load_clamp(), "P6")
+    return Placement(load_clamp(), "P6")
 
 
 def test_nominal_wire_closes_without_opening(closing):
@@ -64,7 +64,7 @@ def test_opening_of_a_pitched_wire_is_at_least_that_of_its_lift_at_the_ends(clos
 
 def test_limits_are_where_the_outcome_turns(closing):
     ranges = {"offset": 15.0, "yaw": math.radians(6), "pitch": math.radians(3)}
-    tolerances = closing.tolerances(ranges, samples=300)
+    tolerances = closing.tolerance(ranges, samples=300)
     for limit in tolerances.limits:
         column = FREEDOMS.index(limit.freedom)
         step = 1e-5 * ranges[limit.freedom]
@@ -85,7 +85,7 @@ def test_touch_as_the_scene_check_sees_it(closing):
         pose = closing.poses(m[None])[0]
         splints = {}
         for k, (name, sign) in enumerate((("P1", 1.0), ("P2", -1.0))):
-            alone = WireClosing.__new__(WireClosing)
+            alone = Placement.__new__(Placement)
             alone.__dict__.update(closing.__dict__)
             alone._splints = [closing._splints[k], closing._splints[k]]
             travel = 0.5 * alone.close(m[None]).opening[0]
@@ -106,11 +106,11 @@ def test_outcomes_by_mouth(closing):
 def test_bad_input():
     clamp = load_clamp()
     with pytest.raises(InputError, match="wire must be one of P6, P7, got 'P1'"):
-        WireClosing(clamp, "P1")
+        Placement(clamp, "P1")
     with pytest.raises(InputError, match="seat tolerance must be a finite length > 0 mm"):
-        WireClosing(clamp, seat_tolerance=-1.0)
+        Placement(clamp, seat_tolerance=-1.0)
     with pytest.raises(InputError, match=r"misplacements must have shape \(n, 4\)"):
-        WireClosing(clamp).close(np.zeros((2, 3)))
+        Placement(clamp).close(np.zeros((2, 3)))
     thin = replace(clamp, line=replace(clamp.line, conductor=None, diameter=3.0))
     with pytest.raises(InputError, match="not clamped"):
-        WireClosing(thin)
+        Placement(thin)

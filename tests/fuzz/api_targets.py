@@ -23,7 +23,7 @@ from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.placement import WireClosing
+from clamp3d.clamp.placement import Placement
 from clamp3d.clamp.section import Section
 from clamp3d.collide.motions import check_poses
 from clamp3d.collide.scene import Allowed
@@ -476,13 +476,13 @@ def targets() -> dict[str, tuple[float, Make]]:
                 },
             ),
         ),
-        "WireClosing": (
+        "Placement": (
             1,
-            _simple(WireClosing, clamp=_fixed(_clamp()), wire=_choice("P6", "P7"), seat_tolerance=size),
+            _simple(Placement, clamp=_fixed(_clamp()), wire=_choice("P6", "P7"), seat_tolerance=size),
         ),
-        "WireClosing.close": (1, lambda r, f: (_closing().close, {"misplacement": 0.1 * r.normal(size=(3, 4))})),
-        "WireClosing.cloud": (1, lambda r, f: (_closing().cloud, {"ranges": {"offset": 1.0}, "count": 5, "seed": 0})),
-        "WireClosing.limits": (0.3, lambda r, f: (_closing().limits, {"freedom": "offset", "reach": 5.0})),
+        "Placement.close": (1, lambda r, f: (_closing().close, {"misplacement": 0.1 * r.normal(size=(3, 4))})),
+        "Placement.cloud": (1, lambda r, f: (_closing().cloud, {"ranges": {"offset": 1.0}, "count": 5, "seed": 0})),
+        "Placement.limits": (0.3, lambda r, f: (_closing().limits, {"freedom": "offset", "reach": 5.0})),
         "measure_image": (
             4,
             _simple(
@@ -558,7 +558,7 @@ def _few(value: Any) -> Any:
 
 @functools.cache
 def _closing() -> Any:
-    return WireClosing(_clamp())
+    return Placement(_clamp())
 
 
 @functools.cache

@@ -33,14 +33,21 @@ class Case:
     start: Array | None = None
 
 
-MAKERS: dict[str, tuple[str, Callable[[np.random.Generator], Case]]] = {}
+Maker = Callable[[np.random.Generator], Case]
+MAKERS: dict[str, tuple[str, Maker]] = {}
 
 
-def _family(
-    name: str, about: str
-) -> Callable[[Callable[[np.random.Generator], Case]], Callable[[np.random.Generator], Case]]:
-    def register(make: Callable[[np.random.Generator], Case]) -> Callable[[np.random.Generator], Case]:
-        MAKERS[f"assembly: {name}"] = (about, make)
+def _family(name: str, about: str) -> Callable[[Callable[[np.random.Generator], Clamp | Case | None]], Any]:
+    """Add a generator, which is asked again where it gives None: grooves that do not fit into the splints."""
+
+    def register(make: Callable[[np.random.Generator], Clamp | Case | None]) -> Any:
+        def case(rng: np.random.Generator) -> Case:
+            found = None
+            while found is None:
+                found = make(rng)
+            return found if isinstance(found, Case) else Case(found)
+
+        MAKERS[f"assembly: {name}"] = (about, case)
         return make
 
     return register
@@ -77,13 +84,6 @@ def clamp_of(
         return None
 
 
-def _first(make: Callable[[], Clamp | None]) -> Clamp:
-    while True:
-        found = make()
-        if found is not None:
-            return found
-
-
 def _near_one(rng: np.random.Generator, shape: int, low: float = -12.0, high: float = -3.0) -> Array:
     """1 +- 1e-12 ... 1e-3, or just 1."""
     off = 10.0 ** rng.uniform(low, high, shape) * rng.choice([-1.0, 0.0, 1.0], shape, p=[0.4, 0.2, 0.4])
@@ -102,12 +102,11 @@ def _grooves(rng: np.random.Generator) -> tuple[Array, Array, Array]:
 
 def random_clamp(rng: np.random.Generator) -> Clamp:
     """A clamp of the reference's kind with any grooves and any wires."""
-
-    def make() -> Clamp | None:
+    clamp = None
+    while clamp is None:
         R, half, offset = _grooves(rng)
-        return clamp_of(R, half, offset, rng.uniform(2.0, 60.0, 2))
-
-    return _first(make)
+        clamp = clamp_of(R, half, offset, rng.uniform(2.0, 60.0, 2))
+    return clamp
 
 
 def open_start(rng: np.random.Generator, section: Section) -> Array:
@@ -118,7 +117,7 @@ def open_start(rng: np.random.Generator, section: Section) -> Array:
         q = section.open_state(section.open_distance() + rng.choice([0.0, 1.0, 100.0]) * rng.random(), tilt)
         for i in (0, 2):
             low, high = bounds[i]
-            # A lip itself, a hair inside it, or anywhere in the mouth.
+            # A lip itself, a little inside it, or anywhere in the mouth.
             place = rng.choice([0.0, 10.0 ** rng.uniform(-9.0, -2.0), rng.random()])
             q[i] = low + place * (high - low) if rng.random() < 0.5 else high - place * (high - low)
             q[i + 1] += rng.uniform(-5.0, 5.0)
@@ -127,8 +126,8 @@ def open_start(rng: np.random.Generator, section: Section) -> Array:
 
 
 @_family("random clamps", "grooves and wires of any size, closed from the open clamp")
-def _random(rng: np.random.Generator) -> Case:
-    return Case(random_clamp(rng))
+def _random(rng: np.random.Generator) -> Clamp:
+    return random_clamp(rng)
 
 
 @_family("poor starts", "far open, fully tilted, wires against a lip or beside the middle")
@@ -137,70 +136,58 @@ def _poor(rng: np.random.Generator) -> Case:
     return Case(clamp, open_start(rng, Section(clamp, Cas())))
 
 
-@_family("equal clearances", "grooves and wires equal, or equal up to 1e-12 ... 1e-3: which contact carries is a hair")
-def _equal(rng: np.random.Generator) -> Case:
-    def make() -> Clamp | None:
-        R, half, offset = _RADIUS * rng.uniform(0.5, 1.2), rng.uniform(0.3, 1.3), _OFFSET * rng.uniform(0.85, 1.15)
-        wire = 2.0 * R * rng.uniform(0.3, 1.3)
-        return clamp_of(R * _near_one(rng, 4), half, offset * _near_one(rng, 4), wire * _near_one(rng, 2))
-
-    return Case(_first(make))
+@_family(
+    "equal clearances",
+    "grooves and wires equal, or up to 1e-12 ... 1e-3: rounding decides which contacts are active",
+)
+def _equal(rng: np.random.Generator) -> Clamp | None:
+    R, half, offset = _RADIUS * rng.uniform(0.5, 1.2), rng.uniform(0.3, 1.3), _OFFSET * rng.uniform(0.85, 1.15)
+    wire = 2.0 * R * rng.uniform(0.3, 1.3)
+    return clamp_of(R * _near_one(rng, 4), half, offset * _near_one(rng, 4), wire * _near_one(rng, 2))
 
 
 @_family("wire fills groove", "a wire's radius is a groove's, or up to 1e-12 ... 1e-3 beside it: arc or both lips")
-def _fills(rng: np.random.Generator) -> Case:
-    def make() -> Clamp | None:
-        R, half, offset = _grooves(rng)
-        if rng.random() < 0.5:  # facing grooves alike: it fills both
-            R[2:], half[2:], offset[2:] = R[:2] * _near_one(rng, 2), half[:2], offset[:2] * _near_one(rng, 2)
-        wires = rng.uniform(10.0, 50.0, 2)
-        for i in (0, 1):
-            if i == 0 or rng.random() < 0.5:
-                wires[i] = 2.0 * R[i + 2 * int(rng.integers(2))] * _near_one(rng, 1)[0]
-        return clamp_of(R, half, offset, wires)
-
-    return Case(_first(make))
+def _fills(rng: np.random.Generator) -> Clamp | None:
+    R, half, offset = _grooves(rng)
+    if rng.random() < 0.5:  # facing grooves alike: it fills both
+        R[2:], half[2:], offset[2:] = R[:2] * _near_one(rng, 2), half[:2], offset[:2] * _near_one(rng, 2)
+    wires = rng.uniform(10.0, 50.0, 2)
+    for i in (0, 1):
+        if i == 0 or rng.random() < 0.5:
+            wires[i] = 2.0 * R[i + 2 * int(rng.integers(2))] * _near_one(rng, 1)[0]
+    return clamp_of(R, half, offset, wires)
 
 
 @_family("lip contacts", "wires thicker than their grooves, or grooves aside: on lips, or about to slide onto one")
-def _lips(rng: np.random.Generator) -> Case:
-    def make() -> Clamp | None:
-        R, half, offset = _grooves(rng)
-        if rng.random() < 0.5:  # facing grooves so far aside that arc and lip compete
-            offset[2:] = offset[:2] + R[:2] * np.sin(half[:2]) * rng.uniform(-0.6, 0.6, 2)
-            wires = 2.0 * R[:2] * rng.uniform(0.5, 1.05, 2)
-        else:
-            wires = 2.0 * R[:2] * rng.uniform(1.0, 1.8, 2)
-        return clamp_of(R, half, offset, wires)
-
-    return Case(_first(make))
+def _lips(rng: np.random.Generator) -> Clamp | None:
+    R, half, offset = _grooves(rng)
+    if rng.random() < 0.5:  # facing grooves so far aside that arc and lip compete
+        offset[2:] = offset[:2] + R[:2] * np.sin(half[:2]) * rng.uniform(-0.6, 0.6, 2)
+        wires = 2.0 * R[:2] * rng.uniform(0.5, 1.05, 2)
+    else:
+        wires = 2.0 * R[:2] * rng.uniform(1.0, 1.8, 2)
+    return clamp_of(R, half, offset, wires)
 
 
 @_family("faces meet", "wires about as thick as both grooves are deep: held by the wires, by the faces, or by both")
-def _faces(rng: np.random.Generator) -> Case:
-    def make() -> Clamp | None:
-        R, half, offset = _grooves(rng)
-        offset[2:] = offset[:2] * (1.0 + rng.uniform(-0.02, 0.02, 2))
-        depth = R * 2.0 * np.sin(0.5 * half) ** 2
-        wires = (depth[:2] + depth[2:]) * np.where(rng.random(2) < 0.5, _near_one(rng, 2), rng.uniform(0.1, 1.3, 2))
-        return clamp_of(R, half, offset, wires)
-
-    return Case(_first(make))
+def _faces(rng: np.random.Generator) -> Clamp | None:
+    R, half, offset = _grooves(rng)
+    offset[2:] = offset[:2] * (1.0 + rng.uniform(-0.02, 0.02, 2))
+    depth = R * 2.0 * np.sin(0.5 * half) ** 2
+    wires = (depth[:2] + depth[2:]) * np.where(rng.random(2) < 0.5, _near_one(rng, 2), rng.uniform(0.1, 1.3, 2))
+    return clamp_of(R, half, offset, wires)
 
 
 @_family("tilt limit", "one thick and one thin wire and little tilt: the limit carries, or nearly does")
-def _tilted(rng: np.random.Generator) -> Case:
-    def make() -> Clamp | None:
-        R, half, offset = _grooves(rng)
-        wires = np.array([rng.uniform(20.0, 60.0), rng.uniform(2.0, 20.0)])[:: int(rng.choice([-1, 1]))]
-        return clamp_of(R, half, offset, wires, max_tilt_deg=float(rng.choice([1e-6, 1e-3, rng.uniform(0.1, 12.8)])))
-
-    return Case(_first(make))
+def _tilted(rng: np.random.Generator) -> Clamp | None:
+    R, half, offset = _grooves(rng)
+    wires = np.array([rng.uniform(20.0, 60.0), rng.uniform(2.0, 20.0)])[:: int(rng.choice([-1, 1]))]
+    return clamp_of(R, half, offset, wires, max_tilt_deg=float(rng.choice([1e-6, 1e-3, rng.uniform(0.1, 12.8)])))
 
 
 @_family("sizes", "the whole clamp 1e-3 to 1e2 times its size: metres in place of millimetres, or a clamp of metres")
-def _sizes(rng: np.random.Generator) -> Case:
-    return Case(scaled(random_clamp(rng), float(10.0 ** rng.uniform(-3.0, 2.0))))
+def _sizes(rng: np.random.Generator) -> Clamp:
+    return scaled(random_clamp(rng), float(10.0 ** rng.uniform(-3.0, 2.0)))
 
 
 _NO_LENGTHS = {"back_half_angle_deg", "max_tilt_deg", "connections", "name", "description", "unit", "sequence"}

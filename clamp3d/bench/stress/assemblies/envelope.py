@@ -1,4 +1,4 @@
-"""The truth about where a clamp comes to rest: curves in closed form, with neither gradients nor multipliers.
+"""The truth about a clamp's equilibria: curves in closed form, with neither gradients nor multipliers.
 
 Of each wire only the envelopes count: ``over(x)``, the highest place that the up splint leaves its centre at ``x``, and
 ``d + under(x, tilt)``, the lowest place above the down splint (y down). A wire fits at x if ``d >= over - under``, so a

@@ -38,7 +38,7 @@ from clamp3d.clamp.section import Section
 from clamp3d.baselines.cas import Cas
 
 section = Section(clamp, Cas())
-print("comes to rest at d =", solve_final_state(section, start).q[4], "mm")
+print("closes to an equilibrium at d =", solve_final_state(section, start).q[4], "mm")
 print("equilibria, d in mm:", [float(state.q[4]) for state in equilibria(section)])
 """
 
@@ -88,7 +88,7 @@ class AssemblyFamily(Family):
 
 
 class _Truths:
-    """Places of rest of each case, worked out when first asked for."""
+    """Equilibria of each case, worked out when first asked for."""
 
     def __init__(self, cases: Assemblies) -> None:
         self.cases = cases

@@ -27,7 +27,7 @@ _SHALLOW, _NEAR = 1.5e-4, 1.5e-2
 
 @dataclass(frozen=True, slots=True)
 class Minimum:
-    """A place of rest: distance ``d`` in mm and ``tilt`` in rad.
+    """An equilibrium: distance ``d`` in mm and ``tilt`` in rad.
 
     It is ``firm`` if opening the clamp by 1.5e-4 of the down splint's half width (0.01 mm for the reference clamp, less
     than the roughness of any casting) does not let it slide to a lower one within a hundred times as much. The edges of

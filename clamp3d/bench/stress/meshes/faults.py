@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 from clamp3d.bench.stress.meshes.cases import Faulty
@@ -40,12 +41,9 @@ def _facet(rng: np.random.Generator, V: Array, F: Faces) -> NDArray[np.bool_]:
 def _far_box(V: Array) -> tuple[Array, Faces]:
     """A second body, below the first and far from any wire."""
     size = float(np.ptp(V, axis=0).max())
-    corner = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
-    faces = [
-        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
-    ]  # fmt: skip
-    return size * corner + [0.0, V[:, 1].min() - 8.0 * size, 0.0], np.array(faces, dtype=np.int64)
+    low = np.array([0.0, V[:, 1].min() - 8.0 * size, 0.0])
+    box = trimesh.creation.box(bounds=[low, low + size])
+    return np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int64)
 
 
 def opened(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:

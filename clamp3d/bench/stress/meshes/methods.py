@@ -1,4 +1,4 @@
-"""The methods that read meshes: the project's own, and the bare libraries as one would call them without its guards."""
+"""The methods that read meshes: this package's, and the bare libraries as one would call them without its guards."""
 
 from __future__ import annotations
 

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.bench.stress.family import into
-from clamp3d.bench.stress.motions.cases import Motions, motions, turned
-from clamp3d.bench.stress.motions.contacts import moved, screws_through, square_to, touching
+from clamp3d.bench.stress.motions.cases import Motions, motions, moved, screws_through, square_to, touching, turned
 from clamp3d.bench.stress.motions.family import MotionFamily
 from clamp3d.bench.stress.poses.cases import (
     FEATURES,
@@ -109,8 +108,8 @@ def _turning_screws(rng: np.random.Generator, n: int, turns: Array, pitch: Array
     cases, normal = touching(rng, shapes, shape, feature, gap)
     # In the hollow a circle narrower than it, square to the groove.
     hollow = np.isin(feature, ["arc", "end arc"])
-    room = (shapes.R - shapes.r)[shape]
-    radius = np.where(hollow, room * rng.uniform(0.1, 0.9, n), shapes.R[shape] * 10.0 ** rng.uniform(-1, 1, n))
+    clearance = (shapes.R - shapes.r)[shape]
+    radius = np.where(hollow, clearance * rng.uniform(0.1, 0.9, n), shapes.R[shape] * 10.0 ** rng.uniform(-1, 1, n))
     axis = square_to(rng, normal)
     along = (feature == "arc") | (rng.random(n) < 0.33) & (np.abs(normal[:, 2]) < 1e-9)
     axis = np.where(along[:, None], [[0.0, 0.0, 1.0]], axis)

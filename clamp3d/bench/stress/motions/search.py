@@ -6,6 +6,7 @@ has slope 1. That finds where it is low; golden section within golden section fi
 
 from __future__ import annotations
 
+import heapq
 import math
 
 import numpy as np
@@ -123,33 +124,7 @@ def polish(m, u, t, wu, wt, u0, u1, l, g, p, speed, limit):  # type: ignore[no-u
 
 
 @_compiled
-def push(heap, top, key, u, t, hu, ht, f):  # type: ignore[no-untyped-def]
-    """Into the heap, lowest key first."""
-    i = top
-    while i > 0 and heap[(i - 1) // 2, 0] > key:
-        heap[i] = heap[(i - 1) // 2]
-        i = (i - 1) // 2
-    heap[i, 0], heap[i, 1], heap[i, 2], heap[i, 3], heap[i, 4], heap[i, 5] = key, u, t, hu, ht, f
-
-
-@_compiled
-def drop(heap, top):  # type: ignore[no-untyped-def]
-    """The first of ``top`` rows out of the heap."""
-    last = heap[top - 1].copy()
-    i = 0
-    while 2 * i + 1 < top - 1:
-        j = 2 * i + 1
-        if j + 1 < top - 1 and heap[j + 1, 0] < heap[j, 0]:
-            j += 1
-        if heap[j, 0] >= last[0]:
-            break
-        heap[i] = heap[j]
-        i = j
-    heap[i] = last
-
-
-@_compiled
-def least(g, l, m, u0, u1, hints, size, cells, heap, p):  # type: ignore[no-untyped-def] # noqa: E741
+def least(g, l, m, u0, u1, hints, size, cells, p):  # type: ignore[no-untyped-def] # noqa: E741
     """Least value for u0 <= u <= u1, |t| <= l with u and t; last, how much lower it could be by slope alone."""
     far = 0.0
     for i in range(2):
@@ -178,63 +153,47 @@ def least(g, l, m, u0, u1, hints, size, cells, heap, p):  # type: ignore[no-unty
             f, u, t = polish(m, hint, place, wide, min(l, max(near, 1e-3 * size)), u0, u1, l, g, p, speed, best)
             if f < best:
                 best, bu, bt = f, u, t
+    # Cells wait as (least that the slope allows, u, t, half widths of both, value in the middle).
     frame(m, 0.5 * (u0 + u1), p)
-    f = on_axis(p, 0.0, g)
-    push(heap, 0, -math.inf, 0.5 * (u0 + u1), 0.0, 0.5 * (u1 - u0), l, f)
-    top = 1
+    waiting = [(-math.inf, 0.5 * (u0 + u1), 0.0, 0.5 * (u1 - u0), l, on_axis(p, 0.0, g))]
     for _ in range(cells):
-        if heap[0, 0] >= best - 1e-9 * size or top + 2 > len(heap):
+        if waiting[0][0] >= best - 1e-9 * size:
             break
-        key, u, t, hu, ht, f = heap[0]
-        drop(heap, top)
-        top -= 1
+        low, u, t, hu, ht, f = heapq.heappop(waiting)
         if f < best:
             best, bu, bt = f, u, t
         by_u = speed * hu > ht
         hu, ht = (0.5 * hu, ht) if by_u else (hu, 0.5 * ht)
-        for i in range(2):
-            sign = -1.0 if i == 0 else 1.0
+        for sign in (-1.0, 1.0):
             cu, ct = (u + sign * hu, t) if by_u else (u, t + sign * ht)
             frame(m, cu, p)
             f = on_axis(p, ct, g)
-            push(
-                heap,
-                top,
-                max(key, f - math.sqrt((speed * hu) ** 2 + ht * ht + 2.0 * speed * hu * ht)),
-                cu,
-                ct,
-                hu,
-                ht,
-                f,
-            )
-            top += 1
-    slack = max(0.0, best - heap[0, 0])
+            heapq.heappush(waiting, (max(low, f - (speed * hu + ht)), cu, ct, hu, ht, f))
+    slack = max(0.0, best - waiting[0][0])
     # From the lowest cells, no two of them side by side.
-    for _ in range(_STARTS):
-        low, row = math.inf, -1
-        for i in range(top):
-            if heap[i, 5] < low and heap[i, 0] < best:
-                low, row = heap[i, 5], i
-        if row < 0:
-            break
-        u, t, hu, ht = heap[row, 1], heap[row, 2], heap[row, 3], heap[row, 4]
-        f, pu, pt = polish(m, u, t, 3.0 * hu, 3.0 * ht, u0, u1, l, g, p, speed, best)
-        if f < best:
-            best, bu, bt = f, pu, pt
-        for i in range(top):
-            if abs(heap[i, 1] - u) <= 6.0 * hu and abs(heap[i, 2] - t) <= 6.0 * ht:
-                heap[i, 5] = math.inf
+    started = [(math.inf, math.inf, 0.0, 0.0)]
+    for f, u, t, hu, ht, low in sorted([(cell[5], cell[1], cell[2], cell[3], cell[4], cell[0]) for cell in waiting]):
+        beside = False
+        for su, st, du, dt in started:
+            beside = beside or (abs(u - su) <= 6.0 * du and abs(t - st) <= 6.0 * dt)
+        if low < best and not beside:
+            started.append((u, t, hu, ht))
+            f, pu, pt = polish(m, u, t, 3.0 * hu, 3.0 * ht, u0, u1, l, g, p, speed, best)
+            if f < best:
+                best, bu, bt = f, pu, pt
+            if len(started) > _STARTS:
+                break
     return best, bu, bt, slack
 
 
 def _least_of(shapes, motions, u0, u1, hints, sizes, cells, out):  # type: ignore[no-untyped-def]
     """`least` of n motions (n, 16) and shapes (n, 4): R, half angle, H, half length; out (n, 4)."""
-    heap, p, g = np.empty((2 * cells + 8, 6)), np.empty(6), np.empty(4)
+    p, g = np.empty(6), np.empty(4)
     for i in range(len(motions)):
         R, a = shapes[i, 0], shapes[i, 1]
         g[0], g[1], g[2], g[3] = R, R * math.sin(a), -R * math.cos(a), shapes[i, 2]
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = least(
-            g, shapes[i, 3], motions[i], u0[i], u1[i], hints[i], sizes[i], cells, heap, p
+            g, shapes[i, 3], motions[i], u0[i], u1[i], hints[i], sizes[i], cells, p
         )
 
 
