@@ -27,6 +27,7 @@ from .errors import InputError as InputError
 from .fit.fit import fit_file as fit_file
 from .fit.fit import fit_mesh as fit_mesh
 from .output.export import export as export
+from .output.viewer import view as view
 from .scenefile.file import load_scene as load_scene
 from .scenefile.load import load as load
 
