@@ -388,6 +388,7 @@ def test_command_takes_scenes_and_meshes(tmp_path):
         (("-o", "x", "--clearance", "-1"), "clearance"),
         (("-o", "x", "nobody"), "nobody"),
         (("-o", "file/x"), "file"),
+        ((str(ROOT / "examples/hinge/scene.toml"), "--method", "chords", "-o", "x"), "go with a clamp"),
     ],
 )
 def test_bad_input_is_one_line_and_writes_nothing(arguments, message, tmp_path):
