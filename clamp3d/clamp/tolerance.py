@@ -22,6 +22,7 @@ from typing import Any, Literal
 import numpy as np
 
 from clamp3d.baselines.cas import Cas
+from clamp3d.checks import choice, function, instance, number, whole
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.journal import Journal
@@ -176,10 +177,10 @@ def monte_carlo(
     >>> result.status, bool(abs(result.distance - result.nominal).max() < 0.1)
     (('clamped', 'clamped', 'clamped'), True)
     """
-    spec, nominal = _spec(clamp, seed, tolerance, wire_tolerance_percent, distribution)
-    for name, value in (("n", n), ("processes", processes)):
-        if value < 1:
-            raise InputError(f"{name} must be >= 1, got {value}")
+    instance("clamp", clamp, Clamp)
+    n, processes = whole("n", n, least=1), whole("processes", processes, least=1)
+    function("progress", progress)
+    spec, nominal = _spec(clamp, whole("seed", seed, least=0), tolerance, wire_tolerance_percent, distribution)
     header = {"monte_carlo": 1, **asdict(spec), "chunk": CHUNK}
     with Journal(resume, header) if resume is not None else nullcontext() as journal:
         kept: dict[int, list[Sample]] = {} if journal is None else dict(journal.pieces)
@@ -215,14 +216,11 @@ def sample_dimensions(spec: Spec, index: int) -> dict[str, float]:
 def _spec(
     clamp: Clamp, seed: int, tolerance: float | None, percent: float, distribution: Distribution
 ) -> tuple[Spec, float | None]:
-    if seed < 0:
-        raise InputError(f"seed must be >= 0, got {seed}")
-    if tolerance is not None and not 0.0 <= tolerance < 1e5:
+    if tolerance is not None and not 0.0 <= (tolerance := number("tolerance", tolerance)) < 1e5:
         raise InputError(f"tolerance must be >= 0 and < 100000 mm, got {tolerance:g}")
-    if not 0.0 <= percent <= 100.0 * _TOP:
+    if not 0.0 <= (percent := number("wire tolerance", percent)) <= 100.0 * _TOP:
         raise InputError(f"wire tolerance must be from 0 to {100.0 * _TOP:g} %, got {percent:g}")
-    if distribution not in ("uniform", "normal"):
-        raise InputError(f"unknown distribution {distribution!r}; available: uniform, normal")
+    choice("distribution", distribution, ("uniform", "normal"))
 
     def of(name: str) -> float:
         size = dimension(clamp, name)
