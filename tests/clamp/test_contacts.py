@@ -222,6 +222,26 @@ def test_wires_through_the_bolt_are_not_clamped() -> None:
     assert {(d.a, d.b) for d in assembly.undeclared} == {("P4", "P6"), ("P4", "P7")}
 
 
+def test_run_of_wires_through_the_bolt_is_a_finding(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "clamp3d/clamp/data/reference.toml").read_text()
+    for old, new in (
+        (r"radius = 23\.8012", "radius = 15.0"),
+        (r"offset = \d+\.\d+", "offset = 30.0"),
+        (r"centre_depth = 48\.7901", "centre_depth = 32.726"),
+        (r"centre_depth = (3\.4624|4\.9057)", "centre_depth = 19.5505"),
+        (r"slot_width = 42\.0", "slot_width = 30.0"),
+        (r"max_tilt_deg = 12\.8", "max_tilt_deg = 5.0"),
+        (r"shank_length = 160\.0", "shank_length = 220.0"),
+    ):
+        text, count = re.subn(old, new, text)
+        assert count
+    file = tmp_path / "through.toml"
+    file.write_text(text)
+    done = CliRunner().invoke(group, ["run", str(file), "-q", "--line", "52", "--jumper", "52", "--no-equilibria"])
+    assert done.exit_code == 1
+    assert "\nnot clamped: P4 overlaps P6 by" in done.output
+
+
 def test_no_command_calls_wires_through_the_bolt_clamped() -> None:
     clamp = through_the_bolt()
     result = monte_carlo(clamp, n=2, tolerance=0.01)
