@@ -6,6 +6,7 @@ from . import shapes as shapes
 from .clamp.assemble import assemble as assemble
 from .clamp.dimensions import Clamp as Clamp
 from .clamp.loader import load_clamp as load_clamp
+from .clamp.placement import placement as placement
 from .clamp.result import Assembly as Assembly
 from .clamp.sensitivity import sensitivity as sensitivity
 from .clamp.tolerance import monte_carlo as monte_carlo
@@ -27,6 +28,8 @@ from .errors import InputError as InputError
 from .fit.fit import fit_file as fit_file
 from .fit.fit import fit_mesh as fit_mesh
 from .output.export import export as export
+from .output.report import report as report
+from .output.viewer import view as view
 from .scenefile.file import load_scene as load_scene
 from .scenefile.load import load as load
 

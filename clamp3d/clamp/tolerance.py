@@ -22,12 +22,13 @@ from typing import Any, Literal
 import numpy as np
 
 from clamp3d.baselines.cas import Cas
+from clamp3d.checks import choice, function, instance, number, whole
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.journal import Journal
 from clamp3d.clamp.section import D, S, Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
-from clamp3d.clamp.status import CLAMPED, final_status
+from clamp3d.clamp.status import CLAMPED, final_status, measured_status
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, MissingLibraryError, SolverError, without_numbers
 
@@ -176,10 +177,10 @@ def monte_carlo(
     >>> result.status, bool(abs(result.distance - result.nominal).max() < 0.1)
     (('clamped', 'clamped', 'clamped'), True)
     """
-    spec, nominal = _spec(clamp, seed, tolerance, wire_tolerance_percent, distribution)
-    for name, value in (("n", n), ("processes", processes)):
-        if value < 1:
-            raise InputError(f"{name} must be >= 1, got {value}")
+    instance("clamp", clamp, Clamp)
+    n, processes = whole("n", n, least=1), whole("processes", processes, least=1)
+    function("progress", progress)
+    spec, nominal = _spec(clamp, whole("seed", seed, least=0), tolerance, wire_tolerance_percent, distribution)
     header = {"monte_carlo": 1, **asdict(spec), "chunk": CHUNK}
     with Journal(resume, header) if resume is not None else nullcontext() as journal:
         kept: dict[int, list[Sample]] = {} if journal is None else dict(journal.pieces)
@@ -215,14 +216,11 @@ def sample_dimensions(spec: Spec, index: int) -> dict[str, float]:
 def _spec(
     clamp: Clamp, seed: int, tolerance: float | None, percent: float, distribution: Distribution
 ) -> tuple[Spec, float | None]:
-    if seed < 0:
-        raise InputError(f"seed must be >= 0, got {seed}")
-    if tolerance is not None and not 0.0 <= tolerance < 1e5:
+    if tolerance is not None and not 0.0 <= (tolerance := number("tolerance", tolerance)) < 1e5:
         raise InputError(f"tolerance must be >= 0 and < 100000 mm, got {tolerance:g}")
-    if not 0.0 <= percent <= 100.0 * _TOP:
+    if not 0.0 <= (percent := number("wire tolerance", percent)) <= 100.0 * _TOP:
         raise InputError(f"wire tolerance must be from 0 to {100.0 * _TOP:g} %, got {percent:g}")
-    if distribution not in ("uniform", "normal"):
-        raise InputError(f"unknown distribution {distribution!r}; available: uniform, normal")
+    choice("distribution", distribution, ("uniform", "normal"))
 
     def of(name: str) -> float:
         size = dimension(clamp, name)
@@ -238,7 +236,7 @@ def _spec(
         pass
     else:
         start = (float(final.q[D]) + _OPENED, float(final.q[S]) / section.lever)
-        nominal = section.splint_distance(final.q) if final_status(section.clamp, final, 0.0) == CLAMPED else None
+        nominal = section.splint_distance(final.q) if measured_status(section, final, 0.0) == CLAMPED else None
     return Spec(clamp, seed, distribution, tuple(of(name) for name in DIMENSIONS), start), nominal
 
 
@@ -257,7 +255,7 @@ def _sample(spec: Spec, index: int) -> Sample:
         final = _close(section, spec.start)
     except SolverError as error:
         return None, f"not solved: {without_numbers(str(error))}"
-    status = final_status(section.clamp, final, 0.0)
+    status = measured_status(section, final, 0.0)
     return (section.splint_distance(final.q) if status == CLAMPED else None), without_numbers(status)
 
 

@@ -153,6 +153,7 @@ def measure(
         From (a, b) to `Distance`.
     """
     instance("scene", scene, Scene)
+    accuracy = positive("accuracy", accuracy)
     cache = cache or ModelCache()
     asked = (
         itertools.combinations([part.name for part in scene.parts], 2) if pairs is None else name_pairs("pairs", pairs)

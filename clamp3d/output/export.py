@@ -120,12 +120,14 @@ def export(
     """
     checks.instance("source", source, Clamp, Scene, Assembly)
     chosen, file = destination(path, format)
-    layout = layout or ("assembly" if file else default_layout(chosen))
+    if layout is None:
+        layout = "assembly" if file else default_layout(chosen)
     checks.choice("layout", layout, LAYOUTS)
-    unit = unit or ("m" if chosen == "glb" else "mm")
+    if unit is None:
+        unit = "m" if chosen == "glb" else "mm"
+    checks.choice("unit", unit, MILLIMETRES)
     if chosen == "glb" and unit != "m":
         raise InputError(f"unit of glb must be m, as glTF 2.0 demands, got {checks.shown(unit)}")
-    checks.choice("unit", unit, MILLIMETRES)
     mesh_error = check_mesh_error(mesh_error)
     if file is not None and layout == "parts":
         raise InputError(f"layout parts needs a folder, got the file {file}")

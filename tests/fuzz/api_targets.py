@@ -463,13 +463,11 @@ def targets() -> dict[str, tuple[float, Make]]:
             lambda r, f: (
                 clamp3d.export,
                 {
-                    "clamp": _clamp(),
+                    "source": garbage.pick(r, (_clamp(), _run(), _scene())),
+                    "path": f / "out",
                     "format": garbage.pick(r, ("stl", "obj", "ply", "glb", "3mf")),
-                    "output": f / "out",
-                    "poses": {n: _run().T_world(n) for n in _run().poses},
-                    "state": "final",
-                    "status": "clamped",
                     "layout": None,
+                    "state": None,
                     "mesh_error": 0.5,
                     "unit": None,
                     "names": garbage.pick(r, (None, ["P1"])),
@@ -483,6 +481,23 @@ def targets() -> dict[str, tuple[float, Make]]:
         "Placement.close": (1, lambda r, f: (_closing().close, {"misplacement": 0.1 * r.normal(size=(3, 4))})),
         "Placement.cloud": (1, lambda r, f: (_closing().cloud, {"ranges": {"offset": 1.0}, "count": 5, "seed": 0})),
         "Placement.limits": (0.3, lambda r, f: (_closing().limits, {"freedom": "offset", "reach": 5.0})),
+        "placement": (
+            0.3,
+            _simple(
+                clamp3d.placement,
+                clamp=_fixed(_clamp()),
+                ranges=_choice({"offset": 1.0}, {"yaw": 0.01}),
+                wire=_choice("P6", "P7"),
+                seat_tolerance=_fixed(0.5),
+                samples=_fixed(5),
+                seed=_fixed(0),
+            ),
+        ),
+        "report": (
+            0.1,
+            lambda r, f: (clamp3d.report, {"source": _scene(), "folder": f / "out", "clearance": None}),
+        ),
+        "view": (0.2, _simple(clamp3d.view, shown=_fixed(_scene()), serve=_fixed(False), mesh_error=_fixed(1.0))),
         "measure_image": (
             4,
             _simple(
