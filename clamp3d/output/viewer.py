@@ -13,7 +13,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import flag, instance, text
@@ -53,7 +53,7 @@ _SEVERITY = {"error": "clash", "warning": "contact", "note": "clear"}
 MEASURED = 40
 """Scenes of up to so many parts are measured pair by pair, larger ones only as far as their verdicts need."""
 
-Shown = Clamp | Scene | Assembly | CheckResult
+Shown: TypeAlias = Clamp | Scene | Assembly | CheckResult
 
 
 class Viewer:
