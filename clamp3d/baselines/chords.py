@@ -11,7 +11,7 @@ from clamp3d.baselines.model import Pieces, check_unit_angle, pose_of, poses_of
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array, check_pose, check_pose_array, inverse
 from clamp3d.core.primitives import SweptArc
-from clamp3d.core.profile import chord_count
+from clamp3d.core.profile import chord_count, sagitta
 from clamp3d.errors import InputError
 
 _PARALLEL = 1e-9
@@ -56,6 +56,12 @@ class Chords:
         starts, ends, _ = _polyline(pair.groove, self.unit_angle)
         signed = [_signed(centre, starts, ends)[0].min() for centre in _section_point(T)]
         return np.array(signed) - pair.cylinder.radius
+
+
+def chord_error(groove: SweptArc, unit_angle: float) -> float:
+    """Largest distance in mm between the groove's arc and equal chords of at most ``unit_angle`` rad."""
+    arc = 2.0 * groove.half_angle
+    return sagitta(groove.radius, arc / chord_count(arc, unit_angle))
 
 
 @lru_cache(maxsize=64)

@@ -17,7 +17,7 @@ from clamp3d.baselines.model import check_unit_angle
 from clamp3d.baselines.polytopes import PerPart, PolytopeModel, Polytopes
 from clamp3d.checks import instance
 from clamp3d.core.pose import Array
-from clamp3d.core.profile import Arc, Segment
+from clamp3d.core.profile import Arc, Segment, chord_count
 from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
 
@@ -109,7 +109,7 @@ def prism(polygon: Array, start: float, end: float) -> tuple[Array, NDArray[np.i
 
 def _sectors(cell: shapely.Polygon, arc: Arc, unit_angle: float) -> list[Wedge]:
     """The cell less the groove: a wedge behind each chord, and what lies beside the first and the last ray."""
-    m = max(1, math.ceil(-arc.sweep / unit_angle - 1e-9))
+    m = chord_count(arc.sweep, unit_angle)
     angles = np.linspace(arc.end_angle, arc.start_angle, m + 1)
     centre = np.array(arc.centre)
     ray = np.column_stack([np.cos(angles), np.sin(angles)])

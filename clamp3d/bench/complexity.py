@@ -25,6 +25,7 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.result import Assembly, Solver
 from clamp3d.clamp.section import Section
 from clamp3d.core.pose import Array, SectionPose, inverse
+from clamp3d.core.profile import chord_count
 
 _OPEN = 12.0
 """mm through which each moving part of the grid search goes."""
@@ -175,7 +176,7 @@ def _timed(run: Run) -> tuple[tuple[int, int], float]:
 
 
 def _segments(model: ContactModel, half_angle: float) -> int:
-    return math.ceil(2.0 * half_angle / model.unit_angle - 1e-9) if isinstance(model, Chords) else 1
+    return chord_count(2.0 * half_angle, model.unit_angle) if isinstance(model, Chords) else 1
 
 
 def _mean_segments(model: ContactModel, clamp: Clamp) -> int:

@@ -9,7 +9,7 @@ from pathlib import Path
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import choice, function, number
-from clamp3d.clamp.contact import Contact, measure_contacts, overlap, seats
+from clamp3d.clamp.contact import Contact, measure_contacts, seats
 from clamp3d.clamp.dimensions import PARTS, Clamp
 from clamp3d.clamp.equilibria import describe, equilibria, same, slipping
 from clamp3d.clamp.final_state import FinalState, solve_final_state
@@ -20,7 +20,7 @@ from clamp3d.clamp.result import Assembly, Equilibrium, Event, Solver, Waypoint,
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import D, S, Section
 from clamp3d.clamp.sequence import parse_sequence
-from clamp3d.clamp.status import CLAMPED, final_status
+from clamp3d.clamp.status import measured_status
 from clamp3d.clamp.stepped import SteppedState, solve_bisection, solve_stepped
 from clamp3d.clamp.steps import Log, approach_line, first_touch, insert_jumper, section_poses
 from clamp3d.errors import InputError
@@ -33,7 +33,7 @@ RESOLUTION = 1e-3
 """Where bisection stops, mm."""
 
 _WIDEST = 1000.0
-"""The most that a clamp is opened further than it needs, mm: it closes by small strides."""
+"""The most that a clamp is opened further than it needs, mm: descents are short."""
 _DRAWN: tuple[Pair, ...] = (("P2", "P3"), ("P1", "P5"), ("P3", "P4"))
 """Pairs that the nut closes; the down splint closes all others."""
 
@@ -135,7 +135,7 @@ def assemble(
         clamp=clamp,
         model=model,
         solver=solver,
-        status=_status(clamp, final, resolution, contacts),
+        status=measured_status(section, final, resolution, contacts),
         distance=section.splint_distance(final.q),
         closing=float(final.q[D]),
         tilt=float(final.q[S]) / section.lever,
@@ -152,14 +152,6 @@ def assemble(
         work=Work(len(PARTS), len(PAIRS), queries, motion_steps, model.meshes_built),
         others=_others(section, final) if others and isinstance(final, FinalState) else None,
     )
-
-
-def _status(clamp: Clamp, final: FinalState | SteppedState, resolution: float, contacts: Sequence[Contact]) -> str:
-    """How the final state ended; parts that overlap are not clamped, whatever holds the wires."""
-    status = final_status(clamp, final, resolution)
-    if status == CLAMPED and (deepest := overlap(min(contacts, key=lambda c: c.gap))):
-        return f"not clamped: {deepest}"
-    return status
 
 
 def _undeclared(clamp: Clamp, contacts: Sequence[Contact], log: Log) -> tuple[Difference, ...]:
@@ -184,7 +176,7 @@ def _others(section: Section, final: FinalState) -> tuple[Equilibrium, ...]:
             distance=section.splint_distance(state.q),
             closing=float(state.q[D]),
             tilt=float(state.q[S]) / section.lever,
-            status=final_status(section.clamp, state, CONTACT),
+            status=measured_status(section, state, CONTACT),
             detail=describe(state),
             is_equilibrium=not slipping(state),
         )

@@ -27,6 +27,8 @@ from clamp3d.core.shapes import Solid
 
 Poses = Mapping[PartName, SectionPose]
 
+_MODEL = 0.1
+"""The nearest points that a contact model says lie on the surfaces to this many mm."""
 NONE = "none"
 """Relation of parts that do not touch and for which the paper has no word."""
 
@@ -142,7 +144,9 @@ def measure_contacts(
         relation = _relation(clamp, poses, (a, b), d)
         kind: ConnectionType = contact_type((a, b)) if d.value <= CONTACT and relation != NONE else 0
         names = [
-            surface_name(solids[part], inverse(poses[part].T()) @ [*point, 1.0])
+            surface_name(
+                solids[part], inverse(poses[part].T()) @ [*point, 1.0], CONTACT if d.estimate is None else _MODEL
+            )
             for part, point in ((a, d.point_a), (b, d.point_b))
             if point is not None
         ]
@@ -219,8 +223,10 @@ _SURFACES = ("lip", "arc", "hole", "flat face", "round face", "end face")
 """Names of surfaces; of two that touch the one that comes first names the contact."""
 
 
-def surface_name(solid: Solid, point: Array) -> str:
+def surface_name(solid: Solid, point: Array, tolerance: float = CONTACT) -> str:
     """The surface of a solid that a point (3,) in its own frame is nearest to; a lip is where a concave arc ends.
+
+    Of surfaces that are as near to within ``tolerance`` mm the first of `_SURFACES` counts.
 
     >>> from clamp3d.core.shapes import cylinder
     >>> surface_name(cylinder(5.0, 20.0), np.array([5.0, 0.0, 3.0]))
@@ -236,7 +242,7 @@ def surface_name(solid: Solid, point: Array) -> str:
             end = min(abs(along - extrusion.start), abs(along - extrusion.end))
             near.append((end, "end face" if extrusion.axis == "Y" else "flat face"))
     least = min(distance for distance, _ in near)
-    return min((name for distance, name in near if distance <= least + CONTACT), key=_SURFACES.index)
+    return min((name for distance, name in near if distance <= least + tolerance), key=_SURFACES.index)
 
 
 def _edge_distance(edge: Edge, a: float, b: float) -> float:

@@ -19,7 +19,7 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.dimensions import Clamp, Wire
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.section import Section
-from clamp3d.clamp.status import CLAMPED, final_status
+from clamp3d.clamp.status import CLAMPED, measured_status
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
 
@@ -110,7 +110,7 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
     """
     section = Section(clamp, Cas())
     final = solve_final_state(section)
-    status = final_status(clamp, final, 0.0)
+    status = measured_status(section, final, 0.0)
     if status != CLAMPED:
         raise SolverError(f"no sensitivity: {status}")
     derivative = _derivatives(section, final)

@@ -2,12 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from clamp3d.clamp.contact import Contact, measure_contacts, overlap
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.final_state import FinalState
-from clamp3d.clamp.section import MOUTH, SPLINTS, WIRES, D
+from clamp3d.clamp.matrix import Pair
+from clamp3d.clamp.section import MOUTH, SPLINTS, WIRES, D, Section
 from clamp3d.clamp.stepped import SteppedState
+from clamp3d.clamp.steps import section_poses
 
 CLAMPED = "clamped"
+
+_REACHABLE: tuple[Pair, ...] = (("P4", "P6"), ("P4", "P7"), ("P6", "P7"))
+"""Pairs that the solver does not keep apart, though wires that are held can overlap there."""
+
+
+def measured_status(
+    section: Section, final: FinalState | SteppedState, resolution: float, contacts: Iterable[Contact] | None = None
+) -> str:
+    """`final_status`, but parts that overlap are not clamped, whatever holds the wires.
+
+    ``contacts`` are those of the state; without them the bolt and the wires are measured.
+    """
+    status = final_status(section.clamp, final, resolution)
+    if status != CLAMPED:
+        return status
+    if contacts is None:
+        contacts = measure_contacts(section.clamp, section_poses(section, final.q), section.model, pairs=_REACHABLE)
+    deepest = overlap(min(contacts, key=lambda c: c.gap))
+    return f"not clamped: {deepest}" if deepest else CLAMPED
 
 
 def final_status(clamp: Clamp, final: FinalState | SteppedState, resolution: float) -> str:

@@ -12,7 +12,7 @@ from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.motion import travel_to_contact
 from clamp3d.clamp.result import Event, Waypoint
-from clamp3d.clamp.section import WIRES, D, Section
+from clamp3d.clamp.section import WIRES, D, S, Section
 from clamp3d.collide.model import ModelCache
 from clamp3d.core.pose import Array, SectionPose
 
@@ -100,8 +100,7 @@ def section_poses(section: Section, q: Array, saddle_d: float | None = None) -> 
     clamp = section.clamp
     x, y = -float(q[0]), -float(q[1])
     down = section.down_splint(q)
-    # At any tilt the round back rests in the apex of the saddle.
-    saddle_y = y + (down.y if saddle_d is None else saddle_d) - clamp.back_clearance
+    saddle_y = y + (down.y - _saddle_lift(section, q) if saddle_d is None else saddle_d - clamp.back_clearance)
     bolt_y = saddle_y + clamp.saddle.radius + clamp.saddle.apex_thickness - clamp.bolt.shank_length
     bolt_x = x + section.bolt_x
     return {
@@ -113,3 +112,17 @@ def section_poses(section: Section, q: Array, saddle_d: float | None = None) -> 
         "P6": SectionPose(0.0, 0.0),
         "P7": SectionPose(x + float(q[2]), y + float(q[3])),
     }
+
+
+def _saddle_lift(section: Section, q: Array) -> float:
+    """How far the saddle's arc centre stands above P2's origin when the nut has drawn it up to the round back; mm."""
+    pair = section.pairs["P3", "P2"]
+    lift = 0.0
+    for _ in range(100):
+        section.queries.contact += 1
+        back = SectionPose(0.0, lift, float(q[S]) / section.lever)
+        gap = float(section.model.pieces(pair, back.T()).distance.min())
+        if abs(gap) <= 1e-12 * section.clamp.saddle.radius:
+            break
+        lift += gap
+    return lift

@@ -28,7 +28,7 @@ from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.journal import Journal
 from clamp3d.clamp.section import D, S, Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
-from clamp3d.clamp.status import CLAMPED, final_status
+from clamp3d.clamp.status import CLAMPED, final_status, measured_status
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, MissingLibraryError, SolverError, without_numbers
 
@@ -236,7 +236,7 @@ def _spec(
         pass
     else:
         start = (float(final.q[D]) + _OPENED, float(final.q[S]) / section.lever)
-        nominal = section.splint_distance(final.q) if final_status(section.clamp, final, 0.0) == CLAMPED else None
+        nominal = section.splint_distance(final.q) if measured_status(section, final, 0.0) == CLAMPED else None
     return Spec(clamp, seed, distribution, tuple(of(name) for name in DIMENSIONS), start), nominal
 
 
@@ -255,7 +255,7 @@ def _sample(spec: Spec, index: int) -> Sample:
         final = _close(section, spec.start)
     except SolverError as error:
         return None, f"not solved: {without_numbers(str(error))}"
-    status = final_status(section.clamp, final, 0.0)
+    status = measured_status(section, final, 0.0)
     return (section.splint_distance(final.q) if status == CLAMPED else None), without_numbers(status)
 
 

@@ -57,6 +57,8 @@ def command(
                 loaded, model, others=others, on_waypoint=tell.waypoint, progress=tell.position, **settings
             )
             made = make_report(subject, clearance=clearance, progress=tell.status)
+        elif method != Method("cas", None, None, None, None, None, None):
+            raise click.UsageError("--method, --solver and their options go with a clamp")
         else:
             made = make_report(loaded, clearance=clearance, progress=tell.status)
         paths = write_report(made, output, progress=tell.status)

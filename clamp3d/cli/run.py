@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.option(
     "--equilibria/--no-equilibria",
     default=None,
-    help="Also tell the other states that the clamp can come to rest in.  [default: with method cas, exact solver]",
+    help="Also report the other states that closing can end in.  [default: with method cas, exact solver]",
 )
 @JSON
 @click.option("--view", is_flag=True, help="Show the run in a browser while it goes on; prints the page's address.")

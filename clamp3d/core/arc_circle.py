@@ -51,10 +51,20 @@ class ArcFeature(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ArcContact:
-    """An arc against a circle: ``gap`` in mm is the distance from centre to arc, less the circle's radius.
+    """An arc against a circle.
 
-    ``points`` are the nearest points (x, y) of the arc, one, or M and N if ``feature`` is both; ``tolerance`` in mm is
-    the one applied.
+    Attributes
+    ----------
+    relation : ArcRelation
+        Column of Table 3.
+    gap : float
+        Distance from the circle's centre to the arc, less the circle's radius; mm.
+    feature : ArcFeature
+        The part of the arc that is nearest.
+    points : tuple of (float, float)
+        Nearest points (x, y) of the arc: one, or M and N if ``feature`` is both.
+    tolerance : float
+        The one applied, mm.
     """
 
     relation: ArcRelation
@@ -67,11 +77,24 @@ class ArcContact:
 def arc_circle(
     arc_radius: float, half_angle: float, circle_radius: float, x: float, y: float, *, tolerance: float
 ) -> ArcContact:
-    """Relation of the arc and a circle of ``circle_radius`` about (x, y); lengths in mm, ``half_angle`` in rad.
+    """Relation of an arc and a circle (Table 3).
 
-    Raises InputError unless both radii are > 0, 0 < half_angle < pi, the centre is finite and ``tolerance`` is >= 0
-    and less than both radii.
+    Parameters
+    ----------
+    arc_radius, half_angle : float
+        The arc, mm and rad; 0 < half_angle < pi.
+    circle_radius, x, y : float
+        The circle and its centre, mm.
+    tolerance : float
+        Gaps up to this are contact, mm; >= 0 and less than both radii.
 
+    Raises
+    ------
+    InputError
+        For values out of range.
+
+    Examples
+    --------
     >>> import math
     >>> arc_circle(7.0, math.radians(60), 6.935, 0.0, -0.065, tolerance=1e-9).relation.value
     'interior contact'
@@ -111,9 +134,9 @@ def arc_circle(
 def classify_arc_circle(
     gap: float, arc_radius: float, half_angle: float, circle_radius: float, x: float, y: float, *, tolerance: float
 ) -> ArcRelation:
-    """Column of Table 3 for a ``gap`` that is already known (also that of a solid groove), circle centre at (x, y).
+    """Column of Table 3 for a ``gap`` (mm) that is already known, also that of a solid groove.
 
-    Raises InputError as ``arc_circle`` does, and for a gap that is not a number.
+    The other parameters, and errors, are those of `arc_circle`.
     """
     arc_radius, half_angle, circle_radius, x, y, tolerance = _checked(
         arc_radius, half_angle, circle_radius, x, y, tolerance

@@ -136,6 +136,8 @@ def kernel() -> ModuleType:
 def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> SignedDistance:
     """Signed distance of ``cylinder`` from ``groove`` with witnesses; ``pose`` (4, 4) is ``T_groove_cylinder``.
 
+    The ends of the cylinder are taken as rounded, those of the bodies of `clamp3d.distance` are flat: where the nearest
+    axis point is an end (``abs(along)`` is half the length) the answer is a lower bound of the flat-ended distance.
     Only the cylinder's position and axis direction matter, so ``pose`` enters as its last column and its third,
     normalised. Raises InputError if ``pose`` is not a finite rigid 4x4 matrix; rounding errors are mended as
     ``check_pose`` says.

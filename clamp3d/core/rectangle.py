@@ -43,9 +43,16 @@ class HoleRelation(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Rectangle:
-    """Eq. 2: centre (``x``, ``y``), orientation ``angle`` (rad), half extents across and along; mm.
+    """A rectangle in the section (Eq. 2).
 
-    Raises InputError unless all are finite and both half extents > 0.
+    Attributes
+    ----------
+    x, y : float
+        Centre, mm.
+    half_width, half_height : float
+        Half extents across and along, > 0 mm.
+    angle : float
+        Orientation, rad.
     """
 
     x: float
@@ -71,12 +78,22 @@ class Rectangle:
 
 @dataclass(frozen=True, slots=True)
 class HoleContact:
-    """A hole against its bolt: least signed gap on either side in mm (positive apart) and the points that touch.
+    """A hole against its bolt.
 
-    A gap is taken square to the flat that is met: the bolt's side for a corner of the hole, the hole's wall for a
-    corner of the bolt. ``points`` (x, y) in the section touch. ``point`` is the hole's where the lesser gap is, and
-    ``normal`` (x, y) unit from the hole to the bolt: the bolt's point is ``point + gap * normal``. For a bolt that is
-    not in the hole ``point`` is the middle of a wall. ``tolerance`` in mm is the one applied.
+    Attributes
+    ----------
+    relation : HoleRelation
+        Row of Table 2.
+    gap_left, gap_right : float
+        Least signed gap on either side in mm, positive apart, taken square to the flat that is met: the bolt's side
+        for a corner of the hole, the hole's wall for a corner of the bolt. Infinite for a bolt outside the hole.
+    points : tuple of (float, float)
+        The points (x, y) that touch.
+    point, normal : (float, float)
+        The hole's point where the lesser gap is (for a bolt outside the hole the middle of a wall), and the unit
+        vector from hole to bolt there: the bolt's point is ``point + gap * normal``.
+    tolerance : float
+        The one applied, mm.
     """
 
     relation: HoleRelation
@@ -98,11 +115,22 @@ class _Facing:
 
 
 def hole_bolt(hole: Rectangle, bolt: Rectangle, *, tolerance: float) -> HoleContact:
-    """Relation of a hole and the bolt in it (Table 2); equality is ``|gap| <= tolerance`` in mm.
+    """Relation of a hole and the bolt in it (Table 2).
 
-    A tolerance below the rounding of the sizes is raised to it. Raises InputError if the two are turned by 90 degrees
-    or more, or ``tolerance`` is negative or not finite.
+    Parameters
+    ----------
+    hole, bolt : Rectangle
+        Turned by less than a right angle to each other.
+    tolerance : float
+        Gaps up to this are contact, mm, >= 0; one below the rounding of the sizes is raised to it.
 
+    Raises
+    ------
+    InputError
+        For values out of range.
+
+    Examples
+    --------
     >>> contact = hole_bolt(Rectangle(1.0, 0.0, 11.0, 15.0), Rectangle(0.0, 0.0, 10.0, 80.0), tolerance=1e-9)
     >>> contact.relation.value, contact.gap_left, contact.gap_right
     ('two points on one side', 0.0, 2.0)

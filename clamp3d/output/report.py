@@ -19,7 +19,7 @@ from clamp3d.collide.check import check
 from clamp3d.collide.distance import Distance
 from clamp3d.collide.result import BAD, PairResult
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import Verdict
+from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core.shapes import MeshShape, Solid
 from clamp3d.output.assembly_steps import StepRow, TighteningRow, step_rows, tightening_rows
 from clamp3d.output.wording import circumstances, gap_text, headline, sentence, titles
@@ -228,18 +228,11 @@ def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
     ]
     told = {finding.row for finding in findings}
     names = titles(scene)
-
-    def told_of(row: PairRow) -> str:
-        a, b, d = names[row.result.a], names[row.result.b], row.distance
-        if row.result.verdict is not Verdict.CLEARANCE:
-            return sentence(row.result, names)
-        return f"{a} and {b}, which nothing joins, are nearer than {scene.clearance:g} mm: {gap_text(d.lower, d.upper)}"
-
-    findings += [
-        Finding(row.severity, told_of(row), row)
-        for row in sorted(rows, key=lambda row: row.distance.upper)
-        if row.severity != "ok" and row not in told
-    ]
+    for row in sorted(rows, key=lambda row: row.distance.upper):
+        if row.severity != "ok" and row not in told:
+            gap = gap_text(row.distance.lower, row.distance.upper)
+            text = f"{names[row.result.a]} and {names[row.result.b]} {row.remark}: {gap}"
+            findings.append(Finding(row.severity, text if row.remark else sentence(row.result, names), row))
     findings.sort(key=lambda finding: list(SEVERITIES).index(finding.severity))
     passed = assembly.clamped and not any(finding.severity == "error" for finding in findings)
     line = "Clamped: both wires are held and nothing meets that should not."
@@ -278,8 +271,12 @@ def _contact_row(scene: Scene, contact: Contact, apart: bool) -> PairRow:
     severity, remark = _severity(verdict), ""
     if verdict is Verdict.CONTACT:
         severity, remark = "error", "touch though the connection matrix declares no connection"
+    elif verdict is Verdict.CLEARANCE:
+        remark = f"are nearer than {scene.clearance:g} mm, and nothing joins them"
     elif apart and severity == "ok":
-        severity, remark = "warning" if contact.declared == 3 else "note", "declared to touch, and do not"
+        severity, remark = "warning" if contact.declared == 3 else "note", "are declared to touch, and do not"
+    elif contact.declared == 3 and Thresholds(scene.contact).verdict(contact.distance) is Verdict.UNCERTAIN:
+        severity, remark = "warning", "touch or not, within the error bound of the method"
     return PairRow(PairResult(a, b, verdict, contact.distance), f"{TITLES[a]}, {TITLES[b]}", severity, remark, contact)
 
 

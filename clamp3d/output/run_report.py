@@ -45,7 +45,7 @@ def _lines(assembly: Assembly) -> Iterator[str]:
                 f"{c.a}-{c.b}",
                 c.type,
                 c.relation,
-                gap_text(c.gap) if c.gap > c.distance.uncertainty + 5e-10 or c.gap < 0.0 else "0",
+                gap_text(c.gap),
                 *(("", "") if c.point is None else (f"{c.point[0]:z.3f}", f"{-c.point[2]:z.3f}")),
                 c.feature,
             )

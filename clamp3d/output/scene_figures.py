@@ -67,29 +67,27 @@ def finding_figure(scene: Scene, row: PairResult) -> Figure:
     if place is None and common is not None:
         place = common.T[:3, :3] @ common.mesh.center_mass + common.T[:3, 3]
     camera = _CAMERAS[0] if place is None else min(_CAMERAS, key=lambda c: _hidden(c, solids, place))
-    axes = figure.subplots(1, 1 if place is None else 2, squeeze=False)[0]
-    half = _ENLARGED * max(float(np.ptp(camera.view(s)[:, :2], axis=0).max()) for s in solids)
-    if common is not None and place is not None:
-        half = max(half, 0.6 * float(np.ptp(camera.view(common)[:, :2], axis=0).max()))
-    for i, ax in enumerate(axes):
-        window = None
-        if i and place is not None:
-            at = camera.project(place[None])[0, :2]
-            reach = np.array([1.2, 1.0]) * half
-            window = at - reach, at + reach
+    outlines = np.vstack([camera.view(s)[:, :2] for s in solids])
+    size = float(np.ptp(outlines, axis=0).max())
+    windows = [(outlines.min(axis=0) - 0.01 * size, outlines.max(axis=0) + 0.01 * size)]
+    if place is not None:
+        half = _ENLARGED * size
+        if common is not None:
+            half = max(half, 0.6 * float(np.ptp(camera.view(common)[:, :2], axis=0).max()))
+        at, reach = camera.project(place[None])[0, :2], np.array([1.2, 1.0]) * half
+        windows.append((at - reach, at + reach))
+    axes = figure.subplots(1, len(windows), squeeze=False)[0]
+    for ax, window in zip(axes, windows, strict=True):
         draw_solids(ax, solids, camera, pixels=800, window=window)
         if common is not None:
-            limits = ax.get_xlim(), ax.get_ylim()
-            draw_solids(ax, [common], camera, pixels=500, window=window, zorder=10.0)
-            ax.set_xlim(limits[0])
-            ax.set_ylim(limits[1])
+            draw_solids(ax, [common], camera, pixels=800, window=window, zorder=10.0)
         if place is not None:
             _mark(ax, camera.project(place[None])[0], row)
-        if i:
-            ax.set_axis_on()
-            ax.set_xticks([])
-            ax.set_yticks([])
-            ax.set_title("enlarged", fontsize=8, loc="left", color=INK)
+    if place is not None:
+        axes[1].set_axis_on()
+        axes[1].set_xticks([])
+        axes[1].set_yticks([])
+        axes[1].set_title("enlarged", fontsize=8, loc="left", color=INK)
     _legend(axes[0], shown)
     return figure
 

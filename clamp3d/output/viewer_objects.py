@@ -143,7 +143,7 @@ def _text_image(text: str, colour: str, ink: str) -> tuple[bytes, float]:
     draw.rounded_rectangle((1, 1, width - 2, height - 2), height // 2 - 2, fill=colour, outline=INK, width=2)
     draw.text((width / 2, height / 2), text, fill=ink, font=font, anchor="mm")
     out = io.BytesIO()
-    picture.save(out, format="PNG", optimize=True)
+    picture.save(out, format="PNG")
     return out.getvalue(), width / height
 
 

@@ -116,7 +116,7 @@ def sentence(row: PairResult, names: dict[str, str]) -> str:
         "contained": f"{a} and {b}: one lies inside the other, {gap}",
         "clash": f"{a} and {b} clash: {gap}",
         "uncertain": f"{a} and {b}: undecided, {gap}",
-        "contact": f"{a} and {b} touch: {gap}",
+        "contact": f"{a} and {b} touch" + ("" if gap == "gap 0.000000 mm" else f": {gap}"),
         "clearance": f"{a} and {b} are too close: {gap}",
     }
     return said.get(row.verdict.value, f"{a} and {b}: {gap}")

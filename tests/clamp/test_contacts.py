@@ -12,18 +12,23 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp, GrooveDimensions
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.matrix import PAIRS
 from clamp3d.clamp.parts import parts
+from clamp3d.clamp.placement import placement
 from clamp3d.clamp.result import Assembly
+from clamp3d.clamp.sensitivity import sensitivity
+from clamp3d.clamp.tolerance import monte_carlo
 from clamp3d.cli import group
 from clamp3d.collide.distance import measure
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.profile import Arc
 from clamp3d.core.shapes import Solid
+from clamp3d.errors import Clamp3dError
 
 WIRES = [
     ("LJ-630", "LJ-120"),
@@ -217,6 +222,36 @@ def test_wires_through_the_bolt_are_not_clamped() -> None:
     assert {(d.a, d.b) for d in assembly.undeclared} == {("P4", "P6"), ("P4", "P7")}
 
 
+def test_run_of_wires_through_the_bolt_is_a_finding(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "clamp3d/clamp/data/reference.toml").read_text()
+    for old, new in (
+        (r"radius = 23\.8012", "radius = 15.0"),
+        (r"offset = \d+\.\d+", "offset = 30.0"),
+        (r"centre_depth = 48\.7901", "centre_depth = 32.726"),
+        (r"centre_depth = (3\.4624|4\.9057)", "centre_depth = 19.5505"),
+        (r"slot_width = 42\.0", "slot_width = 30.0"),
+        (r"max_tilt_deg = 12\.8", "max_tilt_deg = 5.0"),
+        (r"shank_length = 160\.0", "shank_length = 220.0"),
+    ):
+        text, count = re.subn(old, new, text)
+        assert count
+    file = tmp_path / "through.toml"
+    file.write_text(text)
+    done = CliRunner().invoke(group, ["run", str(file), "-q", "--line", "52", "--jumper", "52", "--no-equilibria"])
+    assert done.exit_code == 1
+    assert "\nnot clamped: P4 overlaps P6 by" in done.output
+
+
+def test_no_command_calls_wires_through_the_bolt_clamped() -> None:
+    clamp = through_the_bolt()
+    result = monte_carlo(clamp, n=2, tolerance=0.01)
+    assert result.nominal is None
+    assert all("overlaps" in status for status in result.status)
+    for refuses in (lambda: sensitivity(clamp), lambda: placement(clamp)):
+        with pytest.raises(Clamp3dError, match="not clamped: P4 overlaps P6"):
+            refuses()
+
+
 def test_an_overlap_counts_though_contact_is_declared() -> None:
     clamp = through_the_bolt()
     rows = {**clamp.connections, "P4": {"P5": 1, "P6": 2, "P7": 2}}
@@ -246,3 +281,13 @@ def test_plain_data_and_frame() -> None:
     assert isinstance(frame, pandas.DataFrame)
     assert frame["distance_mm"].tolist() == [c.gap for c in assembly.contacts]
     assert "P1-P2" in assembly._repr_html_()
+
+
+@pytest.mark.parametrize("unit_deg", [5.0, 20.0])
+def test_a_contact_model_measures_its_own_contacts(unit_deg: float) -> None:
+    assembly = assemble(model=Chords(math.radians(unit_deg)))
+    assert assembly.clamped
+    assert {(d.a, d.b) for d in assembly.matrix_differences} == {("P1", "P4"), ("P2", "P4")}
+    arcs = [c for c in assembly.contacts if c.declared == 3]
+    assert all(abs(c.gap) <= 1e-9 and c.distance.method == "chords" for c in arcs)
+    assert all(c.distance.lower <= c.gap <= c.distance.upper for c in arcs)

@@ -149,7 +149,7 @@ def test_notes_tell_of_other_equilibria_and_of_what_is_declared_and_does_not_tou
         (finding,) = (f for f in reference.findings if f.row is not None and f.row.name == pair)
         assert "does not touch: 1.000 mm apart" in finding.text
     (near,) = (f for f in reference.findings if f.row is not None and f.row.name == "P1-P2")
-    assert near.text.endswith("nearer than 5 mm: gap 3.729354 mm")
+    assert near.text == "P1 up splint and P2 down splint are nearer than 5 mm, and nothing joins them: gap 3.729354 mm"
 
 
 def test_a_wire_through_the_bolt_is_a_clash_not_a_pass(reference):
@@ -388,6 +388,7 @@ def test_command_takes_scenes_and_meshes(tmp_path):
         (("-o", "x", "--clearance", "-1"), "clearance"),
         (("-o", "x", "nobody"), "nobody"),
         (("-o", "file/x"), "file"),
+        ((str(ROOT / "examples/hinge/scene.toml"), "--method", "chords", "-o", "x"), "go with a clamp"),
     ],
 )
 def test_bad_input_is_one_line_and_writes_nothing(arguments, message, tmp_path):

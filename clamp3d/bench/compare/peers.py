@@ -26,6 +26,7 @@ from clamp3d.baselines.wedges import part_wedges, prism
 from clamp3d.bench.compare.methods import Method, Prepared
 from clamp3d.bench.compare.scene import WIRE, block, chord_error, pair
 from clamp3d.core.pose import Array
+from clamp3d.core.profile import chord_count
 
 PEER_ANGLES_DEG = (1.0, 5.0, 20.0)
 _FARTHEST = 2.0  # mm
@@ -216,4 +217,4 @@ def _mesh(unit_angle: float) -> tuple[Array, Any]:
 
 
 def _sections(unit_angle: float) -> int:
-    return max(3, math.ceil(2.0 * math.pi / unit_angle - 1e-9))
+    return max(3, chord_count(2.0 * math.pi, unit_angle))

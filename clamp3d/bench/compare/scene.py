@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.baselines import chords
 from clamp3d.bench.compare.block import block_pair, grooved_block
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array, inverse
@@ -128,5 +129,4 @@ def chord_error(unit_angle: float) -> float:
     >>> [round(chord_error(math.radians(a)), 5) for a in (1.0, 5.0, 10.0, 20.0)]
     [0.00046, 0.01142, 0.04566, 0.18231]
     """
-    m = math.ceil(2.0 * GROOVE.half_angle / unit_angle - 1e-9)
-    return 2.0 * GROOVE.radius * math.sin(GROOVE.half_angle / m / 2.0) ** 2
+    return chords.chord_error(GROOVE, unit_angle)

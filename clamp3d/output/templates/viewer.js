@@ -59,7 +59,7 @@ function clamp3dViewer(messages) {
   }
   function addSwitches() {
     if (story.cut) addSwitch("cutaway", story.cut_open, (on) => { show("/clamp3d/cutaway", on); show("/clamp3d/whole", !on); });
-    addSwitch("labels", true, (on) => show("/clamp3d/labels", on));
+    addSwitch("labels", Object.keys(story.nodes).length <= 30, (on) => show("/clamp3d/labels", on));
     addSwitch("contacts", true, (on) => show("/clamp3d/contacts", on));
     addSwitch("gaps", true, (on) => show("/clamp3d/gaps", on));
     for (const o of story.overlays) addSwitch(o.name, false, (on) => show(o.path, on));
@@ -89,6 +89,7 @@ function clamp3dViewer(messages) {
         }
       }
     }
+    show("/clamp3d/labels", Boolean(names) || switches.labels.on);
     $("home").hidden = !names;
     viewer.set_dirty();
   }

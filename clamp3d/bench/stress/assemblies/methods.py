@@ -19,6 +19,7 @@ from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.stepped import solve_stepped
 from clamp3d.core.pose import Array
+from clamp3d.core.profile import chord_count, sagitta
 
 EXACT = 1e-8
 """Bound in mm of the exact solver's answers: ten times the residuals that it proves, and of a clamp of usual size."""
@@ -81,14 +82,13 @@ def _chord_bound(clamp: Clamp) -> float:
     up, down = clamp.up_splint, clamp.down_splint
     worst = 0.0
     for key in ("line_groove", "jumper_groove"):
-        sagitta, steepest = 0.0, 0.0
+        error, steepest = 0.0, 0.0
         for part, face, tilt in ((up, up.thickness, 0.0), (down, down.face_depth, down.max_tilt)):
             groove = getattr(part, key)
             half = math.acos(min(1.0, abs(groove.centre_depth - face) / groove.radius))
-            chord = 2.0 * half / math.ceil(2.0 * half / _UNIT - 1e-9)
-            sagitta += 2.0 * groove.radius * math.sin(0.25 * chord) ** 2
+            error += sagitta(groove.radius, 2.0 * half / chord_count(2.0 * half, _UNIT))
             steepest = max(steepest, half + tilt)
-        worst = max(worst, sagitta / math.cos(steepest) if steepest < 0.5 * math.pi else math.inf)
+        worst = max(worst, error / math.cos(steepest) if steepest < 0.5 * math.pi else math.inf)
     return worst
 
 

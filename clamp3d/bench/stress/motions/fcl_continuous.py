@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.baselines.chords import chord_error
 from clamp3d.baselines.wedges import part_wedges, prism
 from clamp3d.bench.stress.motions.cases import Motions, poses
-from clamp3d.bench.stress.poses.methods import UNIT, block, chord_error
+from clamp3d.bench.stress.poses.methods import UNIT, block
 from clamp3d.bench.stress.worker import Measured, Measures
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import SweptArc
@@ -52,7 +53,7 @@ class FclMethod:
         reach = np.array([_reach(way, wire.length) + wire.radius for way in ways])
         small = min(groove.radius, groove.length, wire.radius, wire.length) < _SMALLEST
         unfit = (reach.max(1) > _LARGEST) | small
-        bound = np.full(n, chord_error(groove))
+        bound = np.full(n, chord_error(groove, UNIT))
         distance = np.full(n, np.nan)
         if not unfit.all():
             pieces = self._pieces(groove, reach[~unfit].max(0))

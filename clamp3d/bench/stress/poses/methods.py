@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from clamp3d.baselines import ContactModel, contact_model
+from clamp3d.baselines.chords import chord_error
 from clamp3d.baselines.polytopes import PartOrMesh
 from clamp3d.bench.stress.family import Methods
 from clamp3d.bench.stress.poses.cases import Cases
@@ -76,7 +77,7 @@ class ChordsMethod:
         T = poses(cases)
         distance = contact_model("chords", unit_angle=UNIT).distances(cases.shapes.pair(k), T)
         beside = np.abs(T[:, 2, 3]) > 0.5 * (cases.shapes.L[k] + cases.shapes.length[k])
-        bound = chord_error(cases.shapes.groove(k)) + 2e-9 * cases.scene()  # 1e-9 rad counts as parallel
+        bound = chord_error(cases.shapes.groove(k), UNIT) + 2e-9 * cases.scene()  # 1e-9 rad counts as parallel
         return Measured(distance, bound, beside, "method 'chords' knows no end faces: the wire must overlap the groove")
 
 
@@ -129,12 +130,6 @@ def block(groove: SweptArc, points: Array) -> Solid:
     return Solid("P1", (body,), title="block with a groove", volume=body.volume)
 
 
-def chord_error(groove: SweptArc) -> float:
-    """Largest distance in mm of chords of `UNIT` from the arc."""
-    chord = 2.0 * groove.half_angle / max(1, math.ceil(2.0 * groove.half_angle / UNIT - 1e-9))
-    return 2.0 * groove.radius * math.sin(0.25 * chord) ** 2
-
-
 def mesh_error(groove: SweptArc) -> float:
     """Chord error of meshes in mm."""
     return MESH_ERROR * groove.radius
@@ -153,7 +148,7 @@ METHODS: Methods = {
     ),
     "wedges 5 deg": (
         "convex partitioning in 3D: python-fcl on exact wedges of 5 degrees; its bound is the chord error",
-        partial(SolidMethod, "wedges", chord_error, {"unit_angle": UNIT}),
+        partial(SolidMethod, "wedges", partial(chord_error, unit_angle=UNIT), {"unit_angle": UNIT}),
     ),
     "mesh": (
         "python-fcl's triangle mesh, chord error R / 2400, which is its bound",
