@@ -64,7 +64,7 @@ def distance(
     >>> from clamp3d.core import shapes
     >>> from clamp3d.core.pose import translation
     >>> found = distance(shapes.box((10, 10, 10)), shapes.cylinder(3, 10), translation(0, 0, 12))
-    >>> round(found.value, 9), found.normal.tolist()
+    >>> round(found.value, 9), (found.normal.round(9) + 0.0).tolist()
     (2.0, [0.0, 0.0, 1.0])
     """
     T = np.eye(4) if T_a_b is None else check_pose(T_a_b, "T_a_b")
