@@ -352,7 +352,7 @@ def test_command_reports_a_clamp_of_ones_own(tmp_path):
     text = resources.files("clamp3d.clamp").joinpath("data/reference.toml").read_text()
     text = text.replace('name = "reference"', 'name = "mine"').replace("length = 60.0", "length = 75.0")
     (tmp_path / "mine.toml").write_text(text.replace("hole_diameter = 22.0", "hole_diameter = 21.0"))
-    arguments = ("--line", "24", "--jumper", "18", "-o", "out", "--clearance", "2", "--outline-error", "0.01")
+    arguments = ("--line", "24", "--jumper", "18", "-o", "out", "--clearance", "2")
     done = command_line("mine.toml", *arguments, folder=tmp_path)
     assert done.returncode in (0, 1), done.stderr
     assert done.stdout.split() == [f"out/{name}" for name in FILES]
