@@ -12,7 +12,7 @@ import numpy as np
 from clamp3d import __version__
 from clamp3d.clamp.placement import FREEDOMS, Freedom, Limits, Outcome, Outcomes, Placement, PlacementTolerance
 from clamp3d.core.distance import Feature
-from clamp3d.output.figures import save_figure
+from clamp3d.output.figures import blank, save_figure
 from clamp3d.output.palette import INK
 
 ANGLES: tuple[Freedom, ...] = ("yaw", "pitch")
@@ -124,10 +124,9 @@ def draw_map(
 ) -> None:
     """Write the map as PNG, SVG or PDF by the file's name: one field per pair of freedoms, the limits marked."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
-    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-    figure = Figure(figsize=(4.3 * len(grids) + 0.6, 5.2), layout="constrained")
+    figure = blank(4.3 * len(grids) + 0.6, 5.2)
     colours = ListedColormap([COLOURS[o] for o in Outcome])
     norm = BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3)
     limits = {x.freedom: x for x in tolerances.limits}

@@ -223,7 +223,7 @@ def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
     different = {(d.a, d.b) for d in assembly.matrix_differences if not d.measured}
     rows = tuple(_contact_row(scene, contact, (contact.a, contact.b) in different) for contact in assembly.contacts)
     findings = [
-        Finding(f.severity, f.text, next((row for row in rows if f.text.startswith(f"{row.name} ")), None))
+        Finding(f.severity, f.text, next((r for r in rows if (r.result.a, r.result.b) == (f.a, f.b)), None))
         for f in assembly.findings
     ]
     told = {finding.row for finding in findings}
@@ -321,13 +321,6 @@ def _left_out(scene: Scene) -> list[str]:
     names = titles(scene)
     drawn = {part.name: part.shape for part in scene.parts if isinstance(part.shape, Solid)}
     return [f"{names[name]}: {solid.not_modelled}" for name, solid in drawn.items() if solid.not_modelled]
-
-
-def _motions(scene: Scene) -> str:
-    n = len(scene.motions)
-    return f"{n or 'no'} {'motion' if n == 1 else 'motions'} of rigid parts" + (
-        ", followed without a gap in time" * bool(n)
-    )
 
 
 def _clamp_modelled(assembly: Assembly) -> tuple[str, ...]:

@@ -11,12 +11,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from clamp3d.collide.distance import Distance
-from clamp3d.collide.result import CheckResult, PairResult
+from clamp3d.collide.result import BAD, CheckResult, PairResult
 from clamp3d.collide.scene import Scene
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 from clamp3d.output.palette import VERDICT_COLOURS
-from clamp3d.output.wording import BAD, gap_text
+from clamp3d.output.wording import gap_text
 
 if TYPE_CHECKING:
     from meshcat.animation import Animation

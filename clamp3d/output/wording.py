@@ -6,11 +6,9 @@ import math
 from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 
-from clamp3d.collide.result import CheckResult, PairResult
+from clamp3d.collide.result import BAD, CheckResult, PairResult
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.collide.verdict import Verdict
-
-BAD = ("contained", "clash")
 
 
 def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
@@ -133,13 +131,6 @@ def circumstances(row: PairResult) -> str:
 def counts_text(result: CheckResult) -> str:
     """How many pairs have which verdict, in words."""
     return ", ".join(f"{count} {name}" for name, count in result.counts.items()) or "no pairs"
-
-
-def contents(scene: Scene) -> str:
-    """How many parts and motions a scene has."""
-    parts, motions = len(scene.parts), len(scene.motions)
-    moving = f", {motions} {'motion' if motions == 1 else 'motions'}" if motions else ""
-    return f"{parts} {'part' if parts == 1 else 'parts'}{moving}"
 
 
 def worst_first(rows: Sequence[PairResult]) -> list[PairResult]:
