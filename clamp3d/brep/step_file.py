@@ -18,9 +18,11 @@ _ANGLE = 0.2  # rad: small fillets get facets enough to be known as round
 def require_open_cascade() -> None:
     """Load Open CASCADE and keep it from printing on stdout. Raises MissingLibraryError if it is not installed."""
     try:
-        from OCP.Message import Message
+        import OCP  # noqa: F401
     except ImportError:
         raise MissingLibraryError("STEP needs Open CASCADE: pip install 'clamp3d[step]'") from None
+    from OCP.Message import Message
+
     messenger = Message.DefaultMessenger_s()
     for printer in [*messenger.Printers()]:
         messenger.RemovePrinter(printer)
