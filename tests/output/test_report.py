@@ -215,6 +215,17 @@ def test_steps_are_what_a_line_worker_sees(reference):
     assert np.diff([s.way for s in stages]) == pytest.approx(stages[-1].way / 4)
 
 
+def test_findings_of_a_clamp_name_their_pair(reference, loose):
+    found = [finding for made in (reference, loose) for finding in made.assembly.findings]
+    named = [(f.a, f.b) for f in found if f.a is not None]
+    assert named
+    assert named == [m.groups() for f in found if (m := re.match(r"(P\d)-(P\d) ", f.text))]
+    for made in (reference, loose):
+        told = {f.text: f.row for f in made.findings}
+        for f in made.assembly.findings:
+            assert (f.a is None) == (told[f.text] is None)
+
+
 def test_csv_and_json_tell_the_same(reference):
     data = json.loads(json.dumps(report_to_dict(reference), allow_nan=False))
     lines = list(csv.DictReader(io.StringIO(report_csv(reference))))
