@@ -15,28 +15,34 @@ CHORD_ERROR = 0.02
 _ANGLE = 0.2  # rad: small fillets get facets enough to be known as round
 
 
+def require_open_cascade() -> None:
+    """Load Open CASCADE and keep it from printing on stdout. Raises MissingLibraryError if it is not installed."""
+    try:
+        import OCP  # noqa: F401
+    except ImportError:
+        raise MissingLibraryError("STEP needs Open CASCADE: pip install 'clamp3d[step]'") from None
+    from OCP.Message import Message
+
+    messenger = Message.DefaultMessenger_s()
+    for printer in [*messenger.Printers()]:
+        messenger.RemovePrinter(printer)
+
+
 def read_step(file: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices (n, 3) in mm and faces (m, 3) of all shapes in a STEP file.
 
     Raises MissingLibraryError without the extra ``step``, InputError if the file is no STEP file or has no surface.
     """
-    try:
-        import OCP  # noqa: F401
-    except ImportError:
-        raise MissingLibraryError("reading STEP needs cadquery-ocp-novtk: pip install 'clamp3d[step]'") from None
+    require_open_cascade()
     from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.IFSelect import IFSelect_ReturnStatus
-    from OCP.Message import Message
     from OCP.STEPControl import STEPControl_Reader
     from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS
 
-    messenger = Message.DefaultMessenger_s()
-    for printer in [*messenger.Printers()]:  # they print on stdout
-        messenger.RemovePrinter(printer)
     reader = STEPControl_Reader()
     if reader.ReadFile(str(file)) != IFSelect_ReturnStatus.IFSelect_RetDone or reader.TransferRoots() == 0:
         raise InputError(f"{file}: not a readable STEP file")

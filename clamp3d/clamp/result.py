@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass
 from html import escape
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from clamp3d import __version__
 from clamp3d.baselines.model import ContactModel
@@ -111,10 +111,12 @@ Severity = Literal["error", "warning", "note"]
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something a reviewer has to know: ``text`` in words, and how grave it is."""
+    """Something a reviewer has to know: ``text`` in words, how grave it is, and its two parts if it has two."""
 
     severity: Severity
     text: str
+    a: PartName | None = None
+    b: PartName | None = None
 
     def __str__(self) -> str:
         return f"{self.severity}: {self.text}"
@@ -227,15 +229,16 @@ class Assembly:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What a reviewer has to know, the worst first; every report prints this list."""
-        errors = [] if self.clamped else [self.status]
-        errors += [text for c in self.contacts if (text := overlap(c)) and not self.status.endswith(text)]
-        errors += [str(d) for d in self.undeclared]
-        rest = [d for d in self.matrix_differences if d.declared != 0]
-        warnings = [str(d) for d in rest if d.declared == 3 or d.measured]
-        notes = [str(d) for d in rest if d.declared != 3 and not d.measured]
-        notes += [str(e) for e in self.others or ()]
-        listed: list[tuple[Severity, list[str]]] = [("error", errors), ("warning", warnings), ("note", notes)]
-        return tuple(Finding(severity, text) for severity, texts in listed for text in texts)
+        overlaps = {text: c for c in self.contacts if (text := overlap(c))}
+        why = next((c for text, c in overlaps.items() if self.status.endswith(text)), None)
+        found = [] if self.clamped else [Finding("error", self.status, *((why.a, why.b) if why else ()))]
+        found += [Finding("error", text, c.a, c.b) for text, c in overlaps.items() if c is not why]
+        found += [Finding("error", str(d), d.a, d.b) for d in self.undeclared]
+        for d in self.matrix_differences:
+            if d.declared != 0:
+                found.append(Finding("warning" if d.declared == 3 or d.measured else "note", str(d), d.a, d.b))
+        found += [Finding("note", str(e)) for e in self.others or ()]
+        return tuple(sorted(found, key=lambda finding: get_args(Severity).index(finding.severity)))
 
     def T_world(self, part: PartName) -> Array:
         """Pose (4, 4) of a part in the world in the final state, lengths in mm."""

@@ -6,15 +6,10 @@ from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.errors import InputError
 
 
-def state_names(run: Assembly) -> list[str]:
-    """What `state` understands: ``open``, the sequence's steps (each also by its number from 1), ``final``."""
-    return ["open", *_steps(run), "final"]
-
-
 def state(run: Assembly, name: str) -> Waypoint:
     """The waypoint of a state: ``open`` is where the run begins, a step is where it ends, ``final`` the run's end.
 
-    Raises InputError for a name that is none of `state_names`, with the choices.
+    Raises InputError for any other name, with the choices.
 
     >>> from clamp3d.clamp.assemble import assemble
     >>> from clamp3d.clamp.loader import load_clamp
@@ -27,13 +22,10 @@ def state(run: Assembly, name: str) -> Waypoint:
         return run.path[0]
     if name == "final":
         return run.path[-1]
-    steps = _steps(run)
+    ends = {waypoint.step: waypoint for waypoint in run.path}
+    steps = list(ends)
     step = steps[int(name) - 1] if name.isdecimal() and 1 <= int(name) <= len(steps) else name
     if step not in steps:
         numbered = ", ".join(f"{step} (or {i})" for i, step in enumerate(steps, 1))
         raise InputError(f"unknown state {name!r}; available: open, {numbered}, final")
-    return next(waypoint for waypoint in reversed(run.path) if waypoint.step == step)
-
-
-def _steps(run: Assembly) -> list[str]:
-    return list(dict.fromkeys(waypoint.step for waypoint in run.path))
+    return ends[step]

@@ -10,12 +10,13 @@ import importlib
 import os
 import sys
 import traceback
+import warnings
 from contextlib import suppress
 
 import click
 
 import clamp3d
-from clamp3d.cli.terminal import ExitCode, tolerate_closed_pipes
+from clamp3d.cli.terminal import ExitCode, show, tolerate_closed_pipes
 from clamp3d.errors import Clamp3dError, SolverError, one_line
 
 # Name -> (module, one line for the list of commands). A command's module is loaded when it is called.
@@ -78,7 +79,9 @@ def main() -> None:
     """Entry point: one line for every fault, never a traceback; CLAMP3D_DEBUG=1 shows it."""
     tolerate_closed_pipes()
     try:
-        status = group.main(prog_name="clamp3d", standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.showwarning = lambda message, *_, **__: show(f"warning: {one_line(str(message))}", err=True)
+            status = group.main(prog_name="clamp3d", standalone_mode=False)
     except click.ClickException as error:
         where = getattr(error, "ctx", None)
         hint = f" (see {where.command_path} --help)" if where is not None else ""

@@ -7,29 +7,21 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import JSON, OUTPUT, QUIET, Source, number, source_argument
+from clamp3d.cli.options import JSON, QUIET, Source, argument, declared, group, option
 from clamp3d.cli.progress import bar
 from clamp3d.cli.terminal import finish, show
 
 
-@click.command("check")
-@source_argument("INPUT", required=True)
-@click.option("--pairs", metavar="A:B,...", help="Only these pairs, for instance P1:P6,P2:P7.")
-@click.option("--clearance", type=number, metavar="MM", help="Gap that parts must keep; replaces the file's.")
-@click.option("--distances", is_flag=True, help="Measure every pair, not only as finely as its verdict needs.")
-@click.option("--full", is_flag=True, help="Also ask every model at its finest for every pair, and compare (slow).")
-@JSON
-@click.option("--html", "html_file", type=OUTPUT, metavar="FILE", help="Write a page in 3D; - is stdout.")
-@QUIET
+@declared("check")
 def command(
-    source: Source,
-    pairs: str | None,
-    clearance: float | None,
-    distances: bool,
-    full: bool,
-    json_file: Path | None,
-    html_file: Path | None,
-    quiet: bool,
+    source: Source = group(Source, source=argument(metavar="INPUT", required=True)),
+    pairs: str | None = option("Only these pairs, for instance P1:P6,P2:P7.", metavar="A:B,..."),
+    clearance: float | None = option("Gap that parts must keep; replaces the file's.", metavar="MM"),
+    distances: bool = option("Measure every pair, not only as finely as its verdict needs."),
+    full: bool = option("Also ask every model at its finest for every pair, and compare (slow)."),
+    json_file: Path | None = JSON,
+    html_file: Path | None = option("Write a page in 3D; - is stdout.", "--html"),
+    quiet: bool = QUIET,
 ) -> None:
     """Check which parts of INPUT clash, touch or keep their clearance, at rest and in motion.
 

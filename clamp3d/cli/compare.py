@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
-
-from clamp3d.cli.options import JSON, QUIET, Output
+from clamp3d.cli.options import JSON, QUIET, Output, declared, option
 from clamp3d.cli.progress import bar
 from clamp3d.cli.terminal import show
 
 CHART = Output((".png", ".svg", ".html"))
 
 
-@click.command("compare")
-@JSON
-@click.option("--plot", "plot_file", type=CHART, metavar="FILE", help="Draw the chart: .png, .svg or .html.")
-@click.option("--peers", is_flag=True, help="Also measure coal, trimesh, MuJoCo, manifold3d and Open CASCADE.")
-@QUIET
-def command(json_file: Path | None, plot_file: Path | None, peers: bool, quiet: bool) -> None:
+@declared("compare")
+def command(
+    json_file: Path | None = JSON,
+    plot_file: Path | None = option("Draw the chart: .png, .svg or .html.", "--plot", type=CHART),
+    peers: bool = option("Also measure coal, trimesh, MuJoCo, manifold3d and Open CASCADE."),
+    quiet: bool = QUIET,
+) -> None:
     """Measure every contact method on the same poses and the same assembly: accuracy against speed.
 
     Takes some minutes. Each method runs in a process of its own; one that fails or does not finish is a row that says

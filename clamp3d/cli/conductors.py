@@ -6,10 +6,13 @@ import json
 
 import click
 
+from clamp3d.cli.options import declared, option
 
-@click.command("conductors")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def command(as_json: bool) -> None:
+
+@declared("conductors")
+def command(
+    as_json: bool = option("Print JSON.", "--json"),
+) -> None:
     """List the conductor catalogue: designation, diameter over all strands, standard."""
     from dataclasses import asdict
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from clamp3d.cli.options import UNITS, Source, number, source_argument
+from clamp3d.cli.options import SOURCE, UNITS, Source, declared, option
 from clamp3d.cli.terminal import show
 
 if TYPE_CHECKING:
@@ -18,40 +18,30 @@ if TYPE_CHECKING:
 FORMATS = ("stl", "obj", "ply", "glb", "3mf", "step")
 
 
-@click.command("export")
-@source_argument()
-@click.option("--format", "-f", type=click.Choice(FORMATS), help="By default the suffix of FILE.")
-@click.option(
-    "--output",
-    "-o",
-    type=click.Path(path_type=Path),
-    required=True,
-    metavar="DIR|FILE",
-    help="A folder, or one file that ends in a format's suffix.",
-)
-@click.option(
-    "--layout",
-    type=click.Choice(["parts", "assembly"]),
-    help="One file per part, or one for all.  [default: assembly for a FILE and for glb, 3mf, step; else parts]",
-)
-@click.option(
-    "--state",
-    metavar="open|final|STEP",
-    help="Place a clamp's parts as they stand there; a step by name or number.  [default: final for an assembly; "
-    "separate parts keep their own frames]",
-)
-@click.option("--mesh-error", type=number, default=0.01, show_default=True, metavar="MM", help="Chord error of meshes.")
-@click.option("--unit", type=click.Choice(UNITS), help="Unit of the file.  [default: mm; m for glb]")
-@click.option("--quiet", "-q", is_flag=True, help="No messages.")
+@declared("export")
 def command(
-    source: Source,
-    format: Format | None,
-    output: Path,
-    layout: Layout | None,
-    state: str | None,
-    mesh_error: float,
-    unit: str | None,
-    quiet: bool,
+    source: Source = SOURCE,
+    format: Format | None = option("By default the suffix of FILE.", "--format", "-f", type=click.Choice(FORMATS)),
+    output: Path = option(
+        "A folder, or one file that ends in a format's suffix.",
+        "--output",
+        "-o",
+        type=click.Path(path_type=Path),
+        required=True,
+        metavar="DIR|FILE",
+    ),
+    layout: Layout | None = option(
+        "One file per part, or one for all.  [default: assembly for a FILE and for glb, 3mf, step; else parts]",
+        type=click.Choice(["parts", "assembly"]),
+    ),
+    state: str | None = option(
+        "Place a clamp's parts as they stand there; a step by name or number.  [default: final for an assembly; "
+        "separate parts keep their own frames]",
+        metavar="open|final|STEP",
+    ),
+    mesh_error: float = option("Chord error of meshes.", default=0.01, metavar="MM"),
+    unit: str | None = option("Unit of the file.  [default: mm; m for glb]", type=click.Choice(UNITS)),
+    quiet: bool = option("No messages.", "--quiet", "-q"),
 ) -> None:
     """Write the parts of INPUT for CAD review, with a manifest beside them.
 

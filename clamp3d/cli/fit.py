@@ -6,24 +6,21 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import JSON, OUTPUT, UNITS
+from clamp3d.cli.options import JSON, UNITS, argument, declared, option
 from clamp3d.cli.progress import bar
 from clamp3d.cli.terminal import show
 
 
-@click.command("fit")
-@click.argument("mesh", metavar="MESH", type=click.Path(path_type=Path))
-@click.option(
-    "--unit",
-    type=click.Choice(UNITS),
-    help="Unit of the file's numbers.  [default: the file's own; mm for STL, OBJ, PLY]",
-)
-@JSON
-@click.option(
-    "--html", "html_file", type=OUTPUT, metavar="FILE", help="Write a page: the mesh, its features, their errors."
-)
-@click.option("--quiet", "-q", is_flag=True, help="No progress and no notes.")
-def command(mesh: Path, unit: str | None, json_file: Path | None, html_file: Path | None, quiet: bool) -> None:
+@declared("fit")
+def command(
+    mesh: Path = argument(metavar="MESH", type=click.Path(path_type=Path)),
+    unit: str | None = option(
+        "Unit of the file's numbers.  [default: the file's own; mm for STL, OBJ, PLY]", type=click.Choice(UNITS)
+    ),
+    json_file: Path | None = JSON,
+    html_file: Path | None = option("Write a page: the mesh, its features, their errors.", "--html"),
+    quiet: bool = option("No progress and no notes.", "--quiet", "-q"),
+) -> None:
     """Find round grooves, cylinders and holes in MESH (STL, OBJ, PLY, GLB, 3MF, STEP) and say how well they are known.
 
     A mesh without any is said to have none, with exit code 0.

@@ -6,44 +6,26 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import INPUT_FILE, JSON, number
+from clamp3d.cli.options import INPUT_FILE, JSON, argument, declared, option
 from clamp3d.cli.terminal import show
 
 
-@click.command("measure-image")
-@click.argument("image", type=INPUT_FILE)
-@click.option("--points", required=True, metavar="'X,Y X,Y'", help="The two end points in px from the top left.")
-@click.option("--reference", required=True, metavar="'X,Y X,Y'", help="The two ends of a measured length, in px.")
-@click.option("--scale", required=True, type=number, metavar="MM", help="That length, by calliper.")
-@click.option(
-    "--measure",
-    "kind",
-    type=click.Choice(["height", "straight"]),
-    default="height",
-    show_default=True,
-    help="Square to the reference line, or straight from point to point.",
-)
-@click.option("--snap", type=number, metavar="PX", help="Move each mark to the strongest corner within PX pixels.")
-@click.option("--marking-error", type=number, metavar="PX", help="Of a mark, one sigma.  [default: 4.5; 0.5 snapped]")
-@click.option(
-    "--calliper-error",
-    type=number,
-    default=0.02,
-    show_default=True,
-    metavar="MM",
-    help="Standard deviation of a reading.",
-)
-@JSON
+@declared("measure-image")
 def command(
-    image: Path,
-    points: str,
-    reference: str,
-    scale: float,
-    kind: str,
-    snap: float | None,
-    marking_error: float | None,
-    calliper_error: float,
-    json_file: Path | None,
+    image: Path = argument(type=INPUT_FILE),
+    points: str = option("The two end points in px from the top left.", required=True, metavar="'X,Y X,Y'"),
+    reference: str = option("The two ends of a measured length, in px.", required=True, metavar="'X,Y X,Y'"),
+    scale: float = option("That length, by calliper.", required=True, metavar="MM"),
+    kind: str = option(
+        "Square to the reference line, or straight from point to point.",
+        "--measure",
+        type=click.Choice(["height", "straight"]),
+        default="height",
+    ),
+    snap: float | None = option("Move each mark to the strongest corner within PX pixels.", metavar="PX"),
+    marking_error: float | None = option("Of a mark, one sigma.  [default: 4.5; 0.5 snapped]", metavar="PX"),
+    calliper_error: float = option("Standard deviation of a reading.", default=0.02, metavar="MM"),
+    json_file: Path | None = JSON,
 ) -> None:
     """Measure a distance in the photograph IMAGE by marked points and a length of known size.
 

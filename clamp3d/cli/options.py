@@ -1,11 +1,11 @@
-"""Options that several commands share. Each group comes to a command as one dataclass."""
+"""Options are written once, as the defaults of a command's parameters; those that several commands share are here."""
 
 from __future__ import annotations
 
-import functools
+import inspect
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from pathlib import Path
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.collide.scene import Scene
 
-Command = Callable[..., Any]
+Declared = Callable[[str, str], click.Parameter]
+"""Makes the option or argument for a parameter with a name and an annotation."""
 UNITS = ("mm", "cm", "m", "in")
 
 
@@ -61,32 +62,78 @@ INPUT_FILE = click.Path(dir_okay=False, path_type=Path)
 OUTPUT = Output()
 PICTURE = Output((".png", ".svg", ".pdf"))
 FOLDER = click.Path(file_okay=False, path_type=Path)
+_USUAL: dict[str, dict[str, Any]] = {
+    "bool": {"is_flag": True},
+    "float": {"type": number},
+    "Path": {"type": OUTPUT, "metavar": "FILE"},
+}
 
 
-def collect(name: str, kind: type[Any], *options: Callable[[Command], Command]) -> Callable[[Command], Command]:
-    """Decorator that adds ``options`` to a command, which gets their values as one ``kind`` by the name ``name``."""
-    keys = [f.name for f in fields(kind)]
+def option(text: str, *names: str, **settings: Any) -> Any:
+    """An option with the help ``text``, as the default of the parameter that gets its value.
 
-    def decorate(command: Command) -> Command:
-        @functools.wraps(command)
-        def call(**values: Any) -> Any:
-            return command(**{name: kind(**{key: values.pop(key) for key in keys})}, **values)
+    Without ``names`` it is called as the parameter. ``settings`` are those of `click.Option`; of a parameter that is
+    annotated as a bool, a float or a Path the type need not be said. A default is shown.
+    """
 
-        decorated: Command = call
-        for option in reversed(options):
-            decorated = option(decorated)
-        return decorated
+    def make(name: str, annotation: str) -> click.Option:
+        usual = _USUAL.get(annotation.removesuffix(" | None"), {}) | {"show_default": "default" in settings}
+        return click.Option([*(names or [f"--{name.replace('_', '-')}"]), name], help=text, **(usual | settings))
+
+    return make
+
+
+def argument(**settings: Any) -> Any:
+    """A `click.Argument`, as the default of the parameter that gets its value."""
+    return lambda name, annotation: click.Argument([name], **settings)
+
+
+@dataclass(frozen=True)
+class _Group:
+    kind: type[Any]
+    members: Mapping[str, Declared]
+
+
+def group(kind: type[Any], **instead: Any) -> Any:
+    """Several options whose values come as one ``kind``: a dataclass with options as its defaults, or ``instead``."""
+    return _Group(kind, {field.name: instead.get(field.name, field.default) for field in fields(kind)})
+
+
+def declared(name: str) -> Callable[[Callable[..., None]], click.Command]:
+    """Decorator that makes a command of a function whose parameters have an `option`, `argument` or `group` each."""
+
+    def decorate(function: Callable[..., None]) -> click.Command:
+        groups: dict[str, _Group] = {}
+        parameters: list[click.Parameter] = []
+        for key, parameter in inspect.signature(function).parameters.items():
+            if isinstance(parameter.default, _Group):
+                groups[key] = parameter.default
+                types = inspect.get_annotations(parameter.default.kind)
+                parameters += [make(member, types[member]) for member, make in parameter.default.members.items()]
+            else:
+                parameters.append(parameter.default(key, parameter.annotation))
+
+        def call(**values: Any) -> None:
+            grouped = {key: g.kind(**{member: values.pop(member) for member in g.members}) for key, g in groups.items()}
+            function(**grouped, **values)
+
+        return click.Command(name, params=parameters, callback=call, help=inspect.getdoc(function))
 
     return decorate
+
+
+CLEARANCE = option("Gap from which parts are clear.", default=5.0, metavar="MM")
+QUIET = option("No progress.", "--quiet", "-q")
+JSON = option("Write the result as JSON; - is stdout.", "--json")
 
 
 @dataclass(frozen=True)
 class Source:
     """What a command is to work on."""
 
-    source: str
-    line: str | None
-    jumper: str | None
+    source: str = argument(metavar="[INPUT]", default="reference", required=False)
+    line: str | None = option("Power line: catalogue name or diameter in mm.", metavar="CONDUCTOR")
+    jumper: str | None = option("Jumper: catalogue name or diameter in mm.", metavar="CONDUCTOR")
 
     def load(self) -> Clamp | Scene:
         """A clamp, or a scene from a scene file, a mesh or a STEP file."""
@@ -101,31 +148,34 @@ class Source:
         return load_clamp(self.source, line=self.line, jumper=self.jumper)
 
 
-def source_argument(metavar: str = "[INPUT]", *, required: bool = False) -> Callable[[Command], Command]:
-    """``[INPUT] --line --jumper`` as ``source: Source``; without an argument it is the reference clamp."""
-    return collect(
-        "source",
-        Source,
-        click.argument("source", metavar=metavar, required=required, default=None if required else "reference"),
-        click.option("--line", metavar="CONDUCTOR", help="Power line: catalogue name or diameter in mm."),
-        click.option("--jumper", metavar="CONDUCTOR", help="Jumper: catalogue name or diameter in mm."),
-    )
-
-
-clamp_argument = source_argument("[CLAMP]")
+SOURCE = group(Source)
+CLAMP = group(Source, source=argument(metavar="[CLAMP]", default="reference", required=False))
 
 
 @dataclass(frozen=True)
 class Method:
     """How grooves are measured, and how the final state is found."""
 
-    method: str
-    unit_angle_deg: float | None
-    threshold: float | None
-    mesh_error: float | None
-    solver: str | None
-    step: float | None
-    tilt_step_deg: float | None
+    method: str = option(
+        "How grooves are measured: as arcs, as chords in the section, or by FCL on convex wedges, on CoACD "
+        "hulls, on meshes.",
+        type=click.Choice(list(METHODS)),
+        default="cas",
+    )
+    unit_angle_deg: float | None = option("Angle of a chord: chords, wedges.  [default: 5]", metavar="A")
+    threshold: float | None = option("Concavity that CoACD may leave: hulls.  [default: 2]", metavar="MM")
+    mesh_error: float | None = option("Chord error of hulls and mesh.  [default: 0.05]", metavar="MM")
+    solver: str | None = option(
+        "[default: exact for cas and chords, bisection for the others; stepped if a step is given]",
+        type=click.Choice(["exact", "stepped", "bisection"]),
+    )
+    step: float | None = option("Move along the bolt, stepped solver.  [default: 1/3]", metavar="MM")
+    tilt_step_deg: float | None = option("Turn of the stepped solver.  [default: 1]", metavar="A")
+
+    def refuse(self) -> None:
+        """Raise click.UsageError if anything was chosen: there is no clamp to use it for."""
+        if {*vars(self).values()} != {"cas", None}:
+            raise click.UsageError("--method, --solver and their options go with a clamp, not with a scene")
 
     def settings(self) -> dict[str, Any]:
         """Arguments of `assemble` for the solver. Raises click.UsageError for options that do not go together."""
@@ -160,77 +210,30 @@ class Method:
         )
 
 
-method_options = collect(
-    "method",
-    Method,
-    click.option(
-        "--method",
-        type=click.Choice(list(METHODS)),
-        default="cas",
-        show_default=True,
-        help="How grooves are measured: as arcs, as chords in the section, or by FCL on convex wedges, on CoACD "
-        "hulls, on meshes.",
-    ),
-    click.option("--unit-angle-deg", type=number, metavar="A", help="Angle of a chord: chords, wedges.  [default: 5]"),
-    click.option("--threshold", type=number, metavar="MM", help="Concavity that CoACD may leave: hulls.  [default: 2]"),
-    click.option("--mesh-error", type=number, metavar="MM", help="Chord error of hulls and mesh.  [default: 0.05]"),
-    click.option(
-        "--solver",
-        type=click.Choice(["exact", "stepped", "bisection"]),
-        help="[default: exact for cas and chords, bisection for the others; stepped if a step is given]",
-    ),
-    click.option("--step", type=number, metavar="MM", help="Move along the bolt, stepped solver.  [default: 1/3]"),
-    click.option("--tilt-step-deg", type=number, metavar="A", help="Turn of the stepped solver.  [default: 1]"),
-)
-"""``--method`` and what goes with it, and the solver's options, as ``method: Method``."""
+METHOD = group(Method)
+"""``--method`` and what goes with it, and the solver's options."""
 
 
 @dataclass(frozen=True)
 class Viewing:
     """What a viewer is to show, and where."""
 
-    html_file: Path | None
-    url: str | None
-    host: str
-    port: int | None
-    timeout: float | None
-    open_browser: bool
-    overlays: tuple[str, ...]
-    draw_error: float
-    clearance: float
-
-
-CLEARANCE = click.option(
-    "--clearance",
-    type=number,
-    default=5.0,
-    show_default=True,
-    metavar="MM",
-    help="Gap from which parts are clear.",
-)
-QUIET = click.option("--quiet", "-q", is_flag=True, help="No progress.")
-JSON = click.option("--json", "json_file", type=OUTPUT, metavar="FILE", help="Write the result as JSON; - is stdout.")
-
-viewer_options = collect(
-    "viewing",
-    Viewing,
-    click.option("--html", "html_file", type=OUTPUT, metavar="FILE", help="Write one page with the whole animation."),
-    click.option("--url", metavar="ZMQ_URL", help="Use a running meshcat server: the zmq_url that it printed."),
-    click.option("--host", default="127.0.0.1", show_default=True, help="Address to serve on; 0.0.0.0 for all."),
-    click.option("--port", type=click.IntRange(0, 65535), help="Port to serve on.  [default: first free from 7000]"),
-    click.option("--timeout", type=click.FloatRange(min=0.0), metavar="S", help="Stop serving after S seconds."),
-    click.option("--open", "open_browser", is_flag=True, help="Open the page in a browser."),
-    click.option(
+    html_file: Path | None = option("Write one page with the whole animation.", "--html")
+    url: str | None = option("Use a running meshcat server: the zmq_url that it printed.", metavar="ZMQ_URL")
+    host: str = option("Address to serve on; 0.0.0.0 for all.", default="127.0.0.1")
+    port: int | None = option("Port to serve on.  [default: first free from 7000]", type=click.IntRange(0, 65535))
+    timeout: float | None = option("Stop serving after S seconds.", type=click.FloatRange(min=0.0), metavar="S")
+    open_browser: bool = option("Open the page in a browser.", "--open")
+    overlays: tuple[str, ...] = option(
+        "Also show what a baseline makes of the parts: wedges (unit angle in deg) or hulls (CoACD's threshold "
+        "in mm). May be given more than once.",
         "--overlay",
-        "overlays",
         multiple=True,
         metavar="NAME[=SIZE]",
-        help="Also show what a baseline makes of the parts: wedges (unit angle in deg) or hulls (CoACD's threshold "
-        "in mm). May be given more than once.",
-    ),
-    click.option(
-        "--draw-error", type=number, default=0.01, show_default=True, metavar="MM", help="Chord error of drawn facets."
-    ),
-    CLEARANCE,
-)
-"""``--html --url --host --port ...`` as ``viewing: Viewing``."""
+    )
+    draw_error: float = option("Chord error of drawn facets.", default=0.01, metavar="MM")
+    clearance: float = CLEARANCE
+
+
+VIEWING = group(Viewing)
+"""``--html --url --host --port ...``."""

@@ -4,32 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
-
-from clamp3d.cli.options import FOLDER, QUIET, Method, Source, method_options, number, source_argument
+from clamp3d.cli.options import FOLDER, METHOD, QUIET, SOURCE, Method, Source, declared, option
 from clamp3d.cli.progress import narrator
 from clamp3d.cli.terminal import finish, show
 
 
-@click.command("report")
-@source_argument()
-@method_options
-@click.option(
-    "--clearance",
-    type=number,
-    metavar="MM",
-    help="Gap that parts must keep.  [default: 5 for a clamp; the scene's own]",
-)
-@click.option("--outline-error", type=number, hidden=True, help="No longer needed: pairs are measured as solids.")
-@click.option("--output", "-o", type=FOLDER, required=True, metavar="DIR")
-@QUIET
+@declared("report")
 def command(
-    source: Source,
-    method: Method,
-    clearance: float | None,
-    outline_error: float | None,
-    output: Path,
-    quiet: bool,
+    source: Source = SOURCE,
+    method: Method = METHOD,
+    clearance: float | None = option(
+        "Gap that parts must keep.  [default: 5 for a clamp; the scene's own]", metavar="MM"
+    ),
+    output: Path = option("", "--output", "-o", type=FOLDER, required=True, metavar="DIR"),
+    quiet: bool = QUIET,
 ) -> None:
     """Write a report for a reviewer into DIR: report.html, report.json, pairs.csv.
 
@@ -57,9 +45,8 @@ def command(
                 loaded, model, others=others, on_waypoint=tell.waypoint, progress=tell.position, **settings
             )
             made = make_report(subject, clearance=clearance, progress=tell.status)
-        elif method != Method("cas", None, None, None, None, None, None):
-            raise click.UsageError("--method, --solver and their options go with a clamp")
         else:
+            method.refuse()
             made = make_report(loaded, clearance=clearance, progress=tell.status)
         paths = write_report(made, output, progress=tell.status)
     for path in paths:

@@ -6,14 +6,15 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import JSON, QUIET
+from clamp3d.cli.options import JSON, QUIET, declared
 from clamp3d.cli.terminal import show
 
 
-@click.command("reproduce")
-@JSON
-@QUIET
-def command(json_file: Path | None, quiet: bool) -> None:
+@declared("reproduce")
+def command(
+    json_file: Path | None = JSON,
+    quiet: bool = QUIET,
+) -> None:
     """Print Tables 1-5 of the paper beside this program's values, with the difference of each."""
     from clamp3d.bench.reproduce import reproduce
     from clamp3d.bench.reproduce_report import reproduction_to_dict, reproduction_to_text

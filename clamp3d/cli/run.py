@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from clamp3d.cli.options import JSON, QUIET, Method, Source, Viewing, clamp_argument, method_options, viewer_options
+from clamp3d.cli.options import CLAMP, JSON, METHOD, QUIET, VIEWING, Method, Source, Viewing, declared, option
 from clamp3d.cli.progress import narrator
 from clamp3d.cli.terminal import finish, show
 
@@ -15,26 +15,19 @@ if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
 
 
-@click.command("run")
-@clamp_argument
-@method_options
-@click.option(
-    "--equilibria/--no-equilibria",
-    default=None,
-    help="Also report the other states that closing can end in.  [default: with method cas, exact solver]",
-)
-@JSON
-@click.option("--view", is_flag=True, help="Show the run in a browser while it goes on; prints the page's address.")
-@viewer_options
-@QUIET
+@declared("run")
 def command(
-    source: Source,
-    method: Method,
-    equilibria: bool | None,
-    json_file: Path | None,
-    view: bool,
-    viewing: Viewing,
-    quiet: bool,
+    source: Source = CLAMP,
+    method: Method = METHOD,
+    equilibria: bool | None = option(
+        "Also report the other states that closing can end in.  [default: with method cas, exact solver]",
+        "--equilibria/--no-equilibria",
+        default=None,
+    ),
+    json_file: Path | None = JSON,
+    view: bool = option("Show the run in a browser while it goes on; prints the page's address."),
+    viewing: Viewing = VIEWING,
+    quiet: bool = QUIET,
 ) -> None:
     """Assemble CLAMP (a built-in name or a TOML file) with its wires, and print where every part ends up.
 

@@ -6,53 +6,34 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import JSON, OUTPUT, PICTURE, QUIET
+from clamp3d.cli.options import JSON, PICTURE, QUIET, declared, option
 from clamp3d.cli.terminal import finish, show
 
 
-@click.command("stress")
-@click.option(
-    "--family",
-    "families",
-    multiple=True,
-    metavar="NAME",
-    help="Only this family, or pose, motion, mesh, assembly for a kind; may be repeated.",
-)
-@click.option("--method", "methods", multiple=True, metavar="NAME", help="Only this method; may be repeated.")
-@click.option("--list", "show_list", is_flag=True, help="List families and methods.")
-@click.option("--n", type=click.IntRange(1), default=1000, show_default=True, help="Cases per family.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the cases.")
-@click.option("--check", type=click.IntRange(0), default=20, show_default=True, help="Truths checked at 50 digits.")
-@click.option(
-    "--time-limit",
-    type=click.FloatRange(1.0),
-    default=60.0,
-    show_default=True,
-    metavar="S",
-    help="Seconds for each other method per family.",
-)
-@click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
-@click.option(
-    "--case", type=click.IntRange(0), metavar="I", help="Print case I of the family as Python, with its truth."
-)
-@JSON
-@click.option("--markdown", "markdown_file", type=OUTPUT, metavar="FILE", help="Write the result as Markdown.")
-@click.option("--plot", "plot_file", type=PICTURE, metavar="FILE", help="Draw the matrix (.png, .svg, .pdf).")
-@QUIET
+@declared("stress")
 def command(
-    families: tuple[str, ...],
-    methods: tuple[str, ...],
-    show_list: bool,
-    n: int,
-    seed: int,
-    check: int,
-    time_limit: float,
-    workers: int,
-    case: int | None,
-    json_file: Path | None,
-    markdown_file: Path | None,
-    plot_file: Path | None,
-    quiet: bool,
+    families: tuple[str, ...] = option(
+        "Only this family, or pose, motion, mesh, assembly for a kind; may be repeated.",
+        "--family",
+        multiple=True,
+        metavar="NAME",
+    ),
+    methods: tuple[str, ...] = option("Only this method; may be repeated.", "--method", multiple=True, metavar="NAME"),
+    show_list: bool = option("List families and methods.", "--list"),
+    n: int = option("Cases per family.", type=click.IntRange(1), default=1000),
+    seed: int = option("Seed of the cases.", type=click.IntRange(0), default=0),
+    check: int = option("Truths checked at 50 digits.", type=click.IntRange(0), default=20),
+    time_limit: float = option(
+        "Seconds for each other method per family.", type=click.FloatRange(1.0), default=60.0, metavar="S"
+    ),
+    workers: int = option("Processes.", type=click.IntRange(1), default=1),
+    case: int | None = option(
+        "Print case I of the family as Python, with its truth.", type=click.IntRange(0), metavar="I"
+    ),
+    json_file: Path | None = JSON,
+    markdown_file: Path | None = option("Write the result as Markdown.", "--markdown"),
+    plot_file: Path | None = option("Draw the matrix (.png, .svg, .pdf).", "--plot", type=PICTURE),
+    quiet: bool = QUIET,
 ) -> None:
     """Put families of hard contact cases with known answers to every contact method, and count what goes wrong.
 

@@ -7,40 +7,26 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import JSON, PICTURE, Source, clamp_argument, number
+from clamp3d.cli.options import CLAMP, JSON, PICTURE, Source, declared, option
 from clamp3d.cli.terminal import show
 
 
-@click.command("sweep")
-@clamp_argument
-@click.option("--wire", type=click.Choice(["P6", "P7"]), default="P6", show_default=True, help="Line or jumper.")
-@click.option("--offset", type=number, default=15.0, show_default=True, metavar="MM", help="Half range across.")
-@click.option("--height", type=number, metavar="MM", help="Half range along the bolt.  [default: not varied]")
-@click.option("--yaw-deg", type=number, default=6.0, show_default=True, metavar="A", help="Half range about the bolt.")
-@click.option(
-    "--pitch-deg", type=number, default=3.0, show_default=True, metavar="A", help="Half range about the cross axis."
-)
-@click.option("--seat-tolerance", type=number, metavar="MM", help="Opening that counts as closed.  [default: 0.5]")
-@click.option("--steps", type=click.IntRange(3, 1001), default=121, show_default=True, help="Grid points per freedom.")
-@click.option(
-    "--random", "count", type=click.IntRange(1, 10_000_000), metavar="N", help="Also try N random misplacements."
-)
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random ones.")
-@click.option("--map", "map_file", type=PICTURE, metavar="FILE", help="Draw the map (PNG, SVG or PDF).")
-@JSON
+@declared("sweep")
 def command(
-    source: Source,
-    wire: str,
-    offset: float,
-    height: float | None,
-    yaw_deg: float,
-    pitch_deg: float,
-    seat_tolerance: float | None,
-    steps: int,
-    count: int | None,
-    seed: int,
-    map_file: Path | None,
-    json_file: Path | None,
+    source: Source = CLAMP,
+    wire: str = option("Line or jumper.", type=click.Choice(["P6", "P7"]), default="P6"),
+    offset: float = option("Half range across.", default=15.0, metavar="MM"),
+    height: float | None = option("Half range along the bolt.  [default: not varied]", metavar="MM"),
+    yaw_deg: float = option("Half range about the bolt.", default=6.0, metavar="A"),
+    pitch_deg: float = option("Half range about the cross axis.", default=3.0, metavar="A"),
+    seat_tolerance: float | None = option("Opening that counts as closed.  [default: 0.5]", metavar="MM"),
+    steps: int = option("Grid points per freedom.", type=click.IntRange(3, 1001), default=121),
+    count: int | None = option(
+        "Also try N random misplacements.", "--random", type=click.IntRange(1, 10_000_000), metavar="N"
+    ),
+    seed: int = option("Seed of the random ones.", type=int, default=0),
+    map_file: Path | None = option("Draw the map (PNG, SVG or PDF).", "--map", type=PICTURE),
+    json_file: Path | None = JSON,
 ) -> None:
     """How far a wire may be misplaced before CLAMP no longer closes on it: the pose tolerance that a robot needs.
 

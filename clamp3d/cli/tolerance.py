@@ -6,44 +6,28 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import JSON, OUTPUT, PICTURE, QUIET, Source, clamp_argument, number
+from clamp3d.cli.options import CLAMP, JSON, PICTURE, QUIET, Source, declared, option
 from clamp3d.cli.terminal import show
 
 
-@click.command("tolerance")
-@clamp_argument
-@click.option("--n", type=click.IntRange(1, 100_000_000), default=1000, show_default=True, help="Clamps to assemble.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the dimensions.")
-@click.option("--tolerance", type=number, metavar="MM", help="Either way, each dimension.  [default: ISO 2768-1 m]")
-@click.option(
-    "--wire-tolerance-percent", type=number, default=1.0, show_default=True, metavar="P", help="Of the diameters."
-)
-@click.option(
-    "--distribution",
-    type=click.Choice(("uniform", "normal")),
-    default="uniform",
-    show_default=True,
-    help="Within the tolerance, or with 3 sigma = tolerance.",
-)
-@click.option("--processes", type=click.IntRange(1, 1024), default=1, show_default=True, help="Processes.")
-@click.option("--scheduler", metavar="ADDRESS", help="Spread over this Dask cluster (extra 'cluster').")
-@click.option("--resume", type=OUTPUT, metavar="FILE", help="Keep finished work here; go on from it if it exists.")
-@JSON
-@click.option("--plot", "plot_file", type=PICTURE, metavar="FILE", help="Draw the histogram (.png, .svg, .pdf).")
-@QUIET
+@declared("tolerance")
 def command(
-    source: Source,
-    n: int,
-    seed: int,
-    tolerance: float | None,
-    wire_tolerance_percent: float,
-    distribution: str,
-    processes: int,
-    scheduler: str | None,
-    resume: Path | None,
-    json_file: Path | None,
-    plot_file: Path | None,
-    quiet: bool,
+    source: Source = CLAMP,
+    n: int = option("Clamps to assemble.", type=click.IntRange(1, 100_000_000), default=1000),
+    seed: int = option("Seed of the dimensions.", type=click.IntRange(0), default=0),
+    tolerance: float | None = option("Either way, each dimension.  [default: ISO 2768-1 m]", metavar="MM"),
+    wire_tolerance_percent: float = option("Of the diameters.", default=1.0, metavar="P"),
+    distribution: str = option(
+        "Within the tolerance, or with 3 sigma = tolerance.",
+        type=click.Choice(("uniform", "normal")),
+        default="uniform",
+    ),
+    processes: int = option("Processes.", type=click.IntRange(1, 1024), default=1),
+    scheduler: str | None = option("Spread over this Dask cluster (extra 'cluster').", metavar="ADDRESS"),
+    resume: Path | None = option("Keep finished work here; go on from it if it exists."),
+    json_file: Path | None = JSON,
+    plot_file: Path | None = option("Draw the histogram (.png, .svg, .pdf).", "--plot", type=PICTURE),
+    quiet: bool = QUIET,
 ) -> None:
     """How the splint distance of CLAMP depends on its dimensions, and how it scatters within their tolerances.
 

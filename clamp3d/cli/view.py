@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import click
-
-from clamp3d.cli.options import Method, Source, Viewing, method_options, source_argument, viewer_options
+from clamp3d.cli.options import METHOD, SOURCE, VIEWING, Method, Source, Viewing, declared, option
 from clamp3d.cli.terminal import finish
 
 
-@click.command("view")
-@source_argument()
-@method_options
-@viewer_options
-@click.option("--quiet", "-q", is_flag=True, help="No progress; the page's address is printed all the same.")
-def command(source: Source, method: Method, viewing: Viewing, quiet: bool) -> None:
+@declared("view")
+def command(
+    source: Source = SOURCE,
+    method: Method = METHOD,
+    viewing: Viewing = VIEWING,
+    quiet: bool = option("No progress; the page's address is printed all the same.", "--quiet", "-q"),
+) -> None:
     """Show INPUT in a browser: a clamp is assembled before your eyes, a scene is checked and its motions played.
 
     INPUT is a clamp (a built-in name or a TOML file), a scene file, a mesh or a STEP file. Prints the page's address
@@ -31,7 +30,6 @@ def command(source: Source, method: Method, viewing: Viewing, quiet: bool) -> No
         run = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=serve)
         finish(finding=not run.clamped or bool(run.undeclared))
     else:
-        if method.method != "cas" or settings != {"solver": "exact"}:
-            raise click.UsageError("--method and --solver go with a clamp, not with a scene")
+        method.refuse()
         result = check_and_view(loaded, viewing, quiet=quiet, serve=serve)
         finish(finding=not result.clean, undecided="uncertain" in result.counts)

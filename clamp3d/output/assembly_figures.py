@@ -14,10 +14,11 @@ from clamp3d.clamp.result import Assembly
 from clamp3d.core.meshing import mesh
 from clamp3d.core.pose import Array, SectionPose
 from clamp3d.core.profile import MIN_MESH_ERROR
-from clamp3d.output.figures import near, same_scale, title
+from clamp3d.output.figures import blank, near, same_scale, title
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
-from clamp3d.output.section import Poses, balloon, draw_section, part_anchor, spread
-from clamp3d.output.view3d import Camera, PosedMesh, draw_solids
+from clamp3d.output.placed import PosedMesh
+from clamp3d.output.section import ARROW, Poses, balloon, draw_section, part_anchor, spread
+from clamp3d.output.view3d import Camera, draw_solids
 
 if TYPE_CHECKING:
     import trimesh
@@ -32,10 +33,8 @@ _ARROW = 0.45  # longest arrow
 
 def exploded_figure(clamp: Clamp) -> Figure:
     """All seven parts drawn apart along the bolt, with names."""
-    from matplotlib.figure import Figure
-
     instance("clamp", clamp, Clamp)
-    figure = Figure(figsize=(7.6, 6.4), layout="constrained")
+    figure = blank(7.6, 6.4)
     ax = figure.add_subplot()
     camera = Camera()
     poses = exploded_poses(clamp)
@@ -92,11 +91,9 @@ def exploded_poses(clamp: Clamp) -> dict[PartName, SectionPose]:
 
 def steps_figure(run: Assembly) -> Figure:
     """Each step of the sequence where it ends: in the view (upper row) and in the section (lower)."""
-    from matplotlib.figure import Figure
-
     instance("run", run, Assembly)
     ends = step_ends(run)
-    figure = Figure(figsize=(3.1 * len(ends), 7.4), layout="constrained")
+    figure = blank(3.1 * len(ends), 7.4)
     axes = figure.subplots(2, len(ends), squeeze=False, height_ratios=(1.0, 1.2))
     solids = _solids(run.clamp)
     start = 0
@@ -123,13 +120,7 @@ def step_ends(run: Assembly) -> list[tuple[str, int]]:
 
 def _arrows(ax: Axes, clamp: Clamp, path: Sequence[Poses], shown: Iterable[PartName]) -> None:
     """The way of what moved, ending where it stands now; parts that moved alike share one arrow. Not to scale."""
-    style = {
-        "arrowstyle": "-|>,head_width=0.3,head_length=0.6",
-        "color": DIMENSION,
-        "lw": 1.8,
-        "shrinkA": 0,
-        "shrinkB": 0,
-    }
+    style = ARROW | {"arrowstyle": "-|>,head_width=0.3,head_length=0.6", "lw": 1.8}
     drawn: list[Array] = []
     least = _MOVED * clamp.up_splint.width
     for name in shown:

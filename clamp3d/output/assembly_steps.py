@@ -26,7 +26,6 @@ class StepRow:
     wires are not between the splints yet.
     """
 
-    number: int
     waypoint: Waypoint
     opening_line: float
     opening_jumper: float
@@ -74,13 +73,12 @@ def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
     tolerance = max([CONTACT, *(s.gap for s in assembly.seats if s.seated)])
     pairs: list[tuple[PartName, PartName]] = [("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7")]
     rows = []
-    for number, waypoint in enumerate(assembly.path, 1):
+    for waypoint in assembly.path:
         poses = waypoint.poses
         line, jumper = edge_openings(clamp, poses)
         left = poses["P1"].x
         rows.append(
             StepRow(
-                number=number,
                 waypoint=waypoint,
                 opening_line=line,
                 opening_jumper=jumper,

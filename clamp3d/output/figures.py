@@ -36,6 +36,13 @@ if TYPE_CHECKING:
 FORMATS = (".svg", ".png", ".pdf")
 
 
+def blank(width: float, height: float) -> Figure:
+    """An empty figure, inch, whose axes make room for what is around them."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
 def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
     """Write ``figure`` to ``path`` by its suffix (``-``: SVG), whole or not at all; equal figures give equal files.
 
@@ -57,12 +64,10 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
 
 def section_figure(run: Assembly, waypoint: Waypoint | None = None) -> Figure:
     """The section at ``waypoint`` (by default the final state) to scale: names, dimensions, contact points."""
-    from matplotlib.figure import Figure
-
     instance("run", run, Assembly)
     if waypoint is not None:
         instance("waypoint", waypoint, Waypoint)
-    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    figure = blank(8.0, 7.0)
     ax = figure.add_subplot()
     poses = near(run.clamp, run.poses if waypoint is None else waypoint.poses)
     draw_section(ax, run.clamp, poses)
@@ -76,10 +81,8 @@ def section_figure(run: Assembly, waypoint: Waypoint | None = None) -> Figure:
 
 def states_figure(run: Assembly) -> Figure:
     """Initial and final state side by side at one scale, as in Fig. 2 of the paper."""
-    from matplotlib.figure import Figure
-
     instance("run", run, Assembly)
-    figure = Figure(figsize=(11.5, 5.8), layout="constrained")
+    figure = blank(11.5, 5.8)
     axes = figure.subplots(1, 2)
     names = ("(a) initial state", "(b) final state")
     for ax, all_poses, name in zip(axes, (run.path[0].poses, run.poses), names, strict=True):
@@ -96,10 +99,8 @@ def states_figure(run: Assembly) -> Figure:
 
 def contacts_figure(run: Assembly) -> Figure:
     """The concave arc contacts in the section, as in Fig. 5, and each enlarged with its relation and gap."""
-    from matplotlib.figure import Figure
-
     instance("run", run, Assembly)
-    figure = Figure(figsize=(11.5, 5.8), layout="constrained")
+    figure = blank(11.5, 5.8)
     contacts = _arc_contacts(run)
     rows = max(1, (len(contacts) + 1) // 2)
     grid = figure.add_gridspec(rows, 3, width_ratios=(2.1, 1.0, 1.0))
@@ -120,11 +121,9 @@ def contacts_figure(run: Assembly) -> Figure:
 
 def contact_figure(run: Assembly, contact: Contact) -> Figure:
     """One contact of ``run``: where it is in the section, dimensioned, and enlarged with relation, gap and normal."""
-    from matplotlib.figure import Figure
-
     instance("run", run, Assembly)
     instance("contact", contact, Contact)
-    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
+    figure = blank(9.0, 4.6)
     overview, close = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
     draw_section(overview, run.clamp, run.poses)
     label_wires(overview, run.poses)

@@ -34,17 +34,7 @@ def whole_file(path: Path) -> Iterator[Path]:
             sys.stdout.buffer.write(temporary.read_bytes())
             sys.stdout.buffer.flush()
         return
-    target = _target(path)
-    with ExitStack() as stack:
-        try:
-            aside = stack.enter_context(tempfile.TemporaryDirectory()) if _special(target) else None
-            beside = target.parent if aside is None else Path(aside)
-            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=beside)
-        except OSError as error:
-            raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
-        os.close(handle)
-        temporary = Path(name)
-        stack.callback(temporary.unlink, missing_ok=True)
+    with _beside(path) as (temporary, target):
         yield temporary
         umask = os.umask(0)
         os.umask(umask)
@@ -60,17 +50,25 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 def check_writable(path: Path) -> None:
     """Raise InputError if a file ``path`` cannot be written: to ask before long work."""
-    if path == STDOUT:
-        return
+    if path != STDOUT:
+        with _beside(path):
+            pass
+
+
+@contextmanager
+def _beside(path: Path) -> Iterator[tuple[Path, Path]]:
+    """A temporary file for the time of the block, and the target of ``path`` whose place it may take."""
     target = _target(path)
-    if _special(target):
-        return
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    except OSError as error:
-        raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
-    os.close(handle)
-    os.unlink(name)
+    with ExitStack() as stack:
+        try:
+            folder = stack.enter_context(tempfile.TemporaryDirectory()) if _special(target) else target.parent
+            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=folder)
+        except OSError as error:
+            raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
+        os.close(handle)
+        temporary = Path(name)
+        stack.callback(temporary.unlink, missing_ok=True)
+        yield temporary, target
 
 
 def _target(path: Path) -> Path:

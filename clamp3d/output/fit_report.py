@@ -14,6 +14,7 @@ from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
 from clamp3d.fit.fit import FitResult
 from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
+from clamp3d.output.wording import counted
 
 COLOURS = {
     "G": ("#e4572e", "#f3a712", "#c3423f", "#f18805"),
@@ -101,14 +102,8 @@ def fit_to_html(result: FitResult) -> str:
 
 
 def _count(result: FitResult) -> str:
-    parts = []
-    for number, one, many in (
-        (len(result.grooves), "groove", "grooves"),
-        (len(result.cylinders), "cylinder", "cylinders"),
-        (len(result.holes), "hole", "holes"),
-    ):
-        parts.append(f"{number or 'no'} {one if number <= 1 else many}")
-    return ", ".join(parts)
+    found = {"groove": result.grooves, "cylinder": result.cylinders, "hole": result.holes}
+    return ", ".join(counted(len(features), kind) if features else f"no {kind}" for kind, features in found.items())
 
 
 def _arc(f: FittedSurface) -> str:

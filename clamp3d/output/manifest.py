@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from importlib import metadata
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,13 @@ from clamp3d import __version__
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.core.meshing import volume_bounds
 from clamp3d.core.shapes import Solid
-from clamp3d.output.mesh_formats import MILLIMETRES, Placement
-from clamp3d.output.placed import PlacedPart
+from clamp3d.output.mesh_formats import MILLIMETRES
+from clamp3d.output.placed import PlacedPart, PosedMesh
 
 
 def manifest(
     placed: Sequence[PlacedPart],
-    meshed: Sequence[Placement],
+    meshed: Sequence[PosedMesh],
     files: Mapping[str, tuple[bytes, Sequence[str]]],
     settings: Mapping[str, Any],
     clamp: Clamp | None,
@@ -32,7 +33,6 @@ def manifest(
     closed form ``volume_mm3`` is null and ``volume_bounds_mm3`` says between what it lies; of a mesh only the mesh's
     own is known. Holds no date: same input, same bytes.
     """
-    by_name = {item.placed.name: item for item in meshed}
     libraries = ["manifold3d", "trimesh", "numpy"] if meshed else ["cadquery-ocp-novtk", "numpy"]
     if settings["format"] == "3mf":
         libraries.append("lib3mf")
@@ -43,14 +43,14 @@ def manifest(
             name: {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest(), "parts": list(parts)}
             for name, (data, parts) in files.items()
         },
-        "parts": {item.name: _part(item, by_name.get(item.name), settings) for item in placed},
+        "parts": {item.name: _part(item, shown, settings) for item, shown in zip_longest(placed, meshed)},
         **({} if clamp is None else {"parameters": dataclasses.asdict(clamp)}),
         "libraries": {name: _version(name) for name in libraries},
     }
     return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode("utf-8")
 
 
-def _part(item: PlacedPart, meshed: Placement | None, settings: Mapping[str, Any]) -> dict[str, Any]:
+def _part(item: PlacedPart, meshed: PosedMesh | None, settings: Mapping[str, Any]) -> dict[str, Any]:
     shape = item.shape
     drawn = shape if isinstance(shape, Solid) else None
     volume = drawn.volume if drawn else None
@@ -62,8 +62,8 @@ def _part(item: PlacedPart, meshed: Placement | None, settings: Mapping[str, Any
         "chord_error_mm": 0.0,
     }
     if meshed is not None:
-        local = meshed.local
-        bounds = np.array([meshed.vertices.min(axis=0), meshed.vertices.max(axis=0)])
+        local = meshed.mesh
+        bounds = np.array([meshed.world.min(axis=0), meshed.world.max(axis=0)])
         entry["chord_error_mm"] = round(local.metadata["chord_error"], 12)
         entry["mesh_volume_mm3"] = round(float(local.volume), 6)
         if drawn:
@@ -75,7 +75,8 @@ def _part(item: PlacedPart, meshed: Placement | None, settings: Mapping[str, Any
         entry["triangles"] = len(local.faces)
     else:
         assert drawn is not None  # a mesh has triangles
-        bounds = drawn.bounds_at(item.T) / MILLIMETRES[settings["unit"]]
+        bounds = drawn.bounds_at(item.T)
+    bounds = bounds / MILLIMETRES[settings["unit"]]
     if settings["up"] == "Y":  # axes X, Z, -Y
         bounds = np.array([bounds[0], bounds[1]])[[[0, 0, 1], [1, 1, 0]], [0, 2, 1]] * [1.0, 1.0, -1.0]
     entry["bounds"] = (np.round(bounds, 9) + 0.0).tolist()

@@ -11,7 +11,7 @@ from clamp3d.errors import InputError
 
 
 def render(template: str, /, **values: Any) -> str:
-    """Fill in one of the files in ``templates``; texts are escaped, and a value that is missing is an error."""
+    """Fill in one of the files in ``templates``: texts on pages are escaped, a value that is missing is an error."""
     return str(_environment().get_template(template).render(**values))
 
 
@@ -35,7 +35,7 @@ def _environment() -> Any:
 
     return jinja2.Environment(
         loader=jinja2.PackageLoader("clamp3d.output", "templates"),
-        autoescape=True,
+        autoescape=lambda name: name is None or not name.endswith(".txt"),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,

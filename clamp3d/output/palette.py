@@ -40,7 +40,12 @@ def darker(colour: str, factor: float = 0.62) -> str:
     >>> darker("#FF8000", 0.5)
     '#804000'
     """
-    return "#" + "".join(f"{round(int(colour[i : i + 2], 16) * factor):02X}" for i in (1, 3, 5))
+    return "#" + "".join(f"{round(channel * factor):02X}" for channel in rgb(colour))
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue of "#RRGGBB" in sRGB, 0 to 255."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
 _CYCLE = ("#77AADD", "#44BB99", "#EEDD88", "#99DDFF", "#FFAABB", "#BBCC33", "#EE8866", "#DDDDDD")

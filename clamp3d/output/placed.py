@@ -22,6 +22,21 @@ if TYPE_CHECKING:
     import trimesh
 
 
+@dataclass(frozen=True, slots=True)
+class PosedMesh:
+    """A mesh in its own frame, mm, at a pose ``T`` (4, 4) in the world, in a colour "#RRGGBB"."""
+
+    mesh: trimesh.Trimesh
+    T: Array
+    colour: str
+    label: str = ""
+
+    @property
+    def world(self) -> Array:
+        """Its vertices (n, 3) in the world, mm."""
+        return np.asarray(self.mesh.vertices) @ self.T[:3, :3].T + self.T[:3, 3]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedPart:
     """A part, its pose ``T_world_part`` (4, 4) in mm (None: it stays in its own frame) and its ``colour`` "#RRGGBB"."""
@@ -38,28 +53,23 @@ class PlacedPart:
         return f"{self.name} {title}" if title and self.shape.name == self.name else self.name
 
     @property
-    def rgb(self) -> tuple[int, int, int]:
-        """Colour in sRGB, 0 to 255."""
-        return int(self.colour[1:3], 16), int(self.colour[3:5], 16), int(self.colour[5:7], 16)
-
-    @property
     def T(self) -> Array:
         """The pose, the identity where there is none."""
         return np.eye(4) if self.T_world_part is None else self.T_world_part
 
-    def mesh(self, mesh_error: float) -> trimesh.Trimesh:
-        """Triangles in the part's own frame, mm; arcs within ``mesh_error`` mm, the facets of a mesh as they are.
+    def posed(self, mesh_error: float) -> PosedMesh:
+        """Its triangles; arcs within ``mesh_error`` mm, the facets of a mesh as they are.
 
-        ``metadata`` holds ``mesh_error`` and ``chord_error``: what was asked for and what it is, mm.
+        Their ``metadata`` holds ``mesh_error`` and ``chord_error``: what was asked for and what it is, mm.
         """
         import trimesh
 
-        if not isinstance(self.shape, MeshShape):
-            return mesh(self.shape, mesh_error)
-        facets = self.shape.mesh
-        return trimesh.Trimesh(
-            facets.vertices, facets.faces, process=False, metadata={"mesh_error": 0.0, "chord_error": 0.0}
-        )
+        if isinstance(self.shape, MeshShape):
+            facets, errors = self.shape.mesh, {"mesh_error": 0.0, "chord_error": 0.0}
+            made = trimesh.Trimesh(facets.vertices, facets.faces, process=False, metadata=errors)
+        else:
+            made = mesh(self.shape, mesh_error)
+        return PosedMesh(made, self.T, self.colour, self.label)
 
 
 def place(source: Clamp | Scene, names: Iterable[str] | None = None) -> tuple[PlacedPart, ...]:

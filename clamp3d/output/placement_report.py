@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,13 @@ import numpy as np
 from clamp3d import __version__
 from clamp3d.clamp.placement import FREEDOMS, Freedom, Limits, Outcome, Outcomes, Placement, PlacementTolerance
 from clamp3d.core.distance import Feature
-from clamp3d.output.figures import save_figure
+from clamp3d.output.figures import blank, save_figure
 from clamp3d.output.palette import INK
 
 ANGLES: tuple[Freedom, ...] = ("yaw", "pitch")
 
 # Okabe and Ito's colours (Color Universal Design, 2008), told apart by colour-blind readers, light to dark.
 COLOURS = {Outcome.CLOSES: "#009E73", Outcome.TOUCHES_WRONGLY: "#E69F00", Outcome.CANNOT_SEAT: "#4A4F55"}
-_HATCH = {Outcome.CLOSES: "", Outcome.TOUCHES_WRONGLY: "//", Outcome.CANNOT_SEAT: ""}
 _TITLES = {"offset": "offset (mm)", "height": "height (mm)", "yaw": "yaw (deg)", "pitch": "pitch (deg)"}
 
 
@@ -72,14 +72,9 @@ def sweep_to_dict(
         "wire": closing.wire,
         "seat_tolerance_mm": closing.seat_tolerance,
         "tolerances": [
-            {
-                "freedom": x.freedom,
-                "unit": "deg" if x.freedom in ANGLES else "mm",
-                "low": shown(x.freedom, x.low),
-                "high": shown(x.freedom, x.high),
-                "low_open": bool(x.low_open),
-                "high_open": bool(x.high_open),
-            }
+            asdict(x)
+            | {"unit": "deg" if x.freedom in ANGLES else "mm"}
+            | {"low": shown(x.freedom, x.low), "high": shown(x.freedom, x.high)}
             for x in tolerances.limits
         ],
         "together": tolerances.together,
@@ -124,10 +119,9 @@ def draw_map(
 ) -> None:
     """Write the map as PNG, SVG or PDF by the file's name: one field per pair of freedoms, the limits marked."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
-    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-    figure = Figure(figsize=(4.3 * len(grids) + 0.6, 5.2), layout="constrained")
+    figure = blank(4.3 * len(grids) + 0.6, 5.2)
     colours = ListedColormap([COLOURS[o] for o in Outcome])
     norm = BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3)
     limits = {x.freedom: x for x in tolerances.limits}
@@ -156,10 +150,7 @@ def draw_map(
     figure.suptitle(
         f"{closing.clamp.name}: where the clamp closes on {closing.wire} ({wire.label}) held misplaced", fontsize=11
     )
-    legend = [
-        Patch(facecolor=COLOURS[o], edgecolor="black" if _HATCH[o] else "none", hatch=_HATCH[o], label=o.label)
-        for o in Outcome
-    ]
+    legend = [Patch(fc=COLOURS[o], hatch="//" * (o is Outcome.TOUCHES_WRONGLY), label=o.label) for o in Outcome]
     figure.legend(
         handles=legend,
         loc="outside lower center",

@@ -20,8 +20,8 @@ from clamp3d.collide.distance import Distance
 from clamp3d.collide.result import BAD, PairResult
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds, Verdict
-from clamp3d.core.shapes import MeshShape, Solid
 from clamp3d.output.assembly_steps import StepRow, TighteningRow, step_rows, tightening_rows
+from clamp3d.output.pages import render
 from clamp3d.output.wording import circumstances, gap_text, headline, sentence, titles
 
 Severity = Literal["error", "warning", "note", "ok"]
@@ -37,10 +37,6 @@ SEVERITIES: dict[Severity, str] = {
     "note": "worth knowing",
     "ok": "as it should be",
 }
-_NOT_MODELLED = (
-    "friction, deformation and forces: the parts are rigid, no torque and no clamping force follow from this report",
-    "tolerances of manufacture and wear",
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,12 +205,8 @@ def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
         rows=tuple(rows[id(pair)] for pair in result.pairs),
         motions=tuple(rows[id(pair)] for pair in result.motions),
         n_pairs=result.work.pairs,
-        modelled=_modelled(scene),
-        not_modelled=(
-            *_left_out(scene),
-            *_NOT_MODELLED,
-            *(() if scene.motions else ("motions: the parts stand where the scene puts them",)),
-        ),
+        modelled=_listed("modelled.txt", scene),
+        not_modelled=_listed("not_modelled.txt", scene),
         settings=_thresholds(scene),
     )
 
@@ -223,7 +215,7 @@ def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
     different = {(d.a, d.b) for d in assembly.matrix_differences if not d.measured}
     rows = tuple(_contact_row(scene, contact, (contact.a, contact.b) in different) for contact in assembly.contacts)
     findings = [
-        Finding(f.severity, f.text, next((row for row in rows if f.text.startswith(f"{row.name} ")), None))
+        Finding(f.severity, f.text, next((r for r in rows if (r.result.a, r.result.b) == (f.a, f.b)), None))
         for f in assembly.findings
     ]
     told = {finding.row for finding in findings}
@@ -248,13 +240,8 @@ def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
         rows=rows,
         motions=(),
         n_pairs=len(rows),
-        modelled=_clamp_modelled(assembly),
-        not_modelled=(
-            *_left_out(scene),
-            *_NOT_MODELLED,
-            "motions out of the section: wires that are bent, turned or shifted along the clamp",
-            *(f"method {assembly.method}: {limit}" for limit in assembly.limits),
-        ),
+        modelled=_listed("modelled.txt", scene, assembly),
+        not_modelled=_listed("not_modelled.txt", scene, assembly),
         settings={"method": assembly.method, "solver": assembly.solver, **_thresholds(scene)},
         assembly=assembly,
         steps=step_rows(assembly),
@@ -294,54 +281,8 @@ def _thresholds(scene: Scene) -> dict[str, str]:
     return {"contact": f"gap or overlap up to {t.contact:g} mm", "clearance": clearance}
 
 
-def _modelled(scene: Scene) -> tuple[str, ...]:
-    taken = {
-        "bound": "its facets, with the error bound of the surfaces fitted to them",
-        "round": "round surfaces through its vertices where they fit",
-        "off": "its facets",
-    }
-    alike: dict[str, list[str]] = {}
-    for part in scene.parts:
-        how = "drawn with true arcs, measured in closed form where one is known, else on ever finer meshes"
-        if isinstance(part.shape, MeshShape):
-            facets = part.shape.mesh
-            how = f"mesh {part.shape.name} of {len(facets.faces)} triangles, taken as {taken[part.shape.fit]}"
-            how += "".join(f"; {note}" for note in facets.notes)
-        alike.setdefault(how, []).append(part.name)
-    lines = [
-        f"{', '.join(names[:20])}{f' and {len(names) - 20} more' * (len(names) > 20)}: {how}"
-        for how, names in alike.items()
-    ]
-    if scene.motions:
-        lines.append("motions of rigid parts, each from where the one before has ended, followed without a gap in time")
-    return tuple(lines)
-
-
-def _left_out(scene: Scene) -> list[str]:
-    names = titles(scene)
-    drawn = {part.name: part.shape for part in scene.parts if isinstance(part.shape, Solid)}
-    return [f"{names[name]}: {solid.not_modelled}" for name, solid in drawn.items() if solid.not_modelled]
-
-
-def _motions(scene: Scene) -> str:
-    n = len(scene.motions)
-    return f"{n or 'no'} {'motion' if n == 1 else 'motions'} of rigid parts" + (
-        ", followed without a gap in time" * bool(n)
-    )
-
-
-def _clamp_modelled(assembly: Assembly) -> tuple[str, ...]:
-    exact = assembly.method == "cas"
-    grooves = "arcs against cylinders in closed form" if exact else f"as the method {assembly.method} sees them"
-    solver = {
-        "exact": "least distance along the bolt with both wires free, proven",
-        "stepped": "first position in steps along the bolt that fits",
-        "bisection": "least distance along the bolt that fits, by bisection",
-    }[assembly.solver]
-    return (
-        "seven rigid parts of nominal dimensions that move in the section: along x and y, the down splint also tilts",
-        f"the five concave arc contacts (each splint with each wire, saddle with round back), {grooves}",
-        "all other pairs as solids in 3D, between bounds that are stated for each; nut and bolt as a screw joint",
-        f"final state by the {assembly.solver} solver: {solver}",
-        "wires as round cylinders of the conductor's outer diameter",
-    )
+def _listed(template: str, scene: Scene, assembly: Assembly | None = None) -> tuple[str, ...]:
+    """The items of a text in ``templates``, which stand one a line."""
+    names = {name: " ".join(title.split()) for name, title in titles(scene).items()}
+    lines = render(template, scene=scene, assembly=assembly, titles=names).splitlines()
+    return tuple(line for line in lines if line.strip())

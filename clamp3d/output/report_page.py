@@ -56,7 +56,7 @@ def report_to_dict(report: Report) -> dict[str, Any]:
         data |= report.assembly.to_dict()
         data["steps"] = [
             {
-                "number": s.number,
+                "number": number,
                 "step": s.waypoint.step,
                 "label": s.waypoint.label,
                 "opening_line_mm": s.opening_line,
@@ -66,7 +66,7 @@ def report_to_dict(report: Report) -> dict[str, Any]:
                 "nut_turns": s.turns,
                 "seats": [{"splint": x.splint, "wire": x.wire, "seated": x.seated, "gap_mm": x.gap} for x in s.seats],
             }
-            for s in report.steps
+            for number, s in enumerate(report.steps, 1)
         ]
         data["tightening"] = [
             {"nut_turns": t.turns, "way_mm": t.way, "saddle_gap_mm": t.saddle_gap} for t in report.tightening

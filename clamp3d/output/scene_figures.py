@@ -15,9 +15,10 @@ from clamp3d.core.pose import Array
 from clamp3d.core.profile import MIN_MESH_ERROR
 from clamp3d.core.shapes import Solid
 from clamp3d.errors import Clamp3dError
+from clamp3d.output.figures import blank
 from clamp3d.output.palette import INK, VERDICT_COLOURS
-from clamp3d.output.placed import place
-from clamp3d.output.view3d import Camera, PosedMesh, draw_solids
+from clamp3d.output.placed import PosedMesh, place
+from clamp3d.output.view3d import Camera, draw_solids
 from clamp3d.output.viewer_cut import overlap
 
 if TYPE_CHECKING:
@@ -37,9 +38,7 @@ _ENLARGED = 0.12
 
 def scene_figure(scene: Scene, marks: Sequence[tuple[int, PairResult]] = ()) -> Figure:
     """All parts of a scene where they stand, with the findings at rest as dots with their numbers."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 5.6), layout="constrained")
+    figure = blank(9.0, 5.6)
     ax = figure.add_subplot()
     camera = _CAMERAS[0]
     solids = _solids(scene, [part.name for part in scene.parts])
@@ -57,9 +56,7 @@ def finding_figure(scene: Scene, row: PairResult) -> Figure:
 
     What the two have in common is drawn in red over them.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 4.4), layout="constrained")
+    figure = blank(9.0, 4.4)
     shown = _solids(_at(scene, row), [row.a, row.b])
     solids = [shown[row.a], shown[row.b]]
     common = _common(*solids) if row.distance.upper < 0.0 else None
@@ -109,7 +106,7 @@ def _solids(scene: Scene, names: Sequence[str]) -> dict[str, PosedMesh]:
     found = {}
     for item in place(scene, names):
         extent = float(np.ptp(item.shape.bounds, axis=0).max()) if isinstance(item.shape, Solid) else 0.0
-        found[item.name] = PosedMesh(item.mesh(max(MIN_MESH_ERROR, _MESH_ERROR * extent)), item.T, item.colour)
+        found[item.name] = item.posed(max(MIN_MESH_ERROR, _MESH_ERROR * extent))
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from clamp3d import __version__
@@ -35,25 +36,10 @@ _MARK = {
 
 def check_to_dict(result: CheckResult, full: CheckResult | None = None) -> dict[str, Any]:
     """The result as JSON data; lengths in mm. Pairs that are not listed are clear."""
-    data = {"clamp3d": __version__, "headline": headline(result)} | result.to_dict() | {"work": _work(result.work)}
+    data = {"clamp3d": __version__, "headline": headline(result)} | result.to_dict() | {"work": asdict(result.work)}
     if full is not None:
-        data["full"] = {"pairs": [row.to_dict() for row in full.pairs], "work": _work(full.work)}
+        data["full"] = {"pairs": [row.to_dict() for row in full.pairs], "work": asdict(full.work)}
     return data
-
-
-def _work(work: Work) -> dict[str, Any]:
-    plain = ("parts", "shapes", "pairs", "candidates", "meshes", "triangles", "hulls", "fits", "full")
-    return {key: getattr(work, key) for key in plain} | {
-        "queries": dict(work.queries),
-        "decided": dict(work.decided),
-        "seconds": dict(work.seconds),
-        "fixed_fidelity": {
-            "mesh_error_mm": work.fixed_error,
-            "meshes": work.fixed_meshes,
-            "triangles": work.fixed_triangles,
-            "queries": work.fixed_queries,
-        },
-    }
 
 
 def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:

@@ -19,7 +19,7 @@ from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import SectionPose
 from clamp3d.core.profile import Arc, Point, Profile
 from clamp3d.core.shapes import Solid
-from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, darker
+from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, darker, rgb
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,13 +31,8 @@ _HATCH: dict[PartName, str] = {"P1": "////", "P2": "\\\\\\\\", "P3": "////"}
 WIRES: tuple[PartName, ...] = ("P6", "P7")
 _LINE: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
 _NUMBER: dict[str, Any] = {"color": DIMENSION, "fontsize": 9, "zorder": 26}
-_ARROW: dict[str, Any] = {
-    "arrowstyle": "-|>,head_width=0.18,head_length=0.45",
-    "color": DIMENSION,
-    "lw": 0.8,
-    "shrinkA": 0.0,
-    "shrinkB": 0.0,
-}
+_HEAD = "-|>,head_width=0.18,head_length=0.45"
+ARROW: dict[str, Any] = {"arrowstyle": _HEAD, "color": DIMENSION, "lw": 0.8, "shrinkA": 0.0, "shrinkB": 0.0}
 _ORDER: tuple[PartName, ...] = ("P6", "P7", "P1", "P2", "P3", "P4", "P5")
 
 
@@ -154,7 +149,7 @@ def _dimension(ax: Axes, above: Point, below: Point, x: float, side: int) -> Non
     top, bottom = sorted((above[1], below[1]))
     reach = 9.0 if bottom - top <= 9.0 else 0.5 * (top - bottom)
     for tip, tail in ((top, top - reach), (bottom, bottom + reach)):
-        ax.annotate("", (x, tip), (x, tail), arrowprops=_ARROW)
+        ax.annotate("", (x, tip), (x, tail), arrowprops=ARROW)
     at = (x + 2.0 * side, 0.5 * (top + bottom))
     text, align = f"{below[1] - above[1]:.3f}", "right" if side < 0 else "left"
     ax.annotate(text, at, (3 * side, 0), textcoords="offset points", ha=align, va="center", **_NUMBER)
@@ -191,7 +186,7 @@ def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
     xs, ys = corner[0] + reach * np.cos(t), corner[1] - reach * np.sin(t)
     ax.plot(xs, ys, **_LINE)
     for tip, tail in ((0, 3), (-1, -4)):
-        ax.annotate("", (xs[tip], ys[tip]), (xs[tail], ys[tail]), arrowprops=_ARROW)
+        ax.annotate("", (xs[tip], ys[tip]), (xs[tail], ys[tail]), arrowprops=ARROW)
     at = (corner[0] + 0.45 * reach, max(corner[1], float(ys.max())))
     text = f"{abs(degrees):.2f}\N{DEGREE SIGN}"
     ax.annotate(text, at, (0, -10), textcoords="offset points", ha="center", va="center", **_NUMBER)
@@ -254,7 +249,7 @@ def _front_edges(profile: Profile) -> list[float]:
 
 
 def _pale(colour: str) -> str:
-    return "#" + "".join(f"{round(255 - 0.4 * (255 - int(colour[i : i + 2], 16))):02X}" for i in (1, 3, 5))
+    return "#" + "".join(f"{round(255 - 0.4 * (255 - channel)):02X}" for channel in rgb(colour))
 
 
 def spread(values: list[float], spacing: float) -> list[float]:

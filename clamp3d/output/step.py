@@ -5,20 +5,21 @@ Needs the extra ``step`` (cadquery-ocp-novtk); imported when a file is written.
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import re
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from clamp3d.brep.step_file import require_open_cascade
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc
 from clamp3d.core.shapes import Solid
-from clamp3d.errors import Clamp3dError, InputError, MissingLibraryError
+from clamp3d.errors import Clamp3dError, InputError
 from clamp3d.output.pages import now
+from clamp3d.output.palette import rgb
 from clamp3d.output.placed import PlacedPart
 
 UNITS = {"mm": "MM", "cm": "CM", "m": "M", "in": "INCH"}
@@ -33,7 +34,7 @@ def step(placed: Sequence[PlacedPart], title: str, unit: str) -> bytes:
     Its time stamp is the environment's SOURCE_DATE_EPOCH (seconds since 1970), if set. Raises InputError for a part
     that is a mesh, MissingLibraryError without Open CASCADE, Clamp3dError if that fails.
     """
-    _require()
+    require_open_cascade()
     from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.Interface import Interface_Static
     from OCP.STEPCAFControl import STEPCAFControl_Writer
@@ -46,7 +47,7 @@ def step(placed: Sequence[PlacedPart], title: str, unit: str) -> bytes:
     before = Interface_Static.CVal_s("write.step.unit")
     Interface_Static.SetCVal_s("write.step.unit", UNITS[unit])
     try:
-        with _silence(), tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "out.step"
             transferred = writer.Transfer(document)
             _header(writer, title, stamp)
@@ -63,7 +64,7 @@ def solid(part: Solid) -> Any:
 
     Raises MissingLibraryError without Open CASCADE.
     """
-    _require()
+    require_open_cascade()
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
     from OCP.BRepCheck import BRepCheck_Analyzer
 
@@ -76,13 +77,6 @@ def solid(part: Solid) -> Any:
     if not BRepCheck_Analyzer(shape).IsValid():
         raise Clamp3dError(f"Open CASCADE finds the solid of {part.name} not valid")
     return shape
-
-
-def _require() -> None:
-    try:
-        import OCP  # noqa: F401
-    except ImportError:
-        raise MissingLibraryError("STEP needs Open CASCADE: pip install 'clamp3d[step]'") from None
 
 
 def _prism(shape: Extrusion, overlap: float = 0.0) -> Any:
@@ -148,7 +142,7 @@ def _document(placed: Sequence[PlacedPart], title: str) -> Any:
             raise InputError(f"{item.name} is a mesh: STEP holds true faces, not facets; use stl, obj, ply, glb or 3mf")
         label = shapes.AddShape(solid(item.shape), False)
         name(label, item.label)
-        r, g, b = (channel / 255 for channel in item.rgb)
+        r, g, b = (channel / 255 for channel in rgb(item.colour))
         colour = Quantity_Color(r, g, b, Quantity_TypeOfColor.Quantity_TOC_sRGB)
         colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorGen)
         if tree:
@@ -193,22 +187,6 @@ def _canonical(content: bytes) -> bytes:
     new = {before: min(old) + i for i, before in enumerate(old)}
     tail = re.sub(rb"#(\d+)", lambda m: b"#%d" % new.get(int(m[1]), int(m[1])), tail)
     return content[: first.start()] + tail + content[end:]
-
-
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """Open CASCADE tells its progress on stdout, which is for data: only failures are let through."""
-    from OCP.Message import Message, Message_Gravity
-
-    printers = list(Message.DefaultMessenger_s().Printers())
-    levels = [printer.GetTraceLevel() for printer in printers]
-    for printer in printers:
-        printer.SetTraceLevel(Message_Gravity.Message_Fail)
-    try:
-        yield
-    finally:
-        for printer, level in zip(printers, levels, strict=True):
-            printer.SetTraceLevel(level)
 
 
 def _header(writer: Any, title: str, stamp: str) -> None:

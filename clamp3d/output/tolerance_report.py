@@ -11,7 +11,7 @@ from typing import Any
 from clamp3d import __version__
 from clamp3d.clamp.sensitivity import DIMENSIONS, Sensitivity
 from clamp3d.clamp.tolerance import MonteCarlo
-from clamp3d.output.figures import save_figure
+from clamp3d.output.figures import blank, save_figure
 from clamp3d.output.palette import INK
 from clamp3d.output.tables import text_table
 
@@ -83,9 +83,7 @@ def tolerance_to_dict(result: MonteCarlo, rows: tuple[Sensitivity, ...]) -> dict
 
 def draw_histogram(path: Path, result: MonteCarlo) -> None:
     """Write the histogram as PNG, SVG or PDF by the file's name; nominal, median, 5 and 95 % are marked and named."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.5, 4.4), layout="constrained")
+    figure = blank(7.5, 4.4)
     axes = figure.add_subplot()
     n, m = len(result.status), len(result.clamped)
     if m:

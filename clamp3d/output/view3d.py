@@ -15,24 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.core.pose import Array
-from clamp3d.output.palette import darker
+from clamp3d.output.palette import darker, rgb
+from clamp3d.output.placed import PosedMesh
 
 if TYPE_CHECKING:
-    import trimesh
     from matplotlib.axes import Axes
 
 _CREASE = math.radians(25.0)
 """Edges sharper than this are drawn; below it the facets stand for one round surface."""
 _LIGHT = np.array([-0.35, 0.62, 0.70])
-
-
-@dataclass(frozen=True, slots=True)
-class PosedMesh:
-    """A mesh at a pose ``T`` (4, 4) in a colour "#RRGGBB"."""
-
-    mesh: trimesh.Trimesh
-    T: Array
-    colour: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +45,7 @@ class Camera:
 
     def view(self, solid: PosedMesh) -> Array:
         """The solid's vertices as `project` gives them."""
-        return self.project(solid.mesh.vertices @ solid.T[:3, :3].T + solid.T[:3, 3])
+        return self.project(solid.world)
 
 
 def draw_solids(
@@ -87,8 +78,9 @@ def draw_solids(
     image = np.zeros((size[1], size[0], 4))
     for solid, view in zip(solids, views, strict=True):
         normals = solid.mesh.face_normals @ solid.T[:3, :3].T @ camera.axes().T
-        rgb = np.array([int(solid.colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
-        shades = np.minimum(rgb * (0.62 + 0.43 * np.maximum(0.0, normals @ _LIGHT))[:, None], 1.0)
+        shades = np.minimum(
+            np.array(rgb(solid.colour)) / 255.0 * (0.62 + 0.43 * np.maximum(0.0, normals @ _LIGHT))[:, None], 1.0
+        )
         corners = ((view - [*low, 0.0]) * [pixels_per_mm, pixels_per_mm, 1.0])[solid.mesh.faces]
         inside = (corners[..., :2].max(1) >= 0.0).all(1) & (corners[..., :2].min(1) <= size).all(1)
         for i in np.flatnonzero((normals[:, 2] > 1e-9) & inside):

@@ -8,7 +8,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -28,14 +27,13 @@ from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
 from clamp3d.output.files import write_text
 from clamp3d.output.palette import VERDICT_COLOURS
-from clamp3d.output.viewer_clamp import UNCUT, ClampStory, facts
+from clamp3d.output.viewer_clamp import UNCUT, ClampStory
 from clamp3d.output.viewer_page import live_page, panel, whole_page
 from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
 from clamp3d.output.viewer_server import CommandLog, LocalServer, RemoteServer
 from clamp3d.output.viewer_timeline import FIRST, Row, Stop, scene_stops
 from clamp3d.output.wording import (
     circumstances,
-    contents,
     headline,
     meaning,
     sentence,
@@ -163,7 +161,7 @@ class Viewer:
                 self.show(waypoint)
             worst = {finding.severity for finding in result.findings}
             state = "found" if "error" in worst else "note" if "warning" in worst else "clean"
-            told = {"said": result.status, "state": state, "facts": facts(result), "limits": [*result.limits]}
+            told = {"said": result.status, "state": state, "assembly": result}
             told["findings"] = [self._assembly_finding(finding) for finding in result.findings]
         else:
             instance("result", result, CheckResult)
@@ -203,12 +201,11 @@ class Viewer:
 
     def _assembly_finding(self, finding: Finding) -> dict[str, Any]:
         """A finding with the place to look at: where the pair that it names is at the end, else the whole clamp."""
-        number, names = len(self._waypoints) - 1, re.findall(r"\bP[1-7]\b", finding.text)[:2]
+        number = len(self._waypoints) - 1
         stop, verdict = self._drawing.timeline.stops[number], _SEVERITY[finding.severity]
-        row = next((row for row in stop.rows if {row.a, row.b} == set(names)), None)
-        if row is None:
-            return self._finding("", "", verdict, finding.text, "", number, self._drawing.extent([stop.poses]))
-        return self._finding(row.a, row.b, verdict, finding.text, "", number, focus(row.distance))
+        row = next((row for row in stop.rows if (row.a, row.b) == (finding.a, finding.b)), None)
+        place = self._drawing.extent([stop.poses]) if row is None else focus(row.distance)
+        return self._finding(finding.a or "", finding.b or "", verdict, finding.text, "", number, place)
 
     def _scene_findings(self, result: CheckResult) -> list[dict[str, Any]]:
         """The findings of a check, each with the stop and the place to look at: a motion's at its first contact."""
@@ -252,9 +249,10 @@ class Viewer:
         used = {row["verdict"] for stop in self._story["stops"] for row in stop["rows"]}
         self._panel = panel(
             self._story
-            | dict.fromkeys(("facts", "limits", "pairs", "motions"), ())
+            | {"assembly": None, "pairs": (), "motions": ()}
             | {
-                "subtitle": contents(scene) if clamp is None else clamp.subtitle,
+                "subtitle": "" if clamp is None else clamp.subtitle,
+                "scene": scene,
                 "state": state,
                 "accuracy": accuracy,
                 "notes": self._notes,

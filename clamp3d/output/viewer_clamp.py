@@ -9,7 +9,7 @@ import numpy as np
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.contact import NONE, measure_contacts
 from clamp3d.clamp.dimensions import TITLES, Clamp
-from clamp3d.clamp.result import Assembly, Waypoint
+from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
@@ -61,13 +61,3 @@ class ClampStory:
 
 def _about_z(angle: float) -> Array:
     return rotation((0.0, 0.0, 1.0), angle)
-
-
-def facts(assembly: Assembly) -> list[str]:
-    """An assembly in a few short lines."""
-    return [
-        f"distance between splints {assembly.distance:.3f} mm",
-        f"tilt of the down splint {abs(math.degrees(assembly.tilt)):.2f}\N{DEGREE SIGN}",
-        f"nut turned {assembly.turns:.2f} times from open",
-        f"method {assembly.method}, {assembly.solver} solver",
-    ]

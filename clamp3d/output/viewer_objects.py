@@ -24,6 +24,14 @@ _FRONT = 10
 """Render order of what is drawn over the solids; labels come after it."""
 
 
+def command(path: str, what: Object) -> dict[str, Any]:
+    """What sets an object at a path; one that is to be seen through the solids is drawn after them."""
+    data: dict[str, Any] = what.lower()
+    if not data["materials"][0].get("depthTest", True):
+        data["object"].setdefault("renderOrder", _FRONT)
+    return {"type": "set_object", "path": path, "object": data}
+
+
 def solid(mesh: trimesh.Trimesh, colour: str) -> Object:
     """A mesh with smooth round faces and sharp edges, in mm of its part's frame."""
     import trimesh
@@ -49,9 +57,7 @@ def facets(
     if not lit:
         return Mesh(geometry, MeshBasicMaterial(color=_number(colour)))
     seen = {"depthTest": False, "transparent": True} if on_top else {}
-    return _ordered(
-        Mesh(geometry, _phong(colour, flatShading=True, opacity=opacity, depthWrite=opacity == 1.0, **seen)), on_top
-    )
+    return Mesh(geometry, _phong(colour, flatShading=True, opacity=opacity, depthWrite=opacity == 1.0, **seen))
 
 
 def segments(points: ArrayLike, colour: str, *, on_top: bool = False) -> Object:
@@ -60,7 +66,7 @@ def segments(points: ArrayLike, colour: str, *, on_top: bool = False) -> Object:
 
     # three.js draws what is transparent after the solids
     material = LineBasicMaterial(color=_number(colour), depthTest=not on_top, transparent=on_top)
-    return _ordered(LineSegments(PointsGeometry(np.asarray(points, dtype=np.float32).T), material), on_top)
+    return LineSegments(PointsGeometry(np.asarray(points, dtype=np.float32).T), material)
 
 
 def box(low: Array, high: Array, colour: str) -> Object:
@@ -74,7 +80,7 @@ def dot(radius: float, colour: str) -> Object:
     """A ball of ``radius`` mm about the origin, drawn over the solids."""
     from meshcat.geometry import Mesh, Sphere
 
-    return _ordered(Mesh(Sphere(radius), _phong(colour, depthTest=False, transparent=True)), True)
+    return Mesh(Sphere(radius), _phong(colour, depthTest=False, transparent=True))
 
 
 def arrow(start: Array, direction: Array, length: float, colour: str) -> Object:
@@ -152,20 +158,6 @@ def _phong(colour: str, **properties: Any) -> Material:
 
     # Seen from both sides (meshcat's default): the inside of cut tubes and of overlays.
     return MeshPhongMaterial(color=_number(colour), specular=0x222222, shininess=25, **properties)
-
-
-def _ordered(made: Object, on_top: bool) -> Object:
-    """The same, drawn after the solids if it is to be seen through them."""
-    if on_top:
-        plain = made.lower
-
-        def lower() -> dict[str, Any]:
-            data: dict[str, Any] = plain()
-            data["object"]["renderOrder"] = _FRONT
-            return data
-
-        made.lower = lower
-    return made
 
 
 def _number(colour: str) -> int:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import base64
 import importlib.util
+import math
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from clamp3d import __version__
 from clamp3d.errors import MissingLibraryError
+from clamp3d.output.pages import render
 from clamp3d.output.wording import gap_text
 
 
@@ -24,12 +25,12 @@ def viewer_files() -> Path:
 
 def panel(context: dict[str, Any]) -> str:
     """What the page says beside the picture, as HTML that can be read without any script."""
-    return _render("viewer.panel.html", **context, version=__version__, gap=gap_text)
+    return render("viewer.panel.html", **context, version=__version__, gap=gap_text, degrees=math.degrees)
 
 
 def live_page(title: str, told: str) -> str:
     """The page that our own server serves: it connects back and shows what comes."""
-    return _page(title, told, meshcat='<script src="main.min.js"></script>', messages=())
+    return render("viewer.html", title=title, panel=told, meshcat='<script src="main.min.js"></script>', messages=())
 
 
 def whole_page(title: str, told: str, messages: Sequence[bytes]) -> str:
@@ -39,23 +40,5 @@ def whole_page(title: str, told: str, messages: Sequence[bytes]) -> str:
     notices = folder / "main.min.js.LICENSE.txt"
     licence = notices.read_text(encoding="utf-8").replace("--", "- -") if notices.exists() else ""
     meshcat = f"<!-- MeshCat viewer and three.js (MIT licence)\n{licence}-->\n<script>{script}</script>"
-    return _page(title, told, meshcat=meshcat, messages=[base64.b64encode(m).decode("ascii") for m in messages])
-
-
-def _page(title: str, told: str, **more: Any) -> str:
-    folder = resources.files("clamp3d.output").joinpath("templates")
-    style, script = (folder.joinpath(f"viewer.{kind}").read_text(encoding="utf-8") for kind in ("css", "js"))
-    return _render("viewer.html", title=title, panel=told, style=style, script=script, **more)
-
-
-def _render(template: str, **values: Any) -> str:
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("clamp3d.output", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    return environment.get_template(template).render(values)
+    coded = [base64.b64encode(m).decode("ascii") for m in messages]
+    return render("viewer.html", title=title, panel=told, meshcat=meshcat, messages=coded)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.collide.distance import Distance
+from clamp3d.collide.result import BAD
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.pose import Array
 from clamp3d.output import viewer_objects as draw
@@ -22,7 +23,7 @@ from clamp3d.output.palette import INK, VERDICT_COLOURS, darker
 from clamp3d.output.placed import place
 from clamp3d.output.viewer_cut import cut_open, overlap
 from clamp3d.output.viewer_timeline import FIRST, Row, Stop, Timeline
-from clamp3d.output.wording import BAD, part_title
+from clamp3d.output.wording import part_title
 
 if TYPE_CHECKING:
     import trimesh
@@ -64,7 +65,7 @@ class SceneDrawing:
     ) -> None:
         self._send = send
         placed = place(scene)
-        self._meshes = {part.name: part.mesh(mesh_error) for part in placed}
+        self._meshes = {part.name: part.posed(mesh_error).mesh for part in placed}
         self.colours = {part.name: part.colour for part in placed}
         self.cut = cut_y is not None and len(scene.parts) <= _CUTTABLE
         self._trees = ("whole", "cutaway") if self.cut else ("whole",)
@@ -254,7 +255,7 @@ class SceneDrawing:
 
     def put(self, path: str, what: Object) -> None:
         """Set the object at a path."""
-        self._send({"type": "set_object", "path": path, "object": what.lower()})
+        self._send(draw.command(path, what))
 
     def transform(self, path: str, T: Array) -> None:
         """Set the pose (4, 4) of a path."""

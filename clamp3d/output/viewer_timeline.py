@@ -11,12 +11,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from clamp3d.collide.distance import Distance
-from clamp3d.collide.result import CheckResult, PairResult
+from clamp3d.collide.result import BAD, CheckResult, PairResult
 from clamp3d.collide.scene import Scene
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 from clamp3d.output.palette import VERDICT_COLOURS
-from clamp3d.output.wording import BAD, gap_text
+from clamp3d.output.wording import gap_text
 
 if TYPE_CHECKING:
     from meshcat.animation import Animation
@@ -220,13 +220,10 @@ def _motion_stops(
 def first_contacts(rows: Iterable[PairResult]) -> dict[float, list[PairResult]]:
     """The pairs that come to touch during a motion where they are not meant to, by the moment; the first dozen."""
     found: dict[float, list[PairResult]] = {}
-    for row in sorted((r for r in rows if r.contact_at and r.verdict in ("contact", "clash", "contained")), key=_first):
-        found.setdefault(_first(row), []).append(row)
-    return dict(list(found.items())[:12])
-
-
-def _first(row: PairResult) -> float:
-    return row.contact_at or 0.0
+    for row in rows:
+        if row.contact_at and row.verdict in ("contact", "clash", "contained"):
+            found.setdefault(row.contact_at, []).append(row)
+    return dict(sorted(found.items())[:12])
 
 
 def _row(result: CheckResult, row: PairResult) -> Row:

@@ -6,11 +6,9 @@ import math
 from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 
-from clamp3d.collide.result import CheckResult, PairResult
+from clamp3d.collide.result import BAD, CheckResult, PairResult
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.collide.verdict import Verdict
-
-BAD = ("contained", "clash")
 
 
 def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
@@ -73,12 +71,21 @@ def meaning(verdict: str, scene: Scene) -> str:
     }[verdict]
 
 
+def counted(number: int, one: str, many: str = "") -> str:
+    """A number of things in words.
+
+    >>> counted(1, "pair"), counted(2, "clash", "clashes")
+    ('1 pair', '2 clashes')
+    """
+    return f"{number} {one if number == 1 else many or one + 's'}"
+
+
 def headline(result: CheckResult) -> str:
     """The result in one line: what was found, or what is clean."""
     found = result.findings
     clashes = [row for row in found if row.verdict in BAD]
     others = [
-        f"{n} {words}" if n == 1 else f"{n} {plural}"
+        counted(n, words, plural)
         for verdict, words, plural in (
             ("uncertain", "pair undecided", "pairs undecided"),
             ("clearance", "gap too small", "gaps too small"),
@@ -92,10 +99,10 @@ def headline(result: CheckResult) -> str:
         where = "" if not moving else " in motion" if moving == len(clashes) else f" ({moving} in motion)"
         depth = gap_text(deepest.lower, deepest.upper).removeprefix("overlap ")
         said = f", deepest {depth}" if deepest.upper < 0.0 else ""
-        others.insert(0, f"{len(clashes)} {'clash' if len(clashes) == 1 else 'clashes'}{where}{said}")
-    checked = f"{result.work.pairs} {'pair' if result.work.pairs == 1 else 'pairs'}"
+        others.insert(0, counted(len(clashes), "clash", "clashes") + where + said)
+    checked = counted(result.work.pairs, "pair")
     if result.scene.motions:
-        checked += f" and {len(result.scene.motions)} {'motion' if len(result.scene.motions) == 1 else 'motions'}"
+        checked += f" and {counted(len(result.scene.motions), 'motion')}"
     if not result.work.pairs:
         return "Clean: no two parts to check"
     if not found:
@@ -133,13 +140,6 @@ def circumstances(row: PairResult) -> str:
 def counts_text(result: CheckResult) -> str:
     """How many pairs have which verdict, in words."""
     return ", ".join(f"{count} {name}" for name, count in result.counts.items()) or "no pairs"
-
-
-def contents(scene: Scene) -> str:
-    """How many parts and motions a scene has."""
-    parts, motions = len(scene.parts), len(scene.motions)
-    moving = f", {motions} {'motion' if motions == 1 else 'motions'}" if motions else ""
-    return f"{parts} {'part' if parts == 1 else 'parts'}{moving}"
 
 
 def worst_first(rows: Sequence[PairResult]) -> list[PairResult]:

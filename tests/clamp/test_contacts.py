@@ -218,6 +218,7 @@ def test_wires_through_the_bolt_are_not_clamped() -> None:
     assert re.fullmatch(r"not clamped: P4 overlaps P6 by (at least )?6 mm", assembly.status)
     texts = [f.text for f in assembly.findings if f.severity == "error"]
     assert texts[0] == assembly.status
+    assert (assembly.findings[0].a, assembly.findings[0].b) == ("P4", "P6")
     assert texts[1] == assembly.status.removeprefix("not clamped: ").replace("P6", "P7")
     assert {(d.a, d.b) for d in assembly.undeclared} == {("P4", "P6"), ("P4", "P7")}
 

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import warnings
 
 import click
 import numpy as np
@@ -12,6 +13,7 @@ import trimesh
 
 from clamp3d import cli
 from clamp3d.cli.options import Output, number
+from clamp3d.core.pose import PoseWarning
 from clamp3d.errors import SolverError
 
 BOX = '[parts.{name}]\nshape = "box"\nsize = [10, 10, 10]\npose = {{ translation = [{x}, 0, 0] }}\n'
@@ -189,3 +191,15 @@ class TestNumbers:
         steps = [json.loads(clamp3d("run", "-q", *more, "--json", "-").stdout) for more in (("--step", "1/3"),)]
         assert steps[0]["solver"] == "stepped"
         assert np.round(steps[0]["distance_mm"], 3) == 31.530
+
+
+def test_a_warning_is_one_line_on_stderr(monkeypatch, capsys):
+    """Without the file, the category and the line of source that Python's own form shows."""
+
+    def mended():
+        warnings.warn("T_world has rounding errors\nof 1e-6", PoseWarning, stacklevel=2)
+        return {}
+
+    monkeypatch.setattr("clamp3d.clamp.conductors.catalogue", mended)
+    code, _, err = main(monkeypatch, capsys, "conductors")
+    assert (code, err) == (0, "warning: T_world has rounding errors\\nof 1e-6\n")

@@ -60,7 +60,7 @@ _QUICK: dict[str, dict[str, tuple[str, ...]]] = {
         "--case": ("0", "1", "99", "x"),
     },
     "export": {"--mesh-error": ("0.5", "1", "0", "-1", "nan", "inf", "x", "1e-9", "1e300")},
-    "report": {"--outline-error": ("0.1", "0", "-1", "nan", "1e-9"), "--method": ("cas", "chords")},
+    "report": {"--method": ("cas", "chords")},
 }
 for _name in ("view", "report"):
     _QUICK[_name] = {**_QUICK["run"], **_QUICK[_name]}

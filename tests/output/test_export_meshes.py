@@ -90,7 +90,7 @@ def test_stl_that_would_lose_accuracy_is_refused(reference: Clamp, tmp_path: Pat
     far = np.eye(4)
     far[0, 3] = 1e6
     scene = clamp_scene(reference, dict.fromkeys(PARTS, far))
-    with pytest.raises(InputError, match=r"stl holds 32-bit numbers: the pose of P1 would lose 0\.03"):
+    with pytest.raises(InputError, match=r"stl holds 32-bit numbers: the pose of P1 up splint would lose 0\.03"):
         export(scene, tmp_path / "stl", format="stl")
     assert not (tmp_path / "stl").exists()
     # The others hold the same place exactly.

@@ -215,6 +215,17 @@ def test_steps_are_what_a_line_worker_sees(reference):
     assert np.diff([s.way for s in stages]) == pytest.approx(stages[-1].way / 4)
 
 
+def test_findings_of_a_clamp_name_their_pair(reference, loose):
+    found = [finding for made in (reference, loose) for finding in made.assembly.findings]
+    named = [(f.a, f.b) for f in found if f.a is not None]
+    assert named
+    assert named == [m.groups() for f in found if (m := re.match(r"(P\d)-(P\d) ", f.text))]
+    for made in (reference, loose):
+        told = {f.text: f.row for f in made.findings}
+        for f in made.assembly.findings:
+            assert (f.a is None) == (told[f.text] is None)
+
+
 def test_csv_and_json_tell_the_same(reference):
     data = json.loads(json.dumps(report_to_dict(reference), allow_nan=False))
     lines = list(csv.DictReader(io.StringIO(report_csv(reference))))
@@ -352,7 +363,7 @@ def test_command_reports_a_clamp_of_ones_own(tmp_path):
     text = resources.files("clamp3d.clamp").joinpath("data/reference.toml").read_text()
     text = text.replace('name = "reference"', 'name = "mine"').replace("length = 60.0", "length = 75.0")
     (tmp_path / "mine.toml").write_text(text.replace("hole_diameter = 22.0", "hole_diameter = 21.0"))
-    arguments = ("--line", "24", "--jumper", "18", "-o", "out", "--clearance", "2", "--outline-error", "0.01")
+    arguments = ("--line", "24", "--jumper", "18", "-o", "out", "--clearance", "2")
     done = command_line("mine.toml", *arguments, folder=tmp_path)
     assert done.returncode in (0, 1), done.stderr
     assert done.stdout.split() == [f"out/{name}" for name in FILES]

@@ -180,7 +180,7 @@ def test_every_dot_lies_on_both_bodies(recorded):
     from clamp3d.output.placed import place
 
     viewer, assembly, _ = recorded
-    meshes = {part.name: part.mesh(0.002) for part in place(assembly.scene)}
+    meshes = {part.name: part.posed(0.002).mesh for part in place(assembly.scene)}
     dots = list(dots_of(viewer))
     assert len([dot for dot in dots if dot[0] == len(assembly.path) - 1]) == 8
     for number, pair, point in dots:
