@@ -101,6 +101,10 @@ class UpSplint:
     line_groove: GrooveDimensions
     jumper_groove: GrooveDimensions
 
+    def half_angle(self, groove: GrooveDimensions) -> float:
+        """Half angle of a groove's arc in rad: it ends on the inner face."""
+        return math.acos((groove.centre_depth - self.thickness) / groove.radius)
+
     @model_validator(mode="after")
     def _grooves_fit(self) -> UpSplint:
         for key in ("line_groove", "jumper_groove"):
@@ -139,6 +143,10 @@ class DownSplint:
     def max_tilt(self) -> float:
         """Largest tilt either way in rad."""
         return math.radians(self.max_tilt_deg)
+
+    def half_angle(self, groove: GrooveDimensions) -> float:
+        """Half angle of a groove's arc in rad: it ends on the inner face."""
+        return math.acos((self.face_depth - groove.centre_depth) / groove.radius)
 
     @model_validator(mode="after")
     def _grooves_fit(self) -> DownSplint:

@@ -24,9 +24,9 @@ import numpy as np
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.checks import choice, function, instance, number, whole
+from clamp3d.clamp import journal
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.final_state import FinalState, solve_final_state
-from clamp3d.clamp import journal
 from clamp3d.clamp.section import D, S, Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
 from clamp3d.clamp.status import CLAMPED, final_status, measured_status
