@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from clamp3d.checks import instance, shown
+from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import (
-    PARTS,
     TITLES,
     Bolt,
     Clamp,
@@ -48,13 +47,6 @@ def parts(clamp: Clamp) -> dict[PartName, Solid]:
         "P6": _wire("P6", clamp.line.radius, clamp.wire_length),
         "P7": _wire("P7", clamp.jumper.radius, clamp.wire_length),
     }
-
-
-def check_part_name(name: str) -> PartName:
-    """Return ``name`` if it is one of P1 to P7, else raise InputError."""
-    if not (isinstance(name, str) and name in PARTS):
-        raise InputError(f"unknown part {shown(name)}; available: {', '.join(PARTS)}")
-    return name
 
 
 @_kept

@@ -184,15 +184,14 @@ def monte_carlo(
     sizes = {k: min(CHUNK, n - k * CHUNK) for k in range(math.ceil(n / CHUNK))}
     waiting = [(spec, k, size) for k, size in sizes.items() if len(kept.get(k, ())) < size]
     done = n - sum(size for _, _, size in waiting)
-    if progress is not None:
-        progress(done, n)
+    tell = progress or (lambda done, of: None)
+    tell(done, n)
     for k, found in _solve(waiting, processes, scheduler):
         kept[k] = found
         if resume is not None:
             journal.add(resume, [k, found])
         done += len(found)
-        if progress is not None:
-            progress(done, n)
+        tell(done, n)
     samples = [sample for k, size in sizes.items() for sample in kept[k][:size]]
     distance = np.array([math.nan if d is None else d for d, _ in samples])
     return MonteCarlo(spec, nominal, distance, tuple(status for _, status in samples))
