@@ -28,7 +28,7 @@ def test_the_papers_sequence():
         ("", "step 1"),
         (
             "P1|P2P3P4P5 -> P8 -> P2 -> P5|P3P4",
-            "part of sequence step 2 must be one of P1, P2, P3, P4, P5, P6, P7, got 'P8'",
+            "part of sequence step 2 must be one of P1, P2, .*, got 'P8'",
         ),
         ("P1|P2P2", "P2 is named twice"),
         ("P1|P2P3P4P5 -> P2 -> P7 -> P5|P3P4", "got P2 where P7 is due"),
