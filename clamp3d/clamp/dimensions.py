@@ -59,13 +59,9 @@ class Wire:
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Wire:
-        if (self.conductor is None) == (self.diameter is None):
-            raise ValueError("conductor or diameter: give one of them, not both")
-        if self.conductor is not None:
-            try:
-                conductor(self.conductor)
-            except InputError as error:
-                raise ValueError(f"conductor: {error}") from None
+        one = (self.conductor is None) != (self.diameter is None)
+        _rule(one, "conductor or diameter: give one of them, not both")
+        check_conductor(self.conductor)
         return self
 
     @property
@@ -294,6 +290,15 @@ class Clamp:
             for b in row:
                 _rule(a < b, f"connections.{a}.{b}: the matrix is given above its diagonal, write it as {b}.{a}")
         return self
+
+
+def check_conductor(name: str | None) -> None:
+    """Raise ValueError for a name that the catalogue does not hold."""
+    try:
+        if name is not None:
+            conductor(name)
+    except InputError as error:
+        raise ValueError(f"conductor: {error}") from None
 
 
 def _rule(holds: bool, message: str) -> None:
