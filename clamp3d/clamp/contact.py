@@ -13,7 +13,7 @@ import numpy as np
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.dimensions import Clamp, ConnectionType, PartName
 from clamp3d.clamp.features import groove_pairs
-from clamp3d.clamp.matrix import ARC_PAIRS, PAIRS, SCREW, Pair, contact_type
+from clamp3d.clamp.matrix import ARC_PAIRS, PAIRS, SCREW, Pair, contact_type, plain
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.scene import CONTACT, clamp_scene
 from clamp3d.clamp.section import SPLINTS, WIRES
@@ -85,16 +85,9 @@ class Contact:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        distance = self.distance.to_dict()
-        return {
-            "a": self.a,
-            "b": self.b,
-            "declared": self.declared,
-            "type": self.type,
-            "relation": self.relation,
-            "point": distance["point_a"],
-            "feature": self.feature,
-        } | distance
+        data = plain(self)
+        distance: dict[str, Any] = data.pop("distance").to_dict()
+        return data | {"point": distance["point_a"]} | distance
 
 
 @dataclass(frozen=True, slots=True)

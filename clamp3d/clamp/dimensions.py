@@ -59,13 +59,9 @@ class Wire:
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Wire:
-        if (self.conductor is None) == (self.diameter is None):
-            raise ValueError("conductor or diameter: give one of them, not both")
-        if self.conductor is not None:
-            try:
-                conductor(self.conductor)
-            except InputError as error:
-                raise ValueError(f"conductor: {error}") from None
+        one = (self.conductor is None) != (self.diameter is None)
+        _rule(one, "conductor or diameter: give one of them, not both")
+        check_conductor(self.conductor)
         return self
 
     @property
@@ -101,16 +97,17 @@ class UpSplint:
     line_groove: GrooveDimensions
     jumper_groove: GrooveDimensions
 
+    def half_angle(self, groove: GrooveDimensions) -> float:
+        """Half angle of a groove's arc in rad: it ends on the inner face."""
+        return math.acos((groove.centre_depth - self.thickness) / groove.radius)
+
     @model_validator(mode="after")
     def _grooves_fit(self) -> UpSplint:
         for key in ("line_groove", "jumper_groove"):
             groove: GrooveDimensions = getattr(self, key)
             _check_groove(key, groove, groove.centre_depth - self.thickness, self.width / 2, self.hole_diameter / 2)
-            if groove.centre_depth - groove.radius <= 0.0:
-                raise ValueError(
-                    f"{key}: the arc cuts the top face: centre_depth - radius must be > 0 mm, "
-                    f"got {groove.centre_depth - groove.radius:.4g}"
-                )
+            left = groove.centre_depth - groove.radius
+            _rule(left > 0.0, f"{key}: the arc cuts the top face: centre_depth - radius must be > 0 mm, got {left:.4g}")
         return self
 
 
@@ -140,25 +137,29 @@ class DownSplint:
         """Largest tilt either way in rad."""
         return math.radians(self.max_tilt_deg)
 
+    def half_angle(self, groove: GrooveDimensions) -> float:
+        """Half angle of a groove's arc in rad: it ends on the inner face."""
+        return math.acos((self.face_depth - groove.centre_depth) / groove.radius)
+
     @model_validator(mode="after")
     def _grooves_fit(self) -> DownSplint:
-        if self.face_depth >= self.underside_depth:
-            raise ValueError(
-                f"face_depth must be above the flat underside (back_radius cos back_half_angle = "
-                f"{self.underside_depth:.4g} mm), got {self.face_depth:g}"
-            )
-        if 2 * self.back_radius * math.sin(math.radians(self.back_half_angle_deg)) > self.width:
-            raise ValueError(
-                f"width must be >= the round back's, 2 back_radius sin back_half_angle, got {self.width:g}"
-            )
+        _rule(
+            self.face_depth < self.underside_depth,
+            f"face_depth must be above the flat underside (back_radius cos back_half_angle = "
+            f"{self.underside_depth:.4g} mm), got {self.face_depth:g}",
+        )
+        _rule(
+            self.width >= 2 * self.back_radius * math.sin(math.radians(self.back_half_angle_deg)),
+            f"width must be >= the round back's, 2 back_radius sin back_half_angle, got {self.width:g}",
+        )
         for key in ("line_groove", "jumper_groove"):
             groove: GrooveDimensions = getattr(self, key)
             _check_groove(key, groove, self.face_depth - groove.centre_depth, self.width / 2, self.slot_width / 2)
-            if groove.centre_depth + groove.radius >= self.underside_depth:
-                raise ValueError(
-                    f"{key}: the arc cuts the underside: centre_depth + radius must be < "
-                    f"{self.underside_depth:.4g} mm, got {groove.centre_depth + groove.radius:.4g}"
-                )
+            _rule(
+                groove.centre_depth + groove.radius < self.underside_depth,
+                f"{key}: the arc cuts the underside: centre_depth + radius must be < "
+                f"{self.underside_depth:.4g} mm, got {groove.centre_depth + groove.radius:.4g}",
+            )
         return self
 
 
@@ -180,10 +181,9 @@ class Saddle:
 
     @model_validator(mode="after")
     def _is_saddle(self) -> Saddle:
-        if self.width >= 2 * self.radius:
-            raise ValueError(f"width must be < 2 radius = {2 * self.radius:g} mm, got {self.width:g}")
-        if self.hole_diameter >= self.width:
-            raise ValueError(f"hole_diameter must be < width = {self.width:g} mm, got {self.hole_diameter:g}")
+        _rule(self.width < 2 * self.radius, f"width must be < 2 radius = {2 * self.radius:g} mm, got {self.width:g}")
+        hole = self.hole_diameter
+        _rule(hole < self.width, f"hole_diameter must be < width = {self.width:g} mm, got {hole:g}")
         return self
 
 
@@ -255,65 +255,74 @@ class Clamp:
     def _parts_fit_each_other(self) -> Clamp:
         r, down = self.bolt.diameter / 2, self.down_splint
         for key, wire in (("line", self.line), ("jumper", self.jumper)):
-            if wire.radius >= self.up_splint.width:
-                raise ValueError(
-                    f"{key}: the diameter must be less than twice up_splint.width = {self.up_splint.width:g} mm, "
-                    f"got {2.0 * wire.radius:g}; are both in mm?"
-                )
-        for key, hole in (("up_splint", self.up_splint.hole_diameter), ("saddle", self.saddle.hole_diameter)):
-            if hole <= 2 * r:
-                raise ValueError(f"{key}.hole_diameter must be > bolt.diameter = {2 * r:g} mm, got {hole:g}")
-        if down.slot_length <= 2 * r:
-            raise ValueError(
-                f"down_splint.slot_length must be > bolt.diameter = {2 * r:g} mm, got {down.slot_length:g}"
+            _rule(
+                wire.radius < self.up_splint.width,
+                f"{key}: the diameter must be less than twice up_splint.width = {self.up_splint.width:g} mm, "
+                f"got {2.0 * wire.radius:g}; are both in mm?",
             )
+        for key, opening in (
+            ("up_splint.hole_diameter", self.up_splint.hole_diameter),
+            ("saddle.hole_diameter", self.saddle.hole_diameter),
+            ("down_splint.slot_length", down.slot_length),
+            ("nut.across_flats", self.nut.across_flats),
+        ):
+            _rule(opening > 2 * r, f"{key} must be > bolt.diameter = {2 * r:g} mm, got {opening:g}")
         # The leaning shank leaves the round back where its outer edge meets the circle: Table 2 at the back's end.
         needed = 2 * down.back_radius * math.sin(down.max_tilt + math.asin(min(1.0, r / down.back_radius)))
-        if down.slot_width < needed:
-            raise ValueError(
-                f"down_splint.slot_width must be >= {needed:.4g} mm for a tilt of {down.max_tilt_deg:g} deg, "
-                f"got {down.slot_width:g}"
-            )
-        if self.back_clearance <= 0.0:
-            raise ValueError(
-                f"saddle.radius must be > down_splint.back_radius = {down.back_radius:g} mm, got {self.saddle.radius:g}"
-            )
+        _rule(
+            down.slot_width >= needed,
+            f"down_splint.slot_width must be >= {needed:.4g} mm for a tilt of {down.max_tilt_deg:g} deg, "
+            f"got {down.slot_width:g}",
+        )
+        _rule(
+            self.back_clearance > 0.0,
+            f"saddle.radius must be > down_splint.back_radius = {down.back_radius:g} mm, got {self.saddle.radius:g}",
+        )
         # The saddle's edge as seen from the back's centre, which lies back_clearance below the saddle's own.
         edge = self.saddle.radius * math.cos(self.saddle.half_angle) - self.back_clearance
         reach = math.degrees(math.atan2(self.saddle.width / 2, edge)) + down.max_tilt_deg
-        if reach > down.back_half_angle_deg:
-            raise ValueError(
-                f"down_splint.back_half_angle_deg must be >= {reach:.4g} (saddle's edge + max_tilt_deg), "
-                f"got {down.back_half_angle_deg:g}"
-            )
-        if self.nut.across_flats <= 2 * r:
-            raise ValueError(f"nut.across_flats must be > bolt.diameter = {2 * r:g} mm, got {self.nut.across_flats:g}")
+        _rule(
+            down.back_half_angle_deg >= reach,
+            f"down_splint.back_half_angle_deg must be >= {reach:.4g} (saddle's edge + max_tilt_deg), "
+            f"got {down.back_half_angle_deg:g}",
+        )
         for a, row in self.connections.items():
             for b in row:
-                if a >= b:
-                    raise ValueError(
-                        f"connections.{a}.{b}: the matrix is given above its diagonal, write it as {b}.{a}"
-                    )
+                _rule(a < b, f"connections.{a}.{b}: the matrix is given above its diagonal, write it as {b}.{a}")
         return self
+
+
+def check_conductor(name: str | None) -> None:
+    """Raise ValueError for a name that the catalogue does not hold."""
+    try:
+        if name is not None:
+            conductor(name)
+    except InputError as error:
+        raise ValueError(f"conductor: {error}") from None
+
+
+def _rule(holds: bool, message: str) -> None:
+    """Raise ValueError, which pydantic reports with the place in the file, unless a rule holds."""
+    if not holds:
+        raise ValueError(message)
 
 
 def _check_groove(
     key: str, groove: GrooveDimensions, centre_to_face: float, half_width: float, half_hole: float
 ) -> None:
     """Raise ValueError unless the arc reaches the inner face and its mouth lies between hole and edge."""
-    if abs(centre_to_face) >= groove.radius:
-        raise ValueError(
-            f"{key}: the arc does not reach its face: the centre must be less than radius = "
-            f"{groove.radius:g} mm from the inner face, got {abs(centre_to_face):.4g}"
-        )
+    _rule(
+        abs(centre_to_face) < groove.radius,
+        f"{key}: the arc does not reach its face: the centre must be less than radius = "
+        f"{groove.radius:g} mm from the inner face, got {abs(centre_to_face):.4g}",
+    )
     half_mouth = math.sqrt(groove.radius**2 - centre_to_face**2) if centre_to_face > 0 else groove.radius
-    if groove.offset + half_mouth > half_width:
-        raise ValueError(
-            f"{key}: the arc leaves the splint at its edge: offset must be <= {half_width - half_mouth:.4g} mm, "
-            f"got {groove.offset:g}"
-        )
-    if groove.offset - half_mouth < half_hole:
-        raise ValueError(
-            f"{key}: the arc meets the bolt hole: offset must be >= {half_hole + half_mouth:.4g} mm, "
-            f"got {groove.offset:g}"
-        )
+    highest, least = half_width - half_mouth, half_hole + half_mouth
+    _rule(
+        groove.offset + half_mouth <= half_width,
+        f"{key}: the arc leaves the splint at its edge: offset must be <= {highest:.4g} mm, got {groove.offset:g}",
+    )
+    _rule(
+        groove.offset - half_mouth >= half_hole,
+        f"{key}: the arc meets the bolt hole: offset must be >= {least:.4g} mm, got {groove.offset:g}",
+    )

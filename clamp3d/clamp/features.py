@@ -5,11 +5,9 @@ Part frames: origin as published (section), middle of the part along the wires; 
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from clamp3d.clamp.dimensions import Clamp, GrooveDimensions, PartName, Wire
+from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder, SweptArc
@@ -27,30 +25,20 @@ def groove_pairs(clamp: Clamp) -> dict[tuple[PartName, PartName], GroovePair]:
     ['P1-P6', 'P1-P7', 'P2-P6', 'P2-P7', 'P3-P2']
     """
     up, down, saddle = clamp.up_splint, clamp.down_splint, clamp.saddle
-    sides: tuple[tuple[PartName, int, Wire, GrooveDimensions, GrooveDimensions], ...] = (
-        ("P6", -1, clamp.line, up.line_groove, down.line_groove),
-        ("P7", +1, clamp.jumper, up.jumper_groove, down.jumper_groove),
-    )
     pairs: dict[tuple[PartName, PartName], GroovePair] = {}
-    for wire, side, dimensions, over, _ in sides:
-        cylinder = Cylinder(dimensions.radius, clamp.wire_length)
-        arc = _arc(over, over.centre_depth - up.thickness, up.length)
-        T = _pose(_MOUTH_DOWN, up.width / 2 + side * over.offset, over.centre_depth)
-        pairs["P1", wire] = GroovePair("P1", wire, arc, T, cylinder, _pose(_MOUTH_UP, 0.0, 0.0))
-    for wire, side, dimensions, _, under in sides:
-        cylinder = Cylinder(dimensions.radius, clamp.wire_length)
-        arc = _arc(under, down.face_depth - under.centre_depth, down.length)
-        T = _pose(_MOUTH_UP, side * under.offset, under.centre_depth)
-        pairs["P2", wire] = GroovePair("P2", wire, arc, T, cylinder, _pose(_MOUTH_UP, 0.0, 0.0))
+    for name, splint, mouth, middle in (("P1", up, _MOUTH_DOWN, up.width / 2), ("P2", down, _MOUTH_UP, 0.0)):
+        for wire, side, radius, groove in (
+            ("P6", -1, clamp.line.radius, splint.line_groove),
+            ("P7", +1, clamp.jumper.radius, splint.jumper_groove),
+        ):
+            arc = SweptArc(groove.radius, splint.half_angle(groove), splint.length)
+            T = _pose(mouth, middle + side * groove.offset, groove.centre_depth)
+            cylinder = Cylinder(radius, clamp.wire_length)
+            pairs[name, wire] = GroovePair(name, wire, arc, T, cylinder, _pose(_MOUTH_UP, 0.0, 0.0))
     back = Cylinder(down.back_radius, down.length)
     seat = SweptArc(saddle.radius, saddle.half_angle, saddle.length)
     pairs["P3", "P2"] = GroovePair("P3", "P2", seat, _pose(_MOUTH_UP, 0.0, 0.0), back, _pose(_MOUTH_UP, 0.0, 0.0))
     return pairs
-
-
-def _arc(groove: GrooveDimensions, centre_to_face: float, length: float) -> SweptArc:
-    """The arc ends on the inner face, ``centre_to_face`` mm from its centre: that is its half angle."""
-    return SweptArc(groove.radius, math.acos(centre_to_face / groove.radius), length)
 
 
 def _pose(R: Array, u: float, v: float) -> Array:

@@ -18,7 +18,7 @@ from scipy.optimize import minimize, nnls
 from clamp3d.clamp.curvature import LEVEL, lagrangian_hessian, least_curvature, rounding_of_normals
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
-from clamp3d.clamp.section import WIRES, D, Gaps, S, Section
+from clamp3d.clamp.section import WIRES, D, Gaps, S, Section, remembered
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
 
@@ -215,14 +215,7 @@ def _slsqp(
     """Least goal . q with no gap negative, by SLSQP in a trust region; only the coordinates ``free`` move."""
     index = list(free)
     low, high = np.array(section.bounds()).T
-    memo: dict[bytes, Gaps] = {}
-
-    def gaps(q: Array) -> Gaps:
-        key = q.tobytes()
-        if key not in memo:
-            memo.clear()
-            memo[key] = section.gaps(q)
-        return memo[key]
+    gaps = remembered(section.gaps)
 
     def at(x: Array) -> Array:
         new = q.copy()

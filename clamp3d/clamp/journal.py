@@ -9,66 +9,49 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from clamp3d.errors import InputError
 
 
-class Journal:
-    """The file ``path`` of a run described by ``header``; ``pieces`` are those that were finished before, by key.
+def pieces(path: Path, header: dict[str, Any]) -> dict[int, Any]:
+    """The pieces that a run described by ``header`` has finished before, by key; the file is ready for more.
 
     Raises InputError if the file cannot be read or written, or belongs to another run.
     """
-
-    def __init__(self, path: Path, header: dict[str, Any]) -> None:
-        self.pieces: dict[int, Any] = {}
-        try:
-            self._file = open(path, "a+b")  # noqa: SIM115 - held open for the run, closed by __exit__
-        except OSError as error:
-            raise InputError(f"cannot write {path}: {error.strerror}") from None
-        try:
-            self._read(path, json.loads(json.dumps(header)))
-        except BaseException:
-            self._file.close()
-            raise
-
-    def _read(self, path: Path, header: dict[str, Any]) -> None:
-        self._file.seek(0)
-        content = self._file.read()
+    first = _line(header)
+    try:
+        content = path.read_bytes() if os.path.lexists(path) else b""
         whole = content[: content.rfind(b"\n") + 1]
-        lines = []
-        try:
-            lines = [json.loads(line) for line in whole.splitlines()]
-            known = lines[0] if lines else None
-            self.pieces = {int(key): value for key, value in lines[1:]}
-        except (ValueError, TypeError):
-            raise InputError(f"{path}: not a file of finished work; give another name or remove it") from None
-        if content and not lines and not json.dumps(header).encode().startswith(content):
-            raise InputError(f"{path}: not a file of finished work; give another name or remove it")
-        if lines and known != header:
-            keys = known if isinstance(known, dict) else {}
-            other = ", ".join(k for k in header if keys.get(k) != header[k]) or "another version"
-            raise InputError(f"{path}: belongs to another run (other {other}); give another name or remove it")
-        if len(whole) < len(content):
-            self._file.truncate(len(whole))
-        if not lines:
-            self._write(header)
+        lines = [json.loads(line) for line in whole.splitlines()]
+        found = {int(key): value for key, value in lines[1:]}
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}") from None
+    except (ValueError, TypeError):
+        lines, found = [], {}
+    if not lines and not first.startswith(content):
+        raise InputError(f"{path}: not a file of finished work; give another name or remove it")
+    if lines and lines[0] != (wanted := json.loads(first)):
+        known = lines[0] if isinstance(lines[0], dict) else {}
+        other = ", ".join(k for k in wanted if known.get(k) != wanted[k]) or "another version"
+        raise InputError(f"{path}: belongs to another run (other {other}); give another name or remove it")
+    if len(whole) < len(content):
+        os.truncate(path, len(whole))
+    if not lines:
+        add(path, header)
+    return found
 
-    def add(self, key: int, piece: Any) -> None:
-        """Keep a finished piece."""
-        self._write([key, piece])
-        self.pieces[key] = piece
 
-    def _write(self, value: Any) -> None:
-        self._file.write(json.dumps(value, separators=(",", ":")).encode() + b"\n")
-        self._file.flush()
-        os.fsync(self._file.fileno())
+def add(path: Path, value: Any) -> None:
+    """Keep a finished piece, ``[key, piece]``. Raises InputError if the file cannot be written."""
+    try:
+        with open(path, "ab") as file:
+            file.write(_line(value))
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}") from None
 
-    def __enter__(self) -> Journal:
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._file.close()
+def _line(value: Any) -> bytes:
+    return json.dumps(value, separators=(",", ":")).encode() + b"\n"

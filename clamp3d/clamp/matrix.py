@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from clamp3d.clamp.dimensions import PARTS, TITLES, ConnectionType, PartName
 from clamp3d.core.pose import Array
@@ -50,6 +52,12 @@ def gap_text(gap: float) -> str:
     return "0" if abs(gap) < 5e-10 else f"{gap:.3g}" if abs(gap) < 1e-3 else f"{gap:.3f}"
 
 
+def plain(item: Any, **names: str) -> dict[str, Any]:
+    """Fields of a dataclass as data for JSON; ``names`` are the keys of fields that are not called the same there."""
+    values = {names.get(f.name, f.name): getattr(item, f.name) for f in fields(item)}
+    return {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in values.items()}
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Difference:
     """A pair whose measured contact is not the declared one.
@@ -85,16 +93,7 @@ class Difference:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "a": self.a,
-            "b": self.b,
-            "declared": self.declared,
-            "measured": self.measured,
-            "gap_mm": self.gap,
-            "point": None if self.place is None else self.place.tolist(),
-            "where": self.where,
-            "text": str(self),
-        }
+        return plain(self, gap="gap_mm", place="point") | {"text": str(self)}
 
 
 def differences(contacts: Iterable[Contact], tolerance: float) -> tuple[Difference, ...]:

@@ -7,10 +7,10 @@ given in the paper's section coordinates u right, v down, so X = u and Z = -v.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
-from clamp3d.checks import instance, shown
+from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import (
-    PARTS,
     TITLES,
     Bolt,
     Clamp,
@@ -20,12 +20,14 @@ from clamp3d.clamp.dimensions import (
     PartName,
     Saddle,
     UpSplint,
-    Wire,
 )
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
+
+_kept = lru_cache(maxsize=16)
+"""A clamp asks for the same parts at every pose."""
 
 
 def parts(clamp: Clamp) -> dict[PartName, Solid]:
@@ -42,18 +44,12 @@ def parts(clamp: Clamp) -> dict[PartName, Solid]:
         "P3": _saddle(clamp.saddle),
         "P4": _bolt(clamp.bolt),
         "P5": _nut(clamp.nut, clamp.bolt.diameter),
-        "P6": _wire("P6", clamp.line, clamp.wire_length),
-        "P7": _wire("P7", clamp.jumper, clamp.wire_length),
+        "P6": _wire("P6", clamp.line.radius, clamp.wire_length),
+        "P7": _wire("P7", clamp.jumper.radius, clamp.wire_length),
     }
 
 
-def check_part_name(name: str) -> PartName:
-    """Return ``name`` if it is one of P1 to P7, else raise InputError."""
-    if not (isinstance(name, str) and name in PARTS):
-        raise InputError(f"unknown part {shown(name)}; available: {', '.join(PARTS)}")
-    return name
-
-
+@_kept
 def _up_splint(d: UpSplint) -> Solid:
     _check_hole("up_splint.hole_diameter", d.hole_diameter, d.length)
     middle = d.width / 2
@@ -61,8 +57,8 @@ def _up_splint(d: UpSplint) -> Solid:
         (0.0, 0.0),
         (d.width, 0.0),
         (d.width, d.thickness),
-        _groove(d.jumper_groove, middle + d.jumper_groove.offset, d.jumper_groove.centre_depth - d.thickness, up=True),
-        _groove(d.line_groove, middle - d.line_groove.offset, d.line_groove.centre_depth - d.thickness, up=True),
+        _groove(d, d.jumper_groove, middle + d.jumper_groove.offset, -math.pi / 2),
+        _groove(d, d.line_groove, middle - d.line_groove.offset, -math.pi / 2),
         (0.0, d.thickness),
     )
     body = _along_wires(outline, d.length)
@@ -70,14 +66,15 @@ def _up_splint(d: UpSplint) -> Solid:
     return Solid("P1", (body,), (hole,), title=TITLES["P1"], volume=body.volume - hole.volume)
 
 
+@_kept
 def _down_splint(d: DownSplint) -> Solid:
     _check_hole("down_splint.slot_length", d.slot_length, d.length)
     half = math.radians(d.back_half_angle_deg)
     right = d.width / 2
     outline = Profile.of(
         (-right, d.face_depth),
-        _groove(d.line_groove, -d.line_groove.offset, d.face_depth - d.line_groove.centre_depth, up=False),
-        _groove(d.jumper_groove, d.jumper_groove.offset, d.face_depth - d.jumper_groove.centre_depth, up=False),
+        _groove(d, d.line_groove, -d.line_groove.offset, math.pi / 2),
+        _groove(d, d.jumper_groove, d.jumper_groove.offset, math.pi / 2),
         (right, d.face_depth),
         (right, d.underside_depth),
         Arc((0.0, 0.0), d.back_radius, math.pi / 2 - half, math.pi / 2 + half),
@@ -93,6 +90,7 @@ def _down_splint(d: DownSplint) -> Solid:
     return Solid("P2", (body,), (slot,), title=TITLES["P2"], volume=body.volume - section * d.slot_length)
 
 
+@_kept
 def _saddle(d: Saddle) -> Solid:
     _check_hole("saddle.hole_diameter", d.hole_diameter, d.length)
     bottom = d.radius + d.apex_thickness
@@ -111,12 +109,14 @@ def _saddle(d: Saddle) -> Solid:
     return Solid("P3", (body,), (hole,), title=TITLES["P3"], volume=body.volume - drilled)
 
 
+@_kept
 def _bolt(d: Bolt) -> Solid:
     shank = Extrusion(Profile.circle(d.diameter / 2), "Z", -d.shank_length, 0.0)
     head = Extrusion(Profile.hexagon(d.head_across_flats), "Z", -d.shank_length - d.head_height, -d.shank_length)
     return Solid("P4", (shank, head), title=TITLES["P4"], volume=shank.volume + head.volume, not_modelled="thread")
 
 
+@_kept
 def _nut(d: Nut, bolt_diameter: float) -> Solid:
     body = Extrusion(Profile.hexagon(d.across_flats), "Z", -d.height, 0.0)
     hole = Extrusion(Profile.circle(bolt_diameter / 2), "Z", -d.height, 0.0)
@@ -130,15 +130,15 @@ def _nut(d: Nut, bolt_diameter: float) -> Solid:
     )
 
 
-def _wire(name: PartName, wire: Wire, length: float) -> Solid:
-    body = _along_wires(Profile.circle(wire.radius), length)
+@_kept
+def _wire(name: PartName, radius: float, length: float) -> Solid:
+    body = _along_wires(Profile.circle(radius), length)
     return Solid(name, (body,), title=TITLES[name], volume=body.volume, not_modelled="strands")
 
 
-def _groove(d: GrooveDimensions, centre: float, centre_to_face: float, *, up: bool) -> Arc:
-    """Concave arc about u = ``centre`` that ends on the inner face; its material lies above it (``up``) or below."""
-    half = math.acos(centre_to_face / d.radius)
-    middle = -math.pi / 2 if up else math.pi / 2
+def _groove(splint: UpSplint | DownSplint, d: GrooveDimensions, centre: float, middle: float) -> Arc:
+    """Concave arc about u = ``centre`` that ends on the inner face; ``middle`` is the direction of its material."""
+    half = splint.half_angle(d)
     return Arc((centre, d.centre_depth), d.radius, middle + half, middle - half)
 
 

@@ -18,6 +18,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from clamp3d.checks import array, choice, instance, number, positive, whole
 from clamp3d.clamp.assemble import assemble
@@ -187,18 +188,11 @@ class Placement:
         m = array("misplacements", misplacement, (None, 4))
         if not np.abs(m[:, :2]).max(initial=0.0) <= _FARTHEST:
             raise InputError(f"misplacements must be up to {_FARTHEST:g} mm, got {np.abs(m[:, :2]).max():g}")
-        cy, sy, cp, sp = np.cos(m[:, 2]), np.sin(m[:, 2]), np.cos(m[:, 3]), np.sin(m[:, 3])
-        T = np.zeros((len(m), 4, 4))
+        T = np.tile(self._nominal, (len(m), 1, 1))
         # Rz(yaw) Rx(pitch), about the wire's middle.
-        T[:, 0, 0], T[:, 0, 1], T[:, 0, 2] = cy, -sy * cp, sy * sp
-        T[:, 1, 0], T[:, 1, 1], T[:, 1, 2] = sy, cy * cp, -cy * sp
-        T[:, 2, 1], T[:, 2, 2] = sp, cp
-        T[:, 0, 3], T[:, 2, 3], T[:, 3, 3] = m[:, 0], m[:, 1], 1.0
-        here = self._nominal.copy()
-        here[:3, 3] = 0.0
-        placed = T @ here
-        placed[:, :3, 3] += self._nominal[:3, 3]
-        return placed
+        T[:, :3, :3] = Rotation.from_euler("ZX", m[:, 2:]).as_matrix() @ self._nominal[:3, :3]
+        T[:, (0, 2), 3] += m[:, :2]
+        return T
 
     def close(self, misplacement: Array) -> Outcomes:
         """Close the clamp on the wire at each misplacement (n, 4): offset, height (mm), yaw, pitch (rad)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from html import escape
 from typing import Any, Literal, get_args
 
@@ -12,7 +12,7 @@ from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import instance
 from clamp3d.clamp.contact import Contact, Seat, measure_contacts, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
-from clamp3d.clamp.matrix import Difference, Pair, differences
+from clamp3d.clamp.matrix import Difference, Pair, differences, plain
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array, SectionPose
@@ -96,14 +96,8 @@ class Equilibrium:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "distance_mm": self.distance,
-            "closing_mm": self.closing,
-            "tilt_deg": math.degrees(self.tilt),
-            "status": self.status,
-            "detail": self.detail,
-            "rests": self.is_equilibrium,
-        }
+        data = plain(self, distance="distance_mm", closing="closing_mm", tilt="tilt_deg", is_equilibrium="rests")
+        return data | {"tilt_deg": math.degrees(self.tilt)}
 
 
 Severity = Literal["error", "warning", "note"]
@@ -280,27 +274,14 @@ class Assembly:
                 for name, pose in self.poses.items()
             },
             "contacts": [c.to_dict() for c in self.contacts],
-            "seats": [
-                {"splint": s.splint, "wire": s.wire, "seated": s.seated, "gap_mm": s.gap, "detail": s.detail}
-                for s in self.seats
-            ],
-            "events": [
-                {
-                    "step": e.step,
-                    "a": e.a,
-                    "b": e.b,
-                    "relation": e.relation,
-                    "point": None if e.point is None else e.point.tolist(),
-                    "travel_mm": e.travel,
-                }
-                for e in self.events
-            ],
+            "seats": [plain(seat, gap="gap_mm") for seat in self.seats],
+            "events": [plain(event, travel="travel_mm") for event in self.events],
             "undeclared": [str(d) for d in self.undeclared],
             "matrix_differences": [d.to_dict() for d in self.matrix_differences],
-            "findings": [asdict(finding) for finding in self.findings],
+            "findings": [plain(finding) for finding in self.findings],
             "residuals": {"largest_violated_gap_mm": self.violation, "optimality_mm": self.optimality},
             "other_ends": None if self.others is None else [e.to_dict() for e in self.others],
-            "work": asdict(self.work),
+            "work": plain(self.work),
         }
 
     def frame(self) -> Any:

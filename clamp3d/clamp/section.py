@@ -7,6 +7,7 @@ d, s) in mm: the two wire centres, the down splint's origin d below P1's along t
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -206,6 +207,20 @@ class Section:
     def gaps(self, q: Array) -> Gaps:
         """All gaps at a state: both wires, faces, tilt limits, mouths."""
         return join(self.wire_gaps(q, "P6"), self.wire_gaps(q, "P7"), self.face_gaps(q), self.mouth_gaps(q))
+
+
+def remembered(function: Callable[[Array], Gaps]) -> Callable[[Array], Gaps]:
+    """The function with its last answer kept: solvers ask for values and derivatives one after the other."""
+    last: dict[bytes, Gaps] = {}
+
+    def gaps(x: Array) -> Gaps:
+        key = x.tobytes()
+        if key not in last:
+            last.clear()
+            last[key] = function(x)
+        return last[key]
+
+    return gaps
 
 
 def join(*parts: Gaps) -> Gaps:

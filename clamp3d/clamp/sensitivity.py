@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 
 from clamp3d.baselines.cas import Cas
+from clamp3d.checks import choice
 from clamp3d.clamp.dimensions import Clamp, Wire
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.status import CLAMPED, measured_status
 from clamp3d.core.pose import Array
-from clamp3d.errors import InputError, SolverError
+from clamp3d.errors import SolverError
 
 _GROOVES = ("line_groove", "jumper_groove")
 DIMENSIONS: tuple[str, ...] = (
@@ -57,7 +58,7 @@ def dimension(clamp: Clamp, name: str) -> float:
     >>> dimension(load_clamp(), "line.diameter"), dimension(load_clamp(), "down_splint.line_groove.radius")
     (32.67, 23.8012)
     """
-    _check_name(name)
+    choice("dimension", name, DIMENSIONS)
     if name in ("line.diameter", "jumper.diameter"):
         wire: Wire = getattr(clamp, name.split(".")[0])
         return 2.0 * wire.radius
@@ -78,7 +79,7 @@ def with_dimensions(clamp: Clamp, values: Mapping[str, float]) -> Clamp:
     """
     tree: dict[str, Any] = {}
     for name, value in values.items():
-        _check_name(name)
+        choice("dimension", name, DIMENSIONS)
         *path, last = name.split(".")
         node = tree
         for key in path:
@@ -120,11 +121,6 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
         if abs(v) > _NONE
     ]
     return tuple(sorted(rows, key=lambda row: -round(abs(row.derivative), 9)))
-
-
-def _check_name(name: str) -> None:
-    if name not in DIMENSIONS:
-        raise InputError(f"unknown dimension {name!r}; available: {', '.join(DIMENSIONS)}")
 
 
 def _replaced(part: Any, tree: Mapping[str, Any]) -> Any:

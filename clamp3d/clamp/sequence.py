@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from clamp3d.checks import choice
 from clamp3d.clamp.dimensions import PARTS, PartName
 from clamp3d.errors import InputError
 
@@ -20,14 +21,9 @@ class Step:
         return self.part + ("|" + "".join(self.followers) if self.followers else "")
 
 
-# What closes a clamp of this kind: the splints are over the wires before they close, and closed before the nut pulls.
-_CLOSES_A_CLAMP: tuple[tuple[PartName, tuple[PartName, ...]], ...] = (
-    ("P1", ("P2", "P3", "P4", "P5")),
-    ("P7", ()),
-    ("P2", ()),
-    ("P5", ("P3", "P4")),
-)
-_NEEDED = " -> ".join(str(Step(part, followers)) for part, followers in _CLOSES_A_CLAMP)
+_NEEDED = "P1|P2P3P4P5 -> P7 -> P2 -> P5|P3P4"
+"""What closes a clamp of this kind: the splints are over the wires before they close, and closed before the nut
+pulls."""
 
 
 def parse_sequence(text: str) -> tuple[Step, ...]:
@@ -39,6 +35,16 @@ def parse_sequence(text: str) -> tuple[Step, ...]:
     >>> [str(step) for step in parse_sequence("P1|P2P3P4P5 -> P7 -> P2 -> P5|P3P4")]
     ['P1|P2P3P4P5', 'P7', 'P2', 'P5|P3P4']
     """
+    steps, needed = _steps(text), _steps(_NEEDED)
+    for step, due in zip(steps, needed, strict=False):
+        if step.part != due.part or set(step.followers) != set(due.followers):
+            raise InputError(f"sequence must move {_NEEDED}: got {step} where {due} is due")
+    if len(steps) != len(needed):
+        raise InputError(f"sequence must have the {len(needed)} steps {_NEEDED}, got {len(steps)}")
+    return steps
+
+
+def _steps(text: str) -> tuple[Step, ...]:
     steps = []
     for number, item in enumerate(re.split(r"->|→|\\rightarrow", text), 1):
         compact = re.sub(r"\s+", "", item)
@@ -48,14 +54,8 @@ def parse_sequence(text: str) -> tuple[Step, ...]:
             )
         names = re.findall(r"P\d+", compact)
         for name in names:
-            if name not in PARTS:
-                raise InputError(f"sequence step {number}: unknown part {name!r}; available: {', '.join(PARTS)}")
+            choice(f"part of sequence step {number}", name, PARTS)
             if names.count(name) > 1:
                 raise InputError(f"sequence step {number}: {name} is named twice")
         steps.append(Step(names[0], tuple(names[1:])))
-    for step, (part, needed) in zip(steps, _CLOSES_A_CLAMP, strict=False):
-        if step.part != part or set(step.followers) != set(needed):
-            raise InputError(f"sequence must move {_NEEDED}: got {step} where {Step(part, needed)} is due")
-    if len(steps) != len(_CLOSES_A_CLAMP):
-        raise InputError(f"sequence must have the {len(_CLOSES_A_CLAMP)} steps {_NEEDED}, got {len(steps)}")
     return tuple(steps)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from clamp3d.clamp.dimensions import PartName
-from clamp3d.clamp.section import WIRES, D, Gaps, S, Section
+from clamp3d.clamp.section import WIRES, D, Gaps, S, Section, remembered
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
 
@@ -133,37 +133,30 @@ class _FreeError(Exception):
 def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
     """Move one wire of ``q`` in place to where its least gap is largest; whether it is free there."""
     i = 2 * WIRES.index(wire)
-    memo: dict[bytes, Gaps] = {}
 
-    def gaps(x: Array) -> Gaps:
-        key = x[:2].tobytes()
-        if key not in memo:
-            memo.clear()
-            q[i : i + 2] = x[:2]
-            memo[key] = section.wire_gaps(q, wire)
-            if not widest and memo[key].value.min() >= -FREE:
-                raise _FreeError
-        return memo[key]
+    def at(xy: Array) -> Gaps:
+        q[i : i + 2] = xy
+        found = section.wire_gaps(q, wire)
+        if not widest and found.value.min() >= -FREE:
+            raise _FreeError
+        return found
 
-    def slack(x: Array) -> Array:
-        return np.asarray(gaps(x).value - x[2])
+    gaps = remembered(at)
 
     def slack_gradient(x: Array) -> Array:
-        found = gaps(x).gradient[:, i : i + 2]
+        found = gaps(x[:2]).gradient[:, i : i + 2]
         return np.column_stack([found, -np.ones(len(found))])
 
     try:
-        start = np.array([q[i], q[i + 1], 0.0])
-        start[2] = gaps(start).value.min()
         found = minimize(
             lambda x: -x[2],
-            start,
+            np.array([*q[i : i + 2], gaps(q[i : i + 2]).value.min()]),
             jac=lambda x: np.array([0.0, 0.0, -1.0]),
             bounds=[*section.room(q, wire), (None, None)],
-            constraints={"type": "ineq", "fun": slack, "jac": slack_gradient},
+            constraints={"type": "ineq", "fun": lambda x: gaps(x[:2]).value - x[2], "jac": slack_gradient},
             method="SLSQP",
             options={"maxiter": 60, "ftol": 1e-12},
         ).x
-        return bool(gaps(found).value.min() >= -FREE)
+        return bool(gaps(found[:2]).value.min() >= -FREE)
     except _FreeError:
         return True

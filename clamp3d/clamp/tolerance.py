@@ -10,10 +10,11 @@ from __future__ import annotations
 import importlib
 import math
 import signal
+from collections import Counter
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import nullcontext
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -23,9 +24,9 @@ import numpy as np
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.checks import choice, function, instance, number, whole
+from clamp3d.clamp import journal
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.final_state import FinalState, solve_final_state
-from clamp3d.clamp.journal import Journal
 from clamp3d.clamp.section import D, S, Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
 from clamp3d.clamp.status import CLAMPED, final_status, measured_status
@@ -101,10 +102,7 @@ class MonteCarlo:
 
     def reasons(self) -> dict[str, int]:
         """How many samples do not clamp, by their reason, most frequent first."""
-        count: dict[str, int] = {}
-        for status in self.status:
-            if status != CLAMPED:
-                count[status] = count.get(status, 0) + 1
+        count = Counter(status for status in self.status if status != CLAMPED)
         return dict(sorted(count.items(), key=lambda item: (-item[1], item[0])))
 
     def percentiles(self, at: tuple[float, ...]) -> tuple[float, ...]:
@@ -182,20 +180,18 @@ def monte_carlo(
     function("progress", progress)
     spec, nominal = _spec(clamp, whole("seed", seed, least=0), tolerance, wire_tolerance_percent, distribution)
     header = {"monte_carlo": 1, **asdict(spec), "chunk": CHUNK}
-    with Journal(resume, header) if resume is not None else nullcontext() as journal:
-        kept: dict[int, list[Sample]] = {} if journal is None else dict(journal.pieces)
-        sizes = {k: min(CHUNK, n - k * CHUNK) for k in range(math.ceil(n / CHUNK))}
-        waiting = [(spec, k, size) for k, size in sizes.items() if len(kept.get(k, ())) < size]
-        done = n - sum(size for _, _, size in waiting)
-        if progress is not None:
-            progress(done, n)
-        for k, samples in _solve(waiting, processes, scheduler):
-            kept[k] = samples
-            if journal is not None:
-                journal.add(k, samples)
-            done += len(samples)
-            if progress is not None:
-                progress(done, n)
+    kept = {} if resume is None else journal.pieces(resume, header)
+    sizes = {k: min(CHUNK, n - k * CHUNK) for k in range(math.ceil(n / CHUNK))}
+    waiting = [(spec, k, size) for k, size in sizes.items() if len(kept.get(k, ())) < size]
+    done = n - sum(size for _, _, size in waiting)
+    tell = progress or (lambda done, of: None)
+    tell(done, n)
+    for k, found in _solve(waiting, processes, scheduler):
+        kept[k] = found
+        if resume is not None:
+            journal.add(resume, [k, found])
+        done += len(found)
+        tell(done, n)
     samples = [sample for k, size in sizes.items() for sample in kept[k][:size]]
     distance = np.array([math.nan if d is None else d for d, _ in samples])
     return MonteCarlo(spec, nominal, distance, tuple(status for _, status in samples))
@@ -280,21 +276,26 @@ def _solve(
     """Chunks as they are finished, in any order."""
     if not tasks:
         return
-    if scheduler is not None:
-        yield from _on_cluster(tasks, scheduler)
-    elif processes == 1:
+    if scheduler is None and processes == 1:
         yield from map(_chunk, tasks)
-    else:
-        workers = min(processes, len(tasks))
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_quiet) as pool:
-            try:
-                for future in as_completed([pool.submit(_chunk, task) for task in tasks]):
-                    yield future.result()
-            except BrokenProcessPool:
-                raise SolverError("a worker process died; finished samples are kept by a resume file only") from None
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+        return
+    with _cluster(scheduler) if scheduler is not None else _processes(min(processes, len(tasks))) as pool:
+        futures = [pool.submit(_chunk, task) for task in tasks]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        finally:
+            for future in futures:
+                future.cancel()
+
+
+@contextmanager
+def _processes(count: int) -> Iterator[Executor]:
+    with ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_quiet) as pool:
+        try:
+            yield pool
+        except BrokenProcessPool:
+            raise SolverError("a worker process died; finished samples are kept by a resume file only") from None
 
 
 def _quiet() -> None:
@@ -302,7 +303,8 @@ def _quiet() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _on_cluster(tasks: list[tuple[Spec, int, int]], scheduler: str) -> Iterator[tuple[int, list[Sample]]]:
+@contextmanager
+def _cluster(scheduler: str) -> Iterator[Executor]:
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
@@ -317,12 +319,7 @@ def _on_cluster(tasks: list[tuple[Spec, int, int]], scheduler: str) -> Iterator[
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"no Dask scheduler at {scheduler!r}: {reason}") from None
     with client:
-        futures = client.map(_chunk, tasks, pure=False)
         try:
-            for future in distributed.as_completed(futures, loop=client.loop):
-                try:
-                    yield future.result()
-                except (distributed.KilledWorker, distributed.client.FutureCancelledError) as error:
-                    raise SolverError(f"the Dask cluster lost the work: {error}") from None
-        finally:
-            client.cancel(futures)
+            yield client.get_executor(pure=False)
+        except (distributed.KilledWorker, CancelledError) as error:
+            raise SolverError(f"the Dask cluster lost the work: {error}") from None

@@ -10,12 +10,11 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.dataclasses import dataclass
 
 from clamp3d.clamp.conductors import conductor
-from clamp3d.clamp.dimensions import ClampPart, Length, Offset
+from clamp3d.clamp.dimensions import ClampPart, Length, Offset, check_conductor
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.core import shapes
 from clamp3d.core.motion import Motion
 from clamp3d.core.primitives import SweptArc
-from clamp3d.errors import InputError
 from clamp3d.scenefile.pose_table import FROZEN, Angle, Number, Pose, Vector
 
 
@@ -67,11 +66,7 @@ class CylinderTable(_Placed):
     @model_validator(mode="after")
     def _one(self) -> CylinderTable:
         _one_of(self, "radius", "diameter", "conductor")
-        if self.conductor is not None:
-            try:
-                conductor(self.conductor)
-            except InputError as error:
-                raise ValueError(f"conductor: {error}") from None
+        check_conductor(self.conductor)
         return self
 
     def make(self, folder: Path) -> shapes.AnyShape:

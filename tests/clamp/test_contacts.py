@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from click.testing import CliRunner
 
 from clamp3d.baselines.chords import Chords
@@ -129,6 +130,30 @@ def test_every_way_to_ask_gives_the_same_distance(assembly: Assembly, tmp_path: 
     for c in assembly.contacts:
         assert rows[c.a, c.b]["distance_mm"] == pytest.approx(c.gap, abs=1e-9)
         assert measured[c.a, c.b].value == pytest.approx(c.gap, abs=1e-9)
+
+
+def test_wires_and_splints_on_the_way_are_as_far_apart_as_their_outlines(assembly: Assembly) -> None:
+    """A section through the middle shows the distance: shapely measures the outlines, chords are within 1e-5 mm."""
+    for waypoint in assembly.path:
+        outline = {}
+        for name, solid in parts(assembly.clamp).items():
+            if name in ("P1", "P2", "P6", "P7"):
+                u, v = (solid.bodies[0].profile.polygon(1e-5) @ solid.bodies[0].frame[:, :2].T)[:, [0, 2]].T
+                corners = np.column_stack([u, 0.0 * u, v, 1.0 + 0.0 * u])
+                outline[name] = shapely.Polygon(corners @ waypoint.T_world(name)[[0, 2]].T)
+        pairs = [(a, b) for a in ("P1", "P2") for b in ("P6", "P7")]
+        for (a, b), d in measure(assembly.scene_at(waypoint), pairs).items():
+            assert d.value == pytest.approx(outline[a].distance(outline[b]), abs=3e-5), (waypoint.label, a, b)
+
+
+def test_contacts_at_a_waypoint_are_those_of_the_open_clamp() -> None:
+    """The wire comes in beside the splints: 20.867 mm from P2, not 2.737 mm inside a face without an end."""
+    assembly = assemble(line="LJ-240", jumper="LJ-240")
+    contacts = {(c.a, c.b): c for c in assembly.contacts_at(assembly.path[0])}
+    assert list(contacts) == list(PAIRS)
+    assert contacts["P2", "P7"].gap == pytest.approx(20.8666, abs=5e-5)
+    assert contacts["P2", "P7"].type == 0
+    assert [c.gap for c in assembly.contacts_at(assembly.path[-1])] == [c.gap for c in assembly.contacts]
 
 
 def test_distances_of_the_reference_are_those_in_space() -> None:

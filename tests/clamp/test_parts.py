@@ -16,7 +16,7 @@ from scipy.integrate import dblquad, quad
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.parts import check_part_name, parts
+from clamp3d.clamp.parts import parts
 from clamp3d.core.meshing import chord_error, mesh, volume_bounds
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.errors import InputError
@@ -203,8 +203,6 @@ def test_bad_values_say_what_is_wrong() -> None:
     for bad in (0.0, -1.0, math.nan, math.inf, 1e-7):
         with pytest.raises(InputError, match="mesh_error must be a finite length >= 1e-06 mm"):
             mesh(REFERENCE["P5"], bad)
-    with pytest.raises(InputError, match="unknown part 'P9'; available: P1, P2"):
-        check_part_name("P9")
     short = replace(CLAMP, up_splint=replace(CLAMP.up_splint, length=20.0))
     with pytest.raises(InputError, match=r"up_splint.hole_diameter must be < the part's length = 20 mm, got 22"):
         parts(short)

@@ -26,7 +26,10 @@ def test_the_papers_sequence():
     ("text", "message"),
     [
         ("", "step 1"),
-        ("P1|P2P3P4P5 -> P8 -> P2 -> P5|P3P4", "unknown part 'P8'; available: P1, P2"),
+        (
+            "P1|P2P3P4P5 -> P8 -> P2 -> P5|P3P4",
+            "part of sequence step 2 must be one of P1, P2, .*, got 'P8'",
+        ),
         ("P1|P2P2", "P2 is named twice"),
         ("P1|P2P3P4P5 -> P2 -> P7 -> P5|P3P4", "got P2 where P7 is due"),
         ("P1|P2P3P4P5 -> P7 -> P2", "4 steps"),

@@ -110,7 +110,7 @@ def test_what_does_not_clamp_is_counted_by_reason():
         ({"seed": -1}, "seed"),
         ({"tolerance": float("nan")}, "tolerance"),
         ({"wire_tolerance_percent": 80.0}, "wire tolerance"),
-        ({"distribution": "cauchy"}, "one of uniform, normal"),
+        ({"distribution": "cauchy"}, "one of uniform, normal, got 'cauchy'"),
     ],
 )
 def test_bad_settings(settings, match):
