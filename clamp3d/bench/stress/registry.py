@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.family import Family
 from clamp3d.bench.stress.meshes.family import MESHES
-from clamp3d.bench.stress.motions.families import MOTIONS
-from clamp3d.bench.stress.poses.families import POSES
+from clamp3d.bench.stress.motions.family import MOTIONS
+from clamp3d.bench.stress.poses.family import POSES
 
 KINDS: dict[str, Mapping[str, Family]] = {"pose": POSES, "motion": MOTIONS, "mesh": MESHES, "assembly": ASSEMBLIES}
 """Kind -> its families by name."""

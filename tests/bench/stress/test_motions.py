@@ -10,7 +10,7 @@ import clamp3d
 import clamp3d.collide.motions as collide_motions
 from clamp3d.bench.stress.motions import methods
 from clamp3d.bench.stress.motions.cases import motions, poses
-from clamp3d.bench.stress.motions.families import MOTIONS
+from clamp3d.bench.stress.motions.family import MOTIONS
 from clamp3d.bench.stress.motions.truth import TRUTH_ERROR, truth
 from clamp3d.bench.stress.poses.cases import Cases, Shapes
 from clamp3d.bench.stress.poses.truth import EXTENDED_WORKS

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from clamp3d.bench.stress.outcome import Outcome, judge
 from clamp3d.bench.stress.poses.cases import Cases, Shapes
-from clamp3d.bench.stress.poses.families import POSES
+from clamp3d.bench.stress.poses.family import POSES
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, EXTENDED_WORKS, truth, truth_50_digits
 from clamp3d.bench.stress.run import run_family, run_stress
 from clamp3d.bench.stress.worker import Answers, Measured, run_isolated

@@ -125,6 +125,4 @@ def _missed(truths: _Truths, i: int, rest: Rest) -> float:
     return next((m.d for m in truths[i] if m.firm and np.abs(named - m.d).min() > same), float("nan"))
 
 
-ASSEMBLIES: dict[str, AssemblyFamily] = {
-    name: AssemblyFamily(name, about, make) for name, (about, make) in MAKERS.items()
-}
+ASSEMBLIES = {name: AssemblyFamily(name, *made) for name, made in MAKERS.items()}

@@ -35,9 +35,7 @@ class MeshFamily(Family):
     part = 0.01
     truth_error = EXTENDED_ERROR
 
-    def __init__(
-        self, name: str, about: str, make: Fault, unit: Callable[[np.random.Generator], float] = _millimetre
-    ) -> None:
+    def __init__(self, name: str, about: str, make: Fault, unit: Callable[[np.random.Generator], float]) -> None:
         super().__init__(name, about, lambda rng, n: None)
         self._fault, self._unit = make, unit
 
@@ -81,19 +79,6 @@ class MeshFamily(Family):
         return "\n".join([*lines, f"# truth: {float(truth_50_digits(cases.poses, i))!r} mm"])
 
 
-_ALL = (
-    MeshFamily("mesh: open", "faces removed from a block with a groove, or a corner torn off", faults.opened),
-    MeshFamily("mesh: inside out", "windings turned: of all faces, of some, of one body of two", faults.inside_out),
-    MeshFamily("mesh: doubled", "faces, vertices or the whole body twice", faults.doubled),
-    MeshFamily("mesh: empty", "no faces, no vertices, or none with an area or a volume", faults.empty),
-    MeshFamily(
-        "mesh: bad numbers", "coordinates nan or infinite, face indices negative or out of range", faults.bad_numbers
-    ),
-    MeshFamily("mesh: soup", "vertices not merged, as in an STL: a good mesh that must be answered", faults.soup),
-    MeshFamily("mesh: turned", "random order of vertices and faces, random rotation: must be answered", faults.turned),
-    MeshFamily(
-        "mesh: scaled", "metres, inches, microns, up to 1e6 sizes from the origin: good meshes", faults.far, _any_unit
-    ),
-)
+_UNITS = {"mesh: scaled": _any_unit}
 
-MESHES: dict[str, MeshFamily] = {family.name: family for family in _ALL}
+MESHES = {name: MeshFamily(name, *made, _UNITS.get(name, _millimetre)) for name, made in faults.MAKERS.items()}

@@ -1,7 +1,7 @@
 """Families of hard motions, each with a seeded generator, built backwards from where and how closely it comes near.
 
 A generator takes ``(rng, n)`` and returns n `Motions`: first the pose at the place of least clearance, as for single
-poses, then a motion through it whose clearance is least there. `MOTIONS` maps name -> `MotionFamily`.
+poses, then a motion through it whose clearance is least there.
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.bench.stress.family import into
+from clamp3d.bench.stress.family import Makers
 from clamp3d.bench.stress.motions.cases import Motions, motions, moved, screws_through, square_to, touching, turned
-from clamp3d.bench.stress.motions.family import MotionFamily
 from clamp3d.bench.stress.poses.cases import (
     FEATURES,
     Extended,
@@ -35,21 +34,19 @@ _CONVEX = ("lip", "end arc", "end edge", "corner")
 """Features that a wire passes on a tangent."""
 
 
-def _built(name: str, about: str, make: Make, *, choose: bool = False) -> MotionFamily:
-    """A family; ``choose`` from three times as many cases, mostly those that touch first where they were built to."""
-    return MotionFamily(f"motion: {name}", about, (lambda rng, n: _best(rng, n, make)) if choose else make)
+MAKERS = Makers("motion: ")
 
 
-MOTIONS: dict[str, MotionFamily] = {}
-_family = into(MOTIONS, _built)
-
-
-def _best(rng: np.random.Generator, n: int, make: Make) -> Motions:
+def _best(make: Make) -> Make:
     """Of 3 n cases n, in their order: those that stand as they were built before those that do not, by and large."""
-    cases = make(rng, 3 * n)
-    rank = np.where(_spoilt(cases), 1.0, 0.0) + rng.random(3 * n) * 1.2
-    rows = np.sort(np.argsort(rank, kind="stable")[:n])
-    return replace(cases.take(rows), number=np.arange(n))
+
+    def chosen(rng: np.random.Generator, n: int) -> Motions:
+        cases = make(rng, 3 * n)
+        rank = np.where(_spoilt(cases), 1.0, 0.0) + rng.random(3 * n) * 1.2
+        rows = np.sort(np.argsort(rank, kind="stable")[:n])
+        return replace(cases.take(rows), number=np.arange(n))
+
+    return chosen
 
 
 def _spoilt(cases: Motions) -> NDArray[np.bool_]:
@@ -75,12 +72,9 @@ def _spoilt(cases: Motions) -> NDArray[np.bool_]:
     return out
 
 
-@_family(
-    "grazing",
-    "straight past a lip, an edge or a corner on a tangent: clear or deep by 1e-12 ... 1e-2 of the radius",
-    choose=True,
-)
+@MAKERS.family("grazing", _best)
 def _grazing(rng: np.random.Generator, n: int) -> Motions:
+    """Straight past a lip, an edge or a corner on a tangent: clear or deep by 1e-12 ... 1e-2 of the radius."""
     k = shape_count(n)
     shapes, shape = random_shapes(rng, k), spread(n, k)
     gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
@@ -121,15 +115,15 @@ def _turning_screws(rng: np.random.Generator, n: int, turns: Array, pitch: Array
     return screws_through(cases, point, np.asarray(axis, float), turns, pitch * radius * turns, instant)
 
 
-@_family("turning", "circles about any axis that touch at one instant and curve away, on any feature", choose=True)
+@MAKERS.family("turning", _best)
 def _turning(rng: np.random.Generator, n: int) -> Motions:
+    """Circles about any axis that touch at one instant and curve away, on any feature."""
     return _turning_screws(rng, n, 10.0 ** rng.uniform(-1.3, 0.8, n) * rng.choice([-1.0, 1.0], n), np.zeros(n))
 
 
-@_family(
-    "screws", "turn and advance together, up to six turns, near at one place; and screws of no plan at all", choose=True
-)
+@MAKERS.family("screws", _best)
 def _screws(rng: np.random.Generator, n: int) -> Motions:
+    """Turn and advance together, up to six turns, near at one place; and screws of no plan at all."""
     part = n // 2
     turns = 10.0 ** rng.uniform(-1.0, np.log10(12.0 * np.pi), n) * rng.choice([-1.0, 1.0], n)
     pitch = signed_powers(rng, n, -3, 0)
@@ -153,8 +147,9 @@ def _choose(first: NDArray[np.bool_], a: Motions, b: Motions) -> Motions:
     return replace(a, **picked)
 
 
-@_family("thin and fast", "a thin groove or a thin short wire crossed in 1e-6 ... 1e-2 of the motion")
+@MAKERS.family("thin and fast")
 def _thin(rng: np.random.Generator, n: int) -> Motions:
+    """A thin groove or a thin short wire crossed in 1e-6 ... 1e-2 of the motion."""
     k = shape_count(n)
     R = 10.0 ** rng.uniform(0, 2, k)
     sheet = rng.random(k) < 0.5
@@ -183,8 +178,9 @@ def _thin(rng: np.random.Generator, n: int) -> Motions:
     return motions(shapes, shape, start, travel=travel, gap=gap, instant=instant)
 
 
-@_family("narrow mouth", "arcs over 180 deg: entry through the mouth hits where it is narrower, sliding along is free")
+@MAKERS.family("narrow mouth")
 def _narrow_mouth(rng: np.random.Generator, n: int) -> Motions:
+    """Arcs over 180 deg: entry through the mouth hits where it is narrower, sliding along is free."""
     k = shape_count(n)
     a = np.pi / 2 + rng.uniform(0.01, 1.4, k)
     R = 10.0 ** rng.uniform(0, 2, k)
@@ -225,10 +221,9 @@ def _narrow_mouth(rng: np.random.Generator, n: int) -> Motions:
     return _choose(rng.random(n) < 0.6, down, slide)
 
 
-@_family(
-    "level", "clearance that does not change: slides along the groove, a face or an edge, turns about its axis; rest"
-)
+@MAKERS.family("level")
 def _level(rng: np.random.Generator, n: int) -> Motions:
+    """Clearance that does not change: slides along the groove, a face or an edge, turns about its axis; rest."""
     k = shape_count(n)
     shapes, shape = random_shapes(rng, k), spread(n, k)
     gap = shapes.r[shape] * signed_powers(rng, n, -9, -1)
@@ -257,12 +252,9 @@ def _level(rng: np.random.Generator, n: int) -> Motions:
     return _choose(kind < 0.6, slides, _choose(kind < 0.85, turns, spins))
 
 
-@_family(
-    "start",
-    "starts in contact or by 1e-12 ... 1e-2 of the radius off it, and leaves, slides or comes back",
-    choose=True,
-)
+@MAKERS.family("start", _best)
 def _start(rng: np.random.Generator, n: int) -> Motions:
+    """Starts in contact or by 1e-12 ... 1e-2 of the radius off it, and leaves, slides or comes back."""
     k = shape_count(n)
     shapes, shape = random_shapes(rng, k), spread(n, k)
     r = shapes.r[shape]
@@ -281,10 +273,9 @@ def _start(rng: np.random.Generator, n: int) -> Motions:
     return _choose(rng.random(n) < 0.75, leaves, turns)
 
 
-@_family(
-    "from far", "comes from 1e3 ... 1e6 mm away and stops at, or flies past, 1e-12 ... 1e-2 of the radius", choose=True
-)
+@MAKERS.family("from far", _best)
 def _from_far(rng: np.random.Generator, n: int) -> Motions:
+    """Comes from 1e3 ... 1e6 mm away and stops at, or flies past, 1e-12 ... 1e-2 of the radius."""
     k = shape_count(n)
     shapes, shape = random_shapes(rng, k), spread(n, k)
     gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)

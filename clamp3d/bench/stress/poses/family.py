@@ -1,4 +1,4 @@
-"""Families of hard poses: how their truths are found."""
+"""All families of hard poses: what has broken collision code, and how their truths are found."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.bench.stress.family import Family
+from clamp3d.bench.stress.poses import features, magnitudes
 from clamp3d.bench.stress.poses.cases import Cases
 from clamp3d.bench.stress.poses.methods import METHODS, CasMethod
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, truth, truth_50_digits
@@ -44,3 +45,6 @@ class PoseFamily(Family):
         """See `Family`."""
         cases = self.cases(n, seed)
         return f"{cases.snippet(i)}\n# truth: {float(truth_50_digits(cases, i))!r} mm"
+
+
+POSES = {name: PoseFamily(name, *made) for name, made in (features.MAKERS | magnitudes.MAKERS).items()}

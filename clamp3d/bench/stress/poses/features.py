@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from clamp3d.bench.stress.family import into
+from clamp3d.bench.stress.family import Makers
 from clamp3d.bench.stress.poses.cases import (
     FEATURES,
     PARALLEL_FEATURES,
@@ -23,15 +23,14 @@ from clamp3d.bench.stress.poses.cases import (
     spread,
     touching,
 )
-from clamp3d.bench.stress.poses.family import PoseFamily
 from clamp3d.core.pose import Array
 
-FAMILIES: dict[str, PoseFamily] = {}
-_family = into(FAMILIES, PoseFamily)
+MAKERS = Makers()
 
 
-@_family("random", "any pose of any groove: parallel, tilted, crossing, clear, touching, deep")
+@MAKERS.family("random")
 def _random(rng: np.random.Generator, n: int) -> Cases:
+    """Any pose of any groove: parallel, tilted, crossing, clear, touching, deep."""
     k = shape_count(n)
     shapes, shape = random_shapes(rng, k), spread(n, k)
     size = (shapes.R + 0.3 * shapes.L)[shape][:, None]
@@ -40,13 +39,15 @@ def _random(rng: np.random.Generator, n: int) -> Cases:
     return free(rng, shapes, shape, centre, direction)
 
 
-@_family("tangency", "gaps of 0 and +-1e-15 to 1e-1 of the radius on every feature, any tilt")
+@MAKERS.family("tangency")
 def _tangency(rng: np.random.Generator, n: int) -> Cases:
+    """Gaps of 0 and +-1e-15 to 1e-1 of the radius on every feature, any tilt."""
     return touching(rng, n, random_shapes(rng, shape_count(n)), (-15, -1))
 
 
-@_family("parallel tangency", "the same with the wire along the groove: contact along a line")
+@MAKERS.family("parallel tangency")
 def _parallel_tangency(rng: np.random.Generator, n: int) -> Cases:
+    """The same with the wire along the groove: contact along a line."""
     shapes, shape, feature = setting(rng, n, PARALLEL_FEATURES)
     gap = shapes.r[shape] * signed_powers(rng, n, -15, -1)
     contact = contact_on(rng, shapes, shape, feature)
@@ -54,8 +55,9 @@ def _parallel_tangency(rng: np.random.Generator, n: int) -> Cases:
     return place(rng, shapes, shape, contact, gap, tilt=np.zeros(n))
 
 
-@_family("equal radii", "wire radius = groove radius (1 +- 1e-3 ... 1e-15) and equal to the last bit, nearly coaxial")
+@MAKERS.family("equal radii")
 def _equal_radii(rng: np.random.Generator, n: int) -> Cases:
+    """Wire radius = groove radius (1 +- 1e-3 ... 1e-15) and equal to the last bit, nearly coaxial."""
     k = shape_count(n)
     given = asdict(random_shapes(rng, k))
     given["r"] = given["R"] * (1.0 + signed_powers(rng, k, -16, -3))
@@ -66,8 +68,9 @@ def _equal_radii(rng: np.random.Generator, n: int) -> Cases:
     return free(rng, shapes, shape, offset, tilt)
 
 
-@_family("oversize wire", "wire larger than the groove: rests on both lips, level or tilted")
+@MAKERS.family("oversize wire")
 def _oversize(rng: np.random.Generator, n: int) -> Cases:
+    """Wire larger than the groove: rests on both lips, level or tilted."""
     k = shape_count(n)
     R = 10.0 ** rng.uniform(0, 2, k)
     shapes = random_shapes(
@@ -89,8 +92,9 @@ def _oversize(rng: np.random.Generator, n: int) -> Cases:
     return Cases(shapes, shape, poses_from_axes(rng, centre, d), np.where(level, gap, np.nan))
 
 
-@_family("arc end points", "contact within 1e-15 ... 1e-2 rad of where the arc ends, on either side")
+@MAKERS.family("arc end points")
 def _arc_ends(rng: np.random.Generator, n: int) -> Cases:
+    """Contact within 1e-15 ... 1e-2 rad of where the arc ends, on either side."""
     shapes, shape, feature = setting(rng, n, ("arc", "lip", "end arc", "corner"))
     a = shapes.half_angle[shape]
     past = 10.0 ** rng.uniform(-16, -2, n) * rng.choice([0.0, 1.0], n, p=[0.1, 0.9])
@@ -103,13 +107,15 @@ def _arc_ends(rng: np.random.Generator, n: int) -> Cases:
     return place(rng, shapes, shape, contact, gap, tilt=tilt)
 
 
-@_family("nearly parallel", "axes 1e-18 ... 1e-3 rad off parallel, contacts on every feature")
+@MAKERS.family("nearly parallel")
 def _near_parallel(rng: np.random.Generator, n: int) -> Cases:
+    """Axes 1e-18 ... 1e-3 rad off parallel, contacts on every feature."""
     return touching(rng, n, random_shapes(rng, shape_count(n)), (-15, -2), tilt=(-18, -3, 0.05))
 
 
-@_family("nearly coaxial", "axis through the arc's centre to 1e-300 ... 1e-3, tilts 1e-18 ... 1e-1")
+@MAKERS.family("nearly coaxial")
 def _near_coaxial(rng: np.random.Generator, n: int) -> Cases:
+    """Axis through the arc's centre to 1e-300 ... 1e-3, tilts 1e-18 ... 1e-1."""
     shapes, shape, _ = setting(rng, n)
     R = shapes.R[shape]
     tiny = np.where(rng.random((n, 2)) < 0.2, 1e-300 * rng.normal(size=(n, 2)), 0.0)
@@ -119,8 +125,9 @@ def _near_coaxial(rng: np.random.Generator, n: int) -> Cases:
     return free(rng, shapes, shape, np.column_stack([offset, z]), d)
 
 
-@_family("wire ends", "the wire ends where the groove ends: faces level to 0, 1e-15 ... 1e-2")
+@MAKERS.family("wire ends")
 def _wire_ends(rng: np.random.Generator, n: int) -> Cases:
+    """The wire ends where the groove ends: faces level to 0, 1e-15 ... 1e-2."""
     shapes, shape, _ = setting(rng, n)
     half, H = shapes.length[shape] / 2, shapes.L[shape] / 2
     angle = rng.uniform(-np.pi, np.pi, n)
@@ -133,8 +140,9 @@ def _wire_ends(rng: np.random.Generator, n: int) -> Cases:
     return free(rng, shapes, shape, centre, tilt)
 
 
-@_family("narrow mouth", "arcs over 180 deg: mouth narrower than the wire; inside free, in the mouth not")
+@MAKERS.family("narrow mouth")
 def _narrow_mouth(rng: np.random.Generator, n: int) -> Cases:
+    """Arcs over 180 deg: mouth narrower than the wire; inside free, in the mouth not."""
     k = shape_count(n)
     a = np.pi / 2 + rng.uniform(1e-6, 1.5, k)
     R = 10.0 ** rng.uniform(0, 2, k)
@@ -154,8 +162,9 @@ def _narrow_mouth(rng: np.random.Generator, n: int) -> Cases:
     return free(rng, shapes, shape, np.stack([x, y, 0 * x], 1), tilt)
 
 
-@_family("half turn", "contacts and offsets at +-180 deg from the deepest line and at +-0, where atan2 jumps")
+@MAKERS.family("half turn")
 def _half_turn(rng: np.random.Generator, n: int) -> Cases:
+    """Contacts and offsets at +-180 deg from the deepest line and at +-0, where atan2 jumps."""
     k = shape_count(n)
     shapes = random_shapes(rng, k, half_angle=np.pi - 10.0 ** rng.uniform(-8, 0, k))
     shape = spread(n, k)
@@ -168,8 +177,9 @@ def _half_turn(rng: np.random.Generator, n: int) -> Cases:
     return free(rng, shapes, shape, np.stack([x, y, rng.choice([0.0, -0.0], n)], 1), d)
 
 
-@_family("embedded", "wires wholly inside the material, or their axis inside it: contained is a hit")
+@MAKERS.family("embedded")
 def _embedded(rng: np.random.Generator, n: int) -> Cases:
+    """Wires wholly inside the material, or their axis inside it: contained is a hit."""
     k = shape_count(n)
     base, shape = random_shapes(rng, k), spread(n, k)
     shapes = replace(base, r=base.R * rng.uniform(0.01, 0.5, k), length=base.R * rng.uniform(0.1, 3, k))
@@ -183,8 +193,9 @@ def _embedded(rng: np.random.Generator, n: int) -> Cases:
     return free(rng, shapes, shape, np.stack([x, y, H * rng.uniform(-1, 1, n)], 1), d)
 
 
-@_family("ties", "two features equally near to 0, 1e-16 ... 1e-6: both lips, both walls, arc and lip")
+@MAKERS.family("ties")
 def _ties(rng: np.random.Generator, n: int) -> Cases:
+    """Two features equally near to 0, 1e-16 ... 1e-6: both lips, both walls, arc and lip."""
     shapes, shape, _ = setting(rng, n)
     R, r = shapes.R[shape], shapes.r[shape]
 
@@ -200,9 +211,12 @@ def _ties(rng: np.random.Generator, n: int) -> Cases:
     return free(rng, shapes, shape, np.stack([off(), y, z + off()], 1), d)
 
 
-@_family("tilted in the groove", "wire turned in the groove's bottom plane until its ends meet the walls")
+@MAKERS.family("tilted in the groove")
 def _tilted(rng: np.random.Generator, n: int) -> Cases:
-    """Clearance R - (L/2 tan t + r / cos t) for half angles from 90 deg: the wire's side meets the end arcs."""
+    """Wire turned in the groove's bottom plane until its ends meet the walls.
+
+    Clearance R - (L/2 tan t + r / cos t) for half angles from 90 deg: the wire's side meets the end arcs.
+    """
     k = shape_count(n)
     R = 10.0 ** rng.uniform(0, 2, k)
     given = {"L": R * rng.uniform(1, 10, k), "length": R * 40.0, "r": R * (1.0 - 10.0 ** rng.uniform(-4, -0.5, k))}
@@ -219,8 +233,9 @@ def _tilted(rng: np.random.Generator, n: int) -> Cases:
     return free(rng, shapes, shape, centre, d)
 
 
-@_family("crossed", "wire square to the groove, across its lips or end edges, in the plane of a face to 1e-16")
+@MAKERS.family("crossed")
 def _crossed(rng: np.random.Generator, n: int) -> Cases:
+    """Wire square to the groove, across its lips or end edges, in the plane of a face to 1e-16."""
     shapes, shape, _ = setting(rng, n)
     R, r, H = shapes.R[shape], shapes.r[shape], shapes.L[shape] / 2
     h = -R * np.cos(shapes.half_angle[shape])
@@ -236,11 +251,9 @@ def _crossed(rng: np.random.Generator, n: int) -> Cases:
     return free(rng, shapes, shape, np.stack([x, y, z], 1), d)
 
 
-@_family(
-    "in a face's plane",
-    "axis in the plane of an end face or of the flat faces to 1e-18 ... 1e-9, through what lies in it",
-)
+@MAKERS.family("in a face's plane")
 def _in_plane(rng: np.random.Generator, n: int) -> Cases:
+    """Axis in the plane of an end face or of the flat faces to 1e-18 ... 1e-9, through what lies in it."""
     shapes, shape, _ = setting(rng, n)
     R, a, H = shapes.R[shape], shapes.half_angle[shape], 0.5 * shapes.L[shape]
     off = R * signed_powers(rng, n, -18, -9, 0.4)
@@ -262,10 +275,9 @@ def _in_plane(rng: np.random.Generator, n: int) -> Cases:
     return free(rng, shapes, shape, centre, d)
 
 
-@_family(
-    "through two points", "axis through two points of faces, edges or corners to 0, 1e-16 ... 1e-9; also along an edge"
-)
+@MAKERS.family("through two points")
 def _two_points(rng: np.random.Generator, n: int) -> Cases:
+    """Axis through two points of faces, edges or corners to 0, 1e-16 ... 1e-9; also along an edge."""
     shapes, shape, feature = setting(rng, n)
     other = np.where(rng.random(n) < 0.3, feature, rng.choice(FEATURES, n))  # along an edge, or across a face
     a, b = contact_on(rng, shapes, shape, feature), contact_on(rng, shapes, shape, other)
