@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from clamp3d.bench.stress.outcome import REFERENCE, Outcome
-from clamp3d.bench.stress.registry import KINDS
 from clamp3d.bench.stress.report import percent
-from clamp3d.bench.stress.run import StressRun
+from clamp3d.bench.stress.run import KINDS, StressRun
 from clamp3d.output.figures import save_figure
 
 _LEAST = 1e-4

@@ -15,8 +15,7 @@ from clamp3d.bench.stress.motions.truth import TRUTH_ERROR, truth
 from clamp3d.bench.stress.poses.cases import Cases, Shapes
 from clamp3d.bench.stress.poses.truth import EXTENDED_WORKS
 from clamp3d.bench.stress.poses.truth import truth as pose_truth
-from clamp3d.bench.stress.registry import FAMILIES
-from clamp3d.bench.stress.run import run_family
+from clamp3d.bench.stress.run import FAMILIES, run_family
 
 CASES = 2000
 

@@ -23,7 +23,7 @@ from clamp3d.bench.stress.poses.cases import (
     place,
     random_shapes,
 )
-from clamp3d.bench.stress.poses.methods import MESH_ERROR, block
+from clamp3d.bench.stress.poses.family import MESH_ERROR, block
 from clamp3d.bench.stress.worker import Rows
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.pose import Array

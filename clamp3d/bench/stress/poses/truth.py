@@ -126,7 +126,8 @@ def _brackets(scene: _Scene, most: int) -> tuple[NDArray[np.intp], NDArray[Any],
             break
         case = np.tile(case[more], 2)
         lo, hi = np.concatenate([lo[more], middle[more]]), np.concatenate([middle[more], hi[more]])
-    return *_joined(scene, *(np.concatenate(column) for column in zip(*kept, strict=True)), slack), best
+    case, lo, hi = (np.concatenate(column) for column in zip(*kept, strict=True))
+    return *_joined(scene, case, lo, hi, slack), best
 
 
 def _joined(scene: _Scene, case: Any, lo: Any, hi: Any, slack: Any) -> tuple[Any, Any, Any]:
