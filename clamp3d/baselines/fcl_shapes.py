@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.core.closed_mesh import Solid, check_solid
 from clamp3d.core.pose import Array
@@ -82,8 +82,12 @@ def convex(vertices: ArrayLike, faces: ArrayLike, name: str = "convex shape") ->
     height = (V @ normals[real].T - np.einsum("ij,ij->i", corners[real, 0], normals[real])) / length[real]
     if height.max() > _CONVEX * np.ptp(V, axis=0).max():
         raise InputError(f"{name} must be convex: a vertex stands {height.max():.3g} mm outside one of its faces")
-    encoded = np.column_stack([np.full(len(F), 3), F]).ravel()
-    return _shape("convex", solid, fcl.Convex(V * UNIT, len(F), encoded))
+    return _shape("convex", solid, fcl.Convex(V * UNIT, len(F), encoded(F)))
+
+
+def encoded(faces: NDArray[Any]) -> NDArray[Any]:
+    """Triangles (m, 3) as `fcl.Convex` takes them: each with its number of corners before it."""
+    return np.insert(faces, 0, 3, axis=1).ravel()
 
 
 def bvh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Shape:

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from clamp3d.baselines.wedges import part_wedges, prism
+from clamp3d.baselines.wedges import wedge_solids
 from clamp3d.bench.compare.methods import Method, Prepared
 from clamp3d.bench.compare.scene import WIRE, block, chord_error, pair
 from clamp3d.core.pose import Array
@@ -179,14 +179,7 @@ def _open_cascade(_: float) -> _Ready:
 
 def _convex_pieces(unit_angle: float) -> list[tuple[Array, Any]]:
     """Vertices and triangles of the block's wedges in the groove's frame."""
-    part = block()
-    body = part.bodies[0]
-    to_groove = body.frame.T @ pair().T_a_groove[:3, :3]
-    pieces = []
-    for wedge in part_wedges(part, unit_angle):
-        V, F = prism(wedge.polygon, body.start, body.end)
-        pieces.append((V @ to_groove, F))
-    return pieces
+    return [(V @ pair().T_a_groove[:3, :3], F) for V, F in wedge_solids(block(), unit_angle).values()]
 
 
 def _mesh(unit_angle: float) -> tuple[Array, Any]:

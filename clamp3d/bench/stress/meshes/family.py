@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.baselines.fcl_shapes import encoded
 from clamp3d.bench.stress.family import Family, Methods
 from clamp3d.bench.stress.meshes import faults
 from clamp3d.bench.stress.meshes.cases import Fault, MeshCase, MeshCases, make_cases
@@ -144,8 +145,8 @@ def _coacd_alone(case: MeshCase) -> Answer:
         parts = coacd.run_coacd(coacd.Mesh(case.mesh.vertices, case.mesh.faces))
     objects = []
     for V, F in parts:
-        encoded = np.column_stack([np.full(len(F), 3), F]).ravel()
-        objects.append(fcl.CollisionObject(fcl.Convex(np.asarray(V, np.float64), len(F), encoded), fcl.Transform()))
+        shape = fcl.Convex(np.asarray(V, np.float64), len(F), encoded(F))
+        objects.append(fcl.CollisionObject(shape, fcl.Transform()))
     return Answer(_fcl_distance(objects, case))
 
 

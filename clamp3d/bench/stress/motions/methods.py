@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.baselines.chords import chord_error
-from clamp3d.baselines.wedges import part_wedges, prism
+from clamp3d.baselines.fcl_shapes import encoded
+from clamp3d.baselines.wedges import wedge_solids
 from clamp3d.bench.stress.family import Methods
 from clamp3d.bench.stress.motions.cases import Motions, poses
 from clamp3d.bench.stress.poses.family import UNIT, block
@@ -71,12 +72,9 @@ class FclMethod:
     def _pieces(self, groove: SweptArc, reach: Array) -> list[Any]:
         """Convex pieces of a block that no wire reaches the back of."""
         part = block(groove, np.array([[reach[0], -reach[1], 0.0]]))
-        body = part.bodies[0]
         out = []
-        for wedge in part_wedges(part, UNIT):
-            vertices, faces = prism(wedge.polygon, body.start, body.end)
-            encoded = np.column_stack([np.full(len(faces), 3), faces]).ravel()
-            shape = self._fcl.Convex(vertices @ body.frame.T, len(faces), encoded)
+        for V, F in wedge_solids(part, UNIT).values():
+            shape = self._fcl.Convex(V, len(F), encoded(F))
             out.append(self._fcl.CollisionObject(shape, self._fcl.Transform()))
         return out
 
