@@ -170,7 +170,7 @@ class AssemblyFamily(Family):
         d, error, missed, near = (np.full(n, np.nan) for _ in range(4))
         for i, rest in truths.rests.items():
             d[i] = rest.q[4]
-            error[i], missed[i], near[i] = _error(truths, i, rest), _missed(truths, i, rest), truths.nearest(i, d[i])
+            error[i], missed[i], near[i] = truths.error(i, rest), truths.missed(i, rest), truths.nearest(i, d[i])
         no_rest, miss = error > answers.bound, np.isfinite(missed)
         found = examples("no equilibrium", np.flatnonzero(no_rest), near, d)
         found += examples("equilibrium not named", np.flatnonzero(miss), missed, d)
@@ -181,46 +181,39 @@ class AssemblyFamily(Family):
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
         cases = self.cases(n, seed)
-        truth = ", ".join(repr(m.d) + ("" if m.firm else " (shallow)") for m in _Truths(cases)[i])
+        truth = ", ".join(repr(m.d) + ("" if m.firm else " (shallow)") for m in _Truths(cases)[i][1])
         return f"{snippet(cases.cases[i])}\n{_AS_PYTHON}# truth: equilibria at d = {truth} mm"
 
 
-class _Truths:
-    """Equilibria of each case, worked out when first asked for."""
+class _Truths(dict[int, tuple[Envelope, list[Minimum]]]):
+    """Envelope and equilibria of each case, worked out when first asked for; ``rests`` are the answers to judge."""
 
     def __init__(self, cases: Assemblies) -> None:
+        super().__init__()
         self.cases = cases
         self.rests: dict[int, Rest] = {}
-        self.envelopes: dict[int, Envelope] = {}
-        self._found: dict[int, list[Minimum]] = {}
 
-    def envelope(self, i: int) -> Envelope:
-        if i not in self.envelopes:
-            self.envelopes[i] = Envelope(self.cases.cases[i].clamp)
-        return self.envelopes[i]
-
-    def __getitem__(self, i: int) -> list[Minimum]:
-        if i not in self._found:
-            self._found[i] = minima(self.envelope(i))
-        return self._found[i]
+    def __missing__(self, i: int) -> tuple[Envelope, list[Minimum]]:
+        envelope = Envelope(self.cases.cases[i].clamp)
+        self[i] = envelope, minima(envelope)
+        return self[i]
 
     def nearest(self, i: int, d: float) -> float:
-        return min((found.d for found in self[i]), key=lambda found: abs(found - d), default=float("nan"))
+        return min((found.d for found in self[i][1]), key=lambda found: abs(found - d), default=float("nan"))
 
+    def error(self, i: int, rest: Rest) -> float:
+        """How far an answer is from rest, mm."""
+        if rest.others is None:
+            return abs(self.nearest(i, float(rest.q[4])) - float(rest.q[4]))
+        return max(max(self[i][0].overlap(q), self[i][0].falls(q)) for q in (rest.q, *rest.others))
 
-def _error(truths: _Truths, i: int, rest: Rest) -> float:
-    if rest.others is None:
-        return abs(truths.nearest(i, float(rest.q[4])) - float(rest.q[4]))
-    envelope = truths.envelope(i)
-    return max(max(envelope.overlap(q), envelope.falls(q)) for q in (rest.q, *rest.others))
-
-
-def _missed(truths: _Truths, i: int, rest: Rest) -> float:
-    """The lowest equilibrium that a solver that is to name all did not; NaN if there is none."""
-    if rest.others is None:
-        return float("nan")
-    named, same = np.array([q[4] for q in rest.others]), SAME * truths.envelope(i).lever
-    return next((m.d for m in truths[i] if m.firm and np.abs(named - m.d).min() > same), float("nan"))
+    def missed(self, i: int, rest: Rest) -> float:
+        """The lowest equilibrium that a solver that is to name all did not; NaN if there is none."""
+        if rest.others is None:
+            return float("nan")
+        (envelope, found), named = self[i], np.array([q[4] for q in rest.others])
+        far = (m.d for m in found if m.firm and np.abs(named - m.d).min() > SAME * envelope.lever)
+        return next(far, float("nan"))
 
 
 ASSEMBLIES = {name: AssemblyFamily(name, *made) for name, made in MAKERS.items()}

@@ -60,18 +60,10 @@ class OneByOne:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Arrays:
-    """A mesh as two arrays, with nothing checked."""
-
-    vertices: NDArray[Any]
-    faces: NDArray[Any]
-
-
 def _fcl_model(name: str, bound: float, case: MeshCase) -> Answer:
     """A contact model made of the mesh as it is; ``bound`` in parts of the groove's radius."""
     settings = {"threshold": THRESHOLD} if name == "hulls" else {}
-    model = fcl_model(name, Arrays(case.mesh.vertices, case.mesh.faces), case.groove, settings, _TIME)
+    model = fcl_model(name, case.mesh, case.groove, settings, _TIME)
     pair = GroovePair("P1", "P6", case.groove, case.mesh.T_mesh_groove, case.wire, np.eye(4))
     distance = float(model.distances(pair, case.T_mesh_wire[None])[0])
     return Answer(distance, bound * case.groove.radius + FCL_ERROR + _rounding(case))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.bench.stress.poses.cases import Cases, Contact, Extended, Shapes, contact_on, place
+from clamp3d.bench.stress.poses.cases import Cases, Extended, Shapes, contact_on, place, unit_rows
 from clamp3d.bench.stress.worker import Rows
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
@@ -51,8 +51,7 @@ class Motions(Rows):
 
     def unit_axis(self) -> Array:
         """Axes (n, 3) of length 1, as long doubles."""
-        axis = self.axis.astype(np.longdouble)
-        return np.asarray(axis / np.sqrt((axis * axis).sum(1))[:, None])
+        return unit_rows(self.axis)
 
     def scene(self) -> Array:
         """Largest length of each case (n,), mm: sizes, the start, the point of the axis and the travel."""
@@ -148,19 +147,12 @@ def touching(
     """Poses at a contact, a third of them along the groove, and the unit normals (n, 3) there."""
     contact = contact_on(rng, shapes, shape, feature)
     tilt = np.where(rng.random(len(shape)) < 0.33, 0.0, rng.uniform(-1.5, 1.5, len(shape)))
-    return place(rng, shapes, shape, contact, gap, tilt=tilt), unit(contact)
-
-
-def unit(contact: Contact) -> NDArray[np.longdouble]:
-    """Unit normals (n, 3) there."""
-    return np.asarray(contact.normal / np.sqrt((contact.normal**2).sum(1))[:, None])
+    return place(rng, shapes, shape, contact, gap, tilt=tilt), unit_rows(contact.normal)
 
 
 def square_to(rng: np.random.Generator, normal: NDArray[np.longdouble]) -> NDArray[np.longdouble]:
     """Random unit vectors (n, 3) square to ``normal``."""
-    v = rng.normal(size=normal.shape).astype(Extended)
-    v = np.cross(normal, v)
-    return np.asarray(v / np.sqrt((v * v).sum(1))[:, None])
+    return unit_rows(np.cross(normal, rng.normal(size=normal.shape).astype(Extended)))
 
 
 def moved(T: Array, by: NDArray[Any]) -> Array:
@@ -173,8 +165,7 @@ def moved(T: Array, by: NDArray[Any]) -> Array:
 def screws_through(cases: Cases, point: Array, axis: Array, angle: Array, travel: Array, instant: Array) -> Motions:
     """Screws that are at the poses of ``cases`` at ``instant`` (n,)."""
     point, axis = np.asarray(point, np.float64), np.asarray(axis, np.float64)
-    p, u = point.astype(Extended), axis.astype(Extended)
-    u = u / np.sqrt((u * u).sum(1))[:, None]
+    p, u = point.astype(Extended), unit_rows(axis)
     s = instant.astype(Extended)
     start, back = cases.T_world_wire.copy(), -s * angle
     for column in range(4):  # turned back about the axis, rounded once

@@ -23,6 +23,7 @@ from clamp3d.bench.stress.poses.cases import (
     poses_from_axes,
     random_shapes,
     shape_count,
+    shapes_for,
     signed_powers,
     spread,
 )
@@ -75,8 +76,7 @@ def _spoilt(cases: Motions) -> NDArray[np.bool_]:
 @MAKERS.family("grazing", _best)
 def _grazing(rng: np.random.Generator, n: int) -> Motions:
     """Straight past a lip, an edge or a corner on a tangent: clear or deep by 1e-12 ... 1e-2 of the radius."""
-    k = shape_count(n)
-    shapes, shape = random_shapes(rng, k), spread(n, k)
+    shapes, shape = shapes_for(rng, n)
     gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
     cases, normal = touching(rng, shapes, shape, rng.choice(_CONVEX, n), gap)
     way = square_to(rng, normal)
@@ -224,8 +224,7 @@ def _narrow_mouth(rng: np.random.Generator, n: int) -> Motions:
 @MAKERS.family("level")
 def _level(rng: np.random.Generator, n: int) -> Motions:
     """Clearance that does not change: slides along the groove, a face or an edge, turns about its axis; rest."""
-    k = shape_count(n)
-    shapes, shape = random_shapes(rng, k), spread(n, k)
+    shapes, shape = shapes_for(rng, n)
     gap = shapes.r[shape] * signed_powers(rng, n, -9, -1)
     feature = rng.choice(("arc", "lip", "flat", "end edge"), n)
     contact = contact_on(rng, shapes, shape, feature)
@@ -255,8 +254,7 @@ def _level(rng: np.random.Generator, n: int) -> Motions:
 @MAKERS.family("start", _best)
 def _start(rng: np.random.Generator, n: int) -> Motions:
     """Starts in contact or by 1e-12 ... 1e-2 of the radius off it, and leaves, slides or comes back."""
-    k = shape_count(n)
-    shapes, shape = random_shapes(rng, k), spread(n, k)
+    shapes, shape = shapes_for(rng, n)
     r = shapes.r[shape]
     gap = np.where(rng.random(n) < 0.2, -r * rng.uniform(0, 0.99, n), r * signed_powers(rng, n, -12, -2, 0.3))
     cases, normal = touching(rng, shapes, shape, rng.choice(FEATURES, n), gap)
@@ -276,8 +274,7 @@ def _start(rng: np.random.Generator, n: int) -> Motions:
 @MAKERS.family("from far", _best)
 def _from_far(rng: np.random.Generator, n: int) -> Motions:
     """Comes from 1e3 ... 1e6 mm away and stops at, or flies past, 1e-12 ... 1e-2 of the radius."""
-    k = shape_count(n)
-    shapes, shape = random_shapes(rng, k), spread(n, k)
+    shapes, shape = shapes_for(rng, n)
     gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
     feature = rng.choice(FEATURES, n)
     cases, normal = touching(rng, shapes, shape, feature, gap)

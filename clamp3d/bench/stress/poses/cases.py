@@ -136,17 +136,26 @@ def setting(
     rng: np.random.Generator, n: int, features: tuple[str, ...] = FEATURES, **given: ArrayLike
 ) -> tuple[Shapes, NDArray[np.intp], NDArray[np.str_]]:
     """Random shapes, the shape (n,) of each case, and the feature (n,) that it touches."""
+    return *shapes_for(rng, n, **given), rng.choice(features, n)
+
+
+def unit_rows(vectors: Any) -> NDArray[Any]:
+    """Vectors (n, 3) of length 1, as long doubles."""
+    v = np.asarray(vectors, Extended)
+    return np.asarray(v / np.sqrt((v * v).sum(1))[:, None])
+
+
+def shapes_for(rng: np.random.Generator, n: int, **given: ArrayLike) -> tuple[Shapes, NDArray[np.intp]]:
+    """Random shapes for n cases, and the shape (n,) of each case."""
     shapes = random_shapes(rng, shape_count(n), **given)
-    return shapes, spread(n, len(shapes)), rng.choice(features, n)
+    return shapes, spread(n, len(shapes))
 
 
 def poses_from_axes(rng: np.random.Generator, centre: Any, direction: Any) -> Array:
     """Poses (n, 4, 4) with origin ``centre`` and z axis ``direction`` (n, 3), turned at random about it."""
-    d = np.asarray(direction, Extended)
-    d = d / np.sqrt((d * d).sum(1))[:, None]
+    d = unit_rows(direction)
     helper = np.where(np.abs(d[:, :1]) < 0.6, np.array([[1.0, 0, 0]]), np.array([[0, 1.0, 0]])).astype(Extended)
-    x = np.cross(helper, d)
-    x = x / np.sqrt((x * x).sum(1))[:, None]
+    x = unit_rows(np.cross(helper, d))
     y = np.cross(d, x)
     turn = rng.uniform(-np.pi, np.pi, len(d)).astype(Extended)
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
@@ -248,11 +257,10 @@ def place(
     """
     n = len(shape)
     r, half = np.asarray(shapes.r, Extended)[shape], np.asarray(shapes.length, Extended)[shape] / 2
-    nrm = contact.normal / np.sqrt((contact.normal**2).sum(1))[:, None]
+    nrm = unit_rows(contact.normal)
     # Square to the normal: what is left of z (or of x where the normal is z), and the third direction.
     z = np.where((np.abs(nrm[:, 2]) < 0.9)[:, None], [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]]).astype(Extended)
-    u = z - (z * nrm).sum(1)[:, None] * nrm
-    u /= np.sqrt((u * u).sum(1))[:, None]
+    u = unit_rows(z - (z * nrm).sum(1)[:, None] * nrm)
     v = np.cross(nrm, u)
     lean = np.asarray(rng.uniform(-np.pi, np.pi, n) if tilt is None else tilt, Extended)
     d = np.cos(lean)[:, None] * u + np.sin(lean)[:, None] * v

@@ -19,6 +19,7 @@ from clamp3d.bench.stress.poses.cases import (
     random_shapes,
     setting,
     shape_count,
+    shapes_for,
     signed_powers,
     spread,
     touching,
@@ -31,8 +32,7 @@ MAKERS = Makers()
 @MAKERS.family("random")
 def _random(rng: np.random.Generator, n: int) -> Cases:
     """Any pose of any groove: parallel, tilted, crossing, clear, touching, deep."""
-    k = shape_count(n)
-    shapes, shape = random_shapes(rng, k), spread(n, k)
+    shapes, shape = shapes_for(rng, n)
     size = (shapes.R + 0.3 * shapes.L)[shape][:, None]
     centre = rng.uniform(-1.5, 1.5, (n, 3)) * size
     direction = rng.normal(size=(n, 3)) * np.array([1.0, 1.0, 2.0])

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.bench.stress.digits import fifty_digits, golden, point_distance
-from clamp3d.bench.stress.poses.cases import Cases, Extended
+from clamp3d.bench.stress.poses.cases import Cases, Extended, unit_rows
 
 EXTENDED_WORKS = bool(np.finfo(Extended).eps < 1e-18)
 """Whether the platform's long double is wide enough for `truth`; if not, it calls `truth_50_digits` case by case."""
@@ -65,7 +65,7 @@ class _Scene:
             T = np.asarray(cases.T_world_groove, Extended)
             c = np.einsum("nij,ni->nj", T[:, :3, :3], c - T[:, :3, 3])
             d = np.einsum("nij,ni->nj", T[:, :3, :3], d)
-        self.c, self.d = c, d / np.sqrt((d * d).sum(1))[:, None]
+        self.c, self.d = c, unit_rows(d)
         self.lean = np.sqrt((self.d[:, :2] ** 2).sum(1))
         self.size = np.asarray(cases.scene(), Extended)
 
