@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.bench.stress.poses.cases import Cases, Extended, Shapes, contact_on, place, unit_rows
+from clamp3d.bench.stress.poses import draw
+from clamp3d.bench.stress.poses.cases import Cases, Extended, Shapes, unit_rows
 from clamp3d.bench.stress.worker import Rows
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
@@ -145,9 +146,9 @@ def touching(
     rng: np.random.Generator, shapes: Shapes, shape: NDArray[np.intp], feature: NDArray[np.str_], gap: Array
 ) -> tuple[Cases, NDArray[np.longdouble]]:
     """Poses at a contact, a third of them along the groove, and the unit normals (n, 3) there."""
-    contact = contact_on(rng, shapes, shape, feature)
+    contact = draw.contact_on(rng, shapes, shape, feature)
     tilt = np.where(rng.random(len(shape)) < 0.33, 0.0, rng.uniform(-1.5, 1.5, len(shape)))
-    return place(rng, shapes, shape, contact, gap, tilt=tilt), unit_rows(contact.normal)
+    return draw.place(rng, shapes, shape, contact, gap, tilt=tilt), unit_rows(contact.normal)
 
 
 def square_to(rng: np.random.Generator, normal: NDArray[np.longdouble]) -> NDArray[np.longdouble]:
