@@ -115,23 +115,14 @@ class Wire:
     ``core`` is the same cylinder ``erosion`` mm smaller all round, None if this is a core.
     """
 
-    def __init__(self, cylinder: Cylinder) -> None:
-        for name, size in (("cylinder radius", cylinder.radius), ("cylinder length", cylinder.length)):
-            _check_size(name, size)
-        self.erosion = _EROSION * min(cylinder.radius, cylinder.length / 2)
-        self.core: Wire | None = Wire._of(
-            Cylinder(cylinder.radius - self.erosion, cylinder.length - 2.0 * self.erosion)
-        )
-        self._make(cylinder)
-
-    @classmethod
-    def _of(cls, cylinder: Cylinder) -> Wire:
-        wire = cls.__new__(cls)
-        wire.core, wire.erosion = None, 0.0
-        wire._make(cylinder)
-        return wire
-
-    def _make(self, cylinder: Cylinder) -> None:
+    def __init__(self, cylinder: Cylinder, *, is_core: bool = False) -> None:
+        self.erosion = 0.0
+        self.core: Wire | None = None
+        if not is_core:
+            _check_size("cylinder radius", cylinder.radius)
+            _check_size("cylinder length", cylinder.length)
+            self.erosion = e = _EROSION * min(cylinder.radius, cylinder.length / 2)
+            self.core = Wire(Cylinder(cylinder.radius - e, cylinder.length - 2.0 * e), is_core=True)
         self.cylinder = cylinder
         self.T = np.eye(4)
         shape = _fcl().Cylinder(cylinder.radius * UNIT, cylinder.length * UNIT)
