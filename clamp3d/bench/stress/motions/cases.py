@@ -61,20 +61,15 @@ class Motions(Rows):
 
     def snippet(self, i: int) -> str:
         """Python lines that ask for case i alone, bit by bit the same numbers."""
-        k = int(self.shape[i])
-        start = f"np.array({self.start[i].tolist()})"
         if self.angle[i] == 0.0:
             motion = f"clamp3d.Motion.translate({self.travel[i].tolist()})"
         else:
             numbers = f"{self.axis[i].tolist()}, {float(self.angle[i])!r}, point={self.point[i].tolist()}"
             motion = f"clamp3d.Motion.screw({numbers}, travel={float(self.travel[i, 0])!r})"
         lines = [
-            "import numpy as np",
-            "import clamp3d",
-            f"groove = clamp3d.kernel.{self.shapes.groove(k)!r}",
-            f"wire = clamp3d.kernel.{self.shapes.cylinder(k)!r}",
+            *self.shapes.snippet(int(self.shape[i])),
             f"motion = {motion}",
-            f"start = {start}",
+            f"start = np.array({self.start[i].tolist()})",
             "print(clamp3d.min_clearance(groove, wire, motion, start))",
             "print(clamp3d.first_contact(groove, wire, motion, start))",
         ]

@@ -17,6 +17,7 @@ from clamp3d.bench.stress.family import Makers
 from clamp3d.bench.stress.motions.cases import Motions, motions, moved, screws_through, square_to, touching, turned
 from clamp3d.bench.stress.poses import draw
 from clamp3d.bench.stress.poses.cases import Extended
+from clamp3d.bench.stress.poses.truth import point_sdf
 from clamp3d.core.pose import Array
 
 Make = Callable[[np.random.Generator, int], Motions]
@@ -53,12 +54,8 @@ def _spoilt(cases: Motions) -> NDArray[np.bool_]:
         angle = u * cases.angle
         centre = cases.point + turned(c - cases.point, axis, angle) + u * vector
         points = centre[:, None, :] + t[:, :, None] * turned(d, axis, angle)[:, None, :]
-        x, y, z = np.abs(points[..., 0]), points[..., 1], np.abs(points[..., 2])
-        rho, lip = np.hypot(x, y), np.hypot(x - R * np.sin(a), y + R * np.cos(a))
-        arc = np.where(x * np.cos(a) + y * np.sin(a) <= 0.0, np.abs(R - rho), lip)
-        ray = np.where(x >= R * np.sin(a), np.abs(y + R * np.cos(a)), lip)
-        g = np.where((y <= -R * np.cos(a)) & (rho >= R), 0.0, np.minimum(arc, ray))
-        low = np.hypot(g, np.maximum(z - H, 0.0)).min(1)
+        x, y, z = (points[..., k] for k in range(3))
+        low = np.maximum(point_sdf(x, y, z, R, R * np.sin(a), -R * np.cos(a), H), 0.0).min(1)
         out |= low - s.r[k] < gap - 1e-9 * s.R[k]
     return out
 

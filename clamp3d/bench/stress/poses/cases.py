@@ -50,6 +50,11 @@ class Shapes:
         """Wire of row k."""
         return Cylinder(float(self.r[k]), float(self.length[k]))
 
+    def snippet(self, k: int) -> list[str]:
+        """Python lines that make the groove and the wire of row k, bit by bit the same numbers."""
+        shapes = {"groove": self.groove(k), "wire": self.cylinder(k)}
+        return ["import numpy as np", "import clamp3d", *(f"{n} = clamp3d.kernel.{s!r}" for n, s in shapes.items())]
+
     def pair(self, k: int) -> GroovePair:
         """Row k as a pair that a contact model takes; both parts have their feature's own frame."""
         return GroovePair("P1", "P6", self.groove(k), np.eye(4), self.cylinder(k), np.eye(4))
@@ -79,14 +84,8 @@ class Cases(Rows):
 
     def snippet(self, i: int) -> str:
         """Python lines that ask for case i alone, bit by bit the same numbers."""
-        k = int(self.shape[i])
-        lines = [
-            "import numpy as np",
-            "import clamp3d",
-            f"groove = clamp3d.kernel.{self.shapes.groove(k)!r}",
-            f"wire = clamp3d.kernel.{self.shapes.cylinder(k)!r}",
-            f"T_world_wire = np.array({self.T_world_wire[i].tolist()})",
-        ]
+        lines = self.shapes.snippet(int(self.shape[i]))
+        lines.append(f"T_world_wire = np.array({self.T_world_wire[i].tolist()})")
         pose = "T_world_wire"
         if self.T_world_groove is not None:
             lines.append(f"T_world_groove = np.array({self.T_world_groove[i].tolist()})")

@@ -134,16 +134,12 @@ def block(groove: SweptArc, points: Array) -> Solid:
     return Solid("P1", (body,), title="block with a groove", volume=body.volume)
 
 
-def mesh_error(groove: SweptArc) -> float:
-    """Chord error of meshes in mm."""
-    return MESH_ERROR * groove.radius
+def in_radii(groove: SweptArc, bound: float) -> float:
+    """A bound in mm that is given in parts of the groove's radius; NaN if there is none."""
+    return bound * groove.radius
 
 
-def no_bound(groove: SweptArc) -> float:
-    """The bound of a method that has none."""
-    return math.nan
-
-
+_NO_BOUND = partial(in_radii, bound=math.nan)
 METHODS: Methods = {
     "cas": ("closed forms of the arc groove; its bound is that of rounding", CasMethod),
     "chords 5 deg": (
@@ -156,11 +152,13 @@ METHODS: Methods = {
     ),
     "mesh": (
         "python-fcl's triangle mesh, chord error R / 2400, which is its bound",
-        partial(SolidMethod, "mesh", mesh_error, {"mesh_error": MESH_ERROR}),
+        partial(SolidMethod, "mesh", partial(in_radii, bound=MESH_ERROR), {"mesh_error": MESH_ERROR}),
     ),
     "hulls": (
         "CoACD's hulls of that mesh at a threshold of R / 12, each convex in python-fcl; no bound",
-        partial(SolidMethod, "hulls", no_bound, {"threshold": THRESHOLD, "mesh_error": MESH_ERROR}),
+        partial(
+            SolidMethod, "hulls", partial(in_radii, bound=math.nan), {"threshold": THRESHOLD, "mesh_error": MESH_ERROR}
+        ),
     ),
 }
 

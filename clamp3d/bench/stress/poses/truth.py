@@ -82,18 +82,22 @@ class _Scene:
     def sdf(self, i: NDArray[np.intp], t: NDArray[Any]) -> NDArray[Any]:
         """Signed distance of the axis points t (m,) of cases i (m,) from their grooves."""
         x, y, z = (self.c[i, k] + t * self.d[i, k] for k in range(3))
-        R, h, sx = self.R[i], self.h[i], self.sx[i]
-        x = np.abs(x)
-        # Squares neither overflow nor vanish in the exponents of a long double.
-        rho = np.sqrt(x * x + y * y)
-        lip = np.sqrt((x - sx) ** 2 + (y - h) ** 2)
-        arc = np.where(x * -h + y * sx <= 0, np.abs(R - rho), lip)
-        ray = np.where(x >= sx, np.abs(y - h), lip)
-        inside = (y <= h) & (rho >= R)
-        g = np.where(inside, -1.0, 1.0) * np.minimum(arc, ray)
-        e = np.abs(z) - self.H[i]
-        outside = np.sqrt(np.maximum(g, 0) ** 2 + np.maximum(e, 0) ** 2)
-        return np.asarray(np.where((g <= 0) & (e <= 0), np.maximum(g, e), outside))
+        return point_sdf(x, y, z, self.R[i], self.sx[i], self.h[i], self.H[i])
+
+
+def point_sdf(x: Any, y: Any, z: Any, R: Any, sx: Any, h: Any, H: Any) -> NDArray[Any]:
+    """Signed distance of points from grooves with lips at (+-sx, h) and ends at +-H, in the numbers that are given."""
+    x = np.abs(x)
+    # Squares neither overflow nor vanish in the exponents of a long double.
+    rho = np.sqrt(x * x + y * y)
+    lip = np.sqrt((x - sx) ** 2 + (y - h) ** 2)
+    arc = np.where(x * -h + y * sx <= 0, np.abs(R - rho), lip)
+    ray = np.where(x >= sx, np.abs(y - h), lip)
+    inside = (y <= h) & (rho >= R)
+    g = np.where(inside, -1.0, 1.0) * np.minimum(arc, ray)
+    e = np.abs(z) - H
+    outside = np.sqrt(np.maximum(g, 0) ** 2 + np.maximum(e, 0) ** 2)
+    return np.asarray(np.where((g <= 0) & (e <= 0), np.maximum(g, e), outside))
 
 
 def _brackets(scene: _Scene, most: int) -> tuple[NDArray[np.intp], NDArray[Any], NDArray[Any], NDArray[Any]]:
