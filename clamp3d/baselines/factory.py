@@ -84,27 +84,20 @@ def contact_model(
             raise InputError(f"{setting} goes with method {takers}, got method {name!r}")
     unit_angle = UNIT_ANGLE if unit_angle is None else unit_angle
     mesh_error = MESH_ERROR if mesh_error is None else mesh_error
+    from clamp3d import baselines  # imports a model when it is asked for
+
     if name == "cas":
-        from clamp3d.baselines.cas import Cas
-
-        return Cas()
+        return baselines.Cas()
     if name == "chords":
-        from clamp3d.baselines.chords import Chords
-
-        return Chords(unit_angle)
+        return baselines.Chords(unit_angle)
     if parts is None:
         raise InputError(f"method {name!r} needs the parts that it is to measure, got none")
     if name == "wedges":
-        from clamp3d.baselines.wedges import Wedges
-
-        return Wedges(parts, unit_angle)  # type: ignore[arg-type]  # a mesh is refused when it is cut
+        return baselines.Wedges(parts, unit_angle)  # type: ignore[arg-type]  # a mesh is refused when it is cut
     if name == "mesh":
-        from clamp3d.baselines.meshes import Meshes
-
-        return Meshes(parts, mesh_error)
+        return baselines.Meshes(parts, mesh_error)
     from clamp3d.baselines.decomposition import DecompositionParameters
-    from clamp3d.baselines.hulls import Hulls
 
     if isinstance(threshold, (int, float)):
         threshold = DecompositionParameters(threshold=threshold)
-    return Hulls(parts, threshold, mesh_error=mesh_error, time_limit=time_limit, progress=progress)
+    return baselines.Hulls(parts, threshold, mesh_error=mesh_error, time_limit=time_limit, progress=progress)

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.core.closed_mesh import Solid, check_solid
 from clamp3d.core.pose import Array
@@ -82,8 +82,12 @@ def convex(vertices: ArrayLike, faces: ArrayLike, name: str = "convex shape") ->
     height = (V @ normals[real].T - np.einsum("ij,ij->i", corners[real, 0], normals[real])) / length[real]
     if height.max() > _CONVEX * np.ptp(V, axis=0).max():
         raise InputError(f"{name} must be convex: a vertex stands {height.max():.3g} mm outside one of its faces")
-    encoded = np.column_stack([np.full(len(F), 3), F]).ravel()
-    return _shape("convex", solid, fcl.Convex(V * UNIT, len(F), encoded))
+    return _shape("convex", solid, fcl.Convex(V * UNIT, len(F), encoded(F)))
+
+
+def encoded(faces: NDArray[Any]) -> NDArray[Any]:
+    """Triangles (m, 3) as `fcl.Convex` takes them: each with its number of corners before it."""
+    return np.insert(faces, 0, 3, axis=1).ravel()
 
 
 def bvh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Shape:
@@ -111,23 +115,14 @@ class Wire:
     ``core`` is the same cylinder ``erosion`` mm smaller all round, None if this is a core.
     """
 
-    def __init__(self, cylinder: Cylinder) -> None:
-        for name, size in (("cylinder radius", cylinder.radius), ("cylinder length", cylinder.length)):
-            _check_size(name, size)
-        self.erosion = _EROSION * min(cylinder.radius, cylinder.length / 2)
-        self.core: Wire | None = Wire._of(
-            Cylinder(cylinder.radius - self.erosion, cylinder.length - 2.0 * self.erosion)
-        )
-        self._make(cylinder)
-
-    @classmethod
-    def _of(cls, cylinder: Cylinder) -> Wire:
-        wire = cls.__new__(cls)
-        wire.core, wire.erosion = None, 0.0
-        wire._make(cylinder)
-        return wire
-
-    def _make(self, cylinder: Cylinder) -> None:
+    def __init__(self, cylinder: Cylinder, *, is_core: bool = False) -> None:
+        self.erosion = 0.0
+        self.core: Wire | None = None
+        if not is_core:
+            _check_size("cylinder radius", cylinder.radius)
+            _check_size("cylinder length", cylinder.length)
+            self.erosion = e = _EROSION * min(cylinder.radius, cylinder.length / 2)
+            self.core = Wire(Cylinder(cylinder.radius - e, cylinder.length - 2.0 * e), is_core=True)
         self.cylinder = cylinder
         self.T = np.eye(4)
         shape = _fcl().Cylinder(cylinder.radius * UNIT, cylinder.length * UNIT)

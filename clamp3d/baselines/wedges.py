@@ -107,6 +107,13 @@ def prism(polygon: Array, start: float, end: float) -> tuple[Array, NDArray[np.i
     return made.vertices + np.array([0.0, 0.0, start]), np.asarray(made.faces, dtype=np.int64)
 
 
+def wedge_solids(part: Solid, unit_angle: float) -> dict[str, tuple[Array, NDArray[np.int64]]]:
+    """Names of the wedges of a part -> their vertices (n, 3) in the part's frame and outward triangles (m, 3)."""
+    body = part.bodies[0]
+    prisms = {w.name: prism(w.polygon, body.start, body.end) for w in part_wedges(part, unit_angle)}
+    return {name: (vertices @ body.frame.T, faces) for name, (vertices, faces) in prisms.items()}
+
+
 def _sectors(cell: shapely.Polygon, arc: Arc, unit_angle: float) -> list[Wedge]:
     """The cell less the groove: a wedge behind each chord, and what lies beside the first and the last ray."""
     m = chord_count(arc.sweep, unit_angle)
@@ -161,10 +168,5 @@ def _mouth(arc: Arc) -> tuple[float, float]:
 
 
 def _polytopes(part: Solid, unit_angle: float) -> Polytopes:
-    body = part.bodies[0]
-    wedges = part_wedges(part, unit_angle)
-    shapes = []
-    for wedge in wedges:
-        vertices, faces = prism(wedge.polygon, body.start, body.end)
-        shapes.append(convex(vertices @ body.frame.T, faces, f"{part.name} {wedge.name}"))
-    return Polytopes(shapes, [wedge.name for wedge in wedges])
+    solids = wedge_solids(part, unit_angle)
+    return Polytopes([convex(V, F, f"{part.name} {name}") for name, (V, F) in solids.items()], [*solids])

@@ -119,38 +119,36 @@ def complexity(progress: Callable[[str], None] = lambda message: None, *, scale:
 
     chords = [Chords(math.radians(d)) for d in (20.0, 10.0, 5.0, 2.5, 1.25)]
     m = [model.segments(wire_pairs(clamp)) / 4.0 for model in chords]
-    plans: list[tuple[str, str, str, str, Sequence[float], list[Run], Exponents | None]] = []
-    for a, steps in ((1, (3000, 10000, 30000, 100000)), (2, (56, 100, 180, 320)), (3, (15, 22, 32, 46))):
-        values = sized(*steps)
-        plans.append(("grid", "cas", "n", f"a = {a}, b = 4", values, [grid(cas, n, a, 4) for n in values], (a, a, a)))
-    (n,), parts = sized(46), [1, 2, 3]
-    runs = [grid(cas, n, a, 4) for a in parts]
-    plans.append(("grid", "cas", "n^a", f"n = {n}, b = 4", [n**a for a in parts], runs, (1.0, 1.0, 1.0)))
-    (n,), grooves = sized(30000), [1, 2, 3, 4]
-    plans.append(
-        ("grid", "cas", "b", f"n = {n}, a = 1", grooves, [grid(cas, n, 1, b) for b in grooves], (0.0, 1.0, 1.0))
-    )
-    for a, most, published in ((1, 300, (0.0, 1.0, 1.0)), (2, 17, (1.0, 2.0, 2.0))):
-        (n,) = sized(most)
-        plans.append(
-            ("grid", "chords", "m", f"n = {n}, a = {a}, b = 4", m, [grid(c, n, a, 4) for c in chords], published)
-        )
-    finer = [1, 2, 4, 8] if scale >= 1.0 else [1, 2]
-    way = Section(clamp, cas).open_distance() - final.closing
-    runs = [solved(cas, "stepped", STEP / k) for k in finer]
-    plans.append(("stepped", "cas", "n", "a = 3, b = 4", [way * k / STEP for k in finer], runs, (3.0, 3.0, 3.0)))
-    runs = [solved(model, "stepped") for model in chords]
-    plans.append(("stepped", "chords", "m", "a = 3, b = 4, step 1/3 mm", m, runs, (2.0, 3.0, 3.0)))
-    plans.append(("exact", "cas", "n", "no steps", [1.0], [solved(cas, "exact")], None))
-    plans.append(("exact", "chords", "m", "no steps", m, [solved(model, "exact") for model in chords], None))
-    sweeps = []
-    for search, method, varied, fixed, at, searches, theirs in plans:
+    sweeps: list[Sweep] = []
+
+    def sweep(what: tuple[str, str, str, str], at: Sequence[float], runs: list[Run], theirs: Exponents | None) -> None:
+        search, method, varied, _ = what
         progress(f"Table 5: {search} search, {method}, {varied} varied")
-        counts, seconds = zip(*map(_timed, searches), strict=True)
+        counts, seconds = zip(*map(_timed, runs), strict=True)
         positions, tests = zip(*counts, strict=True)
         exponents = (fitted(at, positions), fitted(at, tests), fitted(at, seconds))
         x = tuple(float(v) for v in at)
-        sweeps.append(Sweep(search, method, varied, fixed, x, positions, tests, seconds, exponents, theirs))
+        sweeps.append(Sweep(*what, x, positions, tests, seconds, exponents, theirs))
+
+    for a, steps in ((1, (3000, 10000, 30000, 100000)), (2, (56, 100, 180, 320)), (3, (15, 22, 32, 46))):
+        values = sized(*steps)
+        sweep(("grid", "cas", "n", f"a = {a}, b = 4"), values, [grid(cas, n, a, 4) for n in values], (a, a, a))
+    (n,), parts = sized(46), [1, 2, 3]
+    runs = [grid(cas, n, a, 4) for a in parts]
+    sweep(("grid", "cas", "n^a", f"n = {n}, b = 4"), [n**a for a in parts], runs, (1.0, 1.0, 1.0))
+    (n,), grooves = sized(30000), [1, 2, 3, 4]
+    sweep(("grid", "cas", "b", f"n = {n}, a = 1"), grooves, [grid(cas, n, 1, b) for b in grooves], (0.0, 1.0, 1.0))
+    for a, most, published in ((1, 300, (0.0, 1.0, 1.0)), (2, 17, (1.0, 2.0, 2.0))):
+        (n,) = sized(most)
+        sweep(("grid", "chords", "m", f"n = {n}, a = {a}, b = 4"), m, [grid(c, n, a, 4) for c in chords], published)
+    finer = [1, 2, 4, 8] if scale >= 1.0 else [1, 2]
+    way = Section(clamp, cas).open_distance() - final.closing
+    runs = [solved(cas, "stepped", STEP / k) for k in finer]
+    sweep(("stepped", "cas", "n", "a = 3, b = 4"), [way * k / STEP for k in finer], runs, (3.0, 3.0, 3.0))
+    runs = [solved(model, "stepped") for model in chords]
+    sweep(("stepped", "chords", "m", "a = 3, b = 4, step 1/3 mm"), m, runs, (2.0, 3.0, 3.0))
+    sweep(("exact", "cas", "n", "no steps"), [1.0], [solved(cas, "exact")], None)
+    sweep(("exact", "chords", "m", "no steps"), m, [solved(model, "exact") for model in chords], None)
     return tuple(sweeps)
 
 

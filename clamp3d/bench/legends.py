@@ -28,13 +28,6 @@ _ARCS: tuple[tuple[float, tuple[tuple[float, float], ...]], ...] = (
     (_MINOR, ((1.2, -5.3), (-1.5, 1.5), (5.2, -8.4), (0.0, -_R - _r), (0.0, -_R + _r))),
     (_MAJOR, ((-1.2, 0.6), (0.0, 11.5), (-9.4, 0.0), (_R + _r, 0.0), (_R - _r, 0.0))),
 )
-_VERDICT = {
-    ArcRelation.INSIDE: "clear",
-    ArcRelation.OUTSIDE: "clear",
-    ArcRelation.INTERSECT: "clash",
-    ArcRelation.EXTERIOR_CONTACT: "contact",
-    ArcRelation.INTERIOR_CONTACT: "contact",
-}
 
 
 def table2_figure() -> Figure:
@@ -131,9 +124,9 @@ def _arc_cell(ax: Axes, half_angle: float, x: float, y: float, *, fig_6: bool = 
         ax.annotate(name, point, offset, textcoords="offset points", ha="center", **_SMALL)
     if fig_6:
         _construction(ax, m)
-    if found.relation in (ArcRelation.EXTERIOR_CONTACT, ArcRelation.INTERIOR_CONTACT, ArcRelation.INTERSECT):
+    if found.relation not in (ArcRelation.INSIDE, ArcRelation.OUTSIDE):
         for px, py in found.points:
-            _dot(ax, px, py, _VERDICT[found.relation])
+            _dot(ax, px, py, "clash" if found.relation is ArcRelation.INTERSECT else "contact")
     _caption(ax, found.relation.value, f"gap {found.gap:z.2f}")
 
 

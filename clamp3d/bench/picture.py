@@ -10,6 +10,7 @@ Pixel coordinates are (x, y) with the centre of the first pixel at (0, 0), x to 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,10 +70,7 @@ def picture(run: Assembly, px_per_mm: float, *, blur: float = 1.0, grain: float 
     for name, value in (("blur", blur), ("grain", grain)):
         if not (math.isfinite(value) and value >= 0.0):
             raise InputError(f"{name} must be finite and >= 0, got {value}")
-    outlines: list[tuple[PartName, Array]] = []
-    for name in PAINT:
-        for outline in _outlines(run, name):
-            outlines.append((name, np.array([run.poses[name].point(float(u), float(v)) for u, v in outline])))
+    outlines = [(name, outline) for name in PAINT for outline in _outlines(run, name)]
     everything = np.concatenate([outline for _, outline in outlines])
     low, high = everything.min(0) - _MARGIN, everything.max(0) + _MARGIN
     columns, rows = np.ceil((high - low) * px_per_mm).astype(int)
@@ -217,16 +215,15 @@ def _rgb(paint: tuple[float, float, float]) -> tuple[float, float, float]:
     return r, g, b
 
 
-def _outlines(run: Assembly, name: PartName) -> list[Array]:
-    """Outlines (n, 2) of the part's bodies in section coordinates (u, v), seen along the wires."""
-    found = []
+def _outlines(run: Assembly, name: PartName) -> Iterator[Array]:
+    """Outlines (n, 2) of the part's bodies in the section where they stand, seen along the wires."""
     for body in parts(run.clamp)[name].bodies:
         if body.axis == "Y":
-            found.append(body.profile.polygon(0.001))
+            outline = body.profile.polygon(0.001)
         else:
             (a0, _), (a1, _) = body.profile.bounds
-            found.append(np.array([(a0, -body.end), (a1, -body.end), (a1, -body.start), (a0, -body.start)]))
-    return found
+            outline = np.array([(a0, -body.end), (a1, -body.end), (a1, -body.start), (a0, -body.start)])
+        yield np.array([run.poses[name].point(float(u), float(v)) for u, v in outline])
 
 
 def _end_points(run: Assembly) -> list[tuple[float, float]]:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import zip_longest
 from typing import Any
 
-import numpy as np
-
 from clamp3d.bench import published
-from clamp3d.bench.reproduce import PoseRow, Reproduction
+from clamp3d.bench.pages import render
+from clamp3d.bench.reproduce import OrderRow, PoseRow, RelationRow, Reproduction, WorkRow
 from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.matrix import gap_text
 from clamp3d.collide.distance import Distance
-from clamp3d.core.pose import Array
 from clamp3d.output.tables import text_table
 
 
@@ -61,28 +61,29 @@ def _pose_to_dict(row: PoseRow) -> dict[str, Any]:
 
 def reproduction_to_text(found: Reproduction) -> str:
     """The tables as lines for a terminal."""
-    relations = ((2, "Hole against bolt", found.table2), (3, "Arc against circle", found.table3))
-    tables = [_table1(found)]
-    for number, title, rows in relations:
-        cells = [(r.published, r.found, "same" if r.published == r.found else "DIFFERS", r.example) for r in rows]
-        tables.append(f"Table {number}. {title}\n" + text_table(["row", "found", "", "example"], cells, indent=2))
-    return "\n\n".join([*tables, _final_state(found), _table4(found), _table5(found)])
-
-
-def _table1(found: Reproduction) -> str:
-    shown = [row for row in found.table1 if row.published or row.declared or row.measured]
-    cells = [
-        (f"{r.a}-{r.b}", r.published, r.declared, r.measured, _gap(r.distance), r.relation, r.difference or "same")
-        for r in shown
-    ]
-    head = ["pair", "published", "declared", "measured", "gap, mm", "relation", ""]
-    return "\n".join(
-        [
-            "Table 1. Connection matrix: types published, declared in the clamp's file, measured in the final state",
-            text_table(head, cells, indent=2),
-            f"  the other {len(found.table1) - len(shown)} pairs: 0 in all three",
-        ]
+    connections = [row for row in found.table1 if row.published or row.declared or row.measured]
+    return render(
+        "reproduce.txt",
+        table=text_table,
+        connections=[
+            (f"{r.a}-{r.b}", r.published, r.declared, r.measured, _gap(r.distance), r.relation, r.difference or "same")
+            for r in connections
+        ],
+        others=len(found.table1) - len(connections),
+        holes=_relations(found.table2),
+        arcs=_relations(found.table3),
+        poses=[_pose(pose) for pose in found.final_state],
+        matrices=[line for pose in found.final_state for line in _matrices(pose)][:-1],
+        actual=f"{published.ACTUAL_DISTANCE:.3f}",
+        distances=_distances(found),
+        plateau=found.plateau,
+        work=[_work(row) for row in found.table5],
+        orders=[_order(row) for row in found.orders],
     )
+
+
+def _relations(rows: Sequence[RelationRow]) -> list[Sequence[object]]:
+    return [(r.published, r.found, "same" if r.published == r.found else "DIFFERS", r.example) for r in rows]
 
 
 def _gap(distance: Distance) -> str:
@@ -91,78 +92,48 @@ def _gap(distance: Distance) -> str:
     return high if low == high or distance.uncertainty <= 1e-6 else f"{low} to {high}"
 
 
-def _final_state(found: Reproduction) -> str:
-    poses, matrices = [], []
-    for p in found.final_state:
-        apart = [f - w for f, w in zip(p.found, p.published, strict=True)]
-        numbers = [f"{v + 0.0:z.3f}" for v in (*p.found, *p.published)]
-        poses.append([f"{p.part} {TITLES[p.part]}", *numbers, *(f"{v:+z.3f}" for v in apart)])
-        ours, theirs = p.matrices
-        for k in range(4):
-            flat = [_row(matrix[k]) if k < 3 else "" for matrix in (theirs, ours)]
-            matrices.append([p.part if k == 0 else "", *flat, _row(p.T_line_part[k])])
-        matrices.append([""])
-    head = ["part", *("x", "y", "angle") * 2, "x", "y", "angle"]
-    return "\n".join(
-        [
-            "Final state relative to the power line (mm, deg): found, published, difference",
-            text_table(head, poses, indent=2),
-            "",
-            "The paper's six matrices: as it prints them (x right, y down), as found in its convention, and this",
-            "program's T_P6_part (X right, Y along the wires, Z up)",
-            text_table(["part", "published", "found", "T_P6_part"], matrices[:-1], indent=2),
-        ]
-    )
+def _pose(row: PoseRow) -> Sequence[object]:
+    apart = [f"{f - w:+z.3f}" for f, w in zip(row.found, row.published, strict=True)]
+    return [f"{row.part} {TITLES[row.part]}", *(f"{v + 0.0:z.3f}" for v in (*row.found, *row.published)), *apart]
 
 
-def _row(values: Array) -> str:
-    return " ".join(f"{v:z8.3f}" for v in np.asarray(values))
+def _matrices(row: PoseRow) -> list[Sequence[object]]:
+    """Published and found (3, 3) beside ``T_P6_part`` (4, 4), line by line, and a blank line."""
+    ours, theirs = row.matrices
+    columns = [[" ".join(f"{v:z8.3f}" for v in line) for line in M] for M in (theirs, ours, row.T_line_part)]
+    return [
+        [row.part, *(column[0] for column in columns)],
+        *zip_longest([""], *(c[1:] for c in columns), fillvalue=""),
+        [""],
+    ]
 
 
-def _table4(found: Reproduction) -> str:
-    rows = []
+def _distances(found: Reproduction) -> list[Sequence[object]]:
+    rows: list[Sequence[object]] = []
     for d in found.table4:
         # The paper's figures are stepped; the exact rows show what they would be without the step.
         compared = d.solver == "stepped" or d.unit_angle_deg is None
         theirs = (d.published, d.published_error) if compared else (None, None)
         apart = None if theirs[0] is None else f"{d.distance - theirs[0]:+z.3f}"
-        lengths = [d.distance, theirs[0], d.error, theirs[1]]
-        cells = [None if v is None else f"{v:.3f}" for v in lengths]
-        unit = None if d.unit_angle_deg is None else f"{d.unit_angle_deg:g} deg"
-        rows.append([d.method, unit, d.solver, *cells[:2], apart, *cells[2:]])
+        cells = [None if v is None else f"{v:.3f}" for v in (d.distance, theirs[0], d.error, theirs[1])]
+        rows.append([d.method, _unit(d.unit_angle_deg), d.solver, *cells[:2], apart, *cells[2:]])
     for number, (trial, theirs5) in enumerate(zip(found.image_trials, published.IMAGE_DISTANCES, strict=True), 1):
         errors = [f"{abs(v - published.ACTUAL_DISTANCE):.3f}" for v in (trial, theirs5)]
         rows.append(["image", f"trial {number}", "", f"{trial:.3f}", f"{theirs5:.3f}", None, *errors])
-    head = ["method", "unit", "solver", "found", "published", "difference", "error", "published error"]
-    return "\n".join(
-        [
-            f"Table 4. Distance between the splints (mm); errors against {published.ACTUAL_DISTANCE:.3f}, which the "
-            "paper measured on a real clamp",
-            text_table(head, rows, indent=2),
-            "  image: marked by hand in a drawn picture with a chosen error: compare the spread, not the trials",
-            f"  {found.plateau}",
-        ]
-    )
+    return rows
 
 
-def _table5(found: Reproduction) -> str:
-    rows = []
-    for w in found.table5:
-        unit = None if w.unit_angle_deg is None else f"{w.unit_angle_deg:g} deg"
-        formula = ", ".join(published.TABLE_5[w.method]) if w.solver == "stepped" else "no steps: closed-form gradients"
-        rows.append([w.method, unit, w.solver, w.motion_steps, w.contact_queries, w.segments, formula])
-    orders = []
-    for o in found.orders:
-        exponents = f"{o.variable}^{o.published:g}", f"{o.variable}^{o.measured:z.2f}"
-        orders.append([o.search, o.parts, o.quantity, *exponents, "REFUTED" if o.refuted else "as published"])
-    return "\n".join(
-        [
-            "Table 5. Work: positions tried (M), groove queries (C; one arc or its chords), segments m of all arcs",
-            text_table(["method", "unit", "solver", "M", "C", "m", "published M, C, total"], rows, indent=2),
-            "  Orders of growth, published and fitted to counts; a moving parts:",
-            text_table(["search", "a", "count", "published", "measured", ""], orders, indent=4),
-            "  grid: the paper's search, every combination of places of the parts: the segments of an arc do not add",
-            "  to its positions, so the contact tests grow with m and not with m^a. stepped: this program's, one",
-            "  way along the bolt on which the wires settle: the steps of the parts do not multiply either.",
-        ]
-    )
+def _work(row: WorkRow) -> Sequence[object]:
+    theirs = ", ".join(published.TABLE_5[row.method])
+    formula = theirs if row.solver == "stepped" else "no steps: closed-form gradients"
+    counts = row.motion_steps, row.contact_queries, row.segments
+    return [row.method, _unit(row.unit_angle_deg), row.solver, *counts, formula]
+
+
+def _unit(angle_deg: float | None) -> str | None:
+    return None if angle_deg is None else f"{angle_deg:g} deg"
+
+
+def _order(row: OrderRow) -> Sequence[object]:
+    exponents = f"{row.variable}^{row.published:g}", f"{row.variable}^{row.measured:z.2f}"
+    return [row.search, row.parts, row.quantity, *exponents, "REFUTED" if row.refuted else "as published"]

@@ -39,9 +39,8 @@ def command(
 
     Exit code 1 if the project's own method, cas, has a wrong verdict or an error beyond its bound.
     """
-    from clamp3d.bench.stress.registry import FAMILIES, METHODS
     from clamp3d.bench.stress.report import markdown, table
-    from clamp3d.bench.stress.run import run_stress
+    from clamp3d.bench.stress.run import FAMILIES, METHODS, run_stress
     from clamp3d.errors import InputError
 
     if show_list:

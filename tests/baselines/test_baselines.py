@@ -15,7 +15,7 @@ from clamp3d.baselines.hulls import Hulls, intrusion
 from clamp3d.baselines.meshes import Meshes
 from clamp3d.baselines.model import ContactModel
 from clamp3d.baselines.wedges import Wedges
-from clamp3d.bench.compare.block import block_pair, grooved_block
+from clamp3d.bench.compare.scene import block_pair, grooved_block
 from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp

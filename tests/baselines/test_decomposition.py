@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 from clamp3d.baselines import cache, decomposition
 from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
 from clamp3d.baselines.hulls import intrusion
-from clamp3d.bench.compare.block import block_pair, grooved_block
+from clamp3d.bench.compare.scene import block_pair, grooved_block
 from clamp3d.core.closed_mesh import Solid
 from clamp3d.core.meshing import mesh
 from clamp3d.core.primitives import Cylinder, SweptArc

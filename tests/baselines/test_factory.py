@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from clamp3d import baselines
-from clamp3d.bench.compare.block import block_pair, grooved_block
+from clamp3d.bench.compare.scene import block_pair, grooved_block
 from clamp3d.core.meshing import mesh
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError

@@ -28,7 +28,7 @@ import clamp3d
 from clamp3d.baselines.decomposition import decompose
 from clamp3d.baselines.fcl_shapes import Wire, bvh, convex, distance
 from clamp3d.baselines.wedges import prism
-from clamp3d.bench.compare.block import grooved_block
+from clamp3d.bench.compare.scene import grooved_block
 from clamp3d.core import shapes
 from clamp3d.core.meshing import mesh
 from clamp3d.core.motion import Motion

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.wedges import Wedge, Wedges, part_wedges, prism
-from clamp3d.bench.compare.block import block_pair, grooved_block
+from clamp3d.bench.compare.scene import block_pair, grooved_block
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.core.primitives import Cylinder, SweptArc

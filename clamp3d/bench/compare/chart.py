@@ -10,7 +10,7 @@ import math
 import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from clamp3d.bench.compare.assemblies import Imaged
 from clamp3d.bench.compare.measure import Measured
@@ -29,33 +29,30 @@ if TYPE_CHECKING:
 
 FORMATS = (".png", ".svg", ".html")
 
-_STYLE: dict[str, tuple[str, str, str]] = {
-    "cas": ("#D55E00", "*", "clamp3d (CAS): exact arc"),
-    "chords": ("#3A9BD0", "v", "chords in the section\n(parallel axes only)"),
-    "wedges": ("#0072B2", "s", "wedges (FCL)"),
-    "hulls": ("#CC79A7", "D", "CoACD hulls (FCL)"),
-    "mesh": ("#009E73", "o", "mesh (FCL)"),
-    "coal": ("#000000", "P", "coal"),
-    "mujoco": ("#8A6D00", "X", "MuJoCo"),
-    "trimesh": ("#5B7F95", "<", "trimesh"),
-    "manifold3d": ("#7A5195", ">", "manifold3d"),
-    "open-cascade": ("#7F2704", "h", "Open CASCADE (B-rep)"),
-}
-"""Family: colour, marker, name on the chart."""
 
-_LABELS: dict[str, tuple[int, float, float, str]] = {
-    "cas": (0, 14.0, 12.0, "left"),
-    "open-cascade": (0, 0.0, 26.0, "center"),
-    "chords": (0, 0.0, -22.0, "right"),
-    "coal": (-1, -22.0, 10.0, "right"),
-    "mujoco": (-1, -24.0, -16.0, "right"),
-    "wedges": (0, -44.0, -22.0, "center"),
-    "trimesh": (0, 4.0, -40.0, "center"),
-    "mesh": (0, 14.0, -22.0, "center"),
-    "manifold3d": (0, 4.0, 24.0, "left"),
-    "hulls": (-1, 14.0, 0.0, "left"),
+class _Look(NamedTuple):
+    """How a family is drawn; its name stands at its least (0) or greatest (-1) error, moved by ``offset`` points."""
+
+    colour: str = "#444444"
+    marker: str = "o"
+    name: str = ""
+    which: int = 0
+    offset: tuple[float, float] = (10.0, 0.0)
+    align: str = "left"
+
+
+_LOOKS: dict[str, _Look] = {
+    "cas": _Look("#D55E00", "*", "clamp3d (CAS): exact arc", 0, (14.0, 12.0), "left"),
+    "chords": _Look("#3A9BD0", "v", "chords in the section\n(parallel axes only)", 0, (0.0, -22.0), "right"),
+    "wedges": _Look("#0072B2", "s", "wedges (FCL)", 0, (-44.0, -22.0), "center"),
+    "hulls": _Look("#CC79A7", "D", "CoACD hulls (FCL)", -1, (14.0, 0.0), "left"),
+    "mesh": _Look("#009E73", "o", "mesh (FCL)", 0, (14.0, -22.0), "center"),
+    "coal": _Look("#000000", "P", "coal", -1, (-22.0, 10.0), "right"),
+    "mujoco": _Look("#8A6D00", "X", "MuJoCo", -1, (-24.0, -16.0), "right"),
+    "trimesh": _Look("#5B7F95", "<", "trimesh", 0, (4.0, -40.0), "center"),
+    "manifold3d": _Look("#7A5195", ">", "manifold3d", 0, (4.0, 24.0), "left"),
+    "open-cascade": _Look("#7F2704", "h", "Open CASCADE (B-rep)", 0, (0.0, 26.0), "center"),
 }
-"""Where a family's name stands: at its least (0) or greatest (-1) error, offset in points, alignment."""
 
 _QUIET = "#6B7480"
 _SMALL: dict[str, Any] = {"fontsize": 8, "color": _QUIET}
@@ -96,19 +93,16 @@ def comparison_figure(found: Comparison, command: str) -> Figure:
     axes = figure.subplots(2, 2, sharex="col", sharey="row", gridspec_kw=grid)
     figure.subplots_adjust(left=0.08, right=0.985, top=0.875, bottom=0.185, wspace=0.05, hspace=0.07)
     rows = found.measured
-    _limits(axes, rows)
-    for ax in axes.flat:
-        _plain(ax)
+    _frame(axes, rows)
     for time, _ in axes:
         _front(time, rows)
     for family in dict.fromkeys(row.method for row in rows):
         members = sorted((r for r in rows if r.method == family), key=lambda r: r.worst_error)
         for time, setup in axes:
-            _curve(time, members, [r.one * 1e6 for r in members])
+            _curve(time, members, _micro(members))
             _curve(setup, members, [max(r.setup, 1e-3) for r in members])
         _label(axes[0 if members[0].worst_error > _BREAK else 1][0], members)
-    _break_marks(axes)
-    _batch(axes[1][0], rows)
+    _batch(axes[1][0], [row for row in rows if row.method == "cas"])
     _levels(axes[0][0])
     if isinstance(found.image, Imaged):
         _images(axes[0][0], found.image)
@@ -126,30 +120,31 @@ def comparison_figure(found: Comparison, command: str) -> Figure:
     return figure
 
 
-def _limits(axes: Any, rows: Sequence[Measured]) -> None:
-    """Errors of methods with facets above, of exact ones below; times and set-up times of all."""
-    faceted = [r.worst_error for r in rows if r.worst_error > _BREAK] or [1e-3, 1.0]
-    exact = [max(r.worst_error, _SMALLEST) for r in rows if r.worst_error <= _BREAK] or [1e-15]
-    fastest = min((min(r.one, r.many) for r in rows), default=1e-7) * 1e6
-    slowest = max((r.one for r in rows), default=1e-2) * 1e6
-    for (time, setup), errors, spare in ((axes[0], faceted, 3.0), (axes[1], exact, 15.0)):
-        time.set_ylim(min(errors) / 8.0, max(errors) * spare)
-        time.set_xlim(fastest / 3.0, slowest * 4.0)
-        setup.set_xlim(4e-4, max((r.setup for r in rows), default=1.0) * 4.0)
+def _micro(rows: Iterable[Measured]) -> list[float]:
+    """Microseconds per query."""
+    return [row.one * 1e6 for row in rows]
 
 
-def _plain(ax: Axes) -> None:
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    ax.grid(True, which="major", color="#E3E6EA", lw=0.7)
-    ax.set_axisbelow(True)
-    ax.minorticks_off()
-    ax.spines[["top", "right"]].set_visible(False)
+def _errors(rows: Iterable[Measured]) -> list[float]:
+    """Largest errors as they are drawn, mm."""
+    return [max(row.worst_error, _SMALLEST) for row in rows]
 
 
-def _break_marks(axes: Any) -> None:
-    """Between the upper and the lower panels nothing was measured: the error axis is broken there."""
+def _frame(axes: Any, rows: Sequence[Measured]) -> None:
+    """Errors of methods with facets above, of exact ones below: between them the error axis is broken."""
+    faceted = [error for error in _errors(rows) if error > _BREAK] or [1e-3, 1.0]
+    exact = [error for error in _errors(rows) if error <= _BREAK] or [1e-15]
+    axes[0, 0].set_ylim(min(faceted) / 8.0, max(faceted) * 3.0)
+    axes[1, 0].set_ylim(min(exact) / 8.0, max(exact) * 15.0)
+    times = [1e6 * time for row in rows for time in (row.one, row.many)] or [0.1, 1e4]
+    axes[0, 0].set_xlim(min(times) / 3.0, max(_micro(rows), default=1e4) * 4.0)
+    axes[0, 1].set_xlim(4e-4, max((row.setup for row in rows), default=1.0) * 4.0)
     slash = {"marker": [(-1, -0.6), (1, 0.6)], "ms": 9, "color": INK, "mew": 1.0, "clip_on": False}
+    for ax in axes.flat:
+        ax.set(xscale="log", yscale="log", axisbelow=True)
+        ax.grid(True, which="major", color="#E3E6EA", lw=0.7)
+        ax.minorticks_off()
+        ax.spines[["top", "right"]].set_visible(False)
     for upper, lower in axes.T:
         upper.spines["bottom"].set_visible(False)
         upper.tick_params(axis="x", length=0)
@@ -160,31 +155,22 @@ def _break_marks(axes: Any) -> None:
 def _curve(ax: Axes, members: Sequence[Measured], x: Sequence[float]) -> None:
     """One family: its settings joined by a line, in the order of their error."""
     family = members[0].method
-    colour, marker, _ = _STYLE.get(family, ("#444444", "o", family))
-    y = [max(r.worst_error, _SMALLEST) for r in members]
+    look = _LOOKS.get(family, _Look())
     size, order = (18, 6) if family == "cas" else (7.5, 4)
-    marks: dict[str, Any] = {
-        "color": colour,
-        "marker": marker,
-        "ms": size,
-        "lw": 1.3,
-        "mec": "white",
-        "mew": 0.7,
-        "zorder": order,
-    }
-    ax.plot(x, y, ":" if family == "chords" else "-", **marks)
+    marks: dict[str, Any] = {"marker": look.marker, "ms": size, "mec": "white", "mew": 0.7}
+    style = ":" if family == "chords" else "-"
+    ax.plot(x, _errors(members), style, color=look.colour, lw=1.3, zorder=order, **marks)
 
 
 def _label(ax: Axes, members: Sequence[Measured]) -> None:
     family = members[0].method
-    colour, _, name = _STYLE.get(family, ("#444444", "o", family))
-    which, dx, dy, align = _LABELS.get(family, (0, 10.0, 0.0, "left"))
-    row = members[which]
-    leader = {"arrowstyle": "-", "color": colour, "lw": 0.8, "shrinkA": 1, "shrinkB": 5}
-    style: dict[str, Any] = {"color": colour, "ha": align, "va": "center", "linespacing": 1.1, "zorder": 8}
+    look = _LOOKS.get(family, _Look(name=family))
+    row = [members[look.which]]
+    leader = {"arrowstyle": "-", "color": look.colour, "lw": 0.8, "shrinkA": 1, "shrinkB": 5}
+    style: dict[str, Any] = {"color": look.colour, "ha": look.align, "va": "center", "linespacing": 1.1, "zorder": 8}
     style |= {"fontsize": 11 if family == "cas" else 9.5, "fontweight": "bold", "textcoords": "offset points"}
-    at = (row.one * 1e6, max(row.worst_error, _SMALLEST))
-    ax.annotate(name, at, (dx, dy), arrowprops=leader if math.hypot(dx, dy) > 19.0 else None, **style)
+    arrow = leader if math.hypot(*look.offset) > 19.0 else None
+    ax.annotate(look.name, (_micro(row)[0], _errors(row)[0]), look.offset, arrowprops=arrow, **style)
 
 
 def _levels(ax: Axes) -> None:
@@ -194,31 +180,22 @@ def _levels(ax: Axes) -> None:
         ax.text(1.0, value, f"{degrees:g}° chords", transform=across, ha="right", va="center", zorder=1, **_SMALL)
 
 
-def _batch(ax: Axes, rows: Iterable[Measured]) -> None:
+def _batch(ax: Axes, exact: Sequence[Measured]) -> None:
     """The exact method's time in a batch: a hollow mark."""
-    for row in rows:
-        if row.method == "cas":
-            colour, marker, _ = _STYLE[row.method]
-            one, many, y = row.one * 1e6, row.many * 1e6, max(row.worst_error, _SMALLEST)
-            ax.plot([many, one], [y, y], color=colour, lw=1.3, zorder=3)
-            ax.plot([many], [y], marker=marker, ms=18, mfc="white", mec=colour, mew=1.4, zorder=6)
-            style: dict[str, Any] = {
-                "textcoords": "offset points",
-                "fontsize": 8.5,
-                "color": colour,
-                "ha": "center",
-                "zorder": 8,
-            }
-            ax.annotate("in a batch", (many, y), (0, -17), **style)
-            ax.annotate("one call", (one, y), (0, -17), **style)
+    colour, marker, *_ = _LOOKS["cas"]
+    style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8.5, "color": colour, "ha": "center"}
+    for many, one, y in zip([1e6 * row.many for row in exact], _micro(exact), _errors(exact), strict=True):
+        ax.plot([many, one], [y, y], color=colour, lw=1.3, zorder=3)
+        ax.plot([many], [y], marker=marker, ms=18, mfc="white", mec=colour, mew=1.4, zorder=6)
+        for words, x in (("in a batch", many), ("one call", one)):
+            ax.annotate(words, (x, y), (0, -17), zorder=8, **style)
 
 
 def _front(ax: Axes, rows: Sequence[Measured]) -> None:
     """Pareto front of all methods, and of all but clamp3d's own exact one."""
     for front, line, width in ((pareto(rows), "-", 3.0), (pareto([r for r in rows if r.method != "cas"]), "--", 1.3)):
         if front:
-            x = [r.one * 1e6 for r in front]
-            y = [max(r.worst_error, _SMALLEST) for r in front]
+            x, y = _micro(front), _errors(front)
             ax.step([x[0], *x, 1e9], [1e9, *y, y[-1]], line, where="post", color="#A7AFB9", lw=width, zorder=2)
     front, bottom = pareto(rows), ax.get_ylim()[0]
     if front and front[0].worst_error < bottom:

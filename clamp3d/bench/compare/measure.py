@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -120,13 +123,8 @@ def repeated(run: Callable[[], object], budget: float, most: int = 15) -> float:
 
 def resident() -> float | None:
     """Memory of this process in MB: resident now (Linux), its peak (macOS), None elsewhere."""
-    try:
-        with open("/proc/self/statm", encoding="ascii") as file:
-            import os
-
-            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
-    except OSError:
-        pass
+    with suppress(OSError):
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
     try:
         import resource
     except ImportError:

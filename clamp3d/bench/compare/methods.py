@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -40,11 +41,9 @@ class Method:
     @property
     def label(self) -> str:
         """The method in words, 'wedges 5 deg'."""
-        return (
-            self.family
-            if self.setting is None
-            else f"{self.family} {self.setting:g} {UNITS.get(self.family, 'deg')}".rstrip()
-        )
+        if self.setting is None:
+            return self.family
+        return f"{self.family} {self.setting:g} {UNITS.get(self.family, 'deg')}".rstrip()
 
     @property
     def key(self) -> str:
@@ -89,13 +88,9 @@ METHODS = (
 
 def load(method: Method) -> None:
     """Import what the method needs, so that its set-up time is its own."""
-    if method.family == "cas":
-        import clamp3d.core.kernel  # noqa: F401
-    elif method.family != "chords":
-        import fcl  # noqa: F401
-        import manifold3d  # noqa: F401
-        import scipy.spatial  # noqa: F401
-        import trimesh  # noqa: F401
+    own = {"cas": ("clamp3d.core.kernel",), "chords": ()}
+    for module in own.get(method.family, ("fcl", "manifold3d", "scipy.spatial", "trimesh")):
+        importlib.import_module(module)
 
 
 def prepare(method: Method, *, time_limit: float = 300.0) -> Prepared:

@@ -18,11 +18,12 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from clamp3d.baselines.wedges import part_wedges, prism
+from clamp3d.baselines.wedges import wedge_solids
 from clamp3d.bench.compare.methods import Method, Prepared
 from clamp3d.bench.compare.scene import WIRE, block, chord_error, pair
 from clamp3d.core.pose import Array
@@ -31,47 +32,45 @@ from clamp3d.core.profile import chord_count
 PEER_ANGLES_DEG = (1.0, 5.0, 20.0)
 _FARTHEST = 2.0  # mm
 
-_MODULES = {
-    "coal": ("coal", "coal"),
-    "mujoco": ("mujoco", "mujoco"),
-    "trimesh": ("trimesh", "trimesh"),
-    "manifold3d": ("manifold3d", "manifold3d"),
-    "open-cascade": ("OCP", "cadquery-ocp-novtk"),
-}
-"""Peer: module, what to install."""
+_Ready = tuple[Callable[[Array], float], int, bool]
+"""What measures a pose in mm, the number of its pieces, and whether it has a depth."""
 
-PEER_METHODS = (
-    *(Method(peer, angle) for peer in ("coal", "mujoco", "trimesh", "manifold3d") for angle in PEER_ANGLES_DEG),
-    Method("open-cascade"),
-)
+
+class _Peer(NamedTuple):
+    """How a library is installed and set up: ``make`` takes the unit angle, ``needs`` are modules to import first."""
+
+    package: str
+    needs: tuple[str, ...]
+    make: Callable[[float], _Ready]
 
 
 def missing_peers() -> dict[str, str]:
     """Each peer that is not installed, with what to install."""
     return {
-        peer: f"not installed: pip install {package} (or 'clamp3d[peers]')"
-        for peer, (module, package) in _MODULES.items()
-        if importlib.util.find_spec(module) is None
+        name: f"not installed: pip install {peer.package} (or 'clamp3d[peers]')"
+        for name, peer in _PEERS.items()
+        if importlib.util.find_spec(peer.needs[0]) is None
     }
 
 
 def load_peer(method: Method) -> None:
     """Import what the peer and its input need, so that its set-up time is its own."""
-    modules = [_MODULES[method.family][0]]
-    if method.family == "open-cascade":
-        modules.append("OCP.BRepExtrema")
-    if method.family in ("trimesh", "manifold3d"):  # their meshes are made by both
-        modules += ["trimesh.collision", "fcl", "manifold3d", "scipy.spatial"]
-    for module in modules:
+    for module in _PEERS[method.family].needs:
         importlib.import_module(module)
 
 
 def prepare_peer(method: Method) -> Prepared:
     """Set a peer up for the scene of `compare.scene`, everything in the groove's frame."""
-    return _MAKERS[method.family](math.radians(method.setting or 0.0))
+    one, pieces, depth = _PEERS[method.family].make(math.radians(method.setting or 0.0))
+
+    def many(poses: Array) -> Array:
+        return np.array([one(T) for T in poses])
+
+    many(np.eye(4)[None])
+    return Prepared(one, many, pieces, depth=depth)
 
 
-def _coal(unit_angle: float) -> Prepared:
+def _coal(unit_angle: float) -> _Ready:
     coal: Any = importlib.import_module("coal")
     manager = coal.DynamicAABBTreeCollisionManager()
     keep = []
@@ -95,10 +94,11 @@ def _coal(unit_angle: float) -> Prepared:
         manager.distance(wire, callback)
         return float(callback.data.result.min_distance)
 
-    return _looped(one, len(keep), keep)
+    one.keep = keep  # type: ignore[attr-defined]  # coal's bindings hold bare pointers
+    return one, len(keep), False
 
 
-def _mujoco(unit_angle: float) -> Prepared:
+def _mujoco(unit_angle: float) -> _Ready:
     mujoco: Any = importlib.import_module("mujoco")
     mm = 1e-3
     assets, geoms = [], []
@@ -121,10 +121,10 @@ def _mujoco(unit_angle: float) -> Prepared:
         mujoco.mj_sensorPos(model, data)
         return float(data.sensordata[0]) / mm
 
-    return _looped(one, len(geoms), None, depth=True)
+    return one, len(geoms), True
 
 
-def _trimesh(unit_angle: float) -> Prepared:
+def _trimesh(unit_angle: float) -> _Ready:
     trimesh: Any = importlib.import_module("trimesh")
     collision: Any = importlib.import_module("trimesh.collision")
     V, F = _mesh(unit_angle)
@@ -136,10 +136,10 @@ def _trimesh(unit_angle: float) -> Prepared:
         wire.set_transform("wire", T)
         return float(part.min_distance_other(wire))
 
-    return _looped(one, len(F), None)
+    return one, len(F), False
 
 
-def _manifold(unit_angle: float) -> Prepared:
+def _manifold(unit_angle: float) -> _Ready:
     import manifold3d
 
     V, F = _mesh(unit_angle)
@@ -150,10 +150,10 @@ def _manifold(unit_angle: float) -> Prepared:
     def one(T: Array) -> float:
         return float(part.min_gap(wire.transform(T[:3]), _FARTHEST))
 
-    return _looped(one, len(F), None)
+    return one, len(F), False
 
 
-def _open_cascade(_: float) -> Prepared:
+def _open_cascade(_: float) -> _Ready:
     from OCP.BRepExtrema import BRepExtrema_DistShapeShape
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
     from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf
@@ -174,38 +174,12 @@ def _open_cascade(_: float) -> Prepared:
     def one(T: Array) -> float:
         return float(BRepExtrema_DistShapeShape(part, wire.Moved(location(T))).Value())
 
-    return _looped(one, 1, None)
-
-
-_MAKERS = {
-    "coal": _coal,
-    "mujoco": _mujoco,
-    "trimesh": _trimesh,
-    "manifold3d": _manifold,
-    "open-cascade": _open_cascade,
-}
-
-
-def _looped(one: Any, pieces: int, keep: object, *, depth: bool = False) -> Prepared:
-    """A peer that takes poses one by one; ``keep`` lives as long as it does (bindings hold bare pointers)."""
-
-    def many(poses: Array, _keep: object = keep) -> Array:
-        return np.array([one(T) for T in poses])
-
-    many(np.eye(4)[None])
-    return Prepared(one, many, pieces, depth=depth)
+    return one, 1, False
 
 
 def _convex_pieces(unit_angle: float) -> list[tuple[Array, Any]]:
     """Vertices and triangles of the block's wedges in the groove's frame."""
-    part = block()
-    body = part.bodies[0]
-    to_groove = body.frame.T @ pair().T_a_groove[:3, :3]
-    pieces = []
-    for wedge in part_wedges(part, unit_angle):
-        V, F = prism(wedge.polygon, body.start, body.end)
-        pieces.append((V @ to_groove, F))
-    return pieces
+    return [(V @ pair().T_a_groove[:3, :3], F) for V, F in wedge_solids(block(), unit_angle).values()]
 
 
 def _mesh(unit_angle: float) -> tuple[Array, Any]:
@@ -218,3 +192,17 @@ def _mesh(unit_angle: float) -> tuple[Array, Any]:
 
 def _sections(unit_angle: float) -> int:
     return max(3, chord_count(2.0 * math.pi, unit_angle))
+
+
+_MESHED = ("trimesh.collision", "fcl", "manifold3d", "scipy.spatial")  # what makes the meshes
+_PEERS = {
+    "coal": _Peer("coal", ("coal",), _coal),
+    "mujoco": _Peer("mujoco", ("mujoco",), _mujoco),
+    "trimesh": _Peer("trimesh", ("trimesh", *_MESHED), _trimesh),
+    "manifold3d": _Peer("manifold3d", ("manifold3d", *_MESHED), _manifold),
+    "open-cascade": _Peer("cadquery-ocp-novtk", ("OCP", "OCP.BRepExtrema"), _open_cascade),
+}
+PEER_METHODS = (
+    *(Method(peer, angle) for peer in _PEERS if peer != "open-cascade" for angle in PEER_ANGLES_DEG),
+    Method("open-cascade"),
+)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -79,18 +79,19 @@ class Family(ABC):
         """Case i of n as Python lines that run by themselves, the truth in the last one, a comment."""
 
 
-F = TypeVar("F", bound=Family)
+class Makers(dict[str, tuple[str, Callable[..., Any]]]):
+    """Name of a family -> what is hard in it, which its generator's docstring says, and the generator."""
 
+    def __init__(self, kind: str = "") -> None:
+        super().__init__()
+        self._kind = kind
 
-def into(families: dict[str, F], build: Callable[..., F]) -> Callable[..., Callable[[Any], Any]]:
-    """A decorator ``(name, about, **options)`` of generators: ``build(name, about, make, **options)`` is added."""
+    def family(self, name: str, wrap: Callable[[Any], Any] = lambda make: make) -> Callable[[Any], Any]:
+        """A decorator that adds a generator, ``wrap`` about it."""
 
-    def family(name: str, about: str, **options: Any) -> Callable[[Any], Any]:
         def register(make: Any) -> Any:
-            made = build(name, about, make, **options)
-            families[made.name] = made
+            about = " ".join((make.__doc__ or "").split("\n\n")[0].split()).rstrip(".")
+            self[self._kind + name] = (about[:1].lower() + about[1:], wrap(make))
             return make
 
         return register
-
-    return family

@@ -5,8 +5,7 @@ from __future__ import annotations
 from clamp3d.bench.pages import render
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES, COUNTS
 from clamp3d.bench.stress.outcome import Outcome
-from clamp3d.bench.stress.registry import FAMILIES, METHODS
-from clamp3d.bench.stress.run import StressRun
+from clamp3d.bench.stress.run import FAMILIES, METHODS, StressRun
 from clamp3d.output.tables import text_table
 
 

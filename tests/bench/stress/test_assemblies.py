@@ -10,8 +10,7 @@ import pytest
 from clamp3d.baselines.cas import Cas
 from clamp3d.bench.stress.assemblies.clamps import MAKERS, clamp_of, open_start, random_clamp, scaled
 from clamp3d.bench.stress.assemblies.envelope import Envelope
-from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
-from clamp3d.bench.stress.assemblies.methods import EXACT
+from clamp3d.bench.stress.assemblies.family import ASSEMBLIES, EXACT
 from clamp3d.bench.stress.assemblies.minima import minima
 from clamp3d.bench.stress.run import run_family
 from clamp3d.clamp.equilibria import equilibria

@@ -7,8 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from clamp3d.bench.stress.meshes.cases import LEAST
-from clamp3d.bench.stress.meshes.family import MESHES, MeshFamily
-from clamp3d.bench.stress.meshes.methods import METHODS
+from clamp3d.bench.stress.meshes.family import MESHES, METHODS, MeshFamily
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.poses.truth import truth, truth_50_digits
 from clamp3d.bench.stress.run import run_stress

@@ -10,13 +10,12 @@ import clamp3d
 import clamp3d.collide.motions as collide_motions
 from clamp3d.bench.stress.motions import methods
 from clamp3d.bench.stress.motions.cases import motions, poses
-from clamp3d.bench.stress.motions.families import MOTIONS
+from clamp3d.bench.stress.motions.family import MOTIONS
 from clamp3d.bench.stress.motions.truth import TRUTH_ERROR, truth
 from clamp3d.bench.stress.poses.cases import Cases, Shapes
 from clamp3d.bench.stress.poses.truth import EXTENDED_WORKS
 from clamp3d.bench.stress.poses.truth import truth as pose_truth
-from clamp3d.bench.stress.registry import FAMILIES
-from clamp3d.bench.stress.run import run_family
+from clamp3d.bench.stress.run import FAMILIES, run_family
 
 CASES = 2000
 

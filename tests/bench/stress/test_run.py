@@ -9,8 +9,8 @@ from click.testing import CliRunner
 
 from clamp3d.bench.stress.outcome import Outcome, judge
 from clamp3d.bench.stress.poses.cases import Cases, Shapes
-from clamp3d.bench.stress.poses.families import POSES
-from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, EXTENDED_WORKS, truth, truth_50_digits
+from clamp3d.bench.stress.poses.family import POSES
+from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, EXTENDED_WORKS, point_sdf, truth, truth_50_digits
 from clamp3d.bench.stress.run import run_family, run_stress
 from clamp3d.bench.stress.worker import Answers, Measured, run_isolated
 from clamp3d.cli import group
@@ -27,6 +27,27 @@ def test_cas_is_never_wrong_and_never_beyond_its_bound(family):
     assert (outcome.false_hits, outcome.false_misses, outcome.exceptions, outcome.crashes) == (0, 0, 0, 0)
     assert outcome.beyond_bound == 0, outcome.examples
     assert outcome.worst_relative < 1e-14
+
+
+@pytest.mark.skipif(not EXTENDED_WORKS, reason="the quick truth needs 80-bit floats")
+@pytest.mark.parametrize("family", POSES)
+def test_no_point_of_the_axis_is_lower_than_the_truth(family):
+    """Against plain sampling, which knows neither slopes nor stretches; between samples a distance has slope 1."""
+    cases = POSES[family].cases(100, 11)
+    s, k = cases.shapes, cases.shape
+    R, a, H, r, half = (np.asarray(v, np.longdouble)[k, None] for v in (s.R, s.half_angle, s.L / 2, s.r, s.length / 2))
+    T = np.asarray(cases.T_world_wire, np.longdouble)
+    if cases.T_world_groove is not None:
+        G = np.asarray(cases.T_world_groove, np.longdouble)
+        T = np.swapaxes(G, 1, 2) @ (T - G * [0, 0, 0, 1])
+    axis = T[:, :3, 2] / np.sqrt((T[:, :3, 2] ** 2).sum(1))[:, None]
+    rng = np.random.default_rng(1)
+    t = np.sort(np.concatenate([half * rng.uniform(-1, 1, (100, 1999)), -half, half], 1), axis=1)
+    x, y, z = (T[:, i, 3, None] + t * axis[:, i, None] for i in range(3))
+    sampled = point_sdf(x, y, z, R, R * np.sin(a), -R * np.cos(a), H) - r
+    exact, rounding = truth(cases), EXTENDED_ERROR * cases.scene()
+    assert (exact <= sampled.min(1) + rounding).all()
+    assert (exact >= sampled.min(1) - np.diff(t).max(1) / 2 - rounding).all()
 
 
 @pytest.mark.parametrize("family", ["tangency", "parallel tangency", "sizes", "metres", "nearly parallel"])

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.baselines.cas import Cas
+from clamp3d.bench.stress.family import Makers
 from clamp3d.clamp.dimensions import Clamp, Wire
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import Section
@@ -33,24 +34,19 @@ class Case:
     start: Array | None = None
 
 
-Maker = Callable[[np.random.Generator], Case]
-MAKERS: dict[str, tuple[str, Maker]] = {}
+MAKERS = Makers("assembly: ")
 
 
-def _family(name: str, about: str) -> Callable[[Callable[[np.random.Generator], Clamp | Case | None]], Any]:
-    """Add a generator, which is asked again where it gives None: grooves that do not fit into the splints."""
+def _fitting(make: Callable[[np.random.Generator], Clamp | Case | None]) -> Callable[[np.random.Generator], Case]:
+    """The generator, asked again where it gives None: grooves that do not fit into the splints."""
 
-    def register(make: Callable[[np.random.Generator], Clamp | Case | None]) -> Any:
-        def case(rng: np.random.Generator) -> Case:
-            found = None
-            while found is None:
-                found = make(rng)
-            return found if isinstance(found, Case) else Case(found)
+    def case(rng: np.random.Generator) -> Case:
+        found = None
+        while found is None:
+            found = make(rng)
+        return found if isinstance(found, Case) else Case(found)
 
-        MAKERS[f"assembly: {name}"] = (about, case)
-        return make
-
-    return register
+    return case
 
 
 @cache
@@ -125,29 +121,30 @@ def open_start(rng: np.random.Generator, section: Section) -> Array:
             return q
 
 
-@_family("random clamps", "grooves and wires of any size, closed from the open clamp")
+@MAKERS.family("random clamps", _fitting)
 def _random(rng: np.random.Generator) -> Clamp:
+    """Grooves and wires of any size, closed from the open clamp."""
     return random_clamp(rng)
 
 
-@_family("poor starts", "far open, fully tilted, wires against a lip or beside the middle")
+@MAKERS.family("poor starts", _fitting)
 def _poor(rng: np.random.Generator) -> Case:
+    """Far open, fully tilted, wires against a lip or beside the middle."""
     clamp = random_clamp(rng)
     return Case(clamp, open_start(rng, Section(clamp, Cas())))
 
 
-@_family(
-    "equal clearances",
-    "grooves and wires equal, or up to 1e-12 ... 1e-3: rounding decides which contacts are active",
-)
+@MAKERS.family("equal clearances", _fitting)
 def _equal(rng: np.random.Generator) -> Clamp | None:
+    """Grooves and wires equal, or up to 1e-12 ... 1e-3: rounding decides which contacts are active."""
     R, half, offset = _RADIUS * rng.uniform(0.5, 1.2), rng.uniform(0.3, 1.3), _OFFSET * rng.uniform(0.85, 1.15)
     wire = 2.0 * R * rng.uniform(0.3, 1.3)
     return clamp_of(R * _near_one(rng, 4), half, offset * _near_one(rng, 4), wire * _near_one(rng, 2))
 
 
-@_family("wire fills groove", "a wire's radius is a groove's, or up to 1e-12 ... 1e-3 beside it: arc or both lips")
+@MAKERS.family("wire fills groove", _fitting)
 def _fills(rng: np.random.Generator) -> Clamp | None:
+    """A wire's radius is a groove's, or up to 1e-12 ... 1e-3 beside it: arc or both lips."""
     R, half, offset = _grooves(rng)
     if rng.random() < 0.5:  # facing grooves alike: it fills both
         R[2:], half[2:], offset[2:] = R[:2] * _near_one(rng, 2), half[:2], offset[:2] * _near_one(rng, 2)
@@ -158,8 +155,9 @@ def _fills(rng: np.random.Generator) -> Clamp | None:
     return clamp_of(R, half, offset, wires)
 
 
-@_family("lip contacts", "wires thicker than their grooves, or grooves aside: on lips, or about to slide onto one")
+@MAKERS.family("lip contacts", _fitting)
 def _lips(rng: np.random.Generator) -> Clamp | None:
+    """Wires thicker than their grooves, or grooves aside: on lips, or about to slide onto one."""
     R, half, offset = _grooves(rng)
     if rng.random() < 0.5:  # facing grooves so far aside that arc and lip compete
         offset[2:] = offset[:2] + R[:2] * np.sin(half[:2]) * rng.uniform(-0.6, 0.6, 2)
@@ -169,8 +167,9 @@ def _lips(rng: np.random.Generator) -> Clamp | None:
     return clamp_of(R, half, offset, wires)
 
 
-@_family("faces meet", "wires about as thick as both grooves are deep: held by the wires, by the faces, or by both")
+@MAKERS.family("faces meet", _fitting)
 def _faces(rng: np.random.Generator) -> Clamp | None:
+    """Wires about as thick as both grooves are deep: held by the wires, by the faces, or by both."""
     R, half, offset = _grooves(rng)
     offset[2:] = offset[:2] * (1.0 + rng.uniform(-0.02, 0.02, 2))
     depth = R * 2.0 * np.sin(0.5 * half) ** 2
@@ -178,15 +177,17 @@ def _faces(rng: np.random.Generator) -> Clamp | None:
     return clamp_of(R, half, offset, wires)
 
 
-@_family("tilt limit", "one thick and one thin wire and little tilt: the limit carries, or nearly does")
+@MAKERS.family("tilt limit", _fitting)
 def _tilted(rng: np.random.Generator) -> Clamp | None:
+    """One thick and one thin wire and little tilt: the limit carries, or nearly does."""
     R, half, offset = _grooves(rng)
     wires = np.array([rng.uniform(20.0, 60.0), rng.uniform(2.0, 20.0)])[:: int(rng.choice([-1, 1]))]
     return clamp_of(R, half, offset, wires, max_tilt_deg=float(rng.choice([1e-6, 1e-3, rng.uniform(0.1, 12.8)])))
 
 
-@_family("sizes", "the whole clamp 1e-3 to 1e2 times its size: metres in place of millimetres, or a clamp of metres")
+@MAKERS.family("sizes", _fitting)
 def _sizes(rng: np.random.Generator) -> Clamp:
+    """The whole clamp 1e-3 to 1e2 times its size: metres in place of millimetres, or a clamp of metres."""
     return scaled(random_clamp(rng), float(10.0 ** rng.uniform(-3.0, 2.0)))
 
 

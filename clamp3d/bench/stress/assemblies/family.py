@@ -8,17 +8,115 @@ a clamp of which the exact solver did not name every firm equilibrium (`Minimum`
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from clamp3d.baselines import Cas, Chords
 from clamp3d.bench.stress.assemblies.clamps import MAKERS, Case, snippet
 from clamp3d.bench.stress.assemblies.envelope import Envelope
-from clamp3d.bench.stress.assemblies.methods import METHODS, Assemblies, Rest
 from clamp3d.bench.stress.assemblies.minima import Minimum, minima
 from clamp3d.bench.stress.family import Family
 from clamp3d.bench.stress.outcome import REFERENCE, Outcome, examples, score
-from clamp3d.bench.stress.worker import Answers, run_here
+from clamp3d.bench.stress.worker import Answers, Measured, Measures, Rows, run_here
+from clamp3d.clamp.assemble import STEP, TILT_STEP
+from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.equilibria import equilibria
+from clamp3d.clamp.final_state import solve_final_state
+from clamp3d.clamp.section import Section
+from clamp3d.clamp.stepped import solve_stepped
+from clamp3d.core.pose import Array
+from clamp3d.core.profile import chord_count, sagitta
+
+EXACT = 1e-8
+"""Bound in mm of the exact solver's answers: ten times the residuals that it proves, and of a clamp of usual size."""
+
+_UNIT = math.radians(5.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """What a solver says of a clamp: the state ``q`` that it comes to, and all states that it can come to, if told."""
+
+    q: Array
+    others: tuple[Array, ...] | None
+
+
+@dataclass(frozen=True)
+class Assemblies(Rows):
+    """Cases, each of a shape of its own: ``shape`` (n,) are their places in the family."""
+
+    cases: Sequence[Case]
+    shape: NDArray[np.intp]
+
+
+class Solver:
+    """A method that keeps what it found: ``rests``, by the number of the case."""
+
+    measures: Measures = "depth"
+
+    def __init__(self, solve: Callable[[Case], Rest], bound: Callable[[Clamp], float]) -> None:
+        self._solve, self._bound = solve, bound
+        self.rests: dict[int, Rest] = {}
+
+    def measure(self, cases: Assemblies) -> Measured:
+        """Distances between the splints."""
+        distance, bound = np.empty(len(cases)), np.empty(len(cases))
+        for k, number in enumerate(cases.shape):
+            case = cases.cases[number]
+            self.rests[int(number)] = rest = self._solve(case)
+            distance[k] = Section(case.clamp, Cas()).splint_distance(rest.q)
+            bound[k] = self._bound(case.clamp)
+        return Measured(distance, bound)
+
+
+def _exact(case: Case) -> Rest:
+    section = Section(case.clamp, Cas())
+    state = solve_final_state(section, case.start)
+    return Rest(state.q, tuple(other.q for other in equilibria(section)))
+
+
+def _chords(case: Case) -> Rest:
+    return Rest(solve_final_state(Section(case.clamp, Chords(_UNIT)), case.start).q, None)
+
+
+def _stepped(case: Case) -> Rest:
+    return Rest(solve_stepped(Section(case.clamp, Cas()), step=STEP, tilt_step=TILT_STEP).q, None)
+
+
+def _chord_bound(clamp: Clamp) -> float:
+    """Sagittas of the two grooves of a wire over the cosine of the steepest contact: forces add up to the bolt's."""
+    up, down = clamp.up_splint, clamp.down_splint
+    worst = 0.0
+    for key in ("line_groove", "jumper_groove"):
+        error, steepest = 0.0, 0.0
+        for part, face, tilt in ((up, up.thickness, 0.0), (down, down.face_depth, down.max_tilt)):
+            groove = getattr(part, key)
+            half = math.acos(min(1.0, abs(groove.centre_depth - face) / groove.radius))
+            error += sagitta(groove.radius, 2.0 * half / chord_count(2.0 * half, _UNIT))
+            steepest = max(steepest, half + tilt)
+        worst = max(worst, error / math.cos(steepest) if steepest < 0.5 * math.pi else math.inf)
+    return worst
+
+
+METHODS: dict[str, tuple[str, Callable[[], Solver]]] = {
+    "cas": (
+        "closed forms of the arc groove; its bound is that of rounding; of a clamp the exact solver, 1e-8 mm",
+        lambda: Solver(_exact, lambda clamp: EXACT),
+    ),
+    "chords 5 deg": (
+        "convex partitioning in the section, chords of 5 degrees; its bound is the chord error",
+        lambda: Solver(_chords, _chord_bound),
+    ),
+    "stepped": (
+        "of a clamp the paper's search: the down splint moves by 1/3 mm and 1 degree; its bound is the step",
+        lambda: Solver(_stepped, lambda clamp: STEP),
+    ),
+}
+
 
 COUNTS = (
     "one clamp for 100 cases; a false hit is an answer that is not an equilibrium within the method's bound, a false "
@@ -72,7 +170,7 @@ class AssemblyFamily(Family):
         d, error, missed, near = (np.full(n, np.nan) for _ in range(4))
         for i, rest in truths.rests.items():
             d[i] = rest.q[4]
-            error[i], missed[i], near[i] = _error(truths, i, rest), _missed(truths, i, rest), truths.nearest(i, d[i])
+            error[i], missed[i], near[i] = truths.error(i, rest), truths.missed(i, rest), truths.nearest(i, d[i])
         no_rest, miss = error > answers.bound, np.isfinite(missed)
         found = examples("no equilibrium", np.flatnonzero(no_rest), near, d)
         found += examples("equilibrium not named", np.flatnonzero(miss), missed, d)
@@ -83,48 +181,39 @@ class AssemblyFamily(Family):
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
         cases = self.cases(n, seed)
-        truth = ", ".join(repr(m.d) + ("" if m.firm else " (shallow)") for m in _Truths(cases)[i])
+        truth = ", ".join(repr(m.d) + ("" if m.firm else " (shallow)") for m in _Truths(cases)[i][1])
         return f"{snippet(cases.cases[i])}\n{_AS_PYTHON}# truth: equilibria at d = {truth} mm"
 
 
-class _Truths:
-    """Equilibria of each case, worked out when first asked for."""
+class _Truths(dict[int, tuple[Envelope, list[Minimum]]]):
+    """Envelope and equilibria of each case, worked out when first asked for; ``rests`` are the answers to judge."""
 
     def __init__(self, cases: Assemblies) -> None:
+        super().__init__()
         self.cases = cases
         self.rests: dict[int, Rest] = {}
-        self.envelopes: dict[int, Envelope] = {}
-        self._found: dict[int, list[Minimum]] = {}
 
-    def envelope(self, i: int) -> Envelope:
-        if i not in self.envelopes:
-            self.envelopes[i] = Envelope(self.cases.cases[i].clamp)
-        return self.envelopes[i]
-
-    def __getitem__(self, i: int) -> list[Minimum]:
-        if i not in self._found:
-            self._found[i] = minima(self.envelope(i))
-        return self._found[i]
+    def __missing__(self, i: int) -> tuple[Envelope, list[Minimum]]:
+        envelope = Envelope(self.cases.cases[i].clamp)
+        self[i] = envelope, minima(envelope)
+        return self[i]
 
     def nearest(self, i: int, d: float) -> float:
-        return min((found.d for found in self[i]), key=lambda found: abs(found - d), default=float("nan"))
+        return min((found.d for found in self[i][1]), key=lambda found: abs(found - d), default=float("nan"))
+
+    def error(self, i: int, rest: Rest) -> float:
+        """How far an answer is from rest, mm."""
+        if rest.others is None:
+            return abs(self.nearest(i, float(rest.q[4])) - float(rest.q[4]))
+        return max(max(self[i][0].overlap(q), self[i][0].falls(q)) for q in (rest.q, *rest.others))
+
+    def missed(self, i: int, rest: Rest) -> float:
+        """The lowest equilibrium that a solver that is to name all did not; NaN if there is none."""
+        if rest.others is None:
+            return float("nan")
+        (envelope, found), named = self[i], np.array([q[4] for q in rest.others])
+        far = (m.d for m in found if m.firm and np.abs(named - m.d).min() > SAME * envelope.lever)
+        return next(far, float("nan"))
 
 
-def _error(truths: _Truths, i: int, rest: Rest) -> float:
-    if rest.others is None:
-        return abs(truths.nearest(i, float(rest.q[4])) - float(rest.q[4]))
-    envelope = truths.envelope(i)
-    return max(max(envelope.overlap(q), envelope.falls(q)) for q in (rest.q, *rest.others))
-
-
-def _missed(truths: _Truths, i: int, rest: Rest) -> float:
-    """The lowest equilibrium that a solver that is to name all did not; NaN if there is none."""
-    if rest.others is None:
-        return float("nan")
-    named, same = np.array([q[4] for q in rest.others]), SAME * truths.envelope(i).lever
-    return next((m.d for m in truths[i] if m.firm and np.abs(named - m.d).min() > same), float("nan"))
-
-
-ASSEMBLIES: dict[str, AssemblyFamily] = {
-    name: AssemblyFamily(name, about, make) for name, (about, make) in MAKERS.items()
-}
+ASSEMBLIES = {name: AssemblyFamily(name, *made) for name, made in MAKERS.items()}

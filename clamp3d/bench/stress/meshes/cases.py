@@ -14,16 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.bench.stress.family import generator
-from clamp3d.bench.stress.poses.cases import (
-    FEATURES,
-    Cases,
-    Shapes,
-    contact_on,
-    free,
-    place,
-    random_shapes,
-)
-from clamp3d.bench.stress.poses.methods import MESH_ERROR, block
+from clamp3d.bench.stress.poses import draw
+from clamp3d.bench.stress.poses.cases import Cases, Shapes
+from clamp3d.bench.stress.poses.family import MESH_ERROR, block
 from clamp3d.bench.stress.worker import Rows
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.pose import Array
@@ -137,7 +130,7 @@ def _shapes(rng: np.random.Generator, m: int, **given: ArrayLike) -> Shapes:
     half = np.where(rng.random(m) < 0.3, rng.uniform(1.6, 2.6, m), rng.uniform(0.4, 1.57, m))
     columns: dict[str, ArrayLike] = {"R": R, "half_angle": half, "L": R * rng.uniform(0.5, 5.0, m)}
     columns |= {"r": R * rng.uniform(0.3, 0.95, m), "length": R * rng.uniform(0.5, 4.0, m)}
-    return random_shapes(rng, m, **(columns | {name: R * np.asarray(value) for name, value in given.items()}))
+    return draw.shapes(rng, m, **(columns | {name: R * np.asarray(value) for name, value in given.items()}))
 
 
 def _anywhere(rng: np.random.Generator, m: int) -> Cases:
@@ -145,7 +138,7 @@ def _anywhere(rng: np.random.Generator, m: int) -> Cases:
     shapes = _shapes(rng, m)
     rows = np.arange(m, dtype=np.intp)
     gap = shapes.r * rng.choice([-1.0, 1.0], m) * rng.uniform(0.03, 0.6, m)
-    return place(rng, shapes, rows, contact_on(rng, shapes, rows, rng.choice(FEATURES, m)), gap)
+    return draw.place(rng, shapes, rows, draw.contact_on(rng, shapes, rows, rng.choice(draw.FEATURES, m)), gap)
 
 
 def _contained(rng: np.random.Generator, m: int) -> Cases:
@@ -155,4 +148,4 @@ def _contained(rng: np.random.Generator, m: int) -> Cases:
     out = shapes.R + shapes.r * rng.uniform(1.5, 3.0, m)
     centre = np.stack([out * np.sin(side), -out * np.cos(side), shapes.L * rng.uniform(-0.1, 0.1, m)], 1)
     axis = np.tile([0.0, 0.0, 1.0], (m, 1))
-    return free(rng, shapes, np.arange(m, dtype=np.intp), centre, axis)
+    return draw.free(rng, shapes, np.arange(m, dtype=np.intp), centre, axis)

@@ -1,20 +1,191 @@
-"""Families of meshes: broken ones, and good ones that are hard to read. `MESHES` maps name -> `MeshFamily`."""
+"""Families of meshes, broken ones and good ones that are hard to read, and the methods that read them.
+
+The methods are this package's, and the bare libraries as one would call them without its guards.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.bench.stress.family import Family
+from clamp3d.baselines.fcl_shapes import encoded
+from clamp3d.bench.stress.family import Family, Methods
 from clamp3d.bench.stress.meshes import faults
-from clamp3d.bench.stress.meshes.cases import Fault, MeshCases, make_cases
-from clamp3d.bench.stress.meshes.methods import METHODS
+from clamp3d.bench.stress.meshes.cases import Fault, MeshCase, MeshCases, make_cases
 from clamp3d.bench.stress.outcome import TOUCHING, Outcome, judge
+from clamp3d.bench.stress.poses.family import FCL_ERROR, MESH_ERROR, THRESHOLD, fcl_model
+from clamp3d.bench.stress.poses.family import METHODS as POSE_METHODS
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, truth, truth_50_digits
-from clamp3d.bench.stress.worker import Answers
+from clamp3d.bench.stress.worker import Answers, Measured, Measures
+from clamp3d.core.distance import signed_distances
+from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.pose import inverse
+
+_TIME = 15.0
+"""Seconds for CoACD in method hulls: less than a child may be silent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Distance and its bound in mm, NaN where there is none; ``why`` it does not hold."""
+
+    distance: float
+    bound: float = math.nan
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class OneByOne:
+    """A method that answers one mesh at a time."""
+
+    ask: Callable[[MeshCase], Answer]
+    measures: Measures = "clearance"
+
+    def measure(self, cases: MeshCases) -> Measured:
+        """See `Method`."""
+        found = [self.ask(cases[i]) for i in range(len(cases))]
+        return Measured(
+            np.array([answer.distance for answer in found]),
+            np.array([answer.bound for answer in found]),
+            np.array([bool(answer.why) for answer in found]),
+            next((answer.why for answer in found if answer.why), ""),
+        )
+
+
+def _fcl_model(name: str, bound: float, case: MeshCase) -> Answer:
+    """A contact model made of the mesh as it is; ``bound`` in parts of the groove's radius."""
+    settings = {"threshold": THRESHOLD} if name == "hulls" else {}
+    model = fcl_model(name, case.mesh, case.groove, settings, _TIME)
+    pair = GroovePair("P1", "P6", case.groove, case.mesh.T_mesh_groove, case.wire, np.eye(4))
+    distance = float(model.distances(pair, case.T_mesh_wire[None])[0])
+    return Answer(distance, bound * case.groove.radius + FCL_ERROR + _rounding(case))
+
+
+def _rounding(case: MeshCase) -> float:
+    """What a float64 position may be off by where the mesh is, mm."""
+    return 1e-15 * float(np.abs(case.T_mesh_wire[:3, 3]).max())
+
+
+def _fit(case: MeshCase) -> Answer:
+    """Groove fitted to the mesh, wire in it by the kernel; what the fit says of its own errors is the bound."""
+    from clamp3d.core.mesh import make_mesh
+    from clamp3d.fit.fit import fit_mesh
+
+    mesh = make_mesh(case.mesh.vertices, case.mesh.faces)
+    if not mesh.watertight:
+        return Answer(math.nan, why=f"fit: {next(note for note in mesh.notes if 'open' in note)}")
+    result = fit_mesh(mesh)
+    if not result.grooves:
+        return Answer(math.nan, why=f"fit: {result.notes[-1]}")
+    groove = result.grooves[0]
+    T = np.ascontiguousarray(inverse(groove.T_part_feature) @ case.T_mesh_wire)
+    found = signed_distances(groove.shape, case.wire, T[None], full=True, workers=1)
+    ends = groove.radius * groove.arc_error + groove.length_error
+    bound = float(found.error_bound[0]) + groove.fit_error + ends + mesh.rounding
+    return Answer(float(found.distance[0]), bound)
+
+
+def _scene(case: MeshCase) -> Answer:
+    """A scene of the mesh and the wire, checked: what the mesh is for a user who wants a verdict."""
+    from clamp3d.collide.check import check
+    from clamp3d.collide.scene import Scene
+    from clamp3d.collide.verdict import Verdict
+    from clamp3d.core.mesh import make_mesh
+    from clamp3d.core.shapes import MeshShape
+
+    mesh = make_mesh(case.mesh.vertices, case.mesh.faces)
+    size = 10.0 * float(np.ptp(mesh.vertices, axis=0).max())  # so that every pair is measured
+    scene = Scene.of(
+        {"part": (MeshShape(mesh, "round"), np.eye(4)), "wire": (case.wire, case.T_mesh_wire)},
+        contact=1e-3 * case.groove.radius,
+        clearance=size,
+    )
+    (row,) = check(scene).pairs
+    if row.verdict is Verdict.UNCERTAIN:
+        return Answer(math.nan, why="scene: uncertain")
+    if row.verdict in (Verdict.CLASH, Verdict.CONTAINED):
+        return Answer(row.distance.upper)
+    return Answer(row.distance.value, row.distance.uncertainty + _rounding(case))
+
+
+def _fcl_alone(case: MeshCase) -> Answer:
+    import fcl
+
+    V, F = case.mesh.vertices, case.mesh.faces
+    with _silence():
+        model = fcl.BVHModel()
+        model.beginModel(len(V), len(F))
+        model.addSubModel(V, F)
+        model.endModel()
+        return Answer(_fcl_distance([fcl.CollisionObject(model, fcl.Transform())], case))
+
+
+def _coacd_alone(case: MeshCase) -> Answer:
+    import coacd
+    import fcl
+
+    coacd.set_log_level("off")
+    with _silence():
+        parts = coacd.run_coacd(coacd.Mesh(case.mesh.vertices, case.mesh.faces))
+    objects = []
+    for V, F in parts:
+        shape = fcl.Convex(np.asarray(V, np.float64), len(F), encoded(F))
+        objects.append(fcl.CollisionObject(shape, fcl.Transform()))
+    return Answer(_fcl_distance(objects, case))
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Libraries write what they think of a mesh past Python's stdout and stderr."""
+    kept = [os.dup(k) for k in (1, 2)]
+    with open(os.devnull, "wb") as nowhere:
+        for k in (1, 2):
+            os.dup2(nowhere.fileno(), k)
+    try:
+        yield
+    finally:
+        for k, old in enumerate(kept, 1):
+            os.dup2(old, k)
+            os.close(old)
+
+
+def _fcl_distance(objects: list[Any], case: MeshCase) -> float:
+    import fcl
+
+    T = case.T_mesh_wire
+    shape = fcl.Cylinder(case.wire.radius, case.wire.length)
+    wire = fcl.CollisionObject(shape, fcl.Transform(T[:3, :3], T[:3, 3]))
+    return float(min(fcl.distance(each, wire, fcl.DistanceRequest(), fcl.DistanceResult()) for each in objects))
+
+
+METHODS: Methods = {
+    "mesh": (POSE_METHODS["mesh"][0], partial(OneByOne, partial(_fcl_model, "mesh", MESH_ERROR))),
+    "hulls": (POSE_METHODS["hulls"][0], partial(OneByOne, partial(_fcl_model, "hulls", math.nan))),
+    "fit": (
+        "groove fitted to the mesh (clamp3d.fit), the wire in it by closed forms; its bound is that of the fit",
+        partial(OneByOne, _fit, "depth"),
+    ),
+    "scene": (
+        "the mesh in a scene (clamp3d.check), its round surfaces fitted; its bound is that of the scene's answer",
+        partial(OneByOne, _scene),
+    ),
+    "FCL alone": (
+        "python-fcl's triangle mesh made of the arrays as they are, in millimetres, without the project's guards",
+        partial(OneByOne, _fcl_alone),
+    ),
+    "CoACD alone": (
+        "CoACD's hulls of the arrays as they are at its default threshold, each convex in python-fcl, without guards",
+        partial(OneByOne, _coacd_alone),
+    ),
+}
 
 
 def _millimetre(rng: np.random.Generator) -> float:
@@ -35,9 +206,7 @@ class MeshFamily(Family):
     part = 0.01
     truth_error = EXTENDED_ERROR
 
-    def __init__(
-        self, name: str, about: str, make: Fault, unit: Callable[[np.random.Generator], float] = _millimetre
-    ) -> None:
+    def __init__(self, name: str, about: str, make: Fault, unit: Callable[[np.random.Generator], float]) -> None:
         super().__init__(name, about, lambda rng, n: None)
         self._fault, self._unit = make, unit
 
@@ -67,7 +236,7 @@ class MeshFamily(Family):
         lines = [
             "import numpy as np",
             "import clamp3d",
-            "from clamp3d.bench.stress.registry import FAMILIES",
+            "from clamp3d.bench.stress.run import FAMILIES",
             f"case = FAMILIES[{self.name!r}].cases({n}, {seed})[{i}]",
             f"# {cases[i].mesh.what}",
             "try:",
@@ -81,19 +250,6 @@ class MeshFamily(Family):
         return "\n".join([*lines, f"# truth: {float(truth_50_digits(cases.poses, i))!r} mm"])
 
 
-_ALL = (
-    MeshFamily("mesh: open", "faces removed from a block with a groove, or a corner torn off", faults.opened),
-    MeshFamily("mesh: inside out", "windings turned: of all faces, of some, of one body of two", faults.inside_out),
-    MeshFamily("mesh: doubled", "faces, vertices or the whole body twice", faults.doubled),
-    MeshFamily("mesh: empty", "no faces, no vertices, or none with an area or a volume", faults.empty),
-    MeshFamily(
-        "mesh: bad numbers", "coordinates nan or infinite, face indices negative or out of range", faults.bad_numbers
-    ),
-    MeshFamily("mesh: soup", "vertices not merged, as in an STL: a good mesh that must be answered", faults.soup),
-    MeshFamily("mesh: turned", "random order of vertices and faces, random rotation: must be answered", faults.turned),
-    MeshFamily(
-        "mesh: scaled", "metres, inches, microns, up to 1e6 sizes from the origin: good meshes", faults.far, _any_unit
-    ),
-)
+_UNITS = {"mesh: scaled": _any_unit}
 
-MESHES: dict[str, MeshFamily] = {family.name: family for family in _ALL}
+MESHES = {name: MeshFamily(name, *made, _UNITS.get(name, _millimetre)) for name, made in faults.MAKERS.items()}

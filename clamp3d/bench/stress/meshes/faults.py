@@ -8,11 +8,13 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from clamp3d.bench.stress.family import Makers
 from clamp3d.bench.stress.meshes.cases import Faulty
 from clamp3d.core.pose import Array, rotation, translation
 
 Faces = NDArray[np.int64]
 _HERE = np.eye(4)
+MAKERS = Makers("mesh: ")
 
 
 def _broken(vertices: NDArray[np.float64], faces: NDArray[np.generic], what: str) -> Faulty:
@@ -46,8 +48,9 @@ def _far_box(V: Array) -> tuple[Array, Faces]:
     return np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int64)
 
 
+@MAKERS.family("open")
 def opened(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
-    """Faces are missing, or the surface is torn."""
+    """Faces removed from a block with a groove, or a corner torn off."""
     way = rng.integers(5)
     if way == 0:
         return _broken(V, np.delete(F, _some(rng, len(F), 3), axis=0), "1 to 3 faces removed")
@@ -65,6 +68,7 @@ def opened(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
     return _broken(V, F, "a corner torn off by 5 % of the radius")
 
 
+@MAKERS.family("inside out")
 def inside_out(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
     """Windings turned: of all faces, of some, of one body of two."""
     way = rng.integers(4)
@@ -81,8 +85,9 @@ def inside_out(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty
     return _broken(np.vstack([V, box]), np.vstack([first, second + len(V)]), what)
 
 
+@MAKERS.family("doubled")
 def doubled(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
-    """Faces, vertices or the whole body are there twice."""
+    """Faces, vertices or the whole body twice."""
     way = rng.integers(6)
     if way == 0:
         return _broken(V, np.vstack([F, F[_some(rng, len(F), len(F))]]), "faces twice")
@@ -99,8 +104,9 @@ def doubled(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
     return _broken(np.vstack([V, V + shift]), np.vstack([F, F + len(V)]), "the body twice, 1e-6 of the radius apart")
 
 
+@MAKERS.family("empty")
 def empty(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
-    """Nothing there, or nothing with a volume."""
+    """No faces, no vertices, or none with an area or a volume."""
     ways: tuple[Callable[[], tuple[Array, Faces, str]], ...] = (
         lambda: (V, F[:0], "no faces"),
         lambda: (V[:0], F, "no vertices"),
@@ -115,8 +121,9 @@ def empty(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
     return _broken(*ways[int(rng.integers(len(ways)))]())
 
 
+@MAKERS.family("bad numbers")
 def bad_numbers(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
-    """Coordinates that are no lengths, indices of vertices that are not there."""
+    """Coordinates nan or infinite, face indices negative or out of range."""
     V, F = V.copy(), F.copy()
     i, j = int(rng.integers(len(V))), int(rng.integers(3))
     k = int(rng.integers(len(F)))
@@ -136,8 +143,9 @@ def bad_numbers(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Fault
     return _broken(V, F, f"a corner {'negative' if bad < 0 else 'beyond the vertices' if way == 7 else 'far beyond'}")
 
 
+@MAKERS.family("soup")
 def soup(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
-    """Every triangle with corners of its own, as an STL has them; some of them through single precision."""
+    """Vertices not merged, as in an STL: a good mesh that must be answered."""
     if rng.random() < 0.5:
         V = V.astype(np.float32)
         what = "every face its own corners, single precision"
@@ -147,8 +155,9 @@ def soup(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
     return _good(V[F].reshape(-1, 3), np.arange(3 * len(F), dtype=np.int64).reshape(-1, 3), what)
 
 
+@MAKERS.family("turned")
 def turned(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
-    """The same surface in another order of vertices, faces and corners, turned and moved."""
+    """Random order of vertices and faces, random rotation: must be answered."""
     order = rng.permutation(len(V))
     place = np.argsort(order)
     faces = rng.permutation(place[F])
@@ -158,8 +167,9 @@ def turned(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
     return _good(moved, np.take_along_axis(faces, roll, axis=1), "another order, turned", T)
 
 
+@MAKERS.family("scaled")
 def far(rng: np.random.Generator, V: Array, F: Faces, R: float) -> Faulty:
-    """The same surface up to 1e6 sizes from the origin, or where it was."""
+    """Metres, inches, microns, up to 1e6 sizes from the origin: good meshes."""
     away = rng.normal(size=3)
     T = translation(*(R * rng.choice([0.0, 10.0 ** rng.uniform(2.0, 6.0)]) * away / np.linalg.norm(away)))
     return _good(V + T[:3, 3], F, f"at {np.linalg.norm(T[:3, 3]):.1g} mm from the origin", T)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.bench.stress.poses.cases import Cases, Contact, Extended, Shapes, contact_on, place
+from clamp3d.bench.stress.poses import draw
+from clamp3d.bench.stress.poses.cases import Cases, Extended, Shapes, unit_rows
 from clamp3d.bench.stress.worker import Rows
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
@@ -51,8 +52,7 @@ class Motions(Rows):
 
     def unit_axis(self) -> Array:
         """Axes (n, 3) of length 1, as long doubles."""
-        axis = self.axis.astype(np.longdouble)
-        return np.asarray(axis / np.sqrt((axis * axis).sum(1))[:, None])
+        return unit_rows(self.axis)
 
     def scene(self) -> Array:
         """Largest length of each case (n,), mm: sizes, the start, the point of the axis and the travel."""
@@ -61,20 +61,15 @@ class Motions(Rows):
 
     def snippet(self, i: int) -> str:
         """Python lines that ask for case i alone, bit by bit the same numbers."""
-        k = int(self.shape[i])
-        start = f"np.array({self.start[i].tolist()})"
         if self.angle[i] == 0.0:
             motion = f"clamp3d.Motion.translate({self.travel[i].tolist()})"
         else:
             numbers = f"{self.axis[i].tolist()}, {float(self.angle[i])!r}, point={self.point[i].tolist()}"
             motion = f"clamp3d.Motion.screw({numbers}, travel={float(self.travel[i, 0])!r})"
         lines = [
-            "import numpy as np",
-            "import clamp3d",
-            f"groove = clamp3d.kernel.{self.shapes.groove(k)!r}",
-            f"wire = clamp3d.kernel.{self.shapes.cylinder(k)!r}",
+            *self.shapes.snippet(int(self.shape[i])),
             f"motion = {motion}",
-            f"start = {start}",
+            f"start = np.array({self.start[i].tolist()})",
             "print(clamp3d.min_clearance(groove, wire, motion, start))",
             "print(clamp3d.first_contact(groove, wire, motion, start))",
         ]
@@ -146,21 +141,14 @@ def touching(
     rng: np.random.Generator, shapes: Shapes, shape: NDArray[np.intp], feature: NDArray[np.str_], gap: Array
 ) -> tuple[Cases, NDArray[np.longdouble]]:
     """Poses at a contact, a third of them along the groove, and the unit normals (n, 3) there."""
-    contact = contact_on(rng, shapes, shape, feature)
+    contact = draw.contact_on(rng, shapes, shape, feature)
     tilt = np.where(rng.random(len(shape)) < 0.33, 0.0, rng.uniform(-1.5, 1.5, len(shape)))
-    return place(rng, shapes, shape, contact, gap, tilt=tilt), unit(contact)
-
-
-def unit(contact: Contact) -> NDArray[np.longdouble]:
-    """Unit normals (n, 3) there."""
-    return np.asarray(contact.normal / np.sqrt((contact.normal**2).sum(1))[:, None])
+    return draw.place(rng, shapes, shape, contact, gap, tilt=tilt), unit_rows(contact.normal)
 
 
 def square_to(rng: np.random.Generator, normal: NDArray[np.longdouble]) -> NDArray[np.longdouble]:
     """Random unit vectors (n, 3) square to ``normal``."""
-    v = rng.normal(size=normal.shape).astype(Extended)
-    v = np.cross(normal, v)
-    return np.asarray(v / np.sqrt((v * v).sum(1))[:, None])
+    return unit_rows(np.cross(normal, rng.normal(size=normal.shape).astype(Extended)))
 
 
 def moved(T: Array, by: NDArray[Any]) -> Array:
@@ -173,8 +161,7 @@ def moved(T: Array, by: NDArray[Any]) -> Array:
 def screws_through(cases: Cases, point: Array, axis: Array, angle: Array, travel: Array, instant: Array) -> Motions:
     """Screws that are at the poses of ``cases`` at ``instant`` (n,)."""
     point, axis = np.asarray(point, np.float64), np.asarray(axis, np.float64)
-    p, u = point.astype(Extended), axis.astype(Extended)
-    u = u / np.sqrt((u * u).sum(1))[:, None]
+    p, u = point.astype(Extended), unit_rows(axis)
     s = instant.astype(Extended)
     start, back = cases.T_world_wire.copy(), -s * angle
     for column in range(4):  # turned back about the axis, rounded once

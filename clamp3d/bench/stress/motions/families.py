@@ -1,7 +1,7 @@
 """Families of hard motions, each with a seeded generator, built backwards from where and how closely it comes near.
 
 A generator takes ``(rng, n)`` and returns n `Motions`: first the pose at the place of least clearance, as for single
-poses, then a motion through it whose clearance is least there. `MOTIONS` maps name -> `MotionFamily`.
+poses, then a motion through it whose clearance is least there.
 """
 
 from __future__ import annotations
@@ -13,20 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.bench.stress.family import into
+from clamp3d.bench.stress.family import Makers
 from clamp3d.bench.stress.motions.cases import Motions, motions, moved, screws_through, square_to, touching, turned
-from clamp3d.bench.stress.motions.family import MotionFamily
-from clamp3d.bench.stress.poses.cases import (
-    FEATURES,
-    Extended,
-    contact_on,
-    place,
-    poses_from_axes,
-    random_shapes,
-    shape_count,
-    signed_powers,
-    spread,
-)
+from clamp3d.bench.stress.poses import draw
+from clamp3d.bench.stress.poses.cases import Extended
+from clamp3d.bench.stress.poses.truth import point_sdf
 from clamp3d.core.pose import Array
 
 Make = Callable[[np.random.Generator, int], Motions]
@@ -35,21 +26,19 @@ _CONVEX = ("lip", "end arc", "end edge", "corner")
 """Features that a wire passes on a tangent."""
 
 
-def _built(name: str, about: str, make: Make, *, choose: bool = False) -> MotionFamily:
-    """A family; ``choose`` from three times as many cases, mostly those that touch first where they were built to."""
-    return MotionFamily(f"motion: {name}", about, (lambda rng, n: _best(rng, n, make)) if choose else make)
+MAKERS = Makers("motion: ")
 
 
-MOTIONS: dict[str, MotionFamily] = {}
-_family = into(MOTIONS, _built)
-
-
-def _best(rng: np.random.Generator, n: int, make: Make) -> Motions:
+def _best(make: Make) -> Make:
     """Of 3 n cases n, in their order: those that stand as they were built before those that do not, by and large."""
-    cases = make(rng, 3 * n)
-    rank = np.where(_spoilt(cases), 1.0, 0.0) + rng.random(3 * n) * 1.2
-    rows = np.sort(np.argsort(rank, kind="stable")[:n])
-    return replace(cases.take(rows), number=np.arange(n))
+
+    def chosen(rng: np.random.Generator, n: int) -> Motions:
+        cases = make(rng, 3 * n)
+        rank = np.where(_spoilt(cases), 1.0, 0.0) + rng.random(3 * n) * 1.2
+        rows = np.sort(np.argsort(rank, kind="stable")[:n])
+        return replace(cases.take(rows), number=np.arange(n))
+
+    return chosen
 
 
 def _spoilt(cases: Motions) -> NDArray[np.bool_]:
@@ -65,25 +54,17 @@ def _spoilt(cases: Motions) -> NDArray[np.bool_]:
         angle = u * cases.angle
         centre = cases.point + turned(c - cases.point, axis, angle) + u * vector
         points = centre[:, None, :] + t[:, :, None] * turned(d, axis, angle)[:, None, :]
-        x, y, z = np.abs(points[..., 0]), points[..., 1], np.abs(points[..., 2])
-        rho, lip = np.hypot(x, y), np.hypot(x - R * np.sin(a), y + R * np.cos(a))
-        arc = np.where(x * np.cos(a) + y * np.sin(a) <= 0.0, np.abs(R - rho), lip)
-        ray = np.where(x >= R * np.sin(a), np.abs(y + R * np.cos(a)), lip)
-        g = np.where((y <= -R * np.cos(a)) & (rho >= R), 0.0, np.minimum(arc, ray))
-        low = np.hypot(g, np.maximum(z - H, 0.0)).min(1)
+        x, y, z = (points[..., k] for k in range(3))
+        low = np.maximum(point_sdf(x, y, z, R, R * np.sin(a), -R * np.cos(a), H), 0.0).min(1)
         out |= low - s.r[k] < gap - 1e-9 * s.R[k]
     return out
 
 
-@_family(
-    "grazing",
-    "straight past a lip, an edge or a corner on a tangent: clear or deep by 1e-12 ... 1e-2 of the radius",
-    choose=True,
-)
+@MAKERS.family("grazing", _best)
 def _grazing(rng: np.random.Generator, n: int) -> Motions:
-    k = shape_count(n)
-    shapes, shape = random_shapes(rng, k), spread(n, k)
-    gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
+    """Straight past a lip, an edge or a corner on a tangent: clear or deep by 1e-12 ... 1e-2 of the radius."""
+    shapes, shape = draw.shapes_for(rng, n)
+    gap = shapes.r[shape] * draw.powers(rng, n, -12, -2)
     cases, normal = touching(rng, shapes, shape, rng.choice(_CONVEX, n), gap)
     way = square_to(rng, normal)
     # A third square to the groove: the wire's centre moves in the section.
@@ -99,12 +80,12 @@ def _grazing(rng: np.random.Generator, n: int) -> Motions:
 
 def _turning_screws(rng: np.random.Generator, n: int, turns: Array, pitch: Array) -> Motions:
     """Circles and helices that curve away from where they touch, on any feature."""
-    k = shape_count(n)
+    k = draw.count(n)
     R = 10.0 ** rng.uniform(0.0, 2.0, k)
-    shapes = random_shapes(rng, k, R=R, length=R * 10.0 ** rng.uniform(-1.0, 1.0, k))
-    shape = spread(n, k)
-    gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
-    feature = rng.choice(FEATURES, n)
+    shapes = draw.shapes(rng, k, R=R, length=R * 10.0 ** rng.uniform(-1.0, 1.0, k))
+    shape = draw.spread(n, k)
+    gap = shapes.r[shape] * draw.powers(rng, n, -12, -2)
+    feature = rng.choice(draw.FEATURES, n)
     cases, normal = touching(rng, shapes, shape, feature, gap)
     # In the hollow a circle narrower than it, square to the groove.
     hollow = np.isin(feature, ["arc", "end arc"])
@@ -121,22 +102,22 @@ def _turning_screws(rng: np.random.Generator, n: int, turns: Array, pitch: Array
     return screws_through(cases, point, np.asarray(axis, float), turns, pitch * radius * turns, instant)
 
 
-@_family("turning", "circles about any axis that touch at one instant and curve away, on any feature", choose=True)
+@MAKERS.family("turning", _best)
 def _turning(rng: np.random.Generator, n: int) -> Motions:
+    """Circles about any axis that touch at one instant and curve away, on any feature."""
     return _turning_screws(rng, n, 10.0 ** rng.uniform(-1.3, 0.8, n) * rng.choice([-1.0, 1.0], n), np.zeros(n))
 
 
-@_family(
-    "screws", "turn and advance together, up to six turns, near at one place; and screws of no plan at all", choose=True
-)
+@MAKERS.family("screws", _best)
 def _screws(rng: np.random.Generator, n: int) -> Motions:
+    """Turn and advance together, up to six turns, near at one place; and screws of no plan at all."""
     part = n // 2
     turns = 10.0 ** rng.uniform(-1.0, np.log10(12.0 * np.pi), n) * rng.choice([-1.0, 1.0], n)
-    pitch = signed_powers(rng, n, -3, 0)
+    pitch = draw.powers(rng, n, -3, 0)
     built = _turning_screws(rng, n, turns, pitch)
     size = built.shapes.size()[built.shape][:, None]
     centre, point = rng.uniform(-1.5, 1.5, (n, 3)) * size, rng.uniform(-1.0, 1.0, (n, 3)) * size
-    T = poses_from_axes(rng, centre, rng.normal(size=(n, 3)))
+    T = draw.poses_from_axes(rng, centre, rng.normal(size=(n, 3)))
     free = motions(built.shapes, built.shape, T, travel=rng.uniform(-2, 2, n) * size[:, 0], angle=turns, point=point,
                    axis=rng.normal(size=(n, 3)))  # fmt: skip
     return _choose(rng.permutation(n) < part, built, free)
@@ -153,14 +134,15 @@ def _choose(first: NDArray[np.bool_], a: Motions, b: Motions) -> Motions:
     return replace(a, **picked)
 
 
-@_family("thin and fast", "a thin groove or a thin short wire crossed in 1e-6 ... 1e-2 of the motion")
+@MAKERS.family("thin and fast")
 def _thin(rng: np.random.Generator, n: int) -> Motions:
-    k = shape_count(n)
+    """A thin groove or a thin short wire crossed in 1e-6 ... 1e-2 of the motion."""
+    k = draw.count(n)
     R = 10.0 ** rng.uniform(0, 2, k)
     sheet = rng.random(k) < 0.5
     thin = R * 10.0 ** rng.uniform(-6, -2, k)
     r = np.where(rng.random(k) < 0.5, thin, R * 10.0 ** rng.uniform(-5, -1, k))
-    shapes = random_shapes(
+    shapes = draw.shapes(
         rng,
         k,
         R=R,
@@ -168,8 +150,8 @@ def _thin(rng: np.random.Generator, n: int) -> Motions:
         r=r,
         length=r * 10.0 ** rng.uniform(-2, 1, k),
     )
-    shape = spread(n, k)
-    gap = shapes.r[shape] * np.where(rng.random(n) < 0.5, signed_powers(rng, n, -6, -0.1), -rng.uniform(0, 0.9, n))
+    shape = draw.spread(n, k)
+    gap = shapes.r[shape] * np.where(rng.random(n) < 0.5, draw.powers(rng, n, -6, -0.1), -rng.uniform(0, 0.9, n))
     cases, normal = touching(rng, shapes, shape, rng.choice(_CONVEX, n), gap)
     fast = (shapes.R[shape] * 10.0 ** rng.uniform(0.5, 2, n))[:, None]
     tangent = square_to(rng, normal)
@@ -183,29 +165,30 @@ def _thin(rng: np.random.Generator, n: int) -> Motions:
     return motions(shapes, shape, start, travel=travel, gap=gap, instant=instant)
 
 
-@_family("narrow mouth", "arcs over 180 deg: entry through the mouth hits where it is narrower, sliding along is free")
+@MAKERS.family("narrow mouth")
 def _narrow_mouth(rng: np.random.Generator, n: int) -> Motions:
-    k = shape_count(n)
+    """Arcs over 180 deg: entry through the mouth hits where it is narrower, sliding along is free."""
+    k = draw.count(n)
     a = np.pi / 2 + rng.uniform(0.01, 1.4, k)
     R = 10.0 ** rng.uniform(0, 2, k)
     s = R * np.sin(a)
     off = 10.0 ** rng.uniform(-10, -0.5, k) * rng.choice([-1.0, 1.0], k)
     r = np.minimum(s * (1.0 + off), R * (1.0 - 10.0 ** rng.uniform(-4, -1, k)))
-    shapes = random_shapes(rng, k, R=R, half_angle=a, r=r)
-    shape = spread(n, k)
+    shapes = draw.shapes(rng, k, R=R, half_angle=a, r=r)
+    shape = draw.spread(n, k)
     R, r, s, L, length = (v[shape] for v in (shapes.R, shapes.r, s, shapes.L, shapes.length))
     h = -R * np.cos(shapes.half_angle[shape])
     exact = np.asarray(R, Extended) * np.sin(np.asarray(shapes.half_angle, Extended)[shape]) - r
     z = np.zeros(n)
     # Straight down through the mouth, in the middle or a little beside it, level or a little tilted.
     level = rng.random(n) < 0.6
-    beside = np.where(level, 0.0, R * signed_powers(rng, n, -9, -1, 0.3))
-    tilt = np.stack([np.where(level, 0.0, signed_powers(rng, n, -9, -1, 0.3)) for _ in range(2)] + [z + 1.0], 1)
+    beside = np.where(level, 0.0, R * draw.powers(rng, n, -9, -1, 0.3))
+    tilt = np.stack([np.where(level, 0.0, draw.powers(rng, n, -9, -1, 0.3)) for _ in range(2)] + [z + 1.0], 1)
     top, bottom = h + r + R * rng.uniform(0.1, 3.0, n), rng.uniform(-0.3, 0.3, n) * (R - r)
     down = motions(
         shapes,
         shape,
-        poses_from_axes(rng, np.stack([beside, top, rng.uniform(-0.5, 0.5, n) * L], 1), tilt),
+        draw.poses_from_axes(rng, np.stack([beside, top, rng.uniform(-0.5, 0.5, n) * L], 1), tilt),
         travel=np.stack([z, bottom - top, z], 1),
         gap=np.where(level, np.asarray(exact, float), np.nan),
         instant=(top - h) / (top - bottom),
@@ -217,7 +200,7 @@ def _narrow_mouth(rng: np.random.Generator, n: int) -> Motions:
     slide = motions(
         shapes,
         shape,
-        poses_from_axes(rng, np.stack([z, y, -side * far], 1), np.stack([z, z, z + 1.0], 1)),
+        draw.poses_from_axes(rng, np.stack([z, y, -side * far], 1), np.stack([z, z, z + 1.0], 1)),
         travel=np.stack([z, z, 2.0 * side * far], 1),
         gap=(R - r) + y,
         instant=0.5,
@@ -225,17 +208,15 @@ def _narrow_mouth(rng: np.random.Generator, n: int) -> Motions:
     return _choose(rng.random(n) < 0.6, down, slide)
 
 
-@_family(
-    "level", "clearance that does not change: slides along the groove, a face or an edge, turns about its axis; rest"
-)
+@MAKERS.family("level")
 def _level(rng: np.random.Generator, n: int) -> Motions:
-    k = shape_count(n)
-    shapes, shape = random_shapes(rng, k), spread(n, k)
-    gap = shapes.r[shape] * signed_powers(rng, n, -9, -1)
+    """Clearance that does not change: slides along the groove, a face or an edge, turns about its axis; rest."""
+    shapes, shape = draw.shapes_for(rng, n)
+    gap = shapes.r[shape] * draw.powers(rng, n, -9, -1)
     feature = rng.choice(("arc", "lip", "flat", "end edge"), n)
-    contact = contact_on(rng, shapes, shape, feature)
+    contact = draw.contact_on(rng, shapes, shape, feature)
     contact.ends[:] = False
-    cases = place(rng, shapes, shape, contact, gap, tilt=np.zeros(n))
+    cases = draw.place(rng, shapes, shape, contact, gap, tilt=np.zeros(n))
     R = shapes.R[shape]
     length = R * 10.0 ** rng.uniform(-1, 1.5, n) * rng.choice([-1.0, 1.0], n)
     z = np.zeros(n)
@@ -257,17 +238,13 @@ def _level(rng: np.random.Generator, n: int) -> Motions:
     return _choose(kind < 0.6, slides, _choose(kind < 0.85, turns, spins))
 
 
-@_family(
-    "start",
-    "starts in contact or by 1e-12 ... 1e-2 of the radius off it, and leaves, slides or comes back",
-    choose=True,
-)
+@MAKERS.family("start", _best)
 def _start(rng: np.random.Generator, n: int) -> Motions:
-    k = shape_count(n)
-    shapes, shape = random_shapes(rng, k), spread(n, k)
+    """Starts in contact or by 1e-12 ... 1e-2 of the radius off it, and leaves, slides or comes back."""
+    shapes, shape = draw.shapes_for(rng, n)
     r = shapes.r[shape]
-    gap = np.where(rng.random(n) < 0.2, -r * rng.uniform(0, 0.99, n), r * signed_powers(rng, n, -12, -2, 0.3))
-    cases, normal = touching(rng, shapes, shape, rng.choice(FEATURES, n), gap)
+    gap = np.where(rng.random(n) < 0.2, -r * rng.uniform(0, 0.99, n), r * draw.powers(rng, n, -12, -2, 0.3))
+    cases, normal = touching(rng, shapes, shape, rng.choice(draw.FEATURES, n), gap)
     way = square_to(rng, normal)
     away = np.where(rng.random(n) < 0.3, 0.0, rng.uniform(-0.2, 1.5, n))[:, None]
     length = (shapes.R[shape] * 10.0 ** rng.uniform(-2, 1, n))[:, None]
@@ -281,14 +258,12 @@ def _start(rng: np.random.Generator, n: int) -> Motions:
     return _choose(rng.random(n) < 0.75, leaves, turns)
 
 
-@_family(
-    "from far", "comes from 1e3 ... 1e6 mm away and stops at, or flies past, 1e-12 ... 1e-2 of the radius", choose=True
-)
+@MAKERS.family("from far", _best)
 def _from_far(rng: np.random.Generator, n: int) -> Motions:
-    k = shape_count(n)
-    shapes, shape = random_shapes(rng, k), spread(n, k)
-    gap = shapes.r[shape] * signed_powers(rng, n, -12, -2)
-    feature = rng.choice(FEATURES, n)
+    """Comes from 1e3 ... 1e6 mm away and stops at, or flies past, 1e-12 ... 1e-2 of the radius."""
+    shapes, shape = draw.shapes_for(rng, n)
+    gap = shapes.r[shape] * draw.powers(rng, n, -12, -2)
+    feature = rng.choice(draw.FEATURES, n)
     cases, normal = touching(rng, shapes, shape, feature, gap)
     lean = rng.uniform(0.0, 1.4, n)[:, None]
     way = np.cos(lean) * normal + np.sin(lean) * square_to(rng, normal)

@@ -8,6 +8,7 @@ import numpy as np
 
 from clamp3d.bench.stress.family import Family
 from clamp3d.bench.stress.motions.cases import Motions, poses
+from clamp3d.bench.stress.motions.families import MAKERS
 from clamp3d.bench.stress.motions.methods import METHODS, CasMethod
 from clamp3d.bench.stress.motions.truth import TRUTH_ERROR, Least, truth, truth_50_digits
 from clamp3d.bench.stress.outcome import REFERENCE, Outcome
@@ -104,3 +105,6 @@ def check_first_contacts(cases: Motions, exact: Least, asked: CasMethod, answers
         if mask.any():
             answers.failed |= mask
             answers.note(f"{what}: {int(mask.sum())}, first case {int(np.flatnonzero(mask)[0])}")
+
+
+MOTIONS = {name: MotionFamily(name, *made) for name, made in MAKERS.items()}

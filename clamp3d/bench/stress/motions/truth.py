@@ -16,6 +16,7 @@ import numpy as np
 
 from clamp3d.bench.stress.digits import fifty_digits, golden, point_distance
 from clamp3d.bench.stress.motions.cases import Motions, turned
+from clamp3d.bench.stress.poses.cases import unit_rows
 from clamp3d.core.pose import Array
 
 TRUTH_ERROR = 2e-13
@@ -59,8 +60,7 @@ def truth(cases: Motions, until: Array | None = None, hints: Array | None = None
 def _numbers(cases: Motions, base: Array) -> Array:
     """Motions (n, 16) that start at instants ``base``: centre, direction, point, axis, travel (3 each), angle."""
     wide = np.longdouble
-    c, d = cases.start[:, :3, 3].astype(wide), cases.start[:, :3, 2].astype(wide)
-    d = d / np.sqrt((d * d).sum(1))[:, None]
+    c, d = cases.start[:, :3, 3].astype(wide), unit_rows(cases.start[:, :3, 2])
     u, p, v = cases.unit_axis(), cases.point.astype(wide), cases.vector()
     b = base.astype(wide)[:, None]
     theta = b[:, 0] * cases.angle.astype(wide)

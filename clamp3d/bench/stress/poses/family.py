@@ -1,17 +1,167 @@
-"""Families of hard poses: how their truths are found."""
+"""All families of hard poses: what has broken collision code, the methods put to it, and how truths are found."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.bench.stress.family import Family
+from clamp3d.baselines import ContactModel, contact_model
+from clamp3d.baselines.chords import chord_error
+from clamp3d.baselines.polytopes import PartOrMesh
+from clamp3d.bench.stress.family import Family, Methods
+from clamp3d.bench.stress.poses import features, magnitudes
 from clamp3d.bench.stress.poses.cases import Cases
-from clamp3d.bench.stress.poses.methods import METHODS, CasMethod
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, truth, truth_50_digits
-from clamp3d.bench.stress.worker import run_here
+from clamp3d.bench.stress.worker import Measured, Measures, run_here
+from clamp3d.core.distance import SignedDistances, signed_distances
+from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.pose import Array
+from clamp3d.core.primitives import SweptArc
+from clamp3d.core.profile import Arc, Profile
+from clamp3d.core.relation3d import relative_pose
+from clamp3d.core.shapes import Solid
+
+_WORLD = 5e-16
+"""Rounding of a position by `relative_pose`, in parts of the distance between the two origins."""
+
+FCL_ERROR = 2e-6
+"""Error of FCL's own distance in mm, as measured in `baselines.fcl_shapes` (worst of 600 000), rounded up."""
+
+MESH_ERROR = 1.0 / 2400.0
+"""Chord error of meshes in parts of the groove's radius: 0.01 mm for the reference clamp."""
+
+THRESHOLD = 1.0 / 12.0
+"""Threshold of CoACD in parts of the groove's radius: 2 mm for the reference clamp, the command line's default."""
+
+UNIT = math.radians(5.0)
+
+
+def poses(cases: Cases) -> Array:
+    """Poses (n, 4, 4) of the wires in their grooves' frames, as a user gets them from world poses."""
+    if cases.T_world_groove is None:
+        return cases.T_world_wire
+    return np.array([relative_pose(a, b) for a, b in zip(cases.T_world_groove, cases.T_world_wire, strict=True)])
+
+
+def _by_kernel(cases: Cases, T: Array) -> SignedDistances:
+    k = int(cases.shape[0])
+    return signed_distances(cases.shapes.groove(k), cases.shapes.cylinder(k), T, full=True, workers=1)
+
+
+class CasMethod:
+    """The kernel, with its error bound; what `relative_pose` rounds is added to it."""
+
+    measures: Measures = "depth"
+
+    def measure(self, cases: Cases) -> Measured:
+        """See `Method`."""
+        found = _by_kernel(cases, poses(cases))
+        bound = found.error_bound
+        if cases.T_world_groove is not None:
+            apart = cases.T_world_wire[:, :3, 3] - cases.T_world_groove[:, :3, 3]
+            reach = np.sqrt((apart**2).sum(1)) + 0.5 * cases.shapes.length[cases.shape[0]]
+            bound = bound + 2.0 * _WORLD * reach
+        return Measured(found.distance, bound)
+
+
+class ChordsMethod:
+    """The paper's convex partitioning; its bound is the chord error."""
+
+    measures: Measures = "clearance"
+
+    def measure(self, cases: Cases) -> Measured:
+        """See `Method`. It works in the section: wires beside the groove's length are none of its business."""
+        k = int(cases.shape[0])
+        T = poses(cases)
+        distance = contact_model("chords", unit_angle=UNIT).distances(cases.shapes.pair(k), T)
+        beside = np.abs(T[:, 2, 3]) > 0.5 * (cases.shapes.L[k] + cases.shapes.length[k])
+        bound = chord_error(cases.shapes.groove(k), UNIT) + 2e-9 * cases.scene()  # 1e-9 rad counts as parallel
+        return Measured(distance, bound, beside, "method 'chords' knows no end faces: the wire must overlap the groove")
+
+
+@dataclass(frozen=True)
+class SolidMethod:
+    """A model by FCL, which measures a finite block with the groove; ``bound(groove)`` is the error of its pieces, mm.
+
+    ``settings`` of `contact_model` are in parts of the groove's radius, except for the angle. The block reaches beyond
+    every nearest point, so its distance is that of the endless material. FCL's cylinder has flat ends and the truth's
+    wire has round ones: only cases whose nearest place is on the wire's side count.
+    """
+
+    name: str
+    bound: Callable[[SweptArc], float]
+    settings: Mapping[str, float] = field(default_factory=dict)
+    measures: Measures = "clearance"
+
+    def measure(self, cases: Cases) -> Measured:
+        """See `Method`."""
+        k = int(cases.shape[0])
+        T = poses(cases)
+        pair = cases.shapes.pair(k)
+        exact = _by_kernel(cases, T)
+        ended = np.abs(np.einsum("ni,ni->n", exact.normal, T[:, :3, 2])) > 1e-9
+        part = block(pair.groove, exact.point_on_groove[~ended])
+        distance = np.full(len(cases), np.nan)
+        if not ended.all():
+            distance[~ended] = fcl_model(self.name, part, pair.groove, self.settings).distances(pair, T[~ended])
+        bound = np.full(len(cases), self.bound(pair.groove) + FCL_ERROR)
+        return Measured(distance, bound, ended, "the wire's end is nearest, which is flat in FCL")
+
+
+def fcl_model(
+    name: str, part: PartOrMesh, groove: SweptArc, settings: Mapping[str, float], time_limit: float = 60.0
+) -> ContactModel:
+    """The model of a part; ``settings`` but the angle in parts of the groove's radius."""
+    sizes = {key: value * (1.0 if key == "unit_angle" else groove.radius) for key, value in settings.items()}
+    return contact_model(name, {"P1": part}, **sizes, time_limit=time_limit, progress=False)
+
+
+def block(groove: SweptArc, points: Array) -> Solid:
+    """A block with the groove, in the groove's own frame, that reaches beyond ``points`` (n, 3) and the groove."""
+    R, a, H = groove.radius, groove.half_angle, 0.5 * groove.length
+    s, h = R * math.sin(a), -R * math.cos(a)
+    wide = 1.1 * max(s, float(np.abs(points[:, 0]).max(initial=0.0))) + R
+    low = -1.1 * max(R, float((-points[:, 1]).max(initial=0.0))) - R
+    arc = Arc((0.0, 0.0), R, a - 0.5 * math.pi, -a - 0.5 * math.pi)
+    profile = Profile.of((-wide, low), (wide, low), (wide, h), arc, (-wide, h))
+    body = Extrusion(profile, "Z", -H, H)
+    return Solid("P1", (body,), title="block with a groove", volume=body.volume)
+
+
+def in_radii(groove: SweptArc, bound: float) -> float:
+    """A bound in mm that is given in parts of the groove's radius; NaN if there is none."""
+    return bound * groove.radius
+
+
+_NO_BOUND = partial(in_radii, bound=math.nan)
+METHODS: Methods = {
+    "cas": ("closed forms of the arc groove; its bound is that of rounding", CasMethod),
+    "chords 5 deg": (
+        "convex partitioning in the section, chords of 5 degrees; its bound is the chord error",
+        ChordsMethod,
+    ),
+    "wedges 5 deg": (
+        "convex partitioning in 3D: python-fcl on exact wedges of 5 degrees; its bound is the chord error",
+        partial(SolidMethod, "wedges", partial(chord_error, unit_angle=UNIT), {"unit_angle": UNIT}),
+    ),
+    "mesh": (
+        "python-fcl's triangle mesh, chord error R / 2400, which is its bound",
+        partial(SolidMethod, "mesh", partial(in_radii, bound=MESH_ERROR), {"mesh_error": MESH_ERROR}),
+    ),
+    "hulls": (
+        "CoACD's hulls of that mesh at a threshold of R / 12, each convex in python-fcl; no bound",
+        partial(
+            SolidMethod, "hulls", partial(in_radii, bound=math.nan), {"threshold": THRESHOLD, "mesh_error": MESH_ERROR}
+        ),
+    ),
+}
+
 
 _BLOCK = 5000
 _MOST_DECIDED = 500
@@ -44,3 +194,6 @@ class PoseFamily(Family):
         """See `Family`."""
         cases = self.cases(n, seed)
         return f"{cases.snippet(i)}\n# truth: {float(truth_50_digits(cases, i))!r} mm"
+
+
+POSES = {name: PoseFamily(name, *made) for name, made in (features.MAKERS | magnitudes.MAKERS).items()}

@@ -6,141 +6,132 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from clamp3d.bench.stress.family import into
-from clamp3d.bench.stress.poses.cases import (
-    FEATURES,
-    PARALLEL_FEATURES,
-    Cases,
-    Extended,
-    contact_on,
-    free,
-    place,
-    poses_from_axes,
-    random_shapes,
-    setting,
-    shape_count,
-    signed_powers,
-    spread,
-    touching,
-)
-from clamp3d.bench.stress.poses.family import PoseFamily
+from clamp3d.bench.stress.family import Makers
+from clamp3d.bench.stress.poses import draw
+from clamp3d.bench.stress.poses.cases import Cases, Extended
 from clamp3d.core.pose import Array
 
-FAMILIES: dict[str, PoseFamily] = {}
-_family = into(FAMILIES, PoseFamily)
+MAKERS = Makers()
 
 
-@_family("random", "any pose of any groove: parallel, tilted, crossing, clear, touching, deep")
+@MAKERS.family("random")
 def _random(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
-    shapes, shape = random_shapes(rng, k), spread(n, k)
+    """Any pose of any groove: parallel, tilted, crossing, clear, touching, deep."""
+    shapes, shape = draw.shapes_for(rng, n)
     size = (shapes.R + 0.3 * shapes.L)[shape][:, None]
     centre = rng.uniform(-1.5, 1.5, (n, 3)) * size
     direction = rng.normal(size=(n, 3)) * np.array([1.0, 1.0, 2.0])
-    return free(rng, shapes, shape, centre, direction)
+    return draw.free(rng, shapes, shape, centre, direction)
 
 
-@_family("tangency", "gaps of 0 and +-1e-15 to 1e-1 of the radius on every feature, any tilt")
+@MAKERS.family("tangency")
 def _tangency(rng: np.random.Generator, n: int) -> Cases:
-    return touching(rng, n, random_shapes(rng, shape_count(n)), (-15, -1))
+    """Gaps of 0 and +-1e-15 to 1e-1 of the radius on every feature, any tilt."""
+    return draw.touching(rng, n, draw.shapes(rng, draw.count(n)), (-15, -1))
 
 
-@_family("parallel tangency", "the same with the wire along the groove: contact along a line")
+@MAKERS.family("parallel tangency")
 def _parallel_tangency(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, feature = setting(rng, n, PARALLEL_FEATURES)
-    gap = shapes.r[shape] * signed_powers(rng, n, -15, -1)
-    contact = contact_on(rng, shapes, shape, feature)
+    """The same with the wire along the groove: contact along a line."""
+    shapes, shape, feature = draw.setting(rng, n, draw.PARALLEL_FEATURES)
+    gap = shapes.r[shape] * draw.powers(rng, n, -15, -1)
+    contact = draw.contact_on(rng, shapes, shape, feature)
     contact.ends[:] = False
-    return place(rng, shapes, shape, contact, gap, tilt=np.zeros(n))
+    return draw.place(rng, shapes, shape, contact, gap, tilt=np.zeros(n))
 
 
-@_family("equal radii", "wire radius = groove radius (1 +- 1e-3 ... 1e-15) and equal to the last bit, nearly coaxial")
+@MAKERS.family("equal radii")
 def _equal_radii(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
-    given = asdict(random_shapes(rng, k))
-    given["r"] = given["R"] * (1.0 + signed_powers(rng, k, -16, -3))
-    shapes, shape = random_shapes(rng, k, **given), spread(n, k)
+    """Wire radius = groove radius (1 +- 1e-3 ... 1e-15) and equal to the last bit, nearly coaxial."""
+    k = draw.count(n)
+    given = asdict(draw.shapes(rng, k))
+    given["r"] = given["R"] * (1.0 + draw.powers(rng, k, -16, -3))
+    shapes, shape = draw.shapes(rng, k, **given), draw.spread(n, k)
     R = shapes.R[shape]
-    offset = R[:, None] * np.stack([signed_powers(rng, n, -16, -3) for _ in range(3)], 1)
-    tilt = np.stack([signed_powers(rng, n, -16, -3, 0.5) for _ in range(2)] + [np.ones(n)], 1)
-    return free(rng, shapes, shape, offset, tilt)
+    offset = R[:, None] * np.stack([draw.powers(rng, n, -16, -3) for _ in range(3)], 1)
+    tilt = np.stack([draw.powers(rng, n, -16, -3, 0.5) for _ in range(2)] + [np.ones(n)], 1)
+    return draw.free(rng, shapes, shape, offset, tilt)
 
 
-@_family("oversize wire", "wire larger than the groove: rests on both lips, level or tilted")
+@MAKERS.family("oversize wire")
 def _oversize(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
+    """Wire larger than the groove: rests on both lips, level or tilted."""
+    k = draw.count(n)
     R = 10.0 ** rng.uniform(0, 2, k)
-    shapes = random_shapes(
-        rng, k, R=R, half_angle=rng.uniform(0.2, 1.57, k), r=R * (1.0 + 10.0 ** rng.uniform(-6, 1, k))
-    )
-    shape = spread(n, k)
+    shapes = draw.shapes(rng, k, R=R, half_angle=rng.uniform(0.2, 1.57, k), r=R * (1.0 + 10.0 ** rng.uniform(-6, 1, k)))
+    shape = draw.spread(n, k)
     s, h = shapes.lips(shape)
     r = np.asarray(shapes.r, Extended)[shape]
-    gap = shapes.r[shape] * signed_powers(rng, n, -15, -2)
+    gap = shapes.r[shape] * draw.powers(rng, n, -15, -2)
     reach = r + np.asarray(gap, Extended)
     y = h + np.sqrt(np.maximum(reach * reach - s * s, 0))
     # Tilted up in the plane of symmetry the axis keeps the same distance from both lips where it is at height y.
-    tilt = signed_powers(rng, n, -12, -0.5, 0.5)
-    side = shapes.R[shape] * signed_powers(rng, n, -16, -6, 0.5)
+    tilt = draw.powers(rng, n, -12, -0.5, 0.5)
+    side = shapes.R[shape] * draw.powers(rng, n, -16, -6, 0.5)
     centre = np.stack([side.astype(Extended), y, np.zeros(n, Extended)], 1)
     sideways = rng.random(n) < 0.5
     d = np.stack([np.where(sideways, tilt, 0.0), np.where(sideways, 0.0, tilt), np.ones(n)], 1)
     level = (side == 0.0) & (tilt == 0.0)
-    return Cases(shapes, shape, poses_from_axes(rng, centre, d), np.where(level, gap, np.nan))
+    return Cases(shapes, shape, draw.poses_from_axes(rng, centre, d), np.where(level, gap, np.nan))
 
 
-@_family("arc end points", "contact within 1e-15 ... 1e-2 rad of where the arc ends, on either side")
+@MAKERS.family("arc end points")
 def _arc_ends(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, feature = setting(rng, n, ("arc", "lip", "end arc", "corner"))
+    """Contact within 1e-15 ... 1e-2 rad of where the arc ends, on either side."""
+    shapes, shape, feature = draw.setting(rng, n, ("arc", "lip", "end arc", "corner"))
     a = shapes.half_angle[shape]
     past = 10.0 ** rng.uniform(-16, -2, n) * rng.choice([0.0, 1.0], n, p=[0.1, 0.9])
     side = rng.choice([-1.0, 1.0], n)
     near_arc_normal = rng.random(n) < 0.5
     cone = np.where(near_arc_normal, 1.0 - past, past)
-    contact = contact_on(rng, shapes, shape, feature, phi=side * np.maximum(a - past, 0.0), cone=cone)
-    gap = shapes.r[shape] * signed_powers(rng, n, -15, -2)
-    tilt = np.where(rng.random(n) < 0.5, 0.0, signed_powers(rng, n, -9, 0))
-    return place(rng, shapes, shape, contact, gap, tilt=tilt)
+    contact = draw.contact_on(rng, shapes, shape, feature, phi=side * np.maximum(a - past, 0.0), cone=cone)
+    gap = shapes.r[shape] * draw.powers(rng, n, -15, -2)
+    tilt = np.where(rng.random(n) < 0.5, 0.0, draw.powers(rng, n, -9, 0))
+    return draw.place(rng, shapes, shape, contact, gap, tilt=tilt)
 
 
-@_family("nearly parallel", "axes 1e-18 ... 1e-3 rad off parallel, contacts on every feature")
+@MAKERS.family("nearly parallel")
 def _near_parallel(rng: np.random.Generator, n: int) -> Cases:
-    return touching(rng, n, random_shapes(rng, shape_count(n)), (-15, -2), tilt=(-18, -3, 0.05))
+    """Axes 1e-18 ... 1e-3 rad off parallel, contacts on every feature."""
+    return draw.touching(rng, n, draw.shapes(rng, draw.count(n)), (-15, -2), tilt=(-18, -3, 0.05))
 
 
-@_family("nearly coaxial", "axis through the arc's centre to 1e-300 ... 1e-3, tilts 1e-18 ... 1e-1")
+@MAKERS.family("nearly coaxial")
 def _near_coaxial(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, _ = setting(rng, n)
+    """Axis through the arc's centre to 1e-300 ... 1e-3, tilts 1e-18 ... 1e-1."""
+    shapes, shape, _ = draw.setting(rng, n)
     R = shapes.R[shape]
     tiny = np.where(rng.random((n, 2)) < 0.2, 1e-300 * rng.normal(size=(n, 2)), 0.0)
-    offset = np.stack([signed_powers(rng, n, -18, -3, 0.3) for _ in range(2)], 1) * R[:, None] + tiny
+    offset = np.stack([draw.powers(rng, n, -18, -3, 0.3) for _ in range(2)], 1) * R[:, None] + tiny
     z = rng.uniform(-1, 1, n) * shapes.L[shape] * rng.choice([0.0, 1.0], n)
-    d = np.stack([signed_powers(rng, n, -18, -1, 0.3) for _ in range(2)] + [rng.choice([-1.0, 1.0], n)], 1)
-    return free(rng, shapes, shape, np.column_stack([offset, z]), d)
+    d = np.stack([draw.powers(rng, n, -18, -1, 0.3) for _ in range(2)] + [rng.choice([-1.0, 1.0], n)], 1)
+    return draw.free(rng, shapes, shape, np.column_stack([offset, z]), d)
 
 
-@_family("wire ends", "the wire ends where the groove ends: faces level to 0, 1e-15 ... 1e-2")
+@MAKERS.family("wire ends")
 def _wire_ends(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, _ = setting(rng, n)
+    """The wire ends where the groove ends: faces level to 0, 1e-15 ... 1e-2."""
+    shapes, shape, _ = draw.setting(rng, n)
     half, H = shapes.length[shape] / 2, shapes.L[shape] / 2
     angle = rng.uniform(-np.pi, np.pi, n)
     rho = np.where(rng.random(n) < 0.7, np.maximum(shapes.R - shapes.r, 0.0)[shape], shapes.R[shape] * rng.random(n))
-    off = shapes.R[shape] * signed_powers(rng, n, -15, -2)
+    off = shapes.R[shape] * draw.powers(rng, n, -15, -2)
     z = rng.choice([-1.0, 1.0], n) * (H + rng.choice([-1.0, 1.0], n) * half) + off
-    tilt = np.stack([signed_powers(rng, n, -15, -1, 0.4) for _ in range(2)] + [np.ones(n)], 1)
-    lift = shapes.R[shape] * signed_powers(rng, n, -15, -3)
+    tilt = np.stack([draw.powers(rng, n, -15, -1, 0.4) for _ in range(2)] + [np.ones(n)], 1)
+    lift = shapes.R[shape] * draw.powers(rng, n, -15, -3)
     centre = np.stack([rho * np.sin(angle), -rho * np.cos(angle) + lift, z], 1)
-    return free(rng, shapes, shape, centre, tilt)
+    return draw.free(rng, shapes, shape, centre, tilt)
 
 
-@_family("narrow mouth", "arcs over 180 deg: mouth narrower than the wire; inside free, in the mouth not")
+@MAKERS.family("narrow mouth")
 def _narrow_mouth(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
+    """Arcs over 180 deg: mouth narrower than the wire; inside free, in the mouth not."""
+    k = draw.count(n)
     a = np.pi / 2 + rng.uniform(1e-6, 1.5, k)
     R = 10.0 ** rng.uniform(0, 2, k)
-    shapes = random_shapes(rng, k, R=R, half_angle=a, r=R * (1.0 - 10.0 ** rng.uniform(-6, -0.1, k)))
-    shape = spread(n, k)
-    gap = shapes.r[shape] * signed_powers(rng, n, -14, -1)
+    shapes = draw.shapes(rng, k, R=R, half_angle=a, r=R * (1.0 - 10.0 ** rng.uniform(-6, -0.1, k)))
+    shape = draw.spread(n, k)
+    gap = shapes.r[shape] * draw.powers(rng, n, -14, -1)
     s, h = shapes.lips(shape)
     reach = np.asarray(shapes.r[shape], Extended) + np.asarray(gap, Extended)
     fits = reach >= s  # rests on both lips from inside (-) or outside (+)
@@ -150,28 +141,30 @@ def _narrow_mouth(rng: np.random.Generator, n: int) -> Cases:
     at_lips = fits & (rng.random(n) < 0.6)
     x = np.where(at_lips, 0.0, inside * np.sin(angle))
     y = np.where(at_lips, y, -inside * np.cos(angle))
-    tilt = np.stack([signed_powers(rng, n, -12, -1, 0.7) for _ in range(2)] + [np.ones(n)], 1)
-    return free(rng, shapes, shape, np.stack([x, y, 0 * x], 1), tilt)
+    tilt = np.stack([draw.powers(rng, n, -12, -1, 0.7) for _ in range(2)] + [np.ones(n)], 1)
+    return draw.free(rng, shapes, shape, np.stack([x, y, 0 * x], 1), tilt)
 
 
-@_family("half turn", "contacts and offsets at +-180 deg from the deepest line and at +-0, where atan2 jumps")
+@MAKERS.family("half turn")
 def _half_turn(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
-    shapes = random_shapes(rng, k, half_angle=np.pi - 10.0 ** rng.uniform(-8, 0, k))
-    shape = spread(n, k)
-    angle = rng.choice([-np.pi, np.pi, 0.0], n) + signed_powers(rng, n, -17, -2)
+    """Contacts and offsets at +-180 deg from the deepest line and at +-0, where atan2 jumps."""
+    k = draw.count(n)
+    shapes = draw.shapes(rng, k, half_angle=np.pi - 10.0 ** rng.uniform(-8, 0, k))
+    shape = draw.spread(n, k)
+    angle = rng.choice([-np.pi, np.pi, 0.0], n) + draw.powers(rng, n, -17, -2)
     rho = shapes.R[shape] * rng.choice([1.0, 1.0, 0.5, 1e-9], n) - shapes.r[shape] * rng.choice([0.0, 1.0], n)
     x, y = rho * np.sin(angle), -rho * np.cos(angle)
     x = np.where(rng.random(n) < 0.3, rng.choice([0.0, -0.0, 5e-324, -5e-324], n), x)
     y = np.where(rng.random(n) < 0.1, rng.choice([0.0, -0.0], n), y)
-    d = np.stack([signed_powers(rng, n, -15, -1, 0.6) for _ in range(2)] + [rng.choice([-1.0, 1.0], n)], 1)
-    return free(rng, shapes, shape, np.stack([x, y, rng.choice([0.0, -0.0], n)], 1), d)
+    d = np.stack([draw.powers(rng, n, -15, -1, 0.6) for _ in range(2)] + [rng.choice([-1.0, 1.0], n)], 1)
+    return draw.free(rng, shapes, shape, np.stack([x, y, rng.choice([0.0, -0.0], n)], 1), d)
 
 
-@_family("embedded", "wires wholly inside the material, or their axis inside it: contained is a hit")
+@MAKERS.family("embedded")
 def _embedded(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
-    base, shape = random_shapes(rng, k), spread(n, k)
+    """Wires wholly inside the material, or their axis inside it: contained is a hit."""
+    k = draw.count(n)
+    base, shape = draw.shapes(rng, k), draw.spread(n, k)
     shapes = replace(base, r=base.R * rng.uniform(0.01, 0.5, k), length=base.R * rng.uniform(0.1, 3, k))
     R, H = shapes.R[shape], shapes.L[shape] / 2
     depth = R * 10.0 ** rng.uniform(-3, 0.5, n)
@@ -180,71 +173,74 @@ def _embedded(rng: np.random.Generator, n: int) -> Cases:
     y = np.where(beside, -R * np.cos(shapes.half_angle[shape]) - depth, -R - depth)
     d = rng.normal(size=(n, 3)) * np.where(rng.random((n, 3)) < 0.2, 1e-9, 1.0)
     d[:, 2] += np.where((d**2).sum(1) < 1e-12, 1.0, 0.0)
-    return free(rng, shapes, shape, np.stack([x, y, H * rng.uniform(-1, 1, n)], 1), d)
+    return draw.free(rng, shapes, shape, np.stack([x, y, H * rng.uniform(-1, 1, n)], 1), d)
 
 
-@_family("ties", "two features equally near to 0, 1e-16 ... 1e-6: both lips, both walls, arc and lip")
+@MAKERS.family("ties")
 def _ties(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, _ = setting(rng, n)
+    """Two features equally near to 0, 1e-16 ... 1e-6: both lips, both walls, arc and lip."""
+    shapes, shape, _ = draw.setting(rng, n)
     R, r = shapes.R[shape], shapes.r[shape]
 
     def off() -> Array:
-        return R * signed_powers(rng, n, -16, -6, 0.4)
+        return R * draw.powers(rng, n, -16, -6, 0.4)
 
     kind = rng.integers(3, size=n)
     y = np.select([kind == 0, kind == 1], [rng.uniform(-0.2, 1.5, n) * R + r, off()], rng.uniform(-1, 1, n) * R)
     z = np.where(kind == 2, rng.choice([-1, 1], n) * shapes.L[shape] / 2, 0.0)
     angle = rng.choice([0.0, np.pi / 2, np.pi / 4, 1.0], n)
-    lean = rng.choice([0.0, 1e-9, 1e-3, 0.3, 1.5707963267948966], n) + signed_powers(rng, n, -16, -9)
+    lean = rng.choice([0.0, 1e-9, 1e-3, 0.3, 1.5707963267948966], n) + draw.powers(rng, n, -16, -9)
     d = np.stack([np.sin(lean) * np.cos(angle), np.sin(lean) * np.sin(angle), np.cos(lean)], 1)
-    return free(rng, shapes, shape, np.stack([off(), y, z + off()], 1), d)
+    return draw.free(rng, shapes, shape, np.stack([off(), y, z + off()], 1), d)
 
 
-@_family("tilted in the groove", "wire turned in the groove's bottom plane until its ends meet the walls")
+@MAKERS.family("tilted in the groove")
 def _tilted(rng: np.random.Generator, n: int) -> Cases:
-    """Clearance R - (L/2 tan t + r / cos t) for half angles from 90 deg: the wire's side meets the end arcs."""
-    k = shape_count(n)
+    """Wire turned in the groove's bottom plane until its ends meet the walls.
+
+    Clearance R - (L/2 tan t + r / cos t) for half angles from 90 deg: the wire's side meets the end arcs.
+    """
+    k = draw.count(n)
     R = 10.0 ** rng.uniform(0, 2, k)
     given = {"L": R * rng.uniform(1, 10, k), "length": R * 40.0, "r": R * (1.0 - 10.0 ** rng.uniform(-4, -0.5, k))}
-    shapes = random_shapes(rng, k, R=R, half_angle=rng.uniform(1.2, 2.6, k), **given)
-    shape = spread(n, k)
+    shapes = draw.shapes(rng, k, R=R, half_angle=rng.uniform(1.2, 2.6, k), **given)
+    shape = draw.spread(n, k)
     Rn, rn, H = R[shape], shapes.r[shape], shapes.L[shape] / 2
     angle = np.zeros(n)  # H sin t + r = R cos t, by a few Newton steps
     for _ in range(30):
         angle -= (H * np.sin(angle) + rn - Rn * np.cos(angle)) / (H * np.cos(angle) + Rn * np.sin(angle))
-    angle = angle * (1.0 + signed_powers(rng, n, -15, -1))
+    angle = angle * (1.0 + draw.powers(rng, n, -15, -1))
     turn = rng.choice([0.0, 0.0, 0.5, 1.0], n) * rng.uniform(-np.pi, np.pi, n)
     d = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)], 1)
-    centre = np.stack([Rn * signed_powers(rng, n, -12, -3, 0.6) for _ in range(3)], 1)
-    return free(rng, shapes, shape, centre, d)
+    centre = np.stack([Rn * draw.powers(rng, n, -12, -3, 0.6) for _ in range(3)], 1)
+    return draw.free(rng, shapes, shape, centre, d)
 
 
-@_family("crossed", "wire square to the groove, across its lips or end edges, in the plane of a face to 1e-16")
+@MAKERS.family("crossed")
 def _crossed(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, _ = setting(rng, n)
+    """Wire square to the groove, across its lips or end edges, in the plane of a face to 1e-16."""
+    shapes, shape, _ = draw.setting(rng, n)
     R, r, H = shapes.R[shape], shapes.r[shape], shapes.L[shape] / 2
     h = -R * np.cos(shapes.half_angle[shape])
 
     def small() -> Array:
-        return R * signed_powers(rng, n, -16, -2)
+        return R * draw.powers(rng, n, -16, -2)
 
     over = rng.random(n) < 0.5
     y = np.where(over, h + r, rng.uniform(-2, 1, n) * R) + small()
     z = np.where(over, rng.choice([-1, 0, 1], n) * H, rng.choice([-1, 1], n) * (H + r)) + small()
     x = R * rng.uniform(-2, 2, n)
-    d = np.stack([np.ones(n), *(signed_powers(rng, n, -16, -2, 0.4) for _ in range(2))], 1)
-    return free(rng, shapes, shape, np.stack([x, y, z], 1), d)
+    d = np.stack([np.ones(n), *(draw.powers(rng, n, -16, -2, 0.4) for _ in range(2))], 1)
+    return draw.free(rng, shapes, shape, np.stack([x, y, z], 1), d)
 
 
-@_family(
-    "in a face's plane",
-    "axis in the plane of an end face or of the flat faces to 1e-18 ... 1e-9, through what lies in it",
-)
+@MAKERS.family("in a face's plane")
 def _in_plane(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, _ = setting(rng, n)
+    """Axis in the plane of an end face or of the flat faces to 1e-18 ... 1e-9, through what lies in it."""
+    shapes, shape, _ = draw.setting(rng, n)
     R, a, H = shapes.R[shape], shapes.half_angle[shape], 0.5 * shapes.L[shape]
-    off = R * signed_powers(rng, n, -18, -9, 0.4)
-    out = signed_powers(rng, n, -18, -9, 0.4)
+    off = R * draw.powers(rng, n, -18, -9, 0.4)
+    out = draw.powers(rng, n, -18, -9, 0.4)
     # Through the lips, the arc's ends, or anywhere.
     aim = rng.choice([-1.0, 1.0, 0.0], n)
     x, y = aim * R * np.sin(a), -R * np.cos(a)
@@ -259,22 +255,21 @@ def _in_plane(rng: np.random.Generator, n: int) -> Cases:
     h = -R * np.cos(a)
     d = np.stack([u, np.where(in_end, v, out), np.where(in_end, out, v)], 1)
     centre = np.stack([x - t * u, np.where(in_end, y - t * v, h + off), np.where(in_end, end + off, z - t * v)], 1)
-    return free(rng, shapes, shape, centre, d)
+    return draw.free(rng, shapes, shape, centre, d)
 
 
-@_family(
-    "through two points", "axis through two points of faces, edges or corners to 0, 1e-16 ... 1e-9; also along an edge"
-)
+@MAKERS.family("through two points")
 def _two_points(rng: np.random.Generator, n: int) -> Cases:
-    shapes, shape, feature = setting(rng, n)
-    other = np.where(rng.random(n) < 0.3, feature, rng.choice(FEATURES, n))  # along an edge, or across a face
-    a, b = contact_on(rng, shapes, shape, feature), contact_on(rng, shapes, shape, other)
+    """Axis through two points of faces, edges or corners to 0, 1e-16 ... 1e-9; also along an edge."""
+    shapes, shape, feature = draw.setting(rng, n)
+    other = np.where(rng.random(n) < 0.3, feature, rng.choice(draw.FEATURES, n))  # along an edge, or across a face
+    a, b = draw.contact_on(rng, shapes, shape, feature), draw.contact_on(rng, shapes, shape, other)
     R = shapes.R[shape].astype(Extended)
-    p, q = ((c.q + (R * signed_powers(rng, n, -16, -9, 0.5))[:, None] * c.normal) for c in (a, b))
+    p, q = ((c.q + (R * draw.powers(rng, n, -16, -9, 0.5))[:, None] * c.normal) for c in (a, b))
     d = q - p
     same = (d * d).sum(1) == 0
     d[same] = (0, 0, 1)
     norm = np.sqrt((d * d).sum(1))[:, None]
     ahead = np.where(rng.random(n) < 0.3, 0.5, rng.uniform(-0.5, 0.5, n)) * shapes.length[shape]
     centre = p + ahead.astype(Extended)[:, None] * d / norm
-    return free(rng, shapes, shape, centre, d)
+    return draw.free(rng, shapes, shape, centre, d)

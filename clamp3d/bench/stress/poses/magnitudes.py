@@ -6,101 +6,96 @@ from dataclasses import replace
 
 import numpy as np
 
-from clamp3d.bench.stress.family import into
-from clamp3d.bench.stress.poses.cases import (
-    FEATURES,
-    Cases,
-    Extended,
-    contact_on,
-    place,
-    poses_from_axes,
-    random_shapes,
-    shape_count,
-    signed_powers,
-    spread,
-    touching,
-)
-from clamp3d.bench.stress.poses.family import PoseFamily
+from clamp3d.bench.stress.family import Makers
+from clamp3d.bench.stress.poses import draw
+from clamp3d.bench.stress.poses.cases import Cases, Extended
 
-FAMILIES: dict[str, PoseFamily] = {}
-_family = into(FAMILIES, PoseFamily)
+MAKERS = Makers()
 
 
-@_family("full and tiny arcs", "half angles of 1e-12 ... 1e-2 rad and of pi less that")
+@MAKERS.family("full and tiny arcs")
 def _extreme_arcs(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
+    """Half angles of 1e-12 ... 1e-2 rad and of pi less that."""
+    k = draw.count(n)
     small = 10.0 ** rng.uniform(-12, -2, k)
-    shapes = random_shapes(rng, k, half_angle=np.where(rng.random(k) < 0.5, small, np.pi - small))
-    return touching(rng, n, shapes, (-14, -1), tilt=(-9, 0, 0.5))
+    shapes = draw.shapes(rng, k, half_angle=np.where(rng.random(k) < 0.5, small, np.pi - small))
+    return draw.touching(rng, n, shapes, (-14, -1), tilt=(-9, 0, 0.5))
 
 
-@_family("sizes", "all lengths times 1e-6 ... 1e6, gaps of 0 and 1e-15 ... 1e-1 of the radius")
+@MAKERS.family("sizes")
 def _sizes(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
+    """All lengths times 1e-6 ... 1e6, gaps of 0 and 1e-15 ... 1e-1 of the radius."""
+    k = draw.count(n)
     scale = 10.0 ** rng.uniform(-6, 6, k)
-    base = random_shapes(rng, k)
+    base = draw.shapes(rng, k)
     shapes = replace(base, R=base.R * scale, L=base.L * scale, r=base.r * scale, length=base.length * scale)
-    return touching(rng, n, shapes, (-15, -1))
+    return draw.touching(rng, n, shapes, (-15, -1))
 
 
-@_family("metres", "a clamp in metres in place of millimetres: R 5e-3 ... 5e-2, gaps of 1e-7 ... 1e-4")
+@MAKERS.family("metres")
 def _metres(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
+    """A clamp in metres in place of millimetres: R 5e-3 ... 5e-2, gaps of 1e-7 ... 1e-4."""
+    k = draw.count(n)
     R = rng.uniform(5e-3, 5e-2, k)
     given = {"r": R * rng.uniform(0.5, 0.99, k), "L": R * rng.uniform(1, 8, k), "length": R * rng.uniform(1, 20, k)}
-    shapes = random_shapes(rng, k, R=R, **given)
-    shape, feature = spread(n, k), rng.choice(FEATURES, n)
-    gap = signed_powers(rng, n, -7, -4)
-    return place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap)
+    shapes = draw.shapes(rng, k, R=R, **given)
+    shape, feature = draw.spread(n, k), rng.choice(draw.FEATURES, n)
+    gap = draw.powers(rng, n, -7, -4)
+    return draw.place(rng, shapes, shape, draw.contact_on(rng, shapes, shape, feature), gap)
 
 
-@_family("mixed sizes", "wire and groove, or length and radius, different by 1e-6 ... 1e6")
+@MAKERS.family("mixed sizes")
 def _mixed_sizes(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
+    """Wire and groove, or length and radius, different by 1e-6 ... 1e6."""
+    k = draw.count(n)
     R = 10.0 ** rng.uniform(-3, 3, k)
     given = {name: R * 10.0 ** rng.uniform(-6, 6, k) for name in ("r", "L", "length")}
-    shapes = random_shapes(rng, k, R=R, **given)
-    shape, feature = spread(n, k), rng.choice(FEATURES, n)
-    gap = np.minimum(shapes.r, shapes.R)[shape] * signed_powers(rng, n, -12, 0)
-    tilt = signed_powers(rng, n, -12, 0, 0.3)
-    return place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap, tilt=tilt)
+    shapes = draw.shapes(rng, k, R=R, **given)
+    shape, feature = draw.spread(n, k), rng.choice(draw.FEATURES, n)
+    gap = np.minimum(shapes.r, shapes.R)[shape] * draw.powers(rng, n, -12, 0)
+    tilt = draw.powers(rng, n, -12, 0, 0.3)
+    return draw.place(rng, shapes, shape, draw.contact_on(rng, shapes, shape, feature), gap, tilt=tilt)
 
 
-@_family("far from the origin", "both bodies turned and 1e3 ... 1e9 mm from the world's origin")
+@MAKERS.family("far from the origin")
 def _far(rng: np.random.Generator, n: int) -> Cases:
-    near = touching(rng, n, random_shapes(rng, shape_count(n)), (-9, -1))
+    """Both bodies turned and 1e3 ... 1e9 mm from the world's origin."""
+    near = draw.touching(rng, n, draw.shapes(rng, draw.count(n)), (-9, -1))
     away = rng.normal(size=(n, 3))
     away *= (10.0 ** rng.uniform(3, 9, n) / np.sqrt((away**2).sum(1)))[:, None]
-    world = poses_from_axes(rng, away, rng.normal(size=(n, 3)))
+    world = draw.poses_from_axes(rng, away, rng.normal(size=(n, 3)))
     exact = np.asarray(world, Extended) @ np.asarray(near.T_world_wire, Extended)
     return replace(near, T_world_wire=np.asarray(exact, np.float64), gap=np.full(n, np.nan), T_world_groove=world)
 
 
-@_family("far wire", "a long wire whose middle is 1e3 ... 1e6 mm away and whose side still touches")
+@MAKERS.family("far wire")
 def _far_wire(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
-    shapes = random_shapes(rng, k, length=10.0 ** rng.uniform(3, 6.3, k))
-    return touching(rng, n, shapes, (-9, -1), tilt=(-6, 0.5, 0.1))
+    """A long wire whose middle is 1e3 ... 1e6 mm away and whose side still touches."""
+    k = draw.count(n)
+    shapes = draw.shapes(rng, k, length=10.0 ** rng.uniform(3, 6.3, k))
+    return draw.touching(rng, n, shapes, (-9, -1), tilt=(-6, 0.5, 0.1))
 
 
-@_family("vanishing sizes", "groove length, wire length or wire radius down to 1e-12 of the rest")
+@MAKERS.family("vanishing sizes")
 def _vanishing(rng: np.random.Generator, n: int) -> Cases:
-    k = shape_count(n)
+    """Groove length, wire length or wire radius down to 1e-12 of the rest."""
+    k = draw.count(n)
     R = 10.0 ** rng.uniform(0, 2, k)
     which = rng.integers(3, size=k)
     tiny = R * 10.0 ** rng.uniform(-12, -3, k)
-    base = random_shapes(rng, k, R=R)
+    base = draw.shapes(rng, k, R=R)
     shrunk = {name: np.where(which == i, tiny, getattr(base, name)) for i, name in enumerate(("L", "r", "length"))}
     shapes = replace(base, **shrunk)
-    shape, feature = spread(n, k), rng.choice(FEATURES, n)
-    gap = shapes.R[shape] * signed_powers(rng, n, -12, -1)
+    shape, feature = draw.spread(n, k), rng.choice(draw.FEATURES, n)
+    gap = shapes.R[shape] * draw.powers(rng, n, -12, -1)
     gap = np.where(gap < -0.5 * shapes.r[shape], -gap, gap)
-    return place(rng, shapes, shape, contact_on(rng, shapes, shape, feature), gap)
+    return draw.place(rng, shapes, shape, draw.contact_on(rng, shapes, shape, feature), gap)
 
 
-@_family("poses barely rigid", "rotations off by up to 1e-9, as products of many poses are")
+@MAKERS.family("poses barely rigid")
 def _barely_rigid(rng: np.random.Generator, n: int) -> Cases:
-    cases = touching(rng, n, random_shapes(rng, shape_count(n)), (-15, -1))
+    """Rotations off by up to 1e-9, as products of many poses are."""
+    cases = draw.touching(rng, n, draw.shapes(rng, draw.count(n)), (-15, -1))
     T = cases.T_world_wire.copy()
     T[:, :3, :3] += rng.uniform(-1.0, 1.0, (n, 3, 3)) * 10.0 ** rng.uniform(-16, -9.8, n)[:, None, None]
     return replace(cases, T_world_wire=T, gap=np.full(n, np.nan))

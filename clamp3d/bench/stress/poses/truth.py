@@ -2,23 +2,22 @@
 
 Definition: ``min over |t| <= length/2 of sdf(c + t d) - r``, where ``sdf`` is the signed distance of a point from the
 groove's solid. Here ``sdf`` is put together from the boundary pieces of the section (arc, two rays) and the prism
-rule, and the minimum is searched for: samples between all places where the axis changes sides, then golden section.
+rule. Branch and bound with the proven slope bound of ``sdf`` along the axis finds the stretches that hold the minimum,
+so none deeper than 1e-6 of the scene can hide; golden section goes down in each of them:
 
 - `truth`: all cases at once in 80-bit floats (64-bit mantissa: about 2000 times finer than float64).
-- `truth_50_digits`: one case with mpmath at 50 digits; the search is branch and bound with the proven slope bound of
-  ``sdf`` along the axis, so no minimum deeper than 1e-6 of the scene can hide.
+- `truth_50_digits`: one case with mpmath at 50 digits.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.bench.stress.digits import fifty_digits, golden, point_distance
-from clamp3d.bench.stress.poses.cases import Cases, Extended
+from clamp3d.bench.stress.poses.cases import Cases, Extended, unit_rows
 
 EXTENDED_WORKS = bool(np.finfo(Extended).eps < 1e-18)
 """Whether the platform's long double is wide enough for `truth`; if not, it calls `truth_50_digits` case by case."""
@@ -27,9 +26,10 @@ EXTENDED_ERROR = 64.0 * float(np.finfo(Extended).eps)
 """Error of `truth` in parts of the scene's size."""
 
 _GOLDEN = (np.sqrt(Extended(5)) - 1) / 2
-_FILL = 8
-_MANY = 20_000
-"""Stretches at once at which branch and bound stops cutting: a plateau, all of it within rounding of the least."""
+_FILL = 16
+_MANY, _MOST = 500, 20_000
+"""Stretches of a case at which branch and bound stops cutting: a plateau, all of it within rounding of the least. The
+first is for all cases at once, the second for one."""
 
 
 def truth(cases: Cases) -> NDArray[Any]:
@@ -37,72 +37,15 @@ def truth(cases: Cases) -> NDArray[Any]:
     if not EXTENDED_WORKS:
         return np.array([float(truth_50_digits(cases, i)) for i in range(len(cases))], Extended)
     scene = _Scene(cases)
-    rows = np.arange(len(cases))
-    t = _samples(scene)
-    f = np.stack([scene.sdf(rows, t[:, j]) for j in range(t.shape[1])], 1)
-    low = _Lowest(f.min(1), t[rows, f.argmin(1)])
-    case, lo, hi = _brackets(scene, rows, t, f, low.f)
-    # Once more within each: two minima can lie between neighbouring samples.
-    w = np.arange(_FILL * 2 + 1).astype(Extended) / (_FILL * 2)
-    t = lo[:, None] + w * (hi - lo)[:, None]
-    f = np.stack([scene.sdf(case, t[:, j]) for j in range(t.shape[1])], 1)
-    low.take(case, t[np.arange(len(t)), f.argmin(1)], f.min(1))
-    case, lo, hi = _brackets(scene, case, t, f, low.f)
-    _golden(scene, case, lo, hi, low)
-    # Samples closer than their rounding can hide which side falls: look both ways from the lowest, near and far.
-    steps = np.concatenate([[0], 0.5 ** np.arange(1, 60, dtype=Extended)])
-    steps = np.concatenate([-steps[1:], steps])
-    for _ in range(20):
-        span = 2 * scene.half[rows]
-        t = np.clip(low.t[rows, None] + span[:, None] * steps, -scene.half[rows, None], scene.half[rows, None])
-        f = np.stack([scene.sdf(rows, t[:, j]) for j in range(t.shape[1])], 1)
-        j = f.argmin(1)
-        here, there = t[np.arange(len(t)), j], f[np.arange(len(t)), j]
-        better = there < low.f[rows] - EXTENDED_ERROR / 16 * scene.size[rows]
-        rows, here, there = rows[better], here[better], there[better]
-        if not len(rows):
-            break
-        step = 3 * np.abs(here - low.t[rows])
-        low.take(rows, here, there)
-        _golden(scene, rows, np.maximum(here - step, -scene.half[rows]), np.minimum(here + step, scene.half[rows]), low)
-    return np.asarray(low.f - scene.r)
-
-
-class _Lowest:
-    """Lowest sdf of each case so far, and where."""
-
-    def __init__(self, f: NDArray[Any], t: NDArray[Any]) -> None:
-        self.f, self.t = f, t
-
-    def take(self, case: Any, t: NDArray[Any], f: NDArray[Any]) -> None:
-        order = np.argsort(-f, kind="stable")  # of several for one case the last assigned is the lowest
-        case, t, f = case[order], t[order], f[order]
-        better = f < self.f[case]
-        self.f[case[better]], self.t[case[better]] = f[better], t[better]
-
-
-def _brackets(scene: _Scene, case: Any, t: NDArray[Any], f: NDArray[Any], best: NDArray[Any]) -> tuple[Any, Any, Any]:
-    """Stretches (case, lo, hi) around samples no higher than their neighbours that could reach below the best.
-
-    Samples that rounding alone tells apart are level; of a level run only the two ends are looked at.
-    """
-    grain = EXTENDED_ERROR / 16 * scene.size[case][:, None]
-    f = np.round(f / grain) * grain
-    left = np.concatenate([f[:, :1], f[:, :-1]], 1)
-    right = np.concatenate([f[:, 1:], f[:, -1:]], 1)
-    lower, upper = np.concatenate([t[:, :1], t[:, :-1]], 1), np.concatenate([t[:, 1:], t[:, -1:]], 1)
-    i, j = np.nonzero((f <= left) & (f <= right) & ((f < left) | (f < right) | _first_or_last(f)) & (upper > lower))
-    lo, hi, middle = lower[i, j], upper[i, j], f[i, j]
-    width = np.maximum(hi - t[i, j], t[i, j] - lo)
-    reach = middle - width * scene.slope(case[i], t[i, j], middle, width)
-    near = reach < best[case[i]] - EXTENDED_ERROR / 64 * scene.size[case[i]]
-    return case[i[near]], lo[near], hi[near]
-
-
-def _first_or_last(f: NDArray[Any]) -> NDArray[np.bool_]:
-    mask = np.zeros(f.shape, bool)
-    mask[:, [0, -1]] = True
-    return mask
+    case, lo, hi, best = _brackets(scene, _MANY)
+    # A bracket may hold a plateau with two ends a rounding apart: look at it more closely before closing in.
+    t = lo[:, None] + (hi - lo)[:, None] * (np.arange(_FILL + 1).astype(Extended) / _FILL)
+    f = scene.sdf(case[:, None], t)
+    np.minimum.at(best, case, f.min(1))
+    beside = np.pad(f, ((0, 0), (1, 1)), mode="edge")
+    i, j = np.nonzero((f <= beside[:, :-2]) & (f <= beside[:, 2:]))
+    _golden(scene, case[i], t[i, np.maximum(j - 1, 0)], t[i, np.minimum(j + 1, _FILL)], best)
+    return np.asarray(best - scene.r)
 
 
 class _Scene:
@@ -122,7 +65,7 @@ class _Scene:
             T = np.asarray(cases.T_world_groove, Extended)
             c = np.einsum("nij,ni->nj", T[:, :3, :3], c - T[:, :3, 3])
             d = np.einsum("nij,ni->nj", T[:, :3, :3], d)
-        self.c, self.d = c, d / np.sqrt((d * d).sum(1))[:, None]
+        self.c, self.d = c, unit_rows(d)
         self.lean = np.sqrt((self.d[:, :2] ** 2).sum(1))
         self.size = np.asarray(cases.scene(), Extended)
 
@@ -139,49 +82,76 @@ class _Scene:
     def sdf(self, i: NDArray[np.intp], t: NDArray[Any]) -> NDArray[Any]:
         """Signed distance of the axis points t (m,) of cases i (m,) from their grooves."""
         x, y, z = (self.c[i, k] + t * self.d[i, k] for k in range(3))
-        R, h, sx = self.R[i], self.h[i], self.sx[i]
-        x = np.abs(x)
-        # Squares neither overflow nor vanish in the exponents of a long double.
-        rho = np.sqrt(x * x + y * y)
-        lip = np.sqrt((x - sx) ** 2 + (y - h) ** 2)
-        arc = np.where(x * -h + y * sx <= 0, np.abs(R - rho), lip)
-        ray = np.where(x >= sx, np.abs(y - h), lip)
-        inside = (y <= h) & (rho >= R)
-        g = np.where(inside, -1.0, 1.0) * np.minimum(arc, ray)
-        e = np.abs(z) - self.H[i]
-        outside = np.sqrt(np.maximum(g, 0) ** 2 + np.maximum(e, 0) ** 2)
-        return np.asarray(np.where((g <= 0) & (e <= 0), np.maximum(g, e), outside))
+        return point_sdf(x, y, z, self.R[i], self.sx[i], self.h[i], self.H[i])
 
 
-def _samples(s: _Scene) -> NDArray[Any]:
-    """Places on each axis (n, m), sorted: ends, where it changes sides or comes nearest to something, and between."""
+def point_sdf(x: Any, y: Any, z: Any, R: Any, sx: Any, h: Any, H: Any) -> NDArray[Any]:
+    """Signed distance of points from grooves with lips at (+-sx, h) and ends at +-H, in the numbers that are given."""
+    x = np.abs(x)
+    # Squares neither overflow nor vanish in the exponents of a long double.
+    rho = np.sqrt(x * x + y * y)
+    lip = np.sqrt((x - sx) ** 2 + (y - h) ** 2)
+    arc = np.where(x * -h + y * sx <= 0, np.abs(R - rho), lip)
+    ray = np.where(x >= sx, np.abs(y - h), lip)
+    inside = (y <= h) & (rho >= R)
+    g = np.where(inside, -1.0, 1.0) * np.minimum(arc, ray)
+    e = np.abs(z) - H
+    outside = np.sqrt(np.maximum(g, 0) ** 2 + np.maximum(e, 0) ** 2)
+    return np.asarray(np.where((g <= 0) & (e <= 0), np.maximum(g, e), outside))
+
+
+def _brackets(scene: _Scene, most: int) -> tuple[NDArray[np.intp], NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Stretches (case, lo, hi) of the axes, each with one minimum, and the least sdf of each case that was seen.
+
+    Outside of them sdf is more than 1e-6 of the scene above its least value, by the bound on its slope along the axis.
+    No stretch is cut across an end face; ``most`` stretches of a case are as fine as it gets.
+    """
+    n, half, slack = len(scene.half), scene.half, Extended(1e-6) * scene.size
     with np.errstate(all="ignore"):
-        cx, cy, cz = s.c.T
-        dx, dy, dz = s.d.T
-        e2 = dx * dx + dy * dy
-        t = [-s.half, s.half, 0 * s.half]
-        t += [(w * s.H - cz) / dz for w in (-1, 1)] + [(s.h - cy) / dy, -cx / dx, -cy / dy]
-        t += [(w * s.sx - cx) / dx for w in (-1, 1)]
-        t += [-(cx * dx + cy * dy) / e2]  # nearest to the groove's axis
-        t += [-((cx - w * s.sx) * dx + (cy - s.h) * dy) / e2 for w in (-1, 1)]  # nearest to the lips
-        yz = dy * dy + dz * dz
-        t += [-((cy - s.h) * dy + (cz - w * s.H) * dz) / yz for w in (-1, 1)]  # nearest to the end edges
-        t += [
-            -((cx - u * s.sx) * dx + (cy - s.h) * dy + (cz - w * s.H) * dz) for u in (-1, 1) for w in (-1, 1)
-        ]  # nearest to the corners
-        half = (cx * dx + cy * dy) / e2
-        root = np.sqrt(np.maximum(half * half - (cx * cx + cy * cy - s.R * s.R) / e2, 0))
-        t += [-half - root, -half + root]  # through the arc's surface
-    places = np.stack(t, 1)
-    places = np.where(np.isfinite(places), places, 0)
-    places = np.sort(np.clip(places, -s.half[:, None], s.half[:, None]), axis=1)
-    w = np.arange(_FILL).astype(Extended) / _FILL
-    between = places[:, :-1, None] + w * (places[:, 1:, None] - places[:, :-1, None])
-    return np.concatenate([between.reshape(len(places), -1), places[:, -1:]], 1)
+        faces = [
+            np.where(np.abs(t) < half, t, half)
+            for t in ((w * scene.H - scene.c[:, 2]) / scene.d[:, 2] for w in (-1, 1))
+        ]
+    edges = np.sort(np.stack([-half, half, *faces], 1), axis=1)
+    best = scene.sdf(np.arange(n)[:, None], edges).min(1)
+    case, k = np.nonzero(edges[:, 1:] > edges[:, :-1])
+    lo, hi = edges[case, k], edges[case, k + 1]
+    kept = []
+    for _ in range(80):
+        middle, width = (lo + hi) / 2, (hi - lo) / 2
+        f = scene.sdf(case, middle)
+        np.minimum.at(best, case, f)
+        drop = width * scene.slope(case, middle, f, width)
+        keep = f - drop <= best[case] + slack[case] / 1000
+        done = keep & ((drop <= slack[case]) | (np.bincount(case, minlength=n)[case] > most))
+        kept.append((case[done], lo[done], hi[done]))
+        more = keep & ~done
+        if not more.any():
+            break
+        case = np.tile(case[more], 2)
+        lo, hi = np.concatenate([lo[more], middle[more]]), np.concatenate([middle[more], hi[more]])
+    case, lo, hi = (np.concatenate(column) for column in zip(*kept, strict=True))
+    return *_joined(scene, case, lo, hi, slack), best
 
 
-def _golden(scene: _Scene, i: Any, a: NDArray[Any], b: NDArray[Any], low: _Lowest) -> None:
-    """Lower ``low`` to the least sdf between a and b (m,) of cases i, each with one minimum there."""
+def _joined(scene: _Scene, case: Any, lo: Any, hi: Any, slack: Any) -> tuple[Any, Any, Any]:
+    """Kept stretches put together where they touch, cut at inner local maxima, so that each holds one minimum."""
+    order = np.lexsort((lo, case))
+    case, lo, hi = case[order], lo[order], hi[order]
+    f = np.round(scene.sdf(case, (lo + hi) / 2) / (slack[case] / 1000000))  # what differs by rounding only is level
+    touch = (case[1:] == case[:-1]) & (np.abs(lo[1:] - hi[:-1]) <= 1e-9 * (hi[1:] - lo[1:]))
+    start = np.flatnonzero(np.append(True, ~(touch & (f[1:] == f[:-1]))))  # runs of one level
+    stop, g = np.append(start[1:], len(f)) - 1, f[start]
+    linked = np.append(False, touch)[start]  # to the run before
+    after, higher = np.append(linked[1:], False), np.append(False, g[1:] > g[:-1])
+    lower = np.append(g[1:] < g[:-1], False)
+    lowest = np.flatnonzero(~(linked & higher) & ~(after & lower))
+    first, last = start[lowest - linked[lowest]], stop[lowest + after[lowest]]
+    return case[first], lo[first], hi[last]
+
+
+def _golden(scene: _Scene, i: Any, a: NDArray[Any], b: NDArray[Any], best: NDArray[Any]) -> None:
+    """Lower ``best`` (n,) to the least sdf between a and b (m,) of cases i, each with one minimum there."""
     u, v = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
     fu, fv = scene.sdf(i, u), scene.sdf(i, v)
     for step in range(96):
@@ -193,14 +163,14 @@ def _golden(scene: _Scene, i: Any, a: NDArray[Any], b: NDArray[Any], low: _Lowes
         fu, fv = np.where(left, f, fv), np.where(left, fu, f)
         if step % 8 == 7:
             f = np.minimum(fu, fv)
-            low.take(i, np.where(fu < fv, u, v), f)
+            np.minimum.at(best, i, f)
             width = b - a  # what cannot reach below the lowest any more is left
-            on = f - width * scene.slope(i, u, f, width) < low.f[i] - EXTENDED_ERROR / 64 * scene.size[i]
+            on = f - width * scene.slope(i, u, f, width) < best[i] - EXTENDED_ERROR / 64 * scene.size[i]
             i, a, b, u, v, fu, fv = i[on], a[on], b[on], u[on], v[on], fu[on], fv[on]
 
 
 def truth_50_digits(cases: Cases, i: int) -> Any:
-    """Signed distance of case i as an mpmath number: branch and bound in float64, then golden section at 50 digits.
+    """Signed distance of case i as an mpmath number: branch and bound in long doubles, golden section at 50 digits.
 
     Raises MissingLibraryError without mpmath.
     """
@@ -225,73 +195,14 @@ def truth_50_digits(cases: Cases, i: int) -> Any:
 
     best = min(sdf(-half), sdf(half))
     goal = mp.mpf(10) ** -45 * (half + 1)
-    for lo, hi in _branch_and_bound(cases, i):
-        # A bracket may hold a plateau with two ends a rounding apart: look at it at 50 digits before closing in.
-        p, q = max(mp.mpf(lo), -half), min(mp.mpf(hi), half)
-        grid = [p + (q - p) * j / 16 for j in range(17)]
+    _, starts, stops, _ = _brackets(_Scene(cases.take([i])), _MOST)
+    for lo, hi in zip(starts, stops, strict=True):
+        p, q = max(mp.mpf(float(lo)), -half), min(mp.mpf(float(hi)), half)
+        grid = [p + (q - p) * j / _FILL for j in range(_FILL + 1)]
         values = [sdf(t) for t in grid]
         best = min(best, *values)
-        for j in range(17):
-            before, after = max(j - 1, 0), min(j + 1, 16)
+        for j in range(_FILL + 1):
+            before, after = max(j - 1, 0), min(j + 1, _FILL)
             if values[j] <= min(values[before], values[after]):
                 best = min(best, golden(mp, sdf, grid[before], grid[after], goal, enough=best))
     return best - r
-
-
-def _branch_and_bound(cases: Cases, i: int) -> list[tuple[float, float]]:
-    """Stretches of the axis outside of which sdf is more than 1e-6 of the scene above its least value, in float64.
-
-    By the bound on sdf's slope along the axis (`_Scene.slope`); no stretch is cut across an end face.
-    """
-    one = cases.take([i])
-    scene = _Scene(one)
-    half, H = float(scene.half[0]), float(scene.H[0])
-    cz, dz = float(scene.c[0, 2]), float(scene.d[0, 2])
-    slack = 1e-6 * float(one.scene()[0])
-    cuts = [-half, half] + ([t for t in ((-H - cz) / dz, (H - cz) / dz) if abs(t) < half] if dz else [])
-    edges = np.unique(cuts)
-    lo, hi = edges[:-1], edges[1:]
-    best, kept_lo, kept_hi = math.inf, [], []
-
-    def sdf(t: NDArray[Any]) -> NDArray[Any]:
-        return np.asarray(scene.sdf(np.zeros(len(t), np.intp), t.astype(Extended)), np.float64)
-
-    best = float(sdf(edges).min())
-    for _ in range(80):
-        middle, width = 0.5 * (lo + hi), 0.5 * (hi - lo)
-        f = sdf(middle)
-        best = min(best, float(f.min(initial=best)))
-        slope = np.asarray(scene.slope(np.zeros(len(f), np.intp), middle, f, width), np.float64)
-        keep = f - width * slope <= best + 1e-3 * slack
-        done = keep & ((width * slope <= slack) | (len(f) > _MANY))
-        kept_lo.append(lo[done])
-        kept_hi.append(hi[done])
-        more = keep & ~done
-        if not more.any():
-            break
-        cuts_lo, cuts_mid, cuts_hi = lo[more], middle[more], hi[more]
-        lo, hi = np.concatenate([cuts_lo, cuts_mid]), np.concatenate([cuts_mid, cuts_hi])
-    a, b = np.concatenate(kept_lo), np.concatenate(kept_hi)
-    return _joined(a, b, sdf, slack)
-
-
-def _joined(a: Any, b: Any, sdf: Any, slack: float) -> list[tuple[float, float]]:
-    """Kept stretches put together where they touch, cut at inner local maxima, so that each holds one minimum."""
-    order = np.argsort(a)
-    a, b = a[order], b[order]
-    f = np.round(sdf(0.5 * (a + b)) / (1e-6 * slack))  # what differs by rounding only is level
-    joined = np.concatenate([[False], np.abs(a[1:] - b[:-1]) <= 1e-9 * (b[1:] - a[1:])])
-    level = joined & np.concatenate([[False], f[1:] == f[:-1]])
-    start = np.flatnonzero(~level)  # runs of one level
-    stop = np.concatenate([start[1:], [len(a)]]) - 1
-    g = f[start]
-    brackets = []
-    for k in range(len(start)):
-        before = k > 0 and joined[start[k]]
-        after = k + 1 < len(start) and joined[start[k + 1]]
-        if (before and g[k - 1] < g[k]) or (after and g[k + 1] < g[k]):
-            continue
-        lo = a[start[k - 1]] if before else a[start[k]]
-        hi = b[stop[k + 1]] if after else b[stop[k]]
-        brackets.append((float(lo), float(hi)))
-    return brackets
