@@ -15,7 +15,7 @@ from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import kernel_distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
-from clamp3d.collide.model import Counters, Model, ModelCache, Progress
+from clamp3d.collide.model import Model, ModelCache, Progress
 from clamp3d.collide.refine import from_boxes, measured, refine, with_normal
 from clamp3d.collide.result import PairResult
 from clamp3d.collide.scene import Scene
@@ -43,7 +43,6 @@ def check_motions(
     scene: Scene,
     models: list[Model],
     asked: list[tuple[int, int]] | None,
-    counters: Counters,
     progress: Progress | None = None,
 ) -> tuple[PairResult, ...]:
     """Least distance of each moving part from each other part that it comes near, motion by motion.

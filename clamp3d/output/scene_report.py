@@ -47,12 +47,6 @@ def _work(work: Work) -> dict[str, Any]:
         "queries": dict(work.queries),
         "decided": dict(work.decided),
         "seconds": dict(work.seconds),
-        "fixed_fidelity": {
-            "mesh_error_mm": work.fixed_error,
-            "meshes": work.fixed_meshes,
-            "triangles": work.fixed_triangles,
-            "queries": work.fixed_queries,
-        },
     }
 
 
@@ -119,8 +113,6 @@ def work_text(work: Work, full: CheckResult | None = None) -> list[str]:
         f"decided: {decided}",
         f"built: {work.meshes} meshes ({work.triangles} triangles), {work.hulls} hulls, {work.fits} fits "
         f"for {work.shapes} shapes; asked: {queries or 'nothing'}; {sum(work.seconds.values()):.2f} s",
-        f"one fixed fidelity (every part meshed at {work.fixed_error:g} mm, every pair asked): {work.fixed_meshes} "
-        f"meshes, {work.fixed_triangles} triangles, {work.fixed_queries} queries",
     ]
     if full is not None:
         total = full.work
