@@ -208,6 +208,7 @@ def _deepest(model: Surface, triangles: Array, contact: float, rounding: float) 
     The distance from one flat piece of the model's surface is a convex function, so over a triangle it is largest at
     a corner; where the corners share no piece the triangle is cut in four.
     """
+    from trimesh.remesh import subdivide
     from trimesh.triangles import closest_point
 
     own = model.vertices[model.faces]
@@ -228,16 +229,8 @@ def _deepest(model: Surface, triangles: Array, contact: float, rounding: float) 
         done += len(todo)
         if deepest > 2.0 * contact or done > _PATCHES:
             return deepest, max(limit, float(best.max()))
-        todo = _quartered(todo[open_])
+        if not open_.any():
+            break
+        corners, faces = subdivide(todo[open_].reshape(-1, 3), np.arange(3 * int(open_.sum())).reshape(-1, 3))
+        todo = corners[faces]
     return deepest, max(deepest, limit)
-
-
-def _quartered(t: Array) -> Array:
-    m = 0.5 * (t + np.roll(t, -1, axis=1))
-    pieces = [
-        np.stack([t[:, 0], m[:, 0], m[:, 2]], 1),
-        np.stack([t[:, 1], m[:, 1], m[:, 0]], 1),
-        np.stack([t[:, 2], m[:, 2], m[:, 1]], 1),
-        m,
-    ]
-    return np.concatenate(pieces)

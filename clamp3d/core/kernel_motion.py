@@ -25,28 +25,18 @@ from heapq import heappop, heappush
 from typing import Any
 
 from clamp3d.core.jit import entry, formula, source_stamp
+from clamp3d.core.kernel_features import FLAT_N, section, section_foot
 
 CELLS = 200_000
 """Cells that may wait. A search that needs more ends with a wider bound, which it tells."""
 
 
 @formula
-def section(x, y, R, s, h):  # type: ignore[no-untyped-def]
+def slope(x, y, R, s, h):  # type: ignore[no-untyped-def]
     """G and its gradient at a point of the section with x >= 0; last, whether the flat face is what is nearest."""
-    rho = math.sqrt(x * x + y * y)
-    if y <= h and rho >= R:
-        if R - rho >= y - h:
-            return R - rho, -x / rho, -y / rho, False
-        return y - h, 0.0, 1.0, True
-    lx, ly = x - s, y - h
-    lip = math.sqrt(lx * lx + ly * ly)
-    if x >= s and abs(y - h) <= lip and (x * -h + y * s > 0.0 or abs(y - h) <= abs(R - rho)):
-        return abs(y - h), 0.0, 1.0, True
-    if x * -h + y * s <= 0.0 and abs(R - rho) < lip and rho > 0.0:
-        return abs(R - rho), -x / rho, -y / rho, False
-    if lip == 0.0:
-        return 0.0, 0.0, 1.0, True
-    return lip, lx / lip, ly / lip, False
+    g, feature = section(x, y, R, s, h)
+    _, _, nx, ny = section_foot(feature, x, y, R, s, h)
+    return g, nx, ny, feature == FLAT_N
 
 
 @formula
@@ -145,7 +135,7 @@ def cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht):  # type: ignore[no-untyped
     if z < 0.0:
         z, dz, vz, wz = -z, -dz, -vz, -wz
     vx, vy, vz = vx + t * wx, vy + t * wy, vz + t * wz
-    g, nx, ny, flat = section(x, y, R, s, h)
+    g, nx, ny, flat = slope(x, y, R, s, h)
     e = z - H
     f = phi(g, e)
     # What a turn takes off a tangent is square to its axis.
