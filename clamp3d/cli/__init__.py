@@ -10,6 +10,7 @@ import importlib
 import os
 import sys
 import traceback
+from contextlib import suppress
 
 import click
 
@@ -95,8 +96,14 @@ def main() -> None:
         else:
             status = _fail(f"inside clamp3d: {_place(error)}; CLAMP3D_DEBUG=1 shows the traceback", ExitCode.FAILED)
     for stream in (sys.stdout, sys.stderr):
-        if stream is not None:
-            stream.flush()
+        try:
+            if stream is not None:
+                stream.flush()
+        except OSError as error:  # a full disk: what is left in the buffer would be tried once more at exit
+            if stream is sys.stdout and status not in (ExitCode.BAD_INPUT, ExitCode.FAILED):
+                status = _fail(f"cannot write to stdout: {error.strerror}", ExitCode.BAD_INPUT)
+            with suppress(OSError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     sys.exit(int(status) if isinstance(status, int) else 0)
 
 

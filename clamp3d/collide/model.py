@@ -80,6 +80,16 @@ class Model:
         return None
 
     @property
+    def drawn(self) -> bool:
+        """Whether the shape is drawn with outlines, not a mesh."""
+        return isinstance(self.shape, Solid)
+
+    @property
+    def exact(self) -> bool:
+        """Whether it is known which points are material: by a drawn part's closed form, or as a mesh taken as is."""
+        return self.bodies is not None if isinstance(self.shape, Solid) else self.shape.fit == "off"
+
+    @property
     def forms(self) -> tuple[ClosedForm, ...]:
         """The closed form, or the hull in place of it."""
         return self.bodies if self.bodies is not None else (self.hull_body,)

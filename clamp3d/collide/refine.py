@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.collide.answer import Distance
+from clamp3d.collide.attest import attested
 from clamp3d.collide.body import ClosedForm, bodies_distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.convex import Rod
@@ -144,6 +145,8 @@ def _meshes(a: Model, b: Model, T: Array, error: float, thresholds: Thresholds) 
     x, y = a.mesh(error), b.mesh(error)
     found = surface_distance(x, y, T, contact=thresholds.contact)
     chord = x.error + y.error
+    if chord > 0.0 and a.exact and b.exact:
+        found = attested(found, (x, a.bodies if a.drawn else None), (y, b.bodies if b.drawn else None), T)
     return found.labelled("meshes", f"meshes (FCL), chord error {chord:.2g} mm" if chord > 0.0 else "meshes (FCL)")
 
 

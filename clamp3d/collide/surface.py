@@ -231,6 +231,6 @@ def _deepest(model: Surface, triangles: Array, contact: float, rounding: float) 
             return deepest, max(limit, float(best.max()))
         if not open_.any():
             break
-        corners, faces = subdivide(todo[open_].reshape(-1, 3), np.arange(3 * int(open_.sum())).reshape(-1, 3))
+        corners, faces = subdivide(todo[open_].reshape(-1, 3), np.arange(3 * int(open_.sum())).reshape(-1, 3))  # type: ignore[no-untyped-call]
         todo = corners[faces]
     return deepest, max(deepest, limit)

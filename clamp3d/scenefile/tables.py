@@ -124,8 +124,8 @@ class ClampPartTable(_Placed):
     shape: Literal["clamp-part"]
     part: ClampPart
     clamp: str = "reference"
-    line: str | None = None
-    jumper: str | None = None
+    line: Any = None  # a catalogue name or a diameter, checked where the clamp is loaded
+    jumper: Any = None
 
     def make(self, folder: Path) -> shapes.AnyShape:
         """The shape."""
@@ -179,8 +179,8 @@ class ClampTable(_Placed):
     """``[clamp]``: the parts P1 to P7 of a clamp as `clamp3d run` leaves them; their connections are allowed."""
 
     name: str = "reference"
-    line: str | None = None
-    jumper: str | None = None
+    line: Any = None  # a catalogue name or a diameter, checked where the clamp is loaded
+    jumper: Any = None
 
 
 @dataclass(frozen=True, config=FROZEN, kw_only=True)

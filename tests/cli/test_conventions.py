@@ -148,6 +148,24 @@ class TestClosedPipe:
             assert process.wait(120) == code
 
 
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
+class TestFullDisk:
+    @pytest.mark.parametrize("arguments", [("--help",), ("conductors",), ("check", "boxes.toml")])
+    def test_one_line_and_bad_input_whatever_the_verdict(self, arguments, tmp_path):
+        boxes(tmp_path, 9.0)
+        command = [sys.executable, "-m", "clamp3d", *arguments]
+        env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        with open("/dev/full", "w") as full:
+            done = subprocess.run(
+                command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120, check=False, cwd=tmp_path, env=env
+            )
+        assert done.returncode == 2
+        errors = [line for line in done.stderr.splitlines() if "error" in line.lower()]
+        assert len(errors) == 1
+        assert "No space left on device" in errors[0]
+        assert "Traceback" not in done.stderr
+
+
 class TestTextFromFiles:
     def test_control_characters_do_not_reach_the_terminal(self, tmp_path):
         names = ("\x1b[31mred", "bell\x07\u202e")

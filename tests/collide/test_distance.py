@@ -180,7 +180,7 @@ def test_no_time_before_the_first_contact_has_an_overlap(a, b, numbers, angle):
         assert common < 1.0, (t, common)
 
 
-def test_a_rim_against_a_polyhedron_is_known_to_rounding():
+def test_a_rim_against_a_polyhedron_is_known_to_the_accuracy():
     """Cylinders askew before a box: alternating projections between the two convex bodies find the same distance."""
     rng = np.random.default_rng(5)
     half, radius, long = np.array([5.0, 10.0, 4.0]), 5.0, 15.0
@@ -193,7 +193,7 @@ def test_a_rim_against_a_polyhedron_is_known_to_rounding():
         if found.lower < 0.5:
             continue
         seen += 1
-        assert found.uncertainty < 1e-9
+        assert found.uncertainty <= 1e-7
         x = np.zeros(3)
         for _ in range(4000):
             local = (x - T[:3, 3]) @ T[:3, :3]
@@ -203,3 +203,35 @@ def test_a_rim_against_a_polyhedron_is_known_to_rounding():
             x = np.clip(y, -half, half)
         assert found.value <= np.linalg.norm(x - y) + 1e-9
         assert found.value == pytest.approx(np.linalg.norm(x - y), abs=1e-5)
+
+
+OCTAHEDRON = make_mesh(
+    3.0 * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]),
+    [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]],
+)
+
+
+@pytest.mark.parametrize("depth", [1e-2, 1e-3, 2e-4, 1e-5])
+@pytest.mark.parametrize("gap", [0.05, 1e-3, 0.0])
+def test_a_hole_that_just_breaks_through_a_face(depth, gap):
+    """A tip in front of the slot that the hole leaves in the face: the slot's edge is nearest, far from any chord."""
+    plate = shapes.box((20.0, 20.0, 10.0), holes=[shapes.Hole(5.0 + depth, (5.0, 0.0))])
+    half = math.sqrt((5.0 + depth) ** 2 - 5.0**2)
+    # The tip's edges fall back at 45 degrees, so the slot's edge is nearest to the tip, or to one of its edges.
+    truth = math.hypot(gap, half) if half <= gap else (gap + half) / math.sqrt(2.0)
+    d = distance(plate, shapes.MeshShape(OCTAHEDRON, fit="off"), translation(13.0 + gap, 0.0, 0.0))
+    assert d.lower <= truth + 1e-9
+    assert d.upper >= truth - 1e-9
+
+
+def test_witnesses_lie_on_the_bodies_where_meshes_decide():
+    """A disc on edge in a tube: no closed form, so the meshes have the last word."""
+    disc, tube = shapes.cylinder(1.5, 0.5), shapes.cylinder(8.0, 10.0, bore=5.0)
+    T = translation(3.0, 0.4, 0.3) @ rotation([1, 0.3, 0.2], 1.1)
+    d = distance(tube, disc, T)
+    assert "meshes" in d.method
+    assert np.linalg.norm(d.point_b - d.point_a) == pytest.approx(d.value, abs=1e-9)
+    assert d.point_a + d.value * d.normal == pytest.approx(d.point_b, abs=1e-9)
+    assert np.hypot(*d.point_a[:2]) == pytest.approx(5.0, abs=1e-9)
+    x, y, z = np.linalg.inv(T)[:3] @ [*d.point_b, 1.0]
+    assert max(math.hypot(x, y) - 1.5, abs(z) - 0.25) <= 1e-9

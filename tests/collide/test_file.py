@@ -107,6 +107,19 @@ parts = ["cube", "pla*"]
     assert row.distance.value == pytest.approx(32.9 / 2 - 32.67 / 2, abs=1e-6)
 
 
+def test_wires_of_a_clamp_are_names_or_diameters():
+    by_number = parse_scene("[clamp]\nline = 33.6\njumper = 16\n")
+    by_text = parse_scene('[clamp]\nline = "33.6"\njumper = "16"\n')
+    for one, other in zip(by_number.parts, by_text.parts, strict=True):
+        assert one.shape == other.shape
+        assert (one.T_world == other.T_world).all()
+    part = parse_scene('[parts.p]\nshape = "clamp-part"\npart = "P7"\njumper = 16\n').parts[0]
+    assert part.shape == by_number.parts[6].shape
+    for wrong in ("[3]", "true", "-1", "nan"):
+        with pytest.raises(InputError, match="jumper"):
+            parse_scene(f"[clamp]\njumper = {wrong}\n")
+
+
 def test_whole_clamp_with_its_own_connections():
     scene = parse_scene('[clamp]\nname = "reference"\njumper = "LJ-150"\npose = { rpy_deg = [0, 0, 30] }\n')
     assert [p.name for p in scene.parts] == ["P1", "P2", "P3", "P4", "P5", "P6", "P7"]
