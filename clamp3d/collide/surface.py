@@ -231,6 +231,7 @@ def _deepest(model: Surface, triangles: Array, contact: float, rounding: float) 
             return deepest, max(limit, float(best.max()))
         if not open_.any():
             break
-        corners, faces = subdivide(todo[open_].reshape(-1, 3), np.arange(3 * int(open_.sum())).reshape(-1, 3))  # type: ignore[no-untyped-call]
+        corners = todo[open_].reshape(-1, 3)
+        corners, faces = subdivide(corners, np.arange(len(corners)).reshape(-1, 3))  # type: ignore[no-untyped-call]
         todo = corners[faces]
     return deepest, max(deepest, limit)
