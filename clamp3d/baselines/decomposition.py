@@ -35,7 +35,7 @@ from numpy.typing import ArrayLike
 
 from clamp3d.baselines import cache as disk
 from clamp3d.baselines.child import run_child
-from clamp3d.core.closed_mesh import Solid, check_solid
+from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, MissingLibraryError, SolverError
 
@@ -97,7 +97,7 @@ class Decomposition:
     model made of the hulls can miss a hit by that much.
     """
 
-    hulls: tuple[Solid, ...]
+    hulls: tuple[Mesh, ...]
     mesh_hash: str
     parameters: DecompositionParameters
     version: str
@@ -121,10 +121,10 @@ def decompose(
 
     CoACD runs in a process of its own for at most ``time_limit`` s; nothing is left behind when it is interrupted.
     ``progress`` on stderr: None shows it on a terminal. Answers are kept on disk (`clamp3d.baselines.cache`) unless
-    ``cache`` is false. Raises InputError for a mesh that is not a solid (`check_solid`), SolverError if CoACD does not
+    ``cache`` is false. Raises InputError for a mesh that is not closed (`closed_mesh`), SolverError if CoACD does not
     finish in time or ends without an answer, MissingLibraryError if it is not installed.
     """
-    solid = check_solid(vertices, faces, name)
+    solid = closed_mesh(vertices, faces, name)
     parameters = parameters or DecompositionParameters()
     if not time_limit > 0.0:
         raise InputError(f"time_limit must be > 0 s, got {time_limit}")
@@ -163,7 +163,7 @@ def _sha256(*parts: bytes) -> str:
     return digest.hexdigest()
 
 
-def _load(key: str) -> tuple[tuple[Solid, ...], float] | None:
+def _load(key: str) -> tuple[tuple[Mesh, ...], float] | None:
     entry = disk.load(key)
     if entry is None:
         return None
@@ -173,21 +173,21 @@ def _load(key: str) -> tuple[tuple[Solid, ...], float] | None:
         return None
 
 
-def _store(key: str, hulls: tuple[Solid, ...], seconds: float) -> None:
+def _store(key: str, hulls: tuple[Mesh, ...], seconds: float) -> None:
     arrays = {"count": np.array(len(hulls))}
     for i, hull in enumerate(hulls):
         arrays |= {f"v{i}": hull.vertices, f"f{i}": hull.faces}
     disk.store(key, arrays, {"seconds": seconds})
 
 
-def _hulls(arrays: Any) -> tuple[Solid, ...]:
+def _hulls(arrays: Any) -> tuple[Mesh, ...]:
     count = int(arrays["count"])
     if count < 1:
         raise ValueError("no hulls")
-    return tuple(check_solid(arrays[f"v{i}"], arrays[f"f{i}"], f"hull {i}") for i in range(count))
+    return tuple(closed_mesh(arrays[f"v{i}"], arrays[f"f{i}"], f"hull {i}") for i in range(count))
 
 
-def _outside(points: Array, hulls: tuple[Solid, ...]) -> Array:
+def _outside(points: Array, hulls: tuple[Mesh, ...]) -> Array:
     """How far each point (n, 3) lies outside the hull that holds it best: greatest plane distance, <= 0 inside."""
     from scipy.spatial import ConvexHull
 
@@ -199,8 +199,8 @@ def _outside(points: Array, hulls: tuple[Solid, ...]) -> Array:
 
 
 def _run(
-    solid: Solid, parameters: DecompositionParameters, name: str, time_limit: float, progress: bool | None
-) -> tuple[tuple[Solid, ...], float]:
+    solid: Mesh, parameters: DecompositionParameters, name: str, time_limit: float, progress: bool | None
+) -> tuple[tuple[Mesh, ...], float]:
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 

@@ -24,7 +24,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.core.closed_mesh import Solid, check_solid
+from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder
 from clamp3d.core.shells import corners_of, winding_number
@@ -65,7 +65,7 @@ class Shape:
     """A solid at the origin of its own frame, ready for FCL; ``bounds`` (2, 3) in mm. A surface need not be closed."""
 
     kind: Kind
-    solid: Solid
+    solid: Mesh
     bounds: Array
     collision_object: Any
 
@@ -105,7 +105,7 @@ def facets(mesh: Shape) -> list[Shape]:
     out = []
     for group in (*flat, *alone[:, None]):
         used, index = np.unique(F[group], return_inverse=True)
-        out.append(_shape("surface", *_bvh_model(Solid(V[used], index.reshape(-1, 3)))))
+        out.append(_shape("surface", *_bvh_model(Mesh("facet", V[used], index.reshape(-1, 3), False))))
     return out
 
 
@@ -257,12 +257,12 @@ def _from_axis(point: Array, wire: Wire) -> tuple[Array, float]:
     return from_middle - height * axis, height
 
 
-def _shape(kind: Kind, solid: Solid, geometry: Any) -> Shape:
+def _shape(kind: Kind, solid: Mesh, geometry: Any) -> Shape:
     bounds = np.array([solid.vertices.min(axis=0), solid.vertices.max(axis=0)])
     return Shape(kind, solid, bounds, _fcl().CollisionObject(geometry, transform(np.eye(4))))
 
 
-def _bvh_model(solid: Solid) -> tuple[Solid, Any]:
+def _bvh_model(solid: Mesh) -> tuple[Mesh, Any]:
     model = _fcl().BVHModel()
     model.beginModel(len(solid.faces), len(solid.vertices))
     model.addSubModel(solid.vertices * UNIT, solid.faces)
@@ -270,8 +270,8 @@ def _bvh_model(solid: Solid) -> tuple[Solid, Any]:
     return solid, model
 
 
-def _solid(vertices: ArrayLike, faces: ArrayLike, name: str) -> Solid:
-    solid = check_solid(vertices, faces, name)
+def _solid(vertices: ArrayLike, faces: ArrayLike, name: str) -> Mesh:
+    solid = closed_mesh(vertices, faces, name)
     _check_size(f"{name}: largest extent", float(np.ptp(solid.vertices, axis=0).max()))
     return solid
 

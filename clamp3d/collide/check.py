@@ -9,14 +9,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.checks import flag, function, instance
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
-from clamp3d.collide.model import FINEST, Model, ModelCache, Progress
+from clamp3d.collide.model import Model, ModelCache, Progress
 from clamp3d.collide.motions import check_motions
-from clamp3d.collide.refine import contained, every_level, measured, refine, with_normal
+from clamp3d.collide.refine import contained, measured, refine, with_normal
 from clamp3d.collide.result import CheckResult, PairResult, Work
 from clamp3d.collide.scene import Scene, name_pairs
 from clamp3d.collide.verdict import Verdict
@@ -42,7 +41,7 @@ def check(
     pairs : sequence of (str, str), optional
         Names of the pairs to look at; all by default.
     full : bool
-        Ask every model at its finest for every pair, none left out: slow, for comparison.
+        Ask every pair at every level down to the finest meshes: slow, for comparison.
     distances : bool
         Measure every pair to `clamp3d.collide.distance.ACCURACY`, not only until its verdict is certain.
     progress : callable, optional
@@ -76,7 +75,9 @@ def check(
     full, distances = flag("full", full), flag("distances", distances)
     function("progress", progress)
     shop = cache or ModelCache()
-    began = time.perf_counter()
+    counters = shop.counters
+    built, queries = counters.built.copy(), counters.queries.copy()
+    times = [time.perf_counter()]
     models = [shop.model(part.shape) for part in scene.parts]
     n = len(models)
     T = np.array([part.T_world for part in scene.parts]).reshape(n, 4, 4)
@@ -92,10 +93,8 @@ def check(
             chosen = np.array([p for p in chosen.tolist() if tuple(p) in keep], dtype=np.int64)
     chosen = chosen.reshape(-1, 2)
     gaps = box_gaps(boxes, chosen)
-    counters = shop.counters
     counters.queries["boxes"] += len(chosen)
-    counters.seconds["broad phase"] += time.perf_counter() - began
-    began = time.perf_counter()
+    times.append(time.perf_counter())
     rows, decided = [], Counter({"broad phase": every - len(chosen)})
     for k, ((i, j), gap) in enumerate(zip(chosen.tolist(), gaps.tolist(), strict=True)):
         if progress is not None:
@@ -104,19 +103,27 @@ def check(
         row = _pair(scene, i, j, models, T, start, full, distances)
         decided[row.distance.level] += 1
         rows.append(row)
-    counters.seconds["pairs"] += time.perf_counter() - began
-    moved: tuple[PairResult, ...] = ()
-    if scene.motions:
-        began = time.perf_counter()
-        moved = check_motions(scene, models, asked, counters, progress)
-        counters.seconds["motions"] += time.perf_counter() - began
-    work = _work(shop, scene, every, len(chosen), decided, full)
+    times.append(time.perf_counter())
+    moved = check_motions(scene, models, asked, progress)
+    times.append(time.perf_counter())
+    stages = ("broad phase", "pairs", "motions") if scene.motions else ("broad phase", "pairs")
+    work = Work(
+        parts=n,
+        shapes=len(set(models)),
+        pairs=every,
+        candidates=len(chosen),
+        **{name: counters.built[name] - built[name] for name in ("meshes", "triangles", "hulls", "fits")},
+        queries=dict(counters.queries - queries),
+        decided=dict(+decided),
+        seconds={name: round(end - start, 6) for name, start, end in zip(stages, times, times[1:], strict=False)},
+        full=full,
+    )
     names = None if asked is None else tuple((scene.parts[i].name, scene.parts[j].name) for i, j in asked)
     return CheckResult(scene, tuple(rows), moved, names, work)
 
 
 def check_full(scene: Scene, result: CheckResult, *, progress: Progress | None = None) -> CheckResult:
-    """Everything modelled at one fixed fidelity, every pair asked, compared with ``result``.
+    """Every pair asked at every level, whatever the first ones say, and compared with ``result``.
 
     Raises SolverError naming the first pair whose verdict is not the same.
     """
@@ -150,36 +157,11 @@ def _pair(
     T_ab = inverse(T[i]) @ T[j]
 
     def certain(known: Distance) -> bool:
-        return thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN and (not distances or measured(known))
+        known_well = not distances or measured(known)
+        return not full and known_well and thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN
 
-    if full:
-        found = every_level(models[i], models[j], T_ab, start, thresholds)
-    else:
-        found = refine(models[i], models[j], T_ab, start, thresholds, certain)
+    found = refine(models[i], models[j], T_ab, start, thresholds, certain)
     verdict = thresholds.verdict(found, allowance)
     if verdict is Verdict.CLASH and contained(models[i], models[j], T_ab, thresholds):
         verdict = Verdict.CONTAINED
     return PairResult(a, b, verdict, with_normal(found).moved(T[i]))
-
-
-def _work(shop: ModelCache, scene: Scene, pairs: int, candidates: int, decided: Counter[str], full: bool) -> Work:
-    counters = shop.counters
-    used: NDArray[np.int64] = np.array([m.triangles_at(FINEST) for m in shop.models], dtype=np.int64)
-    return Work(
-        parts=len(scene.parts),
-        shapes=len(shop.models),
-        pairs=pairs,
-        candidates=candidates,
-        meshes=counters.meshes,
-        triangles=counters.triangles,
-        hulls=counters.hulls,
-        fits=counters.fits,
-        queries=dict(counters.queries),
-        decided={k: v for k, v in decided.items() if v},
-        seconds={k: round(v, 6) for k, v in counters.seconds.items()},
-        fixed_error=FINEST,
-        fixed_meshes=len(shop.models),
-        fixed_triangles=int(used.sum()),
-        fixed_queries=pairs,
-        full=full,
-    )

@@ -159,13 +159,13 @@ class Hull:
 
     def closest(self, points: Array) -> Array:
         """The points of the surface (k, 3) that are nearest to ``points`` (k, 3), which lie outside."""
-        _V, edges, triangles = self.near(None)
-        found = []
-        for x in points:
-            _, _, on_edge = segment_pairs(x[None, None].repeat(2, axis=1), edges)
-            _, _, on_face = to_faces(x[None], triangles)
-            found.append(min((on_edge, on_face), key=lambda y: float(np.linalg.norm(y - x))))
-        return np.array(found)
+        from trimesh.triangles import closest_point
+
+        k, m = len(points), len(self.faces)
+        pairs = np.tile(self.vertices[self.faces], (k, 1, 1)), np.repeat(points, m, axis=0)
+        feet = closest_point(*pairs).reshape(k, m, 3)  # type: ignore[no-untyped-call]
+        nearest = np.linalg.norm(feet - points[:, None], axis=2).argmin(axis=1)
+        return np.asarray(feet[np.arange(k), nearest])
 
     def crossed_by(self, ends: Array) -> bool:
         """Whether the segment between ``ends`` (2, 3) meets the polyhedron."""
@@ -212,20 +212,24 @@ def hull(points: Array) -> Hull:
 def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, rims: bool = True) -> Distance:
     """Signed distance of two convex pieces placed by ``Ta``, ``Tb`` (4, 4); points and normal in that frame.
 
-    One row for each pair of shapes: closed forms first; what they leave open goes to FCL, whose answer is polished.
+    Closed forms first; what they leave open goes to FCL, whose answer is polished.
     Without ``rims`` the rims of cylinders, which take long, are left to FCL.
     """
-    if isinstance(a, Rod) and isinstance(b, Rod):
-        found = _rods(a, Ta, b, Tb, rims)
-    elif isinstance(a, Rod):
-        found = _rod_hull(a, Ta, b, Tb, None, rims)  # type: ignore[arg-type]
-    elif isinstance(b, Rod):
-        found = _rod_hull(b, Tb, a, Ta, None, rims).swapped()
-    else:
-        found = _hulls(a, Ta, b, Tb, None)
+    found = _closed_form(a, Ta, b, Tb, None, rims)
     if found.upper - found.lower > 1e-10:
         found = found.meet(_by_gjk(a, Ta, b, Tb))
     return replace(found, unique=_unique(a, Ta, b, Tb, found))
+
+
+def _closed_form(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array | None, rims: bool) -> Distance:
+    """What corners, edges, faces, axes and rims say; of large hulls only those that face along ``n``."""
+    if isinstance(a, Rod) and isinstance(b, Rod):
+        return _rods(a, Ta, b, Tb, rims)
+    if isinstance(a, Rod):
+        return _rod_hull(a, Ta, b, Tb, n, rims)  # type: ignore[arg-type]
+    if isinstance(b, Rod):
+        return _rod_hull(b, Tb, a, Ta, None if n is None else -n, rims).swapped()
+    return _hulls(a, Ta, b, Tb, n)
 
 
 def _unique(a: Convex, Ta: Array, b: Convex, Tb: Array, found: Distance) -> bool | None:
@@ -400,13 +404,8 @@ def _by_gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
             low, m = _slab(a, Ta, b, Tb, n)
             outside = max(0.0, -_depth(a, Ta, p), -_depth(b, Tb, q))
             found = Distance(low, size + 2.0 * outside, p, q, m, None, "features", "convex (GJK)")
-            if found.upper - found.lower > 1e-10:
-                if isinstance(a, Hull) and isinstance(b, Hull):
-                    found = found.meet(_hulls(a, Ta, b, Tb, n))
-                elif isinstance(a, Rod) and isinstance(b, Hull):
-                    found = found.meet(_rod_hull(a, Ta, b, Tb, n, False))
-                elif isinstance(b, Rod) and isinstance(a, Hull):
-                    found = found.meet(_rod_hull(b, Tb, a, Ta, -n, False).swapped())
+            if found.upper - found.lower > 1e-10 and (isinstance(a, Hull) or isinstance(b, Hull)):
+                found = found.meet(_closed_form(a, Ta, b, Tb, n, False))
             # The direction of a short distance is mostly rounding.
             return found if size - low < 1e-5 else found.meet(_touching(a, Ta, b, Tb))
     contacts = fcl.CollisionResult()

@@ -35,9 +35,9 @@ class Facets:
         is_round = np.zeros(len(mesh.faces), dtype=bool)
         is_round[round_faces] = True
         groups = []
-        for mask, doubt in ((~is_round, 0.0), (is_round, error)):
+        for mask, uncertainty in ((~is_round, 0.0), (is_round, error)):
             if mask.any():
-                groups.append((Surface(mesh.vertices, mesh.faces[mask], doubt).bvh, doubt))
+                groups.append((Surface(mesh.vertices, mesh.faces[mask], uncertainty).bvh, uncertainty))
         return cls(mesh, tuple(groups))
 
 
@@ -63,7 +63,7 @@ def rod_distance(facets: Facets, body: ClosedForm, T: Array) -> Distance:
     n = (p - a) / distance
     q = a + rod.radius * n
     R, t = T[:3, :3], T[:3, 3]
-    error = max(doubt for _, doubt in facets.groups) if low < distance else 0.0
+    error = max(uncertainty for _, uncertainty in facets.groups) if low < distance else 0.0
     if distance >= rod.radius:
         # Square to the axis the nearest point is on the side, which flat ends share with round ones.
         if abs(float(n @ axis)) < 1e-7 and body.depth(((q - t) @ R)[None])[0] >= -slack:
@@ -111,7 +111,7 @@ def _axis_inside(facets: Facets, body: ClosedForm, T: Array, distance: float) ->
     k = int(np.argmax(both))
     if both[k] == -np.inf:
         return Distance()
-    error = max(doubt for _, doubt in facets.groups) + body.error
+    error = max(uncertainty for _, uncertainty in facets.groups) + body.error
     return Distance(-np.inf, error - float(both[k]), world[k], world[k])
 
 
@@ -121,12 +121,12 @@ def _to_axis(facets: Facets, rod: Rod, T: Array) -> tuple[float, float, Array, A
 
     axis = fcl.CollisionObject(_axis(rod), fcl.Transform(T[:3, :3], T[:3, 3]))
     best, low, where = np.inf, np.inf, (np.zeros(3), np.zeros(3))
-    for tree, doubt in facets.groups:
+    for tree, uncertainty in facets.groups:
         answer = fcl.DistanceResult()
         d = float(
             fcl.distance(fcl.CollisionObject(tree), axis, fcl.DistanceRequest(enable_nearest_points=True), answer)
         )
-        low = min(low, max(d, 0.0) - doubt)
+        low = min(low, max(d, 0.0) - uncertainty)
         if d < best:
             best = d
             where = tuple(np.asarray(x, dtype=np.float64) for x in answer.nearest_points)  # type: ignore[assignment]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -29,14 +28,10 @@ FINEST = 0.001
 
 @dataclass
 class Counters:
-    """What a check has built and asked so far."""
+    """What has been built (meshes, triangles, hulls, fits) and asked (by level) so far."""
 
-    meshes: int = 0
-    triangles: int = 0
-    hulls: int = 0
-    fits: int = 0
+    built: Counter[str] = field(default_factory=Counter)
     queries: Counter[str] = field(default_factory=Counter)
-    seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
 
 
 class Model:
@@ -66,19 +61,13 @@ class Model:
     @cached_property
     def bodies(self) -> tuple[ClosedForm, ...] | None:
         """The shape in closed form; None if it has none."""
-        start = time.perf_counter()
-        found = self._bodies()
-        self.counters.seconds["models"] += time.perf_counter() - start
-        return found
-
-    def _bodies(self) -> tuple[ClosedForm, ...] | None:
         if isinstance(self.shape, Solid):
             return bodies_of(self.shape)
         if self.shape.fit != "off":
             from clamp3d.collide.fitted import bodies_of_fit
             from clamp3d.fit.fit import fit_mesh
 
-            self.counters.fits += 1
+            self.counters.built["fits"] += 1
             result = fit_mesh(self.shape.mesh)
             if result.features:
                 self._round_faces = np.concatenate([feature.faces for feature in result.features])
@@ -120,7 +109,7 @@ class Model:
         return ClosedForm((self._hull(made.vertices),), error=made.error, surface=made.depth)
 
     def _hull(self, points: Array) -> Hull:
-        self.counters.hulls += 1
+        self.counters.built["hulls"] += 1
         return hull(points)
 
     @property
@@ -148,26 +137,17 @@ class Model:
         # Outlines without arcs are exact at any chord error: one mesh serves all.
         key = error if self.refines else 0.0
         if key not in self._meshes:
-            start = time.perf_counter()
             made = mesh(self.shape, error)
             # Where two curved surfaces cross, the edge strays further than either.
             factor = 2.0 if self.shape.holes else 1.0
             model = Surface(np.array(made.vertices), np.array(made.faces, dtype=np.int64), 0.0)
             model.error = factor * chord_error(self.shape, error)
             self._meshes[key] = self._counted(model)
-            self.counters.seconds["models"] += time.perf_counter() - start
         return self._meshes[key]
 
-    def triangles_at(self, error: float) -> int:
-        """Triangles of a mesh at ``error`` mm, from the outlines alone (caps and sides); no mesh is made."""
-        if isinstance(self.shape, MeshShape):
-            return len(self.shape.mesh.faces)
-        body = sum(4 * len(e.profile.polygon(error)) - 4 for e in self.shape.bodies)
-        return body + sum(4 * len(e.profile.polygon(error)) + 4 for e in self.shape.holes)
-
     def _counted(self, made: Surface) -> Surface:
-        self.counters.meshes += 1
-        self.counters.triangles += len(made.faces)
+        self.counters.built["meshes"] += 1
+        self.counters.built["triangles"] += len(made.faces)
         return made
 
 
@@ -196,8 +176,3 @@ class ModelCache:
         if shape not in self._models:
             self._models[shape] = Model(shape, self.counters)
         return self._models[shape]
-
-    @property
-    def models(self) -> tuple[Model, ...]:
-        """All models so far."""
-        return tuple(self._models.values())

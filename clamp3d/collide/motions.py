@@ -15,7 +15,7 @@ from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import kernel_distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
-from clamp3d.collide.model import Counters, Model, ModelCache, Progress
+from clamp3d.collide.model import Model, ModelCache, Progress
 from clamp3d.collide.refine import from_boxes, measured, refine, with_normal
 from clamp3d.collide.result import PairResult
 from clamp3d.collide.scene import Scene
@@ -43,7 +43,6 @@ def check_motions(
     scene: Scene,
     models: list[Model],
     asked: list[tuple[int, int]] | None,
-    counters: Counters,
     progress: Progress | None = None,
 ) -> tuple[PairResult, ...]:
     """Least distance of each moving part from each other part that it comes near, motion by motion.
@@ -330,13 +329,9 @@ def first_contact(
     (True, 0.5375, 'groove kernel')
     """
     margin = place("margin", margin)
-    T, motion = _checked(motion, T_a_b)
-    if isinstance(a, SweptArc) and isinstance(b, Cylinder):
-        search = Search(a, b, motion, T, resolution)
-        touches, t, slack = search.first_contact(margin)
-        return _from_kernel(search, touches, t, slack)
-    cache = ModelCache()
-    pair = _MovingPair(cache.model(as_shape(b)), cache.model(as_shape(a)), motion, T, np.eye(4))
+    pair = _searched(a, b, motion, T_a_b, resolution)
+    if isinstance(pair, Search):
+        return _from_kernel(pair, *pair.first_contact(margin))
     thresholds = Thresholds(max(margin, 1e-6))
     least, t = _least(pair, thresholds, None)
     touches = least.upper <= margin + RESOLUTION
@@ -363,21 +358,23 @@ def min_clearance(
     >>> round(least.distance.value, 12), least.t
     (0.085786437627, 0.0)
     """
-    T, motion = _checked(motion, T_a_b)
-    if isinstance(a, SweptArc) and isinstance(b, Cylinder):
-        search = Search(a, b, motion, T, resolution)
-        t, slack = search.least()
-        return _from_kernel(search, None, t, slack)
-    cache = ModelCache()
-    pair = _MovingPair(cache.model(as_shape(b)), cache.model(as_shape(a)), motion, T, np.eye(4))
+    pair = _searched(a, b, motion, T_a_b, resolution)
+    if isinstance(pair, Search):
+        return _from_kernel(pair, None, *pair.least())
     least, t = _least(pair, Thresholds(1e-6), None)
     return _from_search(pair, least.upper <= RESOLUTION, t, least)
 
 
-def _checked(motion: Motion, T_a_b: ArrayLike | None) -> tuple[Array, Motion]:
+def _searched(
+    a: AnyShape, b: AnyShape, motion: Motion, T_a_b: ArrayLike | None, resolution: float | None
+) -> Search | _MovingPair:
     instance("motion", motion, Motion)
     T = np.eye(4) if T_a_b is None else scene_pose(T_a_b, "T_a_b")
-    return T, motion.resolved(T)
+    motion = motion.resolved(T)
+    if isinstance(a, SweptArc) and isinstance(b, Cylinder):
+        return Search(a, b, motion, T, resolution)
+    cache = ModelCache()
+    return _MovingPair(cache.model(as_shape(b)), cache.model(as_shape(a)), motion, T, np.eye(4))
 
 
 def _from_kernel(search: Search, touches: bool | None, t: float, slack: float) -> MotionDistance:
@@ -426,10 +423,33 @@ def check_poses(
     others: tuple[str, ...] | None = None,
     cache: ModelCache | None = None,
 ) -> PoseVerdicts:
-    """Verdicts of ``part`` at ``poses`` (n, 4, 4) ``T_world`` against ``others`` (names; all by default).
+    """Verdicts of one part of a scene at many poses.
 
-    Raises InputError for unknown names or a pose that is not rigid.
+    Parameters
+    ----------
+    scene : Scene
+        The other parts at their poses, and the thresholds.
+    part : str
+        Name of the part.
+    poses : array_like (n, 4, 4)
+        Its poses in the world, mm.
+    others : tuple of str, optional
+        Names of the parts it may meet; all others by default.
+    cache : ModelCache, optional
+        Keeps models from one call to the next.
 
+    Returns
+    -------
+    PoseVerdicts
+        Verdicts and bounds of the distances, one row per pose.
+
+    Raises
+    ------
+    InputError
+        For unknown names or a pose that is not rigid.
+
+    Examples
+    --------
     >>> from clamp3d.core import shapes
     >>> from clamp3d.core.pose import translation
     >>> scene = Scene().add("plate", shapes.box((50, 50, 4))).add("pin", shapes.cylinder(5, 20))

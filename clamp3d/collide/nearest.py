@@ -13,6 +13,12 @@ Found = tuple[float, Array, Array]
 """A distance in mm and the two points (3,) that have it."""
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Cross products (k, 3), by columns: a third of the time of `numpy.cross` on few rows."""
+    (x, y, z), (u, v, w) = a.T, b.T
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
+
+
 def segment_pairs(a: Array, b: Array) -> Found:
     """Nearest points of all segments ``a`` (k, 2, 3) and ``b`` (m, 2, 3)."""
     p, q = a[:, None, 0], b[None, :, 0]
@@ -36,12 +42,12 @@ def to_faces(points: Array, triangles: Array) -> Found:
     """Nearest of ``points`` (k, 3) to the insides of ``triangles`` (m, 3, 3); infinite if none lies before one."""
     a = triangles[:, 0]
     u, v = triangles[:, 1] - a, triangles[:, 2] - a
-    n = np.cross(u, v)
+    n = cross(u, v)
     nn = np.maximum((n * n).sum(-1), 1e-300)
     w = points[:, None] - a[None]
     height = (w * n).sum(-1) / np.sqrt(nn)
-    beta = (np.cross(w, v[None]) * n).sum(-1) / nn
-    gamma = (np.cross(u[None], w) * n).sum(-1) / nn
+    beta = (w * cross(v, n)).sum(-1) / nn
+    gamma = (w * cross(n, u)).sum(-1) / nn
     inside = (beta >= 0.0) & (gamma >= 0.0) & (beta + gamma <= 1.0)
     d = np.where(inside, np.abs(height), np.inf)
     i, j = np.unravel_index(int(np.argmin(d)), d.shape)

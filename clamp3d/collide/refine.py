@@ -66,23 +66,6 @@ def refine(
             error = max(0.5 * error, FINEST)
 
 
-def every_level(a: Model, b: Model, T: Array, start: Distance, thresholds: Thresholds) -> Distance:
-    """The same from all models at their finest, whatever the first ones say; raises SolverError if they disagree."""
-    never: Enough = lambda _: False  # noqa: E731
-    hulls = bodies_distance(a.hull_body, b.hull_body, T, never).labelled("hulls", "convex hulls")
-    a.counters.queries["hulls"] += 1
-    found = start
-    for new in (
-        _features(a, b, T, never),
-        hulls,
-        _facets(a, b, T, never),
-        _meshes(a, b, T, FINEST, thresholds),
-    ):
-        if new is not None:
-            found = _agreed(found, new)
-    return found
-
-
 def contained(a: Model, b: Model, T: Array, thresholds: Thresholds) -> bool:
     """Whether one of two overlapping parts lies wholly in the other, within the contact threshold."""
     for inner, outer, place in ((b, a, T), (a, b, inverse(T))):

@@ -55,10 +55,10 @@ class PairResult:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What an answer took. ``fixed_...``: what one fixed fidelity (all meshes at ``fixed_error`` mm, every pair) takes.
+    """What an answer took: what was built for it, how often each level was asked, and the seconds of each stage.
 
-    ``queries`` by level; ``decided`` pairs by the level that gave the verdict. ``fixed_triangles`` is counted from the
-    outlines unless the full model was built.
+    ``shapes``: different ones among the parts; ``candidates``: pairs that the broad phase left; ``decided``: pairs by
+    the level that gave the verdict; ``full``: every pair was asked at every level.
     """
 
     parts: int
@@ -72,10 +72,6 @@ class Work:
     queries: Mapping[str, int]
     decided: Mapping[str, int]
     seconds: Mapping[str, float]
-    fixed_error: float
-    fixed_meshes: int
-    fixed_triangles: int
-    fixed_queries: int
     full: bool
 
 

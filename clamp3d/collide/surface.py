@@ -107,16 +107,16 @@ def surface_distance(a: Surface, b: Surface, T: Array, *, contact: float) -> Dis
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame; ``contact`` mm is the depth that matters."""
     import fcl
 
-    doubt = a.error + b.error
+    uncertainty = a.error + b.error
     oa = fcl.CollisionObject(a.bvh, fcl.Transform())
     ob = fcl.CollisionObject(b.bvh, fcl.Transform(T[:3, :3], T[:3, 3]))
     rounding = 1e-12 * (a.scale + b.scale + float(np.abs(T[:3, 3]).max()))
     if fcl.collide(oa, ob, fcl.CollisionRequest(), fcl.CollisionResult()):
-        return _overlap(a, b, T, contact, rounding).widened(doubt + rounding)
+        return _overlap(a, b, T, contact, rounding).widened(uncertainty + rounding)
     answer = fcl.DistanceResult()
     d = fcl.distance(oa, ob, fcl.DistanceRequest(enable_nearest_points=True), answer)
     if d <= rounding:
-        return _overlap(a, b, T, contact, rounding).widened(doubt + rounding)
+        return _overlap(a, b, T, contact, rounding).widened(uncertainty + rounding)
     p, q = (np.asarray(x, dtype=np.float64) for x in answer.nearest_points)
     R, t = T[:3, :3], T[:3, 3]
     for outer, shell_points, points in (
@@ -125,8 +125,8 @@ def surface_distance(a: Surface, b: Surface, T: Array, *, contact: float) -> Dis
     ):
         if any(outer.contains(x) for x in shell_points):  # no surface in common: that shell lies inside as a whole
             deepest = float(outer.distance(points[:: max(1, len(points) // 50)]).max())
-            return Distance(-np.inf, -max(d, deepest if len(shell_points) == 1 else d)).widened(doubt)
-    return Distance(d, d, p, q).widened(doubt + rounding)
+            return Distance(-np.inf, -max(d, deepest if len(shell_points) == 1 else d)).widened(uncertainty)
+    return Distance(d, d, p, q).widened(uncertainty + rounding)
 
 
 def clearance_of_shells(shells: tuple[tuple[Any, float], ...], still: Surface, T: Array, shell_points: Array) -> float:
@@ -208,6 +208,7 @@ def _deepest(model: Surface, triangles: Array, contact: float, rounding: float) 
     The distance from one flat piece of the model's surface is a convex function, so over a triangle it is largest at
     a corner; where the corners share no piece the triangle is cut in four.
     """
+    from trimesh.remesh import subdivide
     from trimesh.triangles import closest_point
 
     own = model.vertices[model.faces]
@@ -228,16 +229,9 @@ def _deepest(model: Surface, triangles: Array, contact: float, rounding: float) 
         done += len(todo)
         if deepest > 2.0 * contact or done > _PATCHES:
             return deepest, max(limit, float(best.max()))
-        todo = _quartered(todo[open_])
+        if not open_.any():
+            break
+        corners = todo[open_].reshape(-1, 3)
+        corners, faces = subdivide(corners, np.arange(len(corners)).reshape(-1, 3))  # type: ignore[no-untyped-call]
+        todo = corners[faces]
     return deepest, max(deepest, limit)
-
-
-def _quartered(t: Array) -> Array:
-    m = 0.5 * (t + np.roll(t, -1, axis=1))
-    pieces = [
-        np.stack([t[:, 0], m[:, 0], m[:, 2]], 1),
-        np.stack([t[:, 1], m[:, 1], m[:, 0]], 1),
-        np.stack([t[:, 2], m[:, 2], m[:, 1]], 1),
-        m,
-    ]
-    return np.concatenate(pieces)

@@ -31,13 +31,14 @@ _EPS = 2.0**-52
 
 
 class ArcRelation(StrEnum):
-    """The five columns of Table 3."""
+    """The five columns of Table 3; ``UNCERTAIN`` in 3D alone, where rounding hides which of its neighbours holds."""
 
     INSIDE = "inside"
     OUTSIDE = "outside"
     INTERSECT = "intersect"
     EXTERIOR_CONTACT = "exterior contact"
     INTERIOR_CONTACT = "interior contact"
+    UNCERTAIN = "uncertain"
 
 
 class ArcFeature(StrEnum):
@@ -165,6 +166,14 @@ def _in_span(x: float, y: float, half_angle: float) -> bool:
     return math.atan2(abs(x), 0.0 - y) <= half_angle  # 0.0 - y, not -y: atan2(0, -0.0) is pi
 
 
+def check_tolerance(tolerance: float, *radii: float) -> float:
+    """The largest gap (mm) that counts as contact. Raises InputError unless it is >= 0 and less than all ``radii``."""
+    tolerance = number("tolerance", tolerance, rule="be >= 0 mm and less than both radii")
+    if not 0.0 <= tolerance < min(radii):
+        raise InputError(f"tolerance must be >= 0 mm and less than both radii, got {tolerance}")
+    return tolerance
+
+
 def _checked(
     arc_radius: float, half_angle: float, circle_radius: float, x: float, y: float, tolerance: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -172,8 +181,6 @@ def _checked(
     arc_radius, circle_radius = size("arc_radius", arc_radius), size("circle_radius", circle_radius)
     half_angle = arc_angle("half_angle", half_angle)
     x, y = place("circle centre x", x), place("circle centre y", y)
-    tolerance = number("tolerance", tolerance, rule="be >= 0 mm and less than both radii")
-    if not 0.0 <= tolerance < min(arc_radius, circle_radius):
-        raise InputError(f"tolerance must be >= 0 mm and less than both radii, got {tolerance}")
+    tolerance = check_tolerance(tolerance, arc_radius, circle_radius)
     tolerance = max(tolerance, 4.0 * _EPS * (arc_radius + circle_radius + abs(x) + abs(y)))
     return arc_radius, half_angle, circle_radius, x, y, tolerance

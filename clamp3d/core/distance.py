@@ -51,11 +51,24 @@ _FEATURES = tuple(Feature)
 
 @dataclass(frozen=True, slots=True)
 class SignedDistance:
-    """Answer of ``signed_distance``; all in the groove's frame, mm.
+    """Answer of `signed_distance`; all in the groove's frame, mm.
 
-    ``point_on_cylinder = point_on_groove + distance * normal``; the normal is unit, from groove to cylinder.
-    ``along`` is where the nearest axis point lies, from the cylinder's middle; ``error_bound`` bounds the rounding
-    error of ``distance``. For cylinders that touch along a line the points are in the middle of it.
+    Attributes
+    ----------
+    distance : float
+        Positive apart, negative inside.
+    point_on_groove, point_on_cylinder : ndarray (3,)
+        Nearest points, ``point_on_cylinder = point_on_groove + distance * normal``; of a line of contact its middle.
+    normal : ndarray (3,)
+        Unit vector from groove to cylinder.
+    feature : Feature
+        The part of the groove that is nearest.
+    along : float
+        Where the nearest axis point lies, from the cylinder's middle.
+    error_bound : float
+        Bound on the rounding error of ``distance``.
+    axis_inside : bool
+        Whether the cylinder's axis enters the material.
     """
 
     distance: float
@@ -134,16 +147,34 @@ def kernel() -> ModuleType:
 
 
 def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> SignedDistance:
-    """Signed distance of ``cylinder`` from ``groove`` with witnesses; ``pose`` (4, 4) is ``T_groove_cylinder``.
+    """Signed distance of a cylinder from a groove, with witnesses.
 
     The ends of the cylinder are taken as rounded, those of the bodies of `clamp3d.distance` are flat: where the nearest
     axis point is an end (``abs(along)`` is half the length) the answer is a lower bound of the flat-ended distance.
     Only the cylinder's position and axis direction matter, so ``pose`` enters as its last column and its third,
-    normalised. Raises InputError if ``pose`` is not a finite rigid 4x4 matrix; rounding errors are mended as
-    ``check_pose`` says.
+    normalised.
 
+    Parameters
+    ----------
+    groove, cylinder : SweptArc, Cylinder
+        The two shapes.
+    pose : array_like (4, 4)
+        ``T_groove_cylinder``, mm; rounding errors are mended as `check_pose` says.
+
+    Returns
+    -------
+    SignedDistance
+        Distance, points and normal in the groove's frame.
+
+    Raises
+    ------
+    InputError
+        For other shapes, or if ``pose`` is not a finite rigid matrix.
+
+    Examples
+    --------
     >>> import numpy as np
-    >>> from clamp3d.core.primitives import LARGEST, Cylinder, SweptArc
+    >>> from clamp3d.core.primitives import Cylinder, SweptArc
     >>> groove, wire = SweptArc(12.0, np.radians(70.0), 50.0), Cylinder(10.5, 80.0)
     >>> answer = signed_distance(groove, wire, np.eye(4))
     >>> answer.distance, answer.feature.name
@@ -183,13 +214,33 @@ def signed_distances(
 def signed_distances(
     groove: SweptArc, cylinder: Cylinder, poses: ArrayLike, *, full: bool = False, workers: int | None = None
 ) -> Array | SignedDistances:
-    """Signed distances for ``poses`` (n, 4, 4): (n,) float64, or all fields as arrays with ``full=True``.
+    """Signed distances of a cylinder from a groove in many poses: the formulas of `signed_distance`, so the same bits.
 
-    The same formulas as ``signed_distance``, so the same bits. ``workers`` threads (all cores by default) share the
-    poses. Raises InputError that names the first pose that is not finite and rigid.
+    Parameters
+    ----------
+    groove, cylinder : SweptArc, Cylinder
+        The two shapes.
+    poses : array_like (n, 4, 4)
+        ``T_groove_cylinder``, mm.
+    full : bool
+        Return all fields, not the distances alone.
+    workers : int, optional
+        Threads that share the poses; all cores by default.
 
+    Returns
+    -------
+    ndarray (n,) or SignedDistances
+        Distances in mm, or all fields as arrays.
+
+    Raises
+    ------
+    InputError
+        For other shapes; it names the first pose that is not finite and rigid.
+
+    Examples
+    --------
     >>> import numpy as np
-    >>> from clamp3d.core.primitives import LARGEST, Cylinder, SweptArc
+    >>> from clamp3d.core.primitives import Cylinder, SweptArc
     >>> signed_distances(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.eye(4)[None])
     array([1.5])
     """

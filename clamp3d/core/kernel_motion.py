@@ -21,31 +21,22 @@ that (``sag``). Lower bounds over a cell:
 from __future__ import annotations
 
 import math
+from heapq import heappop, heappush
 from typing import Any
 
 from clamp3d.core.jit import entry, formula, source_stamp
+from clamp3d.core.kernel_features import FLAT_N, section, section_foot
 
 CELLS = 200_000
 """Cells that may wait. A search that needs more ends with a wider bound, which it tells."""
 
 
 @formula
-def section(x, y, R, s, h):  # type: ignore[no-untyped-def]
+def slope(x, y, R, s, h):  # type: ignore[no-untyped-def]
     """G and its gradient at a point of the section with x >= 0; last, whether the flat face is what is nearest."""
-    rho = math.sqrt(x * x + y * y)
-    if y <= h and rho >= R:
-        if R - rho >= y - h:
-            return R - rho, -x / rho, -y / rho, False
-        return y - h, 0.0, 1.0, True
-    lx, ly = x - s, y - h
-    lip = math.sqrt(lx * lx + ly * ly)
-    if x >= s and abs(y - h) <= lip and (x * -h + y * s > 0.0 or abs(y - h) <= abs(R - rho)):
-        return abs(y - h), 0.0, 1.0, True
-    if x * -h + y * s <= 0.0 and abs(R - rho) < lip and rho > 0.0:
-        return abs(R - rho), -x / rho, -y / rho, False
-    if lip == 0.0:
-        return 0.0, 0.0, 1.0, True
-    return lip, lx / lip, ly / lip, False
+    g, feature = section(x, y, R, s, h)
+    _, _, nx, ny = section_foot(feature, x, y, R, s, h)
+    return g, nx, ny, feature == FLAT_N
 
 
 @formula
@@ -144,7 +135,7 @@ def cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht):  # type: ignore[no-untyped
     if z < 0.0:
         z, dz, vz, wz = -z, -dz, -vz, -wz
     vx, vy, vz = vx + t * wx, vy + t * wy, vz + t * wz
-    g, nx, ny, flat = section(x, y, R, s, h)
+    g, nx, ny, flat = slope(x, y, R, s, h)
     e = z - H
     f = phi(g, e)
     # What a turn takes off a tangent is square to its axis.
@@ -250,47 +241,18 @@ def cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht):  # type: ignore[no-untyped
 
 
 @formula
-def push(heap, top, low, u, t, hu, ht):  # type: ignore[no-untyped-def]
-    """Put a cell into the heap (rows 0 ... top - 1), lowest bound first."""
-    i = top
-    while i > 0 and heap[(i - 1) // 2, 0] > low:
-        heap[i] = heap[(i - 1) // 2]
-        i = (i - 1) // 2
-    heap[i, 0], heap[i, 1], heap[i, 2], heap[i, 3], heap[i, 4] = low, u, t, hu, ht
-
-
-@formula
-def drop(heap, top):  # type: ignore[no-untyped-def]
-    """Take the first of the ``top`` rows out of the heap."""
-    last = heap[top - 1].copy()
-    i = 0
-    while 2 * i + 1 < top - 1:
-        j = 2 * i + 1
-        if j + 1 < top - 1 and heap[j + 1, 0] < heap[j, 0]:
-            j += 1
-        if heap[j, 0] >= last[0]:
-            break
-        heap[i] = heap[j]
-        i = j
-    heap[i] = last
-
-
-@formula
-def halve(heap, top, key, split_u, u, t, hu, ht, ordered):  # type: ignore[no-untyped-def]
+def halve(heap, key, split_u, u, t, hu, ht, ordered):  # type: ignore[no-untyped-def]
     """Put the halves of a cell into the heap; by their beginning if it is ordered by that."""
-    for i in range(2):
-        sign = -1.0 if i == 0 else 1.0
+    for sign in (-1.0, 1.0):
         if split_u:
             middle = u + 0.5 * sign * hu
-            push(heap, top, middle - 0.5 * hu if ordered else key, middle, t, 0.5 * hu, ht)
+            heappush(heap, (middle - 0.5 * hu if ordered else key, middle, t, 0.5 * hu, ht))
         else:
-            push(heap, top, key, u, t + 0.5 * sign * ht, hu, 0.5 * ht)
-        top += 1
-    return top
+            heappush(heap, (key, u, t + 0.5 * sign * ht, hu, 0.5 * ht))
 
 
 @formula
-def bend_of(l, m):  # type: ignore[no-untyped-def] # noqa: E741
+def max_acceleration(l, m):  # type: ignore[no-untyped-def] # noqa: E741
     """Largest acceleration of a point of the axis: that of an end."""
     far = 0.0
     for i in range(2):
@@ -302,34 +264,34 @@ def bend_of(l, m):  # type: ignore[no-untyped-def] # noqa: E741
 
 
 @formula
-def whole(heap, l, m, u0, u1, ordered):  # type: ignore[no-untyped-def] # noqa: E741
-    """Put the motion from u0 to u1 into the heap, half a radian at most to a cell; how many cells that is."""
+def seed_heap(l, m, u0, u1, ordered):  # type: ignore[no-untyped-def] # noqa: E741
+    """The motion from u0 to u1 as a heap of cells, half a radian at most to each."""
     pieces = max(1, min(1024, int(abs(m[15]) * (u1 - u0) * 2.0) + 1))
-    for i in range(pieces):
-        hu = 0.5 * (u1 - u0) / pieces
+    hu = 0.5 * (u1 - u0) / pieces
+    heap = [(u0 if ordered else -math.inf, u0 + hu, 0.0, hu, l)]
+    for i in range(1, pieces):
         begin = u0 + 2.0 * i * hu
-        push(heap, i, begin if ordered else -math.inf, begin + hu, 0.0, hu, l)
-    return pieces
+        heappush(heap, (begin if ordered else -math.inf, begin + hu, 0.0, hu, l))
+    return heap
 
 
 def _entries(stamp: str) -> tuple[Any, Any]:
-    def least(R, half_angle, H, l, m, u0, u1, eps, heap, out):  # type: ignore[no-untyped-def] # noqa: E741
+    def least(R, half_angle, H, l, m, u0, u1, eps, most, out):  # type: ignore[no-untyped-def] # noqa: E741
         """Least sdf from u0 to u1: fills out with value, u, t and a proven lower bound of it; cells looked at."""
         stamp  # noqa: B018
         s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
-        bend = bend_of(l, m)
+        bend = max_acceleration(l, m)
         coaxial = m[6] == 0.0 and m[7] == 0.0 and m[9] == 0.0 and m[10] == 0.0 and m[15] != 0.0
         best, bu, bt = value(R, s, h, H, m, u0, 0.0), u0, 0.0  # of equals the start
-        top = whole(heap, l, m, u0, u1, False)
+        heap = seed_heap(l, m, u0, u1, False)
         count = 0
         bound = math.inf
-        while top > 0:
+        while heap:
             known, u, t, hu, ht = heap[0]
-            if known >= best - eps or top + 2 > len(heap):
+            if known >= best - eps or len(heap) + 2 > most:
                 bound = known
                 break
-            drop(heap, top)
-            top -= 1
+            heappop(heap)
             f, low, split_u, du, dt = cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht)
             count += 1
             if f < best:
@@ -345,30 +307,29 @@ def _entries(stamp: str) -> tuple[Any, Any]:
                 f = value(R, s, h, H, m, cu, ct)
                 if f < best:
                     best, bu, bt = f, cu, ct
-            top = halve(heap, top, low, split_u, u, t, hu, ht, False)
+            halve(heap, low, split_u, u, t, hu, ht, False)
         out[0], out[1], out[2], out[3] = best, bu, bt, min(bound, best)
         return count
 
-    def first(R, half_angle, H, l, m, level, eps, heap, out):  # type: ignore[no-untyped-def] # noqa: E741
+    def first(R, half_angle, H, l, m, level, eps, most, out):  # type: ignore[no-untyped-def] # noqa: E741
         """First u with sdf <= level, 2 if none is found: out[0]; out[1]: up to where nothing is below level - eps."""
         stamp  # noqa: B018
         s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
-        bend = bend_of(l, m)
+        bend = max_acceleration(l, m)
         coaxial = m[6] == 0.0 and m[7] == 0.0 and m[9] == 0.0 and m[10] == 0.0 and m[15] != 0.0
         hit = 2.0
-        top = whole(heap, l, m, 0.0, 1.0, True)
+        heap = seed_heap(l, m, 0.0, 1.0, True)
         count = 0
         out[1] = 1.0
-        while top > 0:
+        while heap:
             begin, u, t, hu, ht = heap[0]
             if begin >= hit:
                 out[1] = hit
                 break
-            if top + 2 > len(heap):
+            if len(heap) + 2 > most:
                 out[1] = begin
                 break
-            drop(heap, top)
-            top -= 1
+            heappop(heap)
             f, low, split_u, _, dt = cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht)
             count += 1
             if u < hit and f <= level:
@@ -383,13 +344,13 @@ def _entries(stamp: str) -> tuple[Any, Any]:
             if hu <= 2.0**-52:
                 continue
             # Where it is below, what comes before is asked for: only a shorter time tells more.
-            top = halve(heap, top, u - hu, split_u or f <= level, u, t, hu, ht, True)
+            halve(heap, u - hu, split_u or f <= level, u, t, hu, ht, True)
         out[0] = hit
         return count
 
     return (
-        entry(least, "i8(f8,f8,f8,f8,f8[::1],f8,f8,f8,f8[:,::1],f8[::1])"),
-        entry(first, "i8(f8,f8,f8,f8,f8[::1],f8,f8,f8[:,::1],f8[::1])"),
+        entry(least, "i8(f8,f8,f8,f8,f8[::1],f8,f8,f8,i8,f8[::1])"),
+        entry(first, "i8(f8,f8,f8,f8,f8[::1],f8,f8,i8,f8[::1])"),
     )
 
 

@@ -6,14 +6,15 @@ differs from the analytic part, so the volume lies within bounds that are comput
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clamp3d.checks import instance
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.profile import check_mesh_error
 from clamp3d.core.shapes import Solid
-from clamp3d.errors import Clamp3dError, InputError
+from clamp3d.errors import Clamp3dError
 
 if TYPE_CHECKING:
     import trimesh
@@ -21,32 +22,13 @@ if TYPE_CHECKING:
 _THROUGH = 1.0  # mm by which a hole's tool stands out at both ends, so that no two faces coincide
 
 
-class Drawn(Protocol):
-    """What can be meshed: bodies drawn along an axis, less holes; a `Part`, or any other solid drawn like one."""
-
-    @property
-    def name(self) -> str:
-        """Name for messages and metadata."""
-        ...
-
-    @property
-    def bodies(self) -> tuple[Extrusion, ...]:
-        """Outlines drawn along an axis; they touch at most."""
-        ...
-
-    @property
-    def holes(self) -> tuple[Extrusion, ...]:
-        """Hollows, each right through."""
-        ...
-
-
-def mesh(part: Drawn, mesh_error: float = 0.01) -> trimesh.Trimesh:
+def mesh(part: Solid, mesh_error: float = 0.01) -> trimesh.Trimesh:
     """Watertight triangle mesh of a part in its own frame, wound outward.
 
     Parameters
     ----------
-    part : Drawn
-        Part of a clamp, or another solid of outlines drawn along an axis.
+    part : Solid
+        Part of a clamp, or another one of outlines drawn along an axis.
     mesh_error : float
         Largest distance in mm between an arc and its chord.
 
@@ -58,7 +40,7 @@ def mesh(part: Drawn, mesh_error: float = 0.01) -> trimesh.Trimesh:
     Raises
     ------
     InputError
-        For a bad error, or what is no drawn solid.
+        For a bad error, or what is no `Solid`.
     Clamp3dError
         If one of the part's sizes vanishes beside the others.
 
@@ -73,8 +55,7 @@ def mesh(part: Drawn, mesh_error: float = 0.01) -> trimesh.Trimesh:
     import trimesh
 
     mesh_error = check_mesh_error(mesh_error)
-    if not all(hasattr(part, name) for name in ("name", "bodies", "holes")):
-        raise InputError(f"part must be a Part or another drawn solid, got {type(part).__name__}")
+    instance("part", part, Solid)
     solid = _solid(part, mesh_error)
     raw = solid.to_mesh64()
     out = trimesh.Trimesh(
@@ -87,7 +68,7 @@ def mesh(part: Drawn, mesh_error: float = 0.01) -> trimesh.Trimesh:
     return out
 
 
-def chord_error(part: Drawn, mesh_error: float) -> float:
+def chord_error(part: Solid, mesh_error: float) -> float:
     """Largest distance in mm between an arc of the part and its chords in ``mesh(part, mesh_error)``."""
     return max(shape.profile.chord_error(mesh_error) for shape in (*part.bodies, *part.holes))
 
@@ -111,7 +92,7 @@ def volume_bounds(part: Solid, mesh_error: float) -> tuple[float, float]:
     return low, high
 
 
-def _solid(part: Drawn, mesh_error: float) -> Any:
+def _solid(part: Solid, mesh_error: float) -> Any:
     import manifold3d
 
     solid = _extrude(part.bodies[0], mesh_error)

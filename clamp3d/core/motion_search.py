@@ -60,13 +60,13 @@ class Search:
         from clamp3d.core import kernel_motion
 
         out = np.empty(4)
-        heap = np.empty((kernel_motion.CELLS, 5))
-        self.evaluations += kernel_motion.least(*self._sizes, self._numbers, 0.0, 1.0, self.slack, heap, out)
+        self.evaluations += kernel_motion.least(
+            *self._sizes, self._numbers, 0.0, 1.0, self.slack, kernel_motion.CELLS, out
+        )
         best, t, _, bound = out.tolist()
         # Down to the rounding where that is cheap: what only just touches is to be known as that.
         low, high = max(0.0, t - _NEAR), min(1.0, t + _NEAR)
-        heap = heap[:_FEW]
-        self.evaluations += kernel_motion.least(*self._sizes, self._numbers, low, high, self.rounding, heap, out)
+        self.evaluations += kernel_motion.least(*self._sizes, self._numbers, low, high, self.rounding, _FEW, out)
         if out[0] <= best:
             best, t = out[:2].tolist()
         return t, max(best - bound, self.slack)
@@ -90,10 +90,11 @@ class Search:
         from clamp3d.core import kernel_motion
 
         out = np.empty(2)
-        heap = np.empty((kernel_motion.CELLS, 5))
         r = self.cylinder.radius
         for _ in range(4):
-            self.evaluations += kernel_motion.first(*self._sizes, self._numbers, level + r, self.slack, heap, out)
+            self.evaluations += kernel_motion.first(
+                *self._sizes, self._numbers, level + r, self.slack, kernel_motion.CELLS, out
+            )
             hit, until = out.tolist()
             if until >= min(hit, 1.0):
                 return hit if hit <= 1.0 else None

@@ -14,13 +14,22 @@ from clamp3d.core.primitives import Cylinder, SweptArc, check_shapes
 
 @dataclass(frozen=True, slots=True)
 class GroovePieces:
-    """Answer of ``groove_pieces``: one row per piece, in the groove's frame, mm.
+    """Answer of `groove_pieces`: one row per piece, in the groove's frame, mm.
 
     Rows: 0 arc surface with its edges, 1 flat face M with its lip, 2 flat face N with its lip, 3 end face -z,
-    4 end face +z. ``distance`` (5,) signed gap, ``point_on_groove`` (5, 3), ``normal`` (5, 3) unit, from groove to
-    cylinder, ``feature`` (5,) codes of ``Feature``, ``gradient`` (5, 6) rate of the gap by the cylinder's twist (3
-    linear, 3 angular about the groove's origin); with a tilted axis inside the material it is the rate at the deepest
-    axis point.
+    4 end face +z.
+
+    Attributes
+    ----------
+    distance : ndarray (5,)
+        Signed gaps.
+    point_on_groove, normal : ndarray (5, 3)
+        Nearest points, and unit vectors from groove to cylinder.
+    feature : ndarray (5,)
+        Codes of `Feature`.
+    gradient : ndarray (5, 6)
+        Rate of the gap by the cylinder's twist (3 linear, 3 angular about the groove's origin); with a tilted axis
+        inside the material it is the rate at the deepest axis point.
     """
 
     distance: Array
@@ -31,15 +40,34 @@ class GroovePieces:
 
 
 def groove_pieces(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> GroovePieces:
-    """Signed gap of each closed boundary piece of ``groove`` to ``cylinder``; ``pose`` (4, 4): ``T_groove_cylinder``.
+    """Signed gap of each closed boundary piece of a groove to a cylinder.
 
     While the cylinder's axis is outside the material, ``min(distance)`` is ``signed_distance(...).distance``. With the
     axis inside, the gaps of the pieces it came through stay negative and fall further, with normals that lead back
     out; the other pieces keep their plain distance. Each gap is continuous, and smooth where its nearest point is
     unique; the one exception is an axis that enters through an end face: there the side pieces change sign at once.
     A cylinder along the groove that sticks out of it has its end pieces equal to the nearest side piece: take rows 0
-    to 2 alone for such cylinders. Raises InputError if ``pose`` is not a finite rigid 4x4 matrix.
+    to 2 alone for such cylinders.
 
+    Parameters
+    ----------
+    groove, cylinder : SweptArc, Cylinder
+        The two shapes.
+    pose : array_like (4, 4)
+        ``T_groove_cylinder``, mm.
+
+    Returns
+    -------
+    GroovePieces
+        Gaps, points, normals and rates of the five pieces.
+
+    Raises
+    ------
+    InputError
+        For other shapes, or if ``pose`` is not a finite rigid matrix.
+
+    Examples
+    --------
     >>> import numpy as np
     >>> from clamp3d.core.pose import translation
     >>> groove, wire = SweptArc(12.0, np.pi / 3, 50.0), Cylinder(15.0, 80.0)

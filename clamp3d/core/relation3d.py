@@ -4,32 +4,32 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import StrEnum
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clamp3d.checks import number
+from clamp3d.core.arc_circle import ArcRelation, check_tolerance
 from clamp3d.core.distance import Feature, SignedDistance, as_pose, signed_distance
 from clamp3d.core.pose import Array, check_pose
 from clamp3d.core.primitives import Cylinder, SweptArc, check_shapes
-from clamp3d.errors import InputError
 
-
-class Relation3D(StrEnum):
-    """The five columns of Table 3, and ``UNCERTAIN`` where rounding hides which of its neighbours a contact is."""
-
-    INSIDE = "inside"
-    OUTSIDE = "outside"
-    INTERSECT = "intersect"
-    EXTERIOR_CONTACT = "exterior contact"
-    INTERIOR_CONTACT = "interior contact"
-    UNCERTAIN = "uncertain"
+Relation3D: TypeAlias = ArcRelation
 
 
 @dataclass(frozen=True, slots=True)
 class GrooveRelation:
-    """Answer of ``groove_relation``: the relation, the distance it follows from, and the tolerance applied in mm."""
+    """Answer of `groove_relation`.
+
+    Attributes
+    ----------
+    relation : Relation3D
+        Column of Table 3, or uncertain.
+    contact : SignedDistance
+        The distance that it follows from.
+    tolerance : float
+        The one applied, mm.
+    """
 
     relation: Relation3D
     contact: SignedDistance
@@ -37,16 +37,36 @@ class GrooveRelation:
 
 
 def groove_relation(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike, *, tolerance: float) -> GrooveRelation:
-    """Relation of ``cylinder`` to ``groove`` for ``pose`` (4, 4), ``T_groove_cylinder``; the plane case is Table 3.
+    """Relation of a cylinder to a groove in any pose; the plane case is Table 3.
 
     A distance within ``tolerance`` mm of zero is a contact, one below an intersection (Eq. 5). A contact is interior if
     the cylinder lies on the hollow side of the surface at the point, exterior otherwise; at a lip or an end edge that
     is the construction of Fig. 6, with the normal in place of the centre. A cylinder that is clear is inside if it has
     a point in common with the groove's hollow, the region between arc and chord over the groove's length (Eq. 3),
     else outside (Eq. 4). The answer is uncertain if the tolerance is below the distance's error bound and the distance
-    is so near to zero that this matters. Raises InputError for a tolerance that is negative or not less than
-    both radii, or a pose that is not rigid.
+    is so near to zero that this matters.
 
+    Parameters
+    ----------
+    groove, cylinder : SweptArc, Cylinder
+        The two shapes; the cylinder's ends are rounded.
+    pose : array_like (4, 4)
+        ``T_groove_cylinder``, mm.
+    tolerance : float
+        Gaps up to this are contact, mm; >= 0 and less than both radii.
+
+    Returns
+    -------
+    GrooveRelation
+        The relation and the distance behind it.
+
+    Raises
+    ------
+    InputError
+        For a tolerance out of range, or a pose that is not rigid.
+
+    Examples
+    --------
     >>> import numpy as np
     >>> from clamp3d.core.pose import translation
     >>> groove, wire = SweptArc(7.0, np.radians(60.0), 50.0), Cylinder(6.935, 80.0)
@@ -54,9 +74,7 @@ def groove_relation(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike, *, to
     'interior contact'
     """
     check_shapes(groove, cylinder)
-    tolerance = number("tolerance", tolerance, rule="be >= 0 mm and less than both radii")
-    if not 0.0 <= tolerance < min(groove.radius, cylinder.radius):
-        raise InputError(f"tolerance must be >= 0 mm and less than both radii, got {tolerance}")
+    tolerance = check_tolerance(tolerance, groove.radius, cylinder.radius)
     contact = signed_distance(groove, cylinder, pose)
     return GrooveRelation(_relation(groove, cylinder, as_pose(pose), contact, tolerance), contact, tolerance)
 
@@ -107,11 +125,28 @@ def _reaches_hollow(groove: SweptArc, cylinder: Cylinder, T: Array) -> bool:
 
 
 def relative_pose(T_world_a: ArrayLike, T_world_b: ArrayLike) -> Array:
-    """``T_a_b`` (4, 4) from two world poses: offsets are subtracted before anything is multiplied.
+    """Relative pose of two bodies from their world poses: offsets are subtracted before anything is multiplied.
 
     So a common offset of both bodies costs no more than its own rounding, where the product with an inverse loses
-    1e-10 mm at an offset of 1e6 mm. Raises InputError for a pose that is not rigid.
+    1e-10 mm at an offset of 1e6 mm.
 
+    Parameters
+    ----------
+    T_world_a, T_world_b : array_like (4, 4)
+        Poses of the two bodies in the world, mm.
+
+    Returns
+    -------
+    ndarray (4, 4)
+        Pose of b in the frame of a.
+
+    Raises
+    ------
+    InputError
+        For a pose that is not rigid.
+
+    Examples
+    --------
     >>> from clamp3d.core.pose import translation
     >>> relative_pose(translation(1e6, 0.0, 0.0), translation(1e6 + 0.5, 0.0, 0.0))[:3, 3].tolist()
     [0.5, 0.0, 0.0]

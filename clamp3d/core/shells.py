@@ -9,9 +9,6 @@ from clamp3d.core.pose import Array
 
 Faces = NDArray[np.int64]
 
-LARGEST_COORDINATE = 1e30
-"""Coordinates of a mesh must be smaller (mm), so that volumes neither overflow nor lose all digits."""
-
 _FLAT = 1e-14
 """A volume below this part of area x extent is rounding."""
 

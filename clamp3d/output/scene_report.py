@@ -105,8 +105,6 @@ def work_text(work: Work, full: CheckResult | None = None) -> list[str]:
         f"decided: {decided}",
         f"built: {work.meshes} meshes ({work.triangles} triangles), {work.hulls} hulls, {work.fits} fits "
         f"for {work.shapes} shapes; asked: {queries or 'nothing'}; {sum(work.seconds.values()):.2f} s",
-        f"one fixed fidelity (every part meshed at {work.fixed_error:g} mm, every pair asked): {work.fixed_meshes} "
-        f"meshes, {work.fixed_triangles} triangles, {work.fixed_queries} queries",
     ]
     if full is not None:
         total = full.work

@@ -16,7 +16,7 @@ from clamp3d.baselines import cache, decomposition
 from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
 from clamp3d.baselines.hulls import intrusion
 from clamp3d.bench.compare.scene import block_pair, grooved_block
-from clamp3d.core.closed_mesh import Solid
+from clamp3d.core.mesh import Mesh
 from clamp3d.core.meshing import mesh
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError, SolverError
@@ -143,7 +143,7 @@ def test_worker_ends_when_its_caller_is_gone(tmp_path: Path) -> None:
 
 
 def test_crash_of_coacd_is_an_error_not_an_end() -> None:
-    nan = Solid(np.full((8, 3), np.nan), F[:4] * 0)
+    nan = Mesh("hull", np.full((8, 3), np.nan), F[:4] * 0, True)
     with pytest.raises(SolverError, match="CoACD gave no hulls for mesh"):
         decomposition._run(nan, COARSE, "mesh", 60.0, False)
 
@@ -153,7 +153,7 @@ def test_crash_of_coacd_is_an_error_not_an_end() -> None:
     [
         (np.full_like(V, np.nan), F, "finite"),
         (V[:0], F[:0], "empty"),
-        (V, F + 1, "must name vertices"),
+        (V, F + 1, "is out of range"),
         (V, F[1:], "watertight"),
         (V, F[:, ::-1], "volume > 0"),
     ],

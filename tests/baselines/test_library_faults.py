@@ -405,8 +405,8 @@ def _bad_meshes() -> dict[str, tuple[Array, Array, str]]:
     nan[3, 1], index[5, 2] = np.nan, 2**31 - 1
     return {
         "empty": (V[:0], F[:0], "must not be empty"),
-        "nan": (nan, F, r"vertices must be finite, got \[.*nan.*\] at row 3"),
-        "index": (V, index, r"must name vertices 0 to 7, got \[.*2147483647\] at row 5"),
+        "nan": (nan, F, r"vertices must be finite, got nan at \[3, 1\]"),
+        "index": (V, index, "face index 2147483647 is out of range"),
         "inverted": (V, F[:, ::-1], "may be inside out"),
     }
 
@@ -419,7 +419,7 @@ def test_meshes_that_end_a_library_are_refused_before(name: str, read: object) -
         read(V, F)  # type: ignore[operator]
 
 
-@mended("CoACD", "a mesh that is inside out passes (CoACD#63)", "contact.solid.check_solid in decompose")
+@mended("CoACD", "a mesh that is inside out passes (CoACD#63)", "core.mesh.closed_mesh in decompose")
 def test_bare_coacd_inside_out(children: dict[str, Child]) -> None:
     assert children["coacd"].said[1] == "refused"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clamp3d.core.closed_mesh import check_solid
+from clamp3d.core.mesh import closed_mesh
 from clamp3d.errors import InputError
 
 V = np.array([[x, y, z] for x in (0.0, 2.0) for y in (0.0, 3.0) for z in (0.0, 4.0)])
@@ -18,7 +18,7 @@ F = np.array(
 
 
 def _with(array: np.ndarray, row: int, value: object) -> np.ndarray:
-    out = array.astype(np.float64)
+    out = array.astype(np.result_type(array, np.asarray(value)))
     out[row] = value
     return out
 
@@ -26,24 +26,24 @@ def _with(array: np.ndarray, row: int, value: object) -> np.ndarray:
 @pytest.mark.parametrize(
     ("vertices", "faces", "rule"),
     [
-        (_with(V, 3, np.nan), F, "must be finite, got [nan, nan, nan] at row 3"),
-        (_with(V, 3, np.inf), F, "must be finite"),
+        (_with(V, 3, np.nan), F, "vertices must be finite, got nan at [3, 0]"),
+        (_with(V, 3, np.inf), F, "vertices must be finite, got inf at [3, 0]"),
         (np.zeros((0, 3)), F, "vertices must not be empty"),
-        (V, np.zeros((0, 3), dtype=int), "faces must not be empty"),
+        (V, np.zeros((0, 3), dtype=int), "faces must have shape (m, 3), got (0, 3)"),
         (V[:, :2], F, "must have shape (n, 3), got (8, 2)"),
         ("text", F, "must be an array of numbers"),
         ([[0, 0], [1, 2, 3]], F, "must be an array of numbers"),
-        (V, _with(F, 5, [0, 1, 8]), "must name vertices 0 to 7, got [0, 1, 8] at row 5"),
-        (V, _with(F, 5, [0, 1, -1]), "must name vertices 0 to 7"),
-        (V, _with(F, 5, [0, 1, 2.5]), "must be whole numbers"),
-        (V, _with(F, 5, [0, 1, np.nan]), "must be whole numbers"),
+        (V, _with(F, 5, [0, 1, 8]), "face index 8 is out of range for 8 vertices"),
+        (V, _with(F, 5, [0, 1, -1]), "face index -1 is out of range for 8 vertices"),
+        (V, _with(F, 5, [0, 1, 2.5]), "faces must be integers, got float64"),
+        (V, _with(F, 5, [0, 1, np.nan]), "faces must be integers, got float64"),
         (V, _with(F, 5, [0, 5, 5]), "three different corners, got [0, 5, 5] at row 5"),
         (V, F[1:], "3 of 18 edges have one face only, at face 0, vertices 0 and 3"),
         (V[F[1:]].reshape(-1, 3), np.arange(33).reshape(-1, 3), "33 of 33 edges have one face only"),
         (np.vstack([V, V + 9.0]), np.vstack([F, F[:, ::-1] + 8]), "must enclose a volume > 0 mm^3, got 0"),
         (np.vstack([2.0 * V, V - 9.0]), np.vstack([F, F[:, ::-1] + 8]), "the one of face 12 (12 faces) encloses -24"),
         (np.vstack([2.0 * V, V - 1.0]), np.vstack([F, F[:, ::-1] + 8]), "is no cavity of another"),
-        (_with(V, 3, 1e300), F, "must be below 1e+30 mm"),
+        (_with(V, 3, 1e300), F, "must be within 1e+12 mm"),
         (V, np.vstack([F, F[:1]]), "have more than two faces"),
         (V, np.vstack([F[:1, ::-1], F[1:]]), "3 edges run the same way in both faces"),
         (V, F[:, ::-1], "must enclose a volume > 0 mm^3, got -24"),
@@ -52,7 +52,7 @@ def _with(array: np.ndarray, row: int, value: object) -> np.ndarray:
 )
 def test_bad_mesh_is_one_clear_line(vertices: object, faces: object, rule: str) -> None:
     with pytest.raises(InputError) as caught:
-        check_solid(vertices, faces, "part P9")  # type: ignore[arg-type]
+        closed_mesh(vertices, faces, "part P9")  # type: ignore[arg-type]
     message = str(caught.value)
     assert message.startswith("part P9")
     assert rule in message
@@ -60,16 +60,16 @@ def test_bad_mesh_is_one_clear_line(vertices: object, faces: object, rule: str) 
 
 
 def test_corners_of_triangles_are_merged_and_cavities_kept() -> None:
-    soup = check_solid(V[F].reshape(-1, 3), np.arange(36).reshape(-1, 3))
+    soup = closed_mesh(V[F].reshape(-1, 3), np.arange(36).reshape(-1, 3))
     assert len(soup.vertices) == 8
     assert {tuple(map(tuple, soup.vertices[face])) for face in soup.faces} == {tuple(map(tuple, V[f])) for f in F}
-    hollow = check_solid(np.vstack([4.0 * V, V + 1.0]), np.vstack([F, F[:, ::-1] + 8]))
+    hollow = closed_mesh(np.vstack([4.0 * V, V + 1.0]), np.vstack([F, F[:, ::-1] + 8]))
     assert len(hollow.faces) == 24
 
 
 def test_good_mesh_is_copied_and_locked() -> None:
     source = V + 1e6
-    solid = check_solid(source, F.astype(np.int32))
+    solid = closed_mesh(source, F.astype(np.int32))
     source[0] = 0.0
     assert solid.vertices[0, 0] == 1e6
     assert solid.faces.dtype == np.int64

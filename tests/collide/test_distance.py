@@ -180,6 +180,31 @@ def test_no_time_before_the_first_contact_has_an_overlap(a, b, numbers, angle):
         assert common < 1.0, (t, common)
 
 
+def test_a_rim_against_a_polyhedron_is_known_to_the_accuracy():
+    """Cylinders askew before a box: alternating projections between the two convex bodies find the same distance."""
+    rng = np.random.default_rng(5)
+    half, radius, long = np.array([5.0, 10.0, 4.0]), 5.0, 15.0
+    box, rod = shapes.box(2.0 * half), shapes.cylinder(radius, 2.0 * long)
+    seen = 0
+    while seen < 25:
+        T = rotation(rng.normal(size=3), rng.uniform(0.0, 3.0))
+        T[:3, 3] = rng.normal(size=3) * 20.0
+        found = distance(box, rod, T)
+        if found.lower < 0.5:
+            continue
+        seen += 1
+        assert found.uncertainty <= 1e-7
+        x = np.zeros(3)
+        for _ in range(4000):
+            local = (x - T[:3, 3]) @ T[:3, :3]
+            local[:2] *= min(1.0, radius / max(math.hypot(*local[:2]), 1e-300))
+            local[2] = np.clip(local[2], -long, long)
+            y = T[:3, :3] @ local + T[:3, 3]
+            x = np.clip(y, -half, half)
+        assert found.lower <= np.linalg.norm(x - y) + 1e-9
+        assert found.value == pytest.approx(np.linalg.norm(x - y), abs=1e-5)
+
+
 OCTAHEDRON = make_mesh(
     3.0 * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]),
     [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]],

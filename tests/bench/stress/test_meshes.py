@@ -85,7 +85,7 @@ def test_cases_are_the_same_again_and_away_from_touching() -> None:
 @pytest.mark.parametrize("family", MESHES)
 def test_every_fault_is_what_it_says(family: str) -> None:
     """A mesh that is called good is closed, has one winding and a volume; one that is called broken has a fault."""
-    from clamp3d.core.closed_mesh import check_solid
+    from clamp3d.core.mesh import closed_mesh
 
     seen = set()
     cases = MESHES[family].cases(60, 11)
@@ -93,7 +93,7 @@ def test_every_fault_is_what_it_says(family: str) -> None:
         case = cases[i].mesh
         seen.add(case.what)
         try:
-            check_solid(case.vertices, case.faces)
+            closed_mesh(case.vertices, case.faces)
             fine = True
         except InputError:
             fine = False
