@@ -299,7 +299,7 @@ def view(shown: Scene | Assembly | CheckResult, *, serve: bool = True, **options
     >>> scene = Scene(name="two balls").add("a", shapes.cylinder(5.0, 10.0)).add("b", shapes.cylinder(4.0, 10.0))
     >>> with view(scene, serve=False) as viewer:
     ...     viewer.story["findings"][0]["verdict"]
-    'clash'
+    'contained'
     """
     if isinstance(shown, Scene):
         scene = _scene(shown, options.pop("clearance", None))

@@ -35,7 +35,7 @@ def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
 
 def _rounded(value: float, rounding: str) -> str:
     """Four significant digits, six decimals at most, rounded to the safe side."""
-    exact = Decimal(value)
+    exact = Decimal(repr(float(value)))  # the digits that name the float: its last bit is no digit of a length
     digits = min(6, max(0, 3 - exact.adjusted())) if exact else 0
     text = f"{exact.quantize(Decimal(1).scaleb(-digits), rounding=rounding):f}"
     return text.rstrip("0").rstrip(".") if "." in text else text

@@ -152,7 +152,7 @@ def test_every_value_at_every_waypoint_is_what_measure_says(recorded):
 
 
 def test_no_clash_at_a_waypoint_of_random_wires_that_the_engine_does_not_find():
-    pairs = random.Random(11).sample(list(itertools.product(sorted(catalogue()), repeat=2)), 12)
+    pairs = random.Random(11).sample(list(itertools.product(sorted(catalogue()), repeat=2)), 5)
     for line, jumper in [*pairs, ("LJ-240", "LJ-240")]:
         assembly = assemble("reference", line=line, jumper=jumper)
         with view(assembly, serve=False, mesh_error=0.2) as viewer:
