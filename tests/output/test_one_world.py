@@ -1,0 +1,54 @@
+"""One question, one answer: the 21 distances of a clamp are the same in every output, whatever its wires are."""
+
+import csv
+import io
+
+import pytest
+
+from clamp3d.clamp.assemble import assemble
+from clamp3d.collide.check import check
+from clamp3d.collide.distance import measure
+from clamp3d.output.report import make_report
+from clamp3d.output.report_page import report_csv, report_to_dict
+from clamp3d.output.scene_report import check_to_dict
+from clamp3d.output.viewer import view
+
+WIRES = [
+    (None, None),
+    ("LJ-240", "LJ-240"),
+    ("LJ-500", "LJ-120"),
+    ("LJ-120", "LJ-630"),
+    ("LJ-800", "LJ-16"),
+    ("LJ-16", "LJ-16"),
+    ("LJ-300", "LJ-95"),
+    ("LJ-500", "LJ-185"),
+    ("40", "12.5"),
+    ("21.6", "21.6"),
+    ("LGJ-240/40", "LGJ-95/15"),
+]
+
+
+@pytest.mark.parametrize(("line", "jumper"), WIRES)
+def test_every_output_says_the_same(line, jumper):
+    assembly = assemble("reference", line=line, jumper=jumper)
+    truth = measure(assembly.scene)
+    assert len(truth) == 21
+    found = make_report(assembly)
+    checked = check_to_dict(check(assembly.scene, distances=True))["pairs"]
+    with view(assembly, serve=False, mesh_error=0.5) as viewer:
+        shown = viewer.story["stops"][-1]["rows"]
+    outputs = {
+        "run": assembly.to_dict()["contacts"],
+        "report.json": report_to_dict(found)["pairs"],
+        "pairs.csv": list(csv.DictReader(io.StringIO(report_csv(found)))),
+        "check": checked,
+        "viewer": shown,
+    }
+    for name, rows in outputs.items():
+        assert {frozenset((row["a"], row["b"])) for row in rows} == {frozenset(pair) for pair in truth}, name
+        for row in rows:
+            exact = truth.get((row["a"], row["b"])) or truth[row["b"], row["a"]]
+            assert float(row["distance_mm"]) == pytest.approx(exact.value, abs=1e-9), (name, row["a"], row["b"])
+    for row in checked:
+        if row["at_least_mm"] is not None:
+            assert row["at_least_mm"] <= row["distance_mm"] <= row["at_most_mm"]
