@@ -183,7 +183,7 @@ def _gap(row: PairRow, digits: int = 6) -> str:
 def _pair_to_dict(row: PairRow) -> dict[str, Any]:
     data = row.result.to_dict() | {
         "severity": row.severity,
-        "lower_bound": not math.isfinite(row.distance.upper),
+        "lower_bound": not (math.isfinite(row.distance.lower) and math.isfinite(row.distance.upper)),
         "remark": row.remark,
         "point": None if row.distance.point_a is None else row.distance.point_a.tolist(),
     }

@@ -11,6 +11,7 @@ from clamp3d.collide.verdict import Verdict
 from clamp3d.output.tables import text_table
 from clamp3d.output.wording import (
     circumstances,
+    counted,
     counts_text,
     gap_text,
     headline,
@@ -49,7 +50,7 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
     moving = f" at rest and {len(result.motions)} in motion" if result.motions else ""
     lines = [
         f"{result.scene.name}: {headline(result)}",
-        f"{n} parts, {result.work.pairs} pairs{moving}: {counts_text(result)}; "
+        f"{counted(n, 'part')}, {counted(result.work.pairs, 'pair')}{moving}: {counts_text(result)}; "
         f"contact up to {t.contact:g} mm, {clearance}",
     ]
     for row in result.findings[:_ROWS]:
@@ -102,7 +103,7 @@ def work_text(work: Work, full: CheckResult | None = None) -> list[str]:
     decided = ", ".join(f"{count} by {level}" for level, count in work.decided.items())
     queries = ", ".join(f"{count} {level}" for level, count in work.queries.items() if count)
     lines = [
-        f"decided: {decided}",
+        f"decided: {decided or 'nothing'}",
         f"built: {work.meshes} meshes ({work.triangles} triangles), {work.hulls} hulls, {work.fits} fits "
         f"for {work.shapes} shapes; asked: {queries or 'nothing'}; {sum(work.seconds.values()):.2f} s",
     ]

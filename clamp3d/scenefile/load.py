@@ -65,7 +65,10 @@ def load(
     if str(path) in builtin_clamps() or _is_clamp(path):
         return load_clamp(path, line=line, jumper=jumper)
     _refuse_wires(path, "a scene", wires)
-    return load_scene(path)
+    scene = load_scene(path)
+    if not scene.parts:
+        raise InputError(f"{checks.short(path)}: the scene has no parts; add [parts.NAME] or [clamp]")
+    return scene
 
 
 def _is_clamp(path: Path) -> bool:

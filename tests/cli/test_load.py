@@ -30,7 +30,6 @@ def test_a_clamp_file_needs_no_ending(tmp_path):
     ("text", "parts"),
     [
         ("[clamp]", ["P1", "P2", "P3", "P4", "P5", "P6", "P7"]),
-        ("clearance = 1.0", []),
         ('[parts.a]\nshape = "box"\nsize = [1, 2, 3]', ["a"]),
     ],
 )
@@ -107,3 +106,10 @@ def test_the_command_lines_argument_is_the_same():
     assert Source("reference", "LJ-500", None).load() == load("reference", line="LJ-500")
     with pytest.raises(InputError, match="line goes with a clamp"):
         Source(str(ROOT / "examples" / "hinge" / "scene.toml"), "LJ-500", None).load()
+
+
+def test_a_scene_without_parts_is_refused(tmp_path):
+    file = tmp_path / "nothing.toml"
+    file.write_text("contact = 0.01\n[parts]\n")
+    with pytest.raises(InputError, match=r"nothing.toml: the scene has no parts; add \[parts.NAME\] or \[clamp\]"):
+        load(file)
