@@ -107,11 +107,14 @@ def prism(polygon: Array, start: float, end: float) -> tuple[Array, NDArray[np.i
     return made.vertices + np.array([0.0, 0.0, start]), np.asarray(made.faces, dtype=np.int64)
 
 
-def wedge_solids(part: Solid, unit_angle: float) -> dict[str, tuple[Array, NDArray[np.int64]]]:
-    """Names of the wedges of a part -> their vertices (n, 3) in the part's frame and outward triangles (m, 3)."""
+def wedge_solids(part: Solid, unit_angle: float) -> list[tuple[str, Array, NDArray[np.int64]]]:
+    """Name of each wedge of a part, its vertices (n, 3) in the part's frame and outward triangles (m, 3).
+
+    Wedges of different cells may share a name.
+    """
     body = part.bodies[0]
-    prisms = {w.name: prism(w.polygon, body.start, body.end) for w in part_wedges(part, unit_angle)}
-    return {name: (vertices @ body.frame.T, faces) for name, (vertices, faces) in prisms.items()}
+    prisms = [(w.name, *prism(w.polygon, body.start, body.end)) for w in part_wedges(part, unit_angle)]
+    return [(name, vertices @ body.frame.T, faces) for name, vertices, faces in prisms]
 
 
 def _sectors(cell: shapely.Polygon, arc: Arc, unit_angle: float) -> list[Wedge]:
@@ -169,4 +172,4 @@ def _mouth(arc: Arc) -> tuple[float, float]:
 
 def _polytopes(part: Solid, unit_angle: float) -> Polytopes:
     solids = wedge_solids(part, unit_angle)
-    return Polytopes([convex(V, F, f"{part.name} {name}") for name, (V, F) in solids.items()], [*solids])
+    return Polytopes([convex(V, F, f"{part.name} {name}") for name, V, F in solids], [name for name, _, _ in solids])

@@ -53,11 +53,9 @@ def _wedges(part: Solid, unit_angle: float) -> list[trimesh.Trimesh]:
     """The wedges of the convex partitioning of a part."""
     import trimesh
 
-    from clamp3d.baselines.wedges import part_wedges, prism
+    from clamp3d.baselines.wedges import wedge_solids
 
-    body = part.bodies[0]
-    prisms = (prism(wedge.polygon, body.start, body.end) for wedge in part_wedges(part, unit_angle))
-    return [trimesh.Trimesh(vertices @ body.frame.T, faces) for vertices, faces in prisms]
+    return [trimesh.Trimesh(vertices, faces) for _, vertices, faces in wedge_solids(part, unit_angle)]
 
 
 def _hulls(part: Solid, threshold: float) -> list[trimesh.Trimesh]:

@@ -179,7 +179,7 @@ def _open_cascade(_: float) -> _Ready:
 
 def _convex_pieces(unit_angle: float) -> list[tuple[Array, Any]]:
     """Vertices and triangles of the block's wedges in the groove's frame."""
-    return [(V @ pair().T_a_groove[:3, :3], F) for V, F in wedge_solids(block(), unit_angle).values()]
+    return [(V @ pair().T_a_groove[:3, :3], F) for _, V, F in wedge_solids(block(), unit_angle)]
 
 
 def _mesh(unit_angle: float) -> tuple[Array, Any]:

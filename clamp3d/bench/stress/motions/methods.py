@@ -73,7 +73,7 @@ class FclMethod:
         """Convex pieces of a block that no wire reaches the back of."""
         part = block(groove, np.array([[reach[0], -reach[1], 0.0]]))
         out = []
-        for V, F in wedge_solids(part, UNIT).values():
+        for _, V, F in wedge_solids(part, UNIT):
             shape = self._fcl.Convex(V, len(F), encoded(F))
             out.append(self._fcl.CollisionObject(shape, self._fcl.Transform()))
         return out
