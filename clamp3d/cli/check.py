@@ -26,7 +26,7 @@ def command(
     """Check which parts of INPUT clash, touch or keep their clearance, at rest and in motion.
 
     INPUT is a scene file, a mesh, a STEP file, or a clamp (a built-in name or a TOML file), which is assembled first
-    and measured in all its pairs. Exit code 1 if parts clash, 3 if a pair cannot be decided.
+    and measured in all its pairs. Exit code 1 if parts clash, 3 if a pair cannot be decided or there is none.
     """
     from clamp3d.clamp.assemble import assemble
     from clamp3d.clamp.dimensions import Clamp
@@ -49,7 +49,8 @@ def command(
     if html_file is not None:
         write_text(html_file, check_to_html(result, complete))
     show(check_to_text(result, complete))
-    finish(finding=not result.clean, undecided=any(row.verdict is Verdict.UNCERTAIN for row in result.rows))
+    open_ = any(row.verdict is Verdict.UNCERTAIN for row in result.rows)
+    finish(finding=not result.clean, undecided=open_ or not result.work.pairs)
 
 
 def _pairs(text: str) -> list[tuple[str, str]]:

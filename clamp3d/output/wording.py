@@ -104,7 +104,7 @@ def headline(result: CheckResult) -> str:
     if result.scene.motions:
         checked += f" and {counted(len(result.scene.motions), 'motion')}"
     if not result.work.pairs:
-        return "Clean: no two parts to check"
+        return "Nothing checked: there are no two parts"
     if not found:
         return f"Clean: {checked} checked, nothing clashes"
     return ("" if clashes else "No clash: ") + "; ".join(others) + f" ({checked} checked)"

@@ -50,7 +50,7 @@ def test_check_writes_all_outputs(tmp_path):
         ([EXAMPLES / "hinge" / "scene.toml"], 1),  # the clash is in a motion only
         ([EXAMPLES / "pipe-clip" / "scene.toml"], None),
         (["reference", "--clearance", "5"], 0),
-        ([EXAMPLES / "hinge" / "pin.stl"], 0),
+        ([EXAMPLES / "hinge" / "pin.stl"], 3),
     ],
 )
 def test_text_json_page_and_exit_code_tell_one_story(arguments, code, tmp_path):
@@ -131,7 +131,7 @@ def test_view_takes_what_check_takes(source, tmp_path):
     assert done.returncode == (1 if source.suffix == ".toml" else 0), done.stderr
     said = page_text(page.read_text())
     assert ("1 clash in motion" in said) == (source.suffix == ".toml")
-    assert ("Clean: no two parts to check" in said) == (source.suffix == ".stl")
+    assert ("Nothing checked: there are no two parts" in said) == (source.suffix == ".stl")
 
 
 def test_check_of_some_pairs_is_clean(tmp_path):

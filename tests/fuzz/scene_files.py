@@ -175,7 +175,8 @@ def _plausible(called: Called, data: dict[str, Any]) -> None:
     """The exit code says what the verdicts say."""
     rows = [*data.get("pairs", []), *data.get("motions", [])]
     verdicts = {row["verdict"] for row in rows}
-    code = 1 if verdicts & {"clash", "contained"} else 3 if "uncertain" in verdicts else 0
+    undecided = "uncertain" in verdicts or not data["work"]["pairs"]
+    code = 1 if verdicts & {"clash", "contained"} else 3 if undecided else 0
     if called.code != code:
         raise FindingError(f"verdicts {sorted(verdicts)} with exit code {called.code}")
     for row in rows:
