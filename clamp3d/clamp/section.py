@@ -100,7 +100,7 @@ class Section:
             limits[2 * i] = (centre - half_mouth, centre + half_mouth)
         return limits
 
-    def room(self, q: Array, wire: PartName) -> tuple[tuple[float, float], tuple[float, float]]:
+    def wire_limits(self, q: Array, wire: PartName) -> tuple[tuple[float, float], tuple[float, float]]:
         """Limits of a wire's (x, y) at a state: its mouth, and the bottoms of the two grooves that face each other.
 
         Parts of finite size are free behind their grooves too; a search must not put the wire there.

@@ -74,7 +74,7 @@ def solve_stepped(
             progress(tried, k * step)
     if k == first:
         raise SolverError(f"the open clamp overlaps at a distance of {k * step:.4g} mm: nothing to close")
-    # Of the tilts that are free at the last distance, the one that leaves the wires most room.
+    # Of the tilts that are free at the last distance, the one that leaves the wires the widest gaps.
     free = [p for i in tilts if (p := _place(section, q, q[D], i * tilt_step, settle=True)) is not None]
     q = max(free, key=lambda p: float(section.gaps(p).value.min()), default=q)
     return SteppedState(q, section.gaps(q), tried)
@@ -152,7 +152,7 @@ def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
             lambda x: -x[2],
             np.array([*q[i : i + 2], gaps(q[i : i + 2]).value.min()]),
             jac=lambda x: np.array([0.0, 0.0, -1.0]),
-            bounds=[*section.room(q, wire), (None, None)],
+            bounds=[*section.wire_limits(q, wire), (None, None)],
             constraints={"type": "ineq", "fun": lambda x: gaps(x[:2]).value - x[2], "jac": slack_gradient},
             method="SLSQP",
             options={"maxiter": 60, "ftol": 1e-12},

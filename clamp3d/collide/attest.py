@@ -38,10 +38,10 @@ def attested(found: Distance, a: Body, b: Body, T: Array) -> Distance:
     R, t = T[:3, :3], T[:3, 3]
     if found.point_a is None or found.point_b is None:
         common = _common(a[0], b[0], T)
-        both = np.minimum(_depth(a, common), _depth(b, (common - t) @ R))
+        in_a, in_b = _depth(a, common), _depth(b, (common - t) @ R)
+        both, deep = np.minimum(in_a, in_b), np.maximum(in_a, in_b)
         inside = both >= -MEMBER * (1.0 + float(np.abs(common).max(initial=0.0)))
         if inside.any():
-            deep = np.maximum(_depth(a, common), _depth(b, (common - t) @ R))
             k = int(np.argmax(np.where(inside, deep, -np.inf)))
             upper = max(found.lower, min(0.0, 2.0 * max(0.0, -float(both[k])) - float(deep[k])))
             return replace(found, upper=upper, point_a=common[k], point_b=common[k])
