@@ -16,9 +16,9 @@ from .collide.check import check as check
 from .collide.distance import distance as distance
 from .collide.distance import distances as distances
 from .collide.distance import measure as measure
-from .collide.motions import check_poses as check_poses
 from .collide.motions import first_contact as first_contact
 from .collide.motions import min_clearance as min_clearance
+from .collide.poses import check_poses as check_poses
 from .collide.result import CheckResult as CheckResult
 from .collide.scene import Part as Part
 from .collide.scene import Scene as Scene

@@ -13,8 +13,8 @@ import numpy as np
 from clamp3d.checks import flag, function, instance
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
+from clamp3d.collide.check_motions import check_motions
 from clamp3d.collide.model import Model, ModelCache, Progress
-from clamp3d.collide.motions import check_motions
 from clamp3d.collide.refine import contained, measured, refine, with_normal
 from clamp3d.collide.result import CheckResult, PairResult, Work
 from clamp3d.collide.scene import Scene, name_pairs

@@ -6,39 +6,18 @@ round surfaces carry the error bound of the fit, flat ones none.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm
 from clamp3d.collide.convex import Hull, Rod
-from clamp3d.collide.surface import Surface
+from clamp3d.collide.surface import Surface, fcl_tree
 from clamp3d.core.pose import Array
 
 _WIDTH = 1e-9
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Facets:
-    """A closed mesh in groups of triangles: (tree, error mm) of the flat and of the round ones."""
-
-    whole: Surface
-    groups: tuple[tuple[Any, float], ...]
-
-    @classmethod
-    def of(cls, mesh: Surface, round_faces: NDArray[np.int64], error: float) -> Facets:
-        """Groups of ``mesh``; ``round_faces`` lie within ``error`` mm of the true surface, the others on it."""
-        is_round = np.zeros(len(mesh.faces), dtype=bool)
-        is_round[round_faces] = True
-        groups = []
-        for mask, uncertainty in ((~is_round, 0.0), (is_round, error)):
-            if mask.any():
-                groups.append((Surface(mesh.vertices, mesh.faces[mask], uncertainty).bvh, uncertainty))
-        return cls(mesh, tuple(groups))
 
 
 @lru_cache(maxsize=1024)
@@ -46,18 +25,22 @@ def _axis(rod: Rod) -> Any:
     half, T = 0.5 * rod.length, rod.T
     ends = T[:3, 3] + np.outer([-half, half, half], T[:3, 2])
     ends[2] += _WIDTH * T[:3, 0]
-    return Surface(ends, np.array([[0, 1, 2]]), 0.0).bvh
+    return fcl_tree(ends, np.array([[0, 1, 2]]))
 
 
-def rod_distance(facets: Facets, body: ClosedForm, T: Array) -> Distance:
+def _holds(facets: Surface, point: Array) -> bool:
+    return bool(facets.contains(point[None])[0])
+
+
+def rod_distance(facets: Surface, body: ClosedForm, T: Array) -> Distance:
     """Distance of the signed distance of a ``body`` with a rod around it, at ``T`` (4, 4) in the mesh's frame."""
     rod = next(piece for piece in body.outers if isinstance(piece, Rod))
     distance, low, p, a = _to_axis(facets, rod, T)
-    slack = 1e-12 * (facets.whole.scale + float(np.abs(T[:3, 3]).max()) + rod.length) + _WIDTH
+    slack = 1e-12 * (facets.scale + float(np.abs(T[:3, 3]).max()) + rod.length) + _WIDTH
     if distance <= slack:
         return _axis_inside(facets, body, T, 0.0)
     axis = T[:3, :3] @ rod.T[:3, 2]
-    if facets.whole.contains(T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
+    if _holds(facets, T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
         return _axis_inside(facets, body, T, distance)
     bounds = Distance(low - rod.radius - slack)
     n = (p - a) / distance
@@ -74,29 +57,29 @@ def rod_distance(facets: Facets, body: ClosedForm, T: Array) -> Distance:
     return Distance(bounds.lower, high, p, p).widened(body.error)
 
 
-def axis_gap(facets: Facets, rod: Rod, T: Array) -> float:
+def axis_gap(facets: Surface, rod: Rod, T: Array) -> float:
     """Lower bound (mm) of the gap between the mesh and a rod at ``T`` (4, 4); minus infinity if its axis is inside."""
     distance, low, _, _ = _to_axis(facets, rod, T)
-    if distance <= 1e-9 or facets.whole.contains(T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
+    if distance <= 1e-9 or _holds(facets, T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
         return -np.inf
-    return low - rod.radius - _WIDTH - 1e-12 * (facets.whole.scale + rod.length + float(np.abs(T[:3, 3]).max()))
+    return low - rod.radius - _WIDTH - 1e-12 * (facets.scale + rod.length + float(np.abs(T[:3, 3]).max()))
 
 
-def hull_gap(facets: Facets, around: Hull) -> float:
+def hull_gap(facets: Surface, around: Hull) -> float:
     """Lower bound (mm) of the gap between the mesh and a polyhedron in its frame; minus infinity if they meet."""
     import fcl
 
-    other = Surface(around.vertices, around.faces, 0.0)
+    other = Surface(around.vertices, around.faces)
     low = np.inf
     for tree, error in facets.groups:
         request, result = fcl.DistanceRequest(), fcl.DistanceResult()
         d = float(fcl.distance(fcl.CollisionObject(tree), fcl.CollisionObject(other.bvh), request, result))
         low = min(low, d - error) if d > 0.0 else -np.inf
-    inside = facets.whole.contains(around.vertices[0]) or (around.depth(facets.whole.shell_points) > 0.0).any()
-    return -np.inf if inside else low - 1e-12 * (facets.whole.scale + other.scale)
+    inside = _holds(facets, around.vertices[0]) or (around.depth(facets.shell_points[:, 0]) > 0.0).any()
+    return -np.inf if inside else low - 1e-12 * (facets.scale + other.scale)
 
 
-def _axis_inside(facets: Facets, body: ClosedForm, T: Array, distance: float) -> Distance:
+def _axis_inside(facets: Surface, body: ClosedForm, T: Array, distance: float) -> Distance:
     """The axis passes through the material or lies in it: points of the body on a grid say how deep at least."""
     rod = next(piece for piece in body.outers if isinstance(piece, Rod))
     turn = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
@@ -106,7 +89,7 @@ def _axis_inside(facets: Facets, body: ClosedForm, T: Array, distance: float) ->
     own = local @ rod.T[:3, :3].T + rod.T[:3, 3]
     world = own @ T[:3, :3].T + T[:3, 3]
     in_body = body.depth(own)
-    in_mesh = facets.whole.depth(world)
+    in_mesh = facets.depth(world)
     both = np.where((in_body >= 0.0) & (in_mesh >= 0.0), np.maximum(in_body, in_mesh), -np.inf)
     k = int(np.argmax(both))
     if both[k] == -np.inf:
@@ -115,7 +98,7 @@ def _axis_inside(facets: Facets, body: ClosedForm, T: Array, distance: float) ->
     return Distance(-np.inf, error - float(both[k]), world[k], world[k])
 
 
-def _to_axis(facets: Facets, rod: Rod, T: Array) -> tuple[float, float, Array, Array]:
+def _to_axis(facets: Surface, rod: Rod, T: Array) -> tuple[float, float, Array, Array]:
     """Distance of the facets from the rod's axis, a lower bound of it for the true part, and the nearest points."""
     import fcl
 

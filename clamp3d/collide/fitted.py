@@ -22,8 +22,8 @@ def fit_error(feature: FittedSurface, round_: bool) -> float:
     return feature.fit_error if round_ else feature.error_bound
 
 
-def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[tuple[ClosedForm, ...], float]:
-    """Bodies around the fitted mesh, and the error (mm) of the mesh itself: largest chord error and that of the fit.
+def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[ClosedForm, ...]:
+    """Bodies around the fitted mesh.
 
     A groove or hole counts where no part of the mesh lies in its circle, over the whole length of the mesh; else the
     mesh is asked. Where the mesh is nothing but a round bar (a wire, a shank, a step of a turned part) it becomes a
@@ -49,7 +49,7 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[t
         in_feature[feature.faces] = True
 
     def depth(x: Array) -> Array:
-        away, face = model.nearest(x)
+        away, face, _ = model.nearest(x)
         on = (away <= 1e-9 * model.scale) & ~in_feature[face]
         for surface in result.features:  # a point on the fitted surface is on the part, within the error of the fit
             local = (x - surface.T_part_feature[:3, 3]) @ surface.T_part_feature[:3, :3]
@@ -58,16 +58,16 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[t
             on |= touch & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) <= surface.half_angle + 1e-9)
         found = np.where(on, 0.0, -mesh_error - away)
         # Nearer to the facets than their own error a point proves nothing; further in it does.
-        for k in np.flatnonzero(~on & (away > mesh_error)):
-            if model.contains(x[k]):
-                found[k] = away[k] - mesh_error
+        far = np.flatnonzero(~on & (away > mesh_error))
+        within = far[model.contains(x[far])]
+        found[within] = away[within] - mesh_error
         return found
 
     bores = tuple(used)
     rods, rest = _rods(result, V, F)
     made = [ClosedForm((rod,), bores, error=error) for rod in rods]
     made += [ClosedForm((hull(points[index]),), bores, error=error, surface=depth) for index in rest]
-    return tuple(made), mesh_error
+    return tuple(made)
 
 
 def _bore(feature: FittedSurface, V: Array, F: Faces) -> Bore | None:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +14,18 @@ from numpy.typing import NDArray
 from clamp3d.collide.body import ClosedForm
 from clamp3d.collide.convex import Hull, hull
 from clamp3d.collide.drawn import bodies_of
-from clamp3d.collide.facets import Facets
-from clamp3d.collide.surface import Surface
-from clamp3d.core.meshing import chord_error, mesh
+from clamp3d.collide.surface import Surface, at_edges
+from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import MeshShape, Shape, Solid
 
+if TYPE_CHECKING:
+    from clamp3d.fit.fit import FitResult
+
 Progress = Callable[[str, int, int], None]
 """What is being done, how much of it is, and of how much."""
+
+Maker = Callable[[Solid, float], tuple[Array, NDArray[np.int64]] | None]
 
 FINEST = 0.001
 """Smallest chord error (mm) that a mesh is made with; a pair still open then is uncertain."""
@@ -40,9 +45,8 @@ class Model:
     def __init__(self, shape: Shape, counters: Counters) -> None:
         self.shape = shape
         self.counters = counters
-        self._meshes: dict[float, Surface] = {}
-        self._fit_error = 0.0
-        self._round_faces: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+        self._inner: dict[float, Surface | None] = {}
+        self._outer: dict[float, Surface | None] = {}
 
     @property
     def name(self) -> str:
@@ -63,16 +67,10 @@ class Model:
         """The shape in closed form; None if it has none."""
         if isinstance(self.shape, Solid):
             return bodies_of(self.shape)
-        if self.shape.fit != "off":
+        if self._fit is not None and self._fit.features:
             from clamp3d.collide.fitted import bodies_of_fit
-            from clamp3d.fit.fit import fit_mesh
 
-            self.counters.built["fits"] += 1
-            result = fit_mesh(self.shape.mesh)
-            if result.features:
-                self._round_faces = np.concatenate([feature.faces for feature in result.features])
-                made, self._fit_error = bodies_of_fit(result, self.raw, round_=self.shape.fit == "round")
-                return made
+            return bodies_of_fit(self._fit, self.raw, round_=self.shape.fit == "round")
         raw = self.raw
         volume = float(raw.manifold.volume())
         if abs(float(raw.manifold.hull().volume()) - volume) <= 1e-9 * volume:
@@ -80,33 +78,31 @@ class Model:
         return None
 
     @property
-    def drawn(self) -> bool:
-        """Whether the shape is drawn with outlines, not a mesh."""
-        return isinstance(self.shape, Solid)
-
-    @property
-    def exact(self) -> bool:
-        """Whether it is known which points are material: by a drawn part's closed form, or as a mesh taken as is."""
-        return self.bodies is not None if isinstance(self.shape, Solid) else self.shape.fit == "off"
-
-    @property
     def forms(self) -> tuple[ClosedForm, ...]:
         """The closed form, or the hull in place of it."""
         return self.bodies if self.bodies is not None else (self.hull_body,)
 
     @cached_property
-    def facets(self) -> Facets | None:
-        """Facets of a mesh shape, flat and round ones apart; None for a drawn solid."""
-        if not isinstance(self.shape, MeshShape):
+    def _fit(self) -> FitResult | None:
+        """Round surfaces found in a mesh; None where none are looked for."""
+        if not isinstance(self.shape, MeshShape) or self.shape.fit == "off":
             return None
-        _ = self.bodies
-        return Facets.of(self.raw, self._round_faces, self._fit_error)
+        from clamp3d.fit.fit import fit_mesh
+
+        self.counters.built["fits"] += 1
+        return fit_mesh(self.shape.mesh)
+
+    @property
+    def facets(self) -> Surface | None:
+        """The mesh of a mesh shape; None for a drawn solid."""
+        return self.raw if isinstance(self.shape, MeshShape) else None
 
     @cached_property
     def hull_body(self) -> ClosedForm:
-        """Convex hull of the part, with its mesh to tell what of it is material."""
-        made = self.mesh(0.5)
-        return ClosedForm((self._hull(made.vertices),), error=made.error, surface=made.depth)
+        """Convex hull of a mesh that holds the part, with one that the part holds to tell what of it is material."""
+        outer, inner = self.outer(0.5), self.inner(0.5)
+        made = self._hull(outer.vertices)
+        return ClosedForm((made,), error=outer.error, surface=_nowhere if inner is None else inner.depth)
 
     def _hull(self, points: Array) -> Hull:
         self.counters.built["hulls"] += 1
@@ -117,38 +113,48 @@ class Model:
         """Whether a smaller chord error gives a better mesh: true of drawn solids with arcs."""
         return isinstance(self.shape, Solid) and any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes))
 
-    @property
+    @cached_property
     def raw(self) -> Surface:
-        """The facets of a mesh shape as they are."""
+        """The facets of a mesh shape; flat faces are exact, round ones are off by the error of the fit."""
         assert isinstance(self.shape, MeshShape)
-        if 0.0 not in self._meshes:
-            source = self.shape.mesh
-            self._meshes[0.0] = self._counted(Surface(source.vertices, source.faces, 0.0))
-        return self._meshes[0.0]
+        V, F = self.shape.mesh.vertices, self.shape.mesh.faces
+        error = None
+        if self._fit is not None and self._fit.features:
+            error = np.zeros(len(F))
+            for feature in self._fit.features:
+                error[feature.faces] = np.maximum(error[feature.faces], feature.error_bound)
+            error = at_edges(V, F, error)
+        return self._counted(Surface(V, F, error))
 
-    def mesh(self, error: float) -> Surface:
-        """Mesh within ``error`` mm, or as near as the shape allows; its own ``error`` says how near."""
+    def outer(self, error: float) -> Surface:
+        """Mesh of chord error ``error`` mm that holds a drawn solid; a mesh shape's own facets, whose errors it has."""
+        made = self._made(self._outer, enclosing, error)
+        assert made is not None
+        return made
+
+    def inner(self, error: float) -> Surface | None:
+        """Mesh of chord error ``error`` mm that a drawn solid holds, or None; a mesh shape's own facets."""
+        return self._made(self._inner, enclosed, error)
+
+    def _made(self, kept: dict[float, Surface | None], make: Maker, error: float) -> Surface | None:
         if isinstance(self.shape, MeshShape):
-            raw = self.raw
-            if self.shape.fit != "off":
-                _ = self.bodies
-                raw.error = self._fit_error
-            return raw
-        # Outlines without arcs are exact at any chord error: one mesh serves all.
-        key = error if self.refines else 0.0
-        if key not in self._meshes:
-            made = mesh(self.shape, error)
-            # Where two curved surfaces cross, the edge strays further than either.
-            factor = 2.0 if self.shape.holes else 1.0
-            model = Surface(np.array(made.vertices), np.array(made.faces, dtype=np.int64), 0.0)
-            model.error = factor * chord_error(self.shape, error)
-            self._meshes[key] = self._counted(model)
-        return self._meshes[key]
+            return self.raw
+        if not self.refines:  # outlines without arcs are exact at any chord error: one mesh serves all
+            kept, error = self._inner, 0.5
+        if error not in kept:
+            made = make(self.shape, error)
+            kept[error] = None if made is None else self._counted(Surface(*made))
+        return kept[error]
 
     def _counted(self, made: Surface) -> Surface:
         self.counters.built["meshes"] += 1
         self.counters.built["triangles"] += len(made.faces)
         return made
+
+
+def _nowhere(points: Array) -> Array:
+    """Depth of points (k, 3) in a body that nothing is known to lie in."""
+    return np.full(len(points), -np.inf)
 
 
 def _bulge(shape: MeshShape) -> float:

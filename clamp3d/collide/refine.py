@@ -11,13 +11,12 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.attest import attested
 from clamp3d.collide.body import ClosedForm, bodies_distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.convex import Rod
 from clamp3d.collide.facets import rod_distance
+from clamp3d.collide.meshes import meshes_distance, within
 from clamp3d.collide.model import FINEST, Model
-from clamp3d.collide.surface import inside, surface_distance
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import SolverError
@@ -54,9 +53,8 @@ def refine(
                 return found
     error = COARSEST
     while True:
-        found = _agreed(found, _meshes(a, b, T, error, thresholds))
-        uncertainty = a.mesh(error).error + b.mesh(error).error
-        if enough(found) or error <= FINEST or uncertainty <= 1e-9 or not (a.refines or b.refines):
+        found = _agreed(found, _meshes(a, b, T, error))
+        if enough(found) or error <= FINEST or not (a.refines or b.refines):
             return found
         # The middle of the bounds guesses how far the nearest threshold is: go there, not step by step.
         middle = 0.5 * (found.lower + found.upper)
@@ -80,8 +78,7 @@ def contained(a: Model, b: Model, T: Array, thresholds: Thresholds) -> bool:
         if ((box[1] - box[0]).max() * 1.7321 + thresholds.contact) < 2.0 * half.max():
             continue
         a.counters.queries["containment"] += 1
-        small, large = inner.mesh(CONTAINED_ERROR), outer.mesh(CONTAINED_ERROR)
-        if inside(small, large, place, thresholds.contact + small.error + large.error):
+        if within(inner, outer, place, CONTAINED_ERROR, thresholds.contact):
             return True
     return False
 
@@ -140,14 +137,11 @@ def _facets(a: Model, b: Model, T: Array, enough: Enough) -> Distance | None:
     return None if found is None else found.labelled("facets", "cylinder on facets (FCL)")
 
 
-def _meshes(a: Model, b: Model, T: Array, error: float, thresholds: Thresholds) -> Distance:
+def _meshes(a: Model, b: Model, T: Array, error: float) -> Distance:
     a.counters.queries["meshes"] += 1
-    x, y = a.mesh(error), b.mesh(error)
-    found = surface_distance(x, y, T, contact=thresholds.contact)
-    chord = x.error + y.error
-    if chord > 0.0 and a.exact and b.exact:
-        found = attested(found, (x, a.bodies if a.drawn else None), (y, b.bodies if b.drawn else None), T)
-    return found.labelled("meshes", f"meshes (FCL), chord error {chord:.2g} mm" if chord > 0.0 else "meshes (FCL)")
+    found = meshes_distance(a, b, T, error)
+    chords = f", chord error {error:.2g} mm" if a.refines or b.refines else ""
+    return found.labelled("meshes", f"meshes (FCL){chords}")
 
 
 ACCURACY = 1e-7

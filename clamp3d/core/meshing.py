@@ -2,6 +2,8 @@
 
 Chords are inscribed: convex arcs (wires, shank, round back) lose material, grooves and holes gain it. Nothing else
 differs from the analytic part, so the volume lies within bounds that are computed from the chords themselves.
+`enclosing` and `enclosed` meshes take tangents where chords would lie on the wrong side: a part lies between the two
+whatever its faces cut, at any angle.
 """
 
 from __future__ import annotations
@@ -9,15 +11,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.checks import instance
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.profile import check_mesh_error
+from clamp3d.core.pose import Array
+from clamp3d.core.profile import Profile, Side, check_mesh_error
 from clamp3d.core.shapes import Solid
 from clamp3d.errors import Clamp3dError
 
 if TYPE_CHECKING:
     import trimesh
+    from shapely import Polygon
 
 _THROUGH = 1.0  # mm by which a hole's tool stands out at both ends, so that no two faces coincide
 
@@ -56,16 +61,38 @@ def mesh(part: Solid, mesh_error: float = 0.01) -> trimesh.Trimesh:
 
     mesh_error = check_mesh_error(mesh_error)
     instance("part", part, Solid)
-    solid = _solid(part, mesh_error)
-    raw = solid.to_mesh64()
+    V, F = _arrays(_solid(part, mesh_error, "chords"))
     out = trimesh.Trimesh(
-        vertices=np.asarray(raw.vert_properties)[:, :3],
-        faces=np.asarray(raw.tri_verts, dtype=np.int64),
+        vertices=V,
+        faces=F,
         process=False,
         metadata={"part": part.name, "mesh_error": mesh_error, "chord_error": chord_error(part, mesh_error)},
     )
     out.units = "mm"
     return out
+
+
+def enclosed(part: Solid, mesh_error: float) -> tuple[Array, NDArray[np.int64]] | None:
+    """Vertices (n, 3) mm and faces (m, 3) of a closed mesh that lies wholly in the part; None where nothing is left."""
+    return _one_sided(part, mesh_error, "inner")
+
+
+def enclosing(part: Solid, mesh_error: float) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (n, 3) mm and faces (m, 3) of a closed mesh that the part lies wholly in."""
+    made = _one_sided(part, mesh_error, "outer")
+    if made is None:
+        raise Clamp3dError(f"mesh of {part.name} is empty: one of its sizes vanishes beside the others")
+    return made
+
+
+def _one_sided(part: Solid, mesh_error: float, side: Side) -> tuple[Array, NDArray[np.int64]] | None:
+    made = _solid(part, mesh_error, side)
+    return None if made.is_empty() else _arrays(made)
+
+
+def _arrays(solid: Any) -> tuple[Array, NDArray[np.int64]]:
+    raw = solid.to_mesh64()
+    return np.array(raw.vert_properties, dtype=np.float64)[:, :3], np.array(raw.tri_verts, dtype=np.int64)
 
 
 def chord_error(part: Solid, mesh_error: float) -> float:
@@ -92,35 +119,57 @@ def volume_bounds(part: Solid, mesh_error: float) -> tuple[float, float]:
     return low, high
 
 
-def _solid(part: Solid, mesh_error: float) -> Any:
+def _solid(part: Solid, mesh_error: float, side: Side) -> Any:
     import manifold3d
 
-    solid = _extrude(part.bodies[0], mesh_error)
-    for body in part.bodies[1:]:
-        solid += _extrude(body, mesh_error)
+    solid = manifold3d.Manifold()
+    for body in part.bodies:
+        solid += _extrude(body, mesh_error, side)
+    tool: dict[Side, Side] = {"chords": "chords", "inner": "outer", "outer": "inner"}
     for hole in part.holes:
-        solid -= _extrude(hole, mesh_error, _THROUGH)
+        solid -= _extrude(hole, mesh_error, tool[side], _THROUGH)
     if solid.status() != manifold3d.Error.NoError:
         raise Clamp3dError(f"mesh of {part.name}: manifold3d reports {solid.status().name}")
-    if solid.is_empty():
+    if solid.is_empty() and side != "inner":
         raise Clamp3dError(f"mesh of {part.name} is empty: one of its sizes vanishes beside the others")
     return solid
 
 
-def _extrude(shape: Extrusion, mesh_error: float, overlap: float = 0.0) -> Any:
+def _extrude(shape: Extrusion, mesh_error: float, side: Side, overlap: float = 0.0) -> Any:
     """Closed prism over the outline, caps without new vertices."""
     import manifold3d
+    import shapely.affinity
     import trimesh
-    from shapely import Polygon
 
-    outline = shape.profile.polygon(mesh_error)
-    # trimesh merges vertices within 1e-8 of any unit; a power of two changes no digit.
-    scale = 2.0 ** np.frexp(np.abs(outline).max())[1]
-    prism = trimesh.creation.extrude_polygon(Polygon(outline / scale), 1.0, engine="manifold")
-    points = prism.vertices * scale
-    # The ends as they are stated, to the bit: bodies that touch share them.
-    points[:, 2] = np.where(prism.vertices[:, 2] > 0.5, shape.end + overlap, shape.start - overlap)
-    # Not trimesh.boolean: it rounds the vertices to single precision.
-    return manifold3d.Manifold(
-        manifold3d.Mesh64(vert_properties=points @ shape.frame.T, tri_verts=prism.faces.astype(np.uint64))
-    )
+    solid = manifold3d.Manifold()
+    for outline in _polygons(shape.profile, mesh_error, side):
+        # trimesh merges vertices within 1e-8 of any unit; a power of two changes no digit.
+        scale = 2.0 ** np.frexp(np.abs(outline.bounds).max())[1]
+        unit = shapely.affinity.scale(outline, 1.0 / scale, 1.0 / scale, origin=(0.0, 0.0))
+        prism = trimesh.creation.extrude_polygon(unit, 1.0, engine="manifold")
+        points = prism.vertices * scale
+        # The ends as they are stated, to the bit: bodies that touch share them.
+        points[:, 2] = np.where(prism.vertices[:, 2] > 0.5, shape.end + overlap, shape.start - overlap)
+        # Not trimesh.boolean: it rounds the vertices to single precision.
+        solid += manifold3d.Manifold(
+            manifold3d.Mesh64(vert_properties=points @ shape.frame.T, tri_verts=prism.faces.astype(np.uint64))
+        )
+    return solid
+
+
+def _polygons(profile: Profile, mesh_error: float, side: Side) -> list[Polygon]:
+    """The outline as polygons: one, or what is left where tangents cut it in pieces."""
+    from shapely import Polygon, union_all
+
+    whole = Polygon(profile.polygon(mesh_error, side))
+    if side == "chords" or whole.is_valid:
+        return [whole]
+    # Tangents that cross a neighbour: the lens between each arc's chords and tangents is added or taken away by itself.
+    lenses = []
+    for arc in profile.arcs:
+        if (arc.sweep > 0.0) == (side == "outer"):
+            chords = [*arc.chords(mesh_error, arc.start), arc.end]
+            lenses.append(Polygon([*chords, *reversed(arc.tangents(mesh_error, arc.start))]).buffer(0.0))
+    chords = Polygon(profile.polygon(mesh_error))
+    made = chords.union(union_all(lenses)) if side == "outer" else chords.difference(union_all(lenses))
+    return [part for part in getattr(made, "geoms", [made]) if part.geom_type == "Polygon" and not part.is_empty]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
 
 Point: TypeAlias = tuple[float, float]
+Side: TypeAlias = Literal["chords", "inner", "outer"]
+"""Polygon of an outline: corners on its arcs, wholly inside the outline, or wholly around it."""
 
 MIN_MESH_ERROR = 1e-6
 """Smallest chord error in mm: a circle of radius 24 then has some 11 000 chords."""
@@ -154,6 +156,22 @@ class Arc:
         """
         multiple = 4 if abs(self.sweep) > 2.0 * math.pi - 1e-9 else 2
         return multiple * chord_count(self.sweep / multiple, chord_angle(self.radius, check_mesh_error(mesh_error)))
+
+    def chords(self, mesh_error: float, start: Point) -> list[Point]:
+        """Corners (a, b) in mm of the arc's chords but for the last one; ``start`` is the arc's own, to the bit."""
+        n = self.chord_count(mesh_error)
+        return [start, *(self.at(self.start_angle + self.sweep * k / n) for k in range(1, n))]
+
+    def tangents(self, mesh_error: float, start: Point) -> list[Point]:
+        """Corners (a, b) in mm of as many tangents as `chords`, which lie on the outer side of the circle.
+
+        A full circle has no corner on the arc. No tangent spans more than a quarter turn: half a turn has no corner.
+        """
+        n = max(self.chord_count(mesh_error), 4 * math.ceil(abs(self.sweep) / (2.0 * math.pi)))
+        step = self.sweep / n
+        around = Arc(self.centre, self.radius / math.cos(0.5 * step), self.start_angle, self.end_angle)
+        corners = [around.at(self.start_angle + (k + 0.5) * step) for k in range(n)]
+        return corners if abs(self.sweep) > 2.0 * math.pi - 1e-9 else [start, *corners]
 
     def sagitta(self, chords: int) -> float:
         """Largest distance in mm of ``chords`` equal chords from the arc: their chord error."""
@@ -297,13 +315,17 @@ class Profile:
                     reach = max(reach, da * edge.centre[0] + db * edge.centre[1] + edge.radius * math.hypot(da, db))
         return reach
 
-    def polygon(self, mesh_error: float) -> Array:
-        """The outline with its arcs as equal chords, whose ends lie on the arc.
+    def polygon(self, mesh_error: float, side: Side = "chords") -> Array:
+        """The outline with its arcs as equal chords, whose ends lie on the arc, or as tangents.
 
         Parameters
         ----------
         mesh_error : float
             Largest distance in mm between an arc and its chords.
+        side : {"chords", "inner", "outer"}
+            "inner" takes tangents for concave arcs, "outer" for convex ones: with chords for the other kind the
+            polygon lies inside the outline, or around it. Where the outline is narrow or has sharp notches it may
+            cross itself.
 
         Returns
         -------
@@ -324,10 +346,12 @@ class Profile:
         points: list[Point] = []
         for i, edge in enumerate(self.edges):
             before = self.edges[i - 1]
-            points.append(before.end if isinstance(before, Segment) else edge.start)
-            if isinstance(edge, Arc):
-                n = edge.chord_count(mesh_error)
-                points += [edge.at(edge.start_angle + edge.sweep * k / n) for k in range(1, n)]
+            if isinstance(edge, Segment):
+                points.append(before.end if isinstance(before, Segment) else edge.start)
+                continue
+            tangents = side != "chords" and (edge.sweep > 0.0) == (side == "outer")
+            start = before.end if isinstance(before, Segment) else edge.start
+            points += edge.tangents(mesh_error, start) if tangents else edge.chords(mesh_error, start)
         return np.array(points)
 
     def chord_error(self, mesh_error: float) -> float:

@@ -19,7 +19,7 @@ from clamp3d.clamp.parts import parts
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check import check, check_full
 from clamp3d.collide.model import ModelCache
-from clamp3d.collide.motions import check_poses
+from clamp3d.collide.poses import check_poses
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes

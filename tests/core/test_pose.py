@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from clamp3d.baselines.chords import Chords
-from clamp3d.collide.motions import check_poses
+from clamp3d.collide.poses import check_poses
 from clamp3d.collide.scene import Scene
 from clamp3d.core import shapes
 from clamp3d.core.distance import signed_distance, signed_distances

@@ -1,0 +1,181 @@
+"""Two shapes by their meshes: distance, overlap and containment between bounds, by FCL, libigl and manifold3d.
+
+A drawn solid lies between two meshes, one wholly inside it and one wholly around it. Both the distance and the depth
+of an overlap only shrink or grow with the bodies, so the outer pair bounds the truth from below and the inner pair from
+above, whatever angles faces and holes meet at. Other meshes are the part but for an error of each triangle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from clamp3d.collide.answer import Distance
+from clamp3d.collide.model import Model
+from clamp3d.collide.overlap import common, deepest
+from clamp3d.collide.surface import Surface
+from clamp3d.core.pose import Array, inverse
+
+_HALVINGS = 16
+"""Ninths of a way that the surface of a body is looked for in, one after another: then it is known to rounding."""
+_TRIED = 3
+"""Directions in which an overlap is tried to be parted."""
+
+
+def meshes_distance(a: Model, b: Model, T: Array, error: float) -> Distance:
+    """Signed distance of ``b`` at ``T`` (4, 4) in a's frame, from meshes of chord error ``error`` mm.
+
+    In an overlap ``upper`` is minus a depth that a point of both has, ``lower`` minus a move that parts them if one
+    of the few that are tried does.
+    """
+    outer = surface_distance(a.outer(error), b.outer(error), T)
+    if not (a.refines or b.refines):
+        return outer
+    inner_a, inner_b = a.inner(error), b.inner(error)
+    if inner_a is None or inner_b is None:
+        return replace(outer, upper=np.inf, point_a=None, point_b=None, normal=None)
+    inner = surface_distance(inner_a, inner_b, T)
+    if inner.lower > 0.0 and inner.point_a is not None and inner.point_b is not None:
+        p = _on_surface(a, np.eye(4), inner.point_a, inner.point_b)
+        q = _on_surface(b, T, inner.point_b, p)
+        inner = replace(
+            inner, upper=float(np.linalg.norm(q - p)) + _rounding(inner_a, inner_b, T), point_a=p, point_b=q
+        )
+    return replace(inner, lower=min(outer.lower, inner.upper), normal=None)
+
+
+def _on_surface(model: Model, T: Array, inside: Array, outside: Array) -> Array:
+    """Last point (3,) of a drawn solid at ``T`` (4, 4) on the way from a point of its inner mesh to one outside."""
+    forms = model.bodies
+    if forms is None or not model.refines:
+        return inside
+    start, way = (inside - T[:3, 3]) @ T[:3, :3], (outside - inside) @ T[:3, :3]
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        steps = np.linspace(low, high, 10)[1:-1]
+        depth = np.max([form.depth(start + steps[:, None] * way) for form in forms], axis=0)
+        out = np.flatnonzero(depth < 0.0)
+        first = int(out[0]) if len(out) else len(steps)
+        low, high = (steps[first - 1] if first else low), (steps[first] if first < len(steps) else high)
+    return np.asarray(inside + low * (outside - inside))
+
+
+def surface_distance(a: Surface, b: Surface, T: Array) -> Distance:
+    """Signed distance of two meshes, ``b`` at ``T`` (4, 4) in a's frame; bounds as in `meshes_distance`."""
+    rounding = _rounding(a, b, T)
+    lower, upper, p, q = _gap(a, b, T)
+    if upper <= rounding:
+        return _overlap(a, b, T, rounding)
+    for outer, inner, place, swapped in ((a, b, T, False), (b, a, inverse(T), True)):
+        if any_inside(outer, inner, place):  # no surface in common: that shell lies inside as a whole
+            points = inner.vertices[:: max(1, len(inner.vertices) // 50)] @ place[:3, :3].T + place[:3, 3]
+            away = outer.distance(points) if len(inner.shells) == 1 else np.array([upper])
+            k = int(np.argmax(away))
+            depth = max(upper, float(away[k])) - a.error - b.error - rounding
+            at = points[k] @ T[:3, :3].T + T[:3, 3] if swapped else points[k]
+            one = len(away) == len(points)
+            return Distance(-np.inf, -depth, at if one else None, at if one else None)
+    off = float(a.error_at(p[None])[0] + b.error_at((q - T[:3, 3])[None] @ T[:3, :3])[0])
+    return Distance(lower - rounding, upper + off + rounding, p, q)
+
+
+def gap(a: Surface, b: Surface, T: Array) -> float:
+    """Gap (mm) that ``b`` at ``T`` (4, 4) certainly keeps from ``a``.
+
+    Minus infinity if they meet or one holds the other. The errors of both meshes are taken off.
+    """
+    rounding = _rounding(a, b, T)
+    lower, upper, _, _ = _gap(a, b, T)
+    if upper <= rounding or any_inside(a, b, T) or any_inside(b, a, inverse(T)):
+        return -np.inf
+    return lower - rounding
+
+
+def any_inside(outer: Surface, inner: Surface, T: Array) -> bool:
+    """Whether a shell of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer``; no surfaces may meet.
+
+    A shell with a vertex outside of the other's box is not inside; only for the others winding numbers are asked.
+    """
+    points = inner.shell_points @ T[:3, :3].T + T[:3, 3]
+    boxed = ((points >= outer.box[0]) & (points <= outer.box[1])).all(axis=(1, 2))
+    return bool(boxed.any()) and bool(outer.contains(points[boxed, 0]).any())
+
+
+def _rounding(a: Surface, b: Surface, T: Array) -> float:
+    """What the distance of two meshes may be off by, mm: manifold3d merges vertices within 1e-12 of the size."""
+    return 4e-12 * (a.scale + b.scale + float(np.abs(T[:3, 3]).max()))
+
+
+def _gap(a: Surface, b: Surface, T: Array) -> tuple[float, float, Array, Array]:
+    """Distance of the true surfaces at least, of the meshes, and its points (3,); 0.0 if the meshes' surfaces meet."""
+    import fcl
+
+    place, here = fcl.Transform(T[:3, :3], T[:3, 3]), fcl.Transform()
+    none = np.zeros(3)
+    oa, ob = fcl.CollisionObject(a.bvh, here), fcl.CollisionObject(b.bvh, place)
+    if fcl.collide(oa, ob, fcl.CollisionRequest(), fcl.CollisionResult()):
+        return -np.inf, 0.0, none, none
+    low, best, p, q = np.inf, np.inf, none, none
+    for first, e in a.groups:
+        for second, f in b.groups:
+            oa, ob = fcl.CollisionObject(first, here), fcl.CollisionObject(second, place)
+            answer = fcl.DistanceResult()
+            d = float(fcl.distance(oa, ob, fcl.DistanceRequest(enable_nearest_points=True), answer))
+            low = min(low, d - e - f)
+            if d < best:
+                best = d
+                p, q = (np.asarray(x, dtype=np.float64) for x in answer.nearest_points)
+    return low, max(best, 0.0), p, q
+
+
+def _overlap(a: Surface, b: Surface, T: Array, rounding: float) -> Distance:
+    """Bounds of two meshes whose surfaces meet."""
+    off = a.error + b.error + rounding
+    shared = common(a, b, T)
+    if shared is None:
+        return Distance(-off, off)
+    depth, at = deepest(a, b, T, shared)
+    return Distance(-_parted(a, b, T, shared.vertices, shared.directions()), off - depth, at, at)
+
+
+def _parted(a: Surface, b: Surface, T: Array, points: Array, directions: Array) -> float:
+    """Length (mm) of a move along one of the ``directions`` (k, 3) that certainly parts the meshes, or infinity.
+
+    ``points`` (k, 3) are those that they share: the move goes beyond them, and is tried.
+    """
+    off = a.error + b.error
+    reach = np.ptp(points @ directions.T, axis=0)
+    slack = 2.0 * _rounding(a, b, T)
+    for k in np.argsort(reach)[:_TRIED].tolist():
+        length = (float(reach[k]) + off) * (1.0 + 1e-9) + 2.0 * slack
+        for sign in (1.0, -1.0):
+            moved = T.copy()
+            moved[:3, 3] += sign * length * directions[k]
+            if gap(a, b, moved) >= 0.0:
+                return length
+    return np.inf
+
+
+def within(inner: Model, outer: Model, T: Array, error: float, slack: float) -> bool:
+    """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer`` or within ``slack`` mm of it.
+
+    A vertex that is certainly outside by more says no at once; ``error`` mm is the chord error that is asked with.
+    """
+    small, large = inner.outer(error), outer.inner(error)
+    if large is None:
+        return False
+    slack += small.error + large.error + (error if inner.refines else 0.0) + (error if outer.refines else 0.0)
+    corners = small.shell_points.reshape(-1, 3) @ T[:3, :3].T + T[:3, 3]
+    for points in (corners, small.vertices @ T[:3, :3].T + T[:3, 3]):
+        if (points < large.box[0] - slack).any() or (points > large.box[1] + slack).any():
+            return False
+        some = points[:: max(1, len(points) // 16)]
+        far = some[large.distance(some) > slack]
+        if len(far) and not large.contains(far[:4]).all():
+            return False
+    outside = small.manifold.transform(np.ascontiguousarray(T[:3])) - large.manifold
+    if outside.is_empty():
+        return True
+    points = np.array(outside.to_mesh64().vert_properties, dtype=np.float64)[:, :3]
+    return bool(large.distance(points).max() <= slack)

@@ -1,0 +1,183 @@
+"""One body that moves against one that stands: bounds at a time and over a stretch, least distance, first contact."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from clamp3d.collide.answer import Distance
+from clamp3d.collide.meshes import any_inside
+from clamp3d.collide.model import Model
+from clamp3d.collide.refine import from_boxes, refine
+from clamp3d.collide.surface import fcl_tree
+from clamp3d.collide.swept import swept_lower
+from clamp3d.collide.verdict import Thresholds, Verdict
+from clamp3d.core.motion import Motion
+from clamp3d.core.pose import Array, inverse
+
+ACCURACY = 1e-4
+"""A least distance on a way is found to within this (mm), or to what the models give."""
+MAX_STEPS = 2000
+MAX_UNINFORMATIVE = 12
+"""Answers in a row that told nothing, after which a method is not asked again."""
+SHELL_ERROR = 0.064
+"""Chord error (mm) of the meshes that a stretch of a motion is bounded with where closed forms say too little."""
+
+
+class MovingPair:
+    """A shape that moves against one that stands: bounds at a time t, and over a stretch of times."""
+
+    def __init__(self, moving: Model, still: Model, motion: Motion, start: Array, T_still: Array) -> None:
+        self.a, self.b = moving, still
+        self.motion, self.start, self.back = motion, start, inverse(T_still)
+        self.counters = moving.counters
+        self.speed = motion.speed(box_corners(moving, start))
+        # How often in a row closed forms, and swept ones, had nothing to say: hulls in each other never have.
+        self.n_uninformative = self.n_uninformative_swept = 0
+
+    def pose(self, t: float) -> Array:
+        """The standing shape in the moving shape's frame."""
+        return inverse(self.back @ self.motion.at(t, self.start))
+
+    def ask(self, t: float, enough: Callable[[Distance], bool], thresholds: Thresholds) -> Distance:
+        """Distance at time ``t``, in the moving shape's frame."""
+        T = self.pose(t)
+        forms = self.n_uninformative < MAX_UNINFORMATIVE
+        found = refine(self.a, self.b, T, from_boxes(self.a, self.b, T), thresholds, enough, forms=forms)
+        self.n_uninformative = self.n_uninformative + 1 if found.level == "meshes" else 0
+        return found
+
+    def lower(self, t: float, half: float, here: float, wanted: float) -> float:
+        """Lower bound from t - half to t + half, ``here`` being that at t; no better than ``wanted``."""
+        plain = here - self.speed * half
+        if plain >= wanted:
+            return plain
+        stretch = (self.pose(t - half), self.pose(t), self.pose(t + half))
+        swept = plain
+        if self.n_uninformative_swept < MAX_UNINFORMATIVE:
+            self.counters.queries["swept"] += 1
+            angle = self.motion.angle * half
+            swept = max(plain, swept_lower(self.a, self.b, *stretch, angle=angle))
+            self.n_uninformative_swept = 0 if swept > plain else self.n_uninformative_swept + 1
+        if swept >= min(wanted, here) - ACCURACY or len(self.shells) < 2:
+            return swept
+        return max(swept, self._by_shells(half, stretch[1]))
+
+    def _by_shells(self, half: float, T: Array) -> float:
+        """Lower bound by meshes: what is near the axis of a rotation hardly moves."""
+        import fcl
+
+        self.counters.queries["swept meshes"] += 1
+        mine, other = self.a.outer(SHELL_ERROR), self.b.outer(SHELL_ERROR)
+        back = inverse(T)
+        fixed, place = fcl.CollisionObject(other.bvh), fcl.Transform(back[:3, :3], back[:3, 3])
+        low = np.inf
+        for tree, speed in self.shells:
+            moving = fcl.CollisionObject(tree, place)
+            d = float(fcl.distance(fixed, moving, fcl.DistanceRequest(), fcl.DistanceResult()))
+            if d <= 0.0:
+                return -np.inf
+            low = min(low, d - half * speed)
+        if any_inside(other, mine, back) or any_inside(mine, other, T):
+            return -np.inf
+        return low - mine.error - other.error - 1e-11 * (mine.scale + other.scale + float(np.abs(T[:3, 3]).max()))
+
+    @cached_property
+    def shells(self) -> tuple[tuple[Any, float], ...]:
+        """The moving mesh's triangles by their distance from the motion's axis: (tree, speed mm per unit of t)."""
+        mesh = self.a.outer(SHELL_ERROR)
+        straight = float(np.linalg.norm(self.motion.travel))
+        if not self.motion.angle:
+            return ((mesh.bvh, straight),)
+        world = mesh.vertices @ self.start[:3, :3].T + self.start[:3, 3] - self.motion.point
+        across = world - np.outer(world @ self.motion.axis, self.motion.axis)
+        out = np.linalg.norm(across, axis=1)[mesh.faces].max(axis=1)
+        ring = np.ceil(4.0 * np.log2(np.maximum(out / max(float(out.min()), 1e-3), 1.0))).astype(int)
+        speed = straight + abs(self.motion.angle) * out
+        return tuple(
+            (fcl_tree(mesh.vertices, mesh.faces[ring == k]), float(speed[ring == k].max())) for k in np.unique(ring)
+        )
+
+
+def box_corners(model: Model, T: Array) -> Array:
+    """Corners (8, 3) of the box around a shape, placed by ``T`` (4, 4)."""
+    pick = np.indices((2, 2, 2)).reshape(3, -1).T
+    points = np.where(pick == 0, model.bounds[0], model.bounds[1])
+    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
+
+
+def least_distance(pair: MovingPair, thresholds: Thresholds, allowance: float | None) -> tuple[Distance, float]:
+    """Least distance on the way, in the moving shape's frame, and its t.
+
+    Branch and bound over t: a stretch is done when nothing in it can come below the best distance found.
+    """
+    best, at = Distance(), 0.0
+
+    def clash(known: Distance) -> bool:
+        return thresholds.verdict(known, allowance) is Verdict.CLASH
+
+    def look(t: float, half: float, above: float) -> tuple[float, float]:
+        nonlocal best, at
+
+        def enough(known: Distance) -> bool:
+            sharp = known.upper - known.lower <= max(ACCURACY, 0.02 * abs(known.lower))
+            return sharp or known.lower - pair.speed * half >= best.upper - ACCURACY or clash(known)
+
+        found = pair.ask(t, enough, thresholds)
+        if found.upper < best.upper:
+            best, at = found, t
+        lower = pair.lower(t, half, found.lower, best.upper - ACCURACY) if half else found.lower
+        return max(lower, above), found.lower
+
+    heap: list[tuple[float, float, float, float]] = []
+    for t, half in ((0.0, 0.0), (1.0, 0.0), (0.5, 0.5)):
+        heapq.heappush(heap, (*look(t, half, -np.inf), t, half))
+    floor = np.inf  # of stretches that were given up
+    for _ in range(MAX_STEPS):
+        lower, here, t, half = heap[0]
+        width = best.upper - min(floor, lower)
+        limit = max(2.0 * ACCURACY, 0.02 * abs(best.upper), 2.0 * (best.upper - best.lower))
+        verdict = thresholds.verdict(Distance(min(floor, lower), best.upper), allowance)
+        if clash(best) or (width <= limit and verdict is not Verdict.UNCERTAIN) or width <= 2.0 * ACCURACY:
+            break
+        heapq.heappop(heap)
+        if half * pair.speed <= 0.5 * ACCURACY or here <= lower + ACCURACY:  # the models have no more to say
+            floor = min(floor, lower)
+        else:
+            for s in (t - 0.5 * half, t + 0.5 * half):
+                heapq.heappush(heap, (*look(s, 0.5 * half, lower), s, 0.5 * half))
+        if not heap:
+            break
+    lower = min([floor, *(item[0] for item in heap)])
+    return replace(best, lower=min(lower, best.upper)), at
+
+
+def first_time(pair: MovingPair, known: float, thresholds: Thresholds, margin: float) -> float:
+    """Everything before this t, at most ``known``, is proven to be further apart than ``margin`` mm.
+
+    It is the start of the leftmost stretch that can neither be cleared nor cut further, so it is never late; where
+    the steps come to an end, of the leftmost one that is still open.
+    """
+
+    def enough(distance: Distance) -> bool:
+        sharp = distance.upper - distance.lower <= ACCURACY
+        return sharp or distance.lower > 2.0 * margin + ACCURACY or distance.upper <= margin
+
+    todo = [(0.0, known)]
+    for _ in range(MAX_STEPS):
+        start, stop = todo[-1]
+        middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
+        if half * pair.speed <= 0.5 * ACCURACY:
+            return start
+        todo.pop()
+        here = pair.ask(middle, enough, thresholds).lower
+        if pair.lower(middle, half, here, margin + 0.5 * ACCURACY) <= margin:
+            todo += [(middle, stop), (start, middle)]
+        elif not todo:
+            return known
+    return todo[-1][0]

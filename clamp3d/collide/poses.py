@@ -1,0 +1,125 @@
+"""One part at many poses against the others of its scene: verdicts and bounds by pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clamp3d.checks import array, instance, items
+from clamp3d.collide.answer import Distance
+from clamp3d.collide.broad import Boxes, box_gaps
+from clamp3d.collide.model import ModelCache
+from clamp3d.collide.refine import refine
+from clamp3d.collide.scene import Scene
+from clamp3d.collide.verdict import Verdict
+from clamp3d.core.motion import scene_pose
+from clamp3d.core.pose import Array, inverse
+from clamp3d.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseVerdicts:
+    """One part at n poses against the others it may meet: arrays (n, k) for k ``others``.
+
+    ``lower`` and ``upper`` bound the signed distance in mm; ``verdict`` holds the verdicts' names.
+    """
+
+    part: str
+    others: tuple[str, ...]
+    verdict: Array
+    lower: Array
+    upper: Array
+
+    @property
+    def worst(self) -> Array:
+        """Worst verdict (n,) of each pose."""
+        order = {v.value: k for k, v in enumerate(Verdict)}
+        ranks = np.vectorize(order.__getitem__, otypes=[np.int64])(self.verdict)
+        return np.asarray(np.array([v.value for v in Verdict])[ranks.min(axis=1)])
+
+
+def check_poses(
+    scene: Scene,
+    part: str,
+    poses: ArrayLike,
+    *,
+    others: tuple[str, ...] | None = None,
+    cache: ModelCache | None = None,
+) -> PoseVerdicts:
+    """Verdicts of one part of a scene at many poses.
+
+    Parameters
+    ----------
+    scene : Scene
+        The other parts at their poses, and the thresholds.
+    part : str
+        Name of the part.
+    poses : array_like (n, 4, 4)
+        Its poses in the world, mm.
+    others : tuple of str, optional
+        Names of the parts it may meet; all others by default.
+    cache : ModelCache, optional
+        Keeps models from one call to the next.
+
+    Returns
+    -------
+    PoseVerdicts
+        Verdicts and bounds of the distances, one row per pose.
+
+    Raises
+    ------
+    InputError
+        For unknown names or a pose that is not rigid.
+
+    Examples
+    --------
+    >>> from clamp3d.core import shapes
+    >>> from clamp3d.core.pose import translation
+    >>> scene = Scene().add("plate", shapes.box((50, 50, 4))).add("pin", shapes.cylinder(5, 20))
+    >>> check_poses(scene, "pin", [translation(0, 0, z) for z in (12.0, 12.5, 0.0)]).worst.tolist()
+    ['contact', 'clear', 'clash']
+    """
+    instance("scene", scene, Scene)
+    if cache is not None:
+        instance("cache", cache, ModelCache)
+    shop = cache or ModelCache()
+    i = scene.index(part)
+    rest = (
+        [scene.index(name) for name in items("others", others, "part names")]
+        if others is not None
+        else [k for k in range(len(scene.parts)) if k != i]
+    )
+    if i in rest:
+        raise InputError(f"others must not hold {part!r} itself")
+    given = array("poses", poses, (None, 4, 4), finite=False)
+    T = np.array([scene_pose(pose, f"poses[{k}]") for k, pose in enumerate(given)]).reshape(-1, 4, 4)
+    n = len(T)
+    lower, upper = np.full((n, len(rest)), np.inf), np.full((n, len(rest)), np.inf)
+    verdict = np.full((n, len(rest)), Verdict.CLEAR.value, dtype=object)
+    model = shop.model(scene.parts[i].shape)
+    for column, j in enumerate(rest):
+        other = shop.model(scene.parts[j].shape)
+        allowance = scene.allowance(part, scene.parts[j].name)
+        T_other = scene.parts[j].T_world
+        both = Boxes.of(
+            np.concatenate([other.bounds[None], np.repeat(model.bounds[None], n, axis=0)]),
+            np.concatenate([T_other[None], T]),
+        )
+        gaps = box_gaps(both, np.column_stack([np.zeros(n, dtype=np.int64), np.arange(1, n + 1)]))
+        shop.counters.queries["boxes"] += n
+        lower[:, column] = gaps
+        local = inverse(T_other) @ T
+        for k in np.flatnonzero(gaps < scene.thresholds.reach + 1e-6).tolist():
+            found = refine(
+                other,
+                model,
+                local[k],
+                Distance(float(gaps[k])),
+                scene.thresholds,
+                lambda d, allowance=allowance: scene.thresholds.verdict(d, allowance) is not Verdict.UNCERTAIN,  # type: ignore[misc]
+            )
+            lower[k, column], upper[k, column] = found.lower, found.upper
+            verdict[k, column] = scene.thresholds.verdict(found, allowance).value
+    return PoseVerdicts(part, tuple(scene.parts[j].name for j in rest), verdict.astype(str), lower, upper)
