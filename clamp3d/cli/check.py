@@ -26,11 +26,13 @@ def command(
     """Check which parts of INPUT clash, touch or keep their clearance, at rest and in motion.
 
     INPUT is a scene file, a mesh, a STEP file, or a clamp (a built-in name or a TOML file), which is assembled first
-    and measured in all its pairs. Exit code 1 if parts clash, 3 if a pair cannot be decided or there is none.
+    and measured in all its pairs. Exit code 1 if parts clash, else 4 if a pair failed, else 3 if one is undecided, and
+    2 if there are no two parts.
     """
     from clamp3d.clamp.assemble import assemble
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.collide.check import check, check_full
+    from clamp3d.collide.result import BAD
     from clamp3d.collide.verdict import Verdict
     from clamp3d.output.files import write_json, write_text
     from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
@@ -49,8 +51,12 @@ def command(
     if html_file is not None:
         write_text(html_file, check_to_html(result, complete))
     show(check_to_text(result, complete))
-    open_ = any(row.verdict is Verdict.UNCERTAIN for row in result.rows)
-    finish(finding=not result.clean, undecided=open_ or not result.work.pairs)
+    finish(
+        finding=bool(result.counts.keys() & BAD),
+        failed=Verdict.FAILED in result.counts,
+        undecided=Verdict.UNCERTAIN in result.counts,
+        empty=not result.work.pairs,
+    )
 
 
 def _pairs(text: str) -> list[tuple[str, str]]:

@@ -32,9 +32,18 @@ def show(text: str, *, err: bool = False) -> None:
     click.echo(escaped(text, keep="\n"), err=err or taken)
 
 
-def finish(*, finding: bool, undecided: bool = False) -> None:
-    """End the command with the exit code of its verdict; a finding counts more than what is undecided."""
-    code = ExitCode.FINDING if finding else ExitCode.UNDECIDED if undecided else ExitCode.CLEAN
+def finish(*, finding: bool, failed: bool = False, undecided: bool = False, empty: bool = False) -> None:
+    """End the command with the exit code of its verdict: what is certain counts most, then what failed.
+
+    ``empty``: there was nothing to judge, which is not clean.
+    """
+    codes = (
+        (finding, ExitCode.FINDING),
+        (failed, ExitCode.FAILED),
+        (undecided, ExitCode.UNDECIDED),
+        (empty, ExitCode.BAD_INPUT),
+    )
+    code = next((code for true, code in codes if true), ExitCode.CLEAN)
     if code:
         raise click.exceptions.Exit(code)
 

@@ -21,6 +21,7 @@ def command(
     """
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.cli.viewing import check_and_view, run_and_view
+    from clamp3d.collide.result import BAD
 
     settings = method.settings()
     loaded = source.load()
@@ -32,4 +33,5 @@ def command(
     else:
         method.refuse()
         result = check_and_view(loaded, viewing, quiet=quiet, serve=serve)
-        finish(finding=not result.clean, undecided="uncertain" in result.counts)
+        failed, undecided = "failed" in result.counts, "uncertain" in result.counts
+        finish(finding=bool(result.counts.keys() & BAD), failed=failed, undecided=undecided)

@@ -26,6 +26,14 @@ class Boxes:
         centre = np.einsum("nij,nj->ni", R, middle) + T[:, :3, 3]
         return cls(centre, 0.5 * (bounds[:, 1] - bounds[:, 0]), R)
 
+    def joined(self, other: Boxes) -> Boxes:
+        """These, then those of ``other``."""
+        return Boxes(
+            np.concatenate([self.centre, other.centre]),
+            np.concatenate([self.half, other.half]),
+            np.concatenate([self.R, other.R]),
+        )
+
     @property
     def reach(self) -> Array:
         """Half sizes (n, 3) of the boxes along the world's axes around them."""

@@ -15,12 +15,14 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check_motions import check_motions
 from clamp3d.collide.model import Model, ModelCache, Progress
+from clamp3d.collide.reasons import failure, undecided
 from clamp3d.collide.refine import contained, measured, refine, with_normal
-from clamp3d.collide.result import CheckResult, PairResult, Work
+from clamp3d.collide.result import BAD, CheckResult, PairResult, Work
 from clamp3d.collide.scene import Scene, name_pairs
 from clamp3d.collide.verdict import Verdict
+from clamp3d.collide.where import locator
 from clamp3d.core.pose import Array, inverse
-from clamp3d.errors import InputError, SolverError
+from clamp3d.errors import InputError, MissingLibraryError, SolverError
 
 
 def check(
@@ -52,14 +54,15 @@ def check(
     Returns
     -------
     CheckResult
-        Rows with verdict and distance; pairs that never came near are clear and have no row, unless ``distances``.
+        Rows with verdict and distance; pairs that never came near are clear and have no row, unless ``distances``. A
+        pair whose models contradict each other or cannot be made has the verdict failed, and its reason.
 
     Raises
     ------
     InputError
         For unknown names.
-    SolverError
-        If two models contradict each other (``full``).
+    MissingLibraryError
+        If a part needs a library that is not installed.
 
     Examples
     --------
@@ -154,14 +157,24 @@ def _pair(
 ) -> PairResult:
     a, b = scene.parts[i].name, scene.parts[j].name
     allowance, thresholds = scene.allowance(a, b), scene.thresholds
-    T_ab = inverse(T[i]) @ T[j]
+    x, y, T_ab = models[i], models[j], inverse(T[i]) @ T[j]
 
     def certain(known: Distance) -> bool:
         known_well = not distances or measured(known)
         return not full and known_well and thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN
 
-    found = refine(models[i], models[j], T_ab, start, thresholds, certain)
-    verdict = thresholds.verdict(found, allowance)
-    if verdict is Verdict.CLASH and contained(models[i], models[j], T_ab, thresholds):
-        verdict = Verdict.CONTAINED
-    return PairResult(a, b, verdict, with_normal(found).moved(T[i]))
+    try:
+        found = refine(x, y, T_ab, start, thresholds, certain)
+        verdict = thresholds.verdict(found, allowance)
+        if verdict is Verdict.CLASH and contained(x, y, T_ab, thresholds):
+            verdict = Verdict.CONTAINED
+    except MissingLibraryError:
+        raise
+    except Exception as error:  # one pair that fails is a finding, not the end of all others
+        return PairResult(a, b, Verdict.FAILED, start, reason=failure(error))
+    row = PairResult(a, b, verdict, with_normal(found).moved(T[i]))
+    if verdict in BAD:
+        return replace(row, locate=locator(x, y, T[i], T_ab))
+    if verdict is Verdict.UNCERTAIN:
+        return replace(row, reason=undecided({a: x, b: y}, found, thresholds, allowance))
+    return row

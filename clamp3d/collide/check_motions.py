@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, near_pairs
 from clamp3d.collide.model import Model, Progress
 from clamp3d.collide.moving_pair import MovingPair, box_corners, first_time, least_distance
+from clamp3d.collide.reasons import failure, undecided
 from clamp3d.collide.refine import with_normal
-from clamp3d.collide.result import PairResult
+from clamp3d.collide.result import BAD, PairResult
 from clamp3d.collide.scene import Scene
+from clamp3d.collide.verdict import Verdict
+from clamp3d.collide.where import locator
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
+from clamp3d.errors import MissingLibraryError
 
 
 def check_motions(
@@ -44,11 +51,21 @@ def check_motions(
 def _row(scene: Scene, models: list[Model], poses: list[Array], motion: Motion, i: int, j: int) -> PairResult:
     a, b = scene.parts[i].name, scene.parts[j].name
     thresholds, allowance = scene.thresholds, scene.allowance(a, b)
-    pair = MovingPair(models[i], models[j], motion, poses[i], poses[j])
-    least, t = least_distance(pair, thresholds, allowance)
-    verdict = thresholds.verdict(least, allowance)
-    contact_at = first_time(pair, t, thresholds, thresholds.contact) if least.upper <= thresholds.contact else None
-    return PairResult(a, b, verdict, with_normal(least.moved(motion.at(t, poses[i]))), motion.name, t, contact_at)
+    try:
+        pair = MovingPair(models[i], models[j], motion, poses[i], poses[j])
+        least, t = least_distance(pair, thresholds, allowance)
+        contact_at = first_time(pair, t, thresholds, thresholds.contact) if least.upper <= thresholds.contact else None
+    except MissingLibraryError:
+        raise
+    except Exception as error:  # one pair that fails is a finding, not the end of all others
+        return PairResult(a, b, Verdict.FAILED, Distance(), motion.name, reason=failure(error))
+    verdict, T = thresholds.verdict(least, allowance), motion.at(t, poses[i])
+    row = PairResult(a, b, verdict, with_normal(least.moved(T)), motion.name, t, contact_at)
+    if verdict in BAD:
+        return replace(row, locate=locator(pair.a, pair.b, T, pair.pose(t)))
+    if verdict is Verdict.UNCERTAIN:
+        return replace(row, reason=undecided({a: pair.a, b: pair.b}, least, thresholds, allowance))
+    return row
 
 
 def _near(

@@ -9,14 +9,15 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
+from clamp3d.collide.batch import by_kernel
 from clamp3d.collide.broad import Boxes, box_gaps
-from clamp3d.collide.model import ModelCache
+from clamp3d.collide.model import Model, ModelCache
 from clamp3d.collide.refine import refine
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core.motion import scene_pose
 from clamp3d.core.pose import Array, inverse
-from clamp3d.errors import InputError
+from clamp3d.errors import InputError, MissingLibraryError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,27 +100,34 @@ def check_poses(
     lower, upper = np.full((n, len(rest)), np.inf), np.full((n, len(rest)), np.inf)
     verdict = np.full((n, len(rest)), Verdict.CLEAR.value, dtype=object)
     model = shop.model(scene.parts[i].shape)
-    for column, j in enumerate(rest):
-        other = shop.model(scene.parts[j].shape)
+    models = [shop.model(scene.parts[j].shape) for j in rest]
+    poses_of = np.array([scene.parts[j].T_world for j in rest]).reshape(-1, 4, 4)
+    moving = Boxes.of(np.repeat(model.bounds[None], n, axis=0), T)
+    for column, (j, other) in enumerate(zip(rest, models, strict=True)):
         allowance = scene.allowance(part, scene.parts[j].name)
-        T_other = scene.parts[j].T_world
-        both = Boxes.of(
-            np.concatenate([other.bounds[None], np.repeat(model.bounds[None], n, axis=0)]),
-            np.concatenate([T_other[None], T]),
-        )
-        gaps = box_gaps(both, np.column_stack([np.zeros(n, dtype=np.int64), np.arange(1, n + 1)]))
+        still = Boxes.of(other.bounds[None], poses_of[column][None])
+        gaps = box_gaps(still.joined(moving), np.column_stack([np.zeros(n, dtype=np.int64), np.arange(1, n + 1)]))
         shop.counters.queries["boxes"] += n
         lower[:, column] = gaps
-        local = inverse(T_other) @ T
-        for k in np.flatnonzero(gaps < scene.thresholds.reach + 1e-6).tolist():
-            found = refine(
-                other,
-                model,
-                local[k],
-                Distance(float(gaps[k])),
-                scene.thresholds,
-                lambda d, allowance=allowance: scene.thresholds.verdict(d, allowance) is not Verdict.UNCERTAIN,  # type: ignore[misc]
-            )
-            lower[k, column], upper[k, column] = found.lower, found.upper
-            verdict[k, column] = scene.thresholds.verdict(found, allowance).value
+        near = np.flatnonzero(gaps < scene.thresholds.reach + 1e-6)
+        local = inverse(poses_of[column]) @ T[near]
+        for row, place, known in zip(near.tolist(), local, by_kernel(other, model, local), strict=True):
+            found, kind = known or Distance(float(gaps[row])), Verdict.UNCERTAIN
+            try:
+                if known is None:
+                    found = _refined(other, model, place, found, scene, allowance)
+                kind = scene.thresholds.verdict(found, allowance)
+            except MissingLibraryError:
+                raise
+            except Exception:  # one pose that fails is a finding, not the end of all others
+                kind = Verdict.FAILED
+            lower[row, column], upper[row, column] = found.lower, found.upper
+            verdict[row, column] = kind.value
     return PoseVerdicts(part, tuple(scene.parts[j].name for j in rest), verdict.astype(str), lower, upper)
+
+
+def _refined(a: Model, b: Model, T: Array, start: Distance, scene: Scene, allowance: float | None) -> Distance:
+    def enough(known: Distance) -> bool:
+        return scene.thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN
+
+    return refine(a, b, T, start, scene.thresholds, enough)

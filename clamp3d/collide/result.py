@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.scene import Scene, unknown_part
+from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.errors import InputError
+
+if TYPE_CHECKING:
+    from clamp3d.collide.where import Overlap
 
 BAD = (Verdict.CLASH, Verdict.CONTAINED)
 """Verdicts that make a scene not clean."""
@@ -35,6 +39,10 @@ class PairResult:
         Name of the motion; None at rest.
     t, contact_at : float or None
         In a motion: normalised time of the least distance, and of the first contact.
+    reason : str
+        Why a verdict is uncertain and what would decide it, or why the pair failed; else empty.
+    locate : callable or None
+        Gives ``where``.
     """
 
     a: str
@@ -44,12 +52,23 @@ class PairResult:
     motion: str | None = None
     t: float | None = None
     contact_at: float | None = None
+    reason: str = ""
+    locate: Callable[[], Overlap | None] | None = field(default=None, repr=False)
+
+    @property
+    def where(self) -> Overlap | None:
+        """Where the parts of a clash overlap, in the world; None for another verdict. Worked out when first asked."""
+        return None if self.locate is None else self.locate()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: unknown bounds are None."""
         row = {"a": self.a, "b": self.b, "verdict": self.verdict.value, **self.distance.to_dict()}
         if self.motion is not None:
             row |= {"motion": self.motion, "t": self.t, "contact_at": self.contact_at}
+        if self.reason:
+            row["reason"] = self.reason
+        if self.where is not None:
+            row["where"] = self.where.to_dict()
         return row
 
 
@@ -75,7 +94,7 @@ class Work:
     full: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class CheckResult:
     """Verdicts of a scene. ``pairs`` holds the pairs that came near; all others of ``scene`` are clear.
 
@@ -100,8 +119,8 @@ class CheckResult:
 
     @property
     def clean(self) -> bool:
-        """Whether nothing clashes, at rest or in motion."""
-        return not any(row.verdict in BAD for row in self.rows)
+        """Whether nothing clashes or failed, at rest or in motion."""
+        return not any(row.verdict in BAD or row.verdict is Verdict.FAILED for row in self.rows)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -119,16 +138,19 @@ class CheckResult:
 
     def verdict(self, a: str, b: str) -> Verdict:
         """Verdict of a pair at rest, in either order. Raises InputError for unknown names and pairs not asked for."""
-        names = {p.name for p in self.scene.parts}
-        for name in (a, b):
-            if name not in names:
-                raise InputError(unknown_part(name, names))
-        if a == b or (self.asked is not None and (a, b) not in self.asked and (b, a) not in self.asked):
+        pair = frozenset((self.scene.index(a), self.scene.index(b)))
+        if len(pair) < 2 or (self._asked is not None and pair not in self._asked):
             raise InputError(f"pair {a}:{b} was not checked")
-        for row in self.pairs:
-            if {row.a, row.b} == {a, b}:
-                return row.verdict
-        return Verdict.CLEAR
+        return self._verdicts.get(pair, Verdict.CLEAR)
+
+    @cached_property
+    def _verdicts(self) -> dict[frozenset[int], Verdict]:
+        index = self.scene.index
+        return {frozenset((index(row.a), index(row.b))): row.verdict for row in self.pairs}
+
+    @cached_property
+    def _asked(self) -> set[frozenset[int]] | None:
+        return None if self.asked is None else {frozenset(map(self.scene.index, pair)) for pair in self.asked}
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; lengths in mm. Pairs that are not listed are clear."""

@@ -59,6 +59,37 @@ class Allowed:
 
 
 @dataclass(frozen=True, slots=True)
+class Allowances:
+    """Allowed overlaps (mm) by names in either order, and those that are given with patterns."""
+
+    exact: dict[tuple[str, str], float]
+    patterns: tuple[Allowed, ...]
+
+    @classmethod
+    def of(cls, allowed: Iterable[Allowed]) -> Allowances:
+        """Sorted into names and patterns."""
+        return cls({}, ()).more(allowed)
+
+    def more(self, allowed: Iterable[Allowed]) -> Allowances:
+        """With these too."""
+        exact, patterns = self.exact.copy(), list(self.patterns)
+        for item in allowed:
+            if any(c in item.a + item.b for c in "*?["):
+                patterns.append(item)
+                continue
+            for pair in ((item.a, item.b), (item.b, item.a)):
+                exact[pair] = max(item.overlap, exact.get(pair, 0.0))
+        return Allowances(exact, tuple(patterns))
+
+    def overlap(self, a: str, b: str) -> float | None:
+        """Largest overlap that is allowed, mm; None if even contact is not meant."""
+        found = [item.overlap for item in self.patterns if item.fits(a, b)]
+        if (a, b) in self.exact:
+            found.append(self.exact[a, b])
+        return max(found) if found else None
+
+
+@dataclass(frozen=True, slots=True)
 class Scene:
     """Parts in the world, what counts as contact and clearance, what may touch, and how parts move.
 
@@ -81,6 +112,9 @@ class Scene:
     motions: tuple[Motion, ...] = ()
     name: str = "scene"
     thresholds: Thresholds = field(init=False)
+    _index: dict[str, int] = field(init=False, repr=False)
+    """Positions by name, shared with the scenes that `add` made of this one: it may hold more names than are here."""
+    _allowances: Allowances = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "thresholds", Thresholds(self.contact, self.clearance))
@@ -91,15 +125,15 @@ class Scene:
             for item in given:
                 instance(f"each of {key}", item, kind)
             object.__setattr__(self, key, given)
-        seen: set[str] = set()
+        seen: dict[str, int] = {}
         for part in self.parts:
             if part.name in seen:
                 raise InputError(f"part {part.name!r} is there twice; names must differ")
-            seen.add(part.name)
+            seen[part.name] = len(seen)
+        object.__setattr__(self, "_index", seen)
         for item in self.allowed:
-            for name in (item.a, item.b):
-                if not any(fnmatchcase(part, name) for part in seen):
-                    raise InputError(f"allowed: {unknown_part(name, seen)}")
+            self._check_allowed(item)
+        object.__setattr__(self, "_allowances", Allowances.of(self.allowed))
         for motion in self.motions:
             if not motion.parts:
                 raise InputError(f"motion {motion.name!r} must name at least one part")
@@ -128,16 +162,31 @@ class Scene:
             part = Part(part, as_shape(shape), np.eye(4) if T_world is None else T_world)  # type: ignore[arg-type]
         elif shape is not None or T_world is not None:
             raise InputError("add() takes a Part alone, or a name with a shape and a pose")
-        if part.name in {p.name for p in self.parts}:
+        n = len(self.parts)
+        if self._index.get(part.name, n) < n:
             raise InputError(f"part {part.name!r} is there twice; names must differ")
         # What is in the scene was checked when it came in.
         scene = copy(self)
         object.__setattr__(scene, "parts", (*self.parts, part))
+        if len(self._index) > n:  # another scene was made of this one before
+            object.__setattr__(scene, "_index", {p.name: i for i, p in enumerate(self.parts)})
+        scene._index[part.name] = n
         return scene
 
     def allow(self, *pairs: tuple[str, str], overlap: float = 0.0) -> Scene:
         """The scene with contact of these pairs allowed, and overlap up to ``overlap`` mm."""
-        return replace(self, allowed=(*self.allowed, *(Allowed(a, b, overlap) for a, b in name_pairs("pairs", pairs))))
+        made = tuple(Allowed(a, b, overlap) for a, b in name_pairs("pairs", pairs))
+        for item in made:
+            self._check_allowed(item)
+        scene = copy(self)
+        object.__setattr__(scene, "allowed", self.allowed + made)
+        object.__setattr__(scene, "_allowances", self._allowances.more(made))
+        return scene
+
+    def _check_allowed(self, item: Allowed) -> None:
+        for name in (item.a, item.b):
+            if name not in self._index and not any(fnmatchcase(part.name, name) for part in self.parts):
+                raise InputError(f"allowed: {unknown_part(name, (part.name for part in self.parts))}")
 
     def moved(self, poses: Mapping[str, ArrayLike]) -> Scene:
         """The scene with parts at other poses ``{name: T_world}``."""
@@ -152,16 +201,14 @@ class Scene:
 
     def index(self, name: str) -> int:
         """Position of a part in ``parts``. Raises InputError for an unknown name."""
-        text("part", name)
-        for i, part in enumerate(self.parts):
-            if part.name == name:
-                return i
-        raise InputError(unknown_part(name, (p.name for p in self.parts)))
+        i = self._index.get(text("part", name))
+        if i is None or i >= len(self.parts):
+            raise InputError(unknown_part(name, (p.name for p in self.parts)))
+        return i
 
     def allowance(self, a: str, b: str) -> float | None:
         """Allowed overlap of a pair in mm; None if even contact is not meant."""
-        found = [item.overlap for item in self.allowed if item.fits(a, b)]
-        return max(found) if found else None
+        return self._allowances.overlap(a, b)
 
 
 def name_pairs(name: str, pairs: object) -> list[tuple[str, str]]:

@@ -18,6 +18,7 @@ class Verdict(StrEnum):
 
     CONTAINED = "contained"
     CLASH = "clash"
+    FAILED = "failed"
     UNCERTAIN = "uncertain"
     CONTACT = "contact"
     CLEARANCE = "clearance"
@@ -85,6 +86,15 @@ class Thresholds:
         if distance <= self.contact + RESOLUTION:
             return Verdict.CONTACT
         return Verdict.CLEARANCE if distance < self.clearance - RESOLUTION else Verdict.CLEAR
+
+    def between(self, distance: Distance, allowance: float | None = None) -> list[str]:
+        """The thresholds that lie between the bounds of a distance, in words: why its verdict is uncertain."""
+        marks = [(self.contact, f"contact up to {self.contact:g} mm")]
+        if self.clearance > 0.0:
+            marks.append((self.clearance, f"the clearance of {self.clearance:g} mm"))
+        depth = self.contact if allowance is None else max(allowance, self.contact)
+        marks.append((-depth, f"{'contact' if allowance is None else 'allowed overlap'} up to {depth:g} mm deep"))
+        return [words for mark, words in marks if distance.lower <= mark <= distance.upper]
 
     def margin(self, distance: float) -> float:
         """How far ``distance`` is from the nearest threshold, mm."""

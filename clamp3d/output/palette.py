@@ -28,6 +28,7 @@ VERDICT_COLOURS: dict[str, str] = {
     "clearance": "#00A6C0",
     "clear": "#8A8F98",
     "uncertain": "#8A8F98",
+    "failed": "#D32F2F",
 }
 
 INK = "#20262E"

@@ -268,7 +268,7 @@ def _contact_row(scene: Scene, contact: Contact, apart: bool) -> PairRow:
 
 
 def _severity(verdict: Verdict) -> Severity:
-    if verdict in BAD:
+    if verdict in BAD or verdict is Verdict.FAILED:
         return "error"
     if verdict is Verdict.UNCERTAIN:
         return "warning"

@@ -32,6 +32,7 @@ _MARK = {
     Verdict.CONTAINED: "C",
     Verdict.ALLOWED: "a",
     Verdict.UNCERTAIN: "?",
+    Verdict.FAILED: "!",
 }
 
 
@@ -74,7 +75,7 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
                 f"{r.a} - {r.b}",
                 r.verdict.value,
                 _gap(r.distance),
-                f"{r.t:.4f}",
+                "" if r.t is None else f"{r.t:.4f}",
                 "" if r.contact_at is None else f"{r.contact_at:.4f}",
                 r.distance.method,
             )

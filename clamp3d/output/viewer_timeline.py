@@ -211,6 +211,7 @@ def _motion_stops(
     least = tuple(
         replace(_row(result, row), what=f"least, at t = {row.t:.4f}", drawn=row.t == 1.0 and row.verdict in BAD)
         for row in rows
+        if row.t is not None
     )
     end = f"{motion.name}: end" + (", through the contact" if contacts else "")
     seconds = max(0.3, _MOTION * (1.0 - before))

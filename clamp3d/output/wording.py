@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
+from typing import TYPE_CHECKING
 
 from clamp3d.collide.result import BAD, CheckResult, PairResult
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.collide.verdict import Verdict
+
+if TYPE_CHECKING:
+    from clamp3d.collide.where import Overlap
 
 
 def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
@@ -63,6 +67,7 @@ def meaning(verdict: str, scene: Scene) -> str:
     return {
         "contained": "one part lies inside the other",
         "clash": f"parts overlap by more than {contact:g} mm",
+        "failed": "could not be computed",
         "uncertain": "could not be decided",
         "contact": f"parts touch (within {contact:g} mm)",
         "clearance": f"gap smaller than {clearance:g} mm",
@@ -87,6 +92,7 @@ def headline(result: CheckResult) -> str:
     others = [
         counted(n, words, plural)
         for verdict, words, plural in (
+            ("failed", "pair failed", "pairs failed"),
             ("uncertain", "pair undecided", "pairs undecided"),
             ("clearance", "gap too small", "gaps too small"),
             ("contact", "contact", "contacts"),
@@ -122,6 +128,7 @@ def sentence(row: PairResult, names: dict[str, str]) -> str:
     said = {
         "contained": f"{a} and {b}: one lies inside the other, {gap}",
         "clash": f"{a} and {b} clash: {gap}",
+        "failed": f"{a} and {b}: failed, no answer",
         "uncertain": f"{a} and {b}: undecided, {gap}",
         "contact": f"{a} and {b} touch" + ("" if gap == "gap 0.000000 mm" else f": {gap}"),
         "clearance": f"{a} and {b} are too close: {gap}",
@@ -130,11 +137,45 @@ def sentence(row: PairResult, names: dict[str, str]) -> str:
 
 
 def circumstances(row: PairResult) -> str:
-    """Where on a motion a finding is; empty for one at rest."""
-    if row.motion is None:
-        return ""
-    first = "" if row.contact_at is None else f"first contact at t = {row.contact_at:.4f}, "
-    return f"in motion {row.motion!r}: {first}{'deepest' if row.verdict in BAD else 'nearest'} at t = {row.t:.4f}"
+    """Where a finding is: when in a motion, and where in space parts overlap; or why there is no verdict."""
+    said = []
+    if row.motion is not None:
+        first = "" if row.contact_at is None else f"first contact at t = {row.contact_at:.4f}, "
+        kind = "deepest" if row.verdict in BAD else "nearest"
+        said.append(f"in motion {row.motion!r}" + ("" if row.t is None else f": {first}{kind} at t = {row.t:.4f}"))
+    if row.where is not None:
+        said.append(where_text(row.where))
+    return "; ".join([*said, row.reason] if row.reason else said)
+
+
+def where_text(where: Overlap) -> str:
+    """The volume that two parts share, with certain digits only, and the box around it.
+
+    >>> import numpy as np
+    >>> from clamp3d.collide.where import Overlap
+    >>> where_text(Overlap((12.3412, 12.3419), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.04]]), None))
+    'shared volume 12.34 mm3, within X 0 to 3, Y 1 to 4, Z 2 to 5.1 mm'
+    >>> where_text(Overlap((0.2, 12.0), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]), None, True))
+    'shared volume of the facets 0.2 to 12 mm3, within X 0 to 3, Y 1 to 4, Z 2 to 5 mm'
+    """
+    low, high = where.volume
+    volume = f"{_rounded(low, ROUND_FLOOR)} to {_rounded(high, ROUND_CEILING)}"
+    for digits in (5, 4, 3, 2):
+        if f"{low:.{digits}g}" == f"{high:.{digits}g}":
+            volume = f"{Decimal(f'{low:.{digits}g}'):f}"
+            break
+    box = ", ".join(
+        f"{axis} {_tenths(a, ROUND_FLOOR)} to {_tenths(b, ROUND_CEILING)}"
+        for axis, a, b in zip("XYZ", *where.box.tolist(), strict=True)
+    )
+    return f"shared volume{' of the facets' if where.of_facets else ''} {volume} mm3, within {box} mm"
+
+
+def _tenths(value: float, rounding: str) -> str:
+    """A coordinate in tenths of a millimetre, rounded outward but for the rounding of floats."""
+    near = round(value, 6) + 0.0
+    text = f"{Decimal(repr(near)).quantize(Decimal('0.1'), rounding=rounding) + 0:f}"
+    return text.removesuffix(".0")
 
 
 def counts_text(result: CheckResult) -> str:

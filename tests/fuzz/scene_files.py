@@ -175,8 +175,8 @@ def _plausible(called: Called, data: dict[str, Any]) -> None:
     """The exit code says what the verdicts say."""
     rows = [*data.get("pairs", []), *data.get("motions", [])]
     verdicts = {row["verdict"] for row in rows}
-    undecided = "uncertain" in verdicts or not data["work"]["pairs"]
-    code = 1 if verdicts & {"clash", "contained"} else 3 if undecided else 0
+    codes = ((verdicts & {"clash", "contained"}, 1), ("failed" in verdicts, 4), ("uncertain" in verdicts, 3))
+    code = next((code for true, code in codes if true), 0 if data["work"]["pairs"] else 2)
     if called.code != code:
         raise FindingError(f"verdicts {sorted(verdicts)} with exit code {called.code}")
     for row in rows:

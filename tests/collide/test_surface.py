@@ -1,0 +1,166 @@
+"""Nearest points of a mesh to rounding; inner and outer meshes hold the part; touching meshes are decided."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import Polygon
+
+from clamp3d.collide.check import check
+from clamp3d.collide.meshes import meshes_distance, surface_distance
+from clamp3d.collide.model import ModelCache
+from clamp3d.collide.scene import Scene
+from clamp3d.collide.surface import Surface, at_edges
+from clamp3d.collide.verdict import Verdict
+from clamp3d.core import shapes
+from clamp3d.core.mesh import make_mesh
+from clamp3d.core.meshing import enclosed, enclosing
+from clamp3d.core.pose import rotation, translation
+from clamp3d.core.primitives import SweptArc
+
+BRACKET = trimesh.creation.extrude_polygon(Polygon([(0, 0), (40, 0), (40, 5), (5, 5), (5, 30), (0, 30)]), 20)
+
+
+def mesh_shape(made: trimesh.Trimesh, fit: str = "off") -> shapes.MeshShape:
+    return shapes.MeshShape(make_mesh(made.vertices, made.faces), fit)
+
+
+@settings(max_examples=60, deadline=None)
+@given(point=st.tuples(*[st.floats(-50.0, 60.0)] * 3))
+def test_nearest_point_of_a_mesh_is_exact(point):
+    """Against every triangle, one by one."""
+    surface = Surface(np.array(BRACKET.vertices), np.array(BRACKET.faces))
+    x = np.array(point)
+    (found,), (face,), (foot,) = surface.nearest(x[None])
+    feet = trimesh.triangles.closest_point(BRACKET.triangles, np.repeat(x[None], len(BRACKET.faces), axis=0))
+    assert found == pytest.approx(np.linalg.norm(feet - x, axis=1).min(), abs=1e-12)
+    assert np.linalg.norm(foot - feet[face]) < 1e-9
+
+
+GROOVED = shapes.groove_block(
+    SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0, holes=[shapes.Hole(2.0, (13.0, -10.0))]
+)
+GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
+PARTS = (
+    shapes.cylinder(5.0, 20.0),
+    shapes.cylinder(5.0, 20.0, bore=4.8),
+    shapes.box((30.0, 20.0, 8.0), holes=[shapes.Hole(3.0, (5.0, 0.0)), shapes.Hole(2.0, (0.0, 0.0), "y")]),
+    shapes.groove_block(GROOVE, 40.0, 20.0, holes=[shapes.Hole(2.0, (13.0, -10.0))]),
+)
+
+
+@settings(max_examples=40, deadline=None)
+@given(part=st.sampled_from(PARTS), error=st.sampled_from([0.5, 0.1, 0.02]), seed=st.integers(0, 2**32 - 1))
+def test_a_drawn_part_lies_between_its_meshes(part, error, seed):
+    """Points of the inner mesh are in the part, points outside of the outer one are not: by the closed form."""
+    forms = ModelCache().model(part).bodies
+    rng = np.random.default_rng(seed)
+
+    def depth(points):
+        return np.max([form.depth(points) for form in forms], axis=0)
+
+    outer, inner = (Surface(*made(part, error)) for made in (enclosing, enclosed))
+    on_inner = trimesh.Trimesh(inner.vertices, inner.faces, process=False).sample(200, seed=int(rng.integers(2**31)))
+    assert depth(np.vstack([on_inner, inner.vertices])).min() >= -1e-9
+    points = rng.uniform(outer.box[0] - 0.1, outer.box[1] + 0.1, (400, 3))
+    assert (outer.contains(points) >= (depth(points) > 1e-9)).all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    tilt=st.floats(0.0, 1.5),
+    turn=st.floats(0.0, 3.0),
+    gap=st.floats(-6.0, -1.0).map(lambda e: 10.0**e),
+    error=st.sampled_from([0.5, 0.06]),
+)
+def test_bounds_of_meshes_hold_at_any_angle(tilt, turn, gap, error):
+    """A tube cut open at its end by a plate, at every tilt: the support function says how far the rim reaches."""
+    tube, plate = shapes.cylinder(5.0, 20.0, bore=4.9), shapes.box((80.0, 80.0, 4.0))
+    R = rotation([0.0, 1.0, 0.0], tilt) @ rotation([0.0, 0.0, 1.0], turn)
+    reach = 10.0 * math.cos(tilt) + 5.0 * math.sin(tilt)
+    T = translation(0.0, 0.0, 2.0 + reach + gap) @ R
+    cache = ModelCache()
+    found = meshes_distance(cache.model(plate), cache.model(tube), T, error)
+    assert found.lower <= gap + 1e-9
+    assert found.upper >= gap - 1e-9
+    if found.point_b is not None and gap > 0.0:
+        assert abs(found.point_a[2]) <= 2.0 + 1e-9
+
+
+@pytest.mark.parametrize("fit", ["off", "bound", "round"])
+def test_a_box_on_the_inner_face_of_a_bracket_touches(fit):
+    scene = (
+        Scene().add("bracket", mesh_shape(BRACKET, fit)).add("box", shapes.box((10, 10, 10)), translation(20, 10, 10))
+    )
+    (row,) = check(scene).pairs
+    assert row.verdict is Verdict.CONTACT
+    assert row.distance.upper - row.distance.lower < 1e-6
+
+
+@settings(max_examples=30, deadline=None)
+@given(size=st.floats(-6.0, 0.3).map(lambda e: 10.0**e), apart=st.booleans(), turn=st.floats(0.0, 6.0))
+def test_gaps_and_overlaps_of_concave_meshes_are_decided(size, apart, turn):
+    """A box over the inner face of an L-bracket, both of them turned: gaps and overlaps of 1e-6 to 2 mm."""
+    gap = size if apart else -size
+    place = translation(3.0, -7.0, 11.0) @ rotation([0.3, -1.0, 0.5], turn)
+    bracket, box = mesh_shape(BRACKET), mesh_shape(trimesh.creation.box((10, 10, 10)))
+    T_box = place @ translation(20.0, 10.0 + gap, 10.0)
+    (row,) = check(Scene(clearance=50.0).add("bracket", bracket, place).add("box", box, T_box)).pairs
+    assert row.distance.lower - 1e-8 <= gap <= row.distance.upper + 1e-8
+    assert row.distance.upper - row.distance.lower < 1e-6
+    assert row.verdict is not Verdict.UNCERTAIN
+
+
+def test_a_mesh_wholly_inside_another_overlaps_and_one_in_its_cavity_does_not():
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=1.0)
+    shell = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
+    core = trimesh.creation.icosphere(subdivisions=3, radius=5.0)
+    full = Surface(np.array(shell.vertices), np.array(shell.faces))
+    hollow = Surface(
+        np.vstack([shell.vertices, core.vertices]), np.vstack([shell.faces, core.faces[:, ::-1] + len(shell.vertices)])
+    )
+    small = Surface(np.array(ball.vertices), np.array(ball.faces))
+    for a, b, T in ((full, small, translation(2, 0, 0)), (small, full, translation(-2, 0, 0))):
+        found = surface_distance(a, b, T)
+        assert found.upper < -6.0
+    apart = surface_distance(hollow, small, translation(0, 0, 1))
+    assert apart.lower == pytest.approx(3.0, abs=0.1)
+    assert surface_distance(hollow, small, translation(7.5, 0, 0)).upper < 0.0
+
+
+def test_flat_faces_of_a_part_with_a_hole_stay_exact():
+    """The chords of one bolt hole say nothing against the flat faces."""
+    plate = trimesh.boolean.difference(
+        [trimesh.creation.box((40, 40, 10)), trimesh.creation.cylinder(6.0, 30.0, sections=24)], engine="manifold"
+    )
+    scene = (
+        Scene().add("plate", mesh_shape(plate, "bound")).add("box", shapes.box((8, 8, 8)), translation(15, 15, 9.05))
+    )
+    (row,) = check(scene).pairs
+    assert row.verdict is Verdict.CLEAR
+    scene = Scene(clearance=1.0, parts=scene.parts)
+    (row,) = check(scene).pairs
+    assert row.verdict is Verdict.CLEARANCE
+    assert row.distance.upper - row.distance.lower < 1e-6
+
+
+@settings(max_examples=40, deadline=None)
+@given(wedge=st.floats(0.15, 3.0))
+def test_error_at_a_knife_edge_reaches_the_true_edge(wedge):
+    """A wedge whose one face bulges by 0.1 mm: the true edge is 0.1 / sin(wedge) from the edge of the mesh."""
+    x = 10.0
+    profile = [(0.0, 0.0), (-x, 0.0), (-x * math.cos(wedge), -x * math.sin(wedge))]
+    wedge_mesh = trimesh.creation.extrude_polygon(Polygon(profile[::-1]), 5.0)
+    top = np.abs(wedge_mesh.face_normals @ [0.0, 1.0, 0.0] - 1.0) < 1e-9
+    error = at_edges(np.array(wedge_mesh.vertices), np.array(wedge_mesh.faces), np.where(top, 0.1, 0.0))
+    # The bulged face y = 0.1 meets the flat side's plane beyond the edge.
+    edge = np.array([0.1 / math.tan(wedge), 0.1, 2.5])
+    surface = Surface(np.array(wedge_mesh.vertices), np.array(wedge_mesh.faces), error)
+    (distance,), _, _ = surface.nearest(edge[None])
+    assert distance <= error.max() + 1e-12
+    assert error[~top].max() == 0.0
