@@ -6,7 +6,6 @@ import contextlib
 import json
 import os
 import tempfile
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,6 @@ from typing import Any
 import numpy as np
 import platformdirs
 from numpy.typing import NDArray
-
-_BROKEN = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
 
 
 def cache_dir() -> Path:
@@ -30,7 +27,7 @@ def load(key: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any]] | None:
         with np.load(_path(key), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         metadata = json.loads(str(arrays.pop("note")))
-    except _BROKEN:
+    except Exception:  # no file; what is damaged can raise anything
         return None
     return (arrays, metadata) if isinstance(metadata, dict) else None
 

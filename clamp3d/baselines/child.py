@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import subprocess
 import sys
@@ -57,9 +58,19 @@ def run_child(
 
 def end_with_caller() -> None:
     """End this process at once when its caller is gone, that is, when its stdin closes."""
+    _end_after(sys.stdin.buffer.read)
 
-    def wait() -> None:
-        sys.stdin.buffer.read()
+
+def end_with_parent() -> None:
+    """End this process of `multiprocessing` at once when its parent is gone, however that ended."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        _end_after(parent.join)
+
+
+def _end_after(wait: Callable[[], object]) -> None:
+    def end() -> None:
+        wait()
         os._exit(1)
 
-    threading.Thread(target=wait, daemon=True).start()
+    threading.Thread(target=end, daemon=True).start()

@@ -12,9 +12,9 @@ import math
 import signal
 from collections import Counter
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -23,10 +23,11 @@ from typing import Any, Literal
 import numpy as np
 
 from clamp3d.baselines.cas import Cas
+from clamp3d.baselines.child import end_with_parent
 from clamp3d.checks import choice, function, instance, number, whole
-from clamp3d.clamp import journal
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.final_state import FinalState, solve_final_state
+from clamp3d.clamp.journal import Journal
 from clamp3d.clamp.section import D, S, Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
 from clamp3d.clamp.status import CLAMPED, final_status, measured_status
@@ -45,6 +46,8 @@ CHUNK = 50
 _MEDIUM = ((6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8), (2000.0, 1.2), (math.inf, 2.0))
 _OPENED = 3.0
 """How far above the nominal final state a sample starts, mm."""
+_PATIENCE = 15.0
+"""Seconds without an answer after which the workers are counted: a cluster's may be starting anew."""
 _SIGMAS = 3.0
 """A tolerance is so many standard deviations of the normal distribution."""
 _TOP = 0.5
@@ -180,18 +183,19 @@ def monte_carlo(
     function("progress", progress)
     spec, nominal = _spec(clamp, whole("seed", seed, least=0), tolerance, wire_tolerance_percent, distribution)
     header = {"monte_carlo": 1, **asdict(spec), "chunk": CHUNK}
-    kept = {} if resume is None else journal.pieces(resume, header)
     sizes = {k: min(CHUNK, n - k * CHUNK) for k in range(math.ceil(n / CHUNK))}
-    waiting = [(spec, k, size) for k, size in sizes.items() if len(kept.get(k, ())) < size]
-    done = n - sum(size for _, _, size in waiting)
-    tell = progress or (lambda done, of: None)
-    tell(done, n)
-    for k, found in _solve(waiting, processes, scheduler):
-        kept[k] = found
-        if resume is not None:
-            journal.add(resume, [k, found])
-        done += len(found)
+    with nullcontext() if resume is None else Journal(resume, header) as journal:
+        kept = {} if journal is None else journal.pieces
+        waiting = [(spec, k, size) for k, size in sizes.items() if len(kept.get(k, ())) < size]
+        done = n - sum(size for _, _, size in waiting)
+        tell = progress or (lambda done, of: None)
         tell(done, n)
+        for k, found in _solve(waiting, processes, scheduler):
+            kept[k] = found
+            if journal is not None:
+                journal.add([k, found])
+            done += len(found)
+            tell(done, n)
     samples = [sample for k, size in sizes.items() for sample in kept[k][:size]]
     distance = np.array([math.nan if d is None else d for d, _ in samples])
     return MonteCarlo(spec, nominal, distance, tuple(status for _, status in samples))
@@ -279,32 +283,37 @@ def _solve(
     if scheduler is None and processes == 1:
         yield from map(_chunk, tasks)
         return
-    with _cluster(scheduler) if scheduler is not None else _processes(min(processes, len(tasks))) as pool:
+    with _cluster(scheduler) if scheduler is not None else _processes(min(processes, len(tasks))) as (pool, workers):
         futures = [pool.submit(_chunk, task) for task in tasks]
+        waiting = set(futures)
         try:
-            for future in as_completed(futures):
-                yield future.result()
+            while waiting:
+                done, waiting = wait(waiting, timeout=_PATIENCE, return_when=FIRST_COMPLETED)
+                if not done and not workers():
+                    raise SolverError("no workers are left; finished samples are kept by a resume file only")
+                yield from (future.result() for future in done)
         finally:
             for future in futures:
                 future.cancel()
 
 
 @contextmanager
-def _processes(count: int) -> Iterator[Executor]:
-    with ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_quiet) as pool:
+def _processes(count: int) -> Iterator[tuple[Executor, Callable[[], int]]]:
+    with ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_worker) as pool:
         try:
-            yield pool
+            yield pool, lambda: count  # the pool itself tells of one that died
         except BrokenProcessPool:
             raise SolverError("a worker process died; finished samples are kept by a resume file only") from None
 
 
-def _quiet() -> None:
-    """Ctrl-C goes to all processes of a terminal: the first one stops the work, the others say nothing."""
+def _worker() -> None:
+    """Ctrl-C goes to all processes of a terminal: the first one stops the work, the others say nothing and end too."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
 
 
 @contextmanager
-def _cluster(scheduler: str) -> Iterator[Executor]:
+def _cluster(scheduler: str) -> Iterator[tuple[Executor, Callable[[], int]]]:
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
@@ -320,6 +329,6 @@ def _cluster(scheduler: str) -> Iterator[Executor]:
         raise InputError(f"no Dask scheduler at {scheduler!r}: {reason}") from None
     with client:
         try:
-            yield client.get_executor(pure=False)
+            yield client.get_executor(pure=False), lambda: len(client.scheduler_info()["workers"])
         except (distributed.KilledWorker, CancelledError) as error:
             raise SolverError(f"the Dask cluster lost the work: {error}") from None

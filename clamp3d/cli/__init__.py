@@ -16,7 +16,7 @@ from contextlib import suppress
 import click
 
 import clamp3d
-from clamp3d.cli.terminal import ExitCode, show, tolerate_closed_pipes
+from clamp3d.cli.terminal import ExitCode, end_on_signals, show, tolerate_closed_pipes
 from clamp3d.errors import Clamp3dError, SolverError, one_line
 
 # Name -> (module, one line for the list of commands). A command's module is loaded when it is called.
@@ -78,7 +78,9 @@ def group() -> None:
 def main() -> None:
     """Entry point: one line for every fault, never a traceback; CLAMP3D_DEBUG=1 shows it."""
     tolerate_closed_pipes()
+    end_on_signals()
     try:
+        _check_environment()
         with warnings.catch_warnings():
             warnings.showwarning = lambda message, *_, **__: show(f"warning: {one_line(str(message))}", err=True)
             status = group.main(prog_name="clamp3d", standalone_mode=False)
@@ -108,6 +110,16 @@ def main() -> None:
             with suppress(OSError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     sys.exit(int(status) if isinstance(status, int) else 0)
+
+
+def _check_environment() -> None:
+    """Libraries read it when they are imported (numpy.f2py does), and end with errors of their own."""
+    if os.environ.get("SOURCE_DATE_EPOCH") == "":
+        del os.environ["SOURCE_DATE_EPOCH"]
+    elif "SOURCE_DATE_EPOCH" in os.environ:
+        from clamp3d.output.pages import now
+
+        now()
 
 
 def _place(error: Exception) -> str:

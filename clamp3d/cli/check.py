@@ -46,11 +46,11 @@ def command(
     with bar(quiet) as report:
         result = check(scene, pairs=asked, distances=distances or is_clamp, progress=report)
         complete = check_full(scene, result, progress=report) if full else None
+    show(check_to_text(result, complete))
     if json_file is not None:
         write_json(json_file, check_to_dict(result, complete))
     if html_file is not None:
         write_text(html_file, check_to_html(result, complete))
-    show(check_to_text(result, complete))
     finish(
         finding=bool(result.counts.keys() & BAD),
         failed=Verdict.FAILED in result.counts,

@@ -30,10 +30,10 @@ def command(
 
     with bar(quiet) as report:
         found = compare(peers=peers, progress=lambda done, total, what: report(what, done, total))
+    show(comparison_to_text(found))
     if json_file is not None:
         write_json(json_file, comparison_to_dict(found))
     if plot_file is not None:
         save_comparison(
             found, plot_file, "clamp3d compare" + (" --peers" if peers else "") + f" --plot {plot_file.name}"
         )
-    show(comparison_to_text(found))

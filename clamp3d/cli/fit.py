@@ -31,11 +31,11 @@ def command(
 
     with bar(quiet) as report:
         result = fit_file(mesh, unit=unit, progress=lambda stage, done: report(f"looking for {stage}", done, 1.0))
-    if json_file is not None:
-        write_json(json_file, result.to_dict())
-    if html_file is not None:
-        write_text(html_file, fit_to_html(result))
     if not quiet:
         for note in result.notes:
             show(f"note: {note}", err=True)
     show(fit_to_text(result))
+    if json_file is not None:
+        write_json(json_file, result.to_dict())
+    if html_file is not None:
+        write_text(html_file, fit_to_html(result))

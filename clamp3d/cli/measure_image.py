@@ -54,12 +54,12 @@ def command(
         marking_error=marking_error,
         calliper_error=calliper_error,
     )
-    if json_file is not None:
-        write_json(json_file, {"image": str(image), "kind": kind, "marks": marks.tolist(), **asdict(found)})
     show(f"distance     {found.distance:.3f} mm +- {found.uncertainty:.3f} mm ({kind}; one standard deviation)")
     show(f"height       {found.height:.3f} mm, straight {found.straight:.3f} mm")
     show(f"scale        {found.mm_per_px:.6f} mm/px, marks +- {marking_error:g} px, reading +- {calliper_error:g} mm")
     show(f"marks        {', '.join(f'({x:.2f}, {y:.2f})' for x, y in marks)}")
+    if json_file is not None:
+        write_json(json_file, {"image": str(image), "kind": kind, "marks": marks.tolist(), **asdict(found)})
 
 
 def _marks(option: str, text: str) -> list[tuple[float, float]]:

@@ -47,9 +47,9 @@ def command(
     model = method.model(loaded, quiet=quiet)
 
     def done(run: Assembly) -> None:
+        show(run_to_text(run))
         if json_file is not None:
             write_json(json_file, run.to_dict())
-        show(run_to_text(run))
 
     if view or viewing.html_file is not None or viewing.url is not None:
         from clamp3d.cli.viewing import run_and_view

@@ -73,6 +73,7 @@ def command(
             workers=workers,
             progress=report,
         )
+    show(table(result))
     if json_file is not None:
         write_json(json_file, _clean(result.to_dict()))
     if markdown_file is not None:
@@ -82,7 +83,6 @@ def command(
         from clamp3d.bench.stress.plot import plot
 
         plot(result, plot_file)
-    show(table(result))
     own = [o for o in result.outcomes if o.method == "cas"]
     finish(finding=any(o.wrong or o.beyond_bound for o in own))
 

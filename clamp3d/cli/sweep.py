@@ -53,8 +53,8 @@ def command(
     cloud = closing.cloud(ranges, count, seed=seed) if count is not None else None
     wanted = planes(ranges) if map_file is not None or json_file is not None else []
     grids = {(x, y): grid(closing, x, y, ranges, steps) for x, y in wanted}
+    show(sweep_to_text(closing, tolerances, cloud))
     if json_file is not None:
         write_json(json_file, sweep_to_dict(closing, tolerances, grids, cloud))
     if map_file is not None:
         draw_map(map_file, closing, tolerances, grids, ranges)
-    show(sweep_to_text(closing, tolerances, cloud))

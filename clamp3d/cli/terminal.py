@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import signal
 import sys
 from enum import IntEnum
+from typing import NoReturn
 
 import click
 
@@ -50,6 +52,19 @@ def finish(*, finding: bool, failed: bool = False, undecided: bool = False, empt
 
 STDOUT_TAKEN = "clamp3d.stdout"
 """Key of the context's ``meta`` under which the option stands that writes its file to stdout."""
+
+
+def end_on_signals() -> None:
+    """Let a process that is asked to end (SIGTERM, SIGHUP) remove its temporary files and its workers before."""
+
+    def end(number: int, frame: object) -> NoReturn:
+        signal.signal(number, signal.SIG_DFL)  # the second one ends it at once
+        raise SystemExit(128 + number)
+
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # nohup ignores SIGHUP
+            signal.signal(number, end)
 
 
 class _Tolerant(io.FileIO):

@@ -59,8 +59,8 @@ def command(
             resume=resume,
             progress=lambda done, of: report("clamps", done, of),
         )
+    show(tolerance_to_text(result, rows, note))
     if json_file is not None:
         write_json(json_file, tolerance_to_dict(result, rows))
     if plot_file is not None:
         draw_histogram(plot_file, result)
-    show(tolerance_to_text(result, rows, note))

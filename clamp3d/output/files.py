@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -15,6 +16,7 @@ from typing import Any
 from clamp3d.checks import short
 from clamp3d.errors import InputError
 
+_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 STDOUT = Path("-")
 """As the path of a file to write: standard output."""
 
@@ -24,7 +26,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     """A temporary path beside ``path`` that takes its place when the block ends well, and is removed when not.
 
     A link stays, its target is written; what is neither a file nor a folder (a device, a pipe) is written into, and
-    so is standard output for the path ``-``. Raises InputError if the folder does not exist or cannot be written to.
+    so is standard output for the path ``-``. Raises InputError if the folder does not exist or cannot be written to,
+    or the disk is full.
     """
     if path == STDOUT:
         with tempfile.TemporaryDirectory() as folder:
@@ -35,7 +38,12 @@ def whole_file(path: Path) -> Iterator[Path]:
             sys.stdout.buffer.flush()
         return
     with _beside(path) as (temporary, target):
-        yield temporary
+        try:
+            yield temporary
+        except OSError as error:
+            if error.errno not in _DISK:
+                raise
+            raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
@@ -84,9 +92,9 @@ def _special(path: Path) -> bool:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write ``text`` as UTF-8. Raises InputError if it cannot be written."""
+    """Write ``text`` as UTF-8, half a character as an escape sequence. Raises InputError if it cannot be written."""
     with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def write_json(path: Path, data: Any) -> None:

@@ -47,7 +47,7 @@ def manifest(
         **({} if clamp is None else {"parameters": dataclasses.asdict(clamp)}),
         "libraries": {name: _version(name) for name in libraries},
     }
-    return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode("utf-8")
+    return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode("utf-8", "backslashreplace")
 
 
 def _part(item: PlacedPart, meshed: PosedMesh | None, settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -41,7 +41,7 @@ def write_report(report: Report, folder: Path, *, progress: Callable[[str], None
     page = report_html(report, progress=progress)
     data = json.dumps(report_to_dict(report), indent=2, allow_nan=False) + "\n"
     files = dict(zip(FILES, (page, data, report_csv(report)), strict=True))
-    return write_files(folder, {name: text.encode("utf-8") for name, text in files.items()})
+    return write_files(folder, {name: text.encode("utf-8", "backslashreplace") for name, text in files.items()})
 
 
 def report_to_dict(report: Report) -> dict[str, Any]:

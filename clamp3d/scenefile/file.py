@@ -12,7 +12,7 @@ from clamp3d.clamp.loader import parse_toml, read_text
 from clamp3d.collide.scene import Allowed, Part, Scene
 from clamp3d.core import shapes
 from clamp3d.core.validation import validate
-from clamp3d.errors import Clamp3dError, InputError
+from clamp3d.errors import Clamp3dError, InputError, escaped
 from clamp3d.scenefile.tables import TAGS, ClampTable, MeshTable, SceneTable, clamp_source
 
 
@@ -23,7 +23,7 @@ def load_scene(path: str | Path) -> Scene:
     """
     path = checks.path("scene", path)
     text = read_text(path)
-    name = (path.resolve().parent.name if path.stem == "scene" else "") or path.stem
+    name = escaped((path.resolve().parent.name if path.stem == "scene" else "") or path.stem)
     return parse_scene(text, origin=str(path), folder=path.parent, name=name)
 
 

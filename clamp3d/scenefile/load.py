@@ -13,7 +13,7 @@ from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.loader import builtin_clamps, load_clamp, parse_toml, read_text
 from clamp3d.collide.scene import Scene
 from clamp3d.core.shapes import MeshShape
-from clamp3d.errors import InputError
+from clamp3d.errors import InputError, escaped
 from clamp3d.scenefile.file import load_scene
 from clamp3d.scenefile.tables import SceneTable
 
@@ -93,8 +93,8 @@ def _is_clamp(path: Path) -> bool:
 
 def _one_part(path: Path, unit: str | None) -> Scene:
     # Characters that a part's name must not hold: a pair is written A:B,C:D, and patterns have * and ?.
-    name = re.sub(r"[\s:,*?]+", "-", path.stem).strip("-") or "part"
-    return Scene(name=name).add(name, MeshShape(load_mesh(path, unit=unit), name=path.name))
+    name = escaped(re.sub(r"[\s:,*?]+", "-", path.stem)).strip("-") or "part"
+    return Scene(name=name).add(name, MeshShape(load_mesh(path, unit=unit), name=escaped(path.name)))
 
 
 def _refuse_wires(path: Path, kind: str, wires: dict[str, str | float]) -> None:

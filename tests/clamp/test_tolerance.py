@@ -8,11 +8,12 @@ import pytest
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp import tolerance as montecarlo
 from clamp3d.clamp.final_state import solve_final_state
+from clamp3d.clamp.journal import Journal
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, sensitivity, with_dimensions
 from clamp3d.clamp.tolerance import monte_carlo
-from clamp3d.errors import InputError
+from clamp3d.errors import InputError, SolverError
 
 
 def _distance(clamp, near):
@@ -124,3 +125,23 @@ def test_an_address_without_a_scheduler_is_one_line():
     done = subprocess.run(line, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr == "clamp3d: error: no Dask scheduler at 'x': missing port number in address 'x'\n"
+
+
+def test_one_process_at_a_time_has_the_file(tmp_path):
+    file = tmp_path / "work"
+    with Journal(file, {"run": 1}) as first:
+        first.add([0, "a"])
+        with pytest.raises(InputError, match="another process is at work on it"):
+            Journal(file, {"run": 1})
+    with Journal(file, {"run": 1}) as second:
+        assert second.pieces == {0: "a"}
+
+
+def test_a_cluster_without_workers_is_said_to_have_none(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(montecarlo, "_PATIENCE", 0.5)
+    with (
+        distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as cluster,
+        pytest.raises(SolverError, match="no workers are left"),
+    ):
+        monte_carlo(load_clamp(), n=52, scheduler=cluster.scheduler_address)

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from typing import Any
 
+from clamp3d.baselines.child import end_with_parent
 from clamp3d.bench.machine import Machine, machine
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.family import Family
@@ -104,7 +105,7 @@ def run_stress(
         for family in families:
             done(family, run_family(family, methods, n, seed, time_limit, check))
     else:
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=end_with_parent) as pool:
             waiting = {pool.submit(run_family, f, methods, n, seed, time_limit, check): f for f in families}
             try:
                 for future in as_completed(waiting):

@@ -16,6 +16,7 @@ from typing import Any, Literal, Protocol, Self, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clamp3d.baselines.child import end_with_parent
 from clamp3d.core.pose import Array
 from clamp3d.errors import Clamp3dError, without_numbers
 
@@ -175,7 +176,8 @@ def run_here(asked: Method, cases: Any, time_limit: float | None = None) -> Answ
 
 
 def _serve(pipe: Connection, make: Callable[[], Method], cases: Any) -> None:
-    """Child: answer the rows that are sent, until the parent closes the pipe."""
+    """Child: answer the rows that are sent, until the parent closes the pipe or is gone."""
+    end_with_parent()
     asked = make()
     for name in _IMPORTED:
         with contextlib.suppress(ImportError):
