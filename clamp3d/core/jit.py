@@ -1,65 +1,269 @@
-"""How the compiled formulas are built: cached on disk where that is possible, never an error where it is not."""
+"""How the compiled formulas are built, and kept: as machine code in the cache folder, loaded without numba.
+
+numba's own cache would do, but to read it numba has to be imported with its compiler and its type libraries (0.5 s of
+CPU, more than most commands work); machine code needs llvmlite alone (0.05 s). What cannot be kept that way (a formula
+that allocates memory, other arrays than those of floats in C order) goes into numba's cache.
+"""
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
+import os
+import platform
+import re
 import sys
+import tempfile
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache, cached_property
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import numba
-from numba.core import event
-
 # IEEE arithmetic as written (no re-association), and division by zero gives inf instead of a Python exception.
 _OPTIONS: dict[str, Any] = {"fastmath": False, "error_model": "numpy", "nogil": True}
+_MATHEMATICS = {"sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "hypot", "fabs", "exp", "log", "pow"}
+_SYMBOLS = _MATHEMATICS | {"memset", "memcpy", "memmove"}
+"""What machine code may call: every process has it."""
+_OTHERWISE = b""
+"""In place of machine code: numba's cache has it."""
+_TYPES: dict[str, Any] = {"f8": ctypes.c_double, "i8": ctypes.c_int64, "b1": ctypes.c_bool, "void": None}
 
-formula = numba.njit(**_OPTIONS)
-"""Decorator of a formula: compiled into its callers, not cached by itself."""
 
-inlined = numba.njit(forceinline=True, **_OPTIONS)
-"""The same for a small formula: built into each caller, which drops what it does not use."""
+class _Formula:
+    """A function that numba compiles into its callers; numba is imported when it is asked for the type of this."""
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        self._function, self._options = function, options
+
+    @cached_property
+    def _compiled(self) -> Any:
+        import numba
+
+        return numba.njit(**_OPTIONS, **self._options)(self._function)
+
+    @property
+    def _numba_type_(self) -> Any:
+        return self._compiled._numba_type_
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._compiled(*arguments)
 
 
+def formula(function: Callable[..., Any]) -> Any:
+    """Decorator of a formula: compiled into its callers, not kept by itself."""
+    return _Formula(function)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """The same for a small formula: built into each caller, which drops what it does not use."""
+    return _Formula(function, forceinline=True)
+
+
+@cache
 def source_stamp() -> str:
-    """Hash of all formula sources.
+    """Hash of all formula sources and of this file.
 
     numba notices a change in the file of a cached function, not in the files of the functions it calls. Entry points
     close over this stamp, which makes it a part of their cache key.
     """
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("kernel*.py")):
+    for path in sorted([*Path(__file__).parent.glob("kernel*.py"), Path(__file__)]):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
-class _Notice(event.Listener):
-    """One line on stderr when numba begins to compile; what it reads from the cache makes no such event."""
-
-    def __init__(self) -> None:
-        self.given = False
-
-    def on_start(self, event: object) -> None:
-        if not self.given:
-            self.given = True
-            text = "clamp3d: compiling the contact kernel, once for this machine (a few seconds) ..."
-            print(text, file=sys.stderr, flush=True)
-
-    def on_end(self, event: object) -> None:
-        pass
-
-
-_notice = _Notice()
-
-
 def entry(function: Callable[..., Any], signature: str) -> Any:
-    """Compile an entry point for one signature, from the disk cache if it is there.
+    """An entry point for one ``signature`` as numba writes it, from the cache or compiled; arrays are in C order.
 
-    Damaged cache files (cut short by a crash or a full disk) are written anew. Without a writable cache folder
-    (read-only installation and home, full disk) the function is compiled in memory.
+    Called with other types than those of its signature it may end the process: the callers check. Damaged files in
+    the cache are written anew; without a place for the cache every run compiles.
     """
-    with event.install_listener("numba:compile", _notice):
+    returned, given = re.fullmatch(r"(\w+)\((.*)\)", signature).groups()  # type: ignore[union-attr]
+    arguments = re.findall(r"\w+(?:\[[^]]*\])?", given)
+    path = _place(function, signature)
+    code = _read(path)
+    if code is None:
+        once = _can_keep(path.parent)
+        _say(once)
+        code = _machine_code(function, returned, arguments)
+        if once:
+            _keep(path, code)
+    if code == _OTHERWISE:
+        return _cached_by_numba(function, signature, _can_keep(path.parent))
+    kinds = [ctypes.py_object if "[" in kind else _TYPES[kind] for kind in arguments]
+    return ctypes.CFUNCTYPE(_TYPES[returned], *kinds)(_load(code))
+
+
+# --- The cache --------------------------------------------------------------------------------------------------------
+
+
+def _place(function: Callable[..., Any], signature: str) -> Path:
+    """The file of an entry point: another one for every source, processor and version."""
+    import llvmlite.binding as llvm
+    import platformdirs
+
+    source = Path(function.__code__.co_filename)
+    facts = [source_stamp(), source.read_bytes() if source.exists() else b"", function.__qualname__, signature]
+    facts += [metadata.version(name) for name in ("numba", "llvmlite", "numpy")]
+    facts += [sys.version, platform.machine(), llvm.get_process_triple(), llvm.get_host_cpu_name(), _features()]
+    key = hashlib.sha256(repr(facts).encode()).hexdigest()[:32]
+    own = os.environ.get("CLAMP3D_CACHE")
+    folder = Path(own).expanduser() if own else platformdirs.user_cache_path("clamp3d", appauthor=False)
+    return folder / f"kernel-{function.__name__}-{key}.o"
+
+
+@cache
+def _features() -> str:
+    """What this processor can do, in LLVM's words."""
+    import llvmlite.binding as llvm
+
+    try:
+        return str(llvm.get_host_cpu_features().flatten())
+    except RuntimeError:  # not known for this kind of processor
+        return ""
+
+
+def _read(path: Path) -> bytes | None:
+    """The machine code in a file; None if there is none or the file is damaged."""
+    with suppress(OSError):
+        content = path.read_bytes()
+        if content[:32] == hashlib.sha256(content[32:]).digest():
+            return content[32:]
+    return None
+
+
+def _keep(path: Path, code: bytes) -> None:
+    """Write it whole or not at all; a cache that cannot be written is no error."""
+    with suppress(OSError), tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        temporary = Path(folder, "code")
+        temporary.write_bytes(hashlib.sha256(code).digest() + code)
+        os.replace(temporary, path)
+
+
+@cache
+def _say(once: bool) -> None:
+    """One line on stderr when compiling begins."""
+    when = "once for this machine" if once else "in every run: no cache folder can be written, CLAMP3D_CACHE names one"
+    print(f"clamp3d: compiling the contact kernel, {when} (a few seconds) ...", file=sys.stderr, flush=True)
+
+
+def _can_keep(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+# --- Machine code -----------------------------------------------------------------------------------------------------
+
+
+@cache
+def _engine() -> Any:
+    """LLVM's own compiler as a loader of machine code."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+
+
+def _machine() -> Any:
+    import llvmlite.binding as llvm
+
+    target = llvm.Target.from_default_triple()
+    return target.create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=_features(), opt=3, reloc="default", codemodel="jitdefault", jit=True
+    )
+
+
+def _load(code: bytes) -> int:
+    """Address of the one function in ``code``."""
+    import llvmlite.binding as llvm
+
+    engine = _engine()
+    name = code[: code.index(b"\n")].decode()
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code[len(name) + 1 :]))
+    engine.finalize_object()
+    return int(engine.get_function_address(name))
+
+
+def _machine_code(function: Callable[..., Any], returned: str, arguments: list[str]) -> bytes:
+    """Name and machine code of an entry point; `_OTHERWISE` if it needs more than mathematics.
+
+    numba writes a C function that takes the arrays as NumPy's own objects, whose fields are public
+    (PyArrayObject_fields): data and dimensions are behind the head that all objects have.
+    """
+    import llvmlite.binding as llvm
+    import numba
+    from llvmlite import ir
+    from numba import types
+    from numba.extending import intrinsic
+
+    if not all(kind in _TYPES or re.fullmatch(r"f8\[(:,)*::1\]", kind) for kind in [returned, *arguments]):
+        return _OTHERWISE
+    head = object.__basicsize__
+
+    @intrinsic
+    def word(typing_context, address, offset):  # type: ignore[no-untyped-def]
+        def build(context, builder, signature, given):  # type: ignore[no-untyped-def]
+            return builder.load(builder.inttoptr(builder.add(*given), ir.IntType(64).as_pointer()))
+
+        return types.int64(types.int64, types.int64), build
+
+    @intrinsic
+    def floats(typing_context, address):  # type: ignore[no-untyped-def]
+        def build(context, builder, signature, given):  # type: ignore[no-untyped-def]
+            return builder.inttoptr(given[0], ir.DoubleType().as_pointer())
+
+        return types.CPointer(types.float64)(types.int64), build  # type: ignore[no-untyped-call]
+
+    names = [f"a{i}" for i in range(len(arguments))]
+    passed = []
+    for name, kind in zip(names, arguments, strict=True):
+        shape = "".join(f"word(word({name}, {head + 16}), {8 * i}), " for i in range(kind.count(":") - 1))
+        passed.append(f"carray(floats(word({name}, {head})), ({shape}))" if "[" in kind else name)
+    text = f"def call({', '.join(names)}):\n    return function({', '.join(passed)})\n"
+    known: dict[str, Any] = {
+        "carray": numba.carray,  # type: ignore[attr-defined]
+        "word": word,
+        "floats": floats,
+    }
+    exec(text, known | {"function": numba.njit(**_OPTIONS)(function)}, known)
+    plain = ", ".join("i8" if "[" in kind else kind for kind in arguments)
+    made = numba.cfunc(f"{returned}({plain})", **_OPTIONS)(known["call"])
+    module = llvm.parse_assembly(made.inspect_llvm())
+    for part in module.functions:
+        if not part.is_declaration and part.name != made.native_name:
+            part.linkage = "internal"
+    machine = _machine()
+    passes = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
+    passes.getModulePassManager().run(module, passes)
+    called = {part.name for part in module.functions if part.is_declaration and not part.name.startswith("llvm.")}
+    if not called <= _SYMBOLS or any(part.is_declaration for part in module.global_variables):
+        return _OTHERWISE
+    return bytes(made.native_name.encode() + b"\n" + machine.emit_object(module))
+
+
+# --- numba's cache ----------------------------------------------------------------------------------------------------
+
+
+def _cached_by_numba(function: Callable[..., Any], signature: str, once: bool) -> Any:
+    """Compiled by numba for one signature, from its cache if it is there; damaged files are written anew."""
+    import numba
+    from numba.core import event
+
+    class Notice(event.Listener):
+        def on_start(self, event: object) -> None:
+            _say(once)
+
+        def on_end(self, event: object) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Notice()):
         with suppress(OSError, RuntimeError):  # no place for the cache, or none left
             cached = numba.njit(cache=True, **_OPTIONS)(function)
             try:
