@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.nearest import rim_minimum, segment_pairs, to_faces
 from clamp3d.core.pose import Array, inverse
+from clamp3d.core.triangles import closest_points
 
 MEMBER = 1e-9
 """Relative to the size of the parts: a point this far outside still counts as on the surface."""
@@ -159,11 +160,9 @@ class Hull:
 
     def closest(self, points: Array) -> Array:
         """The points of the surface (k, 3) that are nearest to ``points`` (k, 3), which lie outside."""
-        from trimesh.triangles import closest_point
-
         k, m = len(points), len(self.faces)
         pairs = np.tile(self.vertices[self.faces], (k, 1, 1)), np.repeat(points, m, axis=0)
-        feet = closest_point(*pairs).reshape(k, m, 3)  # type: ignore[no-untyped-call]
+        feet = closest_points(*pairs).reshape(k, m, 3)
         nearest = np.linalg.norm(feet - points[:, None], axis=2).argmin(axis=1)
         return np.asarray(feet[np.arange(k), nearest])
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq
 
 from clamp3d.core.pose import Array
+from clamp3d.core.roots import root
 
 Found = tuple[float, Array, Array]
 """A distance in mm and the two points (3,) that have it."""
@@ -78,6 +78,6 @@ def rim_minimum(closest: Callable[[Array], Array], T: Array, radius: float) -> t
     middle, step = float(turn[int(np.argmin(d))]), float(turn[1])
     low, high = middle - step, middle + step
     if slope(low) < 0.0 < slope(high):
-        middle = float(brentq(slope, low, high, xtol=1e-15, rtol=8.9e-16, disp=False))
+        middle = root(slope, low, high)
     p = rim(np.array([middle]))
     return p[0], closest(p)[0]

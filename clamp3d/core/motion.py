@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from clamp3d.checks import array, items, number, text
 from clamp3d.core.pose import Array, check_pose, inverse, unit
@@ -89,6 +88,8 @@ class Motion:
         """The motion with ``to`` turned into a screw, for a first part that stands at ``start`` (4, 4)."""
         if self.to is None:
             return self
+        from scipy.spatial.transform import Rotation
+
         M = self.to @ inverse(start)
         turn = Rotation.from_matrix(M[:3, :3]).as_rotvec()
         angle, t = float(np.linalg.norm(turn)), M[:3, 3]
@@ -109,7 +110,11 @@ class Motion:
             raise InputError(f"t must be from 0 to 1 (or at most {_LATEST:g} times as far), got {t}")
         T = np.eye(4) if start is None else start.copy()
         # The turn minus one: what does not move is not rounded.
-        turn = Rotation.from_rotvec(t * self.angle * self.axis).as_matrix() if self.angle else np.eye(3)
+        turn = np.eye(3)
+        if self.angle:
+            from scipy.spatial.transform import Rotation
+
+            turn = Rotation.from_rotvec(t * self.angle * self.axis).as_matrix()
         T[:3, 3] += (turn - np.eye(3)) @ (T[:3, 3] - self.point) + t * self.travel
         T[:3, :3] = turn @ T[:3, :3]
         return T

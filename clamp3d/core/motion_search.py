@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
 
 from clamp3d.checks import positive
 from clamp3d.core.distance import SignedDistance, signed_distance
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.roots import root
 from clamp3d.errors import SolverError
 
 RESOLUTION = 1e-12
@@ -120,4 +120,4 @@ class Search:
         while low > 0.0 and gap(low) <= 0.0:
             low = max(0.0, high - step)
             step *= 2.0
-        return float(brentq(gap, low, high, xtol=1e-16, rtol=8.9e-16)) if gap(low) > 0.0 > gap(high) else high
+        return root(gap, low, high, xtol=1e-16) if gap(low) > 0.0 > gap(high) else high

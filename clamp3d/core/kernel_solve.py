@@ -1,0 +1,235 @@
+"""Compiled entry points of `small`: loops in one order, so the same bits whatever BLAS, cores or process there are.
+
+All arrays are the caller's and are written into; nothing is allocated. Import this module only when it is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from clamp3d.core.jit import entry, formula, source_stamp
+
+EPS = 2.0**-52
+SWEEPS = 60
+
+
+@formula
+def _reduced(A, b, order, count, Q, y):  # type: ignore[no-untyped-def]
+    """Least squares with the first ``count`` columns of A in ``order``, by Householder: solution into y (n,).
+
+    False if the last of them is a sum of the others.
+    """
+    m = A.shape[0]
+    for k in range(count):
+        for i in range(m):
+            Q[i, k] = A[i, int(order[k])]
+    for i in range(m):
+        Q[i, count] = b[i]
+    for k in range(count):
+        whole = 0.0
+        for i in range(k):
+            whole += Q[i, k] * Q[i, k]
+        square = 0.0
+        for i in range(k, m):
+            square += Q[i, k] * Q[i, k]
+        if not square > 1e4 * EPS * EPS * (whole + square):
+            return False
+        r = -math.copysign(math.sqrt(square), Q[k, k])
+        head = Q[k, k] - r
+        for j in range(k + 1, count + 1):
+            along = head * Q[k, j]
+            for i in range(k + 1, m):
+                along += Q[i, k] * Q[i, j]
+            along /= r * head
+            Q[k, j] += along * head
+            for i in range(k + 1, m):
+                Q[i, j] += along * Q[i, k]
+        Q[k, k] = r
+    for k in range(count - 1, -1, -1):
+        rest = Q[k, count]
+        for j in range(k + 1, count):
+            rest -= Q[k, j] * y[j]
+        y[k] = rest / Q[k, k]
+    return True
+
+
+def _nnls(stamp: str) -> Any:
+    def nnls(A, b, x, w, order, y, Q):  # type: ignore[no-untyped-def]
+        """Lawson & Hanson, Solving Least Squares Problems (1974), algorithm NNLS; rounds, or -1 where it does not end.
+
+        ``order`` (n,): the columns of the set that is not 0, then the others; ``w`` (n,), ``y`` (n,) and
+        ``Q`` (m, n + 1) are room to work in.
+        """
+        stamp  # noqa: B018
+        m, n = A.shape
+        scale = 0.0
+        for j in range(n):
+            order[j] = j
+            x[j] = 0.0
+            total = 0.0
+            for i in range(m):
+                total += abs(A[i, j])
+            scale = max(scale, total)
+        tolerance = 10.0 * max(m, n) * EPS * scale
+        count, fresh = 0, True
+        for rounds in range(30 * n + 30):
+            if fresh:
+                for i in range(m):
+                    Q[i, n] = b[i]
+                    for j in range(n):
+                        Q[i, n] -= A[i, j] * x[j]
+                for j in range(n):
+                    w[j] = 0.0
+                    for i in range(m):
+                        w[j] += A[i, j] * Q[i, n]
+            best = -1
+            for k in range(count, n):
+                if w[int(order[k])] > tolerance and (best < 0 or w[int(order[k])] > w[int(order[best])]):
+                    best = k
+            if best < 0 or count >= m:
+                return rounds
+            order[count], order[best] = order[best], order[count]
+            new = int(order[count])
+            fresh = _reduced(A, b, order, count + 1, Q, y) and y[count] > 0.0
+            if not fresh:
+                w[new] = 0.0  # rounding alone says that it would help
+                continue
+            count += 1
+            while True:
+                share, least = 1.0, 1.0
+                for k in range(count):
+                    least = min(least, y[k])
+                    at = x[int(order[k])]
+                    if y[k] <= 0.0:
+                        share = min(share, at / (at - y[k]))
+                if least > 0.0:
+                    break
+                kept = 0
+                for k in range(count):
+                    j = int(order[k])
+                    gone = y[k] <= 0.0 and x[j] / (x[j] - y[k]) <= share
+                    x[j] = 0.0 if gone else x[j] + share * (y[k] - x[j])
+                    if x[j] > 0.0:
+                        order[k], order[kept] = order[kept], order[k]
+                        kept += 1
+                    else:
+                        x[j] = 0.0
+                count = kept
+                _reduced(A, b, order, count, Q, y)
+            for k in range(count):
+                x[int(order[k])] = y[k]
+        return -1
+
+    return entry(nnls, "i8(f8[:,::1],f8[::1],f8[::1],f8[::1],f8[::1],f8[::1],f8[:,::1])")
+
+
+def _svd(stamp: str) -> Any:
+    def svd(U, V, sizes):  # type: ignore[no-untyped-def]
+        """U (m, n) into U diag(sizes), V (n, n) into the right singular vectors, by one-sided Jacobi rotations.
+
+        Sizes fall. [M. R. Hestenes, Inversion of matrices by biorthogonalization, J. SIAM 6 (1958) 51-90]
+        """
+        stamp  # noqa: B018
+        m, n = U.shape
+        for i in range(n):
+            for j in range(n):
+                V[i, j] = 1.0 if i == j else 0.0
+        sweeps = 0
+        turned = True
+        while turned and sweeps < SWEEPS:
+            turned = False
+            sweeps += 1
+            for p in range(n - 1):
+                for q in range(p + 1, n):
+                    a, b, c = 0.0, 0.0, 0.0
+                    for i in range(m):
+                        a += U[i, p] * U[i, p]
+                        b += U[i, q] * U[i, q]
+                        c += U[i, p] * U[i, q]
+                    if not abs(c) > 4.0 * EPS * math.sqrt(a * b):
+                        continue
+                    turned = True
+                    half = (b - a) / (2.0 * c)
+                    t = math.copysign(1.0, half) / (abs(half) + math.sqrt(1.0 + half * half))
+                    cosine = 1.0 / math.sqrt(1.0 + t * t)
+                    sine = t * cosine
+                    for i in range(m):
+                        u, v = U[i, p], U[i, q]
+                        U[i, p], U[i, q] = cosine * u - sine * v, sine * u + cosine * v
+                    for i in range(n):
+                        u, v = V[i, p], V[i, q]
+                        V[i, p], V[i, q] = cosine * u - sine * v, sine * u + cosine * v
+        for j in range(n):
+            sizes[j] = 0.0
+            for i in range(m):
+                sizes[j] += U[i, j] * U[i, j]
+            sizes[j] = math.sqrt(sizes[j])
+        for j in range(n):
+            best = j
+            for k in range(j + 1, n):
+                if sizes[k] > sizes[best]:
+                    best = k
+            sizes[j], sizes[best] = sizes[best], sizes[j]
+            for i in range(m):
+                U[i, j], U[i, best] = U[i, best], U[i, j]
+            for i in range(n):
+                V[i, j], V[i, best] = V[i, best], V[i, j]
+        return sweeps
+
+    return entry(svd, "i8(f8[:,::1],f8[:,::1],f8[::1])")
+
+
+def _eigenvalues(stamp: str) -> Any:
+    def eigenvalues(S):  # type: ignore[no-untyped-def]
+        """Symmetric S (n, n) into a diagonal of its eigenvalues, by cyclic Jacobi rotations."""
+        stamp  # noqa: B018
+        n = S.shape[0]
+        for sweeps in range(SWEEPS):
+            off, whole = 0.0, 0.0
+            for i in range(n):
+                for j in range(n):
+                    whole += S[i, j] * S[i, j]
+                    if i != j:
+                        off += S[i, j] * S[i, j]
+            if not off > EPS * EPS * whole:
+                return sweeps
+            for p in range(n - 1):
+                for q in range(p + 1, n):
+                    if S[p, q] == 0.0:
+                        continue
+                    half = (S[q, q] - S[p, p]) / (2.0 * S[p, q])
+                    t = math.copysign(1.0, half) / (abs(half) + math.sqrt(1.0 + half * half))
+                    cosine = 1.0 / math.sqrt(1.0 + t * t)
+                    sine = t * cosine
+                    for i in range(n):
+                        u, v = S[i, p], S[i, q]
+                        S[i, p], S[i, q] = cosine * u - sine * v, sine * u + cosine * v
+                    for i in range(n):
+                        u, v = S[p, i], S[q, i]
+                        S[p, i], S[q, i] = cosine * u - sine * v, sine * u + cosine * v
+        return -1
+
+    return entry(eigenvalues, "i8(f8[:,::1])")
+
+
+def _product(stamp: str) -> Any:
+    def product(A, B, out):  # type: ignore[no-untyped-def]
+        """Products of matrices A (n, i, j) and B (n, j, k) into out (n, i, k); A or B may be one for all."""
+        stamp  # noqa: B018
+        for n in range(out.shape[0]):
+            a, b = min(n, A.shape[0] - 1), min(n, B.shape[0] - 1)
+            for i in range(out.shape[1]):
+                for k in range(out.shape[2]):
+                    total = 0.0
+                    for j in range(A.shape[2]):
+                        total += A[a, i, j] * B[b, j, k]
+                    out[n, i, k] = total
+
+    return entry(product, "void(f8[:,:,::1],f8[:,:,::1],f8[:,:,::1])")
+
+
+nnls = _nnls(source_stamp())
+svd = _svd(source_stamp())
+eigenvalues = _eigenvalues(source_stamp())
+product = _product(source_stamp())
