@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from clamp3d.bench.compare.methods import MANY, Method, Prepared, load, prepare
-from clamp3d.bench.compare.scene import BANDS, CLEAR, OVERLAP, Poses, known_poses
+from clamp3d.bench.compare.scene import BANDS, CLEAR, OVERLAP, Poses, coherent_poses, known_poses
 from clamp3d.core.pose import Array
 
 
@@ -35,9 +35,10 @@ class Measured:
 
     ``median_error`` and ``worst_error`` are of the distance of a wire that is clear, ``depth_error`` is the worst on
     overlaps up to 0.3 mm deep (None: no depth). ``load`` is the import of the libraries, ``setup`` what comes before
-    the first pose. ``one`` and ``many`` are seconds per pose, medians of repeated passes over all clear poses.
-    ``memory`` is what the process grew by from set-up and queries, ``library_memory`` from the import (None where the
-    system does not tell).
+    the first pose. ``one`` and ``many`` are CPU seconds per pose, medians of repeated passes over as many clear poses
+    as overlapping ones; ``coherent`` is the same on a slow motion, where a solver may start from its last answer;
+    ``threaded`` is by the clock, on all cores (None: the method has no threads). ``memory`` is what the process grew
+    by from set-up and queries, ``library_memory`` from the import (None where the system does not tell).
     """
 
     method: str
@@ -53,8 +54,15 @@ class Measured:
     setup: float
     one: float
     many: float
+    coherent: float
+    threaded: float | None
     memory: float | None
     library_memory: float | None
+
+    @property
+    def error(self) -> float:
+        """Largest error in mm of the signed distance: of clear poses, and of overlaps where the method has a depth."""
+        return max(self.worst_error, self.depth_error or 0.0)
 
 
 def measure(
@@ -76,15 +84,22 @@ def measure(
     if ready.parallel_only:
         poses = poses.select(poses.parallel)
     values = np.array([ready.one(T) for T in poses.T])
-    clear = poses.group == CLEAR
+    clear, overlap = poses.group == CLEAR, poses.group == OVERLAP
     error = np.abs(poses.error(values))
-    timed = np.ascontiguousarray(poses.T[clear])
+    half = np.flatnonzero(overlap)
+    half = np.concatenate([half, np.flatnonzero(clear)[: len(half)]])
+    timed = np.ascontiguousarray(poses.T[half])
     one = repeated(lambda: [ready.one(T) for T in timed], budget) / len(timed)
-    if not np.array_equal(ready.many(timed), values[clear]):
+    way = coherent_poses(len(timed), straight=ready.parallel_only)
+    coherent = repeated(lambda: [ready.one(T) for T in way], budget) / len(way)
+    if not np.allclose(ready.many(timed), values[half], rtol=0.0, atol=1e-12 + 0.5 * error.max()):
         raise AssertionError(f"{method.label}: one and many differ")
     grown = resident()  # before the batch, whose poses and answers are the caller's
-    batch = np.tile(timed, (MANY // len(timed), 1, 1)) if ready.batched else timed
+    times = min(MANY, max(len(timed), int(budget / one))) // len(timed) if ready.batched else 1
+    batch = np.tile(timed, (times, 1, 1))
     many = repeated(lambda: ready.many(batch), budget) / len(batch)
+    run = ready.threaded
+    threaded = None if run is None else repeated(lambda: run(batch), budget, clock=time.perf_counter) / len(batch)
     return Measured(
         method=method.family,
         setting=method.setting,
@@ -93,12 +108,14 @@ def measure(
         poses=len(poses),
         median_error=float(np.median(error[clear])),
         worst_error=float(error[clear].max()),
-        depth_error=float(error[poses.group == OVERLAP].max()) if ready.depth else None,
+        depth_error=float(error[overlap].max()) if ready.depth else None,
         bands=tuple(verdicts(poses, values, band) for band in BANDS),
         load=load_time,
         setup=setup,
         one=one,
         many=many,
+        coherent=coherent,
+        threaded=threaded,
         memory=None if grown is None or loaded is None else max(0.0, grown - loaded),
         library_memory=None if loaded is None or before is None else max(0.0, loaded - before),
     )
@@ -111,13 +128,15 @@ def verdicts(poses: Poses, values: Array, band: float) -> Band:
     return Band(band, int((~hit).sum()), int(hit.sum()), int((said & ~hit).sum()), int((hit & ~said).sum()))
 
 
-def repeated(run: Callable[[], object], budget: float, most: int = 15) -> float:
-    """Median CPU time of ``run`` in s: at least 3 runs, at most ``most``, until ``budget`` s are spent."""
+def repeated(
+    run: Callable[[], object], budget: float, most: int = 15, *, clock: Callable[[], float] = time.process_time
+) -> float:
+    """Median time of ``run`` in s by ``clock``: at least 3 runs, at most ``most``, until ``budget`` s are spent."""
     times: list[float] = []
     while len(times) < 3 or (len(times) < most and sum(times) < budget):
-        start = time.process_time()
+        start = clock()
         run()
-        times.append(time.process_time() - start)
+        times.append(clock() - start)
     return statistics.median(times)
 
 

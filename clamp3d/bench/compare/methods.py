@@ -62,7 +62,8 @@ class Prepared:
     """A method ready to measure poses of the wire in the groove's frame.
 
     ``one`` takes a pose (4, 4), ``many`` takes poses (n, 4, 4). ``pieces`` counts the convex pieces, triangles or
-    chords. ``batched``: ``many`` is more than a loop. ``depth``: a negative value measures the overlap.
+    chords. ``batched``: ``many`` is more than a loop, ``threaded`` the same on all cores. ``depth``: a negative value
+    measures the overlap.
     ``elsewhere`` are seconds of the set-up that other processes took (CoACD, also when its answer was cached).
     """
 
@@ -73,6 +74,7 @@ class Prepared:
     depth: bool = True
     parallel_only: bool = False
     elsewhere: float = 0.0
+    threaded: Callable[[Array], Array] | None = None
 
 
 UNITS = {"chords": "deg", "wedges": "deg", "hulls": "", "mesh": "mm"}
@@ -140,6 +142,7 @@ def _cas() -> Prepared:
         lambda poses: signed_distances(GROOVE, WIRE, poses, workers=1),
         1,
         batched=True,
+        threaded=lambda poses: signed_distances(GROOVE, WIRE, poses),
     )
 
 

@@ -68,7 +68,9 @@ def _contact(row: Measured) -> list[object]:
     depth = "none" if row.depth_error is None else f"{row.depth_error:.2g}"
     errors = [f"{row.median_error:.2g}", f"{row.worst_error:.2g}", depth, f"{known[0]:g}" if known else "-"]
     bands = [f"{b.false_hits}/{b.false_misses}" for b in row.bands]
-    times = [f"{row.one * 1e6:.3g}", f"{row.many * 1e6:.3g}", f"{row.setup:.2g}", f"{row.load:.2f}"]
+    threaded = "-" if row.threaded is None else f"{row.threaded * 1e6:.3g}"
+    times = [f"{t * 1e6:.3g}" for t in (row.one, row.coherent, row.many)]
+    times += [threaded, f"{row.setup:.2g}", f"{row.load:.2f}"]
     both = (row.memory, row.library_memory)
     return [row.label, row.pieces, *errors, *bands, *times, "-" if None in both else f"{sum(filter(None, both)):.0f}"]
 

@@ -131,7 +131,7 @@ def pareto(rows: Sequence[Measured]) -> list[Measured]:
     Methods that only take parallel axes (chords) do not answer the same question and stay out.
     """
     front: list[Measured] = []
-    for row in sorted((r for r in rows if r.method != "chords"), key=lambda r: (r.one, r.worst_error)):
-        if not front or row.worst_error < front[-1].worst_error:
+    for row in sorted((r for r in rows if r.method != "chords"), key=lambda r: (r.one, r.error)):
+        if not front or row.error < front[-1].error:
             front.append(row)
     return front

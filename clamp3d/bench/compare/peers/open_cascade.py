@@ -1,0 +1,87 @@
+"""Open CASCADE 8: `BRepExtrema_DistShapeShape` on the true B-rep, nothing faceted; the block is loaded once.
+
+``solid`` asks two solids and has no depth. ``axis`` asks the wire's axis, less the radius, against the block's shell
+of faces: exact apart and in an overlap as long as the axis is outside the material. ``face`` knows that the groove's
+face decides, and asks it alone.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from clamp3d.bench.compare.methods import Prepared
+from clamp3d.bench.compare.peers.series import Series, ready
+from clamp3d.bench.compare.scene import WIRE, block, pair
+from clamp3d.core.pose import Array, inverse
+
+
+def _location(T: Array) -> Any:
+    from OCP.gp import gp_Trsf
+    from OCP.TopLoc import TopLoc_Location
+
+    transformation = gp_Trsf()
+    transformation.SetValues(*T[:3].ravel().tolist())
+    return TopLoc_Location(transformation)
+
+
+def _asked(part: Any, wire: Any, radius: float, *, depth: bool) -> Prepared:
+    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+
+    extrema = BRepExtrema_DistShapeShape()
+    extrema.LoadS1(part)
+
+    def one(T: Array) -> float:
+        extrema.LoadS2(wire.Moved(_location(T)))
+        extrema.Perform()
+        return float(extrema.Value()) - radius
+
+    return ready(one, 1, depth=depth)
+
+
+def _block() -> Any:
+    from clamp3d.output.step import solid
+
+    return solid(block()).Moved(_location(inverse(pair().T_a_groove)))
+
+
+def _axis() -> Any:
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
+    from OCP.gp import gp_Pnt
+
+    half = 0.5 * WIRE.length
+    return BRepBuilderAPI_MakeEdge(gp_Pnt(0.0, 0.0, -half), gp_Pnt(0.0, 0.0, half)).Edge()
+
+
+def _solid(_: float) -> Prepared:
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+
+    axes = gp_Ax2(gp_Pnt(0.0, 0.0, -0.5 * WIRE.length), gp_Dir(0.0, 0.0, 1.0))
+    wire = BRepPrimAPI_MakeCylinder(axes, WIRE.radius, WIRE.length).Shape()
+    return _asked(_block(), wire, 0.0, depth=False)
+
+
+def _face(_: float) -> Prepared:
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_SurfaceType
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    explorer = TopExp_Explorer(_block(), TopAbs_ShapeEnum.TopAbs_FACE)
+    while explorer.More():
+        face = TopoDS.Face(explorer.Current())
+        if BRepAdaptor_Surface(face).GetType() == GeomAbs_SurfaceType.GeomAbs_Cylinder:
+            return _asked(face, _axis(), WIRE.radius, depth=True)
+        explorer.Next()
+    raise AssertionError("the block has no round face")
+
+
+_NEEDS = ("OCP", "OCP.BRepExtrema", "OCP.BRepPrimAPI")
+SERIES = {
+    "open-cascade": Series(_solid, "cadquery-ocp-novtk", _NEEDS, (None,)),
+    "open-cascade-axis": Series(
+        lambda _: _asked(_block(), _axis(), WIRE.radius, depth=True), "cadquery-ocp-novtk", _NEEDS, (None,)
+    ),
+    "open-cascade-face": Series(_face, "cadquery-ocp-novtk", _NEEDS, (None,)),
+}
