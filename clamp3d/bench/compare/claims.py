@@ -1,4 +1,4 @@
-"""What may be said of a comparison: the sentences of README and docs, made from its JSON and from nothing else."""
+"""What may be said of a comparison: sentences and a table for README and docs, made from its JSON and nothing else."""
 
 from __future__ import annotations
 
@@ -43,20 +43,39 @@ def claims(data: Mapping[str, Any]) -> list[str]:
     return [_arc(arc), _whole(arc, others), _by_hand(arc, others), _verdicts(arc, others), _start(arc, others)]
 
 
-def update(page: Path, data: Mapping[str, Any]) -> None:
-    """Put the sentences between the marks of a page. Raises InputError for a page without marks."""
+def update(page: Path, made: str) -> None:
+    """Put ``made`` between the marks of a page. Raises InputError for a page without marks."""
     from clamp3d.output.files import write_text
 
     text = page.read_text(encoding="utf-8")
     if START not in text or END not in text[text.index(START) :]:
         raise InputError(f"{page.name} must have the marks {START} and {END}")
     before, rest = text.split(START, 1)
-    write_text(page, f"{before}{START}\n{as_list(data)}\n{END}{rest.split(END, 1)[1]}")
+    write_text(page, f"{before}{START}\n{made}\n{END}{rest.split(END, 1)[1]}")
 
 
 def as_list(data: Mapping[str, Any]) -> str:
     """The sentences as a Markdown list."""
     return "\n".join(textwrap.fill(f"- {line}", 124, subsequent_indent="  ") for line in claims(data))
+
+
+def assembly_table(data: Mapping[str, Any]) -> str:
+    """The reference clamp assembled without a step by each method, as a Markdown table; the picture's two rows last."""
+    rows = ["| grooves as | distance, mm | error, mm | set-up, s | assembly, s |", "|---|---|---|---|---|"]
+    for row in data["assembly"]:
+        if row.get("solver") == "exact":
+            error = "-" if row["method"] == "cas" else f"{row['error']:.3f}"
+            rows.append(
+                f"| {row['label']} | {row['distance']:.3f} | {error} | {row['setup']:.2g} | {row['seconds']:.2g} |"
+            )
+        elif "reason" in row:
+            rows.append(f"| {row['label']} | {row['reason']} | | | |")
+    image = data["image"]
+    if "reason" not in image:
+        by_hand = f"{image['trials']} trials, median; marking error chosen"
+        rows.append(f"| a drawn picture, marked by hand ({by_hand}) | - | {image['median_by_hand']:.2f} | | |")
+        rows.append(f"| the same picture, end points found automatically | - | {image['automatic']:.3f} | | |")
+    return "\n".join(dict.fromkeys(rows))
 
 
 def _arc(arc: Mapping[str, Any]) -> str:

@@ -25,7 +25,7 @@ from clamp3d.bench.compare import peers as compare_peers
 from clamp3d.bench.compare import run as study
 from clamp3d.bench.compare.assemblies import Assembled, Imaged, assembled, imaged
 from clamp3d.bench.compare.chart import check_format, save_comparison
-from clamp3d.bench.compare.claims import END, START, as_list, claims, update
+from clamp3d.bench.compare.claims import END, START, as_list, assembly_table, claims, update
 from clamp3d.bench.compare.jobs import JobError, run_job
 from clamp3d.bench.compare.measure import Band, Measured, measure, verdicts
 from clamp3d.bench.compare.methods import METHODS, Method, prepare
@@ -201,6 +201,7 @@ def test_pages_say_what_the_figures_say(tmp_path: Path) -> None:
     data = json.loads((root / "docs" / "compare.json").read_text())
     for page in ("README.md", "docs/methods.md"):
         assert as_list(data) in (root / page).read_text(), f"{page}: run scripts/make-figures"
+    assert assembly_table(data) in (root / "docs" / "reproduction.md").read_text(), "run scripts/make-figures"
     slow = json.loads(json.dumps(data))
     for row in slow["contact"]:
         if row["method"] == "cas":
@@ -211,10 +212,10 @@ def test_pages_say_what_the_figures_say(tmp_path: Path) -> None:
     assert "0.0" in other.split("one call of the arc")[0]  # and it is slower than a piece chosen by hand
     page = tmp_path / "page.md"
     page.write_text(f"before\n{START}\nold\n{END}\nafter\n")
-    update(page, data)
+    update(page, as_list(data))
     assert page.read_text() == f"before\n{START}\n{as_list(data)}\n{END}\nafter\n"
     with pytest.raises(InputError, match="must have the marks"):
-        update(root / "LICENSE", data)
+        update(root / "LICENSE", "")
 
 
 def test_a_missing_peer_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
