@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.brep.tessellate import Tessellation, tessellate
 from clamp3d.core.mesh import Array, IntArray, Mesh, is_closed
@@ -47,6 +49,22 @@ class BrepSolid(MeshShape):
         mesh = _mesh(name, triangles)
         error = float(triangles.errors.max())
         return cls(mesh, "off", name, error, brep=brep, face=triangles.face, errors=triangles.errors)
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """All of it as plain arrays, for another process; `from_arrays` makes it again without Open CASCADE."""
+        return {
+            "brep": np.frombuffer(self.brep, dtype=np.uint8),
+            "vertices": self.mesh.vertices,
+            "faces": self.mesh.faces,
+            "face": self.face,
+            "errors": self.errors,
+        }
+
+    @classmethod
+    def from_arrays(cls, name: str, arrays: Mapping[str, NDArray[Any]]) -> BrepSolid:
+        """From what `to_arrays` gave."""
+        triangles = Tessellation(*(arrays[key] for key in ("vertices", "faces", "face", "errors")))
+        return cls.made(name, arrays["brep"].tobytes(), triangles)
 
     @cached_property
     def solid(self) -> Any:

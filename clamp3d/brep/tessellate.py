@@ -6,12 +6,12 @@ on planes, cylinders, cones, spheres and tori in closed form, on other surfaces 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.core.mesh import Array, IntArray
 from clamp3d.errors import Clamp3dError
@@ -35,15 +35,16 @@ class Tessellation:
     errors: Array
 
 
-def explore(shape: Any, kind: str) -> Iterator[Any]:
-    """Sub-shapes of a ``kind`` ("SOLID", "FACE", "EDGE", ...) in the order of Open CASCADE's explorer."""
+def explore(shape: Any, kind: str, outside: str = "SHAPE") -> Iterator[Any]:
+    """Sub-shapes of a ``kind`` ("SOLID", "FACE", ...), ``outside`` of those of another, in the explorer's order."""
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopoDS import TopoDS
 
     name = kind.capitalize()
     cast = getattr(TopoDS, f"{name}_s", None) or getattr(TopoDS, name)
-    explorer = TopExp_Explorer(shape, getattr(TopAbs_ShapeEnum, f"TopAbs_{kind}"))
+    kinds = (getattr(TopAbs_ShapeEnum, f"TopAbs_{k}") for k in (kind, outside))
+    explorer = TopExp_Explorer(shape, *kinds)
     while explorer.More():
         yield cast(explorer.Current())
         explorer.Next()
@@ -122,7 +123,9 @@ def _collected(solid: Any) -> Tessellation:
         start += n
     if not nodes:
         raise Clamp3dError("the solid has no faces")
-    return _joined(np.concatenate(nodes), np.concatenate(triangles), np.concatenate(owner), np.concatenate(errors), links)
+    return _joined(
+        np.concatenate(nodes), np.concatenate(triangles), np.concatenate(owner), np.concatenate(errors), links
+    )
 
 
 def _joined(V: Array, F: IntArray, owner: IntArray, errors: Array, links: list[tuple[int, int]]) -> Tessellation:
@@ -172,8 +175,10 @@ def _sagitta(edge: Any, polygon: Any) -> Array:
     if kind == Kind.GeomAbs_Ellipse:  # a circle stretched: so is its sagitta, at most by the longer half axis
         return np.asarray(curve.Ellipse().MajorRadius() * (1.0 - np.cos(turn)))
     found = []
-    for a, b in zip(t[:-1], t[1:], strict=True):
-        p = np.array([(q.X(), q.Y(), q.Z()) for q in (curve.Value(a + s * (b - a)) for s in (0.0, 0.25, 0.5, 0.75, 1.0))])
+    for a, b in itertools.pairwise(t):
+        p = np.array(
+            [(q.X(), q.Y(), q.Z()) for q in (curve.Value(a + s * (b - a)) for s in (0.0, 0.25, 0.5, 0.75, 1.0))]
+        )
         along = p[-1] - p[0]
         size = float(np.linalg.norm(along))
         away = np.linalg.norm(np.cross(p - p[0], along), axis=1) / size if size else np.linalg.norm(p - p[0], axis=1)
@@ -182,7 +187,7 @@ def _sagitta(edge: Any, polygon: Any) -> Array:
 
 
 def _bound(face: Any) -> Callable[[Array, Array], Array]:
-    """Distance bound (m,) mm of triangles from a face's surface, from their parameters (m, 3, 2) and corners (m, 3, 3)."""
+    """Distance (m,) mm of triangles from a face at most, by their parameters (m, 3, 2) and corners (m, 3, 3)."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_SurfaceType as Kind
 
@@ -241,4 +246,4 @@ def _sampled(surface: Any, uv: Array, P: Array) -> Array:
     flat = np.einsum("sk,mkd->msd", _SAMPLES, P).reshape(-1, 3)
     points = [surface.Value(float(u), float(v)) for u, v in where]
     found = np.linalg.norm(np.array([(p.X(), p.Y(), p.Z()) for p in points]) - flat, axis=1)
-    return 2.0 * found.reshape(len(P), -1).max(axis=1)
+    return np.asarray(2.0 * found.reshape(len(P), -1).max(axis=1))

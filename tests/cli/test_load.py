@@ -103,9 +103,9 @@ def test_anything_else_is_one_clear_line(source, options, message, tmp_path, mon
 
 
 def test_the_command_lines_argument_is_the_same():
-    assert Source("reference", "LJ-500", None).load() == load("reference", line="LJ-500")
+    assert Source("reference", "LJ-500", *[None] * 6, False).load() == load("reference", line="LJ-500")
     with pytest.raises(InputError, match="line goes with a clamp"):
-        Source(str(ROOT / "examples" / "hinge" / "scene.toml"), "LJ-500", None).load()
+        Source(str(ROOT / "examples" / "hinge" / "scene.toml"), "LJ-500", *[None] * 6, False).load()
 
 
 def test_a_scene_without_parts_is_refused(tmp_path):

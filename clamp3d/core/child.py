@@ -59,7 +59,8 @@ def end_with_caller() -> None:
     """End this process at once when its caller is gone, that is, when its stdin closes."""
 
     def wait() -> None:
-        sys.stdin.buffer.read()
+        while os.read(0, 4096):  # sys.stdin has a lock that a waiting thread would keep at exit
+            pass
         os._exit(1)
 
     threading.Thread(target=wait, daemon=True).start()
