@@ -47,6 +47,8 @@ def read_3mf(path: Path) -> Reading:
         reader.SetStrictModeActive(False)
         reader.ReadFromFile(str(path))
         warnings = {reader.GetWarning(k)[1] for k in range(reader.GetWarningCount())}
+        if any("unit" in text.lower() for text in warnings):
+            raise InputError(f"{path}: unit must be one of micron, millimeter, centimeter, meter, inch, foot")
         scale = _UNITS[model.GetUnit().name]
         placer = Placer(scale)
         items = model.GetBuildItems()

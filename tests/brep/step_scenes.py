@@ -70,7 +70,7 @@ def pose(rng):
 
 
 def nested(rng):
-    """A tree of three levels with a pin that is there three times: the tree, and name, volume and pose of each solid."""
+    """A tree of three levels with a pin that is there three times; and name, volume and pose of each solid."""
     tree = Tree()
     root, sub, plates, pins = (
         tree.product("machine"),

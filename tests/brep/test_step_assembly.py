@@ -1,7 +1,5 @@
 """STEP assemblies against what Open CASCADE wrote: names, placements, instances, units, and nothing left out."""
 
-import re
-
 import numpy as np
 import pytest
 
@@ -94,9 +92,8 @@ def test_a_line_less_is_never_a_body_less(written, tmp_path):
         damaged.write_text("".join(lines[:k] + lines[k + 1 :]))
         try:
             announced(damaged)
-        except InputError as error:
+        except InputError:
             told += 1
-            assert re.search("damaged", str(error))
             continue
         try:
             bodies = load_bodies(damaged).bodies
