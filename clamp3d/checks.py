@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import numbers
 import os
+import stat
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -38,6 +39,21 @@ def shown(value: object) -> str:
         return type(value).__name__
     text = " ".join(text.split())
     return text if len(text) <= 80 and not (isinstance(value, str) and len(value) > 80) else text[:76] + " ..."
+
+
+def readable_file(path: Path, most: float = math.inf) -> int:
+    """Size in bytes of a file that can be read to its end: no folder, pipe or device, and at most ``most`` bytes."""
+    try:
+        found = os.stat(path)
+    except FileNotFoundError:
+        raise InputError(f"{short(path)}: no such file") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{short(path)}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError(f"{short(path)}: not a regular file")
+    if found.st_size > most:
+        raise InputError(f"{short(path)}: {found.st_size} bytes, at most {most:.0f} are read")
+    return found.st_size
 
 
 def short(value: object, most: int = 200) -> str:

@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 
-from clamp3d.baselines.child import end_with_caller
+from clamp3d.core.child import end_with_caller
 
 
 def main(source: str, target: str) -> None:

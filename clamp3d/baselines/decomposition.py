@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.baselines import cache as disk
-from clamp3d.baselines.child import run_child
+from clamp3d.core.child import run_child
 from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, MissingLibraryError, SolverError

@@ -1,72 +1,119 @@
-"""STEP files as triangles: the B-rep tessellated on the way in. Needs the extra ``step`` (cadquery-ocp-novtk)."""
+"""STEP files as placed solids: the product tree with names, placements and shared instances (Open CASCADE's XDE).
+
+This runs in a process of its own (`clamp3d.brep.apart`): a damaged file can end it. Needs the extra ``step``.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from clamp3d.errors import InputError, MissingLibraryError
+from clamp3d.brep.bodies import Reading
+from clamp3d.brep.cad import Key, Node, bodies_of, matrix
+from clamp3d.brep.part21 import Announced, announced
+from clamp3d.brep.solid import require_open_cascade
+from clamp3d.errors import InputError
 
-CHORD_ERROR = 0.02
-"""Largest distance (mm) between a surface and its triangles; their corners lie on the surface."""
-_ANGLE = 0.2  # rad: small fillets get facets enough to be known as round
-
-
-def require_open_cascade() -> None:
-    """Load Open CASCADE and keep it from printing on stdout. Raises MissingLibraryError if it is not installed."""
-    try:
-        import OCP  # noqa: F401
-    except ImportError:
-        raise MissingLibraryError("STEP needs Open CASCADE: pip install 'clamp3d[step]'") from None
-    from OCP.Message import Message
-
-    messenger = Message.DefaultMessenger_s()
-    for printer in [*messenger.Printers()]:
-        messenger.RemovePrinter(printer)
+_OTHERS = {
+    "CSG_SOLID": "solids of constructive geometry",
+    "EXTRUDED_AREA_SOLID": "swept solids",
+    "REVOLVED_AREA_SOLID": "swept solids",
+    "SWEPT_FACE_SOLID": "swept solids",
+    "SOLID_REPLICA": "copied solids",
+    "TESSELLATED_SOLID": "tessellated solids",
+    "TESSELLATED_SHELL": "tessellated shells",
+}
+"""Bodies that Open CASCADE does not make into solids."""
+_PLACE = "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"
 
 
-def read_step(file: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices (n, 3) in mm and faces (m, 3) of all shapes in a STEP file.
+def read_step(path: Path) -> Reading:
+    """The solids of a STEP file, in the order of its tree, in mm.
 
-    Raises MissingLibraryError without the extra ``step``, InputError if the file is no STEP file or has no surface.
+    Raises InputError if its text is damaged or Open CASCADE cannot read it.
     """
+    found = announced(path)
     require_open_cascade()
-    from OCP.BRep import BRep_Tool
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.IFSelect import IFSelect_ReturnStatus
-    from OCP.STEPControl import STEPControl_Reader
-    from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopLoc import TopLoc_Location
-    from OCP.TopoDS import TopoDS
+    from OCP.STEPCAFControl import STEPCAFControl_Reader
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
-    reader = STEPControl_Reader()
-    if reader.ReadFile(str(file)) != IFSelect_ReturnStatus.IFSelect_RetDone or reader.TransferRoots() == 0:
-        raise InputError(f"{file}: not a readable STEP file")
-    shape: Any = reader.OneShape()
-    BRepMesh_IncrementalMesh(shape, CHORD_ERROR, False, _ANGLE, True)
-    to_face = getattr(TopoDS, "Face_s", None) or TopoDS.Face
-    vertices: list[tuple[float, float, float]] = []
-    faces: list[tuple[int, int, int]] = []
-    explorer = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
-    while explorer.More():
-        face = to_face(explorer.Current())
-        explorer.Next()
-        place = TopLoc_Location()
-        triangles = BRep_Tool.Triangulation_s(face, place)
-        if triangles is None:
-            continue
-        start, move = len(vertices) - 1, place.Transformation()  # OCCT counts from 1
-        for i in range(1, triangles.NbNodes() + 1):
-            p = triangles.Node(i).Transformed(move)
-            vertices.append((p.X(), p.Y(), p.Z()))
-        turned = face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
-        for i in range(1, triangles.NbTriangles() + 1):
-            a, b, c = triangles.Triangle(i).Get()
-            faces.append((start + a, start + c, start + b) if turned else (start + a, start + b, start + c))
-    if not faces:
-        raise InputError(f"{file}: no surface in the file")
-    return np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int64)
+    document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
+    XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
+    reader = STEPCAFControl_Reader()
+    reader.SetNameMode(True)
+    if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone or not reader.Transfer(document):
+        raise InputError(f"{path}: not a readable STEP file")
+    reading, solids = bodies_of(_roots(document, path.stem))
+    missing = (*found.orphans, *_lost(document, found, solids))
+    return Reading(reading.bodies, missing + reading.missing, reading.notes)
+
+
+def _roots(document: Any, stem: str) -> Iterator[Node]:
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+    from OCP.XCAFDoc import XCAFDoc_ShapeTool as Tool
+
+    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    for label in _children(tool.BaseLabel()):
+        if Tool.IsShape_s(label) and Tool.IsFree_s(label):
+            yield _node(label, stem)
+
+
+def _node(label: Any, otherwise: str) -> Node:
+    """A label of the product tree: its name, placement and shape, or the labels below it."""
+    from OCP.TDF import TDF_Label
+    from OCP.XCAFDoc import XCAFDoc_ShapeTool as Tool
+
+    product = TDF_Label()
+    if not Tool.GetReferredShape_s(label, product):
+        product = label
+    name = _name(product) or _name(label) or otherwise
+    T = matrix(Tool.GetLocation_s(label))
+    if Tool.IsAssembly_s(product):
+        below = (_node(child, name) for child in _children(product) if Tool.IsComponent_s(child))
+        return Node(name, T, None, below)
+    named = {}
+    for child in _children(product):
+        if Tool.IsSubShape_s(child):
+            shape = Tool.GetShape_s(child)
+            named[Key(shape)] = _name(child)
+    shape = Tool.GetShape_s(product)
+    return Node(name, T if product is not label else np.eye(4), shape, (), named)
+
+
+def _children(label: Any) -> Iterator[Any]:
+    from OCP.TDF import TDF_ChildIterator
+
+    walk = TDF_ChildIterator(label)
+    while walk.More():
+        yield walk.Value()
+        walk.Next()
+
+
+def _name(label: Any) -> str:
+    from OCP.TDataStd import TDataStd_Name
+
+    found = TDataStd_Name()
+    return str(found.Get().ToExtString()).strip() if label.FindAttribute(TDataStd_Name.GetID_s(), found) else ""
+
+
+def _lost(document: Any, found: Announced, solids: int) -> Iterator[str]:
+    """Bodies and instances that the file announces and Open CASCADE has not made: ``solids`` different ones it has."""
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+    from OCP.XCAFDoc import XCAFDoc_ShapeTool as Tool
+
+    for kind, words in _OTHERS.items():
+        if found.counts[kind]:
+            yield f"{found.counts[kind]} {words}, which Open CASCADE does not read"
+    if found.solids > solids:
+        yield f"{found.solids - solids} of the file's {found.solids} solids (not readable)"
+    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    instances = sum(Tool.IsComponent_s(below) for label in _children(tool.BaseLabel()) for below in _children(label))
+    uses, places = (found.counts[f"{kind}"] for kind in ("NEXT_ASSEMBLY_USAGE_OCCURRENCE", _PLACE))
+    if max(uses, places) > instances or 0 < places < uses:
+        yield f"{uses} instances in the tree, {places} places for them, {instances} read"

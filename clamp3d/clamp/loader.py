@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 import typing
 from dataclasses import fields
@@ -15,6 +16,10 @@ from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import SMALLEST, Clamp, Wire
 from clamp3d.core.validation import validate
 from clamp3d.errors import InputError
+
+_MOST_BYTES = 2**26
+_MOST_DOTS = 64
+_DOTTED = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{_MOST_DOTS + 1}}}""")
 
 WireSize: TypeAlias = str | float
 """A wire by catalogue name, or by diameter in mm."""
@@ -93,6 +98,7 @@ def _read(path: Path) -> tuple[str, str]:
 
 def read_text(path: Path) -> str:
     """Text of a UTF-8 file, a byte order mark left out. Raises InputError if it cannot be read or is no text."""
+    checks.readable_file(path, _MOST_BYTES)
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
@@ -103,6 +109,11 @@ def read_text(path: Path) -> str:
 
 def parse_toml(text: str, origin: str) -> dict[str, typing.Any]:
     """Tables of a TOML text. Raises InputError naming ``origin`` and the line."""
+    dotted = _DOTTED.search(text)  # tomllib takes memory that grows as the square of such a key
+    if dotted is not None:
+        raise InputError(
+            f"{origin}: not valid TOML: a key of more than {_MOST_DOTS} dots: {checks.short(dotted[0], 40)}"
+        )
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, ValueError) as error:  # an integer of thousands of digits is a ValueError

@@ -23,7 +23,6 @@ from typing import Any, Literal
 import numpy as np
 
 from clamp3d.baselines.cas import Cas
-from clamp3d.baselines.child import end_with_parent
 from clamp3d.checks import choice, function, instance, number, whole
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.final_state import FinalState, solve_final_state
@@ -31,6 +30,7 @@ from clamp3d.clamp.journal import Journal
 from clamp3d.clamp.section import D, S, Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
 from clamp3d.clamp.status import CLAMPED, final_status, measured_status
+from clamp3d.core.child import end_with_parent
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, MissingLibraryError, SolverError, without_numbers
 

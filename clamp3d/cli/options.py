@@ -134,22 +134,62 @@ class Source:
     source: str = argument(metavar="[INPUT]", default="reference", required=False)
     line: str | None = option("Power line: catalogue name or diameter in mm.", metavar="CONDUCTOR")
     jumper: str | None = option("Jumper: catalogue name or diameter in mm.", metavar="CONDUCTOR")
+    input_unit: str | None = option("Unit of a mesh file.  [default: mm; m for glTF]", type=click.Choice(UNITS))
+    fit: str | None = option(
+        "Round surfaces of a mesh file: off: its facets are the part; bound, round: fitted.  [default: off]",
+        type=click.Choice(["off", "bound", "round"]),
+    )
+    chord: float | None = option("How far a mesh file's true surface can be from its facets.", metavar="MM")
+    joints: str | None = option("Joint values of a URDF: rad, or mm for those that slide.", metavar="NAME=VALUE,...")
+    poses: Path | None = option(
+        "Poses of a folder of meshes: CSV with name,x,y,z,qx,qy,qz,qw.", type=INPUT_FILE, metavar="CSV"
+    )
+    partial: bool = option("Go on where some bodies of a file cannot be read; a note says how many of how many.")
 
     def load(self) -> Clamp | Scene:
-        """A clamp, or a scene from a scene file, a mesh or a STEP file."""
+        """A clamp, or a scene from a scene file or any file that holds bodies."""
         from clamp3d.scenefile.load import load
 
-        return load(self.source, line=self.line, jumper=self.jumper)
+        return load(
+            self.source,
+            line=self.line,
+            jumper=self.jumper,
+            unit=self.input_unit,
+            fit=self.fit,  # type: ignore[arg-type]
+            chord=self.chord,
+            joints=_joints(self.joints),
+            poses=self.poses,
+            partial=self.partial,
+        )
+
+
+def _joints(text: str | None) -> dict[str, float]:
+    found = {}
+    for item in text.split(",") if text else ():
+        name, equals, value = item.partition("=")
+        if not equals or not name.strip():
+            raise click.BadParameter(f"must read like elbow=1.57,slide=20, got {item!r}", param_hint="--joints")
+        found[name.strip()] = number(value)
+    return found
+
+
+@dataclass(frozen=True)
+class ClampSource:
+    """The clamp that a command is to work on."""
+
+    source: str = argument(metavar="[CLAMP]", default="reference", required=False)
+    line: str | None = option("Power line: catalogue name or diameter in mm.", metavar="CONDUCTOR")
+    jumper: str | None = option("Jumper: catalogue name or diameter in mm.", metavar="CONDUCTOR")
 
     def clamp(self) -> Clamp:
-        """A clamp; anything else is an error."""
+        """The clamp; anything else is an error."""
         from clamp3d.clamp.loader import load_clamp
 
         return load_clamp(self.source, line=self.line, jumper=self.jumper)
 
 
 SOURCE = group(Source)
-CLAMP = group(Source, source=argument(metavar="[CLAMP]", default="reference", required=False))
+CLAMP = group(ClampSource)
 
 
 @dataclass(frozen=True)

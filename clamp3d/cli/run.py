@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from clamp3d.cli.options import CLAMP, JSON, METHOD, QUIET, VIEWING, Method, Source, Viewing, declared, option
+from clamp3d.cli.options import CLAMP, JSON, METHOD, QUIET, VIEWING, ClampSource, Method, Viewing, declared, option
 from clamp3d.cli.progress import narrator
 from clamp3d.cli.terminal import finish, show
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @declared("run")
 def command(
-    source: Source = CLAMP,
+    source: ClampSource = CLAMP,
     method: Method = METHOD,
     equilibria: bool | None = option(
         "Also report the other states that closing can end in.  [default: with method cas, exact solver]",

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import CLAMP, JSON, PICTURE, Source, declared, option
+from clamp3d.cli.options import CLAMP, JSON, PICTURE, ClampSource, declared, option
 from clamp3d.cli.terminal import show
 
 
 @declared("sweep")
 def command(
-    source: Source = CLAMP,
+    source: ClampSource = CLAMP,
     wire: str = option("Line or jumper.", type=click.Choice(["P6", "P7"]), default="P6"),
     offset: float = option("Half range across.", default=15.0, metavar="MM"),
     height: float | None = option("Half range along the bolt.  [default: not varied]", metavar="MM"),

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import CLAMP, JSON, PICTURE, QUIET, Source, declared, option
+from clamp3d.cli.options import CLAMP, JSON, PICTURE, QUIET, ClampSource, declared, option
 from clamp3d.cli.terminal import show
 
 
 @declared("tolerance")
 def command(
-    source: Source = CLAMP,
+    source: ClampSource = CLAMP,
     n: int = option("Clamps to assemble.", type=click.IntRange(1, 100_000_000), default=1000),
     seed: int = option("Seed of the dimensions.", type=click.IntRange(0), default=0),
     tolerance: float | None = option("Either way, each dimension.  [default: ISO 2768-1 m]", metavar="MM"),

@@ -30,7 +30,7 @@ def meshes_distance(a: Model, b: Model, T: Array, error: float) -> Distance:
     of the few that are tried does.
     """
     outer = surface_distance(a.outer(error), b.outer(error), T)
-    if not (a.refines or b.refines):
+    if not (a.between or b.between):
         return outer
     inner_a, inner_b = a.inner(error), b.inner(error)
     if inner_a is None or inner_b is None:
@@ -39,16 +39,15 @@ def meshes_distance(a: Model, b: Model, T: Array, error: float) -> Distance:
     if inner.lower > 0.0 and inner.point_a is not None and inner.point_b is not None:
         p = _on_surface(a, np.eye(4), inner.point_a, inner.point_b)
         q = _on_surface(b, T, inner.point_b, p)
-        inner = replace(
-            inner, upper=float(np.linalg.norm(q - p)) + _rounding(inner_a, inner_b, T), point_a=p, point_b=q
-        )
+        off = inner_a.error + inner_b.error + _rounding(inner_a, inner_b, T)
+        inner = replace(inner, upper=float(np.linalg.norm(q - p)) + off, point_a=p, point_b=q)
     return replace(inner, lower=min(outer.lower, inner.upper), normal=None)
 
 
 def _on_surface(model: Model, T: Array, inside: Array, outside: Array) -> Array:
     """Last point (3,) of a drawn solid at ``T`` (4, 4) on the way from a point of its inner mesh to one outside."""
     forms = model.bodies
-    if forms is None or not model.refines:
+    if forms is None or not model.between:
         return inside
     start, way = (inside - T[:3, 3]) @ T[:3, :3], (outside - inside) @ T[:3, :3]
     low, high = 0.0, 1.0

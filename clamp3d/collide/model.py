@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.body import ClosedForm
 from clamp3d.collide.convex import Hull, hull
 from clamp3d.collide.drawn import bodies_of
@@ -29,6 +30,9 @@ Maker = Callable[[Solid, float], tuple[Array, NDArray[np.int64]] | None]
 
 FINEST = 0.001
 """Smallest chord error (mm) that a mesh is made with; a pair still open then is uncertain."""
+
+FINEST_CAD = 0.004
+"""The same (mm) for solids from CAD, whose facets come from a slow mesher."""
 
 
 @dataclass
@@ -59,7 +63,7 @@ class Model:
         if isinstance(self.shape, Solid):
             return self.shape.bounds
         V = self.shape.mesh.vertices
-        reach = _bulge(self.shape) if self.shape.fit != "off" else 0.0
+        reach = self.shape.error + (_bulge(self.shape) if self.shape.fit != "off" else 0.0)
         return np.array([V.min(axis=0) - reach, V.max(axis=0) + reach])
 
     @cached_property
@@ -74,7 +78,7 @@ class Model:
         raw = self.raw
         volume = float(raw.manifold.volume())
         if abs(float(raw.manifold.hull().volume()) - volume) <= 1e-9 * volume:
-            return (ClosedForm((self._hull(self.shape.mesh.vertices),)),)
+            return (ClosedForm((self._hull(self.shape.mesh.vertices),), error=self.shape.error),)
         return None
 
     @property
@@ -110,21 +114,33 @@ class Model:
 
     @property
     def refines(self) -> bool:
-        """Whether a smaller chord error gives a better mesh: true of drawn solids with arcs."""
+        """Whether a smaller chord error gives a better mesh: true of drawn solids with arcs and of solids from CAD."""
+        if isinstance(self.shape, BrepSolid):
+            return self.shape.error > 1e-6
         return isinstance(self.shape, Solid) and any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes))
+
+    @property
+    def between(self) -> bool:
+        """Whether the part lies between an inner and an outer mesh; else one mesh has an error for each triangle."""
+        return isinstance(self.shape, Solid) and self.refines
 
     @cached_property
     def raw(self) -> Surface:
-        """The facets of a mesh shape; flat faces are exact, round ones are off by the error of the fit."""
+        """The facets of a mesh shape; round faces are off by the error of the fit, all by what the shape states."""
         assert isinstance(self.shape, MeshShape)
+        if isinstance(self.shape, BrepSolid):
+            return self._facets(self.shape)
         V, F = self.shape.mesh.vertices, self.shape.mesh.faces
-        error = None
+        error = np.full(len(F), self.shape.error) if self.shape.error else None
         if self._fit is not None and self._fit.features:
-            error = np.zeros(len(F))
+            error = np.zeros(len(F)) if error is None else error
             for feature in self._fit.features:
-                error[feature.faces] = np.maximum(error[feature.faces], feature.error_bound)
+                error[feature.faces] = np.maximum(error[feature.faces], feature.error_bound + self.shape.error)
             error = at_edges(V, F, error)
         return self._counted(Surface(V, F, error))
+
+    def _facets(self, solid: BrepSolid) -> Surface:
+        return self._counted(Surface(solid.mesh.vertices, solid.mesh.faces, solid.errors))
 
     def outer(self, error: float) -> Surface:
         """Mesh of chord error ``error`` mm that holds a drawn solid; a mesh shape's own facets, whose errors it has."""
@@ -137,6 +153,12 @@ class Model:
         return self._made(self._inner, enclosed, error)
 
     def _made(self, kept: dict[float, Surface | None], make: Maker, error: float) -> Surface | None:
+        if isinstance(self.shape, BrepSolid):
+            finer = self.shape.tessellated(max(error, FINEST_CAD))
+            kept, error = self._inner, finer.error
+            if error not in kept:
+                kept[error] = self.raw if finer is self.shape else self._facets(finer)
+            return kept[error]
         if isinstance(self.shape, MeshShape):
             return self.raw
         if not self.refines:  # outlines without arcs are exact at any chord error: one mesh serves all

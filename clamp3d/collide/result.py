@@ -160,6 +160,7 @@ class CheckResult:
             "clean": self.clean,
             "counts": self.counts,
             "findings": [row.to_dict() for row in self.findings],
+            "notes": list(self.scene.notes),
             "parts": {part.name: {"T_world": part.T_world.tolist()} for part in self.scene.parts},
             "pairs": [row.to_dict() for row in self.pairs],
             "motions": [row.to_dict() for row in self.motions],

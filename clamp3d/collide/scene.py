@@ -93,6 +93,8 @@ class Allowances:
 class Scene:
     """Parts in the world, what counts as contact and clearance, what may touch, and how parts move.
 
+    ``notes`` say what was assumed, repaired or left out when the parts were read.
+
     >>> import math
     >>> from clamp3d.core import shapes
     >>> from clamp3d.core.primitives import SweptArc
@@ -111,6 +113,7 @@ class Scene:
     allowed: tuple[Allowed, ...] = ()
     motions: tuple[Motion, ...] = ()
     name: str = "scene"
+    notes: tuple[str, ...] = ()
     thresholds: Thresholds = field(init=False)
     _index: dict[str, int] = field(init=False, repr=False)
     """Positions by name, shared with the scenes that `add` made of this one: it may hold more names than are here."""

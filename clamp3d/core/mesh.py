@@ -271,6 +271,13 @@ def _edges(F: IntArray) -> tuple[IntArray, NDArray[np.intp], NDArray[np.intp]]:
     return directed, edge.reshape(-1), uses
 
 
+def is_closed(F: IntArray) -> bool:
+    """Whether every edge of faces (m, 3) has two of them, which run along it in opposite directions."""
+    directed, edge, uses = _edges(F)
+    balance = np.bincount(edge, weights=np.where(directed[:, 0] < directed[:, 1], 1, -1))
+    return bool((uses == 2).all() and not balance.any())
+
+
 def _place(directed: IntArray, wrong: NDArray[np.bool_]) -> str:
     k = int(np.argmax(wrong))
     return f"at face {k // 3}, vertices {directed[k, 0]} and {directed[k, 1]}"

@@ -87,17 +87,21 @@ class MeshShape:
 
     ``fit``: "bound" fits grooves, cylinders and holes and adds the error bound that assumes nothing between the
     vertices; "round" assumes round surfaces through the vertices (what a CAD export is) and adds the fit's error
-    alone; "off" takes the facets as the part. Raises InputError if the mesh is not watertight.
+    alone; "off" takes the facets as the part. ``error`` mm: how far the true surface can be from the facets, as stated
+    by who made them. Raises InputError if the mesh is not watertight.
     """
 
     mesh: Mesh
     fit: Fit = "bound"
     name: str = field(default="mesh")
+    error: float = 0.0
 
     def __post_init__(self) -> None:
         instance("mesh", self.mesh, Mesh)
         choice("fit", self.fit, FITS)
         text("name of a mesh", self.name)
+        if not number("error of a mesh", self.error) >= 0.0:
+            raise InputError(f"error of a mesh must be >= 0 mm, got {self.error}")
         if not self.mesh.watertight:
             raise InputError(f"{self.mesh.name}: mesh must be watertight to have an inside; close it or merge vertices")
 

@@ -24,6 +24,7 @@ from clamp3d.output.wording import (
 _MATRIX = 14
 """More parts than this and the matrix no longer fits a terminal."""
 _ROWS = 60
+_NOTES = 12
 _MARK = {
     Verdict.CLEAR: ".",
     Verdict.CLEARANCE: "g",
@@ -54,6 +55,9 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
         f"{counted(n, 'part')}, {counted(result.work.pairs, 'pair')}{moving}: {counts_text(result)}; "
         f"contact up to {t.contact:g} mm, {clearance}",
     ]
+    lines += [f"  note: {note}" for note in result.scene.notes[:_NOTES]]
+    if len(result.scene.notes) > _NOTES:
+        lines.append(f"  ... and {len(result.scene.notes) - _NOTES} more notes (--json lists all)")
     for row in result.findings[:_ROWS]:
         where = circumstances(row)
         lines.append(f"  {sentence(row, names)}" + (f"; {where}" if where else ""))
@@ -122,5 +126,5 @@ def check_to_html(result: CheckResult, full: CheckResult | None = None) -> str:
     """The result as one page in 3D that needs no other file and no network."""
     from clamp3d.output.viewer import view
 
-    with view(result, serve=False, notes=work_text(result.work, full)) as viewer:
+    with view(result, serve=False, notes=[*result.scene.notes, *work_text(result.work, full)]) as viewer:
         return viewer.html()

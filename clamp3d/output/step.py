@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from clamp3d.brep.step_file import require_open_cascade
+from clamp3d.brep.solid import require_open_cascade
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc

@@ -13,7 +13,8 @@ from clamp3d.collide.scene import Allowed, Part, Scene
 from clamp3d.core import shapes
 from clamp3d.core.validation import validate
 from clamp3d.errors import Clamp3dError, InputError, escaped
-from clamp3d.scenefile.tables import TAGS, ClampTable, MeshTable, SceneTable, clamp_source
+from clamp3d.scenefile.parts import Parts
+from clamp3d.scenefile.tables import TAGS, ClampTable, FileTable, MeshTable, SceneTable, clamp_source
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -43,16 +44,29 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
     table: SceneTable = validate(SceneTable, parse_toml(text, origin), origin, TAGS)
     parts: list[Part] = []
     allowed: list[Allowed] = []
-    files: dict[tuple[str, str | None, str], shapes.AnyShape] = {}
+    notes: list[str] = []
+    files: dict[tuple[object, ...], shapes.AnyShape] = {}
     where = ""
+
+    def take(found: Parts, of: str) -> None:
+        parts.extend(found.parts)
+        allowed.extend(found.allowed)
+        notes.extend(f"{of}: {note}" for note in found.notes)
+
     try:
         if table.clamp is not None:
             clamp = _clamp_scene(table.clamp, folder)
-            parts, allowed = [*clamp.parts], [*clamp.allowed]
+            take(Parts(clamp.parts, (), clamp.allowed), "clamp")
+        where = "include"
+        for file in [table.include] if isinstance(table.include, str) else table.include:
+            take(FileTable(file=file).read(folder), file)
         for part_name, part in table.parts.items():
             where = f"parts.{part_name}"
+            if isinstance(part, FileTable):
+                take(part.read(folder).prefixed(part_name, part.pose.T()), part_name)
+                continue
             if isinstance(part, MeshTable):  # one file is one shape, however often it is used
-                key = (part.file, part.unit, part.fit)
+                key = (part.file, part.unit, part.fit, part.chord)
                 files[key] = shape = files.get(key) or part.make(folder)
             else:
                 shape = part.make(folder)
@@ -60,9 +74,10 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
         where = "allowed"
         allowed += [Allowed(*item.parts, item.overlap) for item in table.allowed]
         where = "motions"
-        motions = tuple(m.motion(i) for i, m in enumerate(table.motions, 1))
+        names = [part.name for part in parts]
+        motions = tuple(m.motion(i, names) for i, m in enumerate(table.motions, 1))
         where = ""
-        return Scene(tuple(parts), table.contact, table.clearance, tuple(allowed), motions, name)
+        return Scene(tuple(parts), table.contact, table.clearance, tuple(allowed), motions, name, tuple(notes))
     except Clamp3dError as error:
         raise InputError(f"{origin}: {where}{': ' if where else ''}{error}") from None
 

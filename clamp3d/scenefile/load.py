@@ -1,42 +1,71 @@
-"""One door for everything that a command can be given: a clamp, a scene, a mesh or a STEP file."""
+"""One door for everything that a command can be given: a clamp, a scene, or any file that holds bodies."""
 
 from __future__ import annotations
 
 import os
-import re
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 from clamp3d import checks
-from clamp3d.brep.mesh_file import FORMATS, load_mesh
+from clamp3d.brep.bodies import part_name
+from clamp3d.brep.mesh_file import FORMATS
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.loader import builtin_clamps, load_clamp, parse_toml, read_text
 from clamp3d.collide.scene import Scene
-from clamp3d.core.shapes import MeshShape
-from clamp3d.errors import InputError, escaped
+from clamp3d.core.shapes import Fit
+from clamp3d.errors import InputError
 from clamp3d.scenefile.file import load_scene
+from clamp3d.scenefile.parts import Parts, Reader, has_bodies, read_parts, to_parts
 from clamp3d.scenefile.tables import SceneTable
 
 
 def load(
-    source: str | os.PathLike[str],
+    source: str | os.PathLike[str] | Any,
     *,
     line: str | float | None = None,
     jumper: str | float | None = None,
     unit: str | None = None,
+    fit: Fit | None = None,
+    chord: float | None = None,
+    joints: Mapping[str, float] | None = None,
+    poses: str | os.PathLike[str] | None = None,
+    partial: bool = False,
 ) -> Clamp | Scene:
     """Load a clamp, or a scene of parts, from whatever describes it.
 
     Parameters
     ----------
     source
-        Name of a built-in clamp (``"reference"``), or the path of a clamp file (TOML), a scene file (TOML), a mesh
-        (STL, OBJ, PLY, GLB, GLTF, 3MF) or a STEP file. A mesh or STEP file becomes a scene of one part named after the
-        file; all bodies of a STEP file are that one part, as triangles.
+        Name of a built-in clamp (``"reference"``), or a path:
+
+        - a clamp file or a scene file (TOML);
+        - STEP: a part for each solid of the product tree; GLB and GLTF: for each node with a mesh; 3MF: for each
+          object;
+        - STL, OBJ, PLY, OFF: one part;
+        - URDF: a part for each shape of each link;
+        - a folder of such files.
+
+        Parts are called as the file calls them; names that occur more than once are numbered.
+
+        Or an object: an assembly, a shape or a Workplane of CadQuery, a shape of build123d, a TopoDS_Shape of Open
+        CASCADE, a `trimesh.Scene` or `trimesh.Trimesh`.
     line, jumper
         Wires that replace the clamp's own: a catalogue name or a diameter in mm. Only for a clamp.
     unit
-        Unit of the numbers in a mesh file: mm, cm, m or in. Default: the file's own; mm for STL, OBJ and PLY.
+        Unit of the numbers in a mesh file: mm, cm, m or in. Default: mm for STL, OBJ, PLY and OFF, m for glTF. STEP
+        and 3MF state their own.
+    fit
+        What to make of the round surfaces of meshes: "off" (default) takes the facets as the part; see `MeshShape`.
+    chord
+        How far the true surface of a mesh can be from its facets, mm; it widens every bound. 0 by default.
+    joints
+        Joint values of a URDF by name: rad, or mm for joints that slide.
+    poses
+        CSV table of poses for a folder of meshes; its first line is ``name,x,y,z,qx,qy,qz,qw`` (mm, unit quaternion).
+    partial
+        Go on where some bodies of a file cannot be read; a note of the scene says how many of how many were.
 
     Returns
     -------
@@ -45,30 +74,48 @@ def load(
     Raises
     ------
     InputError
-        In one line, for a source that is none of these, cannot be read, or does not go with the other arguments.
+        In one line, for a source that is none of these, cannot be read completely, or does not go with the other
+        arguments.
     MissingLibraryError
-        For a STEP file without the extra ``step``.
+        For STEP without the extra ``step``, URDF without ``urdf``.
 
     Examples
     --------
     >>> load("reference", line="LJ-500").line.conductor
     'LJ-500'
     """
-    path = checks.path("source", source)
     wires = {name: wire for name, wire in (("line", line), ("jumper", jumper)) if wire is not None}
-    is_mesh = path.suffix.lower() in FORMATS
-    if unit is not None and not is_mesh:
-        raise InputError(f"unit goes with a mesh or STEP file, not with {checks.short(path)}")
-    if is_mesh:
-        _refuse_wires(path, "a mesh", wires)
-        return _one_part(path, unit)
+    reader = Reader(
+        unit=unit,
+        fit=fit,
+        chord=chord,
+        joints={} if joints is None else joints,
+        poses=None if poses is None else checks.path("poses", poses),
+        partial=checks.flag("partial", partial),
+    )
+    if not isinstance(source, (str, os.PathLike)):
+        from clamp3d.brep.objects import read_object
+
+        _refuse_wires(type(source).__name__, "an object", wires)
+        reader.refuse("an object", "joints", "poses", "unit")
+        reading, name = read_object(source)
+        return _scene(to_parts(reading.complete(name, partial=partial), reader), name)
+    path = checks.path("source", source)
+    if has_bodies(path) and str(path) not in builtin_clamps():
+        _refuse_wires(path, "a file of bodies", wires)
+        return _scene(read_parts(path, reader), path.resolve().name if path.is_dir() else path.stem)
+    reader.refuse(checks.short(path), "unit", "fit", "chord", "joints", "poses", "partial")
     if str(path) in builtin_clamps() or _is_clamp(path):
         return load_clamp(path, line=line, jumper=jumper)
     _refuse_wires(path, "a scene", wires)
     scene = load_scene(path)
     if not scene.parts:
-        raise InputError(f"{checks.short(path)}: the scene has no parts; add [parts.NAME] or [clamp]")
+        raise InputError(f"{checks.short(path)}: the scene has no parts; add [parts.NAME], include or [clamp]")
     return scene
+
+
+def _scene(found: Parts, name: str) -> Scene:
+    return Scene(found.parts, allowed=found.allowed, name=part_name(name), notes=found.notes)
 
 
 def _is_clamp(path: Path) -> bool:
@@ -91,17 +138,12 @@ def _is_clamp(path: Path) -> bool:
     return as_clamp > as_scene
 
 
-def _one_part(path: Path, unit: str | None) -> Scene:
-    # Characters that a part's name must not hold: a pair is written A:B,C:D, and patterns have * and ?.
-    name = escaped(re.sub(r"[\s:,*?]+", "-", path.stem)).strip("-") or "part"
-    return Scene(name=name).add(name, MeshShape(load_mesh(path, unit=unit), name=escaped(path.name)))
-
-
-def _refuse_wires(path: Path, kind: str, wires: dict[str, str | float]) -> None:
+def _refuse_wires(path: object, kind: str, wires: dict[str, str | float]) -> None:
     for name in wires:
         raise InputError(f"{name} goes with a clamp; {checks.short(path)} is {kind}")
 
 
 def _choices() -> str:
     built_in = ", ".join(builtin_clamps())
-    return f"built in: {built_in}; or give a clamp or scene file (.toml), or a mesh ({', '.join(FORMATS)})"
+    files = ", ".join((*FORMATS, ".urdf"))
+    return f"built in: {built_in}; or give a clamp or scene file (.toml), a folder, or a file ({files})"

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.dataclasses import dataclass
 
@@ -15,6 +17,8 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.core import shapes
 from clamp3d.core.motion import Motion
 from clamp3d.core.primitives import SweptArc
+from clamp3d.errors import InputError
+from clamp3d.scenefile.parts import Parts, Reader, names_like, read_parts
 from clamp3d.scenefile.pose_table import FROZEN, Angle, Number, Pose, Vector
 
 
@@ -131,27 +135,57 @@ class ClampPartTable(_Placed):
 
 @dataclass(frozen=True, config=FROZEN, kw_only=True)
 class MeshTable(_Placed):
-    """``shape = "mesh"``: a closed mesh from a file beside the scene; see `MeshShape` for ``fit``."""
+    """``shape = "mesh"``: a file of one body beside the scene, as a mesh; see `MeshShape` for ``fit``."""
 
     TAG: ClassVar[str] = "mesh"
     shape: Literal["mesh"]
     file: str
     unit: Literal["mm", "cm", "m", "in"] | None = None
-    fit: shapes.Fit = "bound"
+    fit: shapes.Fit = "off"
+    chord: Annotated[float, Field(ge=0.0, lt=1e5, strict=True)] = 0.0
 
     def make(self, folder: Path) -> shapes.AnyShape:
         """The shape."""
-        from clamp3d.brep.mesh_file import load_mesh
+        from clamp3d.brep.mesh_file import load_bodies
 
-        return shapes.MeshShape(load_mesh(folder / self.file, unit=self.unit), self.fit, name=self.file)
+        found = load_bodies(folder / self.file, unit=self.unit)
+        if len(found.bodies) != 1:
+            raise InputError(
+                f"{self.file} holds {len(found.bodies)} bodies: leave out shape, and it gives as many parts"
+            )
+        (body,) = found.bodies
+        if not np.array_equal(body.T, np.eye(4)):
+            raise InputError(f"{self.file} places its body itself: leave out shape, and it is placed so")
+        return shapes.MeshShape(body.shape.mesh, self.fit, self.file, self.chord)
 
 
-_TABLES = (CylinderTable, BoxTable, GrooveBlockTable, ClampPartTable, MeshTable)
+@dataclass(frozen=True, config=FROZEN, kw_only=True)
+class FileTable(_Placed):
+    """A ``file`` and no ``shape``: all bodies of it, as `clamp3d.load` reads them, moved by ``pose``."""
+
+    TAG: ClassVar[str] = "file"
+    file: str
+    unit: Literal["mm", "cm", "m", "in"] | None = None
+    fit: shapes.Fit | None = None
+    chord: Annotated[float, Field(ge=0.0, lt=1e5, strict=True)] | None = None
+    joints: dict[str, Number] = Field(default_factory=dict)
+    poses: str | None = None
+    partial: bool = False
+
+    def read(self, folder: Path) -> Parts:
+        """Its parts, not yet moved or renamed."""
+        poses = None if self.poses is None else folder / self.poses
+        keys = ("unit", "fit", "chord", "joints", "partial")
+        return read_parts(folder / self.file, Reader(poses=poses, **{key: getattr(self, key) for key in keys}))
+
+
+_TABLES = (CylinderTable, BoxTable, GrooveBlockTable, ClampPartTable, MeshTable, FileTable)
 TAGS = {f"shape {table.TAG}": table for table in _TABLES}
 
 
 def _tag(data: Any) -> str | None:
-    tag = f"shape {data.get('shape')}" if isinstance(data, dict) else None
+    kind = data.get("shape", "file" if "file" in data else None) if isinstance(data, dict) else None
+    tag = f"shape {kind}"
     return tag if tag in TAGS else None
 
 
@@ -160,11 +194,14 @@ PartTable = Annotated[
     | Annotated[BoxTable, Tag("shape box")]
     | Annotated[GrooveBlockTable, Tag("shape groove-block")]
     | Annotated[ClampPartTable, Tag("shape clamp-part")]
-    | Annotated[MeshTable, Tag("shape mesh")],
+    | Annotated[MeshTable, Tag("shape mesh")]
+    | Annotated[FileTable, Tag("shape file")],
     Discriminator(
         _tag,
         custom_error_type="shape",
-        custom_error_message="must have shape = one of " + ", ".join(f'"{table.TAG}"' for table in _TABLES),
+        custom_error_message="must have shape = one of "
+        + ", ".join(f'"{table.TAG}"' for table in _TABLES if table is not FileTable)
+        + ", or a file",
     ),
 ]
 
@@ -223,10 +260,10 @@ class MotionTable:
             raise ValueError("rotate: a rotation has no travel or pitch; call it screw")
         return self
 
-    def motion(self, number: int) -> Motion:
-        """The motion; without a name it is called by its number."""
+    def motion(self, number: int, names: Iterable[str] = ()) -> Motion:
+        """The motion of the ``names`` that its parts are patterns of; without a name it is called by its number."""
         name = self.name or f"motion {number}"
-        parts = tuple(self.parts)
+        parts = tuple(names_like(self.parts, names))
         if self.translate is not None:
             return Motion.translate(self.translate, parts=parts, name=name)
         if self.to is not None:
@@ -246,6 +283,7 @@ class SceneTable:
     contact: Annotated[float, Field(gt=0.0, lt=1e3, strict=True)] = 0.01
     clearance: Annotated[float, Field(ge=0.0, lt=1e5, strict=True)] = 0.0
     clamp: ClampTable | None = None
+    include: str | list[str] = Field(default_factory=list)
     parts: dict[str, PartTable] = Field(default_factory=dict)
     allowed: list[AllowedTable] = Field(default_factory=list)
     motions: list[MotionTable] = Field(default_factory=list)

@@ -197,7 +197,7 @@ def test_open_and_unreadable_meshes(tmp_path):
     for name, message in (("open", "watertight"), ("junk", "junk.stl")):
         with pytest.raises(InputError, match=message):
             parse_scene(f'[parts.m]\nshape = "mesh"\nfile = "{name}.stl"\nunit = "mm"\n', folder=tmp_path)
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="no such file"):
         load_scene(Path(tmp_path / "missing.toml"))
 
 

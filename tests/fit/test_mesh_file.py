@@ -49,7 +49,7 @@ def test_units_of_the_3mf_specification(part, tmp_path, unit, size):
             for name, content in files.items():
                 out.writestr(name, content.replace(b'unit="millimeter"', f'unit="{written}"'.encode()))
         if expected is None:
-            with pytest.raises(InputError, match=r"unit must be one of micron, .*, got 'cubit'"):
+            with pytest.raises(InputError, match=r"unit must be one of micron, .*"):
                 load_mesh(tmp_path / "other.3mf")
         else:
             assert np.isclose(np.ptp(load_mesh(tmp_path / "other.3mf").vertices[:, 0]), expected, rtol=1e-6)

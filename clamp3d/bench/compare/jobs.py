@@ -12,8 +12,8 @@ import tempfile
 from pathlib import Path
 from typing import Any, Literal
 
-from clamp3d.baselines.child import end_with_caller, run_child
 from clamp3d.bench.compare.methods import Method
+from clamp3d.core.child import end_with_caller, run_child
 from clamp3d.errors import Clamp3dError
 
 Kind = Literal["contact", "peer", "assembly", "image", "complexity"]

@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from typing import Any
 
-from clamp3d.baselines.child import end_with_parent
 from clamp3d.bench.machine import Machine, machine
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.family import Family
@@ -16,6 +15,7 @@ from clamp3d.bench.stress.meshes.family import MESHES
 from clamp3d.bench.stress.motions.family import MOTIONS
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.poses.family import POSES
+from clamp3d.core.child import end_with_parent
 from clamp3d.errors import InputError, SolverError
 
 LIBRARIES = ("numpy", "numba", "scipy", "python-fcl", "coacd", "mpmath")

@@ -58,7 +58,12 @@ def run_child(
 
 def end_with_caller() -> None:
     """End this process at once when its caller is gone, that is, when its stdin closes."""
-    _end_after(sys.stdin.buffer.read)
+    _end_after(_drained)
+
+
+def _drained() -> None:
+    while os.read(0, 4096):  # sys.stdin has a lock that a waiting thread would keep at exit
+        pass
 
 
 def end_with_parent() -> None:

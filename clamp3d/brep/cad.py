@@ -1,0 +1,121 @@
+"""From a tree of named, placed Open CASCADE shapes to solids: several solids are several bodies, always."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from clamp3d.brep.bodies import MOST_BODIES, Body, Reading
+from clamp3d.brep.solid import CHORD, BrepSolid
+from clamp3d.brep.tessellate import explore
+from clamp3d.core.mesh import Array
+from clamp3d.core.shells import volume
+from clamp3d.errors import Clamp3dError, InputError
+
+_DEEPEST = 200
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Node:
+    """A part of a tree: its ``name``, its place ``T`` (4, 4) in the node above, and a TopoDS_Shape or nodes ``below``.
+
+    ``named`` holds names of single solids of the shape, by `Key`.
+    """
+
+    name: str
+    T: Array
+    shape: Any = None
+    below: Iterable[Node] = ()
+    named: Mapping[Key, str] = field(default_factory=dict)
+
+
+class Key:
+    """A TopoDS_Shape wherever it is placed, as a key: copies of one shape are equal."""
+
+    def __init__(self, shape: Any) -> None:
+        from OCP.TopLoc import TopLoc_Location
+
+        self.shape = shape.Located(TopLoc_Location())
+
+    def __hash__(self) -> int:
+        return hash(self.shape)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Key) and bool(self.shape.IsSame(other.shape))
+
+
+def matrix(location: Any) -> Array:
+    """A TopLoc_Location as a pose (4, 4), mm."""
+    move = location.Transformation()
+    T = np.eye(4)
+    T[:3] = [[move.Value(r, c) for c in (1, 2, 3, 4)] for r in (1, 2, 3)]
+    return T
+
+
+def bodies_of(roots: Iterable[Node], chord: float = CHORD) -> tuple[Reading, int]:
+    """All solids below ``roots`` with names and places, equal ones sharing a shape; and how many different ones.
+
+    What is no closed solid is among the reading's missing. Raises InputError for too many bodies, or too deep a tree.
+    """
+    bodies: list[Body] = []
+    missing: list[str] = []
+    shapes: dict[Key, BrepSolid | str] = {}
+    loose = 0
+    for node, T in _leaves(roots):
+        solids = list(explore(node.shape, "SOLID"))
+        for solid in solids:
+            key = Key(solid)
+            name = node.named.get(key) or node.name
+            if key not in shapes:
+                shapes[key] = _made(key.shape, name, chord)
+            place = T @ matrix(solid.Location())
+            made = shapes[key]
+            if isinstance(made, str):
+                missing.append(f"{name} ({made})")
+            elif abs(np.linalg.det(place[:3, :3]) - 1.0) > 1e-6:
+                missing.append(f"{name} (placed with a scale or a reflection)")
+            else:
+                bodies.append(Body(name, made, place))
+            if len(bodies) + len(missing) > MOST_BODIES:
+                raise InputError(f"more than {MOST_BODIES} bodies")
+        surfaces = sum(1 for _ in explore(node.shape, "SHELL", "SOLID"))
+        surfaces += sum(1 for _ in explore(node.shape, "FACE", "SHELL"))
+        if surfaces:
+            missing.append(f"{node.name} ({'a surface' if surfaces == 1 else f'{surfaces} surfaces'}, not a solid)")
+        elif not solids:
+            loose += 1
+    notes = (f"{loose} products hold curves or points only: left out",) if loose else ()
+    return Reading(tuple(bodies), tuple(missing), notes), len(shapes)
+
+
+def _leaves(roots: Iterable[Node]) -> Iterator[tuple[Node, Array]]:
+    """Nodes with a shape and their places in the world, in the order of the tree."""
+    stack = [(iter(roots), np.eye(4))]
+    while stack:
+        nodes, above = stack[-1]
+        node = next(nodes, None)
+        if node is None:
+            stack.pop()
+            continue
+        T = above @ node.T
+        if node.shape is not None:
+            yield node, T
+        if len(stack) > _DEEPEST:
+            raise InputError(f"assemblies more than {_DEEPEST} levels deep")
+        stack.append((iter(node.below), T))
+
+
+def _made(solid: Any, name: str, chord: float) -> BrepSolid | str:
+    """The solid as a shape, or why it cannot be one."""
+    try:
+        made = BrepSolid.of(solid, name, chord=chord)
+        if volume(made.mesh.vertices, made.mesh.faces) < 0.0:
+            made = BrepSolid.of(solid.Reversed(), name, chord=chord)
+        if not volume(made.mesh.vertices, made.mesh.faces) > 0.0:
+            return "encloses no volume"
+    except Clamp3dError as error:
+        return str(error)
+    return made

@@ -1,0 +1,112 @@
+"""The text of a STEP file (ISO 10303-21): whether it is whole, and what it announces.
+
+Open CASCADE leaves out what it cannot make sense of without a word. A file whose text has lost a line shows it: a
+number that is referred to and not defined, brackets that do not close, a face or a body that nothing refers to.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from clamp3d.errors import InputError
+
+MOST_ENTITIES = 20_000_000
+_NOISE = re.compile(r"'(?:[^']|'')*'|/\*.*?\*/", re.DOTALL)
+_HEADER = re.compile(r"(?<!\w)HEADER\s*;.*?FILE_SCHEMA\s*\(.*?ENDSEC\s*;", re.DOTALL)
+_DATA = re.compile(r"(?<!\w)DATA\s*(?:\([^;]*\)\s*)?;(.*?)ENDSEC\s*;", re.DOTALL)
+_RECORD = re.compile(r"\s*#\s*(\d+)\s*=\s*(.*?)\s*\Z", re.DOTALL)
+_SOLIDS = frozenset({"MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP"})
+_PARTS = {
+    "ADVANCED_FACE": "a face",
+    "FACE_SURFACE": "a face",
+    "CLOSED_SHELL": "a shell",
+    "OPEN_SHELL": "a shell",
+    "EDGE_LOOP": "a face's outline",
+    "FACE_BOUND": "a face's outline",
+    "FACE_OUTER_BOUND": "a face's outline",
+    "ORIENTED_EDGE": "an edge",
+    "MANIFOLD_SOLID_BREP": "a solid",
+    "BREP_WITH_VOIDS": "a solid",
+    "FACETED_BREP": "a solid",
+    "SHELL_BASED_SURFACE_MODEL": "a surface",
+    "PRODUCT_DEFINITION": "a product",
+    "ITEM_DEFINED_TRANSFORMATION": "a placement",
+    "ADVANCED_BREP_SHAPE_REPRESENTATION": "a shape",
+    "FACETED_BREP_SHAPE_REPRESENTATION": "a shape",
+}
+"""Entities that stand for nothing unless another one refers to them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Announced:
+    """What a STEP file says it holds.
+
+    ``counts``: entities by their type in capitals. ``solids``: entities that are a solid of some type. ``orphans``:
+    entities that nothing refers to, but should, in words.
+    """
+
+    counts: Counter[str]
+    solids: int
+    orphans: tuple[str, ...]
+
+
+def announced(path: Path) -> Announced:
+    """What the file announces. Raises InputError if its text is not whole, naming the first fault."""
+    text = path.read_bytes().decode("latin-1")
+    if "ISO-10303-21" not in text[:1000]:
+        raise InputError(f"{path}: not a readable STEP file")
+    text = _NOISE.sub(lambda m: "''" if m[0][0] == "'" else " ", text)
+    if text.count("'") % 2:
+        raise _damaged(path, "a text in it does not end")
+    if not re.search(r"END-ISO-10303-21\s*;", text):
+        raise _damaged(path, "its end is missing")
+    if not _HEADER.search(text):
+        raise _damaged(path, "its header is not whole")
+    sections = _DATA.findall(text)
+    if not sections:
+        raise _damaged(path, "it has no DATA section that ends")
+    counts: Counter[str] = Counter()
+    solids = 0
+    kinds: dict[int, str] = {}
+    referred: set[int] = set()
+    for record in (record for section in sections for record in section.split(";") if record.strip()):
+        number, content = _entity(path, record)
+        if number in kinds:
+            raise _damaged(path, f"#{number} is defined twice")
+        if content.startswith("("):
+            names = re.findall(r"(?<![\w.])([A-Z][A-Z0-9_]*)\s*\(", content)
+        else:
+            names = [content.partition("(")[0].strip()]
+        kinds[number] = names[0] if names else ""
+        counts.update(names)
+        solids += not _SOLIDS.isdisjoint(names)
+        referred.update(map(int, re.findall(r"#\s*(\d+)", content)))
+        if len(kinds) > MOST_ENTITIES:
+            raise InputError(f"{path}: more than {MOST_ENTITIES} entities")
+    dangling = referred - kinds.keys()
+    if dangling:
+        more = f" (and {len(dangling) - 1} more)" if len(dangling) > 1 else ""
+        raise _damaged(path, f"#{min(dangling)} is referred to and not there{more}")
+    alone = [(number, kind) for number, kind in kinds.items() if kind in _PARTS and number not in referred]
+    orphans = tuple(f"{_PARTS[kind]} (#{number}) that belongs to nothing" for number, kind in alone)
+    return Announced(counts, solids, orphans)
+
+
+def _entity(path: Path, record: str) -> tuple[int, str]:
+    """Number and content of ``#number = content``."""
+    found = _RECORD.match(record)
+    if found is None:
+        raise _damaged(path, f"no entity at {' '.join(record.split())[:60]!r}")
+    number, content = int(found[1]), found[2]
+    if not content.endswith(")") or content.count("(") != content.count(")") or "=" in content:
+        raise _damaged(path, f"#{number} does not end")
+    if re.search(r",\s*[,)]|\(\s*,", content):
+        raise _damaged(path, f"#{number} lacks a value")
+    return number, content
+
+
+def _damaged(path: Path, what: str) -> InputError:
+    return InputError(f"{path}: the STEP file is damaged: {what}")

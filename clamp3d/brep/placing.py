@@ -1,0 +1,74 @@
+"""Meshes of a file as bodies: units and axes, placements that scale or mirror, instances that share a shape."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+
+import numpy as np
+
+from clamp3d.brep.bodies import MOST_BODIES, Body, Reading
+from clamp3d.core.mesh import Array, IntArray, make_mesh
+from clamp3d.core.shapes import MeshShape
+from clamp3d.errors import InputError
+
+
+class Placer:
+    """Collects the bodies of a file whose unit is ``scale`` mm and whose axes are turned by ``R`` (3, 3)."""
+
+    def __init__(self, scale: float, R: Array | None = None) -> None:
+        self.scale = scale
+        self.R = np.eye(3) if R is None else R
+        self.bodies: list[Body] = []
+        self.missing: list[str] = []
+        self.notes: list[str] = []
+        self._shapes: dict[tuple[Hashable, bytes], MeshShape | str] = {}
+
+    def place(self, name: str, key: Hashable, arrays: Callable[[], tuple[Array, IntArray]], T: Array) -> None:
+        """One more body: vertices and faces that ``arrays`` gives, the same for each ``key``, at ``T`` (4, 4).
+
+        A scale, shear or reflection in ``T`` goes into the vertices. Raises InputError for too many bodies.
+        """
+        if len(self.bodies) + len(self.missing) >= MOST_BODIES:
+            raise InputError(f"more than {MOST_BODIES} bodies")
+        if not np.isfinite(T).all() or abs(np.linalg.det(T[:3, :3])) < 1e-12:
+            self.missing.append(f"{name} (its placement is flat or not finite)")
+            return
+        pose, form = rigid_part(T)
+        own = (key, form.round(12).tobytes())
+        if own not in self._shapes:
+            self._shapes[own] = self._made(name, arrays, form)
+        shape = self._shapes[own]
+        if isinstance(shape, str):
+            self.missing.append(f"{name} ({shape})")
+            return
+        place = np.eye(4)
+        place[:3, :3] = self.R @ pose[:3, :3] @ self.R.T
+        place[:3, 3] = self.scale * self.R @ pose[:3, 3]
+        self.bodies.append(Body(name, shape, place))
+
+    def _made(self, name: str, arrays: Callable[[], tuple[Array, IntArray]], form: Array) -> MeshShape | str:
+        try:
+            V, F = arrays()
+            if np.linalg.det(form) < 0.0:
+                F = F[:, ::-1]
+            mesh = make_mesh(V @ (self.R @ form).T, F, name=name, scale=self.scale, float32=True)
+            shape = MeshShape(mesh, "off", name)
+        except InputError as error:
+            return str(error).removeprefix(f"{name}: ")
+        self.notes += [f"{name}: {note}" for note in mesh.notes]
+        return shape
+
+    def reading(self) -> Reading:
+        """What was placed."""
+        return Reading(tuple(self.bodies), tuple(self.missing), tuple(self.notes))
+
+
+def rigid_part(T: Array) -> tuple[Array, Array]:
+    """A placement (4, 4) as a rigid pose after a scale, shear or reflection (3, 3): the identity where it is rigid."""
+    R = T[:3, :3]
+    pose = T.copy()
+    if np.abs(R @ R.T - np.eye(3)).max() <= 1e-5 and np.linalg.det(R) > 0.0:
+        return pose, np.eye(3)
+    U, _, W = np.linalg.svd(R)
+    pose[:3, :3] = turn = U @ np.diag([1.0, 1.0, np.linalg.det(U @ W)]).round() @ W
+    return pose, turn.T @ R

@@ -1,0 +1,195 @@
+"""Parts from whatever holds bodies: a geometry file, a folder of meshes with poses, a robot description."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from clamp3d import checks
+from clamp3d.brep.bodies import Reading, unique_names
+from clamp3d.brep.mesh_file import FORMATS, load_bodies
+from clamp3d.brep.solid import BrepSolid
+from clamp3d.clamp.loader import read_text
+from clamp3d.collide.scene import Allowed, Part
+from clamp3d.core.pose import Array
+from clamp3d.core.shapes import FITS, Fit, MeshShape
+from clamp3d.errors import InputError
+from clamp3d.scenefile.pose_table import Pose
+
+COLUMNS = ("name", "x", "y", "z", "qx", "qy", "qz", "qw")
+"""Columns of a table of poses: mm, and a unit quaternion."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reader:
+    """How files are read.
+
+    Attributes
+    ----------
+    unit : str or None
+        Unit of files that carry none (mm, cm, m, in), or another one for glTF.
+    fit : str
+        What to make of a mesh's round surfaces; see `MeshShape`.
+    chord : float
+        How far a mesh's true surface can be from its facets, mm.
+    joints : dict
+        Values of a robot's joints by name: rad, or mm for those that slide; 0, or the nearest limit, by default.
+    poses : Path or None
+        Table of poses for a folder of meshes.
+    partial : bool
+        Go on with what was read where bodies are missing.
+    """
+
+    unit: str | None = None
+    fit: Fit | None = None
+    chord: float | None = None
+    joints: Mapping[str, float] = field(default_factory=dict)
+    poses: Path | None = None
+    partial: bool = False
+
+    def __post_init__(self) -> None:
+        if self.fit is not None:
+            checks.choice("fit", self.fit, FITS)
+        if self.chord is not None and not checks.number("chord", self.chord) >= 0.0:
+            raise InputError(f"chord must be >= 0 mm, got {self.chord}")
+
+    def refuse(self, what: str, *options: str) -> None:
+        """Raise InputError if one of the ``options`` was given, which do not go with ``what``."""
+        for name in options:
+            if getattr(self, name) not in (None, {}, False):
+                raise InputError(f"{name} goes with {_GOES_WITH[name]}, not with {what}")
+
+
+_GOES_WITH = {
+    "unit": "a mesh file",
+    "fit": "a mesh file",
+    "chord": "a mesh file",
+    "joints": "a robot description (.urdf)",
+    "poses": "a folder of meshes",
+    "partial": "a file with geometry",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Parts with names of their own, contacts that are meant between them, and what was noted on the way in."""
+
+    parts: tuple[Part, ...]
+    notes: tuple[str, ...] = ()
+    allowed: tuple[Allowed, ...] = ()
+
+    def prefixed(self, name: str, T: Array) -> Parts:
+        """The same moved by ``T`` (4, 4) and called ``name``, or ``name/...`` if there are several."""
+        names = {p.name: name if len(self.parts) == 1 else f"{name}/{p.name}" for p in self.parts}
+        parts = (Part(names[p.name], p.shape, T @ p.T_world) for p in self.parts)
+        allowed = (Allowed(names[x.a], names[x.b], x.overlap) for x in self.allowed)
+        return Parts(tuple(parts), self.notes, tuple(allowed))
+
+
+def has_bodies(path: Path) -> bool:
+    """Whether a path is read by `read_parts`: a geometry file, a robot description, or a folder."""
+    return path.suffix.lower() in (*FORMATS, ".urdf") or path.is_dir()
+
+
+def read_parts(path: Path, reader: Reader) -> Parts:
+    """The parts of a geometry file, a robot description or a folder of meshes. Raises InputError."""
+    if path.is_dir():
+        reader.refuse("a folder", "joints")
+        return _folder(path, reader)
+    reader.refuse(checks.short(path), "poses")
+    if path.suffix.lower() == ".urdf":
+        from clamp3d.scenefile.urdf import read_urdf
+
+        return read_urdf(path, reader)
+    reader.refuse(checks.short(path), "joints")
+    return to_parts(load_bodies(path, unit=reader.unit, partial=reader.partial), reader)
+
+
+def to_parts(reading: Reading, reader: Reader) -> Parts:
+    """The bodies of a reading as parts with unique names."""
+    shapes: dict[int, MeshShape] = {}
+    parts = []
+    for name, body in zip(unique_names(body.name for body in reading.bodies), reading.bodies, strict=True):
+        shape = shapes.setdefault(id(body.shape), _taken(body.shape, reader))
+        parts.append(Part(name, shape, body.T))
+    return Parts(tuple(parts), reading.notes)
+
+
+def _taken(shape: MeshShape, reader: Reader) -> MeshShape:
+    """A mesh taken as the reader says; a solid from CAD needs no fit and knows its chord error."""
+    if isinstance(shape, BrepSolid):
+        reader.refuse("STEP, whose faces are exact", "fit", "chord")
+        return shape
+    if reader.fit is None and not reader.chord:
+        return shape
+    return replace(shape, fit=reader.fit or shape.fit, error=float(reader.chord or 0.0))
+
+
+def _folder(folder: Path, reader: Reader) -> Parts:
+    """Every geometry file of a folder, in the order of their names, each where the table of poses puts it."""
+    files = sorted(f for f in folder.iterdir() if f.suffix.lower() in FORMATS and f.is_file())
+    if not files:
+        raise InputError(f"{checks.short(folder)}: no geometry file in the folder; read are {', '.join(FORMATS)}")
+    places = read_poses(reader.poses) if reader.poses is not None else [(f.stem, np.eye(4)) for f in files]
+    known = {f.stem: f for f in files}
+    twice = len(files) - len(known)
+    if twice:
+        raise InputError(f"{checks.short(folder)}: {twice} files have the name of another one but for the ending")
+    unknown = [name for name, _ in places if name not in known]
+    if unknown:
+        listed = ", ".join(list(known)[:8]) + (", ..." if len(known) > 8 else "")
+        raise InputError(f"{reader.poses}: no file for {checks.shown(unknown[0])} in {folder}; there are {listed}")
+    left = sorted(known.keys() - {name for name, _ in places})
+    if left and not reader.partial:
+        raise InputError(f"{reader.poses}: no pose for {', '.join(left[:4])} ({len(left)} of {len(files)} files)")
+    notes = [f"{len(left)} of {len(files)} files have no pose and are left out"] if left else []
+    read: dict[str, Parts] = {}
+    bodies: list[tuple[str, Part]] = []
+    for name, T in places:
+        if name not in read:
+            read[name] = read_parts(known[name], replace(reader, poses=None))
+            notes += [f"{name}: {note}" for note in read[name].notes]
+        bodies += [(p.name, p) for p in read[name].prefixed(name, T).parts]
+    names = unique_names(name for name, _ in bodies)
+    return Parts(tuple(replace(p, name=n) for n, (_, p) in zip(names, bodies, strict=True)), tuple(notes))
+
+
+def read_poses(path: Path) -> list[tuple[str, Array]]:
+    """Names and poses (4, 4) of a table with the columns of `COLUMNS`; a name may be there more than once."""
+    rows = csv.reader(read_text(path).splitlines())
+    head = [cell.strip() for cell in next(rows, [])]
+    if tuple(head) != COLUMNS:
+        raise InputError(f"{path}: the first line must be {','.join(COLUMNS)}, got {checks.shown(','.join(head))}")
+    found = []
+    for number, row in enumerate(rows, 2):
+        if not any(cell.strip() for cell in row):
+            continue
+        try:
+            if len(row) != len(COLUMNS):
+                raise ValueError(f"{len(COLUMNS)} values are needed, got {len(row)}")
+            x, y, z, *turn = (checks.number("a value", float(cell)) for cell in row[1:])
+            size = float(np.linalg.norm(turn))
+            if not abs(size - 1.0) <= 1e-3:
+                raise ValueError(f"the quaternion must have length 1, got {size:.6g}")
+            qx, qy, qz, qw = turn
+            found.append((row[0].strip(), Pose(translation=(x, y, z), quaternion=(qx, qy, qz, qw)).T()))
+        except ValueError as error:
+            raise InputError(f"{path}: line {number}: {error}") from None
+    if not found:
+        raise InputError(f"{path}: no pose in the table")
+    return found
+
+
+def names_like(patterns: Iterable[str], names: Iterable[str]) -> list[str]:
+    """Names that are in ``patterns``, or fit one of them; a pattern that fits none stays, to be told as unknown."""
+    from fnmatch import fnmatchcase
+
+    known, found = list(names), []
+    for pattern in patterns:
+        fits = [pattern] if pattern in known else [name for name in known if fnmatchcase(name, pattern)]
+        found += [name for name in fits or [pattern] if name not in found]
+    return found

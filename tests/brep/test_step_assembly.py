@@ -1,0 +1,105 @@
+"""STEP assemblies against what Open CASCADE wrote: names, placements, instances, units, and nothing left out."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("OCP")
+
+from OCP.BRep import BRep_Builder
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.gp import gp_Pnt
+from OCP.TopoDS import TopoDS_Compound
+from step_scenes import Tree, location, nested, pin, plate, pose
+
+from clamp3d import InputError, load
+from clamp3d.brep.mesh_file import load_bodies
+from clamp3d.brep.part21 import announced
+from clamp3d.core.shells import volume
+
+
+@pytest.fixture(scope="module", params=["MM", "INCH"])
+def written(request, tmp_path_factory):
+    tree, truth = nested(np.random.default_rng(7))
+    return tree.write(tmp_path_factory.mktemp("step") / "machine.step", request.param), truth
+
+
+def test_names_places_and_volumes_of_a_tree(written):
+    path, truth = written
+    scene = load(path)
+    assert scene.name == "machine"
+    assert [part.name for part in scene.parts] == [name for name, _, _ in truth]
+    for part, (_, size, T) in zip(scene.parts, truth, strict=True):
+        np.testing.assert_allclose(part.T_world, T, atol=1e-6)
+        mesh = part.shape.mesh
+        assert mesh.watertight
+        area = part.shape.error * np.abs(mesh.vertices).max() ** 2 * 20
+        assert abs(volume(mesh.vertices, mesh.faces) - size) < area
+
+
+def test_instances_share_their_shape(written):
+    scene = load(written[0])
+    assert len({id(part.shape) for part in scene.parts}) == 2
+
+
+def test_several_solids_of_one_product_are_several_parts(tmp_path):
+    both = TopoDS_Compound()
+    builder = BRep_Builder()
+    builder.MakeCompound(both)
+    builder.Add(both, plate())
+    T = pose(np.random.default_rng(3))
+    builder.Add(both, pin().Moved(location(T)))
+    tree = Tree()
+    tree.product("welded", both)
+    scene = load(tree.write(tmp_path / "welded.step"))
+    assert [part.name for part in scene.parts] == ["welded_1", "welded_2"]
+
+
+def shell_beside(tmp_path):
+    """A product that is a box without its top, beside a pin."""
+    from clamp3d.brep.tessellate import explore
+
+    faces = list(explore(BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(1, 1, 1)).Shape(), "FACE"))
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+
+    sewing = BRepBuilderAPI_Sewing()
+    for face in faces[:5]:
+        sewing.Add(face)
+    sewing.Perform()
+    tree = Tree()
+    root = tree.product("top")
+    tree.put(root, tree.product("pin", pin()), np.eye(4))
+    tree.put(root, tree.product("lid", sewing.SewedShape()), np.eye(4))
+    return tree.write(tmp_path / "shell.step")
+
+
+def test_a_shell_is_refused_by_name_and_counted_on_request(tmp_path):
+    path = shell_beside(tmp_path)
+    with pytest.raises(InputError, match=r"only 1 of 2 bodies read; missing: lid \(a surface, not a solid\)"):
+        load(path)
+    scene = load(path, partial=True)
+    assert [part.name for part in scene.parts] == ["pin"]
+    assert scene.notes[0].startswith("1 of 2 bodies read; missing: lid")
+
+
+def test_a_line_less_is_never_a_body_less(written, tmp_path):
+    """Every third line of the file deleted in turn, as far as the text alone tells it; the others by the reader."""
+    path, truth = written
+    lines = path.read_text().splitlines(keepends=True)
+    first = next(k for k, line in enumerate(lines) if line.startswith("DATA"))
+    damaged = tmp_path / "damaged.step"
+    told = 0
+    for k in range(first + 1, len(lines) - 3, 3):
+        damaged.write_text("".join(lines[:k] + lines[k + 1 :]))
+        try:
+            announced(damaged)
+        except InputError:
+            told += 1
+            continue
+        try:
+            bodies = load_bodies(damaged).bodies
+        except InputError:
+            continue
+        assert len(bodies) == len(truth), lines[k]
+        sizes = sorted(volume(b.shape.mesh.vertices, b.shape.mesh.faces) for b in bodies)
+        assert sizes == pytest.approx(sorted(size for _, size, _ in truth), rel=2e-2), lines[k]
+    assert told > 100
