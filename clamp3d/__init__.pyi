@@ -24,6 +24,8 @@ from .collide.scene import Part as Part
 from .collide.scene import Scene as Scene
 from .collide.verdict import Verdict as Verdict
 from .core.motion import Motion as Motion
+from .core.primitives import Capsule as Capsule
+from .core.primitives import Cylinder as Cylinder
 from .errors import InputError as InputError
 from .fit.fit import fit_file as fit_file
 from .fit.fit import fit_mesh as fit_mesh

@@ -11,13 +11,14 @@ from clamp3d.core.arc_circle import ArcContact, ArcRelation, arc_circle, classif
 from clamp3d.core.distance import Feature, SignedDistance, SignedDistances, signed_distance, signed_distances
 from clamp3d.core.pieces import GroovePieces, groove_pieces
 from clamp3d.core.pose import SectionPose, rotation, translation
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.rectangle import HoleContact, HoleRelation, Rectangle, hole_bolt
 from clamp3d.core.relation3d import GrooveRelation, Relation3D, groove_relation, relative_pose
 
 __all__ = [
     "ArcContact",
     "ArcRelation",
+    "Capsule",
     "Cylinder",
     "Feature",
     "GroovePieces",

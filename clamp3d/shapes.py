@@ -8,10 +8,11 @@
 from clamp3d.brep.mesh_file import load_mesh
 from clamp3d.core.mesh import Mesh, make_mesh
 from clamp3d.core.meshing import mesh
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.shapes import Hole, MeshShape, Solid, box, cylinder, groove_block
 
 __all__ = [
+    "Capsule",
     "Cylinder",
     "Hole",
     "Mesh",

@@ -4,7 +4,7 @@ import os
 
 from hypothesis import settings
 
-from clamp3d.kernel import Cylinder, SweptArc, groove_pieces, signed_distance, translation
+from clamp3d.kernel import Capsule, Cylinder, SweptArc, groove_pieces, signed_distance, translation
 
 # A run that decides about a change repeats the same examples; a run at the desk looks for new ones.
 settings.register_profile("ci", derandomize=True)
@@ -14,4 +14,4 @@ settings.load_profile("ci" if os.environ.get("CI") else "default")
 def pytest_sessionstart(session):
     groove, wire = SweptArc(7.0, 1.0, 50.0), Cylinder(6.0, 80.0)
     signed_distance(groove, wire, translation(0.0, 3.0, 0.0))
-    groove_pieces(groove, wire, translation(0.0, 3.0, 0.0))
+    groove_pieces(groove, Capsule(6.0, 80.0), translation(0.0, 3.0, 0.0))

@@ -10,7 +10,7 @@ from clamp3d.collide.convex import MEMBER, Rod
 from clamp3d.collide.model import Model
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.pose import Array, inverse
-from clamp3d.core.primitives import Cylinder
+from clamp3d.core.primitives import Capsule
 
 _KNOWN = 1e-9
 
@@ -43,7 +43,7 @@ def _by_kernel(a: ClosedForm, b: ClosedForm, T: Array) -> list[Distance | None]:
             covers = bore.covers()
             answers = [
                 signed_distances(
-                    groove, Cylinder(rod.radius, rod.length), np.ascontiguousarray(inverse(P) @ T @ rod.T), full=True
+                    groove, Capsule(rod.radius, rod.length), np.ascontiguousarray(inverse(P) @ T @ rod.T), full=True
                 )
                 for groove, P in covers
             ]

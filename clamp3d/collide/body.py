@@ -19,7 +19,7 @@ from clamp3d.collide.convex import MEMBER, Convex, Hull, Rod, convex_distance
 from clamp3d.collide.nearest import segment_pairs, to_faces
 from clamp3d.core.distance import SignedDistance, signed_distance
 from clamp3d.core.pose import Array, inverse
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import Capsule, SweptArc
 
 _TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 _THIN = 1e-30
@@ -137,11 +137,11 @@ def kernel_distance(answer: SignedDistance, error: float = 0.0) -> Distance:
 def bore_rod(bore: Bore, rod: Rod, T: Array) -> Distance:
     """The kernel's answer for a bore of the first body and a rod of the second, placed by ``T``.
 
-    The kernel's cylinder has rounded ends: where the nearest axis point is an end it gives a lower bound, and its
-    point need not be on the rod.
+    The rod is measured as a capsule, which holds it: where the nearest axis point is an end that gives a lower bound,
+    and the point need not be on the rod.
     """
     answers = [
-        (signed_distance(groove, Cylinder(rod.radius, rod.length), inverse(place) @ T @ rod.T), place)
+        (signed_distance(groove, Capsule(rod.radius, rod.length), inverse(place) @ T @ rod.T), place)
         for groove, place in bore.covers()
     ]
     if len(answers) > 1 and any(answer.distance <= answer.error_bound - rod.radius for answer, _ in answers):
@@ -161,7 +161,7 @@ def _bore_hull(bore: Bore, piece: Convex, T: Array) -> Distance:
     """A groove or hole and a polyhedron that lie apart.
 
     The hollow side of the arc bends away from every flat face, so a nearest point lies on an edge of the polyhedron
-    (a thin cylinder for the kernel), or on a lip or an end edge of the groove. That these lines all lie apart proves
+    (a thin capsule for the kernel), or on a lip or an end edge of the groove. That these lines all lie apart proves
     that the bodies do: where a face alone cut the material, the cut would have a corner on one of them, or no end.
     """
     assert isinstance(piece, Hull)
@@ -179,7 +179,7 @@ def _bore_hull(bore: Bore, piece: Convex, T: Array) -> Distance:
             x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
             P[:3, 2], P[:3, 0] = z, x / np.linalg.norm(x)
             P[:3, 1], P[:3, 3] = np.cross(z, P[:3, 0]), 0.5 * (start + end)
-            answer = signed_distance(groove, Cylinder(_THIN, length), P)
+            answer = signed_distance(groove, Capsule(_THIN, length), P)
             if answer.distance < found.upper:
                 found = kernel_distance(answer).moved(place)
         s, h = groove.radius * math.sin(groove.half_angle), -groove.radius * math.cos(groove.half_angle)

@@ -18,7 +18,7 @@ from clamp3d.core.distance import SignedDistance
 from clamp3d.core.motion import Motion, scene_pose
 from clamp3d.core.motion_search import Search
 from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Cylinder, SweptArc, place
+from clamp3d.core.primitives import Capsule, Cylinder, SweptArc, place
 from clamp3d.core.shapes import AnyShape, as_shape
 
 
@@ -70,9 +70,9 @@ def first_contact(
 
     Parameters
     ----------
-    a, b : Solid, MeshShape, Cylinder or SweptArc
-        Two bodies. For a `SweptArc` and a `Cylinder` the kernel's search is used, to rounding; the cylinder's ends
-        then are rounded. Any other pair is found to within 1e-4 mm of way.
+    a, b : Solid, MeshShape, Cylinder, Capsule or SweptArc
+        Two bodies. For a `SweptArc` and a `Cylinder` or `Capsule` the kernel's search is used, to rounding; where a
+        flat end decides, to 1e-9 of the largest size. Any other pair is found to within 1e-4 mm of way.
     motion : Motion
         Moves b.
     T_a_b : array_like (4, 4), optional
@@ -80,7 +80,8 @@ def first_contact(
     margin : float
         Distance in mm that counts as contact.
     resolution : float, optional
-        For groove and cylinder: depth in mm that may be missed, 1e-12 of the largest size by default.
+        For groove and cylinder: depth in mm that may be missed, 1e-12 of the largest size by default (1e-9 where a
+        flat end decides).
 
     Raises
     ------
@@ -142,7 +143,7 @@ def _searched(
     instance("motion", motion, Motion)
     T = np.eye(4) if T_a_b is None else scene_pose(T_a_b, "T_a_b")
     motion = motion.resolved(T)
-    if isinstance(a, SweptArc) and isinstance(b, Cylinder):
+    if isinstance(a, SweptArc) and isinstance(b, (Cylinder, Capsule)):
         return Search(a, b, motion, T, resolution)
     cache = ModelCache()
     return MovingPair(cache.model(as_shape(b)), cache.model(as_shape(a)), motion, T, np.eye(4))

@@ -1,10 +1,13 @@
-"""Exact signed distance of a cylinder from a groove, in any pose.
+"""Exact signed distance of a cylinder or a capsule from a groove, in any pose.
 
-The distance is ``min over the cylinder's axis of sdf(point) - cylinder.radius``, where ``sdf`` is the exact signed
-distance from the groove's material: the Euclidean distance outside, minus the distance from its boundary inside.
-So it is exact for every clearance and for every overlap less deep than the cylinder's radius; once the axis itself
-enters the material it is at most ``-radius``, falls with the depth of the axis, and ``axis_inside`` is set.
-The cylinder's surface is all points at its radius from its axis segment: its ends are rounded.
+Apart it is the Euclidean distance of the two bodies. In an overlap it is a measure that is continuous through contact,
+negative exactly there and cheap to differentiate, what a solver needs; it is not the separating depth (the shortest
+translation that frees the bodies), of which it is a lower bound for a cylinder.
+
+- `Cylinder` (flat ends): minus the inset, by how much radius and both ends must shrink alike for the cylinder to come
+  free: the greatest depth in the cylinder that a point of the material reaches. Where nothing is left of the cylinder
+  before it is free, it falls on with the depth of what was left last: its axis segment, or the middle of a disc.
+- `Capsule`: the signed distance of the axis segment from the material minus the radius.
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, flag, whole
 from clamp3d.core.pose import Array, check_pose, check_pose_array
-from clamp3d.core.primitives import LARGEST, Cylinder, SweptArc, check_shapes
+from clamp3d.core.primitives import LARGEST, AnyCylinder, Cylinder, SweptArc, check_shapes
 from clamp3d.errors import InputError
 
 
@@ -68,7 +71,12 @@ class SignedDistance:
     error_bound : float
         Bound on the rounding error of ``distance``.
     axis_inside : bool
-        Whether the cylinder's axis enters the material.
+        Whether it lies deeper than the least of its half sizes: the axis of a capsule, or what is left of a cylinder
+        when it is shrunk to nothing, enters the material.
+    rate : ndarray (3,)
+        How the distance changes when the cylinder is shifted: the normal, but in an overlap a mixture of two normals
+        where the point of the groove is as near to the cylinder's side as to its end, or where the deepest point of an
+        axis is as near to a second face.
     """
 
     distance: float
@@ -79,6 +87,7 @@ class SignedDistance:
     along: float
     error_bound: float
     axis_inside: bool
+    rate: Array
 
     @property
     def gradient(self) -> Array:
@@ -87,7 +96,7 @@ class SignedDistance:
         Moving the cylinder by ``v`` mm and ``w`` rad (both in the groove's frame) changes the distance by
         ``gradient @ (v, w)`` to first order. Where two places are equally near it is the one of the place named.
         """
-        return _gradient(self.normal, self.point_on_cylinder)
+        return _gradient(self.rate, self.point_on_groove)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,15 +111,16 @@ class SignedDistances:
     along: Array
     error_bound: Array
     axis_inside: NDArray[np.bool_]
+    rate: Array
 
     @property
     def gradient(self) -> Array:
         """Rates of the distances by the cylinder's twist, shape (n, 6); see ``SignedDistance.gradient``."""
-        return _gradient(self.normal, self.point_on_cylinder)
+        return _gradient(self.rate, self.point_on_groove)
 
 
-def _gradient(normal: Array, point: Array) -> Array:
-    return np.concatenate([normal, np.cross(point, normal)], axis=-1)
+def _gradient(rate: Array, point: Array) -> Array:
+    return np.concatenate([rate, np.cross(point, rate)], axis=-1)
 
 
 def as_pose(pose: ArrayLike) -> Array:
@@ -146,17 +156,18 @@ def kernel() -> ModuleType:
     return _kernel
 
 
-def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> SignedDistance:
-    """Signed distance of a cylinder from a groove, with witnesses.
+def signed_distance(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) -> SignedDistance:
+    """Signed distance of a cylinder or a capsule from a groove, with witnesses.
 
-    The ends of the cylinder are taken as rounded, those of the bodies of `clamp3d.distance` are flat: where the nearest
-    axis point is an end (``abs(along)`` is half the length) the answer is a lower bound of the flat-ended distance.
+    Apart it is the distance of the bodies. In an overlap it is minus the inset of a `Cylinder`, and the distance of the
+    axis minus the radius for a `Capsule`: both are continuous through contact and neither is the separating depth,
+    which `clamp3d.distance` gives. A capsule holds the cylinder of its sizes, so its answer is never the larger one.
     Only the cylinder's position and axis direction matter, so ``pose`` enters as its last column and its third,
     normalised.
 
     Parameters
     ----------
-    groove, cylinder : SweptArc, Cylinder
+    groove, cylinder : SweptArc, Cylinder or Capsule
         The two shapes.
     pose : array_like (4, 4)
         ``T_groove_cylinder``, mm; rounding errors are mended as `check_pose` says.
@@ -180,13 +191,14 @@ def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Si
     >>> answer.distance, answer.feature.name
     (1.5, 'ARC')
     """
-    if type(groove) is not SweptArc or type(cylinder) is not Cylinder:
+    flat = type(cylinder) is Cylinder
+    if type(groove) is not SweptArc or not flat:
         check_shapes(groove, cylinder)
     T = as_pose(pose)
-    record = np.empty((1, 13))
+    record = np.empty((1, 16))
     run = (_kernel or kernel()).records
     half, along = 0.5 * groove.length, 0.5 * cylinder.length
-    if run(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, record) >= 0:
+    if run(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, record) >= 0:
         return signed_distance(groove, cylinder, repaired(T, "pose"))
     out = record[0]
     values = out.tolist()
@@ -199,26 +211,32 @@ def signed_distance(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Si
         _FEATURES[int(values[11])],
         values[12],
         values[10],
-        distance < -cylinder.radius,
+        distance < -(min(cylinder.radius, along) if flat else cylinder.radius),
+        out[13:16],
     )
 
 
 @overload
 def signed_distances(
-    groove: SweptArc, cylinder: Cylinder, poses: ArrayLike, *, full: Literal[False] = False, workers: int | None = None
+    groove: SweptArc,
+    cylinder: AnyCylinder,
+    poses: ArrayLike,
+    *,
+    full: Literal[False] = False,
+    workers: int | None = None,
 ) -> Array: ...
 @overload
 def signed_distances(
-    groove: SweptArc, cylinder: Cylinder, poses: ArrayLike, *, full: Literal[True], workers: int | None = None
+    groove: SweptArc, cylinder: AnyCylinder, poses: ArrayLike, *, full: Literal[True], workers: int | None = None
 ) -> SignedDistances: ...
 def signed_distances(
-    groove: SweptArc, cylinder: Cylinder, poses: ArrayLike, *, full: bool = False, workers: int | None = None
+    groove: SweptArc, cylinder: AnyCylinder, poses: ArrayLike, *, full: bool = False, workers: int | None = None
 ) -> Array | SignedDistances:
-    """Signed distances of a cylinder from a groove in many poses: the formulas of `signed_distance`, so the same bits.
+    """Signed distances of a cylinder or a capsule from a groove in many poses: the same bits as `signed_distance`.
 
     Parameters
     ----------
-    groove, cylinder : SweptArc, Cylinder
+    groove, cylinder : SweptArc, Cylinder or Capsule
         The two shapes.
     poses : array_like (n, 4, 4)
         ``T_groove_cylinder``, mm.
@@ -250,9 +268,10 @@ def signed_distances(
     if workers is not None:
         workers = whole("workers", workers, least=1)
     n = len(T)
-    out = np.empty((n, 13) if full else n)
+    out = np.empty((n, 16) if full else n)
+    flat = isinstance(cylinder, Cylinder)
     run = kernel().records if full else kernel().distances
-    sizes = (groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length)
+    sizes = (groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, flat)
     threads = min(workers or os.cpu_count() or 1, max(1, n // 4096))
 
     def part(start: int, stop: int) -> int:
@@ -278,5 +297,6 @@ def signed_distances(
         out[:, 11].astype(np.int8),
         out[:, 12],
         out[:, 10],
-        out[:, 0] < -cylinder.radius,
+        out[:, 0] < -(min(cylinder.radius, 0.5 * cylinder.length) if flat else cylinder.radius),
+        out[:, 13:16],
     )

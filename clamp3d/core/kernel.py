@@ -5,20 +5,22 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from clamp3d.core.jit import entry, formula, source_stamp
-from clamp3d.core.kernel_distance import is_parallel, nearest, parallel
-from clamp3d.core.kernel_pose import rigid
+import numpy as np
 
-RECORD = 13
-"""Numbers per answer: distance, point on groove (3), point on cylinder (3), normal (3), bound, feature, t on axis."""
+from clamp3d.core.jit import entry, formula, source_stamp
+from clamp3d.core.kernel_distance import inside_rate, is_parallel, nearest, parallel
+from clamp3d.core.kernel_flat import ROWS, flat_nearest, flat_parallel
+from clamp3d.core.kernel_pose import axis, rigid
+
+RECORD = 16
+"""Numbers per answer: distance, point on groove (3), point on cylinder (3), normal (3), bound, feature, t on axis,
+rate of the distance by a shift of the cylinder (3)."""
 
 
 @formula
-def record(T, k, R, s, h, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E741
-    """Answer for the valid pose k into out (n, 13)."""
-    v, qx, qy, qz, nx, ny, nz, feature, t, bound = nearest(
-        R, s, h, H, r, l, T[k, 0, 3], T[k, 1, 3], T[k, 2, 3], T[k, 0, 2], T[k, 1, 2], T[k, 2, 2]
-    )
+def put(answer, rate, out, k):  # type: ignore[no-untyped-def]
+    """Write an answer into out (n, 16)."""
+    v, qx, qy, qz, nx, ny, nz, feature, t, bound = answer
     out[k, 0] = v
     out[k, 1] = qx
     out[k, 2] = qy
@@ -32,13 +34,48 @@ def record(T, k, R, s, h, H, r, l, out):  # type: ignore[no-untyped-def] # noqa:
     out[k, 10] = bound
     out[k, 11] = feature
     out[k, 12] = t
+    out[k, 13], out[k, 14], out[k, 15] = rate
+
+
+@formula
+def record(T, k, R, half_angle, s, h, H, r, l, flat, work, found, rows, out):  # type: ignore[no-untyped-def] # noqa: E741
+    """Answer for the valid pose k into out (n, 16); ``flat`` ends or those of a capsule."""
+    cx, cy, cz, dx, dy, dz = T[k, 0, 3], T[k, 1, 3], T[k, 2, 3], T[k, 0, 2], T[k, 1, 2], T[k, 2, 2]
+    if flat:
+        answer = flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, work, found, rows)
+        put(answer[:10], answer[10:], out, k)
+        return
+    answer = nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz)
+    rate = (answer[4], answer[5], answer[6])
+    if answer[0] < -r and not is_parallel(R, l, dx, dy):
+        dx, dy, dz = axis(T, k)
+        rate = inside_rate(R, h, H, l, cx, cy, cz, dx, dy, dz, answer[8])
+    put(answer, rate, out, k)
+
+
+@formula
+def scratch():  # type: ignore[no-untyped-def]
+    """What the search on the edges works in: stretches, angles, candidates."""
+    return np.empty((128, 2)), np.empty(16), np.empty((ROWS, 5))
 
 
 def _entries(stamp: str) -> tuple[Any, Any]:
-    def distances(T, R, half_angle, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E741
+    def distances(T, R, half_angle, H, r, l, flat, out):  # type: ignore[no-untyped-def] # noqa: E741
         stamp  # noqa: B018
         s = R * math.sin(half_angle)
         h = -R * math.cos(half_angle)
+        if flat:
+            work, found, rows = scratch()
+            for i in range(T.shape[0]):
+                if not rigid(T, i):
+                    return i
+                x, y, z = T[i, 0, 3], T[i, 1, 3], T[i, 2, 3]
+                dx, dy, dz = T[i, 0, 2], T[i, 1, 2], T[i, 2, 2]
+                if is_parallel(R, max(l, r), dx, dy):
+                    out[i] = flat_parallel(R, s, h, H, r, l, x, y, z, dz)[0]
+                else:
+                    out[i] = flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, work, found, rows)[0]
+            return -1
         for i in range(T.shape[0]):
             if not rigid(T, i):
                 return i
@@ -51,19 +88,20 @@ def _entries(stamp: str) -> tuple[Any, Any]:
             out[i] = answer[0]
         return -1
 
-    def records(T, R, half_angle, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E741
+    def records(T, R, half_angle, H, r, l, flat, out):  # type: ignore[no-untyped-def] # noqa: E741
         stamp  # noqa: B018
         s = R * math.sin(half_angle)
         h = -R * math.cos(half_angle)
+        work, found, rows = scratch()
         for i in range(T.shape[0]):
             if not rigid(T, i):
                 return i
-            record(T, i, R, s, h, H, r, l, out)
+            record(T, i, R, half_angle, s, h, H, r, l, flat, work, found, rows, out)
         return -1
 
     return (
-        entry(distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,f8[::1])"),
-        entry(records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,f8[:,::1])"),
+        entry(distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[::1])"),
+        entry(records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1])"),
     )
 
 

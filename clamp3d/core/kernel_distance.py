@@ -124,6 +124,48 @@ def inside(R, h, H, r, cx, cy, cz, dx, dy, dz, lo, hi, bound):  # type: ignore[n
 
 
 @formula
+def inside_rate(R, h, H, l, cx, cy, cz, dx, dy, dz, t):  # type: ignore[no-untyped-def] # noqa: E741
+    """Rate of the depth's negative by a shift of an axis inside S whose deepest point is at t.
+
+    At an end of the axis that is the normal of the face it is nearest to. Between its ends the deepest point is as near
+    to a second face, towards which the axis leads the other way: the depth falls by that mixture of both normals that
+    is square to the axis.
+    """
+    x = cx + t * dx
+    y = cy + t * dy
+    z = cz + t * dz
+    rho = math.sqrt(x * x + y * y)
+    up = 1.0 if z >= 0.0 else -1.0
+    best = math.inf
+    nx = ny = nz = 0.0
+    for second in range(2):
+        least = math.inf
+        mx = my = mz = 0.0
+        for face in range(4):
+            if face == 0:
+                depth, ux, uy, uz = rho - R, -x / rho, -y / rho, 0.0
+            elif face == 1:
+                depth, ux, uy, uz = h - y, 0.0, 1.0, 0.0
+            elif face == 2:
+                depth, ux, uy, uz = H - abs(z), 0.0, 0.0, up
+            else:
+                depth, ux, uy, uz = H + abs(z), 0.0, 0.0, -up
+            if depth < least and (second == 0 or (ux * dx + uy * dy + uz * dz) * best < 0.0):
+                least, mx, my, mz = depth, ux, uy, uz
+        if second == 0:
+            nx, ny, nz = mx, my, mz
+            best = nx * dx + ny * dy + nz * dz
+            if abs(t) >= l or best == 0.0:
+                return nx, ny, nz
+        elif least < math.inf:
+            other = mx * dx + my * dy + mz * dz
+            u = other / (other - best)
+            v = 1.0 - u
+            return u * nx + v * mx, u * ny + v * my, u * nz + v * mz
+    return nx, ny, nz
+
+
+@formula
 def edge_normal(feature, R, h, qx, qy, qz):  # type: ignore[no-untyped-def]
     """A unit normal in the middle of the normal cone of an edge, for an axis that passes through the edge itself."""
     x = -qx / R

@@ -27,6 +27,15 @@ TINY = 1e-150
 
 
 @inlined
+def phi(g, e):  # type: ignore[no-untyped-def]
+    """Signed distance from the quadrant g <= 0, e <= 0."""
+    if g <= 0.0 and e <= 0.0:
+        return max(g, e)
+    g, e = max(g, 0.0), max(e, 0.0)
+    return math.sqrt(g * g + e * e)
+
+
+@inlined
 def section(x, y, R, s, h):  # type: ignore[no-untyped-def]
     """Signed gap of (x, y) to the groove's section, negative inside the material, and the nearest feature.
 

@@ -25,7 +25,7 @@ from heapq import heappop, heappush
 from typing import Any
 
 from clamp3d.core.jit import entry, formula, source_stamp
-from clamp3d.core.kernel_features import FLAT_N, section, section_foot
+from clamp3d.core.kernel_features import FLAT_N, phi, section, section_foot
 
 CELLS = 200_000
 """Cells that may wait. A search that needs more ends with a wider bound, which it tells."""
@@ -37,15 +37,6 @@ def slope(x, y, R, s, h):  # type: ignore[no-untyped-def]
     g, feature = section(x, y, R, s, h)
     _, _, nx, ny = section_foot(feature, x, y, R, s, h)
     return g, nx, ny, feature == FLAT_N
-
-
-@formula
-def phi(g, e):  # type: ignore[no-untyped-def]
-    """Signed distance from the quadrant g <= 0, e <= 0."""
-    if g <= 0.0 and e <= 0.0:
-        return max(g, e)
-    g, e = max(g, 0.0), max(e, 0.0)
-    return math.sqrt(g * g + e * e)
 
 
 @formula

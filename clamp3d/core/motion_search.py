@@ -8,22 +8,28 @@ from clamp3d.checks import positive
 from clamp3d.core.distance import SignedDistance, signed_distance
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
 from clamp3d.core.roots import root
 from clamp3d.errors import SolverError
 
 RESOLUTION = 1e-12
 """Default resolution of a search, in parts of the largest length of the scene."""
+FLAT_RESOLUTION = 1e-9
+"""The same where a flat end decides: there the search knows only how fast the cylinder's points move."""
 _NEAR, _FEW = 1e-4, 400
 """Times around the lowest, and cells, within which it is followed down to the rounding."""
 _ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
 
 
 class Search:
-    """One groove, one cylinder and its motion from ``start`` (4, 4), ``T_groove_cylinder``; counts ``evaluations``."""
+    """One groove, one cylinder and its motion from ``start`` (4, 4), ``T_groove_cylinder``; counts ``evaluations``.
+
+    A flat-ended cylinder lies in its capsule: the capsule's answer is a bound, and the answer where both are equally
+    far. Only where a flat end decides the cylinder's own motion is searched.
+    """
 
     def __init__(
-        self, groove: SweptArc, cylinder: Cylinder, motion: Motion, start: Array, resolution: float | None
+        self, groove: SweptArc, cylinder: AnyCylinder, motion: Motion, start: Array, resolution: float | None
     ) -> None:
         self.groove, self.cylinder, self.motion, self.start = groove, cylinder, motion, start
         size = max(groove.radius, groove.length, cylinder.radius, cylinder.length)
@@ -36,6 +42,10 @@ class Search:
         self.evaluations = 0
         self._sizes = (groove.radius, groove.half_angle, 0.5 * groove.length, 0.5 * cylinder.length)
         axis = start[:3, 2] / np.linalg.norm(start[:3, 2])
+        self._capsule: Search | None = None
+        if isinstance(cylinder, Cylinder):
+            self._capsule = Search(groove, Capsule(cylinder.radius, cylinder.length), motion, start, resolution)
+            self.flat_slack = max(self.slack, FLAT_RESOLUTION * size if resolution is None else 0.0)
         self._numbers = np.concatenate([start[:3, 3], axis, motion.point, motion.axis, motion.travel, [motion.angle]])
 
     def _rounding(self, along: float) -> float:
@@ -57,6 +67,8 @@ class Search:
 
     def least(self) -> tuple[float, float]:
         """Time of the least distance, and what any other time can be lower by, mm."""
+        if self._capsule is not None:
+            return self._flat_least(self._capsule)
         from clamp3d.core import kernel_motion
 
         out = np.empty(4)
@@ -70,6 +82,41 @@ class Search:
         if out[0] <= best:
             best, t = out[:2].tolist()
         return t, max(best - bound, self.slack)
+
+    def _flat_least(self, capsule: Search) -> tuple[float, float]:
+        t, slack = capsule.least()
+        self.evaluations += capsule.evaluations
+        here, held = self.at(t), capsule.at(t)
+        if here.distance - held.distance <= here.error_bound + held.error_bound:
+            return t, slack
+        best, found, low = self._flat_search(0.0, -np.inf)
+        return found, max(best - max(low, held.distance - slack), self.rounding)
+
+    def _flat_search(self, begin: float, level: float) -> list[float]:
+        """What the compiled search fills in, from time ``begin`` on."""
+        from clamp3d.core import kernel_motion_flat
+
+        R, half_angle, H, half = self._sizes
+        r = self.cylinder.radius
+        out = np.empty(3)
+        arm = float(np.linalg.norm(np.cross(self.motion.axis, self.start[:3, 3] - self.motion.point)))
+        speed = float(np.linalg.norm(self.motion.travel)) + abs(self.motion.angle) * (arm + float(np.hypot(r, half)))
+        self.evaluations += kernel_motion_flat.search(
+            R,
+            half_angle,
+            H,
+            r,
+            half,
+            self._numbers,
+            speed * (1.0 + 1e-12),
+            begin,
+            1.0,
+            level,
+            self.flat_slack,
+            kernel_motion_flat.MOST,
+            out,
+        )
+        return out.tolist()
 
     def first_contact(self, margin: float) -> tuple[bool, float, float]:
         """Whether the distance comes down to ``margin`` mm; first time of that, or of the least distance; slack, mm."""
@@ -87,6 +134,8 @@ class Search:
 
     def _first(self, level: float) -> float | None:
         """First time at which the distance is at most ``level``, None if it never is."""
+        if self._capsule is not None:
+            return self._flat_first(self._capsule, level)
         from clamp3d.core import kernel_motion
 
         out = np.empty(2)
@@ -100,6 +149,21 @@ class Search:
                 return hit if hit <= 1.0 else None
             self.slack *= 100.0  # it slides along at the level: what is as good as on it is not to be told apart
         raise SolverError(f"motion search did not end within {self.evaluations} cells; give a larger resolution")
+
+    def _flat_first(self, capsule: Search, level: float) -> float | None:
+        held = capsule._first(level)
+        self.evaluations += capsule.evaluations
+        self.slack = max(self.slack, capsule.slack)
+        if held is None or self.at(held).distance <= level:
+            return held
+        for _ in range(4):
+            _, hit, until = self._flat_search(held, level)
+            if hit <= 1.0 or until >= 1.0:
+                self.slack = max(self.slack, self.flat_slack)
+                return hit if hit <= 1.0 else None
+            held = until
+            self.flat_slack *= 100.0
+        raise SolverError(f"motion search did not end within {self.evaluations} poses; give a larger resolution")
 
     def _crossing(self, t: float, level: float, error: float) -> float:
         """The root near ``t`` where the distance passes ``level``, or ``t`` where it only touches."""

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clamp3d.checks import instance
 from clamp3d.core.distance import as_pose, repaired
 from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Cylinder, SweptArc, check_shapes
+from clamp3d.core.primitives import Capsule, SweptArc
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ class GroovePieces:
     gradient: Array
 
 
-def groove_pieces(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> GroovePieces:
+def groove_pieces(groove: SweptArc, cylinder: Capsule, pose: ArrayLike) -> GroovePieces:
     """Signed gap of each closed boundary piece of a groove to a cylinder.
 
     While the cylinder's axis is outside the material, ``min(distance)`` is ``signed_distance(...).distance``. With the
@@ -51,7 +52,7 @@ def groove_pieces(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Groo
 
     Parameters
     ----------
-    groove, cylinder : SweptArc, Cylinder
+    groove, cylinder : SweptArc, Capsule
         The two shapes.
     pose : array_like (4, 4)
         ``T_groove_cylinder``, mm.
@@ -70,13 +71,14 @@ def groove_pieces(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike) -> Groo
     --------
     >>> import numpy as np
     >>> from clamp3d.core.pose import translation
-    >>> groove, wire = SweptArc(12.0, np.pi / 3, 50.0), Cylinder(15.0, 80.0)
+    >>> groove, wire = SweptArc(12.0, np.pi / 3, 50.0), Capsule(15.0, 80.0)
     >>> gaps = groove_pieces(groove, wire, translation(0.0, 5.0, 0.0))  # too thick: it rests on the lips
     >>> gaps.distance[:3].round(3).tolist()
     [0.133, 0.133, 0.133]
     """
-    if type(groove) is not SweptArc or type(cylinder) is not Cylinder:
-        check_shapes(groove, cylinder)
+    if type(groove) is not SweptArc or type(cylinder) is not Capsule:
+        instance("groove", groove, SweptArc)
+        instance("cylinder", cylinder, Capsule)
     T = as_pose(pose)
     out = np.empty((5, 14))
     from clamp3d.core.kernel_pieces import pieces  # compiled on first use

@@ -1,9 +1,10 @@
-"""The two shapes whose contact is closed form: a swept arc (groove) and a cylinder (wire)."""
+"""The shapes whose contact is closed form: a swept arc (groove), and a cylinder (wire) or capsule."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from clamp3d.checks import instance, number, positive
 from clamp3d.errors import InputError
@@ -58,7 +59,10 @@ class SweptArc:
 
 @dataclass(frozen=True, slots=True)
 class Cylinder:
-    """A wire or pin: axis on z, centred, full ``length``; mm. Raises InputError for sizes that are not positive."""
+    """A wire, pin or bolt with flat ends: axis on z, centred, full ``length``; mm.
+
+    Raises InputError for sizes that are not positive.
+    """
 
     radius: float
     length: float
@@ -68,7 +72,26 @@ class Cylinder:
         object.__setattr__(self, "length", size("cylinder length", self.length))
 
 
+@dataclass(frozen=True, slots=True)
+class Capsule:
+    """All points within ``radius`` of an axis segment of ``length`` on z, centred; mm.
+
+    It is longer than the segment by the radius at either end. Raises InputError for sizes that are not positive.
+    """
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", size("capsule radius", self.radius))
+        object.__setattr__(self, "length", size("capsule length", self.length))
+
+
+AnyCylinder: TypeAlias = Cylinder | Capsule
+"""What the kernel measures against a groove: flat-ended or rounded."""
+
+
 def check_shapes(groove: object, cylinder: object) -> None:
-    """Raise InputError unless the two are a groove and a cylinder, in this order."""
+    """Raise InputError unless the two are a groove and a cylinder or capsule, in this order."""
     instance("groove", groove, SweptArc)
-    instance("cylinder", cylinder, Cylinder)
+    instance("cylinder", cylinder, Cylinder, Capsule)

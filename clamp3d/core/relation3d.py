@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from clamp3d.core.arc_circle import ArcRelation, check_tolerance
 from clamp3d.core.distance import Feature, SignedDistance, as_pose, signed_distance
 from clamp3d.core.pose import Array, check_pose
-from clamp3d.core.primitives import Cylinder, SweptArc, check_shapes
+from clamp3d.core.primitives import AnyCylinder, Capsule, SweptArc, check_shapes
 
 Relation3D: TypeAlias = ArcRelation
 
@@ -36,7 +36,7 @@ class GrooveRelation:
     tolerance: float
 
 
-def groove_relation(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike, *, tolerance: float) -> GrooveRelation:
+def groove_relation(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike, *, tolerance: float) -> GrooveRelation:
     """Relation of a cylinder to a groove in any pose; the plane case is Table 3.
 
     A distance within ``tolerance`` mm of zero is a contact, one below an intersection (Eq. 5). A contact is interior if
@@ -48,8 +48,8 @@ def groove_relation(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike, *, to
 
     Parameters
     ----------
-    groove, cylinder : SweptArc, Cylinder
-        The two shapes; the cylinder's ends are rounded.
+    groove, cylinder : SweptArc, Cylinder or Capsule
+        The two shapes.
     pose : array_like (4, 4)
         ``T_groove_cylinder``, mm.
     tolerance : float
@@ -79,7 +79,9 @@ def groove_relation(groove: SweptArc, cylinder: Cylinder, pose: ArrayLike, *, to
     return GrooveRelation(_relation(groove, cylinder, as_pose(pose), contact, tolerance), contact, tolerance)
 
 
-def _relation(groove: SweptArc, cylinder: Cylinder, T: Array, contact: SignedDistance, tolerance: float) -> Relation3D:
+def _relation(
+    groove: SweptArc, cylinder: AnyCylinder, T: Array, contact: SignedDistance, tolerance: float
+) -> Relation3D:
     gap, bound = contact.distance, contact.error_bound
     if tolerance < bound and abs(gap) <= tolerance + bound:
         return Relation3D.UNCERTAIN
@@ -97,16 +99,28 @@ def _hollow_side(contact: SignedDistance) -> bool:
     return bool(q[0] * n[0] + q[1] * n[1] < 0.0)
 
 
-def _reaches_hollow(groove: SweptArc, cylinder: Cylinder, T: Array) -> bool:
+def _reaches_hollow(groove: SweptArc, cylinder: AnyCylinder, T: Array) -> bool:
     """Whether the cylinder meets the hollow, given that it is clear of the material.
 
     Hollow and material make up the block {y <= h, |z| <= H}, so it meets the one if it meets the other. The nearest
-    points of an axis and the block: a plane problem in y and z.
+    points of an axis and the block: a plane problem in y and z. A cylinder with flat ends and the block are convex:
+    they are apart if a plane across y and z is between them.
     """
     h, H = -groove.radius * math.cos(groove.half_angle), 0.5 * groove.length
     cy, cz = T[1:3, 3].tolist()
     dy, dz = (T[1:3, 2] / np.linalg.norm(T[:3, 2])).tolist()
     half = 0.5 * cylinder.length
+    if not isinstance(cylinder, Capsule):
+        angle = np.linspace(0.0, np.pi, 181)
+        for _ in range(12):
+            ny, nz = np.sin(angle), np.cos(angle)
+            along = ny * dy + nz * dz
+            reach = half * np.abs(along) + cylinder.radius * np.sqrt(np.maximum(0.0, 1.0 - along * along))
+            gap = ny * (cy - h) + nz * cz - np.abs(nz) * H - reach
+            k = int(np.argmax(gap))
+            step = angle[1] - angle[0]
+            angle = np.linspace(max(0.0, angle[k] - step), min(np.pi, angle[k] + step), 181)
+        return bool(gap[k] < 0.0)
 
     def distance(t: float) -> float:
         return math.hypot(max(cy + t * dy - h, 0.0), max(abs(cz + t * dz) - H, 0.0))

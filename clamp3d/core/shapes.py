@@ -18,7 +18,7 @@ from clamp3d.checks import array, choice, instance, items, number, text
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.mesh import Mesh
 from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Cylinder, SweptArc, place
+from clamp3d.core.primitives import Capsule, Cylinder, SweptArc, place
 from clamp3d.core.primitives import size as _size
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.errors import InputError
@@ -107,7 +107,7 @@ class MeshShape:
 
 
 Shape: TypeAlias = Solid | MeshShape
-AnyShape: TypeAlias = Shape | Cylinder | SweptArc
+AnyShape: TypeAlias = Shape | Cylinder | Capsule | SweptArc
 
 
 def _drill(holes: Sequence[Hole], low: Array, high: Array) -> tuple[Extrusion, ...]:
@@ -186,12 +186,17 @@ def groove_block(
 def as_shape(shape: AnyShape) -> Shape:
     """The shape that a scene works on: a bare cylinder as a solid, others as they are.
 
-    Raises InputError for a `SweptArc` (it has no outer faces) and for anything that is no shape.
+    Raises InputError for a `SweptArc` (it has no outer faces), for a `Capsule` and for anything that is no shape.
     """
     if isinstance(shape, (Solid, MeshShape)):
         return shape
     if isinstance(shape, Cylinder):
         return cylinder(shape.radius, shape.length)
+    if isinstance(shape, Capsule):
+        raise InputError(
+            "a Capsule is measured against a SweptArc only (kernel.signed_distance, first_contact, min_clearance); "
+            "make a part of a Solid, MeshShape or Cylinder"
+        )
     if isinstance(shape, SweptArc):
         raise InputError("a SweptArc has no outer faces: make a part of it with groove_block(groove, width, height)")
     raise InputError(f"a part's shape must be a Solid, MeshShape or Cylinder, got {type(shape).__name__}")

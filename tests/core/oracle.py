@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import Capsule, SweptArc
 
 DATA = Path(__file__).parent / "data"
 
@@ -22,7 +22,7 @@ _spec.loader.exec_module(make_oracle)
 class Case:
     kind: str
     groove: SweptArc
-    cylinder: Cylinder
+    cylinder: Capsule
     pose: np.ndarray
     value: str  # signed distance, 25 digits
 
@@ -39,7 +39,7 @@ def load() -> list[Case]:
         v = [float.fromhex(number) for number in numbers]
         pose = np.eye(4)
         pose[:3] = np.reshape(v[5:], (3, 4))
-        cases.append(Case(kind, SweptArc(*v[:3]), Cylinder(*v[3:5]), pose, value))
+        cases.append(Case(kind, SweptArc(*v[:3]), Capsule(*v[3:5]), pose, value))
     return cases
 
 
@@ -48,7 +48,7 @@ def surface_distance(groove: SweptArc, points: np.ndarray) -> np.ndarray:
     return np.abs(make_oracle.point_distance(points, groove.radius, groove.half_angle, groove.length / 2))
 
 
-def axis_distance(cylinder: Cylinder, pose: np.ndarray, points: np.ndarray) -> np.ndarray:
+def axis_distance(cylinder: Capsule, pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Distance of points (n, 3) from the cylinder's axis segment."""
     d = pose[:3, 2] / np.linalg.norm(pose[:3, 2])
     m = points - pose[:3, 3]

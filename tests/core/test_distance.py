@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from clamp3d.core.distance import Feature, signed_distance, signed_distances
 from clamp3d.core.pose import rotation, translation
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import Capsule, SweptArc
 from clamp3d.core.relation3d import relative_pose
 from clamp3d.errors import InputError
 from tests.core.oracle import axis_distance, load, make_oracle, surface_distance
@@ -62,7 +62,7 @@ def test_oracle_is_what_its_script_makes():
 
 def test_batch_has_the_bits_of_single():
     rng = np.random.default_rng(0)
-    groove, wire = SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0)
+    groove, wire = SweptArc(12.0, 1.2, 50.0), Capsule(10.5, 80.0)
     poses = np.array([rotation(rng.normal(size=3), rng.choice([0.0, 1e-9, 0.1, 1.0])) for _ in range(20_000)])
     poses[:, :3, 3] = rng.normal(size=(len(poses), 3)) * 8.0
     full = signed_distances(groove, wire, poses, full=True)
@@ -109,7 +109,7 @@ poses = st.builds(
 )
 scenes = st.tuples(
     st.builds(SweptArc, st.floats(1.0, 30.0), st.floats(0.05, 3.1), st.floats(0.1, 80.0)),
-    st.builds(Cylinder, st.floats(0.1, 30.0), st.floats(1e-6, 150.0)),
+    st.builds(Capsule, st.floats(0.1, 30.0), st.floats(1e-6, 150.0)),
     poses,
 )
 
@@ -202,18 +202,18 @@ def test_no_wrong_sign_at_a_nanometre():
             translation(-s - 4.0, h + 10.5 + gap, -80.0 + 20.0),
             translation(s - (10.5 + gap) * math.sin(0.3), h + (10.5 + gap) * math.cos(0.3), 0.0),
         ):
-            assert signed_distance(groove, Cylinder(10.5, 80.0), T).distance == pytest.approx(gap, abs=2e-14)
+            assert signed_distance(groove, Capsule(10.5, 80.0), T).distance == pytest.approx(gap, abs=2e-14)
 
 
 @pytest.mark.parametrize(("offset", "gap"), [(0.05, 0.015), (0.065, 0.0), (0.0650001, -1e-7)])
 def test_tangency_of_nearly_equal_radii(offset, gap):
-    answer = signed_distance(SweptArc(7.0, math.pi / 2, 50.0), Cylinder(6.935, 100.0), translation(0.0, -offset, 0.0))
+    answer = signed_distance(SweptArc(7.0, math.pi / 2, 50.0), Capsule(6.935, 100.0), translation(0.0, -offset, 0.0))
     assert answer.distance == pytest.approx(gap, abs=1e-15)
 
 
 def test_tilted_wire_touches_at_both_ends():
     # R - (L / 2 tan t + r / cos t) = 0
-    groove, wire = SweptArc(7.0, math.pi / 2, 50.0), Cylinder(6.935, 100.0)
+    groove, wire = SweptArc(7.0, math.pi / 2, 50.0), Capsule(6.935, 100.0)
     zero = math.radians(0.148915009)
     for axis in ((0, 1, 0), (1, 0, 0)):
         inside, outside = (signed_distance(groove, wire, rotation(axis, zero * f)).distance for f in (0.9999, 1.0001))
@@ -224,7 +224,7 @@ def test_tilted_wire_touches_at_both_ends():
 
 
 def test_mouth_narrower_than_the_wire():
-    groove, wire = SweptArc(7.0, math.radians(100.0), 50.0), Cylinder(6.935, 50.0)
+    groove, wire = SweptArc(7.0, math.radians(100.0), 50.0), Capsule(6.935, 50.0)
     assert signed_distance(groove, wire, np.eye(4)).distance == pytest.approx(0.065, abs=1e-15)
     y = 7.0 * math.cos(math.radians(80.0))  # between the lips: half the mouth minus the wire
     half_mouth = 7.0 * math.sin(math.radians(100.0))
@@ -234,7 +234,7 @@ def test_mouth_narrower_than_the_wire():
 
 
 def test_tiny_and_huge_numbers():
-    groove, wire = SweptArc(12.0, 1.0, 50.0), Cylinder(5.0, 80.0)
+    groove, wire = SweptArc(12.0, 1.0, 50.0), Capsule(5.0, 80.0)
     for tiny in (5e-324, 1e-310, 2.3e-162, 1e-155, 1e-100):
         for T in (translation(tiny, tiny, tiny), translation(tiny, 0.0, 0.0) @ rotation((1, 0, 0), tiny)):
             answer = signed_distance(groove, wire, T)
@@ -246,7 +246,7 @@ def test_tiny_and_huge_numbers():
         tilted[:3, 3] = (tiny, 25.0 * math.tan(-0.3) + tiny, 25.0)
         at_zero = tilted.copy()
         at_zero[0, 3] = 0.0
-        long = Cylinder(1.0, 200.0)
+        long = Capsule(1.0, 200.0)
         assert signed_distance(groove, long, tilted).distance == pytest.approx(
             signed_distance(groove, long, at_zero).distance, abs=1e-14
         )
@@ -259,26 +259,26 @@ def test_limits():
     groove = SweptArc(12.0, 1.0, 50.0)
     # A cylinder of no length is a ball; its direction does not matter.
     balls = [
-        signed_distance(groove, Cylinder(1.0, 1e-100), translation(0.3, -2.0, 1.0) @ rotation((1, 2, 3), a))
+        signed_distance(groove, Capsule(1.0, 1e-100), translation(0.3, -2.0, 1.0) @ rotation((1, 2, 3), a))
         for a in (0.0, 0.3, 2.0)
     ]
     assert len({b.distance for b in balls}) == 1
     assert balls[0].distance == pytest.approx(11.0 - math.hypot(0.3, 2.0), abs=1e-14)
     # A cylinder of no radius is its axis.
-    thin, thick = (signed_distance(groove, Cylinder(r, 80.0), T).distance for r in (1e-12, 1.0))
+    thin, thick = (signed_distance(groove, Capsule(r, 80.0), T).distance for r in (1e-12, 1.0))
     assert thin - thick == pytest.approx(1.0, abs=1e-11)
     # The mouth closes: a pipe, whose distance from inside is the same all round.
     pipe = SweptArc(12.0, math.pi - 1e-9, 50.0)
     for a in np.linspace(0.0, 6.0, 7):
-        answer = signed_distance(pipe, Cylinder(1.0, 10.0), translation(3.0 * math.sin(a), 3.0 * math.cos(a), 0.0))
+        answer = signed_distance(pipe, Capsule(1.0, 10.0), translation(3.0 * math.sin(a), 3.0 * math.cos(a), 0.0))
         assert answer.distance == pytest.approx(8.0, abs=1e-9)
     # A groove of no length is a sheet.
     sheet = SweptArc(12.0, 1.0, 1e-12)
-    assert signed_distance(sheet, Cylinder(1.0, 4.0), translation(0.0, -20.0, 5.0)).distance == pytest.approx(2.0)
+    assert signed_distance(sheet, Capsule(1.0, 4.0), translation(0.0, -20.0, 5.0)).distance == pytest.approx(2.0)
 
 
 def test_deeper_is_lower():
-    groove, wire = SweptArc(12.0, 1.0, 80.0), Cylinder(5.0, 200.0)
+    groove, wire = SweptArc(12.0, 1.0, 80.0), Capsule(5.0, 200.0)
     answers = [signed_distance(groove, wire, translation(0.0, -y, 0.0)) for y in np.linspace(0.0, 40.0, 81)]
     values = np.array([a.distance for a in answers])
     assert (np.diff(values) < 0.0).all()
@@ -301,7 +301,7 @@ def test_deeper_is_lower():
     ],
 )
 def test_bad_poses_are_named(change, rule):
-    groove, wire = SweptArc(12.0, 1.0, 50.0), Cylinder(5.0, 80.0)
+    groove, wire = SweptArc(12.0, 1.0, 50.0), Capsule(5.0, 80.0)
     T = np.eye(4)
     change(T)
     with pytest.raises(InputError, match=f"pose.*{rule}"):
@@ -314,7 +314,7 @@ def test_bad_poses_are_named(change, rule):
 
 
 def test_bad_shapes_of_input():
-    groove, wire = SweptArc(12.0, 1.0, 50.0), Cylinder(5.0, 80.0)
+    groove, wire = SweptArc(12.0, 1.0, 50.0), Capsule(5.0, 80.0)
     for pose in (np.eye(3), np.zeros((2, 4, 4)), "up", None, [[1, 2], [3]]):
         with pytest.raises(InputError, match="pose"):
             signed_distance(groove, wire, pose)
@@ -324,11 +324,11 @@ def test_bad_shapes_of_input():
     with pytest.raises(InputError, match="workers must be a whole number >= 1, got 0"):
         signed_distances(groove, wire, np.eye(4)[None], workers=0)
     for make in (
-        lambda: Cylinder(1e200, 1.0),
-        lambda: Cylinder(1.0, math.nan),
+        lambda: Capsule(1e200, 1.0),
+        lambda: Capsule(1.0, math.nan),
         lambda: SweptArc(-1.0, 1.0, 1.0),
         lambda: SweptArc(1.0, 4.0, 1.0),
-        lambda: Cylinder(1.0, 0.0),
+        lambda: Capsule(1.0, 0.0),
     ):
         with pytest.raises(InputError, match=r"must be .*got"):
             make()
@@ -344,7 +344,7 @@ def test_bad_shapes_of_input():
 def test_axis_through_the_thin_edge_beside_a_nearly_closed_mouth():
     # The material beside a mouth of 1e-7 mm is thinner there than the rounding of a radius; the axis passes through it.
     groove = SweptArc(5.161415441164862, 3.1415926427670393, 2.0250675696346696)
-    wire = Cylinder(3.5867976131830965, 23.721288892512312)
+    wire = Capsule(3.5867976131830965, 23.721288892512312)
     T = np.eye(4)
     T[:3, 0] = -0.9911410683349434, -0.13281333765803433, -8.365718838961366e-10
     T[:3, 1] = -0.13281333765803433, 0.9911410683349434, 6.243053336094173e-09
@@ -358,7 +358,7 @@ def test_axis_through_the_thin_edge_beside_a_nearly_closed_mouth():
 def test_axis_level_with_an_end_face_touches_it(turned):
     # Neither end of the axis is beyond the face's plane by more than rounding, but the axis lies on the face.
     groove = SweptArc(10.3457246493177, 3.0524651459900665, 23.430698414214742)
-    wire = Cylinder(9.626253306467202, 26.304754317132005)
+    wire = Capsule(9.626253306467202, 26.304754317132005)
     T = np.eye(4)
     T[:3, 0] = -0.11533551134736529, 0.1153355113473654, -0.9866080476280759
     T[:3, 1] = -0.6976372408510326, 0.6976372408510327, 0.16310904437068008
@@ -371,7 +371,7 @@ def test_axis_level_with_an_end_face_touches_it(turned):
 @pytest.mark.parametrize("turned", [np.eye(4), np.diag([-1.0, 1.0, -1.0, 1.0])])
 def test_axis_level_with_the_flat_faces_touches_them(turned):
     groove = SweptArc(60.27661206694996, 0.4055364276778771, 187.53846554205296)
-    wire = Cylinder(48.58597632250411, 1669.9322504748816)
+    wire = Capsule(48.58597632250411, 1669.9322504748816)
     T = np.eye(4)
     T[:3, 0] = 0.1960587234597981, -0.9607923573335858, 0.19605872345979813
     T[:3, 1] = -0.679382791182787, -0.27726890573840257, -0.6793827911827871

@@ -9,10 +9,10 @@ from clamp3d.collide.motions import first_contact, min_clearance
 from clamp3d.core.distance import Feature, signed_distance, signed_distances
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import rotation, translation
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import Capsule, SweptArc
 from clamp3d.errors import InputError
 
-GROOVE, WIRE = SweptArc(12.0, math.radians(70.0), 50.0), Cylinder(10.5, 80.0)
+GROOVE, WIRE = SweptArc(12.0, math.radians(70.0), 50.0), Capsule(10.5, 80.0)
 S, H = 12.0 * math.sin(GROOVE.half_angle), -12.0 * math.cos(GROOVE.half_angle)
 
 
@@ -57,7 +57,7 @@ def test_sliding_near_a_surface_is_proven_quickly():
 @pytest.mark.parametrize("offset", [0.0, 1e-10, -1e-10, 1e-6, -1e-6])
 def test_grazing_a_lip(offset):
     # The wire's centre passes the lip N on a line at 45 degrees, at the distance r + offset: a double root for 0.
-    groove, wire = SweptArc(12.0, math.radians(70.0), 50.0), Cylinder(2.0, 80.0)
+    groove, wire = SweptArc(12.0, math.radians(70.0), 50.0), Capsule(2.0, 80.0)
     u, v = np.array([1.0, 1.0]) / math.sqrt(2.0), np.array([-1.0, 1.0]) / math.sqrt(2.0)
     lip = np.array([S, H])
     start = lip + (2.0 + offset) * v - 3.0 * u
@@ -73,7 +73,7 @@ def test_grazing_a_lip(offset):
 
 def test_grazing_a_flat_face_on_a_circle():
     # A double root of the second kind: the lowest point of a circle touches the flat face.
-    wire = Cylinder(3.0, 20.0)
+    wire = Capsule(3.0, 20.0)
     centre = np.array([30.0, H + 3.0 + 5.0, 0.0])
     start = translation(centre[0] - 5.0, centre[1], 0.0)
     hit = first_contact(GROOVE, wire, Motion.screw((0, 0, 1), math.pi, point=centre), start)
@@ -83,7 +83,7 @@ def test_grazing_a_flat_face_on_a_circle():
 
 def test_thin_wire_through_a_thin_sheet_is_not_missed():
     # 1e-3 mm against 1e-3 mm on a path of 2 m: no sampling of practical density sees it.
-    sheet, needle = SweptArc(10.0, 1.0, 1e-3), Cylinder(1e-3, 1e-3)
+    sheet, needle = SweptArc(10.0, 1.0, 1e-3), Capsule(1e-3, 1e-3)
     hit = first_contact(sheet, needle, Motion.translate((0.0, 0.0, 2000.0)), translation(30.0, -30.0, -1000.0))
     assert hit.touches
     assert hit.t * 2000.0 == pytest.approx(1000.0 - 0.5e-3 - 0.5e-3 - 1e-3, abs=1e-9)
@@ -114,7 +114,7 @@ vectors = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm
     st.floats(-60.0, 60.0),
 )
 def test_against_dense_sampling(half, length, about, tilt, place, axis, angle, travel):
-    groove, wire = SweptArc(12.0, half, 40.0), Cylinder(6.0, length)
+    groove, wire = SweptArc(12.0, half, 40.0), Capsule(6.0, length)
     T = rotation(about, tilt)
     T[:3, 3] = 40.0 * np.array(place)
     motion = Motion.screw(axis, angle, point=10.0 * np.array(place)[::-1], travel=travel)
@@ -152,7 +152,7 @@ def test_bad_motions_are_named():
 
 def test_a_wire_that_crosses_an_end_edge_at_level_distance_is_answered_quickly():
     # Skew to the edge and moving along the plane that touches it, it is as near all the way: once minutes of marching.
-    groove, wire = SweptArc(12.0, math.radians(70.0), 50.0), Cylinder(2.0, 80.0)
+    groove, wire = SweptArc(12.0, math.radians(70.0), 50.0), Capsule(2.0, 80.0)
     normal = np.array([0.0, 1.0, 1.0]) / math.sqrt(2.0)
     lean = np.array([0.0, -0.6, 0.6]) / math.sqrt(0.72) * 0.6 + np.array([0.8, 0.0, 0.0])
     T = np.eye(4)

@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 from clamp3d.core.distance import Feature, signed_distance
 from clamp3d.core.pieces import groove_pieces
 from clamp3d.core.pose import rotation, translation
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import Capsule, SweptArc
 from tests.core.oracle import load, surface_distance
 from tests.core.test_distance import scenes
 
@@ -55,7 +55,7 @@ def test_each_piece_is_the_distance_from_its_own_surface(scene):
 
 def test_parallel_wire_gaps_are_continuous_with_their_gradients():
     rng = np.random.default_rng(1)
-    wire = Cylinder(5.0, 100.0)
+    wire = Capsule(5.0, 100.0)
     step = 1e-6
     for _ in range(3000):
         groove = SweptArc(12.0, rng.uniform(0.2, 3.0), 60.0)
@@ -74,7 +74,7 @@ def test_parallel_wire_gaps_are_continuous_with_their_gradients():
 
 
 def test_axis_inside_has_a_negative_gap_that_leads_out():
-    wire = Cylinder(5.0, 100.0)
+    wire = Capsule(5.0, 100.0)
     rng = np.random.default_rng(2)
     for _ in range(500):
         groove = SweptArc(12.0, rng.uniform(0.3, 2.8), 60.0)
@@ -103,7 +103,7 @@ def test_axis_inside_has_a_negative_gap_that_leads_out():
 
 
 def test_thick_wire_rests_on_both_lips():
-    groove, wire = SweptArc(12.0, 1.0, 50.0), Cylinder(14.0, 80.0)
+    groove, wire = SweptArc(12.0, 1.0, 50.0), Capsule(14.0, 80.0)
     s, h = 12.0 * math.sin(1.0), -12.0 * math.cos(1.0)
     p = groove_pieces(groove, wire, translation(0.0, h + math.sqrt(14.0**2 - s * s), 0.0))
     assert np.abs(p.distance[:3]).max() < 1e-14
@@ -116,7 +116,7 @@ def test_gradients_of_tilted_pieces():
     rng = np.random.default_rng(3)
     checked = 0
     for _ in range(400):
-        groove, wire = SweptArc(12.0, rng.uniform(0.3, 2.8), 50.0), Cylinder(8.0, rng.choice([5.0, 40.0, 120.0]))
+        groove, wire = SweptArc(12.0, rng.uniform(0.3, 2.8), 50.0), Capsule(8.0, rng.choice([5.0, 40.0, 120.0]))
         T = rotation(rng.normal(size=3), rng.choice([1e-3, 0.1, 1.0]))
         T[:3, 3] = rng.normal(size=3) * [8.0, 8.0, 20.0]
         if signed_distance(groove, wire, T).axis_inside:
@@ -137,7 +137,7 @@ def test_gradients_of_tilted_pieces():
 
 
 def test_an_axis_that_ends_in_the_plane_of_an_end_face_is_outside():
-    groove, wire = SweptArc(1.0, 1.0, 1.0), Cylinder(1.0, 1.0)
+    groove, wire = SweptArc(1.0, 1.0, 1.0), Capsule(1.0, 1.0)
     T = translation(0.0, -2.0, 1.0)
     assert not signed_distance(groove, wire, T).axis_inside
     gaps = groove_pieces(groove, wire, T).distance

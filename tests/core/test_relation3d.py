@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from clamp3d.core.arc_circle import ArcRelation, arc_circle
 from clamp3d.core.pose import rotation, translation
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import Capsule, SweptArc
 from clamp3d.core.relation3d import Relation3D, groove_relation, relative_pose
 from clamp3d.errors import InputError
 from tests.core.test_distance import scenes
@@ -38,7 +38,7 @@ TILT = rotation((1, 0, 0), 0.01)
 )
 def test_table_3_in_any_pose(radius, T, wanted):
     length = 4.0 if wanted == "outside" and radius == 0.5 else 80.0
-    assert groove_relation(GROOVE, Cylinder(radius, length), T, tolerance=1e-9).relation.value == wanted
+    assert groove_relation(GROOVE, Capsule(radius, length), T, tolerance=1e-9).relation.value == wanted
 
 
 def test_lip_of_a_major_arc_is_touched_from_both_sides():
@@ -52,14 +52,14 @@ def test_lip_of_a_major_arc_is_touched_from_both_sides():
         (0.6, "interior contact"),
     ):
         T = translation(lip[0] - 3.0 * math.sin(angle), lip[1] + 3.0 * math.cos(angle), 0.0)
-        assert groove_relation(groove, Cylinder(3.0, 80.0), T, tolerance=1e-9).relation.value == wanted
+        assert groove_relation(groove, Capsule(3.0, 80.0), T, tolerance=1e-9).relation.value == wanted
 
 
 @settings(max_examples=300, deadline=None)
 @given(st.floats(0.2, 2.9), st.floats(0.5, 11.9), st.floats(-20.0, 20.0), st.floats(-20.0, 20.0))
 def test_parallel_wire_agrees_with_the_plane_relation(half, r, x, y):
     # Only outside the material: the arc of the plane relation is a curve, without material behind it.
-    groove, wire = SweptArc(12.0, half, 50.0), Cylinder(r, 80.0)
+    groove, wire = SweptArc(12.0, half, 50.0), Capsule(r, 80.0)
     answer = groove_relation(groove, wire, translation(x, y, 0.0), tolerance=1e-9)
     plane = arc_circle(12.0, half, r, x, y, tolerance=1e-9)
     if answer.contact.feature.name not in ("ARC", "LIP_M", "LIP_N") or answer.contact.axis_inside:
@@ -74,7 +74,7 @@ def test_parallel_wire_agrees_with_the_plane_relation(half, r, x, y):
 
 def test_uncertain_where_the_tolerance_is_below_the_error_bound():
     T = translation(0.0, -4.0, 0.0) @ rotation((0, 0, 1), 0.3)
-    wire = Cylinder(3.0, 80.0)
+    wire = Capsule(3.0, 80.0)
     assert groove_relation(GROOVE, wire, T, tolerance=0.0).relation is Relation3D.UNCERTAIN
     assert groove_relation(GROOVE, wire, T, tolerance=1e-13).relation is Relation3D.INTERIOR_CONTACT
     assert groove_relation(GROOVE, wire, translation(0, -2, 0), tolerance=0.0).relation is Relation3D.INSIDE
