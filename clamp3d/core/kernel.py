@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from clamp3d.core.jit import entry, formula, source_stamp
 from clamp3d.core.kernel_distance import inside_rate, is_parallel, nearest, parallel
-from clamp3d.core.kernel_flat import ROWS, flat_nearest, flat_parallel
+from clamp3d.core.kernel_flat import flat_nearest, flat_parallel
 from clamp3d.core.kernel_pose import axis, rigid
 
 RECORD = 16
@@ -38,11 +36,11 @@ def put(answer, rate, out, k):  # type: ignore[no-untyped-def]
 
 
 @formula
-def record(T, k, R, half_angle, s, h, H, r, l, flat, work, found, rows, out):  # type: ignore[no-untyped-def] # noqa: E741
+def record(T, k, R, half_angle, s, h, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
     """Answer for the valid pose k into out (n, 16); ``flat`` ends or those of a capsule."""
     cx, cy, cz, dx, dy, dz = T[k, 0, 3], T[k, 1, 3], T[k, 2, 3], T[k, 0, 2], T[k, 1, 2], T[k, 2, 2]
     if flat:
-        answer = flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, work, found, rows)
+        answer = flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, pad)
         put(answer[:10], answer[10:], out, k)
         return
     answer = nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz)
@@ -53,19 +51,12 @@ def record(T, k, R, half_angle, s, h, H, r, l, flat, work, found, rows, out):  #
     put(answer, rate, out, k)
 
 
-@formula
-def scratch():  # type: ignore[no-untyped-def]
-    """What the search on the edges works in: stretches, angles, candidates."""
-    return np.empty((128, 2)), np.empty(16), np.empty((ROWS, 5))
-
-
 def _entries(stamp: str) -> tuple[Any, Any]:
-    def distances(T, R, half_angle, H, r, l, flat, out):  # type: ignore[no-untyped-def] # noqa: E741
+    def distances(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
         stamp  # noqa: B018
         s = R * math.sin(half_angle)
         h = -R * math.cos(half_angle)
         if flat:
-            work, found, rows = scratch()
             for i in range(T.shape[0]):
                 if not rigid(T, i):
                     return i
@@ -74,7 +65,7 @@ def _entries(stamp: str) -> tuple[Any, Any]:
                 if is_parallel(R, max(l, r), dx, dy):
                     out[i] = flat_parallel(R, s, h, H, r, l, x, y, z, dz)[0]
                 else:
-                    out[i] = flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, work, found, rows)[0]
+                    out[i] = flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, pad)[0]
             return -1
         for i in range(T.shape[0]):
             if not rigid(T, i):
@@ -88,20 +79,19 @@ def _entries(stamp: str) -> tuple[Any, Any]:
             out[i] = answer[0]
         return -1
 
-    def records(T, R, half_angle, H, r, l, flat, out):  # type: ignore[no-untyped-def] # noqa: E741
+    def records(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
         stamp  # noqa: B018
         s = R * math.sin(half_angle)
         h = -R * math.cos(half_angle)
-        work, found, rows = scratch()
         for i in range(T.shape[0]):
             if not rigid(T, i):
                 return i
-            record(T, i, R, half_angle, s, h, H, r, l, flat, work, found, rows, out)
+            record(T, i, R, half_angle, s, h, H, r, l, flat, pad, out)
         return -1
 
     return (
-        entry(distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[::1])"),
-        entry(records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1])"),
+        entry(distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[::1])"),
+        entry(records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[:,::1])"),
     )
 
 

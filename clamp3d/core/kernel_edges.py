@@ -179,7 +179,7 @@ def settle(kind, r, l, side, middle, half, R, kx, ky, kz, off, dx, dy, dz):  # t
 def on_arc(ez, R, half_angle, r, l, cx, cy, cz, dx, dy, dz, best, slack, eps, work, found):  # type: ignore[no-untyped-def] # noqa: E741
     """Minima of f on the end arc z = ez that are below ``best + slack``: their number, and what may lie below.
 
-    Their angles from the deepest line go to ``found`` (k,), best last where only the best is asked for (slack 0).
+    Their angles from the deepest line go to the first column of ``found``, of the best alone if ``slack`` is 0.
     """
     off = (ez - cz) * dz - cx * dx - cy * dy
     kx = -cx - off * dx
@@ -209,7 +209,7 @@ def on_arc(ez, R, half_angle, r, l, cx, cy, cz, dx, dy, dz, best, slack, eps, wo
         if f < best:
             best = f
             if slack == 0.0:
-                found[0] = at
+                found[0, 0] = at
                 count = 1
         limit = best + slack - eps
         low = math.sqrt(max(w * w - W1 * half, 0.0))
@@ -243,7 +243,7 @@ def on_arc(ez, R, half_angle, r, l, cx, cy, cz, dx, dy, dz, best, slack, eps, wo
                 if new_f < best:
                     best, limit = new_f, new_f + slack - eps
                     if slack == 0.0:
-                        found[0] = new
+                        found[0, 0] = new
                         count = 1
             kind = -1
             if g_low > 0.0 and e_low > 0.0:  # all of it beyond the rim
@@ -274,10 +274,10 @@ def on_arc(ez, R, half_angle, r, l, cx, cy, cz, dx, dy, dz, best, slack, eps, wo
             f = phi(w - r, abs(t) - l)
             if slack > 0.0:
                 if f <= best + slack and count < len(found):
-                    found[count] = at
+                    found[count, 0] = at
                     count += 1
             elif f < best:
-                found[0] = at
+                found[0, 0] = at
                 count = 1
             best = min(best, f)
             continue

@@ -41,9 +41,6 @@ from clamp3d.core.kernel_features import (
     section_foot,
 )
 
-ROWS = 64
-"""Candidates that are kept at most."""
-
 
 @inlined
 def note(rows, n, f, x, y, z, feature):  # type: ignore[no-untyped-def]
@@ -245,7 +242,7 @@ def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, slac
         count, rest = on_arc(ez, R, half_angle, r, l, cx, cy, cz, dx, dy, dz, best, slack, eps, work, found)
         left = min(left, rest)
         for k in range(count):
-            x, y = R * math.sin(found[k]), -R * math.cos(found[k])
+            x, y = R * math.sin(found[k, 0]), -R * math.cos(found[k, 0])
             w, t = from_axis(x - cx, y - cy, ez - cz, dx, dy, dz)
             f = phi(w - r, abs(t) - l)
             n = note(rows, n, f, x, y, ez, END_ARC)
@@ -346,6 +343,8 @@ def flat_parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def
         feature = beyond_end(feature)
     elif g >= e:
         nz = 0.0
+        if g < 0.0 and abs(qz - z) - l > g:  # the middle of the line of contact is nearer to an end
+            qz = min(max(z, -H), H)
     else:
         qz = min(max(z, -H), H)
         nx, ny, nz = 0.0, 0.0, above
@@ -355,8 +354,12 @@ def flat_parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def
 
 
 @formula
-def flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, work, found, rows):  # type: ignore[no-untyped-def] # noqa: E741
-    """Signed distance of a flat-ended cylinder: distance, q, normal, feature, place on the axis, bound, rate."""
+def flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, pad):  # type: ignore[no-untyped-def] # noqa: E741
+    """Signed distance of a flat-ended cylinder: distance, q, normal, feature, place on the axis, bound, rate.
+
+    ``pad`` (128, 5) is what it works in.
+    """
+    work, found, rows = pad[:64], pad[64:80], pad[80:]
     if is_parallel(R, max(l, r), dx, dy):
         v, qx, qy, qz, nx, ny, nz, feature, t, bound = flat_parallel(R, s, h, H, r, l, cx, cy, cz, dz)
         return v, qx, qy, qz, nx, ny, nz, feature, t, bound, nx, ny, nz

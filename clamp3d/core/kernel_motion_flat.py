@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.core.jit import entry, source_stamp
-from clamp3d.core.kernel_flat import ROWS, flat_nearest
+from clamp3d.core.kernel_flat import flat_nearest
 from clamp3d.core.kernel_motion import place
 
 MOST = 100_000
@@ -30,7 +30,7 @@ def _entry(stamp: str) -> Any:
         """
         stamp  # noqa: B018
         s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
-        work, found, rows = np.empty((128, 2)), np.empty(16), np.empty((ROWS, 5))
+        pad = np.empty((128, 5))
         a, b = u0, u1
         fa = fb = best = bound = math.inf
         at = u0
@@ -40,7 +40,7 @@ def _entry(stamp: str) -> Any:
         u = u0
         while True:
             p = place(m, u)
-            f = flat_nearest(R, half_angle, s, h, H, r, l, p[0], p[1], p[2], p[3], p[4], p[5], work, found, rows)[0]
+            f = flat_nearest(R, half_angle, s, h, H, r, l, p[0], p[1], p[2], p[3], p[4], p[5], pad)[0]
             count += 1
             if f < best:
                 best, at = f, u
