@@ -16,6 +16,7 @@ Lengths are millimetres, angles radians, poses 4x4 column-vector matrices ``T_ta
 | `clamp3d.kernel` | the closed forms of groove and cylinder: single poses and batches |
 | `clamp3d.baselines` | contact models that chords, wedges, hulls and meshes make of a groove |
 | `clamp3d.figures` | drawings |
+| `clamp3d.testing` | what every bound promises, as assertions for tests of your own shapes |
 | `clamp3d.bench` | experiments on the methods |
 
 Names are loaded on first use (`__init__.pyi` lists them), so ``import clamp3d`` costs next to nothing.

@@ -3,6 +3,7 @@ from . import bench as bench
 from . import figures as figures
 from . import kernel as kernel
 from . import shapes as shapes
+from . import testing as testing
 from .clamp.assemble import assemble as assemble
 from .clamp.dimensions import Clamp as Clamp
 from .clamp.loader import load_clamp as load_clamp

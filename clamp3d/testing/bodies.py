@@ -1,0 +1,173 @@
+"""Bodies by their definition: functions of points, written from what the shapes are said to be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.pose import Array
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.profile import Arc, Profile
+from clamp3d.core.shapes import MeshShape, Solid
+from clamp3d.errors import InputError
+
+Field = Callable[[Array], Array]
+"""Of points (n, 3): <= 0 on the body, > 0 elsewhere, and nowhere steeper than 1. So a point with the value g > 0 is at
+least g mm from the body, and one with g < 0 is the centre of a ball of radius -g mm in it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """A body by its definition: a `Field`, and the corners (2, 3) of a ``box`` around it, infinite if it has no end."""
+
+    field: Field
+    box: Array
+
+    def at(self, T: Array) -> Body:
+        """The body placed by ``T`` (4, 4)."""
+        box = self.box
+        if np.isfinite(box).all():
+            middle, half = 0.5 * (box[0] + box[1]), 0.5 * (box[1] - box[0])
+            centre, reach = T[:3, :3] @ middle + T[:3, 3], np.abs(T[:3, :3]) @ half
+            box = np.array([centre - reach, centre + reach])
+        return Body(lambda x: self.field((x - T[:3, 3]) @ T[:3, :3]), box)
+
+
+AnyBody = Body | Solid | MeshShape | Cylinder | SweptArc
+
+
+def body(shape: AnyBody) -> Body:
+    """The definition of a shape. Raises InputError for what is neither a shape nor a `Body`."""
+    if isinstance(shape, Body):
+        return shape
+    if isinstance(shape, Solid):
+        return Body(_solid(shape), shape.bounds)
+    if isinstance(shape, MeshShape):
+        V = shape.mesh.vertices
+        return Body(_mesh(V[shape.mesh.faces]), np.array([V.min(axis=0), V.max(axis=0)]))
+    if isinstance(shape, Cylinder):
+        r, half = shape.radius, 0.5 * shape.length
+        corner = np.array([r, r, half])
+        return Body(
+            lambda x: _prism(np.hypot(x[:, 0], x[:, 1]) - r, np.abs(x[:, 2]) - half), np.array([-corner, corner])
+        )
+    if isinstance(shape, SweptArc):
+        far = np.full(3, math.inf)
+        return Body(_groove(shape), np.array([-far, far]))
+    raise InputError(f"shape must be a Solid, MeshShape, Cylinder, SweptArc or Body, got {type(shape).__name__}")
+
+
+def convex_body(vertices: ArrayLike) -> Body:
+    """The convex hull of points (n, 3), mm."""
+    from scipy.spatial import ConvexHull
+
+    V = np.asarray(vertices, dtype=np.float64)
+    planes = ConvexHull(V).equations
+    return Body(lambda x: (x @ planes[:, :3].T + planes[:, 3]).max(axis=1), np.array([V.min(axis=0), V.max(axis=0)]))
+
+
+def _prism(across: Array, along: Array) -> Array:
+    """From the distances across and along the axis of what is drawn along it."""
+    return np.asarray(np.hypot(np.maximum(across, 0), np.maximum(along, 0)) + np.minimum(np.maximum(across, along), 0))
+
+
+def _outline(profile: Profile) -> Callable[[Array], Array]:
+    """Signed distance of points (n, 2) from an outline, from the definition of its segments and arcs."""
+
+    def distance(x: Array) -> Array:
+        least, turn = np.full(len(x), np.inf), np.zeros(len(x))
+        for edge in profile.edges:
+            start, end = np.array(edge.start), np.array(edge.end)
+            a, b = x - start, x - end
+            along = end - start
+            if isinstance(edge, Arc):
+                c = x - edge.centre
+                rho, off = np.hypot(*c.T), np.arctan2(c[:, 1], c[:, 0]) - 0.5 * (edge.start_angle + edge.end_angle)
+                on = np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi) <= 0.5 * abs(edge.sweep)
+                ends = np.minimum(np.hypot(*a.T), np.hypot(*b.T))
+                least = np.minimum(least, np.where(on, np.abs(rho - edge.radius), ends))
+                # Between an arc and its chord the arc turns once more round the point than the chord does.
+                side = (along[0] * a[:, 1] - along[1] * a[:, 0]) * np.sign(edge.sweep)
+                whole = abs(edge.sweep) >= 2.0 * math.pi - 1e-9
+                turn += np.sign(edge.sweep) * ((rho < edge.radius) & ((side < 0.0) | whole))
+                if whole:
+                    continue
+            else:
+                s = np.clip(a @ along / (along @ along), 0.0, 1.0)[:, None]
+                least = np.minimum(least, np.hypot(*(a - s * along).T))
+            turn += np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)) / (2.0 * math.pi)
+        return np.asarray(np.where(np.round(turn) != 0, -least, least))
+
+    return distance
+
+
+def _solid(solid: Solid) -> Field:
+    """The bodies less the holes; those along a body's axis are cut out of its outline: that keeps distances exact."""
+    holes = [(hole, _outline(hole.profile)) for hole in solid.holes]
+
+    def one(extrusion: Extrusion) -> Field:
+        outline, frame = _outline(extrusion.profile), extrusion.frame
+        middle, half = 0.5 * (extrusion.start + extrusion.end), 0.5 * (extrusion.end - extrusion.start)
+
+        def field(x: Array) -> Array:
+            local = x @ frame
+            across = outline(local[:, :2])
+            for hole, circle in holes:
+                if hole.axis == extrusion.axis:
+                    across = np.maximum(across, -circle(local[:, :2]))
+            return _prism(across, np.abs(local[:, 2] - middle) - half)
+
+        return field
+
+    fields = [one(extrusion) for extrusion in solid.bodies]
+    crossing = [(hole, f) for hole, f in holes if any(hole.axis != made.axis for made in solid.bodies)]
+
+    def field(x: Array) -> Array:
+        found = np.min([f(x) for f in fields], axis=0)
+        for hole, circle in crossing:
+            found = np.maximum(found, -circle((x @ hole.frame)[:, :2]))
+        return np.asarray(found)
+
+    return field
+
+
+def _groove(groove: SweptArc) -> Field:
+    R, s, h = groove.radius, groove.radius * math.sin(groove.half_angle), -groove.radius * math.cos(groove.half_angle)
+
+    def field(x: Array) -> Array:
+        u, v = np.abs(x[:, 0]), x[:, 1]
+        rho, lip = np.hypot(u, v), np.hypot(u - s, v - h)
+        edge = np.minimum(
+            np.where(np.arctan2(u, -v) <= groove.half_angle, np.abs(rho - R), lip), np.where(u >= s, np.abs(v - h), lip)
+        )
+        return _prism(np.where((v <= h) & (rho >= R), -edge, edge), np.abs(x[:, 2]) - 0.5 * groove.length)
+
+    return field
+
+
+def _mesh(triangles: Array) -> Field:
+    """Distance from triangles (m, 3, 3), negative where they wind round the point (solid angles)."""
+    sides = np.roll(triangles, -1, axis=1) - triangles
+    normal = np.cross(sides[:, 0], sides[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    walls = np.cross(normal[:, None], sides)
+
+    def some(x: Array) -> Array:
+        r = x[:, None, None] - triangles
+        s = np.clip((r * sides).sum(-1) / np.maximum((sides * sides).sum(-1), 1e-300), 0.0, 1.0)
+        edge = np.linalg.norm(r - s[..., None] * sides, axis=-1).min(axis=2)
+        height = np.abs(np.einsum("nmj,mj->nm", r[:, :, 0], normal))
+        least = np.where(((r * walls).sum(-1) >= 0.0).all(axis=2), height, edge).min(axis=1)
+        a, b, c = (-r[:, :, k] for k in range(3))
+        la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
+        below = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
+        turns = np.arctan2((a * np.cross(b, c)).sum(-1), below).sum(axis=1) / (2.0 * math.pi)
+        return np.asarray(np.where(turns > 0.5, -least, least))
+
+    step = max(1, 200_000 // len(triangles))
+    return lambda x: np.concatenate([some(x[k : k + step]) for k in range(0, len(x), step)] or [np.empty(0)])

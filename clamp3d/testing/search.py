@@ -1,0 +1,147 @@
+"""The oracle: how deep two bodies share a point, how far they are apart, by branch and bound over boxes of points."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from clamp3d.collide.answer import Distance
+from clamp3d.core.pose import Array
+from clamp3d.testing.bodies import AnyBody, Body, body
+
+_PROJECTIONS, _FOLLOWED = 8, 3
+"""How often near points are projected to and fro between two bodies, and how many of them are followed to the end."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Common:
+    """The least of ``max(field_a, field_b)`` over all points lies between ``lower`` and ``upper``, mm.
+
+    Negative: the bodies share a ball of that radius; positive: they are at least twice as far apart. ``points`` (k, 3)
+    are the lowest that were looked at, the first has ``upper``.
+    """
+
+    lower: float
+    upper: float
+    points: Array
+
+
+def common(
+    a: AnyBody, b: AnyBody, T_a_b: Array | None = None, *, accuracy: float = 0.01, cells: int = 100_000
+) -> Common:
+    """How deep two bodies share a point, or how far both are from the point nearest to both, by branch and bound.
+
+    Parameters
+    ----------
+    a, b : Body or shape
+    T_a_b : ndarray (4, 4), optional
+        Pose of b in the frame of a.
+    accuracy : float
+        Width in mm at which the search ends.
+    cells : int
+        Number of boxes looked at after which it ends with what is proven.
+    """
+    x, y = body(a), body(b) if T_a_b is None else body(b).at(T_a_b)
+    low, high = _region(x, y)
+    centre, half = 0.5 * (low + high)[None], 0.5 * (high - low)
+    best, floor, seen = math.inf, math.inf, 0
+    kept, values = np.empty((0, 3)), np.empty(0)
+    while len(centre):
+        value = np.maximum(x.field(centre), y.field(centre))
+        seen += len(centre)
+        best = min(best, float(value.min()))
+        radius = float(np.linalg.norm(half))
+        order = np.argsort(np.concatenate([values, value]), kind="stable")[:64]
+        kept, values = np.concatenate([kept, centre])[order], np.concatenate([values, value])[order]
+        open_ = value - radius < best - accuracy
+        if seen > cells:
+            floor = float((value - radius).min(initial=math.inf, where=open_))
+            break
+        centre = centre[open_]
+        k = int(np.argmax(half))
+        half = np.where(np.arange(3) == k, 0.5 * half, half)
+        shift = np.eye(3)[k] * half[k]
+        centre = np.concatenate([centre - shift, centre + shift])
+    return Common(min(floor, best - accuracy), best, kept)
+
+
+def _region(x: Body, y: Body) -> tuple[Array, Array]:
+    """A box with every point that can be the nearest to both; of a body without end only what is near the other."""
+    boxes = [x.box, y.box]
+    for k, (one, other) in enumerate(((x, y), (y, x))):
+        if not np.isfinite(one.box).all():
+            middle, reach = other.box.mean(axis=0), float(np.linalg.norm(0.5 * np.diff(other.box, axis=0)))
+            reach += max(0.0, float(one.field(middle[None])[0]))
+            boxes[k] = np.array([other.box[0] - reach, other.box[1] + reach])
+    return np.minimum(boxes[0][0], boxes[1][0]), np.maximum(boxes[0][1], boxes[1][1])
+
+
+def separation(
+    a: AnyBody, b: AnyBody, T_a_b: Array | None = None, *, accuracy: float = 0.01, cells: int = 20_000
+) -> Distance:
+    """Distance of two bodies, 0 where they meet: ``lower`` proven by `common`, ``upper`` by points of both.
+
+    The points are found by descent from the lowest ones of the search: perhaps not the nearest ones, but real ones.
+    """
+    x, y = body(a), body(b) if T_a_b is None else body(b).at(T_a_b)
+    found = common(x, y, accuracy=0.5 * accuracy, cells=cells)
+    if found.upper <= 0.0:
+        return Distance(0.0, 0.0, found.points[0], found.points[0])
+    q = found.points
+    for _ in range(_PROJECTIONS):
+        p = _onto(x, q)
+        q = _onto(y, p)
+        gaps = np.linalg.norm(q - p, axis=1)
+        q = q[np.argsort(gaps)[: max(_FOLLOWED, len(q) // 2)]]
+    trials = np.concatenate([q, *(_polished(x, y, point) for point in q)])
+    p = _onto(x, trials)
+    q = _onto(y, p)
+    # What the last projection has left outside is added: from there the bodies are no further.
+    outside = np.maximum(x.field(p), 0.0) + np.maximum(y.field(q), 0.0)
+    gaps = np.where(outside <= 1e-9 * (1.0 + np.abs(p).max()), np.linalg.norm(q - p, axis=1) + outside, np.inf)
+    k = int(np.argmin(gaps))
+    return Distance(max(0.0, 2.0 * found.lower), float(gaps[k]), p[k], q[k], method="branch and bound")
+
+
+def _polished(x: Body, y: Body, start: Array) -> Array:
+    """Points (2, 3) near ``start`` (3,) on the two bodies that a descent finds nearest to each other."""
+    from scipy.optimize import minimize
+
+    def inside(v: Array) -> list[float]:
+        return [-float(x.field(v[None, :3])[0]), -float(y.field(v[None, 3:])[0])]
+
+    def slopes(v: Array) -> Array:
+        out = np.zeros((2, 6))
+        out[0, :3], out[1, 3:] = -_slope(x, v[None, :3])[0], -_slope(y, v[None, 3:])[0]
+        return out
+
+    found = minimize(
+        lambda v: np.sum((v[:3] - v[3:]) ** 2),
+        np.concatenate([_onto(x, start[None])[0], start]),
+        jac=lambda v: 2.0 * np.concatenate([v[:3] - v[3:], v[3:] - v[:3]]),
+        constraints={"type": "ineq", "fun": inside, "jac": slopes},
+        method="SLSQP",
+        options={"maxiter": 40, "ftol": 1e-13},
+    )
+    return np.asarray(found.x.reshape(2, 3))
+
+
+def _slope(it: Body, x: Array) -> Array:
+    """Slopes (n, 3) of the field at points (n, 3), by differences."""
+    step = 1e-6 * np.concatenate([np.eye(3), -np.eye(3)])
+    values = it.field((x[None] + step[:, None]).reshape(-1, 3)).reshape(6, len(x))
+    return np.asarray((values[:3] - values[3:]).T / 2e-6)
+
+
+def _onto(it: Body, x: Array) -> Array:
+    """Points (n, 3) moved down the field until they are on the body."""
+    for _ in range(6):
+        out = it.field(x)
+        far = np.flatnonzero(out > 0.0)
+        if not len(far):
+            break
+        x = x.copy()
+        x[far] -= out[far, None] * _slope(it, x[far])
+    return x

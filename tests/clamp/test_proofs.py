@@ -1,0 +1,103 @@
+"""What the proof of a final state rests on, each part alone: a step less and a wrong answer would be called proven."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp import final_state
+from clamp3d.clamp.equilibria import equilibria, same
+from clamp3d.clamp.final_state import solve_final_state
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.meetings import meetings
+from clamp3d.clamp.parts import parts
+from clamp3d.clamp.result import Waypoint
+from clamp3d.clamp.section import WIRES, D, Section
+from clamp3d.collide.model import ModelCache
+from clamp3d.core.pose import SectionPose
+from clamp3d.errors import SolverError
+from clamp3d.testing import assert_returns, body
+
+
+@pytest.fixture(scope="module")
+def section():
+    return Section(load_clamp(), Cas())
+
+
+@pytest.mark.parametrize("shift", [5e-7, -5e-7])
+def test_a_state_that_is_off_is_not_proven(section, shift, monkeypatch):
+    """A little open, its forces balance as well as before: only that they act across gaps gives it away."""
+    polish = final_state._polish
+
+    def off(section, q, active):
+        q, step = polish(section, q, active)
+        q = q.copy()
+        q[D] += shift
+        return q, step
+
+    monkeypatch.setattr(final_state, "_polish", off)
+    with pytest.raises(SolverError, match="final state not proven"):
+        solve_final_state(section)
+
+
+def test_states_that_differ_in_what_is_loose_are_two(section):
+    state = solve_final_state(section)
+    assert same(state, state)
+    for loose in (("P6",), ("P7",), ("P6", "P7")):
+        assert not same(state, replace(state, loose=loose))
+        assert not same(replace(state, loose=loose), state)
+    for k in range(6):
+        moved = state.q.copy()
+        moved[k] += 1e-4
+        assert not same(state, replace(state, q=moved))
+
+
+def test_equilibria_solved_again_from_their_neighbours_return(section):
+    rng = np.random.default_rng(0)
+    for state in equilibria(section):
+        if state.loose:
+            continue
+        starts = []
+        for _ in range(3):
+            start = state.q + 2e-3 * np.eye(len(state.q))[D]
+            start[[1, 3]] += 1e-3
+            start[:4] += rng.uniform(-2e-4, 2e-4, 4)
+            if section.gaps(start).value.min() >= 0.0:
+                starts.append(start)
+        assert_returns(lambda q: solve_final_state(section, q).q, state.q, starts, 1e-6)
+
+
+def test_a_wire_settles_between_the_bottoms_of_its_two_grooves(section):
+    """At its limits the wire's centre lies on the grooves' surfaces, by the parts' own outlines."""
+    q = solve_final_state(section).q
+    splints = {name: body(parts(section.clamp)[name]) for name in ("P1", "P2")}
+    for wire in WIRES:
+        (left, right), (top, bottom) = section.wire_limits(q, wire)
+        up, down = (section.pairs[name, wire] for name in ("P1", "P2"))
+        assert 0.5 * (left + right) == pytest.approx(up.T_a_groove[0, 3], abs=1e-9)
+        at = np.array([[up.T_a_groove[0, 3], 0.0, -top]])
+        assert splints["P1"].field(at)[0] == pytest.approx(0.0, abs=1e-9)
+        # The lowest place is no further below the down splint's groove than that is deep.
+        T = section.down_splint(q).T()
+        centre = T[:3, :3] @ down.T_a_groove[:3, 3] + T[:3, 3]
+        x = np.array([[centre[0], 0.0, -bottom]])
+        assert abs(splints["P2"].at(T).field(x)[0]) <= down.groove.radius * (1.0 - np.cos(section.down_splint(q).angle))
+
+
+def test_a_splint_that_turns_past_a_wire_meets_it_between_two_waypoints():
+    """At both waypoints they stand clear and no origin moves: only that the splint turns brings its end to the line."""
+    clamp = load_clamp()
+    far = {name: SectionPose(1000.0 * k, 5000.0) for k, name in enumerate(("P2", "P3", "P4", "P5", "P7"))}
+    reach = clamp.up_splint.width
+
+    def path(a, b, wire):
+        poses = [{**far, "P1": SectionPose(0.0, 0.0, angle), "P6": SectionPose(*wire)} for angle in (a, b)]
+        return [Waypoint("P1", label, p) for label, p in zip(("before", "after"), poses, strict=True)]
+
+    beside = (0.7 * reach, 0.0)
+    turned = path(0.9, -0.9, beside)  # the splint lies along x when it is level
+    assert meetings(clamp, turned, [("P1", "P6")], ModelCache()) == {("P1", "P6"): "P1 (after)"}
+    away = path(0.9, -0.9, (0.7 * reach, 4.0 * reach))
+    assert meetings(clamp, away, [("P1", "P6")], ModelCache()) == {}
+    assert meetings(clamp, path(0.9, 0.9, beside), [("P1", "P6")], ModelCache()) == {}

@@ -1,0 +1,151 @@
+"""Bounds of distances: any pair, every level, meshes, fitted meshes and contact models, against the oracle."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from clamp3d import baselines, distance, shapes
+from clamp3d.collide.answer import Distance
+from clamp3d.collide.model import ModelCache
+from clamp3d.collide.refine import from_boxes, refine
+from clamp3d.collide.verdict import Thresholds
+from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.pose import inverse, rotation, translation
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.profile import Arc, Profile
+from clamp3d.testing import assert_distance, body
+from tests.kinds import BLOCK, DRAWN, faceted_shape, poses
+
+SLOW = settings(
+    deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate], suppress_health_check=[HealthCheck.too_slow]
+)
+SOME = st.sampled_from(DRAWN)
+
+
+def holds(found, a, b, T, **how):
+    """In an overlap the normal is not yet that of the translation that parts the bodies."""
+    if found.lower < 0.0:
+        found = replace(found, normal=None)
+    assert_distance(found, a, b, T, **how)
+
+
+@settings(SLOW, max_examples=40)
+@given(SOME, SOME, poses(25.0))
+def test_any_pair_of_drawn_solids(a, b, T):
+    holds(distance(a, b, T), a, b, T)
+
+
+@settings(SLOW, max_examples=40)
+@given(
+    st.builds(SweptArc, st.floats(3.0, 15.0), st.floats(0.2, 3.0), st.floats(2.0, 60.0)),
+    st.builds(Cylinder, st.floats(0.5, 12.0), st.floats(1.0, 90.0)),
+    poses(25.0),
+)
+def test_a_bare_groove_and_a_cylinder(groove, wire, T):
+    holds(distance(groove, wire, T), groove, wire, T)
+    holds(distance(wire, groove, inverse(T)), wire, groove, inverse(T))
+
+
+@settings(SLOW, max_examples=15)
+@given(SOME, SOME, poses(22.0))
+def test_every_level_on_the_way_to_an_answer(a, b, T):
+    seen: list[Distance] = []
+    cache = ModelCache()
+    x, y = cache.model(a), cache.model(b)
+    refine(x, y, T, from_boxes(x, y, T), Thresholds(), lambda known: bool(seen.append(known)))
+    assert len({d.level for d in seen}) >= 2
+    for known in {d.level: d for d in seen}.values():
+        holds(known, a, b, T)
+
+
+FACETED = {
+    (a.name, fit): (a, faceted_shape(a, 0.3 if fit == "off" else 0.05, fit))
+    for a in DRAWN
+    for fit in ("off", "round", "bound")
+    if fit == "off" or any(e.profile.arcs for e in (*a.bodies, *a.holes))
+}
+
+
+@settings(SLOW, max_examples=12)
+@given(st.sampled_from([key for key in FACETED if key[1] == "off"]), SOME, poses(20.0))
+def test_facets_that_are_the_part(key, b, T):
+    faceted = FACETED[key][1]
+    holds(distance(faceted, b, T, accuracy=1e-3), faceted, b, T, cells=3000)
+
+
+@settings(SLOW, max_examples=40)
+@given(st.sampled_from([key for key in FACETED if key[1] != "off"]), st.sampled_from([DRAWN[3], DRAWN[5]]), poses(20.0))
+def test_a_fitted_mesh_has_the_bounds_of_the_part_it_comes_from(key, b, T):
+    """Its corners lie on the part's surface, so what is said of it must hold for the part."""
+    solid, faceted = FACETED[key]
+    found = distance(faceted, b, T, accuracy=1e-3)
+    holds(replace(found, point_a=None, normal=None), solid, b, T)
+
+
+@settings(SLOW, max_examples=15)
+@given(st.floats(0.4, 1.4), st.floats(0.0, 3.0), st.floats(-16.0, 16.0), st.floats(-0.5, 4.0), st.floats(-0.2, 0.2))
+def test_a_fitted_groove_between_shoulders(half, above, u, v, turn):
+    """What stands above the ends of the arc is the part's, not air: the groove's mouth is as high as the part."""
+    s, h, face = 7.0 * math.sin(half), -7.0 * math.cos(half), above - 7.0 * math.cos(half)
+    arc = Arc((0.0, 0.0), 7.0, half - 0.5 * math.pi, -half - 0.5 * math.pi)
+    wide, back = 20.0, -15.0
+    corners = [(-wide, face), (-wide, back), (wide, back), (wide, face)]
+    step = [(s + 2.0, face), (s + 2.0, h)] if above else []
+    outline = Profile.of(*corners, *step, arc, *((-x, y) for x, y in reversed(step)))
+    solid = shapes.Solid("raised", (Extrusion(outline, "Z", -15.0, 15.0),))
+    wire = shapes.cylinder(3.0, 20.0)
+    T = rotation((0.0, 1.0, 0.0), turn)
+    T[:3, 3] = (u, face + 3.0 + v, 1.0)
+    for fit in ("bound", "round"):
+        found = distance(faceted_shape(solid, 0.05, fit), wire, T, accuracy=1e-3)
+        holds(replace(found, point_a=None, normal=None), solid, wire, T)
+
+
+@pytest.mark.parametrize("error", [1.0, 0.1])
+@pytest.mark.parametrize("shape", DRAWN, ids=lambda shape: shape.name)
+def test_a_drawn_solid_lies_between_its_two_meshes(shape, error):
+    model = ModelCache().model(shape)
+    rng = np.random.default_rng(0)
+    inner, outer = model.inner(error), model.outer(error)
+    corners = inner.vertices[inner.faces]
+    on = np.einsum("mkc,mcd->mkd", rng.dirichlet(np.ones(3), (len(corners), 30)), corners).reshape(-1, 3)
+    assert body(shape).field(np.vstack([inner.vertices, on])).max() <= 1e-9
+    x = rng.uniform(*body(shape).box, (6000, 3))
+    corners = outer.vertices[outer.faces]
+    on = np.einsum("mkc,mcd->mkd", rng.dirichlet(np.ones(3), (len(corners), 30)), corners).reshape(-1, 3)
+    assert body(shape).field(np.vstack([outer.vertices, on])).min() >= -1e-9
+    assert outer.contains(x[body(shape).field(x) < 0.0]).all()
+
+
+@settings(SLOW, max_examples=30)
+@given(
+    st.sampled_from(["chords", "wedges"]),
+    st.sampled_from([2.0, 10.0, 30.0]),
+    st.floats(-3.0, 3.0),
+    st.floats(-2.0, 3.0),
+    st.floats(-1.5, 1.5),
+)
+def test_contact_models_bound_what_they_approximate(name, unit, x, y, turn):
+    wire = shapes.cylinder(5.0, 70.0)
+    model = baselines.contact_model(name, {"block": BLOCK}, unit_angle=math.radians(unit))
+    T = translation(x, y, 0.0) @ rotation((0.0, 0.0, 1.0), turn)
+    found = distance(BLOCK, wire, T, model=model)
+    assert found.lower <= found.value <= found.upper
+    holds(replace(found, point_a=None, normal=None, estimate=None), BLOCK, wire, T)
+
+
+@pytest.mark.parametrize("shape", DRAWN, ids=lambda shape: shape.name)
+def test_bounding_boxes_hold_the_shape(shape):
+    model = ModelCache().model(shape)
+    low, high = body(shape).box
+    x = np.random.default_rng(1).uniform(low - 5.0, high + 5.0, (20_000, 3))
+    inside = body(shape).field(x) < 0.0
+    assert (x[inside] >= model.bounds[0] - 1e-9).all()
+    assert (x[inside] <= model.bounds[1] + 1e-9).all()
+    for form in model.forms:
+        deep = form.depth(x)
+        assert (body(shape).field(x)[deep > 1e-9] <= 1e-9).all()

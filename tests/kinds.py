@@ -1,0 +1,58 @@
+"""Shapes of every kind, for properties that hold for any of them."""
+
+import math
+
+import numpy as np
+from hypothesis import strategies as st
+
+from clamp3d.core import shapes
+from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.mesh import make_mesh
+from clamp3d.core.meshing import mesh
+from clamp3d.core.pose import rotation
+from clamp3d.core.primitives import SweptArc
+from clamp3d.core.profile import Profile
+
+BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0, name="block")
+DRAWN = [
+    BLOCK,
+    shapes.groove_block(SweptArc(6.0, math.radians(110.0), 40.0), 40.0, 30.0, name="block with a narrow mouth"),
+    shapes.groove_block(
+        SweptArc(7.0, 1.0, 40.0),
+        60.0,
+        20.0,
+        others=[(18.0, 5.0, 0.9)],
+        holes=[shapes.Hole(2.0, (-15.0, 3.0), "y")],
+        name="two grooves and a hole across",
+    ),
+    shapes.cylinder(5.0, 40.0),
+    shapes.cylinder(8.0, 12.0, bore=4.0, name="tube"),
+    shapes.box((30.0, 12.0, 18.0)),
+    shapes.box((30.0, 25.0, 6.0), holes=[shapes.Hole(4.0, (3.0, 2.0))], name="plate"),
+    shapes.Solid(
+        "bolt",
+        (
+            Extrusion(Profile.circle(4.0), "Z", -20.0, 10.0),
+            Extrusion(Profile.of((-7.0, -7.0), (7.0, -7.0), (7.0, 7.0), (-7.0, 7.0)), "Z", 10.0, 15.0),
+        ),
+    ),
+]
+
+
+def faceted_shape(solid: shapes.Solid, error: float, fit: shapes.Fit = "off") -> shapes.MeshShape:
+    """The solid's mesh within ``error`` mm, corners on the true surface, as a shape."""
+    made = mesh(solid, error)
+    return shapes.MeshShape(make_mesh(made.vertices, made.faces), fit, solid.name)
+
+
+def _pose(axis: tuple[float, ...], angle: float, at: tuple[float, ...]) -> np.ndarray:
+    T = rotation(axis, angle)
+    T[:3, 3] = at
+    return T
+
+
+def poses(reach: float) -> st.SearchStrategy:
+    """Rigid poses (4, 4) with offsets up to ``reach`` mm along each axis; upright ones are as likely as any."""
+    angle = st.one_of(st.floats(0.0, 2.0 * math.pi), st.sampled_from([0.0, 1e-3, math.pi / 2, math.pi]))
+    axis = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
+    return st.builds(_pose, axis, angle, st.tuples(*[st.floats(-reach, reach)] * 3))

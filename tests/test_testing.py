@@ -1,0 +1,223 @@
+"""The oracle against closed forms and manifold3d, and every assertion against answers that are wrong."""
+
+import math
+from dataclasses import replace
+
+import manifold3d
+import numpy as np
+import pytest
+
+from clamp3d import check, distance, first_contact, min_clearance, shapes
+from clamp3d.baselines.wedges import wedge_solids
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.parts import parts
+from clamp3d.collide.answer import Distance
+from clamp3d.core.meshing import chord_error, mesh
+from clamp3d.core.motion import Motion
+from clamp3d.core.pose import inverse, rotation, translation
+from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.profile import sagitta
+from clamp3d.errors import InputError
+from clamp3d.fit.fit import fit_mesh
+from clamp3d.testing import (
+    Body,
+    assert_distance,
+    assert_fit,
+    assert_lower_on_way,
+    assert_motion,
+    assert_pieces,
+    assert_returns,
+    body,
+    common,
+    convex_body,
+    directions,
+    pose_at,
+    separation,
+)
+from tests.kinds import BLOCK, DRAWN, faceted_shape
+
+BALL = Body(lambda x: np.linalg.norm(x, axis=1) - 2.0, np.array([[-2.0] * 3, [2.0] * 3]))
+BOX = shapes.box((10.0, 10.0, 10.0))
+
+
+@pytest.mark.parametrize("shape", DRAWN, ids=lambda shape: shape.name)
+def test_fields_agree_with_a_mesh_of_the_same_shape(shape):
+    """Drawn solids are defined by outlines, meshes by solid angles: two definitions that share nothing."""
+    error = 0.02
+    faceted = body(faceted_shape(shape, error))
+    x = np.random.default_rng(0).uniform(*(1.3 * faceted.box), (600, 3))
+    exact, near = body(shape).field(x), faceted.field(x)
+    assert ((exact > 0.0) == (near > 0.0))[np.abs(near) > 2.0 * chord_error(shape, error) + 1e-9].all()
+    assert (np.abs(exact) <= np.abs(near) + 2.0 * chord_error(shape, error) + 1e-9).all()
+    if all(hole.axis == shape.bodies[0].axis for hole in shape.holes):  # then it is the distance itself
+        outside = exact > 0.0
+        assert np.abs(exact - near)[outside].max() <= 2.0 * chord_error(shape, error) + 1e-9
+
+
+def test_fields_are_nowhere_steeper_than_one():
+    rng = np.random.default_rng(1)
+    for shape in (
+        *DRAWN,
+        Cylinder(3.0, 8.0),
+        SweptArc(7.0, 2.0, 9.0),
+        SweptArc(7.0, 0.5, 9.0),
+        *parts(load_clamp()).values(),
+    ):
+        x, step = (
+            rng.uniform(-30.0, 30.0, (4000, 3)),
+            rng.normal(size=(4000, 3)) * 10.0 ** rng.uniform(-6, 1, (4000, 1)),
+        )
+        field = body(shape).field
+        assert (np.abs(field(x + step) - field(x)) <= np.linalg.norm(step, axis=1) * (1.0 + 1e-9) + 1e-12).all()
+
+
+def test_boxes_of_bodies_hold_them():
+    rng = np.random.default_rng(2)
+    for shape in (*DRAWN, Cylinder(3.0, 8.0)):
+        T = rotation(rng.normal(size=3), 1.0) @ translation(1.0, 2.0, 3.0)
+        it = body(shape).at(T)
+        x = rng.uniform(-60.0, 60.0, (20_000, 3))
+        inside = it.field(x) < 0.0
+        assert (x[inside] >= it.box[0] - 1e-9).all()
+        assert (x[inside] <= it.box[1] + 1e-9).all()
+
+
+def test_separation_and_common_in_closed_form():
+    for T, gap in ((translation(9.0, 0.0, 0.0), 2.0), (translation(8.0, 8.0, 8.0), 3.0 * math.sqrt(3.0) - 2.0)):
+        found = separation(BOX, BALL, T)
+        assert found.lower <= gap <= found.upper + 1e-9
+        assert found.lower > gap - 0.1
+        assert found.upper == pytest.approx(gap, abs=1e-7)
+    deep = common(BOX, BALL, translation(6.0, 0.0, 0.0), accuracy=1e-3)  # one millimetre deep
+    assert deep.lower <= -0.5 <= deep.upper
+    assert deep.upper < -0.45
+    groove, wire = SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0)
+    assert separation(groove, wire, translation(0.0, -1.0, 0.0)).upper == pytest.approx(0.5, abs=1e-9)
+    assert common(groove, wire, translation(0.0, -2.0, 0.0)).upper < -0.2
+
+
+def test_separation_agrees_with_manifold():
+    rng = np.random.default_rng(3)
+    seen = 0
+    while seen < 20:
+        a, b = (DRAWN[k] for k in rng.integers(len(DRAWN), size=2))
+        T = rotation(rng.normal(size=3), rng.uniform(0.0, 6.0))
+        T[:3, 3] = rng.normal(size=3) * 22.0
+        error = 0.01
+        A, B = (
+            manifold3d.Manifold(manifold3d.Mesh64(np.array(m.vertices), np.array(m.faces, dtype=np.uint64)))
+            for m in (mesh(a, error), mesh(b, error))
+        )
+        gap = A.min_gap(B.transform(np.ascontiguousarray(T[:3])), 200.0)
+        found, slack = separation(a, b, T), 2.0 * (chord_error(a, error) + chord_error(b, error))
+        assert found.lower <= gap + slack
+        if gap > 0.0:
+            seen += 1
+            assert found.upper == pytest.approx(gap, abs=slack + 1e-6)
+
+
+def test_any_body_can_be_asked_and_what_is_none_is_refused():
+    hull = convex_body([[x, y, z] for x in (-5, 5) for y in (-5, 5) for z in (-5, 5)])
+    x = np.random.default_rng(4).uniform(-9, 9, (500, 3))
+    assert np.array_equal(hull.field(x) <= 0.0, body(BOX).field(x) <= 0.0)
+    with pytest.raises(InputError, match="shape must be a Solid, MeshShape, Cylinder, SweptArc or Body, got int"):
+        body(3)
+
+
+T_APART = rotation((1.0, 2.0, 3.0), 0.7)
+T_APART[:3, 3] = (14.0, 20.0, 5.0)
+APART = distance(BLOCK, BOX, T_APART)
+T_DEEP = translation(9.0, 0.3, 0.2)
+DEEP = Distance(-1.0, -1.0, np.array([5.0, 0.0, 0.0]), np.array([4.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+
+
+def test_right_answers_pass():
+    assert_distance(APART, BLOCK, BOX, T_APART)
+    assert_distance(APART.swapped().moved(inverse(T_APART)), BOX, BLOCK, inverse(T_APART))
+    assert_distance(DEEP, BOX, BOX, T_DEEP)
+    assert_distance(Distance(), BLOCK, BOX, T_APART)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"lower": APART.lower + 1e-3, "upper": APART.upper + 1e-3}, "lower .* > attained"),
+        ({"upper": APART.upper - 1e-3, "lower": -math.inf}, "further apart than upper"),
+        ({"upper": APART.upper - 0.5, "lower": -math.inf, "point_a": None}, "upper .* < proven"),
+        ({"point_a": APART.point_a + 0.01 * APART.normal}, "point on a is 0.01 mm outside"),
+        ({"point_b": APART.point_b - 0.01 * APART.normal}, "point on b is 0.01 mm outside"),
+        ({"normal": 1.1 * APART.normal}, "no unit vector"),
+        ({"lower": APART.upper + 1e-3, "normal": None}, "crossed"),
+    ],
+)
+def test_wrong_answers_apart_are_seen(change, message):
+    with pytest.raises(AssertionError, match=message):
+        assert_distance(replace(APART, **change), BLOCK, BOX, T_APART)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"lower": -0.9, "upper": -0.9}, "share a ball"),
+        ({"lower": -1.5, "upper": -1.5}, "parted by less than 1.5"),
+        ({"normal": np.array([0.0, 1.0, 0.0])}, "along the normal they overlap"),
+    ],
+)
+def test_wrong_answers_in_an_overlap_are_seen(change, message):
+    with pytest.raises(AssertionError, match=message):
+        assert_distance(replace(DEEP, **change), BOX, BOX, T_DEEP)
+
+
+def test_poses_of_a_motion_are_those_of_its_twist():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        start = rotation(rng.normal(size=3), rng.uniform(0, 3))
+        start[:3, 3] = rng.normal(size=3) * 20.0
+        screw = Motion.screw(rng.normal(size=3), rng.normal(), point=rng.normal(size=3), travel=rng.normal())
+        for t in (0.0, 0.3, 1.0):
+            np.testing.assert_allclose(pose_at(screw, t, start), screw.at(t, start), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(directions(50), axis=1), 1.0, atol=1e-14)
+
+
+def test_wrong_motions_are_seen():
+    pin, start, way = Cylinder(2.0, 6.0), translation(20.0, 0.0, 0.0), Motion.translate((-40.0, 8.0, 0.0))
+    least, hit = min_clearance(BOX, pin, way, start), first_contact(BOX, pin, way, start)
+    assert_motion(least, BOX, pin, way, start)
+    assert_motion(hit, BOX, pin, way, start, first=True)
+    with pytest.raises(AssertionError, match="on the way"):
+        assert_motion(replace(least, distance=replace(least.distance, lower=-0.1)), BOX, pin, way, start)
+    late = replace(hit, t=hit.t + 0.05, pose=way.at(hit.t + 0.05, start))
+    with pytest.raises(AssertionError, match="on the way"):
+        assert_motion(late, BOX, pin, way, start, first=True)
+    with pytest.raises(AssertionError, match="the pose is not that of t"):
+        assert_motion(replace(hit, t=0.9), BOX, pin, way, start, first=True)
+    with pytest.raises(AssertionError, match="at pose 1"):
+        assert_lower_on_way(5.0, BOX, BALL, [translation(20, 0, 0), translation(9, 0, 0)])
+
+
+def test_wrong_fits_pieces_and_equilibria_are_seen():
+    (groove,) = fit_mesh(faceted_shape(BLOCK, 0.05).mesh).grooves
+    turn = np.linspace(-0.9, 0.9, 50)
+    on = np.column_stack([7.0 * np.sin(turn), -7.0 * np.cos(turn), 0.0 * turn])
+    assert_fit(groove, on)
+    with pytest.raises(AssertionError, match=r"mm off, stated"):
+        assert_fit(groove, on * (1.0 + 0.1))
+    splint, unit = parts(load_clamp())["P1"], math.radians(10.0)
+    plain = replace(splint, holes=())
+    pieces = [convex_body(V) for _, V, _ in wedge_solids(splint, unit)]
+    out = sagitta(splint.bodies[0].profile.arcs[0].radius, unit)
+    assert_pieces(plain, pieces, outside=out)
+    with pytest.raises(AssertionError, match="is in the body and in no piece"):
+        assert_pieces(plain, pieces[1:], outside=out)
+    with pytest.raises(AssertionError, match="stands out by"):
+        assert_pieces(plain, pieces, outside=0.5 * out)
+    assert_returns(np.round, np.zeros(2), [np.full(2, 0.1), np.full(2, -0.4)], 1e-9)
+    with pytest.raises(AssertionError, match=r"it ends 1\.0 away"):
+        assert_returns(np.round, np.zeros(2), [np.full(2, 0.6)], 1e-9)
+
+
+def test_the_verdicts_of_a_scene_can_be_asked_too():
+    from clamp3d import Scene
+
+    row = check(Scene(clearance=40.0).add("a", BLOCK).add("b", BOX, T_APART), distances=True).pairs[0]
+    assert_distance(row.distance, BLOCK, BOX, T_APART)
