@@ -130,12 +130,12 @@ def _gap(a: Surface, b: Surface, T: Array) -> tuple[float, float, Array, Array]:
 
 def _overlap(a: Surface, b: Surface, T: Array, rounding: float) -> Distance:
     """Bounds of two meshes whose surfaces meet."""
-    off = a.error + b.error + rounding
     shared = common(a, b, T)
     if shared is None:
+        off = a.error + b.error + rounding
         return Distance(-off, off)
     depth, at = deepest(a, b, T, shared)
-    return Distance(-_parted(a, b, T, shared.vertices, shared.directions()), off - depth, at, at)
+    return Distance(-_parted(a, b, T, shared.vertices, shared.directions()), rounding - depth, at, at)
 
 
 def _parted(a: Surface, b: Surface, T: Array, points: Array, directions: Array) -> float:
@@ -146,13 +146,14 @@ def _parted(a: Surface, b: Surface, T: Array, points: Array, directions: Array) 
     off = a.error + b.error
     reach = np.ptp(points @ directions.T, axis=0)
     slack = 2.0 * _rounding(a, b, T)
-    for k in np.argsort(reach)[:_TRIED].tolist():
-        length = (float(reach[k]) + off) * (1.0 + 1e-9) + 2.0 * slack
-        for sign in (1.0, -1.0):
-            moved = T.copy()
-            moved[:3, 3] += sign * length * directions[k]
-            if gap(a, b, moved) >= 0.0:
-                return length
+    for more in (0.0, off) if off > 0.0 else (0.0,):
+        for k in np.argsort(reach)[:_TRIED].tolist():
+            length = (float(reach[k]) + more) * (1.0 + 1e-9) + 2.0 * slack
+            for sign in (1.0, -1.0):
+                moved = T.copy()
+                moved[:3, 3] += sign * length * directions[k]
+                if gap(a, b, moved) >= 0.0:
+                    return length
     return np.inf
 
 

@@ -81,10 +81,15 @@ def common(a: Surface, b: Surface, T: Array) -> Common | None:
 def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Array]:
     """A depth in mm that a point of one body has inside the other, and the point (3,); some of ``shared`` are tried.
 
-    Corners of the common part lie in both bodies, to rounding; so what they are away from either surface counts.
+    Corners of the common part lie in both meshes, to rounding. A point of the true body is within the error of the
+    faces near it, and the true surface of the other no nearer than its faces less their errors. Negative: nothing is
+    certain.
     """
     points = np.vstack([shared.vertices[:: max(1, len(shared.vertices) // _CORNERS)], shared.inner_points()])
     back = inverse(T)
-    found = np.maximum(a.distance(points), b.distance(points @ back[:3, :3].T + back[:3, 3]))
+    local = points @ back[:3, :3].T + back[:3, 3]
+    in_a = a.distance_at_least(points) - b.error_at(local)
+    in_b = b.distance_at_least(local) - a.error_at(points)
+    found = np.maximum(in_a, in_b)
     k = int(np.argmax(found))
     return float(found[k]), points[k]

@@ -71,8 +71,8 @@ class Surface:
         return tuple((fcl_tree(self.vertices, self.faces[rows]), error) for rows, error in self._levels)
 
     @cached_property
-    def _inexact(self) -> list[tuple[Surface, float]]:
-        return [(Surface(self.vertices, self.faces[rows]), error) for rows, error in self._levels if error > 0.0]
+    def _parts(self) -> dict[float, Surface]:
+        return {error: Surface(self.vertices, self.faces[rows]) for rows, error in self._levels}
 
     @cached_property
     def manifold(self) -> Any:
@@ -138,10 +138,18 @@ class Surface:
         d = self.distance(points)
         return np.where(self.contains(points), d, -d)
 
+    def distance_at_least(self, points: Array) -> Array:
+        """How far (k,) mm the true surface is at least from points (k, 3): negative where it may be on either side."""
+        found = np.full(len(points), np.inf)
+        for rows, error in self._levels:
+            part = self if rows.all() else self._parts[error]
+            found = np.minimum(found, part.distance(points) - error)
+        return found
+
     def error_at(self, points: Array) -> Array:
         """How far (k,) mm the true surface may be from points (k, 3) of this one: the largest error of what is near."""
         found = np.zeros(len(points))
-        for part, error in self._inexact:
+        for error, part in self._parts.items() if self.error > 0.0 else ():
             found[part.distance(points) <= error * (1.0 + 1e-9)] = error
         return found
 
