@@ -1,5 +1,6 @@
 """Errors of the package: one clear line each, naming value, rule and choices."""
 
+import importlib.util
 import re
 
 LONGEST = 900
@@ -43,6 +44,37 @@ class SolverError(Clamp3dError):
 
 class MissingLibraryError(Clamp3dError, ImportError):
     """An optional library is not installed. The message says what to install."""
+
+
+EXTRAS = {
+    "OCP": "step",
+    "distributed": "cluster",
+    "lib3mf": "3mf",
+    "matplotlib": "report",
+    "mpmath": "stress",
+    "pandas": "frame",
+    "skimage": "image",
+    "yourdfpy": "urdf",
+}
+"""Optional libraries, and the extra of this package that each one comes with."""
+
+
+def need(library: str, what: str) -> None:
+    """Raise MissingLibraryError unless one of the `EXTRAS` that ``what`` needs is installed: to ask before long work.
+
+    >>> need("matplotlib", "a drawing")
+    """
+    try:
+        there = importlib.util.find_spec(library) is not None
+    except ValueError:
+        there = False
+    if not there:
+        raise missing(library, what)
+
+
+def missing(library: str, what: str) -> MissingLibraryError:
+    """The error that says which extra has a library that ``what`` needs."""
+    return MissingLibraryError(f"{what} needs {library}: pip install 'clamp3d[{EXTRAS[library]}]'")
 
 
 def without_numbers(message: str) -> str:

@@ -25,7 +25,7 @@ from clamp3d.errors import Clamp3dError, InputError, MissingLibraryError
 READERS = {
     ".step": ("clamp3d.brep.step_file", "read_step", "OCP", "STEP needs Open CASCADE: pip install 'clamp3d[step]'"),
     ".stp": ("clamp3d.brep.step_file", "read_step", "OCP", "STEP needs Open CASCADE: pip install 'clamp3d[step]'"),
-    ".3mf": ("clamp3d.brep.threemf_file", "read_3mf", "lib3mf", "3MF needs lib3mf: pip install lib3mf"),
+    ".3mf": ("clamp3d.brep.threemf_file", "read_3mf", "lib3mf", "3MF needs lib3mf: pip install 'clamp3d[3mf]'"),
 }
 """Module and function that read each format, the library they need, and what to say without it."""
 _MEMORY, _PER_BYTE = 2 * 2**30, 60

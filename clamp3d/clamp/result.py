@@ -16,7 +16,7 @@ from clamp3d.clamp.matrix import Difference, Pair, differences, plain
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array, SectionPose
-from clamp3d.errors import MissingLibraryError
+from clamp3d.errors import need
 
 Solver = Literal["exact", "stepped", "bisection"]
 
@@ -286,8 +286,7 @@ class Assembly:
 
     def frame(self) -> Any:
         """The contacts as a pandas DataFrame, a row for each pair. Raises MissingLibraryError without pandas."""
-        try:
-            import pandas  # type: ignore[import-untyped,unused-ignore]
-        except ImportError:
-            raise MissingLibraryError("frame() needs pandas: pip install pandas; contacts does without") from None
+        need("pandas", "frame(), but not contacts,")
+        import pandas  # type: ignore[import-untyped,unused-ignore]
+
         return pandas.DataFrame([c.to_dict() for c in self.contacts])

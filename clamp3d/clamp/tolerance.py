@@ -32,7 +32,7 @@ from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
 from clamp3d.clamp.status import CLAMPED, final_status, measured_status
 from clamp3d.core.child import end_with_parent
 from clamp3d.core.pose import Array
-from clamp3d.errors import InputError, MissingLibraryError, SolverError, without_numbers
+from clamp3d.errors import InputError, SolverError, need, without_numbers
 
 Distribution = Literal["uniform", "normal"]
 Sample = tuple[float | None, str]
@@ -314,10 +314,8 @@ def _worker() -> None:
 
 @contextmanager
 def _cluster(scheduler: str) -> Iterator[tuple[Executor, Callable[[], int]]]:
-    try:
-        distributed: Any = importlib.import_module("distributed")
-    except ImportError:
-        raise MissingLibraryError("a Dask cluster needs dask.distributed: pip install 'clamp3d[cluster]'") from None
+    need("distributed", "a Dask cluster")
+    distributed: Any = importlib.import_module("distributed")
     if not scheduler.strip():  # Dask would start a cluster of its own
         raise InputError("scheduler must be an address like tcp://host:8786, got ''")
     # A client that finds no scheduler waits 20 s for it when it is thrown away, and then prints a traceback.

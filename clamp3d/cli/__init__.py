@@ -17,7 +17,7 @@ import click
 
 import clamp3d
 from clamp3d.cli.terminal import ExitCode, end_on_signals, show, tolerate_closed_pipes
-from clamp3d.errors import Clamp3dError, SolverError, one_line
+from clamp3d.errors import EXTRAS, Clamp3dError, SolverError, missing, one_line
 
 # Name -> (module, one line for the list of commands). A command's module is loaded when it is called.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -94,6 +94,8 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("CLAMP3D_DEBUG"):
             traceback.print_exc()
+        if isinstance(error, ModuleNotFoundError) and (library := str(error.name).partition(".")[0]) in EXTRAS:
+            error = missing(library, "this")
         if isinstance(error, SolverError):
             status = _fail(str(error), ExitCode.FAILED)
         elif isinstance(error, (Clamp3dError, OSError)):

@@ -15,6 +15,7 @@ import click
 
 from clamp3d.baselines import METHODS, contact_model
 from clamp3d.cli.terminal import STDOUT_TAKEN
+from clamp3d.errors import need
 
 if TYPE_CHECKING:
     from clamp3d.baselines.model import ContactModel
@@ -54,6 +55,8 @@ class Output(click.Path):
                 self.fail("only one file can be stdout (-)", param, ctx)
         elif self.suffixes and path.suffix.lower() not in self.suffixes:
             self.fail(f"{path}: the name must end in one of {', '.join(self.suffixes)}", param, ctx)
+        if self.suffixes:
+            need("matplotlib", "a drawing")
         check_writable(path)
         return path
 

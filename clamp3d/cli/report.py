@@ -7,6 +7,7 @@ from pathlib import Path
 from clamp3d.cli.options import FOLDER, METHOD, QUIET, SOURCE, Method, Source, declared, option
 from clamp3d.cli.progress import narrator
 from clamp3d.cli.terminal import finish, show
+from clamp3d.errors import need
 
 
 @declared("report")
@@ -25,6 +26,7 @@ def command(
     --method and --solver go with a clamp. Prints the paths of the files. Exit code 1 if parts clash, or a clamp does
     not close on both wires or parts meet that should not.
     """
+    need("matplotlib", "a report")
     settings = method.settings()
     from clamp3d.clamp.assemble import assemble
     from clamp3d.clamp.dimensions import Clamp

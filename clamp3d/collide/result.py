@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds, Verdict
-from clamp3d.errors import InputError
+from clamp3d.errors import InputError, need
 
 if TYPE_CHECKING:
     from clamp3d.collide.where import Overlap
@@ -172,12 +172,9 @@ class CheckResult:
 
     def frame(self) -> Any:
         """The table as a pandas DataFrame. Raises MissingLibraryError if pandas is not installed."""
-        try:
-            import pandas  # type: ignore[import-untyped,unused-ignore]
-        except ImportError:
-            from clamp3d.errors import MissingLibraryError
+        need("pandas", "frame(), but not table(),")
+        import pandas  # type: ignore[import-untyped,unused-ignore]
 
-            raise MissingLibraryError("frame() needs pandas: pip install pandas; table() does without") from None
         return pandas.DataFrame(self.table())
 
     def __repr__(self) -> str:

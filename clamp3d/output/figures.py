@@ -16,7 +16,7 @@ from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.collide.verdict import Thresholds
-from clamp3d.errors import InputError
+from clamp3d.errors import InputError, need
 from clamp3d.output.files import STDOUT, whole_file
 from clamp3d.output.palette import INK, VERDICT_COLOURS
 from clamp3d.output.section import (
@@ -38,6 +38,7 @@ FORMATS = (".svg", ".png", ".pdf")
 
 def blank(width: float, height: float) -> Figure:
     """An empty figure, inch, whose axes make room for what is around them."""
+    need("matplotlib", "a drawing")
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.core.pose import Array
-from clamp3d.errors import InputError, MissingLibraryError
+from clamp3d.errors import InputError, need
 from clamp3d.output.palette import rgb
 from clamp3d.output.placed import PosedMesh
 
@@ -151,10 +151,8 @@ def three_mf(items: Sequence[PosedMesh], title: str, unit: str, mesh_error: floa
     Same input, same bytes: the identifiers that lib3mf draws are replaced by ones of the names. Raises
     MissingLibraryError if lib3mf, which has no wheel for some platforms, is not installed.
     """
-    try:
-        import lib3mf
-    except ImportError:
-        raise MissingLibraryError("3MF needs lib3mf: pip install lib3mf") from None
+    need("lib3mf", "3MF")
+    import lib3mf
 
     def identify(thing: Any, *names: object) -> None:
         thing.SetUUID(str(uuid.uuid5(uuid.NAMESPACE_URL, "/".join(["clamp3d", title, *map(str, names)]))))

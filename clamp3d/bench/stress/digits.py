@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from clamp3d.errors import MissingLibraryError
+from clamp3d.errors import need
 
 
 def fifty_digits() -> Any:
     """mpmath's context with 50 digits. Raises MissingLibraryError without mpmath."""
-    try:
-        import mpmath
-    except ImportError:
-        raise MissingLibraryError("50-digit answers need mpmath: pip install mpmath") from None
+    need("mpmath", "an answer of 50 digits")
+    import mpmath
+
     mp = mpmath.mp.clone()
     mp.dps = 50
     return mp
