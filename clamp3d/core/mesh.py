@@ -278,8 +278,8 @@ def _without_doubles(F: IntArray) -> IntArray:
     smallest = F.argmin(axis=1)
     rows = np.arange(len(F))
     side = np.where(F[rows, (smallest + 1) % 3] < F[rows, (smallest + 2) % 3], 1, -1)
-    once = F[np.sort(first)]
-    without = F[np.sort(first[np.bincount(group.reshape(-1), weights=side) != 0])]
+    once: IntArray = F[np.sort(first)]
+    without: IntArray = F[np.sort(first[np.bincount(group.reshape(-1), weights=side) != 0])]
     if len(without) in (0, len(once)) or not (_edges(once)[2] % 2).any() or (_edges(without)[2] % 2).any():
         return once
     return without
