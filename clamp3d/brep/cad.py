@@ -112,6 +112,8 @@ def _made(solid: Any, name: str, chord: float) -> BrepSolid | str:
     """The solid as a shape, or why it cannot be one."""
     try:
         made = BrepSolid.of(solid, name, chord=chord)
+        if not made.mesh.watertight:
+            return "its faces do not close"
         if volume(made.mesh.vertices, made.mesh.faces) < 0.0:
             made = BrepSolid.of(solid.Reversed(), name, chord=chord)
         if not volume(made.mesh.vertices, made.mesh.faces) > 0.0:

@@ -39,7 +39,7 @@ def meshes_distance(a: Model, b: Model, T: Array, error: float) -> Distance:
     if inner.lower > 0.0 and inner.point_a is not None and inner.point_b is not None:
         p = _on_surface(a, np.eye(4), inner.point_a, inner.point_b)
         q = _on_surface(b, T, inner.point_b, p)
-        off = inner_a.error + inner_b.error + _rounding(inner_a, inner_b, T)
+        off = inner_a.error + inner_b.error + rounding_of(inner_a, inner_b, T)
         inner = replace(inner, upper=float(np.linalg.norm(q - p)) + off, point_a=p, point_b=q)
     return replace(inner, lower=min(outer.lower, inner.upper), normal=None)
 
@@ -62,8 +62,8 @@ def _on_surface(model: Model, T: Array, inside: Array, outside: Array) -> Array:
 
 def surface_distance(a: Surface, b: Surface, T: Array) -> Distance:
     """Signed distance of two meshes, ``b`` at ``T`` (4, 4) in a's frame; bounds as in `meshes_distance`."""
-    rounding = _rounding(a, b, T)
-    lower, upper, p, q = _gap(a, b, T)
+    rounding = rounding_of(a, b, T)
+    lower, upper, p, q = nearest_of(a, b, T)
     if upper <= rounding:
         return _overlap(a, b, T, rounding)
     for outer, inner, place, swapped in ((a, b, T, False), (b, a, inverse(T), True)):
@@ -84,8 +84,8 @@ def gap(a: Surface, b: Surface, T: Array) -> float:
 
     Minus infinity if they meet or one holds the other. The errors of both meshes are taken off.
     """
-    rounding = _rounding(a, b, T)
-    lower, upper, _, _ = _gap(a, b, T)
+    rounding = rounding_of(a, b, T)
+    lower, upper, _, _ = nearest_of(a, b, T)
     if upper <= rounding or any_inside(a, b, T) or any_inside(b, a, inverse(T)):
         return -np.inf
     return lower - rounding
@@ -101,12 +101,12 @@ def any_inside(outer: Surface, inner: Surface, T: Array) -> bool:
     return bool(boxed.any()) and bool(outer.contains(points[boxed, 0]).any())
 
 
-def _rounding(a: Surface, b: Surface, T: Array) -> float:
+def rounding_of(a: Surface, b: Surface, T: Array) -> float:
     """What the distance of two meshes may be off by, mm: manifold3d merges vertices within 1e-12 of the size."""
     return 4e-12 * (a.scale + b.scale + float(np.abs(T[:3, 3]).max()))
 
 
-def _gap(a: Surface, b: Surface, T: Array) -> tuple[float, float, Array, Array]:
+def nearest_of(a: Surface, b: Surface, T: Array) -> tuple[float, float, Array, Array]:
     """Distance of the true surfaces at least, of the meshes, and its points (3,); 0.0 if the meshes' surfaces meet."""
     import fcl
 
@@ -145,7 +145,7 @@ def _parted(a: Surface, b: Surface, T: Array, points: Array, directions: Array) 
     """
     off = a.error + b.error
     reach = np.ptp(points @ directions.T, axis=0)
-    slack = 2.0 * _rounding(a, b, T)
+    slack = 2.0 * rounding_of(a, b, T)
     for more in (0.0, off) if off > 0.0 else (0.0,):
         for k in np.argsort(reach)[:_TRIED].tolist():
             length = (float(reach[k]) + more) * (1.0 + 1e-9) + 2.0 * slack

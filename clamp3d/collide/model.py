@@ -71,6 +71,8 @@ class Model:
         """The shape in closed form; None if it has none."""
         if isinstance(self.shape, Solid):
             return bodies_of(self.shape)
+        if not self.closed:
+            return None
         if self._fit is not None and self._fit.features:
             from clamp3d.collide.fitted import bodies_of_fit
 
@@ -89,7 +91,7 @@ class Model:
     @cached_property
     def _fit(self) -> FitResult | None:
         """Round surfaces found in a mesh; None where none are looked for."""
-        if not isinstance(self.shape, MeshShape) or self.shape.fit == "off":
+        if not isinstance(self.shape, MeshShape) or self.shape.fit == "off" or not self.closed:
             return None
         from clamp3d.fit.fit import fit_mesh
 
@@ -99,7 +101,7 @@ class Model:
     @property
     def facets(self) -> Surface | None:
         """The mesh of a mesh shape; None for a drawn solid."""
-        return self.raw if isinstance(self.shape, MeshShape) else None
+        return self.raw if isinstance(self.shape, MeshShape) and self.closed else None
 
     @cached_property
     def hull_body(self) -> ClosedForm:
@@ -118,6 +120,11 @@ class Model:
         if isinstance(self.shape, BrepSolid):
             return self.shape.error > 1e-6
         return isinstance(self.shape, Solid) and any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes))
+
+    @property
+    def closed(self) -> bool:
+        """Whether it is known what is inside: not of a mesh with open or crossed edges."""
+        return isinstance(self.shape, Solid) or self.shape.mesh.watertight
 
     @property
     def between(self) -> bool:

@@ -20,7 +20,9 @@ def undecided(models: dict[str, Model], found: Distance, thresholds: Thresholds,
     advice = []
     for name, model in models.items():
         shape = model.shape
-        if isinstance(shape, MeshShape):
+        if not model.closed:
+            advice.append(f"a closed mesh of {name}")
+        elif isinstance(shape, MeshShape):
             error = f"(its round faces are off by up to {model.raw.error:.2g} mm)"
             if model.raw.error > 0.0:
                 round_ = f"fit = 'round' for {name}, or " if shape.fit == "bound" else ""

@@ -17,6 +17,7 @@ from clamp3d.collide.convex import Rod
 from clamp3d.collide.facets import rod_distance
 from clamp3d.collide.meshes import meshes_distance, within
 from clamp3d.collide.model import FINEST, Model
+from clamp3d.collide.open_mesh import open_distance
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import SolverError
@@ -45,6 +46,11 @@ def refine(
     found = start
     if enough(found):
         return found
+    if not (a.closed and b.closed):
+        a.counters.queries["open meshes"] += 1
+        open_ = " and ".join(model.name for model in (a, b) if not model.closed)
+        method = f"surfaces (FCL), inside of {open_} unknown"
+        return _agreed(found, open_distance(a, b, T)).labelled("meshes", method)
     for level in (_features, _facets) if forms else (_facets,):
         new = level(a, b, T, lambda x, known=found: enough(known.meet(x)))  # type: ignore[misc]
         if new is not None:
@@ -66,6 +72,8 @@ def refine(
 
 def contained(a: Model, b: Model, T: Array, thresholds: Thresholds) -> bool:
     """Whether one of two overlapping parts lies wholly in the other, within the contact threshold."""
+    if not (a.closed and b.closed):
+        return False
     for inner, outer, place in ((b, a, T), (a, b, inverse(T))):
         middle, half = inner.bounds.mean(axis=0), 0.5 * (inner.bounds[1] - inner.bounds[0])
         R = place[:3, :3]

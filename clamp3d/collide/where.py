@@ -57,8 +57,10 @@ def locator(a: Model, b: Model, T_a: Array, T_ab: Array) -> Callable[[], Overlap
 
 
 def locate(a: Model, b: Model, T_a: Array, T_ab: Array) -> Overlap | None:
-    """Where two parts overlap; None if not even meshes around them do."""
+    """Where two parts overlap; None if not even meshes around them do, or one has no inside that is known."""
     found = None
+    if not (a.closed and b.closed):
+        return found
     for error in _ERRORS:
         outer_a, outer_b = a.outer(error), b.outer(error)
         outer = common(outer_a, outer_b, T_ab)

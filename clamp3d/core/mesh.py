@@ -110,13 +110,11 @@ def make_mesh(
         raise InputError(f"{name}: extent must be >= {SMALLEST:g} mm, got {extent:.3g} mm; is the unit right?")
     rounding = reach * (2.0**-24 if float32 else 2.0**-50)
     V, F = _merge(V, F, max(4.0 * rounding, 1e-9 * extent))
-    cornered = ~_folded(F)
-    first = np.zeros(len(F), dtype=bool)
-    first[np.unique(np.sort(F, axis=1), axis=0, return_index=True)[1]] = True
-    doubled = int((cornered & ~first).sum())
-    if doubled:
-        notes.append(f"{doubled} doubled triangles left out")
-    mesh = trimesh.Trimesh(V, F[cornered & first], process=False)
+    F = F[~_folded(F)]
+    single = _without_doubles(F)
+    if len(single) < len(F):
+        notes.append(f"{len(F) - len(single)} doubled triangles left out")
+    mesh = trimesh.Trimesh(V, single, process=False)
     if len(mesh.faces) == 0:
         raise InputError(f"{name}: no triangle with an area")
     mesh.remove_unreferenced_vertices()
@@ -125,10 +123,10 @@ def make_mesh(
         trimesh.repair.fix_winding(mesh)  # type: ignore[no-untyped-call]
         turned = int(np.any(before != np.asarray(mesh.faces), axis=1).sum())
         notes.append(f"{turned} triangles turned to one winding")
-    watertight = bool(mesh.is_watertight and mesh.is_winding_consistent)
-    if not watertight:
-        notes.append("open mesh: the material's side is taken from the winding")
     V, F = np.asarray(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+    watertight, fault = _closure(V, F)
+    if fault:
+        notes.append(fault)
     if watertight:
         enclosed = volume(V, F)
         if enclosed < 0.0:
@@ -269,6 +267,41 @@ def _edges(F: IntArray) -> tuple[IntArray, NDArray[np.intp], NDArray[np.intp]]:
     directed = F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     _, edge, uses = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True)
     return directed, edge.reshape(-1), uses
+
+
+def _without_doubles(F: IntArray) -> IntArray:
+    """Each triangle once; of two that wind in opposite directions none, where only so every edge is closed.
+
+    Such a pair encloses nothing: it is a fin, or the wall between two bodies that were put together.
+    """
+    _, first, group = np.unique(np.sort(F, axis=1), axis=0, return_index=True, return_inverse=True)
+    smallest = F.argmin(axis=1)
+    rows = np.arange(len(F))
+    side = np.where(F[rows, (smallest + 1) % 3] < F[rows, (smallest + 2) % 3], 1, -1)
+    once: IntArray = F[np.sort(first)]
+    without: IntArray = F[np.sort(first[np.bincount(group.reshape(-1), weights=side) != 0])]
+    if len(without) in (0, len(once)) or not (_edges(once)[2] % 2).any() or (_edges(without)[2] % 2).any():
+        return once
+    return without
+
+
+def _closure(V: Array, F: IntArray) -> tuple[bool, str]:
+    """Whether triangles enclose a volume, and what is odd about their edges."""
+    directed, edge, uses = _edges(F)
+    rim, crossed = int((uses == 1).sum()), int((uses > 2).sum())
+    balance = np.bincount(edge, weights=np.where(directed[:, 0] < directed[:, 1], 1, -1))
+    if not balance.any():
+        if not crossed:
+            return True, ""
+        import manifold3d
+
+        raw = manifold3d.Mesh64(vert_properties=np.ascontiguousarray(V), tri_verts=F.astype(np.uint64))
+        if manifold3d.Manifold(raw).status() == manifold3d.Error.NoError:
+            return True, f"{crossed} edges with more than two triangles: taken as bodies that touch there"
+    return False, (
+        f"not closed: {rim} edges with one triangle, {crossed} with more than two, "
+        f"{int((balance[uses == 2] != 0).sum())} with both on one side: what is inside is not known"
+    )
 
 
 def is_closed(F: IntArray) -> bool:

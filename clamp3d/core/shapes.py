@@ -83,12 +83,12 @@ class Hole:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshShape:
-    """A closed mesh, and what to make of its round surfaces.
+    """A mesh, and what to make of its round surfaces.
 
     ``fit``: "bound" fits grooves, cylinders and holes and adds the error bound that assumes nothing between the
     vertices; "round" assumes round surfaces through the vertices (what a CAD export is) and adds the fit's error
     alone; "off" takes the facets as the part. ``error`` mm: how far the true surface can be from the facets, as stated
-    by who made them. Raises InputError if the mesh is not watertight.
+    by who made them. A mesh that is not closed is measured as a surface: what is inside of it is not known.
     """
 
     mesh: Mesh
@@ -102,8 +102,6 @@ class MeshShape:
         text("name of a mesh", self.name)
         if not number("error of a mesh", self.error) >= 0.0:
             raise InputError(f"error of a mesh must be >= 0 mm, got {self.error}")
-        if not self.mesh.watertight:
-            raise InputError(f"{self.mesh.name}: mesh must be watertight to have an inside; close it or merge vertices")
 
 
 Shape: TypeAlias = Solid | MeshShape

@@ -118,7 +118,7 @@ def test_scan_within_three_standard_errors(step, sigma):
         assert np.abs(off).max() <= g.error_bound
         assert abs(g.residual_rms / sigma - 1.0) < 0.15
         assert abs(g.half_angle - HALF) <= g.arc_error
-        assert any("open mesh" in note for note in result.notes)
+        assert any("not closed" in note for note in result.notes)
 
 
 def test_split_strips_and_cracks():

@@ -81,7 +81,7 @@ def _fit(case: MeshCase) -> Answer:
 
     mesh = make_mesh(case.mesh.vertices, case.mesh.faces)
     if not mesh.watertight:
-        return Answer(math.nan, why=f"fit: {next(note for note in mesh.notes if 'open' in note)}")
+        return Answer(math.nan, why=f"fit: {next(note for note in mesh.notes if 'not closed' in note)}")
     result = fit_mesh(mesh)
     if not result.grooves:
         return Answer(math.nan, why=f"fit: {result.notes[-1]}")
@@ -102,6 +102,8 @@ def _scene(case: MeshCase) -> Answer:
     from clamp3d.core.shapes import MeshShape
 
     mesh = make_mesh(case.mesh.vertices, case.mesh.faces)
+    if not mesh.watertight:  # the distance that it gets is that of the surfaces, not of what they should enclose
+        return Answer(math.nan, why="scene: inside unknown")
     size = 10.0 * float(np.ptp(mesh.vertices, axis=0).max())  # so that every pair is measured
     scene = Scene.of(
         {"part": (MeshShape(mesh, "round"), np.eye(4)), "wire": (case.wire, case.T_mesh_wire)},

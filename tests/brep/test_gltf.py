@@ -1,0 +1,203 @@
+"""glTF by its specification, written byte by byte: nodes, strips, fans, sparse numbers, and what is refused by name."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+
+from clamp3d import InputError, load
+from clamp3d.brep.gltf_file import read_gltf
+
+CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
+Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+
+
+class Gltf:
+    """A GLB in the making."""
+
+    def __init__(self):
+        self.binary = b""
+        self.data = {"asset": {"version": "2.0"}, "accessors": [], "bufferViews": [], "meshes": [], "nodes": []}
+
+    def view(self, array):
+        self.binary += b"\0" * (-len(self.binary) % 4)
+        raw = np.ascontiguousarray(array).tobytes()
+        self.data["bufferViews"].append({"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(raw)})
+        self.binary += raw
+        return len(self.data["bufferViews"]) - 1
+
+    def numbers(self, array, **more):
+        array = np.asarray(array)
+        kinds = {"f4": 5126, "u4": 5125, "u2": 5123, "i2": 5122}
+        kind = "VEC3" if array.ndim == 2 else "SCALAR"
+        component = kinds[array.dtype.str[1:]]
+        made = {"bufferView": self.view(array), "componentType": component, "count": len(array), "type": kind}
+        self.data["accessors"].append(made | more)
+        return len(self.data["accessors"]) - 1
+
+    def mesh(self, *primitives, name="cube"):
+        self.data["meshes"].append({"name": name, "primitives": list(primitives)})
+        return len(self.data["meshes"]) - 1
+
+    def cube(self, V=CUBE.vertices, F=CUBE.faces):
+        position = self.numbers(np.asarray(V, "f4"))
+        return {"attributes": {"POSITION": position}, "indices": self.numbers(np.asarray(F, "u2").ravel())}
+
+    def node(self, **node):
+        self.data["nodes"].append(node)
+        return len(self.data["nodes"]) - 1
+
+    def write(self, path):
+        self.data["buffers"] = [{"byteLength": len(self.binary)}]
+        text = json.dumps(self.data).encode()
+        text += b" " * (-len(text) % 4)
+        binary = self.binary + b"\0" * (-len(self.binary) % 4)
+        total = 12 + 8 + len(text) + 8 + len(binary)
+        head = struct.pack("<4sII", b"glTF", 2, total) + struct.pack("<I4s", len(text), b"JSON") + text
+        path.write_bytes(head + struct.pack("<I4s", len(binary), b"BIN\0") + binary)
+        return path
+
+
+def only(tmp_path, *primitives_of):
+    made = Gltf()
+    made.node(mesh=made.mesh(*(make(made) for make in primitives_of)))
+    (body,) = read_gltf(made.write(tmp_path / "a.glb"), 1.0).bodies
+    return trimesh.Trimesh(body.shape.mesh.vertices, body.shape.mesh.faces)
+
+
+def test_nodes_are_parts_with_names_places_and_shared_shapes(tmp_path):
+    made = Gltf()
+    cube = made.mesh(made.cube())
+    turn = [0.0, 0.0, np.sin(0.3), np.cos(0.3)]
+    small = made.node(name="small", mesh=cube, scale=[0.5, 0.5, 0.5], translation=[0.0, 1.0, 0.0])
+    mirrored = made.node(name="mirrored", mesh=cube, scale=[-1.0, 1.0, 1.0])
+    top = made.node(name="arm", children=[small, mirrored], rotation=turn, translation=[1.0, 2.0, 3.0])
+    again = made.node(name="arm", mesh=cube, translation=[4.0, 0.0, 0.0])
+    same = made.node(name="arm", mesh=cube)
+    made.data["scenes"] = [{"nodes": [top, again, same]}]
+    scene = load(made.write(tmp_path / "robot.glb"))
+    assert [part.name for part in scene.parts] == ["small", "mirrored", "arm_1", "arm_2"]
+    assert scene.parts[2].shape is scene.parts[3].shape
+    truth = trimesh.load_scene(tmp_path / "robot.glb")
+    worlds = []
+    for node in truth.graph.nodes_geometry:
+        T, key = truth.graph[node]
+        worlds.append(trimesh.transform_points(truth.geometry[key].vertices, T) @ Z_UP.T * 1000.0)
+    for part in scene.parts:
+        got = part.shape.mesh.vertices @ part.T_world[:3, :3].T + part.T_world[:3, 3]
+        assert sum(np.allclose(np.sort(got, axis=0), np.sort(world, axis=0), atol=1e-2) for world in worlds) == 1
+        assert part.shape.mesh.watertight
+
+
+def test_materials_do_not_divide_a_body(tmp_path):
+    mesh = only(tmp_path, lambda g: g.cube(F=CUBE.faces[:5]), lambda g: g.cube(F=CUBE.faces[5:]))
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("mode", [5, 6])
+def test_strips_and_fans(tmp_path, mode):
+    """A prism over a fan of five corners: its caps as a fan or a strip, its walls as triangles."""
+    angle = np.linspace(0.0, 2 * np.pi, 5, endpoint=False)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(5)])
+    V = np.vstack([ring, ring + np.array([0.0, 0.0, 1.0])]).astype("f4")
+    order = np.array([0, 1, 2, 3, 4] if mode == 6 else [0, 1, 4, 2, 3])
+    walls = [[k, (k + 1) % 5, 5 + k] for k in range(5)] + [[(k + 1) % 5, 5 + (k + 1) % 5, 5 + k] for k in range(5)]
+
+    def cap(start, turned):
+        index = order[::-1] if turned and mode == 6 else order
+        if turned and mode == 5:
+            index = np.array([0, 4, 1, 3, 2])
+        return lambda g: {
+            "attributes": {"POSITION": g.numbers(V)},
+            "indices": g.numbers((index + start).astype("u4")),
+            "mode": mode,
+        }
+
+    mesh = only(tmp_path, cap(5, False), cap(0, True), lambda g: g.cube(V, walls))
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(0.5 * 5 * np.sin(2 * np.pi / 5), rel=1e-6)
+
+
+def test_sparse_numbers_and_quantised_ones(tmp_path):
+    def sparse(g):
+        V = np.asarray(CUBE.vertices, "f4").copy()
+        right = V[[2, 7]].copy()
+        V[[2, 7]] = 0.0
+        primitive = g.cube(V)
+        rows, values = g.view(np.array([2, 7], "u2")), g.view(right)
+        g.data["accessors"][primitive["attributes"]["POSITION"]]["sparse"] = {
+            "count": 2,
+            "indices": {"bufferView": rows, "componentType": 5123},
+            "values": {"bufferView": values},
+        }
+        return primitive
+
+    assert only(tmp_path, sparse).volume == pytest.approx(6.0)
+
+    def quantised(g):
+        V = np.round(np.asarray(CUBE.vertices) / 3.0 * 32767).astype("i2")
+        faces = g.numbers(np.asarray(CUBE.faces, "u2").ravel())
+        return {"attributes": {"POSITION": g.numbers(V, normalized=True)}, "indices": faces}
+
+    assert only(tmp_path, quantised).volume == pytest.approx(6.0 / 27.0, rel=1e-3)
+
+
+def damage(what):
+    made = Gltf()
+    made.node(name="good", mesh=made.mesh(made.cube()))
+    if what == "index of a mesh":
+        made.node(name="bad", mesh=7)
+    elif what == "index of a vertex":
+        made.node(name="bad", mesh=made.mesh(made.cube(F=[[0, 1, 99]])))
+    elif what == "node":
+        made.data["scenes"] = [{"nodes": [0, 9]}]
+    elif what == "extension":
+        made.data["extensionsRequired"] = ["EXT_meshopt_compression"]
+    elif what == "circle":
+        made.node(name="bad", children=[2])
+        made.node(children=[1])
+        made.data["scenes"] = [{"nodes": [0, 1]}]
+    elif what == "beyond":
+        made.node(name="bad", mesh=made.mesh(made.cube()))
+        made.data["accessors"][-1]["count"] = 10**9
+    elif what == "zeros":
+        primitive = made.cube()
+        made.data["accessors"][primitive["attributes"]["POSITION"]] = {
+            "componentType": 5126,
+            "type": "VEC3",
+            "count": 10**10,
+        }
+        made.node(name="bad", mesh=made.mesh(primitive))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("what", "message"),
+    [
+        ("index of a mesh", r"only 1 of 2 bodies read; missing: bad \(mesh 7 is not in the file\)"),
+        ("index of a vertex", r"missing: bad \(face index 99 is out of range for 8 vertices\)"),
+        ("node", r"missing: node 9 \(not in the file\)"),
+        ("extension", "needs EXT_meshopt_compression, which is not read"),
+        ("circle", "in the tree twice"),
+        ("beyond", "reach beyond their part|at most 2 GB"),
+        ("zeros", "at most 2 GB are read"),
+    ],
+)
+def test_what_is_not_whole_is_refused(tmp_path, what, message):
+    path = damage(what).write(tmp_path / "a.glb")
+    with pytest.raises(InputError, match=message) as caught:
+        load(path)
+    assert "\n" not in str(caught.value)
+    if "missing" in message:
+        assert len(load(path, partial=True).parts) == 1
+
+
+def test_a_cut_file_is_refused(tmp_path):
+    whole = damage("nothing").write(tmp_path / "a.glb").read_bytes()
+    for size in (10, 30, len(whole) // 2, len(whole) - 1):
+        (tmp_path / "cut.glb").write_bytes(whole[:size])
+        with pytest.raises(InputError):
+            load(tmp_path / "cut.glb")

@@ -1,0 +1,108 @@
+"""Meshes that are not closed: distances and crossings are certain, what is inside them is said to be unknown."""
+
+import fcl
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from clamp3d import Scene, check, shapes
+from clamp3d.collide.open_mesh import _crossing
+from clamp3d.collide.surface import Surface
+from clamp3d.core.mesh import make_mesh
+from clamp3d.core.pose import translation
+
+
+def opened(mesh, *faces):
+    return shapes.MeshShape(make_mesh(mesh.vertices, np.delete(mesh.faces, faces, axis=0)), "off", "open")
+
+
+BOX = trimesh.creation.box((10.0, 10.0, 10.0))
+CUP = opened(BOX, 0)
+
+
+def row(a, b, T, **scene):
+    return check(Scene(**scene).add("a", a).add("b", b, T), distances=True).pairs[0]
+
+
+@pytest.mark.parametrize(
+    "other", [shapes.box((4, 4, 4)), opened(trimesh.creation.box((4, 4, 4)), 3), shapes.cylinder(2, 4)]
+)
+def test_apart_the_distance_is_that_of_the_surfaces(other):
+    found = row(CUP, other, translation(8.0, 0.5, 0.3), clearance=2.0)
+    assert found.verdict.value == "clearance"
+    assert found.distance.lower <= 1.0 <= found.distance.upper < 1.0 + 1e-9
+    assert "inside of open" in found.distance.method
+
+
+def test_what_an_open_mesh_may_hold_is_not_said_to_be_clear():
+    found = row(CUP, shapes.box((4, 4, 4)), np.eye(4))
+    assert found.verdict.value == "uncertain"
+    assert "a closed mesh of a" in found.reason
+
+
+def test_what_a_closed_part_holds_overlaps_it_however_open():
+    found = row(opened(trimesh.creation.box((4, 4, 4)), 3), shapes.box((10, 10, 10)), np.eye(4))
+    assert found.verdict.value == "clash"
+    assert found.distance.upper == pytest.approx(-3.0)
+
+
+def test_surfaces_that_cross_are_a_clash():
+    assert row(CUP, shapes.box((4, 4, 4)), translation(6.0, 0.5, 0.3)).verdict.value == "clash"
+
+
+@st.composite
+def surfaces(draw):
+    """Two surfaces of random triangles near each other, and the place of the second."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    made = []
+    for _ in range(2):
+        V = rng.uniform(-1.0, 1.0, (int(rng.integers(4, 12)), 3))
+        F = np.array([rng.choice(len(V), 3, replace=False) for _ in range(int(rng.integers(1, 9)))])
+        made.append(Surface(V, F))
+    T = np.eye(4)
+    T[:3, :3] = Rotation.random(rng=rng).as_matrix()
+    T[:3, 3] = rng.uniform(-0.5, 0.5, 3)
+    return (*made, T, rng)
+
+
+@given(surfaces())
+def test_no_move_shorter_than_its_depth_ends_a_crossing(drawn):
+    a, b, T, rng = drawn
+    depth, at = _crossing(a, b, T)
+    if at is None:
+        return
+    still = fcl.CollisionObject(a.bvh, fcl.Transform())
+    for way in rng.normal(size=(20, 3)):
+        t = T[:3, 3] + way / np.linalg.norm(way) * depth * 0.999
+        moved = fcl.CollisionObject(b.bvh, fcl.Transform(T[:3, :3], t))
+        assert fcl.collide(still, moved, fcl.CollisionRequest(), fcl.CollisionResult())
+
+
+def test_crossings_are_found():
+    """The depth is not merely zero: a nail right through a wall goes through it however it is moved a little."""
+    wall = Surface(np.array([[-9.0, -9, 0], [9, -9, 0], [0, 9, 0]]), np.array([[0, 1, 2]]))
+    nail = Surface(np.array([[0.0, 0, -2], [0.1, 0, -2], [0, 0, 3]]), np.array([[0, 1, 2]]))
+    assert _crossing(wall, nail, np.eye(4))[0] == pytest.approx(2.0, rel=1e-2)
+
+
+def test_bodies_that_share_an_edge_are_closed_and_a_doubled_wall_is_left_out():
+    cube = trimesh.creation.box((2.0, 2.0, 2.0))
+    both = trimesh.util.concatenate([cube, cube.copy().apply_translation((2.0, 2.0, 0.0))])
+    mesh = make_mesh(both.vertices, both.faces)
+    assert mesh.watertight
+    assert any("bodies that touch" in note for note in mesh.notes)
+    beside = trimesh.util.concatenate([cube, cube.copy().apply_translation((2.0, 0.0, 0.0))])
+    welded = make_mesh(beside.vertices, beside.faces)
+    assert welded.watertight
+    assert np.isclose(trimesh.Trimesh(welded.vertices, welded.faces).volume, 16.0)
+
+
+def test_an_open_mesh_says_how_open():
+    notes = make_mesh(BOX.vertices, BOX.faces[1:]).notes
+    assert notes == (
+        "not closed: 3 edges with one triangle, 0 with more than two, 0 with both on one side: "
+        "what is inside is not known",
+    )
