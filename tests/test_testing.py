@@ -15,7 +15,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.core.meshing import chord_error, mesh
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import inverse, rotation, translation
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.profile import sagitta
 from clamp3d.errors import InputError
 from clamp3d.fit.fit import fit_mesh
@@ -73,7 +73,7 @@ def test_fields_are_nowhere_steeper_than_one():
 
 def test_boxes_of_bodies_hold_them():
     rng = np.random.default_rng(2)
-    for shape in (*DRAWN, Cylinder(3.0, 8.0)):
+    for shape in (*DRAWN, Cylinder(3.0, 8.0), Capsule(3.0, 8.0)):
         T = rotation(rng.normal(size=3), 1.0) @ translation(1.0, 2.0, 3.0)
         it = body(shape).at(T)
         x = rng.uniform(-60.0, 60.0, (20_000, 3))
@@ -120,7 +120,7 @@ def test_any_body_can_be_asked_and_what_is_none_is_refused():
     hull = convex_body([[x, y, z] for x in (-5, 5) for y in (-5, 5) for z in (-5, 5)])
     x = np.random.default_rng(4).uniform(-9, 9, (500, 3))
     assert np.array_equal(hull.field(x) <= 0.0, body(BOX).field(x) <= 0.0)
-    with pytest.raises(InputError, match="shape must be a Solid, MeshShape, Cylinder, SweptArc or Body, got int"):
+    with pytest.raises(InputError, match="shape must be a Solid, MeshShape, Cylinder, Capsule, SweptArc or Body, got int"):
         body(3)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.core.shapes import MeshShape, Solid
 from clamp3d.errors import InputError
@@ -38,7 +38,7 @@ class Body:
         return Body(lambda x: self.field((x - T[:3, 3]) @ T[:3, :3]), box)
 
 
-AnyBody = Body | Solid | MeshShape | Cylinder | SweptArc
+AnyBody = Body | Solid | MeshShape | Cylinder | Capsule | SweptArc
 
 
 def body(shape: AnyBody) -> Body:
@@ -56,10 +56,17 @@ def body(shape: AnyBody) -> Body:
         return Body(
             lambda x: _prism(np.hypot(x[:, 0], x[:, 1]) - r, np.abs(x[:, 2]) - half), np.array([-corner, corner])
         )
+    if isinstance(shape, Capsule):
+        r, half = shape.radius, 0.5 * shape.length
+        corner = np.array([r, r, half + r])
+        return Body(
+            lambda x: np.hypot(np.hypot(x[:, 0], x[:, 1]), np.maximum(np.abs(x[:, 2]) - half, 0.0)) - r,
+            np.array([-corner, corner]),
+        )
     if isinstance(shape, SweptArc):
         far = np.full(3, math.inf)
         return Body(_groove(shape), np.array([-far, far]))
-    raise InputError(f"shape must be a Solid, MeshShape, Cylinder, SweptArc or Body, got {type(shape).__name__}")
+    raise InputError(f"shape must be a Solid, MeshShape, Cylinder, Capsule, SweptArc or Body, got {type(shape).__name__}")
 
 
 def convex_body(vertices: ArrayLike) -> Body:

@@ -26,8 +26,10 @@ def section():
 
 
 @pytest.mark.parametrize("shift", [5e-7, -5e-7])
-def test_a_state_that_is_off_is_not_proven(section, shift, monkeypatch):
-    """A little open, its forces balance as well as before: only that they act across gaps gives it away."""
+@pytest.mark.parametrize("wire", [None, 4.0])
+def test_a_state_that_is_off_is_not_proven(wire, shift, monkeypatch):
+    """Where flat faces meet and it is a little open, all forces balance: only that they act across gaps tells."""
+    section = Section(load_clamp(line=wire, jumper=wire), Cas())
     polish = final_state._polish
 
     def off(section, q, active):

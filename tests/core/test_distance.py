@@ -3,7 +3,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from clamp3d.core.distance import Feature, signed_distance, signed_distances
@@ -167,10 +167,11 @@ def test_gradient_against_differences(scene, direction):
 
     a = signed_distance(groove, wire, T)
     back, here, ahead = moved(-step), a.distance, moved(step)
-    right, left = (ahead - here) / step, (here - back) / step
-    if a.axis_inside or abs(right - left) > 1e-3:  # between two features, or next to an edge
-        return
-    assert abs((ahead - back) / (2 * step) - a.gradient @ v) < 2e-3
+    right, left, rate = (ahead - here) / step, (here - back) / step, a.gradient @ v
+    assume(not a.axis_inside and a.distance + wire.radius > 1e-3)  # where the axis enters the material the rate jumps
+    # The distance is the least over the places: where two are equally near it falls to either side, at most at the rate
+    # of the one that is named on this side, at least on the other.
+    assert right - 2e-3 <= rate <= left + 2e-3
 
 
 def test_world_offsets_cost_nothing():
