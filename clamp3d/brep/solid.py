@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.brep.surfaces import Faces
 from clamp3d.brep.tessellate import Tessellation, tessellate
 from clamp3d.core.mesh import Array, IntArray, Mesh, is_closed
 from clamp3d.core.shapes import MeshShape
@@ -32,11 +33,14 @@ class BrepSolid(MeshShape):
         Number of the exact face of each triangle of ``mesh``, in the order of Open CASCADE's explorer, from 0.
     errors : ndarray (m,)
         How far each triangle can be from its face, mm; ``error`` is the largest.
+    surfaces : Faces
+        The faces: kind, frame and sizes of their surfaces, and the triangles on them.
     """
 
     brep: bytes = b""
     face: IntArray = None  # type: ignore[assignment]
     errors: Array = None  # type: ignore[assignment]
+    surfaces: Faces = None  # type: ignore[assignment]
 
     @classmethod
     def of(cls, solid: Any, name: str, *, chord: float = CHORD) -> BrepSolid:
@@ -48,7 +52,16 @@ class BrepSolid(MeshShape):
         """From its bytes and the triangles that were made of it."""
         mesh = _mesh(name, triangles)
         error = float(triangles.errors.max())
-        return cls(mesh, "off", name, error, brep=brep, face=triangles.face, errors=triangles.errors)
+        return cls(
+            mesh,
+            "off",
+            name,
+            error,
+            brep=brep,
+            face=triangles.face,
+            errors=triangles.errors,
+            surfaces=triangles.surfaces,
+        )
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """All of it as plain arrays, for another process; `from_arrays` makes it again without Open CASCADE."""
@@ -58,12 +71,14 @@ class BrepSolid(MeshShape):
             "faces": self.mesh.faces,
             "face": self.face,
             "errors": self.errors,
+            **self.surfaces.to_arrays(),
         }
 
     @classmethod
     def from_arrays(cls, name: str, arrays: Mapping[str, NDArray[Any]]) -> BrepSolid:
         """From what `to_arrays` gave."""
-        triangles = Tessellation(*(arrays[key] for key in ("vertices", "faces", "face", "errors")))
+        faces = Faces.from_arrays(arrays)
+        triangles = Tessellation(arrays["vertices"], arrays["faces"], arrays["face"], arrays["errors"], faces)
         return cls.made(name, arrays["brep"].tobytes(), triangles)
 
     @cached_property

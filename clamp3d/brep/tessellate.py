@@ -1,24 +1,42 @@
 """Triangles of an Open CASCADE solid, each with a bound of its distance from the face that it stands for.
 
 Open CASCADE takes a deflection as a wish. What the triangles really keep is computed afterwards from their parameters:
-on planes, cylinders, cones, spheres and tori in closed form, on other surfaces from samples, doubled.
+on planes, cylinders, cones, spheres and tori (and free-form surfaces that are one of these) in closed form, on others
+from samples, doubled.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from clamp3d.brep.surfaces import (
+    OTHER,
+    PLANE,
+    Faces,
+    Size,
+    bends,
+    from_sides,
+    height,
+    parameters,
+    sense_of,
+    surface_of,
+    unwrapped,
+)
 from clamp3d.core.mesh import Array, IntArray
 from clamp3d.errors import Clamp3dError
 
 ANGLE = 0.35
 """Largest turn (rad) of a facet's neighbour, so that a small fillet gets facets enough to be seen as round."""
+EDGE_CHORD = 0.0005
+"""Chord error (mm) of the edges: finer than that of the faces, since where two parts touch their borders decide."""
 _RETRIES = 4
+_SAFETY = 2.0
+"""Factor on deviations that are sampled, not computed: of edges that are no lines or circles, of free-form faces."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,12 +45,14 @@ class Tessellation:
 
     ``face`` (m,): number of the B-rep face of each triangle, in the order of an explorer, from 0. ``errors`` (m,) mm:
     no point of the triangle is further from its face, and no point of what it stands for further from the triangle.
+    ``surfaces``: the faces themselves, with the triangles on each.
     """
 
     vertices: Array
     faces: IntArray
     face: IntArray
     errors: Array
+    surfaces: Faces
 
 
 def explore(shape: Any, kind: str, outside: str = "SHAPE") -> Iterator[Any]:
@@ -58,11 +78,15 @@ def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
     """
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
+    from OCP.IMeshTools import IMeshTools_Parameters
 
     wanted = chord
     for _ in range(_RETRIES):
         BRepTools.Clean_s(solid)
-        BRepMesh_IncrementalMesh(solid, wanted, False, angle, False)
+        asked = IMeshTools_Parameters()
+        asked.Deflection, asked.DeflectionInterior = min(EDGE_CHORD, wanted), wanted
+        asked.Angle = asked.AngleInterior = angle
+        BRepMesh_IncrementalMesh(solid, asked)
         made = _collected(solid)
         worst = float(made.errors.max())
         if worst <= chord:
@@ -77,10 +101,9 @@ def _collected(solid: Any) -> Tessellation:
     from OCP.TopAbs import TopAbs_Orientation
     from OCP.TopLoc import TopLoc_Location
 
+    surfaces: list[tuple[int, Array, Size, float]] = []
+    rows: list[tuple[NDArray[Any], ...]] = []
     nodes: list[Array] = []
-    triangles: list[IntArray] = []
-    owner: list[IntArray] = []
-    errors: list[Array] = []
     links: list[tuple[int, int]] = []
     first_seen: dict[int, list[tuple[Any, IntArray]]] = {}
     start = 0
@@ -89,12 +112,13 @@ def _collected(solid: Any) -> Tessellation:
         found = BRep_Tool.Triangulation_s(face, place)
         if found is None:
             raise Clamp3dError(f"Open CASCADE makes no triangles of face {number + 1}")
-        move = place.Transformation()
         n = found.NbNodes()
-        points = [found.Node(i).Transformed(move) for i in range(1, n + 1)]
-        P = np.array([(p.X(), p.Y(), p.Z()) for p in points])
+        P = placed(np.array([found.Node(i).Coord() for i in range(1, n + 1)]), place)
         F = np.array([found.Triangle(i).Get() for i in range(1, found.NbTriangles() + 1)], dtype=np.int64) - 1
-        uv = np.array([(q.X(), q.Y()) for q in map(found.UVNode, range(1, n + 1))])
+        given = F
+        if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED:
+            F = F[:, ::-1]
+        kind, frame, size, deviation = surface_of(face)
         pieces, sags = [], []
         tolerance = BRep_Tool.Tolerance_s(face)
         for edge in explore(face, "EDGE"):
@@ -113,23 +137,51 @@ def _collected(solid: Any) -> Tessellation:
             else:
                 links += list(zip(twin.tolist(), (start + at).tolist(), strict=True))
             pieces.append(np.column_stack([at[:-1], at[1:]]))
-            sags.append(_sagitta(edge, polygon))
-        errors.append(_bound(face)(uv[F], P[F]) + _at_edges(F, n, pieces, sags) + tolerance)
-        if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED:
-            F = F[:, ::-1]
+            sags.append(_sags(edge, polygon, P[at], kind, frame, size))
+        sag = _at_sides(F, n, pieces, sags)
+        uv = unwrapped(kind, parameters(kind, frame, size, P)[F])
+        if kind == OTHER:
+            own = _sampled(face, found, given, P)
+            deviation = float(own.max())
+        else:
+            deviation = max(deviation, float(np.abs(height(kind, frame, size, P)).max()))
+            own = bends(kind, size, uv, P[F]) + deviation
+        surfaces.append((kind, frame, size, deviation))
         nodes.append(P)
-        triangles.append(F + start)
-        owner.append(np.full(len(F), number))
+        rows.append((F + start, np.full(len(F), number), own + sag.max(axis=1) + tolerance, uv, sag, P[F]))
         start += n
     if not nodes:
         raise Clamp3dError("the solid has no faces")
-    return _joined(
-        np.concatenate(nodes), np.concatenate(triangles), np.concatenate(owner), np.concatenate(errors), links
+    F, owner, errors, uv, sag, corners = (np.concatenate(column) for column in zip(*rows, strict=True))
+    V, F, whole = _joined(np.concatenate(nodes), F, links)
+    flat = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) <= 1e-14
+    kept = whole & ~flat
+    senses = [
+        sense_of(kind, frame, size, corners[kept & (owner == number)])
+        for number, (kind, frame, size, _) in enumerate(surfaces)
+    ]
+    faces = Faces(
+        np.array([s[0] for s in surfaces], dtype=np.int64),
+        np.array([s[1] for s in surfaces]),
+        np.array([s[2] for s in surfaces]),
+        np.array(senses),
+        np.array([s[3] for s in surfaces]),
+        *(np.ascontiguousarray(x[kept]) for x in (errors, corners, uv, owner, sag)),
     )
+    return Tessellation(V, F, owner[whole], errors[whole], faces)
 
 
-def _joined(V: Array, F: IntArray, owner: IntArray, errors: Array, links: list[tuple[int, int]]) -> Tessellation:
-    """Nodes that two faces share along an edge made one; triangles that this folds left out."""
+def placed(points: Array, place: Any) -> Array:
+    """Points (n, 3) moved by a TopLoc_Location."""
+    if place.IsIdentity():
+        return points
+    move = place.Transformation()
+    M = np.array([[move.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
+    return np.asarray(points @ M[:, :3].T + M[:, 3])
+
+
+def _joined(V: Array, F: IntArray, links: list[tuple[int, int]]) -> tuple[Array, IntArray, NDArray[np.bool_]]:
+    """Nodes that two faces share along an edge made one, without triangles that this folds; which ones are left."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -141,12 +193,12 @@ def _joined(V: Array, F: IntArray, owner: IntArray, errors: Array, links: list[t
         V, F = V[keep], label[F].astype(np.int64)
     whole = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
     used, rows = np.unique(F[whole], return_inverse=True)
-    return Tessellation(V[used], rows.reshape(-1, 3), owner[whole], errors[whole])
+    return V[used], rows.reshape(-1, 3), whole
 
 
-def _at_edges(F: IntArray, n: int, pieces: list[IntArray], sags: list[Array]) -> Array:
-    """The largest of ``sags`` among the ``pieces`` of the face's edges that are sides of each triangle (m,)."""
-    found = np.zeros(len(F))
+def _at_sides(F: IntArray, n: int, pieces: list[IntArray], sags: list[Array]) -> Array:
+    """The largest of ``sags`` among the ``pieces`` of the face's edges that are each triangle's sides (m, 3)."""
+    found = np.zeros(F.shape)
     if pieces:
         pairs, sag = np.sort(np.concatenate(pieces), axis=1), np.concatenate(sags)
         keys = pairs[:, 0] * n + pairs[:, 1]
@@ -155,95 +207,45 @@ def _at_edges(F: IntArray, n: int, pieces: list[IntArray], sags: list[Array]) ->
             side = np.sort(F[:, [k, (k + 1) % 3]], axis=1)
             wanted = side[:, 0] * n + side[:, 1]
             row = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
-            found = np.maximum(found, np.where(keys[row] == wanted, sag[row], 0.0))
+            found[:, k] = np.where(keys[row] == wanted, sag[row], 0.0)
     return found
 
 
-def _sagitta(edge: Any, polygon: Any) -> Array:
-    """How far each piece (k,) of an edge can be from its chord, mm."""
+def _sags(edge: Any, polygon: Any, nodes: Array, kind: int, frame: Array, size: Size) -> Array:
+    """How far each piece (k,) of an edge can be from the line on the surface that is straight in its parameters, mm."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.GeomAbs import GeomAbs_CurveType as Kind
 
     curve = BRepAdaptor_Curve(edge)
-    kind = curve.GetType()
+    what = curve.GetType()
+    if what == Kind.GeomAbs_Line:
+        return np.zeros(len(nodes) - 1)
     t = np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
-    if kind == Kind.GeomAbs_Line:
-        return np.zeros(len(t) - 1)
     turn = 0.5 * np.minimum(np.abs(np.diff(t)), np.pi)
-    if kind == Kind.GeomAbs_Circle:
+    if what == Kind.GeomAbs_Circle and kind in (PLANE, OTHER):
         return np.asarray(curve.Circle().Radius() * (1.0 - np.cos(turn)))
-    if kind == Kind.GeomAbs_Ellipse:  # a circle stretched: so is its sagitta, at most by the longer half axis
+    if what == Kind.GeomAbs_Ellipse and kind in (PLANE, OTHER):  # a circle stretched: at most by the longer half axis
         return np.asarray(curve.Ellipse().MajorRadius() * (1.0 - np.cos(turn)))
-    found = []
-    for a, b in itertools.pairwise(t):
-        p = np.array(
-            [(q.X(), q.Y(), q.Z()) for q in (curve.Value(a + s * (b - a)) for s in (0.0, 0.25, 0.5, 0.75, 1.0))]
-        )
-        along = p[-1] - p[0]
-        size = float(np.linalg.norm(along))
-        away = np.linalg.norm(np.cross(p - p[0], along), axis=1) / size if size else np.linalg.norm(p - p[0], axis=1)
-        found.append(2.0 * float(away.max()))
-    return np.array(found)
-
-
-def _bound(face: Any) -> Callable[[Array, Array], Array]:
-    """Distance (m,) mm of triangles from a face at most, by their parameters (m, 3, 2) and corners (m, 3, 3)."""
-    from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.GeomAbs import GeomAbs_SurfaceType as Kind
-
-    surface = BRepAdaptor_Surface(face)
-    kind = surface.GetType()
-
-    def turn(uv: Array, k: int) -> Array:
-        return np.asarray(1.0 - np.cos(0.5 * np.minimum(np.ptp(uv[:, :, k], axis=1), np.pi)))
-
-    if kind == Kind.GeomAbs_Plane:
-        return lambda uv, P: np.zeros(len(P))
-    if kind == Kind.GeomAbs_Cylinder:
-        radius = surface.Cylinder().Radius()
-        return lambda uv, P: radius * turn(uv, 0)
-    if kind == Kind.GeomAbs_Cone:
-        cone = surface.Cone()
-        wide, slope = cone.RefRadius(), np.sin(cone.SemiAngle())
-
-        def cone_bound(uv: Array, P: Array) -> Array:
-            # A weighted mean of points on a circle of at most this radius lies no deeper than the sagitta.
-            r = np.abs(wide + slope * uv[:, :, 1])
-            widest = r.max(axis=1)
-            # The apex has no angle: it takes that of the widest corner.
-            at = np.take_along_axis(uv[:, :, 0], r.argmax(axis=1)[:, None], axis=1)
-            u = np.where(r > 1e-9 * widest[:, None], uv[:, :, 0], at)
-            return np.asarray(widest * turn(u[:, :, None], 0))
-
-        return cone_bound
-    if kind == Kind.GeomAbs_Sphere:
-        ball = surface.Sphere().Radius()
-        return lambda uv, P: ball - np.sqrt(np.maximum(ball**2 - _enclosing(P) ** 2, 0.0))
-    if kind == Kind.GeomAbs_Torus:
-        torus = surface.Torus()
-        large, small = torus.MajorRadius(), torus.MinorRadius()
-        return lambda uv, P: (large + small) * turn(uv, 0) + small * turn(uv, 1)
-    return lambda uv, P: _sampled(surface, uv, P)
-
-
-def _enclosing(P: Array) -> Array:
-    """Radius (m,) of the smallest ball around each of triangles (m, 3, 3)."""
-    side = np.linalg.norm(np.roll(P, -1, axis=1) - P, axis=2)
-    long = side.max(axis=1)
-    twice_area = np.linalg.norm(np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0]), axis=1)
-    around = side.prod(axis=1) / np.maximum(2.0 * twice_area, 1e-300)
-    obtuse = 2.0 * long**2 >= (side**2).sum(axis=1)
-    return np.asarray(np.where(obtuse, 0.5 * long, np.minimum(around, long)))
+    off = np.zeros(len(t) - 1)
+    for share in (0.25, 0.5, 0.75):
+        at = (1.0 - share) * t[:-1] + share * t[1:]
+        true = np.array([curve.Value(float(x)).Coord() for x in at])
+        off = np.maximum(off, from_sides(kind, frame, size, nodes[:-1], nodes[1:], true))
+    return np.where(off > 1e-11, _SAFETY * off, 0.0)
 
 
 _SAMPLES = np.array([[1, 1, 1], [3, 3, 0], [0, 3, 3], [3, 0, 3], [4, 1, 1], [1, 4, 1], [1, 1, 4]], dtype=np.float64)
 _SAMPLES /= _SAMPLES.sum(axis=1, keepdims=True)
 
 
-def _sampled(surface: Any, uv: Array, P: Array) -> Array:
+def _sampled(face: Any, triangulation: Any, F: IntArray, P: Array) -> Array:
     """Twice the largest distance (m,) found between points of triangles and the surface at the same parameters."""
-    where = np.einsum("sk,mkd->msd", _SAMPLES, uv).reshape(-1, 2)
-    flat = np.einsum("sk,mkd->msd", _SAMPLES, P).reshape(-1, 3)
-    points = [surface.Value(float(u), float(v)) for u, v in where]
-    found = np.linalg.norm(np.array([(p.X(), p.Y(), p.Z()) for p in points]) - flat, axis=1)
-    return np.asarray(2.0 * found.reshape(len(P), -1).max(axis=1))
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+
+    surface = BRepAdaptor_Surface(face)
+    uv = np.array([triangulation.UVNode(i).Coord() for i in range(1, len(P) + 1)])
+    where = np.einsum("sk,mkd->msd", _SAMPLES, uv[F]).reshape(-1, 2)
+    flat = np.einsum("sk,mkd->msd", _SAMPLES, P[F]).reshape(-1, 3)
+    points = np.array([surface.Value(float(u), float(v)).Coord() for u, v in where])
+    found = np.linalg.norm(points - flat, axis=1)
+    return np.asarray(_SAFETY * found.reshape(len(F), -1).max(axis=1))

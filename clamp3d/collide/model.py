@@ -15,6 +15,7 @@ from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.body import ClosedForm
 from clamp3d.collide.convex import Hull, hull
 from clamp3d.collide.drawn import bodies_of
+from clamp3d.collide.faces import FaceModel
 from clamp3d.collide.surface import Surface, at_edges
 from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import Array
@@ -102,6 +103,11 @@ class Model:
     def facets(self) -> Surface | None:
         """The mesh of a mesh shape; None for a drawn solid."""
         return self.raw if isinstance(self.shape, MeshShape) and self.closed else None
+
+    @cached_property
+    def faces(self) -> FaceModel | None:
+        """The faces of a solid from CAD; None for other shapes."""
+        return FaceModel(self.shape) if isinstance(self.shape, BrepSolid) else None
 
     @cached_property
     def hull_body(self) -> ClosedForm:

@@ -14,6 +14,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm, bodies_distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.convex import Rod
+from clamp3d.collide.faces import faces_distance
 from clamp3d.collide.facets import rod_distance
 from clamp3d.collide.meshes import meshes_distance, within
 from clamp3d.collide.model import FINEST, Model
@@ -26,6 +27,9 @@ COARSEST = 0.512
 """First chord error (mm) of a pair that needs meshes; each further one is a whole power of two finer."""
 CONTAINED_ERROR = 0.064
 """Chord error (mm) of the meshes that containment is asked with."""
+
+_FACE_WIDTHS = (1e-3, 1e-6)
+"""Widths (mm) of the interval that are asked for where a verdict alone is not enough."""
 
 Enough = Callable[[Distance], bool]
 
@@ -51,6 +55,8 @@ def refine(
         open_ = " and ".join(model.name for model in (a, b) if not model.closed)
         method = f"surfaces (FCL), inside of {open_} unknown"
         return _agreed(found, open_distance(a, b, T)).labelled("meshes", method)
+    if a.faces is not None and b.faces is not None:
+        return _faces(a, b, T, found, thresholds, enough)
     for level in (_features, _facets) if forms else (_facets,):
         new = level(a, b, T, lambda x, known=found: enough(known.meet(x)))  # type: ignore[misc]
         if new is not None:
@@ -99,6 +105,19 @@ def _agreed(old: Distance, new: Distance) -> Distance:
             f"[{new.lower:.9g}, {new.upper:.9g}] and [{old.lower:.9g}, {old.upper:.9g}] mm"
         )
     return met.ordered()
+
+
+def _faces(a: Model, b: Model, T: Array, found: Distance, thresholds: Thresholds, enough: Enough) -> Distance:
+    """Two solids from CAD by their faces: until the verdict is certain, then until ``enough``."""
+    for tol in (None, *_FACE_WIDTHS):
+        a.counters.queries["faces"] += 1
+        assert a.faces is not None
+        assert b.faces is not None
+        new = faces_distance(a.faces, b.faces, T, contact=thresholds.contact, clearance=thresholds.clearance, tol=tol)
+        found = _agreed(found, new)
+        if enough(found):
+            break
+    return found
 
 
 def _features(a: Model, b: Model, T: Array, enough: Enough) -> Distance:

@@ -62,14 +62,14 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 @cache
-def source_stamp() -> str:
-    """Hash of all formula sources and of this file.
+def source_stamp(folder: Path = Path(__file__).parent, names: str = "kernel*.py") -> str:
+    """Hash of all formula sources in a folder, the contact kernel's by default, and of this file.
 
     numba notices a change in the file of a cached function, not in the files of the functions it calls. Entry points
     close over this stamp, which makes it a part of their cache key.
     """
     digest = hashlib.sha256()
-    for path in sorted([*Path(__file__).parent.glob("kernel*.py"), Path(__file__)]):
+    for path in sorted([*folder.glob(names), Path(__file__)]):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

@@ -66,7 +66,9 @@ def body(shape: AnyBody) -> Body:
     if isinstance(shape, SweptArc):
         far = np.full(3, math.inf)
         return Body(_groove(shape), np.array([-far, far]))
-    raise InputError(f"shape must be a Solid, MeshShape, Cylinder, Capsule, SweptArc or Body, got {type(shape).__name__}")
+    raise InputError(
+        f"shape must be a Solid, MeshShape, Cylinder, Capsule, SweptArc or Body, got {type(shape).__name__}"
+    )
 
 
 def convex_body(vertices: ArrayLike) -> Body:

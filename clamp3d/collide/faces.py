@@ -1,0 +1,176 @@
+"""Signed distance of two solids with known faces, between proven bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.brep.solid import BrepSolid
+from clamp3d.brep.surfaces import Faces
+from clamp3d.collide.answer import Distance
+from clamp3d.core.pose import Array, inverse
+
+_MOST = 60_000
+"""Pieces looked at before a direction ends with what is known."""
+_BESIDE = 8
+"""Faces beside the nearest one whose surfaces are tried."""
+
+
+@dataclass(eq=False)
+class FaceModel:
+    """A solid's faces as the compiled search takes them, with a tree over their triangles."""
+
+    solid: BrepSolid
+
+    @property
+    def faces(self) -> Faces:
+        """The faces."""
+        return self.solid.surfaces
+
+    @cached_property
+    def frames(self) -> Array:
+        """Origin and axes (n, 12) of each surface."""
+        return np.ascontiguousarray(self.faces.frame.reshape(-1, 12))
+
+    @cached_property
+    def errors(self) -> Array:
+        """Error (m,) of each triangle, mm."""
+        return self.faces.error
+
+    @cached_property
+    def bounds(self) -> Array:
+        """Lower and upper corner (2, 3) of a box that holds the solid, mm."""
+        c, e = self.faces.corners, self.errors[:, None]
+        return np.array([(c.min(axis=1) - e).min(axis=0), (c.max(axis=1) + e).max(axis=0)])
+
+    @cached_property
+    def slack(self) -> float:
+        """By so much (mm) two faces that share an edge may be over one another by the errors of their borders."""
+        scale = float(np.abs(self.bounds).max())
+        return 2.1 * float(self.faces.sag.max()) + 2.0 * float(self.faces.deviation.max()) + 1e-9 + 1e-12 * scale
+
+    @cached_property
+    def groups(self) -> NDArray[np.int64]:
+        """Number (n,) of the surface of each face: faces of one surface share it."""
+        kind, frame, size, sense = self.faces.kind, self.faces.frame, self.faces.size, self.faces.sense
+        found = np.arange(len(kind))
+        for i in range(len(kind)):
+            if kind[i] == 5 or found[i] != i:
+                continue
+            same = (kind == kind[i]) & (sense == sense[i]) & (np.abs(size - size[i]).max(axis=1) < 1e-7)
+            z, o = frame[i, 3], frame[i, 0]
+            same &= np.abs(frame[:, 3] @ z) > 1.0 - 1e-14
+            away = frame[:, 0] - o
+            if kind[i] == 1:
+                same &= np.linalg.norm(away - np.outer(away @ z, z), axis=1) < 1e-7
+            elif kind[i] == 0:
+                same &= (np.abs(away @ z) < 1e-7) & (frame[:, 3] @ z > 0.0)
+            else:
+                same &= np.linalg.norm(away, axis=1) < 1e-7
+                if kind[i] == 2:
+                    same &= frame[:, 3] @ z > 0.0
+            found[same] = i
+        return found.astype(np.int64)
+
+    @cached_property
+    def arrays(self) -> tuple[NDArray[np.generic], ...]:
+        """What the compiled search reads of the solid that distances are measured from."""
+        from clamp3d.collide.faces_kernel import tree
+
+        f, m, n = self.faces, len(self.faces.face), len(self.faces.kind)
+        box, link = np.empty((2 * m + 2 * n, 7)), np.empty((2 * m + 2 * n, 2), dtype=np.int64)
+        order, root = np.empty(m, dtype=np.int64), np.empty(n, dtype=np.int64)
+        used = tree(f.corners, self.errors, np.searchsorted(f.face, np.arange(n + 1)), box, link, order, root)
+        box, link = box[:used].copy(), link[:used].copy()
+        return (
+            f.corners, self.errors, f.face, box, link, order, root, f.uv, np.ascontiguousarray(f.sag.max(axis=1)),
+            f.kind, f.size, self.frames, f.sense, f.deviation, self.groups, self.neighbours,
+            np.zeros((n, m), dtype=np.int8), np.zeros((n, used), dtype=np.int8),
+        )  # fmt: skip
+
+    @cached_property
+    def neighbours(self) -> NDArray[np.int64]:
+        """Up to so many faces (n, k) that share a corner with each face; -1 where there are fewer."""
+        faces = len(self.faces.kind)
+        both = np.unique(self.solid.mesh.faces * faces + self.solid.face[:, None])
+        both = np.column_stack([both // faces, both % faces])
+        found: list[list[int]] = [[] for _ in range(faces)]
+        starts = np.flatnonzero(np.diff(both[:, 0], prepend=-1))
+        for rows in np.split(both[:, 1], starts[1:]):
+            for i in rows if len(rows) > 1 else ():
+                found[i] += [int(j) for j in rows if j != i and j not in found[i]]
+        made = np.full((len(found), _BESIDE), -1, dtype=np.int64)
+        for i, others in enumerate(found):
+            made[i, : len(others[:_BESIDE])] = others[:_BESIDE]
+        return made
+
+    @cached_property
+    def marked(self) -> NDArray[np.int8]:
+        """Which faces' rows of marks are filled."""
+        return np.zeros(len(self.faces.kind), dtype=np.int8)
+
+
+def faces_distance(
+    a: FaceModel, b: FaceModel, T: Array, *, contact: float, clearance: float = 0.0, tol: float | None = None
+) -> Distance:
+    """Signed distance of ``b`` at ``T`` (4, 4) in a's frame.
+
+    Stops when the bounds are on the same side of ``contact`` and ``clearance`` mm, or no further apart than
+    ``tol``, where that is given.
+    """
+    here = inverse(T)
+    first = _towards(a, b, T, contact, clearance, tol)
+    margin = max(contact, clearance)
+    low, high = first.lower, first.upper
+    if low > margin and not _may_hold(b, a, here):
+        return _told(first.swapped())
+    second = _towards(b, a, here, contact, clearance, tol).moved(T)
+    first = first.swapped()
+    best = first if first.upper <= second.upper else second
+    if low > 0.0 and second.lower > 0.0:
+        return _told(replace(best, lower=max(low, second.lower)))
+    low = min(low, second.lower)
+    high = best.upper
+    if high >= 0.0 and min(first.estimate or 0.0, second.estimate or 0.0) < 4.0 * contact:
+        low = -np.inf  # nothing of one stands well out of the other: a copy of it, perhaps
+    return _told(replace(best, lower=low))
+
+
+def _told(found: Distance) -> Distance:
+    return replace(found.ordered(), estimate=None)
+
+
+def _may_hold(inner: FaceModel, outer: FaceModel, T: Array) -> bool:
+    """Whether the first, placed by ``T``, can lie inside the second: by their boxes."""
+    box = inner.bounds
+    middle, half = box.mean(axis=0), 0.5 * (box[1] - box[0])
+    centre = T[:3, :3] @ middle + T[:3, 3]
+    return not ((centre < outer.bounds[0]) | (centre > outer.bounds[1])).any() and half.min() >= 0.0
+
+
+def _towards(a: FaceModel, b: FaceModel, T: Array, contact: float, clearance: float, tol: float | None) -> Distance:
+    """Least signed distance from a of b's faces, ``b`` at ``T`` in a's frame; points in a's frame, b's point first.
+
+    ``estimate`` is how far at least some point of b is outside of a.
+    """
+    from clamp3d.collide.faces_kernel import RESULT, descend
+
+    R, t = T[:3, :3], T[:3, 3]
+    n = len(b.faces.face)
+    pieces, uvs = np.empty((n + _MOST, 3, 3)), np.empty((n + _MOST, 3, 2))
+    faces, sags = np.empty(n + _MOST, dtype=np.int64), np.empty((n + _MOST, 3))
+    pieces[:n], uvs[:n], faces[:n], sags[:n] = b.faces.corners @ R.T + t, b.faces.uv, b.faces.face, b.faces.sag
+    frames = b.faces.frame @ R.T
+    frames[:, 0] += t
+    out = np.zeros(RESULT)
+    out[0] = np.inf
+    found = descend(
+        pieces, uvs, faces, sags, np.empty(n + _MOST), n, *b.arrays[3:6], np.ascontiguousarray(T),
+        b.faces.kind, b.faces.size, np.ascontiguousarray(frames.reshape(-1, 12)), b.faces.deviation,
+        *a.arrays, a.marked, a.slack, contact, clearance, np.inf if tol is None else tol, _MOST, out,
+    )  # fmt: skip
+    p, q = (out[1:4].copy(), out[4:7].copy()) if np.isfinite(out[0]) else (None, None)
+    return Distance(found, float(out[0]), p, q, level="faces", method="faces", estimate=float(out[8]))

@@ -1,0 +1,398 @@
+"""Compiled branch and bound: the least signed distance from a solid that a point of another solid's faces has.
+
+The signed distance from a solid has slope 1: a piece with a point at s and radius r has no point nearer than s - r.
+Three better bounds, each proven for the piece as it lies:
+
+- outside, its distance from each face is at least that of the whole surface, in closed form, and at least that of the
+  face's triangles less their errors;
+- where no face of the solid within a ball reaches above the surface of one of them, the solid in the ball lies below
+  that surface, so the piece's signed distance is at least its least height over the surface;
+- inside, the same with the surroundings in place of the solid says that a point has material all round it.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+import heapq
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clamp3d.collide.faces_math import (
+    CONE,
+    CYLINDER,
+    OTHER,
+    PLANE,
+    SPHERE,
+    TORUS,
+    bend,
+    cut,
+    height_at,
+    least_height,
+    longest,
+    point_triangle,
+    spans,
+    surface_point,
+    to_frame,
+)
+from clamp3d.collide.faces_tree import DEEP, build, from_faces, mark_face, nearest, nearest_marked, nearest_on
+from clamp3d.core.jit import entry, formula, source_stamp
+
+NEAR = 4
+"""Faces whose surfaces are tried as separating ones, those nearest to the piece."""
+TRIED = 16
+"""Faces tried in all, with those beside the nearest."""
+RESULT = 10
+"""Upper bound, points on the piece (3) and the solid (3), face, farthest distance that is certainly outside, pieces."""
+
+
+@formula
+def _over_triangle(kind, a, b, F, uv, x, y, z):
+    """Whether the foot of a point on a surface lies in the triangle uv (3, 2) of its parameters."""
+    x, y, z = x - F[0], y - F[1], z - F[2]
+    X, Y = x * F[3] + y * F[4] + z * F[5], x * F[6] + y * F[7] + z * F[8]
+    Z = x * F[9] + y * F[10] + z * F[11]
+    u, v = X, Y
+    if kind != PLANE:
+        h = math.sqrt(X * X + Y * Y)
+        u = math.atan2(Y, X)
+        if kind == CYLINDER:
+            v = Z
+        elif kind == CONE:
+            v = ((h - a) * math.sin(b) + Z * math.cos(b)) * math.cos(b)
+        elif kind == SPHERE:
+            v = math.atan2(Z, h)
+        else:
+            v = math.atan2(Z, h - a)
+            v += 2.0 * math.pi * math.floor((uv[0, 1] - v) / (2.0 * math.pi) + 0.5)
+        u += 2.0 * math.pi * math.floor((uv[0, 0] - u) / (2.0 * math.pi) + 0.5)
+    one, other = True, True
+    for i in range(3):
+        k = (i + 1) % 3
+        side = (uv[k, 0] - uv[i, 0]) * (v - uv[i, 1]) - (uv[k, 1] - uv[i, 1]) * (u - uv[i, 0])
+        one = one and side >= 0.0  # NaN, a pole: neither
+        other = other and side <= 0.0
+    return one or other
+
+
+@formula
+def _witness(kind, a, b, F, P, uv, x, y, z, q):
+    """A point q (3) of the surface piece of triangle P near a point; returns their distance."""
+    if kind != OTHER and _over_triangle(kind, a, b, F, uv, x, y, z):
+        eps, h = 1e-6, height_at(kind, a, b, F, x, y, z)
+        gx = (height_at(kind, a, b, F, x + eps, y, z) - height_at(kind, a, b, F, x - eps, y, z)) / (2.0 * eps)
+        gy = (height_at(kind, a, b, F, x, y + eps, z) - height_at(kind, a, b, F, x, y - eps, z)) / (2.0 * eps)
+        gz = (height_at(kind, a, b, F, x, y, z + eps) - height_at(kind, a, b, F, x, y, z - eps)) / (2.0 * eps)
+        q[0], q[1], q[2] = x - h * gx, y - h * gy, z - h * gz
+        return abs(h)
+    _, v, w = point_triangle(x, y, z, P)
+    r = 1.0 - v - w
+    for k in range(3):
+        q[k] = r * P[0, k] + v * P[1, k] + w * P[2, k]
+    if kind != OTHER and kind != PLANE:
+        s, t, n = 0.0, 0.0, 0.0
+        weights = (r, v, w)
+        for i in range(3):
+            t += weights[i] * uv[i, 1]
+            if not np.isnan(uv[i, 0]):
+                s += weights[i] * uv[i, 0]
+                n += weights[i]
+        if n > 0.0:
+            surface_point(kind, a, b, F, s / n, t, q)
+    return math.sqrt((x - q[0]) ** 2 + (y - q[1]) ** 2 + (z - q[2]) ** 2)
+
+
+@formula
+def _slopes(kind, size, frame, f, g, x, y, z):
+    """Cosine of the angle between the gradients of two surfaces' heights at a point."""
+    eps, turn = 1e-6, 0.0
+    for i in range(3):
+        dx, dy, dz = (eps if i == 0 else 0.0), (eps if i == 1 else 0.0), (eps if i == 2 else 0.0)
+        a = height_at(kind[f], size[f, 0], size[f, 1], frame[f], x + dx, y + dy, z + dz)
+        a -= height_at(kind[f], size[f, 0], size[f, 1], frame[f], x - dx, y - dy, z - dz)
+        b = height_at(kind[g], size[g, 0], size[g, 1], frame[g], x + dx, y + dy, z + dz)
+        b -= height_at(kind[g], size[g, 0], size[g, 1], frame[g], x - dx, y - dy, z - dz)
+        turn += a * b / (4.0 * eps * eps)
+    return turn
+
+
+@formula
+def _piece(V, uv, g, sag, own, solid, marked, slack, contact, goal, tol, near, chosen, heights, over, work, p, q, out):
+    """Lower bound for one piece; a better upper bound goes into ``out``."""
+    akind, asize, aframe, adeviation = own
+    (
+        P,
+        err,
+        face,
+        box,
+        link,
+        order,
+        root,
+        buv,
+        bsag,
+        kind,
+        size,
+        frame,
+        sense,
+        deviation,
+        group,
+        neighbours,
+        marks,
+        nodes,
+    ) = solid
+    du, v0, v1, u, v = spans(uv)
+    e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
+    rim = max(sag[0], sag[1], sag[2]) + adeviation[g]
+    e += rim
+    if akind[g] == OTHER:
+        for k in range(3):
+            p[k] = (V[0, k] + V[1, k] + V[2, k]) / 3.0
+    else:
+        surface_point(akind[g], asize[g, 0], asize[g, 1], aframe[g], u, v, p)
+    x, y, z = p[0], p[1], p[2]
+    rho = 0.0
+    for i in range(3):
+        rho = max(rho, (V[i, 0] - x) ** 2 + (V[i, 1] - y) ** 2 + (V[i, 2] - z) ** 2)
+    rho = math.sqrt(rho)
+    j, low, high = nearest(P, err, face, box, link, order, x, y, z, np.inf, near)
+    found = -high - rho - e
+    f = face[j]
+    if high - err[j] < out[0]:
+        d = _witness(kind[f], size[f, 0], size[f, 1], frame[f], P[j], buv[j], x, y, z, q)
+        d += rim + bsag[j] + deviation[f]
+        if d < out[0]:
+            out[0] = d
+            for k in range(3):
+                out[1 + k], out[4 + k] = p[k], q[k]
+            out[7] = f
+    outside, empty = -1.0, marks[0, :0]
+    tried = 0
+    for n in range(NEAR + neighbours.shape[1] * TRIED):
+        # The nearest faces first; then those beside them, and beside these.
+        if n < NEAR:
+            f = near[n]
+        else:
+            m = (n - NEAR) // neighbours.shape[1]
+            if m >= tried or tried == TRIED or not (outside < 0.0 and (low > 0.0 or found < -contact)):
+                break
+            f = neighbours[chosen[m], (n - NEAR) % neighbours.shape[1]]
+        if f < 0 or kind[f] == OTHER:
+            continue
+        known = False
+        for k in range(tried):
+            known = known or chosen[k] == f
+        if known:
+            continue
+        h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
+        t = slack + deviation[f]
+        to_frame(frame[f], V, work)
+        least = least_height(kind[f], size[f, 0], size[f, 1], sense[f], work) - t
+        if not marked[f]:
+            mark_face(
+                P, buv, bsag, face, box, link, order, kind, size, frame, deviation, group, f, sense[f], slack,
+                marks[f], nodes[f], work,
+            )  # fmt: skip
+            marked[f] = 1
+        chosen[tried], heights[tried] = f, least
+        tried += 1
+        if not (least - e > found or (h > t and outside < 0.0) or (h < -t and h + t + rim < out[0])):
+            continue
+        at = nearest_on(P, err, box, link, order, root[f], empty, x, y, z)
+        reach = 0.5 * size[f, 0] if kind[f] == TORUS else np.inf
+        if least - e > found or (h > t and outside < 0.0):
+            limit = min(max(least, h) + rho + 2.0 * at, reach)
+            clear = nearest_marked(P, err, box, link, order, marks[f], marks[f], nodes[f], nodes[f], 1, x, y, z, limit)
+            if clear > at:
+                found = max(found, min(least, clear - rho) - e)
+                if h > t:
+                    outside = max(outside, min(h - t, clear))
+        if h < -t and h + t + rim < out[0]:
+            limit = min(2.0 * at - h, reach)
+            clear = nearest_marked(P, err, box, link, order, marks[f], marks[f], nodes[f], nodes[f], 2, x, y, z, limit)
+            if clear > at:
+                depth = min(-h - t, clear) - rim
+                if -depth < out[0] and depth > 0.0:
+                    out[0] = -depth
+                    for k in range(3):
+                        out[1 + k] = out[4 + k] = p[k]
+                    out[7] = f
+    if found < -0.5 * contact:
+        # In a hollow corner the solid lies below one of two surfaces. A way out of both is along both normals.
+        for m in range(tried):
+            f = chosen[m]
+            for n in range(m):
+                g = chosen[n]
+                least = min(heights[m], heights[n])
+                if least - e <= found or kind[f] == TORUS or kind[g] == TORUS:
+                    continue
+                turn = sense[f] * sense[g] * _slopes(kind, size, frame, f, g, x, y, z)
+                if turn < -0.8:
+                    continue
+                if least < 0.0:
+                    least /= 0.9 * math.sqrt(0.5 * (1.0 + turn))
+                # A piece of one that looks over the other: what lies above both there is outside.
+                at = min(
+                    nearest_on(P, err, box, link, order, root[f], marks[g], x, y, z),
+                    nearest_on(P, err, box, link, order, root[g], marks[f], x, y, z),
+                )
+                clear = nearest_marked(
+                    P, err, box, link, order, marks[f], marks[g], nodes[f], nodes[g], 1, x, y, z, 2.0 * at + rho
+                )
+                if clear > at:
+                    found = max(found, min(least, clear - rho) - e)
+    if outside > 0.0:
+        out[8] = max(out[8], outside)
+        found = max(found, low - rho - e)
+        target = min(out[0], goal)
+        if found < target - tol and low > e:
+            d = from_faces(
+                P, err, face, box, link, order, kind, size, frame, deviation, V, over, target + e + tol, work
+            )
+            if d > e:
+                found = max(found, d - e)
+    return found
+
+
+def _entries(stamp: str) -> tuple[Any, Any]:
+    def tree(P, err, start, box, link, order, root):
+        stamp  # noqa: B018
+        return build(P, err, start, box, link, order, root)
+
+    def descend(
+        pieces, uvs, faces, sags, bounds, n, bbox, blink, border, T,
+        akind, asize, aframe, adeviation,
+        P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
+        marks, nodes, marked, slack, contact, clearance, tol, most, out,
+    ):  # fmt: skip
+        stamp  # noqa: B018
+        own = (akind, asize, aframe, adeviation)
+        solid = (
+            P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
+            marks, nodes,
+        )  # fmt: skip
+        chosen, heights = np.empty(TRIED, np.int64), np.empty(TRIED)
+        near, over, work = np.empty(NEAR, np.int64), np.empty(len(kind)), np.empty((3, 3))
+        p, q = np.empty(3), np.empty(3)
+        verdict = np.isinf(tol)
+        goal = max(contact, clearance) + 1e-9 if verdict else np.inf
+        tol = 0.01 * contact if verdict else tol
+        heap = [(0.0, 0) for _ in range(0)]
+        # Down the pieces' own tree: a branch that keeps away from the surface is outside if one of its pieces is.
+        looked, floor = 0, np.inf
+        stack = np.empty(DEEP, np.int64)
+        stack[0], top = 0, 1
+        while top > 0:
+            top -= 1
+            i = stack[top]
+            leaf, radius = blink[i, 1] > 0, 0.0
+            for c in range(3):
+                q[c] = 0.5 * (bbox[i, c] + bbox[i, 3 + c])
+                radius += 0.25 * (bbox[i, 3 + c] - bbox[i, c]) ** 2
+            for c in range(3):
+                p[c] = T[c, 0] * q[0] + T[c, 1] * q[1] + T[c, 2] * q[2] + T[c, 3]
+            radius = math.sqrt(radius) + bbox[i, 6]
+            target = min(goal, out[0])
+            _, low, _ = nearest(
+                P, err, face, box, link, order, p[0], p[1], p[2], max(target, 0.0) + radius + contact, near
+            )
+            if low - radius > target:
+                k = i
+                while blink[k, 1] < 0:
+                    k = blink[k, 0]
+                k = border[blink[k, 0]]
+                looked += 1
+                if _piece(
+                    pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, slack, contact, goal, tol, near, chosen,
+                    heights, over, work, p, q, out,
+                ) > 0.0:  # fmt: skip
+                    floor = min(floor, low - radius)
+                    continue
+            if not leaf:
+                stack[top], stack[top + 1] = blink[i, 0], -blink[i, 1]
+                top += 2
+                continue
+            for j in range(blink[i, 0], blink[i, 0] + blink[i, 1]):
+                k = border[j]
+                low = _piece(
+                    pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, slack, contact, goal, tol, near, chosen,
+                    heights, over, work, p, q, out,
+                )  # fmt: skip
+                bounds[k] = low
+                heapq.heappush(heap, (low, k))
+                looked += 1
+        while len(heap):
+            low = min(floor, heap[0][0])
+            high = out[0]
+            known = high - low <= tol
+            if verdict:
+                known = (
+                    known
+                    or low > goal
+                    or high < -contact
+                    or (low >= -contact and high <= contact)
+                    or (low > contact and high < clearance)
+                )
+            if known or n + 1 >= len(faces) or looked >= most:
+                break
+            i = heapq.heappop(heap)[1]
+            g = faces[i]
+            du, v0, v1, _, _ = spans(uvs[i])
+            e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
+            bent = e > 0.25 * (min(high, goal) - low)
+            side = longest(pieces[i], uvs[i], akind[g], asize[g, 0], asize[g, 1], bent)
+            faces[n] = g
+            cut(
+                pieces[i], uvs[i], side, akind[g], asize[g, 0], asize[g, 1], aframe[g], pieces[n], uvs[n]
+            )  # fmt: skip
+            # The piece keeps the half at corner ``side``; the cut itself is no border.
+            for c in range(3):
+                sags[n, c] = sags[i, c]
+            sags[n, (side + 2) % 3] = 0.0
+            sags[i, (side + 1) % 3] = 0.0
+            for k in (i, n):
+                new = _piece(
+                    pieces[k],
+                    uvs[k],
+                    g,
+                    sags[k],
+                    own,
+                    solid,
+                    marked,
+                    slack,
+                    contact,
+                    goal,
+                    tol,
+                    near,
+                    chosen,
+                    heights,
+                    over,
+                    work,
+                    p,
+                    q,
+                    out,
+                )
+                bounds[k] = max(low, new)
+                heapq.heappush(heap, (bounds[k], k))
+            n += 1
+            looked += 2
+        out[9] = looked
+        return min(floor, heap[0][0]) if len(heap) else floor
+
+    solid = (
+        "f8[:,:,::1],f8[::1],i8[::1],f8[:,::1],i8[:,::1],i8[::1],i8[::1],f8[:,:,::1],f8[::1],"
+        "i8[::1],f8[:,::1],f8[:,::1],f8[::1],f8[::1],i8[::1],i8[:,::1],i1[:,::1],i1[:,::1]"
+    )
+    return (
+        entry(tree, "i8(f8[:,:,::1],f8[::1],i8[::1],f8[:,::1],i8[:,::1],i8[::1],i8[::1])"),
+        entry(
+            descend,
+            "f8(f8[:,:,::1],f8[:,:,::1],i8[::1],f8[:,::1],f8[::1],i8,"
+            "f8[:,::1],i8[:,::1],i8[::1],f8[:,::1],i8[::1],f8[:,::1],f8[:,::1],f8[::1],"
+            f"{solid},i1[::1],f8,f8,f8,f8,i8,f8[::1])",
+        ),
+    )
+
+
+tree, descend = _entries(source_stamp(Path(__file__).parent, "faces_*.py"))
