@@ -1,8 +1,7 @@
 """The signed distance of two bodies between proven bounds: one result type for every pair, model and command.
 
-The signed distance of two bodies is their distance where they are apart. Where they overlap it is minus the depth: the
-greatest distance that a point of one lies inside the other. For a groove and a cylinder whose axis is outside the
-material this is the kernel's signed distance.
+The signed distance of two bodies is their distance where they are apart. Where they overlap it is minus the
+penetration depth: the length of the shortest translation that separates them, as in FCL, coal and Bullet.
 """
 
 from __future__ import annotations
@@ -24,11 +23,13 @@ class Distance:
     Attributes
     ----------
     lower, upper : float
-        The distance lies between these, mm; positive apart, negative inside. Infinite where nothing is known.
+        The distance lies between these, mm; positive apart, in an overlap minus the depth. Infinite where nothing is
+        known: of an overlap of which only ``upper`` is, the depth is at least ``-upper``.
     point_a, point_b : ndarray (3,) or None
-        Points on the two bodies that attest ``upper``; None where it is infinite.
+        Points on the two bodies: the nearest ones, in an overlap those that part last as b moves out; None if unknown.
     normal : ndarray (3,) or None
-        Unit vector from a to b, ``point_b = point_a + value * normal``; None where no direction is known.
+        Unit vector from a to b, ``point_b = point_a + value * normal`` to within the bounds; in an overlap the
+        direction in which b moves out. None where no direction is known.
     unique : bool or None
         Whether the nearest points are the only ones; None where that is not known.
     level, method : str
@@ -49,13 +50,23 @@ class Distance:
 
     @property
     def value(self) -> float:
-        """The distance in mm: the upper bound, which the witness points attest, or what a contact model says."""
+        """The distance in mm: the upper bound, or what a contact model says."""
         return self.upper if self.estimate is None else self.estimate
 
     @property
     def uncertainty(self) -> float:
         """How far ``value`` can be off, mm."""
         return max(self.upper - self.value, self.value - self.lower)
+
+    @property
+    def depth(self) -> float:
+        """Penetration depth in mm, 0 for bodies that are apart: ``-value``, so the least one that the bounds allow."""
+        return max(0.0, -self.value)
+
+    @property
+    def direction(self) -> Array | None:
+        """Unit vector (3,) in which b moves out of an overlap; None where there is none for certain."""
+        return self.normal if self.upper < 0.0 else None
 
     def meet(self, other: Distance) -> Distance:
         """Both at once: the tighter of the bounds on either side."""
@@ -86,6 +97,10 @@ class Distance:
             return self
         return replace(self, lower=self.lower - error, upper=self.upper + error)
 
+    def of_overlap(self) -> Distance:
+        """What the engine says of an overlap, whose ``lower`` is not one of the depth, without it."""
+        return replace(self, lower=-math.inf) if self.lower < 0.0 else self
+
     def labelled(self, level: str, method: str) -> Distance:
         """The same, said to come from ``method`` at ``level``."""
         return replace(self, level=level, method=method)
@@ -111,6 +126,8 @@ class Distance:
             "point_a": _list(self.point_a),
             "point_b": _list(self.point_b),
             "normal": _list(self.normal),
+            "depth_mm": _finite(self.depth),
+            "direction": _list(self.direction),
             "unique": self.unique,
             "level": self.level,
             "method": self.method,

@@ -73,7 +73,7 @@ def _by_kernel(a: ClosedForm, b: ClosedForm, T: Array) -> list[Distance | None]:
                 best[i] = Distance(-np.inf, float(high[i]), p[i], q[i], m[i], None, "features", "groove kernel")
     return [
         Distance(float(lower[i]), x.upper, x.point_a, x.point_b, x.normal, None, x.level, x.method)
-        if (x := best[i]) is not None and upper[i] - lower[i] <= _KNOWN
+        if (x := best[i]) is not None and upper[i] - lower[i] <= _KNOWN and lower[i] >= -_KNOWN  # else how deep?
         else None
         for i in range(n)
     ]

@@ -14,12 +14,13 @@ from clamp3d.checks import flag, function, instance
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check_motions import check_motions
+from clamp3d.collide.depth import penetration
 from clamp3d.collide.model import Model, ModelCache, Progress
 from clamp3d.collide.reasons import failure, undecided
 from clamp3d.collide.refine import contained, measured, refine, with_normal
 from clamp3d.collide.result import BAD, CheckResult, PairResult, Work
 from clamp3d.collide.scene import Scene, name_pairs
-from clamp3d.collide.verdict import Verdict
+from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.collide.where import locator
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import InputError, MissingLibraryError, SolverError
@@ -31,6 +32,7 @@ def check(
     pairs: Sequence[tuple[str, str]] | None = None,
     full: bool = False,
     distances: bool = False,
+    depths: bool = True,
     progress: Progress | None = None,
     cache: ModelCache | None = None,
 ) -> CheckResult:
@@ -46,6 +48,9 @@ def check(
         Ask every pair at every level down to the finest meshes: slow, for comparison.
     distances : bool
         Measure every pair to `clamp3d.collide.distance.ACCURACY`, not only until its verdict is certain.
+    depths : bool
+        Measure how deep overlapping pairs are, as `clamp3d.collide.distance.distance` does; without, as far as the
+        verdict needs, and the rest is "at least".
     progress : callable, optional
         Is told (stage, done, of).
     cache : ModelCache, optional
@@ -75,7 +80,7 @@ def check(
     instance("scene", scene, Scene)
     if cache is not None:
         instance("cache", cache, ModelCache)
-    full, distances = flag("full", full), flag("distances", distances)
+    full, distances, depths = flag("full", full), flag("distances", distances), flag("depths", depths)
     function("progress", progress)
     shop = cache or ModelCache()
     counters = shop.counters
@@ -103,7 +108,7 @@ def check(
         if progress is not None:
             progress("pairs", k, len(chosen))
         start = Distance(gap, level="boxes", method="bounding boxes")
-        row = _pair(scene, i, j, models, T, start, full, distances)
+        row = _pair(scene, i, j, models, T, start, full, distances, depths)
         decided[row.distance.level] += 1
         rows.append(row)
     times.append(time.perf_counter())
@@ -153,7 +158,15 @@ def _asked(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, in
 
 
 def _pair(
-    scene: Scene, i: int, j: int, models: list[Model], T: Array, start: Distance, full: bool, distances: bool
+    scene: Scene,
+    i: int,
+    j: int,
+    models: list[Model],
+    T: Array,
+    start: Distance,
+    full: bool,
+    distances: bool,
+    depths: bool,
 ) -> PairResult:
     a, b = scene.parts[i].name, scene.parts[j].name
     allowance, thresholds = scene.allowance(a, b), scene.thresholds
@@ -163,18 +176,34 @@ def _pair(
         known_well = not distances or measured(known)
         return not full and known_well and thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN
 
+    pair = x, y, T_ab
     try:
-        found = refine(x, y, T_ab, start, thresholds, certain)
-        verdict = thresholds.verdict(found, allowance)
-        if verdict is Verdict.CLASH and contained(x, y, T_ab, thresholds):
+        found = refine(*pair, start, thresholds, certain)
+        deep = _deep(pair, found, thresholds, allowance, depths)
+        verdict = thresholds.verdict(deep, allowance)
+        if verdict is Verdict.UNCERTAIN and not measured(found):
+            found = refine(*pair, found, thresholds, measured)
+            deep = _deep(pair, found, thresholds, allowance, depths)
+            verdict = thresholds.verdict(deep, allowance)
+        if verdict is Verdict.CLASH and contained(*pair, thresholds):
             verdict = Verdict.CONTAINED
     except MissingLibraryError:
         raise
     except Exception as error:  # one pair that fails is a finding, not the end of all others
         return PairResult(a, b, Verdict.FAILED, start, reason=failure(error))
-    row = PairResult(a, b, verdict, with_normal(found).moved(T[i]))
+    row = PairResult(a, b, verdict, deep.moved(T[i]))
     if verdict in BAD:
         return replace(row, locate=locator(x, y, T[i], T_ab))
     if verdict is Verdict.UNCERTAIN:
-        return replace(row, reason=undecided({a: x, b: y}, found, thresholds, allowance))
+        return replace(row, reason=undecided({a: x, b: y}, deep, thresholds, allowance))
     return row
+
+
+def _deep(
+    pair: tuple[Model, Model, Array], found: Distance, thresholds: Thresholds, allowance: float | None, depths: bool
+) -> Distance:
+    """The depth of what ``found`` says is an overlap, or may be; a mere bound of it if that is enough."""
+    known = with_normal(found).of_overlap()
+    if not depths and thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN:
+        return known
+    return penetration(*pair, with_normal(found))

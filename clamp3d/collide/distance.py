@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from clamp3d.checks import instance, positive
 from clamp3d.collide.answer import Distance, Distances
 from clamp3d.collide.batch import by_kernel
+from clamp3d.collide.depth import penetration
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.modelled import modelled
 from clamp3d.collide.refine import ACCURACY, from_boxes, measured, refine, with_normal
@@ -42,8 +43,9 @@ def distance(
     T_a_b : array_like (4, 4), optional
         Pose of b in the frame of a; the same frame by default.
     accuracy : float
-        The distance is refined until its bounds are this close, mm, or until the models have no more to say. Of an
-        overlap only what closed forms tell is asked: its depth may have an upper bound alone.
+        The distance is refined until its bounds are this close, mm, or until the models have no more to say. The
+        depth of an overlap is exact where one contact decides it and in closed form; else it is known to 5 % or
+        0.01 mm, whichever is more, unless the search for it becomes too long.
     model : ContactModel, optional
         Answers in place of the exact engine where one body has a groove and the other a cylinder.
     cache : ModelCache, optional
@@ -170,4 +172,6 @@ def _measured(cache: ModelCache, a: Shape, b: Shape, T: Array, accuracy: float, 
     x, y = cache.model(a), cache.model(b)
     start = from_boxes(x, y, T)
     found = with_normal(refine(x, y, T, start, Thresholds(), lambda known: measured(known, accuracy)))
-    return found if model is None else modelled(x, y, T, found, model)
+    if model is not None and (asked := modelled(x, y, T, found, model)) is not found:
+        return asked
+    return penetration(x, y, T, found)

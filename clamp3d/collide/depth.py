@@ -1,0 +1,344 @@
+"""Penetration depth: the length of the shortest translation that separates two bodies, between proven bounds.
+
+From above: a translation after which the distance engine finds the bodies apart. From below: convex pieces inside the
+bodies, which overlap at all shorter translations; a single pair of them, or many that together leave no way out.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from clamp3d.collide.answer import Distance
+from clamp3d.collide.body import ClosedForm
+from clamp3d.collide.convex import Hull, Rod
+from clamp3d.collide.depth_convex import Supports, convex_depth, supports
+from clamp3d.collide.depth_cover import Union, difference, nearest_behind
+from clamp3d.collide.depth_pieces import around_in_form, around_in_mesh
+from clamp3d.collide.model import Model
+from clamp3d.collide.refine import from_boxes, refine
+from clamp3d.collide.surface import Surface
+from clamp3d.collide.verdict import Thresholds
+from clamp3d.core.pose import Array
+from clamp3d.errors import SolverError
+
+RELATIVE, ABSOLUTE = 0.05, 0.01
+"""A depth is refined until its bounds are this close: relative to it, or in mm, whichever is more."""
+TOUCH = 1e-9
+"""Relative to the size: an overlap this deep is a contact, for no bound is known better."""
+_SETS = 60
+"""Pairs of convex pieces that are tried."""
+_NODES = 500
+"""Sets of planes that are tried for the shortest way past all pieces, before cubes of translations are."""
+_CUBES = 10
+"""Times that cubes are tried."""
+_EXTRA = 8
+"""Pieces after which a depth that is `known_well` is not made better."""
+_STEPS = np.array([v for v in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
+_FINE = 0.01
+"""Chord error (mm) of the mesh that stands for a part without closed form."""
+
+Body: TypeAlias = ClosedForm | Surface
+"""A closed form, or the mesh of a part that has none."""
+
+
+def known_well(found: Distance) -> bool:
+    """Whether the depth that ``found`` tells is as near as is asked for; also for bodies that are apart."""
+    width = found.upper - found.lower
+    return width <= max(ABSOLUTE, RELATIVE * -found.upper)
+
+
+class _Pair:
+    """Two bodies and the translations that are known to separate them."""
+
+    def __init__(self, a: Model, b: Model, T: Array) -> None:
+        self.a, self.b, self.T = a, b, T
+        self.size = float(np.abs(a.bounds).max() + np.abs(b.bounds).max() + np.abs(T[:3, 3]).max())
+        self.slack = TOUCH * self.size
+        self.best: tuple[float, Array, Distance] | None = None
+        self.own, self.other = _bodies(a), _bodies(b)
+        self.meshed = any(isinstance(body, Surface) for body in (*self.own, *self.other))
+
+    def ask(self, t: Array) -> Distance:
+        """What is known of b moved by ``t`` (3,): enough to tell whether they are apart."""
+        T = self.T.copy()
+        T[:3, 3] += t
+
+        def told(known: Distance) -> bool:
+            return known.lower >= -self.slack or known.upper < -10.0 * self.slack
+
+        try:
+            found = refine(self.a, self.b, T, from_boxes(self.a, self.b, T), Thresholds(1e-6), told)
+        except SolverError:
+            return Distance()
+        size = float(np.linalg.norm(t))
+        if found.lower >= -self.slack:
+            size += 4.0 * max(0.0, -found.lower) + 1e-13 * self.size
+            if self.best is None or size < self.best[0]:
+                self.best = (size, t, found)
+        return found
+
+    def overlap_at(self, t: Array, known: Distance) -> Array | None:
+        """Planes (k, 4) of a convex set of translations that overlap, ``t`` (3,) among them; None if none is found."""
+        best: tuple[float, Array, Any, Any] | None = None
+        for point in self._common(t, known):
+            for x in self.own:
+                for y in self.other:
+                    margin, p = _innermost(x, y, self.T, t, point)
+                    if margin > 0.0 and (best is None or margin > best[0]):
+                        best = (margin, p, x, y)
+        if best is None:
+            return None
+        _, p, x, y = best
+        R, shift = self.T[:3, :3], self.T[:3, 3]
+        A, B = _around(x, p), _around(y, (p - t - shift) @ R)
+        return None if A is None or B is None else difference(A, _moved(B, self.T), t)
+
+    def _common(self, t: Array, known: Distance) -> list[Array]:
+        """Points (3,) that may lie in both bodies, b moved by ``t`` (3,)."""
+        found = [x for x in (known.point_a, known.point_b) if x is not None and known.upper < 0.0]
+        if len(found) == 2:
+            found = [0.5 * (found[0] + found[1])]
+        if found and not self.meshed:
+            return found
+        T = self.T.copy()
+        T[:3, 3] += t
+        a, b = self.a.inner(_FINE), self.b.inner(_FINE)
+        if a is None or b is None:
+            return found
+        common = a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3]))
+        parts = sorted(common.decompose(), key=lambda part: -part.volume())
+        return found + [x for part in parts[:2] for x in _inner(part)]
+
+    def freed(self, known: Distance) -> bool:
+        """Whether bodies that touch within their errors come apart by twice as much along the normal."""
+        if known.normal is None or not known.lower > -np.inf:
+            return False
+        return self.ask(2.0 * (known.upper - known.lower) * known.normal).lower >= -self.slack
+
+    def push(self, start: Array, found: Distance, steps: int) -> None:
+        """Move b out along the normals that the engine names, by what it says is left, until the bodies are apart.
+
+        Where several places touch, the next translation is the nearest that is out at all of them.
+        """
+        t = start
+        planes: list[Array] = []
+        for _ in range(steps):
+            if found.lower >= -self.slack or found.normal is None or not found.upper < 0.0:
+                return
+            planes.append(np.array([*found.normal, float(found.normal @ t) - found.upper + 0.1 * self.slack]))
+            t = nearest_behind(np.array(planes[-6:]), t)
+            if self.best is not None and np.linalg.norm(t) >= self.best[0]:
+                return
+            found = self.ask(t)
+        self.back(t, found)
+
+    def part(self, t: Array, found: Distance) -> None:
+        """Verified translations at or just beyond ``t`` (3,), where the bodies touch to rounding or to their errors."""
+        self.push(t, found, 8)
+        for more in (1e-9, 1e-7, 1e-5, 1e-3, 1e-2):
+            if self.best is not None and self.best[0] <= np.linalg.norm(t) * (1.0 + more):
+                return
+            self.ask(t * (1.0 + more))
+
+    def back(self, t: Array, found: Distance) -> None:
+        """Back towards the origin by the distance that is left, as long as it is worth it."""
+        size = float(np.linalg.norm(t))
+        for _ in range(12):
+            if not found.lower > 1e-3 * size:
+                return
+            t = t * (1.0 - min(found.lower, size) / size)
+            size = float(np.linalg.norm(t))
+            if size <= 0.0:
+                return
+            found = self.ask(t)
+            if found.lower < -self.slack:
+                return
+
+
+def penetration(a: Model, b: Model, T: Array, known: Distance) -> Distance:
+    """The signed distance of two bodies of which the engine says that they overlap, or may.
+
+    Parameters
+    ----------
+    a, b : Model
+        The bodies, b placed by ``T`` (4, 4) in a's frame.
+    known : Distance
+        What the engine says: its ``upper``, which a point in both bodies attests, holds.
+
+    Returns
+    -------
+    Distance
+        Minus the penetration depth between proven bounds, `known_well` where the search came to its end; ``normal``
+        is the direction in which b moves out, the points are those that part last.
+    """
+    pair = _Pair(a, b, T)
+    if known.lower >= -pair.slack:
+        return known
+    exact = _convex_pair(a, b, T)
+    if exact is not None:
+        return _with_points(pair, exact)
+    if known.upper >= 0.0 and pair.freed(known):
+        return _joined(pair, replace(known, lower=-np.inf))
+    length, way = _exit(a, b, T)
+    found = Distance(-length, known.upper, None, None, way, None, known.level, known.method)
+    if known_well(found):
+        return found
+    pair.push(np.zeros(3), known, 4)
+    return _searched(pair, _joined(pair, found), known)
+
+
+def _searched(pair: _Pair, found: Distance, known: Distance) -> Distance:
+    """Proves ever longer translations to overlap, by convex pieces around points that both bodies have there.
+
+    The shortest translation that the pieces so far leave open is asked of the bodies. Where they are apart it is the
+    shortest of all; where they overlap they have a point in common, and the pieces around it leave it no longer open.
+    """
+    sets: list[Array] = []
+    t, proven, cubes = np.zeros(3), 0.0, 0
+    for step in range(_SETS):
+        new = pair.overlap_at(t, known)
+        if new is not None:
+            sets.append(new)
+            union = Union(sets, -found.lower * (1.0 + 1e-9))
+        if new is None or union.reach(t[None])[0] <= 0.0:  # too thin to prove anything: all but apart
+            pair.part(t, known)
+            break
+        length, way = union.shortest(_NODES)
+        if way is None and length < -found.lower:
+            cubes += 1
+            covered, way = union.clearance(0.5 * RELATIVE, 0.5 * ABSOLUTE)
+            length = max(length, covered)
+        proven = max(proven, min(length, -found.lower) - 1e-12 * pair.size)
+        found = _joined(pair, found, proven)
+        if way is None or cubes > _CUBES or (known_well(found) and step >= _EXTRA):
+            break
+        t, known = way, pair.ask(way)
+        if known.lower >= -pair.slack:
+            break
+        if step % 3 == 0:
+            pair.push(t, known, 6)
+    return _joined(pair, found, proven)
+
+
+def _joined(pair: _Pair, found: Distance, proven: float = 0.0) -> Distance:
+    """``found`` with the shortest translation that is verified, and a depth (mm) that is ``proven``."""
+    upper = min(found.upper, -proven) if proven > 0.0 else found.upper
+    if pair.best is not None and pair.best[0] <= -found.lower:
+        size, t, at = pair.best
+        p, q = at.point_a, at.point_b
+        normal = t / np.linalg.norm(t) if size > 0.0 else found.normal
+        found = Distance(-size, upper, p, None if q is None else q - t, normal, None)
+    return replace(found, upper=upper, level="depth", method="convex pieces").ordered()
+
+
+def _convex_pair(a: Model, b: Model, T: Array) -> Distance | None:
+    """The depth of two bodies that are one convex piece each; None for others."""
+    pieces = []
+    for model in (a, b):
+        forms = model.bodies
+        if forms is None or len(forms) != 1 or forms[0].bores or len(forms[0].outers) != 1 or forms[0].surface:
+            return None
+        pieces.append((forms[0].outers[0], forms[0].error))
+    (x, e), (y, f) = pieces
+    return convex_depth(x, np.eye(4), y, T).widened(e + f)
+
+
+def _with_points(pair: _Pair, found: Distance) -> Distance:
+    """``found`` with the points that part last."""
+    assert found.normal is not None
+    t = -found.lower * found.normal
+    at = pair.ask(t)
+    if at.point_a is None or at.point_b is None or at.lower < -pair.slack:
+        return found
+    return replace(found, point_a=at.point_a, point_b=at.point_b - t)
+
+
+def _outer(model: Model, T: Array) -> list[tuple[list[Supports], float]]:
+    """Support functions of convex pieces that hold the part: for each form the ones of its outer pieces."""
+    if model.bodies is not None:
+        return [([supports(piece, T) for piece in form.outers], form.error) for form in model.bodies]
+    mesh = model.outer(_FINE)
+    V = mesh.vertices @ T[:3, :3].T + T[:3, 3]
+    return [([lambda N: V[np.argmax(N @ V.T, axis=1)]], mesh.error)]
+
+
+def _heights(outer: list[tuple[list[Supports], float]], N: Array) -> Array:
+    """Support (k,) of a part along ``N`` (k, 3), or more."""
+    return np.max([np.min([(N * s(N)).sum(axis=1) for s in pieces], axis=0) + error for pieces, error in outer], axis=0)
+
+
+def _exit(a: Model, b: Model, T: Array) -> tuple[float, Array]:
+    """Length and direction (3,) of a way out that leaves the other's convex hull."""
+    outer_a, outer_b = _outer(a, np.eye(4)), _outer(b, T)
+    seeds = [np.vstack([np.eye(3), -np.eye(3), T[:3, :3].T, -T[:3, :3].T])]
+    for model, P, sign in ((a, np.eye(4), 1.0), (b, T, -1.0)):
+        for form in model.bodies or ():
+            for piece in form.outers:
+                axes = np.array([piece.T[:3, 2], -piece.T[:3, 2]]) if isinstance(piece, Rod) else piece.planes[:60, :3]
+                seeds.append(sign * axes @ P[:3, :3].T)
+    centre = T[:3, :3] @ b.bounds.mean(axis=0) + T[:3, 3] - a.bounds.mean(axis=0)
+    if np.linalg.norm(centre) > 0.0:
+        seeds.append((centre / np.linalg.norm(centre))[None])
+    N = np.vstack(seeds)
+    h = _heights(outer_a, N) + _heights(outer_b, -N)
+    k = int(np.argmin(h))
+    return float(h[k]), N[k]
+
+
+def _bodies(model: Model) -> tuple[Body, ...]:
+    """The part's closed forms, or its mesh where it has none."""
+    if model.bodies is not None and all(form.surface is None for form in model.bodies):
+        return model.bodies
+    mesh = model.inner(_FINE)
+    return () if mesh is None else (mesh,)
+
+
+def _around(body: Body, x: Array) -> Hull | None:
+    return around_in_mesh(body, x) if isinstance(body, Surface) else around_in_form(body, x)
+
+
+def _innermost(x: Body, y: Body, T: Array, t: Array, point: Array) -> tuple[float, Array]:
+    """A point (3,) near ``point`` that lies deep in both bodies, and how deep (mm); y is placed by ``T`` and ``t``."""
+
+    def margin(points: Array) -> Array:
+        return np.minimum(x.depth(points), y.depth((points - t - T[:3, 3]) @ T[:3, :3]))
+
+    best, here = float(margin(point[None])[0]), point
+    if isinstance(x, Surface) or isinstance(y, Surface):  # takes long
+        return best, here
+    step = 0.1 * y.ball[1]
+    for _ in range(40):
+        around = here + step * _STEPS
+        found = margin(around)
+        k = int(np.argmax(found))
+        if found[k] > best:
+            best, here = float(found[k]), around[k]
+        else:
+            step *= 0.35
+        if step < 0.01 * best or step < 1e-12:
+            break
+    return best, here
+
+
+def _inner(part: Any) -> list[Array]:
+    """Points (3,) inside a part of an overlap: below the middles of its largest triangles, by its mean thickness."""
+    raw = part.to_mesh64()
+    V = np.asarray(raw.vert_properties)[:, :3]
+    C = V[np.asarray(raw.tri_verts, dtype=np.int64)]
+    cross = np.cross(C[:, 1] - C[:, 0], C[:, 2] - C[:, 0])
+    size = np.linalg.norm(cross, axis=1)
+    rows = np.argsort(-size)[:3]
+    rows = rows[size[rows] > 0.0]
+    thick = part.volume() / max(float(size.sum()) / 2.0, 1e-300)
+    middle, normal = C[rows].mean(axis=1), cross[rows] / size[rows, None]
+    return [V.mean(axis=0), *(x for h in (thick, 0.3 * thick) for x in middle - h * normal)]
+
+
+def _moved(piece: Hull, T: Array) -> Hull:
+    N = piece.planes[:, :3] @ T[:3, :3].T
+    planes = np.column_stack([N, piece.planes[:, 3] - N @ T[:3, 3]])
+    return Hull(piece.vertices @ T[:3, :3].T + T[:3, 3], planes, piece.faces)

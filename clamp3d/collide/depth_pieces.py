@@ -1,0 +1,113 @@
+"""A convex polyhedron inside a body around a given point, as large as one step of planes makes it.
+
+Each obstacle around the point, a groove or hole of a closed form or a triangle of a mesh, lies beyond a plane between
+the two; what lies before all those planes is convex, holds the point and no obstacle (the first step of Deits and
+Tedrake, *Computing large convex regions of obstacle-free space*, 2015).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from clamp3d.collide.body import ClosedForm
+from clamp3d.collide.convex import Hull, Rod, hull
+from clamp3d.collide.surface import Surface
+from clamp3d.core.pose import Array
+
+_AROUND = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+_CLOSE = np.array([-0.05, -2e-3, -1e-4, -5e-6, 0.0, 5e-6, 1e-4, 2e-3, 0.05])
+"""Angles (rad) about the point's own of the polygon in place of a round side, which is nearly exact there."""
+_OWN = 0.3
+"""A triangle's own plane is taken if it is at least this far away, as a part of the triangle's distance."""
+LEAST = 1e-11
+"""Relative to the size: a point nearer to the surface than this has no polyhedron around it."""
+
+
+def around_in_form(form: ClosedForm, x: Array) -> Hull | None:
+    """Polyhedron around ``x`` (3,) inside a closed form; None if the point is not well inside."""
+    planes = []
+    for piece in form.outers:
+        planes.append(_prism(piece, x) if isinstance(piece, Rod) else piece.planes)
+    for bore in form.bores:
+        radial = bore.T[:3, :2] @ ((x - bore.T[:3, 3]) @ bore.T[:3, :2])
+        size = float(np.linalg.norm(radial))
+        if size <= bore.radius:
+            return None
+        n = radial / size
+        planes.append(np.array([[*-n, bore.radius + float(n @ bore.T[:3, 3])]]))
+    return _hull_of(np.vstack(planes) + [0.0, 0.0, 0.0, form.error], x)
+
+
+def _prism(rod: Rod, x: Array) -> Array:
+    """Planes (k, 4) of a prism in a cylinder, with edges all around and many near ``x`` (3,)."""
+    local = (x - rod.T[:3, 3]) @ rod.T[:3, :3]
+    own = np.arctan2(local[1], local[0])
+    angle = np.unique(np.concatenate([(own + _AROUND) % (2.0 * np.pi), (own + _CLOSE) % (2.0 * np.pi)]))
+    gap = np.diff(np.append(angle, angle[0] + 2.0 * np.pi))
+    angle, gap = angle[gap > 1e-9], gap[gap > 1e-9]
+    middle = angle + 0.5 * gap
+    flat = np.column_stack([np.cos(middle), np.sin(middle), np.zeros(len(middle))])
+    ends = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+    N = np.vstack([flat, ends]) @ rod.T[:3, :3].T
+    d = np.append(-rod.radius * np.cos(0.5 * gap), [-0.5 * rod.length] * 2)
+    return np.column_stack([N, d - N @ rod.T[:3, 3]])
+
+
+def around_in_mesh(mesh: Surface, x: Array) -> Hull | None:
+    """Polyhedron around ``x`` (3,), which lies inside the mesh; None if the point is not well inside."""
+    corners = mesh.vertices[mesh.faces]
+    error = np.zeros(len(corners)) if mesh.face_error is None else mesh.face_error
+    feet = closest_on_triangles(corners, x)
+    away = np.linalg.norm(feet - x, axis=1)
+    N, d = mesh_planes(mesh)
+    height = d - N @ x  # of the triangles' own planes above the point
+    left = np.argsort(away - error)
+    planes = []
+    while len(left):
+        k = left[0]
+        if away[k] - error[k] <= LEAST * mesh.scale:
+            return None
+        own = height[k] >= _OWN * away[k] and height[k] > error[k]
+        n = N[k] if own else (feet[k] - x) / away[k]
+        offset = float(d[k] if own else n @ feet[k]) - error[k]
+        planes.append(np.array([*n, -offset]))
+        beyond = (corners[left] @ n).min(axis=1) - error[left] >= offset - 1e-12 * mesh.scale
+        left = left[~beyond & (left != k)]
+    return _hull_of(np.array(planes), x)
+
+
+def mesh_planes(mesh: Surface) -> tuple[Array, Array]:
+    """Unit normals (m, 3) and offsets (m,) of a mesh's triangles; none for slivers."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    N = np.cross(b - a, c - a)
+    size = np.linalg.norm(N, axis=1)
+    N = N / np.maximum(size, 1e-300)[:, None]
+    d = np.einsum("ij,ij->i", N, a)
+    return N, np.where(size > 1e-14 * mesh.scale**2, d, -np.inf)
+
+
+def closest_on_triangles(corners: Array, x: Array) -> Array:
+    """Points (m, 3) of triangles (m, 3, 3) that are nearest to ``x`` (3,)."""
+    from trimesh.triangles import closest_point
+
+    found: Any = closest_point(corners, np.broadcast_to(x, (len(corners), 3)))  # type: ignore[no-untyped-call]
+    return np.asarray(found, dtype=np.float64)
+
+
+def _hull_of(planes: Array, x: Array) -> Hull | None:
+    """The polyhedron of all points with n . y + d <= 0; None if ``x`` (3,) is not well inside."""
+    from scipy.spatial import HalfspaceIntersection, QhullError
+
+    depth = -(planes[:, :3] @ x + planes[:, 3])
+    if not depth.min() > LEAST * float(np.abs(planes[:, 3]).max() + np.abs(x).max()):
+        return None
+    try:
+        # About the point and in its scale, so that thin polyhedra keep their digits.
+        made = HalfspaceIntersection(np.column_stack([planes[:, :3], -depth]), np.zeros(3))
+        found = hull(made.intersections[np.isfinite(made.intersections).all(axis=1)])
+    except (QhullError, ValueError):
+        return None
+    moved = np.column_stack([found.planes[:, :3], found.planes[:, 3] - found.planes[:, :3] @ x])
+    return Hull(found.vertices + x, moved, found.faces)
