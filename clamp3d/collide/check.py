@@ -25,6 +25,9 @@ from clamp3d.collide.where import locator
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import InputError, MissingLibraryError, SolverError
 
+_INTERLOCKED = 10.0
+"""Parts whose way out is this many times longer than the overlap that counts as contact, or is allowed, interlock."""
+
 
 def check(
     scene: Scene,
@@ -180,11 +183,11 @@ def _pair(
     try:
         found = refine(*pair, start, thresholds, certain)
         deep = _deep(pair, found, thresholds, allowance, depths)
-        verdict = thresholds.verdict(deep, allowance)
+        verdict = _judged(found, deep, thresholds, allowance)
         if verdict is Verdict.UNCERTAIN and not measured(found):
             found = refine(*pair, found, thresholds, measured)
             deep = _deep(pair, found, thresholds, allowance, depths)
-            verdict = thresholds.verdict(deep, allowance)
+            verdict = _judged(found, deep, thresholds, allowance)
         if verdict is Verdict.CLASH and contained(*pair, thresholds):
             verdict = Verdict.CONTAINED
     except MissingLibraryError:
@@ -197,6 +200,18 @@ def _pair(
     if verdict is Verdict.UNCERTAIN:
         return replace(row, reason=undecided({a: x, b: y}, deep, thresholds, allowance))
     return row
+
+
+def _judged(found: Distance, deep: Distance, thresholds: Thresholds, allowance: float | None) -> Verdict:
+    """The verdict on a pair by its depth; on parts that interlock by how deep their points lie in each other.
+
+    A pin that is a little too thick for its hole has a long way out, and yet it is a contact, or the fit allowed.
+    """
+    pressed = thresholds.verdict(found, allowance)
+    interlocked = deep.upper < -_INTERLOCKED * max(thresholds.contact, allowance or 0.0)
+    if interlocked and pressed in (Verdict.CONTACT, Verdict.ALLOWED):
+        return pressed
+    return thresholds.verdict(deep, allowance)
 
 
 def _deep(

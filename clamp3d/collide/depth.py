@@ -87,7 +87,7 @@ class _Pair:
         for point in self._common(t, known):
             for x in self.own:
                 for y in self.other:
-                    margin, p = _innermost(x, y, self.T, t, point)
+                    margin, p = _innermost(x, y, self.T, t, point, 0.05 * self.size)
                     if margin > 0.0 and (best is None or margin > best[0]):
                         best = (margin, p, x, y)
         if best is None:
@@ -113,11 +113,15 @@ class _Pair:
         parts = sorted(common.decompose(), key=lambda part: -part.volume())
         return found + [x for part in parts[:2] for x in _inner(part)]
 
-    def freed(self, known: Distance) -> bool:
-        """Whether bodies that touch within their errors come apart by twice as much along the normal."""
-        if known.normal is None or not known.lower > -np.inf:
+    def freed(self, known: Distance, way: Array) -> bool:
+        """Whether bodies that touch within their errors come apart by a little more, along the normal or ``way``."""
+        if not known.lower > -np.inf:
             return False
-        return self.ask(2.0 * (known.upper - known.lower) * known.normal).lower >= -self.slack
+        for more in (1.0, 2.0, 8.0):
+            for n in [way] if known.normal is None else [known.normal, way]:
+                if self.ask(-known.lower * (1.0 + 1e-9) * more * n).lower >= -self.slack:
+                    return True
+        return False
 
     def push(self, start: Array, found: Distance, steps: int) -> None:
         """Move b out along the normals that the engine names, by what it says is left, until the bodies are apart.
@@ -181,11 +185,12 @@ def penetration(a: Model, b: Model, T: Array, known: Distance) -> Distance:
     exact = _convex_pair(a, b, T)
     if exact is not None:
         return _with_points(pair, exact)
-    if known.upper >= 0.0 and pair.freed(known):
-        return _joined(pair, replace(known, lower=-np.inf))
     length, way = _exit(a, b, T)
+    if known.upper >= -pair.slack and pair.freed(known, way):
+        assert pair.best is not None
+        return replace(known, lower=-pair.best[0])
     found = Distance(-length, known.upper, None, None, way, None, known.level, known.method)
-    if known_well(found):
+    if found.upper - found.lower <= pair.slack:
         return found
     pair.push(np.zeros(3), known, 4)
     return _searched(pair, _joined(pair, found), known)
@@ -221,6 +226,9 @@ def _searched(pair: _Pair, found: Distance, known: Distance) -> Distance:
             break
         if step % 3 == 0:
             pair.push(t, known, 6)
+        if step % 4 == 3:  # a little further may be out, and near enough
+            size = float(np.linalg.norm(t))
+            pair.ask(t * (1.0 + max(0.5 * RELATIVE, 0.5 * ABSOLUTE / max(size, 1e-300))))
     return _joined(pair, found, proven)
 
 
@@ -268,7 +276,8 @@ def _outer(model: Model, T: Array) -> list[tuple[list[Supports], float]]:
 
 def _heights(outer: list[tuple[list[Supports], float]], N: Array) -> Array:
     """Support (k,) of a part along ``N`` (k, 3), or more."""
-    return np.max([np.min([(N * s(N)).sum(axis=1) for s in pieces], axis=0) + error for pieces, error in outer], axis=0)
+    heights = [np.min([(N * s(N)).sum(axis=1) for s in pieces], axis=0) + error for pieces, error in outer]
+    return np.asarray(np.max(heights, axis=0))
 
 
 def _exit(a: Model, b: Model, T: Array) -> tuple[float, Array]:
@@ -301,21 +310,22 @@ def _around(body: Body, x: Array) -> Hull | None:
     return around_in_mesh(body, x) if isinstance(body, Surface) else around_in_form(body, x)
 
 
-def _innermost(x: Body, y: Body, T: Array, t: Array, point: Array) -> tuple[float, Array]:
-    """A point (3,) near ``point`` that lies deep in both bodies, and how deep (mm); y is placed by ``T`` and ``t``."""
+def _innermost(x: Body, y: Body, T: Array, t: Array, point: Array, size: float) -> tuple[float, Array]:
+    """A point (3,) near ``point`` that lies deep in both bodies, and how deep (mm); y is placed by ``T`` and ``t``.
+
+    A pattern search with steps of ``size`` mm at first.
+    """
 
     def margin(points: Array) -> Array:
         return np.minimum(x.depth(points), y.depth((points - t - T[:3, 3]) @ T[:3, :3]))
 
     best, here = float(margin(point[None])[0]), point
-    if isinstance(x, Surface) or isinstance(y, Surface):  # takes long
-        return best, here
-    step = 0.1 * y.ball[1]
+    step = size
     for _ in range(40):
         around = here + step * _STEPS
         found = margin(around)
         k = int(np.argmax(found))
-        if found[k] > best:
+        if found[k] > best + 0.05 * step:
             best, here = float(found[k]), around[k]
         else:
             step *= 0.35

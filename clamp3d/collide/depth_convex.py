@@ -114,6 +114,9 @@ def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array, *, tolerance: float
         h = (N * difference(N)).sum(axis=1)
         k = int(np.argmin(h))
         return _found(float(h[k]), float(h[k]), N[k], sa, sb, rounding)
+    if isinstance(a, Rod) and isinstance(b, Rod) and len(crossed(Ea, Eb)) == 0:
+        lower, upper, n = _parallel(a, Ta @ a.T, b, Tb @ b.T)
+        return _found(lower, upper, n, sa, sb, rounding)
     flat = np.vstack([Na[:200], -Nb[:200]])
     middle = Va.mean(axis=0) - Vb.mean(axis=0)
     seeds = [flat, _SPHERE, crossed(Ea[:8], Eb[:8])]
@@ -127,6 +130,20 @@ def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array, *, tolerance: float
     P = [difference(N), _faces(flat, Va, Vb)]
     lower, upper, n = expand(difference, N, np.vstack(P), max(tolerance, 2e-11 * scale))
     return _found(lower, upper, n, sa, sb, rounding + 1e-14 * scale)
+
+
+def _parallel(a: Rod, Ta: Array, b: Rod, Tb: Array) -> tuple[float, float, Array]:
+    """Bounds (mm) and direction for cylinders whose axes are parallel to 1e-9: across, or along the axis."""
+    z, w = Ta[:3, 2], Tb[:3, 3] - Ta[:3, 3]
+    across = w - (w @ z) * z
+    size = float(np.linalg.norm(across))
+    side = a.radius + b.radius - size
+    end = 0.5 * (a.length + b.length) - abs(float(w @ z))
+    tilt = float(np.linalg.norm(np.cross(z, Tb[:3, 2])))  # by this angle b is turned about its middle: so far it moves
+    moved = tilt * (b.radius + 0.5 * b.length)
+    n = np.copysign(1.0, w @ z) * z if end <= side else across / size if size > 0.0 else Ta[:3, 0]
+    depth = min(side, end)
+    return depth - moved, depth + moved, n
 
 
 def _faces(N: Array, Va: Array, Vb: Array) -> Array:

@@ -37,7 +37,9 @@ def around_in_form(form: ClosedForm, x: Array) -> Hull | None:
             return None
         n = radial / size
         planes.append(np.array([[*-n, bore.radius + float(n @ bore.T[:3, 3])]]))
-    return _hull_of(np.vstack(planes) + [0.0, 0.0, 0.0, form.error], x)
+    shrunk = np.vstack(planes)
+    shrunk[:, 3] += form.error
+    return _hull_of(shrunk, x)
 
 
 def _prism(rod: Rod, x: Array) -> Array:

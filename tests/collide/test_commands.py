@@ -31,7 +31,7 @@ def test_check_writes_all_outputs(tmp_path):
     done = clamp3d("check", EXAMPLES / "v-block" / "scene.toml", "--full", "--json", data, "--html", page)
     assert done.returncode == 1, done.stderr
     assert done.stderr == ""
-    assert re.search(r"block-3 - bar-low +clash +overlap 0\.0707", done.stdout)
+    assert re.search(r"block-3 - bar-low +clash +overlap 0\.1", done.stdout)
     assert "agrees in all 15 verdicts" in done.stdout
     found = json.loads(data.read_text())
     verdicts = {(p["a"], p["b"]): p["verdict"] for p in found["pairs"]}

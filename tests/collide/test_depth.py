@@ -1,0 +1,211 @@
+"""Penetration depth against independent truths: Minkowski differences of vertices, brute force over translations."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.parts import parts
+from clamp3d.collide.check import check
+from clamp3d.collide.convex import Rod, hull
+from clamp3d.collide.depth_convex import convex_depth
+from clamp3d.collide.distance import distance
+from clamp3d.collide.scene import Scene
+from clamp3d.core import shapes
+from clamp3d.core.mesh import make_mesh
+from clamp3d.core.pose import inverse, rotation, translation
+from clamp3d.core.primitives import SweptArc
+
+HERE = np.eye(4)
+
+
+def placed(rng, reach):
+    T = np.eye(4)
+    T[:3, :3] = Rotation.random(rng=rng).as_matrix()
+    T[:3, 3] = rng.normal(size=3) * reach
+    return T
+
+
+def is_known(d):
+    return d.lower <= d.upper and d.upper - d.lower <= max(0.01, 0.05 * d.depth)
+
+
+def test_convex_polyhedra_have_the_depth_of_the_hull_of_vertex_differences():
+    rng = np.random.default_rng(0)
+    seen = 0
+    for _ in range(60):
+        a, b = (hull(rng.normal(size=(rng.integers(6, 24), 3)) * 5.0) for _ in range(2))
+        T = placed(rng, 2.0)
+        V = b.vertices @ T[:3, :3].T + T[:3, 3]
+        truth = ConvexHull((a.vertices[:, None] - V[None]).reshape(-1, 3)).equations[:, 3].max()
+        if truth < 0.0:
+            seen += 1
+            assert convex_depth(a, HERE, b, T).value == pytest.approx(truth, abs=1e-11)
+    assert seen > 40
+
+
+def test_cylinders_lie_between_inscribed_and_circumscribed_prisms():
+    rng = np.random.default_rng(1)
+    turn = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    rod = Rod(5.0, 20.0, HERE)
+
+    def prism(scale):
+        rim = 5.0 * scale * np.column_stack([np.cos(turn), np.sin(turn)])
+        return hull(np.vstack([np.column_stack([rim, np.full(64, z)]) for z in (-10.0, 10.0)]))
+
+    inner, outer = prism(1.0), prism(1.0 / math.cos(math.pi / 64))
+    for _ in range(25):
+        other = hull(rng.normal(size=(8, 3)) * 6.0)
+        T = placed(rng, 3.0)
+        d = convex_depth(rod, HERE, other, T)
+        if d.upper < 0.0:
+            assert d.upper - d.lower <= 1e-8
+            assert convex_depth(outer, HERE, other, T).lower <= d.upper
+            assert d.lower <= convex_depth(inner, HERE, other, T).upper
+
+
+@pytest.mark.parametrize(("along", "across"), [(0.0, 3.0), (17.0, 3.0), (2.0, 0.0)])
+def test_parallel_cylinders(along, across):
+    d = convex_depth(Rod(5.0, 20.0, HERE), HERE, Rod(3.0, 16.0, HERE), translation(across, 0.0, along))
+    truth = min(8.0 - across, 18.0 - along)
+    assert d.lower <= -truth <= d.upper
+    assert d.upper - d.lower <= 1e-8
+
+
+@pytest.mark.parametrize("x", [-15.0, -20.0, -25.0])
+def test_bolt_through_the_wall_of_its_hole(x):
+    """The shortest way is back into the hole: 14, 19, 24 mm."""
+    plate = shapes.box((137.0, 60.0, 28.0), holes=[shapes.Hole(11.0)])
+    d = distance(plate, shapes.cylinder(10.0, 160.0), translation(x, 0.0, 0.0))
+    assert d.depth == pytest.approx(-x - 1.0, abs=1e-6)
+    assert d.upper - d.lower <= 1e-4
+    assert d.direction == pytest.approx([1.0, 0.0, 0.0], abs=1e-3)
+    row = check(Scene().add("plate", plate).add("bolt", shapes.cylinder(10.0, 160.0), translation(x, 0.0, 0.0))).pairs[
+        0
+    ]
+    assert row.to_dict()["depth_mm"] == pytest.approx(-x - 1.0, abs=1e-6)
+    assert row.to_dict()["at_least_mm"] <= x + 1.0 <= row.to_dict()["at_most_mm"] + 1e-9
+
+
+def test_seam_of_a_union_is_no_surface():
+    """A cube where the head of a bolt meets its shank; truth: the bolt as one convex hull of both at that place."""
+    bolt = parts(load_clamp())["P4"]
+    cube = shapes.box((4.0, 4.0, 4.0))
+    d = distance(bolt, cube, translation(0.0, 0.0, -155.0) @ rotation([1, 2, 3], 0.5))
+    assert is_known(d)
+    assert d.depth > 6.43
+    low, high = brute_force(bolt, cube, translation(0.0, 0.0, -155.0) @ rotation([1, 2, 3], 0.5), d)
+    assert d.lower <= -low
+    assert -high <= d.upper + 1e-9
+
+
+def test_wire_too_thick_for_its_groove_rests_on_both_lips():
+    block = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0)
+    truth = -3.5 + math.sqrt(7.5**2 - (7.0 * math.sin(math.radians(60.0))) ** 2)
+    d = distance(block, shapes.cylinder(7.5, 80.0))
+    assert d.lower <= -truth <= d.upper
+    assert is_known(d)
+
+
+def test_bar_in_a_v_of_a_mesh():
+    outline = [(-30, -25), (30, -25), (30, 20), (20, 20), (0, 0), (-20, 20), (-30, 20)]
+    block = _extruded(outline, 40.0)
+    cube = shapes.box((10.0, 10.0, 20.0))
+    for drop in (0.01, 0.5, 3.0):
+        T = translation(0.0, 5.0 * math.sqrt(2.0) - drop, 0.0) @ rotation([0, 0, 1], math.pi / 4)
+        d = distance(block, cube, T)
+        assert d.lower - 1e-9 <= -drop <= d.upper + 1e-9
+        assert is_known(d)
+        assert d.direction == pytest.approx([0.0, 1.0, 0.0], abs=1e-3)
+
+
+def test_a_press_fit_is_judged_by_what_the_parts_share():
+    plate, pin = shapes.box((40, 40, 8), holes=[shapes.Hole(5.0)]), shapes.cylinder(5.02, 20.0)
+    scene = Scene().add("plate", plate).add("pin", pin)
+    assert check(scene).verdict("plate", "pin").value == "clash"
+    row = check(scene.allow(("plate", "pin"), overlap=0.03)).pairs[0]
+    assert row.verdict.value == "allowed"
+    assert row.distance.depth > 10.0  # the way out is lengthwise
+
+
+def test_a_disc_deep_inside_is_not_an_allowed_overlap():
+    bolt = parts(load_clamp())["P4"]
+    scene = Scene().add("bolt", bolt).add("disc", shapes.cylinder(2.0, 20.0), translation(0.0, 0.0, -160.0))
+    assert check(scene.allow(("bolt", "disc"), overlap=0.5)).verdict("bolt", "disc").value in ("clash", "contained")
+
+
+def test_without_depths_an_overlap_is_at_least():
+    scene = Scene().add("a", shapes.box((10, 10, 10))).add("b", shapes.box((8, 8, 8)), translation(6.0, 0.0, 0.0))
+    quick = check(scene, depths=False).pairs[0].distance
+    assert quick.lower == -math.inf
+    assert -3.0 <= quick.upper < -0.01
+    assert check(scene).pairs[0].distance.depth == pytest.approx(3.0, abs=1e-9)
+
+
+BODIES = {
+    "box": shapes.box((12.0, 9.0, 7.0)),
+    "rod": shapes.cylinder(4.0, 18.0),
+    "tube": shapes.cylinder(8.0, 14.0, bore=5.0),
+    "plate": shapes.box((30.0, 24.0, 6.0), holes=[shapes.Hole(5.0)]),
+    "groove": shapes.groove_block(SweptArc(7.0, 1.0, 30.0), 24.0, 12.0),
+}
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.sampled_from(sorted(BODIES)), st.sampled_from(sorted(BODIES)), st.integers(0, 10**6))
+def test_moving_by_the_depth_separates_and_by_less_does_not(first, second, seed):
+    """And the same from b's side, and in another frame."""
+    rng = np.random.default_rng(seed)
+    a, b, T = BODIES[first], BODIES[second], placed(rng, 4.0)
+    d = distance(a, b, T)
+    if d.upper > -1e-6:
+        return
+    assert d.lower <= d.upper < 0.0
+    if math.isfinite(d.lower):
+        out = T.copy()
+        out[:3, 3] -= (d.lower - 1e-7) * d.direction
+        assert distance(a, b, out).lower >= -1e-7
+    for n in rng.normal(size=(12, 3)):
+        less = T.copy()
+        less[:3, 3] += 0.98 * d.depth * n / np.linalg.norm(n)
+        assert distance(a, b, less).upper < 0.0
+    back = distance(b, a, inverse(T))
+    assert back.lower <= d.upper + 1e-9
+    assert d.lower <= back.upper + 1e-9
+
+
+def _extruded(outline, half):
+    import manifold3d
+
+    made = manifold3d.CrossSection([outline]).extrude(2.0 * half).translate((0.0, 0.0, -half)).to_mesh64()
+    mesh = make_mesh(np.asarray(made.vert_properties)[:, :3], np.asarray(made.tri_verts).astype(np.int64))
+    return shapes.MeshShape(mesh, "off")
+
+
+def brute_force(a, b, T, known):
+    """Depth between bounds (mm) by overlap volumes of Open-CASCADE-free fine meshes over directions and lengths."""
+    from clamp3d.collide.surface import Surface
+    from clamp3d.core.meshing import mesh
+
+    solids = []
+    for shape in (a, b):
+        made = mesh(shape, 0.002)
+        solids.append(Surface(np.asarray(made.vertices), np.asarray(made.faces, dtype=np.int64)).manifold)
+    moved = solids[1].transform(np.ascontiguousarray(T[:3]))
+
+    def apart(t):
+        return (solids[0] ^ moved.translate(tuple(t))).volume() <= 1e-9
+
+    k = np.arange(1500) + 0.5
+    up, turn = 1.0 - k / 750.0, np.pi * (1.0 + 5.0**0.5) * k
+    N = np.column_stack([np.sqrt(1.0 - up * up) * np.cos(turn), np.sqrt(1.0 - up * up) * np.sin(turn), up])
+    low = 0.97 * known.depth
+    for n in N:  # nothing is apart that is nearer
+        assert not apart(low * n)
+    assert apart(-(known.lower - 0.01) * known.direction)
+    return low, -known.lower + 0.01
