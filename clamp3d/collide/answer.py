@@ -30,6 +30,9 @@ class Distance:
     normal : ndarray (3,) or None
         Unit vector from a to b, ``point_b = point_a + value * normal`` to within the bounds; in an overlap the
         direction in which b moves out. None where no direction is known.
+    interference : tuple of float or None
+        Bounds of the greatest depth (mm) of a point of one body inside the other, which is never more than the
+        penetration depth: of a pin pressed into a hole it is small, though the way out is long. None where not asked.
     unique : bool or None
         Whether the nearest points are the only ones; None where that is not known.
     level, method : str
@@ -47,6 +50,7 @@ class Distance:
     level: str = ""
     method: str = ""
     estimate: float | None = None
+    interference: tuple[float, float] | None = None
 
     @property
     def value(self) -> float:
@@ -128,6 +132,7 @@ class Distance:
             "normal": _list(self.normal),
             "depth_mm": _finite(self.depth),
             "direction": _list(self.direction),
+            "interference_mm": None if self.interference is None else [_finite(x) for x in self.interference],
             "unique": self.unique,
             "level": self.level,
             "method": self.method,

@@ -20,13 +20,10 @@ from clamp3d.collide.reasons import failure, undecided
 from clamp3d.collide.refine import contained, measured, refine, with_normal
 from clamp3d.collide.result import BAD, CheckResult, PairResult, Work
 from clamp3d.collide.scene import Scene, name_pairs
-from clamp3d.collide.verdict import Thresholds, Verdict
+from clamp3d.collide.verdict import Verdict
 from clamp3d.collide.where import locator
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import InputError, MissingLibraryError, SolverError
-
-_INTERLOCKED = 10.0
-"""Parts whose way out is this many times longer than the overlap that counts as contact, or is allowed, interlock."""
 
 
 def check(
@@ -52,8 +49,7 @@ def check(
     distances : bool
         Measure every pair to `clamp3d.collide.distance.ACCURACY`, not only until its verdict is certain.
     depths : bool
-        Measure how deep overlapping pairs are, as `clamp3d.collide.distance.distance` does; without, as far as the
-        verdict needs, and the rest is "at least".
+        Measure the penetration depth of clashes, as `clamp3d.collide.distance.distance` does; without, "at least".
     progress : callable, optional
         Is told (stage, done, of).
     cache : ModelCache, optional
@@ -182,12 +178,15 @@ def _pair(
     pair = x, y, T_ab
     try:
         found = refine(*pair, start, thresholds, certain)
-        deep = _deep(pair, found, thresholds, allowance, depths)
-        verdict = _judged(found, deep, thresholds, allowance)
-        if verdict is Verdict.UNCERTAIN and not measured(found):
-            found = refine(*pair, found, thresholds, measured)
-            deep = _deep(pair, found, thresholds, allowance, depths)
-            verdict = _judged(found, deep, thresholds, allowance)
+        verdict = thresholds.verdict(found, allowance)
+        if verdict is Verdict.UNCERTAIN and found.upper < thresholds.reach:
+            # Nothing lies deeper inside than the way out is long.
+            deep = penetration(*pair, with_normal(found))
+            found = replace(found, lower=max(found.lower, deep.lower))
+            verdict = thresholds.verdict(found, allowance)
+        deep = with_normal(found)
+        if verdict is Verdict.CLASH:
+            deep = penetration(*pair, deep) if depths else deep.of_overlap()
         if verdict is Verdict.CLASH and contained(*pair, thresholds):
             verdict = Verdict.CONTAINED
     except MissingLibraryError:
@@ -200,25 +199,3 @@ def _pair(
     if verdict is Verdict.UNCERTAIN:
         return replace(row, reason=undecided({a: x, b: y}, deep, thresholds, allowance))
     return row
-
-
-def _judged(found: Distance, deep: Distance, thresholds: Thresholds, allowance: float | None) -> Verdict:
-    """The verdict on a pair by its depth; on parts that interlock by how deep their points lie in each other.
-
-    A pin that is a little too thick for its hole has a long way out, and yet it is a contact, or the fit allowed.
-    """
-    pressed = thresholds.verdict(found, allowance)
-    interlocked = deep.upper < -_INTERLOCKED * max(thresholds.contact, allowance or 0.0)
-    if interlocked and pressed in (Verdict.CONTACT, Verdict.ALLOWED):
-        return pressed
-    return thresholds.verdict(deep, allowance)
-
-
-def _deep(
-    pair: tuple[Model, Model, Array], found: Distance, thresholds: Thresholds, allowance: float | None, depths: bool
-) -> Distance:
-    """The depth of what ``found`` says is an overlap, or may be; a mere bound of it if that is enough."""
-    known = with_normal(found).of_overlap()
-    if not depths and thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN:
-        return known
-    return penetration(*pair, with_normal(found))

@@ -182,6 +182,14 @@ def penetration(a: Model, b: Model, T: Array, known: Distance) -> Distance:
     pair = _Pair(a, b, T)
     if known.lower >= -pair.slack:
         return known
+    interference = (max(0.0, -known.upper), max(0.0, -known.lower))
+    # Of an open mesh it is not known what is inside.
+    found = _measured(pair, known) if a.closed and b.closed else known.of_overlap()
+    return replace(found, interference=interference)
+
+
+def _measured(pair: _Pair, known: Distance) -> Distance:
+    a, b, T = pair.a, pair.b, pair.T
     exact = _convex_pair(a, b, T)
     if exact is not None:
         return _with_points(pair, exact)

@@ -130,7 +130,8 @@ def test_a_press_fit_is_judged_by_what_the_parts_share():
     assert check(scene).verdict("plate", "pin").value == "clash"
     row = check(scene.allow(("plate", "pin"), overlap=0.03)).pairs[0]
     assert row.verdict.value == "allowed"
-    assert row.distance.depth > 10.0  # the way out is lengthwise
+    assert row.distance.depth == pytest.approx(0.02, abs=1e-9)  # though the way out is lengthwise
+    assert distance(plate, pin).depth > 10.0
 
 
 def test_a_disc_deep_inside_is_not_an_allowed_overlap():
