@@ -29,7 +29,6 @@ def command(
     and measured in all its pairs. Exit code 1 if parts clash, else 4 if a pair failed, else 3 if one is undecided, and
     2 if there are no two parts.
     """
-    from clamp3d.clamp.assemble import assemble
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.collide.check import check, check_full
     from clamp3d.collide.result import BAD
@@ -40,7 +39,12 @@ def command(
     asked = _pairs(pairs) if pairs is not None else None
     loaded = source.load()
     is_clamp = isinstance(loaded, Clamp)
-    scene = assemble(loaded).scene if isinstance(loaded, Clamp) else loaded
+    if isinstance(loaded, Clamp):
+        from clamp3d.clamp.assemble import assemble  # takes long to import, and most scenes need none of it
+
+        scene = assemble(loaded).scene
+    else:
+        scene = loaded
     if clearance is not None:
         scene = replace(scene, clearance=clearance)
     with bar(quiet) as report:

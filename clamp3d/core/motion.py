@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.checks import array, items, number, text
-from clamp3d.core.pose import Array, check_pose, inverse, unit
+from clamp3d.core.pose import Array, check_pose, inverse, rotation, unit
 from clamp3d.errors import InputError
 
 FARTHEST = 1e9
@@ -112,9 +112,7 @@ class Motion:
         # The turn minus one: what does not move is not rounded.
         turn = np.eye(3)
         if self.angle:
-            from scipy.spatial.transform import Rotation
-
-            turn = Rotation.from_rotvec(t * self.angle * self.axis).as_matrix()
+            turn = rotation(self.axis, t * self.angle)[:3, :3]
         T[:3, 3] += (turn - np.eye(3)) @ (T[:3, 3] - self.point) + t * self.travel
         T[:3, :3] = turn @ T[:3, :3]
         return T

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
-from clamp3d.core.pose import Array, nearest_rigid, unit
+from clamp3d.core.pose import Array, nearest_rigid, rotation, turn_of
 
 FROZEN = ConfigDict(extra="forbid")
 """Of every table: a key that is not known is an error."""
@@ -62,8 +62,6 @@ class Pose:
 
     def T(self) -> Array:
         """The pose (4, 4). A typed matrix is brought to the nearest rotation: its printed digits are not exact."""
-        from scipy.spatial.transform import Rotation
-
         T = np.eye(4)
         T[:3, 3] = self.translation
         if self.matrix is not None:
@@ -72,14 +70,20 @@ class Pose:
             # Exact input stays exact: a product of factors is not.
             return T if np.abs(nearest - T).max() < 1e-14 else nearest
         if self.rpy_deg is not None:
-            turn = Rotation.from_euler("xyz", self.rpy_deg, degrees=True)
+            (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in map(math.radians, self.rpy_deg))
+            R = np.array(
+                [
+                    [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+                    [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+                    [-sp, cp * sr, cp * cr],
+                ]
+            )
         elif self.axis is not None and self.angle_deg is not None:
-            turn = Rotation.from_rotvec(math.radians(self.angle_deg) * unit(np.array(self.axis)))
+            R = rotation(self.axis, math.radians(self.angle_deg))[:3, :3]
         elif self.quaternion is not None:  # its square neither overflows nor vanishes
-            turn = Rotation.from_quat(np.array(self.quaternion) / max(map(abs, self.quaternion)))
+            R = turn_of(*(part / max(map(abs, self.quaternion)) for part in self.quaternion))
         else:
             return T
-        R = turn.as_matrix()
         # Without the rounding of zeros and ones: quarter turns are exact.
         T[:3, :3] = np.where(np.abs(R - R.round()) < 1e-14, R.round(), R)
         return T

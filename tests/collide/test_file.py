@@ -7,11 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from clamp3d.collide.check import check
 from clamp3d.collide.verdict import Verdict
 from clamp3d.errors import InputError
 from clamp3d.scenefile.file import load_scene, parse_scene
+from clamp3d.scenefile.pose_table import Pose
 
 WIRE = '[parts.wire]\nshape = "cylinder"\nlength = 80\n'
 BOX = '[parts.box]\nshape = "box"\nsize = [10, 20, 30]\n'
@@ -207,3 +211,11 @@ def test_open_and_unreadable_meshes(tmp_path):
 def test_a_turn_does_not_depend_on_how_long_its_axis_is(turn, size):
     scene = parse_scene(f"[parts.a]\nshape = 'box'\nsize = [1, 2, 3]\npose = {{ {turn.format(size)} }}")
     assert scene.parts[0].T_world[:3, :3] == pytest.approx(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]]), abs=1e-15)
+
+
+@given(st.tuples(*[st.floats(-720.0, 720.0)] * 3))
+def test_roll_pitch_yaw_are_scipys_extrinsic_angles(angles):
+    table = Pose(rpy_deg=list(angles))
+    np.testing.assert_allclose(
+        table.T()[:3, :3], Rotation.from_euler("xyz", angles, degrees=True).as_matrix(), atol=2e-14
+    )

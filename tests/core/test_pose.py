@@ -5,6 +5,10 @@ import warnings
 import mpmath
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy.spatial.transform import Rotation
 
 from clamp3d.baselines.chords import Chords
 from clamp3d.collide.poses import check_poses
@@ -13,7 +17,16 @@ from clamp3d.core import shapes
 from clamp3d.core.distance import signed_distance, signed_distances
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pieces import groove_pieces
-from clamp3d.core.pose import PoseWarning, check_pose, check_pose_array, inverse, nearest_rigid, rotation, translation
+from clamp3d.core.pose import (
+    PoseWarning,
+    check_pose,
+    check_pose_array,
+    inverse,
+    nearest_rigid,
+    rotation,
+    translation,
+    turn_of,
+)
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
 
@@ -124,3 +137,8 @@ def test_batches_of_other_layers_measure_the_mended_poses():
         with pytest.warns(PoseWarning):
             found = measured(rough)
         assert np.array_equal(found, measured(mended))
+
+
+@given(hnp.arrays(float, 4, elements=st.floats(-1.0, 1.0)).filter(lambda q: np.abs(q).max() > 0.1))
+def test_turns_of_quaternions_are_scipys(q):
+    np.testing.assert_allclose(turn_of(*q.tolist()), Rotation.from_quat(q).as_matrix(), atol=1e-15)
