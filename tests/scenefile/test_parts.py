@@ -1,0 +1,155 @@
+"""Folders with poses, robots, 3MF, and scene files that include them."""
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from clamp3d import InputError, check, load
+
+
+@pytest.fixture
+def folder(tmp_path):
+    made = tmp_path / "cell"
+    made.mkdir()
+    trimesh.creation.box((2.0, 4.0, 6.0)).export(made / "plate.stl")
+    trimesh.creation.cylinder(1.0, 5.0, sections=16).export(made / "bolt.ply")
+    return made
+
+
+def table(path, *rows, head="name,x,y,z,qx,qy,qz,qw"):
+    path.write_text("\n".join([head, *rows]) + "\n")
+    return path
+
+
+def test_a_folder_of_meshes_with_poses(folder, tmp_path):
+    turn = Rotation.from_euler("xyz", [20, 30, 40], degrees=True)
+    x, y, z, w = turn.as_quat()
+    poses = table(tmp_path / "poses.csv", "bolt,1,2,3,0,0,0,1", f"plate,9,0,0,{x},{y},{z},{w}", "bolt,0,0,50,1,0,0,0")
+    scene = load(folder, poses=poses)
+    assert scene.name == "cell"
+    assert [p.name for p in scene.parts] == ["bolt_1", "plate", "bolt_2"]
+    np.testing.assert_allclose(scene.parts[1].T_world[:3, :3], turn.as_matrix(), atol=1e-12)
+    assert scene.parts[2].T_world[:3, 3].tolist() == [0, 0, 50]
+    assert scene.parts[0].shape is scene.parts[2].shape
+    assert [p.name for p in load(folder).parts] == ["bolt", "plate"]  # without a table: where the files put them
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (["bolt,1,2,3,0,0,0,1"], r"no pose for plate \(1 of 2 files\)"),
+        (["bolt,1,2,3,0,0,0,1", "nut,1,2,3,0,0,0,1"], "no file for 'nut' in .*; there are bolt, plate"),
+        (["bolt,1,2,3,0,0,0,2", "plate,0,0,0,0,0,0,1"], "line 2: the quaternion must have length 1, got 2"),
+        (["bolt,1,2,3,0,0,1"], "line 2: 8 values are needed, got 7"),
+        (["bolt,1,2,nan,0,0,0,1"], "line 2: "),
+        ([], "no pose in the table"),
+    ],
+)
+def test_a_table_that_does_not_fit_is_refused(folder, tmp_path, rows, message):
+    with pytest.raises(InputError, match=message):
+        load(folder, poses=table(tmp_path / "poses.csv", *rows))
+
+
+def test_other_columns_are_refused(folder, tmp_path):
+    with pytest.raises(InputError, match="the first line must be name,x,y,z,qx,qy,qz,qw, got 'a,b'"):
+        load(folder, poses=table(tmp_path / "poses.csv", head="a,b"))
+
+
+ROBOT = """<robot name="arm">
+  <link name="base"><collision><geometry><box size="0.1 0.1 0.02"/></geometry></collision></link>
+  <link name="rail"><visual><origin xyz="0 0 0.05"/>
+    <geometry><mesh filename="rail.stl" scale="0.001 0.001 0.001"/></geometry></visual></link>
+  <link name="tip"><collision><geometry><sphere radius="0.01"/></geometry></collision>
+    <collision><origin xyz="0 0 0.012"/><geometry><cylinder radius="0.004" length="0.02"/></geometry></collision></link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="rail"/>
+    <origin xyz="0 0 0.01"/><axis xyz="0 0 1"/><limit lower="-1" upper="2" effort="1" velocity="1"/></joint>
+  <joint name="slide" type="prismatic"><parent link="rail"/><child link="tip"/>
+    <origin xyz="0 0 0.2"/><axis xyz="1 0 0"/><limit lower="0.01" upper="0.05" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+@pytest.fixture
+def robot(tmp_path):
+    pytest.importorskip("yourdfpy")
+    trimesh.creation.box((10.0, 20.0, 60.0)).export(tmp_path / "rail.stl")
+    (tmp_path / "arm.urdf").write_text(ROBOT)
+    return tmp_path / "arm.urdf"
+
+
+def test_a_robot_with_joint_values(robot):
+    scene = load(robot, joints={"turn": np.pi / 6, "slide": 30.0})
+    assert [p.name for p in scene.parts] == ["base", "rail", "tip_1", "tip_2"]
+    base, rail, ball, pin = scene.parts
+    assert base.T_world.tolist() == np.eye(4).tolist()
+    np.testing.assert_allclose(rail.T_world[:3, 3], [0, 0, 60], atol=1e-9)
+    np.testing.assert_allclose(rail.T_world[:3, :3], Rotation.from_euler("z", 30, degrees=True).as_matrix(), atol=1e-9)
+    assert np.ptp(rail.shape.mesh.vertices, axis=0).round(3).tolist() == [10.0, 20.0, 60.0]
+    at = [30 * np.cos(np.pi / 6), 30 * np.sin(np.pi / 6), 210]
+    np.testing.assert_allclose(ball.T_world[:3, 3], at, atol=1e-9)
+    np.testing.assert_allclose(pin.T_world[:3, 3], np.add(at, [0, 0, 12]), atol=1e-9)
+    V, F = ball.shape.mesh.vertices, ball.shape.mesh.faces
+    deepest = np.linalg.norm(V[F].mean(axis=1), axis=1).min()
+    assert 0.0 < 10.0 - deepest <= ball.shape.error < 0.1  # the facets of a ball know how far they are from it
+    found = check(scene)
+    assert found.verdict("tip_1", "tip_2").value == "allowed"
+    assert found.verdict("base", "tip_1").value == "clear"
+
+
+def test_joints_start_within_their_limits(robot):
+    assert load(robot).parts[2].T_world[0, 3] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    ("joints", "message"),
+    [
+        ({"elbow": 1.0}, "unknown joint 'elbow'; available: turn, slide"),
+        ({"turn": 2.5}, "joint turn must be from -1 to 2 rad, got 2.5"),
+        ({"slide": 60.0}, "joint slide must be from 10 to 50 mm, got 60"),
+    ],
+)
+def test_joint_values_that_do_not_go(robot, joints, message):
+    with pytest.raises(InputError, match=message):
+        load(robot, joints=joints)
+
+
+def test_a_robot_without_one_of_its_meshes_is_refused(robot):
+    (robot.parent / "rail.stl").unlink()
+    with pytest.raises(InputError, match=r"3 of 4 shapes read; missing: rail \(.*rail.stl: no such file\)"):
+        load(robot)
+    assert [p.name for p in load(robot, partial=True).parts] == ["base", "tip_1", "tip_2"]
+    robot.write_text("<robot")
+    with pytest.raises(InputError, match="not a readable URDF file"):
+        load(robot)
+
+
+def test_a_scene_file_includes_any_of_them(folder, robot):
+    scene = robot.parent / "cell.toml"
+    scene.write_text(
+        'include = "cell"\nclearance = 2.0\n'
+        '[parts.arm]\nfile = "arm.urdf"\njoints = { slide = 20 }\npose = { translation = [500, 0, 0] }\n'
+        '[parts.extra]\nfile = "cell/plate.stl"\nchord = 0.05\n'
+        '[[allowed]]\nparts = ["arm/*", "bolt"]\n'
+        '[[motions]]\nparts = ["arm/tip_*"]\ntranslate = [1, 0, 0]\n'
+    )
+    made = load(scene)
+    assert [p.name for p in made.parts] == [
+        "bolt", "plate", "arm/base", "arm/rail", "arm/tip_1", "arm/tip_2", "extra",
+    ]  # fmt: skip
+    assert made.parts[2].T_world[:3, 3].tolist() == [500, 0, 0]
+    assert made.parts[4].T_world[:3, 3] == pytest.approx([520, 0, 210])
+    assert made.parts[6].shape.error == 0.05
+    assert made.motions[0].parts == ("arm/tip_1", "arm/tip_2")
+    assert made.clearance == 2.0
+    assert any("tip_1" in item.a and "tip_2" in item.b for item in made.allowed)
+
+
+def test_a_mesh_table_takes_one_body_only(tmp_path):
+    trimesh.Scene([trimesh.creation.box(), trimesh.creation.box().apply_translation((3, 0, 0))]).export(
+        tmp_path / "two.glb"
+    )
+    (tmp_path / "scene.toml").write_text('[parts.a]\nshape = "mesh"\nfile = "two.glb"\n')
+    with pytest.raises(InputError, match=r"two.glb holds 2 bodies: leave out shape, and it gives as many parts"):
+        load(tmp_path / "scene.toml")
+    (tmp_path / "scene.toml").write_text('[parts.a]\nfile = "two.glb"\n')
+    assert [p.name for p in load(tmp_path / "scene.toml").parts] == ["a/geometry_0", "a/geometry_1"]
