@@ -4,7 +4,7 @@ Lengths are millimetres, angles radians, poses 4x4 column-vector matrices ``T_ta
 
 | name | what it is |
 |---|---|
-| `load` | a clamp, a scene, a mesh or a STEP file, whatever a path or a name stands for |
+| `load` | a clamp, a scene, or the parts of any file or object: STEP, glTF, 3MF, URDF, meshes, CadQuery, ... |
 | `Scene`, `Part` | parts with poses, thresholds, allowed contacts and motions (`Motion`) |
 | `check` | verdicts of all pairs of a scene, at rest and in motion (`CheckResult`, `Verdict`) |
 | `distance` | signed distance of any two bodies between proven bounds (`Distance`); `measure` for a scene |

@@ -26,9 +26,8 @@ def command(
     """Check which parts of INPUT clash, touch or keep their clearance, at rest and in motion.
 
     INPUT is a scene file, a file or folder with the parts (STEP, GLB, 3MF, URDF, STL, OBJ, PLY, OFF), or a clamp (a
-    built-in name or a TOML file), which is assembled first
-    and measured in all its pairs. Exit code 1 if parts clash, else 4 if a pair failed, else 3 if one is undecided, and
-    2 if there are no two parts.
+    built-in name or a TOML file), which is assembled first and measured in all its pairs. Exit code 1 if parts clash,
+    else 4 if a pair failed, else 3 if one is undecided, and 2 if there are no two parts.
     """
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.collide.check import check, check_full

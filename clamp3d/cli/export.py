@@ -45,7 +45,7 @@ def command(
 ) -> None:
     """Write the parts of INPUT for CAD review, with a manifest beside them.
 
-    INPUT is a clamp (a built-in name or a TOML file), a scene file, a mesh or a STEP file. Prints the paths of the
+    INPUT is a clamp (a built-in name or a TOML file), a scene file, or a file with parts. Prints the paths of the
     files. World axes are Z up, a clamp's wires along Y; GLB is metres and Y up, as its specification demands. STEP
     holds true arcs, not facets.
     """

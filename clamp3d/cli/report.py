@@ -22,7 +22,7 @@ def command(
 ) -> None:
     """Write a report for a reviewer into DIR: report.html, report.json, pairs.csv.
 
-    INPUT is a clamp (a built-in name or a TOML file), which is assembled first, a scene file, a mesh or a STEP file;
+    INPUT is a clamp (a built-in name or a TOML file), which is assembled first, a scene file, or a file with parts;
     --method and --solver go with a clamp. Prints the paths of the files. Exit code 1 if parts clash, or a clamp does
     not close on both wires or parts meet that should not.
     """

@@ -15,7 +15,7 @@ def command(
 ) -> None:
     """Show INPUT in a browser: a clamp is assembled before your eyes, a scene is checked and its motions played.
 
-    INPUT is a clamp (a built-in name or a TOML file), a scene file, a mesh or a STEP file. Prints the page's address
+    INPUT is a clamp (a built-in name or a TOML file), a scene file, or a file with parts. Prints the page's address
     and serves it until Ctrl-C (or --timeout). With --html the page is written to a file instead; with --url the scene
     goes to a meshcat server, which keeps it. Exit code 1 if a clamp does not close as it should, or parts clash.
     """
