@@ -28,8 +28,11 @@ def _axis(rod: Rod) -> Any:
     return fcl_tree(ends, np.array([[0, 1, 2]]))
 
 
-def _holds(facets: Surface, point: Array) -> bool:
-    return bool(facets.contains(point[None])[0])
+def _holds(facets: Surface, points: Array) -> bool:
+    """Whether something whole that does not meet the surface, and has the ``points`` (k, 3), lies inside."""
+    if (points < facets.box[0]).any() or (points > facets.box[1]).any():
+        return False
+    return bool(facets.contains(points[:1])[0])
 
 
 def rod_distance(facets: Surface, body: ClosedForm, T: Array) -> Distance:
@@ -40,7 +43,7 @@ def rod_distance(facets: Surface, body: ClosedForm, T: Array) -> Distance:
     if distance <= slack:
         return _axis_inside(facets, body, T, 0.0)
     axis = T[:3, :3] @ rod.T[:3, 2]
-    if _holds(facets, T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
+    if _holds(facets, rod.ends @ T[:3, :3].T + T[:3, 3]):
         return _axis_inside(facets, body, T, distance)
     bounds = Distance(low - rod.radius - slack)
     n = (p - a) / distance
@@ -60,7 +63,7 @@ def rod_distance(facets: Surface, body: ClosedForm, T: Array) -> Distance:
 def axis_gap(facets: Surface, rod: Rod, T: Array) -> float:
     """Lower bound (mm) of the gap between the mesh and a rod at ``T`` (4, 4); minus infinity if its axis is inside."""
     distance, low, _, _ = _to_axis(facets, rod, T)
-    if distance <= 1e-9 or _holds(facets, T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
+    if distance <= 1e-9 or _holds(facets, rod.ends @ T[:3, :3].T + T[:3, 3]):
         return -np.inf
     return low - rod.radius - _WIDTH - 1e-12 * (facets.scale + rod.length + float(np.abs(T[:3, 3]).max()))
 
@@ -75,7 +78,7 @@ def hull_gap(facets: Surface, around: Hull) -> float:
         request, result = fcl.DistanceRequest(), fcl.DistanceResult()
         d = float(fcl.distance(fcl.CollisionObject(tree), fcl.CollisionObject(other.bvh), request, result))
         low = min(low, d - error) if d > 0.0 else -np.inf
-    inside = _holds(facets, around.vertices[0]) or (around.depth(facets.shell_points[:, 0]) > 0.0).any()
+    inside = _holds(facets, around.vertices) or (around.depth(facets.shell_points[:, 0]) > 0.0).any()
     return -np.inf if inside else low - 1e-12 * (facets.scale + other.scale)
 
 
@@ -89,7 +92,7 @@ def _axis_inside(facets: Surface, body: ClosedForm, T: Array, distance: float) -
     own = local @ rod.T[:3, :3].T + rod.T[:3, 3]
     world = own @ T[:3, :3].T + T[:3, 3]
     in_body = body.depth(own)
-    in_mesh = facets.depth(world)
+    in_mesh = facets.certain_depth(world)
     both = np.where((in_body >= 0.0) & (in_mesh >= 0.0), np.maximum(in_body, in_mesh), -np.inf)
     k = int(np.argmax(both))
     if both[k] == -np.inf:

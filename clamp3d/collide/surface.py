@@ -133,6 +133,21 @@ class Surface:
             found[found] = igl.winding_number(V, F, points[found]) > 0.5
         return np.asarray(found)
 
+    def certain_depth(self, points: Array) -> Array:
+        """How deep points (k, 3) lie inside, where the nearest triangle alone says so; minus infinity elsewhere.
+
+        Before the inside of a triangle that is nearest nothing else of the surface can lie, so its normal tells the
+        side. What it calls inside is inside one of the shells at least.
+        """
+        d, face, foot = self.nearest(points)
+        a, b, c = (self.vertices[self.faces[face, k]] for k in range(3))
+        n = np.cross(b - a, c - a)
+        nn = np.maximum(np.einsum("ij,ij->i", n, n), 1e-300)
+        behind = np.einsum("ij,ij->i", points - foot, n) < 0.0
+        for start, end in ((a, b), (b, c), (c, a)):
+            behind &= np.einsum("ij,ij->i", np.cross(end - start, foot - start), n) > 1e-6 * nn
+        return np.where(behind, d, -np.inf)
+
     def depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside; negative outside."""
         d = self.distance(points)
