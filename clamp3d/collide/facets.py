@@ -18,6 +18,8 @@ from clamp3d.collide.surface import Surface, fcl_tree
 from clamp3d.core.pose import Array
 
 _WIDTH = 1e-9
+_TURNS = 40
+"""Times that two nearest points are looked for from each other."""
 
 
 @lru_cache(maxsize=1024)
@@ -54,10 +56,26 @@ def rod_distance(facets: Surface, body: ClosedForm, T: Array) -> Distance:
         # Square to the axis the nearest point is on the side, which flat ends share with round ones.
         if abs(float(n @ axis)) < 1e-7 and body.depth(((q - t) @ R)[None])[0] >= -slack:
             return Distance(bounds.lower - body.error, distance - rod.radius + error + slack + body.error, p, q)
+        if len(body.outers) == 1 and not body.bores:
+            p, q = _nearer(facets, rod, T, p)
+            upper = float(np.linalg.norm(q - p)) + float(facets.error_at(p[None])[0]) + slack
+            return Distance(bounds.lower, max(upper, bounds.lower), p, q).widened(body.error)
         return bounds.widened(body.error)
     deep = float(body.depth(((p - t) @ R)[None])[0])
     high = slack + error - deep if deep >= -slack else np.inf
     return Distance(bounds.lower, high, p, p).widened(body.error)
+
+
+def _nearer(facets: Surface, rod: Rod, T: Array, p: Array) -> tuple[Array, Array]:
+    """Points (3,) of the mesh and of a cylinder with flat ends, each nearest to the other, from ``p`` on."""
+    R, t = T[:3, :3], T[:3, 3]
+    for _ in range(_TURNS):
+        q = rod.closest(((p - t) @ R)[None])[0] @ R.T + t
+        foot = facets.nearest(q[None])[2][0]
+        if np.linalg.norm(foot - q) >= np.linalg.norm(p - q) - 1e-13:
+            break
+        p = foot
+    return p, q
 
 
 def axis_gap(facets: Surface, rod: Rod, T: Array) -> float:

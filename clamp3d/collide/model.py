@@ -156,9 +156,15 @@ class Model:
         error = np.full(len(F), self.shape.error) if self.shape.error else None
         if self._fit is not None and self._fit.features:
             error = np.zeros(len(F)) if error is None else error
-            for feature in self._fit.features:
+            patch = np.zeros(len(F), dtype=np.int64)
+            for k, feature in enumerate(self._fit.features):
                 error[feature.faces] = np.maximum(error[feature.faces], feature.error_bound + self.shape.error)
-            error = at_edges(V, F, error)
+                patch[feature.faces] = k + 1
+            error = at_edges(V, F, error, patch)
+            off = error.copy()
+            for feature in self._fit.cylinders if self.shape.fit == "round" else ():
+                off[feature.faces] = feature.fit_error + self.shape.error
+            return self._counted(Surface(V, F, error, off))
         return self._counted(Surface(V, F, error))
 
     def _facets(self, solid: BrepSolid) -> Surface:
