@@ -20,6 +20,7 @@ from clamp3d.collide.reasons import failure, undecided
 from clamp3d.collide.refine import contained, measured, refine, with_normal
 from clamp3d.collide.result import BAD, CheckResult, PairResult, Work
 from clamp3d.collide.scene import Scene, name_pairs
+from clamp3d.collide.touching import is_box, touching_boxes
 from clamp3d.collide.verdict import Verdict
 from clamp3d.collide.where import locator
 from clamp3d.core.pose import Array, inverse
@@ -103,11 +104,15 @@ def check(
     counters.queries["boxes"] += len(chosen)
     times.append(time.perf_counter())
     rows, decided = [], Counter({"broad phase": every - len(chosen)})
+    box = {model: is_box(model) for model in set(models)}
+    known = {} if full else touching_boxes(boxes, np.array([box[m] for m in models], dtype=bool), chosen, gaps)
     for k, ((i, j), gap) in enumerate(zip(chosen.tolist(), gaps.tolist(), strict=True)):
         if progress is not None:
             progress("pairs", k, len(chosen))
-        start = Distance(gap, level="boxes", method="bounding boxes")
-        row = _pair(scene, i, j, models, T, start, full, distances, depths)
+        row = _touching(scene, i, j, known[k]) if k in known else None
+        if row is None:
+            start = Distance(gap, level="boxes", method="bounding boxes")
+            row = _pair(scene, i, j, models, T, start, full, distances, depths)
         decided[row.distance.level] += 1
         rows.append(row)
     times.append(time.perf_counter())
@@ -154,6 +159,13 @@ def _asked(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, in
             raise InputError(f"pair {a}:{b} must name two different parts")
         found.add((i, j))
     return sorted(found)
+
+
+def _touching(scene: Scene, i: int, j: int, known: Distance) -> PairResult | None:
+    """The row of a pair that touches, if that decides it; ``known`` in the world."""
+    a, b = scene.parts[i].name, scene.parts[j].name
+    verdict = scene.thresholds.verdict(known, scene.allowance(a, b))
+    return None if verdict is Verdict.UNCERTAIN or verdict in BAD else PairResult(a, b, verdict, known)
 
 
 def _pair(

@@ -18,6 +18,8 @@ from clamp3d.collide.surface import Surface, fcl_tree
 from clamp3d.core.pose import Array
 
 _WIDTH = 1e-9
+_TURNS = 40
+"""Times that two nearest points are looked for from each other."""
 
 
 @lru_cache(maxsize=1024)
@@ -28,8 +30,11 @@ def _axis(rod: Rod) -> Any:
     return fcl_tree(ends, np.array([[0, 1, 2]]))
 
 
-def _holds(facets: Surface, point: Array) -> bool:
-    return bool(facets.contains(point[None])[0])
+def _holds(facets: Surface, points: Array) -> bool:
+    """Whether something whole that does not meet the surface, and has the ``points`` (k, 3), lies inside."""
+    if (points < facets.box[0]).any() or (points > facets.box[1]).any():
+        return False
+    return bool(facets.contains(points[:1])[0])
 
 
 def rod_distance(facets: Surface, body: ClosedForm, T: Array) -> Distance:
@@ -40,7 +45,7 @@ def rod_distance(facets: Surface, body: ClosedForm, T: Array) -> Distance:
     if distance <= slack:
         return _axis_inside(facets, body, T, 0.0)
     axis = T[:3, :3] @ rod.T[:3, 2]
-    if _holds(facets, T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
+    if _holds(facets, rod.ends @ T[:3, :3].T + T[:3, 3]):
         return _axis_inside(facets, body, T, distance)
     bounds = Distance(low - rod.radius - slack)
     n = (p - a) / distance
@@ -51,16 +56,32 @@ def rod_distance(facets: Surface, body: ClosedForm, T: Array) -> Distance:
         # Square to the axis the nearest point is on the side, which flat ends share with round ones.
         if abs(float(n @ axis)) < 1e-7 and body.depth(((q - t) @ R)[None])[0] >= -slack:
             return Distance(bounds.lower - body.error, distance - rod.radius + error + slack + body.error, p, q)
+        if len(body.outers) == 1 and not body.bores:
+            p, q = _nearer(facets, rod, T, p)
+            upper = float(np.linalg.norm(q - p)) + float(facets.error_at(p[None])[0]) + slack
+            return Distance(bounds.lower, max(upper, bounds.lower), p, q).widened(body.error)
         return bounds.widened(body.error)
     deep = float(body.depth(((p - t) @ R)[None])[0])
     high = slack + error - deep if deep >= -slack else np.inf
     return Distance(bounds.lower, high, p, p).widened(body.error)
 
 
+def _nearer(facets: Surface, rod: Rod, T: Array, p: Array) -> tuple[Array, Array]:
+    """Points (3,) of the mesh and of a cylinder with flat ends, each nearest to the other, from ``p`` on."""
+    R, t = T[:3, :3], T[:3, 3]
+    for _ in range(_TURNS):
+        q = rod.closest(((p - t) @ R)[None])[0] @ R.T + t
+        foot = facets.nearest(q[None])[2][0]
+        if np.linalg.norm(foot - q) >= np.linalg.norm(p - q) - 1e-13:
+            break
+        p = foot
+    return p, q
+
+
 def axis_gap(facets: Surface, rod: Rod, T: Array) -> float:
     """Lower bound (mm) of the gap between the mesh and a rod at ``T`` (4, 4); minus infinity if its axis is inside."""
     distance, low, _, _ = _to_axis(facets, rod, T)
-    if distance <= 1e-9 or _holds(facets, T[:3, :3] @ rod.T[:3, 3] + T[:3, 3]):
+    if distance <= 1e-9 or _holds(facets, rod.ends @ T[:3, :3].T + T[:3, 3]):
         return -np.inf
     return low - rod.radius - _WIDTH - 1e-12 * (facets.scale + rod.length + float(np.abs(T[:3, 3]).max()))
 
@@ -75,7 +96,7 @@ def hull_gap(facets: Surface, around: Hull) -> float:
         request, result = fcl.DistanceRequest(), fcl.DistanceResult()
         d = float(fcl.distance(fcl.CollisionObject(tree), fcl.CollisionObject(other.bvh), request, result))
         low = min(low, d - error) if d > 0.0 else -np.inf
-    inside = _holds(facets, around.vertices[0]) or (around.depth(facets.shell_points[:, 0]) > 0.0).any()
+    inside = _holds(facets, around.vertices) or (around.depth(facets.shell_points[:, 0]) > 0.0).any()
     return -np.inf if inside else low - 1e-12 * (facets.scale + other.scale)
 
 
@@ -89,7 +110,7 @@ def _axis_inside(facets: Surface, body: ClosedForm, T: Array, distance: float) -
     own = local @ rod.T[:3, :3].T + rod.T[:3, 3]
     world = own @ T[:3, :3].T + T[:3, 3]
     in_body = body.depth(own)
-    in_mesh = facets.depth(world)
+    in_mesh = facets.certain_depth(world)
     both = np.where((in_body >= 0.0) & (in_mesh >= 0.0), np.maximum(in_body, in_mesh), -np.inf)
     k = int(np.argmax(both))
     if both[k] == -np.inf:

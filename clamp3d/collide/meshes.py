@@ -7,9 +7,12 @@ above, whatever angles faces and holes meet at. Other meshes are the part but fo
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.model import Model
@@ -19,19 +22,24 @@ from clamp3d.core.pose import Array, inverse
 
 _HALVINGS = 16
 """Ninths of a way that the surface of a body is looked for in, one after another: then it is known to rounding."""
+_SPREAD = 100
+"""Vertices of a mesh, spread over it, that are looked for in another one."""
 _TRIED = 3
 """Directions in which an overlap is tried to be parted."""
 
+Enough: TypeAlias = Callable[[Distance], bool]
+Rows: TypeAlias = NDArray[np.intp]
 
-def meshes_distance(a: Model, b: Model, T: Array, error: float) -> Distance:
+
+def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough = lambda _: False) -> Distance:
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame, from meshes of chord error ``error`` mm.
 
     In an overlap ``upper`` is minus a depth that a point of both has, ``lower`` minus a move that parts them if one
-    of the few that are tried does.
+    of the few that are tried does. A depth that is ``enough`` ends the search: that of one vertex often is.
     """
-    outer = surface_distance(a.outer(error), b.outer(error), T)
     if not (a.between or b.between):
-        return outer
+        return surface_distance(a.outer(error), b.outer(error), T, enough)
+    outer = surface_distance(a.outer(error), b.outer(error), T)
     inner_a, inner_b = a.inner(error), b.inner(error)
     if inner_a is None or inner_b is None:
         return replace(outer, upper=np.inf, point_a=None, point_b=None, normal=None)
@@ -60,10 +68,14 @@ def _on_surface(model: Model, T: Array, inside: Array, outside: Array) -> Array:
     return np.asarray(inside + low * (outside - inside))
 
 
-def surface_distance(a: Surface, b: Surface, T: Array) -> Distance:
-    """Signed distance of two meshes, ``b`` at ``T`` (4, 4) in a's frame; bounds as in `meshes_distance`."""
+def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough = lambda _: False) -> Distance:
+    """Signed distance of two meshes, ``b`` at ``T`` (4, 4) in a's frame; answers as `meshes_distance`."""
     rounding = rounding_of(a, b, T)
-    lower, upper, p, q = nearest_of(a, b, T)
+    meeting = _contacts(a, b, T)
+    if meeting is not None:
+        first = _vertex_depth(a, b, T, meeting, rounding)
+        return first if enough(first) else _overlap(a, b, T, rounding)
+    lower, upper, p, q = _gap(a, b, T)
     if upper <= rounding:
         return _overlap(a, b, T, rounding)
     for outer, inner, place, swapped in ((a, b, T, False), (b, a, inverse(T), True)):
@@ -106,15 +118,48 @@ def rounding_of(a: Surface, b: Surface, T: Array) -> float:
     return 4e-12 * (a.scale + b.scale + float(np.abs(T[:3, 3]).max()))
 
 
+def _contacts(a: Surface, b: Surface, T: Array, most: int = 16) -> tuple[Rows, Rows] | None:
+    """Triangles of either mesh that meet one of the other, ``most`` pairs at most; None if the surfaces do not meet."""
+    import fcl
+
+    oa, ob = fcl.CollisionObject(a.bvh, fcl.Transform()), fcl.CollisionObject(b.bvh, fcl.Transform(T[:3, :3], T[:3, 3]))
+    found = fcl.CollisionResult()
+    fcl.collide(oa, ob, fcl.CollisionRequest(num_max_contacts=most, enable_contact=most > 1), found)
+    if not found.is_collision:
+        return None
+    rows = np.array([(c.b1, c.b2) for c in found.contacts], dtype=np.intp).reshape(-1, 2)
+    return rows[:, 0], rows[:, 1]
+
+
+def _vertex_depth(a: Surface, b: Surface, T: Array, meeting: tuple[Rows, Rows], rounding: float) -> Distance:
+    """The deepest of some vertices of either mesh in the other: those of triangles that meet, and of all a few."""
+    found = Distance()
+    for outer, inner, place, rows in ((a, b, T, meeting[1]), (b, a, inverse(T), meeting[0])):
+        spread = inner.vertices[:: max(1, len(inner.vertices) // _SPREAD)]
+        points = np.vstack([inner.vertices[np.unique(inner.faces[rows])], spread]) @ place[:3, :3].T + place[:3, 3]
+        points = points[((points >= outer.box[0]) & (points <= outer.box[1])).all(axis=1)]
+        if len(points):
+            depth = outer.certain_depth(points) - a.error - b.error - rounding
+            k = int(np.argmax(depth))
+            if -depth[k] < found.upper:
+                at = points[k] if outer is a else points[k] @ T[:3, :3].T + T[:3, 3]
+                found = Distance(-np.inf, -float(depth[k]), at, at)
+    return found
+
+
 def nearest_of(a: Surface, b: Surface, T: Array) -> tuple[float, float, Array, Array]:
     """Distance of the true surfaces at least, of the meshes, and its points (3,); 0.0 if the meshes' surfaces meet."""
+    if _contacts(a, b, T, 1) is not None:
+        return -np.inf, 0.0, np.zeros(3), np.zeros(3)
+    return _gap(a, b, T)
+
+
+def _gap(a: Surface, b: Surface, T: Array) -> tuple[float, float, Array, Array]:
+    """The same for meshes whose surfaces do not meet."""
     import fcl
 
     place, here = fcl.Transform(T[:3, :3], T[:3, 3]), fcl.Transform()
     none = np.zeros(3)
-    oa, ob = fcl.CollisionObject(a.bvh, here), fcl.CollisionObject(b.bvh, place)
-    if fcl.collide(oa, ob, fcl.CollisionRequest(), fcl.CollisionResult()):
-        return -np.inf, 0.0, none, none
     low, best, p, q = np.inf, np.inf, none, none
     for first, e in a.groups:
         for second, f in b.groups:

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 Progress = Callable[[str, int, int], None]
 """What is being done, how much of it is, and of how much."""
 
+_LARGE = 2000
+"""Triangles of a mesh beyond which its hull is no quicker to ask than the mesh itself."""
 Maker = Callable[[Solid, float], tuple[Array, NDArray[np.int64]] | None]
 
 FINEST = 0.001
@@ -79,9 +81,11 @@ class Model:
 
             return bodies_of_fit(self._fit, self.raw, round_=self.shape.fit == "round")
         raw = self.raw
+        if not looks_convex(raw.vertices, raw.faces):
+            return None
         volume = float(raw.manifold.volume())
         if abs(float(raw.manifold.hull().volume()) - volume) <= 1e-9 * volume:
-            return (ClosedForm((self._hull(self.shape.mesh.vertices),), error=self.shape.error),)
+            return (ClosedForm((self._hull(self.shape.mesh.vertices),), error=raw.error),)
         return None
 
     @property
@@ -99,6 +103,12 @@ class Model:
         self.counters.built["fits"] += 1
         return fit_mesh(self.shape.mesh)
 
+    @cached_property
+    def simple(self) -> bool:
+        """Whether closed forms, or a small hull in place of them, are quicker to ask than the mesh."""
+        small = isinstance(self.shape, Solid) or len(self.shape.mesh.faces) <= _LARGE
+        return small or (self.bodies is not None and all(form.surface is None for form in self.bodies))
+
     @property
     def facets(self) -> Surface | None:
         """The mesh of a mesh shape; None for a drawn solid."""
@@ -111,10 +121,9 @@ class Model:
 
     @cached_property
     def hull_body(self) -> ClosedForm:
-        """Convex hull of a mesh that holds the part, with one that the part holds to tell what of it is material."""
-        outer, inner = self.outer(0.5), self.inner(0.5)
-        made = self._hull(outer.vertices)
-        return ClosedForm((made,), error=outer.error, surface=_nowhere if inner is None else inner.depth)
+        """Convex hull of a mesh that holds the part: for lower bounds alone."""
+        outer = self.outer(0.5)
+        return ClosedForm((self._hull(outer.vertices),), error=outer.error, surface=_nowhere)
 
     def _hull(self, points: Array) -> Hull:
         self.counters.built["hulls"] += 1
@@ -147,13 +156,20 @@ class Model:
         error = np.full(len(F), self.shape.error) if self.shape.error else None
         if self._fit is not None and self._fit.features:
             error = np.zeros(len(F)) if error is None else error
-            for feature in self._fit.features:
+            patch = np.zeros(len(F), dtype=np.int64)
+            for k, feature in enumerate(self._fit.features):
                 error[feature.faces] = np.maximum(error[feature.faces], feature.error_bound + self.shape.error)
-            error = at_edges(V, F, error)
+                patch[feature.faces] = k + 1
+            error = at_edges(V, F, error, patch)
+            off = error.copy()
+            for feature in self._fit.cylinders if self.shape.fit == "round" else ():
+                off[feature.faces] = feature.fit_error + self.shape.error
+            return self._counted(Surface(V, F, error, off))
         return self._counted(Surface(V, F, error))
 
     def _facets(self, solid: BrepSolid) -> Surface:
-        return self._counted(Surface(solid.mesh.vertices, solid.mesh.faces, solid.errors))
+        V, F = solid.mesh.vertices, solid.mesh.faces
+        return self._counted(Surface(V, F, at_edges(V, F, solid.errors)))
 
     def outer(self, error: float) -> Surface:
         """Mesh of chord error ``error`` mm that holds a drawn solid; a mesh shape's own facets, whose errors it has."""
@@ -187,8 +203,18 @@ class Model:
         return made
 
 
+def looks_convex(vertices: Array, faces: NDArray[np.int64]) -> bool:
+    """Whether no vertex (n, 3) lies before one of a few triangles (m, 3): false proves that a mesh is not convex."""
+    # Rows far apart, in no step with the rings that a mesh may be made of.
+    corners = vertices[faces[np.unique(np.arange(64) * 2654435761 % len(faces))]]
+    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    n /= np.maximum(np.linalg.norm(n, axis=1), 1e-300)[:, None]
+    height = (vertices @ n.T).max(axis=0) - np.einsum("ij,ij->i", corners[:, 0], n)
+    return bool(height.max() <= 1e-6 * float(np.abs(vertices).max()))
+
+
 def _nowhere(points: Array) -> Array:
-    """Depth of points (k, 3) in a body that nothing is known to lie in."""
+    """Depth of points (k, 3) in a part whose hull stands for it: what of the hull is material the meshes know."""
     return np.full(len(points), -np.inf)
 
 

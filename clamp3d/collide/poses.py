@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
@@ -19,12 +19,16 @@ from clamp3d.core.motion import scene_pose
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import InputError, MissingLibraryError
 
+_FEW = 32
+"""Other parts up to which all of their boxes are compared with those of all poses."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseVerdicts:
     """One part at n poses against the others it may meet: arrays (n, k) for k ``others``.
 
-    ``lower`` and ``upper`` bound the signed distance in mm; ``verdict`` holds the verdicts' names.
+    ``lower`` and ``upper`` bound the signed distance in mm, no more closely than the verdict needs; ``verdict`` holds
+    the verdicts' names.
     """
 
     part: str
@@ -98,21 +102,24 @@ def check_poses(
     T = np.array([scene_pose(pose, f"poses[{k}]") for k, pose in enumerate(given)]).reshape(-1, 4, 4)
     n = len(T)
     lower, upper = np.full((n, len(rest)), np.inf), np.full((n, len(rest)), np.inf)
-    verdict = np.full((n, len(rest)), Verdict.CLEAR.value, dtype=object)
+    verdict = np.full((n, len(rest)), Verdict.CLEAR.value, dtype=f"<U{max(len(v.value) for v in Verdict)}")
     model = shop.model(scene.parts[i].shape)
     models = [shop.model(scene.parts[j].shape) for j in rest]
     poses_of = np.array([scene.parts[j].T_world for j in rest]).reshape(-1, 4, 4)
     moving = Boxes.of(np.repeat(model.bounds[None], n, axis=0), T)
-    for column, (j, other) in enumerate(zip(rest, models, strict=True)):
-        allowance = scene.allowance(part, scene.parts[j].name)
+    lower[:] = reach = scene.thresholds.reach + 1e-6
+    rows, columns = _near(moving, Boxes.of(np.array([m.bounds for m in models]).reshape(-1, 2, 3), poses_of), reach)
+    for column in np.unique(columns).tolist():
+        other, near = models[column], rows[columns == column]
+        allowance = scene.allowance(part, scene.parts[rest[column]].name)
         still = Boxes.of(other.bounds[None], poses_of[column][None])
-        gaps = box_gaps(still.joined(moving), np.column_stack([np.zeros(n, dtype=np.int64), np.arange(1, n + 1)]))
-        shop.counters.queries["boxes"] += n
-        lower[:, column] = gaps
-        near = np.flatnonzero(gaps < scene.thresholds.reach + 1e-6)
+        gaps = box_gaps(still.joined(moving), np.column_stack([np.zeros(len(near), dtype=np.int64), 1 + near]))
+        shop.counters.queries["boxes"] += len(near)
+        lower[near, column] = gaps
+        near = near[gaps < reach]
         local = inverse(poses_of[column]) @ T[near]
         for row, place, known in zip(near.tolist(), local, by_kernel(other, model, local), strict=True):
-            found, kind = known or Distance(float(gaps[row])), Verdict.UNCERTAIN
+            found, kind = known or Distance(float(lower[row, column])), Verdict.UNCERTAIN
             try:
                 if known is None:
                     found = _refined(other, model, place, found, scene, allowance)
@@ -123,7 +130,24 @@ def check_poses(
                 kind = Verdict.FAILED
             lower[row, column], upper[row, column] = found.lower, found.upper
             verdict[row, column] = kind.value
-    return PoseVerdicts(part, tuple(scene.parts[j].name for j in rest), verdict.astype(str), lower, upper)
+    return PoseVerdicts(part, tuple(scene.parts[j].name for j in rest), verdict, lower, upper)
+
+
+def _near(moving: Boxes, still: Boxes, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Poses and others (m,) whose boxes along the world's axes come within ``reach`` mm."""
+    if len(still.centre) <= _FEW:
+        away = np.abs(moving.centre[:, None] - still.centre) - moving.reach[:, None] - still.reach
+        rows, columns = np.nonzero((away <= reach).all(axis=2))
+        return rows.astype(np.int64), columns.astype(np.int64)
+    from rtree import index
+
+    half = still.reach + reach
+    tree = index.Index(
+        (np.arange(len(half)), still.centre - half, still.centre + half), properties=index.Property(dimension=3)
+    )
+    found, count = tree.intersection_v(moving.centre - moving.reach, moving.centre + moving.reach)  # type: ignore[no-untyped-call]
+    rows = np.repeat(np.arange(len(moving.centre)), np.asarray(count, dtype=np.int64))
+    return rows, np.asarray(found, dtype=np.int64)
 
 
 def _refined(a: Model, b: Model, T: Array, start: Distance, scene: Scene, allowance: float | None) -> Distance:

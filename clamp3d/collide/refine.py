@@ -57,7 +57,7 @@ def refine(
         return _agreed(found, open_distance(a, b, T)).labelled("meshes", method)
     if a.faces is not None and b.faces is not None:
         return _faces(a, b, T, found, thresholds, enough)
-    for level in (_features, _facets) if forms else (_facets,):
+    for level in (_features, _facets) if forms and a.simple and b.simple else (_facets,):
         new = level(a, b, T, lambda x, known=found: enough(known.meet(x)))  # type: ignore[misc]
         if new is not None:
             found = _agreed(found, new)
@@ -65,7 +65,7 @@ def refine(
                 return found
     error = COARSEST
     while True:
-        found = _agreed(found, _meshes(a, b, T, error))
+        found = _agreed(found, _meshes(a, b, T, error, lambda x, known=found: enough(known.meet(x))))  # type: ignore[misc]
         if enough(found) or error <= FINEST or not (a.refines or b.refines):
             return found
         # The middle of the bounds guesses how far the nearest threshold is: go there, not step by step.
@@ -164,9 +164,9 @@ def _facets(a: Model, b: Model, T: Array, enough: Enough) -> Distance | None:
     return None if found is None else found.labelled("facets", "cylinder on facets (FCL)")
 
 
-def _meshes(a: Model, b: Model, T: Array, error: float) -> Distance:
+def _meshes(a: Model, b: Model, T: Array, error: float, enough: Enough) -> Distance:
     a.counters.queries["meshes"] += 1
-    found = meshes_distance(a, b, T, error)
+    found = meshes_distance(a, b, T, error, enough)
     chords = f", chord error {error:.2g} mm" if a.refines or b.refines else ""
     return found.labelled("meshes", f"meshes (FCL){chords}")
 

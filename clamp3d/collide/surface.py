@@ -26,12 +26,14 @@ class Surface:
     """A closed mesh, ``vertices`` (n, 3) mm, ``faces`` (m, 3) wound outward.
 
     ``face_error`` (m,) mm: every point of the true surface is within this of a triangle, and the other way round;
-    None where the mesh is the part, or holds it, or is held by it.
+    None where the mesh is the part, or holds it, or is held by it. ``point_error`` (m,) mm: how far points of a
+    triangle are from the true body, the same if not given; chords of a convex face lie inside.
     """
 
     vertices: Array
     faces: NDArray[np.int64]
     face_error: Array | None = None
+    point_error: Array | None = None
 
     @property
     def error(self) -> float:
@@ -72,7 +74,11 @@ class Surface:
 
     @cached_property
     def _parts(self) -> dict[float, Surface]:
-        return {error: Surface(self.vertices, self.faces[rows]) for rows, error in self._levels}
+        own = self.point_error
+        return {
+            error: Surface(self.vertices, self.faces[rows], None, None if own is None else own[rows])
+            for rows, error in self._levels
+        }
 
     @cached_property
     def manifold(self) -> Any:
@@ -133,6 +139,21 @@ class Surface:
             found[found] = igl.winding_number(V, F, points[found]) > 0.5
         return np.asarray(found)
 
+    def certain_depth(self, points: Array) -> Array:
+        """How deep points (k, 3) lie inside, where the nearest triangle alone says so; minus infinity elsewhere.
+
+        Before the inside of a triangle that is nearest nothing else of the surface can lie, so its normal tells the
+        side. What it calls inside is inside one of the shells at least.
+        """
+        d, face, foot = self.nearest(points)
+        a, b, c = (self.vertices[self.faces[face, k]] for k in range(3))
+        n = np.cross(b - a, c - a)
+        nn = np.maximum(np.einsum("ij,ij->i", n, n), 1e-300)
+        behind = np.einsum("ij,ij->i", points - foot, n) < 0.0
+        for start, end in ((a, b), (b, c), (c, a)):
+            behind &= np.einsum("ij,ij->i", np.cross(end - start, foot - start), n) > 1e-6 * nn
+        return np.where(behind, d, -np.inf)
+
     def depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside; negative outside."""
         d = self.distance(points)
@@ -150,7 +171,9 @@ class Surface:
         """How far (k,) mm the true surface may be from points (k, 3) of this one: the largest error of what is near."""
         found = np.zeros(len(points))
         for error, part in self._parts.items() if self.error > 0.0 else ():
-            found[part.distance(points) <= error * (1.0 + 1e-9)] = error
+            away, face, _ = part.nearest(points)
+            own = error if part.point_error is None else part.point_error[face]
+            found = np.where(away <= error * (1.0 + 1e-9), np.maximum(found, own), found)
         return found
 
 
@@ -165,9 +188,10 @@ def fcl_tree(vertices: Array, faces: NDArray[np.int64]) -> Any:
     return tree
 
 
-def at_edges(vertices: Array, faces: NDArray[np.int64], error: Array) -> Array:
+def at_edges(vertices: Array, faces: NDArray[np.int64], error: Array, patch: NDArray[np.int64] | None = None) -> Array:
     """Errors (m,) of triangles that hold for their patches' true borders too; ``error`` (m,) is square to each patch.
 
+    ``patch`` (m,) numbers the patches; else triangles that meet at more than 30 degrees are of two.
     Two patches that bulge by e and f meet within (e + f) / sin(w) of the edge between them, w being the angle of the
     material if that is acute; else within e + f. At a blunt or hollow edge with a flat patch the foot of every point
     lies on the mesh.
@@ -181,7 +205,8 @@ def at_edges(vertices: Array, faces: NDArray[np.int64], error: Array) -> Array:
     total = both.sum(axis=1)
     knife = convex & (cosine < 0.0)
     total[knife] /= np.maximum(np.sqrt(1.0 - np.minimum(1.0, cosine[knife] ** 2)), 1e-6)
-    wider = (knife & (total > 0.0)) | ((cosine < _SHARP) & (both > 0.0).all(axis=1))
+    sharp = cosine < _SHARP if patch is None else patch[pairs[:, 0]] != patch[pairs[:, 1]]
+    wider = sharp & ((knife & (total > 0.0)) | (both > 0.0).all(axis=1))
     found = error.copy()
     for side in (0, 1):
         np.maximum.at(found, pairs[wider, side], np.where(both[wider, side] > 0.0, total[wider], 0.0))

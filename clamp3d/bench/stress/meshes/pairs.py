@@ -31,8 +31,8 @@ from clamp3d.core.shapes import MeshShape, Shape, Solid
 CONTACT, CLEARANCE = 0.01, 0.5
 _SAME = 1e-6
 """Two distances (mm) that agree to this are one: Open CASCADE's own tolerance is 1e-7."""
-_DEEP = 5e-6
-"""The same for depths: beside an edge Open CASCADE's distance of a point from a shell is off by up to 2e-6."""
+_DEEP = 2e-5
+"""The same for depths: beside an edge Open CASCADE's distance of a point from a shell is off by up to 7e-6."""
 
 
 FITS: tuple[shapes.Fit, ...] = ("off", "round")
