@@ -33,6 +33,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "check": ("clamp3d.cli.check", "Check which parts of a scene clash, touch or keep their clearance."),
     "sweep": ("clamp3d.cli.sweep", "Map how far a wire may be misplaced before a clamp no longer closes on it."),
     "tolerance": ("clamp3d.cli.tolerance", "Sensitivity to each dimension, and a Monte Carlo over tolerances."),
+    "verify": ("clamp3d.cli.verify", "Compute a result again and compare every value."),
     "conductors": ("clamp3d.cli.conductors", "List the conductor catalogue."),
 }
 

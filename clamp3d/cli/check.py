@@ -9,6 +9,7 @@ import click
 
 from clamp3d.cli.options import JSON, QUIET, Source, argument, declared, group, option
 from clamp3d.cli.progress import bar
+from clamp3d.cli.results import write_result
 from clamp3d.cli.terminal import finish, show
 
 
@@ -33,7 +34,7 @@ def command(
     from clamp3d.collide.check import check, check_full
     from clamp3d.collide.result import BAD
     from clamp3d.collide.verdict import Verdict
-    from clamp3d.output.files import write_json, write_text
+    from clamp3d.output.files import write_text
     from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
 
     asked = _pairs(pairs) if pairs is not None else None
@@ -52,7 +53,7 @@ def command(
         complete = check_full(scene, result, progress=report) if full else None
     show(check_to_text(result, complete))
     if json_file is not None:
-        write_json(json_file, check_to_dict(result, complete))
+        write_result(json_file, check_to_dict(result, complete))
     if html_file is not None:
         write_text(html_file, check_to_html(result, complete))
     finish(

@@ -9,6 +9,7 @@ import click
 
 from clamp3d.cli.options import CLAMP, JSON, METHOD, QUIET, VIEWING, ClampSource, Method, Viewing, declared, option
 from clamp3d.cli.progress import narrator
+from clamp3d.cli.results import write_result
 from clamp3d.cli.terminal import finish, show
 
 if TYPE_CHECKING:
@@ -40,7 +41,6 @@ def command(
         equilibria if equilibria is not None else method.method == "cas" and settings["solver"] == "exact"
     )
     from clamp3d.clamp.assemble import assemble
-    from clamp3d.output.files import write_json
     from clamp3d.output.run_report import run_to_text
 
     loaded = source.clamp()
@@ -49,7 +49,7 @@ def command(
     def done(run: Assembly) -> None:
         show(run_to_text(run))
         if json_file is not None:
-            write_json(json_file, run.to_dict())
+            write_result(json_file, run.to_dict())
 
     if view or viewing.html_file is not None or viewing.url is not None:
         from clamp3d.cli.viewing import run_and_view

@@ -1,0 +1,101 @@
+"""What --json wrote is computed again, from the arguments that it holds."""
+
+import json
+
+import pytest
+import trimesh
+
+from clamp3d import cli
+
+BOXES = """
+[parts.a]
+shape = "box"
+size = [10, 10, 10]
+[parts.b]
+shape = "cylinder"
+radius = 4
+length = 10
+pose = { translation = [9.5, 0, 0], rpy_deg = [0, 30, 10] }
+"""
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(BOXES)
+    trimesh.creation.icosphere(subdivisions=2, radius=5.0).export(tmp_path / "ball.stl")
+
+    def run(*arguments):
+        monkeypatch.setattr("sys.argv", ["clamp3d", *arguments])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        return stop.value.code, capsys.readouterr()
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("arguments", "kept"),
+    [
+        (
+            ("run", "-q", "--line", "LJ-500", "--jumper", "16", "--no-equilibria"),
+            ["run", "--line", "LJ-500", "--jumper", "16", "--no-equilibria"],
+        ),
+        (("run", "--step", "1/3", "reference"), ["run", "--step", repr(1 / 3), "reference"]),
+        (("check", "scene.toml", "--distances", "-q"), ["check", "--distances", "scene.toml"]),
+        (("fit", "ball.stl"), ["fit", "ball.stl"]),
+        (("sweep", "--steps", "3", "--random", "4"), ["sweep", "--steps", "3", "--random", "4"]),
+        (("tolerance", "--n", "2", "--processes", "1"), ["tolerance", "--n", "2"]),
+    ],
+)
+def test_every_value_is_found_again(call, tmp_path, arguments, kept):
+    call(*arguments, "--json", "result.json")
+    assert json.loads((tmp_path / "result.json").read_text())["command"] == kept
+    code, said = call("verify", "result.json", "--tolerance", "0")
+    assert (code, said.err) == (0, "")
+    assert said.out.endswith("values computed again, all equal\n")
+
+
+def test_a_changed_value_is_a_finding(call, tmp_path):
+    file = tmp_path / "result.json"
+    assert call("check", "scene.toml", "-q", "--json", str(file))[0] == 1
+    data = json.loads(file.read_text())
+    data["parts"]["a"]["T_world"][0][3] = 1e-6
+    data["clean"] = True
+    del data["thresholds"]["contact_mm"]
+    file.write_text(json.dumps(data))
+    code, said = call("verify", "result.json")
+    assert code == 1
+    lines = said.out.splitlines()
+    assert lines[:3] == [
+        "thresholds.contact_mm: nothing in the file, 0.01 now",
+        "clean: True in the file, False now",
+        "parts.a.T_world.0.3: 1e-06 in the file, 0.0 now",
+    ]
+    assert (
+        "3 differ by more than 1e-09; the largest difference of a number is 1e-06, of parts.a.T_world.0.3" in lines[3]
+    )
+    assert call("verify", "result.json", "--tolerance", "1e-5")[1].out.splitlines()[0].startswith("thresholds")
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        ("", "not a JSON file"),
+        ("[1]", "does not say what was asked"),
+        ('{"command": ["run", 3]}', "does not say what was asked"),
+        ('{"command": ["view"]}', "asked for 'view', must be one of run, check, fit, sweep, tolerance"),
+        ('{"command": ["check", "gone.toml"]}', "gone.toml"),
+    ],
+)
+def test_what_is_no_result_is_bad_input(call, tmp_path, text, rule):
+    (tmp_path / "result.json").write_text(text)
+    code, said = call("verify", "result.json")
+    assert (code, said.out) == (2, "")
+    assert rule in said.err
+    assert len(said.err.splitlines()) == 1
+
+
+def test_a_file_that_is_not_there(call):
+    code, said = call("verify", "none.json")
+    assert (code, said.err) == (2, "clamp3d: error: none.json: cannot be read: No such file or directory\n")
