@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from heapq import heappop, heappush
-from typing import Any
+from typing import Any, cast
 
 import numba
 import numpy as np
@@ -145,6 +145,5 @@ def flat_truth(
     s, h, H = R * math.sin(half_angle), -R * math.cos(half_angle), 0.5 * L
     lips = [(x, h, z) for x in (-s, s) for z in (-H, min(max(float(c[2]), -H), H), H)]
     start = min(lips, key=lambda q: _own(*q, c, d, r, 0.5 * length)[0])
-    search: Any = _search
-    low, high, _ = search(R, s, h, H, r, 0.5 * length, c, d, *start, tolerance, most)
+    low, high, _ = cast(Any, _search)(R, s, h, H, r, 0.5 * length, c, d, *start, tolerance, most)
     return float(low), float(high)
