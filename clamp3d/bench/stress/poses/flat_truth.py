@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from heapq import heappop, heappush
-from typing import Any, cast
 
 import numba
 import numpy as np
@@ -143,7 +142,8 @@ def flat_truth(
     d = np.ascontiguousarray(T[:3, 2], np.float64)
     d = d / np.linalg.norm(d)
     s, h, H = R * math.sin(half_angle), -R * math.cos(half_angle), 0.5 * L
-    lips = [(x, h, z) for x in (-s, s) for z in (-H, min(max(float(c[2]), -H), H), H)]
-    start = min(lips, key=lambda q: _own(*q, c, d, r, 0.5 * length)[0])
-    low, high, _ = cast(Any, _search)(R, s, h, H, r, 0.5 * length, c, d, *start, tolerance, most)
+    lips: list[tuple[float, float, float]] = [(x, h, z) for x in (-s, s) for z in (-H, min(max(float(c[2]), -H), H), H)]
+    start = min(lips, key=lambda q: _own(q[0], q[1], q[2], c, d, r, 0.5 * length)[0])
+    qx, qy, qz = start
+    low, high, _ = _search(R, s, h, H, r, 0.5 * length, c, d, qx, qy, qz, tolerance, most)
     return float(low), float(high)
