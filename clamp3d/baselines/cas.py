@@ -9,7 +9,6 @@ from clamp3d.core.distance import Feature, signed_distances
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pieces import groove_pieces
 from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Capsule
 
 _SIDES = slice(0, 3)
 """Rows of `groove_pieces` that a wire through the whole groove can touch; the end faces are behind it."""
@@ -26,8 +25,7 @@ class Cas:
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to the arc surface and the two faces beside it, for a wire that passes through; see `ContactModel`."""
         T_a_b = pose_of(pair, T_a_b)
-        wire = Capsule(pair.cylinder.radius, pair.cylinder.length)  # its ends are out of the groove's reach
-        found = groove_pieces(pair.groove, wire, pair.T_groove_a @ T_a_b @ pair.T_b_cylinder)
+        found = groove_pieces(pair.groove, pair.cylinder, pair.T_groove_a @ T_a_b @ pair.T_b_cylinder)
         R, p = pair.T_groove_a[:3, :3], pair.T_a_groove[:3, 3]
         feature = tuple(_NAMES[code] for code in found.feature[_SIDES].tolist())
         return Pieces(found.distance[_SIDES], found.point_on_groove[_SIDES] @ R + p, found.normal[_SIDES] @ R, feature)

@@ -190,6 +190,7 @@ def on_arc(ez, R, half_angle, r, l, cx, cy, cz, dx, dy, dz, best, slack, eps, wo
     # Largest derivatives of w^2 by the angle; t is at most T from off.
     N = 2.0 * R * math.sqrt(kx * kx + ky * ky)
     W1, W2, W3 = N + T * T, N + 2.0 * T * T, N + 4.0 * T * T
+    M = R * math.sqrt(cx * cx + cy * cy)  # the same of half the squared distance from the cylinder's middle
     count = 0
     left = math.inf
     cuts = 4
@@ -249,6 +250,7 @@ def on_arc(ez, R, half_angle, r, l, cx, cy, cz, dx, dy, dz, best, slack, eps, wo
             if g_low > 0.0 and e_low > 0.0:  # all of it beyond the rim
                 G2 = w1 * w1 + g * w2 + e1 * e1 + e * e2
                 G3 = 3.0 * by * bend + g_high * third + 3.0 * T * T + e_high * T
+                G3 = min(G3, M + r * third + l * T)
                 if limit > 0.0 and 0.5 * (g * g + e * e) - fall(g * w1 + e * e1, G2, G3, half) >= 0.5 * limit * limit:
                     continue
                 if G3 * half < G2:

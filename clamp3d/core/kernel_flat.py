@@ -168,7 +168,7 @@ def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, slac
     if e > 0.0:
         for which in range(4):
             rho, x, y, z, by_r, by_l = rim_arc(which, R, r, l, cx, cy, cz, dx, dy, dz, 0.0)
-            if rho <= 0.0 or R - rho > best + slack:
+            if not (rho > 0.0 and R - rho <= best + slack):  # nor if a square has overflowed
                 continue
             inset = 0.0
             if rho > R:

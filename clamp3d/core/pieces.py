@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.checks import instance
 from clamp3d.core.distance import as_pose, repaired
 from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Capsule, SweptArc
+from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc, check_shapes
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +39,10 @@ class GroovePieces:
     gradient: Array
 
 
-def groove_pieces(groove: SweptArc, cylinder: Capsule, pose: ArrayLike) -> GroovePieces:
+def groove_pieces(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) -> GroovePieces:
     """Signed gap of each closed boundary piece of a groove to a cylinder.
 
-    While the cylinder's axis is outside the material, ``min(distance)`` is ``signed_distance(...).distance``. With the
+    While the capsule's axis is outside the material, ``min(distance)`` is ``signed_distance(...).distance``. With the
     axis inside, the gaps of the pieces it came through stay negative and fall further, with normals that lead back
     out; the other pieces keep their plain distance. Each gap is continuous, and smooth where its nearest point is
     unique; the one exception is an axis that enters through an end face: there the side pieces change sign at once.
@@ -52,8 +51,8 @@ def groove_pieces(groove: SweptArc, cylinder: Capsule, pose: ArrayLike) -> Groov
 
     Parameters
     ----------
-    groove, cylinder : SweptArc, Capsule
-        The two shapes.
+    groove, cylinder : SweptArc, Cylinder or Capsule
+        The two shapes; of a cylinder the capsule about it is measured, whose gaps are never larger.
     pose : array_like (4, 4)
         ``T_groove_cylinder``, mm.
 
@@ -76,9 +75,8 @@ def groove_pieces(groove: SweptArc, cylinder: Capsule, pose: ArrayLike) -> Groov
     >>> gaps.distance[:3].round(3).tolist()
     [0.133, 0.133, 0.133]
     """
-    if type(groove) is not SweptArc or type(cylinder) is not Capsule:
-        instance("groove", groove, SweptArc)
-        instance("cylinder", cylinder, Capsule)
+    if type(groove) is not SweptArc or type(cylinder) not in (Capsule, Cylinder):
+        check_shapes(groove, cylinder)
     T = as_pose(pose)
     out = np.empty((5, 14))
     from clamp3d.core.kernel_pieces import pieces  # compiled on first use

@@ -125,7 +125,7 @@ def _right(name: str, arguments: dict[str, Any], result: Any) -> None:
                 raise FindingError(f"poses[{k}]: {found[k]!r} in the batch, {one.distance!r} alone")
     elif name in ("check_pose", "relative_pose") and _off(result) > 1e-8:
         raise FindingError(f"the result is not rigid by {_off(result):.3g}")
-    elif name in ("SweptArc", "Cylinder"):
+    elif name in ("SweptArc", "Cylinder", "Capsule"):
         for field in dataclasses.fields(result):
             if type(getattr(result, field.name)) is not float:
                 raise FindingError(f"{field.name} is kept as {type(getattr(result, field.name)).__name__}")

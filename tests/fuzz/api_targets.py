@@ -124,7 +124,7 @@ def _groove(rng: Rng) -> Any:
 
 
 def _wire(rng: Rng) -> Any:
-    return kernel.Cylinder(size(rng), size(rng))
+    return (kernel.Cylinder if rng.random() < 0.5 else kernel.Capsule)(size(rng), size(rng))
 
 
 def _motion(rng: Rng) -> Any:
@@ -204,6 +204,7 @@ def targets() -> dict[str, tuple[float, Make]]:
             5,
             _simple(kernel.SweptArc, radius=size, half_angle=lambda r: float(r.uniform(0, 3.2)), length=size),
         ),
+        "Capsule": (1, _simple(kernel.Capsule, radius=size, length=size)),
         "Cylinder": (3, _simple(kernel.Cylinder, radius=size, length=size)),
         "signed_distance": (20, _simple(kernel.signed_distance, groove=_groove, cylinder=_wire, pose=pose)),
         "signed_distances": (

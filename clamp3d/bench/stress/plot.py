@@ -15,7 +15,13 @@ from clamp3d.output.figures import save_figure
 _LEAST = 1e-4
 _CELL_WIDTH, _CELL_HEIGHT, _LABELS, _HEAD = 0.78, 0.23, 1.75, 0.78
 """Inches."""
-_TITLES = {"pose": "single poses", "motion": "motions", "mesh": "meshes", "assembly": "whole clamps"}
+_TITLES = {
+    "pose": "single poses",
+    "flat": "flat ends",
+    "motion": "motions",
+    "mesh": "meshes",
+    "assembly": "whole clamps",
+}
 
 
 def plot(run: StressRun, path: Path) -> None:

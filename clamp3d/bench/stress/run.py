@@ -15,12 +15,19 @@ from clamp3d.bench.stress.meshes.family import MESHES
 from clamp3d.bench.stress.motions.family import MOTIONS
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.poses.family import POSES
+from clamp3d.bench.stress.poses.flat import FLATS
 from clamp3d.core.child import end_with_parent
 from clamp3d.errors import InputError, SolverError
 
 LIBRARIES = ("numpy", "numba", "scipy", "python-fcl", "coacd", "mpmath")
 
-KINDS: dict[str, Mapping[str, Family]] = {"pose": POSES, "motion": MOTIONS, "mesh": MESHES, "assembly": ASSEMBLIES}
+KINDS: dict[str, Mapping[str, Family]] = {
+    "pose": POSES,
+    "flat": FLATS,
+    "motion": MOTIONS,
+    "mesh": MESHES,
+    "assembly": ASSEMBLIES,
+}
 """Kind -> its families by name."""
 
 FAMILIES: dict[str, Family] = {name: family for kind in KINDS.values() for name, family in kind.items()}
@@ -30,7 +37,7 @@ METHODS: dict[str, str] = {name: about for f in FAMILIES.values() for name, (abo
 
 
 def expand(names: list[str]) -> list[str]:
-    """Families by name; ``pose``, ``motion``, ``mesh`` and ``assembly`` stand for all of their kind.
+    """Families by name; ``pose``, ``flat``, ``motion``, ``mesh`` and ``assembly`` stand for all of their kind.
 
     >>> expand(["ties", "mesh"])[:2]
     ['ties', 'mesh: open']

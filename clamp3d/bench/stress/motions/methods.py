@@ -53,7 +53,7 @@ class FclMethod:
     def measure(self, cases: Motions) -> Measured:
         """See `Method`: -1 where FCL finds contact, 1 where it does not."""
         k = int(cases.shape[0])
-        groove, wire = cases.shapes.groove(k), cases.shapes.cylinder(k)
+        groove, wire = cases.shapes.groove(k), cases.shapes.wire(k)
         n = len(cases)
         ways = [poses(cases, i, np.linspace(0.0, 1.0, 129)) for i in range(n)]
         reach = np.array([_reach(way, wire.length) + wire.radius for way in ways])
@@ -124,7 +124,7 @@ class CasMethod:
     def measure(self, cases: Motions) -> Measured:
         """See `Method`."""
         k = int(cases.shape[0])
-        groove, wire = cases.shapes.groove(k), cases.shapes.cylinder(k)
+        groove, wire = cases.shapes.groove(k), cases.shapes.wire(k)
         distance, bound = np.empty(len(cases)), np.empty(len(cases))
         for i in range(len(cases)):
             motion, start = cases.motion(i), cases.start[i]
@@ -162,7 +162,7 @@ class SteppedMethod:
     def measure(self, cases: Motions) -> Measured:
         """See `Method`."""
         k = int(cases.shape[0])
-        groove, wire = cases.shapes.groove(k), cases.shapes.cylinder(k)
+        groove, wire = cases.shapes.groove(k), cases.shapes.wire(k)
         ways = (poses(cases, i, self.instants) for i in range(len(cases)))
         least = np.array([signed_distances(groove, wire, way, workers=1).min() for way in ways])
         return Measured(least, np.full(len(cases), np.nan))

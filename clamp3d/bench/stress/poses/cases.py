@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from clamp3d.bench.stress.worker import Rows
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
 
 Extended = np.longdouble
 """80-bit floats where the platform has them: only there is the quick truth good enough (see `oracle`)."""
@@ -21,7 +21,7 @@ Extended = np.longdouble
 class Shapes:
     """Grooves and wires, one row each (k,): ``R``, ``half_angle``, ``L`` of the groove, ``r``, ``length`` of the wire.
 
-    Lengths in mm, angles in rad.
+    Lengths in mm, angles in rad. The wires are capsules, or cylinders with ``flat`` ends.
     """
 
     R: Array
@@ -29,6 +29,7 @@ class Shapes:
     L: Array
     r: Array
     length: Array
+    flat: bool = False
 
     def __len__(self) -> int:
         return len(self.R)
@@ -46,13 +47,17 @@ class Shapes:
         """Groove of row k."""
         return SweptArc(float(self.R[k]), float(self.half_angle[k]), float(self.L[k]))
 
-    def cylinder(self, k: int) -> Cylinder:
+    def wire(self, k: int) -> AnyCylinder:
         """Wire of row k."""
+        return (Cylinder if self.flat else Capsule)(float(self.r[k]), float(self.length[k]))
+
+    def cylinder(self, k: int) -> Cylinder:
+        """Wire of row k with flat ends."""
         return Cylinder(float(self.r[k]), float(self.length[k]))
 
     def snippet(self, k: int) -> list[str]:
         """Python lines that make the groove and the wire of row k, bit by bit the same numbers."""
-        shapes = {"groove": self.groove(k), "wire": self.cylinder(k)}
+        shapes = {"groove": self.groove(k), "wire": self.wire(k)}
         return ["import numpy as np", "import clamp3d", *(f"{n} = clamp3d.kernel.{s!r}" for n, s in shapes.items())]
 
     def pair(self, k: int) -> GroovePair:

@@ -37,7 +37,8 @@ def shapes(rng: np.random.Generator, k: int, **given: ArrayLike) -> Shapes:
         "length": R * 10.0 ** rng.uniform(-0.5, 1.5, k),
     }
     columns.update({name: np.broadcast_to(np.asarray(value, np.float64), (k,)) for name, value in given.items()})
-    return Shapes(**{name: np.ascontiguousarray(value) for name, value in columns.items()})
+    arrays: dict[str, Any] = {name: np.ascontiguousarray(value) for name, value in columns.items()}
+    return Shapes(**arrays)
 
 
 def spread(n: int, k: int) -> NDArray[np.intp]:

@@ -51,7 +51,7 @@ def poses(cases: Cases) -> Array:
 
 def _by_kernel(cases: Cases, T: Array) -> SignedDistances:
     k = int(cases.shape[0])
-    return signed_distances(cases.shapes.groove(k), cases.shapes.cylinder(k), T, full=True, workers=1)
+    return signed_distances(cases.shapes.groove(k), cases.shapes.wire(k), T, full=True, workers=1)
 
 
 class CasMethod:

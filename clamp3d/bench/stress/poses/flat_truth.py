@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from heapq import heappop, heappush
-from typing import Any
 
 import numba
 import numpy as np
@@ -21,7 +20,8 @@ from clamp3d.core.pose import Array
 
 @numba.njit(cache=True)
 def _own(x, y, z, c, d, r, l):  # type: ignore[no-untyped-def] # noqa: E741
-    """Signed distance of a point from the flat-ended cylinder, and a gradient of it."""
+    """Signed distance of a point from the flat-ended cylinder, a gradient of it, and the gradient's rounding error."""
+    size = abs(x) + abs(y) + abs(z) + abs(c[0]) + abs(c[1]) + abs(c[2])
     x, y, z = x - c[0], y - c[1], z - c[2]
     t = x * d[0] + y * d[1] + z * d[2]
     x, y, z = x - t * d[0], y - t * d[1], z - t * d[2]
@@ -34,47 +34,58 @@ def _own(x, y, z, c, d, r, l):  # type: ignore[no-untyped-def] # noqa: E741
         f = math.sqrt(max(side, 0.0) ** 2 + max(end, 0.0) ** 2)
         u, v = max(side, 0.0) / f, max(end, 0.0) / f
     if w == 0.0:
-        return f, v * up * d[0], v * up * d[1], v * up * d[2]
+        return f, v * up * d[0], v * up * d[1], v * up * d[2], 0.0
+    error = 1e-15 * u * size / w
     u /= w
     v *= up
-    return f, u * x + v * d[0], u * y + v * d[1], u * z + v * d[2]
+    return f, u * x + v * d[0], u * y + v * d[1], u * z + v * d[2], error
 
 
 @numba.njit(cache=True)
-def _box(lx, ly, lz, hx, hy, hz, R, s, h, c, d, r, l):  # type: ignore[no-untyped-def] # noqa: E741
-    """Lower bound of f over the material in a box (inf if there is none), and f at a point of the material (or inf)."""
+def _tangent(x, y, z, lx, ly, lz, hx, hy, hz, R, c, d, r, l):  # type: ignore[no-untyped-def] # noqa: E741
+    """Least value over the material in a box of the plane that is tangent to f at a point, and the gradient there."""
+    f, gx, gy, gz, error = _own(x, y, z, c, d, r, l)
     mx, my, mz = 0.5 * (lx + hx), 0.5 * (ly + hy), 0.5 * (lz + hz)
     ax, ay, az = 0.5 * (hx - lx), 0.5 * (hy - ly), 0.5 * (hz - lz)
+    error *= abs(mx - x) + abs(my - y) + abs(mz - z) + ax + ay + az
+    at_middle = f - error + gx * (mx - x) + gy * (my - y) + gz * (mz - z)
+    low = at_middle - abs(gx) * ax - abs(gy) * ay - abs(gz) * az
     rho = math.sqrt(mx * mx + my * my)
-    reach = math.sqrt(ax * ax + ay * ay)
-    if rho + reach < R:
-        return math.inf, math.inf, mx, my, mz
-    ex, ey = (mx / rho, my / rho) if rho > 0.0 else (0.0, -1.0)
-    f, gx, gy, gz = _own(mx, my, mz, c, d, r, l)
-    low = f - abs(gx) * ax - abs(gy) * ay - abs(gz) * az
+    if rho == 0.0:
+        return low, gx, gy, gz
+    ex, ey = mx / rho, my / rho
     k = gx * ex + gy * ey
-    if k > 0.0 and rho > 0.0:
-        across = abs(ey) * ax + abs(ex) * ay
-        chord = math.sqrt(max(R * R - across * across, 0.0))
-        if rho - reach > -chord:  # on this side of the axis
-            low = max(low, f + k * (chord - rho) - abs(gx - k * ex) * ax - abs(gy - k * ey) * ay - abs(gz) * az)
-    # A point of the material near the middle: pushed behind the arc, then below the flat faces.
-    px, py = mx, my
-    if rho < R:
-        px, py = ex * R, ey * R
-        if py > hy:
-            py = hy
-            px = math.copysign(math.sqrt(max(R * R - py * py, 0.0)), mx)
-    if py <= h and px * px + py * py >= R * R * (1.0 - 1e-15):
-        return low, _own(px, py, mz, c, d, r, l)[0], px, py, mz
-    return low, math.inf, px, py, mz
+    across = abs(ey) * ax + abs(ex) * ay
+    chord = math.sqrt(max(R * R - across * across, 0.0))
+    if k > 0.0 and rho - math.sqrt(ax * ax + ay * ay) > -chord:  # on this side of the axis
+        rest = abs(gx - k * ex) * ax + abs(gy - k * ey) * ay + abs(gz) * az
+        low = max(low, at_middle + k * (chord - rho) - rest)
+    return low, gx, gy, gz
 
 
 @numba.njit(cache=True)
-def _search(R, s, h, H, r, l, c, d, start, tolerance, most):  # type: ignore[no-untyped-def] # noqa: E741
-    """Interval [lower, upper] of the least f over the material, and how many boxes were looked at."""
-    best = start
-    reach = math.sqrt(r * r + l * l) + max(start, 0.0)
+def _point(x, y, z, R, h, H):  # type: ignore[no-untyped-def]
+    """A point of the material near (x, y, z), and whether there is one: behind the arc, or beside it below the face."""
+    y, z = min(y, h), min(max(z, -H), H)
+    rho = math.sqrt(x * x + y * y)
+    if rho < R:
+        if rho == 0.0:
+            return x, y, z, False
+        x, y = x * (R / rho), y * (R / rho)
+        if y > h:
+            y = h
+            x = math.copysign(math.sqrt(max(R * R - y * y, 0.0)), x)
+    return x, y, z, x * x + y * y >= R * R * (1.0 - 1e-15)
+
+
+@numba.njit(cache=True)
+def _search(R, s, h, H, r, l, c, d, qx, qy, qz, tolerance, most):  # type: ignore[no-untyped-def] # noqa: E741
+    """Interval [lower, upper] of the least f over the material, of which q is a point; how many boxes were looked at.
+
+    The tangent planes are those at a box's middle, and at its point that is nearest to the best one so far.
+    """
+    best = _own(qx, qy, qz, c, d, r, l)[0]
+    reach = math.sqrt(r * r + l * l) + max(best, 0.0)
     x0, x1 = c[0] - reach, c[0] + reach
     y0, y1 = c[1] - reach, min(c[1] + reach, h)
     z0, z1 = max(c[2] - reach, -H), min(c[2] + reach, H)
@@ -86,23 +97,34 @@ def _search(R, s, h, H, r, l, c, d, start, tolerance, most):  # type: ignore[no-
             return min(low, best - tolerance), best, count
         heappop(heap)
         wx, wy, wz = x1 - x0, y1 - y0, z1 - z0
-        m = 0.5
         for half in range(2):
             bx0, bx1, by0, by1, bz0, bz1 = x0, x1, y0, y1, z0, z1
             if wx >= wy and wx >= wz:
-                cut = x0 + m * wx
+                cut = x0 + 0.5 * wx
                 bx0, bx1 = (x0, cut) if half == 0 else (cut, x1)
             elif wy >= wz:
-                cut = y0 + m * wy
+                cut = y0 + 0.5 * wy
                 by0, by1 = (y0, cut) if half == 0 else (cut, y1)
             else:
-                cut = z0 + m * wz
+                cut = z0 + 0.5 * wz
                 bz0, bz1 = (z0, cut) if half == 0 else (cut, z1)
             count += 1
-            bound, value, _, _, _ = _box(bx0, by0, bz0, bx1, by1, bz1, R, s, h, c, d, r, l)
-            if value < best:
-                best = value
+            if max(bx0 * bx0, bx1 * bx1) + max(by0 * by0, by1 * by1) < R * R:
+                continue
+            mx, my, mz = 0.5 * (bx0 + bx1), 0.5 * (by0 + by1), 0.5 * (bz0 + bz1)
+            bound, gx, gy, gz = _tangent(mx, my, mz, bx0, by0, bz0, bx1, by1, bz1, R, c, d, r, l)
             bound = max(bound, low)
+            # Points of the material to try: near the middle, and near where the tangent plane is lowest.
+            for trial in range(2):
+                if trial == 1:
+                    mx, my, mz = bx0 if gx > 0.0 else bx1, by0 if gy > 0.0 else by1, bz0 if gz > 0.0 else bz1
+                px, py, pz, is_one = _point(mx, my, mz, R, h, H)
+                if is_one:
+                    f = _own(px, py, pz, c, d, r, l)[0]
+                    if f < best:
+                        best, qx, qy, qz = f, px, py, pz
+            nx, ny, nz = min(max(qx, bx0), bx1), min(max(qy, by0), by1), min(max(qz, bz0), bz1)
+            bound = max(bound, _tangent(nx, ny, nz, bx0, by0, bz0, bx1, by1, bz1, R, c, d, r, l)[0])
             if bound < best - tolerance:
                 heappush(heap, (bound, bx0, by0, bz0, bx1, by1, bz1))
     return best - tolerance, best, count
@@ -120,9 +142,8 @@ def flat_truth(
     d = np.ascontiguousarray(T[:3, 2], np.float64)
     d = d / np.linalg.norm(d)
     s, h, H = R * math.sin(half_angle), -R * math.cos(half_angle), 0.5 * L
-    start = math.inf
-    for x in (-s, s):
-        for z in (-H, min(max(c[2], -H), H), H):
-            start = min(start, _own(x, h, z, c, d, r, 0.5 * length)[0])
-    found: tuple[float, float, Any] = _search(R, s, h, H, r, 0.5 * length, c, d, start, tolerance, most)
-    return found[0], found[1]
+    lips: list[tuple[float, float, float]] = [(x, h, z) for x in (-s, s) for z in (-H, min(max(float(c[2]), -H), H), H)]
+    start = min(lips, key=lambda q: _own(q[0], q[1], q[2], c, d, r, 0.5 * length)[0])
+    qx, qy, qz = start
+    low, high, _ = _search(R, s, h, H, r, 0.5 * length, c, d, qx, qy, qz, tolerance, most)
+    return float(low), float(high)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +85,9 @@ def _vanishing(rng: np.random.Generator, n: int) -> Cases:
     which = rng.integers(3, size=k)
     tiny = R * 10.0 ** rng.uniform(-12, -3, k)
     base = draw.shapes(rng, k, R=R)
-    shrunk = {name: np.where(which == i, tiny, getattr(base, name)) for i, name in enumerate(("L", "r", "length"))}
+    shrunk: dict[str, Any] = {
+        name: np.where(which == i, tiny, getattr(base, name)) for i, name in enumerate(("L", "r", "length"))
+    }
     shapes = replace(base, **shrunk)
     shape, feature = draw.spread(n, k), rng.choice(draw.FEATURES, n)
     gap = shapes.R[shape] * draw.powers(rng, n, -12, -1)
