@@ -25,11 +25,10 @@ from clamp3d.clamp.sensitivity import sensitivity
 from clamp3d.clamp.tolerance import monte_carlo
 from clamp3d.cli import group
 from clamp3d.collide.distance import measure
-from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array, inverse
-from clamp3d.core.profile import Arc
 from clamp3d.core.shapes import Solid
 from clamp3d.errors import Clamp3dError
+from clamp3d.testing import body
 
 WIRES = [
     ("LJ-630", "LJ-120"),
@@ -52,39 +51,9 @@ def assembly(request: pytest.FixtureRequest) -> Assembly:
     return assemble(line=line, jumper=jumper)
 
 
-def planar_distance(body: Extrusion, a: float, b: float) -> float:
-    """Signed distance of (a, b) from an outline: negative inside. Written anew here, from the outline's edges alone."""
-    least, crossings = math.inf, 0.0
-    for edge in body.profile.edges:
-        if isinstance(edge, Arc):
-            centre = complex(*edge.centre)
-            turn = np.linspace(edge.start_angle, edge.end_angle, 201)
-            around = centre + edge.radius * np.exp(1j * turn)
-            points = np.column_stack([around.real, around.imag])
-            w = (complex(a, b) - centre) * np.exp(-0.5j * (edge.start_angle + edge.end_angle))  # its middle on a
-            if abs(np.angle(w)) <= 0.5 * abs(edge.sweep):
-                least = min(least, abs(abs(w) - edge.radius))
-            least = min(least, math.dist(points[0], (a, b)), math.dist(points[-1], (a, b)))
-        else:
-            points = np.array([edge.start, edge.end])
-            along = points[1] - points[0]
-            s = float(np.clip(((a, b) - points[0]) @ along / (along @ along), 0.0, 1.0))
-            least = min(least, math.dist(points[0] + s * along, (a, b)))
-        angles = np.unwrap(np.arctan2(points[:, 1] - b, points[:, 0] - a))
-        crossings += (angles[-1] - angles[0]) / (2.0 * math.pi)
-    return -least if round(crossings) else least
-
-
 def outside(solid: Solid, point: Array) -> float:
-    """How far a point is from the material at least, mm: outside of every body, or inside a hole."""
-    bodies, holes = [], []
-    for body in solid.bodies:
-        a, b, along = point @ body.frame
-        bodies.append(max(planar_distance(body, a, b), body.start - along, along - body.end))
-    for hole in solid.holes:  # right through: its ends are not walls
-        a, b, _ = point @ hole.frame
-        holes.append(-planar_distance(hole, a, b))
-    return max(0.0, min(bodies), *holes)
+    """How far a point is from the material at least, mm."""
+    return max(0.0, float(body(solid).field(point[None])[0]))
 
 
 def test_the_membership_test_itself() -> None:

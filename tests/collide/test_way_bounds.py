@@ -136,3 +136,29 @@ def test_what_is_inside_all_the_time_overlaps_all_the_time(inner, outer):
             assert least.distance.lower < 0.0
             stretch = [pose_at(way, t, start) for t in (0.0, 0.5, 1.0)]
             assert swept_lower(CACHE.model(a), CACHE.model(b), *stretch, angle=0.5 * way.angle) <= 0.0
+
+
+@settings(SLOW, max_examples=30)
+@given(st.floats(0.01, 0.99), st.floats(100.0, 2000.0), st.floats(0.05, 1.0), st.sampled_from([0, 1, 2]), st.booleans())
+@example(0.51, 1000.0, 0.5, 0, False)
+@example(0.49, 1000.0, 0.5, 1, True)
+def test_a_thin_plate_is_met_wherever_on_the_way_it_stands(when, length, thick, kind, back):
+    """A way of metres through a sheet: nothing between two times that are looked at may be stepped over."""
+    sheet = shapes.box((50.0, 50.0, thick))
+    pin = (Cylinder(2.0, 5.0), shapes.box((3.0, 4.0, 5.0)), FACETED[3])[kind]
+    half = (2.5, 2.5, 20.0)[kind]
+    start, way = translation(0.0, 0.0, when * length), Motion.translate((0.0, 0.0, -length))
+    if back:
+        start[:3, 3], way = [0.0, 0.0, -when * length], Motion.translate((0.0, 0.0, length))
+    hit = first_contact(sheet, pin, way, start)
+    assert hit.touches
+    truth = max(0.0, when - (half + 0.5 * thick) / length)
+    assert truth - 2e-4 / length * 1000.0 <= hit.t <= truth + 1e-9
+    least = min_clearance(sheet, pin, way, start)
+    assert least.touches
+    beside = translation(25.0 + 15.0, 0.0, 0.0)  # past the sheet's edge it is known how near
+    least = min_clearance(sheet, pin, way, beside @ start)
+    gap = 15.0 - (2.0, 1.5, 5.0)[kind]
+    assert least.distance.lower <= gap + 1e-9
+    assert least.distance.upper >= gap - 1e-9
+    assert least.distance.upper <= 1.03 * gap + 1e-3
