@@ -228,7 +228,7 @@ def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
             in_set[i] = False
     multipliers = np.zeros(len(gaps.value))
     if in_set.any():
-        multipliers[in_set] = nnls(gaps.gradient[np.ix_(in_set, free)].T, CLOSING[free])[0]
+        multipliers[in_set] = nnls(gaps.gradient[in_set][:, free].T, CLOSING[free])[0]
     multipliers[multipliers < _NO_MULTIPLIER] = 0.0
     return multipliers
 

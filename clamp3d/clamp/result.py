@@ -57,7 +57,7 @@ class Waypoint:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where closing begins: splint origins' distance along the bolt (mm), tilt (rad), wire centres seen from P1 (mm)."""
+    """Where closing begins: splint origins' distance (mm), tilt (rad), wire centres seen from P1 (mm)."""
 
     closing: float
     tilt: float

@@ -1,8 +1,8 @@
 """The clamp in its section: eight numbers place the parts, gaps say what may not overlap.
 
 Everything is seen from the up splint (P1 at rest), in the paper's section frame. The state q (8,) holds in mm: the two
-wire centres x6, y6, x7, y7; d, how far below P1's origin the down splint's stands when it rests in the saddle's apex (so
-that saddle and bolt follow d); s = half width * tilt; the bolt's shift b in the up splint's hole; and the down splint's
+wire centres x6, y6, x7, y7; d, how far below P1's origin the down splint's stands when it rests in the saddle's apex
+(saddle and bolt follow d); s = half width * tilt; the bolt's shift b in the up splint's hole; and the down splint's
 shift w beside the bolt. The last two stay 0 unless the clamp's joints have play.
 """
 
@@ -42,8 +42,8 @@ _FAR = 1e3
 class Gaps:
     """Values (k,) mm of the gaps at a state, their derivatives (k, 8) by q (dimensionless), and what each one is.
 
-    ``pair`` names the two parts, ``feature`` the piece; ``point`` (k, 2) is on one of them and ``normal`` (k, 2) leads from
-    the first to the second, in P1's section frame (right, down).
+    ``pair`` names the two parts, ``feature`` the piece; ``point`` (k, 2) is on one of them and ``normal`` (k, 2) leads
+    from the first to the second, in P1's section frame (right, down).
     """
 
     value: Array
@@ -102,15 +102,17 @@ class Section:
 
     @cached_property
     def play(self) -> tuple[float, float, float]:
-        """How far the bolt may shift in the up splint's hole, the saddle on the bolt, and the back in the saddle; mm."""
+        """How far the bolt may shift in the up splint's hole, the saddle on the bolt, the back in the saddle; mm."""
         clamp, joints = self.clamp, self.clamp.joints
         hole, washer = (0.5 * (p.hole_diameter - clamp.bolt.diameter) for p in (clamp.up_splint, clamp.saddle))
         slide = clamp.back_clearance * math.sin(clamp.saddle.half_angle)
         return hole * joints.hole, washer * joints.washer, slide * joints.saddle
 
     def lift(self, w: float) -> tuple[float, float, float]:
-        """How much higher the down splint rests when shifted by ``w``, mm, and its two derivatives: it rolls in the saddle
-        once the saddle has taken its play on the bolt."""
+        """How much higher the down splint rests when shifted by ``w``, mm, and its two derivatives.
+
+        It rolls in the saddle once the saddle has taken its play on the bolt.
+        """
         if w == 0.0:
             return 0.0, 0.0, 0.0
         c, aside = self.clamp.back_clearance, max(0.0, abs(w) - self.play[1])
@@ -323,8 +325,10 @@ class Section:
         )
 
     def _stop_rows(self, q: Array) -> _Rows:
-        """What ends the down splint's tilt and slide: its underside on the saddle's edges, its slot on the shank (Table 2
-        of the paper), and what play the joints leave."""
+        """What ends the down splint's tilt and slide.
+
+        Its underside on the saddle's edges, its slot on the shank (Table 2 of the paper), and the joints' play.
+        """
         clamp, down, saddle = self.clamp, self.clamp.down_splint, self.clamp.saddle
         r = clamp.bolt.diameter / 2
         (px, py, angle), b, w = self._down(q), float(q[B]), float(q[W])

@@ -139,7 +139,7 @@ def _derivatives(section: Section, final: FinalState) -> Array:
     def conditions(at: Section, x: Array) -> Array:
         """Gradient of the Lagrangian (n, up to a constant), active gaps (k), and the splint distance."""
         gaps = at.gaps(x)
-        gradient = -final.multipliers[active] @ gaps.gradient[np.ix_(active, free)]
+        gradient = -final.multipliers[active] @ gaps.gradient[active][:, free]
         return np.array([*gradient, *gaps.value[active], at.splint_distance(x)])
 
     def changed(name: str, by: float) -> Section:
@@ -150,7 +150,7 @@ def _derivatives(section: Section, final: FinalState) -> Array:
     )
     by_p = np.column_stack([conditions(changed(n, h), q) - conditions(changed(n, -h), q) for n in DIMENSIONS])
     by_q, by_p = by_q / (2.0 * h), by_p / (2.0 * h)
-    A, k = final.gaps.gradient[np.ix_(active, free)], len(active)
+    A, k = final.gaps.gradient[active][:, free], len(active)
     kkt = np.block([[by_q[: len(free)], -A.T], [A, np.zeros((k, k))]])
     sizes = np.linalg.svd(kkt, compute_uv=False)
     if sizes[-1] < _WELL_POSED * sizes[0]:

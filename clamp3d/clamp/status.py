@@ -20,7 +20,7 @@ def final_status(
     resolution: float = CONTACT,
     contacts: Iterable[Contact] = (),
 ) -> str:
-    """'clamped' if both wires are held between the splints, nothing overlaps, and the nut is wholly on the bolt; else why not.
+    """'clamped' if the splints hold both wires, nothing overlaps and the nut is wholly on the bolt; else why not.
 
     ``resolution`` mm: gaps of a stepped state up to it count as closed. ``contacts`` are those of the state where they
     have been measured: the section keeps apart every pair that can meet.

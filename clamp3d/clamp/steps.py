@@ -47,7 +47,7 @@ class Log:
 
 
 def approach_line(section: Section, opened: Array, start: Array, step: str, log: Log) -> Array:
-    """The ``opened`` clamp comes in from the right until the line lies under its groove, then settles down on the line."""
+    """The ``opened`` clamp comes in from the right until the line lies under its groove, then settles on the line."""
     clamp = section.clamp
     beside, over, settled = opened.copy(), opened.copy(), opened.copy()
     middle = 0.5 * (clamp.up_splint.thickness + section.down_splint(opened).point(0.0, clamp.down_splint.face_depth)[1])
@@ -143,7 +143,7 @@ def saddle_rise(section: Section, q: Array, saddle_d: float) -> float:
 
 
 def _saddle_lift(section: Section, q: Array, lift: float = 0.0) -> float:
-    """How far the saddle's arc centre, rising from ``lift`` above P2's origin, stands when it meets the round back; mm."""
+    """How far above P2's origin the saddle's arc centre, rising from ``lift``, is when it meets the round back; mm."""
     pair, aside = section.pairs["P3", "P2"], float(q[W]) - section.on_bolt(q)
     for _ in range(100):
         section.queries.contact += 1

@@ -41,7 +41,7 @@ def _lines(assembly: Assembly) -> Iterator[str]:
         pushes = ", ".join(f"{f.a}-{f.b} {f.force:.3f}" for f in assembly.forces if f.feature != HELD)
         yield f"contact forces per newton of bolt force: {pushes}"
         yield from (
-            f"sideways {f.force:.3f} is left over: the down splint is taken as {f.feature} (see joints in the clamp file)"
+            f"sideways {f.force:.3f} is left over: the down splint is taken as {f.feature} (joints in the clamp file)"
             for f in assembly.forces
             if f.feature == HELD
         )

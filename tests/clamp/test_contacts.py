@@ -219,7 +219,7 @@ def test_a_type_that_is_not_the_declared_one_is_a_difference() -> None:
 
 
 def against_the_bolt() -> Clamp:
-    """Thick wires on narrow grooves near the bolt: in the middle of their grooves they would reach 6 mm into its shank."""
+    """Thick wires on narrow grooves near the bolt: in their middle they would reach 6 mm into its shank."""
     clamp = load_clamp(line=52, jumper=52)
 
     def grooves(depth: float) -> dict[str, GrooveDimensions]:

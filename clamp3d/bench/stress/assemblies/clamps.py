@@ -60,7 +60,7 @@ def clamp_of(
     """The reference clamp with other grooves and wires; None if such grooves do not fit into its splints.
 
     Of the grooves up line, up jumper, down line, down jumper: ``radius`` (4,) mm, ``half_angle`` (4,) rad, ``offset``
-    (4,) mm from the bolt; ``diameter`` (2,) mm of line and jumper. ``max_tilt_deg`` is where a narrow slot stops the tilt.
+    (4,) mm from the bolt; ``diameter`` (2,) mm of line and jumper. A narrow slot stops the tilt at ``max_tilt_deg``.
     """
     base, parts = _base(), dict[str, dict[str, Any]](up_splint={}, down_splint={})
     R, half, beside = (np.broadcast_to(np.asarray(v, float), 4) for v in (radius, half_angle, offset))
