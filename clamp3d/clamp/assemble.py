@@ -4,26 +4,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import choice, function, number
+from clamp3d.clamp.closing import HELD, open_start
 from clamp3d.clamp.contact import Contact, measure_contacts, seats
-from clamp3d.clamp.dimensions import PARTS, Clamp
-from clamp3d.clamp.equilibria import describe, equilibria, same, slipping
+from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
+from clamp3d.clamp.equilibria import describe, equilibria, same, start_tilts
 from clamp3d.clamp.final_state import FinalState, solve_final_state
+from clamp3d.clamp.forces import contact_forces
 from clamp3d.clamp.loader import WireSize, load_clamp
-from clamp3d.clamp.matrix import PAIRS, Difference, Pair, contact_type
+from clamp3d.clamp.matrix import PAIRS, Difference, contact_type
 from clamp3d.clamp.meetings import meetings
-from clamp3d.clamp.result import Assembly, Equilibrium, Event, Solver, Waypoint, Work
+from clamp3d.clamp.result import Assembly, Equilibrium, Event, Solver, Start, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
-from clamp3d.clamp.section import D, S, Section
+from clamp3d.clamp.section import B, D, S, Section, W
 from clamp3d.clamp.sequence import parse_sequence
-from clamp3d.clamp.status import measured_status
+from clamp3d.clamp.status import CLAMPED, final_status
 from clamp3d.clamp.stepped import SteppedState, solve_bisection, solve_stepped
-from clamp3d.clamp.steps import Log, approach_line, first_touch, insert_jumper, section_poses
-from clamp3d.errors import InputError
+from clamp3d.clamp.steps import (
+    Log,
+    Meetings,
+    approach_line,
+    close_splints,
+    first_touch,
+    insert_jumper,
+    section_poses,
+    tighten_nut,
+)
+from clamp3d.errors import InputError, SolverError
 
 STEP = 1.0 / 3.0
 """Move along the bolt of the paper's program in mm (derived from its Table 4)."""
@@ -34,8 +47,6 @@ RESOLUTION = 1e-3
 
 _WIDEST = 1000.0
 """The most that a clamp is opened further than it needs, mm: descents are short."""
-_DRAWN: tuple[Pair, ...] = (("P2", "P3"), ("P1", "P5"), ("P3", "P4"))
-"""Pairs that the nut closes; the down splint closes all others."""
 
 
 def assemble(
@@ -70,7 +81,8 @@ def assemble(
     open_by, open_tilt : float
         How much further than needed the clamp stands open before it comes in; mm and rad.
     others : bool
-        Also find the other states that closing can end in (exact solver only).
+        Also find the other states that closing can end in, how far the start may tilt before one of them is reached,
+        and the distance with the joints' play (exact solver only).
     on_waypoint : callable, optional
         Called with every `Waypoint` as it is reached.
     progress : callable, optional
@@ -106,28 +118,35 @@ def assemble(
     sequence = [str(s) for s in parse_sequence(clamp.sequence)]
     section = Section(clamp, model)
     log = Log(section, on_waypoint)
-    q = section.open_state(section.open_distance() + open_by, open_tilt)
-    q = approach_line(section, q, sequence[0], log)
-    q = insert_jumper(section, q, sequence[1], log)
-    d_open = float(q[D])
+    opened = section.open_state(section.open_distance() + open_by, open_tilt)
+    start = open_start(section, open_by=open_by, open_tilt=open_tilt)
+    approach_line(section, opened, start, sequence[0], log)
+    insert_jumper(section, opened, start, sequence[1], log)
     final: FinalState | SteppedState
+    met: Meetings = []
     if solver == "exact":
-        final = solve_final_state(section, q)
-    elif solver == "stepped":
-        final = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
+        final = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
+        held = final.held
+        met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
     else:
-        final = solve_bisection(section, resolution=RESOLUTION, step=step, tilt_step=tilt_step, progress=progress)
-    travel = d_open - float(final.q[D])
-    first_touch(section, q, sequence[2], log, travel)
-    log.reach(sequence[2], "splints closed", section_poses(section, final.q, saddle_d=d_open))
+        if solver == "stepped":
+            final = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
+        else:
+            final = solve_bisection(section, resolution=RESOLUTION, step=step, tilt_step=tilt_step, progress=progress)
+        held = final.q
+        met = first_touch(section, start, float(start[D] - held[D]))
+    by_hand = [(pair, q) for pair, q in met if not q[[B, W]].any()]
+    close_splints(section, start, held, by_hand, sequence[2], log)
+    taken = [(pair, q) for pair, q in met if q[[B, W]].any()]
+    travel = tighten_nut(section, start, held, final.q, taken, sequence[3], log)
     poses = section_poses(section, final.q)
-    log.reach(sequence[3], "nut tightened", poses)
     contacts = measure_contacts(clamp, poses, model, cache=log.cache)
     resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
-    for drawn_by_nut, by in ((False, sequence[2]), (True, sequence[3])):
-        for c in contacts:
-            if c.gap <= resolution and (c.declared or c.type) not in (0, 1) and ((c.a, c.b) in _DRAWN) == drawn_by_nut:
-                log.events.append(Event(by, c.a, c.b, c.relation, c.point, travel))
+    found = {(e.a, e.b) for e in log.events}
+    for c in contacts:  # what touches in the end though no force says when
+        if c.gap <= resolution and (c.declared or c.type) not in (0, 1) and (c.a, c.b) not in found:
+            log.events.append(Event(sequence[2], c.a, c.b, c.relation, c.point, float(start[D] - held[D])))
+    log.events.sort(key=lambda e: (sequence.index(e.step), e.travel))
     queries = section.queries.contact  # what the assembly itself asked, without the other equilibria
     proof = (final.violation, final.optimality) if isinstance(final, FinalState) else (None, None)
     motion_steps = final.motion_steps if isinstance(final, SteppedState) else 0
@@ -135,7 +154,7 @@ def assemble(
         clamp=clamp,
         model=model,
         solver=solver,
-        status=measured_status(section, final, resolution, contacts),
+        status=final_status(section, final, resolution, contacts),
         distance=section.splint_distance(final.q),
         closing=float(final.q[D]),
         tilt=float(final.q[S]) / section.lever,
@@ -150,8 +169,37 @@ def assemble(
         violation=proof[0],
         optimality=proof[1],
         work=Work(len(PARTS), len(PAIRS), queries, motion_steps, model.meshes_built),
-        others=_others(section, final) if others and isinstance(final, FinalState) else None,
+        start=Start(float(start[D]), open_tilt, (float(start[0]), float(start[1])), (float(start[2]), float(start[3]))),
+        **(_solved(section, final, others, open_by, open_tilt) if isinstance(final, FinalState) else {}),
     )
+
+
+def _solved(section: Section, final: FinalState, others: bool, open_by: float, open_tilt: float) -> dict[str, Any]:
+    """What only an exact answer has: its forces and, if asked, what else closing could have ended in."""
+    found: dict[str, Any] = {"forces": contact_forces(section, final)}
+    if others:
+        found["others"] = _others(section, final)
+        found["start_tilts"] = start_tilts(section, final, open_by=open_by, open_tilt=open_tilt)
+        found["with_play"] = _with_play(section, final)
+    return found
+
+
+def _with_play(section: Section, final: FinalState) -> dict[str, float | None] | None:
+    """Distances that the clamp closes to from its final state when its joints have play, one after the other."""
+    if section.free != HELD:
+        return None
+    found: dict[str, float | None] = {}
+    for joints in (("hole",), ("hole", "saddle"), ("hole", "saddle", "washer")):
+        clamp = replace(section.clamp, joints=Joints(**dict.fromkeys(joints, True)))
+        free = Section(clamp, section.model)
+        try:
+            end = solve_final_state(free, final.q)
+        except SolverError:
+            found[", ".join(joints)] = None
+            continue
+        clamped = final_status(free, end) == CLAMPED
+        found[", ".join(joints)] = free.splint_distance(end.q) if clamped else None
+    return found
 
 
 def _undeclared(clamp: Clamp, contacts: Sequence[Contact], log: Log) -> tuple[Difference, ...]:
@@ -176,9 +224,9 @@ def _others(section: Section, final: FinalState) -> tuple[Equilibrium, ...]:
             distance=section.splint_distance(state.q),
             closing=float(state.q[D]),
             tilt=float(state.q[S]) / section.lever,
-            status=measured_status(section, state, CONTACT),
-            detail=describe(state),
-            is_equilibrium=not slipping(state),
+            status=final_status(section, state),
+            detail=describe(state, section.escaped(state.q)),
+            is_equilibrium=not section.escaped(state.q),
         )
         for state in equilibria(section)
         if not same(state, final)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.clamp.section import Gaps, Section
+from clamp3d.clamp.section import SIZE, Gaps, Section
 from clamp3d.core.pose import Array
 
 LEVEL = 1e-6
@@ -26,7 +26,7 @@ def least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array, 
     """
     strong = np.flatnonzero(multipliers)
     A = gaps.gradient[strong]
-    free = np.flatnonzero(np.abs(A).max(axis=0, initial=0.0) > 0.0)
+    free = touched(section, gaps, strong)
     if not len(free):
         return np.inf
     _, sizes, rows = np.linalg.svd(A[:, free])
@@ -53,13 +53,19 @@ def least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array, 
     return float(np.einsum("ni,ij,nj->n", motions, reduced, motions).min(initial=np.inf))
 
 
+def touched(section: Section, gaps: Gaps, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The free coordinates that any of the gaps ``rows`` depends on."""
+    free = np.array(section.free)
+    return np.asarray(free[np.abs(gaps.gradient[np.ix_(rows, free)]).max(axis=0, initial=0.0) > 0.0])
+
+
 def lagrangian_hessian(section: Section, q: Array, rows: NDArray[np.intp], multipliers: Array) -> Array:
-    """Second derivatives (6, 6) of goal - multipliers . gaps by central differences of the closed-form gradients."""
+    """Second derivatives (8, 8) of goal - multipliers . gaps by central differences of the closed-form gradients."""
     # A wire that nearly fills its groove turns its normal within R - r: the step must be short beside that.
     h = min(1e-4, max(1e-8, 0.03 * section.least_slack))
-    H = np.empty((6, 6))
-    for j in range(6):
-        e = np.zeros(6)
+    H = np.zeros((SIZE, SIZE))
+    for j in touched(section, section.gaps(q), rows):
+        e = np.zeros(SIZE)
         e[j] = h
         H[j] = -(multipliers @ (section.gaps(q + e).gradient[rows] - section.gaps(q - e).gradient[rows])) / (2.0 * h)
     return 0.5 * (H + H.T)

@@ -123,7 +123,7 @@ class DownSplint:
     back_half_angle_deg: Annotated[float, Field(gt=0.0, lt=90.0, strict=True)]
     slot_width: Length
     slot_length: Length
-    max_tilt_deg: Annotated[float, Field(gt=0.0, lt=45.0, strict=True)]
+    max_tilt_deg: Annotated[float, Field(gt=0.0, lt=45.0, strict=True)] | None = None
     line_groove: GrooveDimensions
     jumper_groove: GrooveDimensions
 
@@ -133,9 +133,9 @@ class DownSplint:
         return self.back_radius * math.cos(math.radians(self.back_half_angle_deg))
 
     @property
-    def max_tilt(self) -> float:
-        """Largest tilt either way in rad."""
-        return math.radians(self.max_tilt_deg)
+    def slot_bottom(self) -> float:
+        """Where the slot's walls come out of the round back, or of the underside beside it, below the origin; mm."""
+        return math.sqrt(max(self.back_radius**2 - (self.slot_width / 2) ** 2, self.underside_depth**2))
 
     def half_angle(self, groove: GrooveDimensions) -> float:
         """Half angle of a groove's arc in rad: it ends on the inner face."""
@@ -219,6 +219,17 @@ class Nut:
 
 @one_line_errors
 @dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+class Joints:
+    """Whether parts use their sideways play: the bolt in the up splint's ``hole``, the down splint's round back in the
+    ``saddle``, the saddle ``washer`` on the bolt. The paper holds the down splint on the bolt's axis: none of it."""
+
+    hole: bool = False
+    saddle: bool = False
+    washer: bool = False
+
+
+@one_line_errors
+@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
 class Clamp:
     """A parallel groove clamp with its two wires, connection matrix and assembly sequence."""
 
@@ -233,6 +244,7 @@ class Clamp:
     saddle: Saddle
     bolt: Bolt
     nut: Nut
+    joints: Joints = Joints()
     connections: dict[ClampPart, dict[ClampPart, ConnectionType]]
 
     @property
@@ -244,6 +256,42 @@ class Clamp:
     def back_clearance(self) -> float:
         """Distance of the two arc centres when the round back rests in the saddle's apex; mm."""
         return self.saddle.radius - self.down_splint.back_radius
+
+    @property
+    def _saddle_edge(self) -> tuple[float, float]:
+        """The saddle's edge as seen from the back's centre, when the back rests in the apex: distance in mm, angle."""
+        x, y = self.saddle.width / 2, self.saddle.radius * math.cos(self.saddle.half_angle) - self.back_clearance
+        return math.hypot(x, y), math.atan2(x, y)
+
+    @property
+    def _tilt_stops(self) -> dict[str, float]:
+        """Tilts in rad at which the bodies stop the down splint, centred over the bolt."""
+        down, r = self.down_splint, self.bolt.diameter / 2
+        distance, angle = self._saddle_edge
+        # The flat underside comes down on the saddle's edge.
+        stops = {"the saddle's edge": math.acos(min(1.0, down.underside_depth / distance)) - angle}
+        # A corner of the slot meets the upright shank: half cos t - depth sin t = r, lower end and upper end alike.
+        half = down.slot_width / 2
+        for depth in (down.slot_bottom, down.face_depth):
+            far = math.hypot(half, depth)
+            stops["the slot"] = min(stops.get("the slot", math.inf), math.acos(r / far) - math.atan2(depth, half))
+        return stops
+
+    @property
+    def tilt_stop(self) -> float:
+        """Tilt in rad, either way, at which the bodies stop the down splint when it is centred over the bolt.
+
+        >>> from clamp3d.clamp.loader import load_clamp
+        >>> clamp = load_clamp()
+        >>> round(math.degrees(clamp.tilt_stop), 3), clamp.tilt_stopped_by
+        (12.99, "the saddle's edge")
+        """
+        return min(self._tilt_stops.values())
+
+    @property
+    def tilt_stopped_by(self) -> str:
+        """What stops the tilt: "the saddle's edge" or "the slot"."""
+        return min(self._tilt_stops, key=self._tilt_stops.__getitem__)
 
     def connection(self, a: PartName, b: PartName) -> ConnectionType:
         """Entry c_ij of the connection matrix (Eq. 1 and Table 1 of the paper), symmetric."""
@@ -267,25 +315,27 @@ class Clamp:
             ("nut.across_flats", self.nut.across_flats),
         ):
             _rule(opening > 2 * r, f"{key} must be > bolt.diameter = {2 * r:g} mm, got {opening:g}")
-        # The leaning shank leaves the round back where its outer edge meets the circle: Table 2 at the back's end.
-        needed = 2 * down.back_radius * math.sin(down.max_tilt + math.asin(min(1.0, r / down.back_radius)))
         _rule(
-            down.slot_width >= needed,
-            f"down_splint.slot_width must be >= {needed:.4g} mm for a tilt of {down.max_tilt_deg:g} deg, "
-            f"got {down.slot_width:g}",
+            down.slot_width > 2 * r,
+            f"down_splint.slot_width must be > bolt.diameter = {2 * r:g} mm, got {down.slot_width:g}",
         )
         _rule(
             self.back_clearance > 0.0,
             f"saddle.radius must be > down_splint.back_radius = {down.back_radius:g} mm, got {self.saddle.radius:g}",
         )
-        # The saddle's edge as seen from the back's centre, which lies back_clearance below the saddle's own.
-        edge = self.saddle.radius * math.cos(self.saddle.half_angle) - self.back_clearance
-        reach = math.degrees(math.atan2(self.saddle.width / 2, edge)) + down.max_tilt_deg
+        reach = math.degrees(self._saddle_edge[1])
         _rule(
             down.back_half_angle_deg >= reach,
-            f"down_splint.back_half_angle_deg must be >= {reach:.4g} (saddle's edge + max_tilt_deg), "
+            f"down_splint.back_half_angle_deg must be >= {reach:.4g} (the saddle's edge), "
             f"got {down.back_half_angle_deg:g}",
         )
+        if down.max_tilt_deg is not None:
+            stop = math.degrees(self.tilt_stop)
+            _rule(
+                down.max_tilt_deg <= stop,
+                f"down_splint.max_tilt_deg must be <= {stop:.4g}, where {self.tilt_stopped_by} stops the tilt, "
+                f"got {down.max_tilt_deg:g}",
+            )
         for a, row in self.connections.items():
             for b in row:
                 _rule(a < b, f"connections.{a}.{b}: the matrix is given above its diagonal, write it as {b}.{a}")

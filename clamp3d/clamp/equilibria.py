@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from clamp3d.checks import instance
+from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.dimensions import TITLES, PartName
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.landscape import initial_guesses
-from clamp3d.clamp.section import MOUTH, WIRES, D, S, Section
-from clamp3d.errors import SolverError
+from clamp3d.clamp.section import EDGE, WIRES, B, D, S, Section, W
+from clamp3d.clamp.status import stop_words
+from clamp3d.errors import InputError, SolverError
 
-OFF_ARC = ("face ", "flat", "lip", "end", "corner")
+OFF_ARC = ("face ", "flat", "lip", "end", "corner", EDGE)
 """How the names of features begin that are not of a groove's arc."""
+_TILT = math.radians(0.1)
+"""How closely the tilts of the start are told."""
 SAME = 1e-6
 """States whose distance, tilt and held wires agree to this many mm are one."""
-_TRUST_RADIUS = 0.004
-"""Longest move of a descent that begins just above an equilibrium, in parts of the down splint's half width."""
+_STRIDE = 0.004
+"""Longest step of a path that begins just above an equilibrium, in parts of the down splint's half width."""
 
 
 def equilibria(section: Section) -> tuple[FinalState, ...]:
@@ -24,7 +30,7 @@ def equilibria(section: Section) -> tuple[FinalState, ...]:
 
     Starts are taken just above every local minimum of the sampled distance (`landscape`). A clamp in which a wire can
     rest on a lip as well as in its groove has more than one equilibrium; which one it ends in depends on how it is put
-    together. States in which a wire is about to slip out of its mouth are among them, for there the closing ends too.
+    together. A state that a wire has slipped out of is among them: the closing ends there too.
     A minimum so shallow that opening by 1.5e-4 of the down splint's half width (0.01 mm of the reference clamp) lets
     the clamp slide on may be missing.
 
@@ -55,7 +61,7 @@ def equilibria(section: Section) -> tuple[FinalState, ...]:
     last: SolverError | None = None
     for start in initial_guesses(section):
         try:
-            state = solve_final_state(section, start, _TRUST_RADIUS)
+            state = solve_final_state(section, start, stride=_STRIDE)
         except SolverError as error:
             last = error
             continue
@@ -68,33 +74,52 @@ def equilibria(section: Section) -> tuple[FinalState, ...]:
     return tuple(sorted(found, key=lambda state: float(state.q[D])))
 
 
+def start_tilts(section: Section, final: FinalState, *, open_by: float, open_tilt: float) -> tuple[float, float]:
+    """Tilts (rad) of the open clamp between which closing ends in ``final``, which it does from ``open_tilt``.
+
+    Either way the furthest tilt is tried first; where that ends elsewhere the boundary is halved down to 0.1 degrees. A
+    start in between that ends elsewhere all the same is not seen.
+    """
+
+    def reaches(tilt: float) -> bool:
+        try:
+            return same(solve_final_state(section, open_start(section, open_by=open_by, open_tilt=tilt)), final)
+        except (SolverError, InputError):
+            return False
+
+    ends = []
+    for limit in (-section.clamp.tilt_stop, section.clamp.tilt_stop):
+        inside, outside = (limit, limit) if reaches(limit) else (open_tilt, limit)
+        while abs(outside - inside) > _TILT:
+            middle = 0.5 * (inside + outside)
+            inside, outside = (middle, outside) if reaches(middle) else (inside, middle)
+        ends.append(inside)
+    return ends[0], ends[1]
+
+
 def same(a: FinalState, b: FinalState) -> bool:
     """Whether two final states are one. Loose wires lie where gravity leaves them: they do not tell states apart."""
     if a.loose != b.loose:
         return False
     held = [k for i, wire in enumerate(WIRES) if wire not in a.loose for k in (2 * i, 2 * i + 1)]
-    return bool(np.abs((a.q - b.q)[[*held, D, S]]).max() <= SAME)
+    return bool(np.abs((a.q - b.q)[[*held, D, S, B, W]]).max() <= SAME)
 
 
-def describe(state: FinalState) -> str:
-    """What holds a state beside the grooves' arcs: 'jumper on a lip of the down splint, at the tilt limit'."""
+def describe(state: FinalState, slipped: tuple[PartName, ...]) -> str:
+    """What holds a state beside the grooves' arcs: 'jumper on a lip of the down splint, faces meet'.
+
+    ``slipped`` are the wires that have left the clamp (`Section.escaped`).
+    """
     words = []
     for wire in WIRES:
-        lips = [TITLES[pair[0]] for pair, feature in state.active if pair[1] == wire and feature.startswith(OFF_ARC)]
-        if wire in slipping(state):
+        on = {pair[0]: feature for pair, feature in state.active if pair[1] == wire and feature.startswith(OFF_ARC)}
+        kinds = {
+            p: f"{'the face' if name.startswith('flat') else 'a lip'} of the {TITLES[p]}" for p, name in on.items()
+        }
+        if wire in slipped:
             words.append(f"{TITLES[wire]} slips out of its groove")
-        elif lips:
-            words.append(f"{TITLES[wire]} on a lip of the {' and the '.join(dict.fromkeys(lips))}")
+        elif kinds:
+            words.append(f"{TITLES[wire]} on {' and '.join(kinds.values())}")
         elif wire in state.loose:
             words.append(f"{TITLES[wire]} loose")
-    if any(pair == ("P1", "P2") for pair, _ in state.active):
-        words.append("faces meet")
-    if any(feature == "tilt limit" for _, feature in state.active):
-        words.append("at the tilt limit")
-    return ", ".join(words)
-
-
-def slipping(state: FinalState) -> tuple[PartName, ...]:
-    """The wires that nothing but the end of the mouth keeps in it: closing ends there, but it is no equilibrium."""
-    out = {pair[1] for pair, feature in state.active if feature == MOUTH}
-    return tuple(wire for wire in WIRES if wire in out)
+    return ", ".join([*words, *stop_words(state.active)])

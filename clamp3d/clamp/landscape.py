@@ -13,19 +13,23 @@ import math
 
 import numpy as np
 
-from clamp3d.clamp.section import WIRES, D, S, Section
+from clamp3d.clamp.section import SIZE, WIRES, D, S, Section
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array
 
 _TILTS, _POSITIONS = 481, 961
 _ADVANCES = 80
+_LEVEL = 1e-9
+"""Distances that differ by this part of the wire's radius are level: between two faces a wire rests anywhere."""
+_ROUNDING = 1e-9
+"""Overlap in parts of the wire's radius that is none: a wire stands beside the bolt."""
 _CLEAR = 1e-3
 """Gap in parts of the wire's radius that a start leaves to what it would touch."""
 
 
 def initial_guesses(section: Section) -> list[Array]:
-    """Open states q (6,), each just above a local minimum of the feasible distance; the lowest first."""
-    limit, lever = section.clamp.down_splint.max_tilt, section.lever
+    """Open states q (8,), each just above a local minimum of the feasible distance; the lowest first."""
+    limit, lever = section.clamp.tilt_stop, section.lever
     tilts = np.linspace(-limit, limit, _TILTS)
     faces = np.array([_faces(section, tilt) for tilt in tilts])
     wires = [_Minima(section, i, tilts) for i in range(len(WIRES))]
@@ -37,7 +41,7 @@ def initial_guesses(section: Section) -> list[Array]:
             here = max(faces[k], one[1], other[1])
             if here > max(faces[left], one[0], other[0]) or here > max(faces[right], one[2], other[2]):
                 continue
-            q = np.zeros(6)
+            q = np.zeros(SIZE)
             q[D], q[S] = here, lever * tilt
             for i, w, minimum in ((0, wires[0], a), (2, wires[1], b)):
                 at = w.position[minimum]
@@ -57,7 +61,7 @@ class _Minima:
     def __init__(self, section: Section, i: int, tilts: Array) -> None:
         wire, bolt = WIRES[i], section.bolt_x
         up, down = section.pairs["P1", wire], section.pairs["P2", wire]
-        r, (low, high) = up.cylinder.radius, section.bounds()[2 * i]
+        r, (low, high) = up.cylinder.radius, section.reach(wire)
         face = section.clamp.down_splint.face_depth
         self.x = np.linspace(low, high, _POSITIONS)
         self.over = _curve(section, up, self.x, section.clamp.up_splint.thickness + 1.01 * r, -1.0)
@@ -69,10 +73,10 @@ class _Minima:
         for k, tilt in enumerate(tilts):
             c, s = math.cos(tilt), math.sin(tilt)
             self.under[k] = np.interp(self.x, np.maximum.accumulate(bolt + u * c + v * s), v * c - u * s)
-        least = self.over - self.under
+        least = np.round((self.over - self.under) / (_LEVEL * r)) * (_LEVEL * r)
         walled = np.pad(least, ((0, 0), (1, 1)), constant_values=np.inf)
         to_left, to_right = walled[:, :-2], walled[:, 2:]
-        step = np.where((to_right < least) & (to_right <= to_left), 1, np.where(to_left < least, -1, 0))
+        step = np.where((to_right < least) & (to_right <= to_left), 1, np.where(to_left <= least, -1, 0))
         row, self.position = np.nonzero(step == 0)
         key = row * _POSITIONS + self.position
         self.beside = np.empty((len(key), 3))
@@ -82,11 +86,12 @@ class _Minima:
             after = np.searchsorted(key, rows * _POSITIONS + self.position, side="left")
             end = key[np.where(step[rows, self.position] < 0, after - 1, after)]
             self.beside[:, column] = least[rows, end % _POSITIONS]
+        self._outside = 0 if i == 0 else _POSITIONS - 1
         self._first = np.searchsorted(row, np.arange(len(tilts) + 1))
 
-    def at(self, k: int) -> range:
-        """The minima at tilt k."""
-        return range(self._first[k], self._first[k + 1])
+    def at(self, k: int) -> list[int]:
+        """The minima at tilt k, but for that in which the wire leaves the clamp."""
+        return [m for m in range(self._first[k], self._first[k + 1]) if self.position[m] != self._outside]
 
 
 def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: float) -> Array:
@@ -105,9 +110,9 @@ def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: flo
 
 def _faces(section: Section, tilt: float) -> float:
     """Least d at which the inner faces do not overlap."""
-    q = np.zeros(6)
+    q = np.zeros(SIZE)
     q[S] = section.lever * tilt
-    return float(-section.face_gaps(q).value[:2].min())
+    return float(-section.face_gaps(q).value.min())
 
 
 def _open(section: Section, q: Array) -> Array | None:
@@ -115,7 +120,7 @@ def _open(section: Section, q: Array) -> Array | None:
     r = min(section.pairs["P1", wire].cylinder.radius for wire in WIRES)
     for _ in range(30):
         lacking = float(section.gaps(q).value.min())
-        if lacking >= 0.0:
+        if lacking >= -_ROUNDING * r:
             return q
         more = max(2.0 * -lacking, _CLEAR * r)
         q = q.copy()

@@ -12,6 +12,7 @@ from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import instance
 from clamp3d.clamp.contact import Contact, Seat, measure_contacts, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
+from clamp3d.clamp.forces import Force
 from clamp3d.clamp.matrix import Difference, Pair, differences, plain
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.collide.scene import Scene
@@ -52,6 +53,21 @@ class Waypoint:
     def T_world(self, part: PartName) -> Array:
         """Pose (4, 4) of a part in the world, lengths in mm."""
         return self.poses[part].T()
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where closing begins: splint origins' distance (mm), tilt (rad), wire centres seen from P1 (mm)."""
+
+    closing: float
+    tilt: float
+    line: tuple[float, float]
+    jumper: tuple[float, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        data = plain(self, closing="closing_mm", tilt="tilt_deg")
+        return data | {"tilt_deg": math.degrees(self.tilt)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,8 +172,16 @@ class Assembly:
         Proof of the exact answer in mm: deepest overlap, and residual of the optimality conditions.
     work : Work
         What the answer took.
+    start : Start
+        Where closing began.
+    forces : tuple of Force
+        The contact forces per newton of bolt force (exact solver).
     others : tuple of Equilibrium or None
         The other states that closing can end in, the one closed furthest first; None if they were not looked for.
+    start_tilts : (float, float) or None
+        Tilts of the open down splint, rad, between which closing ends in this state; None if they were not looked for.
+    with_play : dict or None
+        Distance in mm with the joints' play (None: not clamped), by the joints that have it; None if not looked for.
     """
 
     clamp: Clamp
@@ -178,6 +202,10 @@ class Assembly:
     violation: float | None
     optimality: float | None
     work: Work
+    start: Start
+    forces: tuple[Force, ...] = ()
+    start_tilts: tuple[float, float] | None = None
+    with_play: dict[str, float | None] | None = None
     others: tuple[Equilibrium, ...] | None = None
 
     @property
@@ -281,6 +309,10 @@ class Assembly:
             "findings": [plain(finding) for finding in self.findings],
             "residuals": {"largest_violated_gap_mm": self.violation, "optimality_mm": self.optimality},
             "other_ends": None if self.others is None else [e.to_dict() for e in self.others],
+            "start": self.start.to_dict(),
+            "start_tilts_deg": None if self.start_tilts is None else [math.degrees(t) for t in self.start_tilts],
+            "forces": [f.to_dict() for f in self.forces],
+            "with_play_mm": self.with_play,
             "work": plain(self.work),
         }
 

@@ -1,50 +1,63 @@
-"""The clamp in its section: six numbers place the wires and the down splint, gaps say what may not overlap.
+"""The clamp in its section: eight numbers place the parts, gaps say what may not overlap.
 
-Everything is seen from the up splint (P1 at rest), in the paper's section frame. The state q holds (x6, y6, x7, y7,
-d, s) in mm: the two wire centres, the down splint's origin d below P1's along the bolt, and s = half width * tilt.
+Everything is seen from the up splint (P1 at rest), in the paper's section frame. The state q (8,) holds in mm: the two
+wire centres x6, y6, x7, y7; d, how far below P1's origin the down splint's stands when it rests in the saddle's apex
+(saddle and bolt follow d); s = half width * tilt; the bolt's shift b in the up splint's hole; and the down splint's
+shift w beside the bolt. The last two stay 0 unless the clamp's joints have play.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from clamp3d.baselines.model import ContactModel, check_model
+from clamp3d.baselines.model import ContactModel, Pieces, check_model
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
+from clamp3d.clamp.matrix import Pair
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.pose import Array, SectionPose, inverse
+from clamp3d.core.pose import Array, SectionPose
 
 SPLINTS: tuple[PartName, PartName] = ("P1", "P2")
 WIRES: tuple[PartName, PartName] = ("P6", "P7")
-D, S = 4, 5
-"""Where the down splint's distance and scaled tilt stand in the state q."""
+D, S, B, W = 4, 5, 6, 7
+"""Where the down splint's distance, its scaled tilt, and the shifts of bolt and down splint stand in the state q."""
+SIZE = 8
+"""Coordinates of a state."""
 
-MOUTH = "mouth"
-"""Feature of the gaps that keep a wire in the mouth it was put into."""
-
+EDGE = "outer edge"
+"""Feature of a splint's gap to a wire that has left its face sideways."""
 
 _SPARE, _SPARE_OF_LEVER = 10.0, 0.2
 """How much wider than the wires need a clamp stands open, mm, and at most how much of its half width."""
+_FAR = 1e3
+"""Gap in mm of a piece that another one stands for."""
 
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """Values (k,) mm of the gaps at a state, their derivatives (k, 6) by q (dimensionless), and what each one is.
+    """Values (k,) mm of the gaps at a state, their derivatives (k, 8) by q (dimensionless), and what each one is.
 
-    ``pair`` names the two parts, ``feature`` the piece; ``point`` (k, 2) is on the first part in P1's section frame.
+    ``pair`` names the two parts, ``feature`` the piece; ``point`` (k, 2) is on one of them and ``normal`` (k, 2) leads
+    from the first to the second, in P1's section frame (right, down).
     """
 
     value: Array
     gradient: Array
-    pair: tuple[tuple[PartName, PartName], ...]
+    pair: tuple[Pair, ...]
     feature: tuple[str, ...]
     point: Array
+    normal: Array
+
+
+_Rows = tuple[Array, Array, Array, tuple[Pair, ...], tuple[str, ...], Array, Array]
+"""Values, gradients, derivatives (k, 3) by the down splint's x, y and angle, pairs, features, points, normals."""
+_Row = tuple[float, tuple[float, ...], tuple[float, float, float], Pair, str, tuple[float, float], tuple[float, float]]
+_NONE = (0.0, 0.0, 0.0)
 
 
 @dataclass
@@ -67,66 +80,117 @@ class Section:
         check_model(self.model)
 
     @cached_property
-    def pairs(self) -> dict[tuple[PartName, PartName], GroovePair]:
+    def pairs(self) -> dict[Pair, GroovePair]:
         """The clamp's grooves with what lies in them."""
         return groove_pairs(self.clamp)
 
-    @property
+    @cached_property
     def lever(self) -> float:
         """Half width of the down splint in mm: it turns the tilt into a length."""
         return self.clamp.down_splint.width / 2
 
-    @property
+    @cached_property
     def bolt_x(self) -> float:
-        """Bolt axis from P1's left edge in mm."""
+        """Axis of the up splint's hole from P1's left edge in mm."""
         return self.clamp.up_splint.width / 2
+
+    @cached_property
+    def free(self) -> tuple[int, ...]:
+        """The coordinates of q that move."""
+        joints = self.clamp.joints
+        return (0, 1, 2, 3, D, S, *([B] if joints.hole else []), *([W] if joints.saddle or joints.washer else []))
+
+    @cached_property
+    def play(self) -> tuple[float, float, float]:
+        """How far the bolt may shift in the up splint's hole, the saddle on the bolt, the back in the saddle; mm."""
+        clamp, joints = self.clamp, self.clamp.joints
+        hole, washer = (0.5 * (p.hole_diameter - clamp.bolt.diameter) for p in (clamp.up_splint, clamp.saddle))
+        slide = clamp.back_clearance * math.sin(clamp.saddle.half_angle)
+        return hole * joints.hole, washer * joints.washer, slide * joints.saddle
+
+    def lift(self, w: float) -> tuple[float, float, float]:
+        """How much higher the down splint rests when shifted by ``w``, mm, and its two derivatives.
+
+        It rolls in the saddle once the saddle has taken its play on the bolt.
+        """
+        if w == 0.0:
+            return 0.0, 0.0, 0.0
+        c, aside = self.clamp.back_clearance, max(0.0, abs(w) - self.play[1])
+        rest = math.sqrt(max(c * c - aside * aside, 1e-12 * c * c))
+        return aside * aside / (c + rest), math.copysign(aside / rest, w), c * c / rest**3 if aside else 0.0
 
     def down_splint(self, q: Array) -> SectionPose:
         """P2 seen from P1."""
-        return SectionPose(self.bolt_x, float(q[D]), float(q[S]) / self.lever)
+        return SectionPose(*self._down(q))
+
+    def _down(self, q: Array) -> tuple[float, float, float]:
+        w = float(q[W])
+        return self.bolt_x + float(q[B]) + w, float(q[D]) - self.lift(w)[0], float(q[S]) / self.lever
 
     @property
     def least_slack(self) -> float:
         """Least difference of a wire's and its groove's radius in mm."""
         return min(abs(p.groove.radius - p.cylinder.radius) for p in self.pairs.values() if p.a != "P3")
 
-    def bounds(self) -> list[tuple[float, float]]:
-        """Limits of q: each wire stays in the mouth it was put into (a longer way out exists, but no wire takes it)."""
-        limits = [(-np.inf, np.inf)] * 6
-        for i, wire in enumerate(WIRES):
-            pair = self.pairs["P1", wire]
-            half_mouth = pair.groove.radius * math.sin(pair.groove.half_angle)
-            centre = float(pair.T_a_groove[0, 3])
-            limits[2 * i] = (centre - half_mouth, centre + half_mouth)
-        return limits
+    def mouth(self, wire: PartName) -> tuple[float, float]:
+        """Where the up splint's groove begins and ends on its inner face, x in mm."""
+        pair = self.pairs["P1", wire]
+        half = pair.groove.radius * math.sin(pair.groove.half_angle)
+        centre = float(pair.T_a_groove[0, 3])
+        return centre - half, centre + half
+
+    def reach(self, wire: PartName) -> tuple[float, float]:
+        """Between which x a wire's centre is beside the bolt (shank at rest) and touches the up splint; mm."""
+        r, bolt = self.pairs["P1", wire].cylinder.radius, self.clamp.bolt.diameter / 2
+        if wire == "P6":
+            return -r, self.bolt_x - bolt - r
+        return self.bolt_x + bolt + r, self.clamp.up_splint.width + r
 
     def wire_limits(self, q: Array, wire: PartName) -> tuple[tuple[float, float], tuple[float, float]]:
         """Limits of a wire's (x, y) at a state: its mouth, and the bottoms of the two grooves that face each other.
 
         Parts of finite size are free behind their grooves too; a search must not put the wire there.
         """
-        i = WIRES.index(wire)
         up, down = self.pairs["P1", wire], self.pairs["P2", wire]
         top = -up.T_a_groove[2, 3] - up.groove.radius
         centre = self.down_splint(q).point(down.T_a_groove[0, 3], -down.T_a_groove[2, 3])[1]
-        return self.bounds()[2 * i], (float(top), centre + down.groove.radius)
+        return self.mouth(wire), (float(top), centre + down.groove.radius)
+
+    def on_bolt(self, q: Array) -> float:
+        """The saddle's shift over the bolt, mm: it goes with the down splint as far as its hole lets it."""
+        return min(max(float(q[W]), -self.play[1]), self.play[1])
 
     def splint_distance(self, q: Array) -> float:
         """Height between the inner edges of the splints on the line side (the distance of Table 4); mm."""
         up, down = self.clamp.up_splint, self.clamp.down_splint
         return self.down_splint(q).point(-down.width / 2, down.face_depth)[1] - up.thickness
 
+    def escaped(self, q: Array) -> tuple[PartName, ...]:
+        """The wires whose centre is beside a splint: nothing leads them back."""
+        half, pose = self.clamp.down_splint.width / 2, self.down_splint(q)
+        c, s = math.cos(pose.angle), math.sin(pose.angle)
+        found = []
+        for i, wire in enumerate(WIRES):
+            x, y = float(q[2 * i]), float(q[2 * i + 1])
+            u = (x - pose.x) * c - (y - pose.y) * s
+            if not (0.0 <= x <= self.clamp.up_splint.width and abs(u) <= half):
+                found.append(wire)
+        return tuple(found)
+
     def open_state(self, d: float, tilt: float = 0.0) -> Array:
         """State with the down splint at ``d`` and ``tilt``, both wires in the middle between their two arc centres.
 
-        Where that is beside the up splint's mouth, or so deep that the wire would meet an inner face, it is put clear.
+        Where that is beside the up splint's mouth, in the bolt, or so deep that the wire would meet an inner face, it
+        is put clear.
         """
-        q = np.array([0.0, 0.0, 0.0, 0.0, d, self.lever * tilt])
+        q = np.zeros(SIZE)
+        q[D], q[S] = d, self.lever * tilt
         pose = self.down_splint(q)
         for i, wire in enumerate(WIRES):
             up, down = self.pairs["P1", wire].T_a_groove, self.pairs["P2", wire].T_a_groove
             q[2 * i : 2 * i + 2] = 0.5 * (np.array([up[0, 3], -up[2, 3]]) + pose.point(down[0, 3], -down[2, 3]))
-            q[2 * i] = min(max(q[2 * i], self.bounds()[2 * i][0]), self.bounds()[2 * i][1])
+            for low, high in (self.mouth(wire), self.reach(wire)):
+                q[2 * i] = min(max(q[2 * i], low), high)
             r, face = self.pairs["P1", wire].cylinder.radius, self.clamp.down_splint.face_depth
             under = pose.point((q[2 * i] - pose.x) / math.cos(pose.angle), face)[1]
             low, high = self.clamp.up_splint.thickness + r, under - r / math.cos(pose.angle)
@@ -135,100 +199,175 @@ class Section:
         return q
 
     def open_distance(self) -> float:
-        """A distance d at which the clamp stands open: both wires pass between the faces at any allowed tilt; mm."""
+        """A distance d at which the clamp stands open: both wires pass between the faces at any tilt; mm."""
         up, down = self.clamp.up_splint, self.clamp.down_splint
         thickest = 2.0 * max(self.clamp.line.radius, self.clamp.jumper.radius)
         spare = min(_SPARE, _SPARE_OF_LEVER * self.lever)
-        return up.thickness - down.face_depth + thickest + self.lever * math.sin(down.max_tilt) + spare
+        return up.thickness - down.face_depth + thickest + self.lever * math.sin(self.clamp.tilt_stop) + spare
 
     def wire_gaps(self, q: Array, wire: PartName) -> Gaps:
-        """Gaps of one wire to both splints, every piece of the contact model."""
+        """Gaps of one wire to both splints, every piece of the contact model, and to the bolt."""
+        return self._moved(q, [self._wire_rows(q, wire)])
+
+    def gaps(self, q: Array) -> Gaps:
+        """All gaps at a state: both wires, faces, stops."""
+        rows = [self._wire_rows(q, wire) for wire in WIRES]
+        return self._moved(q, [*rows, self._face_rows(q), self._stop_rows(q)])
+
+    def _moved(self, q: Array, rows: list[_Rows]) -> Gaps:
+        """Rows joined, with what moves the down splint written out in the state's coordinates."""
+        values, gradients, by, pairs, features, points, normals = zip(*rows, strict=True)
+        gradient = np.concatenate(gradients)
+        by_x, by_y, by_angle = np.concatenate(by).T
+        gradient[:, D] += by_y
+        gradient[:, S] += by_angle / self.lever
+        gradient[:, B] += by_x
+        gradient[:, W] += by_x - self.lift(float(q[W]))[1] * by_y
+        point, normal = np.concatenate(points), np.concatenate(normals)
+        return Gaps(np.concatenate(values), gradient, sum(pairs, ()), sum(features, ()), point, normal)
+
+    def _wire_rows(self, q: Array, wire: PartName) -> _Rows:
         i = 2 * WIRES.index(wire)
-        T_wire = SectionPose(q[i], q[i + 1]).T()
-        T_down = self.down_splint(q).T()
-        R, p = T_down[:3, :3], T_down[:3, 3]
-        up = self.model.pieces(self.pairs["P1", wire], T_wire)
-        down = self.model.pieces(self.pairs["P2", wire], inverse(T_down) @ T_wire)
+        x, y = float(q[i]), float(q[i + 1])
+        px, py, angle = self._down(q)
+        c, s = math.cos(angle), math.sin(angle)
+        dx, dy = x - px, y - py
+        T_up = np.array([[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -y], [0.0, 0.0, 0.0, 1.0]])
+        T_down = np.array(
+            [[c, 0.0, s, dx * c - dy * s], [0.0, 1.0, 0.0, 0.0], [-s, 0.0, c, -(dx * s + dy * c)], [0.0, 0.0, 0.0, 1.0]]
+        )
+        up = self._trimmed("P1", wire, T_up)
+        down = self._trimmed("P2", wire, T_down)
         self.queries.contact += 2
         k, n = len(up.distance), len(up.distance) + len(down.distance)
-        normal, arm = down.normal @ R.T, down.point @ R.T
-        gradient, point = np.zeros((n, 6)), np.empty((n, 2))
+        value, by, point = np.empty(n + 1), np.zeros((n + 1, 3)), np.empty((n + 1, 2))
+        gradient = np.zeros((n + 1, SIZE))
+        value[:k], value[k:n] = up.distance, down.distance
         gradient[:k, i], gradient[:k, i + 1] = up.normal[:, 0], -up.normal[:, 2]
-        gradient[k:, i], gradient[k:, i + 1] = normal[:, 0], -normal[:, 2]
-        # The gap falls by what the groove's point moves along the normal: P2 moves down by d and turns about -Y.
-        gradient[k:, D] = normal[:, 2]
-        gradient[k:, S] = (normal[:, 0] * arm[:, 2] - normal[:, 2] * arm[:, 0]) / self.lever
         point[:k, 0], point[:k, 1] = up.point[:, 0], -up.point[:, 2]
-        point[k:, 0], point[k:, 1] = arm[:, 0] + p[0], -(arm[:, 2] + p[2])
-        pair: tuple[tuple[PartName, PartName], ...] = (("P1", wire),) * k + (("P2", wire),) * (n - k)
-        return Gaps(np.concatenate([up.distance, down.distance]), gradient, pair, up.feature + down.feature, point)
+        # Of the down splint's normals and points the section components in its own axes (right, down), then in P1's.
+        normal, arm = down.normal[:, ::2] * (1.0, -1.0), down.point[:, ::2] * (1.0, -1.0)
+        turn = np.array([[c, -s], [s, c]])
+        gradient[k:n, i : i + 2] = normal @ turn
+        by[k:n, :2] = -gradient[k:n, i : i + 2]
+        by[k:n, 2] = normal[:, 1] * arm[:, 0] - normal[:, 0] * arm[:, 1]
+        point[k:n] = arm @ turn + (px, py)
+        # The shank stands between the wires: each keeps to its side.
+        side = -1.0 if wire == "P6" else 1.0
+        bolt, r = self.clamp.bolt.diameter / 2, self.pairs["P1", wire].cylinder.radius
+        axis = self.bolt_x + float(q[B])
+        value[n], point[n] = side * (x - axis) - bolt - r, (axis + side * bolt, y)
+        gradient[n, i], gradient[n, B] = side, -side
+        pair: tuple[Pair, ...] = (("P1", wire),) * k + (("P2", wire),) * (n - k) + (("P4", wire),)
+        return value, gradient, by, pair, (*up.feature, *down.feature, "shank"), point, gradient[:, i : i + 2].copy()
+
+    def _trimmed(self, splint: PartName, wire: PartName, T: Array) -> Pieces:
+        """The model's pieces, with the faces ended at the splint's outer edge: the groove's material has no end."""
+        pair = self.pairs[splint, wire]
+        found = self.model.pieces(pair, T)
+        half, face, out = (
+            (self.bolt_x, self.clamp.up_splint.thickness, 1.0)
+            if splint == "P1"
+            else (self.lever, self.clamp.down_splint.face_depth, -1.0)
+        )
+        middle = self.bolt_x if splint == "P1" else 0.0
+        side = -1.0 if wire == "P6" else 1.0
+        beyond = side * (float(T[0, 3]) - middle) - half
+        if beyond <= 0.0:
+            return found
+        above = max(out * (-float(T[2, 3]) - face), 0.0)
+        gap = math.hypot(beyond, above)
+        distance, point, normal = found.distance.copy(), found.point.copy(), found.normal.copy()
+        k = int(np.argmin(distance))
+        distance[distance < gap - pair.cylinder.radius] = _FAR
+        distance[k] = gap - pair.cylinder.radius
+        point[k] = (middle + side * half, 0.0, -face if above else float(T[2, 3]))
+        normal[k] = (side * beyond / gap, 0.0, -out * above / gap)
+        feature = tuple(EDGE if i == k else name for i, name in enumerate(found.feature))
+        return Pieces(distance, point, normal, feature)
 
     def face_gaps(self, q: Array) -> Gaps:
-        """Gaps between the inner faces along the bolt, at both ends of their overlap, and to the tilt limits.
+        """Gaps between the inner faces, at both ends of their overlap.
 
         The splints are taken as their rectangles here (convex object collision, type 2 of the paper). The gap between
         two straight faces is least at an end of their overlap.
         """
+        return self._moved(q, [self._face_rows(q)])
+
+    def _face_rows(self, q: Array) -> _Rows:
         up, down = self.clamp.up_splint, self.clamp.down_splint
-        pose, v, half = self.down_splint(q), down.face_depth, down.width / 2
-        c, s = math.cos(pose.angle), math.sin(pose.angle)
-        value, gradient, point = np.empty(4), np.zeros((4, 6)), np.zeros((4, 2))
-        for k, side in enumerate((-1, 1)):
-            corner_x = pose.point(side * half, v)[0]
-            edge_x = self.bolt_x + side * up.width / 2
+        v, half = down.face_depth, self.lever
+        px, py, angle = self._down(q)
+        c, s = math.cos(angle), math.sin(angle)
+        value, by, point, normal = [], [], [], []
+        for side in (-1.0, 1.0):
+            u = side * half
+            corner_x, edge_x = px + u * c + v * s, self.bolt_x + side * up.width / 2
             if side * (corner_x - edge_x) <= 0.0:  # P2's corner under P1's face
-                u, x = side * half, corner_x
-                slope = -u * c - v * s
+                value.append(py - u * s + v * c - up.thickness)
+                by.append((0.0, 1.0, px - corner_x))
+                point.append((corner_x, up.thickness))
+                normal.append((0.0, 1.0))
             else:  # P1's edge over P2's face
-                x = edge_x
-                u = (x - pose.x - v * s) / c
-                slope = -(x - pose.x) / c**2 + v * s / c**2
-            y = pose.y - u * s + v * c
-            value[k] = y - up.thickness
-            gradient[k, D], gradient[k, S] = 1.0, slope / self.lever
-            point[k] = (x, up.thickness)
-        limit = self.lever * down.max_tilt
-        value[2:] = limit - q[S], limit + q[S]
-        gradient[2:, S] = -1.0, 1.0
-        point[2:] = (pose.x, pose.y + down.back_radius)
-        pairs: tuple[tuple[PartName, PartName], ...] = (("P1", "P2"), ("P1", "P2"), ("P2", "P4"), ("P2", "P4"))
-        return Gaps(value, gradient, pairs, ("left edge", "right edge", "tilt limit", "tilt limit"), point)
+                x, y = edge_x - px, up.thickness - py
+                value.append(v - (x * s + y * c))
+                by.append((s, c, y * s - x * c))
+                point.append((edge_x, up.thickness))
+                normal.append((s, c))
+        return (
+            np.array(value),
+            np.zeros((2, SIZE)),
+            np.array(by),
+            (("P1", "P2"),) * 2,
+            ("left edge", "right edge"),
+            np.array(point),
+            np.array(normal),
+        )
 
-    def mouth_gaps(self, q: Array) -> Gaps:
-        """Ways left to each wire's centre before it slips out of the up splint's mouth, to both sides."""
-        value, gradient = np.empty(4), np.zeros((4, 6))
-        for i, (low, high) in enumerate(self.bounds()[:4:2]):
-            value[2 * i : 2 * i + 2] = q[2 * i] - low, high - q[2 * i]
-            gradient[2 * i : 2 * i + 2, 2 * i] = 1.0, -1.0
-        point = np.repeat(q[:4].reshape(2, 2), 2, axis=0)
-        pair: tuple[tuple[PartName, PartName], ...] = (("P1", "P6"), ("P1", "P6"), ("P1", "P7"), ("P1", "P7"))
-        return Gaps(value, gradient, pair, (MOUTH,) * 4, point)
+    def _stop_rows(self, q: Array) -> _Rows:
+        """What ends the down splint's tilt and slide.
 
-    def gaps(self, q: Array) -> Gaps:
-        """All gaps at a state: both wires, faces, tilt limits, mouths."""
-        return join(self.wire_gaps(q, "P6"), self.wire_gaps(q, "P7"), self.face_gaps(q), self.mouth_gaps(q))
+        Its underside on the saddle's edges, its slot on the shank (Table 2 of the paper), and the joints' play.
+        """
+        clamp, down, saddle = self.clamp, self.clamp.down_splint, self.clamp.saddle
+        r = clamp.bolt.diameter / 2
+        (px, py, angle), b, w = self._down(q), float(q[B]), float(q[W])
+        c, s = math.cos(angle), math.sin(angle)
+        axis, half = self.bolt_x + b, down.slot_width / 2
+        hole, washer, slide = self.play
+        # The centre of the saddle's arc stands back_clearance above the state's d.
+        edge_y = float(q[D]) + self._edge_below
+        rows: list[_Row] = []
+        for side in (-1.0, 1.0):
+            edge_x = axis + self.on_bolt(q) + side * saddle.width / 2
+            x, y = edge_x - px, edge_y - py
+            own = (c, 0.0, s, s if abs(w) < washer else 0.0)
+            by = (-s, -c, x * c - y * s)
+            gap = x * s + y * c - down.underside_depth
+            rows.append((gap, own, by, ("P2", "P3"), "saddle's edge", (edge_x, edge_y), (s, c)))
+            for v in (self._slot_bottom, down.face_depth) if W in self.free else (self._slot_bottom,):
+                x, y = px + side * half * c + v * s, py - side * half * s + v * c
+                gap = side * (x - axis) - r
+                by = (side, 0.0, side * (y - py))
+                rows.append((gap, (0.0, 0.0, -side, 0.0), by, ("P2", "P4"), "slot", (x, y), (-side, 0.0)))
+            if B in self.free:
+                at = axis + side * r, 0.5 * clamp.up_splint.thickness
+                rows.append((hole - side * b, (0.0, 0.0, -side, 0.0), _NONE, ("P1", "P4"), "hole", at, (-side, 0.0)))
+            if W in self.free:
+                pair, name = (("P2", "P3"), "end of the saddle") if slide else (("P3", "P4"), "hole")
+                at = px, py + down.back_radius
+                rows.append((washer + slide - side * w, (0.0, 0.0, 0.0, -side), _NONE, pair, name, at, (side, 0.0)))
+        value, own_rows, by_rows, pairs, names, points, normals = zip(*rows, strict=True)
+        gradient = np.zeros((len(rows), SIZE))
+        gradient[:, D:] = own_rows
+        return np.array(value), gradient, np.array(by_rows), pairs, names, np.array(points), np.array(normals)
 
+    @cached_property
+    def _slot_bottom(self) -> float:
+        return self.clamp.down_splint.slot_bottom
 
-def remembered(function: Callable[[Array], Gaps]) -> Callable[[Array], Gaps]:
-    """The function with its last answer kept: solvers ask for values and derivatives one after the other."""
-    last: dict[bytes, Gaps] = {}
-
-    def gaps(x: Array) -> Gaps:
-        key = x.tobytes()
-        if key not in last:
-            last.clear()
-            last[key] = function(x)
-        return last[key]
-
-    return gaps
-
-
-def join(*parts: Gaps) -> Gaps:
-    """One `Gaps` of several."""
-    return Gaps(
-        np.concatenate([g.value for g in parts]),
-        np.concatenate([g.gradient for g in parts]),
-        sum((g.pair for g in parts), ()),
-        sum((g.feature for g in parts), ()),
-        np.concatenate([g.point for g in parts]),
-    )
+    @cached_property
+    def _edge_below(self) -> float:
+        """The saddle's edges below d, mm."""
+        saddle = self.clamp.saddle
+        return saddle.radius * math.cos(saddle.half_angle) - self.clamp.back_clearance

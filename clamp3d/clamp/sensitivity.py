@@ -19,8 +19,8 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.checks import choice
 from clamp3d.clamp.dimensions import Clamp, Wire
 from clamp3d.clamp.final_state import FinalState, solve_final_state
-from clamp3d.clamp.section import Section
-from clamp3d.clamp.status import CLAMPED, measured_status
+from clamp3d.clamp.section import SIZE, Section
+from clamp3d.clamp.status import CLAMPED, final_status
 from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
 
@@ -111,7 +111,7 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
     """
     section = Section(clamp, Cas())
     final = solve_final_state(section)
-    status = measured_status(section, final, 0.0)
+    status = final_status(section, final)
     if status != CLAMPED:
         raise SolverError(f"no sensitivity: {status}")
     derivative = _derivatives(section, final)
@@ -134,20 +134,24 @@ def _derivatives(section: Section, final: FinalState) -> Array:
     # Central differences of closed forms: the step balances rounding and the turn of a normal within the groove.
     h = float((np.spacing(np.abs(q).max()) * section.least_slack**2) ** (1.0 / 3.0))
 
+    free = list(section.free)
+
     def conditions(at: Section, x: Array) -> Array:
-        """Gradient of the Lagrangian (6, up to a constant), active gaps (k), and the splint distance."""
+        """Gradient of the Lagrangian (n, up to a constant), active gaps (k), and the splint distance."""
         gaps = at.gaps(x)
-        gradient = -final.multipliers[active] @ gaps.gradient[active]
+        gradient = -final.multipliers[active] @ gaps.gradient[active][:, free]
         return np.array([*gradient, *gaps.value[active], at.splint_distance(x)])
 
     def changed(name: str, by: float) -> Section:
         return Section(with_dimensions(clamp, {name: dimension(clamp, name) + by}), section.model)
 
-    by_q = np.column_stack([conditions(section, q + h * e) - conditions(section, q - h * e) for e in np.eye(6)])
+    by_q = np.column_stack(
+        [conditions(section, q + h * e) - conditions(section, q - h * e) for e in np.eye(SIZE)[free]]
+    )
     by_p = np.column_stack([conditions(changed(n, h), q) - conditions(changed(n, -h), q) for n in DIMENSIONS])
     by_q, by_p = by_q / (2.0 * h), by_p / (2.0 * h)
-    A, k = final.gaps.gradient[active], len(active)
-    kkt = np.block([[by_q[:6], -A.T], [A, np.zeros((k, k))]])
+    A, k = final.gaps.gradient[active][:, free], len(active)
+    kkt = np.block([[by_q[: len(free)], -A.T], [A, np.zeros((k, k))]])
     sizes = np.linalg.svd(kkt, compute_uv=False)
     if sizes[-1] < _WELL_POSED * sizes[0]:
         raise SolverError("no sensitivity: the final state is not isolated, its KKT matrix is singular")

@@ -4,40 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from clamp3d.clamp.contact import Contact, measure_contacts, overlap
-from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.contact import Contact, overlap
+from clamp3d.clamp.dimensions import TITLES, Clamp
 from clamp3d.clamp.final_state import FinalState
-from clamp3d.clamp.matrix import Pair
-from clamp3d.clamp.section import MOUTH, SPLINTS, WIRES, D, Section
+from clamp3d.clamp.scene import CONTACT
+from clamp3d.clamp.section import SPLINTS, WIRES, D, Section
 from clamp3d.clamp.stepped import SteppedState
-from clamp3d.clamp.steps import section_poses
 
 CLAMPED = "clamped"
 
-_REACHABLE: tuple[Pair, ...] = (("P4", "P6"), ("P4", "P7"), ("P6", "P7"))
-"""Pairs that the solver does not keep apart, though wires that are held can overlap there."""
 
-
-def measured_status(
-    section: Section, final: FinalState | SteppedState, resolution: float, contacts: Iterable[Contact] | None = None
+def final_status(
+    section: Section,
+    final: FinalState | SteppedState,
+    resolution: float = CONTACT,
+    contacts: Iterable[Contact] = (),
 ) -> str:
-    """`final_status`, but parts that overlap are not clamped, whatever holds the wires.
+    """'clamped' if the splints hold both wires, nothing overlaps and the nut is wholly on the bolt; else why not.
 
-    ``contacts`` are those of the state; without them the bolt and the wires are measured.
-    """
-    status = final_status(section.clamp, final, resolution)
-    if status != CLAMPED:
-        return status
-    if contacts is None:
-        contacts = measure_contacts(section.clamp, section_poses(section, final.q), section.model, pairs=_REACHABLE)
-    deepest = overlap(min(contacts, key=lambda c: c.gap))
-    return f"not clamped: {deepest}" if deepest else CLAMPED
-
-
-def final_status(clamp: Clamp, final: FinalState | SteppedState, resolution: float) -> str:
-    """'clamped' if both wires are held between the splints and the nut is wholly on the bolt, else why not.
-
-    ``resolution`` mm: gaps of a stepped state up to it count as closed.
+    ``resolution`` mm: gaps of a stepped state up to it count as closed. ``contacts`` are those of the state where they
+    have been measured: the section keeps apart every pair that can meet.
     """
     gaps = final.gaps
     if isinstance(final, FinalState):
@@ -48,26 +34,38 @@ def final_status(clamp: Clamp, final: FinalState | SteppedState, resolution: flo
         stops = {(p, f) for p, f, n in zip(gaps.pair, gaps.feature, near, strict=True) if n}
         held = {p for p, _ in stops}
         loose = {w for w in WIRES if not all((splint, w) in held for splint in SPLINTS)}
-    slipping = sorted({pair[1] for pair, feature in stops if feature == MOUTH})
-    if slipping:
-        return f"not clamped: {' and '.join(slipping)} slips out of its groove"
+    slipped = section.escaped(final.q)
+    if slipped:
+        return f"not clamped: {' and '.join(slipped)} slips out of its groove"
     if not loose:
-        shortfall = bolt_shortfall(clamp, float(final.q[D]))
-        return CLAMPED if shortfall <= 0.0 else f"not clamped: the bolt is {shortfall:.4g} mm too short for the nut"
-    reasons = []
-    if any(pair == ("P1", "P2") for pair, _ in stops):
-        reasons.append("faces meet")
-    if any(feature == "tilt limit" for _, feature in stops):
-        reasons.append("tilt limit reached")
+        shortfall = bolt_shortfall(section.clamp, float(final.q[D]))
+        if shortfall > 0.0:
+            return f"not clamped: the bolt is {shortfall:.4g} mm too short for the nut"
+        k = int(gaps.value.argmin())
+        if gaps.value[k] < -CONTACT:
+            return f"not clamped: {gaps.pair[k][0]} overlaps {gaps.pair[k][1]} by {-gaps.value[k]:.4g} mm"
+        deepest = overlap(min(contacts, key=lambda c: c.gap)) if contacts else ""
+        return f"not clamped: {deepest}" if deepest else CLAMPED
+    reasons = stop_words(stops)
     if not reasons:  # a wire on four lips holds both splints, whatever they do to the other one
         reasons.append(f"{' and '.join(w for w in WIRES if w not in loose)} alone holds the splints apart")
     return f"not clamped: {' and '.join(reasons)}, {' and '.join(sorted(loose))} loose"
 
 
-def bolt_shortfall(clamp: Clamp, d: float) -> float:
-    """How far the bolt's end lies below the nut's free face, mm, with the down splint at ``d``; negative: stands out.
+def stop_words(stops: Iterable[tuple[tuple[str, str], str]]) -> list[str]:
+    """What stops the splints beside the wires, in words: pairs and features that touch."""
+    words = []
+    for (a, b), feature in stops:
+        if (a, b) == ("P1", "P2"):
+            words.append("faces meet")
+        elif (a, b) == ("P2", "P3") or (a, b) == ("P2", "P4"):
+            words.append(f"the {TITLES[b] if b == 'P4' else feature} stops the down splint")
+        elif a == "P4":
+            words.append(f"{TITLES[b]} rests on the bolt")
+    return sorted(set(words))
 
-    The round back rests in the saddle's apex at any tilt, so that bolt and saddle follow ``d``.
-    """
+
+def bolt_shortfall(clamp: Clamp, d: float) -> float:
+    """How far the bolt's end lies below the nut's free face, mm, with the saddle at ``d``; negative: stands out."""
     stack = d + clamp.down_splint.back_radius + clamp.saddle.apex_thickness + clamp.nut.height
     return stack - clamp.bolt.shank_length

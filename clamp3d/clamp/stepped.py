@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from clamp3d.clamp.dimensions import PartName
-from clamp3d.clamp.section import WIRES, D, Gaps, S, Section, remembered
+from clamp3d.clamp.section import WIRES, D, Gaps, S, Section
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
 
@@ -29,7 +29,7 @@ _MOVES = 100_000
 
 @dataclass(frozen=True, slots=True)
 class SteppedState:
-    """Last free position ``q`` (6,) as in `section`, its gaps, and ``motion_steps``: positions tried (M of Table 5)."""
+    """Last free position ``q`` (8,) as in `section`, its gaps, and ``motion_steps``: positions tried (M of Table 5)."""
 
     q: Array
     gaps: Gaps
@@ -47,16 +47,16 @@ def solve_stepped(
 
     Raises InputError for moves that are not positive, SolverError if the open clamp already overlaps.
     """
-    down, start = section.clamp.down_splint, section.open_distance()
+    start = section.open_distance()
     for name, value, reach, unit in (
         ("step", step, start, "mm"),
-        ("tilt step", math.degrees(tilt_step), down.max_tilt_deg, "deg"),
+        ("tilt step", math.degrees(tilt_step), math.degrees(section.clamp.tilt_stop), "deg"),
     ):
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(f"{name} must be > 0 {unit}, got {value:g}")
         if not value * _MOVES >= reach:
             raise InputError(f"{name} must be >= {reach / _MOVES:.4g} {unit} here, got {value:g}")
-    limit = int(down.max_tilt / tilt_step + 1e-9)
+    limit = int(section.clamp.tilt_stop / tilt_step + 1e-9)
     tilts = range(-limit, limit + 1)
     first = math.ceil(start / step)
     q, tilt, tried = section.open_state(first * step), 0, 0
@@ -96,7 +96,7 @@ def solve_bisection(
         raise InputError(f"resolution must be > 0 mm, got {resolution:g}")
     state = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
     q, tried = state.q, state.motion_steps
-    limit = section.clamp.down_splint.max_tilt
+    limit = section.clamp.tilt_stop
     while step > resolution:
         step, tilt_step = 0.5 * step, 0.5 * tilt_step
         found: Array | None = q
@@ -126,6 +126,20 @@ def _place(section: Section, q: Array, d: float, tilt: float, settle: bool = Fal
     return new
 
 
+def _remembered(function: Callable[[Array], Gaps]) -> Callable[[Array], Gaps]:
+    """The function with its last answer kept: solvers ask for values and derivatives one after the other."""
+    last: dict[bytes, Gaps] = {}
+
+    def gaps(x: Array) -> Gaps:
+        key = x.tobytes()
+        if key not in last:
+            last.clear()
+            last[key] = function(x)
+        return last[key]
+
+    return gaps
+
+
 class _FreeError(Exception):
     """Found a free place: no need to look for a better one."""
 
@@ -141,7 +155,7 @@ def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
             raise _FreeError
         return found
 
-    gaps = remembered(at)
+    gaps = _remembered(at)
 
     def slack_gradient(x: Array) -> Array:
         found = gaps(x[:2]).gradient[:, i : i + 2]

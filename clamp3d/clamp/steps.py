@@ -12,11 +12,13 @@ from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.motion import travel_to_contact
 from clamp3d.clamp.result import Event, Waypoint
-from clamp3d.clamp.section import WIRES, D, S, Section
+from clamp3d.clamp.section import SIZE, WIRES, B, D, S, Section, W
 from clamp3d.collide.model import ModelCache
 from clamp3d.core.pose import Array, SectionPose
 
 Poses = dict[PartName, SectionPose]
+Meetings = list[tuple[Pair, Array]]
+"""Pairs of parts, each with the state (8,) in which they meet."""
 _SPARE = 20.0
 """Free way in mm between a wire and the open clamp before it comes in."""
 
@@ -37,25 +39,21 @@ class Log:
         if self.on_waypoint is not None:
             self.on_waypoint(self.path[-1])
 
-    def touch(self, q: Array, step: str, pair: Pair | None, travel: float) -> None:
-        """Add the event of a motion that ended at state ``q``, where ``pair`` touches."""
-        assert pair is not None  # every motion here ends at a groove
+    def touch(self, q: Array, step: str, pair: Pair, travel: float) -> None:
+        """Add the event of a contact that is found at state ``q``."""
         section = self.section
         (c,) = measure_contacts(section.clamp, section_poses(section, q), section.model, pairs=[pair], cache=self.cache)
         self.events.append(Event(step, c.a, c.b, c.relation, c.point, travel))
 
 
-def approach_line(section: Section, q: Array, step: str, log: Log) -> Array:
-    """The open clamp comes in from the right until the line lies under its groove, then settles down on the line."""
+def approach_line(section: Section, opened: Array, start: Array, step: str, log: Log) -> Array:
+    """The ``opened`` clamp comes in from the right until the line lies under its groove, then settles on the line."""
     clamp = section.clamp
-    beside, over, settled = q.copy(), q.copy(), q.copy()
-    middle = 0.5 * (clamp.up_splint.thickness + section.down_splint(q).point(0.0, clamp.down_splint.face_depth)[1])
-    for state in (beside, over):
-        state[1] = middle
+    beside, over, settled = opened.copy(), opened.copy(), opened.copy()
+    middle = 0.5 * (clamp.up_splint.thickness + section.down_splint(opened).point(0.0, clamp.down_splint.face_depth)[1])
+    beside[1] = over[1] = middle
     beside[0] = -clamp.line.radius - _SPARE
-    settled[:2] = over[:2]
-    travel, touch = travel_to_contact(section, settled, "P6", -_unit(1), "P1")
-    settled = settled - travel * _unit(1)
+    settled[:2] = start[:2]
     # The jumper waits clear of the clamp's way in.
     waiting = settled.copy()
     waiting[2] = settled[0] - beside[0] + clamp.up_splint.width + clamp.jumper.radius + _SPARE
@@ -64,35 +62,59 @@ def approach_line(section: Section, q: Array, step: str, log: Log) -> Array:
     for state, label in ((beside, "open clamp beside the line"), (over, "line between the splints")):
         log.reach(step, label, section_poses(section, state) | {"P7": jumper})
     log.reach(step, "up splint rests on the line", section_poses(section, waiting))
-    log.touch(waiting, step, touch, travel)
+    log.touch(waiting, step, ("P1", "P6"), float(opened[1] - start[1]))
     return waiting
 
 
-def insert_jumper(section: Section, q: Array, step: str, log: Log) -> Array:
+def insert_jumper(section: Section, opened: Array, start: Array, step: str, log: Log) -> None:
     """The jumper comes in between the splints from its side and is lifted into the up splint's groove."""
-    inside = q.copy()
-    inside[2] = float(section.pairs["P1", "P7"].T_a_groove[0, 3])
+    inside = start.copy()
+    inside[3] = opened[3]
     log.reach(step, "jumper between the splints", section_poses(section, inside))
-    travel, touch = travel_to_contact(section, inside, "P7", -_unit(3), "P1")
-    inside = inside - travel * _unit(3)
-    log.reach(step, "jumper in the up splint's groove", section_poses(section, inside))
-    log.touch(inside, step, touch, travel)
-    return inside
+    log.reach(step, "jumper in the up splint's groove", section_poses(section, start))
+    log.touch(start, step, ("P1", "P7"), float(opened[3] - start[3]))
 
 
-def first_touch(section: Section, q: Array, step: str, log: Log, limit: float) -> None:
-    """The down splint rises along the bolt until it first touches a wire, within its whole way of ``limit`` mm."""
+def close_splints(section: Section, start: Array, end: Array, met: Meetings, step: str, log: Log) -> None:
+    """The down splint closes along its path from ``start`` to ``end``, the saddle left where it was."""
+    d = float(start[D])
+    for pair, q in met:
+        log.reach(step, f"down splint touches {pair[1]}", section_poses(section, q, saddle_d=d))
+        log.touch(q, step, pair, d - float(q[D]))
+    log.reach(step, "splints closed", section_poses(section, end, saddle_d=d))
+
+
+def tighten_nut(section: Section, start: Array, held: Array, end: Array, met: Meetings, step: str, log: Log) -> float:
+    """The nut draws the saddle up to the round back, and on from ``held`` to ``end`` if the joints have play.
+
+    Returns the way that the nut has gone when it is tight, mm.
+    """
+    clamp, d = section.clamp, float(start[D])
+    travel = saddle_rise(section, held, d)
+    if not np.array_equal(held, end):
+        log.reach(step, "saddle meets the down splint", section_poses(section, held))
+        log.touch(held, step, ("P2", "P3"), travel)
+        for pair, q in met:
+            log.touch(q, step, pair, travel + float(held[D] - q[D]))
+        travel = saddle_rise(section, end, d)
+    log.reach(step, "nut tightened", section_poses(section, end))
+    if np.array_equal(held, end):
+        log.touch(end, step, ("P2", "P3"), travel)
+    for pair in (("P1", "P5"), ("P3", "P4")):
+        if clamp.connection(*pair):
+            log.touch(end, step, pair, travel)
+    return travel
+
+
+def first_touch(section: Section, q: Array, limit: float) -> Meetings:
+    """Where the down splint, rising straight along the bolt, first touches a wire within ``limit`` mm."""
     reach = {wire: travel_to_contact(section, q, wire, -_unit(D), "P2", limit=limit) for wire in WIRES}
-    wire = min(WIRES, key=lambda w: reach[w][0])
-    travel, touch = reach[wire]
-    if touch is not None:
-        touching = q - travel * _unit(D)
-        log.reach(step, f"down splint touches {wire}", section_poses(section, touching, saddle_d=float(q[D])))
-        log.touch(touching, step, touch, travel)
+    travel, touch = min(reach.values(), key=lambda found: found[0])
+    return [] if touch is None else [(touch, q - travel * _unit(D))]
 
 
 def _unit(i: int) -> Array:
-    return np.asarray(np.eye(6)[i])
+    return np.asarray(np.eye(SIZE)[i])
 
 
 def section_poses(section: Section, q: Array, saddle_d: float | None = None) -> Poses:
@@ -102,11 +124,11 @@ def section_poses(section: Section, q: Array, saddle_d: float | None = None) -> 
     down = section.down_splint(q)
     saddle_y = y + (down.y - _saddle_lift(section, q) if saddle_d is None else saddle_d - clamp.back_clearance)
     bolt_y = saddle_y + clamp.saddle.radius + clamp.saddle.apex_thickness - clamp.bolt.shank_length
-    bolt_x = x + section.bolt_x
+    bolt_x = x + section.bolt_x + float(q[B])
     return {
         "P1": SectionPose(x, y),
-        "P2": SectionPose(bolt_x, y + down.y, down.angle),
-        "P3": SectionPose(bolt_x, saddle_y),
+        "P2": SectionPose(x + down.x, y + down.y, down.angle),
+        "P3": SectionPose(bolt_x + section.on_bolt(q), saddle_y),
         "P4": SectionPose(bolt_x, bolt_y),
         "P5": SectionPose(bolt_x, y - clamp.nut.height),
         "P6": SectionPose(0.0, 0.0),
@@ -114,13 +136,18 @@ def section_poses(section: Section, q: Array, saddle_d: float | None = None) -> 
     }
 
 
-def _saddle_lift(section: Section, q: Array) -> float:
-    """How far the saddle's arc centre stands above P2's origin when the nut has drawn it up to the round back; mm."""
-    pair = section.pairs["P3", "P2"]
-    lift = 0.0
+def saddle_rise(section: Section, q: Array, saddle_d: float) -> float:
+    """How far the saddle rises from where it stood with ``saddle_d`` until it meets the round back at ``q``; mm."""
+    opened = section.down_splint(q).y - saddle_d + section.clamp.back_clearance
+    return _saddle_lift(section, q, opened) - opened
+
+
+def _saddle_lift(section: Section, q: Array, lift: float = 0.0) -> float:
+    """How far above P2's origin the saddle's arc centre, rising from ``lift``, is when it meets the round back; mm."""
+    pair, aside = section.pairs["P3", "P2"], float(q[W]) - section.on_bolt(q)
     for _ in range(100):
         section.queries.contact += 1
-        back = SectionPose(0.0, lift, float(q[S]) / section.lever)
+        back = SectionPose(aside, lift, float(q[S]) / section.lever)
         gap = float(section.model.pieces(pair, back.T()).distance.min())
         if abs(gap) <= 1e-12 * section.clamp.saddle.radius:
             break

@@ -1,7 +1,7 @@
 """Monte Carlo over manufacturing tolerances and conductor diameters: how the splint distance scatters.
 
-Every sample draws from a generator of its own, seeded by (seed, index of the sample), and is solved by itself from a
-start that only the nominal clamp decides. So its result does not depend on how the samples are spread: over one
+Every sample draws from a generator of its own, seeded by (seed, index of the sample), and is closed by itself along the
+path that `assemble` takes. So its result does not depend on how the samples are spread: over one
 process, several, or a Dask cluster. (On processors with other floating point libraries the last digits may differ.)
 """
 
@@ -25,11 +25,11 @@ import numpy as np
 from clamp3d.baselines.cas import Cas
 from clamp3d.checks import choice, function, instance, number, whole
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.clamp.final_state import FinalState, solve_final_state
+from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.journal import Journal
-from clamp3d.clamp.section import D, S, Section
+from clamp3d.clamp.section import Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
-from clamp3d.clamp.status import CLAMPED, final_status, measured_status
+from clamp3d.clamp.status import CLAMPED, final_status
 from clamp3d.core.child import end_with_parent
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError, need, without_numbers
@@ -44,8 +44,6 @@ CHUNK = 50
 """Samples that are solved, sent and kept together: about a second of work."""
 # ISO 2768-1:1989, table 1, class m: (nominal sizes up to, permissible deviation either way), mm.
 _MEDIUM = ((6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8), (2000.0, 1.2), (math.inf, 2.0))
-_OPENED = 3.0
-"""How far above the nominal final state a sample starts, mm."""
 _PATIENCE = 15.0
 """Seconds without an answer after which the workers are counted: a cluster's may be starting anew."""
 _SIGMAS = 3.0
@@ -66,15 +64,12 @@ class Spec:
     distribution : str
     tolerance : tuple of float
         Mm either way, for each of `DIMENSIONS`.
-    start : (float, float) or None
-        Down splint's distance (mm) and tilt (rad) of the nominal final state; None if it has none.
     """
 
     clamp: Clamp
     seed: int
     distribution: Distribution
     tolerance: tuple[float, ...]
-    start: tuple[float, float] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,16 +223,11 @@ def _spec(
             return size * percent / 100.0
         return general_tolerance(size) if tolerance is None else tolerance
 
-    start, nominal = None, None
-    section = Section(clamp, Cas())
+    spec = Spec(clamp, seed, distribution, tuple(of(name) for name in DIMENSIONS))
     try:
-        final = solve_final_state(section)
+        return spec, _closed(clamp)[0]
     except SolverError:
-        pass
-    else:
-        start = (float(final.q[D]) + _OPENED, float(final.q[S]) / section.lever)
-        nominal = section.splint_distance(final.q) if measured_status(section, final, 0.0) == CLAMPED else None
-    return Spec(clamp, seed, distribution, tuple(of(name) for name in DIMENSIONS), start), nominal
+        return spec, None
 
 
 def _chunk(task: tuple[Spec, int, int]) -> tuple[int, list[Sample]]:
@@ -248,30 +238,20 @@ def _chunk(task: tuple[Spec, int, int]) -> tuple[int, list[Sample]]:
 
 def _sample(spec: Spec, index: int) -> Sample:
     try:
-        section = Section(with_dimensions(spec.clamp, sample_dimensions(spec, index)), Cas())
+        clamp = with_dimensions(spec.clamp, sample_dimensions(spec, index))
     except InputError as error:
         return None, f"not a clamp: {without_numbers(str(error))}"
     try:
-        final = _close(section, spec.start)
+        return _closed(clamp)
     except SolverError as error:
         return None, f"not solved: {without_numbers(str(error))}"
-    status = measured_status(section, final, 0.0)
+
+
+def _closed(clamp: Clamp) -> Sample:
+    section = Section(clamp, Cas())
+    final = solve_final_state(section)
+    status = final_status(section, final)
     return (section.splint_distance(final.q) if status == CLAMPED else None), without_numbers(status)
-
-
-def _close(section: Section, start: tuple[float, float] | None) -> FinalState:
-    """From a little above the nominal final state, which is quicker; from fully open if that does not do."""
-    if start is not None:
-        q = section.open_state(*start)
-        if float(section.gaps(q).value.min()) >= 0.0:
-            try:
-                final = solve_final_state(section, q)
-            except SolverError:
-                pass
-            else:
-                if final_status(section.clamp, final, 0.0) == CLAMPED:
-                    return final
-    return solve_final_state(section)
 
 
 def _solve(

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from clamp3d.clamp.dimensions import TITLES
+from clamp3d.clamp.forces import HELD
 from clamp3d.clamp.matrix import gap_text
 from clamp3d.clamp.result import Assembly
 from clamp3d.output.tables import text_table
@@ -14,6 +15,15 @@ from clamp3d.output.tables import text_table
 def run_to_text(assembly: Assembly) -> str:
     """The assembly as lines for a terminal, numbers to the paper's printed digits."""
     return "\n".join(_lines(assembly))
+
+
+_PLAY = {"hole": "in the up splint's hole", "saddle": "in the saddle", "washer": "of the saddle on the bolt"}
+
+
+def _play(item: tuple[str, float | None]) -> str:
+    joints, distance = item
+    words = _PLAY[joints.split(", ")[-1]]
+    return f"{'not clamped' if distance is None else f'{distance:.3f} mm'} {'and ' * (', ' in joints)}{words}"
 
 
 def _lines(assembly: Assembly) -> Iterator[str]:
@@ -25,6 +35,19 @@ def _lines(assembly: Assembly) -> Iterator[str]:
         f"{assembly.status}; distance between the splints {assembly.distance:.3f} mm, "
         f"tilt {math.degrees(assembly.tilt):.2f} deg, nut turned {assembly.turns:.2f} times from open"
     )
+    if assembly.with_play:
+        yield "with play: " + ", ".join(map(_play, assembly.with_play.items()))
+    if assembly.forces:
+        pushes = ", ".join(f"{f.a}-{f.b} {f.force:.3f}" for f in assembly.forces if f.feature != HELD)
+        yield f"contact forces per newton of bolt force: {pushes}"
+        yield from (
+            f"sideways {f.force:.3f} is left over: the down splint is taken as {f.feature} (joints in the clamp file)"
+            for f in assembly.forces
+            if f.feature == HELD
+        )
+    if assembly.start_tilts:
+        low, high = (f"{math.degrees(t):z.1f}" for t in assembly.start_tilts)
+        yield f"every start tilted by {low} to {high} deg ends here"
     yield from map(str, assembly.others or ())
     yield ""
     yield "final state (mm; x right, y down from the power line's centre, angle counter-clockwise)"

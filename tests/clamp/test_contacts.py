@@ -19,15 +19,12 @@ from clamp3d.clamp.dimensions import Clamp, GrooveDimensions
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.matrix import PAIRS
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.placement import placement
 from clamp3d.clamp.result import Assembly
-from clamp3d.clamp.sensitivity import sensitivity
 from clamp3d.clamp.tolerance import monte_carlo
 from clamp3d.cli import group
 from clamp3d.collide.distance import measure
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.shapes import Solid
-from clamp3d.errors import Clamp3dError
 from clamp3d.testing import body
 
 WIRES = [
@@ -190,8 +187,8 @@ def test_a_type_that_is_not_the_declared_one_is_a_difference() -> None:
     assert "warning" in {f.severity for f in assembly.findings if "P2-P7" in f.text}
 
 
-def through_the_bolt() -> Clamp:
-    """Thick wires on narrow grooves near the bolt: they reach 6 mm into its shank."""
+def against_the_bolt() -> Clamp:
+    """Thick wires on narrow grooves near the bolt: in their middle they would reach 6 mm into its shank."""
     clamp = load_clamp(line=52, jumper=52)
 
     def grooves(depth: float) -> dict[str, GrooveDimensions]:
@@ -207,17 +204,18 @@ def through_the_bolt() -> Clamp:
     )
 
 
-def test_wires_through_the_bolt_are_not_clamped() -> None:
-    assembly = assemble(through_the_bolt())
-    assert re.fullmatch(r"not clamped: P4 overlaps P6 by (at least )?6 mm", assembly.status)
-    texts = [f.text for f in assembly.findings if f.severity == "error"]
-    assert texts[0] == assembly.status
-    assert (assembly.findings[0].a, assembly.findings[0].b) == ("P4", "P6")
-    assert texts[1] == assembly.status.removeprefix("not clamped: ").replace("P6", "P7")
+def test_the_bolt_stops_wires_and_is_named() -> None:
+    assembly = assemble(against_the_bolt())
+    gaps = {(c.a, c.b): c.gap for c in assembly.contacts}
+    assert min(gaps.values()) > -1e-9
+    assert gaps["P4", "P6"] == pytest.approx(0.0, abs=1e-9)
+    assert gaps["P4", "P7"] == pytest.approx(0.0, abs=1e-9)
     assert {(d.a, d.b) for d in assembly.undeclared} == {("P4", "P6"), ("P4", "P7")}
+    assert {(f.a, f.b) for f in assembly.findings if f.severity == "error"} == {("P4", "P6"), ("P4", "P7")}
+    assert {(f.a, f.b) for f in assembly.forces if f.force > 0.1} >= {("P4", "P6"), ("P4", "P7")}
 
 
-def test_run_of_wires_through_the_bolt_is_a_finding(tmp_path: Path) -> None:
+def test_run_of_wires_against_the_bolt_is_a_finding(tmp_path: Path) -> None:
     text = (Path(__file__).parents[2] / "clamp3d/clamp/data/reference.toml").read_text()
     for old, new in (
         (r"radius = 23\.8012", "radius = 15.0"),
@@ -230,30 +228,18 @@ def test_run_of_wires_through_the_bolt_is_a_finding(tmp_path: Path) -> None:
     ):
         text, count = re.subn(old, new, text)
         assert count
-    file = tmp_path / "through.toml"
+    file = tmp_path / "against.toml"
     file.write_text(text)
     done = CliRunner().invoke(group, ["run", str(file), "-q", "--line", "52", "--jumper", "52", "--no-equilibria"])
     assert done.exit_code == 1
-    assert "\nnot clamped: P4 overlaps P6 by" in done.output
+    assert "P4-P6 (bolt, power line) declared 0 (no connection) but met as 2" in done.output
 
 
-def test_no_command_calls_wires_through_the_bolt_clamped() -> None:
-    clamp = through_the_bolt()
-    result = monte_carlo(clamp, n=2, tolerance=0.01)
-    assert result.nominal is None
-    assert all("overlaps" in status for status in result.status)
-    for refuses in (lambda: sensitivity(clamp), lambda: placement(clamp)):
-        with pytest.raises(Clamp3dError, match="not clamped: P4 overlaps P6"):
-            refuses()
-
-
-def test_an_overlap_counts_though_contact_is_declared() -> None:
-    clamp = through_the_bolt()
-    rows = {**clamp.connections, "P4": {"P5": 1, "P6": 2, "P7": 2}}
-    assembly = assemble(replace(clamp, connections=rows))
-    assert assembly.status.startswith("not clamped: P4 overlaps P6 by ")
-    assert not assembly.undeclared
-    assert not assembly.clamped
+def test_every_command_stops_wires_at_the_bolt_in_the_same_place() -> None:
+    clamp = against_the_bolt()
+    assembly, result = assemble(clamp), monte_carlo(clamp, n=1, tolerance=0.0, wire_tolerance_percent=0.0)
+    assert result.nominal == assembly.distance == result.distance[0]
+    assert set(result.status) == {assembly.status}
 
 
 def test_seven_parts_meet_on_the_way_only_where_they_may() -> None:

@@ -60,7 +60,7 @@ def clamp_of(
     """The reference clamp with other grooves and wires; None if such grooves do not fit into its splints.
 
     Of the grooves up line, up jumper, down line, down jumper: ``radius`` (4,) mm, ``half_angle`` (4,) rad, ``offset``
-    (4,) mm from the bolt; ``diameter`` (2,) mm of line and jumper.
+    (4,) mm from the bolt; ``diameter`` (2,) mm of line and jumper. A narrow slot stops the tilt at ``max_tilt_deg``.
     """
     base, parts = _base(), dict[str, dict[str, Any]](up_splint={}, down_splint={})
     R, half, beside = (np.broadcast_to(np.asarray(v, float), 4) for v in (radius, half_angle, offset))
@@ -71,7 +71,8 @@ def clamp_of(
             getattr(getattr(base, part), key), radius=float(r), offset=float(o), centre_depth=float(depth)
         )
     if max_tilt_deg is not None:
-        parts["down_splint"]["max_tilt_deg"] = max_tilt_deg
+        back, bolt = base.down_splint.back_radius, base.bolt.diameter / 2
+        parts["down_splint"]["slot_width"] = 2.0 * back * math.sin(math.radians(max_tilt_deg) + math.asin(bolt / back))
     line, jumper = (Wire(diameter=float(d)) for d in np.broadcast_to(np.asarray(diameter, float), 2))
     try:
         splints = {part: replace(getattr(base, part), **changed) for part, changed in parts.items()}
@@ -107,12 +108,13 @@ def random_clamp(rng: np.random.Generator) -> Clamp:
 
 def open_start(rng: np.random.Generator, section: Section) -> Array:
     """An open state (6,), a poor one: far open, fully tilted, wires beside the middle or against a lip."""
-    limit, bounds = section.clamp.down_splint.max_tilt, section.bounds()
+    limit = section.clamp.tilt_stop
     while True:
         tilt = float(rng.choice([-limit, 0.0, limit, rng.uniform(-limit, limit)]))
         q = section.open_state(section.open_distance() + rng.choice([0.0, 1.0, 100.0]) * rng.random(), tilt)
-        for i in (0, 2):
-            low, high = bounds[i]
+        for i, wire in ((0, "P6"), (2, "P7")):
+            (low, high), (least, most) = section.mouth(wire), section.reach(wire)
+            low, high = max(low, least), min(high, most)
             # A lip itself, a little inside it, or anywhere in the mouth.
             place = rng.choice([0.0, 10.0 ** rng.uniform(-9.0, -2.0), rng.random()])
             q[i] = low + place * (high - low) if rng.random() < 0.5 else high - place * (high - low)

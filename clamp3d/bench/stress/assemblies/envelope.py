@@ -10,7 +10,8 @@ are known in closed form: where two of them meet, and where an arc of one and a 
 list the function is monotone, so its minima are read from the list, exact to rounding (1e-13 of the clamp). Only the
 tilt is searched.
 
-Grooves must be minor arcs (half angle up to 90 degrees): over others a wire can hide behind a lip.
+Grooves must be minor arcs (half angle up to 90 degrees): over others a wire can hide behind a lip. A wire may leave its
+groove, over a face and round the splint's outer edge, where nothing holds it any more; the bolt stops it on the inside.
 """
 
 from __future__ import annotations
@@ -65,16 +66,43 @@ class Wire:
     down: _Groove
     r: float
     bolt_x: float
+    bolt_r: float
+    half_up: float
+    half_down: float
+
+    @property
+    def side(self) -> float:
+        """-1 for the line, +1 for the jumper."""
+        return -1.0 if self.up.x < self.bolt_x else 1.0
+
+    @property
+    def inner(self) -> float:
+        """Where the wire touches the bolt."""
+        return self.bolt_x + self.side * (self.bolt_r + self.r)
+
+    @property
+    def edge(self) -> float:
+        """Outer edge of the up splint."""
+        return self.bolt_x + self.side * self.half_up
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """Places from the bolt to beyond both splints."""
+        out = self.bolt_x + self.side * (max(self.half_up, self.half_down) + 2.0 * self.r)
+        return min(self.inner, out), max(self.inner, out)
 
     def over(self, x: Array) -> Array:
-        """Least y of the centre at x (any shape) under the up splint; x inside the mouth."""
+        """Least y of the centre at x (any shape) under the up splint; minus infinity beside it."""
         g, r = self.up, self.r
         u = x - g.x
         y = np.fmax(g.face + _root(u + g.s, r), g.face + _root(u - g.s, r))
         if r < g.R:
             arc = g.y - _root(u, g.R - r)
             y = np.fmax(y, np.where(np.abs(u) <= (g.R - r) * g.s / g.R, arc, np.nan))
-        return y
+        beyond = self.side * (x - self.edge)
+        y = np.where((np.abs(u) >= g.s) & (beyond <= 0.0), g.face + r, y)
+        corner = np.nan_to_num(g.face + _root(beyond, r), nan=-np.inf)
+        return np.where(beyond > 0.0, corner, y)
 
     def under(self, x: Array, tilt: Array) -> Array:
         """Largest y (n, k) of the centre at x over the down splint with its origin at (bolt_x, 0)."""
@@ -93,14 +121,16 @@ class Wire:
             along, deep = (x - cx) * c - rest * s, (x - cx) * s + rest * c
             inside = np.abs(along) * (math.sqrt((g.R - g.s) * (g.R + g.s))) <= deep * g.s
             y = np.fmin(y, np.where(inside, cy + rest, np.nan))
-        return y
+        ex, ey = self._place(self.side * self.half_down, g.face, tilt)
+        corner = np.nan_to_num(ey - _root(x - ex, r), nan=np.inf)
+        return np.where(self.side * ((x - ex) + r * s) > 0.0, corner, y)
 
     def least(self, x: Array, tilt: Array) -> Array:
         """Least d (n, k) with the wire's centre at x."""
         return self.over(x) - self.under(x, tilt)
 
     def places(self, tilt: Array) -> Array:
-        """Places (n, k) in the mouth between which the least d is monotone, in order."""
+        """Places (n, k) in the window between which the least d is monotone, in order."""
         up, down, r = self.up, self.down, self.r
         n = len(tilt)
         s = np.sin(tilt)[:, None]
@@ -108,15 +138,17 @@ class Wire:
         lips_up = [(up.x - up.s, r), (up.x + up.s, r)]
         (lx, ly), (mx, my) = (self._place(down.x + w * down.s, down.face, tilt) for w in (-1.0, 1.0))
         cx, _ = self._place(down.x, down.y, tilt)
-        fixed = [up.x, *(x + w * r for x, _ in lips_up for w in (-1.0, 1.0))]
-        moving = [lx - r * s, mx - r * s, lx - r, lx + r, mx - r, mx + r, cx]
+        ex, _ = self._place(self.side * self.half_down, down.face, tilt)
+        lips_up.append((self.edge, r))
+        fixed = [up.x - up.s, up.x, up.x + up.s, self.edge, *(x + w * r for x, _ in lips_up for w in (-1.0, 1.0))]
+        moving = [p + w * r for p in (lx, mx, ex) for w in (-1.0, -s, 1.0)] + [cx]
         # Where the circles about the two lips of the down splint cross: on the upright of their middle.
         half = 0.5 * np.hypot(mx - lx, my - ly)
         with np.errstate(invalid="ignore"):
             high = np.where(r >= half, np.sqrt(np.maximum(r * r - half * half, 0.0)), np.nan)
         moving.append(0.5 * (lx + mx) - high * s)
         circles_up = list(lips_up)
-        circles_down = [(lx, r), (mx, r)]
+        circles_down = [(lx, r), (mx, r), (ex, r)]
         if r < up.R:
             reach = (up.R - r) * up.s / up.R
             fixed += [up.x - reach, up.x + reach]
@@ -132,7 +164,7 @@ class Wire:
                     total = q + sign * p
                     if total != 0.0:
                         moving.append((a * q + sign * b * p) / total)
-        low, high_end = up.x - up.s, up.x + up.s
+        low, high_end = self.window
         x = np.hstack([*(one * f for f in (low, high_end, *fixed)), *(one * m for m in moving)])
         x = np.where(np.isfinite(x), x, low)
         return np.sort(np.clip(x, low, high_end), axis=1)
@@ -150,8 +182,9 @@ class Envelope:
         self.clamp = clamp
         self.bolt_x = clamp.up_splint.width / 2
         self.lever = clamp.down_splint.width / 2
-        self.limit = clamp.down_splint.max_tilt
-        self.wires = [Wire(*_grooves(clamp, wire), self.bolt_x) for wire in WIRES]
+        self.limit = clamp.tilt_stop
+        sizes = self.bolt_x, clamp.bolt.diameter / 2, clamp.up_splint.width / 2, self.lever
+        self.wires = [Wire(*_grooves(clamp, wire), *sizes) for wire in WIRES]
 
     def faces(self, tilt: Array) -> Array:
         """Least d (n,) at which the inner faces do not overlap."""
@@ -168,7 +201,7 @@ class Envelope:
         for i, wire in enumerate(self.wires):
             x, y = np.array([[q[2 * i]]]), float(q[2 * i + 1])
             worst += [float(wire.over(x)[0, 0]) - y, y - float(q[4] + wire.under(x, tilt)[0, 0])]
-            worst.append(abs(float(q[2 * i]) - wire.up.x) - wire.up.s)
+            worst.append(wire.side * (wire.inner - float(q[2 * i])))
         return max(0.0, *worst) if not any(map(math.isnan, worst)) else math.inf
 
     def falls(self, q: Array, reach: float = 0.02, barrier: float = 1e-9) -> float:
@@ -197,7 +230,7 @@ def _slide(wire: Wire, tilts: Array, x: float, level: float, reach: float) -> Ar
     """Lowest d (n,) at each tilt that a wire at x gets to within ``reach`` without rising above ``level``."""
     places = wire.places(tilts)
     n = len(tilts)
-    here = np.clip(np.array([[x, x - reach, x + reach]]), wire.up.x - wire.up.s, wire.up.x + wire.up.s)
+    here = np.clip(np.array([[x, x - reach, x + reach]]), *wire.window)
     places = np.sort(np.hstack([places, np.repeat(here, n, 0)]), axis=1)
     values = wire.least(places, tilts)
     # Of each row the unblocked stretch around x, which the walls of the window end.

@@ -93,7 +93,7 @@ def _chord_bound(clamp: Clamp) -> float:
     worst = 0.0
     for key in ("line_groove", "jumper_groove"):
         error, steepest = 0.0, 0.0
-        for part, face, tilt in ((up, up.thickness, 0.0), (down, down.face_depth, down.max_tilt)):
+        for part, face, tilt in ((up, up.thickness, 0.0), (down, down.face_depth, clamp.tilt_stop)):
             groove = getattr(part, key)
             half = math.acos(min(1.0, abs(groove.centre_depth - face) / groove.radius))
             error += sagitta(groove.radius, 2.0 * half / chord_count(2.0 * half, _UNIT))

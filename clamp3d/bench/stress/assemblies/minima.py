@@ -92,6 +92,8 @@ def minima(envelope: Envelope, count: int = 301) -> list[Minimum]:
                 max(tables[0][c][a], tables[1][c][b], faces[min(max(k + s, 0), count - 1)])
                 for c, s in ((1, 0), (2, -1), (3, 1))
             )
+            if np.isneginf(min(tables[0][1][a], tables[1][1][b])):  # a wire is out of the clamp
+                continue
             if (k > 0 and left < here) or (k < count - 1 and right < here):
                 continue
             q = _lowest(envelope, float(tilts[k]), float(tilts[1] - tilts[0]), tables[0][0][a], tables[1][0][b])

@@ -1,0 +1,228 @@
+"""The closing path: the quasi-static motion of the clamp while its bolt is drawn, without friction.
+
+The parts move as if each coordinate of the state (`section`) met the same slight drag and nothing overlapped: the
+velocity is the force of the bolt, projected on the motions that keep every closed gap closed or open it (a sweeping
+process). One step of the length h solves "least |q' - q|^2 / 2 + h d', no gap negative", Moreau's catching-up scheme
+[J. J. Moreau, Evolution problem associated with a moving convex set, J. Differential Equations 26 (1977) 347-374], by
+sequential quadratic programming. It is implicit: a long step is as stable as a short one. The multipliers of a step
+over h are the contact forces in parts of the bolt force.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import brentq, nnls
+
+from clamp3d.clamp.curvature import lagrangian_hessian
+from clamp3d.clamp.matrix import Pair
+from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, W
+from clamp3d.core.pose import Array
+from clamp3d.errors import SolverError
+
+STRIDE = 0.01
+"""How far a step moves any coordinate, in parts of the down splint's half width (0.7 mm for the reference clamp)."""
+CLOSING = np.eye(SIZE)[D]
+"""What the bolt does: it lowers d."""
+
+HELD = (0, 1, 2, 3, D, S)
+"""Coordinates that move while the down splint is closed by hand: what play the joints have the nut takes up."""
+OnContact = Callable[[Pair, Array], None]
+"""Told a pair and the state when the pair first carries force."""
+
+_AT_REST = 1e-6
+"""Speed over the bolt's at which nothing moves: what certifies a final state takes it from there."""
+_STEPS, _ROUNDS = 2000, 12
+_SETTLED, _OVERLAP = 1e-3, 1e-8
+"""A step is found when a round moves it by this part of a stride, and it overlaps by no more than this part."""
+_SLOW = 4.0
+"""A step that is longer than so many strides is one near rest."""
+_SHORTEST = 1e-9
+"""Shortest stride, in parts of the half width."""
+
+
+def open_start(section: Section, *, open_by: float = 0.0, open_tilt: float = 0.0) -> Array:
+    """Where every closing begins: the clamp wide open, the up splint resting on the line, the jumper in its groove.
+
+    Parameters
+    ----------
+    section : Section
+    open_by, open_tilt : float
+        How much further than needed the clamp is open, and how its down splint is tilted; mm and rad.
+    """
+    q = section.open_state(section.open_distance() + open_by, open_tilt)
+    for i, wire in enumerate(WIRES):
+        y = 2 * i + 1
+        q = descend(section, q, np.eye(SIZE)[y], free=(y,))
+        overlap = -float(section.wire_gaps(q, wire).value.min())
+        if overlap > 0.0:  # the descent's rounding
+            q[y] += 2.0 * overlap
+    return q
+
+
+def descend(
+    section: Section,
+    q: Array,
+    goal: Array = CLOSING,
+    *,
+    free: tuple[int, ...] | None = None,
+    stride: float = STRIDE,
+    on_contact: OnContact | None = None,
+    most: int | None = None,
+) -> Array:
+    """Where the motion from ``q`` that lowers ``goal . q`` comes to rest; ``stride`` as `STRIDE`.
+
+    Only the coordinates ``free`` move, by default all that the joints let. Raises SolverError if that takes more than
+    ``most`` steps.
+    """
+    moving = list(section.free if free is None else free)
+    longest = stride * section.lever
+    gaps, h = section.gaps(q), longest
+    loaded: set[Pair] = set()
+    for _ in range(most or _STEPS):
+        found = _step(section, q, gaps, goal, moving, h, longest)
+        if found is None:
+            h *= 0.25
+            if h < _SHORTEST * section.lever:
+                return q
+            continue
+        new, new_gaps, force = found
+        speed = float(np.abs(new - q).max()) / h
+        if on_contact is not None:
+            for pair in dict.fromkeys(new_gaps.pair[k] for k in np.flatnonzero(force > _AT_REST)):
+                if pair not in loaded:
+                    loaded.add(pair)
+                    on_contact(pair, _meeting(section, q, gaps, goal, moving, h, longest, pair, new))
+        q, gaps = new, new_gaps
+        if speed <= _AT_REST:
+            return q
+        h = min(longest / speed, 4.0 * h)
+        if not force.any():  # nothing is pushed: no gap closes faster than the motion goes
+            closing = gaps.gradient @ goal > 0.0
+            h = max(h, float(gaps.value[closing].min(initial=math.inf))) if closing.any() else h
+    raise SolverError(
+        f"closing takes more than {most or _STEPS} steps of {longest:.3g} mm: the down splint's width "
+        f"({2.0 * section.lever:.3g} mm) is too small beside the way it closes"
+    )
+
+
+def _meeting(
+    section: Section,
+    q: Array,
+    gaps: Gaps,
+    goal: Array,
+    moving: list[int],
+    h: float,
+    longest: float,
+    pair: Pair,
+    new: Array,
+) -> Array:
+    """The state within a step of ``h`` from q to ``new`` at which ``pair`` meets: the step without it, cut short."""
+    states = {0.0: q}
+
+    def gap(part: float) -> float:
+        if part not in states:
+            found = _step(section, q, gaps, goal, moving, part * h, longest, without=pair)
+            states[part] = new if found is None else found[0]
+        at = section.gaps(states[part])
+        return float(min(v for v, p in zip(at.value, at.pair, strict=True) if p == pair))
+
+    if gap(0.0) <= 0.0:
+        return q
+    return states[brentq(gap, 0.0, 1.0, xtol=1e-9)] if gap(1.0) < 0.0 else new
+
+
+def _step(
+    section: Section,
+    q: Array,
+    gaps: Gaps,
+    goal: Array,
+    moving: list[int],
+    h: float,
+    longest: float,
+    *,
+    without: Pair | None = None,
+) -> tuple[Array, Gaps, Array] | None:
+    """State after a step of ``h`` from q, its gaps and forces; None if the linearised gaps do not lead there.
+
+    The gaps of the pair ``without`` do not count.
+    """
+    target = q - h * goal
+    at, force = q, np.zeros(len(gaps.value))
+    ignored = np.array([pair == without for pair in gaps.pair]) if without else np.zeros(len(force), dtype=bool)
+    for k in range(_ROUNDS):
+        if h <= _SLOW * longest or k == 1:
+            bend = _bend(section, at, gaps, force, moving, exact=h > _SLOW * longest)
+        elif k == 0:
+            bend = np.zeros((len(moving), len(moving)))
+        hessian = np.eye(len(moving)) + h * bend
+        near = np.flatnonzero(~ignored & (gaps.value <= 2.0 * longest + np.abs(gaps.gradient[:, D]) * h))
+        move, pushed = _project((at - target)[moving], hessian, gaps.gradient[near][:, moving], gaps.value[near], h)
+        if move is None:
+            return None
+        new = at.copy()
+        new[moving] += move
+        if np.abs(new - q).max() > 3.0 * max(longest, h):
+            return None
+        gaps, at = section.gaps(new), new
+        if len(gaps.value) != len(force):
+            return None
+        force = np.zeros(len(force))
+        force[near] = pushed / h
+        least = float(gaps.value[~ignored].min())
+        if (np.abs(move).max() <= _SETTLED * longest and least >= -_OVERLAP * longest) or (
+            not len(near) and least >= 0.0
+        ):
+            return at, gaps, force
+    return None
+
+
+def _project(offset: Array, hessian: Array, A: Array, value: Array, scale: float) -> tuple[Array | None, Array]:
+    """Least x . H x / 2 + offset . x with A x >= -value, and the multipliers; None where A x cannot be.
+
+    A least-distance problem, solved by non-negative least squares [Lawson & Hanson, Solving Least Squares Problems,
+    1974, chapter 23].
+    """
+    L = np.linalg.cholesky(hessian)
+    z0 = np.linalg.solve(L, offset)
+    if not len(A):
+        return -np.linalg.solve(L.T, z0), np.zeros(0)
+    G = np.linalg.solve(L, A.T).T
+    lower = (G @ z0 - value) / scale
+    u, _ = nnls(np.vstack([G.T, lower]), np.append(np.zeros(len(offset)), 1.0))
+    rest = 1.0 - float(lower @ u)
+    if not rest > 1e-12:
+        return None, u
+    multipliers = u / rest * scale
+    return np.linalg.solve(L.T, G.T @ multipliers - z0), multipliers
+
+
+def _bend(section: Section, q: Array, gaps: Gaps, force: Array, moving: list[int], *, exact: bool) -> Array:
+    """Curvature of the loaded gaps: on a short step that which keeps a wire, or the round back, in the round of its arc
+    (force over radius difference), on a long one all there is, by differences."""
+    if exact:
+        size, axes = np.linalg.eigh(
+            lagrangian_hessian(section, q, np.flatnonzero(force), force[force > 0.0])[np.ix_(moving, moving)]
+        )
+        return np.asarray((axes * np.maximum(size, 0.0)) @ axes.T)
+    found = np.zeros((SIZE, SIZE))
+    found[W, W] = section.lift(float(q[W]))[2] * float(force @ gaps.gradient[:, D])
+    pose = section.down_splint(q)
+    c, s = math.cos(pose.angle), math.sin(pose.angle)
+    for k in np.flatnonzero(force):
+        (splint, wire), row = gaps.pair[k], gaps.gradient[k]
+        if gaps.feature[k] != "arc" or wire not in WIRES:
+            continue
+        pair, i = section.pairs[splint, wire], 2 * WIRES.index(wire)
+        along = np.zeros(SIZE)
+        tx, ty = -row[i + 1], row[i]
+        along[i], along[i + 1] = tx, ty
+        if splint == "P2":
+            u, v = float(pair.T_a_groove[0, 3]), -float(pair.T_a_groove[2, 3])
+            ox, oy = u * c + v * s, v * c - u * s
+            along[D], along[S] = -ty, (ty * ox - tx * oy) / section.lever
+            along[B] = along[W] = -tx
+        found += force[k] / abs(pair.groove.radius - pair.cylinder.radius) * np.outer(along, along)
+    return found[np.ix_(moving, moving)]

@@ -1,0 +1,83 @@
+"""The contact forces that hold a final state, per newton of bolt force: the multipliers of its active gaps."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from clamp3d.clamp.dimensions import PartName
+from clamp3d.clamp.final_state import FinalState
+from clamp3d.clamp.matrix import plain
+from clamp3d.clamp.section import Section
+from clamp3d.core.pose import Array
+
+HELD = "held on the bolt's axis"
+"""What carries the sideways force that frictionless contacts leave, where the joints are said to have no play."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Force:
+    """A contact force: part a pushes part b.
+
+    Attributes
+    ----------
+    a, b : str
+        The two parts.
+    feature : str
+        What touches, as the section names it; `HELD` is no contact but an assumption.
+    force : float
+        Newton per newton of bolt force.
+    point : ndarray (3,)
+        Where it acts, in the world, mm.
+    direction : ndarray (3,)
+        Unit vector in which b is pushed, in the world.
+    """
+
+    a: PartName
+    b: PartName
+    feature: str
+    force: float
+    point: Array
+    direction: Array
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return plain(self)
+
+
+def contact_forces(section: Section, final: FinalState) -> tuple[Force, ...]:
+    """The forces of a final state, those on the wires first; see `Force`.
+
+    >>> from clamp3d.baselines.cas import Cas
+    >>> from clamp3d.clamp.final_state import solve_final_state
+    >>> from clamp3d.clamp.loader import load_clamp
+    >>> section = Section(load_clamp(), Cas())
+    >>> [(f.a, f.b, round(f.force, 3)) for f in contact_forces(section, solve_final_state(section))][:2]
+    [('P1', 'P6', 0.541), ('P2', 'P6', 0.541)]
+    """
+    q, gaps, clamp = final.q, final.gaps, section.clamp
+    found, total = [], np.zeros(2)
+    for k in np.flatnonzero(final.multipliers):
+        (a, b), push = gaps.pair[k], float(final.multipliers[k])
+        found.append(_force(q, a, b, gaps.feature[k], push * gaps.normal[k], gaps.point[k]))
+        total += push * gaps.normal[k] * ((b == "P2") - (a == "P2"))
+    # What pushes the down splint it hands on to the saddle: through the arc, as far as that can carry it.
+    down = section.down_splint(q)
+    carried = total if clamp.joints.saddle else np.array([0.0, total[1]])
+    lean = total[0] / total[1] if clamp.joints.saddle else 0.0
+    depth = clamp.down_splint.back_radius / math.hypot(1.0, lean)
+    found.append(_force(q, "P2", "P3", "arc", carried, (down.x + lean * depth, down.y + depth)))
+    if abs(total[0] - carried[0]) > 1e-9:
+        held = np.array([-(total[0] - carried[0]), 0.0])
+        found.append(_force(q, "P4", "P2", HELD, held, (down.x, down.y)))
+    return tuple(found)
+
+
+def _force(q: Array, a: PartName, b: PartName, feature: str, push: Array, at: Any) -> Force:
+    """``push`` and ``at`` are in P1's section frame, the world's origin is the line's centre."""
+    size = float(np.hypot(*push))
+    point = np.array([at[0] - q[0], 0.0, q[1] - at[1]])
+    return Force(a, b, feature, size, point, np.array([push[0], 0.0, -push[1]]) / size)
