@@ -43,7 +43,9 @@ def pose_of(pair: GroovePair, T_a_b: Array) -> Array:
     """
     if type(pair) is not GroovePair:
         instance("pair", pair, GroovePair)
-    T = array("T_a_b", T_a_b, (4, 4), finite=False)
+    T = T_a_b
+    if not (type(T) is np.ndarray and T.dtype == np.float64 and T.shape == (4, 4)):
+        T = array("T_a_b", T_a_b, (4, 4), finite=False)
     if not np.vdot(T, T) < LARGEST**2:  # NaN, infinite, or too large to be multiplied
         check_pose(T, "T_a_b")
         raise InputError(f"T_a_b must have an offset up to {LARGEST:g} mm, got {shown(T[:3, 3])}")

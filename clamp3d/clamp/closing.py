@@ -22,8 +22,8 @@ from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, W
 from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
 
-STRIDE = 0.01
-"""How far a step moves any coordinate, in parts of the down splint's half width (0.7 mm for the reference clamp)."""
+STRIDE = 0.02
+"""How far a step moves any coordinate, in parts of the down splint's half width (1.4 mm for the reference clamp)."""
 CLOSING = np.eye(SIZE)[D]
 """What the bolt does: it lowers d."""
 
@@ -32,12 +32,12 @@ HELD = (0, 1, 2, 3, D, S)
 OnContact = Callable[[Pair, Array], None]
 """Told a pair and the state when the pair first carries force."""
 
-_AT_REST = 1e-6
+_AT_REST = 1e-4
 """Speed over the bolt's at which nothing moves: what certifies a final state takes it from there."""
 _STEPS, _ROUNDS = 2000, 12
 _SETTLED, _OVERLAP = 1e-3, 1e-8
 """A step is found when a round moves it by this part of a stride, and it overlaps by no more than this part."""
-_SLOW = 4.0
+_SLOW = 16.0
 """A step that is longer than so many strides is one near rest."""
 _SHORTEST = 1e-9
 """Shortest stride, in parts of the half width."""

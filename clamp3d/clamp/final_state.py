@@ -245,7 +245,8 @@ def _polish(section: Section, q: Array, active: float) -> tuple[Array, float]:
         overlapping = (gaps.value < -TOLERANCE) & (gaps.value >= -active)
         rows = np.flatnonzero((multipliers > 0.0) | overlapping)
         free = touched(section, gaps, rows)
-        hessian = lagrangian_hessian(section, q, rows, multipliers[rows])
+        if step > _ACTIVE:  # nearer it does not change any more
+            hessian = lagrangian_hessian(section, q, rows, multipliers[rows])
         A = gaps.gradient[rows]
         k, n = len(rows), len(free)
         kkt = np.block([[hessian[np.ix_(free, free)], -A[:, free].T], [A[:, free], np.zeros((k, k))]])

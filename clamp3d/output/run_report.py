@@ -17,13 +17,16 @@ def run_to_text(assembly: Assembly) -> str:
     return "\n".join(_lines(assembly))
 
 
-_PLAY = {"hole": "in the up splint's hole", "saddle": "in the saddle", "washer": "of the saddle on the bolt"}
+_PLAY = {
+    "hole": "bolt in the up splint's hole",
+    "saddle": "and round back in the saddle",
+    "washer": "and saddle on bolt",
+}
 
 
 def _play(item: tuple[str, float | None]) -> str:
     joints, distance = item
-    words = _PLAY[joints.split(", ")[-1]]
-    return f"{'not clamped' if distance is None else f'{distance:.3f} mm'} {'and ' * (', ' in joints)}{words}"
+    return f"{'not clamped' if distance is None else f'{distance:.3f} mm'} ({_PLAY[joints.split(', ')[-1]]})"
 
 
 def _lines(assembly: Assembly) -> Iterator[str]:
@@ -47,7 +50,7 @@ def _lines(assembly: Assembly) -> Iterator[str]:
         )
     if assembly.start_tilts:
         low, high = (f"{math.degrees(t):z.1f}" for t in assembly.start_tilts)
-        yield f"every start tilted by {low} to {high} deg ends here"
+        yield f"closing from a start tilted by {low} or {high} deg ends here too"
     yield from map(str, assembly.others or ())
     yield ""
     yield "final state (mm; x right, y down from the power line's centre, angle counter-clockwise)"

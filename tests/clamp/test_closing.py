@@ -1,0 +1,209 @@
+"""The closing path: one answer in every command, stops that are there, play, forces and their virtual work."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.dimensions import Clamp, Joints, Wire
+from clamp3d.clamp.equilibria import equilibria
+from clamp3d.clamp.final_state import solve_final_state
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.section import SIZE, B, D, Gaps, S, Section, W
+from clamp3d.clamp.tolerance import monte_carlo
+from clamp3d.errors import Clamp3dError
+
+
+def random_clamp(rng: np.random.Generator) -> Clamp:
+    """A valid clamp, all dimensions varied by 15 %, a quarter of the grooves major arcs."""
+    base = load_clamp()
+
+    def about(value: float, share: float = 0.15) -> float:
+        return float(value * rng.uniform(1.0 - share, 1.0 + share))
+
+    while True:
+        bolt = float(rng.choice([12.0, 16.0, 20.0, 24.0]) * rng.uniform(0.95, 1.05))
+        thickness, face, back = about(27.7), about(24.55), about(48.0)
+        grooves = []
+        for surface, sign in ((thickness, 1.0), (thickness, 1.0), (face, -1.0), (face, -1.0)):
+            half = rng.uniform(0.3, 1.4) if rng.random() < 0.75 else rng.uniform(1.6, 2.2)
+            radius = float(rng.uniform(8.0, 30.0) if half < 1.5 else rng.uniform(5.0, 13.0))
+            depth = float(surface + sign * radius * math.cos(half))
+            old = base.up_splint.line_groove
+            grooves.append(replace(old, radius=radius, offset=about(48.0, 0.2), centre_depth=depth))
+        try:
+            up = replace(
+                base.up_splint,
+                width=about(137.0),
+                thickness=thickness,
+                hole_diameter=bolt + rng.uniform(0.5, 3.0),
+                line_groove=grooves[0],
+                jumper_groove=grooves[1],
+            )
+            down = replace(
+                base.down_splint,
+                width=about(137.0),
+                face_depth=face,
+                back_radius=back,
+                back_half_angle_deg=float(rng.uniform(36.0, 50.0)),
+                slot_width=about(42.0, 0.2),
+                slot_length=bolt + rng.uniform(0.5, 4.0),
+                max_tilt_deg=None,
+                line_groove=grooves[2],
+                jumper_groove=grooves[3],
+            )
+            saddle = replace(
+                base.saddle,
+                radius=back + rng.uniform(0.3, 3.0),
+                width=about(44.0),
+                apex_thickness=about(12.19),
+                hole_diameter=bolt + rng.uniform(0.5, 3.0),
+            )
+            wires = [
+                Wire(diameter=float(2.0 * rng.uniform(0.15, 1.2) * min(grooves[i].radius, grooves[i + 2].radius)))
+                for i in (0, 1)
+            ]
+            return replace(
+                base,
+                name="random",
+                line=wires[0],
+                jumper=wires[1],
+                up_splint=up,
+                down_splint=down,
+                saddle=saddle,
+                bolt=replace(base.bolt, diameter=bolt, shank_length=about(170.0)),
+                nut=replace(base.nut, across_flats=1.5 * bolt),
+            )
+        except (Clamp3dError, ValueError):
+            continue
+
+
+def test_every_command_closes_a_clamp_in_the_same_way() -> None:
+    rng = np.random.default_rng(14)
+    for _ in range(12):
+        clamp = random_clamp(rng)
+        run = assemble(clamp)
+        sampled = monte_carlo(clamp, n=1, tolerance=0.0, wire_tolerance_percent=0.0)
+        assert run.closing == solve_final_state(Section(clamp, Cas())).q[D]
+        if run.clamped:
+            assert sampled.status == ("clamped",)
+            assert sampled.nominal == sampled.distance[0] == run.distance
+            assert min(c.gap for c in run.contacts if (c.a, c.b) != ("P4", "P5")) >= -1e-6
+        else:
+            assert sampled.nominal is None
+            assert sampled.status != ("clamped",)
+
+
+def test_the_end_does_not_depend_on_the_length_of_a_step() -> None:
+    rng = np.random.default_rng(15)
+    for _ in range(6):
+        section = Section(random_clamp(rng), Cas())
+        ends = [solve_final_state(section, stride=stride).q[D] for stride in (0.01, 0.004)]
+        assert ends[0] == pytest.approx(ends[1], abs=1e-7)
+
+
+def test_gradients_agree_with_differences_where_joints_have_play_and_wires_leave_the_faces() -> None:
+    rng = np.random.default_rng(16)
+    clamp = replace(load_clamp(), joints=Joints(hole=True, saddle=True, washer=True))
+    section, h = Section(clamp, Cas()), 1e-6
+    for side in (0.0, 40.0):
+        for _ in range(10):
+            q = section.open_state(26.0, 0.05)
+            q += np.array([-side, 0.0, side, 0.0, 0.0, 0.0, 0.0, 0.0]) + 0.3 * rng.normal(size=SIZE)
+            gaps = section.gaps(q)
+            numeric = [
+                (section.gaps(q + h * e).value - section.gaps(q - h * e).value) / (2.0 * h) for e in np.eye(SIZE)
+            ]
+            assert np.allclose(np.array(numeric).T, gaps.gradient, atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("joints", "distance"),
+    [
+        (Joints(hole=True), 31.428),
+        (Joints(hole=True, saddle=True), 31.427),
+        (Joints(hole=True, saddle=True, washer=True), 31.416),
+    ],
+)
+def test_play_lets_the_reference_clamp_close_further(joints: Joints, distance: float) -> None:
+    run = assemble(replace(load_clamp(), joints=joints))
+    assert run.clamped
+    assert round(run.distance, 3) == distance
+    assert min(c.gap for c in run.contacts if (c.a, c.b) != ("P4", "P5")) >= -1e-6
+    x = sum(f.force * f.direction[0] * ((f.b == "P2") - (f.a == "P2")) for f in run.forces)
+    assert x == pytest.approx(0.0, abs=1e-9)  # nothing sideways is left over that no contact carries
+
+
+def test_forces_do_the_virtual_work_of_a_gap_that_is_opened() -> None:
+    """Padding the contact k by e lifts the distance by its force times e."""
+    section = Section(load_clamp(), Cas())
+    final = solve_final_state(section)
+    for k in np.flatnonzero(final.multipliers):
+        ends = []
+        for pad in (-1e-4, 1e-4):
+            padded = _Padded(section.clamp, section.model)
+            padded.__dict__.update(row=int(k), pad=pad)
+            start = final.q + 0.05 * np.eye(SIZE)[D] + 0.025 * (np.eye(SIZE)[1] + np.eye(SIZE)[3])
+            ends.append(float(solve_final_state(padded, start).q[D]))
+        assert (ends[1] - ends[0]) / 2e-4 == pytest.approx(final.multipliers[k], rel=1e-5)
+
+
+class _Padded(Section):
+    def gaps(self, q: np.ndarray) -> Gaps:
+        gaps = super().gaps(q)
+        gaps.value[self.__dict__["row"]] -= self.__dict__["pad"]
+        return gaps
+
+
+def test_forces_on_each_wire_and_on_the_down_splint_balance() -> None:
+    run = assemble()
+    for part in ("P6", "P7", "P2"):
+        total = sum(f.force * f.direction * ((f.b == part) - (f.a == part)) for f in run.forces)
+        assert np.allclose(total, 0.0, atol=1e-9), part
+    down = run.poses["P2"]
+    moment = 0.0
+    for f in run.forces:
+        if "P2" in (f.a, f.b):
+            arm, push = f.point - [down.x, 0.0, -down.y], f.direction * f.force * ((f.b == "P2") - (f.a == "P2"))
+            moment += arm[2] * push[0] - arm[0] * push[2]
+    assert moment == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_wire_beyond_the_mouth_can_rest_between_face_and_groove() -> None:
+    """Small up groove, set 10 mm aside: the mouth is no wall."""
+    base = load_clamp(line=16, jumper=16)
+    up = base.up_splint
+    small = replace(up.line_groove, radius=9.0, offset=56.0, centre_depth=up.thickness + 5.0)
+    clamp = replace(base, up_splint=replace(up, line_groove=small))
+    section = Section(clamp, Cas())
+    beyond = [s for s in equilibria(section) if not section.mouth("P6")[0] <= s.q[0] <= section.mouth("P6")[1]]
+    assert beyond
+    for state in beyond:
+        assert not section.escaped(state.q)
+        assert max(state.violation, state.optimality) <= 1e-9
+
+
+@pytest.mark.parametrize("tilt_deg", [12.9, 12.98])
+def test_the_tilt_stops_where_the_bodies_meet(tilt_deg: float) -> None:
+    """At the derived stop the exact bodies touch; a little less and they are apart, a little more and they overlap."""
+    from clamp3d.clamp.contact import measure_contacts
+    from clamp3d.clamp.steps import section_poses
+
+    clamp = load_clamp()
+    section = Section(clamp, Cas())
+
+    def gap(tilt: float) -> float:
+        q = np.zeros(SIZE)
+        q[D], q[S] = 60.0, section.lever * tilt
+        (c,) = measure_contacts(clamp, section_poses(section, q, saddle_d=60.0), pairs=[("P2", "P3")])
+        return c.gap
+
+    assert gap(math.radians(tilt_deg)) >= -1e-9
+    assert gap(clamp.tilt_stop) == pytest.approx(0.0, abs=1e-6)
+    assert gap(clamp.tilt_stop + math.radians(0.05)) < -1e-3
+    assert not np.any(solve_final_state(section).q[[B, W]])
