@@ -27,9 +27,7 @@ SOME = st.sampled_from(DRAWN)
 
 
 def holds(found, a, b, T, **how):
-    """In an overlap the normal is not yet that of the translation that parts the bodies."""
-    if found.lower < 0.0:
-        found = replace(found, normal=None)
+    """One name for the property."""
     assert_distance(found, a, b, T, **how)
 
 

@@ -210,3 +210,9 @@ def brute_force(a, b, T, known):
         assert not apart(low * n)
     assert apart(-(known.lower - 0.01) * known.direction)
     return low, -known.lower + 0.01
+
+
+@pytest.mark.parametrize(("tilt", "unique"), [(0.0, False), (1e-8, None), (3e-8, None), (0.3, False)])
+def test_unique_is_not_claimed_where_rounding_decides(tilt, unique):
+    d = distance(shapes.box((10, 10, 10)), shapes.box((4, 4, 4)), translation(0, 0, 9) @ rotation([1, 0, 0], tilt))
+    assert d.unique is unique
