@@ -132,7 +132,9 @@ class _Pair:
             if found.lower >= -self.slack or found.normal is None or not found.upper < 0.0:
                 return
             planes.append(np.array([*found.normal, float(found.normal @ t) - found.upper + 0.1 * self.slack]))
-            t = nearest_behind(np.array(planes[-6:]), t)
+            start, t = t, nearest_behind(np.array(planes[-6:]), t)
+            if t is start:  # no translation is behind all of them
+                return
             if self.best is not None and np.linalg.norm(t) >= self.best[0]:
                 return
             found = self.ask(t)
