@@ -25,6 +25,8 @@ MEMBER = 1e-9
 """Relative to the size of the parts: a point this far outside still counts as on the surface."""
 _FLAT = 1e-8
 """Sine of the angle below which a face or line counts as square to a direction."""
+_LEVEL = 1e-6
+"""Below this sine it is not claimed that the nearest points are the only ones: rounding decides."""
 _SMALL = 40
 """Hulls with more corners are searched only where FCL finds the nearest points."""
 _EPS = 2.0**-52
@@ -62,12 +64,12 @@ class Rod:
             return self.support(n)[None]
         return np.asarray(local @ self.T[:3, :3].T + self.T[:3, 3])
 
-    def flatness(self, n: Array) -> tuple[int, Array | None]:
+    def flatness(self, n: Array, within: float = _FLAT) -> tuple[int, Array | None]:
         """Dimension of what lies furthest along ``n`` (3,), and its direction if it is a line."""
         m = n @ self.T[:3, :3]
-        if float(np.hypot(m[0], m[1])) < _FLAT:
+        if float(np.hypot(m[0], m[1])) < within:
             return 2, None
-        return (1, self.T[:3, 2]) if abs(m[2]) < _FLAT else (0, None)
+        return (1, self.T[:3, 2]) if abs(m[2]) < within else (0, None)
 
     def depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""
@@ -123,9 +125,9 @@ class Hull:
         """The vertex (3,) that lies furthest along ``n`` (3,)."""
         return np.asarray(self.vertices[int(np.argmax(self.vertices @ n))])
 
-    def _highest(self, n: Array) -> Array:
+    def _highest(self, n: Array, within: float = _FLAT) -> Array:
         height = self.vertices @ n
-        return np.asarray(self.vertices[height >= height.max() - _FLAT * (1.0 + float(np.ptp(height)))][:24])
+        return np.asarray(self.vertices[height >= height.max() - within * (1.0 + float(np.ptp(height)))][:24])
 
     def face(self, n: Array) -> Array:
         """Points (k, 3) of what lies furthest along ``n`` (3,): corners, and the middles between each two of them."""
@@ -133,9 +135,9 @@ class Hull:
         i, j = np.triu_indices(len(corners))
         return np.asarray(0.5 * (corners[i] + corners[j]))
 
-    def flatness(self, n: Array) -> tuple[int, Array | None]:
+    def flatness(self, n: Array, within: float = _FLAT) -> tuple[int, Array | None]:
         """Dimension of what lies furthest along ``n`` (3,), and its direction if it is a line."""
-        corners = self._highest(n)
+        corners = self._highest(n, within)
         if len(corners) == 2:
             along = corners[1] - corners[0]
             return 1, along / np.linalg.norm(along)
@@ -236,12 +238,18 @@ def _unique(a: Convex, Ta: Array, b: Convex, Tb: Array, found: Distance) -> bool
     n = found.normal
     if n is None or found.lower < -1e-9:
         return None
-    (i, u), (j, v) = a.flatness(n @ Ta[:3, :3]), b.flatness(-n @ Tb[:3, :3])
+    flat, nearly = (_several(a, Ta, b, Tb, n, within) for within in (_FLAT, _LEVEL))
+    return not flat if flat == nearly else None
+
+
+def _several(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array, within: float) -> bool:
+    """Whether faces, or parallel lines, look at each other along ``n`` (3,); angles below ``within`` count as none."""
+    (i, u), (j, v) = a.flatness(n @ Ta[:3, :3], within), b.flatness(-n @ Tb[:3, :3], within)
     if i == 0 or j == 0:
-        return True
+        return False
     if u is not None and v is not None:
-        return bool(np.linalg.norm(np.cross(Ta[:3, :3] @ u, Tb[:3, :3] @ v)) > _FLAT)
-    return False
+        return bool(np.linalg.norm(np.cross(Ta[:3, :3] @ u, Tb[:3, :3] @ v)) <= within)
+    return True
 
 
 def _placed(points: Array, T: Array) -> Array:

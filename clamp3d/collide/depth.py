@@ -7,6 +7,7 @@ bodies, which overlap at all shorter translations; a single pair of them, or man
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -22,7 +23,7 @@ from clamp3d.collide.model import Model
 from clamp3d.collide.refine import from_boxes, refine
 from clamp3d.collide.surface import Surface
 from clamp3d.collide.verdict import Thresholds
-from clamp3d.core.pose import Array
+from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import SolverError
 
 RELATIVE, ABSOLUTE = 0.05, 0.01
@@ -33,7 +34,7 @@ _SETS = 60
 """Pairs of convex pieces that are tried."""
 _NODES = 500
 """Sets of planes that are tried for the shortest way past all pieces, before cubes of translations are."""
-_CUBES = 10
+_CUBES = 20
 """Times that cubes are tried."""
 _EXTRA = 8
 """Pieces after which a depth that is `known_well` is not made better."""
@@ -60,7 +61,6 @@ class _Pair:
         self.slack = TOUCH * self.size
         self.best: tuple[float, Array, Distance] | None = None
         self.own, self.other = _bodies(a), _bodies(b)
-        self.meshed = any(isinstance(body, Surface) for body in (*self.own, *self.other))
 
     def ask(self, t: Array) -> Distance:
         """What is known of b moved by ``t`` (3,): enough to tell whether they are apart."""
@@ -83,35 +83,33 @@ class _Pair:
 
     def overlap_at(self, t: Array, known: Distance) -> Array | None:
         """Planes (k, 4) of a convex set of translations that overlap, ``t`` (3,) among them; None if none is found."""
-        best: tuple[float, Array, Any, Any] | None = None
-        for point in self._common(t, known):
-            for x in self.own:
-                for y in self.other:
-                    margin, p = _innermost(x, y, self.T, t, point, 0.05 * self.size)
-                    if margin > 0.0 and (best is None or margin > best[0]):
-                        best = (margin, p, x, y)
-        if best is None:
-            return None
-        _, p, x, y = best
-        R, shift = self.T[:3, :3], self.T[:3, 3]
-        A, B = _around(x, p), _around(y, (p - t - shift) @ R)
-        return None if A is None or B is None else difference(A, _moved(B, self.T), t)
+        named = [x for x in (known.point_a, known.point_b) if x is not None and known.upper < 0.0]
+        if len(named) == 2:
+            named.append(0.5 * (named[0] + named[1]))
+        for points in (named, self._common(t)):
+            found = [
+                (*_innermost(x, y, self.T, t, point, 0.05 * self.size), x, y)
+                for point in points
+                for x in self.own
+                for y in self.other
+            ]
+            margin, p, x, y = max(found, key=lambda item: item[0], default=(0.0, t, None, None))
+            if margin > 0.0 and x is not None and y is not None:
+                A, B = _around(x, p), _around(y, (p - t - self.T[:3, 3]) @ self.T[:3, :3])
+                if A is not None and B is not None:
+                    return difference(A, _moved(B, self.T), t)
+        return None
 
-    def _common(self, t: Array, known: Distance) -> list[Array]:
-        """Points (3,) that may lie in both bodies, b moved by ``t`` (3,)."""
-        found = [x for x in (known.point_a, known.point_b) if x is not None and known.upper < 0.0]
-        if len(found) == 2:
-            found = [0.5 * (found[0] + found[1])]
-        if found and not self.meshed:
-            return found
+    def _common(self, t: Array) -> Iterator[Array]:
+        """Points (3,) that may lie in both bodies, b moved by ``t`` (3,): by meshes that they hold."""
         T = self.T.copy()
         T[:3, 3] += t
         a, b = self.a.inner(_FINE), self.b.inner(_FINE)
         if a is None or b is None:
-            return found
+            return
         common = a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3]))
-        parts = sorted(common.decompose(), key=lambda part: -part.volume())
-        return found + [x for part in parts[:2] for x in _inner(part)]
+        for part in sorted(common.decompose(), key=lambda part: -part.volume())[:2]:
+            yield from _inner(part)
 
     def freed(self, known: Distance, way: Array) -> bool:
         """Whether bodies that touch within their errors come apart by a little more, along the normal or ``way``."""
@@ -134,7 +132,9 @@ class _Pair:
             if found.lower >= -self.slack or found.normal is None or not found.upper < 0.0:
                 return
             planes.append(np.array([*found.normal, float(found.normal @ t) - found.upper + 0.1 * self.slack]))
-            t = nearest_behind(np.array(planes[-6:]), t)
+            start, t = t, nearest_behind(np.array(planes[-6:]), t)
+            if t is start:  # no translation is behind all of them
+                return
             if self.best is not None and np.linalg.norm(t) >= self.best[0]:
                 return
             found = self.ask(t)
@@ -142,6 +142,8 @@ class _Pair:
 
     def part(self, t: Array, found: Distance) -> None:
         """Verified translations at or just beyond ``t`` (3,), where the bodies touch to rounding or to their errors."""
+        if not t.any():
+            return
         self.push(t, found, 8)
         for more in (1e-9, 1e-7, 1e-5, 1e-3, 1e-2):
             if self.best is not None and self.best[0] <= np.linalg.norm(t) * (1.0 + more):
@@ -179,6 +181,8 @@ def penetration(a: Model, b: Model, T: Array, known: Distance) -> Distance:
         Minus the penetration depth between proven bounds, `known_well` where the search came to its end; ``normal``
         is the direction in which b moves out, the points are those that part last.
     """
+    if _key(a) > _key(b):  # one order, so that the answer does not depend on it
+        return penetration(b, a, inverse(T), known.moved(inverse(T)).swapped()).moved(T).swapped()
     pair = _Pair(a, b, T)
     if known.lower >= -pair.slack:
         return known
@@ -186,6 +190,10 @@ def penetration(a: Model, b: Model, T: Array, known: Distance) -> Distance:
     # Of an open mesh it is not known what is inside.
     found = _measured(pair, known) if a.closed and b.closed else known.of_overlap()
     return replace(found, interference=interference)
+
+
+def _key(model: Model) -> tuple[float, ...]:
+    return (float(np.prod(model.bounds[1] - model.bounds[0])), *model.bounds.ravel().tolist())
 
 
 def _measured(pair: _Pair, known: Distance) -> Distance:
@@ -196,7 +204,8 @@ def _measured(pair: _Pair, known: Distance) -> Distance:
     length, way = _exit(a, b, T)
     if known.upper >= -pair.slack and pair.freed(known, way):
         assert pair.best is not None
-        return replace(known, lower=-pair.best[0])
+        size, t, _ = pair.best
+        return replace(known, lower=-size, normal=t / np.linalg.norm(t))
     found = Distance(-length, known.upper, None, None, way, None, known.level, known.method)
     if found.upper - found.lower <= pair.slack:
         return found
@@ -220,7 +229,7 @@ def _searched(pair: _Pair, found: Distance, known: Distance) -> Distance:
         if new is None or union.reach(t[None])[0] <= 0.0:  # too thin to prove anything: all but apart
             pair.part(t, known)
             break
-        length, way = union.shortest(_NODES)
+        length, way = union.shortest(_NODES if cubes < 3 else 0)  # where planes are too many they stay so
         if way is None and length < -found.lower:
             cubes += 1
             covered, way = union.clearance(0.5 * RELATIVE, 0.5 * ABSOLUTE)

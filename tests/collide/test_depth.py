@@ -210,3 +210,10 @@ def brute_force(a, b, T, known):
         assert not apart(low * n)
     assert apart(-(known.lower - 0.01) * known.direction)
     return low, -known.lower + 0.01
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-9, 1e-8, 3e-8, 1e-7])
+def test_unique_is_not_claimed_where_rounding_decides(tilt):
+    a, b = shapes.box((10, 10, 10)), shapes.box((4, 4, 4))
+    assert distance(a, b, translation(0, 0, 9) @ rotation([1, 2, 0], tilt)).unique is not True
+    assert distance(a, b, translation(0, 0, 9) @ rotation([1, 2, 0], 0.3)).unique is True
