@@ -14,6 +14,7 @@ from clamp3d.core.pose import SectionPose, rotation, translation
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.rectangle import HoleContact, HoleRelation, Rectangle, hole_bolt
 from clamp3d.core.relation3d import GrooveRelation, Relation3D, groove_relation, relative_pose
+from clamp3d.core.subgradient import GeneralisedGradient, generalised_gradient
 
 __all__ = [
     "ArcContact",
@@ -21,6 +22,7 @@ __all__ = [
     "Capsule",
     "Cylinder",
     "Feature",
+    "GeneralisedGradient",
     "GroovePieces",
     "GrooveRelation",
     "HoleContact",
@@ -33,6 +35,7 @@ __all__ = [
     "SweptArc",
     "arc_circle",
     "classify_arc_circle",
+    "generalised_gradient",
     "groove_pieces",
     "groove_relation",
     "hole_bolt",

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from types import ModuleType
 from typing import Literal, overload
@@ -73,10 +73,14 @@ class SignedDistance:
     axis_inside : bool
         Whether it lies deeper than the least of its half sizes: the axis of a capsule, or what is left of a cylinder
         when it is shrunk to nothing, enters the material.
-    rate : ndarray (3,)
-        How the distance changes when the cylinder is shifted: the normal, but in an overlap a mixture of two normals
-        where the point of the groove is as near to the cylinder's side as to its end, or where the deepest point of an
-        axis is as near to a second face.
+    gradient : ndarray (6,)
+        Rate of the distance by the cylinder's twist, 3 linear, then 3 angular about the groove's origin: moving it by
+        ``v`` mm and ``w`` rad (in the groove's frame) changes the distance by ``gradient @ (v, w)`` to first order. Its
+        first half is the normal, but in an overlap a mixture of two where the groove's point is as near to the
+        cylinder's side as to its end, or where the deepest point of an axis is as near to a second face. Where several
+        places are equally near (``unique`` is False) it is that of the place named; `generalised_gradient` gives all.
+    asked : tuple
+        Groove, cylinder and pose of the question.
     """
 
     distance: float
@@ -87,16 +91,15 @@ class SignedDistance:
     along: float
     error_bound: float
     axis_inside: bool
-    rate: Array
+    gradient: Array
+    asked: tuple[SweptArc, AnyCylinder, Array] = field(repr=False, compare=False)
 
     @property
-    def gradient(self) -> Array:
-        """Rate of the distance by the cylinder's twist (6,): 3 linear, then 3 angular about the groove's origin.
+    def unique(self) -> bool:
+        """Whether one place alone is nearest, so that `gradient` is the derivative; see `generalised_gradient`."""
+        from clamp3d.core.subgradient import generalised_gradient
 
-        Moving the cylinder by ``v`` mm and ``w`` rad (both in the groove's frame) changes the distance by
-        ``gradient @ (v, w)`` to first order. Where two places are equally near it is the one of the place named.
-        """
-        return _gradient(self.rate, self.point_on_groove)
+        return generalised_gradient(*self.asked).unique
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,16 +114,7 @@ class SignedDistances:
     along: Array
     error_bound: Array
     axis_inside: NDArray[np.bool_]
-    rate: Array
-
-    @property
-    def gradient(self) -> Array:
-        """Rates of the distances by the cylinder's twist, shape (n, 6); see ``SignedDistance.gradient``."""
-        return _gradient(self.rate, self.point_on_groove)
-
-
-def _gradient(rate: Array, point: Array) -> Array:
-    return np.concatenate([rate, np.cross(point, rate)], axis=-1)
+    gradient: Array
 
 
 def as_pose(pose: ArrayLike) -> Array:
@@ -195,7 +189,7 @@ def signed_distance(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) ->
     if type(groove) is not SweptArc or not flat:
         check_shapes(groove, cylinder)
     T = as_pose(pose)
-    record, pad = np.empty((1, 16)), np.empty((128, 5))
+    record, pad = np.empty((1, 19)), np.empty((128, 5))
     run = (_kernel or kernel()).records
     half, along = 0.5 * groove.length, 0.5 * cylinder.length
     if run(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, pad, record) >= 0:
@@ -212,7 +206,8 @@ def signed_distance(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) ->
         values[12],
         values[10],
         distance < -(min(cylinder.radius, along) if flat else cylinder.radius),
-        out[13:16],
+        out[13:19],
+        (groove, cylinder, T),
     )
 
 
@@ -268,7 +263,7 @@ def signed_distances(
     if workers is not None:
         workers = whole("workers", workers, least=1)
     n = len(T)
-    out = np.empty((n, 16) if full else n)
+    out = np.empty((n, 19) if full else n)
     flat = isinstance(cylinder, Cylinder)
     run = kernel().records if full else kernel().distances
     sizes = (groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, flat)
@@ -298,5 +293,5 @@ def signed_distances(
         out[:, 12],
         out[:, 10],
         out[:, 0] < -(min(cylinder.radius, 0.5 * cylinder.length) if flat else cylinder.radius),
-        out[:, 13:16],
+        out[:, 13:19],
     )

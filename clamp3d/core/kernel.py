@@ -10,14 +10,14 @@ from clamp3d.core.kernel_distance import inside_rate, is_parallel, nearest, para
 from clamp3d.core.kernel_flat import flat_nearest, flat_parallel
 from clamp3d.core.kernel_pose import axis, rigid
 
-RECORD = 16
+RECORD = 19
 """Numbers per answer: distance, point on groove (3), point on cylinder (3), normal (3), bound, feature, t on axis,
-rate of the distance by a shift of the cylinder (3)."""
+rate of the distance by the cylinder's twist (6)."""
 
 
 @formula
-def put(answer, rate, out, k):  # type: ignore[no-untyped-def]
-    """Write an answer into out (n, 16)."""
+def put(answer, rate, inner, out, k):  # type: ignore[no-untyped-def]
+    """Write an answer into out (n, 19); what is deeper than ``inner`` moves with the axis, the rest stands."""
     v, qx, qy, qz, nx, ny, nz, feature, t, bound = answer
     out[k, 0] = v
     out[k, 1] = qx
@@ -32,23 +32,31 @@ def put(answer, rate, out, k):  # type: ignore[no-untyped-def]
     out[k, 10] = bound
     out[k, 11] = feature
     out[k, 12] = t
-    out[k, 13], out[k, 14], out[k, 15] = rate
+    gx, gy, gz = rate
+    below = min(v + inner, 0.0)
+    x, y, z = qx + below * nx, qy + below * ny, qz + below * nz
+    out[k, 13] = gx
+    out[k, 14] = gy
+    out[k, 15] = gz
+    out[k, 16] = y * gz - z * gy
+    out[k, 17] = z * gx - x * gz
+    out[k, 18] = x * gy - y * gx
 
 
 @formula
 def record(T, k, R, half_angle, s, h, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
-    """Answer for the valid pose k into out (n, 16); ``flat`` ends or those of a capsule."""
+    """Answer for the valid pose k into out (n, 19); ``flat`` ends or those of a capsule."""
     cx, cy, cz, dx, dy, dz = T[k, 0, 3], T[k, 1, 3], T[k, 2, 3], T[k, 0, 2], T[k, 1, 2], T[k, 2, 2]
     if flat:
         answer = flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, pad)
-        put(answer[:10], answer[10:], out, k)
+        put(answer[:10], answer[10:], min(r, l), out, k)
         return
     answer = nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz)
     rate = (answer[4], answer[5], answer[6])
-    if answer[0] < -r and not is_parallel(R, l, dx, dy):
+    if answer[0] < -r:
         dx, dy, dz = axis(T, k)
         rate = inside_rate(R, h, H, l, cx, cy, cz, dx, dy, dz, answer[8])
-    put(answer, rate, out, k)
+    put(answer, rate, r, out, k)
 
 
 def _entries(stamp: str) -> tuple[Any, Any]:

@@ -136,7 +136,7 @@ def inside_rate(R, h, H, l, cx, cy, cz, dx, dy, dz, t):  # type: ignore[no-untyp
     z = cz + t * dz
     rho = math.sqrt(x * x + y * y)
     up = 1.0 if z >= 0.0 else -1.0
-    best = math.inf
+    best = first = math.inf
     nx = ny = nz = 0.0
     for second in range(2):
         least = math.inf
@@ -153,11 +153,11 @@ def inside_rate(R, h, H, l, cx, cy, cz, dx, dy, dz, t):  # type: ignore[no-untyp
             if depth < least and (second == 0 or (ux * dx + uy * dy + uz * dz) * best < 0.0):
                 least, mx, my, mz = depth, ux, uy, uz
         if second == 0:
-            nx, ny, nz = mx, my, mz
+            first, nx, ny, nz = least, mx, my, mz
             best = nx * dx + ny * dy + nz * dz
             if abs(t) >= l or best == 0.0:
                 return nx, ny, nz
-        elif least < math.inf:
+        elif least - first <= 1e-9 * (R + H + first):
             other = mx * dx + my * dy + mz * dz
             u = other / (other - best)
             v = 1.0 - u

@@ -362,7 +362,12 @@ def flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, pad):  # 
     work, found, rows = pad[:64], pad[64:80], pad[80:]
     if is_parallel(R, max(l, r), dx, dy):
         v, qx, qy, qz, nx, ny, nz, feature, t, bound = flat_parallel(R, s, h, H, r, l, cx, cy, cz, dz)
-        return v, qx, qy, qz, nx, ny, nz, feature, t, bound, nx, ny, nz
+        gx, gy, gz = nx, ny, nz
+        if l < r and abs(v + l) <= bound:  # nothing is left of a disc, and its middle is not in the material yet
+            gx = gy = gz = 0.0
+        elif l >= r and v < -r:
+            gx, gy, gz = inside_rate(R, h, H, l - r, cx, cy, cz, 0.0, 0.0, math.copysign(1.0, dz), t)
+        return v, qx, qy, qz, nx, ny, nz, feature, t, bound, gx, gy, gz
     v, qx, qy, qz, nx, ny, nz, feature, t, bound = nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz)
     n = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
     dx *= n
@@ -405,5 +410,7 @@ def flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, pad):  # 
             k = i
     f, qx, qy, qz, feature = rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3], int(rows[k, 4])
     nx, ny, nz, gx, gy, gz, t = witness(f, qx, qy, qz, feature, R, s, h, r, l, cx, cy, cz, dx, dy, dz, bound)
+    if l < r and f + l <= bound:  # nothing is left of a disc, and its middle is not in the material yet
+        gx = gy = gz = 0.0
     bound += max(f - rest, 0.0)
     return f, qx, qy, qz, nx, ny, nz, feature, t, bound, gx, gy, gz

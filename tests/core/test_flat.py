@@ -135,7 +135,7 @@ def test_batch_has_the_bits_of_single():
         assert np.array_equal(full.distance, signed_distances(groove, wire, poses))
         for i in range(0, len(poses), 97):
             one = signed_distance(groove, wire, poses[i])
-            for name in ("distance", "feature", "axis_inside", "error_bound", "along", "rate", "gradient", "normal"):
+            for name in ("distance", "feature", "axis_inside", "error_bound", "along", "gradient", "normal"):
                 assert np.array_equal(getattr(one, name), getattr(full, name)[i]), name
 
 
