@@ -155,12 +155,17 @@ def _from_kernel(search: Search, touches: bool | None, t: float, slack: float) -
     if touches is None:
         touches = found.upper <= 0.0
         found = replace(found, lower=found.lower - slack)
-    return MotionDistance(touches, t, found, search.pose(t), slack, search.evaluations, contact)
+    return MotionDistance(touches, t, _overlap(found), search.pose(t), slack, search.evaluations, contact)
 
 
 def _from_search(pair: MovingPair, touches: bool, t: float, found: Distance) -> MotionDistance:
     pose = pair.motion.at(t, pair.start)
     width = max(found.upper - found.lower, ACCURACY)
     return MotionDistance(
-        touches, t, with_normal(found.moved(pose).swapped()), pose, width, sum(pair.counters.queries.values())
+        touches, t, _overlap(with_normal(found.moved(pose).swapped())), pose, width, sum(pair.counters.queries.values())
     )
+
+
+def _overlap(found: Distance) -> Distance:
+    """Of an overlap without what bounds its deepest point only: that bounds no depth, nor is its normal the way out."""
+    return replace(found.of_overlap(), normal=None) if found.upper < -RESOLUTION else found
