@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.model import Model
-from clamp3d.collide.overlap import common, deepest
+from clamp3d.collide.overlap import common, deepest, deepest_at_most
 from clamp3d.collide.surface import Surface
 from clamp3d.core.pose import Array, inverse
 
@@ -38,7 +38,7 @@ def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough =
     of the few that are tried does. A depth that is ``enough`` ends the search: that of one vertex often is.
     """
     if not (a.between or b.between):
-        return surface_distance(a.outer(error), b.outer(error), T, enough)
+        return surface_distance(a.outer(error), b.outer(error), T, enough, search=True)
     outer = surface_distance(a.outer(error), b.outer(error), T)
     inner_a, inner_b = a.inner(error), b.inner(error)
     if inner_a is None or inner_b is None:
@@ -49,7 +49,11 @@ def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough =
         q = _on_surface(b, T, inner.point_b, p)
         off = inner_a.error + inner_b.error + rounding_of(inner_a, inner_b, T)
         inner = replace(inner, upper=float(np.linalg.norm(q - p)) + off, point_a=p, point_b=q)
-    return replace(inner, lower=min(outer.lower, inner.upper), normal=None)
+    found = replace(inner, lower=min(outer.lower, inner.upper), normal=None)
+    if outer.upper < 0.0 and not enough(found):
+        outer = surface_distance(a.outer(error), b.outer(error), T, search=True)
+        found = replace(found, lower=min(outer.lower, inner.upper))
+    return found
 
 
 def _on_surface(model: Model, T: Array, inside: Array, outside: Array) -> Array:
@@ -68,16 +72,21 @@ def _on_surface(model: Model, T: Array, inside: Array, outside: Array) -> Array:
     return np.asarray(inside + low * (outside - inside))
 
 
-def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough = lambda _: False) -> Distance:
-    """Signed distance of two meshes, ``b`` at ``T`` (4, 4) in a's frame; answers as `meshes_distance`."""
+def surface_distance(
+    a: Surface, b: Surface, T: Array, enough: Enough = lambda _: False, *, search: bool = False
+) -> Distance:
+    """Signed distance of two meshes, ``b`` at ``T`` (4, 4) in a's frame; answers as `meshes_distance`.
+
+    With ``search`` the deepest point of an overlap is limited from above too, if the rest is not ``enough``.
+    """
     rounding = rounding_of(a, b, T)
     meeting = _contacts(a, b, T)
     if meeting is not None:
         first = _vertex_depth(a, b, T, meeting, rounding)
-        return first if enough(first) else _overlap(a, b, T, rounding)
+        return first if enough(first) else _overlap(a, b, T, rounding, enough, search)
     lower, upper, p, q = _gap(a, b, T)
     if upper <= rounding:
-        return _overlap(a, b, T, rounding)
+        return _overlap(a, b, T, rounding, enough, search)
     for outer, inner, place, swapped in ((a, b, T, False), (b, a, inverse(T), True)):
         if any_inside(outer, inner, place):  # no surface in common: that shell lies inside as a whole
             points = inner.vertices[:: max(1, len(inner.vertices) // 50)] @ place[:3, :3].T + place[:3, 3]
@@ -173,14 +182,18 @@ def _gap(a: Surface, b: Surface, T: Array) -> tuple[float, float, Array, Array]:
     return low, max(best, 0.0), p, q
 
 
-def _overlap(a: Surface, b: Surface, T: Array, rounding: float) -> Distance:
+def _overlap(a: Surface, b: Surface, T: Array, rounding: float, enough: Enough, search: bool) -> Distance:
     """Bounds of two meshes whose surfaces meet."""
     shared = common(a, b, T)
     if shared is None:
         off = a.error + b.error + rounding
         return Distance(-off, off)
     depth, at = deepest(a, b, T, shared)
-    return Distance(-_parted(a, b, T, shared.vertices, shared.directions()), rounding - depth, at, at)
+    limit = _parted(a, b, T, shared.vertices, shared.directions())
+    found = Distance(-limit, rounding - depth, at, at)
+    if not search or a.error + b.error > 0.0 or limit <= 1.05 * depth + rounding or enough(found):
+        return found
+    return replace(found, lower=max(-limit, -deepest_at_most(a, b, T, shared, depth) - rounding))
 
 
 def _parted(a: Surface, b: Surface, T: Array, points: Array, directions: Array) -> float:

@@ -16,6 +16,9 @@ _INNER = 40
 """Triangles of an overlap under which a point is tried."""
 _CORNERS = 400
 """Corners of an overlap that are measured."""
+_CELLS, _CELLS_ACROSS, _CLOSE = 60_000, 24, 1.03
+"""Cells of a search for the deepest point, those along an axis at first, and how near to the deepest known it goes."""
+_CORNERS_OF_CUBE = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
 
 @dataclass(eq=False)
@@ -93,3 +96,31 @@ def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Ar
     found = np.maximum(in_a, in_b)
     k = int(np.argmax(found))
     return float(found[k]), points[k]
+
+
+def deepest_at_most(a: Surface, b: Surface, T: Array, shared: Common, reached: float) -> float:
+    """Upper limit (mm) of how deep any point of one mesh lies in the other; ``reached`` mm is a depth that one has.
+
+    Branch and bound over cells around the common part: a point's depth changes by no more than the way to it, so no
+    point of a cell is deeper than its middle by more than its half diagonal.
+    """
+    piece, back = Surface(shared.vertices, shared.faces), inverse(T)
+    low, high = shared.box
+    half = 0.5 * (high - low) + 1e-300
+    count = np.minimum(np.ceil(half / half.min()), _CELLS_ACROSS)
+    steps = [np.arange(n) for n in count.astype(int)]
+    cells = low + (np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3) * 2.0 + 1.0) * half / count
+    half = half / count
+    while True:
+        radius = float(np.linalg.norm(half))
+        away, inside = piece.distance(cells), piece.contains(cells)
+        near = inside | (away <= radius)
+        cells, inside = cells[near], inside[near]
+        depth = np.maximum(a.distance(cells), b.distance(cells @ back[:3, :3].T + back[:3, 3]))
+        reached = max(reached, float(depth[inside].max(initial=0.0)))
+        open_ = depth + radius > _CLOSE * reached
+        cells, most = cells[open_], float((depth + radius).max(initial=0.0))
+        if not len(cells) or 8 * len(cells) > _CELLS or radius <= 1e-9:
+            return max(most if len(cells) else 0.0, _CLOSE * reached)
+        half = 0.5 * half
+        cells = (cells[:, None] + _CORNERS_OF_CUBE * half).reshape(-1, 3)

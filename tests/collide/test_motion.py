@@ -155,3 +155,15 @@ def test_no_instant_is_below_the_least_distance():
         elif "clearance" in verdicts:
             assert row.verdict.value != "clear"
     assert seen >= {"clash", "clear"}
+
+
+def test_first_contact_is_never_late_where_a_part_slides_close_by():
+    """A block 0.02 mm above a floor, on its way to a bead: by hand it touches the bead at t = 0.115."""
+    floor, block, bead = shapes.box((200, 60, 10)), shapes.box((20, 20, 20)), shapes.box((2, 20, 1))
+    scene = Scene().add("floor", floor).add("bead", bead, translation(2.5, 0.0, 5.5))
+    scene = scene.add("block", block, translation(-20.0, 0.0, 15.02))
+    moved = replace(scene, motions=(Motion.translate((100.0, 0.0, 0.0), parts=("block",), name="slide"),))
+    (row,) = [row for row in check(moved).motions if "bead" in (row.a, row.b)]
+    assert row.verdict is Verdict.CLASH
+    assert row.contact_at == pytest.approx(0.115, abs=2e-4)
+    assert row.contact_at <= 0.115

@@ -35,8 +35,8 @@ _DEEP = 2e-5
 """The same for depths: beside an edge Open CASCADE's distance of a point from a shell is off by up to 7e-6."""
 
 
-FITS: tuple[shapes.Fit, ...] = ("off", "round")
-"""What meshes are taken as: their facets, or round surfaces through their vertices."""
+FITS: tuple[shapes.Fit, ...] = ("off",)
+"""What meshes are taken as where nothing else is said: their facets."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
