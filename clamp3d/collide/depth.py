@@ -97,7 +97,10 @@ class _Pair:
             if margin > 0.0 and x is not None and y is not None:
                 A, B = _around(x, p), _around(y, (p - t - self.T[:3, 3]) @ self.T[:3, :3])
                 if A is not None and B is not None:
-                    return difference(A, _moved(B, self.T), t)
+                    try:
+                        return difference(A, _moved(B, self.T), t)
+                    except RuntimeError:  # Qhull's: too thin
+                        continue
         return None
 
     def _common(self, t: Array) -> Iterator[Array]:
@@ -199,8 +202,10 @@ def _key(model: Model) -> tuple[float, ...]:
 def _measured(pair: _Pair, known: Distance) -> Distance:
     a, b, T = pair.a, pair.b, pair.T
     exact = _convex_pair(a, b, T)
+    if exact is not None and exact.lower >= 0.0:  # a plane parts them
+        return replace(known, lower=max(known.lower, 0.0))
     if exact is not None:
-        return _with_points(pair, exact)
+        return _with_points(pair, replace(exact, upper=min(exact.upper, known.upper)).ordered())
     length, way = _exit(a, b, T)
     if known.upper >= -pair.slack and pair.freed(known, way):
         assert pair.best is not None

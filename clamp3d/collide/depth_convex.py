@@ -170,7 +170,10 @@ def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[
     for _ in range(_ROUNDS):
         if upper <= 0.0:
             return upper, upper, n
-        made = ConvexHull(P)
+        try:
+            made = ConvexHull(P)
+        except RuntimeError:  # Qhull's: the points are too near to each other for it; the bounds so far hold
+            break
         planes = np.unique(made.equations, axis=0)
         lower = max(lower, -float(planes[:, 3].max()))
         if upper - lower <= tolerance:
