@@ -180,11 +180,14 @@ def _svd(stamp: str) -> Any:
     return entry(svd, "i8(f8[:,::1],f8[:,::1],f8[::1])")
 
 
-def _eigenvalues(stamp: str) -> Any:
-    def eigenvalues(S):  # type: ignore[no-untyped-def]
-        """Symmetric S (n, n) into a diagonal of its eigenvalues, by cyclic Jacobi rotations."""
+def _eigh(stamp: str) -> Any:
+    def eigh(S, V):  # type: ignore[no-untyped-def]
+        """Symmetric S (n, n) into a diagonal of its eigenvalues, V into its axes, by cyclic Jacobi rotations."""
         stamp  # noqa: B018
         n = S.shape[0]
+        for i in range(n):
+            for j in range(n):
+                V[i, j] = 1.0 if i == j else 0.0
         for sweeps in range(SWEEPS):
             off, whole = 0.0, 0.0
             for i in range(n):
@@ -205,12 +208,14 @@ def _eigenvalues(stamp: str) -> Any:
                     for i in range(n):
                         u, v = S[i, p], S[i, q]
                         S[i, p], S[i, q] = cosine * u - sine * v, sine * u + cosine * v
+                        u, v = V[i, p], V[i, q]
+                        V[i, p], V[i, q] = cosine * u - sine * v, sine * u + cosine * v
                     for i in range(n):
                         u, v = S[p, i], S[q, i]
                         S[p, i], S[q, i] = cosine * u - sine * v, sine * u + cosine * v
         return -1
 
-    return entry(eigenvalues, "i8(f8[:,::1])")
+    return entry(eigh, "i8(f8[:,::1],f8[:,::1])")
 
 
 def _product(stamp: str) -> Any:
@@ -231,5 +236,5 @@ def _product(stamp: str) -> Any:
 
 nnls = _nnls(source_stamp())
 svd = _svd(source_stamp())
-eigenvalues = _eigenvalues(source_stamp())
+eigh = _eigh(source_stamp())
 product = _product(source_stamp())

@@ -63,10 +63,11 @@ def lstsq(A: ArrayLike, b: ArrayLike, rcond: float = 2.0**-52) -> Array:
     return np.asarray(product(along[None], rows[:rank])[0]) if rank else np.zeros(len(rows))
 
 
-def eigenvalues(S: ArrayLike) -> Array:
-    """Eigenvalues (n,) of a symmetric matrix, rising."""
+def eigh(S: ArrayLike) -> tuple[Array, Array]:
+    """Eigenvalues (n,) of a symmetric matrix, in no order, and their axes as columns (n, n)."""
     from clamp3d.core import kernel_solve
 
     diagonal = np.array(S, dtype=np.float64, order="C")
-    kernel_solve.eigenvalues(diagonal)
-    return np.sort(diagonal.diagonal())
+    axes = np.empty_like(diagonal)
+    kernel_solve.eigh(diagonal, axes)
+    return diagonal.diagonal(), axes
