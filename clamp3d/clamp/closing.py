@@ -23,8 +23,8 @@ from clamp3d.core.roots import root
 from clamp3d.core.small import eigh, nnls, product, svd
 from clamp3d.errors import SolverError
 
-STRIDE = 0.02
-"""How far a step moves any coordinate, in parts of the down splint's half width (1.4 mm for the reference clamp)."""
+STRIDE = 0.01
+"""How far a step moves any coordinate, in parts of the down splint's half width (0.7 mm for the reference clamp)."""
 CLOSING = np.eye(SIZE)[D]
 """What the bolt does: it lowers d."""
 
