@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.brep.solid import BrepSolid
-from clamp3d.brep.surfaces import Faces
+from clamp3d.brep.surfaces import OTHER, Faces, height
 from clamp3d.collide.answer import Distance
 from clamp3d.core.pose import Array, inverse
 
-_MOST = 60_000
+_MOST = 20_000
 """Pieces looked at before a direction ends with what is known."""
+_ASKED = 8
+"""Triangles below which a point is looked for that only one of two touching solids has."""
 _BESIDE = 8
 """Faces beside the nearest one whose surfaces are tried."""
 
@@ -47,10 +49,23 @@ class FaceModel:
         return np.array([(c.min(axis=1) - e).min(axis=0), (c.max(axis=1) + e).max(axis=0)])
 
     @cached_property
-    def slack(self) -> float:
-        """By so much (mm) two faces that share an edge may be over one another by the errors of their borders."""
+    def slack(self) -> Array:
+        """By so much (n,) mm can faces beside each face reach above it by the errors of the borders that they share."""
+        f = self.faces
+        rows, sides = np.nonzero(f.sag)
+        sag = f.sag[rows, sides]
+        start, end = f.corners[rows, sides], f.corners[rows, (sides + 1) % 3]
+        found = np.zeros(len(f.kind))
+        for i in range(len(f.kind)):
+            size = (float(f.size[i, 0]), float(f.size[i, 1]))
+            on = f.face[rows] == i
+            if f.kind[i] != OTHER:
+                near = 1e-6 + 2.0 * f.deviation.max()
+                for corner in (start, end):
+                    on |= np.abs(height(int(f.kind[i]), f.frame[i], size, corner)) < near
+            found[i] = sag[on].max(initial=0.0)
         scale = float(np.abs(self.bounds).max())
-        return 2.1 * float(self.faces.sag.max()) + 2.0 * float(self.faces.deviation.max()) + 1e-9 + 1e-12 * scale
+        return np.asarray(2.1 * found + 2.0 * f.deviation.max() + 1e-9 + 1e-12 * scale)
 
     @cached_property
     def groups(self) -> NDArray[np.int64]:
@@ -125,7 +140,7 @@ def faces_distance(
     first = _towards(a, b, T, contact, clearance, tol)
     margin = max(contact, clearance)
     low, high = first.lower, first.upper
-    if low > margin and not _may_hold(b, a, here):
+    if low > margin and not _may_hold(a, b, here):
         return _told(first.swapped())
     second = _towards(b, a, here, contact, clearance, tol).moved(T)
     first = first.swapped()
@@ -134,9 +149,44 @@ def faces_distance(
         return _told(replace(best, lower=max(low, second.lower)))
     low = min(low, second.lower)
     high = best.upper
-    if high >= 0.0 and min(first.estimate or 0.0, second.estimate or 0.0) < 4.0 * contact:
-        low = -np.inf  # nothing of one stands well out of the other: a copy of it, perhaps
+    if high >= -contact and not (_own(b, a, T, first.estimate, contact) and _own(a, b, here, second.estimate, contact)):
+        low = -np.inf  # nothing of one is certainly out of the other: a copy of it, perhaps
     return _told(replace(best, lower=low))
+
+
+def _own(b: FaceModel, a: FaceModel, T: Array, outside: float | None, contact: float) -> bool:
+    """Whether some of ``b``, at ``T`` in a's frame, is certainly not in ``a``.
+
+    No point of one surface lies deep in the other. So what is deep in b is in a as a whole or not at all: one point
+    of it tells. ``outside``: how far a point of b's surface is known to be out of a.
+    """
+    if outside is not None and outside > 4.0 * contact:
+        return True
+    c = b.faces.corners
+    normal = np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])
+    size = np.linalg.norm(normal, axis=1)
+    for k in np.argsort(-size)[:_ASKED]:
+        for depth in (1.0, 0.2, 4.0 * contact):
+            p = c[k].mean(axis=0) - depth * normal[k] / size[k]
+            if _at(b, p)[1] < -2.0 * contact and _at(a, T[:3, :3] @ p + T[:3, 3])[0] > 0.0:
+                return True
+    return False
+
+
+def _at(a: FaceModel, point: Array) -> tuple[float, float]:
+    """Bounds of a point's signed distance from a solid."""
+    from clamp3d.collide.faces_kernel import RESULT, descend
+
+    out = np.zeros(RESULT)
+    out[0] = np.inf
+    box = np.concatenate([point, point, [0.0]])[None]
+    low = descend(
+        np.tile(point, (1, 3, 1)), np.zeros((1, 3, 2)), np.zeros(1, dtype=np.int64), np.zeros((1, 3)), np.empty(1), 1,
+        box, np.array([[0, 1]]), np.zeros(1, dtype=np.int64), np.eye(4),
+        np.array([OTHER]), np.zeros((1, 2)), np.zeros((1, 12)), np.zeros(1),
+        *a.arrays, a.marked, a.slack, 1.0, 0.0, 1e-3, 0, out,
+    )  # fmt: skip
+    return float(low), float(out[0])
 
 
 def _told(found: Distance) -> Distance:

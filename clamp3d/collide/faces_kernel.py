@@ -119,9 +119,40 @@ def _slopes(kind, size, frame, f, g, x, y, z):
 
 
 @formula
-def _piece(V, uv, g, sag, own, solid, marked, slack, contact, goal, tol, near, chosen, heights, over, work, p, q, out):
+def _winding(P, x, y, z):
+    """How often the triangles wind round a point that is on none of them: 1 inside, 0 outside."""
+    total = 0.0
+    for t in range(P.shape[0]):
+        ax, ay, az = P[t, 0, 0] - x, P[t, 0, 1] - y, P[t, 0, 2] - z
+        bx, by, bz = P[t, 1, 0] - x, P[t, 1, 1] - y, P[t, 1, 2] - z
+        cx, cy, cz = P[t, 2, 0] - x, P[t, 2, 1] - y, P[t, 2, 2] - z
+        a, b = math.sqrt(ax * ax + ay * ay + az * az), math.sqrt(bx * bx + by * by + bz * bz)
+        c = math.sqrt(cx * cx + cy * cy + cz * cz)
+        triple = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+        ab, bc, ca = ax * bx + ay * by + az * bz, bx * cx + by * cy + bz * cz, cx * ax + cy * ay + cz * az
+        total += math.atan2(triple, a * b * c + ab * c + bc * a + ca * b)
+    return total / (2.0 * math.pi)
+
+
+@formula
+def _mark(f, solid, marked, slack, work):
+    """Fill the marks against face f, if they are not yet."""
+    if marked[f]:
+        return
+    P, _, face, box, link, order, _, buv, bsag, kind, size, frame, sense, deviation, group, _, marks, nodes = solid
+    mark_face(
+        P, buv, bsag, face, box, link, order, kind, size, frame, deviation, group, f, sense[f], slack[f],
+        marks[f], nodes[f], work,
+    )  # fmt: skip
+    marked[f] = 1
+
+
+@formula
+def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
     """Lower bound for one piece; a better upper bound goes into ``out``."""
     akind, asize, aframe, adeviation = own
+    slack, contact, goal, tol = limits
+    near, chosen, heights, over, work, point, p, q = scratch
     (
         P,
         err,
@@ -137,7 +168,7 @@ def _piece(V, uv, g, sag, own, solid, marked, slack, contact, goal, tol, near, c
         frame,
         sense,
         deviation,
-        group,
+        _group,
         neighbours,
         marks,
         nodes,
@@ -186,33 +217,33 @@ def _piece(V, uv, g, sag, own, solid, marked, slack, contact, goal, tol, near, c
         if known:
             continue
         h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
-        t = slack + deviation[f]
+        t = slack[f] + deviation[f]
         to_frame(frame[f], V, work)
         least = least_height(kind[f], size[f, 0], size[f, 1], sense[f], work) - t
-        if not marked[f]:
-            mark_face(
-                P, buv, bsag, face, box, link, order, kind, size, frame, deviation, group, f, sense[f], slack,
-                marks[f], nodes[f], work,
-            )  # fmt: skip
-            marked[f] = 1
         chosen[tried], heights[tried] = f, least
         tried += 1
-        if not (least - e > found or (h > t and outside < 0.0) or (h < -t and h + t + rim < out[0])):
+        if not (least - e > found or (h > t and outside < 0.0) or (h < -t and h + rim < out[0])):
             continue
+        _mark(f, solid, marked, slack, work)
         at = nearest_on(P, err, box, link, order, root[f], empty, x, y, z)
-        reach = 0.5 * size[f, 0] if kind[f] == TORUS else np.inf
+        # Beyond this the inside of a torus within a ball may be in two pieces.
+        reach = size[f, 0] if kind[f] == TORUS else np.inf
         if least - e > found or (h > t and outside < 0.0):
-            limit = min(max(least, h) + rho + 2.0 * at, reach)
+            limit = min(max(least, h) + rho + 2.0 * at, reach if sense[f] < 0.0 else np.inf)
             clear = nearest_marked(P, err, box, link, order, marks[f], marks[f], nodes[f], nodes[f], 1, x, y, z, limit)
             if clear > at:
                 found = max(found, min(least, clear - rho) - e)
                 if h > t:
                     outside = max(outside, min(h - t, clear))
-        if h < -t and h + t + rim < out[0]:
-            limit = min(2.0 * at - h, reach)
+        if h < -t and h + rim < out[0]:
+            limit = min(2.0 * at - h, reach if sense[f] > 0.0 else np.inf)
             clear = nearest_marked(P, err, box, link, order, marks[f], marks[f], nodes[f], nodes[f], 2, x, y, z, limit)
-            if clear > at:
-                depth = min(-h - t, clear) - rim
+            if clear > at:  # inside: as deep as the faces are away
+                for i in range(3):
+                    for c in range(3):
+                        work[i, c] = p[c]
+                depth = from_faces(P, err, face, box, link, order, kind, size, frame, deviation, work, over, -h, point)
+                depth = max(depth, min(-h - t, clear)) - rim
                 if -depth < out[0] and depth > 0.0:
                     out[0] = -depth
                     for k in range(3):
@@ -232,6 +263,8 @@ def _piece(V, uv, g, sag, own, solid, marked, slack, contact, goal, tol, near, c
                     continue
                 if least < 0.0:
                     least /= 0.9 * math.sqrt(0.5 * (1.0 + turn))
+                _mark(f, solid, marked, slack, work)
+                _mark(g, solid, marked, slack, work)
                 # A piece of one that looks over the other: what lies above both there is outside.
                 at = min(
                     nearest_on(P, err, box, link, order, root[f], marks[g], x, y, z),
@@ -242,6 +275,8 @@ def _piece(V, uv, g, sag, own, solid, marked, slack, contact, goal, tol, near, c
                 )
                 if clear > at:
                     found = max(found, min(least, clear - rho) - e)
+    if outside < 0.0 and low > 0.0 and found < min(out[0], goal) - tol and _winding(P, x, y, z) < 0.5:
+        outside = low  # clear of all errors: what the triangles say holds
     if outside > 0.0:
         out[8] = max(out[8], outside)
         found = max(found, low - rho - e)
@@ -274,16 +309,22 @@ def _entries(stamp: str) -> tuple[Any, Any]:
         )  # fmt: skip
         chosen, heights = np.empty(TRIED, np.int64), np.empty(TRIED)
         near, over, work = np.empty(NEAR, np.int64), np.empty(len(kind)), np.empty((3, 3))
+        point = np.empty((3, 3))
         p, q = np.empty(3), np.empty(3)
+        scratch = (near, chosen, heights, over, work, point, p, q)
         verdict = np.isinf(tol)
         goal = max(contact, clearance) + 1e-9 if verdict else np.inf
         tol = 0.01 * contact if verdict else tol
+        limits = (slack, contact, goal, tol)
         heap = [(0.0, 0) for _ in range(0)]
+        first = n
         # Down the pieces' own tree: a branch that keeps away from the surface is outside if one of its pieces is.
         looked, floor = 0, np.inf
         stack = np.empty(DEEP, np.int64)
         stack[0], top = 0, 1
         while top > 0:
+            if verdict and out[0] < -contact:
+                return -np.inf
             top -= 1
             i = stack[top]
             leaf, radius = blink[i, 1] > 0, 0.0
@@ -303,10 +344,7 @@ def _entries(stamp: str) -> tuple[Any, Any]:
                     k = blink[k, 0]
                 k = border[blink[k, 0]]
                 looked += 1
-                if _piece(
-                    pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, slack, contact, goal, tol, near, chosen,
-                    heights, over, work, p, q, out,
-                ) > 0.0:  # fmt: skip
+                if _piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out) > 0.0:
                     floor = min(floor, low - radius)
                     continue
             if not leaf:
@@ -315,10 +353,7 @@ def _entries(stamp: str) -> tuple[Any, Any]:
                 continue
             for j in range(blink[i, 0], blink[i, 0] + blink[i, 1]):
                 k = border[j]
-                low = _piece(
-                    pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, slack, contact, goal, tol, near, chosen,
-                    heights, over, work, p, q, out,
-                )  # fmt: skip
+                low = _piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out)
                 bounds[k] = low
                 heapq.heappush(heap, (low, k))
                 looked += 1
@@ -334,7 +369,7 @@ def _entries(stamp: str) -> tuple[Any, Any]:
                     or (low >= -contact and high <= contact)
                     or (low > contact and high < clearance)
                 )
-            if known or n + 1 >= len(faces) or looked >= most:
+            if known or n >= len(faces) or n - first >= most:
                 break
             i = heapq.heappop(heap)[1]
             g = faces[i]
@@ -352,27 +387,7 @@ def _entries(stamp: str) -> tuple[Any, Any]:
             sags[n, (side + 2) % 3] = 0.0
             sags[i, (side + 1) % 3] = 0.0
             for k in (i, n):
-                new = _piece(
-                    pieces[k],
-                    uvs[k],
-                    g,
-                    sags[k],
-                    own,
-                    solid,
-                    marked,
-                    slack,
-                    contact,
-                    goal,
-                    tol,
-                    near,
-                    chosen,
-                    heights,
-                    over,
-                    work,
-                    p,
-                    q,
-                    out,
-                )
+                new = _piece(pieces[k], uvs[k], g, sags[k], own, solid, marked, limits, scratch, out)
                 bounds[k] = max(low, new)
                 heapq.heappush(heap, (bounds[k], k))
             n += 1
@@ -390,7 +405,7 @@ def _entries(stamp: str) -> tuple[Any, Any]:
             descend,
             "f8(f8[:,:,::1],f8[:,:,::1],i8[::1],f8[:,::1],f8[::1],i8,"
             "f8[:,::1],i8[:,::1],i8[::1],f8[:,::1],i8[::1],f8[:,::1],f8[:,::1],f8[::1],"
-            f"{solid},i1[::1],f8,f8,f8,f8,i8,f8[::1])",
+            f"{solid},i1[::1],f8[::1],f8,f8,f8,i8,f8[::1])",
         ),
     )
 

@@ -1,0 +1,241 @@
+"""Assemblies of parts as engineers draw them, and what Open CASCADE says of each pair."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex, BRepBuilderAPI_Transform
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+from OCP.BRepGProp import BRepGProp
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.BRepPrimAPI import (
+    BRepPrimAPI_MakeBox,
+    BRepPrimAPI_MakeCone,
+    BRepPrimAPI_MakeCylinder,
+    BRepPrimAPI_MakeSphere,
+    BRepPrimAPI_MakeTorus,
+)
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf
+from OCP.GProp import GProp_GProps
+
+from clamp3d.brep.tessellate import explore
+
+
+def moved(shape, T):
+    """The shape with its geometry moved by T (4, 4)."""
+    move = gp_Trsf()
+    move.SetValues(*(float(x) for x in np.asarray(T)[:3].ravel()))
+    return BRepBuilderAPI_Transform(shape, move, True).Shape()
+
+
+def shift(x, y, z):
+    T = np.eye(4)
+    T[:3, 3] = x, y, z
+    return T
+
+
+def box(low, high):
+    return BRepPrimAPI_MakeBox(gp_Pnt(*map(float, low)), gp_Pnt(*map(float, high))).Shape()
+
+
+def rod(radius, low, high, at=(0.0, 0.0)):
+    axis = gp_Ax2(gp_Pnt(at[0], at[1], low), gp_Dir(0, 0, 1))
+    return BRepPrimAPI_MakeCylinder(axis, radius, high - low).Shape()
+
+
+def cone(r0, r1, low, high):
+    return BRepPrimAPI_MakeCone(gp_Ax2(gp_Pnt(0, 0, low), gp_Dir(0, 0, 1)), r0, r1, high - low).Shape()
+
+
+def ball(radius, at=(0, 0, 0)):
+    return BRepPrimAPI_MakeSphere(gp_Pnt(*map(float, at)), radius).Shape()
+
+
+def ring(major, minor, z=0.0):
+    return BRepPrimAPI_MakeTorus(gp_Ax2(gp_Pnt(0, 0, z), gp_Dir(0, 0, 1)), major, minor).Shape()
+
+
+def cut(shape, *tools):
+    for tool in tools:
+        shape = BRepAlgoAPI_Cut(shape, tool).Shape()
+    return shape
+
+
+def fuse(shape, *others):
+    for other in others:
+        shape = BRepAlgoAPI_Fuse(shape, other).Shape()
+    return shape
+
+
+def solid_of(shape):
+    return next(iter(explore(shape, "SOLID")))
+
+
+def fasteners():
+    """Two plates, two shouldered screws with washers and nuts: planes, cylinders, coaxial fits."""
+    holes = [(12.0, 0.0), (-12.0, 0.0)]
+    plate = cut(box((-25, -10, 0), (25, 10, 6)), *(rod(3.2, -1, 7, at) for at in holes))
+    under = cut(box((-25, -10, -6), (25, 10, 0)), *(rod(3.0, -7, 1, at) for at in holes))
+    parts = {"plate": plate, "under": under}
+    for k, (x, y) in enumerate(holes):
+        washer = cut(rod(6, 6, 7.2), rod(3.2, 5, 8))
+        screw = fuse(rod(3, -12, 7.2), rod(5, 7.2, 12.2))
+        nut = cut(box((-5, -5, -11), (5, 5, -6)), rod(3, -12, -5))
+        for name, part in (("washer", washer), ("screw", screw), ("nut", nut)):
+            parts[f"{name}_{k}"] = moved(part, shift(x, y, 0))
+    return parts
+
+
+def hinge():
+    """Two leaves with knuckles on one pin, 0.1 mm between the knuckles."""
+    parts = {"pin": fuse(rod(2.0, 0.0, 40.0), rod(3.0, 40.0, 42.0))}
+    for name, side, spans in (("left", -1, [(0, 9.9), (20, 29.9)]), ("right", 1, [(10, 19.9), (30, 40)])):
+        leaf = None
+        for low, high in spans:
+            knuckle = fuse(rod(4.0, low, high), box((min(0, 18 * side), -4, low), (max(0, 18 * side), -2, high)))
+            leaf = knuckle if leaf is None else fuse(leaf, knuckle)
+        spine = box((min(6 * side, 18 * side), -4, 0), (max(6 * side, 18 * side), -2, 40))
+        parts[name] = cut(fuse(leaf, spine), rod(2.0, -1, 41))
+    return parts
+
+
+def clip():
+    """A bent pipe in two clips on a base: tori, cylinders, planes."""
+    straight = cut(rod(5.0, 0, 30), rod(4.0, -1, 31))
+    bend = cut(ring(20.0, 5.0), ring(20.0, 4.0))
+    bend = BRepAlgoAPI_Common(bend, box((0, -30, -6), (30, 0, 6))).Shape()
+    turn = np.array([[1.0, 0, 0, -20], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
+    parts = {"pipe": fuse(straight, moved(bend, turn))}
+    for k, z in enumerate((8.0, 20.0)):
+        body = box((-8, -9, z), (8, 2, z + 5))
+        parts[f"clip_{k}"] = cut(body, rod(5.0, z - 1, z + 6), box((-3.5, 0, z - 1), (3.5, 3, z + 6)))
+    parts["base"] = box((-20, -12, 0), (20, -9, 30))
+    return parts
+
+
+def taper():
+    """A taper pin in a hub, a ball in its socket, a rubber ring in its groove: cones, spheres, tori."""
+    plate = cut(box((-14, -14, -10), (14, 14, 10)), cone(2.0, 2.5, -10.0, 10.0))
+    pin = cone(2.0, 2.5, -10.0, 10.0)
+    stud = fuse(rod(3.0, 10, 20, (9, 9)), ball(5.0, (9, 9, 25)))
+    socket = cut(box((0, 0, 25), (18, 18, 33)), ball(5.0, (9, 9, 25)))
+    groove = moved(cut(rod(9.0, -4, 4), ring(9.0, 1.5)), shift(-30, 0, 0))
+    return {"plate": plate, "pin": pin, "stud": stud, "socket": socket, "groove": groove,
+            "seal": moved(ring(9.0, 1.5), shift(-30, 0, 0))}  # fmt: skip
+
+
+def bearing():
+    """A deep groove ball bearing of bd_warehouse on a shaft, in a housing."""
+    from bd_warehouse.bearing import SingleRowDeepGrooveBallBearing
+
+    made = SingleRowDeepGrooveBallBearing(size="M8-22-7", bearing_type="SKT")
+    parts = {}
+    for k, solid in enumerate(explore(made.wrapped, "SOLID")):
+        parts[f"part_{k}"] = solid
+    low, high = -10.0, 10.0
+    parts["shaft"] = rod(4.0, low, high)
+    parts["housing"] = cut(box((-16, -16, low), (16, 16, high)), rod(11.0, low - 1, high + 1))
+    return parts
+
+
+def gears():
+    """Two spur gears of bd_warehouse with flanks that touch; a shaft in each."""
+    from bd_warehouse.gear import SpurGear
+
+    parts = {}
+    for k, (teeth, x) in enumerate(((15, 0.0), (20, 1.5 * 17.5 + 0.05))):
+        gear = SpurGear(module=1.5, tooth_count=teeth, pressure_angle=20, thickness=6)
+        turn = 0.0 if k == 0 else math.pi / teeth * (1 + teeth % 2)
+        c, s = math.cos(turn), math.sin(turn)
+        T = np.array([[c, -s, 0, x], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+        body = cut(moved(solid_of(gear.wrapped), T), rod(3.0, -5, 12, (x, 0.0)))
+        parts[f"gear_{k}"] = body
+        parts[f"shaft_{k}"] = rod(3.0, -10, 16, (x, 0.0))
+    return parts
+
+
+def nudged(parts, seed, least=0.003, most=0.05):
+    """Each part moved by ``least`` to ``most`` mm in some direction, and turned by up to 1e-3 rad every third time."""
+    rng = np.random.default_rng(seed)
+    made = {}
+    for k, (name, shape) in enumerate(parts.items()):
+        way = rng.normal(size=3)
+        T = shift(*(way / np.linalg.norm(way) * rng.uniform(least, most)))
+        if k % 3 == 2:
+            x, y, z = rng.normal(size=3) * 3e-4
+            T[:3, :3] = np.linalg.qr(np.eye(3) + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]))[0]
+            T[:3, :3] *= np.sign(np.diag(T[:3, :3]))
+        made[name] = moved(shape, T)
+    return made
+
+
+@dataclass
+class Truth:
+    """Distance (mm), common volume (mm3) and depth of the deepest point found (mm, a lower bound)."""
+
+    distance: float
+    volume: float = 0.0
+    depth: float = 0.0
+
+    def verdict(self, contact=0.01):
+        """What the pair is; None where the depth is too near to the threshold to say."""
+        if self.distance > contact:
+            return "clear"
+        if self.depth > contact:
+            return "clash"
+        return "contact" if self.depth < 0.8 * contact else None
+
+
+def truth(a, b):
+    """By Open CASCADE: the distance; of an overlap the volume, and corners of its mesh measured against both."""
+    found = BRepExtrema_DistShapeShape(a, b)
+    distance = found.Value()
+    if distance > 1e-7:
+        return Truth(distance)
+    common = BRepAlgoAPI_Common(a, b).Shape()
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(common, properties)
+    if properties.Mass() <= 1e-9:  # or the boolean has failed: ask some points
+        return Truth(0.0, 0.0, max(deepest_corner(a, b), deepest_corner(b, a)))
+    return Truth(0.0, properties.Mass(), max(deepest(common, x) for x in (a, b)))
+
+
+def deepest(common, solid):
+    """The largest distance that a corner of the common part's mesh has from the solid's boundary."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopLoc import TopLoc_Location
+
+    BRepMesh_IncrementalMesh(common, 0.05, False, 0.3, False)
+    shell = next(iter(explore(solid, "SHELL")))
+    points = []
+    for face in explore(common, "FACE"):
+        mesh = BRep_Tool.Triangulation_s(face, TopLoc_Location())
+        points += [mesh.Node(i) for i in range(1, mesh.NbNodes() + 1)] if mesh is not None else []
+    return max((from_shell(p, shell) for p in points[:: max(1, len(points) // 60)]), default=0.0)
+
+
+def deepest_corner(a, b):
+    """The deepest of some corners of a's triangles inside b."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepClass3d import BRepClass3d_SolidClassifier
+    from OCP.TopAbs import TopAbs_State
+    from OCP.TopLoc import TopLoc_Location
+
+    shell, found = next(iter(explore(b, "SHELL"))), 0.0
+    BRepMesh_IncrementalMesh(a, 0.05, False, 0.3, False)
+    for face in explore(a, "FACE"):
+        mesh = BRep_Tool.Triangulation_s(face, TopLoc_Location())
+        nodes = [] if mesh is None else [mesh.Node(i) for i in range(1, mesh.NbNodes() + 1)]
+        for point in nodes[:: max(1, len(nodes) // 20)]:
+            if BRepClass3d_SolidClassifier(b, point, 1e-7).State() == TopAbs_State.TopAbs_IN:
+                found = max(found, from_shell(point, shell))
+    return found
+
+
+def from_shell(point, shell):
+    """Distance of a gp_Pnt from a shell."""
+    return BRepExtrema_DistShapeShape(BRepBuilderAPI_MakeVertex(point).Vertex(), shell).Value()
+
+
+ASSEMBLIES = {made.__name__: made for made in (fasteners, hinge, clip, taper, bearing, gears)}

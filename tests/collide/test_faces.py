@@ -1,0 +1,253 @@
+"""Solids with known faces: bounds against closed forms and Open CASCADE, touching and overlapping pairs certain."""
+
+import itertools
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("OCP")
+sys.path.insert(0, str(Path(__file__).parents[1] / "brep"))
+
+from assemblies import (
+    ASSEMBLIES,
+    ball,
+    box,
+    cone,
+    cut,
+    fuse,
+    moved,
+    nudged,
+    ring,
+    rod,
+    shift,
+    solid_of,
+    truth,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from clamp3d import Scene, check
+from clamp3d.brep.solid import BrepSolid
+from clamp3d.brep.surfaces import KINDS
+from clamp3d.collide.faces import FaceModel, faces_distance
+from clamp3d.collide.verdict import Thresholds, Verdict
+
+CONTACT = 0.01
+
+
+def model(shape):
+    return FaceModel(BrepSolid.of(solid_of(shape), "solid"))
+
+
+def rotation(axis, angle):
+    x, y, z = np.asarray(axis) / np.linalg.norm(axis)
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    T = np.eye(4)
+    T[:3, :3] += math.sin(angle) * K + (1 - math.cos(angle)) * K @ K
+    return T
+
+
+def between(a, b, T=None, **options):
+    return faces_distance(model(a), model(b), np.eye(4) if T is None else T, contact=CONTACT, **options)
+
+
+def holds(found, value, slack=1e-7):
+    assert found.lower - slack <= value <= found.upper + slack, (found.lower, value, found.upper)
+
+
+# --- The faces --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("shape", "kinds"),
+    [
+        (box((0, 0, 0), (1, 2, 3)), {"plane"}),
+        (rod(2, 0, 5), {"plane", "cylinder"}),
+        (cone(3, 1, 0, 4), {"plane", "cone"}),
+        (ball(2), {"sphere"}),
+        (ring(5, 1), {"torus"}),
+    ],
+)
+def test_kinds_senses_and_errors(shape, kinds):
+    solid = BrepSolid.of(solid_of(shape), "solid")
+    faces = solid.surfaces
+    assert {KINDS[k] for k in faces.kind} == kinds
+    hollow = BrepSolid.of(solid_of(cut(box((-9, -9, -9), (9, 9, 9)), shape)), "hollow").surfaces
+    round_ = faces.kind != 0
+    assert (faces.sense[round_] == 1.0).all()
+    assert (hollow.sense[hollow.kind != 0] == -1.0).all()
+    # The middle of each triangle is no further from its surface than its error.
+    for f, triangle, error in zip(faces.face, faces.corners, faces.error, strict=True):
+        from clamp3d.brep.surfaces import height
+
+        size = (float(faces.size[f, 0]), float(faces.size[f, 1]))
+        heights = height(int(faces.kind[f]), faces.frame[f], size, np.vstack([triangle, triangle.mean(axis=0)]))
+        assert np.abs(heights[:3]).max() < 1e-9
+        assert abs(heights[3]) <= error
+
+
+def test_a_spline_that_is_a_cylinder_is_one():
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
+
+    spline = BRepBuilderAPI_NurbsConvert(rod(5, 0, 12)).Shape()
+    made = BrepSolid.of(solid_of(spline), "spline").surfaces
+    assert sorted(KINDS[k] for k in made.kind) == ["cylinder", "plane", "plane"]
+    assert made.deviation.max() < 1e-3
+
+
+def test_arrays_carry_the_faces():
+    solid = BrepSolid.of(solid_of(rod(2, 0, 5)), "pin")
+    again = BrepSolid.from_arrays("pin", solid.to_arrays())
+    np.testing.assert_array_equal(again.surfaces.corners, solid.surfaces.corners)
+    found = faces_distance(FaceModel(again), model(ball(1, (0, 0, 7))), np.eye(4), contact=CONTACT, tol=1e-4)
+    holds(found, 1.0)
+
+
+# --- Closed forms -----------------------------------------------------------------------------------------------------
+
+APART = [
+    ("two balls", ball(2), ball(3, (0, 0, 5.3)), 0.3),
+    ("ball in a hollow", cut(box((-9, -9, -9), (9, 9, 9)), ball(5)), ball(4.9, (0, 0, 0.05)), 0.05),
+    ("pin in a hole", cut(box((-9, -9, 0), (9, 9, 8)), rod(3, -1, 9)), rod(2.95, -2, 10, (0.02, 0)), 0.03),
+    ("parallel rods", rod(2, 0, 9), rod(1, 3, 20, (3.02, 0)), 0.02),
+    ("ball over a cone", cone(4, 0, 0, 4), ball(1, (0, 2 + 1.02 * math.sqrt(0.5), 2 + 1.02 * math.sqrt(0.5))), 0.02),
+    ("ball in a torus", ring(8, 2), ball(1, (0, 0, 0)), 5.0),
+    ("edge on edge", box((0, 0, 0), (5, 5, 5)), box((5.03, 0, 5.04), (9, 5, 9)), 0.05),
+    ("plate over plate", box((0, 0, 0), (9, 9, 1)), box((2, 2, 1.02), (14, 7, 2)), 0.02),
+]
+
+
+@pytest.mark.parametrize(("a", "b", "gap"), [x[1:] for x in APART], ids=[x[0] for x in APART])
+@pytest.mark.parametrize("turned", [False, True])
+def test_gaps(a, b, gap, turned):
+    T = rotation((1, 2, 3), 0.7) if turned else np.eye(4)
+    T[:3, 3] = (3, -1, 2) if turned else 0.0
+    found = faces_distance(model(moved(a, T)), model(b), T, contact=CONTACT, tol=2e-3)
+    holds(found, gap)
+    assert found.upper - found.lower <= 2.01e-3
+    assert Thresholds().verdict(found) is Verdict.CLEAR
+    assert np.linalg.norm(found.point_a - found.point_b) <= found.upper + 1e-7
+
+
+TOUCHING = [
+    ("plate on plate", box((0, 0, 0), (9, 9, 1)), box((2, 2, 1), (14, 7, 2))),
+    ("pin in a hole of its size", cut(box((-9, -9, 0), (9, 9, 8)), rod(3, -1, 9)), rod(3, -2, 10)),
+    ("shouldered pin", cut(box((-9, -9, 0), (9, 9, 8)), rod(3, -1, 9)), fuse(rod(3, -2, 8), rod(5, 8, 11))),
+    ("ball in a socket of its size", cut(box((-9, -9, -9), (9, 9, 0)), ball(5)), ball(5)),
+    ("cone in its seat", cut(box((-9, -9, 0), (9, 9, 8)), cone(2, 4, 0, 8)), cone(2, 4, 0, 8)),
+    ("corner in corner", cut(box((0, 0, 0), (9, 9, 9)), box((4, 4, 4), (10, 10, 10))), box((4, 4, 4), (8, 8, 8))),
+    (
+        "rod on plate",
+        box((-9, -9, -1), (9, 9, 0)),
+        moved(rod(3, -5, 5), rotation((1, 0, 0), math.pi / 2) @ shift(0, 3, 0)),
+    ),
+]
+
+
+@pytest.mark.parametrize(("a", "b"), [x[1:] for x in TOUCHING], ids=[x[0] for x in TOUCHING])
+def test_touching_is_contact_and_certain(a, b):
+    found = between(a, b)
+    holds(found, 0.0)
+    assert found.upper - found.lower < 1.5 * CONTACT
+    assert Thresholds().verdict(found) is Verdict.CONTACT
+
+
+@pytest.mark.parametrize(("deep", "verdict"), [(0.003, Verdict.CONTACT), (0.03, Verdict.CLASH)])
+def test_small_overlaps(deep, verdict):
+    plate, hole = box((0, 0, 0), (9, 9, 1)), cut(box((-9, -9, 0), (9, 9, 8)), rod(3, -1, 9))
+    for a, b in (
+        (plate, box((2, 2, 1 - deep), (14, 7, 2))),
+        (hole, rod(3, -2, 10, (deep, 0))),
+        (hole, rod(3 + deep, -2, 10)),
+        (ball(4), ball(4, (0, 0, 8 - deep))),
+    ):
+        found = between(a, b)
+        holds(found, -deep)
+        assert Thresholds().verdict(found) is verdict
+
+
+def test_inside_and_copies_are_not_contact():
+    large, small = box((0, 0, 0), (9, 9, 9)), box((3, 3, 3), (5, 5, 5))
+    for a, b in ((large, small), (small, large), (large, large), (ball(4), ball(4))):
+        assert Thresholds().verdict(between(a, b)) not in (Verdict.CONTACT, Verdict.CLEAR)
+    assert Thresholds().verdict(between(large, small)) is Verdict.CLASH
+
+
+shapes = st.sampled_from(
+    [
+        box((-2, -3, -1), (2, 3, 1)),
+        rod(2, -3, 3),
+        cone(2.5, 0.5, -2, 2),
+        cone(2, 0, -2, 2),
+        ball(2.2),
+        ring(3, 1),
+        cut(box((-4, -4, -2), (4, 4, 2)), rod(2, -3, 3)),
+        cut(rod(4, -2, 2), ball(2.5, (0, 0, 2))),
+    ]
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    shapes,
+    shapes,
+    st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1),
+    st.floats(0, math.pi),
+    st.tuples(*[st.floats(-5, 5)] * 3),
+)
+def test_bounds_hold_against_open_cascade(a, b, axis, angle, at):
+    T = rotation(axis, angle)
+    T[:3, 3] = at
+    placed = moved(b, T)
+    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+
+    known = BRepExtrema_DistShapeShape(a, placed).Value()
+    found = faces_distance(model(a), model(b), T, contact=CONTACT, tol=0.01)
+    assert found.lower <= known + 1e-6
+    if known > 1e-6:  # the solver may miss the nearest place, never name a nearer one
+        assert found.upper <= known + 0.02 or found.upper - found.lower > 0.01
+        assert found.upper > 0.0
+    else:
+        assert found.lower <= 0.0
+
+
+# --- Assemblies -------------------------------------------------------------------------------------------------------
+
+
+CERTAIN = ("fasteners", "hinge", "clip", "bearing")
+"""Assemblies with every pair decided; free-form flanks and tori of one size may stay uncertain, never wrong."""
+
+
+@pytest.mark.parametrize("seed", [None, 1])
+@pytest.mark.parametrize("name", ASSEMBLIES)
+def test_assemblies(name, seed):
+    if name in ("bearing", "gears"):
+        pytest.importorskip("bd_warehouse")
+    parts = ASSEMBLIES[name]()
+    parts = parts if seed is None else nudged(parts, seed)
+    scene = Scene()
+    for part, shape in parts.items():
+        scene = scene.add(part, BrepSolid.of(solid_of(shape), part))
+    result = check(scene)
+    rows = {(row.a, row.b): row for row in result.pairs}
+    wrong, uncertain = [], []
+    for a, b in itertools.combinations(parts, 2):
+        row = rows.get((a, b))
+        known = truth(parts[a], parts[b])
+        wanted = known.verdict()
+        verdict = "clear" if row is None else row.verdict.value.replace("contained", "clash")
+        if verdict == "uncertain":
+            uncertain.append((a, b))
+        elif wanted is not None and verdict != wanted:
+            wrong.append((a, b, verdict, known))
+        if row is not None:
+            value = known.distance if known.distance > 1e-7 else -known.depth
+            assert row.distance.lower <= value + 1e-6, (a, b, row.distance, known)
+            if value > 0.0:
+                assert row.distance.upper >= value - 1e-6, (a, b, row.distance, known)
+    assert not wrong
+    if name in CERTAIN:
+        assert len(uncertain) <= 0.02 * len(rows), uncertain
