@@ -10,6 +10,7 @@ import pytest
 
 from clamp3d.collide.check import check
 from clamp3d.collide.scene import Scene
+from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.motion import Motion
