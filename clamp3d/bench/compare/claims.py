@@ -129,7 +129,7 @@ def _verdicts(arc: Mapping[str, Any], others: list[Any]) -> str:
 
 
 def _start(arc: Mapping[str, Any], others: list[Any]) -> str:
-    light = min((row for row in others if _error(row) < 0.02), key=lambda row: float(row["load"]))
+    light = min((row for row in others if row["method"] == "coal-sector"), key=lambda row: float(row["load"]))
     return (
         f"The arc is *not* the best choice for anything but round grooves and cylinders, nor for a script that asks "
         f"once: its library loads in {arc['load']:.2f} s ({_name(light)}: {light['load']:.2f} s)."
