@@ -6,7 +6,6 @@ import importlib.machinery
 import importlib.util
 import itertools
 import math
-import time
 from pathlib import Path
 
 import numpy as np
