@@ -116,7 +116,7 @@ def check(
         decided[row.distance.level] += 1
         rows.append(row)
     times.append(time.perf_counter())
-    moved = check_motions(scene, models, asked, progress)
+    moved = check_motions(scene, models, asked, progress, depths)
     times.append(time.perf_counter())
     stages = ("broad phase", "pairs", "motions") if scene.motions else ("broad phase", "pairs")
     work = Work(

@@ -8,6 +8,7 @@ import numpy as np
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, near_pairs
+from clamp3d.collide.depth import penetration
 from clamp3d.collide.model import Model, Progress
 from clamp3d.collide.moving_pair import MovingPair, box_corners, first_time, least_distance
 from clamp3d.collide.reasons import failure, undecided
@@ -26,9 +27,11 @@ def check_motions(
     models: list[Model],
     asked: list[tuple[int, int]] | None,
     progress: Progress | None = None,
+    depths: bool = True,
 ) -> tuple[PairResult, ...]:
     """Least distance of each moving part from each other part that it comes near, motion by motion.
 
+    Where they clash, ``depths`` asks for the penetration depth at the deepest instant that was found.
     Each motion starts where the one before has left the parts. What lies between two instants is bounded too, by the
     speed of the part's fastest point and by swept shapes: no thin part is stepped over.
     """
@@ -42,25 +45,31 @@ def check_motions(
         for k, (i, j) in enumerate(near):
             if progress is not None:
                 progress(f"motion {motion.name}", k, len(near))
-            rows.append(_row(scene, models, poses, resolved, i, j))
+            rows.append(_row(scene, models, poses, resolved, i, j, depths))
         for i in moving:
             poses[i] = resolved.at(1.0, poses[i])
     return tuple(rows)
 
 
-def _row(scene: Scene, models: list[Model], poses: list[Array], motion: Motion, i: int, j: int) -> PairResult:
+def _row(
+    scene: Scene, models: list[Model], poses: list[Array], motion: Motion, i: int, j: int, depths: bool
+) -> PairResult:
     a, b = scene.parts[i].name, scene.parts[j].name
     thresholds, allowance = scene.thresholds, scene.allowance(a, b)
     try:
         pair = MovingPair(models[i], models[j], motion, poses[i], poses[j])
         least, t = least_distance(pair, thresholds, allowance)
         contact_at = first_time(pair, t, thresholds, thresholds.contact) if least.upper <= thresholds.contact else None
+        verdict = thresholds.verdict(least, allowance)
+        deep = with_normal(least)
+        if verdict in BAD:
+            deep = penetration(pair.a, pair.b, pair.pose(t), deep) if depths else deep.of_overlap()
     except MissingLibraryError:
         raise
     except Exception as error:  # one pair that fails is a finding, not the end of all others
         return PairResult(a, b, Verdict.FAILED, Distance(), motion.name, reason=failure(error))
-    verdict, T = thresholds.verdict(least, allowance), motion.at(t, poses[i])
-    row = PairResult(a, b, verdict, with_normal(least.moved(T)), motion.name, t, contact_at)
+    T = motion.at(t, poses[i])
+    row = PairResult(a, b, verdict, deep.moved(T), motion.name, t, contact_at)
     if verdict in BAD:
         return replace(row, locate=locator(pair.a, pair.b, T, pair.pose(t)))
     if verdict is Verdict.UNCERTAIN:
