@@ -28,8 +28,10 @@ def from_axis(x, y, z, dx, dy, dz):  # type: ignore[no-untyped-def]
 
 
 @formula
-def on_line(r, l, kx, ky, kz, ux, uz, dx, dy, dz, lo, hi):  # type: ignore[no-untyped-def] # noqa: E741
+def on_line(r, l, kx, ky, kz, ux, uz, dx, dy, dz, lo, hi, limit):  # type: ignore[no-untyped-def] # noqa: E741
     """Least f at ``k + s u``, lo <= s <= hi, and s; k is given from the cylinder's middle, u is x or z, square to k.
+
+    What cannot be below ``limit`` is not looked for: then the value is inf.
 
     Between the point nearest to the axis and the one nearest to the middle plane w and |t| go opposite ways.
     """
@@ -49,6 +51,8 @@ def on_line(r, l, kx, ky, kz, ux, uz, dx, dy, dz, lo, hi):  # type: ignore[no-un
         return phi(ga, ea), a
     w, t = from_axis(kx + b * ux, ky, kz + b * uz, dx, dy, dz)
     gb, eb = w - r, abs(t) - l
+    if phi(ga, eb) > limit:
+        return math.inf, a
     if gb <= min(eb, 0.0):
         return eb, b
     _, t = from_axis(kx + 0.5 * (a + b) * ux, ky, kz + 0.5 * (a + b) * uz, dx, dy, dz)
@@ -59,7 +63,7 @@ def on_line(r, l, kx, ky, kz, ux, uz, dx, dy, dz, lo, hi):  # type: ignore[no-un
             continue
         p, q = a, b
         s = 0.5 * (a + b)
-        for _ in range(60):
+        for k in range(60):
             x = kx + s * ux
             z = kz + s * uz
             t = x * dx + ky * dy + z * dz
@@ -86,11 +90,15 @@ def on_line(r, l, kx, ky, kz, ux, uz, dx, dy, dz, lo, hi):  # type: ignore[no-un
             else:
                 p = s
             step = f / slope if slope != 0.0 else math.inf
+            if abs(step) <= 1e-16 * (abs(s) + math.sqrt(k2)):
+                break
             new = s - step
-            if not min(p, q) < new < max(p, q):
+            if k == 0 and rim == 1 and not min(a, b) < new < max(a, b):  # at an end of the line, often
+                new = a if rising else b
+                p, q = a, b
+            elif not min(p, q) < new < max(p, q):
                 new = 0.5 * (p + q)
-            if abs(new - s) <= 1e-17 * (abs(s) + math.sqrt(k2)) or new == s:
-                s = new
+            if new == s:
                 break
             s = new
         w, t = from_axis(kx + s * ux, ky, kz + s * uz, dx, dy, dz)
@@ -145,7 +153,7 @@ def settle(kind, r, l, side, middle, half, R, kx, ky, kz, off, dx, dy, dz):  # t
     """
     lo, hi = middle - half, middle + half
     at = middle
-    for _ in range(60):
+    for k in range(60):
         w, t, w1, t1, w2, t2 = arc_terms(at, R, kx, ky, kz, off, dx, dy, dz)
         g, e, e1, e2 = w - r, side * t - l, side * t1, side * t2
         if kind == 0:
@@ -165,11 +173,22 @@ def settle(kind, r, l, side, middle, half, R, kx, ky, kz, off, dx, dy, dz):  # t
             hi = at
         else:
             lo = at
-        new = at - f / slope if slope != 0.0 else math.inf
+        if k == 0:  # the end that it leads to is tried first: often the root is beyond it
+            end = lo if hi == at else hi
+            w, t, w1, t1, w2, t2 = arc_terms(end, R, kx, ky, kz, off, dx, dy, dz)
+            g, e, e1 = w - r, side * t - l, side * t1
+            there = (
+                g * w1 + e * e1 if kind == 0 else w1 if kind == 1 else e1 if kind == 2 else g - e if kind == 3 else t
+            )
+            if (there > 0.0) == (f > 0.0):
+                return end
+        step = f / slope if slope != 0.0 else math.inf
+        if abs(step) <= 2e-16:
+            break
+        new = at - step
         if not lo < new < hi:
             new = 0.5 * (lo + hi)
-        if abs(new - at) <= 2e-17 or new == at:
-            at = new
+        if new == at:
             break
         at = new
     return at
@@ -247,24 +266,36 @@ def on_arc(ez, R, half_angle, r, l, cx, cy, cz, dx, dy, dz, best, slack, eps, wo
                         found[0, 0] = new
                         count = 1
             kind = -1
+            falling = 0.0  # slope, where it has one sign over the whole stretch
             if g_low > 0.0 and e_low > 0.0:  # all of it beyond the rim
+                G1 = g * w1 + e * e1
                 G2 = w1 * w1 + g * w2 + e1 * e1 + e * e2
                 G3 = 3.0 * by * bend + g_high * third + 3.0 * T * T + e_high * T
                 G3 = min(G3, M + r * third + l * T)
-                if limit > 0.0 and 0.5 * (g * g + e * e) - fall(g * w1 + e * e1, G2, G3, half) >= 0.5 * limit * limit:
+                if limit > 0.0 and 0.5 * (g * g + e * e) - fall(G1, G2, G3, half) >= 0.5 * limit * limit:
                     continue
                 if G3 * half < G2:
                     kind = 0
-            elif e_high <= min(g_low, 0.0) and w2 > third * half:  # all of it beside the side
-                kind = 1
-            elif g_high <= min(e_low, 0.0) and not split and e2 > T * half:
-                kind = 2
-            if kind < 0 and not split and (abs(w1) > bend * half and abs(e1) > T * half):
-                if (w1 > 0.0) == (e1 > 0.0):  # both fall to the same end
-                    at = at - half if w1 > 0.0 else at + half
-                    done = True
+                elif abs(G1) > (abs(G2) + 0.5 * G3 * half) * half:
+                    falling = G1
+            elif e_high <= min(g_low, 0.0):  # all of it beside the side
+                if w2 > third * half:
+                    kind = 1
+                elif abs(w1) > bend * half:
+                    falling = w1
+            elif g_high <= min(e_low, 0.0) and not split:
+                if e2 > T * half:
+                    kind = 2
+                elif abs(e1) > T * half:
+                    falling = e1
+            elif not split and abs(w1) > bend * half and abs(e1) > T * half:
+                if (w1 > 0.0) == (e1 > 0.0):
+                    falling = w1
                 else:
                     kind = 3
+            if falling != 0.0:
+                at = at - half if falling > 0.0 else at + half
+                done = True
             if kind >= 0:
                 new = settle(kind, r, l, side, at, half, R, kx, ky, kz, off, dx, dy, dz)
                 w, t, _, _, _, _ = arc_terms(new, R, kx, ky, kz, off, dx, dy, dz)

@@ -210,7 +210,7 @@ def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, slac
     if n == 0 or cy + high >= h or h > 0.0:
         for i in range(2):
             kx = (-s if i == 0 else s) - cx
-            f, at = on_line(r, l, kx, h - cy, 0.0, 0.0, 1.0, dx, dy, dz, -H - cz, H - cz)
+            f, at = on_line(r, l, kx, h - cy, 0.0, 0.0, 1.0, dx, dy, dz, -H - cz, H - cz, best + slack)
             if f <= best + slack:
                 z = min(max(at + cz, -H), H)
                 feature = LIP_M if i == 0 else LIP_N
@@ -231,7 +231,7 @@ def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, slac
             for j in range(2):
                 side = -1.0 if j == 0 else 1.0
                 a, b = (-math.inf, -s - cx) if j == 0 else (s - cx, math.inf)
-                f, at = on_line(r, l, 0.0, h - cy, ez - cz, 1.0, 0.0, dx, dy, dz, a, b)
+                f, at = on_line(r, l, 0.0, h - cy, ez - cz, 1.0, 0.0, dx, dy, dz, a, b, best + slack)
                 if f <= best + slack:
                     x = side * max(side * (at + cx), s)
                     feature = END_EDGE_M if j == 0 else END_EDGE_N

@@ -86,7 +86,7 @@ def generalised_gradient(
     >>> groove, wire = SweptArc(12.0, np.pi / 3, 50.0), Cylinder(14.0, 80.0)
     >>> found = generalised_gradient(groove, wire, translation(0.0, 5.0, 0.0))  # over both lips
     >>> found.unique, sorted({str(feature) for feature in found.features})
-    (False, ['corner M', 'corner N'])
+    (False, ['corner M', 'corner N', 'lip M', 'lip N'])
     """
     check_shapes(groove, cylinder)
     nearest = signed_distance(groove, cylinder, pose)
