@@ -14,13 +14,12 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize import brentq, nnls
 
 from clamp3d.clamp.curvature import lagrangian_hessian
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, W
 from clamp3d.core.pose import Array
-from clamp3d.core.roots import root
-from clamp3d.core.small import eigh, nnls, product, svd
 from clamp3d.errors import SolverError
 
 STRIDE = 0.01
@@ -132,7 +131,7 @@ def _meeting(
 
     if gap(0.0) <= 0.0:
         return q
-    return states[root(gap, 0.0, 1.0, xtol=1e-9)] if gap(1.0) < 0.0 else new
+    return states[brentq(gap, 0.0, 1.0, xtol=1e-9)] if gap(1.0) < 0.0 else new
 
 
 def _step(
@@ -186,30 +185,28 @@ def _project(offset: Array, hessian: Array, A: Array, value: Array, scale: float
     A least-distance problem, solved by non-negative least squares [Lawson & Hanson, Solving Least Squares Problems,
     1974, chapter 23].
     """
-    _, sizes, axes = svd(hessian)
-    root_of_inverse = axes / np.sqrt(sizes)[:, None]
-    z0 = (root_of_inverse * offset).sum(axis=1)
+    L = np.linalg.cholesky(hessian)
+    z0 = np.linalg.solve(L, offset)
     if not len(A):
-        return -(root_of_inverse * z0[:, None]).sum(axis=0), np.zeros(0)
-    G = product(A, root_of_inverse.T)
-    lower = ((G * z0).sum(axis=1) - value) / scale
-    u = nnls(np.vstack([G.T, lower]), np.append(np.zeros(len(offset)), 1.0))
-    rest = 1.0 - float((lower * u).sum())
+        return -np.linalg.solve(L.T, z0), np.zeros(0)
+    G = np.linalg.solve(L, A.T).T
+    lower = (G @ z0 - value) / scale
+    u, _ = nnls(np.vstack([G.T, lower]), np.append(np.zeros(len(offset)), 1.0))
+    rest = 1.0 - float(lower @ u)
     if not rest > 1e-12:
         return None, u
     multipliers = u / rest * scale
-    z = (G * multipliers[:, None]).sum(axis=0) - z0
-    return (root_of_inverse * z[:, None]).sum(axis=0), multipliers
+    return np.linalg.solve(L.T, G.T @ multipliers - z0), multipliers
 
 
 def _bend(section: Section, q: Array, gaps: Gaps, force: Array, moving: list[int], *, exact: bool) -> Array:
     """Curvature of the loaded gaps: on a short step that which keeps a wire, or the round back, in the round of its arc
     (force over radius difference), on a long one all there is, by differences."""
     if exact:
-        size, axes = eigh(
+        size, axes = np.linalg.eigh(
             lagrangian_hessian(section, q, np.flatnonzero(force), force[force > 0.0])[np.ix_(moving, moving)]
         )
-        return product(axes * np.maximum(size, 0.0), axes.T)
+        return np.asarray((axes * np.maximum(size, 0.0)) @ axes.T)
     found = np.zeros((SIZE, SIZE))
     found[W, W] = section.lift(float(q[W]))[2] * float(force @ gaps.gradient[:, D])
     pose = section.down_splint(q)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from clamp3d.clamp.section import SIZE, Gaps, Section
 from clamp3d.core.pose import Array
-from clamp3d.core.small import eigh, product, svd
 
 LEVEL = 1e-6
 """Curvature in 1/mm that counts as none: rounding of the differences that it is taken from."""
@@ -30,13 +29,13 @@ def least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array, 
     free = touched(section, gaps, strong)
     if not len(free):
         return np.inf
-    _, sizes, rows = svd(A[:, free])
+    _, sizes, rows = np.linalg.svd(A[:, free])
     tangent = rows[int((sizes > 1e-9).sum()) :]
     if not len(tangent):
         return np.inf
     hessian = lagrangian_hessian(section, q, strong, multipliers[strong])[np.ix_(free, free)]
-    reduced = product(product(tangent, hessian), tangent.T)
-    least = float(eigh(reduced)[0].min())
+    reduced = tangent @ hessian @ tangent.T
+    least = float(np.linalg.eigvalsh(reduced).min())
     weak = np.flatnonzero((np.abs(gaps.value) <= tolerance) & (multipliers == 0.0))
     if least >= -LEVEL or not len(weak):
         return least

@@ -12,6 +12,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import nnls
 
 from clamp3d.clamp.closing import CLOSING, HELD, STRIDE, OnContact, descend, open_start
 from clamp3d.clamp.curvature import LEVEL, lagrangian_hessian, least_curvature, rounding_of_normals, touched
@@ -19,7 +20,6 @@ from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section
 from clamp3d.core.pose import Array
-from clamp3d.core.small import lstsq, nnls
 from clamp3d.errors import InputError, SolverError
 
 TOLERANCE = 1e-9
@@ -212,7 +212,7 @@ def _settle_loose(section: Section, q: Array, wire: PartName) -> Array:
             return fallen
         near = gaps.value < depth
         fallen = fallen.copy()
-        fallen[[x, y]] -= lstsq(gaps.gradient[near][:, [x, y]], gaps.value[near])
+        fallen[[x, y]] -= np.linalg.lstsq(gaps.gradient[near][:, [x, y]], gaps.value[near], rcond=None)[0]
     return fallen if depth <= TOLERANCE else q
 
 
@@ -228,7 +228,7 @@ def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
             in_set[i] = False
     multipliers = np.zeros(len(gaps.value))
     if in_set.any():
-        multipliers[in_set] = nnls(gaps.gradient[in_set][:, free].T, CLOSING[free])
+        multipliers[in_set] = nnls(gaps.gradient[in_set][:, free].T, CLOSING[free])[0]
     multipliers[multipliers < _NO_MULTIPLIER] = 0.0
     return multipliers
 
@@ -252,7 +252,7 @@ def _polish(section: Section, q: Array, active: float) -> tuple[Array, float]:
         kkt = np.block([[hessian[np.ix_(free, free)], -A[:, free].T], [A[:, free], np.zeros((k, k))]])
         rhs = -np.concatenate([(CLOSING - multipliers[rows] @ A)[free], gaps.value[rows]])
         move = np.zeros(SIZE)
-        move[free] = lstsq(kkt, rhs, 1e-12)[:n]
+        move[free] = np.linalg.lstsq(kkt, rhs, rcond=1e-12)[0][:n]
         new = float(np.abs(move).max())
         if not new < step:
             break

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize
 
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.section import WIRES, D, Gaps, S, Section
@@ -159,8 +160,6 @@ def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
     def slack_gradient(x: Array) -> Array:
         found = gaps(x[:2]).gradient[:, i : i + 2]
         return np.column_stack([found, -np.ones(len(found))])
-
-    from scipy.optimize import minimize
 
     try:
         found = minimize(
