@@ -53,7 +53,7 @@ def test_bad_files_give_one_clear_line(tmp_path, old, new, message):
 
 @pytest.mark.parametrize("source", ["nothing.toml", "nothing", "."])
 def test_a_file_that_is_not_there(source):
-    with pytest.raises(InputError, match=r"cannot be read|unknown clamp"):
+    with pytest.raises(InputError, match=r"no such file|not a regular file|unknown clamp"):
         load_clamp(source)
 
 
