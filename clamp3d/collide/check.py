@@ -50,7 +50,8 @@ def check(
     distances : bool
         Measure every pair to `clamp3d.collide.distance.ACCURACY`, not only until its verdict is certain.
     depths : bool
-        Measure the penetration depth of clashes, as `clamp3d.collide.distance.distance` does; without, "at least".
+        Measure the penetration depth of clashes, as `clamp3d.collide.distance.distance` does; without, and between two
+        solids from CAD, "at least".
     progress : callable, optional
         Is told (stage, done, of).
     cache : ModelCache, optional
@@ -198,7 +199,9 @@ def _pair(
             verdict = thresholds.verdict(found, allowance)
         deep = with_normal(found)
         if verdict is Verdict.CLASH:
-            deep = penetration(*pair, deep) if depths else deep.of_overlap()
+            # Between solids from CAD the search takes seconds a pair: there the depth is asked for by `distance`.
+            quick = x.faces is None or y.faces is None
+            deep = penetration(*pair, deep) if depths and quick else deep.of_overlap()
         if verdict is Verdict.CLASH and contained(*pair, thresholds):
             verdict = Verdict.CONTAINED
     except MissingLibraryError:
