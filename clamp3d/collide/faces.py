@@ -15,6 +15,8 @@ from clamp3d.core.pose import Array, inverse
 
 _MOST = 20_000
 """Pieces looked at before a direction ends with what is known."""
+_LEAST = 5e-4
+"""So far (mm) may a face beside another reach above it: pieces that leave it in a tangent need not be cut for ever."""
 _ASKED = 8
 """Triangles below which a point is looked for that only one of two touching solids has."""
 _BESIDE = 8
@@ -65,7 +67,7 @@ class FaceModel:
                     on |= np.abs(height(int(f.kind[i]), f.frame[i], size, corner)) < near
             found[i] = sag[on].max(initial=0.0)
         scale = float(np.abs(self.bounds).max())
-        return np.asarray(2.1 * found + 2.0 * f.deviation.max() + 1e-9 + 1e-12 * scale)
+        return np.asarray(np.maximum(2.1 * found, _LEAST) + 2.0 * f.deviation.max() + 1e-9 + 1e-12 * scale)
 
     @cached_property
     def groups(self) -> NDArray[np.int64]:
