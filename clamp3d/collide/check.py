@@ -50,7 +50,8 @@ def check(
     distances : bool
         Measure every pair to `clamp3d.collide.distance.ACCURACY`, not only until its verdict is certain.
     depths : bool
-        Measure the penetration depth of clashes, as `clamp3d.collide.distance.distance` does; without, "at least".
+        Measure the penetration depth of clashes, as `clamp3d.collide.distance.distance` does; without, and between two
+        solids from CAD, "at least".
     progress : callable, optional
         Is told (stage, done, of).
     cache : ModelCache, optional
@@ -188,17 +189,19 @@ def _pair(
         return not full and known_well and thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN
 
     pair = x, y, T_ab
+    # Between solids from CAD the search takes seconds a pair: there the depth is asked for by `distance`.
+    quick = x.faces is None or y.faces is None
     try:
         found = refine(*pair, start, thresholds, certain)
         verdict = thresholds.verdict(found, allowance)
-        if verdict is Verdict.UNCERTAIN and found.upper < thresholds.reach:
+        if verdict is Verdict.UNCERTAIN and found.upper < thresholds.reach and quick:
             # Nothing lies deeper inside than the way out is long.
             deep = penetration(*pair, with_normal(found))
             found = replace(found, lower=max(found.lower, deep.lower))
             verdict = thresholds.verdict(found, allowance)
         deep = with_normal(found)
         if verdict is Verdict.CLASH:
-            deep = penetration(*pair, deep) if depths else deep.of_overlap()
+            deep = penetration(*pair, deep) if depths and quick else deep.of_overlap()
         if verdict is Verdict.CLASH and contained(*pair, thresholds):
             verdict = Verdict.CONTAINED
     except MissingLibraryError:

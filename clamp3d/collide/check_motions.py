@@ -63,7 +63,8 @@ def _row(
         verdict = thresholds.verdict(least, allowance)
         deep = with_normal(least)
         if verdict in BAD:
-            deep = penetration(pair.a, pair.b, pair.pose(t), deep) if depths else deep.of_overlap()
+            quick = pair.a.faces is None or pair.b.faces is None
+            deep = penetration(pair.a, pair.b, pair.pose(t), deep) if depths and quick else deep.of_overlap()
     except MissingLibraryError:
         raise
     except Exception as error:  # one pair that fails is a finding, not the end of all others

@@ -15,6 +15,8 @@ from clamp3d.core.pose import Array, inverse
 
 _MOST = 20_000
 """Pieces looked at before a direction ends with what is known."""
+_LEAST = 5e-4
+"""So far (mm) may a face beside another reach above it: pieces that leave it in a tangent need not be cut for ever."""
 _ASKED = 8
 """Triangles below which a point is looked for that only one of two touching solids has."""
 _BESIDE = 8
@@ -65,7 +67,7 @@ class FaceModel:
                     on |= np.abs(height(int(f.kind[i]), f.frame[i], size, corner)) < near
             found[i] = sag[on].max(initial=0.0)
         scale = float(np.abs(self.bounds).max())
-        return np.asarray(2.1 * found + 2.0 * f.deviation.max() + 1e-9 + 1e-12 * scale)
+        return np.asarray(np.maximum(2.1 * found, _LEAST) + 2.0 * f.deviation.max() + 1e-9 + 1e-12 * scale)
 
     @cached_property
     def groups(self) -> NDArray[np.int64]:
@@ -137,7 +139,11 @@ def faces_distance(
     ``tol``, where that is given.
     """
     here = inverse(T)
+    if len(a.faces.face) < len(b.faces.face):  # the pieces of the one with fewer first: they often decide
+        return faces_distance(b, a, here, contact=contact, clearance=clearance, tol=tol).moved(T).swapped()
     first = _towards(a, b, T, contact, clearance, tol)
+    if tol is None and first.upper < -contact:
+        return _told(replace(first.swapped(), lower=-np.inf))
     margin = max(contact, clearance)
     low, high = first.lower, first.upper
     if low > margin and not _may_hold(a, b, here):
@@ -171,6 +177,16 @@ def _own(b: FaceModel, a: FaceModel, T: Array, outside: float | None, contact: f
             if _at(b, p)[1] < -2.0 * contact and _at(a, T[:3, :3] @ p + T[:3, 3])[0] > 0.0:
                 return True
     return False
+
+
+def stands_out(b: FaceModel, a: FaceModel, T: Array, slack: float) -> bool:
+    """Whether one of the outermost corners of ``b``, at ``T`` in a's frame, is certainly ``slack`` mm out of ``a``.
+
+    A no says nothing.
+    """
+    c = b.faces.corners.reshape(-1, 3) @ T[:3, :3].T + T[:3, 3]
+    rows = {int(k) for k in (*c.argmin(axis=0), *c.argmax(axis=0))}
+    return any(_at(a, c[k])[0] > slack + float(b.faces.deviation.max()) for k in rows)
 
 
 def _at(a: FaceModel, point: Array) -> tuple[float, float]:

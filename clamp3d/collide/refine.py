@@ -14,7 +14,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm, bodies_distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.convex import Rod
-from clamp3d.collide.faces import faces_distance
+from clamp3d.collide.faces import faces_distance, stands_out
 from clamp3d.collide.facets import rod_distance
 from clamp3d.collide.meshes import meshes_distance, within
 from clamp3d.collide.model import FINEST, Model
@@ -90,6 +90,9 @@ def contained(a: Model, b: Model, T: Array, thresholds: Thresholds) -> bool:
         if (centre + 0.5 * reach < box[0]).any() or (centre - 0.5 * reach > box[1]).any():
             continue
         if ((box[1] - box[0]).max() * 1.7321 + thresholds.contact) < 2.0 * half.max():
+            continue
+        x, y = inner.faces, outer.faces
+        if x is not None and y is not None and stands_out(x, y, place, thresholds.contact):
             continue
         a.counters.queries["containment"] += 1
         if within(inner, outer, place, CONTAINED_ERROR, thresholds.contact):

@@ -233,9 +233,12 @@ def test_assemblies(name, seed):
         scene = scene.add(part, BrepSolid.of(solid_of(shape), part))
     result = check(scene)
     rows = {(row.a, row.b): row for row in result.pairs}
+    boxes = {part.name: FaceModel(part.shape).bounds for part in scene.parts}
     wrong, uncertain = [], []
     for a, b in itertools.combinations(parts, 2):
         row = rows.get((a, b))
+        if row is None and (boxes[a][0] > boxes[b][1] + 1.0).any() | (boxes[b][0] > boxes[a][1] + 1.0).any():
+            continue
         known = truth(parts[a], parts[b])
         wanted = known.verdict()
         verdict = "clear" if row is None else row.verdict.value.replace("contained", "clash")
