@@ -166,6 +166,8 @@ def _certify(section: Section, q: Array, start: Array, held: Array, active: floa
     complementarity = float(multipliers @ np.abs(gaps.value))  # by this much the distance is off
     curvature = least_curvature(section, q, gaps, multipliers, TOLERANCE)
     optimality = max(optimality, residual, complementarity)
+    if section.free == HELD:  # nothing moves while the nut turns
+        held = q
     return FinalState(q, start, held, gaps, multipliers, violation, optimality, loose, curvature)
 
 
