@@ -80,7 +80,7 @@ def test_a_clash_in_motion_is_told_with_its_depth_and_first_contact():
     clash = next(
         line for line in done.stdout.splitlines() if "leaf-b and leaf-a" in line or "leaf-a and leaf-b" in line
     )
-    assert re.search(r"overlap \d+\.\d+ mm", clash)
+    assert re.search(r"overlap at least \d+\.\d+ mm", clash)  # that of an instant: at another it may be deeper
     assert "first contact at t = " in clash
     # By hand: plate and web meet 140 degrees past flat, of 320 in all, after the fold has taken half a turn.
     t = float(re.search(r"first contact at t = ([\d.]+)", clash)[1])
