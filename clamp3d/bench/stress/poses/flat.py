@@ -11,7 +11,7 @@ import numpy as np
 from clamp3d.bench.stress.family import Family, Makers, Methods
 from clamp3d.bench.stress.outcome import REFERENCE, Outcome, examples, score
 from clamp3d.bench.stress.poses import draw, features
-from clamp3d.bench.stress.poses.cases import Cases, Extended, unit_rows
+from clamp3d.bench.stress.poses.cases import Cases, Extended, Shapes, unit_rows
 from clamp3d.bench.stress.poses.family import METHODS as POSE_METHODS
 from clamp3d.bench.stress.poses.flat_truth import flat_truth
 from clamp3d.bench.stress.poses.truth import truth
@@ -83,19 +83,26 @@ def intervals(cases: Cases) -> Array:
 
 def interval(cases: Cases, i: int, most: int = MANY_BOXES) -> tuple[float, float]:
     """The interval in mm that holds the signed distance of case i."""
-    k, s, scene = int(cases.shape[i]), cases.shapes, float(cases.scene()[i])
-    r, length = float(s.r[k]), float(s.length[k])
-    T = cases.T_world_wire[i]
-    low, high = flat_truth(float(s.R[k]), float(s.half_angle[k]), float(s.L[k]), r, length, T, _NARROW * scene, most)
+    case = _alone(cases, i)
+    s, scene, T = case.shapes, float(case.scene()[0]), case.T_world_wire[0]
+    R, half_angle, L, r, length = (float(column[0]) for column in (s.R, s.half_angle, s.L, s.r, s.length))
+    low, high = flat_truth(R, half_angle, L, r, length, T, _NARROW * scene, most)
     rounding = 20.0 * _NARROW * scene if high < -min(r, 0.5 * length) + _KNOWN * scene else 0.05 * _NARROW * scene
     if low <= -min(r, 0.5 * length) + rounding:
         if length <= 2.0 * r:  # of a disc only a bound is known from here on
             return -np.inf, high + rounding
-        core = replace(cases.take([i]), shapes=replace(s, length=s.length - 2.0 * s.r, flat=False))
+        core = replace(case, shapes=replace(s, length=s.length - 2.0 * s.r, flat=False))
         deep = float(truth(core)[0])  # what is left of it: the axis segment, whose truth is that of a capsule
         if deep <= -r:
             return deep - rounding, deep + rounding
     return low - rounding, high + rounding
+
+
+def _alone(cases: Cases, i: int) -> Cases:
+    """Case i with a table of shapes of its own: that of many cases takes longer to read than one truth to find."""
+    k, s = int(cases.shape[i]), cases.shapes
+    R, half_angle, L, r, length = (column[k : k + 1] for column in (s.R, s.half_angle, s.L, s.r, s.length))
+    return replace(cases.take([i]), shapes=Shapes(R, half_angle, L, r, length, flat=s.flat), shape=np.zeros(1, np.intp))
 
 
 METHODS: Methods = {REFERENCE: POSE_METHODS[REFERENCE]}
