@@ -16,9 +16,8 @@ from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core import shapes
 from clamp3d.core.motion import Motion
-from clamp3d.errors import InputError
 from clamp3d.core.pose import translation
-from clamp3d.errors import SolverError
+from clamp3d.errors import InputError, SolverError
 
 SCENE = """
 [parts.a]

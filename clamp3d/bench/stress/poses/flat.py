@@ -20,9 +20,9 @@ from clamp3d.core.pose import Array
 
 Make = Callable[[np.random.Generator, int], Cases]
 
-_NARROW = 1e-13
+NARROW = 1e-13
 """Width of a truth, in parts of the scene, at which it is narrow enough."""
-_BOXES, MANY_BOXES = 4000, 200_000
+_BOXES, MAX_BOXES = 4000, 200_000
 """Boxes that a truth may look at, and that a check of it may."""
 _KNOWN = 1e-9
 """Truths are counted as known that are narrower than this, in parts of the scene."""
@@ -81,13 +81,13 @@ def intervals(cases: Cases) -> Array:
     return np.array([interval(cases, i, _BOXES) for i in range(len(cases))]).reshape(-1, 2)
 
 
-def interval(cases: Cases, i: int, most: int = MANY_BOXES) -> tuple[float, float]:
+def interval(cases: Cases, i: int, most: int = MAX_BOXES) -> tuple[float, float]:
     """The interval in mm that holds the signed distance of case i."""
     case = _alone(cases, i)
     s, scene, T = case.shapes, float(case.scene()[0]), case.T_world_wire[0]
     R, half_angle, L, r, length = (float(column[0]) for column in (s.R, s.half_angle, s.L, s.r, s.length))
-    low, high = flat_truth(R, half_angle, L, r, length, T, _NARROW * scene, most)
-    rounding = 20.0 * _NARROW * scene if high < -min(r, 0.5 * length) + _KNOWN * scene else 0.05 * _NARROW * scene
+    low, high = flat_truth(R, half_angle, L, r, length, T, NARROW * scene, most)
+    rounding = 20.0 * NARROW * scene if high < -min(r, 0.5 * length) + _KNOWN * scene else 0.05 * NARROW * scene
     if low <= -min(r, 0.5 * length) + rounding:
         if length <= 2.0 * r:  # of a disc only a bound is known from here on
             return -np.inf, high + rounding
@@ -100,9 +100,9 @@ def interval(cases: Cases, i: int, most: int = MANY_BOXES) -> tuple[float, float
 
 def _alone(cases: Cases, i: int) -> Cases:
     """Case i with a table of shapes of its own: that of many cases takes longer to read than one truth to find."""
-    k, s = int(cases.shape[i]), cases.shapes
-    R, half_angle, L, r, length = (column[k : k + 1] for column in (s.R, s.half_angle, s.L, s.r, s.length))
-    return replace(cases.take([i]), shapes=Shapes(R, half_angle, L, r, length, flat=s.flat), shape=np.zeros(1, np.intp))
+    k, s = slice(cases.shape[i], cases.shape[i] + 1), cases.shapes
+    shapes = Shapes(s.R[k], s.half_angle[k], s.L[k], s.r[k], s.length[k], s.flat)
+    return replace(cases.take([i]), shapes=shapes, shape=np.zeros(1, np.intp))
 
 
 METHODS: Methods = {REFERENCE: POSE_METHODS[REFERENCE]}
@@ -120,7 +120,7 @@ class FlatFamily(Family):
 
     def difference(self, cases: Cases, truths: Array, i: int) -> float:
         """See `Family`: how far the interval is from a second, finer one."""
-        low, high = interval(cases, i, MANY_BOXES)
+        low, high = interval(cases, i, MAX_BOXES)
         return max(low - float(truths[i, 1]), float(truths[i, 0]) - high, 0.0) / float(cases.scene()[i])
 
     def judge(self, name: str, cases: Cases, truths: Array, answers: Answers) -> Outcome:
@@ -145,7 +145,7 @@ class FlatFamily(Family):
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
         cases = self.cases(n, seed)
-        low, high = interval(cases, i, MANY_BOXES)
+        low, high = interval(cases, i, MAX_BOXES)
         return f"{cases.snippet(i)}\n# truth: from {low!r} to {high!r} mm"
 
 
