@@ -116,11 +116,14 @@ class FlatFamily(Family):
 
     def truths(self, cases: Cases) -> Array:
         """Intervals (n, 2) in mm."""
-        return intervals(cases)
+        return np.array([self._interval(cases, i, _BOXES) for i in range(len(cases))]).reshape(-1, 2)
+
+    def _interval(self, cases: Cases, i: int, most: int) -> tuple[float, float]:
+        return interval(cases, i, most)
 
     def difference(self, cases: Cases, truths: Array, i: int) -> float:
         """See `Family`: how far the interval is from a second, finer one."""
-        low, high = interval(cases, i, MAX_BOXES)
+        low, high = self._interval(cases, i, MAX_BOXES)
         return max(low - float(truths[i, 1]), float(truths[i, 0]) - high, 0.0) / float(cases.scene()[i])
 
     def judge(self, name: str, cases: Cases, truths: Array, answers: Answers) -> Outcome:
@@ -145,7 +148,7 @@ class FlatFamily(Family):
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
         cases = self.cases(n, seed)
-        low, high = interval(cases, i, MAX_BOXES)
+        low, high = self._interval(cases, i, MAX_BOXES)
         return f"{cases.snippet(i)}\n# truth: from {low!r} to {high!r} mm"
 
 

@@ -160,7 +160,7 @@ class SolidFamily(FlatFamily):
         super().__init__(f"solid: {kind}", about, partial(_cases, kind=kind))
         self.part = part
 
-    def _interval(self, cases: Solids, i: int, most: int) -> tuple[float, float]:
+    def _interval(self, cases: Solids, i: int, most: int) -> tuple[float, float]:  # type: ignore[override]
         T, half = cases.T[i], cases.half[i]
         R, r, length = float(cases.radius[i]), float(cases.r[i]), float(cases.length[i])
         rounding = NARROW * float(cases.take([i]).scene()[0])
