@@ -14,12 +14,13 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq, nnls
 
 from clamp3d.clamp.curvature import lagrangian_hessian
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, W
+from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
+from clamp3d.core.roots import root
 from clamp3d.errors import SolverError
 
 STRIDE = 0.01
@@ -134,7 +135,7 @@ def _meeting(
 
     if gap(0.0) <= 0.0:
         return q
-    return states[brentq(gap, 0.0, 1.0, xtol=1e-9)] if gap(1.0) < 0.0 else new
+    return states[root(gap, 0.0, 1.0, xtol=1e-9)] if gap(1.0) < 0.0 else new
 
 
 def _step(
@@ -194,7 +195,7 @@ def _project(offset: Array, hessian: Array, A: Array, value: Array, scale: float
         return -np.linalg.solve(L.T, z0), np.zeros(0)
     G = np.linalg.solve(L, A.T).T
     lower = (G @ z0 - value) / scale
-    u, _ = nnls(np.vstack([G.T, lower]), np.append(np.zeros(len(offset)), 1.0))
+    u = nnls(np.vstack([G.T, lower]), np.append(np.zeros(len(offset)), 1.0))
     rest = 1.0 - float(lower @ u)
     if not rest > 1e-12:
         return None, u

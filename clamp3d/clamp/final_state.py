@@ -12,13 +12,13 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
 from clamp3d.clamp.closing import CLOSING, HELD, STILL, STRIDE, OnContact, descend, open_start
 from clamp3d.clamp.curvature import LEVEL, lagrangian_hessian, least_curvature, rounding_of_normals, touched
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section
+from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
 
@@ -231,7 +231,7 @@ def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
             in_set[i] = False
     multipliers = np.zeros(len(gaps.value))
     if in_set.any():
-        multipliers[in_set] = nnls(gaps.gradient[in_set][:, free].T, CLOSING[free])[0]
+        multipliers[in_set] = nnls(gaps.gradient[in_set][:, free].T, CLOSING[free])
     multipliers[multipliers < _NO_MULTIPLIER] = 0.0
     return multipliers
 
