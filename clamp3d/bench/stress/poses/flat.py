@@ -76,6 +76,28 @@ def _discs(rng: np.random.Generator, n: int) -> Cases:
     return _on_rims(rng, n, draw.shapes(rng, k, R=R, r=r, length=r * 10.0 ** rng.uniform(-3.0, -0.3, k)))
 
 
+def intervals(cases: Cases) -> Array:
+    """Intervals (n, 2) in mm that hold the signed distances."""
+    return np.array([interval(cases, i, _BOXES) for i in range(len(cases))]).reshape(-1, 2)
+
+
+def interval(cases: Cases, i: int, most: int = MAX_BOXES) -> tuple[float, float]:
+    """The interval in mm that holds the signed distance of case i."""
+    case = _alone(cases, i)
+    s, scene, T = case.shapes, float(case.scene()[0]), case.T_world_wire[0]
+    R, half_angle, L, r, length = (float(column[0]) for column in (s.R, s.half_angle, s.L, s.r, s.length))
+    low, high = flat_truth(R, half_angle, L, r, length, T, NARROW * scene, most)
+    rounding = 20.0 * NARROW * scene if high < -min(r, 0.5 * length) + _KNOWN * scene else 0.05 * NARROW * scene
+    if low <= -min(r, 0.5 * length) + rounding:
+        if length <= 2.0 * r:  # of a disc only a bound is known from here on
+            return -np.inf, high + rounding
+        core = replace(case, shapes=replace(s, length=s.length - 2.0 * s.r, flat=False))
+        deep = float(truth(core)[0])  # what is left of it: the axis segment, whose truth is that of a capsule
+        if deep <= -r:
+            return deep - rounding, deep + rounding
+    return low - rounding, high + rounding
+
+
 def _alone(cases: Cases, i: int) -> Cases:
     """Case i with a table of shapes of its own: that of many cases takes longer to read than one truth to find."""
     k, s = slice(cases.shape[i], cases.shape[i] + 1), cases.shapes
@@ -97,19 +119,7 @@ class FlatFamily(Family):
         return np.array([self._interval(cases, i, _BOXES) for i in range(len(cases))]).reshape(-1, 2)
 
     def _interval(self, cases: Cases, i: int, most: int) -> tuple[float, float]:
-        case = _alone(cases, i)
-        s, scene, T = case.shapes, float(case.scene()[0]), case.T_world_wire[0]
-        R, half_angle, L, r, length = (float(column[0]) for column in (s.R, s.half_angle, s.L, s.r, s.length))
-        low, high = flat_truth(R, half_angle, L, r, length, T, NARROW * scene, most)
-        rounding = 20.0 * NARROW * scene if high < -min(r, 0.5 * length) + _KNOWN * scene else 0.05 * NARROW * scene
-        if low <= -min(r, 0.5 * length) + rounding:
-            if length <= 2.0 * r:  # of a disc only a bound is known from here on
-                return -np.inf, high + rounding
-            core = replace(case, shapes=replace(s, length=s.length - 2.0 * s.r, flat=False))
-            deep = float(truth(core)[0])  # what is left of it: the axis segment, whose truth is that of a capsule
-            if deep <= -r:
-                return deep - rounding, deep + rounding
-        return low - rounding, high + rounding
+        return interval(cases, i, most)
 
     def difference(self, cases: Cases, truths: Array, i: int) -> float:
         """See `Family`: how far the interval is from a second, finer one."""
