@@ -159,7 +159,7 @@ class Peers:
 
 
 def ends(repeats: int) -> None:
-    """Batches of cylinders and of capsules at the same poses: by (length, tilt, where along the groove, how far about)."""
+    """Batches of cylinders and of capsules at the same poses: (length, tilt, where along the groove, how far about)."""
     rng = np.random.default_rng(2)
     kinds = {
         "parallel": (80.0, 0.0, 0.0, 0.5),
