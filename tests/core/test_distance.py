@@ -212,7 +212,7 @@ def test_gradient_against_differences(scene, direction):
 def test_world_offsets_cost_nothing():
     mp.mp.dps = 50
     rng = np.random.default_rng(5)
-    for case in CASES[::17]:
+    for case in CASES[::40]:
         A = rotation(rng.normal(size=3), 1.0)
         A[:3, 3] = rng.uniform(-1e6, 1e6, 3)
         B = A @ case.pose
