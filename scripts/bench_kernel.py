@@ -25,7 +25,7 @@ import numpy as np
 from clamp3d.core.distance import signed_distance, signed_distances
 from clamp3d.core.pieces import groove_pieces
 from clamp3d.core.pose import rotation
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 
 GROOVE, WIRE = SweptArc(12.0, np.radians(70.0), 50.0), Cylinder(10.5, 80.0)
 BACK, SIDE = 30.0, 40.0  # the block that peers need in place of unbounded material
@@ -158,6 +158,27 @@ class Peers:
         return fcl.distance(self.mesh, self.wire, self.request, fcl.DistanceResult())
 
 
+def ends(repeats: int) -> None:
+    """Batches of cylinders and of capsules at the same poses: (length, tilt, where along the groove, how far about)."""
+    rng = np.random.default_rng(2)
+    kinds = {
+        "parallel": (80.0, 0.0, 0.0, 0.5),
+        "tilted, reaching out at both ends": (80.0, 0.05, 0.0, 0.5),
+        "short, tilted, in the groove": (20.0, 0.1, 0.0, 0.5),
+        "short, steep, in overlap": (20.0, 1.0, 0.0, 3.0),
+        "end at the groove's end": (80.0, 0.05, 65.0, 0.5),
+        "end before the groove's end": (80.0, 0.3, 68.0, 3.0),
+    }
+    print("\n| flat ends beside a capsule, batch on one core, ns | cylinder | capsule | ratio |\n|---|---|---|---|")
+    for name, (length, tilt, at, about) in kinds.items():
+        T = np.array([rotation((*rng.normal(size=2), 0.0), rng.uniform(0.0, tilt)) for _ in range(4000)])
+        T[:, :3, 3] = rng.normal(size=(4000, 3)) * about + [0.0, 0.0, at]
+        shapes = Cylinder(10.5, length), Capsule(10.5, length)
+        runs = [lambda s=s, T=T: signed_distances(GROOVE, s, T, workers=1) for s in shapes]
+        flat, round_ = (1e3 * least(run, 4000, 5 * repeats) for run in runs)
+        print(f"| {name} | {flat:.0f} | {round_:.0f} | {flat / round_:.1f} |")
+
+
 def start_up() -> tuple[float, float]:
     """CPU seconds of import and first call in a new process: nothing compiled yet, and from the disk cache."""
     import tempfile
@@ -218,6 +239,7 @@ def main() -> None:
             f"{table['wedges, culled by hand'][i] / table['clamp3d, one call'][i]:.0f} and "
             f"{table['wedges, culled by hand'][i] / table[names[-1]][i]:.0f} times"
         )
+    ends(repeats)
     if not options.quick:
         cold, warm = start_up()
         print(

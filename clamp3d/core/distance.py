@@ -137,6 +137,18 @@ def repaired(T: Array, name: str) -> Array:
     return T
 
 
+def _unit_axes(T: Array) -> Array:
+    """Positions and axes (n, 2, 3) that the kernel refused, with axes of length 1. Raises InputError for others."""
+    longest = np.abs(T[:, 1]).max(axis=1, keepdims=True)
+    sound = np.isfinite(T).all(axis=(1, 2)) & (np.abs(T[:, 0]).sum(axis=1) < LARGEST) & (longest[:, 0] > 0.0)
+    if not sound.all():
+        k = int(np.argmin(sound))
+        rule = f"be a finite position, below {LARGEST:g} mm, and an axis that is not zero"
+        raise InputError(f"poses[{k}] must {rule}, got {T[k].tolist()}")
+    axis = T[:, 1] / longest
+    return np.stack([T[:, 0], axis / np.linalg.norm(axis, axis=1, keepdims=True)], axis=1)
+
+
 _kernel: ModuleType | None = None
 
 
@@ -229,12 +241,15 @@ def signed_distances(
 ) -> Array | SignedDistances:
     """Signed distances of a cylinder or a capsule from a groove in many poses: the same bits as `signed_distance`.
 
+    A pose may be given as position and axis alone, which is all of it that matters.
+
     Parameters
     ----------
     groove, cylinder : SweptArc, Cylinder or Capsule
         The two shapes.
-    poses : array_like (n, 4, 4)
-        ``T_groove_cylinder``, mm.
+    poses : array_like (n, 4, 4) or (n, 2, 3)
+        ``T_groove_cylinder``, mm, rounding errors (single precision) mended as `check_pose` says; or, as an
+        array, the cylinder's middle and a vector of any length along its axis, in the groove's frame.
     full : bool
         Return all fields, not the distances alone.
     workers : int, optional
@@ -248,7 +263,7 @@ def signed_distances(
     Raises
     ------
     InputError
-        For other shapes; it names the first pose that is not finite and rigid.
+        For other shapes; it names the first pose that is not finite and rigid, or the first axis of no length.
 
     Examples
     --------
@@ -256,10 +271,14 @@ def signed_distances(
     >>> from clamp3d.core.primitives import Cylinder, SweptArc
     >>> signed_distances(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.eye(4)[None])
     array([1.5])
+    >>> signed_distances(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.array([[(0, 0, 0), (0, 0, 1)]]))
+    array([1.5])
     """
     check_shapes(groove, cylinder)
     flag("full", full)
-    T = np.require(array("poses", poses, (None, 4, 4), finite=False), np.float64, ["C", "A", "W"])
+    axes = isinstance(poses, np.ndarray) and poses.shape[1:] == (2, 3)
+    T = array("poses", poses, (None, 2, 3) if axes else (None, 4, 4), finite=False)
+    T = np.require(T, np.float64, ["C", "A", "W"])
     if workers is not None:
         workers = whole("workers", workers, least=1)
     n = len(T)
@@ -280,7 +299,7 @@ def signed_distances(
         with ThreadPoolExecutor(threads) as pool:
             found = list(pool.map(part, cuts[:-1], cuts[1:]))
     if max(found) >= 0:
-        mended = repaired(T, "poses")
+        mended = _unit_axes(T) if axes else repaired(T, "poses")
         return signed_distances(groove, cylinder, mended, full=full, workers=workers)  # type: ignore[call-overload, no-any-return]
     if not full:
         return out

@@ -8,7 +8,7 @@ from typing import Any
 from clamp3d.core.jit import entry, formula, source_stamp
 from clamp3d.core.kernel_distance import inside_rate, is_parallel, nearest, parallel
 from clamp3d.core.kernel_flat import flat_nearest, flat_parallel
-from clamp3d.core.kernel_pose import axis, rigid
+from clamp3d.core.kernel_pose import axis, place, rigid
 
 RECORD = 19
 """Numbers per answer: distance, point on groove (3), point on cylinder (3), normal (3), bound, feature, t on axis,
@@ -46,7 +46,7 @@ def put(answer, rate, inner, out, k):  # type: ignore[no-untyped-def]
 @formula
 def record(T, k, R, half_angle, s, h, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
     """Answer for the valid pose k into out (n, 19); ``flat`` ends or those of a capsule."""
-    cx, cy, cz, dx, dy, dz = T[k, 0, 3], T[k, 1, 3], T[k, 2, 3], T[k, 0, 2], T[k, 1, 2], T[k, 2, 2]
+    cx, cy, cz, dx, dy, dz = place(T, k)
     if flat:
         answer = flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, pad)
         put(answer[:10], answer[10:], min(r, l), out, k)
@@ -68,8 +68,7 @@ def _entries(stamp: str) -> tuple[Any, Any]:
             for i in range(T.shape[0]):
                 if not rigid(T, i):
                     return i
-                x, y, z = T[i, 0, 3], T[i, 1, 3], T[i, 2, 3]
-                dx, dy, dz = T[i, 0, 2], T[i, 1, 2], T[i, 2, 2]
+                x, y, z, dx, dy, dz = place(T, i)
                 if is_parallel(R, max(l, r), dx, dy):
                     out[i] = flat_parallel(R, s, h, H, r, l, x, y, z, dz)[0]
                 else:
@@ -78,8 +77,7 @@ def _entries(stamp: str) -> tuple[Any, Any]:
         for i in range(T.shape[0]):
             if not rigid(T, i):
                 return i
-            x, y, z = T[i, 0, 3], T[i, 1, 3], T[i, 2, 3]
-            dx, dy, dz = T[i, 0, 2], T[i, 1, 2], T[i, 2, 2]
+            x, y, z, dx, dy, dz = place(T, i)
             if is_parallel(R, l, dx, dy):  # inlined here it is free of what only the witnesses need
                 answer = parallel(R, s, h, H, r, l, x, y, z, dz)
             else:

@@ -323,6 +323,17 @@ def witness(f, qx, qy, qz, feature, R, s, h, r, l, cx, cy, cz, dx, dy, dz, bound
 
 
 @formula
+def way_out(x, y, z, R, s, h, H):  # type: ignore[no-untyped-def]
+    """Depth of a point of the material, its nearest point of the boundary, the normal there, the feature."""
+    depth, feature = point_depth(x, y, z, R, h, H)
+    if feature == END_FACE:
+        up = 1.0 if z > 0.0 else -1.0
+        return depth, x, y, H * up, 0.0, 0.0, up, feature
+    qx, qy, nx, ny = section_foot(feature, x, y, R, s, h)
+    return depth, qx, qy, z, nx, ny, 0.0, feature
+
+
+@formula
 def flat_parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def] # noqa: E741
     """Axis along z: the plane problem of a disc and the section, and the gap along z."""
     gap, feature = section(x, y, R, s, h)
@@ -331,13 +342,7 @@ def flat_parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def
     if gap < 0.0 and beyond <= max(l - r, 0.0):
         if l >= r:
             return parallel(R, s, h, H, r, l - r, x, y, z, dz)
-        depth, feature = point_depth(x, y, z, R, h, H)
-        qx, qy, qz, nx, ny, nz = x, y, z, 0.0, 0.0, 0.0
-        if feature == END_FACE:
-            nz = 1.0 if z > 0.0 else -1.0
-            qz = H * nz
-        else:
-            qx, qy, nx, ny = section_foot(feature, x, y, R, s, h)
+        depth, qx, qy, qz, nx, ny, nz, feature = way_out(x, y, z, R, s, h, H)
         return -l - depth, qx, qy, qz, nx, ny, nz, feature, 0.0, bound
     g = gap - r if gap > 0.0 else -r
     if feature == ARC and gap > 0.0:
@@ -407,13 +412,7 @@ def flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, pad):  # 
                 gx, gy, gz = inside_rate(R, h, H, left, cx, cy, cz, dx, dy, dz, t)
                 return v, qx, qy, qz, nx, ny, nz, feature, t, bound, gx, gy, gz
         elif section(cx, cy, R, s, h)[0] <= 0.0 and abs(cz) <= H:
-            depth, feature = point_depth(cx, cy, cz, R, h, H)
-            qx, qy, qz, nx, ny, nz = cx, cy, cz, 0.0, 0.0, 0.0
-            if feature == END_FACE:
-                nz = 1.0 if cz > 0.0 else -1.0
-                qz = H * nz
-            else:
-                qx, qy, nx, ny = section_foot(feature, cx, cy, R, s, h)
+            depth, qx, qy, qz, nx, ny, nz, feature = way_out(cx, cy, cz, R, s, h, H)
             return -l - depth, qx, qy, qz, nx, ny, nz, feature, 0.0, bound, nx, ny, nz
     bound = 2.0 * bound + 4.0 * UNIT * r
     eps = UNIT * (abs(cx) + abs(cy) + abs(cz) + l + H + R + r)

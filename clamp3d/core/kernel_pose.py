@@ -10,8 +10,22 @@ from clamp3d.core.primitives import LARGEST
 
 
 @inlined
+def place(T, k):  # type: ignore[no-untyped-def]
+    """Position and axis as given, of pose k of (n, 4, 4) or of (n, 2, 3), which is these two alone."""
+    if T.shape[1] == 2:
+        return T[k, 0, 0], T[k, 0, 1], T[k, 0, 2], T[k, 1, 0], T[k, 1, 1], T[k, 1, 2]
+    return T[k, 0, 3], T[k, 1, 3], T[k, 2, 3], T[k, 0, 2], T[k, 1, 2], T[k, 2, 2]
+
+
+@inlined
 def rigid(T, k):  # type: ignore[no-untyped-def]
-    """Whether pose k of (n, 4, 4) is rigid by the rule of ``pose.check_pose``, and its offset below LARGEST."""
+    """Whether pose k of (n, 4, 4) is rigid by the rule of ``pose.check_pose``, and its offset below LARGEST.
+
+    Of (n, 2, 3): whether the axis is of unit length to the same tolerance.
+    """
+    if T.shape[1] == 2:
+        x, y, z, dx, dy, dz = place(T, k)
+        return abs(dx * dx + dy * dy + dz * dz - 1.0) <= RIGID_TOLERANCE and abs(x) + abs(y) + abs(z) < LARGEST
     a, b, c = T[k, 0, 0], T[k, 0, 1], T[k, 0, 2]
     d, e, f = T[k, 1, 0], T[k, 1, 1], T[k, 1, 2]
     g, h, i = T[k, 2, 0], T[k, 2, 1], T[k, 2, 2]
@@ -35,7 +49,7 @@ def rigid(T, k):  # type: ignore[no-untyped-def]
 
 @formula
 def axis(T, k):  # type: ignore[no-untyped-def]
-    """Unit direction of the z axis of pose k: the column as given, normalised."""
-    x, y, z = T[k, 0, 2], T[k, 1, 2], T[k, 2, 2]
+    """Unit direction of the z axis of pose k: as given, normalised."""
+    _, _, _, x, y, z = place(T, k)
     n = math.sqrt(x * x + y * y + z * z)
     return x / n, y / n, z / n

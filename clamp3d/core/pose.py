@@ -141,13 +141,14 @@ def nearest_rigid(T: Array) -> Array:
     >>> bool(np.abs(nearest_rigid(rounded) - rotation((1, 2, 3), 0.5)).max() < 1e-6)
     True
     """
-    from scipy.spatial.transform import RigidTransform
-
-    return np.asarray(RigidTransform.from_matrix(T).as_matrix())
+    left, _, right = np.linalg.svd(T[..., :3, :3])  # SciPy's conversions take a small stretch for a turn
+    out = T.copy()
+    out[..., :3, :3] = left @ right
+    return out
 
 
 def inverse(T: Array) -> Array:
-    """Inverse of rigid poses, by the transpose (SciPy's RigidTransform takes 75 us for one, this takes 5).
+    """Inverse of rigid poses, by the transpose.
 
     Parameters
     ----------
