@@ -103,7 +103,7 @@ def load(
     path = checks.path("source", source)
     if has_bodies(path) and str(path) not in builtin_clamps():
         _refuse_wires(path, "a file of bodies", wires)
-        return _scene(read_parts(path, reader), path.resolve().name if path.is_dir() else path.stem)
+        return _scene(read_parts(path, reader), path.resolve().name if os.path.isdir(path) else path.stem)
     reader.refuse(checks.short(path), "unit", "fit", "chord", "joints", "poses", "partial")
     if str(path) in builtin_clamps() or _is_clamp(path):
         return load_clamp(path, line=line, jumper=jumper)
