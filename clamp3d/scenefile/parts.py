@@ -13,7 +13,6 @@ from clamp3d import checks
 from clamp3d.brep.bodies import Reading, unique_names
 from clamp3d.brep.mesh_file import FORMATS, load_bodies
 from clamp3d.brep.solid import BrepSolid
-from clamp3d.clamp.loader import read_text
 from clamp3d.collide.scene import Allowed, Part
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import FITS, Fit, MeshShape
@@ -95,6 +94,12 @@ def has_bodies(path: Path) -> bool:
     return path.suffix.lower() in (*FORMATS, ".urdf") or path.is_dir()
 
 
+def refuse_wires(path: object, kind: str, wires: dict[str, str | float]) -> None:
+    """Raises InputError for a wire that is to replace one of ``path``, which is of another ``kind`` than a clamp."""
+    for name in wires:
+        raise InputError(f"{name} goes with a clamp; {checks.short(path)} is {kind}")
+
+
 def read_parts(path: Path, reader: Reader) -> Parts:
     """The parts of a geometry file, a robot description or a folder of meshes. Raises InputError."""
     if path.is_dir():
@@ -160,6 +165,8 @@ def _folder(folder: Path, reader: Reader) -> Parts:
 
 def read_poses(path: Path) -> list[tuple[str, Array]]:
     """Names and poses (4, 4) of a table with the columns of `COLUMNS`; a name may be there more than once."""
+    from clamp3d.clamp.loader import read_text
+
     rows = csv.reader(read_text(path).splitlines())
     head = [cell.strip() for cell in next(rows, [])]
     if tuple(head) != COLUMNS:
