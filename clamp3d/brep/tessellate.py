@@ -89,12 +89,13 @@ def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
         BRepTools.Clean_s(solid)
         asked = IMeshTools_Parameters()
         asked.Angle = asked.AngleInterior = angle
-        asked.InternalVerticesMode = inner
         asked.Deflection, asked.DeflectionInterior = min(BORDER, wanted), wanted
         for face, (kind, *_) in zip(faces, surfaces, strict=True):
             if kind == OTHER:  # their facets stand for them to the end
                 BRepMesh_IncrementalMesh(face, asked)
         asked.Deflection = wanted
+        if not inner:  # most faces need none, or are meshed in rows
+            asked.InternalVerticesMode, asked.DeflectionInterior, asked.AngleInterior = False, 1e3, 3.0
         BRepMesh_IncrementalMesh(solid, asked)
         made = _collected(faces, surfaces, wanted)
         worst = float(made.errors.max())

@@ -17,7 +17,6 @@ from clamp3d.collide.scene import Allowed, Part
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import FITS, Fit, MeshShape
 from clamp3d.errors import InputError
-from clamp3d.scenefile.pose_table import Pose
 
 COLUMNS = ("name", "x", "y", "z", "qx", "qy", "qz", "qw")
 """Columns of a table of poses: mm, and a unit quaternion."""
@@ -166,6 +165,7 @@ def _folder(folder: Path, reader: Reader) -> Parts:
 def read_poses(path: Path) -> list[tuple[str, Array]]:
     """Names and poses (4, 4) of a table with the columns of `COLUMNS`; a name may be there more than once."""
     from clamp3d.clamp.loader import read_text
+    from clamp3d.scenefile.pose_table import Pose
 
     rows = csv.reader(read_text(path).splitlines())
     head = [cell.strip() for cell in next(rows, [])]
