@@ -99,7 +99,7 @@ def test_separation_and_common_in_closed_form():
 def test_separation_agrees_with_manifold():
     rng = np.random.default_rng(3)
     seen = 0
-    while seen < 20:
+    while seen < 10:
         a, b = (DRAWN[k] for k in rng.integers(len(DRAWN), size=2))
         T = rotation(rng.normal(size=3), rng.uniform(0.0, 6.0))
         T[:3, 3] = rng.normal(size=3) * 22.0

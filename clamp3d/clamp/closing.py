@@ -34,6 +34,8 @@ OnContact = Callable[[Pair, Array], None]
 
 _AT_REST = 1e-4
 """Speed over the bolt's at which nothing moves: what certifies a final state takes it from there."""
+STILL = 1e-9
+"""The same where that is on the ridge of a saddle, from which the motion leaves slowly at first."""
 _STEPS, _ROUNDS = 2000, 12
 _SETTLED, _OVERLAP = 1e-3, 1e-8
 """A step is found when a round moves it by this part of a stride, and it overlaps by no more than this part."""
@@ -71,11 +73,12 @@ def descend(
     stride: float = STRIDE,
     on_contact: OnContact | None = None,
     most: int | None = None,
+    at_rest: float = _AT_REST,
 ) -> Array:
     """Where the motion from ``q`` that lowers ``goal . q`` comes to rest; ``stride`` as `STRIDE`.
 
-    Only the coordinates ``free`` move, by default all that the joints let. Raises SolverError if that takes more than
-    ``most`` steps.
+    Only the coordinates ``free`` move, by default all that the joints let. It rests when it is slower than
+    ``at_rest`` over the bolt's speed. Raises SolverError if that takes more than ``most`` steps.
     """
     moving = list(section.free if free is None else free)
     longest = stride * section.lever
@@ -96,7 +99,7 @@ def descend(
                     loaded.add(pair)
                     on_contact(pair, _meeting(section, q, gaps, goal, moving, h, longest, pair, new))
         q, gaps = new, new_gaps
-        if speed <= _AT_REST:
+        if speed <= at_rest:
             return q
         h = min(longest / speed, 4.0 * h)
         if not force.any():  # nothing is pushed: no gap closes faster than the motion goes

@@ -54,7 +54,7 @@ def equilibria(section: Section) -> tuple[FinalState, ...]:
     >>> from clamp3d.baselines.cas import Cas
     >>> section = Section(load_clamp(), Cas())
     >>> [round(section.splint_distance(state.q), 3) for state in equilibria(section)]
-    [31.53, 31.638]
+    [31.638, 31.53]
     """
     instance("section", section, Section)
     found: list[FinalState] = []

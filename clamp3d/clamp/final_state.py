@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from clamp3d.clamp.closing import CLOSING, HELD, STRIDE, OnContact, descend, open_start
+from clamp3d.clamp.closing import CLOSING, HELD, STILL, STRIDE, OnContact, descend, open_start
 from clamp3d.clamp.curvature import LEVEL, lagrangian_hessian, least_curvature, rounding_of_normals, touched
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
@@ -28,7 +28,7 @@ TOLERANCE = 1e-9
 _ACTIVE = 1e-6
 _ACTIVE_TRIES = (1e-6, 1e-8, 1e-10, 1e-4)
 """Gaps in the active set, mm: a wire that nearly fills its groove is within the first of contacts it lacks."""
-_ATTEMPTS = 3
+_ATTEMPTS = 4
 _PERTURBATION = 1.5e-3
 """How far a restart begins from the last end, in parts of the down splint's half width."""
 _SETTLING = 300
@@ -117,8 +117,9 @@ def solve_final_state(
     for attempt in range(_ATTEMPTS):
         if _proven(found):
             break
-        # Degenerate active set or saddle point: restart from a perturbed, slightly opened state.
-        again = _best(section, descend(section, _perturb(section, found.q, attempt), stride=stride), start, held)
+        # Degenerate active set or saddle point: let it slide off, or restart from a perturbed, slightly opened state.
+        q = end if attempt == 0 else _perturb(section, found.q, attempt)
+        again = _best(section, descend(section, q, stride=stride, at_rest=STILL), start, held)
         if _proven(again) or _kkt_residual(again) < _kkt_residual(found):
             found = again
     if _proven(found):
@@ -166,6 +167,8 @@ def _certify(section: Section, q: Array, start: Array, held: Array, active: floa
     complementarity = float(multipliers @ np.abs(gaps.value))  # by this much the distance is off
     curvature = least_curvature(section, q, gaps, multipliers, TOLERANCE)
     optimality = max(optimality, residual, complementarity)
+    if section.free == HELD:  # nothing moves while the nut turns
+        held = q
     return FinalState(q, start, held, gaps, multipliers, violation, optimality, loose, curvature)
 
 

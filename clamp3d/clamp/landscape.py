@@ -12,6 +12,7 @@ import itertools
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.clamp.section import SIZE, WIRES, D, S, Section
 from clamp3d.core.groove_pair import GroovePair
@@ -34,18 +35,28 @@ def initial_guesses(section: Section) -> list[Array]:
     faces = np.array([_faces(section, tilt) for tilt in tilts])
     wires = [_Minima(section, i, tilts) for i in range(len(WIRES))]
     found: list[Array] = []
+
+    def least(k: int, a: int, b: int) -> float:
+        return float(max(faces[k], wires[0].least[a], wires[1].least[b]))
+
+    def rises(k: int, a: int, b: int, way: int) -> bool:
+        """Whether the distance is larger beyond a level stretch at the tilt k, upwards (``way`` 1) or downwards."""
+        here = least(k, a, b)
+        while 0 <= k + way < _TILTS:
+            k, a, b = k + way, wires[0].beside[way][a], wires[1].beside[way][b]
+            if least(k, a, b) != here or way < 0:  # the first tilt of a level stretch stands for all
+                return least(k, a, b) > here
+        return True
+
     for k, tilt in enumerate(tilts):
-        left, right = max(k - 1, 0), min(k + 1, _TILTS - 1)
         for a, b in itertools.product(*(w.at(k) for w in wires)):
-            one, other = wires[0].beside[a], wires[1].beside[b]
-            here = max(faces[k], one[1], other[1])
-            if here > max(faces[left], one[0], other[0]) or here > max(faces[right], one[2], other[2]):
+            if not rises(k, a, b, -1) or not rises(k, a, b, 1):
                 continue
             q = np.zeros(SIZE)
-            q[D], q[S] = here, lever * tilt
+            q[D], q[S] = least(k, a, b), lever * tilt
             for i, w, minimum in ((0, wires[0], a), (2, wires[1], b)):
                 at = w.position[minimum]
-                q[i : i + 2] = w.x[at], 0.5 * (w.over[at] + here + w.under[k, at])
+                q[i : i + 2] = w.x[at], 0.5 * (w.over[at] + q[D] + w.under[k, at])
             found.append(q)
     found.sort(key=lambda q: float(q[D]))
     return [opened for q in found if (opened := _open(section, q)) is not None]
@@ -54,8 +65,8 @@ def initial_guesses(section: Section) -> list[Array]:
 class _Minima:
     """Local minima, over a wire's position, of the distance d that the wire allows, all tilts after another.
 
-    ``position`` (v,) is the index of the wire's position at each, ``beside`` (v, 3) the distance there, in the middle,
-    and that of the minimum it slides to when the splint is tilted by one step less and one more.
+    ``position`` (v,) is the index of the wire's position at each, ``least`` (v,) the distance there, and ``beside[-1]``
+    and ``beside[1]`` (v,) the minimum it slides to when the splint is tilted by one step less and one more.
     """
 
     def __init__(self, section: Section, i: int, tilts: Array) -> None:
@@ -74,24 +85,33 @@ class _Minima:
             c, s = math.cos(tilt), math.sin(tilt)
             self.under[k] = np.interp(self.x, np.maximum.accumulate(bolt + u * c + v * s), v * c - u * s)
         least = np.round((self.over - self.under) / (_LEVEL * r)) * (_LEVEL * r)
-        walled = np.pad(least, ((0, 0), (1, 1)), constant_values=np.inf)
-        to_left, to_right = walled[:, :-2], walled[:, 2:]
-        step = np.where((to_right < least) & (to_right <= to_left), 1, np.where(to_left <= least, -1, 0))
+        after_left, after_right = _beyond(least[:, ::-1])[:, ::-1], _beyond(least)
+        level = np.pad(least[:, 1:] == least[:, :-1], ((0, 0), (1, 0)))
+        to_right = (after_right < least) & (after_right <= after_left)
+        step = np.where(to_right, 1, np.where((after_left < least) | level, -1, 0))
         row, self.position = np.nonzero(step == 0)
         key = row * _POSITIONS + self.position
-        self.beside = np.empty((len(key), 3))
-        for column, shift in enumerate((-1, 0, 1)):
-            rows = np.clip(row + shift, 0, len(tilts) - 1)
+        self.least = least[row, self.position]
+        self.beside: dict[int, NDArray[np.intp]] = {}
+        for way in (-1, 1):
+            rows = np.clip(row + way, 0, len(tilts) - 1)
             # Downhill there is the next minimum on that side.
             after = np.searchsorted(key, rows * _POSITIONS + self.position, side="left")
-            end = key[np.where(step[rows, self.position] < 0, after - 1, after)]
-            self.beside[:, column] = least[rows, end % _POSITIONS]
+            self.beside[way] = np.where(step[rows, self.position] < 0, after - 1, after)
         self._outside = 0 if i == 0 else _POSITIONS - 1
         self._first = np.searchsorted(row, np.arange(len(tilts) + 1))
 
     def at(self, k: int) -> list[int]:
         """The minima at tilt k, but for that in which the wire leaves the clamp."""
         return [m for m in range(self._first[k], self._first[k + 1]) if self.position[m] != self._outside]
+
+
+def _beyond(least: Array) -> Array:
+    """The next other value to the right of each (k, n), infinite where there is none: a slight slope is a stair."""
+    n = least.shape[1]
+    last = np.where(least[:, 1:] != least[:, :-1], np.arange(n - 1), n - 1)
+    last = np.minimum.accumulate(np.pad(last, ((0, 0), (0, 1)), constant_values=n - 1)[:, ::-1], axis=1)[:, ::-1]
+    return np.take_along_axis(np.pad(least, ((0, 0), (0, 1)), constant_values=np.inf), last + 1, axis=1)
 
 
 def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: float) -> Array:

@@ -72,6 +72,10 @@ class Spec:
     tolerance: tuple[float, ...]
 
 
+_Task = tuple[Spec, int, int, int]
+"""What is sampled, the number of the chunk, its first sample and how many it has."""
+
+
 @dataclass(frozen=True, slots=True)
 class MonteCarlo:
     """Splint distances of n clamps within their tolerances.
@@ -181,8 +185,8 @@ def monte_carlo(
     sizes = {k: min(CHUNK, n - k * CHUNK) for k in range(math.ceil(n / CHUNK))}
     with nullcontext() if resume is None else Journal(resume, header) as journal:
         kept = {} if journal is None else journal.pieces
-        waiting = [(spec, k, size) for k, size in sizes.items() if len(kept.get(k, ())) < size]
-        done = n - sum(size for _, _, size in waiting)
+        waiting = [(spec, k, k * CHUNK, size) for k, size in sizes.items() if len(kept.get(k, ())) < size]
+        done = n - sum(size for *_, size in waiting)
         tell = progress or (lambda done, of: None)
         tell(done, n)
         for k, found in _solve(waiting, processes, scheduler):
@@ -230,10 +234,9 @@ def _spec(
         return spec, None
 
 
-def _chunk(task: tuple[Spec, int, int]) -> tuple[int, list[Sample]]:
-    """Chunk ``k``: its first ``size`` samples."""
-    spec, k, size = task
-    return k, [_sample(spec, index) for index in range(k * CHUNK, k * CHUNK + size)]
+def _chunk(task: _Task) -> tuple[int, list[Sample]]:
+    spec, k, first, size = task
+    return k, [_sample(spec, index) for index in range(first, first + size)]
 
 
 def _sample(spec: Spec, index: int) -> Sample:
@@ -254,9 +257,7 @@ def _closed(clamp: Clamp) -> Sample:
     return (section.splint_distance(final.q) if status == CLAMPED else None), without_numbers(status)
 
 
-def _solve(
-    tasks: list[tuple[Spec, int, int]], processes: int, scheduler: str | None
-) -> Iterator[tuple[int, list[Sample]]]:
+def _solve(tasks: list[_Task], processes: int, scheduler: str | None) -> Iterator[tuple[int, list[Sample]]]:
     """Chunks as they are finished, in any order."""
     if not tasks:
         return

@@ -99,6 +99,10 @@ def main() -> None:
             error = missing(library, "this")
         if isinstance(error, SolverError):
             status = _fail(str(error), ExitCode.FAILED)
+        elif isinstance(error, OSError) and error.filename is not None:
+            from clamp3d.checks import short
+
+            status = _fail(f"{short(error.filename)}: {error.strerror}", ExitCode.BAD_INPUT)
         elif isinstance(error, (Clamp3dError, OSError)):
             status = _fail(str(error), ExitCode.BAD_INPUT)
         else:

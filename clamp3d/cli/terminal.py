@@ -10,7 +10,7 @@ from typing import NoReturn
 
 import click
 
-from clamp3d.errors import escaped
+from clamp3d.errors import InputError, escaped
 
 
 class ExitCode(IntEnum):
@@ -43,11 +43,12 @@ def finish(*, finding: bool, failed: bool = False, undecided: bool = False, empt
         (finding, ExitCode.FINDING),
         (failed, ExitCode.FAILED),
         (undecided, ExitCode.UNDECIDED),
-        (empty, ExitCode.BAD_INPUT),
     )
     code = next((code for true, code in codes if true), ExitCode.CLEAN)
     if code:
         raise click.exceptions.Exit(code)
+    if empty:
+        raise InputError("there is no pair of parts to judge")
 
 
 STDOUT_TAKEN = "clamp3d.stdout"

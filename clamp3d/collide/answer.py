@@ -139,6 +139,8 @@ class Distance:
         }
 
     def __repr__(self) -> str:
+        if math.isinf(self.lower):
+            return f"Distance(at most {self.upper:.12g} mm, {self.method!r})"
         return f"Distance({self.value:.12g} mm, uncertainty {self.uncertainty:.1e}, {self.method!r})"
 
 

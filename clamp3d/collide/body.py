@@ -72,16 +72,18 @@ class ClosedForm:
         return np.asarray(found)
 
     @cached_property
-    def ball(self) -> tuple[Array, float]:
-        """Centre (3,) and radius of a ball that holds the body."""
-        found = []
+    def bounds(self) -> Array:
+        """Box (2, 3) along the frame's axes that holds the body."""
+        low, high = np.full(3, -np.inf), np.full(3, np.inf)
         for piece in self.outers:
             if isinstance(piece, Rod):
-                found.append((piece.T[:3, 3], math.hypot(piece.radius, 0.5 * piece.length)))
+                axis = piece.T[:3, 2]
+                half = 0.5 * piece.length * np.abs(axis) + piece.radius * np.sqrt(np.maximum(1.0 - axis * axis, 0.0))
+                ends = piece.T[:3, 3] - half, piece.T[:3, 3] + half
             else:
-                middle = 0.5 * (piece.vertices.min(axis=0) + piece.vertices.max(axis=0))
-                found.append((middle, float(np.linalg.norm(piece.vertices - middle, axis=1).max())))
-        return min(found, key=lambda ball: ball[1])
+                ends = piece.vertices.min(axis=0), piece.vertices.max(axis=0)
+            low, high = np.maximum(low, ends[0]), np.minimum(high, ends[1])
+        return np.array([low, high])
 
 
 def bodies_distance(a: ClosedForm, b: ClosedForm, T: Array, enough: Callable[[Distance], bool]) -> Distance:

@@ -31,7 +31,8 @@ def check_motions(
 ) -> tuple[PairResult, ...]:
     """Least distance of each moving part from each other part that it comes near, motion by motion.
 
-    Where they clash, ``depths`` asks for the penetration depth at the deepest instant that was found.
+    Where they clash, ``depths`` asks for the penetration depth at the deepest instant that was found: the least one
+    that the motion has.
     Each motion starts where the one before has left the parts. What lies between two instants is bounded too, by the
     speed of the part's fastest point and by swept shapes: no thin part is stepped over.
     """
@@ -64,7 +65,9 @@ def _row(
         deep = with_normal(least)
         if verdict in BAD:
             quick = pair.a.faces is None or pair.b.faces is None
-            deep = penetration(pair.a, pair.b, pair.pose(t), deep) if depths and quick else deep.of_overlap()
+            if depths and quick:
+                deep = penetration(pair.a, pair.b, pair.pose(t), deep)
+            deep = replace(deep.of_overlap(), interference=None)  # at another instant they may be deeper
     except MissingLibraryError:
         raise
     except Exception as error:  # one pair that fails is a finding, not the end of all others

@@ -5,16 +5,16 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from clamp3d.collide.answer import Distance
+from clamp3d.collide.invariants import can_meet
 from clamp3d.collide.meshes import any_inside
 from clamp3d.collide.model import Model
 from clamp3d.collide.refine import from_boxes, refine
-from clamp3d.collide.surface import fcl_tree
+from clamp3d.collide.surface import Surface, fcl_tree
 from clamp3d.collide.swept import swept_lower
 from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core.motion import Motion
@@ -29,12 +29,25 @@ SHELL_ERROR = 0.064
 """Chord error (mm) of the meshes that a stretch of a motion is bounded with where closed forms say too little."""
 
 
+class _Near(NamedTuple):
+    """Triangles that may come within ``limit`` mm of the other mesh on the way; all others never do.
+
+    ``moving``: FCL's trees of those of the moving mesh, by their error in mm and by their distance from the motion's
+    axis, with the greatest speed in mm per unit of t. ``still``: trees and errors of those of the standing one.
+    """
+
+    limit: float
+    moving: tuple[tuple[Any, float, float], ...]
+    still: tuple[tuple[Any, float], ...]
+
+
 class MovingPair:
     """A shape that moves against one that stands: bounds at a time t, and over a stretch of times."""
 
     def __init__(self, moving: Model, still: Model, motion: Motion, start: Array, T_still: Array) -> None:
         self.a, self.b = moving, still
-        self.motion, self.start, self.back = motion, start, inverse(T_still)
+        self.motion, self.start, self.T_still, self.back = motion, start, T_still, inverse(T_still)
+        self._near: _Near | None = None
         self.counters = moving.counters
         self.speed = motion.speed(box_corners(moving, start))
         # How often in a row closed forms, and swept ones, had nothing to say: hulls in each other never have.
@@ -64,43 +77,58 @@ class MovingPair:
             angle = self.motion.angle * half
             swept = max(plain, swept_lower(self.a, self.b, *stretch, angle=angle))
             self.n_uninformative_swept = 0 if swept > plain else self.n_uninformative_swept + 1
-        if swept >= min(wanted, here) - ACCURACY or len(self.shells) < 2:
+        if swept >= min(wanted, here) - ACCURACY:
             return swept
-        return max(swept, self._by_shells(half, stretch[1]))
+        return max(swept, self.by_meshes(half, stretch[1], min(wanted, here)))
 
-    def _by_shells(self, half: float, T: Array) -> float:
-        """Lower bound by meshes: what is near the axis of a rotation hardly moves."""
+    @property
+    def meshed(self) -> bool:
+        """Whether a stretch has been bounded by meshes."""
+        return self._near is not None
+
+    def by_meshes(self, half: float, T: Array, wanted: float) -> float:
+        """Lower bound by those triangles that may come within ``wanted``; of them what is near an axis hardly moves."""
         import fcl
 
         self.counters.queries["swept meshes"] += 1
         mine, other = self.a.outer(SHELL_ERROR), self.b.outer(SHELL_ERROR)
         back = inverse(T)
-        fixed, place = fcl.CollisionObject(other.bvh), fcl.Transform(back[:3, :3], back[:3, 3])
-        low = np.inf
-        for tree, speed in self.shells:
+        limit = max(wanted - 0.25 * ACCURACY, 0.0)
+        if self._near is None or not limit <= self._near.limit <= 2.0 * limit:
+            self._near = self._meeting(mine, other, limit)
+        low = self._near.limit
+        place = fcl.Transform(back[:3, :3], back[:3, 3])
+        for tree, error, speed in self._near.moving:
             moving = fcl.CollisionObject(tree, place)
-            d = float(fcl.distance(fixed, moving, fcl.DistanceRequest(), fcl.DistanceResult()))
-            if d <= 0.0:
-                return -np.inf
-            low = min(low, d - half * speed)
+            for still, off in self._near.still:
+                fixed = fcl.CollisionObject(still)
+                d = float(fcl.distance(fixed, moving, fcl.DistanceRequest(), fcl.DistanceResult()))
+                if d <= 0.0:
+                    return -np.inf
+                low = min(low, d - error - off - half * speed)
         if any_inside(other, mine, back) or any_inside(mine, other, T):
             return -np.inf
-        return low - mine.error - other.error - 1e-11 * (mine.scale + other.scale + float(np.abs(T[:3, 3]).max()))
+        return low - 1e-11 * (mine.scale + other.scale + float(np.abs(T[:3, 3]).max()))
 
-    @cached_property
-    def shells(self) -> tuple[tuple[Any, float], ...]:
-        """The moving mesh's triangles by their distance from the motion's axis: (tree, speed mm per unit of t)."""
-        mesh = self.a.outer(SHELL_ERROR)
-        straight = float(np.linalg.norm(self.motion.travel))
-        if not self.motion.angle:
-            return ((mesh.bvh, straight),)
-        world = mesh.vertices @ self.start[:3, :3].T + self.start[:3, 3] - self.motion.point
-        across = world - np.outer(world @ self.motion.axis, self.motion.axis)
-        out = np.linalg.norm(across, axis=1)[mesh.faces].max(axis=1)
-        ring = np.ceil(4.0 * np.log2(np.maximum(out / max(float(out.min()), 1e-3), 1.0))).astype(int)
-        speed = straight + abs(self.motion.angle) * out
-        return tuple(
-            (fcl_tree(mesh.vertices, mesh.faces[ring == k]), float(speed[ring == k].max())) for k in np.unique(ring)
+    def _meeting(self, mine: Surface, other: Surface, limit: float) -> _Near:
+        """The triangles of the two meshes that may come within ``limit`` mm of the other one on the way."""
+        motion = self.motion
+        placed = [s.vertices @ T[:3, :3].T + T[:3, 3] for s, T in ((mine, self.start), (other, self.T_still))]
+        moving, still = (v[s.faces] for v, s in zip(placed, (mine, other), strict=True))
+        errors = [np.zeros(len(s.faces)) if s.face_error is None else s.face_error for s in (mine, other)]
+        ours, theirs = can_meet(motion, (moving, errors[0]), (still, errors[1]), limit)
+        local = moving - motion.point
+        out = np.linalg.norm(local - (local @ motion.axis)[..., None] * motion.axis, axis=2).max(axis=1)
+        ring = np.zeros(len(out), dtype=int)
+        if motion.angle and ours.any():
+            ring = np.ceil(4.0 * np.log2(np.maximum(out / max(float(out[ours].min()), 1e-3), 1.0))).astype(int)
+        speed = float(np.linalg.norm(motion.travel)) + abs(motion.angle) * out
+        rings = [(rows & ours & (ring == k), e) for rows, e in mine.levels for k in np.unique(ring[ours])]
+        fixed = [(rows & theirs, e) for rows, e in other.levels]
+        return _Near(
+            limit,
+            tuple((fcl_tree(mine.vertices, mine.faces[k]), e, float(speed[k].max())) for k, e in rings if k.any()),
+            tuple((fcl_tree(other.vertices, other.faces[k]), e) for k, e in fixed if k.any()),
         )
 
 
@@ -175,8 +203,13 @@ def first_time(pair: MovingPair, known: float, thresholds: Thresholds, margin: f
         if half * pair.speed <= 0.5 * ACCURACY:
             return start
         todo.pop()
-        here = pair.ask(middle, enough, thresholds).lower
-        if pair.lower(middle, half, here, margin + 0.5 * ACCURACY) <= margin:
+        wanted = margin + 0.5 * ACCURACY
+        # Where meshes are used, the few triangles that can meet are asked first: that is cheaper than a distance.
+        clear = pair.meshed and pair.by_meshes(half, pair.pose(middle), wanted) > margin
+        if not clear:
+            here = pair.ask(middle, enough, thresholds).lower
+            clear = pair.lower(middle, half, here, wanted) > margin
+        if not clear:
             todo += [(middle, stop), (start, middle)]
         elif not todo:
             return known

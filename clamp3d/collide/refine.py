@@ -5,6 +5,7 @@ This is the one place where pairs of shapes are handed to the methods that measu
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -127,11 +128,13 @@ def _features(a: Model, b: Model, T: Array, enough: Enough) -> Distance:
     """Closed forms of both; the convex hull of a part that has none stands in for it."""
     level = "hulls" if a.bodies is None or b.bodies is None else "features"
     pairs: list[tuple[float, int, ClosedForm, ClosedForm]] = []
-    for x in a.forms:
-        for y in b.forms:
-            (p, r), (q, s) = x.ball, y.ball
-            gap = float(np.linalg.norm(T[:3, :3] @ q + T[:3, 3] - p)) - r - s - x.error - y.error
-            pairs.append((gap, len(pairs), x, y))
+    forms = [*a.forms, *b.forms]
+    places = np.where(np.arange(len(forms))[:, None, None] < len(a.forms), np.eye(4), T)
+    boxes = Boxes.of(np.array([form.bounds for form in forms]), places)
+    both = np.array(list(itertools.product(range(len(a.forms)), range(len(a.forms), len(forms)))))
+    for k, ((i, j), gap) in enumerate(zip(both, box_gaps(boxes, both), strict=True)):
+        x, y = forms[i], forms[j]
+        pairs.append((float(gap) - x.error - y.error, k, x, y))
     found = Distance(np.inf, np.inf)
     for gap, _, x, y in sorted(pairs):
         if gap > found.upper:  # of these and all that follow

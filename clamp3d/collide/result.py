@@ -34,7 +34,7 @@ class PairResult:
         What the distance means under the scene's thresholds.
     distance : Distance
         The signed distance between its bounds, points in the world. A pair that was refined no further than its
-        verdict needed has wide bounds. In a motion: the least distance.
+        verdict needed has wide bounds. In a motion: the least distance; of a clash that at ``t``, from above only.
     motion : str or None
         Name of the motion; None at rest.
     t, contact_at : float or None

@@ -56,7 +56,7 @@ class Surface:
         return fcl_tree(self.vertices, self.faces)
 
     @cached_property
-    def _levels(self) -> list[tuple[NDArray[np.bool_], float]]:
+    def levels(self) -> list[tuple[NDArray[np.bool_], float]]:
         """Triangles (m,) by their error, and its largest in mm; the exact ones first."""
         if self.face_error is None:
             return [(np.ones(len(self.faces), dtype=bool), 0.0)]
@@ -68,16 +68,16 @@ class Surface:
     @cached_property
     def groups(self) -> tuple[tuple[Any, float], ...]:
         """Triangles by their error: (FCL's tree, error mm), the exact ones first."""
-        if len(self._levels) == 1:
+        if len(self.levels) == 1:
             return ((self.bvh, self.error),)
-        return tuple((fcl_tree(self.vertices, self.faces[rows]), error) for rows, error in self._levels)
+        return tuple((fcl_tree(self.vertices, self.faces[rows]), error) for rows, error in self.levels)
 
     @cached_property
     def _parts(self) -> dict[float, Surface]:
         own = self.point_error
         return {
             error: Surface(self.vertices, self.faces[rows], None, None if own is None else own[rows])
-            for rows, error in self._levels
+            for rows, error in self.levels
         }
 
     @cached_property
@@ -162,7 +162,7 @@ class Surface:
     def distance_at_least(self, points: Array) -> Array:
         """How far (k,) mm the true surface is at least from points (k, 3): negative where it may be on either side."""
         found = np.full(len(points), np.inf)
-        for rows, error in self._levels:
+        for rows, error in self.levels:
             part = self if rows.all() else self._parts[error]
             found = np.minimum(found, part.distance(points) - error)
         return found

@@ -166,15 +166,27 @@ def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, slac
                 best = min(best, f)
     # Arc surface: a rim from inside.
     if e > 0.0:
-        for which in range(4):
+        for k in range(4):
+            which = k if cx * dx + cy * dy >= 0.0 else k ^ 1  # the end that is farther from the groove's axis first
             rho, x, y, z, by_r, by_l = rim_arc(which, R, r, l, cx, cy, cz, dx, dy, dz, 0.0)
             if not (rho > 0.0 and R - rho <= best + slack):  # nor if a square has overflowed
                 continue
             inset = 0.0
             if rho > R:
+                if slack == 0.0 and best < 0.0 and which < 2:  # less than the best inset frees this rim, or it goes on
+                    inset = -best
+                    if inset < -lowest:
+                        rho, x, y, z, by_r, by_l = rim_arc(which, R, r, l, cx, cy, cz, dx, dy, dz, inset)
+                    if inset == -lowest or rho <= R:
+                        continue
+                last = math.inf
                 for _ in range(60):  # the rim of what is left just touches
                     rate = by_r + by_l
                     step = (rho - R) / rate if rate > 0.0 else math.inf
+                    # Convex, so Newton's steps stay on this side of the root: what passes the bound is no candidate.
+                    if which < 2 and inset + step > 64.0 * eps - least:
+                        rho = -1.0
+                        break
                     if not inset + step < -lowest:  # it never does: of a disc, what is left last
                         inset = -lowest
                         rho = -1.0
@@ -183,8 +195,10 @@ def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, slac
                         break
                     inset += step
                     rho, x, y, z, by_r, by_l = rim_arc(which, R, r, l, cx, cy, cz, dx, dy, dz, inset)
-                    if rho <= 0.0 or abs(step) <= 1e-16 * R:
+                    size = abs(step)
+                    if rho <= 0.0 or size <= 1e-12 * R or (size <= 1e-8 * R and size > 0.7 * last):
                         break
+                    last = size
                 if rho <= 0.0 or (inset == -lowest and rho < R):
                     continue
             if abs(z) > H:

@@ -69,6 +69,7 @@ def groove_relation(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike, *,
     --------
     >>> import numpy as np
     >>> from clamp3d.core.pose import translation
+    >>> from clamp3d.core.primitives import Cylinder
     >>> groove, wire = SweptArc(7.0, np.radians(60.0), 50.0), Cylinder(6.935, 80.0)
     >>> groove_relation(groove, wire, translation(0.0, -0.065, 0.0), tolerance=1e-9).relation.value
     'interior contact'
@@ -162,6 +163,7 @@ def relative_pose(T_world_a: ArrayLike, T_world_b: ArrayLike) -> Array:
     Examples
     --------
     >>> from clamp3d.core.pose import translation
+    >>> from clamp3d.core.primitives import Cylinder
     >>> relative_pose(translation(1e6, 0.0, 0.0), translation(1e6 + 0.5, 0.0, 0.0))[:3, 3].tolist()
     [0.5, 0.0, 0.0]
     """

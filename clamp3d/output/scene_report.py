@@ -58,11 +58,13 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
     lines += [f"  note: {note}" for note in result.scene.notes[:_NOTES]]
     if len(result.scene.notes) > _NOTES:
         lines.append(f"  ... and {len(result.scene.notes) - _NOTES} more notes (--json lists all)")
-    for row in result.findings[:_ROWS]:
+    # What merely touches at rest stands in the table of pairs.
+    told = [row for row in result.findings if row.verdict is not Verdict.CONTACT or row.motion is not None]
+    for row in told[:_ROWS]:
         where = circumstances(row)
         lines.append(f"  {sentence(row, names)}" + (f"; {where}" if where else ""))
-    if len(result.findings) > _ROWS:
-        lines.append(f"  ... and {len(result.findings) - _ROWS} more (--json or --html lists all)")
+    if len(told) > _ROWS:
+        lines.append(f"  ... and {len(told) - _ROWS} more (--json or --html lists all)")
     if 2 <= n <= _MATRIX and result.asked is None:
         lines += ["", *_matrix(result)]
     pairs = worst_first(result.pairs)[: _ROWS // 2]

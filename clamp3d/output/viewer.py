@@ -3,7 +3,7 @@
 >>> from clamp3d.clamp.assemble import assemble
 >>> with view(assemble("reference"), serve=False) as viewer:  # with serve=True: open viewer.url in a browser
 ...     len(viewer.story["stops"])
-8
+9
 """
 
 from __future__ import annotations

@@ -96,9 +96,9 @@ def load(
         reading, name = read_object(source)
         return _scene(to_parts(reading.complete(name, partial=partial), reader), name)
     path = checks.path("source", source)
-    if has_bodies(path) and not (path.is_dir() and _is_builtin(str(path))):
+    if has_bodies(path) and not (os.path.isdir(path) and _is_builtin(str(path))):
         refuse_wires(path, "a file of bodies", wires)
-        return _scene(read_parts(path, reader), path.resolve().name if path.is_dir() else path.stem)
+        return _scene(read_parts(path, reader), path.resolve().name if os.path.isdir(path) else path.stem)
     from clamp3d.scenefile.described import load_described  # pydantic takes longer to load than a small STEP file
 
     reader.refuse(checks.short(path), "unit", "fit", "chord", "joints", "poses", "partial")

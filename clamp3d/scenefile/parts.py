@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -90,7 +91,7 @@ class Parts:
 
 def has_bodies(path: Path) -> bool:
     """Whether a path is read by `read_parts`: a geometry file, a robot description, or a folder."""
-    return path.suffix.lower() in (*FORMATS, ".urdf") or path.is_dir()
+    return path.suffix.lower() in (*FORMATS, ".urdf") or os.path.isdir(path)  # False for names that no folder can have
 
 
 def refuse_wires(path: object, kind: str, wires: dict[str, str | float]) -> None:
@@ -101,7 +102,7 @@ def refuse_wires(path: object, kind: str, wires: dict[str, str | float]) -> None
 
 def read_parts(path: Path, reader: Reader) -> Parts:
     """The parts of a geometry file, a robot description or a folder of meshes. Raises InputError."""
-    if path.is_dir():
+    if os.path.isdir(path):
         reader.refuse("a folder", "joints")
         return _folder(path, reader)
     reader.refuse(checks.short(path), "poses")

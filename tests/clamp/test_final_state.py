@@ -52,7 +52,7 @@ def test_any_open_start_ends_in_the_same_state(clamp):
     known = solve_final_state(section).q
     rng = np.random.default_rng(20)
     limit = clamp.tilt_stop
-    for _ in range(100):
+    for _ in range(20):
         start = section.open_state(section.open_distance() + rng.uniform(0.0, 60.0), rng.uniform(-limit, limit))
         start[:4] += rng.uniform(-5.0, 5.0, 4)
         assert section.gaps(start).value.min() > 0.0
@@ -106,7 +106,7 @@ def test_gradients_agree_with_differences(clamp):
 
 def test_pairs_of_conductors_end_in_a_stated_result():
     """The thinnest, the thickest and a spread of others: what the status says is what the contacts are."""
-    names = list(catalogue())[::6]
+    names = list(catalogue())[::12]
     stated = set()
     for k, (line, jumper) in enumerate(itertools.product(names, names)):
         run = assemble(load_clamp(line=line, jumper=jumper), Cas())
@@ -121,7 +121,7 @@ def test_pairs_of_conductors_end_in_a_stated_result():
             if "faces meet" in run.status:
                 assert any({c.a, c.b} == {"P1", "P2"} and abs(c.gap) < 1e-6 for c in run.contacts)
                 assert run.undeclared
-        if k % 4 == 0:  # the envelopes of the wires' ways in closed form, without gradients or multipliers
+        if k % 3 == 0:  # the envelopes of the wires' ways in closed form, without gradients or multipliers
             low = [m for m in minima(Envelope(run.clamp)) if abs(m.d - run.closing) <= 1e-6]
             assert any(abs(m.tilt - run.tilt) <= 1e-5 for m in low), (line, jumper, run.closing)
         stated.add(run.status.split(",")[0])

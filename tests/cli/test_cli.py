@@ -4,7 +4,6 @@ import json
 import math
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -16,18 +15,13 @@ def clamp3d(*arguments, **kwargs):
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **kwargs)
 
 
-def test_help_is_quick_and_lists_every_command():
-    seconds = []
-    for _ in range(3):
-        start = time.perf_counter()
-        done = clamp3d("--help")
-        seconds.append(time.perf_counter() - start)
+def test_help_lists_every_command_and_loads_no_numeric_library():
+    done = clamp3d("--help")
     assert done.returncode == 0
     assert "reproduce" in done.stdout
     heavy = ("numpy", "numba", "scipy", "trimesh", "fcl", "coacd", "meshcat")
     code = f"import sys, clamp3d.cli; print([m for m in {heavy} if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
-    assert min(seconds) < 1.0  # 0.3 s on a free machine; this only guards against loading the numeric stack
 
 
 def test_run_prints_the_published_state_and_writes_json(tmp_path):

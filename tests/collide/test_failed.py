@@ -17,7 +17,7 @@ from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core import shapes
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import translation
-from clamp3d.errors import SolverError
+from clamp3d.errors import InputError, SolverError
 
 SCENE = """
 [parts.a]
@@ -91,7 +91,8 @@ def test_exit_code_is_that_of_the_worst_certain_verdict(z, broken_pair, code, tm
 def test_one_part_alone_is_nothing_to_check(tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text('[parts.a]\nshape = "box"\nsize = [1, 1, 1]\n')
-    assert CliRunner().invoke(group, ["check", str(file), "-q"]).exit_code == 2
+    with pytest.raises(InputError, match="no pair of parts"):  # exit code 2
+        CliRunner().invoke(group, ["check", str(file), "-q"], catch_exceptions=False)
 
 
 def test_an_uncertain_verdict_names_the_thresholds_between_its_bounds():

@@ -15,11 +15,12 @@ import pytest
 from clamp3d.core import jit
 
 PACKAGE = Path(__file__).parents[2] / "clamp3d"
+LOADED = "print(*sorted({'numba', 'scipy'} & set(sys.modules)))"
 CALL = (
     "import sys, numpy as np; from clamp3d.kernel import *;"
-    "print(signed_distance(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.eye(4)).distance);"
-    "print(*sorted({'numba', 'scipy'} & set(sys.modules)))"
+    f"print(signed_distance(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.eye(4)).distance); {LOADED}"
 )
+PLAY = f"import sys, clamp3d.core.play; {LOADED}"
 
 
 def run(code: str, folder: Path, **env: str) -> tuple[list[str], str]:
@@ -35,13 +36,9 @@ def run(code: str, folder: Path, **env: str) -> tuple[list[str], str]:
     return done.stdout.split(), done.stderr
 
 
-def test_cold_and_warm_start(tmp_path):
-    """A warm one loads no compiler."""
-    cold, said = run(CALL, PACKAGE.parent, CLAMP3D_CACHE=str(tmp_path))
-    warm, silent = run(CALL, PACKAGE.parent, CLAMP3D_CACHE=str(tmp_path))
-    assert (cold, warm) == (["1.5", "numba", "scipy"], ["1.5"])
-    assert said.count("compiling the contact kernel") == 1
-    assert silent == ""
+def test_a_warm_start_of_the_kernel_loads_no_compiler():
+    run(CALL, PACKAGE.parent)
+    assert run(CALL, PACKAGE.parent) == (["1.5"], "")
 
 
 @pytest.fixture
@@ -112,26 +109,48 @@ def test_reading_the_cache_is_not_announced_however_slow_it_is(folder, capsys, m
     assert capsys.readouterr().err == ""
 
 
-def test_a_changed_formula_is_compiled_again(tmp_path):
+@pytest.fixture
+def copied(tmp_path):
+    """A copy of the package with a formula and, in another file, an entry point: quicker to compile than the kernel."""
     shutil.copytree(PACKAGE, tmp_path / "clamp3d", ignore=shutil.ignore_patterns("__pycache__"))
-    cache = str(tmp_path / "cache")
-    assert run(CALL, tmp_path, CLAMP3D_CACHE=cache)[0][0] == "1.5"
-    formulas = tmp_path / "clamp3d" / "core" / "kernel_distance.py"
-    formulas.write_text(formulas.read_text().replace("return (R - r) - ", "return 100.0 + (R - r) - "))
-    assert run(CALL, tmp_path, CLAMP3D_CACHE=cache)[0][0] == "101.5"
+    core = tmp_path / "clamp3d" / "core"
+    formula = "from clamp3d.core.jit import formula\n@formula\ndef play(R, r):\n    return R - r\n"
+    (core / "kernel_play.py").write_text(formula)
+    (core / "play.py").write_text(
+        "from clamp3d.core.jit import entry\nfrom clamp3d.core.kernel_play import play\n"
+        "def plays(R, r):\n    return play(R, r)\n"
+        "print(entry(plays, 'f8(f8,f8)')(12.0, 10.5))\n"
+    )
+    return tmp_path
+
+
+def test_compiled_once_and_again_when_a_formula_has_changed(copied):
+    cache = str(copied / "cache")
+    cold, said = run(PLAY, copied, CLAMP3D_CACHE=cache)
+    assert (cold[0], "numba" in cold) == ("1.5", True)
+    assert said.count("compiling the contact kernel") == 1
+    assert run(PLAY, copied, CLAMP3D_CACHE=cache) == (["1.5"], "")
+    formulas = copied / "clamp3d" / "core" / "kernel_play.py"
+    formulas.write_text(formulas.read_text().replace("return R", "return 100.0 + R"))
+    assert run(PLAY, copied, CLAMP3D_CACHE=cache)[0][0] == "101.5"
+
+
+def test_every_formula_of_the_kernel_is_in_a_file_that_the_cache_watches():
+    holding = {path.name for path in (PACKAGE / "core").glob("*.py") if "@formula" in path.read_text()}
+    assert len(holding) > 5
+    assert holding <= {path.name for path in (PACKAGE / "core").glob("kernel*.py")}
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs POSIX permissions")
-def test_no_place_for_a_cache(tmp_path):
-    shutil.copytree(PACKAGE, tmp_path / "clamp3d", ignore=shutil.ignore_patterns("__pycache__"))
+def test_no_place_for_a_cache(copied):
     # A file where the cache folders would be: that stops even root, whom permissions do not.
-    (tmp_path / "clamp3d" / "core" / "__pycache__").write_text("")
-    (tmp_path / "home").write_text("")
-    (tmp_path / "clamp3d").chmod(stat.S_IRUSR | stat.S_IXUSR)
-    home = str(tmp_path / "home")
+    (copied / "clamp3d" / "core" / "__pycache__").write_text("")
+    (copied / "home").write_text("")
+    (copied / "clamp3d").chmod(stat.S_IRUSR | stat.S_IXUSR)
+    home = str(copied / "home")
     env = {"HOME": home, "XDG_CACHE_HOME": home, "CLAMP3D_CACHE": "", "PYTHONDONTWRITEBYTECODE": "1"}
-    out, said = run(CALL, tmp_path, **env)
-    (tmp_path / "clamp3d").chmod(stat.S_IRWXU)
+    out, said = run(PLAY, copied, **env)
+    (copied / "clamp3d").chmod(stat.S_IRWXU)
     assert out[0] == "1.5"
     assert said.count("\n") == 1
     assert "compiling the contact kernel, in every run: no cache folder can be written, CLAMP3D_CACHE names one" in said

@@ -18,7 +18,7 @@ from tests.fuzz.api_targets import Make, targets
 from tests.fuzz.api_values import Rng, anything
 from tests.fuzz.runner import FindingError
 
-_INFINITE = {"curvature", "gap_left", "gap_right", "gap", "high", "opening", "upper", "uncertainty"}
+_INFINITE = {"curvature", "gap_left", "gap_right", "gap", "high", "lower", "opening", "upper", "uncertainty"}
 """Fields whose documented value is infinite where there is none."""
 
 

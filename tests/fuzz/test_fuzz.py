@@ -7,7 +7,7 @@ import pytest
 import clamp3d
 from tests.fuzz import api_targets, runner
 
-COUNTS = {"clamp files": 150, "scene files": 150, "API calls": 2000, "mesh files": 150, "command lines": 150}
+COUNTS = {"clamp files": 50, "scene files": 50, "API calls": 800, "mesh files": 50, "command lines": 50}
 SEED = 20_000
 
 

@@ -16,6 +16,7 @@ from clamp3d.bench.stress.motions.family import MOTIONS
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.poses.family import POSES
 from clamp3d.bench.stress.poses.flat import FLATS
+from clamp3d.bench.stress.poses.solids import SOLIDS
 from clamp3d.core.child import end_with_parent
 from clamp3d.errors import InputError, SolverError
 
@@ -24,6 +25,7 @@ LIBRARIES = ("numpy", "numba", "scipy", "python-fcl", "coacd", "mpmath")
 KINDS: dict[str, Mapping[str, Family]] = {
     "pose": POSES,
     "flat": FLATS,
+    "solid": SOLIDS,
     "motion": MOTIONS,
     "mesh": MESHES,
     "assembly": ASSEMBLIES,
@@ -37,7 +39,7 @@ METHODS: dict[str, str] = {name: about for f in FAMILIES.values() for name, (abo
 
 
 def expand(names: list[str]) -> list[str]:
-    """Families by name; ``pose``, ``flat``, ``motion``, ``mesh`` and ``assembly`` stand for all of their kind.
+    """Families by name; ``pose``, ``flat``, ``solid``, ``motion``, ``mesh`` and ``assembly`` stand for their kind.
 
     >>> expand(["ties", "mesh"])[:2]
     ['ties', 'mesh: open']

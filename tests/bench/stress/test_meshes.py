@@ -9,7 +9,6 @@ from click.testing import CliRunner
 from clamp3d.bench.stress.meshes.cases import LEAST
 from clamp3d.bench.stress.meshes.family import MESHES, METHODS, MeshFamily
 from clamp3d.bench.stress.outcome import Outcome
-from clamp3d.bench.stress.poses.truth import truth, truth_50_digits
 from clamp3d.bench.stress.run import run_stress
 from clamp3d.bench.stress.worker import run_here, run_isolated
 from clamp3d.cli import group
@@ -23,7 +22,7 @@ REFUSING = 150
 
 def _ask(family: MeshFamily, name: str, n: int, seed: int = 7) -> Outcome:
     cases = family.cases(n, seed)
-    return family.judge(name, cases, truth(cases.poses), run_here(METHODS[name][1](), cases))
+    return family.judge(name, cases, family.truths(cases), run_here(METHODS[name][1](), cases))
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -42,11 +41,12 @@ def test_own_methods_are_never_wrong(family: str, name: str) -> None:
 
 def test_hulls_refuse_what_would_end_coacd(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path))
-    for family in ("mesh: open", "mesh: empty", "mesh: bad numbers", "mesh: inside out"):
-        found = _ask(MESHES[family], "hulls", 25)
+    for name in ("mesh: open", "mesh: empty", "mesh: bad numbers", "mesh: inside out"):
+        found = _ask(MESHES[name], "hulls", 25)
         assert (found.refused, found.wrong) == (25, 0), found.notes
-    soup = MESHES["mesh: soup"].cases(6, 18).take([2])  # CoACD is quick on its wide groove
-    found = MESHES["mesh: soup"].judge("hulls", soup, truth(soup.poses), run_here(METHODS["hulls"][1](), soup))
+    family = MESHES["mesh: soup"]
+    soup = family.cases(6, 18).take([2])  # CoACD is quick on its wide groove
+    found = family.judge("hulls", soup, family.truths(soup), run_here(METHODS["hulls"][1](), soup))
     assert (found.answered, found.wrong) == (1, 0), found.notes
 
 
@@ -76,9 +76,10 @@ def test_cases_are_the_same_again_and_away_from_touching() -> None:
         one = once.take([i])[0]
         assert np.array_equal(one.mesh.vertices, once[i].mesh.vertices)
         assert np.array_equal(one.T_mesh_wire, once[i].T_mesh_wire)
-    exact = np.asarray(truth(once.poses), float)
-    assert (np.abs(exact) >= 0.999 * LEAST * once.poses.shapes.R).all()
-    assert float(truth_50_digits(once.poses, 5)) == pytest.approx(exact[5], rel=1e-14)
+    exact = family.truths(once)
+    assert (np.abs(exact) >= 0.999 * LEAST * once.poses.shapes.R[:, None]).all()
+    assert (np.ptp(exact, axis=1) <= 1e-3 * once.scene()).all()
+    assert family.difference(once, exact, 5) == 0.0
     assert not np.array_equal(family.cases(8, 4)[0].T_mesh_wire, once[0].T_mesh_wire)
 
 

@@ -17,12 +17,12 @@ from clamp3d.bench.stress.poses.truth import EXTENDED_WORKS
 from clamp3d.bench.stress.poses.truth import truth as pose_truth
 from clamp3d.bench.stress.run import FAMILIES, run_family
 
-CASES = 2000
+CASES = 300  # the campaign of docs/methods.md has 100 000
 
 
 @pytest.mark.parametrize("family", MOTIONS)
 def test_cas_is_never_wrong_and_never_beyond_its_bound(family):
-    (outcome,), difference = run_family(family, ["cas"], CASES, 20, 60.0, 2)
+    (outcome,), difference = run_family(family, ["cas"], CASES, 20, 60.0, 1)
     assert difference < TRUTH_ERROR
     assert (outcome.asked, outcome.answered, outcome.refused) == (CASES, CASES, 0)
     assert (outcome.false_hits, outcome.false_misses, outcome.exceptions) == (0, 0, 0), outcome.notes
@@ -32,7 +32,7 @@ def test_cas_is_never_wrong_and_never_beyond_its_bound(family):
 
 @pytest.mark.parametrize("family", MOTIONS)
 def test_truth_against_more_cells_and_against_the_truth_of_poses(family):
-    cases = MOTIONS[family].cases(40, 7)
+    cases = MOTIONS[family].cases(15, 7)
     found = truth(cases)
     size = cases.scene()
     more = truth(cases, cells=20_000)
@@ -40,7 +40,7 @@ def test_truth_against_more_cells_and_against_the_truth_of_poses(family):
     # What was built is there, and no pose of a dense row is lower; at the lowest instant it is that low.
     built = np.isfinite(cases.gap)
     assert (found.distance[built] <= cases.gap[built] + 1e-14 * size[built]).all()
-    for i in range(0, 40, 1 if EXTENDED_WORKS else 20):
+    for i in range(0, 15, 1 if EXTENDED_WORKS else 7):
         instants = np.append(np.linspace(0.0, 1.0, 101), found.instant[i])
         T = poses(cases, i, instants)
         one = Cases(cases.shapes, np.full(len(T), cases.shape[i]), T, np.full(len(T), np.nan))

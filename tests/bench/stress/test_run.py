@@ -10,23 +10,39 @@ from click.testing import CliRunner
 from clamp3d.bench.stress.outcome import Outcome, judge
 from clamp3d.bench.stress.poses.cases import Cases, Shapes
 from clamp3d.bench.stress.poses.family import POSES
+from clamp3d.bench.stress.poses.flat import FLATS
+from clamp3d.bench.stress.poses.solids import SOLIDS
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, EXTENDED_WORKS, point_sdf, truth, truth_50_digits
-from clamp3d.bench.stress.run import run_family, run_stress
+from clamp3d.bench.stress.run import KINDS, run_family, run_stress
 from clamp3d.bench.stress.worker import Answers, Measured, run_isolated
 from clamp3d.cli import group
 from clamp3d.errors import InputError
 
-CASES = 2000 if EXTENDED_WORKS else 100
+CASES = 400 if EXTENDED_WORKS else 50  # the campaigns of docs/methods.md have 100 000
 
 
 @pytest.mark.parametrize("family", POSES)
 def test_cas_is_never_wrong_and_never_beyond_its_bound(family):
-    (outcome,), difference = run_family(family, ["cas"], CASES, 20, 60.0, 10)
+    (outcome,), difference = run_family(family, ["cas"], CASES, 20, 60.0, 2)
     assert difference < EXTENDED_ERROR
     assert (outcome.asked, outcome.answered, outcome.refused) == (CASES, CASES, 0)
     assert (outcome.false_hits, outcome.false_misses, outcome.exceptions, outcome.crashes) == (0, 0, 0, 0)
     assert outcome.beyond_bound == 0, outcome.examples
     assert outcome.worst_relative < 1e-14
+
+
+@pytest.mark.parametrize("family", FLATS)
+def test_flat_ends_are_never_wrong_and_never_beyond_their_bound(family):
+    (outcome,), difference = run_family(family, ["cas"], 100, 20, 60.0, 1)
+    assert difference <= FLATS[family].truth_error
+    assert (outcome.answered, outcome.wrong, outcome.beyond_bound) == (100, 0, 0), outcome.examples
+
+
+@pytest.mark.parametrize("family", SOLIDS)
+def test_finite_bodies_are_never_wrong_and_never_beyond_their_bound(family):
+    (outcome,), difference = run_family(family, ["cas"], int(40 / SOLIDS[family].part ** 0.5), 20, 60.0, 1)
+    assert difference <= SOLIDS[family].truth_error
+    assert (outcome.wrong, outcome.beyond_bound) == (0, 0), outcome.examples
 
 
 @pytest.mark.skipif(not EXTENDED_WORKS, reason="the quick truth needs 80-bit floats")
@@ -83,8 +99,8 @@ def test_truth_of_known_cases(offset, tilt, half_angle, gap):
 
 def test_same_seed_same_cases_and_same_result_on_two_processes():
     names = ["tangency", "crossed"]
-    one = run_stress(names, ["cas"], n=100, seed=5, check=2)
-    two = run_stress(names, ["cas"], n=100, seed=5, check=2, workers=2)
+    one = run_stress(names, ["cas"], n=40, seed=5, check=1)
+    two = run_stress(names, ["cas"], n=40, seed=5, check=1, workers=2)
     drop = lambda run: [  # noqa: E731
         {k: v for k, v in row.items() if k != "seconds"} for row in run.to_dict()["outcomes"]
     ]
@@ -133,7 +149,7 @@ _BAD = POSES["tangency"].cases(6, 0).gap[[2, 4]]
 
 def test_a_method_that_ends_the_interpreter_is_counted():
     cases = POSES["tangency"].cases(6, 0)
-    answers = run_isolated(_Fatal, cases, time_limit=60.0, case_limit=3.0)
+    answers = run_isolated(_Fatal, cases, time_limit=60.0, case_limit=2.0)
     assert answers.crashed == [2]
     assert answers.timeouts == [4]
     assert np.isfinite(answers.distance).sum() == 4
@@ -150,9 +166,8 @@ def test_fcl_methods_hold_their_bounds_on_clearances():
 
 
 def test_names_and_numbers_are_checked():
-    with pytest.raises(
-        InputError, match="unknown family 'x'; available: pose, motion, mesh, assembly, random, tangency"
-    ):
+    known = ", ".join([*KINDS, *list(POSES)[:2]])
+    with pytest.raises(InputError, match=f"unknown family 'x'; available: {known}"):
         run_stress(["x"])
     with pytest.raises(InputError, match="unknown method 'x'; available: cas"):
         run_stress(methods=["x"])

@@ -72,6 +72,7 @@ def clamp_of(
         )
     if max_tilt_deg is not None:
         back, bolt = base.down_splint.back_radius, base.bolt.diameter / 2
+        parts["down_splint"]["max_tilt_deg"] = None  # the file's check is of the reference's slot
         parts["down_splint"]["slot_width"] = 2.0 * back * math.sin(math.radians(max_tilt_deg) + math.asin(bolt / back))
     line, jumper = (Wire(diameter=float(d)) for d in np.broadcast_to(np.asarray(diameter, float), 2))
     try:

@@ -141,7 +141,7 @@ class Wire:
         ex, _ = self._place(self.side * self.half_down, down.face, tilt)
         lips_up.append((self.edge, r))
         fixed = [up.x - up.s, up.x, up.x + up.s, self.edge, *(x + w * r for x, _ in lips_up for w in (-1.0, 1.0))]
-        moving = [p + w * r for p in (lx, mx, ex) for w in (-1.0, -s, 1.0)] + [cx]
+        moving = [p + w * r for p in (lx, mx, ex) for w in (-1.0, -s, 0.0, 1.0)] + [cx]
         # Where the circles about the two lips of the down splint cross: on the upright of their middle.
         half = 0.5 * np.hypot(mx - lx, my - ly)
         with np.errstate(invalid="ignore"):

@@ -136,7 +136,7 @@ from clamp3d.clamp.section import Section
 from clamp3d.baselines.cas import Cas
 
 section = Section(clamp, Cas())
-print("closes to an equilibrium at d =", solve_final_state(section, start).q[4], "mm")
+print("closes to d =", solve_final_state(section, start).q[4], "mm")
 print("equilibria, d in mm:", [float(state.q[4]) for state in equilibria(section)])
 """
 
@@ -181,7 +181,10 @@ class AssemblyFamily(Family):
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
         cases = self.cases(n, seed)
-        truth = ", ".join(repr(m.d) + ("" if m.firm else " (shallow)") for m in _Truths(cases)[i][1])
+        truth = ", ".join(
+            repr(m.d) + (" (shallow)" if not m.firm else " (a wire slips out)" if m.slipped else "")
+            for m in _Truths(cases)[i][1]
+        )
         return f"{snippet(cases.cases[i])}\n{_AS_PYTHON}# truth: equilibria at d = {truth} mm"
 
 
@@ -212,7 +215,7 @@ class _Truths(dict[int, tuple[Envelope, list[Minimum]]]):
         if rest.others is None:
             return float("nan")
         (envelope, found), named = self[i], np.array([q[4] for q in rest.others])
-        far = (m.d for m in found if m.firm and np.abs(named - m.d).min() > SAME * envelope.lever)
+        far = (m.d for m in found if m.firm and not m.slipped and np.abs(named - m.d).min() > SAME * envelope.lever)
         return next(far, float("nan"))
 
 

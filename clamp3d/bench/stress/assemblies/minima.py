@@ -31,12 +31,14 @@ class Minimum:
 
     It is ``firm`` if opening the clamp by 1.5e-4 of the down splint's half width (0.01 mm for the reference clamp, less
     than the roughness of any casting) does not let it slide to a lower one within a hundred times as much. The edges of
-    nearly equal grooves make pairs of minima nanometres apart, which are not.
+    nearly equal grooves make pairs of minima nanometres apart, which are not. It is ``slipped`` if a wire has left the
+    clamp: closing ends there too, but nobody asks for it.
     """
 
     d: float
     tilt: float
     firm: bool
+    slipped: bool
 
 
 class Valleys:
@@ -92,17 +94,15 @@ def minima(envelope: Envelope, count: int = 301) -> list[Minimum]:
                 max(tables[0][c][a], tables[1][c][b], faces[min(max(k + s, 0), count - 1)])
                 for c, s in ((1, 0), (2, -1), (3, 1))
             )
-            if np.isneginf(min(tables[0][1][a], tables[1][1][b])):  # a wire is out of the clamp
-                continue
             if (k > 0 and left < here) or (k < count - 1 and right < here):
                 continue
             q = _lowest(envelope, float(tilts[k]), float(tilts[1] - tilts[0]), tables[0][0][a], tables[1][0][b])
             d, tilt = float(q[4]), float(q[5] / envelope.lever)
             same = any(abs(d - other.d) <= _SAME and abs(tilt - other.tilt) <= 1e-5 for other in found)
             if not same and envelope.falls(q) <= _SAME:
-                found.append(
-                    Minimum(d, tilt, envelope.falls(q, _NEAR * envelope.lever, _SHALLOW * envelope.lever) <= _SAME)
-                )
+                firm = envelope.falls(q, _NEAR * envelope.lever, _SHALLOW * envelope.lever) <= _SAME
+                slipped = bool(np.isneginf(min(tables[0][1][a], tables[1][1][b])))
+                found.append(Minimum(d, tilt, firm, slipped))
     return sorted(found, key=lambda minimum: minimum.d)
 
 

@@ -1,7 +1,7 @@
 """Cases of the mesh families: a block with a groove as a mesh with a fault, and a wire whose distance is known.
 
-The truth is the distance of the wire from the part that was meant, worked out from the groove itself; no case is nearer
-to touching than the errors of tessellation, so a wrong verdict is never a matter of the chord error.
+The truth is the distance of the flat-ended wire from the part that was meant, worked out from the groove itself; no
+case is nearer to touching than the errors of tessellation, so a wrong verdict is never a matter of the chord error.
 """
 
 from __future__ import annotations
@@ -109,9 +109,10 @@ def make_cases(family: str, seed: int, n: int, fault: Fault, unit: Callable[[np.
             made = contained if rng.random() < _CONTAINED else anywhere
             groove, wire, T = made.shapes.groove(k), made.shapes.cylinder(k), made.T_world_wire[k]
             found = signed_distances(groove, wire, T[None], full=True, workers=1)
-            # FCL's cylinder has flat ends, the truth's wire round ones: the nearest place is to be on the side.
-            on_side = abs(float(found.normal[0] @ T[:3, 2])) < 1e-9
-            if not on_side or abs(found.distance[0]) < LEAST * groove.radius:
+            distance, thick = float(found.distance[0]), min(wire.radius, 0.5 * wire.length)
+            # Of a disc that is deeper inside than it is thick only a bound of the signed distance is known.
+            unknown = wire.length <= 2.0 * wire.radius and distance < -0.99 * thick
+            if unknown or abs(distance) < LEAST * groove.radius:
                 continue
             mm = unit(rng)
             lengths = mm * np.array([groove.radius, groove.length, wire.radius, wire.length])

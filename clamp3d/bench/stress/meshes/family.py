@@ -23,11 +23,11 @@ from clamp3d.bench.stress.meshes.cases import Fault, MeshCase, MeshCases, make_c
 from clamp3d.bench.stress.outcome import TOUCHING, Outcome, judge
 from clamp3d.bench.stress.poses.family import FCL_ERROR, MESH_ERROR, THRESHOLD, fcl_model
 from clamp3d.bench.stress.poses.family import METHODS as POSE_METHODS
-from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, truth, truth_50_digits
+from clamp3d.bench.stress.poses.flat import interval, intervals
 from clamp3d.bench.stress.worker import Answers, Measured, Measures
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.pose import inverse
+from clamp3d.core.pose import Array, inverse
 
 _TIME = 15.0
 """Seconds for CoACD in method hulls: less than a child may be silent."""
@@ -206,7 +206,7 @@ class MeshFamily(Family):
 
     methods = METHODS
     part = 0.01
-    truth_error = EXTENDED_ERROR
+    truth_error = 1e-12
 
     def __init__(self, name: str, about: str, make: Fault, unit: Callable[[np.random.Generator], float]) -> None:
         super().__init__(name, about, lambda rng, n: None)
@@ -216,21 +216,21 @@ class MeshFamily(Family):
         """See `Family`."""
         return make_cases(self.name, seed, n, self._fault, self._unit)
 
-    def truths(self, cases: MeshCases) -> NDArray[Any]:
-        """See `Family`."""
-        return truth(cases.poses)
+    def truths(self, cases: MeshCases) -> Array:
+        """Intervals (n, 2) in mm."""
+        return intervals(cases.poses)
 
     def difference(self, cases: MeshCases, truths: NDArray[Any], i: int) -> float:
         """See `Family`."""
-        exact = float(truths[i])
-        difference = abs(float(truth_50_digits(cases.poses, i) - exact))
-        return max(0.0, difference - 2e-16 * abs(exact)) / float(cases.scene()[i])
+        low, high = interval(cases.poses, i)
+        return max(low - float(truths[i, 1]), float(truths[i, 0]) - high, 0.0) / float(cases.scene()[i])
 
     def judge(self, name: str, cases: MeshCases, truths: NDArray[Any], answers: Answers) -> Outcome:
         """See `Family`; a verdict within the method's own bound of touching is not wrong."""
         band = np.maximum(TOUCHING * cases.scene(), np.nan_to_num(answers.bound, nan=0.0))
         measures = self.methods[name][1]().measures
-        return judge(self.name, name, cases.scene(), truths, answers, measures, band=band)
+        exact = np.clip(np.nan_to_num(answers.distance), truths[:, 0], truths[:, 1])  # the nearest that may be true
+        return judge(self.name, name, cases.scene(), exact, answers, measures, band=band)
 
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
@@ -249,7 +249,8 @@ class MeshFamily(Family):
             "except clamp3d.InputError as error:",
             '    print("refused:", error)',
         ]
-        return "\n".join([*lines, f"# truth: {float(truth_50_digits(cases.poses, i))!r} mm"])
+        low, high = interval(cases.poses, i)
+        return "\n".join([*lines, f"# truth: from {low!r} to {high!r} mm"])
 
 
 _UNITS = {"mesh: scaled": _any_unit}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -44,9 +44,8 @@ def _parallel_tangency(rng: np.random.Generator, n: int) -> Cases:
 def _equal_radii(rng: np.random.Generator, n: int) -> Cases:
     """Wire radius = groove radius (1 +- 1e-3 ... 1e-15) and equal to the last bit, nearly coaxial."""
     k = draw.count(n)
-    given = asdict(draw.shapes(rng, k))
-    given["r"] = given["R"] * (1.0 + draw.powers(rng, k, -16, -3))
-    shapes, shape = draw.shapes(rng, k, **given), draw.spread(n, k)
+    any_radius, shape = draw.shapes(rng, k), draw.spread(n, k)
+    shapes = replace(any_radius, r=any_radius.R * (1.0 + draw.powers(rng, k, -16, -3)))
     R = shapes.R[shape]
     offset = R[:, None] * np.stack([draw.powers(rng, n, -16, -3) for _ in range(3)], 1)
     tilt = np.stack([draw.powers(rng, n, -16, -3, 0.5) for _ in range(2)] + [np.ones(n)], 1)

@@ -11,7 +11,7 @@ import numpy as np
 from clamp3d.bench.stress.family import Family, Makers, Methods
 from clamp3d.bench.stress.outcome import REFERENCE, Outcome, examples, score
 from clamp3d.bench.stress.poses import draw, features
-from clamp3d.bench.stress.poses.cases import Cases, Extended, unit_rows
+from clamp3d.bench.stress.poses.cases import Cases, Extended, Shapes, unit_rows
 from clamp3d.bench.stress.poses.family import METHODS as POSE_METHODS
 from clamp3d.bench.stress.poses.flat_truth import flat_truth
 from clamp3d.bench.stress.poses.truth import truth
@@ -20,9 +20,9 @@ from clamp3d.core.pose import Array
 
 Make = Callable[[np.random.Generator, int], Cases]
 
-_NARROW = 1e-13
+NARROW = 1e-13
 """Width of a truth, in parts of the scene, at which it is narrow enough."""
-_BOXES, _MANY_BOXES = 4000, 200_000
+_BOXES, MAX_BOXES = 4000, 200_000
 """Boxes that a truth may look at, and that a check of it may."""
 _KNOWN = 1e-9
 """Truths are counted as known that are narrower than this, in parts of the scene."""
@@ -76,6 +76,35 @@ def _discs(rng: np.random.Generator, n: int) -> Cases:
     return _on_rims(rng, n, draw.shapes(rng, k, R=R, r=r, length=r * 10.0 ** rng.uniform(-3.0, -0.3, k)))
 
 
+def intervals(cases: Cases) -> Array:
+    """Intervals (n, 2) in mm that hold the signed distances."""
+    return np.array([interval(cases, i, _BOXES) for i in range(len(cases))]).reshape(-1, 2)
+
+
+def interval(cases: Cases, i: int, most: int = MAX_BOXES) -> tuple[float, float]:
+    """The interval in mm that holds the signed distance of case i."""
+    case = _alone(cases, i)
+    s, scene, T = case.shapes, float(case.scene()[0]), case.T_world_wire[0]
+    R, half_angle, L, r, length = (float(column[0]) for column in (s.R, s.half_angle, s.L, s.r, s.length))
+    low, high = flat_truth(R, half_angle, L, r, length, T, NARROW * scene, most)
+    rounding = 20.0 * NARROW * scene if high < -min(r, 0.5 * length) + _KNOWN * scene else 0.05 * NARROW * scene
+    if low <= -min(r, 0.5 * length) + rounding:
+        if length <= 2.0 * r:  # of a disc only a bound is known from here on
+            return -np.inf, high + rounding
+        core = replace(case, shapes=replace(s, length=s.length - 2.0 * s.r, flat=False))
+        deep = float(truth(core)[0])  # what is left of it: the axis segment, whose truth is that of a capsule
+        if deep <= -r:
+            return deep - rounding, deep + rounding
+    return low - rounding, high + rounding
+
+
+def _alone(cases: Cases, i: int) -> Cases:
+    """Case i with a table of shapes of its own: that of many cases takes longer to read than one truth to find."""
+    k, s = slice(cases.shape[i], cases.shape[i] + 1), cases.shapes
+    shapes = Shapes(s.R[k], s.half_angle[k], s.L[k], s.r[k], s.length[k], s.flat)
+    return replace(cases.take([i]), shapes=shapes, shape=np.zeros(1, np.intp))
+
+
 METHODS: Methods = {REFERENCE: POSE_METHODS[REFERENCE]}
 
 
@@ -90,25 +119,11 @@ class FlatFamily(Family):
         return np.array([self._interval(cases, i, _BOXES) for i in range(len(cases))]).reshape(-1, 2)
 
     def _interval(self, cases: Cases, i: int, most: int) -> tuple[float, float]:
-        k, s, scene = int(cases.shape[i]), cases.shapes, float(cases.scene()[i])
-        r, length = float(s.r[k]), float(s.length[k])
-        T = cases.T_world_wire[i]
-        low, high = flat_truth(
-            float(s.R[k]), float(s.half_angle[k]), float(s.L[k]), r, length, T, _NARROW * scene, most
-        )
-        rounding = 20.0 * _NARROW * scene if high < -min(r, 0.5 * length) + _KNOWN * scene else 0.05 * _NARROW * scene
-        if low <= -min(r, 0.5 * length) + rounding:
-            if length <= 2.0 * r:  # of a disc only a bound is known from here on
-                return -np.inf, high + rounding
-            core = replace(cases.take([i]), shapes=replace(s, length=s.length - 2.0 * s.r, flat=False))
-            deep = float(truth(core)[0])  # what is left of it: the axis segment, whose truth is that of a capsule
-            if deep <= -r:
-                return deep - rounding, deep + rounding
-        return low - rounding, high + rounding
+        return interval(cases, i, most)
 
     def difference(self, cases: Cases, truths: Array, i: int) -> float:
         """See `Family`: how far the interval is from a second, finer one."""
-        low, high = self._interval(cases, i, _MANY_BOXES)
+        low, high = self._interval(cases, i, MAX_BOXES)
         return max(low - float(truths[i, 1]), float(truths[i, 0]) - high, 0.0) / float(cases.scene()[i])
 
     def judge(self, name: str, cases: Cases, truths: Array, answers: Answers) -> Outcome:
@@ -133,7 +148,7 @@ class FlatFamily(Family):
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
         cases = self.cases(n, seed)
-        low, high = self._interval(cases, i, _MANY_BOXES)
+        low, high = self._interval(cases, i, MAX_BOXES)
         return f"{cases.snippet(i)}\n# truth: from {low!r} to {high!r} mm"
 
 

@@ -42,7 +42,7 @@ def _own(x, y, z, c, d, r, l):  # type: ignore[no-untyped-def] # noqa: E741
 
 
 @numba.njit(cache=True)
-def _tangent(x, y, z, lx, ly, lz, hx, hy, hz, R, c, d, r, l):  # type: ignore[no-untyped-def] # noqa: E741
+def _tangent(x, y, z, lx, ly, lz, hx, hy, hz, R, hollow, c, d, r, l):  # type: ignore[no-untyped-def] # noqa: E741
     """Least value over the material in a box of the plane that is tangent to f at a point, and the gradient there."""
     f, gx, gy, gz, error = _own(x, y, z, c, d, r, l)
     mx, my, mz = 0.5 * (lx + hx), 0.5 * (ly + hy), 0.5 * (lz + hz)
@@ -56,39 +56,41 @@ def _tangent(x, y, z, lx, ly, lz, hx, hy, hz, R, c, d, r, l):  # type: ignore[no
     ex, ey = mx / rho, my / rho
     k = gx * ex + gy * ey
     across = abs(ey) * ax + abs(ex) * ay
-    chord = math.sqrt(max(R * R - across * across, 0.0))
-    if k > 0.0 and rho - math.sqrt(ax * ax + ay * ay) > -chord:  # on this side of the axis
+    chord = math.sqrt(max(R * R - across * across, 0.0)) if hollow else R
+    if (k > 0.0) == hollow and (not hollow or rho - math.sqrt(ax * ax + ay * ay) > -chord):  # on this side of the axis
         rest = abs(gx - k * ex) * ax + abs(gy - k * ey) * ay + abs(gz) * az
         low = max(low, at_middle + k * (chord - rho) - rest)
     return low, gx, gy, gz
 
 
 @numba.njit(cache=True)
-def _point(x, y, z, R, h, H):  # type: ignore[no-untyped-def]
-    """A point of the material near (x, y, z), and whether there is one: behind the arc, or beside it below the face."""
-    y, z = min(y, h), min(max(z, -H), H)
+def _point(x, y, z, R, hollow, lo, hi):  # type: ignore[no-untyped-def]
+    """A point of the material near (x, y, z), and whether there is one: on the right side of the arc, in the block."""
+    x, y, z = min(max(x, lo[0]), hi[0]), min(max(y, lo[1]), hi[1]), min(max(z, lo[2]), hi[2])
     rho = math.sqrt(x * x + y * y)
-    if rho < R:
+    if (rho < R) == hollow:
         if rho == 0.0:
-            return x, y, z, False
+            return x, y, z, not hollow
         x, y = x * (R / rho), y * (R / rho)
-        if y > h:
-            y = h
+        if y > hi[1]:
+            y = hi[1]
             x = math.copysign(math.sqrt(max(R * R - y * y, 0.0)), x)
-    return x, y, z, x * x + y * y >= R * R * (1.0 - 1e-15)
+    rho2, inside = x * x + y * y, lo[0] <= x <= hi[0] and lo[1] <= y <= hi[1]
+    return x, y, z, inside and (rho2 >= R * R * (1.0 - 1e-15) if hollow else rho2 <= R * R * (1.0 + 1e-15))
 
 
 @numba.njit(cache=True)
-def _search(R, s, h, H, r, l, c, d, qx, qy, qz, tolerance, most):  # type: ignore[no-untyped-def] # noqa: E741
+def _search(R, hollow, lo, hi, r, l, c, d, qx, qy, qz, tolerance, most):  # type: ignore[no-untyped-def] # noqa: E741
     """Interval [lower, upper] of the least f over the material, of which q is a point; how many boxes were looked at.
 
+    The material is the block from ``lo`` to ``hi`` (3,) outside the circle of radius R if ``hollow``, else inside.
     The tangent planes are those at a box's middle, and at its point that is nearest to the best one so far.
     """
     best = _own(qx, qy, qz, c, d, r, l)[0]
     reach = math.sqrt(r * r + l * l) + max(best, 0.0)
-    x0, x1 = c[0] - reach, c[0] + reach
-    y0, y1 = c[1] - reach, min(c[1] + reach, h)
-    z0, z1 = max(c[2] - reach, -H), min(c[2] + reach, H)
+    x0, x1 = max(c[0] - reach, lo[0]), min(c[0] + reach, hi[0])
+    y0, y1 = max(c[1] - reach, lo[1]), min(c[1] + reach, hi[1])
+    z0, z1 = max(c[2] - reach, lo[2]), min(c[2] + reach, hi[2])
     heap = [(-math.inf, x0, y0, z0, x1, y1, z1)]
     count = 0
     while heap:
@@ -109,22 +111,24 @@ def _search(R, s, h, H, r, l, c, d, qx, qy, qz, tolerance, most):  # type: ignor
                 cut = z0 + 0.5 * wz
                 bz0, bz1 = (z0, cut) if half == 0 else (cut, z1)
             count += 1
-            if max(bx0 * bx0, bx1 * bx1) + max(by0 * by0, by1 * by1) < R * R:
+            if hollow and max(bx0 * bx0, bx1 * bx1) + max(by0 * by0, by1 * by1) < R * R:
+                continue
+            if not hollow and max(bx0, -bx1, 0.0) ** 2 + max(by0, -by1, 0.0) ** 2 > R * R * (1.0 + 1e-15):
                 continue
             mx, my, mz = 0.5 * (bx0 + bx1), 0.5 * (by0 + by1), 0.5 * (bz0 + bz1)
-            bound, gx, gy, gz = _tangent(mx, my, mz, bx0, by0, bz0, bx1, by1, bz1, R, c, d, r, l)
+            bound, gx, gy, gz = _tangent(mx, my, mz, bx0, by0, bz0, bx1, by1, bz1, R, hollow, c, d, r, l)
             bound = max(bound, low)
             # Points of the material to try: near the middle, and near where the tangent plane is lowest.
             for trial in range(2):
                 if trial == 1:
                     mx, my, mz = bx0 if gx > 0.0 else bx1, by0 if gy > 0.0 else by1, bz0 if gz > 0.0 else bz1
-                px, py, pz, is_one = _point(mx, my, mz, R, h, H)
+                px, py, pz, is_one = _point(mx, my, mz, R, hollow, lo, hi)
                 if is_one:
                     f = _own(px, py, pz, c, d, r, l)[0]
                     if f < best:
                         best, qx, qy, qz = f, px, py, pz
             nx, ny, nz = min(max(qx, bx0), bx1), min(max(qy, by0), by1), min(max(qz, bz0), bz1)
-            bound = max(bound, _tangent(nx, ny, nz, bx0, by0, bz0, bx1, by1, bz1, R, c, d, r, l)[0])
+            bound = max(bound, _tangent(nx, ny, nz, bx0, by0, bz0, bx1, by1, bz1, R, hollow, c, d, r, l)[0])
             if bound < best - tolerance:
                 heappush(heap, (bound, bx0, by0, bz0, bx1, by1, bz1))
     return best - tolerance, best, count
@@ -145,5 +149,20 @@ def flat_truth(
     lips: list[tuple[float, float, float]] = [(x, h, z) for x in (-s, s) for z in (-H, min(max(float(c[2]), -H), H), H)]
     start = min(lips, key=lambda q: _own(q[0], q[1], q[2], c, d, r, 0.5 * length)[0])
     qx, qy, qz = start
-    low, high, _ = _search(R, s, h, H, r, 0.5 * length, c, d, qx, qy, qz, tolerance, most)
+    lo, hi = np.array([-np.inf, -np.inf, -H]), np.array([np.inf, h, H])
+    low, high, _ = _search(R, True, lo, hi, r, 0.5 * length, c, d, qx, qy, qz, tolerance, most)
+    return float(low), float(high)
+
+
+def solid_truth(
+    R: float, hollow: bool, half: Array, r: float, length: float, T: Array, tolerance: float, most: int = 200_000
+) -> tuple[float, float]:
+    """The same for a finite body in place of the groove: a box of half sizes (3,), and of it only one side of a circle.
+
+    A ``hollow`` one has a hole of radius R (or none: 0) along z, any other is the cylinder of radius R in the box.
+    """
+    c, d = np.ascontiguousarray(T[:3, 3], np.float64), np.ascontiguousarray(T[:3, 2], np.float64)
+    d = d / np.linalg.norm(d)
+    qx, qy, qz = half.tolist() if hollow else (0.0, 0.0, 0.0)
+    low, high, _ = _search(R, hollow, -half, half, r, 0.5 * length, c, d, qx, qy, qz, tolerance, most)
     return float(low), float(high)

@@ -1,0 +1,210 @@
+"""Families of a flat-ended cylinder against finite bodies: boxes, plates with a hole, other cylinders.
+
+Each case is a contact of two features, made from the bodies' definition, at a small gap or overlap. The truth is an
+interval of the signed distance: apart that of the branch and bound of `flat_truth`; in an overlap the depth is at least
+that of the deepest point inside, and at most what parts the bodies in any of many directions.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.bench.stress.family import Methods
+from clamp3d.bench.stress.outcome import REFERENCE
+from clamp3d.bench.stress.poses import draw
+from clamp3d.bench.stress.poses.cases import unit_rows
+from clamp3d.bench.stress.poses.flat import MAX_BOXES, NARROW, FlatFamily
+from clamp3d.bench.stress.poses.flat_truth import solid_truth
+from clamp3d.bench.stress.worker import Measured, Measures, Rows
+from clamp3d.collide.convex import MEMBER
+from clamp3d.collide.distance import distance
+from clamp3d.collide.model import ModelCache
+from clamp3d.core import shapes
+from clamp3d.core.pose import Array
+from clamp3d.core.primitives import Cylinder
+from clamp3d.core.shapes import Solid
+from clamp3d.testing import assert_distance, directions
+
+_WAYS = directions(200)
+
+
+@dataclass(frozen=True, slots=True)
+class Solids(Rows):
+    """n cases: half sizes (n, 3) of the block around each body, its ``radius`` (n,), the cylinder's sizes and pose.
+
+    A ``hollow`` body is the block outside the circle of the radius (0: all of it), any other what is inside.
+    """
+
+    hollow: bool
+    half: Array
+    radius: Array
+    r: Array
+    length: Array
+    T: Array
+    shape: NDArray[np.intp]
+
+    def scene(self) -> Array:
+        """Largest length of each case (n,), mm."""
+        sizes = [self.half.max(1), self.radius, self.r, self.length, np.abs(self.T[:, :3, 3]).max(1)]
+        return np.asarray(np.maximum.reduce(sizes))
+
+    def body(self, i: int) -> Solid | Cylinder:
+        """The body of case i."""
+        R, (x, y, z) = float(self.radius[i]), (2.0 * self.half[i]).tolist()
+        if not self.hollow:
+            return Cylinder(R, z)
+        return shapes.box((x, y, z), holes=[shapes.Hole(R, (0.0, 0.0))] if R > 0.0 else ())
+
+    def cylinder(self, i: int) -> Cylinder:
+        """The cylinder of case i."""
+        return Cylinder(float(self.r[i]), float(self.length[i]))
+
+
+def _normals(rng: np.random.Generator, n: int) -> Array:
+    """Unit vectors (n, 3), a third along an axis, a third square to one: normals of faces, edges and corners."""
+    v = rng.normal(size=(n, 3))
+    kept, kind = np.argsort(rng.random((n, 3)), axis=1), rng.random(n)
+    v[kept == 0] = np.where(np.abs(v[kept == 0]) < 1e-3, 1.0, v[kept == 0])
+    v[(kept > 0) & (kind < 1 / 3)[:, None]] = 0.0
+    v[(kept == 2) & (kind < 2 / 3)[:, None]] = 0.0
+    return np.asarray(unit_rows(v), np.float64)
+
+
+def _on_block(rng: np.random.Generator, half: Array, normal: Array) -> Array:
+    """Points (n, 3) of blocks that are farthest along ``normal``."""
+    return np.where(normal == 0.0, half * rng.uniform(-1.0, 1.0, half.shape), half * np.sign(normal))
+
+
+def _on_cylinder(rng: np.random.Generator, r: Array, half: Array, normal: Array) -> Array:
+    """The same of cylinders."""
+    n = len(r)
+    across = np.hypot(normal[:, 0], normal[:, 1])
+    turn, part = rng.uniform(0.0, 2.0 * math.pi, n), np.sqrt(rng.random(n))
+    disc = (r * part)[:, None] * np.stack([np.cos(turn), np.sin(turn)], 1)
+    rim = r[:, None] * normal[:, :2] / np.where(across > 0.0, across, 1.0)[:, None]
+    z = np.where(normal[:, 2] == 0.0, half * rng.uniform(-1.0, 1.0, n), half * np.sign(normal[:, 2]))
+    return np.column_stack([np.where((across > 0.0)[:, None], rim, disc), z])
+
+
+def _frames(rng: np.random.Generator, normal: Array) -> Array:
+    """Rotations (n, 3, 3) whose first column is ``normal``, turned at random about it."""
+    u = np.asarray(unit_rows(np.cross(normal, rng.normal(size=normal.shape))), np.float64)
+    return np.stack([normal, u, np.cross(normal, u)], 2)
+
+
+def _cases(rng: np.random.Generator, n: int, kind: str) -> Solids:
+    k = draw.count(n)
+    shape = draw.spread(n, k)
+    half = 10.0 ** rng.uniform(0.0, 1.5, (k, 3))
+    radius = np.zeros(k)
+    r, length = 10.0 ** rng.uniform(0.0, 1.3, k), 10.0 ** rng.uniform(0.0, 2.0, k)
+    if kind == "cylinder":
+        radius = half[:, 0].copy()
+        half[:, 1] = radius
+    if kind == "hole":
+        radius = half[:, :2].min(1) * rng.uniform(0.2, 0.9, k)
+        r = radius * np.where(rng.random(k) < 0.7, rng.uniform(0.3, 0.999, k), rng.uniform(1.0, 3.0, k))
+    half, radius, r, length = half[shape], radius[shape], r[shape], length[shape]
+    normal = _normals(rng, n)
+    q = _on_block(rng, half, normal) if kind != "cylinder" else _on_cylinder(rng, radius, half[:, 2], normal)
+    if kind == "hole":  # most touch the wall of the hole or its rims
+        wall = rng.random(n) < 0.8
+        turn = rng.uniform(0.0, 2.0 * math.pi, n)
+        out = np.stack([np.cos(turn), np.sin(turn), np.zeros(n)], 1)
+        up = np.where(rng.random(n) < 0.5, rng.uniform(0.0, math.pi / 2, n), 0.0)
+        end = rng.choice([-1.0, 1.0], n)
+        z = np.where(up > 0.0, end, rng.uniform(-1.0, 1.0, n)) * half[:, 2]
+        at_wall = radius[:, None] * out + z[:, None] * [0.0, 0.0, 1.0]
+        q = np.where(wall[:, None], at_wall, q)
+        inward = np.cos(up)[:, None] * -out + (end * np.sin(up))[:, None] * [0.0, 0.0, 1.0]
+        normal = np.where(wall[:, None], inward, normal)
+    own = _normals(rng, n)
+    p = _on_cylinder(rng, r, 0.5 * length, own)
+    turned = _frames(rng, -normal) @ np.swapaxes(_frames(rng, own), 1, 2)
+    gap = r * draw.powers(rng, n, -12, -1)
+    T = np.tile(np.eye(4), (n, 1, 1))
+    T[:, :3, :3] = turned
+    T[:, :3, 3] = q + gap[:, None] * normal - (turned @ p[:, :, None])[:, :, 0]
+    return Solids(kind != "cylinder", half, radius, r, length, T, shape)
+
+
+class EngineMethod:
+    """The pair engine, as `clamp3d.distance` answers; its bounds are good to 1e-9 of the parts' size."""
+
+    measures: Measures = "depth"
+
+    def measure(self, cases: Solids) -> Measured:
+        """See `Method`. Where no depth is known, but only that it is not less, it is unsure."""
+        cache = ModelCache()
+        a, b = cases.body(0), cases.cylinder(0)
+        found = np.array([(d.lower, d.upper) for d in (distance(a, b, T, cache=cache) for T in cases.T)])
+        low, high = found.T
+        unsure = ~np.isfinite(low)
+        low = np.where(unsure, high, low)
+        bound = 0.5 * np.maximum(high - low, 0.0) + MEMBER * cases.scene()
+        return Measured(0.5 * (low + high), bound, unsure, "the depth is not bounded from above")
+
+
+class SolidFamily(FlatFamily):
+    """A kind of body that a flat-ended cylinder touches. Depths take long: it has a ``part`` of the cases asked for."""
+
+    methods: ClassVar[Methods] = {REFERENCE: ("the exact engine, with proven bounds", EngineMethod)}
+
+    def __init__(self, kind: str, part: float, about: str) -> None:
+        super().__init__(f"solid: {kind}", about, partial(_cases, kind=kind))
+        self.part = part
+
+    def _interval(self, cases: Solids, i: int, most: int) -> tuple[float, float]:  # type: ignore[override]
+        T, half = cases.T[i], cases.half[i]
+        R, r, length = float(cases.radius[i]), float(cases.r[i]), float(cases.length[i])
+        rounding = NARROW * float(cases.take([i]).scene()[0])
+        low, high = solid_truth(R, cases.hollow, half, r, length, T, rounding, most)
+        if low > -rounding:
+            return low - rounding, high + rounding
+        c, d = T[:3, 3], T[:3, 2]
+        ways = np.vstack([_WAYS, np.eye(3), -np.eye(3), d, -d])
+        if cases.hollow:
+            own = np.abs(ways) @ half
+        else:
+            own = R * np.hypot(ways[:, 0], ways[:, 1]) + half[2] * np.abs(ways[:, 2])
+        along = ways @ d
+        other = 0.5 * length * np.abs(along) + r * np.sqrt(np.maximum(1.0 - along * along, 0.0)) - ways @ c
+        return -float((own + other).min()) - rounding, high + rounding
+
+    def difference(self, cases: Solids, truths: Array, i: int) -> float:  # type: ignore[override]
+        """See `Family`; and the answer's points, normal and depth hold before an oracle of its own."""
+        a, b, T = cases.body(i), cases.cylinder(i), cases.T[i]
+        assert_distance(distance(a, b, T), a, b, T, tolerance=1e-6)
+        return super().difference(cases, truths, i)  # type: ignore[arg-type]
+
+    def case(self, n: int, seed: int, i: int) -> str:
+        """See `Family`."""
+        cases = self.cases(n, seed)
+        low, high = self._interval(cases, i, MAX_BOXES)
+        size, R = (2.0 * cases.half[i]).tolist(), float(cases.radius[i])
+        body = f"shapes.box({size}" + (f", holes=[shapes.Hole({R!r})])" if R > 0.0 else ")")
+        lines = [
+            "import clamp3d",
+            "from clamp3d import shapes",
+            f"body = {body if cases.hollow else f'clamp3d.kernel.{cases.body(i)!r}'}",
+            f"wire = clamp3d.kernel.{cases.cylinder(i)!r}",
+            f"print(clamp3d.distance(body, wire, {cases.T[i].tolist()}))",
+            f"# truth: from {low!r} to {high!r} mm",
+        ]
+        return "\n".join(lines)
+
+
+_FAMILIES = (
+    SolidFamily(
+        "box", 1.0, "features of a cylinder on faces, edges and corners of a box, gaps of +-1e-12 ... 0.1 radii"
+    ),
+    SolidFamily("cylinder", 0.25, "the same on another flat-ended cylinder: sides, rims, ends"),
+    SolidFamily("hole", 0.05, "the same in and about the hole of a plate: its wall, its rims, the plate's other faces"),
+)
+SOLIDS = {family.name: family for family in _FAMILIES}
