@@ -81,7 +81,7 @@ def fit_file(
     Parameters
     ----------
     path : str or Path
-        STL, OBJ, PLY, GLB, GLTF, 3MF or STEP file; see `load_mesh`.
+        STL, OBJ, PLY, GLB, GLTF, 3MF or STEP file; see `load_mesh`. Of STEP the cylindrical faces are the features.
     unit : str, optional
         Unit of the file's lengths: mm, cm, m or in.
     progress : callable, optional
