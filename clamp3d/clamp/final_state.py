@@ -26,7 +26,7 @@ TOLERANCE = 1e-9
 """Largest violated gap and largest optimality residual of a proven answer, in mm."""
 
 _ACTIVE = 1e-6
-_ACTIVE_TRIES = ((1e-6, 0.0), (1e-8, 0.0), (1e-10, 0.0), (1e-4, 0.0), (1e-6, 1e-2))
+_ACTIVE_TRIES = ((1e-6, 0.0), (1e-8, 0.0), (1e-10, 0.0), (1e-4, 0.0), (1e-6, 0.1))
 """Gaps in the active set, mm: a wire that nearly fills its groove is within the first of contacts it lacks. And the
 least multiplier that counts on the way: of arc and lip, 1e-8 mm apart, both seem to carry while the arc's normal is
 off."""
