@@ -20,15 +20,15 @@ from clamp3d.clamp.section import SIZE, B, D, Gaps, S, Section, W
 
 
 def test_every_command_an_optimiser_a_grid_and_virtual_work_agree() -> None:
-    """Seven of the clamps that ``scripts/check-clamps`` takes hundreds of."""
-    score = check_clamps(7, 1)
+    """Four of the clamps that ``scripts/check-clamps`` takes hundreds of."""
+    score = check_clamps(4, 1)
     assert score.findings == []
-    assert score.asked["run"] == score.asked["tolerance"] == score.asked["sweep"] == 7
+    assert score.asked["run"] == score.asked["tolerance"] == score.asked["sweep"] == 4
     assert score.asked["clamped"] > 0
     assert score.asked["not clamped"] > 0
-    assert score.asked["optimiser without play"] == score.asked["optimiser with play"] == 3
+    assert score.asked["optimiser without play"] == score.asked["optimiser with play"] == 2
     assert score.asked["forces"] > 0
-    assert score.asked["equilibria named"] == 2
+    assert score.asked["equilibria named"] == 1
 
 
 def test_the_end_does_not_depend_on_the_length_of_a_step() -> None:

@@ -49,10 +49,15 @@ class Score:
             self.findings.append((k, f"{what}: {error:.3g}"))
 
 
-def check_clamps(n: int, seed: int, listen: Callable[[int, Score], None] = lambda k, score: None) -> Score:
-    """Check ``n`` random clamps: all in every command, each third by an optimiser, each sixth by a grid."""
+def check_clamps(
+    n: int, seed: int, first: int = 0, listen: Callable[[int, Score], None] = lambda k, score: None
+) -> Score:
+    """Check ``n`` random clamps from number ``first`` on.
+
+    All are closed by every command, each third by an optimiser, and each sixth has its equilibria from a grid.
+    """
     score = Score()
-    for k in range(n):
+    for k in range(first, first + n):
         rng = np.random.default_rng([seed, k])
         clamp = whole_clamp(rng)
         final = one_answer(score, k, clamp)
@@ -109,24 +114,28 @@ def forces(score: Score, k: int, clamp: Clamp, final: FinalState) -> None:
         if wire in final.loose:
             continue
         r = getattr(clamp, key).radius
-        ends = []
+        starts, sections = [], []
         for more in (-_WIDER * r, _WIDER * r):
             thicker: Any = {key: Wire(diameter=2.0 * (r + more))}
-            other = Section(replace(clamp, **thicker), Cas())
-            ends.append(solve_final_state(other, _opened(other, final.q)).q[D])
+            sections.append(Section(replace(clamp, **thicker), Cas()))
+            starts.append(_opened(sections[-1], final.q))
+        if starts[0] is None or starts[1] is None:
+            score.asked["forces not asked: no room to open"] += 1
+            continue
+        ends = [solve_final_state(section, start).q[D] for section, start in zip(sections, starts, strict=True)]
         pushed = sum(m for m, pair in zip(final.multipliers, final.gaps.pair, strict=True) if wire in pair)
         score.note(k, "forces", abs((ends[1] - ends[0]) / (2.0 * _WIDER * r) - float(pushed)), FORCES)
 
 
-def _opened(section: Section, q: Array) -> Array:
-    """The state opened as far as the wires have room for in their grooves, at most by 0.04 mm."""
+def _opened(section: Section, q: Array) -> Array | None:
+    """The state opened as far as the wires have room for in their grooves, at most by 0.04 mm; None if they jam."""
     for lift in 0.04 * 0.25 ** np.arange(8):
         opened = q.copy()
         opened[D] += lift
         opened[[1, 3]] += 0.5 * lift
         if section.gaps(opened).value.min() > 0.0:
-            break
-    return opened
+            return opened
+    return None
 
 
 def grid(score: Score, k: int, clamp: Clamp) -> None:
