@@ -42,6 +42,8 @@ _SETTLED, _OVERLAP = 1e-3, 1e-8
 """A step is found when a round moves it by this part of a stride, and it overlaps by no more than this part."""
 _SLOW = 16.0
 """A step that is longer than so many strides is one near rest."""
+_FULL = 1e-9
+"""Clearance in parts of the groove's radius below which a wire fills it: there is no round to roll in."""
 _SHORTEST = 1e-9
 """Shortest stride, in parts of the half width."""
 
@@ -228,5 +230,6 @@ def _bend(section: Section, q: Array, gaps: Gaps, force: Array, moving: list[int
             ox, oy = u * c + v * s, v * c - u * s
             along[D], along[S] = -ty, (ty * ox - tx * oy) / section.lever
             along[B] = along[W] = -tx
-        found += force[k] / abs(pair.groove.radius - pair.cylinder.radius) * np.outer(along, along)
+        slack = max(abs(pair.groove.radius - pair.cylinder.radius), _FULL * pair.groove.radius)
+        found += force[k] / slack * np.outer(along, along)
     return found[np.ix_(moving, moving)]
