@@ -1,4 +1,4 @@
-"""Compiled entry point of `nonnegative`: loops in one order, so the same bits whatever BLAS, cores or process there are.
+"""Compiled entry point of `nonnegative`: loops in one order, so the same bits whatever BLAS, cores or process.
 
 All arrays are the caller's and are written into; nothing is allocated. Import this module only when it is needed.
 """
