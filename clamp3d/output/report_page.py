@@ -9,7 +9,7 @@ import io
 import json
 import math
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -87,21 +87,32 @@ def report_to_dict(report: Report) -> dict[str, Any]:
 
 def report_csv(report: Report) -> str:
     """One line for each pair at rest, then those in motion, with a header; lengths in mm, vectors as three columns."""
-    rows = []
-    for row in (*report.rows, *report.motions):
-        flat: dict[str, Any] = {}
-        for key, value in _pair_to_dict(row).items():
-            if key in ("point", "point_a", "point_b", "normal"):
-                flat |= {f"{key}_{axis}": v for axis, v in zip("xyz", value or ("", "", ""), strict=True)}
-            else:
-                flat[key] = "" if value is None else value
-        rows.append(flat)
+    rows = [dict(_cells(_pair_to_dict(row))) for row in (*report.rows, *report.motions)]
+    head = {
+        key: "" for row in [*rows, dict.fromkeys(("a", "b", "verdict", "distance_mm", "error_bound_mm"))] for key in row
+    }
     out = io.StringIO()
-    head = max(rows, key=len, default={"a": "", "b": "", "verdict": "", "distance_mm": "", "error_bound_mm": ""})
     writer = csv.DictWriter(out, list(head), restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     return out.getvalue()
+
+
+def _cells(data: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    """The cells of a row of the table: a vector has three, an interval two, and what is unknown is empty."""
+    for key, value in data.items():
+        if key in ("point", "point_a", "point_b", "normal", "direction"):
+            yield from zip((f"{key}_{axis}" for axis in "xyz"), value or ("", "", ""), strict=True)
+        elif key == "interference_mm":
+            names = ("interference_at_least_mm", "interference_at_most_mm")
+            yield from zip(names, ("" if x is None else x for x in value or (None, None)), strict=True)
+        elif key == "where":
+            (low, high), inside = value["box_mm"], value["point"] or ("", "", "")
+            yield from ((name, value[name]) for name in value if name.startswith("volume"))
+            for axis, least, most, at in zip("xyz", low, high, inside, strict=True):
+                yield from ((f"box_{axis}_min", least), (f"box_{axis}_max", most), (f"inside_{axis}", at))
+        else:
+            yield key, "" if value is None else value
 
 
 def report_html(report: Report, *, progress: Callable[[str], None] = lambda what: None) -> str:

@@ -141,7 +141,7 @@ def circumstances(row: PairResult) -> str:
     said = []
     if row.motion is not None:
         first = "" if row.contact_at is None else f"first contact at t = {row.contact_at:.4f}, "
-        kind = "deepest" if row.verdict in BAD else "nearest"
+        kind = "deepest found" if row.verdict in BAD else "nearest"
         said.append(f"in motion {row.motion!r}" + ("" if row.t is None else f": {first}{kind} at t = {row.t:.4f}"))
     if row.where is not None:
         said.append(where_text(row.where))
