@@ -287,6 +287,12 @@ def test_a_clashing_scene_says_so_worst_first(clashing, tmp_path):
     assert rows["block-near"].distance.value == pytest.approx(0.3, abs=1e-6)
     (pushed,) = (row for row in found.motions if row.name == "far-near")
     assert pushed.result.contact_at == pytest.approx((60 - 2.5 - 30.3) / 30, abs=1e-3)
+    lines = list(csv.DictReader(io.StringIO(report_csv(found))))
+    assert [(line["a"], line["b"]) for line in lines] == [(r.result.a, r.result.b) for r in (*found.rows, *found.motions)]
+    assert not [cell for line in lines for cell in line.values() if cell[:1] in ("[", "{")]  # a number a column
+    (hit,) = (line for line in lines if line["b"] == "wire" and line["verdict"] == "clash")
+    assert 0.0 < float(hit["volume_at_least_mm3"]) <= float(hit["volume_at_most_mm3"])
+    assert float(hit["box_y_min"]) <= float(hit["inside_y"]) <= float(hit["box_y_max"])
     page = report_html(found)
     assert len(pictures(page)) == 1 + len(found.findings)
     ids = set(re.findall(r'id="([^"]*)"', page))
