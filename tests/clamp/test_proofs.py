@@ -32,8 +32,8 @@ def test_a_state_that_is_off_is_not_proven(wire, shift, monkeypatch):
     section = Section(load_clamp(line=wire, jumper=wire), Cas())
     polish = final_state._polish
 
-    def off(section, q, active):
-        q, step = polish(section, q, active)
+    def off(section, q, active, least):
+        q, step = polish(section, q, active, least)
         q = q.copy()
         q[D] += shift
         return q, step
