@@ -31,6 +31,8 @@ SIZE = 8
 
 EDGE = "outer edge"
 """Feature of a splint's gap to a wire that has left its face sideways."""
+EDGES = "saddle's edge"
+"""Feature of the gap between the down splint's underside and the saddle."""
 
 _SPARE, _SPARE_OF_LEVER = 10.0, 0.2
 """How much wider than the wires need a clamp stands open, mm, and at most how much of its half width."""
@@ -344,7 +346,7 @@ class Section:
             own = (c, 0.0, s, s if abs(w) < washer else 0.0)
             by = (-s, -c, x * c - y * s)
             gap = x * s + y * c - down.underside_depth
-            rows.append((gap, own, by, ("P2", "P3"), "saddle's edge", (edge_x, edge_y), (s, c)))
+            rows.append((gap, own, by, ("P2", "P3"), EDGES, (edge_x, edge_y), (s, c)))
             for v in (self._slot_bottom, down.face_depth) if W in self.free else (self._slot_bottom,):
                 x, y = px + side * half * c + v * s, py - side * half * s + v * c
                 gap = side * (x - axis) - r

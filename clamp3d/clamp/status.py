@@ -8,7 +8,7 @@ from clamp3d.clamp.contact import Contact, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp
 from clamp3d.clamp.final_state import FinalState
 from clamp3d.clamp.scene import CONTACT
-from clamp3d.clamp.section import SPLINTS, WIRES, D, Section
+from clamp3d.clamp.section import EDGES, SPLINTS, WIRES, D, Section
 from clamp3d.clamp.stepped import SteppedState
 
 CLAMPED = "clamped"
@@ -27,6 +27,8 @@ def final_status(
     """
     gaps = final.gaps
     if isinstance(final, FinalState):
+        if saddle_pull(final) > CONTACT:
+            return "not clamped: the down splint lifts off the saddle's arc, which is not modelled"
         stops = set(final.active)
         loose = set(final.loose)
     else:
@@ -50,6 +52,16 @@ def final_status(
     if not reasons:  # a wire on four lips holds both splints, whatever they do to the other one
         reasons.append(f"{' and '.join(w for w in WIRES if w not in loose)} alone holds the splints apart")
     return f"not clamped: {' and '.join(reasons)}, {' and '.join(sorted(loose))} loose"
+
+
+def saddle_pull(final: FinalState) -> float:
+    """What the saddle's arc would have to pull the down splint with, in parts of the bolt force; negative: it pushes.
+
+    Where the saddle's edges push with more than the bolt does the round back leaves the arc that the section holds it
+    in.
+    """
+    rows = zip(final.gaps.pair, final.gaps.feature, final.multipliers, final.gaps.normal, strict=True)
+    return sum(float(m * n[1]) for pair, feature, m, n in rows if pair == ("P2", "P3") and feature == EDGES) - 1.0
 
 
 def stop_words(stops: Iterable[tuple[tuple[str, str], str]]) -> list[str]:

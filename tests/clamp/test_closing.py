@@ -11,12 +11,14 @@ import pytest
 from clamp3d.baselines.cas import Cas
 from clamp3d.bench.stress.assemblies.check import check_clamps
 from clamp3d.bench.stress.assemblies.clamps import whole_clamp
+from clamp3d.bench.stress.assemblies.outlines import Outlines
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import SIZE, B, D, Gaps, S, Section, W
+from clamp3d.clamp.status import final_status, saddle_pull
 
 
 def test_every_command_an_optimiser_a_grid_and_virtual_work_agree() -> None:
@@ -29,6 +31,16 @@ def test_every_command_an_optimiser_a_grid_and_virtual_work_agree() -> None:
     assert score.asked["optimiser without play"] == score.asked["optimiser with play"] == 2
     assert score.asked["forces"] > 0
     assert score.asked["equilibria named"] == 1
+
+
+def test_a_down_splint_that_would_lift_off_the_saddle_is_not_called_clamped() -> None:
+    """Where the saddle's edge pushes with more than the bolt, the arc would have to pull; an optimiser goes lower."""
+    clamp = whole_clamp(np.random.default_rng([0, 204]))
+    final = solve_final_state(Section(clamp, Cas()))
+    assert saddle_pull(final) == pytest.approx(0.47, abs=0.01)
+    assert Outlines(clamp).lowest(final.q)[0] < float(final.q[D]) - 0.2
+    status = "not clamped: the down splint lifts off the saddle's arc, which is not modelled"
+    assert assemble(clamp).status == final_status(Section(clamp, Cas()), final) == status
 
 
 def test_the_end_does_not_depend_on_the_length_of_a_step() -> None:

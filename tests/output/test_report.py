@@ -288,7 +288,9 @@ def test_a_clashing_scene_says_so_worst_first(clashing, tmp_path):
     (pushed,) = (row for row in found.motions if row.name == "far-near")
     assert pushed.result.contact_at == pytest.approx((60 - 2.5 - 30.3) / 30, abs=1e-3)
     lines = list(csv.DictReader(io.StringIO(report_csv(found))))
-    assert [(line["a"], line["b"]) for line in lines] == [(r.result.a, r.result.b) for r in (*found.rows, *found.motions)]
+    assert [(line["a"], line["b"]) for line in lines] == [
+        (r.result.a, r.result.b) for r in (*found.rows, *found.motions)
+    ]
     assert not [cell for line in lines for cell in line.values() if cell[:1] in ("[", "{")]  # a number a column
     (hit,) = (line for line in lines if line["b"] == "wire" and line["verdict"] == "clash")
     assert 0.0 < float(hit["volume_at_least_mm3"]) <= float(hit["volume_at_most_mm3"])
