@@ -49,7 +49,7 @@ def read_apart(path: Path) -> Reading:
     seconds = factor * (_SECONDS + _PER_MEGABYTE * size / 1e6)
     memory = factor * (_MEMORY + _PER_BYTE * size)
     with tempfile.TemporaryDirectory(prefix="clamp3d-") as folder:
-        out = Path(folder) / "bodies.npz"
+        out = Path(folder) / "bodies"
         arguments = (str(path.absolute()), str(out), str(path), str(int(memory)))
         code, said = run_child("clamp3d.brep.apart", *arguments, time_limit=seconds)
         told = Path(f"{out}.json")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -123,16 +124,20 @@ def save(reading: Reading, path: Path) -> None:
         "notes": reading.notes,
     }
     arrays["T"] = np.array([body.T for body in reading.bodies]).reshape(-1, 4, 4)
-    arrays["meta"] = np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8)
+    meta["arrays"] = [(key, value.dtype.str, value.shape) for key, value in arrays.items()]
     with path.open("wb") as out:
-        np.savez(out, **arrays)  # type: ignore[arg-type]
+        out.write(json.dumps(meta).encode() + b"\n")
+        for value in arrays.values():
+            out.write(np.ascontiguousarray(value).tobytes())
 
 
 def restore(path: Path) -> Reading:
     """A reading that `save` wrote."""
-    with np.load(path, allow_pickle=False) as data:
-        arrays = dict(data)
-    meta = json.loads(arrays.pop("meta").tobytes())
+    arrays: dict[str, NDArray[Any]] = {}
+    with path.open("rb") as file:
+        meta = json.loads(file.readline())
+        for key, kind, shape in meta["arrays"]:
+            arrays[key] = np.fromfile(file, np.dtype(kind), math.prod(shape)).reshape(shape)
     places = arrays.pop("T")
     own: list[dict[str, NDArray[Any]]] = [{} for _ in meta["shapes"]]
     for key, value in arrays.items():

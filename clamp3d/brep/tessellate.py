@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.brep.borders import BORDER, Borders
+from clamp3d.brep.grid import divisions, gridded
 from clamp3d.brep.surfaces import (
     OTHER,
     PLANE,
     Faces,
     Size,
     bends,
-    from_sides,
     height,
     parameters,
     sense_of,
@@ -32,11 +33,12 @@ from clamp3d.errors import Clamp3dError
 
 ANGLE = 0.35
 """Largest turn (rad) of a facet's neighbour, so that a small fillet gets facets enough to be seen as round."""
-EDGE_CHORD = 0.0005
-"""Chord error (mm) of the edges: finer than that of the faces, since where two parts touch their borders decide."""
 _RETRIES = 4
 _SAFETY = 2.0
-"""Factor on deviations that are sampled, not computed: of edges that are no lines or circles, of free-form faces."""
+"""Factor on the deviations of free-form faces, which are sampled, not computed."""
+
+Surface = tuple[int, Array, Size, float]
+"""Kind, frame, sizes and deviation of a face's surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,46 +82,52 @@ def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
     from OCP.BRepTools import BRepTools
     from OCP.IMeshTools import IMeshTools_Parameters
 
-    wanted = chord
+    faces = list(explore(solid, "FACE"))
+    surfaces = [surface_of(face) for face in faces]
+    wanted, inner = 0.45 * chord, False
     for _ in range(_RETRIES):
         BRepTools.Clean_s(solid)
         asked = IMeshTools_Parameters()
-        asked.Deflection, asked.DeflectionInterior = min(EDGE_CHORD, wanted), wanted
         asked.Angle = asked.AngleInterior = angle
+        asked.Deflection, asked.DeflectionInterior = min(BORDER, wanted), wanted
+        for face, (kind, *_) in zip(faces, surfaces, strict=True):
+            if kind == OTHER:  # their facets stand for them to the end
+                BRepMesh_IncrementalMesh(face, asked)
+        asked.Deflection = wanted
+        if not inner:  # most faces need none, or are meshed in rows
+            asked.InternalVerticesMode, asked.DeflectionInterior, asked.AngleInterior = False, 1e3, 3.0
         BRepMesh_IncrementalMesh(solid, asked)
-        made = _collected(solid)
+        made = _collected(faces, surfaces, wanted)
         worst = float(made.errors.max())
         if worst <= chord:
             break
+        if not inner:
+            inner = True
+            continue
         # Below a tenth of what is asked for it is the file's own tolerance that is in the way.
         wanted, angle = max(0.7 * wanted * chord / worst, 0.1 * chord), 0.7 * angle
     return made
 
 
-def _collected(solid: Any) -> Tessellation:
+def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tessellation:
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_Orientation
     from OCP.TopLoc import TopLoc_Location
 
-    surfaces: list[tuple[int, Array, Size, float]] = []
-    rows: list[tuple[NDArray[Any], ...]] = []
+    coarse: list[tuple[NDArray[Any], ...]] = []
+    fine: list[tuple[NDArray[Any], ...]] = []
     nodes: list[Array] = []
     links: list[tuple[int, int]] = []
+    deviations: list[float] = []
     first_seen: dict[int, list[tuple[Any, IntArray]]] = {}
     start = 0
-    for number, face in enumerate(explore(solid, "FACE")):
+    for number, (face, (kind, frame, size, deviation)) in enumerate(zip(faces, surfaces, strict=True)):
         place = TopLoc_Location()
         found = BRep_Tool.Triangulation_s(face, place)
         if found is None:
             raise Clamp3dError(f"Open CASCADE makes no triangles of face {number + 1}")
-        n = found.NbNodes()
-        P = placed(np.array([found.Node(i).Coord() for i in range(1, n + 1)]), place)
-        F = np.array([found.Triangle(i).Get() for i in range(1, found.NbTriangles() + 1)], dtype=np.int64) - 1
-        given = F
-        if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED:
-            F = F[:, ::-1]
-        kind, frame, size, deviation = surface_of(face)
-        pieces, sags = [], []
+        P = placed(np.array([found.Node(i).Coord() for i in range(1, found.NbNodes() + 1)]), place)
+        edges, border = [], []
         tolerance = BRep_Tool.Tolerance_s(face)
         for edge in explore(face, "EDGE"):
             polygon = BRep_Tool.PolygonOnTriangulation_s(edge, found, place)
@@ -127,6 +135,7 @@ def _collected(solid: Any) -> Tessellation:
                 continue
             tolerance = max(tolerance, BRep_Tool.Tolerance_s(edge))
             at = np.array([polygon.Node(i) for i in range(1, polygon.NbNodes() + 1)]) - 1
+            border.append(at)
             if BRep_Tool.Degenerated_s(edge):
                 links += [(start + int(at[0]), start + int(k)) for k in at[1:]]
                 continue
@@ -136,39 +145,78 @@ def _collected(solid: Any) -> Tessellation:
                 twins.append((edge, start + at))
             else:
                 links += list(zip(twin.tolist(), (start + at).tolist(), strict=True))
-            pieces.append(np.column_stack([at[:-1], at[1:]]))
-            sags.append(_sags(edge, polygon, P[at], kind, frame, size))
-        sag = _at_sides(F, n, pieces, sags)
-        uv = unwrapped(kind, parameters(kind, frame, size, P)[F])
+            t = np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
+            edges.append(Borders.of(edge, at, t, P[at], kind, frame, size))
+        F, P, own = _facets(face, found, P, kind, size, border, chord)
         if kind == OTHER:
-            own = _sampled(face, found, given, P)
             deviation = float(own.max())
         else:
             deviation = max(deviation, float(np.abs(height(kind, frame, size, P)).max()))
-            own = bends(kind, size, uv, P[F]) + deviation
-        surfaces.append((kind, frame, size, deviation))
+        if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED:
+            F = F[:, ::-1]
+        corners, sag = P[F], np.zeros(F.shape)
+        if edges:
+            borders = Borders.joined(edges)
+            rows = borders.at_sides(F, len(P))
+            sag = np.where(rows >= 0, borders.sag[rows], 0.0)
+        for table in (coarse, fine):
+            if table is fine and kind != OTHER and edges:
+                corners, sag, _ = borders.split(F, rows, P)
+            uv = unwrapped(kind, parameters(kind, frame, size, corners.reshape(-1, 3)).reshape(-1, 3, 2))
+            if kind != OTHER:
+                own = bends(kind, size, uv, corners) + deviation
+            error = own + sag.max(axis=1) + tolerance
+            table.append((error, corners, uv, np.full(len(error), number), sag))
+        deviations.append(deviation)
         nodes.append(P)
-        rows.append((F + start, np.full(len(F), number), own + sag.max(axis=1) + tolerance, uv, sag, P[F]))
-        start += n
+        coarse[-1] += (F + start,)
+        start += len(P)
     if not nodes:
         raise Clamp3dError("the solid has no faces")
-    F, owner, errors, uv, sag, corners = (np.concatenate(column) for column in zip(*rows, strict=True))
+    errors, _, _, owner, _, F = (np.concatenate(column) for column in zip(*coarse, strict=True))
     V, F, whole = _joined(np.concatenate(nodes), F, links)
-    flat = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) <= 1e-14
-    kept = whole & ~flat
+    exact = [np.concatenate(column) for column in zip(*fine, strict=True)]
+    corners = exact[1]
+    kept = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) > 1e-14
+    exact = [np.ascontiguousarray(x[kept]) for x in exact]
     senses = [
-        sense_of(kind, frame, size, corners[kept & (owner == number)])
+        sense_of(kind, frame, size, exact[1][exact[3] == number])
         for number, (kind, frame, size, _) in enumerate(surfaces)
     ]
-    faces = Faces(
+    made = Faces(
         np.array([s[0] for s in surfaces], dtype=np.int64),
         np.array([s[1] for s in surfaces]),
         np.array([s[2] for s in surfaces]),
         np.array(senses),
-        np.array([s[3] for s in surfaces]),
-        *(np.ascontiguousarray(x[kept]) for x in (errors, corners, uv, owner, sag)),
+        np.array(deviations),
+        *exact,
     )
-    return Tessellation(V, F, owner[whole], errors[whole], faces)
+    return Tessellation(V, F, owner[whole], errors[whole], made)
+
+
+def _facets(
+    face: Any, found: Any, P: Array, kind: int, size: Size, border: list[IntArray], chord: float
+) -> tuple[IntArray, Array, Array]:
+    """Triangles of a face, its nodes, and of a free-form one how far each triangle can be from it.
+
+    In rows, where its border allows it; of a free-form face only what is extruded.
+    """
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_SurfaceType
+
+    surface, made = BRepAdaptor_Surface(face), None
+    uv = np.array([found.UVNode(i).Coord() for i in range(1, len(P) + 1)])
+    regular = kind != PLANE if kind != OTHER else surface.GetType() == GeomAbs_SurfaceType.GeomAbs_SurfaceOfExtrusion
+    if regular and border:
+        made = gridded(uv, np.unique(np.concatenate(border)), lambda span: divisions(kind, size, span, chord))
+    n = found.NbTriangles() if made is None else min(8, found.NbTriangles())
+    F = np.array([found.Triangle(i).Get() for i in range(1, n + 1)], dtype=np.int64) - 1
+    if made is not None:
+        (a, b), (grid, new) = (uv[F[:, k]] - uv[F[:, 0]] for k in (1, 2)), made
+        F = grid if (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() > 0.0 else grid[:, ::-1]
+        uv = np.concatenate([uv, new])
+        P = np.concatenate([P, np.reshape([surface.Value(u, v).Coord() for u, v in new.tolist()], (-1, 3))])
+    return F, P, _sampled(surface, F, uv, P) if kind == OTHER else np.zeros(0)
 
 
 def placed(points: Array, place: Any) -> Array:
@@ -182,70 +230,45 @@ def placed(points: Array, place: Any) -> Array:
 
 def _joined(V: Array, F: IntArray, links: list[tuple[int, int]]) -> tuple[Array, IntArray, NDArray[np.bool_]]:
     """Nodes that two faces share along an edge made one, without triangles that this folds; which ones are left."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
+    label = np.arange(len(V))
     if links:
         i, j = np.array(links).T
-        graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(len(V), len(V)))
-        _, label = connected_components(graph, directed=False)
-        keep = np.unique(label, return_index=True)[1]
-        V, F = V[keep], label[F].astype(np.int64)
+        while (label[i] != label[j]).any():  # the least number of those that are one
+            least = np.minimum(label[i], label[j])
+            np.minimum.at(label, i, least)
+            np.minimum.at(label, j, least)
+            label = label[label]
+    F = label[F]
     whole = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
     used, rows = np.unique(F[whole], return_inverse=True)
     return V[used], rows.reshape(-1, 3), whole
-
-
-def _at_sides(F: IntArray, n: int, pieces: list[IntArray], sags: list[Array]) -> Array:
-    """The largest of ``sags`` among the ``pieces`` of the face's edges that are each triangle's sides (m, 3)."""
-    found = np.zeros(F.shape)
-    if pieces:
-        pairs, sag = np.sort(np.concatenate(pieces), axis=1), np.concatenate(sags)
-        keys = pairs[:, 0] * n + pairs[:, 1]
-        order = np.argsort(keys)
-        for k in range(3):
-            side = np.sort(F[:, [k, (k + 1) % 3]], axis=1)
-            wanted = side[:, 0] * n + side[:, 1]
-            row = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
-            found[:, k] = np.where(keys[row] == wanted, sag[row], 0.0)
-    return found
-
-
-def _sags(edge: Any, polygon: Any, nodes: Array, kind: int, frame: Array, size: Size) -> Array:
-    """How far each piece (k,) of an edge can be from the line on the surface that is straight in its parameters, mm."""
-    from OCP.BRepAdaptor import BRepAdaptor_Curve
-    from OCP.GeomAbs import GeomAbs_CurveType as Kind
-
-    curve = BRepAdaptor_Curve(edge)
-    what = curve.GetType()
-    if what == Kind.GeomAbs_Line:
-        return np.zeros(len(nodes) - 1)
-    t = np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
-    turn = 0.5 * np.minimum(np.abs(np.diff(t)), np.pi)
-    if what == Kind.GeomAbs_Circle and kind in (PLANE, OTHER):
-        return np.asarray(curve.Circle().Radius() * (1.0 - np.cos(turn)))
-    if what == Kind.GeomAbs_Ellipse and kind in (PLANE, OTHER):  # a circle stretched: at most by the longer half axis
-        return np.asarray(curve.Ellipse().MajorRadius() * (1.0 - np.cos(turn)))
-    off = np.zeros(len(t) - 1)
-    for share in (0.25, 0.5, 0.75):
-        at = (1.0 - share) * t[:-1] + share * t[1:]
-        true = np.array([curve.Value(float(x)).Coord() for x in at])
-        off = np.maximum(off, from_sides(kind, frame, size, nodes[:-1], nodes[1:], true))
-    return np.where(off > 1e-11, _SAFETY * off, 0.0)
 
 
 _SAMPLES = np.array([[1, 1, 1], [3, 3, 0], [0, 3, 3], [3, 0, 3], [4, 1, 1], [1, 4, 1], [1, 1, 4]], dtype=np.float64)
 _SAMPLES /= _SAMPLES.sum(axis=1, keepdims=True)
 
 
-def _sampled(face: Any, triangulation: Any, F: IntArray, P: Array) -> Array:
-    """Twice the largest distance (m,) found between points of triangles and the surface at the same parameters."""
-    from OCP.BRepAdaptor import BRepAdaptor_Surface
+def _sampled(surface: Any, F: IntArray, nodes: Array, P: Array) -> Array:
+    """Twice the largest distance (m,) of points of triangles from the surface, found from the same parameters on."""
+    from OCP.gp import gp_Pnt, gp_Vec
 
-    surface = BRepAdaptor_Surface(face)
-    uv = np.array([triangulation.UVNode(i).Coord() for i in range(1, len(P) + 1)])
-    where = np.einsum("sk,mkd->msd", _SAMPLES, uv[F]).reshape(-1, 2)
+    point, along, across = gp_Pnt(), gp_Vec(), gp_Vec()
+
+    def at(uv: Array) -> Array:
+        """Points (k, 0) of the surface and its tangents there (k, 1), (k, 2)."""
+        made = np.empty((len(uv), 3, 3))
+        for k, (u, v) in enumerate(uv.tolist()):
+            surface.D1(u, v, point, along, across)
+            made[k] = point.Coord(), along.Coord(), across.Coord()
+        return made
+
+    where = np.einsum("sk,mkd->msd", _SAMPLES, nodes[F]).reshape(-1, 2)
     flat = np.einsum("sk,mkd->msd", _SAMPLES, P[F]).reshape(-1, 3)
-    points = np.array([surface.Value(float(u), float(v)).Coord() for u, v in where])
-    found = np.linalg.norm(points - flat, axis=1)
+    made = at(where)
+    off = flat - made[:, 0]
+    T = made[:, 1:].transpose(0, 2, 1)
+    step = np.einsum("kij,kj->ki", np.linalg.pinv(T), off)  # the same parameters are not the nearest point's
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    nearer = at(np.clip(where + step, low, high))[:, 0]
+    found = np.minimum(np.linalg.norm(off, axis=1), np.linalg.norm(flat - nearer, axis=1))
     return np.asarray(_SAFETY * found.reshape(len(F), -1).max(axis=1))

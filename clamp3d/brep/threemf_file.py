@@ -51,11 +51,16 @@ def read_3mf(path: Path) -> Reading:
             raise InputError(f"{path}: unit must be one of micron, millimeter, centimeter, meter, inch, foot")
         scale = _UNITS[model.GetUnit().name]
         placer = Placer(scale)
-        items = model.GetBuildItems()
-        while items.MoveNext():
-            item = items.GetCurrent()
+        items: list[Any] = []
+        known: dict[int, int] = {}
+        listed = model.GetBuildItems()
+        while listed.MoveNext():
+            items.append(listed.GetCurrent())
+        if sum(_count(item.GetObjectResource(), known, 0) for item in items) > MOST_BODIES:
+            raise InputError(f"{path}: more than {MOST_BODIES} bodies")
+        for item in items:
             T = _matrix(item.GetObjectTransform()) if item.HasObjectTransform() else np.eye(4)
-            for obj, place in _meshes(item.GetObjectResource(), T, [0], 0):
+            for obj, place in _meshes(item.GetObjectResource(), T):
                 placer.place(obj.GetName() or path.stem, obj.GetResourceID(), partial(_arrays, obj), place)
     except lib3mf.ELib3MFException as error:
         raise InputError(f"{path}: not a readable 3MF file ({' '.join(str(error).split())})") from None
@@ -63,18 +68,26 @@ def read_3mf(path: Path) -> Reading:
     return placer.reading()
 
 
-def _meshes(obj: Any, T: Array, visited: list[int], depth: int) -> Iterator[tuple[Any, Array]]:
+def _count(obj: Any, known: dict[int, int], depth: int) -> int:
+    """How many meshes an object is made of, at least 1; ``known`` keeps the answers, since components can double."""
+    if depth > _DEEPEST:
+        raise InputError(f"components more than {_DEEPEST} levels deep")
+    number = obj.GetResourceID()
+    if number not in known:
+        below = [] if obj.IsMeshObject() else [obj.GetComponent(k) for k in range(obj.GetComponentCount())]
+        known[number] = max(1, sum(_count(part.GetObjectResource(), known, depth + 1) for part in below))
+    return known[number]
+
+
+def _meshes(obj: Any, T: Array) -> Iterator[tuple[Any, Array]]:
     """The meshes that an object is made of, with their places."""
-    visited[0] += 1
-    if depth > _DEEPEST or visited[0] > 10 * MOST_BODIES:
-        raise InputError(f"components more than {_DEEPEST} levels deep, or more than {10 * MOST_BODIES} of them")
     if obj.IsMeshObject():
         yield obj, T
         return
     for k in range(obj.GetComponentCount()):
         part = obj.GetComponent(k)
         own = _matrix(part.GetTransform()) if part.HasTransform() else np.eye(4)
-        yield from _meshes(part.GetObjectResource(), T @ own, visited, depth + 1)
+        yield from _meshes(part.GetObjectResource(), T @ own)
 
 
 def _matrix(transform: Any) -> Array:

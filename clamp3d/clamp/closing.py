@@ -14,12 +14,13 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq, nnls
 
 from clamp3d.clamp.curvature import lagrangian_hessian
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, W
+from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
+from clamp3d.core.roots import root
 from clamp3d.errors import SolverError
 
 STRIDE = 0.01
@@ -41,6 +42,8 @@ _SETTLED, _OVERLAP = 1e-3, 1e-8
 """A step is found when a round moves it by this part of a stride, and it overlaps by no more than this part."""
 _SLOW = 16.0
 """A step that is longer than so many strides is one near rest."""
+_FULL = 1e-9
+"""Clearance in parts of the groove's radius below which a wire fills it: there is no round to roll in."""
 _SHORTEST = 1e-9
 """Shortest stride, in parts of the half width."""
 
@@ -134,7 +137,7 @@ def _meeting(
 
     if gap(0.0) <= 0.0:
         return q
-    return states[brentq(gap, 0.0, 1.0, xtol=1e-9)] if gap(1.0) < 0.0 else new
+    return states[root(gap, 0.0, 1.0, xtol=1e-9)] if gap(1.0) < 0.0 else new
 
 
 def _step(
@@ -194,7 +197,7 @@ def _project(offset: Array, hessian: Array, A: Array, value: Array, scale: float
         return -np.linalg.solve(L.T, z0), np.zeros(0)
     G = np.linalg.solve(L, A.T).T
     lower = (G @ z0 - value) / scale
-    u, _ = nnls(np.vstack([G.T, lower]), np.append(np.zeros(len(offset)), 1.0))
+    u = nnls(np.vstack([G.T, lower]), np.append(np.zeros(len(offset)), 1.0))
     rest = 1.0 - float(lower @ u)
     if not rest > 1e-12:
         return None, u
@@ -227,5 +230,6 @@ def _bend(section: Section, q: Array, gaps: Gaps, force: Array, moving: list[int
             ox, oy = u * c + v * s, v * c - u * s
             along[D], along[S] = -ty, (ty * ox - tx * oy) / section.lever
             along[B] = along[W] = -tx
-        found += force[k] / abs(pair.groove.radius - pair.cylinder.radius) * np.outer(along, along)
+        slack = max(abs(pair.groove.radius - pair.cylinder.radius), _FULL * pair.groove.radius)
+        found += force[k] / slack * np.outer(along, along)
     return found[np.ix_(moving, moving)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.clamp.section import SIZE, Gaps, Section
+from clamp3d.clamp.section import SIZE, WIRES, Gaps, Section
 from clamp3d.core.pose import Array
 
 LEVEL = 1e-6
@@ -64,10 +64,19 @@ def lagrangian_hessian(section: Section, q: Array, rows: NDArray[np.intp], multi
     # A wire that nearly fills its groove turns its normal within R - r: the step must be short beside that.
     h = min(1e-4, max(1e-8, 0.03 * section.least_slack))
     H = np.zeros((SIZE, SIZE))
-    for j in touched(section, section.gaps(q), rows):
+    gaps = section.gaps(q)
+    for j in touched(section, gaps, rows):
         e = np.zeros(SIZE)
         e[j] = h
-        H[j] = -(multipliers @ (section.gaps(q + e).gradient[rows] - section.gaps(q - e).gradient[rows])) / (2.0 * h)
+        if j < 2 * len(WIRES):  # a wire's own coordinates move no other gap
+            wire = WIRES[j // 2]
+            own = np.flatnonzero([pair[1] == wire for pair in gaps.pair])
+            which, counted = np.searchsorted(own, rows[np.isin(rows, own)]), np.isin(rows, own)
+            high, low = (section.wire_gaps(q + by, wire).gradient[which] for by in (e, -e))
+        else:
+            counted = np.ones(len(rows), dtype=bool)
+            high, low = (section.gaps(q + by).gradient[rows] for by in (e, -e))
+        H[j] = -(multipliers[counted] @ (high - low)) / (2.0 * h)
     return 0.5 * (H + H.T)
 
 

@@ -12,13 +12,13 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
 from clamp3d.clamp.closing import CLOSING, HELD, STILL, STRIDE, OnContact, descend, open_start
 from clamp3d.clamp.curvature import LEVEL, lagrangian_hessian, least_curvature, rounding_of_normals, touched
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section
+from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
 
@@ -26,13 +26,18 @@ TOLERANCE = 1e-9
 """Largest violated gap and largest optimality residual of a proven answer, in mm."""
 
 _ACTIVE = 1e-6
-_ACTIVE_TRIES = (1e-6, 1e-8, 1e-10, 1e-4)
-"""Gaps in the active set, mm: a wire that nearly fills its groove is within the first of contacts it lacks."""
+_ACTIVE_TRIES = ((1e-6, 0.0), (1e-8, 0.0), (1e-10, 0.0), (1e-4, 0.0), (1e-6, 0.1))
+"""Gaps in the active set, mm: a wire that nearly fills its groove is within the first of contacts it lacks. And the
+least multiplier that counts on the way: of arc and lip, 1e-8 mm apart, both seem to carry while the arc's normal is
+off."""
 _ATTEMPTS = 4
 _PERTURBATION = 1.5e-3
 """How far a restart begins from the last end, in parts of the down splint's half width."""
 _SETTLING = 300
 """Steps in which a loose wire falls; it stays where it was if that is not enough."""
+_ONE_CONTACT = 3e-5
+"""Gaps of two parts whose derivatives differ by less are one contact: face and lip where the one goes over into the
+other. A wire of 1 mm that is `TOLERANCE` off the face has turned by so much about the lip."""
 _NO_MULTIPLIER = 1e-9
 """Multipliers below are rounding of the least squares: a wire they hold is not held."""
 
@@ -132,11 +137,11 @@ def solve_final_state(
 
 def _best(section: Section, q: Array, start: Array, held: Array) -> FinalState:
     """The state at the end of a path, with the active set that proves it best."""
-    best = _certify(section, q, start, held, _ACTIVE_TRIES[0])
-    for active in _ACTIVE_TRIES[1:]:
+    best = _certify(section, q, start, held, *_ACTIVE_TRIES[0])
+    for tried in _ACTIVE_TRIES[1:]:
         if _kkt_residual(best) <= TOLERANCE:
             break
-        best = min(best, _certify(section, q, start, held, active), key=_kkt_residual)
+        best = min(best, _certify(section, q, start, held, *tried), key=_kkt_residual)
     return best
 
 
@@ -151,9 +156,9 @@ def _kkt_residual(state: FinalState) -> float:
     return residual if residual == residual else np.inf
 
 
-def _certify(section: Section, q: Array, start: Array, held: Array, active: float) -> FinalState:
+def _certify(section: Section, q: Array, start: Array, held: Array, active: float, least: float) -> FinalState:
     """Polish a state whose active set are the gaps within ``active`` mm, settle loose wires, and measure the proof."""
-    q, optimality = _polish(section, q, active)
+    q, optimality = _polish(section, q, active, least)
     gaps = section.gaps(q)
     multipliers = _multipliers(section, gaps, active)
     loose = _not_held(gaps, multipliers)
@@ -222,29 +227,30 @@ def _settle_loose(section: Section, q: Array, wire: PartName) -> Array:
 def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
     """Multipliers >= 0 (k,) of the gaps within ``active`` mm, by non-negative least squares; 0 of the others.
 
-    A lip ends the arc and the face beside it and is in both gaps: the face's counts, for the arc's jumps to the other
-    lip when that comes nearer, and its derivatives with it.
+    Of gaps that are one contact the nearest counts: a lip ends the arc and the face beside it, and is in both. Of equal
+    ones it is the face's, for the arc's jumps to the other lip when that comes nearer, and its derivatives with it.
     """
     in_set, free = np.abs(gaps.value) <= active, list(section.free)
     for i, j in itertools.combinations(np.flatnonzero(in_set), 2):
-        if gaps.value[i] == gaps.value[j] and (gaps.pair[i], gaps.feature[i]) == (gaps.pair[j], gaps.feature[j]):
-            in_set[i] = False
+        if gaps.pair[i] == gaps.pair[j] and np.abs(gaps.gradient[i] - gaps.gradient[j]).max() <= _ONE_CONTACT:
+            in_set[i if gaps.value[i] >= gaps.value[j] else j] = False
     multipliers = np.zeros(len(gaps.value))
     if in_set.any():
-        multipliers[in_set] = nnls(gaps.gradient[in_set][:, free].T, CLOSING[free])[0]
+        multipliers[in_set] = nnls(gaps.gradient[in_set][:, free].T, CLOSING[free])
     multipliers[multipliers < _NO_MULTIPLIER] = 0.0
     return multipliers
 
 
-def _polish(section: Section, q: Array, active: float) -> tuple[Array, float]:
+def _polish(section: Section, q: Array, active: float, least: float) -> tuple[Array, float]:
     """Newton's method on stationarity and the active gaps together; returns the state and its last step in mm.
 
-    A gap that a step has closed too far joins the active set.
+    A gap that a step has closed too far joins the active set; multipliers below ``least`` do not count.
     """
     step = np.inf
     for _ in range(20):
         gaps = section.gaps(q)
         multipliers = _multipliers(section, gaps, active)
+        multipliers[multipliers < least] = 0.0
         overlapping = (gaps.value < -TOLERANCE) & (gaps.value >= -active)
         rows = np.flatnonzero((multipliers > 0.0) | overlapping)
         free = touched(section, gaps, rows)

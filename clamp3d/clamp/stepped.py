@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.section import WIRES, D, Gaps, S, Section
@@ -146,6 +145,8 @@ class _FreeError(Exception):
 
 def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
     """Move one wire of ``q`` in place to where its least gap is largest; whether it is free there."""
+    from scipy.optimize import minimize  # takes long to import, and the exact solver needs none of it
+
     i = 2 * WIRES.index(wire)
 
     def at(xy: Array) -> Gaps:

@@ -197,17 +197,20 @@ Convex: TypeAlias = Rod | Hull
 
 
 def hull(points: Array) -> Hull:
-    """Convex hull of points (n, 3) that do not lie in one plane."""
-    from scipy.spatial import ConvexHull
+    """Convex hull of points (n, 3). Raises ValueError if they lie in one plane."""
+    import manifold3d
 
-    found = ConvexHull(points)
-    planes = np.asarray(found.equations, dtype=np.float64)
-    faces = found.simplices
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), planes[:, :3]) < 0.0
-    faces = np.where(inward[:, None], faces[:, ::-1], faces)
-    used, index = np.unique(faces, return_inverse=True)
-    return Hull(points[used], np.unique(planes.round(14), axis=0), index.reshape(faces.shape).astype(np.int64))
+    made = manifold3d.Manifold.hull_points(np.ascontiguousarray(points, dtype=np.float64)).to_mesh64()
+    vertices, faces = np.array(made.vert_properties)[:, :3], np.array(made.tri_verts, dtype=np.int64)
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    area = np.linalg.norm(normal, axis=1)
+    if not len(faces) or not area.max() > 0.0:
+        raise ValueError("the points lie in one plane")
+    kept = area > 1e-14 * area.max()
+    normal = normal[kept] / area[kept, None]
+    offset = -(vertices @ normal.T).max(axis=0)  # no rounding of a triangle cuts into the hull
+    return Hull(vertices, np.unique(np.column_stack([normal, offset]).round(14), axis=0), faces)
 
 
 def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, rims: bool = True) -> Distance:

@@ -71,7 +71,7 @@ class _Pair:
             return known.lower >= -self.slack or known.upper < -10.0 * self.slack
 
         try:
-            found = refine(self.a, self.b, T, from_boxes(self.a, self.b, T), Thresholds(1e-6), told)
+            found = refine(self.a, self.b, T, from_boxes(self.a, self.b, T), Thresholds(1e-6), told, search=False)
         except SolverError:
             return Distance()
         size = float(np.linalg.norm(t))

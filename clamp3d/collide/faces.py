@@ -66,8 +66,10 @@ class FaceModel:
                 for corner in (start, end):
                     on |= np.abs(height(int(f.kind[i]), f.frame[i], size, corner)) < near
             found[i] = sag[on].max(initial=0.0)
+        deviation = f.deviation.copy()
+        np.maximum.at(deviation, self._adjacent[:, 0], f.deviation[self._adjacent[:, 1]])
         scale = float(np.abs(self.bounds).max())
-        return np.asarray(np.maximum(2.1 * found, _LEAST) + 2.0 * f.deviation.max() + 1e-9 + 1e-12 * scale)
+        return np.asarray(np.maximum(2.1 * found, _LEAST) + 2.0 * deviation + 1e-9 + 1e-12 * scale)
 
     @cached_property
     def groups(self) -> NDArray[np.int64]:
@@ -111,18 +113,26 @@ class FaceModel:
     @cached_property
     def neighbours(self) -> NDArray[np.int64]:
         """Up to so many faces (n, k) that share a corner with each face; -1 where there are fewer."""
-        faces = len(self.faces.kind)
-        both = np.unique(self.solid.mesh.faces * faces + self.solid.face[:, None])
-        both = np.column_stack([both // faces, both % faces])
-        found: list[list[int]] = [[] for _ in range(faces)]
-        starts = np.flatnonzero(np.diff(both[:, 0], prepend=-1))
-        for rows in np.split(both[:, 1], starts[1:]):
-            for i in rows if len(rows) > 1 else ():
-                found[i] += [int(j) for j in rows if j != i and j not in found[i]]
-        made = np.full((len(found), _BESIDE), -1, dtype=np.int64)
-        for i, others in enumerate(found):
-            made[i, : len(others[:_BESIDE])] = others[:_BESIDE]
+        made = np.full((len(self.faces.kind), _BESIDE), -1, dtype=np.int64)
+        i, j = self._adjacent.T
+        place = np.arange(len(i)) - np.searchsorted(i, i)
+        made[i[place < _BESIDE], place[place < _BESIDE]] = j[place < _BESIDE]
         return made
+
+    @cached_property
+    def _adjacent(self) -> NDArray[np.int64]:
+        """Pairs (k, 2) of faces that share a corner, both ways, sorted."""
+        faces = len(self.faces.kind)
+        at = np.unique(self.solid.mesh.faces * faces + self.solid.face[:, None])
+        corner, face = at // faces, at % faces
+        order = np.arange(len(at))
+        last = np.searchsorted(corner, corner, side="right")
+        pairs = []
+        for step in range(1, int((last - order).max(initial=1))):
+            first = order[order + step < last]
+            pairs += [face[first] * faces + face[first + step], face[first + step] * faces + face[first]]
+        found = np.unique(np.concatenate(pairs)) if pairs else np.zeros(0, dtype=np.int64)
+        return np.column_stack([found // faces, found % faces])
 
     @cached_property
     def marked(self) -> NDArray[np.int8]:

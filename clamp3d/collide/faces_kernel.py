@@ -29,6 +29,7 @@ from clamp3d.collide.faces_math import (
     TORUS,
     bend,
     cut,
+    difference,
     height_at,
     least_height,
     longest,
@@ -220,6 +221,9 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
         t = slack[f] + deviation[f]
         to_frame(frame[f], V, work)
         least = least_height(kind[f], size[f, 0], size[f, 1], sense[f], work) - t
+        if akind[g] == kind[f] and (kind[f] == SPHERE or kind[f] == TORUS):  # the same surface, but for a little
+            off = difference(kind[f], asize[g, 0], asize[g, 1], aframe[g], size[f, 0], size[f, 1], frame[f])
+            least = max(least, e - rim - off - t)
         chosen[tried], heights[tried] = f, least
         tried += 1
         if not (least - e > found or (h > t and outside < 0.0) or (h < -t and h + rim < out[0])):

@@ -261,6 +261,17 @@ def height_at(kind, a, b, F, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @formula
+def difference(kind, a, b, F, c, d, G):  # type: ignore[no-untyped-def]
+    """How far points of one ball or torus (sizes a, b, frame F) are at most from another (c, d, G)."""
+    move = math.sqrt((F[0] - G[0]) ** 2 + (F[1] - G[1]) ** 2 + (F[2] - G[2]) ** 2)
+    if kind == SPHERE:
+        return move + abs(a - c)
+    x, y, z = F[10] * G[11] - F[11] * G[10], F[11] * G[9] - F[9] * G[11], F[9] * G[10] - F[10] * G[9]
+    turn = math.sqrt(x * x + y * y + z * z)  # the sine; an axis has two directions, so the angle is below pi / 2
+    return move + abs(a - c) + 1.5 * max(a, c) * turn + abs(b - d)
+
+
+@formula
 def bend(kind, a, b, du, dv, v0, v1):  # type: ignore[no-untyped-def]
     """Bound of the distance between a surface and a flat piece over spans du, dv of its parameters, v in [v0, v1]."""
     if kind == CYLINDER:

@@ -12,6 +12,7 @@ import numpy as np
 
 from clamp3d.collide.faces_math import (
     OTHER,
+    TORUS,
     bend,
     cut,
     height,
@@ -302,9 +303,12 @@ def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, pieces, uvs, wor
         if high + e + rim <= slack:
             continue
         left -= 1
-        if left < 0 or top + 2 > len(pieces) or (high + rim > slack and e < 0.1 * (high + rim - slack)):
+        # Over a torus ``high`` is only a bound, over the others it is reached.
+        reached = kind[f] != TORUS and high + rim > slack and e < 0.1 * (high + rim - slack)
+        if left < 0 or top + 2 > len(pieces) or reached:
             return True
-        side = longest(pieces[top], uvs[top], kind[g], size[g, 0], size[g, 1], e > 0.0)
+        bent = e > 0.25 * (high + e + rim - slack)
+        side = longest(pieces[top], uvs[top], kind[g], size[g, 0], size[g, 1], bent)
         cut(pieces[top], uvs[top], side, kind[g], size[g, 0], size[g, 1], frame[g], pieces[top + 1], uvs[top + 1])
         top += 2
     return False

@@ -31,14 +31,17 @@ Enough: TypeAlias = Callable[[Distance], bool]
 Rows: TypeAlias = NDArray[np.intp]
 
 
-def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough = lambda _: False) -> Distance:
+def meshes_distance(
+    a: Model, b: Model, T: Array, error: float, enough: Enough = lambda _: False, *, search: bool = True
+) -> Distance:
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame, from meshes of chord error ``error`` mm.
 
     In an overlap ``upper`` is minus a depth that a point of both has, ``lower`` minus a move that parts them if one
-    of the few that are tried does. A depth that is ``enough`` ends the search: that of one vertex often is.
+    of the few that are tried does. A depth that is ``enough`` ends the search: that of one vertex often is. With
+    ``search`` the deepest point is limited from above too.
     """
     if not (a.between or b.between):
-        return surface_distance(a.outer(error), b.outer(error), T, enough, search=True)
+        return surface_distance(a.outer(error), b.outer(error), T, enough, search=search)
     outer = surface_distance(a.outer(error), b.outer(error), T)
     inner_a, inner_b = a.inner(error), b.inner(error)
     if inner_a is None or inner_b is None:
@@ -50,7 +53,7 @@ def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough =
         off = inner_a.error + inner_b.error + rounding_of(inner_a, inner_b, T)
         inner = replace(inner, upper=float(np.linalg.norm(q - p)) + off, point_a=p, point_b=q)
     found = replace(inner, lower=min(outer.lower, inner.upper), normal=None)
-    if outer.upper < 0.0 and not enough(found):
+    if search and outer.upper < 0.0 and not enough(found):
         outer = surface_distance(a.outer(error), b.outer(error), T, search=True)
         found = replace(found, lower=min(outer.lower, inner.upper))
     return found

@@ -111,16 +111,19 @@ def deepest_at_most(a: Surface, b: Surface, T: Array, shared: Common, reached: f
     steps = [np.arange(n) for n in count.astype(int)]
     cells = low + (np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3) * 2.0 + 1.0) * half / count
     half = half / count
+    whole = np.zeros(len(cells), dtype=bool)  # cells that lie inside as a whole: theirs do too
     while True:
         radius = float(np.linalg.norm(half))
-        away, inside = piece.distance(cells), piece.contains(cells)
-        near = inside | (away <= radius)
-        cells, inside = cells[near], inside[near]
         depth = np.maximum(a.distance(cells), b.distance(cells @ back[:3, :3].T + back[:3, 3]))
-        reached = max(reached, float(depth[inside].max(initial=0.0)))
         open_ = depth + radius > _CLOSE * reached
-        cells, most = cells[open_], float((depth + radius).max(initial=0.0))
+        cells, depth, whole = cells[open_], depth[open_], whole[open_]
+        away, inside = piece.distance(cells), whole
+        inside[~whole] = piece.contains(cells[~whole])
+        reached = max(reached, float(depth[inside].max(initial=0.0)))
+        open_ = (inside | (away <= radius)) & (depth + radius > _CLOSE * reached)
+        cells, whole = cells[open_], (inside & (away > radius))[open_]
         if not len(cells) or 8 * len(cells) > _CELLS or radius <= 1e-9:
-            return max(most if len(cells) else 0.0, _CLOSE * reached)
+            return max(float((depth[open_] + radius).max(initial=0.0)), _CLOSE * reached)
         half = 0.5 * half
         cells = (cells[:, None] + _CORNERS_OF_CUBE * half).reshape(-1, 3)
+        whole = whole.repeat(8)

@@ -42,11 +42,20 @@ def from_boxes(a: Model, b: Model, T: Array) -> Distance:
 
 
 def refine(
-    a: Model, b: Model, T: Array, start: Distance, thresholds: Thresholds, enough: Enough, *, forms: bool = True
+    a: Model,
+    b: Model,
+    T: Array,
+    start: Distance,
+    thresholds: Thresholds,
+    enough: Enough,
+    *,
+    forms: bool = True,
+    search: bool = True,
 ) -> Distance:
     """Distance of ``b`` at ``T`` (4, 4) in a's frame, from ``start`` (what the boxes said), until ``enough``.
 
     Without ``forms`` the closed forms are left out: a caller that asks often may know that they say nothing here.
+    Without ``search`` the interference of meshes is not limited from above, which takes the longest.
     """
     found = start
     if enough(found):
@@ -66,7 +75,8 @@ def refine(
                 return found
     error = COARSEST
     while True:
-        found = _agreed(found, _meshes(a, b, T, error, lambda x, known=found: enough(known.meet(x))))  # type: ignore[misc]
+        new = _meshes(a, b, T, error, lambda x, known=found: enough(known.meet(x)), search)  # type: ignore[misc]
+        found = _agreed(found, new)
         if enough(found) or error <= FINEST or not (a.refines or b.refines):
             return found
         # The middle of the bounds guesses how far the nearest threshold is: go there, not step by step.
@@ -170,9 +180,9 @@ def _facets(a: Model, b: Model, T: Array, enough: Enough) -> Distance | None:
     return None if found is None else found.labelled("facets", "cylinder on facets (FCL)")
 
 
-def _meshes(a: Model, b: Model, T: Array, error: float, enough: Enough) -> Distance:
+def _meshes(a: Model, b: Model, T: Array, error: float, enough: Enough, search: bool) -> Distance:
     a.counters.queries["meshes"] += 1
-    found = meshes_distance(a, b, T, error, enough)
+    found = meshes_distance(a, b, T, error, enough, search=search)
     chords = f", chord error {error:.2g} mm" if a.refines or b.refines else ""
     return found.labelled("meshes", f"meshes (FCL){chords}")
 

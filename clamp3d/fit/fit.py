@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.brep.mesh_file import load_mesh
+from clamp3d.brep.mesh_file import load_bodies, load_mesh
 from clamp3d.checks import function, instance
-from clamp3d.core.mesh import Mesh
+from clamp3d.core.mesh import Array, Mesh
+from clamp3d.fit.cad import cad_features
 from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
 from clamp3d.fit.join import join
 from clamp3d.fit.measure import measure
@@ -80,7 +81,7 @@ def fit_file(
     Parameters
     ----------
     path : str or Path
-        STL, OBJ, PLY, GLB, GLTF, 3MF or STEP file; see `load_mesh`.
+        STL, OBJ, PLY, GLB, GLTF, 3MF or STEP file; see `load_mesh`. Of STEP the cylindrical faces are the features.
     unit : str, optional
         Unit of the file's lengths: mm, cm, m or in.
     progress : callable, optional
@@ -98,6 +99,9 @@ def fit_file(
     MissingLibraryError
         For STEP without the extra ``step``.
     """
+    if Path(path).suffix.lower() in (".step", ".stp"):
+        mesh, found, notes = cad_features(load_bodies(path, unit=unit), Path(path).name)
+        return _result(mesh, found, mesh.vertices[mesh.faces], notes)
     return fit_mesh(load_mesh(path, unit=unit), progress=progress)
 
 
@@ -135,37 +139,39 @@ def fit_mesh(mesh: Mesh, *, progress: Callable[[str, float], None] | None = None
     function("progress", progress)
     surface = Surface(mesh)
     regions = join(surface, find_regions(surface, progress))
-    regions.sort(key=lambda r: -float(surface.areas[r.faces].sum()))
+    found = [(float(region.sign), measure(surface, region)) for region in regions]
+    return _result(mesh, [(k, v) for k, v in found if v is not None], surface.V[surface.F], list(mesh.notes))
+
+
+def _result(mesh: Mesh, found: list[tuple[float, dict[str, Any]]], corners: Array, notes: list[str]) -> FitResult:
+    """The features whose sense and values were ``found``, named; ``corners`` (m, 3, 3) of all triangles."""
     grooves: list[GrooveFit] = []
     cylinders: list[CylinderFit] = []
     holes: list[HoleFit] = []
-    notes = list(mesh.notes)
-    for region in regions:
-        values = measure(surface, region)
-        if values is None:
-            continue
-        if region.sign > 0:
+    for sign, values in sorted(found, key=lambda x: -x[1]["covered_area"]):
+        if sign > 0:
             cylinders.append(CylinderFit(name=f"C{len(cylinders) + 1}", **values))
         elif values["half_angle"] < np.pi:
             grooves.append(GrooveFit(name=f"G{len(grooves) + 1}", **values))
         else:
-            holes.append(HoleFit(name=f"H{len(holes) + 1}", **values, through=_open_ended(surface, values)))
+            holes.append(HoleFit(name=f"H{len(holes) + 1}", **values, through=_open_ended(corners, values)))
     if not grooves:
-        notes.append("no groove: no concave circular arc found")
+        notes = [*notes, "no groove: no concave circular arc found"]
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return FitResult(
         mesh=mesh,
         grooves=tuple(grooves),
         cylinders=tuple(cylinders),
         holes=tuple(holes),
-        area=float(surface.areas.sum()),
+        area=0.5 * float(np.linalg.norm(sides, axis=1).sum()),
         notes=tuple(notes),
     )
 
 
-def _open_ended(surface: Surface, values: dict[str, Any]) -> bool:
+def _open_ended(corners: Array, values: dict[str, Any]) -> bool:
     """True if nothing closes either end: from the middle, no face crosses the axis up to a radius past the ends."""
     T, reach = values["T_part_feature"], 0.5 * values["length"] + values["radius"]
-    x, y, z = np.moveaxis((surface.V[surface.F] - T[:3, 3]) @ T[:3, :3], -1, 0)
+    x, y, z = np.moveaxis((corners - T[:3, 3]) @ T[:3, :3], -1, 0)
     # A face meets the axis if the origin lies in its projection along z: all three edge functions of one sign.
     e = np.roll(x, -1, axis=1) * np.roll(y, -2, axis=1) - np.roll(y, -1, axis=1) * np.roll(x, -2, axis=1)
     total = e.sum(axis=1)

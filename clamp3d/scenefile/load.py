@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import fields
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from clamp3d import checks
 from clamp3d.brep.bodies import part_name
-from clamp3d.brep.mesh_file import FORMATS
-from clamp3d.clamp.dimensions import Clamp
-from clamp3d.clamp.loader import builtin_clamps, load_clamp, parse_toml, read_text
 from clamp3d.collide.scene import Scene
 from clamp3d.core.shapes import Fit
-from clamp3d.errors import InputError
-from clamp3d.scenefile.file import load_scene
-from clamp3d.scenefile.parts import Parts, Reader, has_bodies, read_parts, to_parts
-from clamp3d.scenefile.tables import SceneTable
+from clamp3d.scenefile.parts import Parts, Reader, has_bodies, read_parts, refuse_wires, to_parts
+
+if TYPE_CHECKING:
+    from clamp3d.clamp.dimensions import Clamp
 
 
 def load(
@@ -96,54 +91,25 @@ def load(
     if not isinstance(source, (str, os.PathLike)):
         from clamp3d.brep.objects import read_object
 
-        _refuse_wires(type(source).__name__, "an object", wires)
+        refuse_wires(type(source).__name__, "an object", wires)
         reader.refuse("an object", "joints", "poses", "unit")
         reading, name = read_object(source)
         return _scene(to_parts(reading.complete(name, partial=partial), reader), name)
     path = checks.path("source", source)
-    if has_bodies(path) and str(path) not in builtin_clamps():
-        _refuse_wires(path, "a file of bodies", wires)
+    if has_bodies(path) and not (os.path.isdir(path) and _is_builtin(str(path))):
+        refuse_wires(path, "a file of bodies", wires)
         return _scene(read_parts(path, reader), path.resolve().name if os.path.isdir(path) else path.stem)
+    from clamp3d.scenefile.described import load_described  # pydantic takes longer to load than a small STEP file
+
     reader.refuse(checks.short(path), "unit", "fit", "chord", "joints", "poses", "partial")
-    if str(path) in builtin_clamps() or _is_clamp(path):
-        return load_clamp(path, line=line, jumper=jumper)
-    _refuse_wires(path, "a scene", wires)
-    scene = load_scene(path)
-    if not scene.parts:
-        raise InputError(f"{checks.short(path)}: the scene has no parts; add [parts.NAME], include or [clamp]")
-    return scene
+    return load_described(path, wires)
 
 
 def _scene(found: Parts, name: str) -> Scene:
     return Scene(found.parts, allowed=found.allowed, name=part_name(name), notes=found.notes)
 
 
-def _is_clamp(path: Path) -> bool:
-    """Whether the tables of a TOML file are those of a clamp; False: those of a scene."""
-    named_toml = path.suffix.lower() == ".toml"
-    if not named_toml and not os.path.isfile(path):
-        raise InputError(f"unknown clamp or file {checks.shown(str(path))}; {_choices()}")
-    try:
-        given = set(parse_toml(read_text(path), str(path)))
-    except InputError:
-        if named_toml:
-            raise
-        raise InputError(f"{checks.short(path)}: unknown kind of file; {_choices()}") from None
-    of_clamp, of_scene = ({f.name for f in fields(kind)} for kind in (Clamp, SceneTable))
-    as_clamp, as_scene = len(given & of_clamp - of_scene), len(given & of_scene - of_clamp)
-    if not as_clamp and not as_scene:
-        raise InputError(
-            f"{checks.short(path)}: neither a clamp ([up_splint], [line], ...) nor a scene ([parts.NAME], [clamp], ...)"
-        )
-    return as_clamp > as_scene
+def _is_builtin(name: str) -> bool:
+    from clamp3d.clamp.loader import builtin_clamps
 
-
-def _refuse_wires(path: object, kind: str, wires: dict[str, str | float]) -> None:
-    for name in wires:
-        raise InputError(f"{name} goes with a clamp; {checks.short(path)} is {kind}")
-
-
-def _choices() -> str:
-    built_in = ", ".join(builtin_clamps())
-    files = ", ".join((*FORMATS, ".urdf"))
-    return f"built in: {built_in}; or give a clamp or scene file (.toml), a folder, or a file ({files})"
+    return name in builtin_clamps()

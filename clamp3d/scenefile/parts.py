@@ -14,12 +14,10 @@ from clamp3d import checks
 from clamp3d.brep.bodies import Reading, unique_names
 from clamp3d.brep.mesh_file import FORMATS, load_bodies
 from clamp3d.brep.solid import BrepSolid
-from clamp3d.clamp.loader import read_text
 from clamp3d.collide.scene import Allowed, Part
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import FITS, Fit, MeshShape
 from clamp3d.errors import InputError
-from clamp3d.scenefile.pose_table import Pose
 
 COLUMNS = ("name", "x", "y", "z", "qx", "qy", "qz", "qw")
 """Columns of a table of poses: mm, and a unit quaternion."""
@@ -96,6 +94,12 @@ def has_bodies(path: Path) -> bool:
     return path.suffix.lower() in (*FORMATS, ".urdf") or os.path.isdir(path)  # False for names that no folder can have
 
 
+def refuse_wires(path: object, kind: str, wires: dict[str, str | float]) -> None:
+    """Raises InputError for a wire that is to replace one of ``path``, which is of another ``kind`` than a clamp."""
+    for name in wires:
+        raise InputError(f"{name} goes with a clamp; {checks.short(path)} is {kind}")
+
+
 def read_parts(path: Path, reader: Reader) -> Parts:
     """The parts of a geometry file, a robot description or a folder of meshes. Raises InputError."""
     if os.path.isdir(path):
@@ -161,6 +165,9 @@ def _folder(folder: Path, reader: Reader) -> Parts:
 
 def read_poses(path: Path) -> list[tuple[str, Array]]:
     """Names and poses (4, 4) of a table with the columns of `COLUMNS`; a name may be there more than once."""
+    from clamp3d.clamp.loader import read_text
+    from clamp3d.scenefile.pose_table import Pose
+
     rows = csv.reader(read_text(path).splitlines())
     head = [cell.strip() for cell in next(rows, [])]
     if tuple(head) != COLUMNS:

@@ -11,6 +11,8 @@ from clamp3d import InputError, load
 from clamp3d.brep import apart
 from clamp3d.brep.bodies import unique_names
 from clamp3d.brep.mesh_file import load_bodies
+from clamp3d.brep.placing import Placer
+from clamp3d.brep.threemf_file import read_3mf
 from clamp3d.core.child import run_child
 
 TYPES = (
@@ -70,19 +72,22 @@ def test_a_3mf_that_names_what_is_not_there_is_refused(tmp_path, objects, build)
         load(write_3mf(tmp_path / "a.3mf", objects, build))
 
 
-def test_components_doubled_thirty_times_end(tmp_path, monkeypatch):
+def test_components_doubled_again_and_again_are_counted_not_made(tmp_path):
+    levels = range(2, 20)
     twice = "".join(
         f'<object id="{k}" type="model"><components><component objectid="{k - 1}"/><component objectid="{k - 1}"/>'
         "</components></object>"
-        for k in range(2, 32)
+        for k in levels
     )
-    path = write_3mf(
-        tmp_path / "a.3mf", f'<object id="1" type="model">{SOLID}</object>{twice}', '<item objectid="31"/>'
-    )
+    objects = f'<object id="1" type="model">{SOLID}</object>{twice}'
+    path = write_3mf(tmp_path / "a.3mf", objects, f'<item objectid="{levels[-1]}"/>')
     assert path.stat().st_size < 2000
-    monkeypatch.setenv(apart.LIMITS, "0.15")
-    with pytest.raises(InputError, match=r"not read in|takes more than|more than \d+ of them"):
-        load(path)
+    placed = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Placer, "place", lambda *given: placed.append(given))
+        with pytest.raises(InputError, match="more than 20000 bodies"):
+            read_3mf(path)
+    assert not placed
 
 
 @pytest.mark.parametrize(

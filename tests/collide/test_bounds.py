@@ -26,13 +26,13 @@ SLOW = settings(
 SOME = st.sampled_from(DRAWN)
 
 
-@settings(SLOW, max_examples=40)
+@settings(SLOW, max_examples=20)
 @given(SOME, SOME, poses(25.0))
 def test_any_pair_of_drawn_solids(a, b, T):
     assert_distance(distance(a, b, T), a, b, T)
 
 
-@settings(SLOW, max_examples=40)
+@settings(SLOW, max_examples=20)
 @given(
     st.builds(SweptArc, st.floats(3.0, 15.0), st.floats(0.2, 3.0), st.floats(2.0, 60.0)),
     st.builds(Cylinder, st.floats(0.5, 12.0), st.floats(1.0, 90.0)),
@@ -43,7 +43,7 @@ def test_a_bare_groove_and_a_cylinder(groove, wire, T):
     assert_distance(distance(wire, groove, inverse(T)), wire, groove, inverse(T))
 
 
-@settings(SLOW, max_examples=15)
+@settings(SLOW, max_examples=8)
 @given(SOME, SOME, poses(22.0))
 def test_every_level_on_the_way_to_an_answer(a, b, T):
     seen: list[Distance] = []
@@ -64,14 +64,14 @@ FACETED = {
 }
 
 
-@settings(SLOW, max_examples=12)
+@settings(SLOW, max_examples=8)
 @given(st.sampled_from([key for key in FACETED if key[1] == "off"]), SOME, poses(20.0))
 def test_facets_that_are_the_part(key, b, T):
     faceted = FACETED[key][1]
     assert_distance(distance(faceted, b, T, accuracy=1e-3), faceted, b, T, cells=3000)
 
 
-@settings(SLOW, max_examples=40)
+@settings(SLOW, max_examples=20)
 @given(st.sampled_from([key for key in FACETED if key[1] != "off"]), st.sampled_from([DRAWN[3], DRAWN[5]]), poses(20.0))
 def test_a_fitted_mesh_has_the_bounds_of_the_part_it_comes_from(key, b, T):
     """Its corners lie on the part's surface, so what is said of it must hold for the part."""
@@ -80,7 +80,7 @@ def test_a_fitted_mesh_has_the_bounds_of_the_part_it_comes_from(key, b, T):
     assert_distance(replace(found, point_a=None, normal=None), solid, b, T)
 
 
-@settings(SLOW, max_examples=15)
+@settings(SLOW, max_examples=10)
 @given(st.floats(0.4, 1.4), st.floats(0.0, 3.0), st.floats(-16.0, 16.0), st.floats(-0.5, 4.0), st.floats(-0.2, 0.2))
 def test_a_fitted_groove_between_shoulders(half, above, u, v, turn):
     """What stands above the ends of the arc is the part's, not air: the groove's mouth is as high as the part."""
@@ -115,7 +115,7 @@ def test_a_drawn_solid_lies_between_its_two_meshes(shape, error):
     assert outer.contains(x[body(shape).field(x) < 0.0]).all()
 
 
-@settings(SLOW, max_examples=30)
+@settings(SLOW, max_examples=20)
 @given(
     st.sampled_from(["chords", "wedges"]),
     st.sampled_from([2.0, 10.0, 30.0]),

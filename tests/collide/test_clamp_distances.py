@@ -1,4 +1,4 @@
-"""All pairs of an assembled clamp against Open CASCADE, for eleven pairs of wires: thick, thin, clamped and not."""
+"""All pairs of an assembled clamp against Open CASCADE, for seven pairs of wires: thick, thin, clamped and not."""
 
 import itertools
 
@@ -9,6 +9,7 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.collide.check import check
 from clamp3d.collide.distance import distance, measure
 from clamp3d.collide.model import ModelCache
+from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core.pose import inverse
 
@@ -16,15 +17,11 @@ pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
 WIRES = [
     (None, None),
-    ("LJ-240", "LJ-240"),
-    ("LJ-500", "LJ-120"),
     ("LJ-120", "LJ-630"),
     ("LJ-16", "LJ-16"),
     ("LJ-800", "LJ-800"),
     ("LJ-16", "LJ-800"),
     ("LJ-800", "LJ-16"),
-    ("LJ-300", "LJ-400"),
-    ("Swan", "LJ-500"),
     ("LGJ-240/40", "LJ-35"),
 ]
 CACHE = ModelCache()
@@ -107,7 +104,7 @@ def test_the_reference_clamp():
         assert distance(second.shape, first.shape, inverse(T)).value == pytest.approx(found[a, b].value, abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_bounds_hold_at_random_poses(seed):
     """Apart: Open CASCADE's distance lies between the bounds. Overlapping: the least that can be said is its sign."""
     rng = np.random.default_rng(seed)
@@ -118,7 +115,8 @@ def test_bounds_hold_at_random_poses(seed):
         T[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
         T[:3, 0] *= np.sign(np.linalg.det(T[:3, :3]))
         T[:3, 3] = rng.normal(size=3) * rng.choice([20.0, 60.0, 120.0])
-        d = distance(a.shape, b.shape, T, cache=CACHE)
+        scene = Scene().add("a", a.shape).add("b", b.shape, T)
+        d = check(scene, distances=True, depths=False, cache=CACHE).pairs[0].distance
         A, B = placed(type(a)("a", a.shape)), placed(type(b)("b", b.shape, T))
         truth = least(A, B)
         assert d.lower <= d.upper

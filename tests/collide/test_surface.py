@@ -18,10 +18,12 @@ from clamp3d.collide.scene import Scene
 from clamp3d.collide.surface import Surface, at_edges
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
+from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import SweptArc
+from clamp3d.core.profile import Profile
 
 BRACKET = trimesh.creation.extrude_polygon(Polygon([(0, 0), (40, 0), (40, 5), (5, 5), (5, 30), (0, 30)]), 20)
 
@@ -118,6 +120,22 @@ def test_gaps_and_overlaps_of_concave_meshes_are_decided(size, apart, turn):
     found = meshes_distance(cache.model(bracket), cache.model(box), np.linalg.inv(place) @ T_box, 0.5)
     assert found.lower - 1e-8 <= gap <= found.upper + 1e-8
     assert found.upper - found.lower < 1e-6
+
+
+@settings(max_examples=15, deadline=None)
+@given(size=st.floats(-6.0, -2.0).map(lambda e: 10.0**e), apart=st.booleans(), drawn=st.booleans())
+def test_on_the_seam_of_a_union_gaps_and_overlaps_are_those_of_its_face(size, apart, drawn):
+    """A box over the line where two blocks meet, which is no surface: 1e-6 to 1e-2 mm off them or in them."""
+    gap = size if apart else -size
+    left, right = (Extrusion(Profile.rectangle(20.0, 18.0, (x, 0.0)), "Z", -8.0, 0.0) for x in (-10.0, 10.0))
+    floor = shapes.Solid("floor", (left, right))
+    if not drawn:
+        halves = [trimesh.creation.box((20, 18, 8)).apply_translation((x, 0, -4)) for x in (-10.0, 10.0)]
+        floor = mesh_shape(trimesh.boolean.union(halves, engine="manifold"))
+    scene = Scene(clearance=1.0).add("floor", floor).add("box", shapes.box((6, 6, 6)), translation(0.3, 1.0, 3.0 + gap))
+    (row,) = check(scene).pairs
+    assert row.verdict is Verdict.CONTACT or abs(size - 0.01) < 1e-8
+    assert row.distance.lower - 1e-8 <= gap <= row.distance.upper + 1e-8
 
 
 def test_a_mesh_wholly_inside_another_overlaps_and_one_in_its_cavity_does_not():

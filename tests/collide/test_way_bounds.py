@@ -42,13 +42,13 @@ def holds_on_way(a, b, way, start, until=1.0):
     assert_lower_on_way(low, a, b, [pose_at(way, t * until, start) for t in np.linspace(0.0, 1.0, 5)], cells=2000)
 
 
-@settings(SLOW, max_examples=20)
+@settings(SLOW, max_examples=10)
 @given(st.sampled_from(DRAWN), st.sampled_from(DRAWN), ways, poses(30.0), st.sampled_from([1.0, 0.3]))
 def test_no_time_of_a_stretch_is_below_its_bound(a, b, way, start, until):
     holds_on_way(a, b, way, start, until)
 
 
-@settings(SLOW, max_examples=25)
+@settings(SLOW, max_examples=10)
 @given(
     st.floats(0.5, 4.0),
     st.floats(4.0, 20.0),
@@ -77,7 +77,7 @@ def test_a_cylinder_that_turns_near_a_plate(radius, length, angle, beside, axis,
         assert low <= least + 1e-9
 
 
-@settings(SLOW, max_examples=25)
+@settings(SLOW, max_examples=10)
 @given(
     st.floats(1.0, 30.0), st.floats(0.3, 3.0), st.floats(0.5, 3.0), st.booleans(), st.booleans(), st.floats(0.0, 1.0)
 )
@@ -106,7 +106,7 @@ def test_least_distances_and_first_contacts(a, b, way, start):
     assert_motion(first_contact(a, b, way, start), a, b, way, start, first=True, tolerance=1e-5, cells=1500, times=5)
 
 
-@settings(SLOW, max_examples=15)
+@settings(SLOW, max_examples=6)
 @given(
     st.builds(SweptArc, st.floats(5.0, 15.0), st.floats(0.3, 2.8), st.floats(5.0, 40.0)),
     st.builds(Cylinder, st.floats(1.0, 8.0), st.floats(2.0, 60.0)),

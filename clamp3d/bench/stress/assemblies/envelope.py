@@ -195,12 +195,15 @@ class Envelope:
         return np.maximum(*(up.thickness - (v / c - (x - self.bolt_x) * s / c) for x in (left, right)))
 
     def overlap(self, q: Array) -> float:
-        """Deepest overlap in mm of a state of `section`, measured along y; 0 if there is none."""
+        """Deepest overlap in mm of a state of `section`, measured along y (beside a splint: or x); 0 if none."""
         tilt = np.array([q[5] / self.lever])
         worst = [float(self.faces(tilt)[0] - q[4]), abs(float(q[5])) - self.lever * self.limit]
         for i, wire in enumerate(self.wires):
             x, y = np.array([[q[2 * i]]]), float(q[2 * i + 1])
-            worst += [float(wire.over(x)[0, 0]) - y, y - float(q[4] + wire.under(x, tilt)[0, 0])]
+            corner = float(wire._place(wire.side * wire.half_down, wire.down.face, tilt)[0][0, 0])
+            beyond = wire.side * (float(q[2 * i]) - corner)
+            below = y - float(q[4] + wire.under(x, tilt)[0, 0])
+            worst += [float(wire.over(x)[0, 0]) - y, min(below, wire.r - beyond) if beyond > 0.0 else below]
             worst.append(wire.side * (wire.inner - float(q[2 * i])))
         return max(0.0, *worst) if not any(map(math.isnan, worst)) else math.inf
 

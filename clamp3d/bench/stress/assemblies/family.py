@@ -150,21 +150,21 @@ class AssemblyFamily(Family):
     def __init__(self, name: str, about: str, make: Callable[[np.random.Generator], Case]) -> None:
         super().__init__(name, about, lambda rng, n: Assemblies([make(rng) for _ in range(n)], np.arange(n)))
 
-    def truths(self, cases: Assemblies) -> _Truths:
+    def truths(self, cases: Assemblies) -> Truths:
         """See `Family`."""
-        return _Truths(cases)
+        return Truths(cases)
 
-    def difference(self, cases: Assemblies, truths: _Truths, i: int) -> float:
+    def difference(self, cases: Assemblies, truths: Truths, i: int) -> float:
         """No truth is worked out twice here."""
         return 0.0
 
-    def ask(self, name: str, cases: Assemblies, truths: _Truths, time_limit: float) -> Answers:
+    def ask(self, name: str, cases: Assemblies, truths: Truths, time_limit: float) -> Answers:
         """See `Family`; all solvers work in this process, and their states are kept."""
         solver = METHODS[name][1]()
         truths.rests = solver.rests
         return run_here(solver, cases, None if name == REFERENCE else time_limit)
 
-    def judge(self, name: str, cases: Assemblies, truths: _Truths, answers: Answers) -> Outcome:
+    def judge(self, name: str, cases: Assemblies, truths: Truths, answers: Answers) -> Outcome:
         """See the module; ``answers`` are those of the solver that was asked last."""
         n = len(cases)
         d, error, missed, near = (np.full(n, np.nan) for _ in range(4))
@@ -183,12 +183,12 @@ class AssemblyFamily(Family):
         cases = self.cases(n, seed)
         truth = ", ".join(
             repr(m.d) + (" (shallow)" if not m.firm else " (a wire slips out)" if m.slipped else "")
-            for m in _Truths(cases)[i][1]
+            for m in Truths(cases)[i][1]
         )
         return f"{snippet(cases.cases[i])}\n{_AS_PYTHON}# truth: equilibria at d = {truth} mm"
 
 
-class _Truths(dict[int, tuple[Envelope, list[Minimum]]]):
+class Truths(dict[int, tuple[Envelope, list[Minimum]]]):
     """Envelope and equilibria of each case, worked out when first asked for; ``rests`` are the answers to judge."""
 
     def __init__(self, cases: Assemblies) -> None:
@@ -202,6 +202,7 @@ class _Truths(dict[int, tuple[Envelope, list[Minimum]]]):
         return self[i]
 
     def nearest(self, i: int, d: float) -> float:
+        """The distance of the equilibrium that is nearest to ``d``; NaN if there is none."""
         return min((found.d for found in self[i][1]), key=lambda found: abs(found - d), default=float("nan"))
 
     def error(self, i: int, rest: Rest) -> float:

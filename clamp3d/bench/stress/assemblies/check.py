@@ -1,0 +1,147 @@
+"""Random clamps of all dimensions, closed by every command and judged by means that know nothing of the solver."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.bench.stress.assemblies.clamps import Case, whole_clamp
+from clamp3d.bench.stress.assemblies.family import EXACT, Assemblies, Rest, Truths
+from clamp3d.bench.stress.assemblies.outlines import Outlines
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.dimensions import Clamp, Joints, Wire
+from clamp3d.clamp.equilibria import equilibria
+from clamp3d.clamp.final_state import FinalState, solve_final_state
+from clamp3d.clamp.placement import Placement
+from clamp3d.clamp.section import WIRES, D, Section
+from clamp3d.clamp.sensitivity import sensitivity
+from clamp3d.clamp.tolerance import monte_carlo
+from clamp3d.core.pose import Array
+from clamp3d.errors import InputError, SolverError, without_numbers
+
+OPTIMISER = 1e-5
+"""Mm to which the optimiser on points agrees."""
+FORCES = 1e-4
+"""To this part of the bolt force a force agrees with the work that it does."""
+_PLAY = Joints(hole=True, saddle=True, washer=True)
+_WIDER = 1e-5
+"""By how much a wire's radius changes, in parts of it."""
+
+
+@dataclass
+class Score:
+    """``asked`` counts of each check, the ``worst`` of each, and ``findings``: (number of the clamp, what is wrong)."""
+
+    asked: Counter[str] = field(default_factory=Counter)
+    worst: dict[str, float] = field(default_factory=dict)
+    findings: list[tuple[int, str]] = field(default_factory=list)
+
+    def note(self, k: int, what: str, error: float, allowed: float) -> None:
+        """Count a check of clamp ``k``; not a number is a finding too."""
+        self.asked[what] += 1
+        self.worst[what] = max(self.worst.get(what, 0.0), error)
+        if not error <= allowed:
+            self.findings.append((k, f"{what}: {error:.3g}"))
+
+
+def check_clamps(
+    n: int, seed: int, first: int = 0, listen: Callable[[int, Score], None] = lambda k, score: None
+) -> Score:
+    """Check ``n`` random clamps from number ``first`` on.
+
+    All are closed by every command, each third by an optimiser, and each sixth has its equilibria from a grid.
+    """
+    score = Score()
+    for k in range(first, first + n):
+        rng = np.random.default_rng([seed, k])
+        clamp = whole_clamp(rng)
+        final = one_answer(score, k, clamp)
+        if final is not None and k % 3 == 0:
+            for joints in (Joints(), _PLAY):
+                optimised(score, k, replace(clamp, joints=joints))
+            forces(score, k, clamp, final)
+        if k % 6 == 0:
+            grid(score, k, whole_clamp(rng, major=0.0))
+        listen(k, score)
+    return score
+
+
+def one_answer(score: Score, k: int, clamp: Clamp) -> FinalState | None:
+    """The final state that every command gives; None if every command says that there is none."""
+    try:
+        final = solve_final_state(Section(clamp, Cas()))
+    except SolverError as error:
+        score.note(k, f"refused ({error})", np.inf, 0.0)
+        return None
+    run = assemble(clamp)
+    score.asked["clamped" if run.clamped else "not clamped"] += 1
+    score.note(k, "run", abs(run.closing - float(final.q[D])), 0.0)
+    many = monte_carlo(clamp, n=1, tolerance=0.0, wire_tolerance_percent=0.0)
+    said = [(many.nominal if run.clamped else None), float(many.distance[0]) if run.clamped else None]
+    score.note(k, "tolerance", float(said != [run.distance if run.clamped else None] * 2), 0.0)
+    clash = " overlaps " in run.status  # only what is measured in three dimensions tells it
+    score.note(k, "reasons", float(not clash and many.status[0] != without_numbers(run.status)), 0.0)
+    for name, ask in (("sensitivity", sensitivity), ("sweep", Placement)):
+        try:
+            ask(clamp)
+            answered = True
+        except (InputError, SolverError) as error:
+            answered = "not clamped" not in str(error)
+        score.note(k, name, float(answered != run.clamped), 0.0)
+    return final
+
+
+def optimised(score: Score, k: int, clamp: Clamp) -> None:
+    """The distance against that of the optimiser on sampled outlines."""
+    play = "with play" if clamp.joints.hole else "without play"
+    try:
+        q = solve_final_state(Section(clamp, Cas())).q
+    except SolverError as error:
+        score.note(k, f"refused {play} ({error})", np.inf, 0.0)
+        return
+    least, overlap = Outlines(clamp).lowest(q)
+    score.note(k, f"optimiser {play}", max(abs(least - float(q[D])), overlap), OPTIMISER)
+
+
+def forces(score: Score, k: int, clamp: Clamp, final: FinalState) -> None:
+    """A thicker wire lifts the distance by the forces on it times what its radius grows: virtual work."""
+    for key, wire in zip(("line", "jumper"), WIRES, strict=True):
+        if wire in final.loose:
+            continue
+        r = getattr(clamp, key).radius
+        starts, sections = [], []
+        for more in (-_WIDER * r, _WIDER * r):
+            thicker: Any = {key: Wire(diameter=2.0 * (r + more))}
+            sections.append(Section(replace(clamp, **thicker), Cas()))
+            starts.append(_opened(sections[-1], final.q))
+        if starts[0] is None or starts[1] is None:
+            score.asked["forces not asked: no room to open"] += 1
+            continue
+        ends = [solve_final_state(section, start).q[D] for section, start in zip(sections, starts, strict=True)]
+        pushed = sum(m for m, pair in zip(final.multipliers, final.gaps.pair, strict=True) if wire in pair)
+        score.note(k, "forces", abs((ends[1] - ends[0]) / (2.0 * _WIDER * r) - float(pushed)), FORCES)
+
+
+def _opened(section: Section, q: Array) -> Array | None:
+    """The state opened as far as the wires have room for in their grooves, at most by 0.04 mm; None if they jam."""
+    for lift in 0.04 * 0.25 ** np.arange(8):
+        opened = q.copy()
+        opened[D] += lift
+        opened[[1, 3]] += 0.5 * lift
+        if section.gaps(opened).value.min() > 0.0:
+            return opened
+    return None
+
+
+def grid(score: Score, k: int, clamp: Clamp) -> None:
+    """All equilibria of a clamp of minor arcs against those of a grid of tilts."""
+    states = equilibria(Section(clamp, Cas()))
+    truths = Truths(Assemblies([Case(clamp)], np.arange(1)))
+    rest = Rest(states[0].q, tuple(state.q for state in states))
+    score.note(k, "equilibria at rest", truths.error(0, rest), EXACT)
+    score.note(k, "equilibria named", float(np.isfinite(truths.missed(0, rest))), 0.0)

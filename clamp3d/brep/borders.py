@@ -1,0 +1,133 @@
+"""The edges of a face as its triangles see them: how far they bulge, and triangles split until that is little."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.brep.surfaces import OTHER, PLANE, Size, from_sides
+from clamp3d.core.mesh import Array, IntArray
+
+BORDER = 0.0003
+"""Largest sag (mm) of a border that is not split: where two parts touch their borders decide."""
+_MOST = 64
+_SAFETY = 2.0
+"""Factor on deviations that are sampled, not computed: of edges that are no lines or circles."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Borders:
+    """Pieces of a face's edges: ``nodes`` (k, 2) of the face at their ends, and how far each bulges, ``sag`` (k,) mm.
+
+    Each is ``count`` finer pieces: its points begin at row ``start`` of ``points`` (n, 3), the sags of its parts at the
+    same row of ``fine`` (n,).
+    """
+
+    nodes: IntArray
+    sag: Array
+    count: IntArray
+    start: IntArray
+    points: Array
+    fine: Array
+
+    @classmethod
+    def joined(cls, edges: list[Borders]) -> Borders:
+        """Those of all edges of a face."""
+        before = np.cumsum([0] + [len(edge.points) for edge in edges])
+        start = [edge.start + n for edge, n in zip(edges, before, strict=False)]
+        columns = ([getattr(edge, name) for edge in edges] for name in ("nodes", "sag", "count", "points", "fine"))
+        nodes, sag, count, points, fine = (np.concatenate(column) for column in columns)
+        return cls(nodes, sag, count, np.concatenate(start), points, fine)
+
+    @classmethod
+    def of(cls, edge: Any, at: IntArray, t: Array, ends: Array, kind: int, frame: Array, size: Size) -> Borders:
+        """Of one edge, with the face's nodes ``at`` (k + 1,) at its parameters ``t`` and places ``ends``."""
+        from OCP.BRepAdaptor import BRepAdaptor_Curve
+
+        curve = BRepAdaptor_Curve(edge)
+        sag = _sags(curve, t, ends, kind, frame, size)
+        count = np.ceil(np.sqrt(sag / BORDER)).clip(1, _MOST if kind != OTHER else 1).astype(np.int64)
+        start = np.cumsum(count) - count
+        points, fine = ends, sag
+        if (count > 1).any():
+            step = np.arange(count.sum()) - np.repeat(start, count)
+            along = np.append(np.repeat(t[:-1], count) + step * np.repeat(np.diff(t) / count, count), t[-1])
+            points = np.array([curve.Value(float(x)).Coord() for x in along])
+            points[start], points[-1] = ends[:-1], ends[-1]
+            fine = _sags(curve, along, points, kind, frame, size)
+        return cls(np.column_stack([at[:-1], at[1:]]), sag, count, start, points, np.append(fine, 0.0))
+
+    def at_sides(self, F: IntArray, n: int) -> IntArray:
+        """Row of the piece that each triangle's side is (m, 3), of triangles of ``n`` nodes; -1 for none."""
+        pairs = np.sort(self.nodes, axis=1)
+        keys = pairs[:, 0] * n + pairs[:, 1]
+        order = np.lexsort((-self.sag, keys))  # of two with the same ends the larger sag
+        side = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=2), axis=2)
+        wanted = side[:, :, 0] * n + side[:, :, 1]
+        row = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
+        return np.asarray(np.where(keys[row] == wanted, row, -1))
+
+    def split(self, F: IntArray, rows: IntArray, P: Array) -> tuple[Array, Array, IntArray]:
+        """Triangles F (m, 3) of nodes P cut into fans at the sides ``rows`` (m, 3) that bulge.
+
+        Returns their corners (k, 3, 3), the sags of their sides (k, 3) and the triangle that each came from (k,).
+        """
+        sag = np.where(rows >= 0, self.sag[rows], 0.0)
+        corners, origin = P[F], np.arange(len(F))
+        forward = self.nodes[rows, 0] == F
+        for s in range(3):
+            parts = np.where(rows[:, s] >= 0, self.count[rows[:, s]], 1)
+            while True:
+                made = self._fans(s, parts, corners, rows, forward[:, s], sag)
+                turned = np.einsum("ij,ij->i", _normals(made[0]), _normals(corners)[made[1]]) < 0.0
+                if not turned.any():
+                    break
+                parts[made[1][turned]] = 1  # too slim for its arc: it stays as it is
+            corners, source, rows, sag = made
+            forward, origin = forward[source], origin[source]
+        return corners, sag, origin
+
+    def _fans(
+        self, s: int, parts: IntArray, corners: Array, rows: IntArray, forward: NDArray[np.bool_], sag: Array
+    ) -> tuple[Array, IntArray, IntArray, Array]:
+        """Each triangle as ``parts`` (m,) ones along its side ``s``, and the triangle that each came from."""
+        source = np.repeat(np.arange(len(parts)), parts)
+        step = np.arange(len(source)) - np.repeat(np.cumsum(parts) - parts, parts)
+        corners, rows, sag = corners[source], rows[source], sag[source]
+        cut = parts[source] > 1
+        left = parts[source] - 1 - step
+        low = self.start[rows[:, s]] + np.where(forward[source], step, left)
+        ends = np.column_stack([low, low + 1])[cut]
+        ends[~forward[source][cut]] = ends[~forward[source][cut]][:, ::-1]
+        corners[cut, s], corners[cut, (s + 1) % 3] = self.points[ends[:, 0]], self.points[ends[:, 1]]
+        sag[cut, s] = self.fine[low[cut]]
+        for inner, side in ((left > 0, (s + 1) % 3), (step > 0, (s + 2) % 3)):
+            sag[cut & inner, side], rows[cut & inner, side] = 0.0, -1
+        return corners, source, rows, sag
+
+
+def _normals(corners: Array) -> Array:
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def _sags(curve: Any, t: Array, points: Array, kind: int, frame: Array, size: Size) -> Array:
+    """How far each piece (k,) of an edge can be from the line on the surface that is straight in its parameters, mm."""
+    from OCP.GeomAbs import GeomAbs_CurveType as Kind
+
+    what = curve.GetType()
+    if what == Kind.GeomAbs_Line:
+        return np.zeros(len(points) - 1)
+    turn = 0.5 * np.minimum(np.abs(np.diff(t)), np.pi)
+    if what == Kind.GeomAbs_Circle and kind in (PLANE, OTHER):
+        return np.asarray(curve.Circle().Radius() * (1.0 - np.cos(turn)))
+    if what == Kind.GeomAbs_Ellipse and kind in (PLANE, OTHER):  # a circle stretched: at most by the longer half axis
+        return np.asarray(curve.Ellipse().MajorRadius() * (1.0 - np.cos(turn)))
+    off = np.zeros(len(t) - 1)
+    for share in (0.25, 0.5, 0.75):
+        at = (1.0 - share) * t[:-1] + share * t[1:]
+        true = np.array([curve.Value(float(x)).Coord() for x in at])
+        off = np.maximum(off, from_sides(kind, frame, size, points[:-1], points[1:], true))
+    return np.where(off > 1e-11, _SAFETY * off, 0.0)

@@ -1,0 +1,71 @@
+"""Features of STEP solids are their cylindrical faces: no other face is one, and arcs apart stay apart."""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("OCP")
+sys.path.insert(0, str(Path(__file__).parents[1] / "brep"))
+
+from assemblies import box, cone, cut, fuse, ring, rod, shift, solid_of, write_step
+
+from clamp3d.brep.bodies import Body, Reading
+from clamp3d.brep.solid import BrepSolid
+from clamp3d.fit.cad import cad_features
+from clamp3d.fit.fit import fit_file
+
+
+def features(shape, T=None):
+    solid = BrepSolid.of(solid_of(shape), "part")
+    return cad_features(Reading((Body("part", solid, np.eye(4) if T is None else T),)), "part")
+
+
+@pytest.mark.parametrize(
+    ("shape", "note"), [(cone(2.5, 2.0, 0, 20), "1 cone"), (ring(9, 1.5), "1 torus"), (box((0, 0, 0), (1, 1, 1)), None)]
+)
+def test_what_is_no_cylinder_is_named_and_not_one(shape, note):
+    _, found, notes = features(shape)
+    assert found == []
+    assert notes == ([] if note is None else [f"faces that are no cylinders: {note}"])
+
+
+def test_arcs_apart_on_one_axis_stay_apart():
+    slotted = cut(rod(10, 0, 8), box((-11, -3, -1), (11, 3, 9)), box((-3, -3, -1), (3, 3, 9)))
+    whole = fuse(slotted, rod(5, 0, 8))
+    _, found, _ = features(whole)
+    arcs = [values for sense, values in found if values["radius"] == pytest.approx(10.0)]
+    assert len(arcs) == 2
+    for values in arcs:
+        assert 2.0 * values["half_angle"] == pytest.approx(math.pi - 2.0 * math.asin(0.3), abs=1e-9)
+        assert values["covered_area"] == pytest.approx(2.0 * values["half_angle"] * 10.0 * 8.0)
+        assert values["arc_error"] < 1e-9
+        assert values["length_error"] < 1e-9
+
+
+def test_a_file_gives_holes_grooves_and_cylinders_with_their_places(tmp_path):
+    plate = cut(box((-20, -10, 0), (20, 10, 6)), rod(3, -1, 7, (5, 2)), rod(2, 3, 7, (-8, 0)), rod(4, -1, 7, (20, 0)))
+    result = fit_file(write_step({"plate": plate, "pin": rod(2.5, 0, 30, (60, 0))}, tmp_path / "a.step"))
+    through, blind = result.holes
+    (pin,), (groove,) = result.cylinders, result.grooves
+    assert (through.radius, through.through, blind.radius, blind.through) == (3.0, True, 2.0, False)
+    assert groove.half_angle == pytest.approx(math.pi / 2)
+    for feature, middle, length in (
+        (through, (5, 2, 3), 6), (blind, (-8, 0, 4.5), 3), (pin, (60, 0, 15), 30), (groove, (20, 0, 3), 6),
+    ):  # fmt: skip
+        np.testing.assert_allclose(feature.T_part_feature[:3, 3], middle, atol=1e-9)
+        assert feature.length == pytest.approx(length)
+        assert feature.error_bound < 1e-9
+        assert np.linalg.det(feature.T_part_feature) == pytest.approx(1.0)
+        local = (result.mesh.vertices[result.mesh.faces[feature.faces]] - middle) @ feature.T_part_feature[:3, :3]
+        np.testing.assert_allclose(np.hypot(local[..., 0], local[..., 1]), feature.radius, atol=1e-9)
+        assert np.abs(np.arctan2(local[..., 0], -local[..., 1])).max() <= feature.half_angle + 1e-9
+
+
+def test_a_placed_body_carries_its_features_along():
+    _, ((sense, values),), _ = features(rod(2, 0, 9), shift(1, 2, 3))
+    assert sense == 1.0
+    assert values["half_angle"] == math.pi
+    np.testing.assert_allclose(values["T_part_feature"][:3, 3], (1, 2, 7.5), atol=1e-12)
