@@ -16,10 +16,10 @@ radius = 4
 length = 10
 pose = { translation = [20, 0, 0], rpy_deg = [0, 90, 10] }
 """
-SLOW = {"igl", "manifold3d", "matplotlib", "networkx", "numba", "OCP", "scipy", "shapely", "skimage", "trimesh"}
+SLOW = {"igl", "matplotlib", "networkx", "numba", "OCP", "scipy", "shapely", "skimage", "trimesh"}
 
 
-@pytest.mark.parametrize(("arguments", "needed"), [(("check", "scene.toml"), set()), (("run", "-q"), {"scipy"})])
+@pytest.mark.parametrize(("arguments", "needed"), [(("check", "scene.toml"), set()), (("run", "-q"), set())])
 def test_slow_libraries_are_not_imported(arguments, needed, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
     code = (
