@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
@@ -45,6 +46,8 @@ def test_a_warm_start_of_the_kernel_loads_no_compiler():
 def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path))
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    # A numba that is loaded reads the environment again only while it compiles, after it has chosen the folder.
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     jit._say.cache_clear()
     return tmp_path
 
