@@ -162,6 +162,7 @@ def assert_drawn(page, poses):
 
 
 def go_to(page, number):
+    wait_for(page, f"document.getElementById('marks').children.length > {number}")  # a live page asks for them
     page.evaluate("n => document.getElementById('marks').children[n].click()", number)
     page.wait_for_timeout(100)
 
