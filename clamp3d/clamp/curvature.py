@@ -71,7 +71,8 @@ def lagrangian_hessian(section: Section, q: Array, rows: NDArray[np.intp], multi
         if j < 2 * len(WIRES):  # a wire's own coordinates move no other gap
             wire = WIRES[j // 2]
             own = np.flatnonzero([pair[1] == wire for pair in gaps.pair])
-            which, counted = np.searchsorted(own, rows[np.isin(rows, own)]), np.isin(rows, own)
+            counted = np.isin(rows, own)
+            which = np.searchsorted(own, rows[counted])
             high, low = (section.wire_gaps(q + by, wire).gradient[which] for by in (e, -e))
         else:
             counted = np.ones(len(rows), dtype=bool)

@@ -14,7 +14,7 @@ from clamp3d.checks import flag, function, instance
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check_motions import check_motions
-from clamp3d.collide.depth import penetration
+from clamp3d.collide.depth import is_quick, penetration
 from clamp3d.collide.model import Model, ModelCache, Progress
 from clamp3d.collide.reasons import failure, undecided
 from clamp3d.collide.refine import contained, measured, refine, with_normal
@@ -189,8 +189,7 @@ def _pair(
         return not full and known_well and thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN
 
     pair = x, y, T_ab
-    # Between solids from CAD the search takes seconds a pair: there the depth is asked for by `distance`.
-    quick = x.faces is None or y.faces is None
+    quick = is_quick(x, y)
     try:
         found = refine(*pair, start, thresholds, certain)
         verdict = thresholds.verdict(found, allowance)

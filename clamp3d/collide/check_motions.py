@@ -8,7 +8,7 @@ import numpy as np
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, near_pairs
-from clamp3d.collide.depth import penetration
+from clamp3d.collide.depth import is_quick, penetration
 from clamp3d.collide.model import Model, Progress
 from clamp3d.collide.moving_pair import MovingPair, box_corners, first_time, least_distance
 from clamp3d.collide.reasons import failure, undecided
@@ -64,8 +64,7 @@ def _row(
         verdict = thresholds.verdict(least, allowance)
         deep = with_normal(least)
         if verdict in BAD:
-            quick = pair.a.faces is None or pair.b.faces is None
-            if depths and quick:
+            if depths and is_quick(pair.a, pair.b):
                 deep = penetration(pair.a, pair.b, pair.pose(t), deep)
             deep = replace(deep.of_overlap(), interference=None)  # at another instant they may be deeper
     except MissingLibraryError:

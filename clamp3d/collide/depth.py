@@ -168,6 +168,11 @@ class _Pair:
                 return
 
 
+def is_quick(a: Model, b: Model) -> bool:
+    """Whether a check searches the depth of a pair: of two solids from CAD, where it takes seconds, `distance` does."""
+    return a.faces is None or b.faces is None
+
+
 def penetration(a: Model, b: Model, T: Array, known: Distance) -> Distance:
     """The signed distance of two bodies of which the engine says that they overlap, or may.
 

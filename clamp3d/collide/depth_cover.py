@@ -12,6 +12,7 @@ import numpy as np
 
 from clamp3d.collide.convex import Hull
 from clamp3d.collide.depth_convex import normals_of, supports
+from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 
 _CORNERS = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
@@ -52,14 +53,12 @@ def nearest_behind(planes: Array, start: Array) -> Array:
 
     Lawson and Hanson, *Solving Least Squares Problems*, 1974, problem LDP.
     """
-    from scipy.optimize import nnls
-
     lack = planes[:, 3] - planes[:, :3] @ start
     size = float(np.abs(lack).max())
     if not lack.max() > 0.0:
         return start
     E, goal = np.vstack([planes[:, :3].T, lack / size]), np.array([0.0, 0.0, 0.0, 1.0])
-    r = E @ nnls(E, goal)[0] - goal
+    r = E @ nnls(E, goal) - goal
     return start if abs(r[3]) < 1e-14 else np.asarray(start - size * r[:3] / r[3])
 
 

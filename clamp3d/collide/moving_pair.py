@@ -98,10 +98,10 @@ class MovingPair:
             self._near = self._meeting(mine, other, limit)
         low = self._near.limit
         place = fcl.Transform(back[:3, :3], back[:3, 3])
+        standing = [(fcl.CollisionObject(tree), off) for tree, off in self._near.still]
         for tree, error, speed in self._near.moving:
             moving = fcl.CollisionObject(tree, place)
-            for still, off in self._near.still:
-                fixed = fcl.CollisionObject(still)
+            for fixed, off in standing:
                 d = float(fcl.distance(fixed, moving, fcl.DistanceRequest(), fcl.DistanceResult()))
                 if d <= 0.0:
                     return -np.inf
@@ -117,8 +117,7 @@ class MovingPair:
         moving, still = (v[s.faces] for v, s in zip(placed, (mine, other), strict=True))
         errors = [np.zeros(len(s.faces)) if s.face_error is None else s.face_error for s in (mine, other)]
         ours, theirs = can_meet(motion, (moving, errors[0]), (still, errors[1]), limit)
-        local = moving - motion.point
-        out = np.linalg.norm(local - (local @ motion.axis)[..., None] * motion.axis, axis=2).max(axis=1)
+        out = motion.from_axis(moving).max(axis=1)
         ring = np.zeros(len(out), dtype=int)
         if motion.angle and ours.any():
             ring = np.ceil(4.0 * np.log2(np.maximum(out / max(float(out[ours].min()), 1e-3), 1.0))).astype(int)

@@ -58,7 +58,7 @@ def _nnls(stamp: str) -> Any:
         """Lawson & Hanson, Solving Least Squares Problems (1974), algorithm NNLS; rounds, or -1 where it does not end.
 
         ``order`` (n,): the columns of the set that is not 0, then the others; ``w`` (n,), ``y`` (n,) and
-        ``Q`` (m, n + 1) are room to work in.
+        ``Q`` (m, n + 1) are the workspace.
         """
         stamp  # noqa: B018
         m, n = A.shape

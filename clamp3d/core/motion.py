@@ -117,15 +117,14 @@ class Motion:
         T[:3, :3] = turn @ T[:3, :3]
         return T
 
-    def distance_from_axis(self, points: Array) -> float:
-        """Largest distance (mm) of points (k, 3) from the axis."""
+    def from_axis(self, points: Array) -> Array:
+        """Distances (...) in mm of points (..., 3) from the axis."""
         out = points - self.point
-        out = out - np.outer(out @ self.axis, self.axis)
-        return float(np.linalg.norm(out, axis=1).max())
+        return np.asarray(np.linalg.norm(out - (out @ self.axis)[..., None] * self.axis, axis=-1))
 
     def speed(self, points: Array) -> float:
         """Bound (mm per unit of t) of the speed of points (k, 3), given where they are at the start."""
-        turning = abs(self.angle) * self.distance_from_axis(points) if self.angle else 0.0
+        turning = abs(self.angle) * float(self.from_axis(points).max()) if self.angle else 0.0
         return float(np.linalg.norm(self.travel)) + turning
 
 

@@ -37,7 +37,7 @@ FORMATS = (".svg", ".png", ".pdf")
 
 
 def blank(width: float, height: float) -> Figure:
-    """An empty figure, inch, whose axes make room for what is around them."""
+    """An empty figure, inch, whose axes leave space for what is around them."""
     need("matplotlib", "a drawing")
     from matplotlib.figure import Figure
 

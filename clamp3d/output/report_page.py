@@ -88,9 +88,7 @@ def report_to_dict(report: Report) -> dict[str, Any]:
 def report_csv(report: Report) -> str:
     """One line for each pair at rest, then those in motion, with a header; lengths in mm, vectors as three columns."""
     rows = [dict(_cells(_pair_to_dict(row))) for row in (*report.rows, *report.motions)]
-    head = {
-        key: "" for row in [*rows, dict.fromkeys(("a", "b", "verdict", "distance_mm", "error_bound_mm"))] for key in row
-    }
+    head = dict.fromkeys(key for row in rows for key in row) or ["a", "b", "verdict", "distance_mm", "error_bound_mm"]
     out = io.StringIO()
     writer = csv.DictWriter(out, list(head), restval="", lineterminator="\n")
     writer.writeheader()

@@ -125,7 +125,7 @@ def forces(score: Score, k: int, clamp: Clamp, final: FinalState) -> None:
             sections.append(Section(replace(clamp, **thicker), Cas()))
             starts.append(_opened(sections[-1], final.q))
         if starts[0] is None or starts[1] is None:
-            score.asked["forces not asked: no room to open"] += 1
+            score.asked["forces not asked: the wire jams"] += 1
             continue
         ends = [solve_final_state(section, start).q[D] for section, start in zip(sections, starts, strict=True)]
         pushed = sum(m for m, pair in zip(final.multipliers, final.gaps.pair, strict=True) if wire in pair)
@@ -133,7 +133,7 @@ def forces(score: Score, k: int, clamp: Clamp, final: FinalState) -> None:
 
 
 def _opened(section: Section, q: Array) -> Array | None:
-    """The state opened as far as the wires have room for in their grooves, at most by 0.04 mm; None if they jam."""
+    """The state opened by at most 0.04 mm, and less where the wires would meet their grooves; None if they jam."""
     for lift in 0.04 * 0.25 ** np.arange(8):
         opened = q.copy()
         opened[D] += lift
