@@ -156,9 +156,14 @@ def cut_colours(page, poses):
 
 
 def assert_drawn(page, poses):
-    for name, seen in cut_colours(page, poses).items():
-        colour = [int(PART_COLOURS[name][i : i + 2], 16) for i in (1, 3, 5)]
-        np.testing.assert_allclose(seen, colour, atol=3, err_msg=name)
+    wanted = {name: [int(PART_COLOURS[name][i : i + 2], 16) for i in (1, 3, 5)] for name in CUT}
+    for _ in range(30):  # a busy machine draws the frame later
+        seen = cut_colours(page, poses)
+        if all(np.allclose(seen[name], wanted[name], rtol=0.0, atol=3) for name in CUT):
+            break
+        page.wait_for_timeout(100)
+    for name, colour in wanted.items():
+        np.testing.assert_allclose(seen[name], colour, atol=3, err_msg=name)
 
 
 def go_to(page, number):
