@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+from typing import Any
 
 LONGEST = 900
 """Characters of a message: what a user gave may be longer."""
@@ -51,7 +52,7 @@ class SequenceError(Clamp3dError):
         What blocks each way that was tried, the one that leads furthest first.
     """
 
-    def __init__(self, message: object = "", blocks: tuple[object, ...] = ()) -> None:
+    def __init__(self, message: object = "", blocks: tuple[Any, ...] = ()) -> None:
         super().__init__(message)
         self.blocks = blocks
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
-from clamp3d.checks import choice, function, number
+from clamp3d.checks import choice, function, number, text
 from clamp3d.clamp.closing import HELD, open_start
 from clamp3d.clamp.contact import Contact, measure_contacts, seats
 from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
@@ -56,6 +56,7 @@ def assemble(
     *,
     line: WireSize | None = None,
     jumper: WireSize | None = None,
+    sequence: str | None = None,
     solver: Solver = "exact",
     step: float = STEP,
     tilt_step: float = TILT_STEP,
@@ -75,6 +76,8 @@ def assemble(
         How grooves are measured; by default `Cas`, the exact arcs.
     line, jumper : str or float, optional
         Wires in place of the clamp's own: catalogue name, or diameter in mm.
+    sequence : str, optional
+        Order of assembly in place of the clamp's own, in the paper's notation (see `clamp3d.clamp.sequence`).
     solver : {"exact", "stepped", "bisection"}
         How the closed position is found.
     step, tilt_step : float
@@ -99,6 +102,8 @@ def assemble(
         For bad settings, dimensions or sequence.
     SolverError
         If an answer cannot be proven.
+    SequenceError
+        If a step of the sequence is blocked.
 
     Examples
     --------
@@ -107,6 +112,8 @@ def assemble(
     ('clamped', 31.53)
     """
     clamp = load_clamp(clamp, line=line, jumper=jumper)
+    if sequence is not None:
+        clamp = replace(clamp, sequence=text("sequence", sequence))
     model = Cas() if model is None else model
     choice("solver", solver, ("exact", "stepped", "bisection"))
     check_model(model)
@@ -117,14 +124,14 @@ def assemble(
     function("on_waypoint", on_waypoint)
     function("progress", progress)
     steps = parse_sequence(clamp.sequence)
-    sequence, published = [step.name for step in steps], as_published(steps)
+    names, published = [step.name for step in steps], as_published(steps)
     section = Section(clamp, model)
     log = Log(section, on_waypoint)
     opened = section.open_state(section.open_distance() + open_by, open_tilt)
     start = open_start(section, open_by=open_by, open_tilt=open_tilt)
     if published:
-        approach_line(section, opened, start, sequence[0], log)
-        insert_jumper(section, opened, start, sequence[1], log)
+        approach_line(section, opened, start, names[0], log)
+        insert_jumper(section, opened, start, names[1], log)
     final: FinalState | SteppedState
     met: Meetings = []
     if solver == "exact":
@@ -141,8 +148,8 @@ def assemble(
     by_hand = [(pair, q) for pair, q in met if not q[[B, W]].any()]
     taken = [(pair, q) for pair, q in met if q[[B, W]].any()]
     if published:
-        close_splints(section, start, held, by_hand, sequence[2], log)
-        travel = tighten_nut(section, start, held, final.q, taken, sequence[3], log)
+        close_splints(section, start, held, by_hand, names[2], log)
+        travel = tighten_nut(section, start, held, final.q, taken, names[3], log)
     else:
         travel = follow(section, steps, Closing(start, held, final.q, by_hand, taken), log)
     poses = section_poses(section, final.q)
@@ -153,7 +160,7 @@ def assemble(
     for c in contacts:  # what touches in the end though no force says when
         if c.gap <= resolution and (c.declared or c.type) not in (0, 1) and (c.a, c.b) not in found:
             log.events.append(Event(closes, c.a, c.b, c.relation, c.point, float(start[D] - held[D])))
-    log.events.sort(key=lambda e: (sequence.index(e.step), e.travel))
+    log.events.sort(key=lambda e: (names.index(e.step), e.travel))
     queries = section.queries.contact  # what the assembly itself asked, without the other equilibria
     proof = (final.violation, final.optimality) if isinstance(final, FinalState) else (None, None)
     motion_steps = final.motion_steps if isinstance(final, SteppedState) else 0
