@@ -160,7 +160,7 @@ class _Plan:
                     if last is None or not moves:
                         continue
                     (low, high), (other_low, other_high) = boxes[a], boxes[b]
-                    if (low >= other_high).any() or (high <= other_low).any():
+                    if max((low - other_high).max(), (other_low - high).max()) >= 0.5 * SPARE:
                         continue
                     origin = self.legs[last][-1][0]
                     axis, sign = int(np.argmax(np.abs(DIRECTIONS[origin]))), sum(DIRECTIONS[origin])
