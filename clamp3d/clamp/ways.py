@@ -1,7 +1,7 @@
 """The way by which parts come to their place, found by taking them out: straight, or with one bend.
 
 What comes out on a way comes in on it (assembly by disassembly). A way counts as free only if the continuous test of
-the bodies proves that no overlap is deeper than `CONTACT` anywhere on it; touching is free.
+the bodies proves that no overlap on it is deeper than that test resolves (1e-4 mm); touching is free.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ _BENDS = (0.5, 0.25, 0.75)
 """Where a way out bends, in parts of how far the parts can go before they meet something."""
 _LOOKS = (0.5, 0.25, 0.125, 0.0625, 0.03125)
 """Where a way is looked at before it is proven: most ways that are blocked show it."""
-_SHORTEST = 0.01
-"""Shortest leg of a way, mm."""
+_SHORTEST = 0.5
+"""Shortest leg of a way with a bend, mm."""
 _THRESHOLDS = Thresholds(CONTACT)
 
 Leg = tuple[str, float]
@@ -106,8 +106,10 @@ class Ways:
             if self._free(todo, place, np.zeros(3), origin, length):
                 return ((origin, length + SPARE),)
         for origin, length in ways:
+            if not self._free(todo, place, np.zeros(3), origin, min(length, _SHORTEST / _BENDS[1])):
+                continue
             free = length * self._first(todo, place, np.zeros(3), _out(origin, length))[0]
-            for part in _BENDS if _BENDS[1] * free >= _SHORTEST else ():
+            for part in _BENDS:
                 corner = _out(origin, part * free)
                 for then, more in self._outward(pairs, place, corner):
                     if np.dot(_out(then), _out(origin)) == 0.0 and self._free(todo, place, corner, then, more):
@@ -138,7 +140,7 @@ class Ways:
                 break
             if self._apart(pair, place, start, t * by):
                 continue
-            part = first_time(self._moving(pair, place, start, t * by), 1.0, _THRESHOLDS, -CONTACT)
+            part = first_time(self._moving(pair, place, start, t * by), 1.0, _THRESHOLDS, -ACCURACY)
             if part < 1.0:
                 t, met = part * t, pair
         return t, met
@@ -151,8 +153,8 @@ class Ways:
                 continue
             moving = self._moving(pair, place, start, by)
             if (
-                any(moving.ask(t, _known, _THRESHOLDS).upper < -CONTACT for t in _LOOKS)
-                or first_time(moving, 1.0, _THRESHOLDS, -CONTACT) < 1.0
+                any(moving.ask(t, _known, _THRESHOLDS).upper < -ACCURACY for t in _LOOKS)
+                or first_time(moving, 1.0, _THRESHOLDS, -ACCURACY) < 1.0
             ):
                 pairs.remove(pair)
                 pairs.insert(0, pair)
@@ -207,7 +209,7 @@ class Ways:
 
 def _known(found: Distance) -> bool:
     """Whether bounds say on which side of an overlap a distance is."""
-    return found.upper < -CONTACT or found.lower > -CONTACT
+    return found.upper < -ACCURACY or found.lower >= -ACCURACY
 
 
 def _out(origin: str, length: float = 1.0) -> Array:

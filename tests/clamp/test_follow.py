@@ -8,10 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 
+from clamp3d.baselines.cas import Cas
+from clamp3d.bench.stress.assemblies.clamps import whole_clamp
 from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
+from clamp3d.clamp.section import Section
+from clamp3d.clamp.steps import section_poses
 from clamp3d.clamp.ways import DIRECTIONS, Ways, way_out
 from clamp3d.core.meshing import mesh
 from clamp3d.errors import SequenceError
@@ -163,6 +168,16 @@ def test_a_blocked_step_names_pair_place_and_instant(sequence, step, pair, trave
     assert (first.a, first.b) == pair
     assert f"t = {first.travel / first.way:.4f}" in str(refused.value)
     assert travel is None or first.travel == pytest.approx(travel, abs=1e-3)
+
+
+def test_a_splint_that_rests_on_the_line_beside_the_middle_of_its_groove_comes_from_above():
+    """The last 1e-4 mm of a way onto a slope are proven by where it ends."""
+    section = Section(whole_clamp(np.random.default_rng([0, 9])), Cas())
+    place = {name: pose.T() for name, pose in section_poses(section, open_start(section)).items()}
+    groove = section.pairs["P1", "P6"]
+    assert abs(place["P1"][0, 3] + groove.T_a_groove[0, 3]) > 0.1  # not above the line
+    ((origin, _),) = Ways(section.clamp).find([("P1", "P6")], place)
+    assert origin == "from above"
 
 
 def test_the_nut_comes_down_on_the_bolts_end_and_blocks_the_splint_below_it():
