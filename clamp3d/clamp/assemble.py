@@ -135,9 +135,9 @@ def assemble(
             final = solve_bisection(section, resolution=RESOLUTION, step=step, tilt_step=tilt_step, progress=progress)
         held = final.q
         met = first_touch(section, start, float(start[D] - held[D]))
-    by_hand = [(pair, q) for pair, q in met if not q[[B, W]].any()]
+    by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
     close_splints(section, start, held, by_hand, sequence[2], log)
-    taken = [(pair, q) for pair, q in met if q[[B, W]].any()]
+    taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
     travel = tighten_nut(section, start, held, final.q, taken, sequence[3], log)
     poses = section_poses(section, final.q)
     contacts = measure_contacts(clamp, poses, model, cache=log.cache)

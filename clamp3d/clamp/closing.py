@@ -17,7 +17,7 @@ import numpy as np
 
 from clamp3d.clamp.curvature import lagrangian_hessian
 from clamp3d.clamp.matrix import Pair
-from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, W
+from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, U, V, W
 from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 from clamp3d.core.roots import root
@@ -28,7 +28,7 @@ STRIDE = 0.01
 CLOSING = np.eye(SIZE)[D]
 """What the bolt does: it lowers d."""
 
-HELD = (0, 1, 2, 3, D, S)
+HELD = (0, 1, 2, 3, D, S, U)
 """Coordinates that move while the down splint is closed by hand: what play the joints have the nut takes up."""
 OnContact = Callable[[Pair, Array], None]
 """Told a pair and the state when the pair first carries force."""
@@ -40,6 +40,8 @@ STILL = 1e-9
 _STEPS, _ROUNDS = 2000, 12
 _SETTLED, _OVERLAP = 1e-3, 1e-8
 """A step is found when a round moves it by this part of a stride, and it overlaps by no more than this part."""
+_UPHILL = 1e-6
+"""Rise of what a step makes least, over its length, that is rounding: in parts of a stride."""
 _SLOW = 16.0
 """A step that is longer than so many strides is one near rest."""
 _FULL = 1e-9
@@ -97,7 +99,7 @@ def descend(
         new, new_gaps, force = found
         speed = float(np.abs(new - q).max()) / h
         if on_contact is not None:
-            for pair in dict.fromkeys(new_gaps.pair[k] for k in np.flatnonzero(force > _AT_REST)):
+            for pair in dict.fromkeys(new_gaps.pair[k] for k in np.flatnonzero(force[:-1] > _AT_REST)):
                 if pair not in loaded:
                     loaded.add(pair)
                     on_contact(pair, _meeting(section, q, gaps, goal, moving, h, longest, pair, new))
@@ -133,7 +135,7 @@ def _meeting(
             found = _step(section, q, gaps, goal, moving, part * h, longest, without=pair)
             states[part] = new if found is None else found[0]
         at = section.gaps(states[part])
-        return float(min(v for v, p in zip(at.value, at.pair, strict=True) if p == pair))
+        return float(min(v for v, p in zip(at.value[:-1], at.pair[:-1], strict=True) if p == pair))
 
     if gap(0.0) <= 0.0:
         return q
@@ -153,11 +155,11 @@ def _step(
 ) -> tuple[Array, Gaps, Array] | None:
     """State after a step of ``h`` from q, its gaps and forces; None if the linearised gaps do not lead there.
 
-    The gaps of the pair ``without`` do not count.
+    The gaps of the pair ``without`` do not count, but for the saddle's arc: it carries from the outset.
     """
     target = q - h * goal
     at, force = q, np.zeros(len(gaps.value))
-    ignored = np.array([pair == without for pair in gaps.pair]) if without else np.zeros(len(force), dtype=bool)
+    ignored = np.array([without is not None and pair == without for pair in gaps.pair[:-1]] + [False])
     for k in range(_ROUNDS):
         if h <= _SLOW * longest or k == 1:
             bend = _bend(section, at, gaps, force, moving, exact=h > _SLOW * longest)
@@ -179,9 +181,12 @@ def _step(
         force[near] = pushed / h
         least = float(gaps.value[~ignored].min())
         if (np.abs(move).max() <= _SETTLED * longest and least >= -_OVERLAP * longest) or (
-            not len(near) and least >= 0.0
+            not pushed.any() and least >= 0.0
         ):
-            return at, gaps, force
+            # A step that ends higher than it began is another local minimum's: the way there is no motion.
+            way = at - q
+            uphill = 0.5 * float(way @ way) + h * float(goal @ way) > _UPHILL * h * longest
+            return None if uphill else (at, gaps, force)
     return None
 
 
@@ -214,7 +219,7 @@ def _bend(section: Section, q: Array, gaps: Gaps, force: Array, moving: list[int
         )
         return np.asarray((axes * np.maximum(size, 0.0)) @ axes.T)
     found = np.zeros((SIZE, SIZE))
-    found[W, W] = section.lift(float(q[W]))[2] * float(force @ gaps.gradient[:, D])
+    found[W, W] = max(0.0, section.lift(float(q[W]))[2]) * force[-1] * gaps.normal[-1, 1]
     pose = section.down_splint(q)
     c, s = math.cos(pose.angle), math.sin(pose.angle)
     for k in np.flatnonzero(force):
@@ -228,8 +233,8 @@ def _bend(section: Section, q: Array, gaps: Gaps, force: Array, moving: list[int
         if splint == "P2":
             u, v = float(pair.T_a_groove[0, 3]), -float(pair.T_a_groove[2, 3])
             ox, oy = u * c + v * s, v * c - u * s
-            along[D], along[S] = -ty, (ty * ox - tx * oy) / section.lever
-            along[B] = along[W] = -tx
+            along[D], along[U], along[S] = -ty, ty, (ty * ox - tx * oy) / section.lever
+            along[B] = along[V] = along[W] = -tx
         slack = max(abs(pair.groove.radius - pair.cylinder.radius), _FULL * pair.groove.radius)
         found += force[k] / slack * np.outer(along, along)
     return found[np.ix_(moving, moving)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.clamp.section import SIZE, WIRES, Gaps, Section
+from clamp3d.clamp.section import SIZE, WIRES, Gaps, Section, U
 from clamp3d.core.pose import Array
 
 LEVEL = 1e-6
@@ -60,12 +60,17 @@ def touched(section: Section, gaps: Gaps, rows: NDArray[np.intp]) -> NDArray[np.
 
 
 def lagrangian_hessian(section: Section, q: Array, rows: NDArray[np.intp], multipliers: Array) -> Array:
-    """Second derivatives (8, 8) of goal - multipliers . gaps by central differences of the closed-form gradients."""
+    """Second derivatives (10, 10) of goal - multipliers . gaps by central differences of the closed-form gradients.
+
+    Those by u are left 0 where the saddle's arc is among the ``rows``: no motion that keeps them closed changes u.
+    """
     # A wire that nearly fills its groove turns its normal within R - r: the step must be short beside that.
     h = min(1e-4, max(1e-8, 0.03 * section.least_slack))
     H = np.zeros((SIZE, SIZE))
     gaps = section.gaps(q)
     for j in touched(section, gaps, rows):
+        if j == U and len(gaps.value) - 1 in rows:
+            continue
         e = np.zeros(SIZE)
         e[j] = h
         if j < 2 * len(WIRES):  # a wire's own coordinates move no other gap

@@ -17,7 +17,7 @@ from clamp3d.clamp.closing import CLOSING, HELD, STILL, STRIDE, OnContact, desce
 from clamp3d.clamp.curvature import LEVEL, lagrangian_hessian, least_curvature, rounding_of_normals, touched
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
-from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section
+from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section, U
 from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
@@ -48,11 +48,11 @@ class FinalState:
 
     Attributes
     ----------
-    q : ndarray (8,)
+    q : ndarray (10,)
         The state as in `section`.
-    start : ndarray (8,)
+    start : ndarray (10,)
         Where its closing began.
-    held : ndarray (8,)
+    held : ndarray (10,)
         Where the path was when the down splint, closed by hand, came to rest: before the nut takes up the joints' play.
     gaps : Gaps
         All gaps at q.
@@ -95,12 +95,12 @@ def solve_final_state(
     Parameters
     ----------
     section : Section
-    start : ndarray (8,), optional
+    start : ndarray (10,), optional
         Where closing begins; by default `open_start`, which every command begins from.
     stride : float
         Longest move of a step in parts of the down splint's half width.
     on_contact : callable, optional
-        Called with each pair of parts and the state (8,) when the pair first carries force.
+        Called with each pair of parts and the state (10,) when the pair first carries force.
 
     Raises
     ------
@@ -192,6 +192,8 @@ def _perturb(section: Section, q: Array, attempt: int) -> Array:
         new[D] += step
         if gaps.pair[k][0] == "P1":  # opening does not help the wire out of the up splint
             new[:4] -= gaps.value[k] * gaps.gradient[k, :4]
+        elif gaps.pair[k] == ("P2", "P3"):  # nor the down splint out of the saddle
+            new[U] -= gaps.value[k]
     return new
 
 

@@ -28,7 +28,7 @@ _MOVES = 100_000
 
 @dataclass(frozen=True, slots=True)
 class SteppedState:
-    """Last free position ``q`` (8,) as in `section`, its gaps, and ``motion_steps``: positions tried (M of Table 5)."""
+    """Last free position ``q`` (10,) of `section`, its gaps, and ``motion_steps``: positions tried (M of Table 5)."""
 
     q: Array
     gaps: Gaps

@@ -12,13 +12,13 @@ from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.motion import travel_to_contact
 from clamp3d.clamp.result import Event, Waypoint
-from clamp3d.clamp.section import SIZE, WIRES, B, D, S, Section, W
+from clamp3d.clamp.section import SIZE, WIRES, B, D, S, Section, U, V, W
 from clamp3d.collide.model import ModelCache
 from clamp3d.core.pose import Array, SectionPose
 
 Poses = dict[PartName, SectionPose]
 Meetings = list[tuple[Pair, Array]]
-"""Pairs of parts, each with the state (8,) in which they meet."""
+"""Pairs of parts, each with the state (10,) in which they meet."""
 _SPARE = 20.0
 """Free way in mm between a wire and the open clamp before it comes in."""
 
@@ -128,7 +128,7 @@ def section_poses(section: Section, q: Array, saddle_d: float | None = None) -> 
     return {
         "P1": SectionPose(x, y),
         "P2": SectionPose(x + down.x, y + down.y, down.angle),
-        "P3": SectionPose(bolt_x + section.on_bolt(q), saddle_y),
+        "P3": SectionPose(bolt_x + float(q[V]), saddle_y),
         "P4": SectionPose(bolt_x, bolt_y),
         "P5": SectionPose(bolt_x, y - clamp.nut.height),
         "P6": SectionPose(0.0, 0.0),
@@ -143,8 +143,9 @@ def saddle_rise(section: Section, q: Array, saddle_d: float) -> float:
 
 
 def _saddle_lift(section: Section, q: Array, lift: float = 0.0) -> float:
-    """How far above P2's origin the saddle's arc centre, rising from ``lift``, is when it meets the round back; mm."""
-    pair, aside = section.pairs["P3", "P2"], float(q[W]) - section.on_bolt(q)
+    """How far above P2's origin the saddle's arc centre, rising from ``lift``, ends: where it meets the round back, or
+    u below that; mm."""
+    pair, aside = section.pairs["P3", "P2"], float(q[W])
     for _ in range(100):
         section.queries.contact += 1
         back = SectionPose(aside, lift, float(q[S]) / section.lever)
@@ -152,4 +153,4 @@ def _saddle_lift(section: Section, q: Array, lift: float = 0.0) -> float:
         if abs(gap) <= 1e-12 * section.clamp.saddle.radius:
             break
         lift += gap
-    return lift
+    return lift - float(q[U])

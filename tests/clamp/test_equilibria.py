@@ -54,7 +54,7 @@ def test_every_equilibrium_is_proven_and_holds_when_closed_again():
     for state in equilibria(section):
         assert max(state.violation, state.optimality) <= TOLERANCE
         assert section.gaps(state.q).value.min() >= -TOLERANCE
-        opened = state.q + 1e-3 * np.array([0.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0])
+        opened = state.q + 1e-3 * np.array([0.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
         if section.gaps(opened).value.min() >= 0.0:
             assert solve_final_state(section, opened, stride=1e-4).q[4:] == pytest.approx(state.q[4:], abs=1e-8)
 
