@@ -196,27 +196,25 @@ def _project(offset: Array, hessian: Array, A: Array, value: Array, scale: float
     A least-distance problem, solved by non-negative least squares [Lawson & Hanson, Solving Least Squares Problems,
     1974, chapter 23].
     """
-    L = np.linalg.cholesky(hessian)
-    z0 = np.linalg.solve(L, offset)
+    back = np.linalg.inv(np.linalg.cholesky(hessian))
+    z0 = back @ offset
     if not len(A):
-        return -np.linalg.solve(L.T, z0), np.zeros(0)
-    G = np.linalg.solve(L, A.T).T
+        return -z0 @ back, np.zeros(0)
+    G = A @ back.T
     lower = (G @ z0 - value) / scale
     u = nnls(np.vstack([G.T, lower]), np.append(np.zeros(len(offset)), 1.0))
     rest = 1.0 - float(lower @ u)
     if not rest > 1e-12:
         return None, u
     multipliers = u / rest * scale
-    return np.linalg.solve(L.T, G.T @ multipliers - z0), multipliers
+    return (multipliers @ G - z0) @ back, multipliers
 
 
 def _bend(section: Section, q: Array, gaps: Gaps, force: Array, moving: list[int], *, exact: bool) -> Array:
     """Curvature of the loaded gaps: on a short step that which keeps a wire, or the round back, in the round of its arc
     (force over radius difference), on a long one all there is, by differences."""
     if exact:
-        size, axes = np.linalg.eigh(
-            lagrangian_hessian(section, q, np.flatnonzero(force), force[force > 0.0])[np.ix_(moving, moving)]
-        )
+        size, axes = np.linalg.eigh(lagrangian_hessian(section, q, gaps, force)[np.ix_(moving, moving)])
         return np.asarray((axes * np.maximum(size, 0.0)) @ axes.T)
     found = np.zeros((SIZE, SIZE))
     found[W, W] = max(0.0, section.lift(float(q[W]))[2]) * force[-1] * gaps.normal[-1, 1]

@@ -231,10 +231,15 @@ def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
 
     Of gaps that are one contact the nearest counts: a lip ends the arc and the face beside it, and is in both. Of equal
     ones it is the face's, for the arc's jumps to the other lip when that comes nearer, and its derivatives with it.
+    A lip beside a face that the wire lies on holds nothing back: the wire rolls over it.
     """
     in_set, free = np.abs(gaps.value) <= active, list(section.free)
+    flat = [name.replace("lip", "flat") for name in gaps.feature]
     for i, j in itertools.combinations(np.flatnonzero(in_set), 2):
-        if gaps.pair[i] == gaps.pair[j] and np.abs(gaps.gradient[i] - gaps.gradient[j]).max() <= _ONE_CONTACT:
+        if gaps.pair[i] != gaps.pair[j]:
+            continue
+        beside = flat[i] == flat[j] and flat[i].startswith("flat")
+        if beside or np.abs(gaps.gradient[i] - gaps.gradient[j]).max() <= _ONE_CONTACT:
             in_set[i if gaps.value[i] >= gaps.value[j] else j] = False
     multipliers = np.zeros(len(gaps.value))
     if in_set.any():
@@ -257,7 +262,7 @@ def _polish(section: Section, q: Array, active: float, least: float) -> tuple[Ar
         rows = np.flatnonzero((multipliers > 0.0) | overlapping)
         free = touched(section, gaps, rows)
         if step > _ACTIVE:  # nearer it does not change any more
-            hessian = lagrangian_hessian(section, q, rows, multipliers[rows])
+            hessian = lagrangian_hessian(section, q, gaps, multipliers)
         A = gaps.gradient[rows]
         k, n = len(rows), len(free)
         kkt = np.block([[hessian[np.ix_(free, free)], -A[:, free].T], [A[:, free], np.zeros((k, k))]])

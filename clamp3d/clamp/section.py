@@ -64,6 +64,8 @@ _Rows = tuple[Array, Array, Array, tuple[Pair, ...], tuple[str, ...], Array, Arr
 """Values, gradients, derivatives (k, 3) by the down splint's x, y and angle, pairs, features, points, normals."""
 _Row = tuple[float, tuple[float, ...], tuple[float, float, float], Pair, str, tuple[float, float], tuple[float, float]]
 _NONE = (0.0, 0.0, 0.0)
+_RIGHT_DOWN = np.array([1.0, -1.0])
+"""Times a part's X and Z: its section coordinates."""
 
 
 @dataclass
@@ -216,48 +218,44 @@ class Section:
 
     def wire_gaps(self, q: Array, wire: PartName) -> Gaps:
         """Gaps of one wire to both splints, every piece of the contact model, and to the bolt."""
-        return self._moved(q, [self._wire_rows(q, wire)])
+        return self._moved(q, [self._wire_rows(q, wire, self._down(q))])
 
     def gaps(self, q: Array) -> Gaps:
         """All gaps at a state: both wires, faces, stops."""
-        rows = [self._wire_rows(q, wire) for wire in WIRES]
-        return self._moved(q, [*rows, self._face_rows(q), self._stop_rows(q)])
+        down = self._down(q)
+        wires = [self._wire_rows(q, wire, down) for wire in WIRES]
+        return self._moved(q, [*wires, self._face_rows(down), self._stop_rows(q, down)])
 
     def _moved(self, q: Array, rows: list[_Rows]) -> Gaps:
         """Rows joined, with what moves the down splint written out in the state's coordinates."""
         values, gradients, by, pairs, features, points, normals = zip(*rows, strict=True)
-        gradient = np.concatenate(gradients)
-        by_x, by_y, by_angle = np.concatenate(by).T
-        gradient[:, D] += by_y
-        gradient[:, S] += by_angle / self.lever
-        gradient[:, B] += by_x
-        gradient[:, V] += by_x
-        gradient[:, W] += by_x - self.lift(float(q[W]))[1] * by_y
-        gradient[:, U] -= by_y
+        gradient = np.concatenate(gradients) + np.concatenate(by) @ self._down_by(float(q[W]))
         point, normal = np.concatenate(points), np.concatenate(normals)
         return Gaps(np.concatenate(values), gradient, sum(pairs, ()), sum(features, ()), point, normal)
 
-    def _wire_rows(self, q: Array, wire: PartName) -> _Rows:
+    def _down_by(self, w: float) -> Array:
+        """Derivatives (3, 10) of the down splint's x, y and angle by q."""
+        found = np.zeros((3, SIZE))
+        found[0, B : W + 1] = found[1, D] = 1.0
+        found[1, W], found[1, U], found[2, S] = -self.lift(w)[1], -1.0, 1.0 / self.lever
+        return found
+
+    def _wire_rows(self, q: Array, wire: PartName, pose: tuple[float, float, float]) -> _Rows:
         i = 2 * WIRES.index(wire)
-        x, y = float(q[i]), float(q[i + 1])
-        px, py, angle = self._down(q)
+        x, y = q[i : i + 2].tolist()
+        px, py, angle = pose
         c, s = math.cos(angle), math.sin(angle)
         dx, dy = x - px, y - py
-        T_up = np.array([[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -y], [0.0, 0.0, 0.0, 1.0]])
-        T_down = np.array(
-            [[c, 0.0, s, dx * c - dy * s], [0.0, 1.0, 0.0, 0.0], [-s, 0.0, c, -(dx * s + dy * c)], [0.0, 0.0, 0.0, 1.0]]
-        )
-        up = self._trimmed("P1", wire, T_up)
-        down = self._trimmed("P2", wire, T_down)
-        self.queries.contact += 2
+        up = self._pieces("P1", wire, x, y)
+        down = self._pieces("P2", wire, dx * c - dy * s, dx * s + dy * c, c, s)
         k, n = len(up.distance), len(up.distance) + len(down.distance)
         value, by, point = np.empty(n + 1), np.zeros((n + 1, 3)), np.empty((n + 1, 2))
         gradient = np.zeros((n + 1, SIZE))
         value[:k], value[k:n] = up.distance, down.distance
-        gradient[:k, i], gradient[:k, i + 1] = up.normal[:, 0], -up.normal[:, 2]
-        point[:k, 0], point[:k, 1] = up.point[:, 0], -up.point[:, 2]
+        gradient[:k, i : i + 2] = up.normal[:, ::2] * _RIGHT_DOWN
+        point[:k] = up.point[:, ::2] * _RIGHT_DOWN
         # Of the down splint's normals and points the section components in its own axes (right, down), then in P1's.
-        normal, arm = down.normal[:, ::2] * (1.0, -1.0), down.point[:, ::2] * (1.0, -1.0)
+        normal, arm = down.normal[:, ::2] * _RIGHT_DOWN, down.point[:, ::2] * _RIGHT_DOWN
         turn = np.array([[c, -s], [s, c]])
         gradient[k:n, i : i + 2] = normal @ turn
         by[k:n, :2] = -gradient[k:n, i : i + 2]
@@ -272,10 +270,43 @@ class Section:
         pair: tuple[Pair, ...] = (("P1", wire),) * k + (("P2", wire),) * (n - k) + (("P4", wire),)
         return value, gradient, by, pair, (*up.feature, *down.feature, "shank"), point, gradient[:, i : i + 2].copy()
 
-    def _trimmed(self, splint: PartName, wire: PartName, T: Array) -> Pieces:
-        """The model's pieces, with the faces ended at the splint's outer edge: the groove's material has no end."""
+    def wire_curvature(self, q: Array, splint: PartName, wire: PartName, force: Array, h: float) -> Array:
+        """Second derivatives (10, 10) by q of ``force`` (k,) times a wire's gaps to a splint.
+
+        The normals turn with the wire's place (u, v) in the splint's own axes: differences over ``h`` mm. How u and v
+        follow from q is written out.
+        """
+        i = 2 * WIRES.index(wire)
+        px, py, angle = self._down(q) if splint == "P2" else (0.0, 0.0, 0.0)
+        c, s = math.cos(angle), math.sin(angle)
+        turn = np.array([[c, -s], [s, c]])
+        u, v = (turn @ (q[i : i + 2] - (px, py))).tolist()
+
+        def push(u: float, v: float) -> Array:
+            return np.asarray(force @ self._pieces(splint, wire, u, v, c, s).normal[:, ::2] * _RIGHT_DOWN)
+
+        turning = np.column_stack([push(u + h, v) - push(u - h, v), push(u, v + h) - push(u, v - h)]) / (2.0 * h)
+        by_q, found = np.zeros((2, SIZE)), np.zeros((SIZE, SIZE))
+        by_q[:, i : i + 2] = turn
+        if splint == "P2":
+            by_q += np.column_stack([-turn, (-v, u)]) @ self._down_by(float(q[W]))
+            along, deep = push(u, v)
+            found[S] = (deep * by_q[0] - along * by_q[1]) / self.lever
+            found += found.T
+            found[S, S] *= 0.5
+            found[W, W] += self.lift(float(q[W]))[2] * (along * turn[0, 1] + deep * turn[1, 1])
+        return by_q.T @ turning @ by_q + found
+
+    def _pieces(self, splint: PartName, wire: PartName, u: float, v: float, c: float = 1.0, s: float = 0.0) -> Pieces:
+        """The model's pieces for a wire at (u, v) in the splint's own axes (right, down), which is turned by (c, s).
+
+        The faces end at the splint's outer edge: the groove's material has no end.
+        """
         pair = self.pairs[splint, wire]
-        found = self.model.pieces(pair, T)
+        self.queries.contact += 1
+        found = self.model.pieces(
+            pair, np.array([c, 0.0, s, u, 0.0, 1.0, 0.0, 0.0, -s, 0.0, c, -v, 0.0, 0.0, 0.0, 1.0]).reshape(4, 4)
+        )
         half, face, out = (
             (self.bolt_x, self.clamp.up_splint.thickness, 1.0)
             if splint == "P1"
@@ -283,16 +314,16 @@ class Section:
         )
         middle = self.bolt_x if splint == "P1" else 0.0
         side = -1.0 if wire == "P6" else 1.0
-        beyond = side * (float(T[0, 3]) - middle) - half
+        beyond = side * (u - middle) - half
         if beyond <= 0.0:
             return found
-        above = max(out * (-float(T[2, 3]) - face), 0.0)
+        above = max(out * (v - face), 0.0)
         gap = math.hypot(beyond, above)
         distance, point, normal = found.distance.copy(), found.point.copy(), found.normal.copy()
         k = int(np.argmin(distance))
         distance[distance < gap - pair.cylinder.radius] = _FAR
         distance[k] = gap - pair.cylinder.radius
-        point[k] = (middle + side * half, 0.0, -face if above else float(T[2, 3]))
+        point[k] = (middle + side * half, 0.0, -face if above else -v)
         normal[k] = (side * beyond / gap, 0.0, -out * above / gap)
         feature = tuple(EDGE if i == k else name for i, name in enumerate(found.feature))
         return Pieces(distance, point, normal, feature)
@@ -303,12 +334,12 @@ class Section:
         The splints are taken as their rectangles here (convex object collision, type 2 of the paper). The gap between
         two straight faces is least at an end of their overlap.
         """
-        return self._moved(q, [self._face_rows(q)])
+        return self._moved(q, [self._face_rows(self._down(q))])
 
-    def _face_rows(self, q: Array) -> _Rows:
+    def _face_rows(self, pose: tuple[float, float, float]) -> _Rows:
         up, down = self.clamp.up_splint, self.clamp.down_splint
         v, half = down.face_depth, self.lever
-        px, py, angle = self._down(q)
+        px, py, angle = pose
         c, s = math.cos(angle), math.sin(angle)
         value, by, point, normal = [], [], [], []
         for side in (-1.0, 1.0):
@@ -335,7 +366,7 @@ class Section:
             np.array(normal),
         )
 
-    def _stop_rows(self, q: Array) -> _Rows:
+    def _stop_rows(self, q: Array, pose: tuple[float, float, float]) -> _Rows:
         """What ends the down splint's tilt and slide, and carries it.
 
         Its underside on the saddle's edges, its slot on the shank (Table 2 of the paper), the joints' play, and its
@@ -343,7 +374,7 @@ class Section:
         """
         clamp, down, saddle, joints = self.clamp, self.clamp.down_splint, self.clamp.saddle, self.clamp.joints
         r = clamp.bolt.diameter / 2
-        (px, py, angle), (b, v, w, u) = self._down(q), q[B:].tolist()
+        (px, py, angle), (b, v, w, u) = pose, q[B:].tolist()
         c, s = math.cos(angle), math.sin(angle)
         axis, half = self.bolt_x + b, down.slot_width / 2
         hole, washer = self.play
