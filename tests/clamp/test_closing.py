@@ -57,6 +57,13 @@ def test_the_end_does_not_depend_on_the_length_of_a_step() -> None:
         assert ends[0] == pytest.approx(ends[1], abs=1e-7)
 
 
+def test_two_states_do_not_take_turns() -> None:
+    """A long step from one rest on a lip led to the next one, higher, and back, 2000 times."""
+    clamp = replace(whole_clamp(np.random.default_rng([0, 20])), joints=Joints(hole=True, saddle=True, washer=True))
+    final = solve_final_state(Section(clamp, Cas()))
+    assert Outlines(clamp).lowest(final.q)[0] == pytest.approx(float(final.q[D]), abs=1e-5)
+
+
 def test_gradients_agree_with_differences_where_joints_have_play_and_wires_leave_the_faces() -> None:
     rng = np.random.default_rng(16)
     clamp = replace(load_clamp(), joints=Joints(hole=True, saddle=True, washer=True))

@@ -10,6 +10,8 @@ from click.testing import CliRunner
 from clamp3d import assemble, load_clamp
 from clamp3d.baselines.cas import Cas
 from clamp3d.bench.stress.assemblies.clamps import clamp_of
+from clamp3d.bench.stress.assemblies.envelope import Envelope
+from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.clamp.equilibria import describe, equilibria
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.section import Section
@@ -39,6 +41,15 @@ def test_oversize_wires_rest_on_all_lips():
         "jumper on a lip of the up splint and a lip of the down splint"
     )
     assert not section.escaped(states[0].q)
+
+
+def test_a_lip_holds_nothing_beside_the_face_that_a_wire_lies_on():
+    """Between faces 2e-8 rad from parallel a wire creeps over the lip and falls into the groove."""
+    clamp = ASSEMBLIES["assembly: tilt limit"].cases(50, 0).cases[45].clamp
+    envelope, states = Envelope(clamp), equilibria(Section(clamp, Cas()))
+    assert len(states) == 2
+    for state in states:
+        assert envelope.falls(state.q) <= 1e-8
 
 
 def test_a_symmetric_clamp_has_its_equilibria_in_mirrored_pairs():
