@@ -41,8 +41,6 @@ STILL = 1e-9
 _STEPS, _ROUNDS = 2000, 12
 _SETTLED, _OVERLAP = 1e-3, 1e-8
 """A step is found when a round moves it by this part of a stride, and it overlaps by no more than this part."""
-_UPHILL = 1e-6
-"""Rise of what a step makes least, over its length, that is rounding: in parts of a stride."""
 _SLOW = 16.0
 """A step that is longer than so many strides is one near rest."""
 _FULL = 1e-9
@@ -158,10 +156,7 @@ class _Motion:
             if (np.abs(move).max() <= _SETTLED * longest and least >= -_OVERLAP * longest) or (
                 not pushed.any() and least >= 0.0
             ):
-                # A step that ends higher than it began is another local minimum's: the way there is no motion.
-                way = at - q
-                uphill = 0.5 * float(way @ way) + h * float(self.goal @ way) > _UPHILL * h * longest
-                return None if uphill else (at, gaps, force)
+                return at, gaps, force
         return None
 
     def meeting(self, q: Array, gaps: Gaps, h: float, pair: Pair, new: Array) -> Array:

@@ -57,8 +57,8 @@ def test_the_end_does_not_depend_on_the_length_of_a_step() -> None:
         assert ends[0] == pytest.approx(ends[1], abs=1e-7)
 
 
-def test_two_states_do_not_take_turns() -> None:
-    """A long step from one rest on a lip led to the next one, higher, and back, 2000 times."""
+def test_a_saddle_with_play_on_the_bolt_comes_to_rest() -> None:
+    """Taken as following the splint it had a kink at the end of its play, on both sides of which steps took turns."""
     clamp = replace(whole_clamp(np.random.default_rng([0, 20])), joints=Joints(hole=True, saddle=True, washer=True))
     final = solve_final_state(Section(clamp, Cas()))
     assert Outlines(clamp).lowest(final.q)[0] == pytest.approx(float(final.q[D]), abs=1e-5)
