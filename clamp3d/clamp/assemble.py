@@ -12,7 +12,7 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import choice, function, number, text
 from clamp3d.clamp.closing import HELD, open_start
-from clamp3d.clamp.contact import Contact, measure_contacts, seats
+from clamp3d.clamp.contact import Contact, seats
 from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
 from clamp3d.clamp.equilibria import describe, equilibria, same, start_tilts
 from clamp3d.clamp.final_state import FinalState, solve_final_state
@@ -153,7 +153,7 @@ def assemble(
     else:
         travel = follow(section, steps, Closing(start, held, final.q, by_hand, taken), log)
     poses = section_poses(section, final.q)
-    contacts = measure_contacts(clamp, poses, model, cache=log.cache)
+    contacts = log.contacts(poses)
     resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
     found = {(e.a, e.b) for e in log.events}
     closes = next(step.name for step in steps if step.kind != "bring")

@@ -133,7 +133,7 @@ def _faces(section: Section, tilt: float) -> float:
     """Least d at which the inner faces do not overlap."""
     q = np.zeros(SIZE)
     q[S] = section.lever * tilt
-    return float(-section.face_gaps(q).value.min())
+    return -section.face_gap(q)
 
 
 def _open(section: Section, q: Array) -> Array | None:

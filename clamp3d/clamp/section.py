@@ -328,13 +328,13 @@ class Section:
         feature = tuple(EDGE if i == k else name for i, name in enumerate(found.feature))
         return Pieces(distance, point, normal, feature)
 
-    def face_gaps(self, q: Array) -> Gaps:
-        """Gaps between the inner faces, at both ends of their overlap.
+    def face_gap(self, q: Array) -> float:
+        """The least gap between the inner faces, at an end of their overlap; mm.
 
         The splints are taken as their rectangles here (convex object collision, type 2 of the paper). The gap between
         two straight faces is least at an end of their overlap.
         """
-        return self._moved(q, [self._face_rows(self._down(q))])
+        return float(self._face_rows(self._down(q))[0].min())
 
     def _face_rows(self, pose: tuple[float, float, float]) -> _Rows:
         up, down = self.clamp.up_splint, self.clamp.down_splint
