@@ -1,8 +1,8 @@
 """Triangles of an Open CASCADE solid, each with a bound of its distance from the face that it stands for.
 
 Open CASCADE takes a deflection as a wish. What the triangles really keep is computed afterwards from their parameters:
-on planes, cylinders, cones, spheres and tori (and free-form surfaces that are one of these) in closed form, on others
-from samples, doubled.
+on planes, cylinders, cones, spheres and tori (and free-form surfaces that are one of these) in closed form, on extruded
+splines from their control points, on others from samples, doubled.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.brep.borders import BORDER, Borders
+from clamp3d.brep.borders import BORDER, Borders, spline_sags
 from clamp3d.brep.grid import divisions, gridded
 from clamp3d.brep.surfaces import (
     OTHER,
@@ -218,7 +218,7 @@ def _facets(
     In rows, where its border allows it; of a free-form face only what is extruded.
     """
     from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.GeomAbs import GeomAbs_SurfaceType
+    from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
 
     surface, made = BRepAdaptor_Surface(face), None
     uv = np.array([found.UVNode(i).Coord() for i in range(1, len(P) + 1)])
@@ -238,7 +238,13 @@ def _facets(
         P = np.concatenate([P, np.reshape([surface.Value(u, v).Coord() for u, v in new.tolist()], (-1, 3))])
     # Two nodes a whole turn apart are at one place: a triangle of theirs can stand for all round it.
     own = np.where(_spread(uv[F], turns) & (made is None), np.linalg.norm(np.ptp(P, axis=0)), 0.0)
-    return F, P, np.maximum(own, _sampled(surface, F, uv, P)) if kind == OTHER else own
+    if kind != OTHER:
+        return F, P, own
+    off = None
+    if regular and surface.BasisCurve().GetType() == GeomAbs_CurveType.GeomAbs_BSplineCurve:
+        u = uv[F, 0]
+        off = spline_sags(surface.BasisCurve().BSpline(), u.min(axis=1), u.max(axis=1))
+    return F, P, np.maximum(own, _sampled(surface, F, uv, P) if off is None else off)
 
 
 def _spread(uv: Array, turns: Array) -> NDArray[np.bool_]:
