@@ -228,10 +228,11 @@ def test_a_hole_that_just_breaks_through_a_face(depth, gap):
 
 
 def test_witnesses_lie_on_the_bodies_where_meshes_decide():
-    """A disc on edge in a tube: no closed form, so the meshes have the last word."""
-    disc, tube = shapes.cylinder(1.5, 0.5), shapes.cylinder(8.0, 10.0, bore=5.0)
+    """A coin of many corners on edge in a tube: no closed form, so the meshes have the last word."""
+    tube, turn = shapes.cylinder(8.0, 10.0, bore=5.0), np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    outline = Profile.of(*((1.5 * math.cos(x), 1.5 * math.sin(x)) for x in turn.tolist()))
     T = translation(3.0, 0.4, 0.3) @ rotation([1, 0.3, 0.2], 1.1)
-    d = distance(tube, disc, T)
+    d = distance(tube, shapes.Solid("coin", (Extrusion(outline, "Z", -0.25, 0.25),)), T)
     assert "meshes" in d.method
     assert np.linalg.norm(d.point_b - d.point_a) == pytest.approx(d.value, abs=1e-9)
     assert d.point_a + d.value * d.normal == pytest.approx(d.point_b, abs=1e-9)
