@@ -71,7 +71,7 @@ def distance(
     """
     T = np.eye(4) if T_a_b is None else check_pose(T_a_b, "T_a_b")
     x, y = _bounded(a, b, T[None])
-    return _measured(cache or ModelCache(), x, y, T, positive("accuracy", accuracy), model)
+    return _measured(_checked(cache, model), x, y, T, positive("accuracy", accuracy), model)
 
 
 def distances(
@@ -109,7 +109,7 @@ def distances(
     [0.5, 0.3]
     """
     T = check_pose_array(T_a_b, "T_a_b")
-    cache = cache or ModelCache()
+    cache = _checked(cache, model)
     shapes = _bounded(a, b, T)
     x, y = (cache.model(shape) for shape in shapes)
     found: list[Distance | None] = [None] * len(T) if model is not None else by_kernel(x, y, T)
@@ -156,7 +156,7 @@ def measure(
     """
     instance("scene", scene, Scene)
     accuracy = positive("accuracy", accuracy)
-    cache = cache or ModelCache()
+    cache = _checked(cache, model)
     asked = (
         itertools.combinations([part.name for part in scene.parts], 2) if pairs is None else name_pairs("pairs", pairs)
     )
@@ -166,6 +166,16 @@ def measure(
         T = inverse(first.T_world) @ second.T_world
         found[a, b] = _measured(cache, first.shape, second.shape, T, accuracy, model).moved(first.T_world)
     return found
+
+
+def _checked(cache: ModelCache | None, model: ContactModel | None) -> ModelCache:
+    """The cache, or a new one. Raises InputError for what is neither a cache nor a contact model."""
+    if model is not None:
+        instance("model", model, ContactModel)
+    if cache is None:
+        return ModelCache()
+    instance("cache", cache, ModelCache)
+    return cache
 
 
 def _measured(cache: ModelCache, a: Shape, b: Shape, T: Array, accuracy: float, model: ContactModel | None) -> Distance:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array
@@ -25,6 +25,7 @@ class Pieces:
     feature: tuple[str, ...]
 
 
+@runtime_checkable
 class ContactModel(Protocol):
     """One way to measure a `GroovePair`; all models answer the same questions on the same parts."""
 

@@ -103,12 +103,12 @@ class Motion:
     def at(self, t: float, start: Array | None = None) -> Array:
         """Pose (4, 4) at time ``t`` of a body that stands at ``start`` (4, 4; the origin by default) at t = 0.
 
-        Raises InputError unless ``t`` is a finite number, at most 1e6 times as far as the motion.
+        Raises InputError unless all are finite numbers and ``t`` at most 1e6 times as far as the motion.
         """
         t = number("t", t)
         if not abs(t) <= _LATEST:
             raise InputError(f"t must be from 0 to 1 (or at most {_LATEST:g} times as far), got {t}")
-        T = np.eye(4) if start is None else start.copy()
+        T = np.eye(4) if start is None else array("start", start, (4, 4)).copy()
         # The turn minus one: what does not move is not rounded.
         turn = np.eye(3)
         if self.angle:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from clamp3d import checks
 from clamp3d.brep.mesh_file import load_bodies, load_mesh
 from clamp3d.checks import function, instance
 from clamp3d.core.mesh import Array, Mesh
@@ -99,8 +100,9 @@ def fit_file(
     MissingLibraryError
         For STEP without the extra ``step``.
     """
-    if Path(path).suffix.lower() in (".step", ".stp"):
-        mesh, found, notes = cad_features(load_bodies(path, unit=unit), Path(path).name)
+    file = checks.path("path", path)
+    if file.suffix.lower() in (".step", ".stp"):
+        mesh, found, notes = cad_features(load_bodies(file, unit=unit), file.name)
         return _result(mesh, found, mesh.vertices[mesh.faces], notes)
     return fit_mesh(load_mesh(path, unit=unit), progress=progress)
 

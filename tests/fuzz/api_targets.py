@@ -5,15 +5,16 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hypothesis import strategies as st
 
 import clamp3d
 from clamp3d import figures, kernel, shapes
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
+from clamp3d.baselines.meshes import Meshes
 from clamp3d.baselines.wedges import Wedges
 from clamp3d.bench.image import image_study, measure_image
 from clamp3d.bench.legends import table2_figure, table3_figure
@@ -28,561 +29,204 @@ from clamp3d.clamp.section import Section
 from clamp3d.collide.poses import check_poses
 from clamp3d.collide.scene import Allowed
 from clamp3d.core import pose as poses
+from clamp3d.core.meshing import mesh
 from clamp3d.core.motion import Motion
 from clamp3d.core.shapes import FITS
 from clamp3d.output.viewer import Viewer
 from clamp3d.scenefile.file import load_scene
-from tests.fuzz import garbage
-from tests.fuzz.api_values import Rng, pose, pose_batch, rigid
+from tests.fuzz.values import any_pose, pose_batch, rigid
 
-Make = Callable[[Rng, Path], tuple[Callable[..., Any], dict[str, Any]]]
+Target = tuple[Callable[..., Any], dict[str, Any]]
+"""A function, and its arguments or strategies for them; what has a default and is not named gets that."""
 
-RESULTS = {
-    "ArcContact",
-    "Assembly",
-    "Cas",
-    "Clamp",
-    "Distance",
-    "Mesh",
-    "baselines",
-    "bench",
-    "figures",
-    "kernel",
-    "shapes",
-    "testing",
-    "Equilibrium",
-    "ArcRelation",
-    "CheckResult",
-    "CylinderFit",
-    "Distances",
-    "Feature",
-    "GeneralisedGradient",
-    "FitResult",
-    "GrooveFit",
-    "GroovePieces",
-    "GrooveRelation",
-    "HoleContact",
-    "HoleFit",
-    "HoleRelation",
-    "ImageMeasurement",
-    "ImageStudy",
-    "InputError",
-    "MotionDistance",
-    "PairResult",
-    "PoseVerdicts",
-    "Relation3D",
-    "SignedDistance",
-    "SignedDistances",
-    "Verdict",
-}
+_READ = (
+    "ArcContact ArcRelation Assembly Cas CheckResult Clamp CylinderFit Distance Distances Equilibrium Feature "
+    "FitResult GeneralisedGradient GrooveFit GroovePieces GrooveRelation HoleContact HoleFit HoleRelation "
+    "ImageMeasurement ImageStudy InputError Mesh MotionDistance PairResult PoseVerdicts Relation3D "
+    "SignedDistance SignedDistances Verdict baselines bench figures kernel shapes testing "
+)
+RESULTS = set(_READ.split())
 """Public names that a user reads and does not call."""
 
-
-@functools.cache
-def _clamp() -> Any:
-    return load_clamp()
-
-
-@functools.cache
-def _run() -> Any:
-    return assemble(_clamp(), Cas())
-
-
-@functools.cache
-def _models() -> tuple[Any, ...]:
-    from clamp3d.baselines.meshes import Meshes
-    from clamp3d.core.meshing import mesh
-
-    solids = parts(_clamp())
-    return (
-        Cas(),
-        Chords(0.2),
-        Wedges(solids, 0.2),
-        Meshes({name: mesh(solids[name], 0.5) for name in ("P1", "P2", "P3")}),
-    )
+SIZES = st.floats(1.0, 20.0) | st.floats(1.0, 20.0) | st.floats(-6.0, 6.0).map(lambda x: 10.0**x)
+ANGLES, TOLERANCES = st.floats(-4.0, 4.0), st.sampled_from([0.0, 1e-9, 1e-6, 1e-3])
+THREE = st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3)
+GROOVES = st.builds(kernel.SweptArc, SIZES, st.floats(0.05, 3.1), SIZES)
+WIRES = st.builds(kernel.Cylinder, SIZES, SIZES) | st.builds(kernel.Capsule, SIZES, SIZES)
+AXES = THREE.filter(lambda x: np.linalg.norm(x) > 1e-3)
+MOTIONS = st.builds(lambda x: Motion.translate(40.0 * np.array(x)), AXES) | st.builds(
+    lambda axis, angle, point, travel: Motion.screw(axis, angle, point=point, travel=travel),
+    AXES,
+    ANGLES,
+    THREE,
+    ANGLES,
+)
+ABOVE = rigid(5.0).map(lambda T: poses.translation(0.0, 40.0, 0.0) @ T)
+RECTANGLES = st.builds(kernel.Rectangle, ANGLES, ANGLES, SIZES, SIZES, st.floats(-0.5, 0.5))
+MARKS = st.lists(st.lists(st.floats(0.0, 500.0), min_size=2, max_size=2), min_size=2, max_size=2)
+BOX = shapes.box((1, 2, 3))
+FLAT = [[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]]
+FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+one_of = st.sampled_from
 
 
 @functools.cache
-def _scene() -> Any:
+def targets() -> dict[str, Target]:
+    """Everything callable by name."""
+    return {name: target for _, some in groups() for name, target in some.items()}
+
+
+@functools.cache
+def groups() -> tuple[tuple[int, dict[str, Target]], ...]:
+    """What is called, in groups: how often all of a group together, in a hundred calls."""
+    clamp, run, tetrahedron = load_clamp(), assemble(load_clamp(), Cas()), shapes.make_mesh(FLAT, FACES)
+    solids, closing, section = parts(clamp), Placement(clamp), Section(clamp, Cas())
     block = shapes.groove_block(kernel.SweptArc(7.0, 1.0, 50.0), 40.0, 20.0)
-    return clamp3d.Scene(clearance=0.5).add("block", block).add("wire", shapes.cylinder(6.5, 80.0))
-
-
-_TETRAHEDRON = ([[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
-
-
-@functools.cache
-def _mesh() -> Any:
-    return shapes.make_mesh(*_TETRAHEDRON)
-
-
-def size(rng: Rng) -> float:
-    """A length that is good, mostly an ordinary one."""
-    return float(rng.uniform(1.0, 20.0)) if rng.integers(4) else 10.0 ** float(rng.uniform(-6, 6))
-
-
-def _groove(rng: Rng) -> Any:
-    return kernel.SweptArc(size(rng), float(rng.uniform(0.05, 3.1)), size(rng))
-
-
-def _wire(rng: Rng) -> Any:
-    return (kernel.Cylinder if rng.random() < 0.5 else kernel.Capsule)(size(rng), size(rng))
-
-
-def _motion(rng: Rng) -> Any:
-    way = rng.integers(3)
-    if way == 0:
-        return Motion.translate(rng.normal(size=3) * 40.0)
-    travel = 30.0 * float(way - 1)
-    return Motion.screw(rng.normal(size=3), float(rng.uniform(-7, 7)), point=rng.normal(size=3), travel=travel)
-
-
-def _above(rng: Rng) -> Any:
-    return poses.translation(0.0, 40.0, 0.0) @ rigid(rng, 5.0)
-
-
-def _marks(rng: Rng) -> Any:
-    return rng.uniform(0.0, 500.0, (2, 2))
-
-
-def _three(rng: Rng) -> Any:
-    return rng.normal(size=3).tolist()
-
-
-def _stl(folder: Path) -> Path:
-    import trimesh
-
-    trimesh.creation.box((10.0, 8.0, 6.0)).export(folder / "box.stl")
-    return folder / "box.stl"
-
-
-def _model_call(name: str) -> Make:
-    def make(rng: Rng, folder: Path) -> Any:
-        model = garbage.pick(rng, _models())
-        pair = garbage.pick(rng, list(groove_pairs(_clamp()).values())[:4])
-        first = _run().T_world(pair.a)
-        T = np.linalg.inv(first) @ _run().T_world(pair.b)
-        T[:3, :3], T[:3, 3] = np.round(T[:3, :3], 15), T[:3, 3] + rng.normal(size=3)
-        many = name == "distances"
-        value = pose_batch(rng) if many else pose(rng)
-        if rng.integers(2):
-            value = np.array([T] * 3) if many else T
-        if many and np.size(value) > 200:
-            value = value[:10]
-        return getattr(model, name), {"pair": pair, "T_a_b": value}
-
-    return make
-
-
-def _simple(function: Callable[..., Any], **makers: Callable[[Rng], Any]) -> Make:
-    return lambda rng, folder: (function, {name: maker(rng) for name, maker in makers.items()})
-
-
-def _angle(rng: Rng) -> float:
-    return float(rng.uniform(-4.0, 4.0))
-
-
-def _tolerance(rng: Rng) -> float:
-    return float(rng.choice([0.0, 1e-9, 1e-6, 1e-3]))
-
-
-def _fixed(value: Any) -> Callable[[Rng], Any]:
-    return lambda rng: value
-
-
-def _choice(*values: Any) -> Callable[[Rng], Any]:
-    return lambda rng: garbage.pick(rng, values)
-
-
-def _rectangle(rng: Rng) -> Any:
-    return kernel.Rectangle(*rng.normal(size=2), size(rng), size(rng), float(rng.normal(0, 0.3)))
-
-
-def targets() -> dict[str, tuple[float, Make]]:
-    """Everything callable with how often it is called, by name."""
-    vertices, faces = _TETRAHEDRON
-    return {
-        "SweptArc": (
-            5,
-            _simple(kernel.SweptArc, radius=size, half_angle=lambda r: float(r.uniform(0, 3.2)), length=size),
-        ),
-        "Capsule": (1, _simple(kernel.Capsule, radius=size, length=size)),
-        "Cylinder": (3, _simple(kernel.Cylinder, radius=size, length=size)),
-        "generalised_gradient": (
-            5,
-            _simple(kernel.generalised_gradient, groove=_groove, cylinder=_wire, pose=pose),
-        ),
-        "signed_distance": (20, _simple(kernel.signed_distance, groove=_groove, cylinder=_wire, pose=pose)),
-        "signed_distances": (
-            20,
-            _simple(
-                kernel.signed_distances,
-                groove=_groove,
-                cylinder=_wire,
-                poses=pose_batch,
-                full=_choice(True, False),
-                workers=_choice(None, 1, 2),
-            ),
-        ),
-        "groove_pieces": (10, _simple(kernel.groove_pieces, groove=_groove, cylinder=_wire, pose=pose)),
-        "groove_relation": (
-            10,
-            _simple(kernel.groove_relation, groove=_groove, cylinder=_wire, pose=pose, tolerance=_tolerance),
-        ),
-        "relative_pose": (8, _simple(kernel.relative_pose, T_world_a=pose, T_world_b=pose)),
-        "Motion.at": (3, lambda r, f: (_motion(r).at, {"t": float(r.random())})),
+    scene = clamp3d.Scene(clearance=0.5).add("block", block).add("wire", shapes.cylinder(6.5, 80.0))
+    coarse = {name: mesh(solids[name], 0.5) for name in ("P1", "P2", "P3")}
+    models = one_of([Cas(), Chords(0.2), Wedges(solids, 0.2), Meshes(coarse)])
+    pairs = one_of(list(groove_pairs(clamp).values())[:4])
+    asked = one_of([None, [("wire", "block")]])
+    pair_and_pose: dict[str, Any] = {"groove": GROOVES, "cylinder": WIRES, "pose": any_pose()}
+    circle: dict[str, Any] = {"arc_radius": SIZES, "circle_radius": SIZES, "x": ANGLES, "y": ANGLES}
+    way: dict[str, Any] = {"a": GROOVES, "b": WIRES, "motion": MOTIONS, "T_a_b": ABOVE}
+    few = pose_batch().map(lambda T: T[:5] if isinstance(T, np.ndarray) and T.ndim else T)
+    batch = {"groove": GROOVES, "cylinder": WIRES, "poses": pose_batch(), "full": st.booleans()}
+    of_model: dict[str, Any] = {"self": models, "pair": pairs}
+    numbers: dict[str, Target] = {
+        "signed_distance": (kernel.signed_distance, pair_and_pose),
+        "signed_distances": (kernel.signed_distances, {**batch, "workers": one_of([None, 1, 2])}),
+        "groove_pieces": (kernel.groove_pieces, pair_and_pose),
+        "groove_relation": (kernel.groove_relation, {**pair_and_pose, "tolerance": TOLERANCES}),
+        "generalised_gradient": (kernel.generalised_gradient, pair_and_pose),
+        "relative_pose": (kernel.relative_pose, {"T_world_a": any_pose(), "T_world_b": any_pose()}),
+    }
+    small: dict[str, Target] = {
+        "SweptArc": (kernel.SweptArc, {"radius": SIZES, "half_angle": st.floats(0.0, 3.2), "length": SIZES}),
+        "Capsule": (kernel.Capsule, {"radius": SIZES, "length": SIZES}),
+        "Cylinder": (kernel.Cylinder, {"radius": SIZES, "length": SIZES}),
+        "Motion.at": (Motion.at, {"self": MOTIONS, "t": st.floats(0.0, 1.0)}),
         "first_contact": (
-            3,
-            _simple(
-                clamp3d.first_contact,
-                a=_groove,
-                b=_wire,
-                motion=_motion,
-                T_a_b=_above,
-                margin=_choice(0.0, 0.1, -0.1),
-                resolution=_choice(None, 1e-3),
-            ),
+            clamp3d.first_contact,
+            {**way, "margin": one_of([0.0, 0.1, -0.1]), "resolution": one_of([None, 1e-3])},
         ),
-        "min_clearance": (2, _simple(clamp3d.min_clearance, a=_groove, b=_wire, motion=_motion, T_a_b=_above)),
+        "min_clearance": (clamp3d.min_clearance, way),
         "arc_circle": (
-            8,
-            _simple(
-                kernel.arc_circle,
-                arc_radius=size,
-                half_angle=lambda r: float(r.uniform(0, 3.2)),
-                circle_radius=size,
-                x=_angle,
-                y=_angle,
-                tolerance=_tolerance,
-            ),
+            kernel.arc_circle,
+            {**circle, "half_angle": st.floats(0.0, 3.2), "tolerance": TOLERANCES},
         ),
         "classify_arc_circle": (
-            4,
-            _simple(
-                kernel.classify_arc_circle,
-                gap=_angle,
-                arc_radius=size,
-                half_angle=_fixed(1.0),
-                circle_radius=size,
-                x=_angle,
-                y=_angle,
-                tolerance=_tolerance,
-            ),
+            kernel.classify_arc_circle,
+            {**circle, "gap": ANGLES, "half_angle": 1.0, "tolerance": TOLERANCES},
         ),
         "Rectangle": (
-            4,
-            _simple(kernel.Rectangle, x=_angle, y=_angle, half_width=size, half_height=size, angle=_angle),
+            kernel.Rectangle,
+            {"x": ANGLES, "y": ANGLES, "half_width": SIZES, "half_height": SIZES, "angle": ANGLES},
         ),
-        "hole_bolt": (5, _simple(kernel.hole_bolt, hole=_rectangle, bolt=_rectangle, tolerance=_tolerance)),
-        "check_pose": (5, _simple(poses.check_pose, pose=pose)),
-        "rotation": (4, _simple(poses.rotation, axis=_three, angle=_angle)),
-        "translation": (3, _simple(poses.translation, x=_angle, y=_angle, z=_angle)),
-        "SectionPose": (3, _simple(poses.SectionPose, x=_angle, y=_angle, angle=_angle)),
-        "pieces": (8, _model_call("pieces")),
-        "distances": (8, _model_call("distances")),
-        "Chords": (1, _simple(Chords, unit_angle=lambda r: float(r.uniform(0, 3.2)))),
-        "Wedges": (
-            1,
-            _simple(Wedges, parts=_fixed(parts(_clamp())), unit_angle=lambda r: float(r.uniform(0.1, 3.2))),
-        ),
+        "hole_bolt": (kernel.hole_bolt, {"hole": RECTANGLES, "bolt": RECTANGLES, "tolerance": TOLERANCES}),
+        "check_pose": (poses.check_pose, {"pose": any_pose()}),
+        "rotation": (poses.rotation, {"axis": THREE, "angle": ANGLES}),
+        "translation": (poses.translation, {"x": ANGLES, "y": ANGLES, "z": ANGLES}),
+        "SectionPose": (poses.SectionPose, {"x": ANGLES, "y": ANGLES, "angle": ANGLES}),
+        "pieces": (lambda self, pair, T_a_b: self.pieces(pair, T_a_b), {**of_model, "T_a_b": any_pose()}),
+        "distances": (lambda self, pair, T_a_b: self.distances(pair, T_a_b), {**of_model, "T_a_b": few}),
+        "Chords": (Chords, {"unit_angle": st.floats(0.0, 3.2)}),
         "make_mesh": (
-            8,
-            _simple(
-                shapes.make_mesh,
-                vertices=lambda r: (np.array(vertices) * size(r)).tolist(),
-                faces=_fixed(faces),
-                name=_fixed("m"),
-                scale=_choice(1.0, 1000.0),
-                float32=_choice(True, False),
-            ),
+            shapes.make_mesh,
+            {"vertices": SIZES.map(lambda s: (s * np.array(FLAT)).tolist()), "faces": FACES, "float32": st.booleans()},
         ),
-        "load_mesh": (
-            1,
-            lambda r, f: (shapes.load_mesh, {"path": _stl(f), "unit": garbage.pick(r, (None, "mm", "in"))}),
-        ),
-        "fit_file": (1, lambda r, f: (clamp3d.fit_file, {"path": _stl(f), "unit": None, "progress": None})),
-        "fit_mesh": (2, _simple(clamp3d.fit_mesh, mesh=_fixed(_mesh()), progress=_fixed(None))),
-        "MeshShape": (
-            3,
-            _simple(shapes.MeshShape, mesh=_fixed(_mesh()), fit=_choice(*FITS), name=_fixed("m")),
-        ),
-        "Solid": (
-            2,
-            _simple(shapes.Solid, name=_fixed("s"), bodies=_fixed(shapes.box((1, 2, 3)).bodies), holes=_fixed(())),
-        ),
-        "shapes.Hole": (
-            2,
-            lambda r, f: (shapes.Hole, {"radius": 3.0, "at": (1.0, 2.0), "axis": garbage.pick(r, ("y", "z"))}),
-        ),
-        "shapes.cylinder": (3, _simple(shapes.cylinder, radius=size, length=size, bore=_fixed(0.0), name=_fixed("c"))),
-        "shapes.box": (
-            3,
-            _simple(shapes.box, size=lambda r: [size(r) for _ in range(3)], holes=_fixed(()), name=_fixed("b")),
-        ),
+        "MeshShape": (shapes.MeshShape, {"mesh": tetrahedron, "fit": one_of(FITS)}),
+        "Solid": (shapes.Solid, {"name": "s", "bodies": BOX.bodies}),
+        "shapes.Hole": (shapes.Hole, {"radius": 3.0, "at": (1.0, 2.0), "axis": one_of(["y", "z"])}),
+        "shapes.cylinder": (shapes.cylinder, {"radius": SIZES, "length": SIZES}),
+        "shapes.box": (shapes.box, {"size": THREE.map(lambda x: (np.abs(x) + 0.1).tolist())}),
         "shapes.groove_block": (
-            3,
-            _simple(
-                shapes.groove_block,
-                groove=_groove,
-                width=lambda r: 100.0 * size(r),
-                height=lambda r: 100.0 * size(r),
-                others=_fixed(()),
-                holes=_fixed(()),
-            ),
+            shapes.groove_block,
+            {"groove": GROOVES, "width": SIZES.map(lambda s: 100.0 * s), "height": SIZES.map(lambda s: 100.0 * s)},
         ),
-        "Scene": (
-            4,
-            _simple(
-                clamp3d.Scene,
-                parts=_fixed(_scene().parts),
-                contact=_tolerance,
-                clearance=_choice(0.0, 0.5),
-                allowed=_fixed(()),
-                motions=_fixed(()),
-                name=_fixed("s"),
-            ),
-        ),
-        "Scene.of": (
-            2,
-            lambda r, f: (
-                clamp3d.Scene.of,
-                {"parts": {"a": (shapes.box((1, 2, 3)), pose(r))}, "clearance": 0.0, "contact": 0.01},
-            ),
-        ),
-        "Scene.add": (
-            3,
-            lambda r, f: (_scene().add, {"part": "a", "shape": shapes.box((1, 2, 3)), "T_world": pose(r)}),
-        ),
-        "Allowed": (2, _simple(Allowed, a=_fixed("block"), b=_fixed("w*"), overlap=_choice(0.0, 0.1))),
-        "Scene.moved": (2, lambda r, f: (_scene().moved, {"poses": {"wire": pose(r)}})),
-        "load_scene": (1, lambda r, f: (load_scene, {"path": "no.toml"})),
-        "Motion.translate": (2, _simple(Motion.translate, parts=_fixed("wire"), by=_three, name=_fixed("m"))),
+        "Scene": (clamp3d.Scene, {"parts": scene.parts, "contact": TOLERANCES, "clearance": one_of([0.0, 0.5])}),
+        "Scene.of": (clamp3d.Scene.of, {"parts": any_pose().map(lambda T: {"a": (BOX, T)})}),
+        "Scene.add": (scene.add, {"part": "a", "shape": BOX, "T_world": any_pose()}),
+        "Scene.moved": (scene.moved, {"poses": any_pose().map(lambda T: {"wire": T})}),
+        "Allowed": (Allowed, {"a": "block", "b": "w*", "overlap": one_of([0.0, 0.1])}),
+        "load_scene": (load_scene, {"path": "no.toml"}),
+        "Motion.translate": (Motion.translate, {"parts": "wire", "by": THREE}),
         "Motion.screw": (
-            2,
-            _simple(
-                Motion.screw,
-                parts=_fixed("wire"),
-                axis=_three,
-                angle=_angle,
-                point=_three,
-                travel=_angle,
-                name=_fixed("m"),
-            ),
+            Motion.screw,
+            {"parts": "wire", "axis": THREE, "angle": ANGLES, "point": THREE, "travel": ANGLES},
         ),
-        "Motion.to_pose": (2, _simple(Motion.to_pose, parts=_fixed("wire"), to=pose, name=_fixed("m"))),
-        "check": (
-            2,
-            lambda r, f: (
-                clamp3d.check,
-                {
-                    "scene": _scene().moved({"wire": rigid(r)}),
-                    "pairs": garbage.pick(r, (None, [("wire", "block")])),
-                    "full": False,
-                    "distances": False,
-                    "progress": None,
-                    "cache": None,
-                },
-            ),
-        ),
-        "Part": (3, lambda r, f: (clamp3d.Part, {"name": "a", "shape": shapes.box((1, 2, 3)), "T_world": pose(r)})),
+        "Motion.to_pose": (Motion.to_pose, {"parts": "wire", "to": any_pose()}),
+        "check": (clamp3d.check, {"scene": rigid().map(lambda T: scene.moved({"wire": T})), "pairs": asked}),
+        "Part": (clamp3d.Part, {"name": "a", "shape": BOX, "T_world": any_pose()}),
         "distance": (
-            2,
-            lambda r, f: (
-                clamp3d.distance,
-                {"a": _scene().parts[0].shape, "b": shapes.cylinder(6.5, 80.0), "T_a_b": rigid(r), "accuracy": 1e-3},
-            ),
+            clamp3d.distance,
+            {"a": block, "b": scene.parts[1].shape, "T_a_b": rigid()},
         ),
-        "measure": (
-            1,
-            lambda r, f: (
-                clamp3d.measure,
-                {"scene": _scene(), "pairs": garbage.pick(r, (None, [("wire", "block")])), "accuracy": 1e-3},
-            ),
-        ),
-        "check_poses": (
-            2,
-            lambda r, f: (
-                check_poses,
-                {"scene": _scene(), "part": "wire", "others": None, "poses": _few(pose_batch(r)), "cache": None},
-            ),
-        ),
+        "measure": (clamp3d.measure, {"scene": scene, "pairs": asked, "accuracy": 1e-3}),
+        "check_poses": (check_poses, {"scene": scene, "part": "wire", "poses": few}),
         "load_clamp": (
-            3,
-            lambda r, f: (
-                load_clamp,
-                {
-                    "source": "reference",
-                    "line": garbage.pick(r, (None, "LJ-500", "20")),
-                    "jumper": garbage.pick(r, (None, "16")),
-                },
-            ),
+            load_clamp,
+            {"source": "reference", "line": one_of([None, "LJ-500", "20"]), "jumper": one_of([None, "16"])},
         ),
-        "assemble": (
-            1,
-            _simple(
-                assemble,
-                clamp=_fixed(_clamp()),
-                model=_choice(*_models()[:2]),
-                solver=_fixed("exact"),
-                step=_fixed(2.0),
-                tilt_step=_fixed(0.1),
-                open_by=_choice(0.0, 3.0),
-                open_tilt=_choice(0.0, 0.05),
-            ),
-        ),
-        "load": (
-            2,
-            lambda r, f: (
-                clamp3d.load,
-                {
-                    "source": garbage.pick(r, ("reference", _stl(f))),
-                    "line": garbage.pick(r, (None, "LJ-500")),
-                    "jumper": None,
-                    "unit": garbage.pick(r, (None, "in")),
-                },
-            ),
-        ),
-        "sensitivity": (0.2, _simple(clamp3d.sensitivity, clamp=_fixed(_clamp()))),
-        "monte_carlo": (
-            0.2,
-            _simple(
-                clamp3d.monte_carlo,
-                clamp=_fixed(_clamp()),
-                n=_choice(1, 2),
-                seed=_fixed(0),
-                tolerance=_choice(None, 0.1),
-                wire_tolerance_percent=_fixed(1.0),
-                distribution=_choice("uniform", "normal"),
-                processes=_fixed(1),
-            ),
-        ),
-        "Wire": (1, lambda r, f: (Wire, {"diameter": float(r.uniform(5.0, 50.0))})),
-        "replace": (3, _changed_clamp),
-        "Section": (2, _simple(Section, clamp=_fixed(_clamp()), model=_choice(*_models()))),
-        "equilibria": (0.1, _simple(equilibria, section=_fixed(Section(_clamp(), Cas())))),
-        "parts": (2, _simple(parts, clamp=_fixed(_clamp()))),
-        "mesh": (
-            2,
-            _simple(shapes.mesh, part=_choice(*parts(_clamp()).values()), mesh_error=_choice(0.5, 0.1)),
-        ),
-        "export": (
-            2,
-            lambda r, f: (
-                clamp3d.export,
-                {
-                    "source": garbage.pick(r, (_clamp(), _run(), _scene())),
-                    "path": f / "out",
-                    "format": garbage.pick(r, ("stl", "obj", "ply", "glb", "3mf")),
-                    "layout": None,
-                    "state": None,
-                    "mesh_error": 0.5,
-                    "unit": None,
-                    "names": garbage.pick(r, (None, ["P1"])),
-                },
-            ),
-        ),
-        "Placement": (
-            1,
-            _simple(Placement, clamp=_fixed(_clamp()), wire=_choice("P6", "P7"), seat_tolerance=size),
-        ),
-        "Placement.close": (1, lambda r, f: (_closing().close, {"misplacement": 0.1 * r.normal(size=(3, 4))})),
-        "Placement.cloud": (1, lambda r, f: (_closing().cloud, {"ranges": {"offset": 1.0}, "count": 5, "seed": 0})),
-        "Placement.limits": (0.3, lambda r, f: (_closing().limits, {"freedom": "offset", "reach": 5.0})),
-        "placement": (
-            0.3,
-            _simple(
-                clamp3d.placement,
-                clamp=_fixed(_clamp()),
-                ranges=_choice({"offset": 1.0}, {"yaw": 0.01}),
-                wire=_choice("P6", "P7"),
-                seat_tolerance=_fixed(0.5),
-                samples=_fixed(5),
-                seed=_fixed(0),
-            ),
-        ),
-        "report": (
-            0.1,
-            lambda r, f: (clamp3d.report, {"source": _scene(), "folder": f / "out", "clearance": None}),
-        ),
-        "view": (0.2, _simple(clamp3d.view, shown=_fixed(_scene()), serve=_fixed(False), mesh_error=_fixed(1.0))),
+        "Wire": (Wire, {"diameter": st.floats(5.0, 50.0)}),
+        **{f"replace {name}": _replacing(clamp, name) for name in ("line", "up_splint", "down_splint", "bolt", "nut")},
+        "Section": (Section, {"clamp": clamp, "model": models}),
+        "parts": (parts, {"clamp": clamp}),
         "measure_image": (
-            4,
-            _simple(
-                measure_image,
-                points=_marks,
-                reference=_marks,
-                reference_mm=size,
-                kind=_choice("height", "straight"),
-                marking_error=_choice(4.5, 0.0),
-                calliper_error=_fixed(0.02),
-            ),
+            measure_image,
+            {"points": MARKS, "reference": MARKS, "reference_mm": SIZES, "kind": one_of(["height", "straight"])},
         ),
-        "image_study": (
-            0.3,
-            _simple(
-                image_study,
-                run=_fixed(_run()),
-                count=_fixed(5),
-                px_per_mm=_fixed(4.0),
-                seed=_fixed(1),
-                kind=_choice("height", "straight"),
-            ),
-        ),
-        "Viewer": (
-            0.2,
-            _simple(
-                Viewer,
-                clamp=_fixed(_clamp()),
-                model=_fixed(Cas()),
-                mesh_error=_fixed(1.0),
-                clearance=_fixed(5.0),
-                overlays=_fixed(None),
-                serve=_fixed(False),
-                url=_fixed(None),
-            ),
-        ),
-        "save_figure": (
-            0.2,
-            lambda r, f: (figures.save_figure, {"figure": _figure(), "path": f / "x.svg", "dpi": 50}),
-        ),
-        "section_figure": (
-            0.2,
-            _simple(figures.section_figure, run=_fixed(_run()), waypoint=_choice(None, _run().path[1])),
-        ),
-        "states_figure": (0.1, _simple(figures.states_figure, run=_fixed(_run()))),
-        "contacts_figure": (0.1, _simple(figures.contacts_figure, run=_fixed(_run()))),
-        "contact_figure": (
-            0.1,
-            _simple(figures.contact_figure, run=_fixed(_run()), contact=_fixed(_run().contacts[0])),
-        ),
-        "exploded_figure": (0.1, _simple(figures.exploded_figure, clamp=_fixed(_clamp()))),
-        "steps_figure": (0.1, _simple(figures.steps_figure, run=_fixed(_run()))),
-        "table2_figure": (0.05, _simple(table2_figure)),
-        "table3_figure": (0.05, _simple(table3_figure)),
+        "Placement": (Placement, {"clamp": clamp, "wire": one_of(["P6", "P7"]), "seat_tolerance": SIZES}),
     }
+    slow: dict[str, Target] = {
+        "Wedges": (Wedges, {"parts": solids, "unit_angle": st.floats(0.1, 3.2)}),
+        "load_mesh": (shapes.load_mesh, {"path": "box.stl", "unit": one_of([None, "mm", "in"])}),
+        "fit_file": (clamp3d.fit_file, {"path": "box.stl"}),
+        "fit_mesh": (clamp3d.fit_mesh, {"mesh": tetrahedron}),
+        "load": (clamp3d.load, {"source": one_of(["reference", "box.stl"]), "unit": one_of([None, "in"])}),
+        "assemble": (assemble, {"clamp": clamp, "model": one_of([Cas(), Chords(0.2)]), "solver": "exact", "step": 2.0}),
+        "mesh": (shapes.mesh, {"part": one_of(list(solids.values())), "mesh_error": one_of([0.5, 0.1])}),
+        "export": (
+            clamp3d.export,
+            {
+                "source": one_of([clamp, run, scene]),
+                "path": "out",
+                "format": one_of(["stl", "obj", "ply", "glb", "3mf"]),
+                "mesh_error": 0.5,
+                "names": one_of([None, ["P1"]]),
+            },
+        ),
+        "Placement.close": (closing.close, {"misplacement": np.full((3, 4), 0.1)}),
+        "Placement.cloud": (closing.cloud, {"ranges": {"offset": 1.0}, "count": 5, "seed": 0}),
+    }
+    slowest: dict[str, Target] = {
+        "sensitivity": (clamp3d.sensitivity, {"clamp": clamp}),
+        "monte_carlo": (clamp3d.monte_carlo, {"clamp": clamp, "n": one_of([1, 2]), "seed": 0, "processes": 1}),
+        "equilibria": (equilibria, {"section": section}),
+        "Placement.limits": (closing.limits, {"freedom": "offset", "reach": 5.0}),
+        "placement": (clamp3d.placement, {"clamp": clamp, "ranges": {"offset": 1.0}, "wire": "P6", "samples": 5}),
+        "report": (clamp3d.report, {"source": scene, "folder": "out"}),
+        "view": (clamp3d.view, {"shown": scene, "serve": False, "mesh_error": 1.0}),
+        "Viewer": (Viewer, {"clamp": clamp, "model": Cas(), "mesh_error": 1.0, "serve": False}),
+        "image_study": (image_study, {"run": run, "count": 5, "px_per_mm": 4.0}),
+        "save_figure": (figures.save_figure, {"figure": table2_figure(), "path": "x.svg", "dpi": 50}),
+        "section_figure": (figures.section_figure, {"run": run, "waypoint": one_of([None, run.path[1]])}),
+        "states_figure": (figures.states_figure, {"run": run}),
+        "contacts_figure": (figures.contacts_figure, {"run": run}),
+        "contact_figure": (figures.contact_figure, {"run": run, "contact": run.contacts[0]}),
+        "exploded_figure": (figures.exploded_figure, {"clamp": clamp}),
+        "steps_figure": (figures.steps_figure, {"run": run}),
+        "table2_figure": (table2_figure, {}),
+        "table3_figure": (table3_figure, {}),
+    }
+    return (36, numbers), (55, small), (7, slow), (2, slowest)
 
 
-def _changed_clamp(rng: Rng, folder: Path) -> tuple[Callable[..., Any], dict[str, Any]]:
+def _replacing(clamp: Any, name: str) -> Target:
     """One part of the clamp with its own dimensions, to be given again."""
-    name = garbage.pick(rng, ("line", "up_splint", "down_splint", "saddle", "bolt", "nut"))
-    part = getattr(_clamp(), name)
-    values = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+    part = getattr(clamp, name)
 
     def change(**values: Any) -> Any:
-        return dataclasses.replace(_clamp(), **{name: dataclasses.replace(part, **values)})
+        return dataclasses.replace(clamp, **{name: dataclasses.replace(part, **values)})
 
-    return change, values
-
-
-def _few(value: Any) -> Any:
-    return value[:5] if isinstance(value, np.ndarray) and value.ndim and len(value) > 5 else value
-
-
-@functools.cache
-def _closing() -> Any:
-    return Placement(_clamp())
-
-
-@functools.cache
-def _figure() -> Any:
-    return table2_figure()
+    return change, {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}

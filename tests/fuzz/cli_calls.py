@@ -10,9 +10,7 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from tests.fuzz.runner import FindingError
+from tests.fuzz.values import Draw, chance
 
 OLD = b"what was here before\n"
 """Content of an output file that exists before the command."""
@@ -23,6 +21,10 @@ _RAW = re.compile(
     r"invalid literal|could not convert|could not be broadcast|out of bounds for axis|<class '|positional argument"
 )
 _LONGEST = 1000
+
+
+class FindingError(Exception):
+    """The project answered in a way that is not allowed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,9 +99,9 @@ def held_to_rules(called: Called) -> Called:
     return called
 
 
-def some_old(rng: np.random.Generator, paths: list[Path]) -> list[Path]:
+def some_old(draw: Draw, paths: list[Path]) -> list[Path]:
     """One in three of ``paths``, made to be there before the command."""
-    old = [path for path in paths if rng.integers(3) == 0]
+    old = [path for path in paths if chance(draw, 3)]
     for path in old:
         path.write_bytes(OLD)
     return old

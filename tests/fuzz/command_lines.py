@@ -11,9 +11,11 @@ from typing import Any
 
 import click
 import numpy as np
+from hypothesis import strategies as st
 
-from tests.fuzz import garbage
+from tests.fuzz import files
 from tests.fuzz.cli_calls import OLD, Called, call, check_outputs, held_to_rules
+from tests.fuzz.values import Draw, chance, pick
 
 _FLOATS = ("1", "0.5", "0", "-1", "nan", "inf", "-inf", "1e308", "1e400", "5e-324", "", "x", "1,5", "0x1", "١", " 2 ")
 _INTS = ("1", "2", "0", "-1", "1.5", "99999999999999999999", "", "x", "0x1", "1e3", "nan")
@@ -35,6 +37,45 @@ _WORDS = (
     "nan",
     "1e5",
 )
+_BARE = ("--help", "--version", "-h", "run", "nonsense", "", "--", "-", "--nonsense", "ünï", "-1")
+_BAD = (["--nonsense"], ["--json", "no/where.json"], ["--json", "a folder"], ["surplus"], ["--quiet=1"], ["--json"])
+_NO_INPUT = (
+    "nowhere",
+    "nowhere.toml",
+    "a folder",
+    "loop",
+    "empty",
+    "",
+    ".",
+    "x" * 300,
+    "tetra.stl",
+    "scene.toml",
+    "a\nb",
+)
+
+# Values of options by name, where their kind does not say what to try.
+_VALUES: dict[str, tuple[str, ...]] = {
+    "--points": ("5,5 50,30", "1,1 40,2", "0,0 0,0", "1,1", "a,b c,d", "nan,1 2,3", "1e9,1 2,3", "-1,-1 5,5", ""),
+    "--pairs": ("block:wire", "block:block", "a:b", "", ":", "block", "block:wire,block:wire"),
+    "--state": ("open", "final", "1", "0", "99", "-1", "P7", "", "x", "1.5", "١"),
+    "--overlay": (
+        "wedges",
+        "wedges=20",
+        "wedges=0",
+        "wedges=x",
+        "x",
+        "",
+        "hulls=nan",
+        "wedges=nan",
+        "wedges=1e-9",
+        "=",
+    ),
+    "--host": ("127.0.0.1", "", "300.1.1.1", "a b"),
+    "--output": ("out", "a folder", "empty", "empty/out", "new/deep", "loop", "", "x" * 300),
+    "--method": ("cas", "x", ""),
+}
+_VALUES["--reference"] = _VALUES["--points"]
+_SUFFIXES = {"--json": ".json", "--html": ".html", "--markdown": ".md"}
 
 # Good values that take a second at most; without an entry the option's kind says what to try.
 _QUICK: dict[str, dict[str, tuple[str, ...]]] = {
@@ -88,34 +129,26 @@ def _commands() -> dict[str, click.Command]:
     return {name: cli.group.get_command(context, name) for name in cli.COMMANDS}  # type: ignore[misc]
 
 
-def make(rng: np.random.Generator, folder: Path) -> tuple[str, Callable[[], bool]]:
+def make(draw: Draw, folder: Path) -> tuple[str, Callable[[], bool]]:
     """A command line, and the files that it is about."""
+    from PIL import Image
+
     click.launch = lambda *a, **k: 0
-    _files(folder)
-    way = rng.integers(30)
+    Path(folder, "clamp.toml").write_text(files.CLAMP, encoding="utf-8")
+    Path(folder, "scene.toml").write_text(files.PARTS, encoding="utf-8")
+    Path(folder, "tetra.stl").write_bytes(files.TETRA)
+    Path(folder, "empty").write_bytes(b"")
+    Path(folder, "a folder").mkdir()
+    Path(folder, "loop").symlink_to("loop")
+    Image.fromarray(np.full((40, 60), 200, np.uint8)).save(folder / "image.png")
     old: list[Path] = []
-    if way == 0:
-        words = (
-            "--help",
-            "--version",
-            "-h",
-            "run",
-            "nonsense",
-            "",
-            "--",
-            "-",
-            "--nonsense",
-            "\x00".strip("\x00"),
-            "ünï",
-            "-1",
-        )
-        args = [str(garbage.pick(rng, words)) for _ in range(rng.integers(4))]
+    if chance(draw, 30):
+        args = draw(st.lists(st.sampled_from(_BARE), max_size=4))
     else:
-        name = str(garbage.pick(rng, list(_commands())))
-        args, old = _line(rng, folder, name)
+        args, old = _line(draw, folder, pick(draw, *_commands()))
     for path in old:
         path.write_bytes(OLD)
-    child = rng.integers(100) == 0 and not any("\x00" in a for a in args)
+    child = chance(draw, 100)
 
     def ask() -> bool:
         called = _in_a_process(args) if child else call(args)
@@ -127,162 +160,53 @@ def make(rng: np.random.Generator, folder: Path) -> tuple[str, Callable[[], bool
 
 def _in_a_process(args: list[str]) -> Called:
     """The same through a real process."""
-    done = subprocess.run(
-        [sys.executable, "-m", "clamp3d", *args],
-        capture_output=True,
-        timeout=120,
-        stdin=subprocess.DEVNULL,
-        check=False,
-    )
+    command = [sys.executable, "-m", "clamp3d", *args]
+    done = subprocess.run(command, capture_output=True, timeout=120, stdin=subprocess.DEVNULL, check=False)
     return held_to_rules(Called(done.returncode, done.stdout.decode(), done.stderr.decode("utf-8", "replace")))
 
 
-def _files(folder: Path) -> None:
-    from PIL import Image
-
-    from tests.fuzz.clamp_files import TEXT
-    from tests.fuzz.scene_files import _PARTS, _TETRA
-
-    Path(folder, "clamp.toml").write_text(TEXT, encoding="utf-8")
-    Path(folder, "scene.toml").write_text(_PARTS, encoding="utf-8")
-    Path(folder, "tetra.stl").write_bytes(_TETRA)
-    Path(folder, "empty").write_bytes(b"")
-    Path(folder, "a folder").mkdir()
-    Path(folder, "loop").symlink_to("loop")
-    Image.fromarray(np.full((40, 60), 200, np.uint8)).save(folder / "image.png")
-
-
-def _line(rng: np.random.Generator, folder: Path, name: str) -> tuple[list[str], list[Path]]:
-    command = _commands()[name]
-    args = [name]
-    old: list[Path] = []
-    arguments = [p for p in command.params if isinstance(p, click.Argument)]
-    options = [p for p in command.params if isinstance(p, click.Option)]
-    for _ in arguments:
-        good = {"scene": "scene.toml", "mesh": "tetra.stl", "image": "image.png", "clamp": "clamp.toml"}
-        value = good.get(str(arguments[0].name), "reference")
-        way = rng.integers(5)
-        if way == 0:
-            value = str(
-                garbage.pick(
-                    rng,
-                    (
-                        "nowhere",
-                        "nowhere.toml",
-                        "a folder",
-                        "loop",
-                        "empty",
-                        "",
-                        ".",
-                        "x" * 300,
-                        "tetra.stl",
-                        "scene.toml",
-                        "a\nb",
-                        "\x1b[0m",
-                    ),
-                )
-            )
-        if way != 1:
-            args.append(value)
+def _line(draw: Draw, folder: Path, name: str) -> tuple[list[str], list[Path]]:
+    params, args, old = _commands()[name].params, [name], []
+    good = {"scene": "scene.toml", "mesh": "tetra.stl", "image": "image.png", "clamp": "clamp.toml"}
+    for argument in (p for p in params if isinstance(p, click.Argument)):
+        args += pick(draw, *[[good.get(str(argument.name), "reference")]] * 3, [], [pick(draw, *_NO_INPUT)])
     args += _ALWAYS.get(name, [])
-    required = [o for o in options if o.required and rng.integers(8)]
-    others = [o for o in options if o not in required]
-    chosen = [*required, *(others[int(i)] for i in rng.permutation(len(others))[: int(rng.integers(5))])]
-    for option in chosen:
+    options = [p for p in params if isinstance(p, click.Option)]
+    required = [o for o in options if o.required and not chance(draw, 8)]
+    others = draw(st.permutations([o for o in options if o not in required]))[: draw(st.integers(0, 4))]
+    for option in (*required, *others):
         flag = str(max(option.opts, key=len))
         if flag in _SKIPPED and flag not in _QUICK.get(name, {}):
             continue
         if option.is_flag:
-            if name not in _LONG:
-                args.append(flag)
+            args += [flag] * (name not in _LONG)
             continue
-        value, there = _value(rng, folder, name, flag, option)
+        value, there = _value(draw, folder, _QUICK.get(name, {}).get(flag) or _VALUES.get(flag), flag, option)
         old += there
-        args += [f"{flag}={value}"] if rng.integers(4) == 0 else [flag, value]
+        args += [f"{flag}={value}"] if chance(draw, 4) else [flag, value]
     if name in _LONG:
-        args += garbage.pick(
-            rng,
-            (
-                ["--nonsense"],
-                ["--json", "no/where.json"],
-                ["--json", "a folder"],
-                ["surplus"],
-                ["--quiet=1"],
-                ["--json"],
-            ),
-        )
-        if "--json" in args[:-2] and name == "reproduce":
-            args.append("--nonsense")
-    elif rng.integers(20) == 0:
-        args.insert(
-            int(rng.integers(1, len(args) + 1)),
-            str(garbage.pick(rng, ("--nonsense", "--", "surplus", "", "-x", "--json"))),
-        )
+        args += [*pick(draw, *_BAD), "--nonsense"]
+    elif chance(draw, 20):
+        args.insert(draw(st.integers(1, len(args))), pick(draw, "--nonsense", "--", "surplus", "", "-x", "--json"))
     return args, old
 
 
 def _value(
-    rng: np.random.Generator, folder: Path, name: str, flag: str, option: click.Option
+    draw: Draw, folder: Path, known: tuple[str, ...] | None, flag: str, option: click.Option
 ) -> tuple[str, list[Path]]:
     """A value for an option, and the files that are there before."""
-    quick = _QUICK.get(name, {}).get(flag)
-    if quick is not None:
-        return str(garbage.pick(rng, quick)), []
     kind: Any = option.type
+    if known is not None:
+        return pick(draw, *known), []
     if isinstance(kind, click.Choice):
-        return str(garbage.pick(rng, [*kind.choices] * 3 + [*_WORDS] if flag != "--method" else ["cas", "x", ""])), []
+        return str(pick(draw, *[*kind.choices] * 3, *_WORDS)), []
     if isinstance(kind, click.Path):
-        way = rng.integers(7)
-        suffix = {"--json": ".json", "--html": ".html", "--markdown": ".md"}.get(
-            flag, str(garbage.pick(rng, (".png", ".svg", ".pdf")))
-        )
-        if flag in ("--output",):
-            return str(
-                garbage.pick(rng, ("out", "a folder", "empty", "empty/out", "new/deep", "loop", "", "x" * 300))
-            ), []
-        if way < 2:
-            return f"new{suffix}", []
-        if way < 4:
-            return f"old{suffix}", [folder / f"old{suffix}"] if flag != "--resume" else []
-        return str(
-            garbage.pick(
-                rng,
-                (
-                    "no/where" + suffix,
-                    "a folder",
-                    "empty/x" + suffix,
-                    "loop",
-                    "",
-                    ".",
-                    "x" * 300 + suffix,
-                    "bad.suffix",
-                    "a\nb" + suffix,
-                ),
-            )
-        ), []
+        suffix = _SUFFIXES.get(flag, pick(draw, ".png", ".svg", ".pdf"))
+        value = pick(draw, "new", "new", "old", "old", "no/where", "empty/x", "x" * 300, "a\nb") + suffix
+        value = pick(draw, *[value] * 6, "a folder", "loop", "", ".", "bad.suffix")
+        return value, [folder / value] * (value.startswith("old") and flag != "--resume")
     if isinstance(kind, (click.types.IntParamType, click.IntRange)):
-        return str(garbage.pick(rng, _INTS)), []
+        return pick(draw, *_INTS), []
     if isinstance(kind, (click.types.FloatParamType, click.FloatRange)):
-        return str(garbage.pick(rng, _FLOATS)), []
-    if flag in ("--points", "--reference"):
-        return str(
-            garbage.pick(
-                rng, ("5,5 50,30", "1,1 40,2", "0,0 0,0", "1,1", "a,b c,d", "nan,1 2,3", "1e9,1 2,3", "-1,-1 5,5", "")
-            )
-        ), []
-    if flag == "--pairs":
-        return str(
-            garbage.pick(rng, ("block:wire", "block:block", "a:b", "", ":", "block", "block:wire,block:wire"))
-        ), []
-    if flag == "--state":
-        return str(garbage.pick(rng, ("open", "final", "1", "0", "99", "-1", "P7", "", "x", "1.5", "١"))), []
-    if flag == "--overlay":
-        return str(
-            garbage.pick(
-                rng,
-                ("wedges", "wedges=20", "wedges=0", "wedges=x", "x", "", "hulls=nan", "wedges=nan", "wedges=1e-9", "="),
-            ),
-        ), []
-    if flag == "--host":
-        return str(garbage.pick(rng, ("127.0.0.1", "", "300.1.1.1", "a b"))), []
-    return str(garbage.pick(rng, _WORDS)), []
+        return pick(draw, *_FLOATS), []
+    return pick(draw, *_WORDS), []

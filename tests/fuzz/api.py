@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import math
 import warnings
 from collections.abc import Callable, Mapping
@@ -10,45 +11,45 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hypothesis import strategies as st
 
 import clamp3d
 from clamp3d.errors import Clamp3dError
-from tests.fuzz import garbage
-from tests.fuzz.api_targets import Make, targets
-from tests.fuzz.api_values import Rng, anything
-from tests.fuzz.runner import FindingError
+from tests.fuzz.api_targets import groups
+from tests.fuzz.cli_calls import FindingError
+from tests.fuzz.values import ANYTHING, Draw, near, pick
 
 _INFINITE = {"curvature", "gap_left", "gap_right", "gap", "high", "lower", "opening", "upper", "uncertainty"}
 """Fields whose documented value is infinite where there is none."""
 
 
-_TARGETS: dict[str, tuple[float, Make]] = {}
-
-
-def make(rng: Rng, folder: Path) -> tuple[str, Callable[[], bool]]:
+def make(draw: Draw, folder: Path) -> tuple[str, Callable[[], bool]]:
     """A call, with none to three of its arguments spoilt."""
-    if not _TARGETS:
-        _TARGETS.update(targets())
-    names = list(_TARGETS)
-    weights = np.array([_TARGETS[name][0] for name in names])
-    name = names[int(rng.choice(len(names), p=weights / weights.sum()))]
-    function, arguments = _TARGETS[name][1](rng, folder)
-    spoilt = []
-    for _ in range(int(rng.choice([0, 1, 1, 1, 2, 3]))):
-        key = garbage.pick(rng, list(arguments)) if arguments else "extra"
-        way = rng.integers(30)
-        if way == 0:
+    group = groups()[draw(st.sampled_from([k for k, (weight, _) in enumerate(groups()) for _ in range(weight)]))][1]
+    name = pick(draw, *group)
+    function, given = group[name]
+    known = inspect.signature(function).parameters.values()
+    defaults = {p.name: p.default for p in known if p.default is not p.empty}
+    others = [] if any(p.kind is p.VAR_KEYWORD for p in known) else ["extra"]
+    arguments = {**defaults, **given}
+    for key, value in arguments.items():
+        arguments[key] = draw(value) if isinstance(value, st.SearchStrategy) else value
+    for key in draw(
+        st.lists(st.sampled_from([*(key for key in arguments if key != "self"), *others] or ["extra"]), max_size=3)
+    ):
+        way = draw(st.integers(0, 29))
+        if way == 29:
             arguments.pop(key, None)
-            spoilt.append(f"no {key}")
-            continue
-        old = arguments.get(key)
-        if isinstance(old, float) and way < 10:
-            arguments[key] = garbage.near(rng, old)
+        elif way < 10 and isinstance(arguments.get(key), float):
+            arguments[key] = near(draw, arguments[key])
         else:
-            arguments[key] = anything(rng)
-        if key == "progress" and callable(arguments[key]):  # what a user's own function raises is theirs
+            arguments[key] = draw(ANYTHING)
+        if key == "progress" and callable(arguments.get(key)):  # what a user's own function raises is theirs
             arguments[key] = None
-        spoilt.append(key)
+    if any(isinstance(value, str) and value == "box.stl" for value in arguments.values()):
+        import trimesh
+
+        trimesh.creation.box((10.0, 8.0, 6.0)).export(folder / "box.stl")
     text = f"{name}({', '.join(f'{k}={v!r}'[:300] for k, v in arguments.items())})"
 
     def ask() -> bool:
