@@ -132,6 +132,20 @@ def test_contact_models_bound_what_they_approximate(name, unit, x, y, turn):
     assert_distance(replace(found, point_a=None, normal=None, estimate=None), BLOCK, wire, T)
 
 
+def test_of_a_model_without_known_bounds_none_are_claimed():
+    wire, T = shapes.cylinder(5.0, 70.0), translation(0.0, 1.0, 0.0)
+    model = baselines.contact_model("mesh", {"block": BLOCK, "cylinder": wire})
+    found = distance(BLOCK, wire, T, model=model)
+    assert (found.level, found.lower, found.upper) == ("model", -math.inf, math.inf)
+    assert found.estimate == pytest.approx(distance(BLOCK, wire, T).value, abs=0.1)
+
+
+@pytest.mark.parametrize("convex", [True, False])
+def test_a_mesh_has_a_closed_form_exactly_if_it_is_convex(convex):
+    shape = faceted_shape(DRAWN[3] if convex else DRAWN[4], 0.1)
+    assert (ModelCache().model(shape).bodies is not None) == convex
+
+
 @pytest.mark.parametrize("shape", DRAWN, ids=lambda shape: shape.name)
 def test_bounding_boxes_hold_the_shape(shape):
     model = ModelCache().model(shape)
