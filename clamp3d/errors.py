@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+from typing import Any
 
 LONGEST = 900
 """Characters of a message: what a user gave may be longer."""
@@ -40,6 +41,20 @@ class InputError(Clamp3dError, ValueError):
 
 class SolverError(Clamp3dError):
     """A solver could not prove its answer. The message says which condition does not hold."""
+
+
+class SequenceError(Clamp3dError):
+    """A sequence asks for a motion that bodies block (exit code 1). The message says which, where and when.
+
+    Attributes
+    ----------
+    blocks : tuple
+        What blocks each way that was tried, the one that leads furthest first.
+    """
+
+    def __init__(self, message: object = "", blocks: tuple[Any, ...] = ()) -> None:
+        super().__init__(message)
+        self.blocks = blocks
 
 
 class MissingLibraryError(Clamp3dError, ImportError):

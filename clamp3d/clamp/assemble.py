@@ -10,12 +10,13 @@ from typing import Any
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
-from clamp3d.checks import choice, function, number
+from clamp3d.checks import choice, function, number, text
 from clamp3d.clamp.closing import HELD, open_start
 from clamp3d.clamp.contact import Contact, measure_contacts, seats
 from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
 from clamp3d.clamp.equilibria import describe, equilibria, same, start_tilts
 from clamp3d.clamp.final_state import FinalState, solve_final_state
+from clamp3d.clamp.follow import Closing, follow
 from clamp3d.clamp.forces import contact_forces
 from clamp3d.clamp.loader import WireSize, load_clamp
 from clamp3d.clamp.matrix import PAIRS, Difference, contact_type
@@ -23,7 +24,7 @@ from clamp3d.clamp.meetings import meetings
 from clamp3d.clamp.result import Assembly, Equilibrium, Event, Solver, Start, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import B, D, S, Section, W
-from clamp3d.clamp.sequence import parse_sequence
+from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.clamp.status import CLAMPED, final_status
 from clamp3d.clamp.stepped import SteppedState, solve_bisection, solve_stepped
 from clamp3d.clamp.steps import (
@@ -55,6 +56,7 @@ def assemble(
     *,
     line: WireSize | None = None,
     jumper: WireSize | None = None,
+    sequence: str | None = None,
     solver: Solver = "exact",
     step: float = STEP,
     tilt_step: float = TILT_STEP,
@@ -74,6 +76,8 @@ def assemble(
         How grooves are measured; by default `Cas`, the exact arcs.
     line, jumper : str or float, optional
         Wires in place of the clamp's own: catalogue name, or diameter in mm.
+    sequence : str, optional
+        Order of assembly in place of the clamp's own, in the paper's notation (see `clamp3d.clamp.sequence`).
     solver : {"exact", "stepped", "bisection"}
         How the closed position is found.
     step, tilt_step : float
@@ -98,6 +102,8 @@ def assemble(
         For bad settings, dimensions or sequence.
     SolverError
         If an answer cannot be proven.
+    SequenceError
+        If a step of the sequence is blocked.
 
     Examples
     --------
@@ -106,6 +112,8 @@ def assemble(
     ('clamped', 31.53)
     """
     clamp = load_clamp(clamp, line=line, jumper=jumper)
+    if sequence is not None:
+        clamp = replace(clamp, sequence=text("sequence", sequence))
     model = Cas() if model is None else model
     choice("solver", solver, ("exact", "stepped", "bisection"))
     check_model(model)
@@ -115,13 +123,15 @@ def assemble(
         raise InputError(f"open_by must be between 0 and {_WIDEST:g} mm, got {open_by:g}")
     function("on_waypoint", on_waypoint)
     function("progress", progress)
-    sequence = [str(s) for s in parse_sequence(clamp.sequence)]
+    steps = parse_sequence(clamp.sequence)
+    names, published = [step.name for step in steps], as_published(steps)
     section = Section(clamp, model)
     log = Log(section, on_waypoint)
     opened = section.open_state(section.open_distance() + open_by, open_tilt)
     start = open_start(section, open_by=open_by, open_tilt=open_tilt)
-    approach_line(section, opened, start, sequence[0], log)
-    insert_jumper(section, opened, start, sequence[1], log)
+    if published:
+        approach_line(section, opened, start, names[0], log)
+        insert_jumper(section, opened, start, names[1], log)
     final: FinalState | SteppedState
     met: Meetings = []
     if solver == "exact":
@@ -136,17 +146,21 @@ def assemble(
         held = final.q
         met = first_touch(section, start, float(start[D] - held[D]))
     by_hand = [(pair, q) for pair, q in met if not q[[B, W]].any()]
-    close_splints(section, start, held, by_hand, sequence[2], log)
     taken = [(pair, q) for pair, q in met if q[[B, W]].any()]
-    travel = tighten_nut(section, start, held, final.q, taken, sequence[3], log)
+    if published:
+        close_splints(section, start, held, by_hand, names[2], log)
+        travel = tighten_nut(section, start, held, final.q, taken, names[3], log)
+    else:
+        travel = follow(section, steps, Closing(start, held, final.q, by_hand, taken), log)
     poses = section_poses(section, final.q)
     contacts = measure_contacts(clamp, poses, model, cache=log.cache)
     resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
     found = {(e.a, e.b) for e in log.events}
+    closes = next(step.name for step in steps if step.kind != "bring")
     for c in contacts:  # what touches in the end though no force says when
         if c.gap <= resolution and (c.declared or c.type) not in (0, 1) and (c.a, c.b) not in found:
-            log.events.append(Event(sequence[2], c.a, c.b, c.relation, c.point, float(start[D] - held[D])))
-    log.events.sort(key=lambda e: (sequence.index(e.step), e.travel))
+            log.events.append(Event(closes, c.a, c.b, c.relation, c.point, float(start[D] - held[D])))
+    log.events.sort(key=lambda e: (names.index(e.step), e.travel))
     queries = section.queries.contact  # what the assembly itself asked, without the other equilibria
     proof = (final.violation, final.optimality) if isinstance(final, FinalState) else (None, None)
     motion_steps = final.motion_steps if isinstance(final, SteppedState) else 0

@@ -70,7 +70,8 @@ def _way(before: Waypoint, after: Waypoint, pair: Pair, reach: dict[PartName, fl
     """The most that any two points of two parts move against each other between two waypoints, mm."""
     (a, b), (c, d) = ((w.poses[pair[0]], w.poses[pair[1]]) for w in (before, after))
     turn = sum(abs(after.poses[n].angle - before.poses[n].angle) * reach[n] for n in pair)
-    return math.hypot(c.x - a.x - d.x + b.x, c.y - a.y - d.y + b.y) + turn
+    along = c.along - a.along - d.along + b.along
+    return math.hypot(c.x - a.x - d.x + b.x, c.y - a.y - d.y + b.y, along) + turn
 
 
 def _between(before: Waypoint, after: Waypoint, t: float) -> dict[PartName, Array]:
@@ -78,6 +79,6 @@ def _between(before: Waypoint, after: Waypoint, t: float) -> dict[PartName, Arra
     poses = {}
     for name, p in before.poses.items():
         q = after.poses[name]
-        x, y, angle = (u + t * (v - u) for u, v in ((p.x, q.x), (p.y, q.y), (p.angle, q.angle)))
-        poses[name] = SectionPose(x, y, angle).T()
+        pairs = ((p.x, q.x), (p.y, q.y), (p.angle, q.angle), (p.along, q.along))
+        poses[name] = SectionPose(*(u + t * (v - u) for u, v in pairs)).T()
     return poses

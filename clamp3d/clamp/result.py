@@ -54,6 +54,14 @@ class Waypoint:
         """Pose (4, 4) of a part in the world, lengths in mm."""
         return self.poses[part].T()
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: x, y, angle in degrees, and the way along the wires where there is one."""
+        parts = {
+            name: {"x": p.x, "y": p.y, "angle_deg": math.degrees(p.angle)} | ({"along": p.along} if p.along else {})
+            for name, p in self.poses.items()
+        }
+        return {"step": self.step, "label": self.label, "parts": parts}
+
 
 @dataclass(frozen=True, slots=True)
 class Start:
@@ -288,6 +296,7 @@ class Assembly:
             "method": self.method,
             "solver": self.solver,
             "limits": list(self.limits),
+            "sequence": self.clamp.sequence,
             "status": self.status,
             "distance_mm": self.distance,
             "closing_mm": self.closing,
@@ -304,6 +313,7 @@ class Assembly:
             "contacts": [c.to_dict() for c in self.contacts],
             "seats": [plain(seat, gap="gap_mm") for seat in self.seats],
             "events": [plain(event, travel="travel_mm") for event in self.events],
+            "path": [waypoint.to_dict() for waypoint in self.path],
             "undeclared": [str(d) for d in self.undeclared],
             "matrix_differences": [d.to_dict() for d in self.matrix_differences],
             "findings": [plain(finding) for finding in self.findings],

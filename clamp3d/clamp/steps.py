@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -32,18 +33,36 @@ class Log:
     events: list[Event] = field(default_factory=list)
     path: list[Waypoint] = field(default_factory=list)
     cache: ModelCache = field(default_factory=ModelCache)
+    aside: dict[PartName, Array] = field(default_factory=dict)
+    """How far parts that wait are from where the section has them, (3,) mm of the world."""
 
     def reach(self, step: str, label: str, poses: Poses) -> None:
         """Add a waypoint."""
-        self.path.append(Waypoint(step, label, dict(poses)))
+        self.path.append(Waypoint(step, label, self.shifted(poses)))
         if self.on_waypoint is not None:
             self.on_waypoint(self.path[-1])
 
     def touch(self, q: Array, step: str, pair: Pair, travel: float) -> None:
         """Add the event of a contact that is found at state ``q``."""
-        section = self.section
-        (c,) = measure_contacts(section.clamp, section_poses(section, q), section.model, pairs=[pair], cache=self.cache)
-        self.events.append(Event(step, c.a, c.b, c.relation, c.point, travel))
+        self.measure(section_poses(self.section, q), step, [pair], travel)
+
+    def measure(self, poses: Poses, step: str, pairs: Sequence[Pair], travel: float, within: float = math.inf) -> None:
+        """Add an event for each pair that is no further apart than ``within`` mm."""
+        for c in measure_contacts(
+            self.section.clamp, self.shifted(poses), self.section.model, pairs=pairs, cache=self.cache
+        ):
+            if c.gap <= within:
+                self.events.append(Event(step, c.a, c.b, c.relation, c.point, travel))
+
+    def shifted(self, poses: Poses) -> Poses:
+        """The poses with those of parts that wait where they wait."""
+        return {name: moved(pose, self.aside[name]) if name in self.aside else pose for name, pose in poses.items()}
+
+
+def moved(pose: SectionPose, by: Array) -> SectionPose:
+    """A pose moved ``by`` (3,) mm of the world."""
+    x, along, z = (float(v) for v in by)
+    return SectionPose(pose.x + x, pose.y - z, pose.angle, pose.along + along)
 
 
 def approach_line(section: Section, opened: Array, start: Array, step: str, log: Log) -> Array:

@@ -1,7 +1,7 @@
 """The command line: parse, call, print. Data on stdout, progress and messages on stderr.
 
-Exit codes: 0 clean, 1 a finding (clash, not clamped), 2 bad input, 3 undecided (a verdict that is not certain),
-4 failed inside (a fault of the program, or a solver that could not prove its answer), 130 interrupted.
+Exit codes: 0 clean, 1 a finding (clash, not clamped, blocked), 2 bad input, 3 undecided (a verdict that is not
+certain), 4 failed inside (a fault of the program, or a solver that could not prove its answer), 130 interrupted.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import click
 
 import clamp3d
 from clamp3d.cli.terminal import ExitCode, end_on_signals, show, tolerate_closed_pipes
-from clamp3d.errors import EXTRAS, Clamp3dError, SolverError, missing, one_line
+from clamp3d.errors import EXTRAS, Clamp3dError, SequenceError, SolverError, missing, one_line
 
 # Name -> (module, one line for the list of commands). A command's module is loaded when it is called.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -97,7 +97,9 @@ def main() -> None:
             traceback.print_exc()
         if isinstance(error, ModuleNotFoundError) and (library := str(error.name).partition(".")[0]) in EXTRAS:
             error = missing(library, "this")
-        if isinstance(error, SolverError):
+        if isinstance(error, SequenceError):
+            status = _fail(str(error), ExitCode.FINDING)
+        elif isinstance(error, SolverError):
             status = _fail(str(error), ExitCode.FAILED)
         elif isinstance(error, OSError) and error.filename is not None:
             from clamp3d.checks import short

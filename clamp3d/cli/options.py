@@ -212,6 +212,10 @@ class Method:
         "[default: exact for cas and chords, bisection for the others; stepped if a step is given]",
         type=click.Choice(["exact", "stepped", "bisection"]),
     )
+    sequence: str | None = option(
+        "Order of assembly in place of the clamp's own: steps of a grasped part and its followers.",
+        metavar="'P1|P2P3 -> P4 ...'",
+    )
     step: float | None = option("Move along the bolt, stepped solver.  [default: 1/3]", metavar="MM")
     tilt_step_deg: float | None = option("Turn of the stepped solver.  [default: 1]", metavar="A")
 
@@ -227,6 +231,8 @@ class Method:
             raise click.UsageError("--step and --tilt-step-deg go with --solver stepped, not exact")
         default = "stepped" if by_step else "exact" if self.method in ("cas", "chords") else "bisection"
         settings: dict[str, Any] = {"solver": self.solver or default}
+        if self.sequence is not None:
+            settings["sequence"] = self.sequence
         if self.step is not None:
             settings["step"] = self.step
         if self.tilt_step_deg is not None:

@@ -11,6 +11,7 @@ from clamp3d.cli.options import CLAMP, JSON, METHOD, QUIET, VIEWING, ClampSource
 from clamp3d.cli.progress import narrator
 from clamp3d.cli.results import write_result
 from clamp3d.cli.terminal import finish, show
+from clamp3d.errors import SequenceError
 
 if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
@@ -32,7 +33,8 @@ def command(
 ) -> None:
     """Assemble CLAMP (a built-in name or a TOML file) with its wires, and print where every part ends up.
 
-    Exit code 1 if the clamp does not close on both wires, or parts meet that should not.
+    Exit code 1 if the clamp does not close on both wires, parts meet that should not, or a step of the sequence is
+    blocked: then it is said by what, where and when.
     """
     settings = method.settings()
     if equilibria and settings["solver"] != "exact":
@@ -45,18 +47,26 @@ def command(
 
     loaded = source.clamp()
     model = method.model(loaded, quiet=quiet)
+    result: Assembly | None = None
 
     def done(run: Assembly) -> None:
         show(run_to_text(run))
         if json_file is not None:
             write_result(json_file, run.to_dict())
 
-    if view or viewing.html_file is not None or viewing.url is not None:
-        from clamp3d.cli.viewing import run_and_view
+    try:
+        if view or viewing.html_file is not None or viewing.url is not None:
+            from clamp3d.cli.viewing import run_and_view
 
-        result = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=view, done=done)
-    else:
-        with narrator(quiet) as tell:
-            result = assemble(loaded, model, on_waypoint=tell.waypoint, progress=tell.position, **settings)
-        done(result)
-    finish(finding=not result.clamped or bool(result.undeclared))
+            result = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=view, done=done)
+        else:
+            with narrator(quiet) as tell:
+                result = assemble(loaded, model, on_waypoint=tell.waypoint, progress=tell.position, **settings)
+            done(result)
+    except SequenceError as error:
+        show(f"not assembled: {error}")
+        if json_file is not None:
+            write_result(
+                json_file, {"status": f"not assembled: {error}", "blocks": [b.to_dict() for b in error.blocks]}
+            )
+    finish(finding=result is None or not result.clamped or bool(result.undeclared))

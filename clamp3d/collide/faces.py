@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,12 +98,15 @@ class FaceModel:
     @cached_property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
         """What the compiled search reads of the solid that distances are measured from."""
-        from clamp3d.collide.faces_kernel import tree
+        from clamp3d.collide.faces_tree import tree
 
         f, m, n = self.faces, len(self.faces.face), len(self.faces.kind)
         box, link = np.empty((2 * m + 2 * n, 7)), np.empty((2 * m + 2 * n, 2), dtype=np.int64)
-        order, root = np.empty(m, dtype=np.int64), np.empty(n, dtype=np.int64)
-        used = tree(f.corners, self.errors, np.searchsorted(f.face, np.arange(n + 1)), box, link, order, root)
+        order, root, start = np.arange(m), np.empty(n, dtype=np.int64), np.searchsorted(f.face, np.arange(n + 1))
+        middle = 0.5 * (f.corners.min(axis=1) + f.corners.max(axis=1))
+        first = np.minimum(start[:-1], m - 1)
+        centre = 0.5 * (np.minimum.reduceat(middle, first) + np.maximum.reduceat(middle, first))
+        used = tree(f.corners, self.errors, start, middle, centre, np.arange(n), box, link, order, root)
         box, link = box[:used].copy(), link[:used].copy()
         return (
             f.corners, self.errors, f.face, box, link, order, root, f.uv, np.ascontiguousarray(f.sag.max(axis=1)),
@@ -201,18 +205,43 @@ def stands_out(b: FaceModel, a: FaceModel, T: Array, slack: float) -> bool:
 
 def _at(a: FaceModel, point: Array) -> tuple[float, float]:
     """Bounds of a point's signed distance from a solid."""
-    from clamp3d.collide.faces_kernel import RESULT, descend
+    box, none = np.concatenate([point, point, [0.0]])[None], np.zeros(1, dtype=np.int64)
+    pieces = np.tile(point, (1, 3, 1)), np.zeros((1, 3, 2)), none, np.zeros((1, 3))
+    tree = box, np.array([[0, 1]]), none
+    surface = np.array([OTHER]), np.zeros((1, 2)), np.zeros((1, 12)), np.zeros(1)
+    low, out = _search(a, pieces, tree, np.eye(4), surface, 1.0, 0.0, 1e-3, 0)
+    return low, float(out[0])
 
-    out = np.zeros(RESULT)
+
+def _search(
+    a: FaceModel,
+    pieces: tuple[NDArray[Any], ...],
+    tree: tuple[NDArray[Any], ...],
+    T: Array,
+    surfaces: tuple[NDArray[Any], ...],
+    contact: float,
+    clearance: float,
+    tol: float,
+    most: int,
+) -> tuple[float, Array]:
+    """Lower bound of the signed distance from ``a`` of another solid's pieces, and what else the search tells.
+
+    ``pieces``: corners, parameters, faces, sags of borders, in a's frame; ``tree`` over them, in their own frame;
+    ``surfaces``: kind, size, frame, deviation. At most ``most`` pieces are added.
+    """
+    from clamp3d.collide.faces_kernel import RESULT, SPACE, TRIED, WORK, descend
+
+    n, out = len(pieces[0]), np.zeros(RESULT)
+    rows = [np.empty((n + most, *given.shape[1:]), dtype=given.dtype) for given in pieces]
+    for row, given in zip(rows, pieces, strict=True):
+        row[:n] = given
     out[0] = np.inf
-    box = np.concatenate([point, point, [0.0]])[None]
-    low = descend(
-        np.tile(point, (1, 3, 1)), np.zeros((1, 3, 2)), np.zeros(1, dtype=np.int64), np.zeros((1, 3)), np.empty(1), 1,
-        box, np.array([[0, 1]]), np.zeros(1, dtype=np.int64), np.eye(4),
-        np.array([OTHER]), np.zeros((1, 2)), np.zeros((1, 12)), np.zeros(1),
-        *a.arrays, a.marked, a.slack, 1.0, 0.0, 1e-3, 0, out,
+    found = descend(
+        *rows, np.empty(n + most), n, *tree, T, *surfaces,
+        *a.arrays, a.marked, a.slack, contact, clearance, tol, most,
+        np.empty(TRIED + len(a.faces.kind)), np.empty((WORK, 3, 3)), np.empty(SPACE + n + most, dtype=np.int64), out,
     )  # fmt: skip
-    return float(low), float(out[0])
+    return float(found), out
 
 
 def _told(found: Distance) -> Distance:
@@ -232,21 +261,12 @@ def _towards(a: FaceModel, b: FaceModel, T: Array, contact: float, clearance: fl
 
     ``estimate`` is how far at least some point of b is outside of a.
     """
-    from clamp3d.collide.faces_kernel import RESULT, descend
-
     R, t = T[:3, :3], T[:3, 3]
-    n = len(b.faces.face)
-    pieces, uvs = np.empty((n + _MOST, 3, 3)), np.empty((n + _MOST, 3, 2))
-    faces, sags = np.empty(n + _MOST, dtype=np.int64), np.empty((n + _MOST, 3))
-    pieces[:n], uvs[:n], faces[:n], sags[:n] = b.faces.corners @ R.T + t, b.faces.uv, b.faces.face, b.faces.sag
     frames = b.faces.frame @ R.T
     frames[:, 0] += t
-    out = np.zeros(RESULT)
-    out[0] = np.inf
-    found = descend(
-        pieces, uvs, faces, sags, np.empty(n + _MOST), n, *b.arrays[3:6], np.ascontiguousarray(T),
-        b.faces.kind, b.faces.size, np.ascontiguousarray(frames.reshape(-1, 12)), b.faces.deviation,
-        *a.arrays, a.marked, a.slack, contact, clearance, np.inf if tol is None else tol, _MOST, out,
-    )  # fmt: skip
+    pieces = b.faces.corners @ R.T + t, b.faces.uv, b.faces.face, b.faces.sag
+    surfaces = b.faces.kind, b.faces.size, np.ascontiguousarray(frames.reshape(-1, 12)), b.faces.deviation
+    width = np.inf if tol is None else tol
+    found, out = _search(a, pieces, b.arrays[3:6], np.ascontiguousarray(T), surfaces, contact, clearance, width, _MOST)
     p, q = (out[1:4].copy(), out[4:7].copy()) if np.isfinite(out[0]) else (None, None)
     return Distance(found, float(out[0]), p, q, level="faces", method="faces", estimate=float(out[8]))

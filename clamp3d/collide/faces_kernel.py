@@ -13,10 +13,7 @@ Three better bounds, each proven for the piece as it lies:
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
-import heapq
 import math
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -38,8 +35,8 @@ from clamp3d.collide.faces_math import (
     surface_point,
     to_frame,
 )
-from clamp3d.collide.faces_tree import DEEP, build, from_faces, mark_face, nearest, nearest_marked, nearest_on
-from clamp3d.core.jit import entry, formula, source_stamp
+from clamp3d.collide.faces_tree import DEEP, from_faces, mark_face, nearest, nearest_marked
+from clamp3d.core.jit import entry, formula
 
 NEAR = 4
 """Faces whose surfaces are tried as separating ones, those nearest to the piece."""
@@ -47,6 +44,11 @@ TRIED = 16
 """Faces tried in all, with those beside the nearest."""
 RESULT = 10
 """Upper bound, points on the piece (3) and the solid (3), face, farthest distance that is certainly outside, pieces."""
+_PIECES = 24
+"""Pieces that may wait while one is cut to see whether it reaches above a surface."""
+WORK = 3 + 2 * _PIECES
+"""Triangles (3, 3) that the search takes for itself; ``SPACE``: numbers, besides one for each piece."""
+SPACE = 2 * DEEP + NEAR + TRIED
 
 
 @formula
@@ -143,7 +145,7 @@ def _mark(f, solid, marked, slack, work):
     P, _, face, box, link, order, _, buv, bsag, kind, size, frame, sense, deviation, group, _, marks, nodes = solid
     mark_face(
         P, buv, bsag, face, box, link, order, kind, size, frame, deviation, group, f, sense[f], slack[f],
-        marks[f], nodes[f], work,
+        marks[f], nodes[f], work[3 : 3 + _PIECES], work[3 + _PIECES :], work[0],
     )  # fmt: skip
     marked[f] = 1
 
@@ -153,27 +155,11 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
     """Lower bound for one piece; a better upper bound goes into ``out``."""
     akind, asize, aframe, adeviation = own
     slack, contact, goal, tol = limits
-    near, chosen, heights, over, work, point, p, q = scratch
-    (
-        P,
-        err,
-        face,
-        box,
-        link,
-        order,
-        root,
-        buv,
-        bsag,
-        kind,
-        size,
-        frame,
-        sense,
-        deviation,
-        _group,
-        neighbours,
-        marks,
-        nodes,
-    ) = solid
+    near, chosen, heights, over, stack, whole = scratch
+    work, point, p, q = whole[0], whole[1], whole[2, 0], whole[2, 1]
+    P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, _, beside, marks, nodes = (
+        solid
+    )
     du, v0, v1, u, v = spans(uv)
     e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
     rim = max(sag[0], sag[1], sag[2]) + adeviation[g]
@@ -188,7 +174,7 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
     for i in range(3):
         rho = max(rho, (V[i, 0] - x) ** 2 + (V[i, 1] - y) ** 2 + (V[i, 2] - z) ** 2)
     rho = math.sqrt(rho)
-    j, low, high = nearest(P, err, face, box, link, order, x, y, z, np.inf, near)
+    j, low, high = nearest(P, err, face, box, link, order, x, y, z, np.inf, near, stack)
     found = -high - rho - e
     f = face[j]
     if high - err[j] < out[0]:
@@ -199,17 +185,16 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
             for k in range(3):
                 out[1 + k], out[4 + k] = p[k], q[k]
             out[7] = f
-    outside, empty = -1.0, marks[0, :0]
-    tried = 0
-    for n in range(NEAR + neighbours.shape[1] * TRIED):
+    outside, tried = -1.0, 0
+    for n in range(NEAR + beside.shape[1] * TRIED):
         # The nearest faces first; then those beside them, and beside these.
         if n < NEAR:
             f = near[n]
         else:
-            m = (n - NEAR) // neighbours.shape[1]
+            m = (n - NEAR) // beside.shape[1]
             if m >= tried or tried == TRIED or not (outside < 0.0 and (low > 0.0 or found < -contact)):
                 break
-            f = neighbours[chosen[m], (n - NEAR) % neighbours.shape[1]]
+            f = beside[chosen[m], (n - NEAR) % beside.shape[1]]
         if f < 0 or kind[f] == OTHER:
             continue
         known = False
@@ -228,25 +213,28 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
         tried += 1
         if not (least - e > found or (h > t and outside < 0.0) or (h < -t and h + rim < out[0])):
             continue
-        _mark(f, solid, marked, slack, work)
-        at = nearest_on(P, err, box, link, order, root[f], empty, x, y, z)
+        _mark(f, solid, marked, slack, whole)
+        own_marks = (marks[f], marks[f], nodes[f], nodes[f])
+        at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
         # Beyond this the inside of a torus within a ball may be in two pieces.
         reach = size[f, 0] if kind[f] == TORUS else np.inf
         if least - e > found or (h > t and outside < 0.0):
             limit = min(max(least, h) + rho + 2.0 * at, reach if sense[f] < 0.0 else np.inf)
-            clear = nearest_marked(P, err, box, link, order, marks[f], marks[f], nodes[f], nodes[f], 1, x, y, z, limit)
+            clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 1, -1.0, x, y, z, limit, stack)
             if clear > at:
                 found = max(found, min(least, clear - rho) - e)
                 if h > t:
                     outside = max(outside, min(h - t, clear))
         if h < -t and h + rim < out[0]:
             limit = min(2.0 * at - h, reach if sense[f] > 0.0 else np.inf)
-            clear = nearest_marked(P, err, box, link, order, marks[f], marks[f], nodes[f], nodes[f], 2, x, y, z, limit)
+            clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 2, -1.0, x, y, z, limit, stack)
             if clear > at:  # inside: as deep as the faces are away
                 for i in range(3):
                     for c in range(3):
                         work[i, c] = p[c]
-                depth = from_faces(P, err, face, box, link, order, kind, size, frame, deviation, work, over, -h, point)
+                depth = from_faces(
+                    P, err, face, box, link, order, kind, size, frame, deviation, work, over, -h, point, stack
+                )
                 depth = max(depth, min(-h - t, clear)) - rim
                 if -depth < out[0] and depth > 0.0:
                     out[0] = -depth
@@ -267,16 +255,16 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
                     continue
                 if least < 0.0:
                     least /= 0.9 * math.sqrt(0.5 * (1.0 + turn))
-                _mark(f, solid, marked, slack, work)
-                _mark(g, solid, marked, slack, work)
+                _mark(f, solid, marked, slack, whole)
+                _mark(g, solid, marked, slack, whole)
                 # A piece of one that looks over the other: what lies above both there is outside.
-                at = min(
-                    nearest_on(P, err, box, link, order, root[f], marks[g], x, y, z),
-                    nearest_on(P, err, box, link, order, root[g], marks[f], x, y, z),
-                )
-                clear = nearest_marked(
-                    P, err, box, link, order, marks[f], marks[g], nodes[f], nodes[g], 1, x, y, z, 2.0 * at + rho
-                )
+                at = np.inf
+                for one, other in ((f, g), (g, f)):
+                    rows = (marks[other], marks[other], nodes[other], nodes[other])
+                    at = nearest_marked(P, err, box, link, order, root[one], *rows, 1, 1.0, x, y, z, at, stack)
+                rows = (marks[f], marks[g], nodes[f], nodes[g])
+                limit = 2.0 * at + rho
+                clear = nearest_marked(P, err, box, link, order, 0, *rows, 1, -1.0, x, y, z, limit, stack)
                 if clear > at:
                     found = max(found, min(least, clear - rho) - e)
     if outside < 0.0 and low > 0.0 and found < min(out[0], goal) - tol and _winding(P, x, y, z) < 0.5:
@@ -287,131 +275,146 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
         target = min(out[0], goal)
         if found < target - tol and low > e:
             d = from_faces(
-                P, err, face, box, link, order, kind, size, frame, deviation, V, over, target + e + tol, work
+                P, err, face, box, link, order, kind, size, frame, deviation, V, over, target + e + tol, work, stack
             )
             if d > e:
                 found = max(found, d - e)
     return found
 
 
-def _entries(stamp: str) -> tuple[Any, Any]:
-    def tree(P, err, start, box, link, order, root):
-        stamp  # noqa: B018
-        return build(P, err, start, box, link, order, root)
+@formula
+def _push(heap, count, key, item):
+    """One more item on a heap of ``count``, that with the least key first."""
+    k = count
+    while k > 0 and key[heap[(k - 1) // 2]] > key[item]:
+        heap[k] = heap[(k - 1) // 2]
+        k = (k - 1) // 2
+    heap[k] = item
 
-    def descend(
-        pieces, uvs, faces, sags, bounds, n, bbox, blink, border, T,
-        akind, asize, aframe, adeviation,
-        P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
-        marks, nodes, marked, slack, contact, clearance, tol, most, out,
-    ):  # fmt: skip
-        stamp  # noqa: B018
-        own = (akind, asize, aframe, adeviation)
-        solid = (
-            P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
-            marks, nodes,
-        )  # fmt: skip
-        chosen, heights = np.empty(TRIED, np.int64), np.empty(TRIED)
-        near, over, work = np.empty(NEAR, np.int64), np.empty(len(kind)), np.empty((3, 3))
-        point = np.empty((3, 3))
-        p, q = np.empty(3), np.empty(3)
-        scratch = (near, chosen, heights, over, work, point, p, q)
-        verdict = np.isinf(tol)
-        goal = max(contact, clearance) + 1e-9 if verdict else np.inf
-        tol = 0.01 * contact if verdict else tol
-        limits = (slack, contact, goal, tol)
-        heap = [(0.0, 0) for _ in range(0)]
-        first = n
-        # Down the pieces' own tree: a branch that keeps away from the surface is outside if one of its pieces is.
-        looked, floor = 0, np.inf
-        stack = np.empty(DEEP, np.int64)
-        stack[0], top = 0, 1
-        while top > 0:
-            if verdict and out[0] < -contact:
-                return -np.inf
-            top -= 1
-            i = stack[top]
-            leaf, radius = blink[i, 1] > 0, 0.0
-            for c in range(3):
-                q[c] = 0.5 * (bbox[i, c] + bbox[i, 3 + c])
-                radius += 0.25 * (bbox[i, 3 + c] - bbox[i, c]) ** 2
-            for c in range(3):
-                p[c] = T[c, 0] * q[0] + T[c, 1] * q[1] + T[c, 2] * q[2] + T[c, 3]
-            radius = math.sqrt(radius) + bbox[i, 6]
-            target = min(goal, out[0])
-            _, low, _ = nearest(
-                P, err, face, box, link, order, p[0], p[1], p[2], max(target, 0.0) + radius + contact, near
-            )
-            if low - radius > target:
-                k = i
-                while blink[k, 1] < 0:
-                    k = blink[k, 0]
-                k = border[blink[k, 0]]
-                looked += 1
-                if _piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out) > 0.0:
-                    floor = min(floor, low - radius)
-                    continue
-            if not leaf:
-                stack[top], stack[top + 1] = blink[i, 0], -blink[i, 1]
-                top += 2
-                continue
-            for j in range(blink[i, 0], blink[i, 0] + blink[i, 1]):
-                k = border[j]
-                low = _piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out)
-                bounds[k] = low
-                heapq.heappush(heap, (low, k))
-                looked += 1
-        while len(heap):
-            low = min(floor, heap[0][0])
-            high = out[0]
-            known = high - low <= tol
-            if verdict:
-                known = (
-                    known
-                    or low > goal
-                    or high < -contact
-                    or (low >= -contact and high <= contact)
-                    or (low > contact and high < clearance)
-                )
-            if known or n >= len(faces) or n - first >= most:
-                break
-            i = heapq.heappop(heap)[1]
-            g = faces[i]
-            du, v0, v1, _, _ = spans(uvs[i])
-            e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
-            bent = e > 0.25 * (min(high, goal) - low)
-            side = longest(pieces[i], uvs[i], akind[g], asize[g, 0], asize[g, 1], bent)
-            faces[n] = g
-            cut(
-                pieces[i], uvs[i], side, akind[g], asize[g, 0], asize[g, 1], aframe[g], pieces[n], uvs[n]
-            )  # fmt: skip
-            # The piece keeps the half at corner ``side``; the cut itself is no border.
-            for c in range(3):
-                sags[n, c] = sags[i, c]
-            sags[n, (side + 2) % 3] = 0.0
-            sags[i, (side + 1) % 3] = 0.0
-            for k in (i, n):
-                new = _piece(pieces[k], uvs[k], g, sags[k], own, solid, marked, limits, scratch, out)
-                bounds[k] = max(low, new)
-                heapq.heappush(heap, (bounds[k], k))
-            n += 1
-            looked += 2
-        out[9] = looked
-        return min(floor, heap[0][0]) if len(heap) else floor
 
+@formula
+def _pop(heap, count, key):
+    """Take the first item off a heap of ``count``."""
+    first, last, k = heap[0], heap[count - 1], 0
+    while 2 * k + 1 < count - 1:
+        j = 2 * k + 1
+        if j + 1 < count - 1 and key[heap[j + 1]] < key[heap[j]]:
+            j += 1
+        if key[heap[j]] >= key[last]:
+            break
+        heap[k] = heap[j]
+        k = j
+    heap[k] = last
+    return first
+
+
+def _descend(
+    pieces, uvs, faces, sags, bounds, n, bbox, blink, border, T,
+    akind, asize, aframe, adeviation,
+    P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
+    marks, nodes, marked, slack, contact, clearance, tol, most, over, whole, space, out,
+):  # fmt: skip
+    own = (akind, asize, aframe, adeviation)
     solid = (
-        "f8[:,:,::1],f8[::1],i8[::1],f8[:,::1],i8[:,::1],i8[::1],i8[::1],f8[:,:,::1],f8[::1],"
-        "i8[::1],f8[:,::1],f8[:,::1],f8[::1],f8[::1],i8[::1],i8[:,::1],i1[:,::1],i1[:,::1]"
-    )
-    return (
-        entry(tree, "i8(f8[:,:,::1],f8[::1],i8[::1],f8[:,::1],i8[:,::1],i8[::1],i8[::1])"),
-        entry(
-            descend,
-            "f8(f8[:,:,::1],f8[:,:,::1],i8[::1],f8[:,::1],f8[::1],i8,"
-            "f8[:,::1],i8[:,::1],i8[::1],f8[:,::1],i8[::1],f8[:,::1],f8[:,::1],f8[::1],"
-            f"{solid},i1[::1],f8[::1],f8,f8,f8,i8,f8[::1])",
-        ),
-    )
+        P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
+        marks, nodes,
+    )  # fmt: skip
+    stack, inner = space[:DEEP], space[DEEP : 2 * DEEP]
+    near, chosen, heap = space[2 * DEEP : 2 * DEEP + NEAR], space[2 * DEEP + NEAR : SPACE], space[SPACE:]
+    heights, over, p, q = over[:TRIED], over[TRIED:], whole[2, 0], whole[2, 1]
+    scratch = (near, chosen, heights, over, inner, whole)
+    verdict = np.isinf(tol)
+    goal = max(contact, clearance) + 1e-9 if verdict else np.inf
+    tol = 0.01 * contact if verdict else tol
+    limits = (slack, contact, goal, tol)
+    first, waiting = n, 0
+    # Down the pieces' own tree: a branch that keeps away from the surface is outside if one of its pieces is.
+    looked, floor = 0, np.inf
+    stack[0], top = 0, 1
+    while top > 0:
+        if verdict and out[0] < -contact:
+            return -np.inf
+        top -= 1
+        i = stack[top]
+        leaf, radius = blink[i, 1] > 0, 0.0
+        for c in range(3):
+            q[c] = 0.5 * (bbox[i, c] + bbox[i, 3 + c])
+            radius += 0.25 * (bbox[i, 3 + c] - bbox[i, c]) ** 2
+        for c in range(3):
+            p[c] = T[c, 0] * q[0] + T[c, 1] * q[1] + T[c, 2] * q[2] + T[c, 3]
+        radius = math.sqrt(radius) + bbox[i, 6]
+        target = min(goal, out[0])
+        _, low, _ = nearest(
+            P, err, face, box, link, order, p[0], p[1], p[2], max(target, 0.0) + radius + contact, near, inner
+        )
+        if low - radius > target:
+            k = i
+            while blink[k, 1] < 0:
+                k = blink[k, 0]
+            k = border[blink[k, 0]]
+            looked += 1
+            if _piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out) > 0.0:
+                floor = min(floor, low - radius)
+                continue
+        if not leaf:
+            stack[top], stack[top + 1] = blink[i, 0], -blink[i, 1]
+            top += 2
+            continue
+        for j in range(blink[i, 0], blink[i, 0] + blink[i, 1]):
+            k = border[j]
+            bounds[k] = _piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out)
+            _push(heap, waiting, bounds, k)
+            waiting += 1
+            looked += 1
+    while waiting:
+        low = min(floor, bounds[heap[0]])
+        high = out[0]
+        known = high - low <= tol
+        if verdict:
+            known = (
+                known
+                or low > goal
+                or high < -contact
+                or (low >= -contact and high <= contact)
+                or (low > contact and high < clearance)
+            )
+        if known or n >= len(faces) or n - first >= most:
+            break
+        i = _pop(heap, waiting, bounds)
+        waiting -= 1
+        g = faces[i]
+        du, v0, v1, _, _ = spans(uvs[i])
+        e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
+        bent = e > 0.25 * (min(high, goal) - low)
+        side = longest(pieces[i], uvs[i], akind[g], asize[g, 0], asize[g, 1], bent)
+        faces[n] = g
+        cut(
+            pieces[i], uvs[i], side, akind[g], asize[g, 0], asize[g, 1], aframe[g], pieces[n], uvs[n]
+        )  # fmt: skip
+        # The piece keeps the half at corner ``side``; the cut itself is no border.
+        for c in range(3):
+            sags[n, c] = sags[i, c]
+        sags[n, (side + 2) % 3] = 0.0
+        sags[i, (side + 1) % 3] = 0.0
+        for k in (i, n):
+            new = _piece(pieces[k], uvs[k], g, sags[k], own, solid, marked, limits, scratch, out)
+            bounds[k] = max(low, new)
+            _push(heap, waiting, bounds, k)
+            waiting += 1
+        n += 1
+        looked += 2
+    out[9] = looked
+    return min(floor, bounds[heap[0]]) if waiting else floor
 
 
-tree, descend = _entries(source_stamp(Path(__file__).parent, "faces_*.py"))
+_SOLID = (
+    "f8[:,:,::1],f8[::1],i8[::1],f8[:,::1],i8[:,::1],i8[::1],i8[::1],f8[:,:,::1],f8[::1],"
+    "i8[::1],f8[:,::1],f8[:,::1],f8[::1],f8[::1],i8[::1],i8[:,::1],i1[:,::1],i1[:,::1]"
+)
+descend = entry(
+    _descend,
+    "f8(f8[:,:,::1],f8[:,:,::1],i8[::1],f8[:,::1],f8[::1],i8,f8[:,::1],i8[:,::1],i8[::1],f8[:,::1],"
+    f"i8[::1],f8[:,::1],f8[:,::1],f8[::1],{_SOLID},"
+    "i1[::1],f8[::1],f8,f8,f8,i8,f8[::1],f8[:,:,::1],i8[::1],f8[::1])",
+    "faces_*.py",
+)

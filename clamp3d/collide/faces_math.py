@@ -331,7 +331,9 @@ def cut(V, uv, i, kind, a, b, F, V2, uv2):  # type: ignore[no-untyped-def]
     elif np.isnan(uv[j, 0]):
         u = uv[i, 0]
     for c in range(3):
-        V2[c], uv2[c] = V[c], uv[c]
+        for k in range(3):
+            V2[c, k] = V[c, k]
+        uv2[c, 0], uv2[c, 1] = uv[c, 0], uv[c, 1]
     middle = V2[i]
     if kind == OTHER:
         for c in range(3):
@@ -339,5 +341,6 @@ def cut(V, uv, i, kind, a, b, F, V2, uv2):  # type: ignore[no-untyped-def]
     else:
         surface_point(kind, a, b, F, u, v, middle)
     uv2[i, 0], uv2[i, 1] = u, v
-    V[j] = middle
+    for c in range(3):
+        V[j, c] = middle[c]
     uv[j, 0], uv[j, 1] = u, v

@@ -24,118 +24,129 @@ from clamp3d.collide.faces_math import (
     to_frame,
     triangles,
 )
-from clamp3d.core.jit import formula
+from clamp3d.core.jit import entry, formula
 
 LEAF = 4
 DEEP = 128
 
 
 @formula
-def _spread(box, i, C, t):
-    """Let the node's box hold a triangle C[t] (3, 3)."""
+def _spread(box, i, C):
+    """Let the node's box hold a triangle C (3, 3)."""
     for k in range(3):
         for c in range(3):
-            box[i, k] = min(box[i, k], C[t, c, k])
-            box[i, 3 + k] = max(box[i, 3 + k], C[t, c, k])
+            box[i, k] = min(box[i, k], C[c, k])
+            box[i, 3 + k] = max(box[i, 3 + k], C[c, k])
 
 
 @formula
-def build(P, err, start, box, link, order, root):
+def _halve(items, s, n, at, axis):
+    """Order the n items from s on so that the first half has the lesser at[item, axis]: Hoare's quickselect."""
+    low, high, half = s, s + n - 1, s + n // 2
+    while low < high:
+        pivot, i, j = at[items[half], axis], low, high
+        while i <= j:
+            while at[items[i], axis] < pivot:
+                i += 1
+            while at[items[j], axis] > pivot:
+                j -= 1
+            if i <= j:
+                items[i], items[j] = items[j], items[i]
+                i, j = i + 1, j - 1
+        if j < half:
+            low = i
+        if i > half:
+            high = j
+
+
+def _build(P, err, start, middle, centre, chosen, box, link, order, root):
     """Tree of triangles P (m, 3, 3), face by face, into box (n, 7: low, high, largest error); returns its size.
 
     ``start`` (f + 1,): first triangle of each face. An inner node has the children link[i, 0] and -link[i, 1], both
-    after it; a leaf has link[i, 1] triangles, from link[i, 0] on in ``order``. root[f] is the node of face f.
+    after it; a leaf has link[i, 1] triangles, from link[i, 0] on in ``order`` (m,). root[f] is the node of face f.
+    Given are the numbers of all triangles in ``order`` and of all faces in ``chosen``, and the middles of their boxes.
     """
-    m, faces = P.shape[0], len(root)
-    middle = 0.5 * (
-        np.minimum(np.minimum(P[:, 0], P[:, 1]), P[:, 2]) + np.maximum(np.maximum(P[:, 0], P[:, 1]), P[:, 2])
-    )
-    centre, chosen = np.empty((faces, 3)), np.arange(faces)
-    for f in range(faces):
-        for k in range(3):
-            part = middle[start[f] : start[f + 1], k]
-            centre[f, k] = 0.5 * (part.min() + part.max())
-    for i in range(m):
-        order[i] = i
-    # A node is a range of faces, or of one face's triangles.
-    first, count = np.zeros(2 * m + 2 * faces, np.int64), np.zeros(2 * m + 2 * faces, np.int64)
-    whole = np.zeros(2 * m + 2 * faces, np.bool_)
-    first[0], count[0], whole[0] = 0, faces, True
+    # A node that waits is a range of faces (its error is -1), or of one face's triangles: first and how many.
+    link[0, 0], link[0, 1], box[0, 6] = 0, len(chosen), -1.0
     used, i = 1, 0
     while i < used:
-        if whole[i] and count[i] == 1:
-            f = chosen[first[i]]
-            root[f], whole[i] = i, False
-            first[i], count[i] = start[f], start[f + 1] - start[f]
-        s, n = first[i], count[i]
+        s, n, whole = link[i, 0], link[i, 1], box[i, 6] < 0.0
+        if whole and n == 1:
+            f, whole = chosen[s], False
+            root[f], s, n = i, start[f], start[f + 1] - start[f]
         for k in range(3):
             box[i, k], box[i, 3 + k] = np.inf, -np.inf
         box[i, 6] = 0.0
-        if whole[i]:
-            for c in range(s, s + n):
-                for t in range(start[chosen[c]], start[chosen[c] + 1]):
-                    _spread(box, i, P, t)
-                    box[i, 6] = max(box[i, 6], err[t])
-            items, at = chosen[s : s + n].copy(), centre
-        else:
-            for c in range(s, s + n):
-                _spread(box, i, P, order[c])
-                box[i, 6] = max(box[i, 6], err[order[c]])
-            items, at = order[s : s + n].copy(), middle
-        if not whole[i] and n <= LEAF:
-            link[i, 0], link[i, 1] = s, n
-        else:
+        for c in range(s, s + n):
+            first, last = (start[chosen[c]], start[chosen[c] + 1]) if whole else (c, c + 1)
+            for j in range(first, last):
+                t = j if whole else order[j]
+                _spread(box, i, P[t])
+                box[i, 6] = max(box[i, 6], err[t])
+        if whole or n > LEAF:
+            items, at = (chosen, centre) if whole else (order, middle)
             axis, widest = 0, -1.0
             for k in range(3):
                 low, high = np.inf, -np.inf
-                for t in items:
-                    low, high = min(low, at[t, k]), max(high, at[t, k])
+                for c in range(s, s + n):
+                    low, high = min(low, at[items[c], k]), max(high, at[items[c], k])
                 if high - low > widest:
                     axis, widest = k, high - low
-            items = items[np.argsort(at[items, axis])]
-            if whole[i]:
-                chosen[s : s + n] = items
-            else:
-                order[s : s + n] = items
-            half = n // 2
-            link[i, 0], link[i, 1] = used, -(used + 1)
-            first[used], count[used], whole[used] = s, half, whole[i]
-            first[used + 1], count[used + 1], whole[used + 1] = s + half, n - half, whole[i]
+            _halve(items, s, n, at, axis)
+            for half in range(2):
+                link[used + half, 0] = s + half * (n // 2)
+                link[used + half, 1] = n // 2 if half == 0 else n - n // 2
+                box[used + half, 6] = -1.0 if whole else 0.0
+            s, n = used, -(used + 1)
             used += 2
+        link[i, 0], link[i, 1] = s, n
         i += 1
     return used
 
 
+tree = entry(
+    _build,
+    "i8(f8[:,:,::1],f8[::1],i8[::1],f8[:,::1],f8[:,::1],i8[::1],f8[:,::1],i8[:,::1],i8[::1],i8[::1])",
+    "faces_*.py",
+)
+
+
 @formula
-def box_distance(box, i, x, y, z):
-    """Distance of a point from a node's box."""
-    dx = max(0.0, box[i, 0] - x, x - box[i, 3])
-    dy = max(0.0, box[i, 1] - y, y - box[i, 4])
-    dz = max(0.0, box[i, 2] - z, z - box[i, 5])
+def _box_distance(box, i, x0, y0, z0, x1, y1, z1):
+    """Distance of a node's box from the box that the last six are the lower and upper corner of."""
+    dx = max(0.0, box[i, 0] - x1, x0 - box[i, 3])
+    dy = max(0.0, box[i, 1] - y1, y0 - box[i, 4])
+    dz = max(0.0, box[i, 2] - z1, z0 - box[i, 5])
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @formula
-def nearest(P, err, face, box, link, order, x, y, z, cut, near):
+def _put_children(box, link, i, x0, y0, z0, x1, y1, z1, stack, top):
+    """The children of a node onto the stack, the one that is nearer to the box last; returns how many are on it."""
+    a, b = link[i, 0], -link[i, 1]
+    if _box_distance(box, a, x0, y0, z0, x1, y1, z1) < _box_distance(box, b, x0, y0, z0, x1, y1, z1):
+        a, b = b, a
+    stack[top], stack[top + 1] = a, b
+    return top + 2
+
+
+@formula
+def nearest(P, err, face, box, link, order, x, y, z, cut, near, stack):
     """Triangle nearest to a point: (index or -1, lower bound of the distance of the faces, upper bound of it).
 
     Nothing beyond ``cut`` is looked at. ``near`` (k,) gets the faces of the triangles last found nearest, -1 for none.
     """
-    stack = np.empty(DEEP, np.int64)
     stack[0], top = 0, 1
     found, low, high = -1, cut, np.inf
-    near[:] = -1
+    for k in range(len(near)):
+        near[k] = -1
     while top > 0:
         top -= 1
         i = stack[top]
-        if box_distance(box, i, x, y, z) - box[i, 6] > low:
+        if _box_distance(box, i, x, y, z, x, y, z) - box[i, 6] > low:
             continue
         if link[i, 1] < 0:
-            a, b = link[i, 0], -link[i, 1]
-            if box_distance(box, a, x, y, z) < box_distance(box, b, x, y, z):
-                a, b = b, a
-            stack[top], stack[top + 1] = a, b
-            top += 2
+            top = _put_children(box, link, i, x, y, z, x, y, z, stack, top)
             continue
         for j in range(link[i, 0], link[i, 0] + link[i, 1]):
             t = order[j]
@@ -145,122 +156,61 @@ def nearest(P, err, face, box, link, order, x, y, z, cut, near):
                 found = t
             if d - err[t] <= low:
                 low = min(low, d - err[t])
-                for k in range(len(near)):
-                    if near[k] == face[t]:
-                        for l in range(k, 0, -1):  # noqa: E741
-                            near[l] = near[l - 1]
-                        near[0] = face[t]
-                        break
-                else:
-                    for l in range(len(near) - 1, 0, -1):  # noqa: E741
-                        near[l] = near[l - 1]
-                    near[0] = face[t]
+                last = 0  # where the face is already, or the end
+                while last < len(near) - 1 and near[last] != face[t]:
+                    last += 1
+                for k in range(last, 0, -1):
+                    near[k] = near[k - 1]
+                near[0] = face[t]
     return found, low, high
 
 
 @formula
-def nearest_marked(P, err, box, link, order, mark, other, nodes, rest, bit, x, y, z, cut):
-    """Lower bound of a point's distance from the pieces marked with ``bit`` in both rows of marks, at most ``cut``.
+def nearest_marked(P, err, box, link, order, root, mark, other, nodes, rest, bit, side, x, y, z, cut, stack):
+    """Bound of a point's distance, at most ``cut``, from the pieces below the node ``root``.
 
-    ``mark`` and ``other`` (m,) are rows of triangles, ``nodes`` and ``rest`` (n,) the same for the tree's nodes.
+    ``side`` -1 for a lower bound, 1 for an upper one. Of those that are marked with ``bit`` in both rows of marks, or
+    of all where it is 0: ``mark`` and ``other`` (m,) are rows of triangles, ``nodes`` and ``rest`` (n,) of tree nodes.
     """
-    stack = np.empty(DEEP, np.int64)
-    stack[0], top = 0, 1
+    stack[0], top = root, 1
     low = cut
     while top > 0:
         top -= 1
         i = stack[top]
-        if not (nodes[i] & rest[i] & bit) or box_distance(box, i, x, y, z) - box[i, 6] >= low:
+        least = _box_distance(box, i, x, y, z, x, y, z) + min(side, 0.0) * box[i, 6]
+        if nodes[i] & rest[i] & bit != bit or least >= low:
             continue
         if link[i, 1] < 0:
-            a, b = link[i, 0], -link[i, 1]
-            if box_distance(box, a, x, y, z) < box_distance(box, b, x, y, z):
-                a, b = b, a
-            stack[top], stack[top + 1] = a, b
-            top += 2
+            top = _put_children(box, link, i, x, y, z, x, y, z, stack, top)
             continue
         for j in range(link[i, 0], link[i, 0] + link[i, 1]):
             t = order[j]
-            if mark[t] & other[t] & bit:
+            if mark[t] & other[t] & bit == bit:
                 d, _, _ = point_triangle(x, y, z, P[t])
-                low = min(low, d - err[t])
+                low = min(low, d + side * err[t])
     return low
 
 
 @formula
-def nearest_on(P, err, box, link, order, root, mark, x, y, z):
-    """Upper bound of a point's distance from the face whose node is ``root``: from those of its pieces that are marked
-    1 in ``mark`` (m,), all of them where that is empty."""
-    stack = np.empty(DEEP, np.int64)
-    stack[0], top = root, 1
-    low = np.inf
-    while top > 0:
-        top -= 1
-        i = stack[top]
-        if box_distance(box, i, x, y, z) >= low:
-            continue
-        if link[i, 1] < 0:
-            a, b = link[i, 0], -link[i, 1]
-            if box_distance(box, a, x, y, z) < box_distance(box, b, x, y, z):
-                a, b = b, a
-            stack[top], stack[top + 1] = a, b
-            top += 2
-            continue
-        for j in range(link[i, 0], link[i, 0] + link[i, 1]):
-            t = order[j]
-            if len(mark) == 0 or mark[t] & 1:
-                d, _, _ = point_triangle(x, y, z, P[t])
-                low = min(low, d + err[t])
-    return low
-
-
-@formula
-def _boxes(one, i, other, j):
-    """Distance of two boxes."""
-    s = 0.0
-    for k in range(3):
-        d = max(0.0, one[i, k] - other[j, 3 + k], other[j, k] - one[i, 3 + k])
-        s += d * d
-    return math.sqrt(s)
-
-
-@formula
-def _box_triangle(one, P):
-    """Distance of a box from the box of a triangle."""
-    s = 0.0
-    for k in range(3):
-        d = max(0.0, one[0, k] - max(P[0, k], P[1, k], P[2, k]), min(P[0, k], P[1, k], P[2, k]) - one[0, 3 + k])
-        s += d * d
-    return math.sqrt(s)
-
-
-@formula
-def from_faces(P, err, face, box, link, order, kind, size, frame, deviation, V, over, limit, work):
+def from_faces(P, err, face, box, link, order, kind, size, frame, deviation, V, over, limit, work, stack):
     """Lower bound of the flat triangle V's distance from all pieces, at most ``limit``.
 
     ``over`` (n,) keeps V's least distance from each whole surface, NaN where it was not asked yet.
     """
-    stack = np.empty(DEEP, np.int64)
     stack[0], top = 0, 1
     low = limit
-    own = np.empty((1, 6))
-    own[0, :3], own[0, 3:] = np.inf, -np.inf
-    for k in range(3):
-        for c in range(3):
-            own[0, k] = min(own[0, k], V[c, k])
-            own[0, 3 + k] = max(own[0, 3 + k], V[c, k])
-    over[:] = np.nan
+    x0, x1 = min(V[0, 0], V[1, 0], V[2, 0]), max(V[0, 0], V[1, 0], V[2, 0])
+    y0, y1 = min(V[0, 1], V[1, 1], V[2, 1]), max(V[0, 1], V[1, 1], V[2, 1])
+    z0, z1 = min(V[0, 2], V[1, 2], V[2, 2]), max(V[0, 2], V[1, 2], V[2, 2])
+    for f in range(len(over)):
+        over[f] = np.nan
     while top > 0:
         top -= 1
         i = stack[top]
-        if _boxes(own, 0, box, i) - box[i, 6] >= low:
+        if _box_distance(box, i, x0, y0, z0, x1, y1, z1) - box[i, 6] >= low:
             continue
         if link[i, 1] < 0:
-            a, b = link[i, 0], -link[i, 1]
-            if _boxes(own, 0, box, a) < _boxes(own, 0, box, b):
-                a, b = b, a
-            stack[top], stack[top + 1] = a, b
-            top += 2
+            top = _put_children(box, link, i, x0, y0, z0, x1, y1, z1, stack, top)
             continue
         for j in range(link[i, 0], link[i, 0] + link[i, 1]):
             t = order[j]
@@ -273,7 +223,12 @@ def from_faces(P, err, face, box, link, order, kind, size, frame, deviation, V, 
                     over[f] = max(up, down, 0.0) - deviation[f]
                 if over[f] >= low:
                     continue
-            if _box_triangle(own, P[t]) - err[t] >= low:
+            apart = 0.0
+            for k in range(3):
+                c = max(min(V[0, k], V[1, k], V[2, k]) - max(P[t, 0, k], P[t, 1, k], P[t, 2, k]), 0.0)
+                c = max(min(P[t, 0, k], P[t, 1, k], P[t, 2, k]) - max(V[0, k], V[1, k], V[2, k]), c)
+                apart += c * c
+            if math.sqrt(apart) - err[t] >= low:
                 continue
             d = triangles(V, P[t]) - err[t]
             if kind[f] != OTHER:
@@ -288,8 +243,11 @@ def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, pieces, uvs, wor
 
     The piece is cut until its own bend no longer matters, at most so often that the stack ``pieces`` (n, 3, 3) is full.
     """
-    pieces[0], uvs[0], top = V, uv, 1
-    left = 400
+    for i in range(3):
+        for k in range(3):
+            pieces[0, i, k] = V[i, k]
+        uvs[0, i, 0], uvs[0, i, 1] = uv[i, 0], uv[i, 1]
+    top, left = 1, 400
     while top > 0:
         top -= 1
         to_frame(frame[f], pieces[top], work)
@@ -316,11 +274,11 @@ def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, pieces, uvs, wor
 
 @formula
 def mark_face(
-    P, uv, sag, face, box, link, order, kind, size, frame, deviation, group, f, sense, slack, mark, nodes, work
-):
+    P, uv, sag, face, box, link, order, kind, size, frame, deviation, group, f, sense, slack, mark, nodes, pieces, uvs,
+    work,
+):  # fmt: skip
     """Marks of the triangles (m,) and tree nodes (n,) against the surface of face f: 1 for pieces that reach above it,
     2 for those that reach below."""
-    pieces, uvs = np.empty((24, 3, 3)), np.empty((24, 3, 2))
     # What is known of a node's triangles goes down with it: bits 1 and 2 as in the marks, 4 and 8 where they are open.
     nodes[0] = 12
     for i in range(len(nodes)):

@@ -2,7 +2,7 @@
 
 numba's own cache would do, but to read it numba has to be imported with its compiler and its type libraries (0.5 s of
 CPU, more than most commands work); machine code needs llvmlite alone (0.05 s). What cannot be kept that way (a formula
-that allocates memory, other arrays than those of floats in C order) goes into numba's cache.
+that allocates memory, other arrays than those in C order) goes into numba's cache.
 """
 
 from __future__ import annotations
@@ -74,15 +74,16 @@ def source_stamp(folder: Path = Path(__file__).parent, names: str = "kernel*.py"
     return digest.hexdigest()
 
 
-def entry(function: Callable[..., Any], signature: str) -> Any:
+def entry(function: Callable[..., Any], signature: str, sources: str = "kernel*.py") -> Any:
     """An entry point for one ``signature`` as numba writes it, from the cache or compiled; arrays are in C order.
 
     Called with other types than those of its signature it may end the process: the callers check. Damaged files in
-    the cache are written anew; without a place for the cache every run compiles.
+    the cache are written anew; without a place for the cache every run compiles. ``sources``: files in the function's
+    folder that hold the formulas it calls.
     """
     returned, given = re.fullmatch(r"(\w+)\((.*)\)", signature).groups()  # type: ignore[union-attr]
     arguments = re.findall(r"\w+(?:\[[^]]*\])?", given)
-    path = _place(function, signature)
+    path = _place(function, signature, sources)
     code = _read(path)
     if code is None:
         once = _can_keep(path.parent)
@@ -99,13 +100,14 @@ def entry(function: Callable[..., Any], signature: str) -> Any:
 # --- The cache --------------------------------------------------------------------------------------------------------
 
 
-def _place(function: Callable[..., Any], signature: str) -> Path:
+def _place(function: Callable[..., Any], signature: str, sources: str) -> Path:
     """The file of an entry point: another one for every source, processor and version."""
     import llvmlite.binding as llvm
     import platformdirs
 
     source = Path(function.__code__.co_filename)
-    facts = [source_stamp(), source.read_bytes() if source.exists() else b"", function.__qualname__, signature]
+    facts = [source_stamp(source.parent, sources), source.read_bytes() if source.exists() else b""]
+    facts += [function.__qualname__, signature]
     facts += [metadata.version(name) for name in ("numba", "llvmlite", "numpy")]
     facts += [sys.version, platform.machine(), llvm.get_process_triple(), llvm.get_host_cpu_name(), _features()]
     key = hashlib.sha256(repr(facts).encode()).hexdigest()[:32]
@@ -203,7 +205,7 @@ def _machine_code(function: Callable[..., Any], returned: str, arguments: list[s
     from numba import types
     from numba.extending import intrinsic
 
-    if not all(kind in _TYPES or re.fullmatch(r"f8\[(:,)*::1\]", kind) for kind in [returned, *arguments]):
+    if not all(kind in _TYPES or re.fullmatch(r"(f8|i8|i1)\[(:,)*::1\]", kind) for kind in [returned, *arguments]):
         return _OTHERWISE
     head = object.__basicsize__
 
@@ -214,23 +216,28 @@ def _machine_code(function: Callable[..., Any], returned: str, arguments: list[s
 
         return types.int64(types.int64, types.int64), build
 
-    @intrinsic
-    def floats(typing_context, address):  # type: ignore[no-untyped-def]
-        def build(context, builder, signature, given):  # type: ignore[no-untyped-def]
-            return builder.inttoptr(given[0], ir.DoubleType().as_pointer())
+    def pointer(kind: Any, low: Any) -> Any:
+        @intrinsic
+        def at(typing_context, address):  # type: ignore[no-untyped-def]
+            def build(context, builder, signature, given):  # type: ignore[no-untyped-def]
+                return builder.inttoptr(given[0], low.as_pointer())
 
-        return types.CPointer(types.float64)(types.int64), build  # type: ignore[no-untyped-call]
+            return types.CPointer(kind)(types.int64), build  # type: ignore[no-untyped-call]
+
+        return at
 
     names = [f"a{i}" for i in range(len(arguments))]
     passed = []
     for name, kind in zip(names, arguments, strict=True):
         shape = "".join(f"word(word({name}, {head + 16}), {8 * i}), " for i in range(kind.count(":") - 1))
-        passed.append(f"carray(floats(word({name}, {head})), ({shape}))" if "[" in kind else name)
+        passed.append(f"carray({kind[:2]}(word({name}, {head})), ({shape}))" if "[" in kind else name)
     text = f"def call({', '.join(names)}):\n    return function({', '.join(passed)})\n"
     known: dict[str, Any] = {
         "carray": numba.carray,  # type: ignore[attr-defined]
         "word": word,
-        "floats": floats,
+        "f8": pointer(types.float64, ir.DoubleType()),
+        "i8": pointer(types.int64, ir.IntType(64)),
+        "i1": pointer(types.int8, ir.IntType(8)),
     }
     exec(text, known | {"function": numba.njit(**_OPTIONS)(function)}, known)
     plain = ", ".join("i8" if "[" in kind else kind for kind in arguments)

@@ -279,20 +279,23 @@ class SectionPose:
         Position in mm, x right and y down.
     angle : float
         Angle in rad, counter-clockwise as seen.
+    along : float
+        How far the part's middle is behind the section, on the wires' direction Y; mm.
     """
 
     x: float
     y: float
     angle: float = 0.0
+    along: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("x", "y", "angle"):
+        for name in ("x", "y", "angle", "along"):
             object.__setattr__(self, name, number(name, getattr(self, name)))
 
-    def T(self, along: float = 0.0) -> Array:
-        """World pose (4, 4) of the part, its middle at ``along`` mm on the wires' direction Y."""
+    def T(self) -> Array:
+        """World pose (4, 4) of the part."""
         c, s = np.cos(self.angle), np.sin(self.angle)
-        return np.array([[c, 0.0, -s, self.x], [0.0, 1.0, 0.0, along], [s, 0.0, c, -self.y], [0.0, 0.0, 0.0, 1.0]])
+        return np.array([[c, 0.0, -s, self.x], [0.0, 1.0, 0.0, self.along], [s, 0.0, c, -self.y], [0.0, 0.0, 0.0, 1.0]])
 
     def point(self, u: float, v: float) -> tuple[float, float]:
         """Section coordinates (x, y) in mm of the part's own point (u right, v down).

@@ -68,7 +68,7 @@ class TighteningRow:
 
 def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
     """The state at every waypoint of an assembly."""
-    clamp, first = assembly.clamp, assembly.path[0].poses
+    clamp, start, last = assembly.clamp, *_last_step(assembly)
     # A solver that tries positions leaves small gaps; what it counted as seated is seated here.
     tolerance = max([CONTACT, *(s.gap for s in assembly.seats if s.seated)])
     pairs: list[tuple[PartName, PartName]] = [("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7")]
@@ -83,7 +83,9 @@ def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
                 opening_line=line,
                 opening_jumper=jumper,
                 tilt=poses["P2"].angle - poses["P1"].angle,
-                turns=round((_screwed(poses) - _screwed(first)) / clamp.bolt.pitch, 9) + 0.0,
+                turns=round((_screwed(poses) - _screwed(start)) / clamp.bolt.pitch, 9) + 0.0
+                if waypoint in last
+                else 0.0,
                 seats=seats(measure_contacts(clamp, poses, assembly.model, pairs=pairs), tolerance),
                 outside=tuple(w for w in _WIRES if not left < poses[w].x < left + clamp.up_splint.width),
             )
@@ -92,20 +94,29 @@ def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
 
 
 def tightening_rows(assembly: Assembly) -> tuple[TighteningRow, ...]:
-    """The nut's own step in equal stages: the bolt is drawn up until the saddle meets the round back."""
-    before, after = assembly.path[-2].poses, assembly.path[-1].poses
-    way = _screwed(after) - _screwed(before)
-    rows = []
-    for stage in range(TIGHTENING_STAGES + 1):
-        f = stage / TIGHTENING_STAGES
-        poses = {
+    """The nut's own step: in equal stages where it is one straight way, else where that changes."""
+    before, last = _last_step(assembly)
+    after = last[0].poses
+    stages = [
+        {
             name: SectionPose(p.x + f * (after[name].x - p.x), p.y + f * (after[name].y - p.y), after[name].angle)
             for name, p in before.items()
         }
+        for f in (stage / TIGHTENING_STAGES for stage in range(TIGHTENING_STAGES + 1))
+    ]
+    rows = []
+    for poses in stages if len(last) == 1 else [before, *(waypoint.poses for waypoint in last)]:
+        way = _screwed(poses) - _screwed(before)
         (saddle,) = measure_contacts(assembly.clamp, poses, assembly.model, pairs=[("P2", "P3")])
         gap = 0.0 if abs(saddle.gap) <= CONTACT else saddle.gap
-        rows.append(TighteningRow(f * way / assembly.clamp.bolt.pitch, f * way, gap))
+        rows.append(TighteningRow(way / assembly.clamp.bolt.pitch, way, gap))
     return tuple(rows)
+
+
+def _last_step(assembly: Assembly) -> tuple[dict[PartName, SectionPose], list[Waypoint]]:
+    """Poses before the nut's own step, and its waypoints."""
+    last = [waypoint for waypoint in assembly.path if waypoint.step == assembly.path[-1].step]
+    return assembly.path[-len(last) - 1].poses, last
 
 
 def _screwed(poses: dict[PartName, SectionPose]) -> float:

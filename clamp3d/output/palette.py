@@ -33,6 +33,7 @@ VERDICT_COLOURS: dict[str, str] = {
 
 INK = "#20262E"
 DIMENSION = "#8B1A4F"
+FORCE = "#7B2D8E"
 
 
 def darker(colour: str, factor: float = 0.62) -> str:

@@ -17,6 +17,7 @@ from typing import Any, TypeAlias
 from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import flag, instance, text
 from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.forces import HELD
 from clamp3d.clamp.result import Assembly, Finding, Waypoint
 from clamp3d.collide.check import check
 from clamp3d.collide.distance import measure
@@ -26,7 +27,7 @@ from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
 from clamp3d.output.files import write_text
-from clamp3d.output.palette import VERDICT_COLOURS
+from clamp3d.output.palette import FORCE, VERDICT_COLOURS
 from clamp3d.output.viewer_clamp import UNCUT, ClampStory
 from clamp3d.output.viewer_page import live_page, panel, whole_page
 from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
@@ -159,9 +160,11 @@ class Viewer:
         if isinstance(result, Assembly):
             for waypoint in result.path[len(self._waypoints) :]:
                 self.show(waypoint)
+            forces = [force for force in result.forces if force.feature != HELD]
+            self._drawing.forces(len(self._waypoints) - 1, forces)
             worst = {finding.severity for finding in result.findings}
             state = "found" if "error" in worst else "note" if "warning" in worst else "clean"
-            told = {"said": result.status, "state": state, "assembly": result}
+            told = {"said": result.status, "state": state, "assembly": result, "forces": forces}
             told["findings"] = [self._assembly_finding(finding) for finding in result.findings]
         else:
             instance("result", result, CheckResult)
@@ -240,6 +243,7 @@ class Viewer:
             "done": done,
             "stops": [_stop_data(stop, *drawing.extent([stop.poses])) for stop in drawing.timeline.stops],
             "findings": more.pop("findings", []),
+            "forces": [force.to_dict() for force in more.get("forces", ())],
             "nodes": {part.name: drawing.paths(part.name) for part in scene.parts},
             "overlays": [{"name": name, "path": f"{ROOT}/overlay {name}"} for name in drawing.overlays],
             "cut": drawing.cut,
@@ -249,7 +253,7 @@ class Viewer:
         used = {row["verdict"] for stop in self._story["stops"] for row in stop["rows"]}
         self._panel = panel(
             self._story
-            | {"assembly": None, "pairs": (), "motions": ()}
+            | {"assembly": None, "forces": (), "pairs": (), "motions": ()}
             | {
                 "subtitle": "" if clamp is None else clamp.subtitle,
                 "scene": scene,
@@ -259,6 +263,8 @@ class Viewer:
                 "parts": titles(scene),
                 "part_colours": drawing.colours,
                 "colours": VERDICT_COLOURS,
+                "force_colour": FORCE,
+                "force_length": drawing.force_length,
                 "meanings": {name: meaning(name, scene) for name in VERDICT_COLOURS if name in used},
             }
             | more

@@ -10,7 +10,7 @@ from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.contact import NONE, measure_contacts
 from clamp3d.clamp.dimensions import TITLES, Clamp
 from clamp3d.clamp.result import Waypoint
-from clamp3d.clamp.scene import clamp_scene
+from clamp3d.clamp.scene import CONTACT, clamp_scene
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array, rotation
@@ -43,7 +43,8 @@ class ClampStory:
             for c in measure_contacts(self.clamp, waypoint.poses, self._model, cache=self._cache)
         ]
         rows.sort(key=lambda row: not row.declared)
-        on = float(poses["P4"][2, 3] - poses["P5"][2, 3])  # up to a constant
+        beside = float(np.abs(poses["P4"][:2, 3] - poses["P5"][:2, 3]).max())
+        on = max(0.0, float(poses["P4"][2, 3] - poses["P5"][2, 3]) + self.clamp.nut.height) if beside < CONTACT else 0.0
         self._first = on if self._first is None else self._first
         before, self._turn = self._turn, -self.clamp.bolt.turn(on - self._first)  # clockwise
         n = math.ceil(abs(self._turn - before) / _TURN)

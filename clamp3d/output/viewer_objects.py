@@ -83,11 +83,23 @@ def dot(radius: float, colour: str) -> Object:
     return Mesh(Sphere(radius), _phong(colour, depthTest=False, transparent=True))
 
 
-def arrow(start: Array, direction: Array, length: float, colour: str) -> Object:
-    """An arrow of ``length`` mm from ``start`` (3,) along the unit ``direction`` (3,)."""
+def arrow(
+    start: Array,
+    direction: Array,
+    length: float,
+    colour: str,
+    *,
+    thickness: float | None = None,
+    on_top: bool = False,
+) -> Object:
+    """An arrow of ``length`` mm from ``start`` (3,) along the unit ``direction`` (3,).
+
+    Its shaft is ``thickness`` mm thick, by default in proportion.
+    """
     import trimesh
 
-    head, radius = 0.3 * length, 0.035 * length
+    radius = 0.035 * length if thickness is None else 0.5 * thickness
+    head = min(8.5 * radius, 0.8 * length)
     shaft = trimesh.creation.cylinder(radius, segment=[[0.0, 0.0, 0.0], [0.0, 0.0, length - head]], sections=16)
     tip = trimesh.creation.cone(3.0 * radius, head, sections=24)
     tip.apply_translation([0.0, 0.0, length - head])
@@ -95,7 +107,7 @@ def arrow(start: Array, direction: Array, length: float, colour: str) -> Object:
     turn: Array = trimesh.geometry.align_vectors([0.0, 0.0, 1.0], direction)  # type: ignore[no-untyped-call]
     both.apply_transform(turn)
     both.apply_translation(start)
-    return facets(both, colour)
+    return facets(both, colour, on_top=on_top)
 
 
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:

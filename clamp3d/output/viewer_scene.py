@@ -1,25 +1,27 @@
 """A scene and its stops as meshcat commands: parts, marks where they touch or clash, gaps, labels, animation.
 
 The tree, all of it in mm under ``/clamp3d``: ``whole`` and ``cutaway`` hold the parts (one of the two is seen),
-``contacts`` and ``gaps`` a group for each stop, ``labels`` the names, ``overlay ...`` convex pieces of a baseline.
+``contacts``, ``gaps`` and ``forces`` a group for each stop, ``labels`` the names, ``overlay ...`` convex pieces of a
+baseline.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clamp3d.clamp.forces import Force
 from clamp3d.collide.distance import Distance
 from clamp3d.collide.result import BAD
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.pose import Array
 from clamp3d.output import viewer_objects as draw
-from clamp3d.output.palette import INK, VERDICT_COLOURS, darker
+from clamp3d.output.palette import FORCE, INK, VERDICT_COLOURS, darker
 from clamp3d.output.placed import place
 from clamp3d.output.viewer_cut import cut_open, overlap
 from clamp3d.output.viewer_timeline import FIRST, Row, Stop, Timeline
@@ -42,6 +44,10 @@ _FRONT, _CORNER = (0.2, 0.24, 1.0), (0.55, 0.5, 1.0)
 """Where the camera stands: to the right, up, and towards the viewer."""
 _CUTTABLE, _MARKED = 60, 200
 """So many parts are also drawn cut open, and so many pairs marked at a stop; a scene of more is slow to look at."""
+_MARKS = ("contacts", "gaps", "forces")
+"""What is marked at a stop and seen there only."""
+_FORCE, _SHAFT = 0.2, 0.008
+"""Length of an arrow for the whole bolt force, and thickness of its shaft, in parts of the scene's size."""
 _OVERLAY_COLOURS = ("#4477AA", "#EE6677", "#228833", "#CCBB44", "#66CCEE", "#AA3377")  # Tol's bright scheme
 
 
@@ -114,7 +120,7 @@ class SceneDrawing:
             for path in self.paths(name):
                 self.transform(path, T)
         for k in range(len(self.timeline.stops)):
-            for group in ("contacts", "gaps"):
+            for group in _MARKS:
                 self.visible(f"{ROOT}/{group}/{self.timeline.group(k)}", k == number)
 
     def play(self) -> None:
@@ -124,7 +130,7 @@ class SceneDrawing:
         self.frame()
         self.go(0)  # so that it does not matter whether a page reads this or the animation first
         followers = {name: self.paths(name) for name in self._meshes}
-        groups = [f"{ROOT}/contacts", f"{ROOT}/gaps"]
+        groups = [f"{ROOT}/{marks}" for marks in _MARKS]
         if len(self.timeline.stops) > 1:
             self._send(SetAnimation(self.timeline.animation(followers, groups)).lower())
 
@@ -252,6 +258,23 @@ class SceneDrawing:
     def dimension(self, number: int, name: str, a: Array, b: Array, text: str) -> None:
         """One more length at a stop, from ``a`` to ``b``."""
         self._gap(f"{ROOT}/gaps/{self.timeline.group(number)}/{name}", a, b, text)
+
+    @property
+    def force_length(self) -> float:
+        """Length of the arrow of a force as large as the bolt's, mm."""
+        return _FORCE * self.size
+
+    def forces(self, number: int, forces: Iterable[Force]) -> None:
+        """An arrow at a stop for each force, its tip where the first part pushes the second."""
+        for k, f in enumerate(forces):
+            path = f"{ROOT}/forces/{self.timeline.group(number)}/{f.a}-{f.b}/{k}"
+            length = f.force * self.force_length
+            tail = f.point - length * f.direction
+            thickness = _SHAFT * self.size
+            arrow = draw.arrow(tail, f.direction, length, FORCE, thickness=thickness, on_top=True)
+            self.put(f"{path}/arrow", arrow)
+            beside = tail - 0.025 * self.size * f.direction
+            self._label(f"{path}/value", f"{f.force:.3f}", beside, "#F3E5F7", 0.7)
 
     def put(self, path: str, what: Object) -> None:
         """Set the object at a path."""

@@ -36,9 +36,13 @@ def run(code: str, folder: Path, **env: str) -> tuple[list[str], str]:
     return done.stdout.split(), done.stderr
 
 
-def test_a_warm_start_of_the_kernel_loads_no_compiler():
-    run(CALL, PACKAGE.parent)
-    assert run(CALL, PACKAGE.parent) == (["1.5"], "")
+FACES = f"import sys, clamp3d.collide.faces_kernel as k; print(bool(k.descend)); {LOADED}"
+
+
+@pytest.mark.parametrize(("code", "says"), [(CALL, "1.5"), (FACES, "True")])
+def test_a_warm_start_of_the_kernel_loads_no_compiler(code, says):
+    run(code, PACKAGE.parent)
+    assert run(code, PACKAGE.parent) == ([says], "")
 
 
 @pytest.fixture

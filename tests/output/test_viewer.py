@@ -20,6 +20,7 @@ import pytest
 import clamp3d
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.conductors import catalogue
+from clamp3d.clamp.forces import HELD
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.collide.check import check
 from clamp3d.collide.distance import measure
@@ -208,6 +209,29 @@ def test_gaps_are_lines_between_the_witness_points_with_their_length(recorded):
 def line_of(command):
     packed = command["object"]["geometries"][0]["data"]["attributes"]["position"]["array"].data
     return np.frombuffer(packed, dtype=np.float32).reshape(-1, 3)
+
+
+def test_an_arrow_for_each_contact_force_as_long_as_its_part_of_the_bolts(recorded):
+    viewer, assembly, _ = recorded
+    whole = float(re.search(r"([\d.]+) mm for the whole", viewer._panel)[1])
+    arrows = {}
+    for c in viewer.commands:
+        if c["path"].startswith(f"/clamp3d/forces/{len(assembly.path)} nut tightened/") and c["path"].endswith("/arrow"):
+            packed = c["object"]["geometries"][0]["data"]["attributes"]["position"]["array"].data
+            arrows[c["path"].split("/")[4]] = np.frombuffer(packed, dtype=np.float32).reshape(-1, 3)
+    contacts = [force for force in assembly.forces if force.feature != HELD]
+    assert list(arrows) == [f"{f.a}-{f.b}" for f in contacts]
+    pushes = {}
+    for force in contacts:
+        along = arrows[f"{force.a}-{force.b}"] @ force.direction
+        assert along.max() == pytest.approx(force.point @ force.direction, abs=1e-3)
+        assert np.ptp(along) == pytest.approx(force.force * whole, rel=2e-3)
+        pushes[f"{force.a}-{force.b}"] = np.ptp(along) * force.direction
+    # each wire is held by its two arrows alone, and what the nut's pull leaves at the saddle is the whole bolt force
+    for wire in ("P6", "P7"):
+        np.testing.assert_allclose(pushes[f"P1-{wire}"] + pushes[f"P2-{wire}"], 0.0, atol=1e-2)
+    assert np.linalg.norm(pushes["P2-P3"]) == pytest.approx(whole, rel=2e-3)
+    assert [(f["a"], f["b"]) for f in viewer.story["forces"]] == [(f.a, f.b) for f in contacts]
 
 
 def test_scene_with_a_motion_stops_at_first_contact_and_marks_it():

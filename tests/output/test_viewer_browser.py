@@ -238,6 +238,26 @@ def test_cutaway_and_labels_switch(page, run):
     assert_drawn(page, run.poses)
 
 
+def test_arrows_of_forces_are_seen_at_the_end_and_switch(page, run):
+    go_to(page, 0)
+    page.wait_for_timeout(100)
+    before = violet(page)
+    go_to(page, len(run.path) - 1)
+    with_arrows = violet(page)
+    assert with_arrows > before + 100
+    page.click("#switch-forces")
+    assert not visible(page, "forces")
+    assert violet(page) < before + 10
+    page.click("#switch-forces")
+    assert violet(page) == pytest.approx(with_arrows, rel=0.2)
+
+
+def violet(page):
+    """Pixels with the hue of an arrow, lit or shaded: red and blue far above green, blue first."""
+    red, green, blue = pixels(page)[..., :3].astype(int).transpose(2, 0, 1)
+    return int(((red > 1.6 * green) & (blue > 1.15 * red) & (blue > 60)).sum())
+
+
 def test_page_plays_by_itself_and_states_its_mesh_error(page, run):
     go_to(page, 0)
     page.click("#play")

@@ -62,6 +62,7 @@ function clamp3dViewer(messages) {
     addSwitch("labels", Object.keys(story.nodes).length <= 30, (on) => show("/clamp3d/labels", on));
     addSwitch("contacts", true, (on) => show("/clamp3d/contacts", on));
     addSwitch("gaps", true, (on) => show("/clamp3d/gaps", on));
+    if (story.forces.length) addSwitch("forces", true, (on) => show("/clamp3d/forces", on));
     for (const o of story.overlays) addSwitch(o.name, false, (on) => show(o.path, on));
     addSwitch("scene tree", false, (on) => $("stage").classList.toggle("tree", on));
   }
@@ -81,7 +82,7 @@ function clamp3dViewer(messages) {
       }
       show("/clamp3d/labels/" + name, !faint);
     }
-    for (const group of ["contacts", "gaps"]) {
+    for (const group of ["contacts", "gaps", "forces"]) {
       const n = node("/clamp3d/" + group);
       for (const marks of n ? Object.values(n.children) : []) {
         for (const [pair, mark] of Object.entries(marks.children)) {

@@ -1,0 +1,191 @@
+"""Sequences other than the paper's: ways that are said to be free or blocked, seen by volumes of manifold3d."""
+
+import itertools
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.dimensions import PARTS
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.parts import parts
+from clamp3d.clamp.ways import DIRECTIONS, Ways, way_out
+from clamp3d.core.meshing import mesh
+from clamp3d.errors import SequenceError
+from clamp3d.output.report import make_report
+
+manifold3d = pytest.importorskip("manifold3d")
+
+MESH_ERROR = 0.01
+SCREW = ("P4", "P5")  # one diameter, so facets overlap all around
+TOUCHING = 5.0  # mm3 that facets of parts in contact overlap by; a sheet of 0.01 mm between two parts' ends is more
+
+
+@cache
+def bodies():
+    made = {}
+    for name, part in parts(load_clamp()).items():
+        facets = mesh(part, MESH_ERROR)
+        data = manifold3d.Mesh64(np.array(facets.vertices), np.array(facets.faces, dtype=np.uint64))
+        made[name] = manifold3d.Manifold(data)
+    return made
+
+
+def volume(a, T_a, b, T_b):
+    """What two parts share, mm3."""
+    placed = [bodies()[name].transform(T[:3]) for name, T in ((a, T_a), (b, T_b))]
+    return (placed[0] ^ placed[1]).volume()
+
+
+@cache
+def reference():
+    return assemble("reference")
+
+
+@cache
+def at_once():
+    """The nut draws all that is below it."""
+    return assemble(replace(load_clamp(), sequence="P1|P2P3P4P5 -> P7 -> P5|P2P3P4"))
+
+
+def open_place():
+    """World poses in the open clamp on the line."""
+    run = reference()
+    return {name: run.path[4].T_world(name) for name in PARTS}
+
+
+def at(T, offset):
+    moved = T.copy()
+    moved[:3, 3] += offset
+    return moved
+
+
+def overlaps_on(path, steps=4):
+    """Largest volume that two parts share anywhere on a path, looked at in ``steps`` instants of each stretch."""
+    worst = 0.0
+    for before, after in itertools.pairwise(path):
+        for t in np.linspace(0.0, 1.0, steps):
+            T = {}
+            for name in PARTS:
+                p, q = before.poses[name], after.poses[name]
+                keys = ("x", "y", "angle", "along")
+                T[name] = type(p)(*(getattr(p, k) + t * (getattr(q, k) - getattr(p, k)) for k in keys)).T()
+            for a, b in itertools.combinations(PARTS, 2):
+                if (a, b) != SCREW:
+                    worst = max(worst, volume(a, T[a], b, T[b]))
+    return worst
+
+
+def positions(way, steps=5):
+    """Offsets (3,) on a way out, which begins at the place."""
+    corners = [np.zeros(3), *way]
+    return [a + t * (b - a) for a, b in itertools.pairwise(corners) for t in np.linspace(0.0, 1.0, steps)]
+
+
+@pytest.mark.parametrize(
+    "sequence",
+    [
+        "P1 -> P7 -> P2 -> P3|P4 -> P5",
+        "P4|P3 -> P2 -> P1 -> P5 -> P1|P2P3P4P5 -> P7 -> P2 -> P5|P3P4",
+    ],
+)
+def test_parts_that_come_one_by_one_overlap_nowhere_and_end_in_the_same_clamp(sequence):
+    run = assemble("reference", sequence=sequence)
+    assert run.status == "clamped"
+    assert run.distance == reference().distance
+    assert run.poses == reference().poses
+    assert run.undeclared == ()
+    assert overlaps_on(run.path) < TOUCHING
+    first = run.path[0].poses
+    for a, b in itertools.combinations(PARTS, 2):
+        if {a, b} != {"P3", "P4"}:
+            assert volume(a, first[a].T(), b, first[b].T()) == 0.0, (a, b)
+    ends = {w.step: w for w in run.path}
+    assert list(ends) == list(dict.fromkeys(w.step for w in run.path))
+    assert len(ends) == sequence.count("->") + 1 + 2 * ("P5|" not in sequence)
+
+
+def test_the_papers_own_motions_overlap_nowhere():
+    assert overlaps_on(reference().path) < TOUCHING
+
+
+def assert_as_volumes_say(part, others):
+    """A way in that is free or blocked: the same answer as from the facets' volumes, at the same instant."""
+    place, ways = open_place(), Ways(load_clamp())
+    pairs = [(part, other) for other in others]
+    legs = ways.find(pairs, place)
+    for offset in positions(way_out(legs)) if legs else ():
+        for _, b in pairs:
+            if {part, b} != set(SCREW):
+                assert volume(part, at(place[part], offset), b, place[b]) < TOUCHING, (legs, offset, b)
+    blocks = () if legs else ways.blocks(pairs, place)
+    assert legs or blocks
+    for block in blocks:
+        u = np.array(DIRECTIONS[block.origin])
+
+        def shared(travel, other, u=u, block=block):
+            return volume(part, at(place[part], (block.way - travel) * u), other, place[other])
+
+        assert shared(block.travel + 0.2, block.b) > 1e-6, str(block)
+        for travel in np.linspace(0.0, block.travel - 0.2, 12):
+            for other in others:
+                assert {part, other} == set(SCREW) or shared(travel, other) < 1e-6, (str(block), travel, other)
+    return legs
+
+
+@pytest.mark.parametrize(
+    ("part", "others", "free"),
+    [  # scripts/check-sequences asks all that permutations of the parts lead to
+        ("P7", ("P1", "P3", "P4", "P6"), True),
+        ("P4", ("P1", "P3", "P5", "P6"), True),
+        ("P3", ("P1", "P5", "P7"), True),
+        ("P1", ("P5", "P6"), False),
+    ],
+)
+def test_a_way_is_free_or_blocked_as_volumes_say(part, others, free):
+    assert bool(assert_as_volumes_say(part, others)) == free
+
+
+@pytest.mark.parametrize(
+    ("sequence", "step", "pair", "travel"),
+    [
+        ("P1|P2P3P4P5 -> P7 -> P5|P3P4", r"step 3, P5\|P3P4", ("P3", "P2"), 0.0),
+        ("P1|P2P3P4P5 -> P2 -> P7", "step 3, P7", ("P7", "P2"), None),
+    ],
+)
+def test_a_blocked_step_names_pair_place_and_instant(sequence, step, pair, travel):
+    with pytest.raises(SequenceError, match=f"{step}: .* meets .* after") as refused:
+        assemble("reference", sequence=sequence)
+    first = refused.value.blocks[0]
+    assert (first.a, first.b) == pair
+    assert f"t = {first.travel / first.way:.4f}" in str(refused.value)
+    assert travel is None or first.travel == pytest.approx(travel, abs=1e-3)
+
+
+def test_the_nut_comes_down_on_the_bolts_end_and_blocks_the_splint_below_it():
+    """By hand: the splint rises from under the nut until its top is at the nut's seat, as far as both are high."""
+    ways, place = Ways(load_clamp()), open_place()
+    block = ways.block([("P1", "P5")], place, "from above", 100.0)
+    assert block.travel == pytest.approx(100.0 - 26.4 - 27.726, abs=2e-4)
+    assert block.point[2] == pytest.approx(place["P5"][2, 3], abs=2e-4)
+
+
+def test_a_report_of_any_sequence_counts_the_nuts_turns_from_the_open_clamp():
+    run = at_once()
+    made = make_report(run)
+    assert [row.turns for row in made.steps][:5] == [0.0] * 5
+    assert made.steps[-1].turns == pytest.approx(run.turns)
+    assert made.tightening[-1].turns == pytest.approx(run.turns)
+    assert all(row.saddle_gap == 0.0 for row in made.tightening)
+
+
+def test_a_sequence_is_data_of_the_result():
+    run = at_once()
+    data = run.to_dict()
+    assert data["sequence"] == "P1|P2P3P4P5 -> P7 -> P5|P2P3P4"
+    assert [w["step"] for w in data["path"]][-1] == "P5|P2P3P4"
+    assert data["path"][-1]["parts"]["P2"]["x"] == run.poses["P2"].x
+    assert not re.search("along", str(data["path"]))
