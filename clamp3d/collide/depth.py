@@ -39,6 +39,8 @@ _CUBES = 20
 _EXTRA = 8
 """Pieces after which a depth that is `known_well` is not made better."""
 _STEPS = np.array([v for v in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
+_ROOM = 8.0
+"""How far from a common point pieces of large meshes reach, in parts of the shortest way out that is known."""
 _FINE = 0.01
 """Chord error (mm) of the mesh that stands for a part without closed form."""
 
@@ -81,8 +83,11 @@ class _Pair:
                 self.best = (size, t, found)
         return found
 
-    def overlap_at(self, t: Array, known: Distance) -> Array | None:
-        """Planes (k, 4) of a convex set of translations that overlap, ``t`` (3,) among them; None if none is found."""
+    def overlap_at(self, t: Array, known: Distance, room: float) -> Array | None:
+        """Planes (k, 4) of a convex set of translations that overlap, ``t`` (3,) among them; None if none is found.
+
+        Of large meshes it is made of what lies within ``room`` mm of a point that the bodies have in common.
+        """
         named = [x for x in (known.point_a, known.point_b) if x is not None and known.upper < 0.0]
         if len(named) == 2:
             named.append(0.5 * (named[0] + named[1]))
@@ -95,7 +100,7 @@ class _Pair:
             ]
             margin, p, x, y = max(found, key=lambda item: item[0], default=(0.0, t, None, None))
             if margin > 0.0 and x is not None and y is not None:
-                A, B = _around(x, p), _around(y, (p - t - self.T[:3, 3]) @ self.T[:3, :3])
+                A, B = _around(x, p, room), _around(y, (p - t - self.T[:3, 3]) @ self.T[:3, :3], room)
                 if A is not None and B is not None:
                     try:
                         return difference(A, _moved(B, self.T), t)
@@ -216,7 +221,7 @@ def _measured(pair: _Pair, known: Distance) -> Distance:
         assert pair.best is not None
         size, t, _ = pair.best
         return replace(known, lower=-size, normal=t / np.linalg.norm(t))
-    found = Distance(-length, known.upper, None, None, way, None, known.level, known.method)
+    found = Distance(-length, known.upper, None, None, way, None, known.level, known.method).ordered()
     if found.upper - found.lower <= pair.slack:
         return found
     pair.push(np.zeros(3), known, 4)
@@ -233,7 +238,7 @@ def _searched(pair: _Pair, found: Distance, known: Distance) -> Distance:
     sets: list[Array] = []
     t, proven, cubes = np.zeros(3), 0.0, 0
     for step in range(_SETS):
-        new = pair.overlap_at(t, known)
+        new = pair.overlap_at(t, known, _ROOM * -found.lower)
         if new is not None:
             sets.append(new)
             union = Union(sets, -found.lower * (1.0 + 1e-9))
@@ -348,8 +353,8 @@ def _bodies(model: Model) -> tuple[Body, ...]:
     return () if mesh is None else (mesh,)
 
 
-def _around(body: Body, x: Array) -> Hull | None:
-    return around_in_mesh(body, x) if isinstance(body, Surface) else around_in_form(body, x)
+def _around(body: Body, x: Array, room: float) -> Hull | None:
+    return around_in_mesh(body, x, room) if isinstance(body, Surface) else around_in_form(body, x)
 
 
 def _innermost(x: Body, y: Body, T: Array, t: Array, point: Array, size: float) -> tuple[float, Array]:

@@ -139,6 +139,8 @@ def assert_motion(
     if first and found.touches:
         assert_lower_on_way(0.0, a, b, poses, tolerance=max(tolerance, found.resolution), cells=cells)
     else:
+        assert not (found.touches and found.distance.lower > tolerance), f"touches at {found.distance.lower} mm"
+        assert found.touches or found.distance.upper > -tolerance, f"touches nowhere, at {found.distance.upper} mm"
         assert_lower_on_way(found.distance.lower, a, b, poses, tolerance=tolerance, cells=cells)
         assert_distance(replace(found.distance, lower=-math.inf), a, b, found.pose, tolerance=tolerance, cells=cells)
 

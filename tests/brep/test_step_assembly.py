@@ -1,6 +1,7 @@
 """STEP assemblies against what Open CASCADE wrote: names, placements, instances, units, and nothing left out."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -119,3 +120,26 @@ def test_a_line_less_is_never_a_body_less(tmp_path):
     for line, found in zip(untold.values(), map(json.loads, read.stdout.splitlines()), strict=True):
         if found is not None:
             assert sorted(found) == pytest.approx(sorted(size for _, size, _ in truth), rel=2e-2), line
+
+
+FORKED = """
+import os
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
+from clamp3d.brep.tessellate import tessellate
+
+def count():
+    return len(tessellate(BRepPrimAPI_MakeCylinder(5.0, 9.0).Solid(), 0.01).faces)
+
+known = count()
+for _ in range(3):
+    child = os.fork()
+    if child == 0:
+        os._exit(int(count() != known))
+    assert os.waitpid(child, 0)[1] == 0
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_forked_process_meshes_too():
+    """Open CASCADE's parallel mesher would wait for threads that only the parent has."""
+    subprocess.run([sys.executable, "-c", FORKED], check=True, timeout=120)

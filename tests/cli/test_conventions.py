@@ -117,6 +117,15 @@ class TestExitCodes:
         assert code == 4
         assert "Traceback (most recent call last)" in err
 
+    def test_out_of_memory_is_no_finding(self, monkeypatch, capsys):
+        def fail(*args, **kwargs):
+            raise MemoryError
+
+        monkeypatch.setattr("clamp3d.clamp.conductors.catalogue", fail)
+        code, out, err = main(monkeypatch, capsys, "conductors")
+        assert (code, out, err.count("\n")) == (4, "", 1)
+        assert "MemoryError" in err
+
     def test_a_solver_without_proof(self, monkeypatch, capsys):
         def fail(*args, **kwargs):
             raise SolverError("optimality is 1e-3")

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from clamp3d import baselines, distance, shapes
 from clamp3d.collide.answer import Distance
+from clamp3d.collide.convex import Rod
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.refine import from_boxes, refine
 from clamp3d.collide.verdict import Thresholds
@@ -130,6 +131,35 @@ def test_contact_models_bound_what_they_approximate(name, unit, x, y, turn):
     found = distance(BLOCK, wire, T, model=model)
     assert found.lower <= found.value <= found.upper
     assert_distance(replace(found, point_a=None, normal=None, estimate=None), BLOCK, wire, T)
+
+
+def test_of_a_model_without_known_bounds_none_are_claimed():
+    wire, T = shapes.cylinder(5.0, 70.0), translation(0.0, 1.0, 0.0)
+    model = baselines.contact_model("mesh", {"block": BLOCK, "cylinder": wire})
+    found = distance(BLOCK, wire, T, model=model)
+    assert (found.level, found.lower, found.upper) == ("model", -math.inf, math.inf)
+    assert found.estimate == pytest.approx(distance(BLOCK, wire, T).value, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("way", "dimension"),
+    [((0, 0, 1), 2), ((0, 0, -1), 2), ((1, 0, 0), 1), ((0, -1, 0), 1), ((0.6, 0, 0.8), 0), ((0, 0.6, -0.8), 0)],
+)
+def test_what_of_a_rod_lies_furthest(way, dimension):
+    T = rotation((1.0, 2.0, 3.0), 0.7)
+    n = T[:3, :3] @ way
+    found, line = Rod(3.0, 8.0, T).flatness(n)
+    assert found == dimension
+    assert line is None if dimension != 1 else abs(line @ n) < 1e-12
+    face = Rod(3.0, 8.0, T).face(n)
+    assert np.ptp(face @ n) < 1e-9
+    assert np.linalg.matrix_rank(face - face[0], tol=1e-9) == dimension
+
+
+@pytest.mark.parametrize("convex", [True, False])
+def test_a_mesh_has_a_closed_form_exactly_if_it_is_convex(convex):
+    shape = faceted_shape(DRAWN[3] if convex else DRAWN[4], 0.1)
+    assert (ModelCache().model(shape).bodies is not None) == convex
 
 
 @pytest.mark.parametrize("shape", DRAWN, ids=lambda shape: shape.name)

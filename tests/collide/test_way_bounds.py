@@ -158,6 +158,7 @@ def test_a_thin_plate_is_met_wherever_on_the_way_it_stands(when, length, thick, 
     assert least.touches
     beside = translation(25.0 + 15.0, 0.0, 0.0)  # past the sheet's edge it is known how near
     least = min_clearance(sheet, pin, way, beside @ start)
+    assert not least.touches
     gap = 15.0 - (2.0, 1.5, 5.0)[kind]
     assert least.distance.lower <= gap + 1e-9
     assert least.distance.upper >= gap - 1e-9

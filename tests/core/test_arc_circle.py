@@ -204,3 +204,12 @@ def test_contact_along_the_arc(half: float, r: float, share: float, exterior: bo
 def test_mirror(half: float, r: float, x: float, y: float) -> None:
     here, there = (arc_circle(R, half, r, side * x, y, tolerance=1e-9) for side in (1, -1))
     assert (here.gap, here.relation) == (there.gap, there.relation)
+
+
+@pytest.mark.parametrize(("side", "feature"), [(-1.0, ArcFeature.M), (1.0, ArcFeature.N)])
+@pytest.mark.parametrize("half", [0.4, 1.0, 2.6])
+def test_a_contact_within_the_tolerance_of_an_end_is_at_the_end(half: float, side: float, feature: ArcFeature) -> None:
+    angle = side * (half - 1e-5)  # 1e-4 mm from the end of an arc of radius 10
+    x, y = 7.0 * math.sin(angle), -7.0 * math.cos(angle)
+    for tolerance, wanted in ((2e-4, feature), (5e-5, ArcFeature.ARC)):
+        assert arc_circle(10.0, half, 3.0, x, y, tolerance=tolerance).feature is wanted

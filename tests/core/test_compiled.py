@@ -96,6 +96,10 @@ def test_a_formula_that_allocates_is_kept_by_numba(tmp_path):
     assert first[0] == second[0] == ["CPUDispatcher"]
     assert first[1].count("compiling the contact kernel, once for this machine") == 1
     assert second[1] == ""
+    (index,) = tmp_path.rglob("*.nbi")
+    index.write_bytes(index.read_bytes()[::-1])
+    again = run(code, PACKAGE.parent, CLAMP3D_CACHE=str(tmp_path), NUMBA_CACHE_DIR=str(tmp_path))
+    assert (again[0], again[1].count("\n")) == (["CPUDispatcher"], 1)
 
 
 @pytest.mark.parametrize(

@@ -144,3 +144,26 @@ def test_an_axis_that_ends_in_the_plane_of_an_end_face_is_outside():
     lip = math.hypot(math.sin(1.0), 2.0 - math.cos(1.0)) - 1.0  # the face's nearest point, from (0, -2)
     assert np.allclose(gaps[:3], [0.0, lip, lip], atol=1e-12)
     assert abs(gaps.min() + 1.0) < 1e-12
+
+
+def test_gradients_are_the_differences_where_those_agree_from_both_sides():
+    """Those of the end faces also with the wire's end deep in the material, whichever way out is the shorter."""
+    groove, step = SweptArc(7.0, 1.0, 20.0), 1e-6
+    rng, compared, through = np.random.default_rng(4), 0, {-1: 0, 1: 0}
+    for _ in range(400):
+        wire = Capsule(float(rng.uniform(1.0, 6.0)), float(rng.uniform(4.0, 60.0)))
+        T = rotation(rng.normal(size=3), float(rng.uniform(-1.5, 1.5)))
+        T[:3, 3] = rng.uniform((-15.0, -25.0, -25.0), (15.0, 5.0, 25.0))
+        here = groove_pieces(groove, wire, T)
+        for k in range(3):
+            there = [groove_pieces(groove, wire, translation(*(s * step * np.eye(3)[k])) @ T).distance for s in (-1, 1)]
+            back, forth = (here.distance - there[0]) / step, (there[1] - here.distance) / step
+            smooth = np.abs(back - forth) < 1e-4
+            smooth[:3] &= (here.distance > -wire.radius).all()
+            np.testing.assert_allclose(here.gradient[smooth, k], (0.5 * (back + forth))[smooth], atol=1e-3)
+            compared += int(smooth.sum())
+        for row, sign in ((3, -1.0), (4, 1.0)):
+            if here.distance[row] < -wire.radius and abs(abs(here.gradient[row, 2]) - 1.0) < 1e-9:
+                through[int(sign * here.gradient[row, 2])] += 1
+    assert compared > 3000
+    assert min(through.values()) > 10
