@@ -15,7 +15,7 @@ BORDER = 0.0003
 """Largest sag (mm) of a border that is not split: where two parts touch their borders decide."""
 _MOST = 64
 _SAFETY = 2.0
-"""Factor on deviations that are sampled, not computed: of edges that are no lines or circles."""
+"""Factor on deviations that are sampled, not computed: of edges that are no lines, circles or plain splines."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,9 +125,37 @@ def _sags(curve: Any, t: Array, points: Array, kind: int, frame: Array, size: Si
         return np.asarray(curve.Circle().Radius() * (1.0 - np.cos(turn)))
     if what == Kind.GeomAbs_Ellipse and kind in (PLANE, OTHER):  # a circle stretched: at most by the longer half axis
         return np.asarray(curve.Ellipse().MajorRadius() * (1.0 - np.cos(turn)))
+    if what == Kind.GeomAbs_BSplineCurve and kind in (PLANE, OTHER):
+        found = spline_sags(curve.BSpline(), np.minimum(t[:-1], t[1:]), np.maximum(t[:-1], t[1:]))
+        if found is not None:
+            return found
     off = np.zeros(len(t) - 1)
     for share in (0.25, 0.5, 0.75):
         at = (1.0 - share) * t[:-1] + share * t[1:]
         true = np.array([curve.Value(float(x)).Coord() for x in at])
         off = np.maximum(off, from_sides(kind, frame, size, points[:-1], points[1:], true))
     return np.where(off > 1e-11, _SAFETY * off, 0.0)
+
+
+def spline_sags(spline: Any, start: Array, end: Array) -> Array | None:
+    """How far each stretch (k,) of a Geom_BSplineCurve can be from points on it joined by lines or triangles, mm.
+
+    No mean of points on a stretch of length h is further from the point at the mean parameter than h^2 / 8 times the
+    largest second derivative, and that lies in the hull of its control points (Piegl, Tiller, The NURBS Book, 3.3).
+    None for a rational or periodic spline, for one of lines, and where it has a kink inside a stretch.
+    """
+    p = spline.Degree()
+    if p < 2 or spline.IsRational() or spline.IsPeriodic():
+        return None
+    many = [spline.Multiplicity(i) for i in range(1, spline.NbKnots() + 1)]
+    knots = np.repeat([spline.Knot(i) for i in range(1, spline.NbKnots() + 1)], many)
+    D = np.array([spline.Pole(i).Coord() for i in range(1, spline.NbPoles() + 1)])
+    for degree in (p, p - 1):
+        knots = knots[1:-1]
+        step, width = np.diff(D, axis=0), (knots[degree:] - knots[:-degree])[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            D = np.where(step == 0.0, 0.0, degree * step / width)
+    size = np.linalg.norm(D, axis=1)
+    active = (knots[: len(D)] < end[:, None]) & (knots[len(knots) - len(D) :] > start[:, None])
+    sag = (end - start) ** 2 / 8.0 * np.where(active, size, 0.0).max(axis=1)
+    return sag if np.isfinite(sag).all() else None

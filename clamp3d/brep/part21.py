@@ -17,7 +17,10 @@ MOST_ENTITIES = 20_000_000
 _NOISE = re.compile(r"'(?:[^']|'')*'|/\*.*?\*/", re.DOTALL)
 _HEADER = re.compile(r"(?<!\w)HEADER\s*;.*?FILE_SCHEMA\s*\(.*?ENDSEC\s*;", re.DOTALL)
 _DATA = re.compile(r"(?<!\w)DATA\s*(?:\([^;]*\)\s*)?;(.*?)ENDSEC\s*;", re.DOTALL)
-_RECORD = re.compile(r"\s*#\s*(\d+)\s*=\s*(.*?)\s*\Z", re.DOTALL)
+_RECORD = re.compile(r"\s*#\s*(\d+)\s*=\s*(.*)", re.DOTALL)
+_NAMES = re.compile(r"(?<![\w.])([A-Z][A-Z0-9_]*)\s*\(")
+_REFERRED = re.compile(r"#\s*(\d+)(?!\d|\s*=)")
+_LACKING = re.compile(r",\s*[,)]|\(\s*,")
 _SOLIDS = frozenset({"MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP"})
 _PARTS = {
     "ADVANCED_FACE": "a face",
@@ -68,22 +71,18 @@ def announced(path: Path) -> Announced:
     sections = _DATA.findall(text)
     if not sections:
         raise _damaged(path, "it has no DATA section that ends")
-    counts: Counter[str] = Counter()
+    every: list[str] = []
     solids = 0
     kinds: dict[int, str] = {}
-    referred: set[int] = set()
+    referred = {int(number) for section in sections for number in _REFERRED.findall(section)}
     for record in (record for section in sections for record in section.split(";") if record.strip()):
         number, content = _entity(path, record)
         if number in kinds:
             raise _damaged(path, f"#{number} is defined twice")
-        if content.startswith("("):
-            names = re.findall(r"(?<![\w.])([A-Z][A-Z0-9_]*)\s*\(", content)
-        else:
-            names = [content.partition("(")[0].strip()]
+        names = _NAMES.findall(content) if content.startswith("(") else [content.partition("(")[0].strip()]
         kinds[number] = names[0] if names else ""
-        counts.update(names)
+        every += names
         solids += not _SOLIDS.isdisjoint(names)
-        referred.update(map(int, re.findall(r"#\s*(\d+)", content)))
         if len(kinds) > MOST_ENTITIES:
             raise InputError(f"{path}: more than {MOST_ENTITIES} entities")
     dangling = referred - kinds.keys()
@@ -92,7 +91,7 @@ def announced(path: Path) -> Announced:
         raise _damaged(path, f"#{min(dangling)} is referred to and not there{more}")
     alone = [(number, kind) for number, kind in kinds.items() if kind in _PARTS and number not in referred]
     orphans = tuple(f"{_PARTS[kind]} (#{number}) that belongs to nothing" for number, kind in alone)
-    return Announced(counts, solids, orphans)
+    return Announced(Counter(every), solids, orphans)
 
 
 def _entity(path: Path, record: str) -> tuple[int, str]:
@@ -100,10 +99,10 @@ def _entity(path: Path, record: str) -> tuple[int, str]:
     found = _RECORD.match(record)
     if found is None:
         raise _damaged(path, f"no entity at {' '.join(record.split())[:60]!r}")
-    number, content = int(found[1]), found[2]
+    number, content = int(found[1]), found[2].rstrip()
     if not content.endswith(")") or content.count("(") != content.count(")") or "=" in content:
         raise _damaged(path, f"#{number} does not end")
-    if re.search(r",\s*[,)]|\(\s*,", content):
+    if _LACKING.search(content):
         raise _damaged(path, f"#{number} lacks a value")
     return number, content
 

@@ -1,8 +1,8 @@
 """Triangles of an Open CASCADE solid, each with a bound of its distance from the face that it stands for.
 
 Open CASCADE takes a deflection as a wish. What the triangles really keep is computed afterwards from their parameters:
-on planes, cylinders, cones, spheres and tori (and free-form surfaces that are one of these) in closed form, on others
-from samples, doubled.
+on planes, cylinders, cones, spheres and tori (and free-form surfaces that are one of these) in closed form, on extruded
+splines from their control points, on others from samples, doubled.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.brep.borders import BORDER, Borders
+from clamp3d.brep.borders import BORDER, Borders, spline_sags
 from clamp3d.brep.grid import divisions, gridded
 from clamp3d.brep.surfaces import (
     OTHER,
@@ -75,6 +75,7 @@ def explore(shape: Any, kind: str, outside: str = "SHAPE") -> Iterator[Any]:
 def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
     """Triangles of a TopoDS_Shape within ``chord`` mm of its faces, where the mesher gets there in a few tries.
 
+    Those of ``surfaces`` are; the ``faces``, whose borders are not split, are within twice that.
     The mesher runs in this thread: Open CASCADE's parallel one hangs in a forked process. Raises Clamp3dError if a
     face gets no triangles.
     """
@@ -84,7 +85,7 @@ def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
 
     faces = list(explore(solid, "FACE"))
     surfaces = [surface_of(face) for face in faces]
-    wanted, inner = 0.45 * chord, False
+    wanted, inner = 0.45 * chord, any(_is_trimmed(face, kind) for face, (kind, *_) in zip(faces, surfaces, strict=True))
     for _ in range(_RETRIES):
         BRepTools.Clean_s(solid)
         asked = IMeshTools_Parameters()
@@ -93,12 +94,12 @@ def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
         for face, (kind, *_) in zip(faces, surfaces, strict=True):
             if kind == OTHER:  # their facets stand for them to the end
                 BRepMesh_IncrementalMesh(face, asked)
-        asked.Deflection = wanted
+        asked.Deflection = 0.3 * wanted if inner else wanted  # borders are split in turn, where triangles allow it
         if not inner:  # most faces need none, or are meshed in rows
             asked.InternalVerticesMode, asked.DeflectionInterior, asked.AngleInterior = False, 1e3, 3.0
         BRepMesh_IncrementalMesh(solid, asked)
         made = _collected(faces, surfaces, wanted)
-        worst = float(made.errors.max())
+        worst = max(float(made.surfaces.error.max()), 0.5 * float(made.errors.max()))
         if worst <= chord:
             break
         if not inner:
@@ -107,6 +108,19 @@ def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
         # Below a tenth of what is asked for it is the file's own tolerance that is in the way.
         wanted, angle = max(0.7 * wanted * chord / worst, 0.1 * chord), 0.7 * angle
     return made
+
+
+def _is_trimmed(face: Any, kind: int) -> bool:
+    """Whether a round face has edges that are no lines or circles, so that it cannot be meshed in rows."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
+
+    if kind in (PLANE, OTHER) or BRepAdaptor_Surface(face).GetType() == GeomAbs_SurfaceType.GeomAbs_BSplineSurface:
+        return False
+    plain = (GeomAbs_CurveType.GeomAbs_Line, GeomAbs_CurveType.GeomAbs_Circle)
+    edges = explore(face, "EDGE")
+    return any(not BRep_Tool.Degenerated_s(e) and BRepAdaptor_Curve(e).GetType() not in plain for e in edges)
 
 
 def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tessellation:
@@ -159,13 +173,15 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
             borders = Borders.joined(edges)
             rows = borders.at_sides(F, len(P))
             sag = np.where(rows >= 0, borders.sag[rows], 0.0)
+        source = np.arange(len(F))
         for table in (coarse, fine):
             if table is fine and kind != OTHER and edges:
-                corners, sag, _ = borders.split(F, rows, P)
+                corners, sag, source = borders.split(F, rows, P)
             uv = unwrapped(kind, parameters(kind, frame, size, corners.reshape(-1, 3)).reshape(-1, 3, 2))
+            error = own[source]
             if kind != OTHER:
-                own = bends(kind, size, uv, corners) + deviation
-            error = own + sag.max(axis=1) + tolerance
+                error = np.maximum(error, bends(kind, size, uv, corners) + deviation)
+            error = error + sag.max(axis=1) + tolerance
             table.append((error, corners, uv, np.full(len(error), number), sag))
         deviations.append(deviation)
         nodes.append(P)
@@ -197,12 +213,12 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
 def _facets(
     face: Any, found: Any, P: Array, kind: int, size: Size, border: list[IntArray], chord: float
 ) -> tuple[IntArray, Array, Array]:
-    """Triangles of a face, its nodes, and of a free-form one how far each triangle can be from it.
+    """Triangles of a face, its nodes, and how far each triangle can be from it besides what a round face bends.
 
     In rows, where its border allows it; of a free-form face only what is extruded.
     """
     from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.GeomAbs import GeomAbs_SurfaceType
+    from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
 
     surface, made = BRepAdaptor_Surface(face), None
     uv = np.array([found.UVNode(i).Coord() for i in range(1, len(P) + 1)])
@@ -211,12 +227,29 @@ def _facets(
         made = gridded(uv, np.unique(np.concatenate(border)), lambda span: divisions(kind, size, span, chord))
     n = found.NbTriangles() if made is None else min(8, found.NbTriangles())
     F = np.array([found.Triangle(i).Get() for i in range(1, n + 1)], dtype=np.int64) - 1
+    turns = np.array([
+        surface.LastUParameter() - surface.FirstUParameter() if surface.IsUClosed() else np.inf,
+        surface.LastVParameter() - surface.FirstVParameter() if surface.IsVClosed() else np.inf,
+    ])  # fmt: skip
     if made is not None:
         (a, b), (grid, new) = (uv[F[:, k]] - uv[F[:, 0]] for k in (1, 2)), made
         F = grid if (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() > 0.0 else grid[:, ::-1]
         uv = np.concatenate([uv, new])
         P = np.concatenate([P, np.reshape([surface.Value(u, v).Coord() for u, v in new.tolist()], (-1, 3))])
-    return F, P, _sampled(surface, F, uv, P) if kind == OTHER else np.zeros(0)
+    # Two nodes a whole turn apart are at one place: a triangle of theirs can stand for all round it.
+    own = np.where(_spread(uv[F], turns) & (made is None), np.linalg.norm(np.ptp(P, axis=0)), 0.0)
+    if kind != OTHER:
+        return F, P, own
+    off = None
+    if regular and surface.BasisCurve().GetType() == GeomAbs_CurveType.GeomAbs_BSplineCurve:
+        u = uv[F, 0]
+        off = spline_sags(surface.BasisCurve().BSpline(), u.min(axis=1), u.max(axis=1))
+    return F, P, np.maximum(own, _sampled(surface, F, uv, P) if off is None else off)
+
+
+def _spread(uv: Array, turns: Array) -> NDArray[np.bool_]:
+    """Whether parameters (m, k, 2) of each row are nearly half a turn apart or more."""
+    return np.asarray((np.ptp(uv, axis=1) > 0.45 * turns).any(axis=1))
 
 
 def placed(points: Array, place: Any) -> Array:

@@ -12,7 +12,7 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import choice, function, number, text
 from clamp3d.clamp.closing import HELD, open_start
-from clamp3d.clamp.contact import Contact, measure_contacts, seats
+from clamp3d.clamp.contact import Contact, seats
 from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
 from clamp3d.clamp.equilibria import describe, equilibria, same, start_tilts
 from clamp3d.clamp.final_state import FinalState, solve_final_state
@@ -145,15 +145,15 @@ def assemble(
             final = solve_bisection(section, resolution=RESOLUTION, step=step, tilt_step=tilt_step, progress=progress)
         held = final.q
         met = first_touch(section, start, float(start[D] - held[D]))
-    by_hand = [(pair, q) for pair, q in met if not q[[B, W]].any()]
-    taken = [(pair, q) for pair, q in met if q[[B, W]].any()]
+    by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
+    taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
     if published:
         close_splints(section, start, held, by_hand, names[2], log)
         travel = tighten_nut(section, start, held, final.q, taken, names[3], log)
     else:
         travel = follow(section, steps, Closing(start, held, final.q, by_hand, taken), log)
     poses = section_poses(section, final.q)
-    contacts = measure_contacts(clamp, poses, model, cache=log.cache)
+    contacts = log.contacts(poses)
     resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
     found = {(e.a, e.b) for e in log.events}
     closes = next(step.name for step in steps if step.kind != "bring")

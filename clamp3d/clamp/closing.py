@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from clamp3d.clamp.curvature import lagrangian_hessian
 from clamp3d.clamp.matrix import Pair
-from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, W
+from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, U, V, W
 from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 from clamp3d.core.roots import root
@@ -28,7 +29,7 @@ STRIDE = 0.01
 CLOSING = np.eye(SIZE)[D]
 """What the bolt does: it lowers d."""
 
-HELD = (0, 1, 2, 3, D, S)
+HELD = (0, 1, 2, 3, D, S, U)
 """Coordinates that move while the down splint is closed by hand: what play the joints have the nut takes up."""
 OnContact = Callable[[Pair, Array], None]
 """Told a pair and the state when the pair first carries force."""
@@ -83,12 +84,12 @@ def descend(
     Only the coordinates ``free`` move, by default all that the joints let. It rests when it is slower than
     ``at_rest`` over the bolt's speed. Raises SolverError if that takes more than ``most`` steps.
     """
-    moving = list(section.free if free is None else free)
     longest = stride * section.lever
+    motion = _Motion(section, goal, list(section.free if free is None else free), longest)
     gaps, h = section.gaps(q), longest
     loaded: set[Pair] = set()
     for _ in range(most or _STEPS):
-        found = _step(section, q, gaps, goal, moving, h, longest)
+        found = motion.step(q, gaps, h)
         if found is None:
             h *= 0.25
             if h < _SHORTEST * section.lever:
@@ -97,10 +98,10 @@ def descend(
         new, new_gaps, force = found
         speed = float(np.abs(new - q).max()) / h
         if on_contact is not None:
-            for pair in dict.fromkeys(new_gaps.pair[k] for k in np.flatnonzero(force > _AT_REST)):
+            for pair in dict.fromkeys(new_gaps.pair[k] for k in np.flatnonzero(force[:-1] > _AT_REST)):
                 if pair not in loaded:
                     loaded.add(pair)
-                    on_contact(pair, _meeting(section, q, gaps, goal, moving, h, longest, pair, new))
+                    on_contact(pair, motion.meeting(q, gaps, h, pair, new))
         q, gaps = new, new_gaps
         if speed <= at_rest:
             return q
@@ -114,75 +115,92 @@ def descend(
     )
 
 
-def _meeting(
-    section: Section,
-    q: Array,
-    gaps: Gaps,
-    goal: Array,
-    moving: list[int],
-    h: float,
-    longest: float,
-    pair: Pair,
-    new: Array,
-) -> Array:
-    """The state within a step of ``h`` from q to ``new`` at which ``pair`` meets: the step without it, cut short."""
-    states = {0.0: q}
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """The motion that lowers ``goal`` by the coordinates ``moving``, in steps of about ``longest`` mm."""
 
-    def gap(part: float) -> float:
-        if part not in states:
-            found = _step(section, q, gaps, goal, moving, part * h, longest, without=pair)
-            states[part] = new if found is None else found[0]
-        at = section.gaps(states[part])
-        return float(min(v for v, p in zip(at.value, at.pair, strict=True) if p == pair))
+    section: Section
+    goal: Array
+    moving: list[int]
+    longest: float
 
-    if gap(0.0) <= 0.0:
-        return q
-    return states[root(gap, 0.0, 1.0, xtol=1e-9)] if gap(1.0) < 0.0 else new
+    def step(self, q: Array, gaps: Gaps, h: float, without: Pair | None = None) -> tuple[Array, Gaps, Array] | None:
+        """State after a step of ``h`` from q, its gaps and forces; None if the linearised gaps do not lead there.
 
+        The gaps of the pair ``without`` do not count, but for the saddle's arc: it carries from the outset.
+        """
+        longest, moving = self.longest, self.moving
+        target = q - h * self.goal
+        at, force = q, np.zeros(len(gaps.value))
+        ignored = np.array([without is not None and pair == without for pair in gaps.pair[:-1]] + [False])
+        for k in range(_ROUNDS):
+            if h <= _SLOW * longest or k == 1:
+                bend = self._bend(at, gaps, force, exact=h > _SLOW * longest)
+            elif k == 0:
+                bend = np.zeros((len(moving), len(moving)))
+            hessian = np.eye(len(moving)) + h * bend
+            near = np.flatnonzero(~ignored & (gaps.value <= 2.0 * longest + np.abs(gaps.gradient[:, D]) * h))
+            move, pushed = _project((at - target)[moving], hessian, gaps.gradient[near][:, moving], gaps.value[near], h)
+            if move is None:
+                return None
+            new = at.copy()
+            new[moving] += move
+            if np.abs(new - q).max() > 3.0 * max(longest, h):
+                return None
+            gaps, at = self.section.gaps(new), new
+            if len(gaps.value) != len(force):
+                return None
+            force = np.zeros(len(force))
+            force[near] = pushed / h
+            least = float(gaps.value[~ignored].min())
+            if (np.abs(move).max() <= _SETTLED * longest and least >= -_OVERLAP * longest) or (
+                not pushed.any() and least >= 0.0
+            ):
+                return at, gaps, force
+        return None
 
-def _step(
-    section: Section,
-    q: Array,
-    gaps: Gaps,
-    goal: Array,
-    moving: list[int],
-    h: float,
-    longest: float,
-    *,
-    without: Pair | None = None,
-) -> tuple[Array, Gaps, Array] | None:
-    """State after a step of ``h`` from q, its gaps and forces; None if the linearised gaps do not lead there.
+    def meeting(self, q: Array, gaps: Gaps, h: float, pair: Pair, new: Array) -> Array:
+        """The state in a step of ``h`` from q to ``new`` at which ``pair`` meets: the step without it, cut short."""
+        states = {0.0: q}
 
-    The gaps of the pair ``without`` do not count.
-    """
-    target = q - h * goal
-    at, force = q, np.zeros(len(gaps.value))
-    ignored = np.array([pair == without for pair in gaps.pair]) if without else np.zeros(len(force), dtype=bool)
-    for k in range(_ROUNDS):
-        if h <= _SLOW * longest or k == 1:
-            bend = _bend(section, at, gaps, force, moving, exact=h > _SLOW * longest)
-        elif k == 0:
-            bend = np.zeros((len(moving), len(moving)))
-        hessian = np.eye(len(moving)) + h * bend
-        near = np.flatnonzero(~ignored & (gaps.value <= 2.0 * longest + np.abs(gaps.gradient[:, D]) * h))
-        move, pushed = _project((at - target)[moving], hessian, gaps.gradient[near][:, moving], gaps.value[near], h)
-        if move is None:
-            return None
-        new = at.copy()
-        new[moving] += move
-        if np.abs(new - q).max() > 3.0 * max(longest, h):
-            return None
-        gaps, at = section.gaps(new), new
-        if len(gaps.value) != len(force):
-            return None
-        force = np.zeros(len(force))
-        force[near] = pushed / h
-        least = float(gaps.value[~ignored].min())
-        if (np.abs(move).max() <= _SETTLED * longest and least >= -_OVERLAP * longest) or (
-            not len(near) and least >= 0.0
-        ):
-            return at, gaps, force
-    return None
+        def gap(part: float) -> float:
+            if part not in states:
+                found = self.step(q, gaps, part * h, without=pair)
+                states[part] = new if found is None else found[0]
+            at = self.section.gaps(states[part])
+            return float(min(v for v, p in zip(at.value[:-1], at.pair[:-1], strict=True) if p == pair))
+
+        if gap(0.0) <= 0.0:
+            return q
+        return states[root(gap, 0.0, 1.0, xtol=1e-9)] if gap(1.0) < 0.0 else new
+
+    def _bend(self, q: Array, gaps: Gaps, force: Array, *, exact: bool) -> Array:
+        """Curvature of the loaded gaps: on a short step what keeps a wire, or the round back, in the round of its arc
+        (force over radius difference), on a long one all there is, by differences."""
+        section, moving = self.section, self.moving
+        if exact:
+            size, axes = np.linalg.eigh(lagrangian_hessian(section, q, gaps, force)[np.ix_(moving, moving)])
+            return np.asarray((axes * np.maximum(size, 0.0)) @ axes.T)
+        found = np.zeros((SIZE, SIZE))
+        found[W, W] = max(0.0, section.lift(float(q[W]))[2]) * force[-1] * gaps.normal[-1, 1]
+        pose = section.down_splint(q)
+        c, s = math.cos(pose.angle), math.sin(pose.angle)
+        for k in np.flatnonzero(force):
+            (splint, wire), row = gaps.pair[k], gaps.gradient[k]
+            if gaps.feature[k] != "arc" or wire not in WIRES:
+                continue
+            pair, i = section.pairs[splint, wire], 2 * WIRES.index(wire)
+            along = np.zeros(SIZE)
+            tx, ty = -row[i + 1], row[i]
+            along[i], along[i + 1] = tx, ty
+            if splint == "P2":
+                u, v = float(pair.T_a_groove[0, 3]), -float(pair.T_a_groove[2, 3])
+                ox, oy = u * c + v * s, v * c - u * s
+                along[D], along[U], along[S] = -ty, ty, (ty * ox - tx * oy) / section.lever
+                along[B] = along[V] = along[W] = -tx
+            slack = max(abs(pair.groove.radius - pair.cylinder.radius), _FULL * pair.groove.radius)
+            found += force[k] / slack * np.outer(along, along)
+        return found[np.ix_(moving, moving)]
 
 
 def _project(offset: Array, hessian: Array, A: Array, value: Array, scale: float) -> tuple[Array | None, Array]:
@@ -191,45 +209,15 @@ def _project(offset: Array, hessian: Array, A: Array, value: Array, scale: float
     A least-distance problem, solved by non-negative least squares [Lawson & Hanson, Solving Least Squares Problems,
     1974, chapter 23].
     """
-    L = np.linalg.cholesky(hessian)
-    z0 = np.linalg.solve(L, offset)
+    back = np.linalg.inv(np.linalg.cholesky(hessian))
+    z0 = back @ offset
     if not len(A):
-        return -np.linalg.solve(L.T, z0), np.zeros(0)
-    G = np.linalg.solve(L, A.T).T
+        return -z0 @ back, np.zeros(0)
+    G = A @ back.T
     lower = (G @ z0 - value) / scale
     u = nnls(np.vstack([G.T, lower]), np.append(np.zeros(len(offset)), 1.0))
     rest = 1.0 - float(lower @ u)
     if not rest > 1e-12:
         return None, u
     multipliers = u / rest * scale
-    return np.linalg.solve(L.T, G.T @ multipliers - z0), multipliers
-
-
-def _bend(section: Section, q: Array, gaps: Gaps, force: Array, moving: list[int], *, exact: bool) -> Array:
-    """Curvature of the loaded gaps: on a short step that which keeps a wire, or the round back, in the round of its arc
-    (force over radius difference), on a long one all there is, by differences."""
-    if exact:
-        size, axes = np.linalg.eigh(
-            lagrangian_hessian(section, q, np.flatnonzero(force), force[force > 0.0])[np.ix_(moving, moving)]
-        )
-        return np.asarray((axes * np.maximum(size, 0.0)) @ axes.T)
-    found = np.zeros((SIZE, SIZE))
-    found[W, W] = section.lift(float(q[W]))[2] * float(force @ gaps.gradient[:, D])
-    pose = section.down_splint(q)
-    c, s = math.cos(pose.angle), math.sin(pose.angle)
-    for k in np.flatnonzero(force):
-        (splint, wire), row = gaps.pair[k], gaps.gradient[k]
-        if gaps.feature[k] != "arc" or wire not in WIRES:
-            continue
-        pair, i = section.pairs[splint, wire], 2 * WIRES.index(wire)
-        along = np.zeros(SIZE)
-        tx, ty = -row[i + 1], row[i]
-        along[i], along[i + 1] = tx, ty
-        if splint == "P2":
-            u, v = float(pair.T_a_groove[0, 3]), -float(pair.T_a_groove[2, 3])
-            ox, oy = u * c + v * s, v * c - u * s
-            along[D], along[S] = -ty, (ty * ox - tx * oy) / section.lever
-            along[B] = along[W] = -tx
-        slack = max(abs(pair.groove.radius - pair.cylinder.radius), _FULL * pair.groove.radius)
-        found += force[k] / slack * np.outer(along, along)
-    return found[np.ix_(moving, moving)]
+    return (multipliers @ G - z0) @ back, multipliers

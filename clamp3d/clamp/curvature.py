@@ -5,10 +5,12 @@ The second-order condition of a constrained minimum [Nocedal & Wright, Numerical
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.clamp.section import SIZE, WIRES, Gaps, Section
+from clamp3d.clamp.section import SIZE, SPLINTS, WIRES, Gaps, Section
 from clamp3d.core.pose import Array
 
 LEVEL = 1e-6
@@ -33,7 +35,7 @@ def least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array, 
     tangent = rows[int((sizes > 1e-9).sum()) :]
     if not len(tangent):
         return np.inf
-    hessian = lagrangian_hessian(section, q, strong, multipliers[strong])[np.ix_(free, free)]
+    hessian = lagrangian_hessian(section, q, gaps, multipliers)[np.ix_(free, free)]
     reduced = tangent @ hessian @ tangent.T
     least = float(np.linalg.eigvalsh(reduced).min())
     weak = np.flatnonzero((np.abs(gaps.value) <= tolerance) & (multipliers == 0.0))
@@ -59,25 +61,24 @@ def touched(section: Section, gaps: Gaps, rows: NDArray[np.intp]) -> NDArray[np.
     return np.asarray(free[np.abs(gaps.gradient[np.ix_(rows, free)]).max(axis=0, initial=0.0) > 0.0])
 
 
-def lagrangian_hessian(section: Section, q: Array, rows: NDArray[np.intp], multipliers: Array) -> Array:
-    """Second derivatives (8, 8) of goal - multipliers . gaps by central differences of the closed-form gradients."""
+def lagrangian_hessian(section: Section, q: Array, gaps: Gaps, force: Array) -> Array:
+    """Second derivatives (10, 10) of goal - ``force`` . ``gaps`` at q, by central differences of closed-form gradients.
+
+    The saddle's arc is left out: its gap is straight in u, and w does not change it where it is closed.
+    """
     # A wire that nearly fills its groove turns its normal within R - r: the step must be short beside that.
     h = min(1e-4, max(1e-8, 0.03 * section.least_slack))
-    H = np.zeros((SIZE, SIZE))
-    gaps = section.gaps(q)
+    H, others = np.zeros((SIZE, SIZE)), np.append(force[:-1] != 0.0, False)
+    for pair in itertools.product(SPLINTS, WIRES):
+        own = np.array([p == pair for p in gaps.pair])
+        if force[own].any():
+            H -= section.wire_curvature(q, *pair, force[own], h)
+        others &= ~own
+    rows = np.flatnonzero(others)
     for j in touched(section, gaps, rows):
         e = np.zeros(SIZE)
         e[j] = h
-        if j < 2 * len(WIRES):  # a wire's own coordinates move no other gap
-            wire = WIRES[j // 2]
-            own = np.flatnonzero([pair[1] == wire for pair in gaps.pair])
-            counted = np.isin(rows, own)
-            which = np.searchsorted(own, rows[counted])
-            high, low = (section.wire_gaps(q + by, wire).gradient[which] for by in (e, -e))
-        else:
-            counted = np.ones(len(rows), dtype=bool)
-            high, low = (section.gaps(q + by).gradient[rows] for by in (e, -e))
-        H[j] = -(multipliers[counted] @ (high - low)) / (2.0 * h)
+        H[j] -= force[rows] @ (section.gaps(q + e).gradient[rows] - section.gaps(q - e).gradient[rows]) / (2.0 * h)
     return 0.5 * (H + H.T)
 
 

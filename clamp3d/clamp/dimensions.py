@@ -264,7 +264,7 @@ class Clamp:
         return math.hypot(x, y), math.atan2(x, y)
 
     @property
-    def _tilt_stops(self) -> dict[str, float]:
+    def tilt_stops(self) -> dict[str, float]:
         """Tilts in rad at which the bodies stop the down splint, centred over the bolt."""
         down, r = self.down_splint, self.bolt.diameter / 2
         distance, angle = self._saddle_edge
@@ -286,12 +286,12 @@ class Clamp:
         >>> round(math.degrees(clamp.tilt_stop), 3), clamp.tilt_stopped_by
         (12.99, "the saddle's edge")
         """
-        return min(self._tilt_stops.values())
+        return min(self.tilt_stops.values())
 
     @property
     def tilt_stopped_by(self) -> str:
         """What stops the tilt: "the saddle's edge" or "the slot"."""
-        return min(self._tilt_stops, key=self._tilt_stops.__getitem__)
+        return min(self.tilt_stops, key=self.tilt_stops.__getitem__)
 
     def connection(self, a: PartName, b: PartName) -> ConnectionType:
         """Entry c_ij of the connection matrix (Eq. 1 and Table 1 of the paper), symmetric."""

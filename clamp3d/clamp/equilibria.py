@@ -11,7 +11,7 @@ from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.dimensions import TITLES, PartName
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.landscape import initial_guesses
-from clamp3d.clamp.section import EDGE, WIRES, B, D, S, Section, W
+from clamp3d.clamp.section import EDGE, SIZE, WIRES, D, Section
 from clamp3d.clamp.status import stop_words
 from clamp3d.errors import InputError, SolverError
 
@@ -102,7 +102,7 @@ def same(a: FinalState, b: FinalState) -> bool:
     if a.loose != b.loose:
         return False
     held = [k for i, wire in enumerate(WIRES) if wire not in a.loose for k in (2 * i, 2 * i + 1)]
-    return bool(np.abs((a.q - b.q)[[*held, D, S, B, W]]).max() <= SAME)
+    return bool(np.abs((a.q - b.q)[[*held, *range(D, SIZE)]]).max() <= SAME)
 
 
 def describe(state: FinalState, slipped: tuple[PartName, ...]) -> str:

@@ -17,7 +17,7 @@ from clamp3d.clamp.closing import CLOSING, HELD, STILL, STRIDE, OnContact, desce
 from clamp3d.clamp.curvature import LEVEL, lagrangian_hessian, least_curvature, rounding_of_normals, touched
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
-from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section
+from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section, U
 from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
@@ -48,11 +48,11 @@ class FinalState:
 
     Attributes
     ----------
-    q : ndarray (8,)
+    q : ndarray (10,)
         The state as in `section`.
-    start : ndarray (8,)
+    start : ndarray (10,)
         Where its closing began.
-    held : ndarray (8,)
+    held : ndarray (10,)
         Where the path was when the down splint, closed by hand, came to rest: before the nut takes up the joints' play.
     gaps : Gaps
         All gaps at q.
@@ -95,12 +95,12 @@ def solve_final_state(
     Parameters
     ----------
     section : Section
-    start : ndarray (8,), optional
+    start : ndarray (10,), optional
         Where closing begins; by default `open_start`, which every command begins from.
     stride : float
         Longest move of a step in parts of the down splint's half width.
     on_contact : callable, optional
-        Called with each pair of parts and the state (8,) when the pair first carries force.
+        Called with each pair of parts and the state (10,) when the pair first carries force.
 
     Raises
     ------
@@ -192,6 +192,8 @@ def _perturb(section: Section, q: Array, attempt: int) -> Array:
         new[D] += step
         if gaps.pair[k][0] == "P1":  # opening does not help the wire out of the up splint
             new[:4] -= gaps.value[k] * gaps.gradient[k, :4]
+        elif gaps.pair[k] == ("P2", "P3"):  # nor the down splint out of the saddle
+            new[U] -= gaps.value[k]
     return new
 
 
@@ -229,10 +231,15 @@ def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
 
     Of gaps that are one contact the nearest counts: a lip ends the arc and the face beside it, and is in both. Of equal
     ones it is the face's, for the arc's jumps to the other lip when that comes nearer, and its derivatives with it.
+    A lip beside a face that the wire lies on holds nothing back: the wire rolls over it.
     """
     in_set, free = np.abs(gaps.value) <= active, list(section.free)
+    flat = [name.replace("lip", "flat") for name in gaps.feature]
     for i, j in itertools.combinations(np.flatnonzero(in_set), 2):
-        if gaps.pair[i] == gaps.pair[j] and np.abs(gaps.gradient[i] - gaps.gradient[j]).max() <= _ONE_CONTACT:
+        if gaps.pair[i] != gaps.pair[j]:
+            continue
+        beside = flat[i] == flat[j] and flat[i].startswith("flat")
+        if beside or np.abs(gaps.gradient[i] - gaps.gradient[j]).max() <= _ONE_CONTACT:
             in_set[i if gaps.value[i] >= gaps.value[j] else j] = False
     multipliers = np.zeros(len(gaps.value))
     if in_set.any():
@@ -255,7 +262,7 @@ def _polish(section: Section, q: Array, active: float, least: float) -> tuple[Ar
         rows = np.flatnonzero((multipliers > 0.0) | overlapping)
         free = touched(section, gaps, rows)
         if step > _ACTIVE:  # nearer it does not change any more
-            hessian = lagrangian_hessian(section, q, rows, multipliers[rows])
+            hessian = lagrangian_hessian(section, q, gaps, multipliers)
         A = gaps.gradient[rows]
         k, n = len(rows), len(free)
         kkt = np.block([[hessian[np.ix_(free, free)], -A[:, free].T], [A[:, free], np.zeros((k, k))]])

@@ -62,16 +62,16 @@ def _bring(section: Section, plan: _Plan, k: int, log: Log) -> None:
     """The parts of a step come in on their way; they end where they touch, if they do."""
     step, legs, base, before = plan.steps[k], plan.legs[k], plan.bases[k], log.aside
     end = plan.offsets(k + 1)
-    corners = [(way, "before its place") for way in reversed(way_out(legs)[:-1])]
     origin, length = legs[0]
+    corners = [(way_out(legs[:1])[0], f"{step.part} before its place, {legs[1][0]}")] if legs[1:] else []
     engaged = base["P5"].y + section.clamp.nut.height - base["P4"].y
     if _meet_screw(step, plan.together(k)) and DIRECTIONS[origin][2] and 0.0 < engaged < length:
         corners.append((way_out([(origin, engaged)])[0], "nut on the bolt's end"))
     for corner, label in corners:
         log.aside = before | {name: end[name] + corner for name in step.parts}
-        log.reach(step.name, f"{step.part} {label}" if label.startswith("before") else label, base)
+        log.reach(step.name, label, base)
     log.aside = end
-    log.reach(step.name, f"{step.part} in place", base)
+    log.reach(step.name, f"{step.part} in place, {origin}", base)
     near = [pair for pair in PAIRS if len(step.parts.intersection(pair)) == 1 and pair in plan.together(k)]
     log.measure(base, step.name, near, sum(length for _, length in legs), within=CONTACT)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,21 +57,15 @@ def contact_forces(section: Section, final: FinalState) -> tuple[Force, ...]:
     >>> [(f.a, f.b, round(f.force, 3)) for f in contact_forces(section, solve_final_state(section))][:2]
     [('P1', 'P6', 0.541), ('P2', 'P6', 0.541)]
     """
-    q, gaps, clamp = final.q, final.gaps, section.clamp
-    found, total = [], np.zeros(2)
+    q, gaps = final.q, final.gaps
+    found, total = [], 0.0
     for k in np.flatnonzero(final.multipliers):
         (a, b), push = gaps.pair[k], float(final.multipliers[k])
         found.append(_force(q, a, b, gaps.feature[k], push * gaps.normal[k], gaps.point[k]))
-        total += push * gaps.normal[k] * ((b == "P2") - (a == "P2"))
-    # What pushes the down splint it hands on to the saddle: through the arc, as far as that can carry it.
-    down = section.down_splint(q)
-    carried = total if clamp.joints.saddle else np.array([0.0, total[1]])
-    lean = total[0] / total[1] if clamp.joints.saddle else 0.0
-    depth = clamp.down_splint.back_radius / math.hypot(1.0, lean)
-    found.append(_force(q, "P2", "P3", "arc", carried, (down.x + lean * depth, down.y + depth)))
-    if abs(total[0] - carried[0]) > 1e-9:
-        held = np.array([-(total[0] - carried[0]), 0.0])
-        found.append(_force(q, "P4", "P2", HELD, held, (down.x, down.y)))
+        total += push * gaps.normal[k, 0] * ((b == "P2") - (a == "P2"))
+    if not section.clamp.joints.saddle and abs(total) > 1e-9:
+        down = section.down_splint(q)
+        found.append(_force(q, "P4", "P2", HELD, np.array([-total, 0.0]), (down.x, down.y)))
     return tuple(found)
 
 

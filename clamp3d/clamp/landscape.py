@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.clamp.section import SIZE, WIRES, D, S, Section
+from clamp3d.clamp.section import SIZE, WIRES, D, S, Section, U
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array
 
@@ -29,15 +29,16 @@ _CLEAR = 1e-3
 
 
 def initial_guesses(section: Section) -> list[Array]:
-    """Open states q (8,), each just above a local minimum of the feasible distance; the lowest first."""
-    limit, lever = section.clamp.tilt_stop, section.lever
+    """Open states q (10,), each just above a local minimum of the feasible distance; the lowest first."""
+    limit, lever = section.clamp.tilt_stops["the slot"], section.lever
     tilts = np.linspace(-limit, limit, _TILTS)
+    lifted = section.lifted(tilts)
     faces = np.array([_faces(section, tilt) for tilt in tilts])
     wires = [_Minima(section, i, tilts) for i in range(len(WIRES))]
     found: list[Array] = []
 
     def least(k: int, a: int, b: int) -> float:
-        return float(max(faces[k], wires[0].least[a], wires[1].least[b]))
+        return float(max(faces[k], wires[0].least[a], wires[1].least[b]) + lifted[k])
 
     def rises(k: int, a: int, b: int, way: int) -> bool:
         """Whether the distance is larger beyond a level stretch at the tilt k, upwards (``way`` 1) or downwards."""
@@ -53,10 +54,10 @@ def initial_guesses(section: Section) -> list[Array]:
             if not rises(k, a, b, -1) or not rises(k, a, b, 1):
                 continue
             q = np.zeros(SIZE)
-            q[D], q[S] = least(k, a, b), lever * tilt
+            q[D], q[S], q[U] = least(k, a, b), lever * tilt, lifted[k]
             for i, w, minimum in ((0, wires[0], a), (2, wires[1], b)):
                 at = w.position[minimum]
-                q[i : i + 2] = w.x[at], 0.5 * (w.over[at] + q[D] + w.under[k, at])
+                q[i : i + 2] = w.x[at], 0.5 * (w.over[at] + q[D] - q[U] + w.under[k, at])
             found.append(q)
     found.sort(key=lambda q: float(q[D]))
     return [opened for q in found if (opened := _open(section, q)) is not None]
@@ -132,7 +133,7 @@ def _faces(section: Section, tilt: float) -> float:
     """Least d at which the inner faces do not overlap."""
     q = np.zeros(SIZE)
     q[S] = section.lever * tilt
-    return float(-section.face_gaps(q).value.min())
+    return -section.face_gap(q)
 
 
 def _open(section: Section, q: Array) -> Array | None:

@@ -16,7 +16,7 @@ _MAX_ADVANCES = 100_000
 def travel_to_contact(
     section: Section, q: Array, wire: PartName, direction: Array, splint: PartName, *, limit: float = math.inf
 ) -> tuple[float, tuple[PartName, PartName] | None]:
-    """Travel in mm of the unit ``direction`` (8,) from state ``q`` until ``splint`` and ``wire`` touch.
+    """Travel in mm of the unit ``direction`` (10,) from state ``q`` until ``splint`` and ``wire`` touch.
 
     Returns the travel and the pair that touches, or ``limit`` and None. No gap can close faster than the motion goes,
     so advancing by the least gap never passes a contact, however thin. Raises SolverError if the start overlaps or

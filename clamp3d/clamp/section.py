@@ -1,9 +1,10 @@
-"""The clamp in its section: eight numbers place the parts, gaps say what may not overlap.
+"""The clamp in its section: ten numbers place the parts, gaps say what may not overlap.
 
-Everything is seen from the up splint (P1 at rest), in the paper's section frame. The state q (8,) holds in mm: the two
+Everything is seen from the up splint (P1 at rest), in the paper's section frame. The state q (10,) holds in mm: the two
 wire centres x6, y6, x7, y7; d, how far below P1's origin the down splint's stands when it rests in the saddle's apex
-(saddle and bolt follow d); s = half width * tilt; the bolt's shift b in the up splint's hole; and the down splint's
-shift w beside the bolt. The last two stay 0 unless the clamp's joints have play.
+(the bolt draws the saddle, and d is where that is); s = half width * tilt; the shifts b of the bolt in the up splint's
+hole, v of the saddle on the bolt and w of the down splint in the saddle, 0 unless the clamp's joints have play; and u,
+how high the round back stands over the saddle's arc, 0 unless the saddle's edges lift it off.
 """
 
 from __future__ import annotations
@@ -24,15 +25,18 @@ from clamp3d.core.pose import Array, SectionPose
 
 SPLINTS: tuple[PartName, PartName] = ("P1", "P2")
 WIRES: tuple[PartName, PartName] = ("P6", "P7")
-D, S, B, W = 4, 5, 6, 7
-"""Where the down splint's distance, its scaled tilt, and the shifts of bolt and down splint stand in the state q."""
-SIZE = 8
+D, S, B, V, W, U = 4, 5, 6, 7, 8, 9
+"""Where the distance, the scaled tilt, the shifts of bolt, saddle and down splint, and its height over the saddle's arc
+stand in the state q."""
+SIZE = 10
 """Coordinates of a state."""
 
 EDGE = "outer edge"
 """Feature of a splint's gap to a wire that has left its face sideways."""
 EDGES = "saddle's edge"
 """Feature of the gap between the down splint's underside and the saddle."""
+SEAT = "arc"
+"""Feature of the gap between the round back and the saddle's arc: the last one of `Section.gaps`."""
 
 _SPARE, _SPARE_OF_LEVER = 10.0, 0.2
 """How much wider than the wires need a clamp stands open, mm, and at most how much of its half width."""
@@ -42,7 +46,7 @@ _FAR = 1e3
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """Values (k,) mm of the gaps at a state, their derivatives (k, 8) by q (dimensionless), and what each one is.
+    """Values (k,) mm of the gaps at a state, their derivatives (k, 10) by q (dimensionless), and what each one is.
 
     ``pair`` names the two parts, ``feature`` the piece; ``point`` (k, 2) is on one of them and ``normal`` (k, 2) leads
     from the first to the second, in P1's section frame (right, down).
@@ -60,6 +64,8 @@ _Rows = tuple[Array, Array, Array, tuple[Pair, ...], tuple[str, ...], Array, Arr
 """Values, gradients, derivatives (k, 3) by the down splint's x, y and angle, pairs, features, points, normals."""
 _Row = tuple[float, tuple[float, ...], tuple[float, float, float], Pair, str, tuple[float, float], tuple[float, float]]
 _NONE = (0.0, 0.0, 0.0)
+_RIGHT_DOWN = np.array([1.0, -1.0])
+"""Times a part's X and Z: its section coordinates."""
 
 
 @dataclass
@@ -100,34 +106,41 @@ class Section:
     def free(self) -> tuple[int, ...]:
         """The coordinates of q that move."""
         joints = self.clamp.joints
-        return (0, 1, 2, 3, D, S, *([B] if joints.hole else []), *([W] if joints.saddle or joints.washer else []))
+        shifts = ((B, joints.hole), (V, joints.washer), (W, joints.saddle))
+        return (0, 1, 2, 3, D, S, *(i for i, plays in shifts if plays), U)
 
     @cached_property
-    def play(self) -> tuple[float, float, float]:
-        """How far the bolt may shift in the up splint's hole, the saddle on the bolt, the back in the saddle; mm."""
-        clamp, joints = self.clamp, self.clamp.joints
-        hole, washer = (0.5 * (p.hole_diameter - clamp.bolt.diameter) for p in (clamp.up_splint, clamp.saddle))
-        slide = clamp.back_clearance * math.sin(clamp.saddle.half_angle)
-        return hole * joints.hole, washer * joints.washer, slide * joints.saddle
+    def play(self) -> tuple[float, float]:
+        """How far the bolt may shift in the up splint's hole, and the saddle on the bolt; mm."""
+        up, saddle, bolt = self.clamp.up_splint, self.clamp.saddle, self.clamp.bolt
+        return 0.5 * (up.hole_diameter - bolt.diameter), 0.5 * (saddle.hole_diameter - bolt.diameter)
 
     def lift(self, w: float) -> tuple[float, float, float]:
-        """How much higher the down splint rests when shifted by ``w``, mm, and its two derivatives.
+        """How much higher the down splint rests when shifted by ``w`` in the saddle, mm, and its two derivatives.
 
-        It rolls in the saddle once the saddle has taken its play on the bolt.
+        The round back rolls in the saddle's arc, and beyond it on a lip.
         """
-        if w == 0.0:
-            return 0.0, 0.0, 0.0
-        c, aside = self.clamp.back_clearance, max(0.0, abs(w) - self.play[1])
-        rest = math.sqrt(max(c * c - aside * aside, 1e-12 * c * c))
-        return aside * aside / (c + rest), math.copysign(aside / rest, w), c * c / rest**3 if aside else 0.0
+        aside = abs(w)
+        c, r, saddle = self.clamp.back_clearance, self.clamp.down_splint.back_radius, self.clamp.saddle
+        to_lip = 0.5 * saddle.width - aside
+        if r * aside <= c * to_lip:  # the arc's end, where both centres and the lip are on one line
+            rest = math.sqrt(c * c - aside * aside)
+            return aside * aside / (c + rest), math.copysign(aside / rest, w), c * c / rest**3
+        rest = math.sqrt(max(r * r - to_lip * to_lip, 1e-12 * r * r))
+        return rest - self._edge_below, math.copysign(to_lip / rest, w * to_lip), -r * r / rest**3
+
+    def lifted(self, tilt: Array) -> Array:
+        """How high (n,) over its arc the centred saddle's edges hold the down splint at a tilt (n,) in rad; mm."""
+        half, under = 0.5 * self.clamp.saddle.width, self.clamp.down_splint.underside_depth
+        return np.maximum(0.0, (under + half * np.abs(np.sin(tilt))) / np.cos(tilt) - self._edge_below)
 
     def down_splint(self, q: Array) -> SectionPose:
         """P2 seen from P1."""
         return SectionPose(*self._down(q))
 
     def _down(self, q: Array) -> tuple[float, float, float]:
-        w = float(q[W])
-        return self.bolt_x + float(q[B]) + w, float(q[D]) - self.lift(w)[0], float(q[S]) / self.lever
+        b, v, w = q[B : W + 1].tolist()
+        return self.bolt_x + b + v + w, float(q[D]) - self.lift(w)[0] - float(q[U]), float(q[S]) / self.lever
 
     @property
     def least_slack(self) -> float:
@@ -157,10 +170,6 @@ class Section:
         top = -up.T_a_groove[2, 3] - up.groove.radius
         centre = self.down_splint(q).point(down.T_a_groove[0, 3], -down.T_a_groove[2, 3])[1]
         return self.mouth(wire), (float(top), centre + down.groove.radius)
-
-    def on_bolt(self, q: Array) -> float:
-        """The saddle's shift over the bolt, mm: it goes with the down splint as far as its hole lets it."""
-        return min(max(float(q[W]), -self.play[1]), self.play[1])
 
     def splint_distance(self, q: Array) -> float:
         """Height between the inner edges of the splints on the line side (the distance of Table 4); mm."""
@@ -209,46 +218,44 @@ class Section:
 
     def wire_gaps(self, q: Array, wire: PartName) -> Gaps:
         """Gaps of one wire to both splints, every piece of the contact model, and to the bolt."""
-        return self._moved(q, [self._wire_rows(q, wire)])
+        return self._moved(q, [self._wire_rows(q, wire, self._down(q))])
 
     def gaps(self, q: Array) -> Gaps:
         """All gaps at a state: both wires, faces, stops."""
-        rows = [self._wire_rows(q, wire) for wire in WIRES]
-        return self._moved(q, [*rows, self._face_rows(q), self._stop_rows(q)])
+        down = self._down(q)
+        wires = [self._wire_rows(q, wire, down) for wire in WIRES]
+        return self._moved(q, [*wires, self._face_rows(down), self._stop_rows(q, down)])
 
     def _moved(self, q: Array, rows: list[_Rows]) -> Gaps:
         """Rows joined, with what moves the down splint written out in the state's coordinates."""
         values, gradients, by, pairs, features, points, normals = zip(*rows, strict=True)
-        gradient = np.concatenate(gradients)
-        by_x, by_y, by_angle = np.concatenate(by).T
-        gradient[:, D] += by_y
-        gradient[:, S] += by_angle / self.lever
-        gradient[:, B] += by_x
-        gradient[:, W] += by_x - self.lift(float(q[W]))[1] * by_y
+        gradient = np.concatenate(gradients) + np.concatenate(by) @ self._down_by(float(q[W]))
         point, normal = np.concatenate(points), np.concatenate(normals)
         return Gaps(np.concatenate(values), gradient, sum(pairs, ()), sum(features, ()), point, normal)
 
-    def _wire_rows(self, q: Array, wire: PartName) -> _Rows:
+    def _down_by(self, w: float) -> Array:
+        """Derivatives (3, 10) of the down splint's x, y and angle by q."""
+        found = np.zeros((3, SIZE))
+        found[0, B : W + 1] = found[1, D] = 1.0
+        found[1, W], found[1, U], found[2, S] = -self.lift(w)[1], -1.0, 1.0 / self.lever
+        return found
+
+    def _wire_rows(self, q: Array, wire: PartName, pose: tuple[float, float, float]) -> _Rows:
         i = 2 * WIRES.index(wire)
-        x, y = float(q[i]), float(q[i + 1])
-        px, py, angle = self._down(q)
+        x, y = q[i : i + 2].tolist()
+        px, py, angle = pose
         c, s = math.cos(angle), math.sin(angle)
         dx, dy = x - px, y - py
-        T_up = np.array([[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -y], [0.0, 0.0, 0.0, 1.0]])
-        T_down = np.array(
-            [[c, 0.0, s, dx * c - dy * s], [0.0, 1.0, 0.0, 0.0], [-s, 0.0, c, -(dx * s + dy * c)], [0.0, 0.0, 0.0, 1.0]]
-        )
-        up = self._trimmed("P1", wire, T_up)
-        down = self._trimmed("P2", wire, T_down)
-        self.queries.contact += 2
+        up = self._pieces("P1", wire, x, y)
+        down = self._pieces("P2", wire, dx * c - dy * s, dx * s + dy * c, c, s)
         k, n = len(up.distance), len(up.distance) + len(down.distance)
         value, by, point = np.empty(n + 1), np.zeros((n + 1, 3)), np.empty((n + 1, 2))
         gradient = np.zeros((n + 1, SIZE))
         value[:k], value[k:n] = up.distance, down.distance
-        gradient[:k, i], gradient[:k, i + 1] = up.normal[:, 0], -up.normal[:, 2]
-        point[:k, 0], point[:k, 1] = up.point[:, 0], -up.point[:, 2]
+        gradient[:k, i : i + 2] = up.normal[:, ::2] * _RIGHT_DOWN
+        point[:k] = up.point[:, ::2] * _RIGHT_DOWN
         # Of the down splint's normals and points the section components in its own axes (right, down), then in P1's.
-        normal, arm = down.normal[:, ::2] * (1.0, -1.0), down.point[:, ::2] * (1.0, -1.0)
+        normal, arm = down.normal[:, ::2] * _RIGHT_DOWN, down.point[:, ::2] * _RIGHT_DOWN
         turn = np.array([[c, -s], [s, c]])
         gradient[k:n, i : i + 2] = normal @ turn
         by[k:n, :2] = -gradient[k:n, i : i + 2]
@@ -263,10 +270,43 @@ class Section:
         pair: tuple[Pair, ...] = (("P1", wire),) * k + (("P2", wire),) * (n - k) + (("P4", wire),)
         return value, gradient, by, pair, (*up.feature, *down.feature, "shank"), point, gradient[:, i : i + 2].copy()
 
-    def _trimmed(self, splint: PartName, wire: PartName, T: Array) -> Pieces:
-        """The model's pieces, with the faces ended at the splint's outer edge: the groove's material has no end."""
+    def wire_curvature(self, q: Array, splint: PartName, wire: PartName, force: Array, h: float) -> Array:
+        """Second derivatives (10, 10) by q of ``force`` (k,) times a wire's gaps to a splint.
+
+        The normals turn with the wire's place (u, v) in the splint's own axes: differences over ``h`` mm. How u and v
+        follow from q is written out.
+        """
+        i = 2 * WIRES.index(wire)
+        px, py, angle = self._down(q) if splint == "P2" else (0.0, 0.0, 0.0)
+        c, s = math.cos(angle), math.sin(angle)
+        turn = np.array([[c, -s], [s, c]])
+        u, v = (turn @ (q[i : i + 2] - (px, py))).tolist()
+
+        def push(u: float, v: float) -> Array:
+            return np.asarray(force @ self._pieces(splint, wire, u, v, c, s).normal[:, ::2] * _RIGHT_DOWN)
+
+        turning = np.column_stack([push(u + h, v) - push(u - h, v), push(u, v + h) - push(u, v - h)]) / (2.0 * h)
+        by_q, found = np.zeros((2, SIZE)), np.zeros((SIZE, SIZE))
+        by_q[:, i : i + 2] = turn
+        if splint == "P2":
+            by_q += np.column_stack([-turn, (-v, u)]) @ self._down_by(float(q[W]))
+            along, deep = push(u, v)
+            found[S] = (deep * by_q[0] - along * by_q[1]) / self.lever
+            found += found.T
+            found[S, S] *= 0.5
+            found[W, W] += self.lift(float(q[W]))[2] * (along * turn[0, 1] + deep * turn[1, 1])
+        return by_q.T @ turning @ by_q + found
+
+    def _pieces(self, splint: PartName, wire: PartName, u: float, v: float, c: float = 1.0, s: float = 0.0) -> Pieces:
+        """The model's pieces for a wire at (u, v) in the splint's own axes (right, down), which is turned by (c, s).
+
+        The faces end at the splint's outer edge: the groove's material has no end.
+        """
         pair = self.pairs[splint, wire]
-        found = self.model.pieces(pair, T)
+        self.queries.contact += 1
+        found = self.model.pieces(
+            pair, np.array([c, 0.0, s, u, 0.0, 1.0, 0.0, 0.0, -s, 0.0, c, -v, 0.0, 0.0, 0.0, 1.0]).reshape(4, 4)
+        )
         half, face, out = (
             (self.bolt_x, self.clamp.up_splint.thickness, 1.0)
             if splint == "P1"
@@ -274,32 +314,32 @@ class Section:
         )
         middle = self.bolt_x if splint == "P1" else 0.0
         side = -1.0 if wire == "P6" else 1.0
-        beyond = side * (float(T[0, 3]) - middle) - half
+        beyond = side * (u - middle) - half
         if beyond <= 0.0:
             return found
-        above = max(out * (-float(T[2, 3]) - face), 0.0)
+        above = max(out * (v - face), 0.0)
         gap = math.hypot(beyond, above)
         distance, point, normal = found.distance.copy(), found.point.copy(), found.normal.copy()
         k = int(np.argmin(distance))
         distance[distance < gap - pair.cylinder.radius] = _FAR
         distance[k] = gap - pair.cylinder.radius
-        point[k] = (middle + side * half, 0.0, -face if above else float(T[2, 3]))
+        point[k] = (middle + side * half, 0.0, -face if above else -v)
         normal[k] = (side * beyond / gap, 0.0, -out * above / gap)
         feature = tuple(EDGE if i == k else name for i, name in enumerate(found.feature))
         return Pieces(distance, point, normal, feature)
 
-    def face_gaps(self, q: Array) -> Gaps:
-        """Gaps between the inner faces, at both ends of their overlap.
+    def face_gap(self, q: Array) -> float:
+        """The least gap between the inner faces, at an end of their overlap; mm.
 
         The splints are taken as their rectangles here (convex object collision, type 2 of the paper). The gap between
         two straight faces is least at an end of their overlap.
         """
-        return self._moved(q, [self._face_rows(q)])
+        return float(self._face_rows(self._down(q))[0].min())
 
-    def _face_rows(self, q: Array) -> _Rows:
+    def _face_rows(self, pose: tuple[float, float, float]) -> _Rows:
         up, down = self.clamp.up_splint, self.clamp.down_splint
         v, half = down.face_depth, self.lever
-        px, py, angle = self._down(q)
+        px, py, angle = pose
         c, s = math.cos(angle), math.sin(angle)
         value, by, point, normal = [], [], [], []
         for side in (-1.0, 1.0):
@@ -326,39 +366,47 @@ class Section:
             np.array(normal),
         )
 
-    def _stop_rows(self, q: Array) -> _Rows:
-        """What ends the down splint's tilt and slide.
+    def _stop_rows(self, q: Array, pose: tuple[float, float, float]) -> _Rows:
+        """What ends the down splint's tilt and slide, and carries it.
 
-        Its underside on the saddle's edges, its slot on the shank (Table 2 of the paper), and the joints' play.
+        Its underside on the saddle's edges, its slot on the shank (Table 2 of the paper), the joints' play, and its
+        round back in the saddle's arc.
         """
-        clamp, down, saddle = self.clamp, self.clamp.down_splint, self.clamp.saddle
+        clamp, down, saddle, joints = self.clamp, self.clamp.down_splint, self.clamp.saddle, self.clamp.joints
         r = clamp.bolt.diameter / 2
-        (px, py, angle), b, w = self._down(q), float(q[B]), float(q[W])
+        (px, py, angle), (b, v, w, u) = pose, q[B:].tolist()
         c, s = math.cos(angle), math.sin(angle)
         axis, half = self.bolt_x + b, down.slot_width / 2
-        hole, washer, slide = self.play
+        hole, washer = self.play
         # The centre of the saddle's arc stands back_clearance above the state's d.
         edge_y = float(q[D]) + self._edge_below
         rows: list[_Row] = []
+        # Centred, the slot's lower ends meet the shank first.
+        walls = (self._slot_bottom, down.face_depth) if joints.washer or joints.saddle else (self._slot_bottom,)
         for side in (-1.0, 1.0):
-            edge_x = axis + self.on_bolt(q) + side * saddle.width / 2
+            edge_x = axis + v + side * saddle.width / 2
             x, y = edge_x - px, edge_y - py
-            own = (c, 0.0, s, s if abs(w) < washer else 0.0)
+            own = (c, 0.0, s, s, 0.0, 0.0)
             by = (-s, -c, x * c - y * s)
             gap = x * s + y * c - down.underside_depth
             rows.append((gap, own, by, ("P2", "P3"), EDGES, (edge_x, edge_y), (s, c)))
-            for v in (self._slot_bottom, down.face_depth) if W in self.free else (self._slot_bottom,):
-                x, y = px + side * half * c + v * s, py - side * half * s + v * c
+            for end in walls:
+                x, y = px + side * half * c + end * s, py - side * half * s + end * c
                 gap = side * (x - axis) - r
                 by = (side, 0.0, side * (y - py))
-                rows.append((gap, (0.0, 0.0, -side, 0.0), by, ("P2", "P4"), "slot", (x, y), (-side, 0.0)))
-            if B in self.free:
-                at = axis + side * r, 0.5 * clamp.up_splint.thickness
-                rows.append((hole - side * b, (0.0, 0.0, -side, 0.0), _NONE, ("P1", "P4"), "hole", at, (-side, 0.0)))
-            if W in self.free:
-                pair, name = (("P2", "P3"), "end of the saddle") if slide else (("P3", "P4"), "hole")
-                at = px, py + down.back_radius
-                rows.append((washer + slide - side * w, (0.0, 0.0, 0.0, -side), _NONE, pair, name, at, (side, 0.0)))
+                rows.append((gap, (0.0, 0.0, -side, 0.0, 0.0, 0.0), by, ("P2", "P4"), "slot", (x, y), (-side, 0.0)))
+            if joints.hole:
+                at, own = (axis + side * r, 0.5 * clamp.up_splint.thickness), (0.0, 0.0, -side, 0.0, 0.0, 0.0)
+                rows.append((hole - side * b, own, _NONE, ("P1", "P4"), "hole", at, (-side, 0.0)))
+            if joints.washer:
+                at, own = (axis - side * r, float(q[D]) + down.back_radius), (0.0, 0.0, 0.0, -side, 0.0, 0.0)
+                rows.append((washer - side * v, own, _NONE, ("P3", "P4"), "hole", at, (side, 0.0)))
+        # The height over the arc, square to it.
+        _, slope, bend = self.lift(w)
+        upright = 1.0 / math.hypot(1.0, slope)
+        nx, own = slope * upright, (0.0, 0.0, 0.0, 0.0, -u * slope * bend * upright**3, upright)
+        at = px + down.back_radius * nx, py + down.back_radius * upright
+        rows.append((u * upright, own, _NONE, ("P2", "P3"), SEAT, at, (nx, upright)))
         value, own_rows, by_rows, pairs, names, points, normals = zip(*rows, strict=True)
         gradient = np.zeros((len(rows), SIZE))
         gradient[:, D:] = own_rows

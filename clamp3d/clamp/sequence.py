@@ -37,6 +37,7 @@ class Step:
         return self.part + ("|" + "".join(self.followers) if self.followers else "")
 
 
+_MOST = 30
 _SADDLE_AND_BOLT: frozenset[PartName] = frozenset(("P3", "P4"))
 
 
@@ -89,7 +90,10 @@ def as_published(steps: tuple[Step, ...]) -> bool:
 
 def _read(text: str) -> list[Step]:
     steps = []
-    for number, item in enumerate(re.split(r"->|→|\\rightarrow", text), 1):
+    items = re.split(r"->|→|\\rightarrow", text)
+    if len(items) > _MOST:
+        raise InputError(f"sequence must have at most {_MOST} steps, got {len(items)}")
+    for number, item in enumerate(items, 1):
         compact = re.sub(r"\s+", "", item)
         if not re.fullmatch(r"P\d+(\|(P\d+)+)?", compact):
             raise InputError(

@@ -27,8 +27,6 @@ def final_status(
     """
     gaps = final.gaps
     if isinstance(final, FinalState):
-        if saddle_pull(final) > CONTACT:
-            return "not clamped: the down splint lifts off the saddle's arc, which is not modelled"
         stops = set(final.active)
         loose = set(final.loose)
     else:
@@ -54,23 +52,13 @@ def final_status(
     return f"not clamped: {' and '.join(reasons)}, {' and '.join(sorted(loose))} loose"
 
 
-def saddle_pull(final: FinalState) -> float:
-    """What the saddle's arc would have to pull the down splint with, in parts of the bolt force; negative: it pushes.
-
-    Where the saddle's edges push with more than the bolt does the round back leaves the arc that the section holds it
-    in.
-    """
-    rows = zip(final.gaps.pair, final.gaps.feature, final.multipliers, final.gaps.normal, strict=True)
-    return sum(float(m * n[1]) for pair, feature, m, n in rows if pair == ("P2", "P3") and feature == EDGES) - 1.0
-
-
 def stop_words(stops: Iterable[tuple[tuple[str, str], str]]) -> list[str]:
     """What stops the splints beside the wires, in words: pairs and features that touch."""
     words = []
     for (a, b), feature in stops:
         if (a, b) == ("P1", "P2"):
             words.append("faces meet")
-        elif (a, b) == ("P2", "P3") or (a, b) == ("P2", "P4"):
+        elif feature == EDGES or (a, b) == ("P2", "P4"):
             words.append(f"the {TITLES[b] if b == 'P4' else feature} stops the down splint")
         elif a == "P4":
             words.append(f"{TITLES[b]} rests on the bolt")

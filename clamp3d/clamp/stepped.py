@@ -28,7 +28,7 @@ _MOVES = 100_000
 
 @dataclass(frozen=True, slots=True)
 class SteppedState:
-    """Last free position ``q`` (8,) as in `section`, its gaps, and ``motion_steps``: positions tried (M of Table 5)."""
+    """Last free position ``q`` (10,) of `section`, its gaps, and ``motion_steps``: positions tried (M of Table 5)."""
 
     q: Array
     gaps: Gaps
@@ -117,7 +117,7 @@ def _place(section: Section, q: Array, d: float, tilt: float, settle: bool = Fal
     """State with the down splint at (d, tilt) and the wires in a free place, or None; ``settle`` seeks the widest."""
     new = q.copy()
     new[D], new[S] = d, section.lever * tilt
-    if section.face_gaps(new).value.min() < -FREE:
+    if section.face_gap(new) < -FREE:
         return None
     for wire in WIRES:
         if not _settle(section, new, wire, settle):

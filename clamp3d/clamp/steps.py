@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from clamp3d.clamp.contact import measure_contacts
+from clamp3d.clamp.contact import Contact, measure_contacts
 from clamp3d.clamp.dimensions import PartName
-from clamp3d.clamp.matrix import Pair
+from clamp3d.clamp.matrix import PAIRS, Pair
 from clamp3d.clamp.motion import travel_to_contact
 from clamp3d.clamp.result import Event, Waypoint
-from clamp3d.clamp.section import SIZE, WIRES, B, D, S, Section, W
+from clamp3d.clamp.section import SIZE, WIRES, B, D, S, Section, U, V, W
 from clamp3d.collide.model import ModelCache
 from clamp3d.core.pose import Array, SectionPose
 
 Poses = dict[PartName, SectionPose]
 Meetings = list[tuple[Pair, Array]]
-"""Pairs of parts, each with the state (8,) in which they meet."""
+"""Pairs of parts, each with the state (10,) in which they meet."""
 _SPARE = 20.0
 """Free way in mm between a wire and the open clamp before it comes in."""
 
@@ -33,6 +33,7 @@ class Log:
     events: list[Event] = field(default_factory=list)
     path: list[Waypoint] = field(default_factory=list)
     cache: ModelCache = field(default_factory=ModelCache)
+    measured: dict[tuple[Pair, SectionPose, SectionPose], Contact] = field(default_factory=dict)
     aside: dict[PartName, Array] = field(default_factory=dict)
     """How far parts that wait are from where the section has them, (3,) mm of the world."""
 
@@ -48,11 +49,19 @@ class Log:
 
     def measure(self, poses: Poses, step: str, pairs: Sequence[Pair], travel: float, within: float = math.inf) -> None:
         """Add an event for each pair that is no further apart than ``within`` mm."""
-        for c in measure_contacts(
-            self.section.clamp, self.shifted(poses), self.section.model, pairs=pairs, cache=self.cache
-        ):
+        for c in self.contacts(self.shifted(poses), pairs):
             if c.gap <= within:
                 self.events.append(Event(step, c.a, c.b, c.relation, c.point, travel))
+
+    def contacts(self, poses: Poses, pairs: Sequence[Pair] = PAIRS) -> tuple[Contact, ...]:
+        """How pairs stand to each other; what has been measured at the same two poses is not measured again."""
+        section, keys = self.section, [(pair, poses[pair[0]], poses[pair[1]]) for pair in pairs]
+        new = [key for key in keys if key not in self.measured]
+        if new:
+            asked = [pair for pair, *_ in new]
+            found = measure_contacts(section.clamp, poses, section.model, pairs=asked, cache=self.cache)
+            self.measured.update(zip(new, found, strict=True))
+        return tuple(self.measured[key] for key in keys)
 
     def shifted(self, poses: Poses) -> Poses:
         """The poses with those of parts that wait where they wait."""
@@ -147,7 +156,7 @@ def section_poses(section: Section, q: Array, saddle_d: float | None = None) -> 
     return {
         "P1": SectionPose(x, y),
         "P2": SectionPose(x + down.x, y + down.y, down.angle),
-        "P3": SectionPose(bolt_x + section.on_bolt(q), saddle_y),
+        "P3": SectionPose(bolt_x + float(q[V]), saddle_y),
         "P4": SectionPose(bolt_x, bolt_y),
         "P5": SectionPose(bolt_x, y - clamp.nut.height),
         "P6": SectionPose(0.0, 0.0),
@@ -162,8 +171,9 @@ def saddle_rise(section: Section, q: Array, saddle_d: float) -> float:
 
 
 def _saddle_lift(section: Section, q: Array, lift: float = 0.0) -> float:
-    """How far above P2's origin the saddle's arc centre, rising from ``lift``, is when it meets the round back; mm."""
-    pair, aside = section.pairs["P3", "P2"], float(q[W]) - section.on_bolt(q)
+    """How far above P2's origin the saddle's arc centre, rising from ``lift``, ends: where it meets the round back, or
+    u below that; mm."""
+    pair, aside = section.pairs["P3", "P2"], float(q[W])
     for _ in range(100):
         section.queries.contact += 1
         back = SectionPose(aside, lift, float(q[S]) / section.lever)
@@ -171,4 +181,4 @@ def _saddle_lift(section: Section, q: Array, lift: float = 0.0) -> float:
         if abs(gap) <= 1e-12 * section.clamp.saddle.radius:
             break
         lift += gap
-    return lift
+    return lift - float(q[U])

@@ -10,7 +10,7 @@ from clamp3d.collide.convex import MEMBER, Rod
 from clamp3d.collide.model import Model
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.pose import Array, inverse
-from clamp3d.core.primitives import Capsule
+from clamp3d.core.primitives import Cylinder
 
 _KNOWN = 1e-9
 
@@ -41,19 +41,17 @@ def _by_kernel(a: ClosedForm, b: ClosedForm, T: Array) -> list[Distance | None]:
             if not isinstance(rod, Rod):
                 continue
             covers = bore.covers()
+            rows = [np.ascontiguousarray(inverse(P) @ T @ rod.T) for _, P in covers]
+            wire = Cylinder(rod.radius, rod.length)
             answers = [
-                signed_distances(
-                    groove, Capsule(rod.radius, rod.length), np.ascontiguousarray(inverse(P) @ T @ rod.T), full=True
-                )
-                for groove, P in covers
+                signed_distances(groove, wire, P, full=True) for (groove, _), P in zip(covers, rows, strict=True)
             ]
             d = np.array([answer.distance for answer in answers])
             k = d.argmin(axis=0)
             row = np.arange(n)
             d, e = d[k, row], np.array([answer.error_bound for answer in answers])[k, row]
-            # In the material of a hole the two halves' depths end where they meet.
-            known = (d > e - rod.radius) | (len(covers) == 1)
-            lower = np.where(known, np.maximum(lower, d - e), lower)
+            apart = d >= -e  # of an overlap it is no bound of the depth
+            lower = np.where(apart, np.maximum(lower, np.where(d > e, d - e, -0.5 * _KNOWN)), lower)
             R = np.array([P[:3, :3] for _, P in covers])[k]
             t = np.array([P[:3, 3] for _, P in covers])[k]
             fields = ("point_on_groove", "point_on_cylinder", "normal")
@@ -63,12 +61,9 @@ def _by_kernel(a: ClosedForm, b: ClosedForm, T: Array) -> list[Distance | None]:
             )
             p, q = p + t, q + t
             slack = MEMBER * (1.0 + float(max(np.abs(p).max(), np.abs(q).max())))
-            in_a = a.depth(p)
-            deep, in_b = (b.depth(np.einsum("nji,nj->ni", T[:, :3, :3], x - T[:, :3, 3])) for x in (p, q))
-            outside = np.minimum(in_a, in_b)
-            # In an overlap the groove's point attests the depth that it has in the cylinder.
-            high = np.where(d >= 0.0, d + e, -deep) + np.maximum(0.0, -4.0 * outside)
-            for i in np.flatnonzero(known & (outside >= -slack) & ((d >= 0.0) | (deep > 0.0)) & (high < upper)):
+            outside = np.minimum(a.depth(p), b.depth(np.einsum("nji,nj->ni", T[:, :3, :3], q - T[:, :3, 3])))
+            high = d + e + np.maximum(0.0, -4.0 * outside)
+            for i in np.flatnonzero(apart & (outside >= -slack) & (high < upper)):
                 upper[i] = high[i]
                 best[i] = Distance(-np.inf, float(high[i]), p[i], q[i], m[i], None, "features", "groove kernel")
     return [

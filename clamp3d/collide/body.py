@@ -19,7 +19,7 @@ from clamp3d.collide.convex import MEMBER, Convex, Hull, Rod, convex_distance
 from clamp3d.collide.nearest import segment_pairs, to_faces
 from clamp3d.core.distance import SignedDistance, signed_distance
 from clamp3d.core.pose import Array, inverse
-from clamp3d.core.primitives import Capsule, SweptArc
+from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 
 _TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 _THIN = 1e-30
@@ -98,7 +98,7 @@ def bodies_distance(a: ClosedForm, b: ClosedForm, T: Array, enough: Callable[[Di
         if kind == "convex":
             for piece in a.outers:
                 for other in b.outers:
-                    for rims in (False, True):
+                    for rims in (True,) if piece.sum is not None and other.sum is not None else (False, True):
                         new = _convex(piece, other, a, b, here, T, rims)
                         found = found.meet(new)
                         if enough(found.widened(error)):
@@ -139,19 +139,19 @@ def kernel_distance(answer: SignedDistance, error: float = 0.0) -> Distance:
 def bore_rod(bore: Bore, rod: Rod, T: Array) -> Distance:
     """The kernel's answer for a bore of the first body and a rod of the second, placed by ``T``.
 
-    The rod is measured as a capsule, which holds it: where the nearest axis point is an end that gives a lower bound,
-    and the point need not be on the rod.
+    In an overlap the capsule that holds the rod gives a lower bound, and the rod's own answer is how deep a point lies.
     """
-    answers = [
-        (signed_distance(groove, Capsule(rod.radius, rod.length), inverse(place) @ T @ rod.T), place)
-        for groove, place in bore.covers()
-    ]
-    if len(answers) > 1 and any(answer.distance <= answer.error_bound - rod.radius for answer, _ in answers):
-        return Distance()  # in the material the two halves' depths end where they meet, that of the whole does not
-    answer, place = min(answers, key=lambda found: found[0].distance)
-    found = kernel_distance(answer).moved(place)
+    covers = [(groove, place, inverse(place) @ T @ rod.T) for groove, place in bore.covers()]
     tilt = np.linalg.norm(np.cross(bore.T[:3, 2], T[:3, :3] @ rod.T[:3, 2]))
-    return replace(found, unique=False) if tilt < 1e-12 else found
+    flat = [(signed_distance(groove, Cylinder(rod.radius, rod.length), P), place) for groove, place, P in covers]
+    answer, place = min(flat, key=lambda found: found[0].distance)
+    found = replace(kernel_distance(answer).moved(place), unique=False if tilt < 1e-12 else None)
+    if answer.distance > answer.error_bound:
+        return found
+    answers = [signed_distance(groove, Capsule(rod.radius, rod.length), P) for groove, _, P in covers]
+    if len(answers) > 1 and any(answer.distance <= answer.error_bound - rod.radius for answer in answers):
+        return Distance()  # in the material the two halves' depths end where they meet, that of the whole does not
+    return replace(found, lower=min(answer.distance - answer.error_bound for answer in answers))
 
 
 def _bore_rod(bore: Bore, piece: Convex, T: Array) -> Distance:

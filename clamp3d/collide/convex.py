@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.nearest import rim_minimum, segment_pairs, to_faces
+from clamp3d.collide.zonoid import Zonoid, box_of, zonoid_distance
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.triangles import closest_points
 
@@ -96,6 +97,12 @@ class Rod:
         return np.asarray(local @ self.T[:3, :3].T + self.T[:3, 3])
 
     @property
+    def sum(self) -> Zonoid:
+        """The same as a sum of segments and discs."""
+        z, t = self.T[:3, 2], self.T[:3, 3]
+        return Zonoid(t, 0.5 * self.length * z[None], np.array([[*z, self.radius]]))
+
+    @property
     def ends(self) -> Array:
         """Both ends (2, 3) of the axis."""
         return np.asarray(self.T[:3, 3] + np.outer([-0.5 * self.length, 0.5 * self.length], self.T[:3, 2]))
@@ -120,6 +127,11 @@ class Hull:
         pairs, owner = both[order].reshape(-1, 4)[:, :2], (order // 3).reshape(-1, 2)
         bent = np.linalg.norm(np.cross(normal[owner[:, 0]], normal[owner[:, 1]]), axis=1) > 1e-10
         return np.asarray(pairs[bent])
+
+    @cached_property
+    def sum(self) -> Zonoid | None:
+        """A box as a sum of segments; None for any other polyhedron."""
+        return box_of(self.vertices, self.edges)
 
     def support(self, n: Array) -> Array:
         """The vertex (3,) that lies furthest along ``n`` (3,)."""
@@ -216,19 +228,29 @@ def hull(points: Array) -> Hull:
 def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, rims: bool = True) -> Distance:
     """Signed distance of two convex pieces placed by ``Ta``, ``Tb`` (4, 4); points and normal in that frame.
 
-    Closed forms first; what they leave open goes to FCL, whose answer is polished.
-    Without ``rims`` the rims of cylinders, which take long, are left to FCL.
+    Of boxes and cylinders exact. Of others closed forms first; what they leave open goes to FCL, whose answer is
+    polished. Without ``rims`` the rims of a cylinder beside a polyhedron, which take long, are left to FCL.
     """
-    found = _closed_form(a, Ta, b, Tb, None, rims)
-    if found.upper - found.lower > 1e-10:
-        found = found.meet(_by_gjk(a, Ta, b, Tb))
+    if a.sum is not None and b.sum is not None:
+        found = _of_sums(a, Ta, b, Tb, zonoid_distance(a.sum.at(Ta), b.sum.at(Tb)))
+    else:
+        found = _closed_form(a, Ta, b, Tb, None, rims)
+        if found.upper - found.lower > 1e-10:
+            found = found.meet(_by_gjk(a, Ta, b, Tb))
     return replace(found, unique=_unique(a, Ta, b, Tb, found))
+
+
+def _of_sums(a: Convex, Ta: Array, b: Convex, Tb: Array, known: Distance) -> Distance:
+    """Of an overlap, whose depth is known, the deepest point in both that is found."""
+    p, q = known.point_a, known.point_b
+    if known.upper >= 0.0 or p is None or q is None:
+        return known
+    found = _deepest(a, Ta, b, Tb, [p, q, 0.5 * (p + q)], known.lower, MEMBER * (1.0 + float(np.abs(p).max())))
+    return replace(found, normal=known.normal, point_a=p, point_b=q, method=known.method)
 
 
 def _closed_form(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array | None, rims: bool) -> Distance:
     """What corners, edges, faces, axes and rims say; of large hulls only those that face along ``n``."""
-    if isinstance(a, Rod) and isinstance(b, Rod):
-        return _rods(a, Ta, b, Tb, rims)
     if isinstance(a, Rod):
         return _rod_hull(a, Ta, b, Tb, n, rims)  # type: ignore[arg-type]
     if isinstance(b, Rod):
@@ -318,52 +340,6 @@ def _rims(a: Rod, Ta: Array, b: Convex, Tb: Array) -> Distance:
             p, q = rim
             found = found.meet(_proven(a, Ta, b, Tb, p, q, float(np.linalg.norm(q - p))))
     return found
-
-
-def closest_on_axes(a: Rod, Ta: Array, b: Rod, Tb: Array) -> tuple[Array, Array, bool]:
-    """Nearest points (3,) of two rods' axis segments, and whether both lie within the segments, square to them."""
-    A, B = Ta @ a.T, Tb @ b.T
-    p, u, q, v = A[:3, 3], A[:3, 2], B[:3, 3], B[:3, 2]
-    ha, hb = 0.5 * a.length, 0.5 * b.length
-    w = q - p
-    cosine = float(u @ v)
-    square = float(np.cross(u, v) @ np.cross(u, v))
-    wu, wv = float(w @ u), float(w @ v)
-    if square > 1e-24:
-        s = min(max((wu - cosine * wv) / square, -ha), ha)
-    else:  # parallel: the middle of the stretch they share, if they do
-        low, high = sorted((wu - hb, wu + hb))
-        s = min(max(0.5 * (max(low, -ha) + min(high, ha)), -ha), ha)
-    t = min(max(s * cosine - wv, -hb), hb)
-    s = min(max(t * cosine + wu, -ha), ha)
-    x, y = p + s * u, q + t * v
-    d = y - x
-    slack = 1e-12 * (1.0 + float(np.abs(d).max()))
-    return x, y, abs(float(d @ u)) <= slack and abs(float(d @ v)) <= slack
-
-
-def _rods(a: Rod, Ta: Array, b: Rod, Tb: Array, rims: bool) -> Distance:
-    """Two cylinders side by side in closed form; with rounded ends in place of flat ones it is a lower bound."""
-    x, y, square = closest_on_axes(a, Ta, b, Tb)
-    d = y - x
-    apart = float(np.linalg.norm(d))
-    gap = apart - (a.radius + b.radius)
-    slack = 8.0 * _EPS * (float(np.abs(x).max() + np.abs(y).max()) + a.radius + b.radius)
-    if apart <= 1e-9 * (a.radius + b.radius):
-        return Distance(gap - slack)
-    if not square:
-        found = Distance(gap - slack)
-        if rims and gap > 0.0:
-            found = found.meet(_rims(a, Ta, b, Tb))
-            if found.upper - found.lower > 1e-10:
-                found = found.meet(_rims(b, Tb, a, Ta).swapped())
-        return found
-    n = d / apart
-    p, q = x + a.radius * n, y - b.radius * n
-    if gap >= 0.0:
-        return Distance(gap - slack, gap + slack, p, q, n, None, "features", "cylinders")
-    found = _deepest(a, Ta, b, Tb, [p, q, x, y], gap - slack, slack)
-    return replace(found, normal=n, method="cylinders")
 
 
 def _deepest(a: Convex, Ta: Array, b: Convex, Tb: Array, trials: list[Array], low: float, slack: float) -> Distance:

@@ -15,7 +15,7 @@ import numpy as np
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm
-from clamp3d.collide.convex import Hull, Rod
+from clamp3d.collide.convex import Convex, Hull, Rod
 from clamp3d.collide.depth_convex import Supports, convex_depth, supports
 from clamp3d.collide.depth_cover import Union, difference, nearest_behind
 from clamp3d.collide.depth_pieces import around_in_form, around_in_mesh
@@ -39,6 +39,8 @@ _CUBES = 20
 _EXTRA = 8
 """Pieces after which a depth that is `known_well` is not made better."""
 _STEPS = np.array([v for v in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
+_ROOM = 8.0
+"""How far from a common point pieces of large meshes reach, in parts of the shortest way out that is known."""
 _FINE = 0.01
 """Chord error (mm) of the mesh that stands for a part without closed form."""
 
@@ -81,8 +83,11 @@ class _Pair:
                 self.best = (size, t, found)
         return found
 
-    def overlap_at(self, t: Array, known: Distance) -> Array | None:
-        """Planes (k, 4) of a convex set of translations that overlap, ``t`` (3,) among them; None if none is found."""
+    def overlap_at(self, t: Array, known: Distance, room: float) -> Array | None:
+        """Planes (k, 4) of a convex set of translations that overlap, ``t`` (3,) among them; None if none is found.
+
+        Of large meshes it is made of what lies within ``room`` mm of a point that the bodies have in common.
+        """
         named = [x for x in (known.point_a, known.point_b) if x is not None and known.upper < 0.0]
         if len(named) == 2:
             named.append(0.5 * (named[0] + named[1]))
@@ -95,7 +100,7 @@ class _Pair:
             ]
             margin, p, x, y = max(found, key=lambda item: item[0], default=(0.0, t, None, None))
             if margin > 0.0 and x is not None and y is not None:
-                A, B = _around(x, p), _around(y, (p - t - self.T[:3, 3]) @ self.T[:3, :3])
+                A, B = _around(x, p, room), _around(y, (p - t - self.T[:3, 3]) @ self.T[:3, :3], room)
                 if A is not None and B is not None:
                     try:
                         return difference(A, _moved(B, self.T), t)
@@ -216,11 +221,12 @@ def _measured(pair: _Pair, known: Distance) -> Distance:
         assert pair.best is not None
         size, t, _ = pair.best
         return replace(known, lower=-size, normal=t / np.linalg.norm(t))
-    found = Distance(-length, known.upper, None, None, way, None, known.level, known.method)
+    found = Distance(-length, known.upper, None, None, way, None, known.level, known.method).ordered()
     if found.upper - found.lower <= pair.slack:
         return found
     pair.push(np.zeros(3), known, 4)
-    return _searched(pair, _joined(pair, found), known)
+    found = _joined(pair, found)
+    return found if found.upper - found.lower <= pair.slack else _searched(pair, found, known)
 
 
 def _searched(pair: _Pair, found: Distance, known: Distance) -> Distance:
@@ -232,7 +238,7 @@ def _searched(pair: _Pair, found: Distance, known: Distance) -> Distance:
     sets: list[Array] = []
     t, proven, cubes = np.zeros(3), 0.0, 0
     for step in range(_SETS):
-        new = pair.overlap_at(t, known)
+        new = pair.overlap_at(t, known, _ROOM * -found.lower)
         if new is not None:
             sets.append(new)
             union = Union(sets, -found.lower * (1.0 + 1e-9))
@@ -245,13 +251,14 @@ def _searched(pair: _Pair, found: Distance, known: Distance) -> Distance:
             covered, way = union.clearance(0.5 * RELATIVE, 0.5 * ABSOLUTE)
             length = max(length, covered)
         proven = max(proven, min(length, -found.lower) - 1e-12 * pair.size)
-        found = _joined(pair, found, proven)
-        if way is None or cubes > _CUBES or (known_well(found) and step >= _EXTRA):
+        width, found = found.upper - found.lower, _joined(pair, found, proven)
+        slow = found.upper - found.lower > 0.7 * width  # else it is soon known to rounding
+        if way is None or cubes > _CUBES or (known_well(found) and step >= _EXTRA and slow):
             break
         t, known = way, pair.ask(way)
         if known.lower >= -pair.slack:
             break
-        if step % 3 == 0:
+        if step % 3 == 0 or known.upper > -1e-3 * float(np.linalg.norm(t)):  # all but out: by how little?
             pair.push(t, known, 6)
         if step % 4 == 3:  # a little further may be out, and near enough
             size = float(np.linalg.norm(t))
@@ -270,22 +277,35 @@ def _joined(pair: _Pair, found: Distance, proven: float = 0.0) -> Distance:
     return replace(found, upper=upper, level="depth", method="convex pieces").ordered()
 
 
+def is_exact(a: Model, b: Model) -> bool:
+    """Whether both bodies are boxes or cylinders, of which distance and depth are known in closed form."""
+    pieces = [_convex_piece(model) for model in (a, b)]
+    return all(piece is not None and piece[0].sum is not None for piece in pieces)
+
+
+def _convex_piece(model: Model) -> tuple[Convex, float] | None:
+    """The one convex piece that a body is, and its error; None for other bodies."""
+    forms = model.bodies
+    if forms is None or len(forms) != 1 or forms[0].bores or len(forms[0].outers) != 1 or forms[0].surface:
+        return None
+    return forms[0].outers[0], forms[0].error
+
+
 def _convex_pair(a: Model, b: Model, T: Array) -> Distance | None:
     """The depth of two bodies that are one convex piece each; None for others."""
-    pieces = []
-    for model in (a, b):
-        forms = model.bodies
-        if forms is None or len(forms) != 1 or forms[0].bores or len(forms[0].outers) != 1 or forms[0].surface:
-            return None
-        pieces.append((forms[0].outers[0], forms[0].error))
-    (x, e), (y, f) = pieces
-    return convex_depth(x, np.eye(4), y, T).widened(e + f)
+    x, y = _convex_piece(a), _convex_piece(b)
+    if x is None or y is None:
+        return None
+    return convex_depth(x[0], np.eye(4), y[0], T).widened(x[1] + y[1])
 
 
 def _with_points(pair: _Pair, found: Distance) -> Distance:
     """``found`` with the points that part last."""
     assert found.normal is not None
     t = -found.lower * found.normal
+    p, q = found.point_a, found.point_b
+    if p is not None and q is not None and np.abs(q + t - p).max() <= pair.slack:
+        return found
     at = pair.ask(t)
     if at.point_a is None or at.point_b is None or at.lower < -pair.slack:
         return found
@@ -333,8 +353,8 @@ def _bodies(model: Model) -> tuple[Body, ...]:
     return () if mesh is None else (mesh,)
 
 
-def _around(body: Body, x: Array) -> Hull | None:
-    return around_in_mesh(body, x) if isinstance(body, Surface) else around_in_form(body, x)
+def _around(body: Body, x: Array, room: float) -> Hull | None:
+    return around_in_mesh(body, x, room) if isinstance(body, Surface) else around_in_form(body, x)
 
 
 def _innermost(x: Body, y: Body, T: Array, t: Array, point: Array, size: float) -> tuple[float, Array]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.convex import Convex, Hull, Rod
+from clamp3d.collide.zonoid import zonoid_distance
 from clamp3d.core.pose import Array
 
 _RIM = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
@@ -101,6 +102,8 @@ def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array, *, tolerance: float
     Distance
         With ``normal``, along which b moves out, and points of the two surfaces that meet then.
     """
+    if a.sum is not None and b.sum is not None:
+        return zonoid_distance(a.sum.at(Ta), b.sum.at(Tb)).labelled("depth", "convex")
     sa, sb = supports(a, Ta), supports(b, Tb)
 
     def difference(N: Array) -> Array:
@@ -114,9 +117,6 @@ def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array, *, tolerance: float
         h = (N * difference(N)).sum(axis=1)
         k = int(np.argmin(h))
         return _found(float(h[k]), float(h[k]), N[k], sa, sb, rounding)
-    if isinstance(a, Rod) and isinstance(b, Rod) and len(crossed(Ea, Eb)) == 0:
-        lower, upper, n = _parallel(a, Ta @ a.T, b, Tb @ b.T)
-        return _found(lower, upper, n, sa, sb, rounding)
     flat = np.vstack([Na[:200], -Nb[:200]])
     middle = Va.mean(axis=0) - Vb.mean(axis=0)
     seeds = [flat, _SPHERE, crossed(Ea[:8], Eb[:8])]
@@ -130,20 +130,6 @@ def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array, *, tolerance: float
     P = [difference(N), _faces(flat, Va, Vb)]
     lower, upper, n = expand(difference, N, np.vstack(P), max(tolerance, 2e-11 * scale))
     return _found(lower, upper, n, sa, sb, rounding + 1e-14 * scale)
-
-
-def _parallel(a: Rod, Ta: Array, b: Rod, Tb: Array) -> tuple[float, float, Array]:
-    """Bounds (mm) and direction for cylinders whose axes are parallel to 1e-9: across, or along the axis."""
-    z, w = Ta[:3, 2], Tb[:3, 3] - Ta[:3, 3]
-    across = w - (w @ z) * z
-    size = float(np.linalg.norm(across))
-    side = a.radius + b.radius - size
-    end = 0.5 * (a.length + b.length) - abs(float(w @ z))
-    tilt = float(np.linalg.norm(np.cross(z, Tb[:3, 2])))  # by this angle b is turned about its middle: so far it moves
-    moved = tilt * (b.radius + 0.5 * b.length)
-    n = np.copysign(1.0, w @ z) * z if end <= side else across / size if size > 0.0 else Ta[:3, 0]
-    depth = min(side, end)
-    return depth - moved, depth + moved, n
 
 
 def _faces(N: Array, Va: Array, Vb: Array) -> Array:

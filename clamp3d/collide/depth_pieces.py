@@ -21,6 +21,8 @@ _CLOSE = np.array([-0.05, -2e-3, -1e-4, -5e-6, 0.0, 5e-6, 1e-4, 2e-3, 0.05])
 """Angles (rad) about the point's own of the polygon in place of a round side, which is nearly exact there."""
 _OWN = 0.3
 """A triangle's own plane is taken if it is at least this far away, as a part of the triangle's distance."""
+_LARGE = 5000
+"""Triangles of a mesh beyond which those far away are left out."""
 LEAST = 1e-11
 """Relative to the size: a point nearer to the surface than this has no polyhedron around it."""
 
@@ -57,16 +59,24 @@ def _prism(rod: Rod, x: Array) -> Array:
     return np.column_stack([N, d - N @ rod.T[:3, 3]])
 
 
-def around_in_mesh(mesh: Surface, x: Array) -> Hull | None:
-    """Polyhedron around ``x`` (3,), which lies inside the mesh; None if the point is not well inside."""
+def around_in_mesh(mesh: Surface, x: Array, room: float) -> Hull | None:
+    """Polyhedron around ``x`` (3,), which lies inside the mesh; None if the point is not well inside.
+
+    Of more than `_LARGE` triangles it is cut off ``room`` mm from the point along the axes.
+    """
     corners = mesh.vertices[mesh.faces]
     error = np.zeros(len(corners)) if mesh.face_error is None else mesh.face_error
-    feet = closest_on_triangles(corners, x)
-    away = np.linalg.norm(feet - x, axis=1)
     N, d = mesh_planes(mesh)
+    planes = []
+    if len(corners) > _LARGE:
+        within = (corners.min(axis=1) - error[:, None] < x + room).all(axis=1)
+        within &= (corners.max(axis=1) + error[:, None] > x - room).all(axis=1)
+        corners, error, N, d = corners[within], error[within], N[within], d[within]
+        planes = [np.array([*n, -(n @ x) - room]) for n in np.vstack([np.eye(3), -np.eye(3)])]
+    feet = closest_on_triangles(corners, x) if len(corners) else corners[:, 0]
+    away = np.linalg.norm(feet - x, axis=1)
     height = d - N @ x  # of the triangles' own planes above the point
     left = np.argsort(away - error)
-    planes = []
     while len(left):
         k = left[0]
         if away[k] - error[k] <= LEAST * mesh.scale:

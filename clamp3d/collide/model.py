@@ -81,6 +81,8 @@ class Model:
 
             return bodies_of_fit(self._fit, self.raw, round_=self.shape.fit == "round")
         raw = self.raw
+        if len(raw.faces) > _LARGE:  # the mesh is quicker than a hull of so many faces
+            return None
         if not looks_convex(raw.vertices, raw.faces):
             return None
         volume = float(raw.manifold.volume())

@@ -206,8 +206,8 @@ def first_time(pair: MovingPair, known: float, thresholds: Thresholds, margin: f
         # Where meshes are used, the few triangles that can meet are asked first: that is cheaper than a distance.
         clear = pair.meshed and pair.by_meshes(half, pair.pose(middle), wanted) > margin
         if not clear:
-            here = pair.ask(middle, enough, thresholds).lower
-            clear = pair.lower(middle, half, here, wanted) > margin
+            here = pair.ask(middle, enough, thresholds)
+            clear = here.upper > margin and pair.lower(middle, half, here.lower, wanted) > margin
         if not clear:
             todo += [(middle, stop), (start, middle)]
         elif not todo:

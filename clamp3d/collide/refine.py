@@ -137,6 +137,10 @@ def _faces(a: Model, b: Model, T: Array, found: Distance, thresholds: Thresholds
 def _features(a: Model, b: Model, T: Array, enough: Enough) -> Distance:
     """Closed forms of both; the convex hull of a part that has none stands in for it."""
     level = "hulls" if a.bodies is None or b.bodies is None else "features"
+    if len(a.forms) == len(b.forms) == 1:
+        a.counters.queries[level] += 1
+        found = bodies_distance(a.forms[0], b.forms[0], T, enough)
+        return found.labelled(level, f"{found.method} on hulls" if level == "hulls" else found.method)
     pairs: list[tuple[float, int, ClosedForm, ClosedForm]] = []
     forms = [*a.forms, *b.forms]
     places = np.where(np.arange(len(forms))[:, None, None] < len(a.forms), np.eye(4), T)
@@ -150,8 +154,8 @@ def _features(a: Model, b: Model, T: Array, enough: Enough) -> Distance:
         if gap > found.upper:  # of these and all that follow
             break
         a.counters.queries[level] += 1
-        found = found.union(bodies_distance(x, y, T, enough if len(pairs) == 1 else _known))
-    if len(pairs) > 1 and found.lower < -1e-6:
+        found = found.union(bodies_distance(x, y, T, _known))
+    if found.lower < -1e-6:
         # Where two pieces of a body meet, neither knows how deep a point lies in both together.
         found = replace(found, lower=-np.inf)
     return found.labelled(level, f"{found.method} on hulls" if level == "hulls" else found.method)

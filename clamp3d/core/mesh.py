@@ -265,8 +265,9 @@ def _folded(F: IntArray) -> NDArray[np.bool_]:
 def _edges(F: IntArray) -> tuple[IntArray, NDArray[np.intp], NDArray[np.intp]]:
     """Edges (3m, 2) face by face, the number (3m,) of each without direction, and how many faces each of those has."""
     directed = F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    _, edge, uses = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True)
-    return directed, edge.reshape(-1), uses
+    key = directed.min(axis=1) * (F.max() + 1) + directed.max(axis=1)  # one number for both ends: quick to sort
+    _, edge, uses = np.unique(key, return_inverse=True, return_counts=True)
+    return directed, edge, uses
 
 
 def _without_doubles(F: IntArray) -> IntArray:

@@ -9,6 +9,7 @@ from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.forces import HELD
 from clamp3d.clamp.matrix import gap_text
 from clamp3d.clamp.result import Assembly
+from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.output.tables import text_table
 
 
@@ -87,6 +88,10 @@ def _lines(assembly: Assembly) -> Iterator[str]:
         [(f"{s.splint}-{s.wire}", "yes" if s.seated else "no", s.detail) for s in assembly.seats],
         indent=2,
     )
+    if not as_published(parse_sequence(clamp.sequence)):
+        yield ""
+        yield f"sequence {clamp.sequence}"
+        yield text_table(("step", "reached"), [(w.step, w.label) for w in assembly.path], indent=2)
     yield ""
     yield "events (mm travelled in the step)"
     yield text_table(

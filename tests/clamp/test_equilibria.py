@@ -10,6 +10,8 @@ from click.testing import CliRunner
 from clamp3d import assemble, load_clamp
 from clamp3d.baselines.cas import Cas
 from clamp3d.bench.stress.assemblies.clamps import clamp_of
+from clamp3d.bench.stress.assemblies.envelope import Envelope
+from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.clamp.equilibria import describe, equilibria
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.section import Section
@@ -41,6 +43,15 @@ def test_oversize_wires_rest_on_all_lips():
     assert not section.escaped(states[0].q)
 
 
+def test_a_lip_holds_nothing_beside_the_face_that_a_wire_lies_on():
+    """Between faces 2e-8 rad from parallel a wire creeps over the lip and falls into the groove."""
+    clamp = ASSEMBLIES["assembly: tilt limit"].cases(50, 0).cases[45].clamp
+    envelope, states = Envelope(clamp), equilibria(Section(clamp, Cas()))
+    assert len(states) == 2
+    for state in states:
+        assert envelope.falls(state.q) <= 1e-8
+
+
 def test_a_symmetric_clamp_has_its_equilibria_in_mirrored_pairs():
     clamp = clamp_of(15.0, math.pi / 3, np.array([48.0, 48.0, 40.0, 40.0]), 24.0)
     assert clamp is not None
@@ -54,7 +65,7 @@ def test_every_equilibrium_is_proven_and_holds_when_closed_again():
     for state in equilibria(section):
         assert max(state.violation, state.optimality) <= TOLERANCE
         assert section.gaps(state.q).value.min() >= -TOLERANCE
-        opened = state.q + 1e-3 * np.array([0.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0])
+        opened = state.q + 1e-3 * np.array([0.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
         if section.gaps(opened).value.min() >= 0.0:
             assert solve_final_state(section, opened, stride=1e-4).q[4:] == pytest.approx(state.q[4:], abs=1e-8)
 

@@ -16,7 +16,7 @@ from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble
 from clamp3d.clamp.conductors import catalogue
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.section import Section
+from clamp3d.clamp.section import SIZE, Section
 from clamp3d.clamp.stepped import solve_stepped
 from clamp3d.errors import InputError, SolverError
 
@@ -55,7 +55,7 @@ def test_any_open_start_ends_in_the_same_state(clamp):
     for _ in range(20):
         start = section.open_state(section.open_distance() + rng.uniform(0.0, 60.0), rng.uniform(-limit, limit))
         start[:4] += rng.uniform(-5.0, 5.0, 4)
-        assert section.gaps(start).value.min() > 0.0
+        assert section.gaps(start).value[:-1].min() > 0.0  # the saddle's arc, the last, carries
         assert solve_final_state(section, start).q == pytest.approx(known, abs=1e-9)
 
 
@@ -97,10 +97,10 @@ def test_gradients_agree_with_differences(clamp):
     for model in (Cas(), Chords(math.radians(7.0))):
         section = Section(clamp, model)
         for _ in range(20):
-            q = section.open_state(26.0, 0.05) + np.concatenate([rng.normal(size=6), [0.0, 0.0]])
+            q = section.open_state(26.0, 0.05) + np.concatenate([rng.normal(size=6), [0.0] * 4])
             gaps = section.gaps(q)
             h = 1e-6
-            numeric = [(section.gaps(q + h * e).value - section.gaps(q - h * e).value) / (2 * h) for e in np.eye(8)]
+            numeric = [(section.gaps(q + h * e).value - section.gaps(q - h * e).value) / (2 * h) for e in np.eye(SIZE)]
             assert np.allclose(np.array(numeric).T, gaps.gradient, atol=1e-6)
 
 

@@ -8,8 +8,10 @@ from hypothesis import strategies as st
 from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.parts import parts
+from clamp3d.collide.batch import by_kernel
 from clamp3d.collide.check import check
 from clamp3d.collide.distance import distance, distances, measure
+from clamp3d.collide.model import ModelCache
 from clamp3d.collide.motions import first_contact, min_clearance
 from clamp3d.collide.result import CheckResult
 from clamp3d.collide.scene import Part, Scene
@@ -24,7 +26,7 @@ from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.core.profile import Profile
 from clamp3d.errors import InputError
-from clamp3d.testing import common
+from clamp3d.testing import body, common, separation
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
@@ -228,13 +230,35 @@ def test_a_hole_that_just_breaks_through_a_face(depth, gap):
 
 
 def test_witnesses_lie_on_the_bodies_where_meshes_decide():
-    """A disc on edge in a tube: no closed form, so the meshes have the last word."""
-    disc, tube = shapes.cylinder(1.5, 0.5), shapes.cylinder(8.0, 10.0, bore=5.0)
+    """A coin of many corners on edge in a tube: no closed form, so the meshes have the last word."""
+    tube, turn = shapes.cylinder(8.0, 10.0, bore=5.0), np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    outline = Profile.of(*((1.5 * math.cos(x), 1.5 * math.sin(x)) for x in turn.tolist()))
     T = translation(3.0, 0.4, 0.3) @ rotation([1, 0.3, 0.2], 1.1)
-    d = distance(tube, disc, T)
+    d = distance(tube, shapes.Solid("coin", (Extrusion(outline, "Z", -0.25, 0.25),)), T)
     assert "meshes" in d.method
     assert np.linalg.norm(d.point_b - d.point_a) == pytest.approx(d.value, abs=1e-9)
     assert d.point_a + d.value * d.normal == pytest.approx(d.point_b, abs=1e-9)
     assert np.hypot(*d.point_a[:2]) == pytest.approx(5.0, abs=1e-9)
     x, y, z = np.linalg.inv(T)[:3] @ [*d.point_b, 1.0]
     assert max(math.hypot(x, y) - 1.5, abs(z) - 0.25) <= 1e-9
+
+
+def test_many_poses_of_flat_ends_in_a_hole_are_measured_at_once():
+    """A disc on edge beside or in a hole touches with its rims, which the batch knows as the single call does."""
+    rng = np.random.default_rng(3)
+    plate, disc = shapes.box((40.0, 40.0, 10.0), holes=[shapes.Hole(8.0)]), shapes.cylinder(3.0, 4.0)
+    T = np.array(
+        [
+            translation(*rng.uniform(-2.0, 2.0, 3)) @ rotation(rng.normal(size=3), rng.uniform(0.0, 3.0))
+            for _ in range(12)
+        ]
+    )
+    found, cache = distances(plate, disc, T), ModelCache()
+    known = by_kernel(cache.model(plate), cache.model(disc), T)
+    assert sum(one is not None for one in known) >= 11
+    for k, one in enumerate(known):
+        truth = separation(body(plate), body(disc).at(T[k]), cells=2000)
+        assert found.lower[k] <= truth.upper + 1e-9
+        assert found.upper[k] >= truth.lower - 1e-9
+        if one is not None:
+            assert distance(plate, disc, T[k], cache=cache).value == pytest.approx(one.value, abs=1e-12)

@@ -4,6 +4,7 @@ import itertools
 import math
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clamp3d import Scene, check
+from clamp3d.brep.borders import spline_sags
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import KINDS
 from clamp3d.collide.faces import FaceModel, faces_distance
@@ -97,6 +99,45 @@ def test_a_spline_that_is_a_cylinder_is_one():
     made = BrepSolid.of(solid_of(spline), "spline").surfaces
     assert sorted(KINDS[k] for k in made.kind) == ["cylinder", "plane", "plane"]
     assert made.deviation.max() < 1e-3
+
+
+def spline(degree, knots, many, poles):
+    """What answers Geom_BSplineCurve's questions from knots and poles."""
+    return SimpleNamespace(
+        Degree=lambda: degree,
+        IsRational=lambda: False,
+        IsPeriodic=lambda: False,
+        NbKnots=lambda: len(knots),
+        NbPoles=lambda: len(poles),
+        Knot=lambda i: knots[i - 1],
+        Multiplicity=lambda i: many[i - 1],
+        Pole=lambda i: SimpleNamespace(Coord=lambda: tuple(poles[i - 1])),
+    )
+
+
+def test_a_spline_stays_within_its_sags():
+    """Against points by de Boor's algorithm (SciPy); a kink inside a stretch is not bounded, at its end it is."""
+    from scipy.interpolate import BSpline
+
+    rng = np.random.default_rng(5)
+    w = np.linspace(0.0, 1.0, 11)[1:-1, None, None]
+    tight = 0.0
+    for _ in range(60):
+        p, inner = int(rng.integers(2, 6)), int(rng.integers(0, 5))
+        knots = np.concatenate([[0.0], np.sort(rng.uniform(0.05, 0.95, inner)), [1.0]])
+        many = [p + 1, *rng.integers(1, p, inner).tolist(), p + 1]
+        poles = rng.normal(size=(sum(many) - p - 1, 3))
+        curve = BSpline(np.repeat(knots, many), poles, p)
+        t = np.linspace(0.0, 1.0, int(rng.integers(2, 60)))
+        sags = spline_sags(spline(p, knots, many, poles), t[:-1], t[1:])
+        flat = (1.0 - w) * curve(t[:-1]) + w * curve(t[1:])
+        off = np.linalg.norm(flat - curve((1.0 - w[..., 0]) * t[:-1] + w[..., 0] * t[1:]), axis=2).max(axis=0)
+        assert (off <= sags + 1e-12).all()
+        tight = max(tight, float((off / sags).max()))
+    assert tight > 0.9
+    bent = spline(2, [0.0, 0.5, 1.0], [3, 2, 3], np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 2, 0.0]]))
+    assert spline_sags(bent, np.array([0.4]), np.array([0.6])) is None
+    np.testing.assert_array_equal(spline_sags(bent, np.array([0.0, 0.5]), np.array([0.5, 1.0])), 0.0)
 
 
 def test_arrays_carry_the_faces():

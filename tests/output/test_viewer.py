@@ -216,7 +216,9 @@ def test_an_arrow_for_each_contact_force_as_long_as_its_part_of_the_bolts(record
     whole = float(re.search(r"([\d.]+) mm for the whole", viewer._panel)[1])
     arrows = {}
     for c in viewer.commands:
-        if c["path"].startswith(f"/clamp3d/forces/{len(assembly.path)} nut tightened/") and c["path"].endswith("/arrow"):
+        if c["path"].startswith(f"/clamp3d/forces/{len(assembly.path)} nut tightened/") and c["path"].endswith(
+            "/arrow"
+        ):
             packed = c["object"]["geometries"][0]["data"]["attributes"]["position"]["array"].data
             arrows[c["path"].split("/")[4]] = np.frombuffer(packed, dtype=np.float32).reshape(-1, 3)
     contacts = [force for force in assembly.forces if force.feature != HELD]

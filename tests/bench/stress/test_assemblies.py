@@ -56,7 +56,7 @@ def test_falls_is_the_way_down_to_the_closed_form(lift):
         clamp.up_splint.line_groove.centre_depth + straight_d(clamp) + clamp.down_splint.line_groove.centre_depth
     )
     middle = clamp.up_splint.width / 2
-    q = np.array([middle - 48.0, y, middle + 48.0, y, straight_d(clamp) + lift, 0.0, 0.0, 0.0])
+    q = np.array([middle - 48.0, y, middle + 48.0, y, straight_d(clamp) + lift, *[0.0] * 5])
     envelope = Envelope(clamp)
     assert envelope.falls(q) == pytest.approx(lift, abs=1e-12)
     assert envelope.overlap(q) == pytest.approx(0.0, abs=1e-12)
@@ -70,7 +70,7 @@ def test_falls_sees_a_wire_beside_the_deepest_line_and_a_tilt_that_is_off():
     rise = 6.0 - math.sqrt(6.0**2 - x**2)
     d, middle = straight_d(clamp), clamp.up_splint.width / 2
     y = 0.5 * (clamp.up_splint.line_groove.centre_depth + d + clamp.down_splint.line_groove.centre_depth)
-    q = np.array([middle - 48.0 + x, y, middle + 48.0, y, d + 2.0 * rise, 0.0, 0.0, 0.0])
+    q = np.array([middle - 48.0 + x, y, middle + 48.0, y, d + 2.0 * rise, *[0.0] * 5])
     assert Envelope(clamp).falls(q) == pytest.approx(2.0 * rise, abs=1e-9)
     q[:6] = [middle - 48.0, y, middle + 48.0, y, d + 0.02, 0.01]
     assert 0.015 < Envelope(clamp).falls(q) <= 0.02 + 1e-12  # tilts are sampled: never more than the truth
@@ -85,7 +85,7 @@ def test_envelopes_of_a_wire_against_the_distance_to_the_groove():
         for i, (name, wire) in enumerate(zip(("P6", "P7"), Envelope(clamp).wires, strict=True)):
             x = np.array([[rng.uniform(*sorted((wire.inner, wire.edge)))]])
             over, under = float(wire.over(x)[0, 0]), float(wire.under(x, tilt)[0, 0])
-            q = np.array([1e3, 1e3, 1e3, 1e3, over - under, section.lever * tilt[0], 0.0, 0.0])
+            q = np.array([1e3, 1e3, 1e3, 1e3, over - under, section.lever * tilt[0], *[0.0] * 4])
             q[2 * i : 2 * i + 2] = x[0, 0], over
             gaps = section.wire_gaps(q, name)
             for splint in ("P1", "P2") if math.isfinite(over - under) else ():

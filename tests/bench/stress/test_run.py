@@ -40,7 +40,7 @@ def test_flat_ends_are_never_wrong_and_never_beyond_their_bound(family):
 
 @pytest.mark.parametrize("family", SOLIDS)
 def test_finite_bodies_are_never_wrong_and_never_beyond_their_bound(family):
-    (outcome,), difference = run_family(family, ["cas"], int(40 / SOLIDS[family].part ** 0.5), 20, 60.0, 1)
+    (outcome,), difference = run_family(family, ["cas"], int(max(300, 8 / SOLIDS[family].part)), 20, 60.0, 1)
     assert difference <= SOLIDS[family].truth_error
     assert (outcome.wrong, outcome.beyond_bound) == (0, 0), outcome.examples
 

@@ -20,7 +20,6 @@ from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.placement import Placement
 from clamp3d.clamp.section import WIRES, D, Section
 from clamp3d.clamp.sensitivity import sensitivity
-from clamp3d.clamp.status import saddle_pull
 from clamp3d.clamp.tolerance import monte_carlo
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError, without_numbers
@@ -104,9 +103,6 @@ def optimised(score: Score, k: int, clamp: Clamp) -> None:
         final = solve_final_state(Section(clamp, Cas()))
     except SolverError as error:
         score.note(k, f"refused {play} ({error})", np.inf, 0.0)
-        return
-    if saddle_pull(final) > 0.0:
-        score.asked["optimiser not asked: lifts off the saddle"] += 1
         return
     q = final.q
     least, overlap = Outlines(clamp).lowest(q)

@@ -8,7 +8,8 @@ Both envelopes are made of circular arcs and straight lines. The places where ``
 are known in closed form: where two of them meet, and where an arc of one and a piece of the other have the same slope
 (``(x - a) / p = +-(x - b) / q`` for circles about a and b of radii p and q). Between two neighbouring places of that
 list the function is monotone, so its minima are read from the list, exact to rounding (1e-13 of the clamp). Only the
-tilt is searched.
+tilt is searched. Where it is more than the saddle's edges leave, the down splint stands on one of them, off its arc: d,
+where the saddle is, is larger by what it is lifted.
 
 Grooves must be minor arcs (half angle up to 90 degrees): over others a wire can hide behind a lip. A wire may leave its
 groove, over a face and round the splint's outer edge, where nothing holds it any more; the bolt stops it on the inside.
@@ -182,7 +183,7 @@ class Envelope:
         self.clamp = clamp
         self.bolt_x = clamp.up_splint.width / 2
         self.lever = clamp.down_splint.width / 2
-        self.limit = clamp.tilt_stop
+        self.limit = clamp.tilt_stops["the slot"]
         sizes = self.bolt_x, clamp.bolt.diameter / 2, clamp.up_splint.width / 2, self.lever
         self.wires = [Wire(*_grooves(clamp, wire), *sizes) for wire in WIRES]
 
@@ -194,15 +195,25 @@ class Envelope:
         right = np.minimum(self.bolt_x + half * c + v * s, self.bolt_x + up.width / 2)
         return np.maximum(*(up.thickness - (v / c - (x - self.bolt_x) * s / c) for x in (left, right)))
 
+    def lifted(self, tilt: Array) -> Array:
+        """How far (n,) a saddle's edge holds the round back off the saddle's arc."""
+        saddle, back = self.clamp.saddle, self.clamp.down_splint.back_radius
+        half = saddle.width / 2
+        edge = math.sqrt(saddle.radius**2 - half**2) - (saddle.radius - back)  # below the back's centre, when seated
+        below = half * np.abs(np.sin(tilt)) + self.clamp.down_splint.underside_depth  # so far the edge must be, upright
+        return np.asarray(np.maximum(below / np.cos(tilt) - edge, 0.0))
+
     def overlap(self, q: Array) -> float:
         """Deepest overlap in mm of a state of `section`, measured along y (beside a splint: or x); 0 if none."""
         tilt = np.array([q[5] / self.lever])
-        worst = [float(self.faces(tilt)[0] - q[4]), abs(float(q[5])) - self.lever * self.limit]
+        down = float(q[4] - q[9])
+        worst = [float(self.faces(tilt)[0]) - down, abs(float(q[5])) - self.lever * self.limit]
+        worst.append(float(self.lifted(tilt)[0] - q[9]))
         for i, wire in enumerate(self.wires):
             x, y = np.array([[q[2 * i]]]), float(q[2 * i + 1])
             corner = float(wire._place(wire.side * wire.half_down, wire.down.face, tilt)[0][0, 0])
             beyond = wire.side * (float(q[2 * i]) - corner)
-            below = y - float(q[4] + wire.under(x, tilt)[0, 0])
+            below = y - down - float(wire.under(x, tilt)[0, 0])
             worst += [float(wire.over(x)[0, 0]) - y, min(below, wire.r - beyond) if beyond > 0.0 else below]
             worst.append(wire.side * (wire.inner - float(q[2 * i])))
         return max(0.0, *worst) if not any(map(math.isnan, worst)) else math.inf
@@ -220,17 +231,18 @@ class Envelope:
             tilts = tilts[np.abs(tilts) <= self.limit * (1.0 + 1e-12)]
             if not len(tilts):
                 continue
-            level = self.faces(tilts)
+            level, lifted = self.faces(tilts), self.lifted(tilts)
             for i, wire in enumerate(self.wires):
-                level = np.maximum(level, _slide(wire, tilts, float(q[2 * i]), float(q[4]) + barrier, reach))
+                level = np.maximum(level, _slide(wire, tilts, float(q[2 * i]), float(q[4]) + barrier - lifted, reach))
+            level = level + lifted
             stop = np.flatnonzero(level > q[4] + barrier)
             level = level[: stop[0]] if len(stop) else level
             best = min(best, float(level.min(initial=math.inf)))
         return max(0.0, float(q[4]) - best)
 
 
-def _slide(wire: Wire, tilts: Array, x: float, level: float, reach: float) -> Array:
-    """Lowest d (n,) at each tilt that a wire at x gets to within ``reach`` without rising above ``level``."""
+def _slide(wire: Wire, tilts: Array, x: float, level: Array, reach: float) -> Array:
+    """Lowest d (n,) at each tilt that a wire at x gets to within ``reach`` without rising above ``level`` (n,)."""
     places = wire.places(tilts)
     n = len(tilts)
     here = np.clip(np.array([[x, x - reach, x + reach]]), *wire.window)
@@ -239,7 +251,7 @@ def _slide(wire: Wire, tilts: Array, x: float, level: float, reach: float) -> Ar
     # Of each row the unblocked stretch around x, which the walls of the window end.
     column = np.arange(places.shape[1])
     at = (places < here[0, 0]).sum(1)[:, None]
-    blocked = ~(values <= level) | (places < here[0, 1]) | (places > here[0, 2])
+    blocked = ~(values <= level[:, None]) | (places < here[0, 1]) | (places > here[0, 2])
     first = np.where(blocked & (column < at), column, -1).max(1)[:, None]
     last = np.where(blocked & (column > at), column, len(column)).min(1)[:, None]
     return np.asarray(np.fmin.reduce(np.where((column > first) & (column < last), values, np.nan), axis=1))

@@ -76,7 +76,7 @@ class Valleys:
 def minima(envelope: Envelope, count: int = 301) -> list[Minimum]:
     """Local minima, the lowest first."""
     tilts = np.linspace(-envelope.limit, envelope.limit, count)
-    faces = envelope.faces(tilts)
+    faces, lifted = envelope.faces(tilts), envelope.lifted(tilts)
     # Of each wire's valleys: tilt, place, and d there and where it goes to one tilt to the left and to the right.
     tables = []
     for wire in envelope.wires:
@@ -91,8 +91,8 @@ def minima(envelope: Envelope, count: int = 301) -> list[Minimum]:
         own = [range(table[4][k], table[4][k + 1]) for table in tables]
         for a, b in itertools.product(*own):
             here, left, right = (
-                max(tables[0][c][a], tables[1][c][b], faces[min(max(k + s, 0), count - 1)])
-                for c, s in ((1, 0), (2, -1), (3, 1))
+                max(tables[0][c][a], tables[1][c][b], faces[at]) + lifted[at]
+                for c, at in ((1, k), (2, max(k - 1, 0)), (3, min(k + 1, count - 1)))
             )
             if (k > 0 and left < here) or (k < count - 1 and right < here):
                 continue
@@ -121,6 +121,7 @@ def _lowest(envelope: Envelope, tilt: float, width: float, x6: float, x7: float)
                     column = int(valleys.settle(np.array([k]), np.array([at]))[0])
                     at = places[k, w] = float(valleys.x[k, column])
                     level[k] = max(level[k], valleys.d[k, column])
+        level += envelope.lifted(tilts)
         best = int(level.argmin())
         tilt, x, d = float(tilts[best]), [float(p) for p in places[best]], float(level[best])
         width /= 5.0

@@ -62,12 +62,16 @@ class Outlines:
 
     def state(self, q: Array) -> Array:
         """The state of a `Section`'s ``q``, with the parts placed by hand."""
-        clamp, joints = self.clamp, self.clamp.joints
-        bolt, shift = self.middle + q[6], float(q[7])
-        washer = 0.5 * (clamp.saddle.hole_diameter - clamp.bolt.diameter) * joints.washer
-        saddle = bolt + min(max(shift, -washer), washer)
-        x = bolt + shift
-        y = q[4] - self.clear + math.sqrt(max(self.clear**2 - (x - saddle) ** 2, 0.0))
+        clamp = self.clamp
+        bolt = self.middle + q[6]
+        saddle, x = bolt + q[7], bolt + q[7] + q[8]
+        # The back's centre is below the arc's by what leaves the nearest point of the arc, or a lip, at its radius.
+        half, lip = clamp.saddle.width / 2 - abs(q[8]), clamp.saddle.radius * math.cos(clamp.saddle.half_angle)
+        if abs(q[8]) <= self.clear * math.sin(clamp.saddle.half_angle):
+            below = math.sqrt(self.clear**2 - q[8] ** 2)
+        else:
+            below = lip - math.sqrt(clamp.down_splint.back_radius**2 - half**2)
+        y = q[4] - self.clear + below - q[9]
         return np.array([*q[:4], x, y, q[5] / (clamp.down_splint.width / 2), bolt, saddle, q[4]])
 
     def gaps(self, z: Array, chosen: Sequence[tuple[Array, ...]]) -> Array:
@@ -97,24 +101,24 @@ class Outlines:
         return np.concatenate(found)
 
     def joints(self, z: Array) -> Array:
-        """What the joints leave: round back in the saddle's arc, bolt in the hole, saddle on the bolt (>= 0)."""
+        """What the joints leave: round back over the saddle's arc, bolt in the hole, saddle on the bolt (>= 0)."""
         clamp, joints = self.clamp, self.clamp.joints
         x, y, _, bolt, saddle, height = z[4:]
         hole = 0.5 * (clamp.up_splint.hole_diameter - clamp.bolt.diameter) * joints.hole
         washer = 0.5 * (clamp.saddle.hole_diameter - clamp.bolt.diameter) * joints.washer
-        slide = self.clear * math.sin(clamp.saddle.half_angle) * joints.saddle
-        # The arc's centre is `clear` above the height; the back's centre stays within `clear` of it.
-        within = self.clear**2 - (x - saddle) ** 2 - (y - height + self.clear) ** 2
-        return np.array(
-            [
-                within / self.clear,
-                *(
-                    play - side * off
-                    for play, off in ((hole, bolt - self.middle), (washer, saddle - bolt), (slide, x - saddle))
-                    for side in (-1.0, 1.0)
-                ),
-            ]
-        )
+        slide = math.inf if joints.saddle else 0.0
+        # The arc's centre is `clear` above the height. Toward the arc the back's centre stays within `clear` of it,
+        # beside the arc its own radius away from the nearer lip, and above it is free.
+        off, below = abs(x - saddle), y - height + self.clear
+        half = clamp.saddle.half_angle
+        if math.atan2(off, below) <= half:
+            within = self.clear - math.hypot(off, below)
+        else:
+            lip = clamp.saddle.radius * math.sin(half) - off, clamp.saddle.radius * math.cos(half) - below
+            within = math.hypot(*lip) - clamp.down_splint.back_radius
+        plays = ((hole, bolt - self.middle), (washer, saddle - bolt), (slide, x - saddle))
+        walls = (play - side * shift for play, shift in plays if math.isfinite(play) for side in (-1.0, 1.0))
+        return np.array([within, *walls])
 
     def lowest(self, q: Array) -> tuple[float, float]:
         """The saddle's least height near the state ``q`` of a `Section`, and by how much ``q`` itself overlaps; mm."""

@@ -204,7 +204,9 @@ _FAMILIES = (
     SolidFamily(
         "box", 1.0, "features of a cylinder on faces, edges and corners of a box, gaps of +-1e-12 ... 0.1 radii"
     ),
-    SolidFamily("cylinder", 0.25, "the same on another flat-ended cylinder: sides, rims, ends"),
-    SolidFamily("hole", 0.05, "the same in and about the hole of a plate: its wall, its rims, the plate's other faces"),
+    SolidFamily("cylinder", 1.0, "the same on another flat-ended cylinder: sides, rims, ends"),
+    SolidFamily(
+        "hole", 0.005, "the same in and about the hole of a plate: its wall, its rims, the plate's other faces"
+    ),
 )
 SOLIDS = {family.name: family for family in _FAMILIES}

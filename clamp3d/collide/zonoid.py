@@ -1,0 +1,105 @@
+"""Boxes and cylinders as sums of segments and discs, and the signed distance of two of them, exact in both signs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.collide.answer import Distance
+from clamp3d.core.pose import Array
+
+_EPS = 2.0**-52
+_CELLS = 50_000
+"""Cells of directions that are looked at before a wider bound is told; the hardest of 2e4 poses needs 36 000."""
+
+_PARALLEL = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Zonoid:
+    """``centre`` (3,) plus half segments ``lines`` (m, 3), both ways, and ``discs`` (k, 4): unit normals and radii.
+
+    ``error`` (mm): the piece it stands for is this near.
+    """
+
+    centre: Array
+    lines: Array
+    discs: Array
+    error: float = 0.0
+
+    def at(self, T: Array) -> Zonoid:
+        """The same placed by ``T`` (4, 4)."""
+        R = T[:3, :3].T
+        discs = np.column_stack([self.discs[:, :3] @ R, self.discs[:, 3]])
+        return Zonoid(self.centre @ R + T[:3, 3], self.lines @ R, discs, self.error)
+
+
+def box_of(vertices: Array, edges: NDArray[np.int64]) -> Zonoid | None:
+    """A parallelepiped of 8 ``vertices`` (8, 3) and 12 ``edges`` (12, 2); None for any other polyhedron."""
+    if len(vertices) != 8 or len(edges) != 12:
+        return None
+    at_first = edges[(edges == 0).any(axis=1)].sum(axis=1)
+    if len(at_first) != 3:
+        return None
+    centre, half = vertices.mean(axis=0), 0.5 * (vertices[at_first] - vertices[0])
+    corners = centre + np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) @ half
+    off = np.linalg.norm(corners[:, None] - vertices, axis=2).min(axis=1).max()
+    if off > 1e-14 * (1.0 + np.abs(vertices).max()):
+        return None
+    return Zonoid(centre, half, np.empty((0, 4)), float(off))
+
+
+def zonoid_distance(a: Zonoid, b: Zonoid) -> Distance:
+    """Signed distance of two pieces: where they overlap minus the shortest translation that parts them.
+
+    The points are the nearest ones; in an overlap those that meet when b has moved out along the normal.
+    """
+    from clamp3d.core.kernel_zonoid import CELLS, zonoid
+
+    if len(a.discs) == len(b.discs) == 1 and (known := _parallel(a, b)) is not None:
+        return known
+    lines, discs = np.vstack([a.lines, b.lines]), np.vstack([a.discs, b.discs])
+    parts, out = np.empty((len(lines) + len(discs), 3)), np.empty(5)
+    c = b.centre - a.centre
+    size = float(np.abs(a.centre).sum() + np.abs(b.centre).sum() + np.abs(lines).sum() + discs[:, 3].sum())
+    zonoid(c, lines, discs, 1e-12 * size, _CELLS, np.empty((CELLS, 5)), parts, out)
+    of_a = np.zeros(len(parts), dtype=bool)
+    of_a[: len(a.lines)] = of_a[len(lines) : len(lines) + len(a.discs)] = True
+    p, q = a.centre + parts[of_a].sum(axis=0), b.centre - parts[~of_a].sum(axis=0)
+    error = 4.0 * _EPS * size + a.error + b.error
+    lower, upper = -float(out[1]) - error, -float(out[0]) + error
+    if upper >= 0.0:  # what the points attest
+        upper = max(upper, float(np.linalg.norm(q - p)) + error)
+    return Distance(lower, upper, p, q, out[2:].copy(), None, "features", "convex")
+
+
+def _parallel(a: Zonoid, b: Zonoid) -> Distance | None:
+    """Two cylinders that overlap, axes parallel to 1e-9: coaxial ones come free in any direction across."""
+    z, c = a.discs[0, :3], b.centre - a.centre
+    tilt = float(np.linalg.norm(np.cross(z, b.discs[0, :3])))
+    if tilt > _PARALLEL:
+        return None
+    along = float(c @ z)
+    away = c - along * z
+    off = float(np.linalg.norm(away))
+    out = away / off if off > 0.0 else np.linalg.svd(z[None])[2][1]
+    half = [float(np.linalg.norm(x.lines)) for x in (a, b)]
+    radii = [float(x.discs[0, 3]) for x in (a, b)]
+    side, end = sum(radii) - off, sum(half) - abs(along)
+    depth = min(side, end)
+    error = tilt * (radii[1] + half[1])  # b turned about its middle: so far it moves
+    size = float(np.abs(a.centre).sum() + np.abs(b.centre).sum()) + sum(radii + half)
+    error += a.error + b.error + 16.0 * _EPS * size
+    if depth <= error:
+        return None
+    if end <= side:
+        n = np.copysign(1.0, along) * z
+        x = 0.5 * (max(-radii[0], off - radii[1]) + min(radii[0], off + radii[1])) * out
+        p = a.centre + half[0] * n + x
+    else:
+        n = out
+        x = 0.5 * (max(-half[0], along - half[1]) + min(half[0], along + half[1])) * z
+        p = a.centre + radii[0] * n + x
+    return Distance(-depth - error, -depth + error, p, p - depth * n, n, None, "features", "convex")
