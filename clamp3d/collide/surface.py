@@ -17,8 +17,8 @@ from clamp3d.core.shells import shells
 
 _LEVELS = 4
 """Groups that the triangles with errors are put in at most, each four times finer than the one before."""
-_FEW = 64
-"""Points so few are asked one by one: libigl makes its tree for winding numbers anew at each call."""
+_FEW = 1.0 / 32.0
+"""Points so few for each triangle are asked one by one: libigl makes its tree for winding numbers anew at each call."""
 _TURNED = rotation([0.3, 0.5, 0.8], 0.7)[:3, :3]
 """Edges of parts mostly run along the axes, and so do points that are asked."""
 _SHARP = np.cos(np.radians(30.0))
@@ -137,7 +137,7 @@ class Surface:
         points = np.ascontiguousarray(points, dtype=np.float64)
         found = ((points > self.box[0]) & (points < self.box[1])).all(axis=1)
         rows = np.flatnonzero(found)
-        if len(rows) <= _FEW:
+        if len(rows) <= _FEW * len(self.faces):
             counts = [self.winding_number(points[k]) for k in rows]
             found[rows] = [count is not None and count > 0 for count in counts]
             rows = rows[[count is None for count in counts]]
