@@ -259,8 +259,8 @@ def test_bounds_hold_against_open_cascade(a, b, axis, angle, at):
 # --- Assemblies -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", [None, 1])
-@pytest.mark.parametrize("name", ASSEMBLIES)
+# In the last two an overlap is 10 % short of the contact threshold, at a corner of an arc and along an edge of a cone.
+@pytest.mark.parametrize(("name", "seed"), [*itertools.product(ASSEMBLIES, (None, 1)), ("clip", 2), ("taper", 2)])
 def test_assemblies(name, seed):
     if name in ("bearing", "gears"):
         pytest.importorskip("bd_warehouse")
