@@ -108,7 +108,6 @@ def _build(P, err, start, middle, centre, chosen, box, link, order, root):
 tree = entry(
     _build,
     "i8(f8[:,:,::1],f8[::1],i8[::1],f8[:,::1],f8[:,::1],i8[::1],f8[:,::1],i8[:,::1],i8[::1],i8[::1])",
-    "faces_*.py",
 )
 
 

@@ -37,6 +37,8 @@ from clamp3d.brep.borders import spline_sags
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import KINDS
 from clamp3d.collide.faces import FaceModel, faces_distance
+from clamp3d.collide.faces_kernel import _over_triangle
+from clamp3d.collide.faces_math import CYLINDER
 from clamp3d.collide.verdict import Thresholds, Verdict
 
 CONTACT = 0.01
@@ -318,3 +320,18 @@ def test_assemblies(name, seed):
             (uncertain if said == "uncertain" else wrong).append((a, b, verdict, known))
     assert not wrong
     assert len(uncertain) <= 0.02 * len(rows), uncertain
+
+
+def test_the_foot_on_a_cylinder_is_told_from_those_beside_its_triangle():
+    rng = np.random.default_rng(0)
+    seen = set()
+    for _ in range(100):
+        axes, origin, radius = np.linalg.qr(rng.normal(size=(3, 3)))[0], rng.normal(size=3), rng.uniform(1.0, 5.0)
+        uv, foot = rng.uniform(0.0, 3.0, (3, 2)), rng.uniform(0.0, 3.0, 2)
+        (u, v), out = foot, radius * rng.uniform(0.1, 2.0)
+        x = origin + out * math.cos(u) * axes[0] + out * math.sin(u) * axes[1] + v * axes[2]
+        parts = np.linalg.solve(np.vstack([uv.T, np.ones(3)]), np.append(foot, 1.0))
+        over = _over_triangle(CYLINDER, radius, 0.0, np.concatenate([origin, *axes]), uv, *x)
+        assert over == (parts.min() >= 0.0)
+        seen.add(over)
+    assert seen == {True, False}
