@@ -30,6 +30,7 @@ from clamp3d.core.kernel_features import (
     end_arc,
     end_arc_reach,
     end_edge,
+    inverse_root,
     lip_line,
     point_depth,
     section,
@@ -186,7 +187,7 @@ def edge_normal(feature, R, h, qx, qy, qz):  # type: ignore[no-untyped-def]
 def unit(dx, dy, dz):  # type: ignore[no-untyped-def]
     """A direction that is not parallel to the groove, of length 1, and the square of its part across the groove."""
     e2 = dx * dx + dy * dy
-    n = 1.0 / math.sqrt(e2 + dz * dz)
+    n = inverse_root(e2 + dz * dz)
     return dx * n, dy * n, dz * n, e2 * (n * n)
 
 

@@ -133,6 +133,12 @@ def corner(kx, ky, kz, cx, cy, cz, dx, dy, dz, l):  # type: ignore[no-untyped-de
     return d2, t, abs(kx) * my - math.copysign(ky, kx * ky) * mx > 0.0
 
 
+@inlined
+def inverse_root(g):  # type: ignore[no-untyped-def]
+    """1 / sqrt(g), at g near 1 by its series, whose next term is below the rounding: without waiting for a root."""
+    return 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
+
+
 @formula
 def nearer_root(k, a, q):  # type: ignore[no-untyped-def]
     """Root mu > 0 of (a / (k + mu))^2 + (q / mu)^2 = 1, for k, a >= 0 and q > 0 (or a > k).
@@ -153,7 +159,8 @@ def nearer_root(k, a, q):  # type: ignore[no-untyped-def]
         g = x2 + y2
         step = (math.sqrt(g) - 1.0) * g / (x2 * u + y2 * v)
         mu = max(low, mu + step)
-        if abs(step) <= CONVERGED * mu:
+        # What is left is at most 3/8 k^2 step^2 / (mu^2 (k + mu)): without k the left side's root is linear.
+        if abs(step) * min(k, mu) <= CONVERGED * mu * mu:
             break
     return mu
 
@@ -230,7 +237,7 @@ def end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: i
                     break
                 C = p / (k - root)
                 S = -q / root
-            n = 1.0 / math.sqrt(C * C + S * S)
+            n = inverse_root(C * C + S * S)
             C *= n
             S *= n
         else:  # the point is on the major axis, within the evolute: two mirrored minima

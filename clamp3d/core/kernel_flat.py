@@ -400,9 +400,7 @@ def flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, pad):  # 
     dz *= n
     least = v
     if v >= -r:
-        if is_beside(v, t, l) or (
-            abs(nx * dx + ny * dy + nz * dz) <= 8.0 * UNIT and (v >= 0.0 or abs(t) - l <= v)
-        ):
+        if is_beside(v, t, l) or (abs(nx * dx + ny * dy + nz * dz) <= 8.0 * UNIT and (v >= 0.0 or abs(t) - l <= v)):
             return v, qx, qy, qz, nx, ny, nz, feature, t, bound, nx, ny, nz
     else:
         least = -math.inf
