@@ -259,22 +259,15 @@ def outside(R, s, h, H, l, cx, cy, cz, dx, dy, dz, e2):  # type: ignore[no-untyp
                 best2, bt, bz, feature = d2, t, z, f
     # Corners, and whether the distance falls from one of an end's into the end arc.
     top_falls = bottom_falls = False
-    if bottom:
-        d2, t, one = corner(-s, h, -H, cx, cy, cz, dx, dy, dz, l)
-        if d2 < best2:
-            best2, bt, bz, feature = d2, t, -H, CORNER_M
-        d2, t, other = corner(s, h, -H, cx, cy, cz, dx, dy, dz, l)
-        if d2 < best2:
-            best2, bt, bz, feature = d2, t, -H, CORNER_N
-        bottom_falls = one or other
-    if top:
-        d2, t, one = corner(-s, h, H, cx, cy, cz, dx, dy, dz, l)
-        if d2 < best2:
-            best2, bt, bz, feature = d2, t, H, CORNER_M
-        d2, t, other = corner(s, h, H, cx, cy, cz, dx, dy, dz, l)
-        if d2 < best2:
-            best2, bt, bz, feature = d2, t, H, CORNER_N
-        top_falls = one or other
+    for k in range(4):
+        at_top, right = k > 1, k % 2 == 1
+        if top if at_top else bottom:
+            ez = H if at_top else -H
+            d2, t, falls = corner(s if right else -s, h, ez, cx, cy, cz, dx, dy, dz, l)
+            if d2 < best2:
+                best2, bt, bz, feature = d2, t, ez, CORNER_N if right else CORNER_M
+            top_falls = top_falls or (at_top and falls)
+            bottom_falls = bottom_falls or (falls and not at_top)
     # Inside of the axis against the lips, and the edges of the ends that it passes.
     for i in range(2):
         sx = -s if i == 0 else s
