@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from clamp3d.core.jit import entry, formula, inlined, source_stamp
+from clamp3d.core.jit import entry, formula, inlined
 from clamp3d.core.kernel_distance import (
     enters,
     from_outside,
@@ -86,32 +85,26 @@ def distance_alone(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, flat, pad)
     return nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)[0]
 
 
-def _entries(stamp: str) -> tuple[Any, Any]:
-    def distances(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
-        stamp  # noqa: B018
-        s = R * math.sin(half_angle)
-        h = -R * math.cos(half_angle)
-        for i in range(T.shape[0]):
-            if not rigid(T, i):
-                return i
-            x, y, z, dx, dy, dz = place(T, i)
-            out[i] = distance_alone(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, flat, pad)
-        return -1
-
-    def records(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
-        stamp  # noqa: B018
-        s = R * math.sin(half_angle)
-        h = -R * math.cos(half_angle)
-        for i in range(T.shape[0]):
-            if not rigid(T, i):
-                return i
-            record(T, i, R, half_angle, s, h, H, r, l, flat, pad, out)
-        return -1
-
-    return (
-        entry(distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[::1])"),
-        entry(records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[:,::1])"),
-    )
+def _distances(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
+    s = R * math.sin(half_angle)
+    h = -R * math.cos(half_angle)
+    for i in range(T.shape[0]):
+        if not rigid(T, i):
+            return i
+        x, y, z, dx, dy, dz = place(T, i)
+        out[i] = distance_alone(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, flat, pad)
+    return -1
 
 
-distances, records = _entries(source_stamp())
+def _records(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
+    s = R * math.sin(half_angle)
+    h = -R * math.cos(half_angle)
+    for i in range(T.shape[0]):
+        if not rigid(T, i):
+            return i
+        record(T, i, R, half_angle, s, h, H, r, l, flat, pad, out)
+    return -1
+
+
+distances = entry(_distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[::1])")
+records = entry(_records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[:,::1])")
