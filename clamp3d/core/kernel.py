@@ -4,9 +4,18 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.core.jit import entry, formula
-from clamp3d.core.kernel_distance import inside_rate, is_parallel, nearest, parallel
-from clamp3d.core.kernel_flat import flat_nearest, flat_parallel
+from clamp3d.core.jit import entry, formula, inlined
+from clamp3d.core.kernel_distance import (
+    enters,
+    from_outside,
+    inside_rate,
+    is_parallel,
+    nearest,
+    outside,
+    parallel,
+    unit,
+)
+from clamp3d.core.kernel_flat import flat_nearest, flat_parallel, is_beside
 from clamp3d.core.kernel_pose import axis, place, rigid
 
 RECORD = 19
@@ -58,28 +67,32 @@ def record(T, k, R, half_angle, s, h, H, r, l, flat, pad, out):  # type: ignore[
     put(answer, rate, r, out, k)
 
 
+@inlined
+def distance_alone(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, flat, pad):  # type: ignore[no-untyped-def] # noqa: E741
+    """The distance of `record` to the bit, without what only the witnesses need."""
+    if is_parallel(R, max(l, r) if flat else l, dx, dy):
+        if flat:
+            return flat_parallel(R, s, h, H, r, l, x, y, z, dz)[0]
+        return parallel(R, s, h, H, r, l, x, y, z, dz)[0]
+    ux, uy, uz, e2 = unit(dx, dy, dz)
+    if y - l * abs(uy) > h or not enters(R, s, h, H, l, x, y, z, ux, uy, uz)[0]:
+        best2, t, _, feature, _, _ = outside(R, s, h, H, l, x, y, z, ux, uy, uz, e2)
+        v = from_outside(R, r, best2, feature, x + t * ux, y + t * uy)
+        if not flat or is_beside(v, t, l):
+            return v
+    if flat:
+        return flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, pad)[0]
+    return nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)[0]
+
+
 def _distances(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
     s = R * math.sin(half_angle)
     h = -R * math.cos(half_angle)
-    if flat:
-        for i in range(T.shape[0]):
-            if not rigid(T, i):
-                return i
-            x, y, z, dx, dy, dz = place(T, i)
-            if is_parallel(R, max(l, r), dx, dy):
-                out[i] = flat_parallel(R, s, h, H, r, l, x, y, z, dz)[0]
-            else:
-                out[i] = flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, pad)[0]
-        return -1
     for i in range(T.shape[0]):
         if not rigid(T, i):
             return i
         x, y, z, dx, dy, dz = place(T, i)
-        if is_parallel(R, l, dx, dy):  # inlined here it is free of what only the witnesses need
-            answer = parallel(R, s, h, H, r, l, x, y, z, dz)
-        else:
-            answer = nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)
-        out[i] = answer[0]
+        out[i] = distance_alone(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, flat, pad)
     return -1
 
 

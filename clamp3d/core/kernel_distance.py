@@ -30,6 +30,7 @@ from clamp3d.core.kernel_features import (
     end_arc,
     end_arc_reach,
     end_edge,
+    inverse_root,
     lip_line,
     point_depth,
     section,
@@ -182,121 +183,164 @@ def edge_normal(feature, R, h, qx, qy, qz):  # type: ignore[no-untyped-def]
     return x / n, y / n, z / n
 
 
+@inlined
+def unit(dx, dy, dz):  # type: ignore[no-untyped-def]
+    """A direction that is not parallel to the groove, of length 1, and the square of its part across the groove."""
+    e2 = dx * dx + dy * dy
+    n = inverse_root(e2 + dz * dz)
+    return dx * n, dy * n, dz * n, e2 * (n * n)
+
+
+@formula
+def enters(R, s, h, H, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untyped-def] # noqa: E741
+    """Whether an axis enters S, and its part lo <= t <= hi in the block."""
+    lo, hi = clip(h, H, cy, cz, dy, dz, l)
+    behind = False
+    if lo <= hi:
+        # rho is convex along the axis: if any point of the part in the block is behind the arc, an end of it is.
+        for i in range(2):
+            t = lo if i == 0 else hi
+            x = cx + t * dx
+            y = cy + t * dy
+            if (x * x + y * y >= R * R and (h < 0.0 or abs(x) * -h + y * s <= 0.0)) or (
+                abs(x) >= s and (dy < 0.0 if i == 0 else dy > 0.0) and t == (h - cy) / dy
+            ):
+                behind = True
+    return behind, lo, hi
+
+
+@inlined
+def from_outside(R, r, best2, feature, x, y):  # type: ignore[no-untyped-def]
+    """Signed distance where the axis is outside S: of what `outside` found, the axis point at (x, y)."""
+    if feature == ARC:
+        # R - r first: exact for nearly equal radii, and rho is what is left.
+        return (R - r) - math.sqrt(x * x + y * y)
+    return math.sqrt(best2) - r
+
+
+@formula
+def end_point(R, s, h, H, l, cx, cy, cz, dx, dy, dz, t):  # type: ignore[no-untyped-def] # noqa: E741
+    """Squared distance of an end of the axis from S, the place along the groove there, the feature."""
+    z = cz + t * dz
+    gap, f = section(cx + t * dx, cy + t * dy, R, s, h)
+    d2 = gap * gap
+    end = abs(z) - H
+    if end > 0.0:
+        z = math.copysign(H, z)
+        if gap <= 0.0:
+            return end * end, z, END_FACE
+        return d2 + end * end, z, beyond_end(f)
+    if gap < 0.0 and end * end < d2:
+        # In the material by the rounding of z alone (an axis in the plane of an end face): it is on the face.
+        return end * end, math.copysign(H, z), END_FACE
+    return d2, z, f
+
+
+@formula
+def outside(R, s, h, H, l, cx, cy, cz, dx, dy, dz, e2):  # type: ignore[no-untyped-def] # noqa: E741
+    """Nearest feature of an axis that does not enter S: squared distance, place on the axis, z, feature, x and y.
+
+    The last two are of an end arc that the axis' inside is nearest to, else 0. A feature whose line, or whose end's
+    plane, is no nearer than the best so far is not looked at.
+    """
+    best2 = math.inf
+    bt = bz = bx = by = 0.0
+    feature = ARC
+    # Top and bottom: whether the axis reaches beyond the end faces, or level with them: an axis in the plane of an end
+    # face leaves it by less than rounding.
+    half = l * abs(dz)
+    top, bottom = cz + half >= H, cz - half <= -H
+    through = top and bottom  # then its ends are far from S
+    if not through:
+        for i in range(2):
+            t = -l if i == 0 else l
+            d2, z, f = end_point(R, s, h, H, l, cx, cy, cz, dx, dy, dz, t)
+            if d2 < best2:
+                best2, bt, bz, feature = d2, t, z, f
+    # Corners, and whether the distance falls from one of an end's into the end arc.
+    top_falls = bottom_falls = False
+    for k in range(4):
+        at_top, right = k > 1, k % 2 == 1
+        if top if at_top else bottom:
+            ez = H if at_top else -H
+            d2, t, falls = corner(s if right else -s, h, ez, cx, cy, cz, dx, dy, dz, l)
+            if d2 < best2:
+                best2, bt, bz, feature = d2, t, ez, CORNER_N if right else CORNER_M
+            top_falls = top_falls or (at_top and falls)
+            bottom_falls = bottom_falls or (falls and not at_top)
+    # Inside of the axis against the lips, and the edges of the ends that it passes.
+    for i in range(2):
+        sx = -s if i == 0 else s
+        cross = (cx - sx) * dy - (cy - h) * dx
+        if cross * cross < best2 * e2:
+            d2, t, z = lip_line(sx, h, H, cx, cy, cz, dx, dy, dz, e2, l)
+            if d2 < best2:
+                best2, bt, bz, feature = d2, t, z, LIP_M if i == 0 else LIP_N
+    if cy + l * abs(dy) >= h and (top or bottom):
+        f2 = dy * dy + dz * dz
+        for i in range(2):
+            ez = -H if i == 0 else H
+            cross = (cy - h) * dz - (cz - ez) * dy
+            if (top if i else bottom) and cross * cross < best2 * f2:
+                d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l)
+                if d2 < best2:
+                    best2, bt, bz, feature = d2, t, ez, END_EDGE_M if x < 0.0 else END_EDGE_N
+    # End arcs: where the distance from the circle has one minimum and falls from no corner into the arc, none is on it.
+    if top or bottom:
+        ex, ey, e, p, along = ellipse(R, cx, cy, dx, dy, e2)
+        low_v, low_reach = end_arc_reach(-H, R, cz, dz, e, p, along)
+        top_v, top_reach = end_arc_reach(H, R, cz, dz, e, p, along)
+        top_first = top and (not bottom or top_reach < low_reach)
+        for i in range(2):
+            at_top = top_first if i == 0 else not top_first
+            least = top_reach if at_top else low_reach
+            if least * least >= best2 or not (top if at_top else bottom):
+                continue
+            ez = H if at_top else -H
+            v = top_v if at_top else low_v
+            if not (top_falls if at_top else bottom_falls) and (abs(p) >= e2 or abs(dz * v) >= e2):
+                continue
+            d2, x, y, t = end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
+            if d2 < best2:
+                best2, bt, bz, feature, bx, by = d2, t, ez, END_ARC, x, y
+    if through:
+        for i in range(2):
+            t = -l if i == 0 else l
+            end = abs(cz + t * dz) - H
+            if end * end < best2:
+                d2, z, f = end_point(R, s, h, H, l, cx, cy, cz, dx, dy, dz, t)
+                if d2 < best2:
+                    best2, bt, bz, feature, bx, by = d2, t, z, f, 0.0, 0.0
+    return best2, bt, bz, feature, bx, by
+
+
 @formula
 def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untyped-def] # noqa: E741
     """Signed distance of a cylinder centred at c with its axis along d (of any length but zero)."""
     if is_parallel(R, l, dx, dy):
         return parallel(R, s, h, H, r, l, cx, cy, cz, dz)
-    e2 = dx * dx + dy * dy
-    n = 1.0 / math.sqrt(e2 + dz * dz)
-    dx *= n
-    dy *= n
-    dz *= n
-    e2 *= n * n
+    dx, dy, dz, e2 = unit(dx, dy, dz)
 
     # A direction is normalised to 3 units, a point of the axis (a product and a sum, |t| <= l) known to 5 units of
     # |c| + l, s and h to 3 units of R, a difference of these and its norm to 3 more: 11, rounded up, and r's own.
     bound = UNIT * (12.0 * (abs(cx) + abs(cy) + abs(cz) + 2.0 * l + H + R) + r)
-    high = l * abs(dy)
-    if cy - high <= h:
-        lo, hi = clip(h, H, cy, cz, dy, dz, l)
-        if lo <= hi:
-            # rho is convex along the axis: if any point of the part in the block is behind the arc, an end of it is.
-            behind = False
-            for i in range(2):
-                t = lo if i == 0 else hi
-                x = cx + t * dx
-                y = cy + t * dy
-                if (x * x + y * y >= R * R and (h < 0.0 or abs(x) * -h + y * s <= 0.0)) or (
-                    abs(x) >= s and (dy < 0.0 if i == 0 else dy > 0.0) and t == (h - cy) / dy
-                ):
-                    behind = True
-            if behind:
-                return inside(R, h, H, r, cx, cy, cz, dx, dy, dz, lo, hi, bound)
-
-    # Ends of the axis against S; top and bottom: whether the axis reaches beyond the end faces.
-    best2 = math.inf
-    bt = bz = 0.0
-    feature = ARC
-    top = bottom = False
-    for i in range(2):
-        t = -l if i == 0 else l
-        z = cz + t * dz
-        gap, f = section(cx + t * dx, cy + t * dy, R, s, h)
-        d2 = gap * gap
-        end = abs(z) - H
-        if end >= 0.0:  # level with it too: an axis in the plane of an end face leaves it by less than rounding
-            if z > 0.0:
-                top = True
-            else:
-                bottom = True
-        if end > 0.0:
-            z = math.copysign(H, z)
-            if gap <= 0.0:
-                d2 = end * end
-                f = END_FACE
-            else:
-                d2 += end * end
-                f = beyond_end(f)
-        elif gap < 0.0 and end * end < d2:
-            # In the material by the rounding of z alone (an axis in the plane of an end face): it is on the face.
-            d2 = end * end
-            z = math.copysign(H, z)
-            f = END_FACE
-        if d2 < best2:
-            best2, bt, bz, feature = d2, t, z, f
-
-    # Inside of the axis against the lips.
-    for i in range(2):
-        d2, t, z = lip_line(-s if i == 0 else s, h, H, cx, cy, cz, dx, dy, dz, e2, l)
-        if d2 < best2:
-            best2, bt, bz, feature = d2, t, z, LIP_M if i == 0 else LIP_N
-
-    # Inside of the axis against the edges and corners of the ends it passes; the end arcs last: they cost most.
-    bx = by = 0.0
-    on_end_arc = False
-    if top or bottom:
-        for i in range(2):
-            if not (bottom if i == 0 else top):
-                continue
-            ez = -H if i == 0 else H
-            if cy + high >= h:
-                d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l)
-                if d2 < best2:
-                    best2, bt, bz, feature = d2, t, ez, END_EDGE_M if x < 0.0 else END_EDGE_N
-            for j in range(2):
-                d2, t = corner(-s if j == 0 else s, h, ez, cx, cy, cz, dx, dy, dz, l)
-                if d2 < best2:
-                    best2, bt, bz, feature = d2, t, ez, CORNER_M if j == 0 else CORNER_N
-        ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
-        low_v, low_reach = end_arc_reach(-H, R, cz, dz, e2, p, along)
-        top_v, top_reach = end_arc_reach(H, R, cz, dz, e2, p, along)
-        top_first = top and (not bottom or top_reach < low_reach)
-        for i in range(2):
-            at_top = top_first if i == 0 else not top_first
-            reach = top_reach if at_top else low_reach
-            if reach * reach >= best2 or not (top if at_top else bottom):
-                continue
-            ez = H if at_top else -H
-            v = top_v if at_top else low_v
-            d2, x, y, t = end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
-            if d2 < best2:
-                best2, bt, bz, feature = d2, t, ez, END_ARC
-                bx, by, on_end_arc = x, y, True
-
+    if cy - l * abs(dy) <= h:
+        behind, lo, hi = enters(R, s, h, H, l, cx, cy, cz, dx, dy, dz)
+        if behind:
+            return inside(R, h, H, r, cx, cy, cz, dx, dy, dz, lo, hi, bound)
+    best2, bt, bz, feature, bx, by = outside(R, s, h, H, l, cx, cy, cz, dx, dy, dz, e2)
     x = cx + bt * dx
     y = cy + bt * dy
+    value = from_outside(R, r, best2, feature, x, y)
     if feature == ARC:
         bx, by, nx, ny = section_foot(ARC, x, y, R, s, h)
-        # R - r first: exact for nearly equal radii, and rho is what is left.
-        return (R - r) - math.sqrt(x * x + y * y), bx, by, bz, nx, ny, 0.0, ARC, bt, bound
-    distance = math.sqrt(best2)
+        return value, bx, by, bz, nx, ny, 0.0, ARC, bt, bound
     if feature in (FLAT_M, FLAT_N):
-        return distance - r, x, h, bz, 0.0, 1.0, 0.0, feature, bt, bound
+        return value, x, h, bz, 0.0, 1.0, 0.0, feature, bt, bound
     if feature == END_FACE:
-        return distance - r, x, y, bz, 0.0, 0.0, math.copysign(1.0, bz), feature, bt, bound
+        return value, x, y, bz, 0.0, 0.0, math.copysign(1.0, bz), feature, bt, bound
     if feature == END_ARC:
-        if not on_end_arc:
+        if bx == 0.0 and by == 0.0:  # an end of the axis
             bx, by, nx, ny = section_foot(ARC, x, y, R, s, h)
     else:
         by = h
@@ -321,4 +365,4 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
     n = math.sqrt(nx * nx + ny * ny + nz * nz)
     if n == 0.0:
         nx, ny, nz, n = -dy, dx, 0.0, math.sqrt(e2)
-    return distance - r, bx, by, bz, nx / n, ny / n, nz / n, feature, bt, bound
+    return value, bx, by, bz, nx / n, ny / n, nz / n, feature, bt, bound

@@ -372,6 +372,12 @@ def flat_parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def
     return f, qx, qy, qz, nx, ny, nz, feature, (qz - z) * up, bound
 
 
+@inlined
+def is_beside(v, t, l):  # type: ignore[no-untyped-def] # noqa: E741
+    """Whether the capsule's distance v is the cylinder's: its axis point t is inside, where the normal is square."""
+    return abs(t) < l and (v >= 0.0 or abs(t) - l <= v)
+
+
 @formula
 def flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, pad):  # type: ignore[no-untyped-def] # noqa: E741
     """Signed distance of a flat-ended cylinder: distance, q, normal, feature, place on the axis, bound, rate.
@@ -394,7 +400,7 @@ def flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, pad):  # 
     dz *= n
     least = v
     if v >= -r:
-        if abs(nx * dx + ny * dy + nz * dz) <= 8.0 * UNIT and (v >= 0.0 or abs(t) - l <= v):
+        if is_beside(v, t, l) or (abs(nx * dx + ny * dy + nz * dz) <= 8.0 * UNIT and (v >= 0.0 or abs(t) - l <= v)):
             return v, qx, qy, qz, nx, ny, nz, feature, t, bound, nx, ny, nz
     else:
         least = -math.inf

@@ -178,14 +178,14 @@ def side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[
                     best2, bx, by, bz, bt, feature = d2, sx, h, z, t, LIP_M if j == 0 else LIP_N
                 for i in range(2):
                     ez = -H if i == 0 else H
-                    d2, t = corner(sx, h, ez, cx, cy, cz, dx, dy, dz, l)
+                    d2, t, _ = corner(sx, h, ez, cx, cy, cz, dx, dy, dz, l)
                     if d2 < best2:
                         best2, bx, by, bz, bt, feature = d2, sx, h, ez, t, CORNER_M if j == 0 else CORNER_N
             for i in range(2):
                 ez = -H if i == 0 else H
                 if piece == 0:
-                    ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
-                    v, _ = end_arc_reach(ez, R, cz, dz, e2, p, along)
+                    ex, ey, e, p, along = ellipse(R, cx, cy, dx, dy, e2)
+                    v, _ = end_arc_reach(ez, R, cz, dz, e, p, along)
                     d2, x, y, t = end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
                     if d2 < best2:
                         best2, bx, by, bz, bt, feature = d2, x, y, ez, t, END_ARC
@@ -256,11 +256,11 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
             best2, bx, by, bt, feature = d2, x, h, t, END_EDGE_M if x < 0.0 else END_EDGE_N
         for j in range(2):
             sx = -s if j == 0 else s
-            d2, t = corner(sx, h, ez, cx, cy, cz, dx, dy, dz, l)
+            d2, t, _ = corner(sx, h, ez, cx, cy, cz, dx, dy, dz, l)
             if d2 < best2:
                 best2, bx, by, bt, feature = d2, sx, h, t, CORNER_M if j == 0 else CORNER_N
-        ex, ey, p, along = ellipse(R, cx, cy, dx, dy, e2)
-        v, _ = end_arc_reach(ez, R, cz, dz, e2, p, along)
+        ex, ey, e, p, along = ellipse(R, cx, cy, dx, dy, e2)
+        v, _ = end_arc_reach(ez, R, cz, dz, e, p, along)
         d2, x, y, t = end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
         if d2 < best2:
             best2, bx, by, bt, feature = d2, x, y, t, END_ARC

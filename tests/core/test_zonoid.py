@@ -6,7 +6,11 @@ from scipy.optimize import minimize
 
 from clamp3d.collide.convex import Rod, convex_distance, hull
 from clamp3d.collide.depth_convex import convex_depth
+from clamp3d.collide.distance import distance
+from clamp3d.core import shapes
 from clamp3d.core.pose import rotation, translation
+from clamp3d.core.primitives import Cylinder
+from clamp3d.testing import assert_distance
 
 HERE = np.eye(4)
 SIGNS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
@@ -72,3 +76,48 @@ def test_coaxial_cylinders_come_free_in_any_direction():
     d = convex_depth(Rod(5.0, 60.0, HERE), HERE, Rod(3.0, 50.0, HERE), HERE)
     assert d.value == pytest.approx(-8.0, abs=1e-10)
     assert d.normal[2] == pytest.approx(0.0, abs=1e-10)
+
+
+_TOUCHING = {
+    "a rim all but along an edge": (
+        shapes.box((2.491442923003952, 8.55521087021536, 26.258346480350113)),
+        Cylinder(12.160449012951348, 30.85077835061726),
+        [
+            [0.0, -0.5894864883301247, 0.807778236941438, 0.20444283345262837],
+            [-0.9643578693161994, -0.21373925086692805, -0.15597894898595965, -15.88570114015586],
+            [0.26460139812162786, -0.7789872994568411, -0.5684759338767277, 16.78028989661837],
+            [0.0, 0.0, 0.0, 1.0],
+        ],
+    ),
+    "a rim in an edge by 1.5e-8 mm": (
+        shapes.box((8.122834822590447, 2.918685107568892, 34.274075229694404)),
+        Cylinder(7.345717370420728, 26.136398137459054),
+        [
+            [0.010120564103750587, -0.8044489618594282, -0.5939355536971248, 0.7146591208964872],
+            [-0.0714979898139192, -0.5930278650936462, 0.8020012398213865, 6.611046362698823],
+            [-0.9973893981965071, 0.034348493209461706, -0.06351826020483387, -24.882560712138034],
+            [0.0, 0.0, 0.0, 1.0],
+        ],
+    ),
+    "two rims": (
+        Cylinder(8.438891598154685, 12.19938028232666),
+        Cylinder(10.08818548730286, 34.222572627514104),
+        [
+            [-0.8175581104062842, 0.44776924428327214, -0.3620793283009862, -19.771509980470285],
+            [0.5758461045356702, 0.6357208538372695, -0.5140625058176359, 4.103038515511449],
+            [0.0, -0.6287779416220008, -0.7775849150604709, -10.373172349815231],
+            [0.0, 0.0, 0.0, 1.0],
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", _TOUCHING)
+def test_points_where_a_search_one_segment_at_a_time_stalls(name):
+    """Contacts of which single steps find points 1e-5 mm and more beside the nearest ones."""
+    a, b, T = _TOUCHING[name]
+    d = distance(a, b, T)
+    assert d.upper - d.lower <= 1e-9
+    gap = d.point_b - d.point_a
+    assert gap == pytest.approx(d.value * d.normal, abs=2e-9)
+    assert_distance(d, a, b, np.array(T), tolerance=1e-8)
