@@ -72,7 +72,8 @@ def first_contact(
     ----------
     a, b : Solid, MeshShape, Cylinder, Capsule or SweptArc
         Two bodies. For a `SweptArc` and a `Cylinder` or `Capsule` the kernel's search is used, to rounding; where a
-        flat end decides, to 1e-9 of the largest size. Any other pair is found to within 1e-4 mm of way.
+        flat end decides, to 1e-9 of the largest size. Any other pair is at most 2e-4 mm further apart than ``margin``
+        at the answer; a larger ``distance`` there means that the search ended early, and only that all before is free.
     motion : Motion
         Moves b.
     T_a_b : array_like (4, 4), optional

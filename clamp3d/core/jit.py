@@ -19,6 +19,7 @@ from contextlib import suppress
 from functools import cache, cached_property
 from importlib import metadata
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 # IEEE arithmetic as written (no re-association), and division by zero gives inf instead of a Python exception.
@@ -61,29 +62,15 @@ def inlined(function: Callable[..., Any]) -> Any:
     return _Formula(function, forceinline=True)
 
 
-@cache
-def source_stamp(folder: Path = Path(__file__).parent, names: str = "kernel*.py") -> str:
-    """Hash of all formula sources in a folder, the contact kernel's by default, and of this file.
-
-    numba notices a change in the file of a cached function, not in the files of the functions it calls. Entry points
-    close over this stamp, which makes it a part of their cache key.
-    """
-    digest = hashlib.sha256()
-    for path in sorted([*folder.glob(names), Path(__file__)]):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
-def entry(function: Callable[..., Any], signature: str, sources: str = "kernel*.py") -> Any:
+def entry(function: Callable[..., Any], signature: str) -> Any:
     """An entry point for one ``signature`` as numba writes it, from the cache or compiled; arrays are in C order.
 
     Called with other types than those of its signature it may end the process: the callers check. Damaged files in
-    the cache are written anew; without a place for the cache every run compiles. ``sources``: files in the function's
-    folder that hold the formulas it calls.
+    the cache are written anew; without a place for the cache every run compiles.
     """
     returned, given = re.fullmatch(r"(\w+)\((.*)\)", signature).groups()  # type: ignore[union-attr]
     arguments = re.findall(r"\w+(?:\[[^]]*\])?", given)
-    path = _place(function, signature, sources)
+    path = _place(function, signature)
     code = _read(path)
     if code is None:
         once = _can_keep(path.parent)
@@ -92,7 +79,7 @@ def entry(function: Callable[..., Any], signature: str, sources: str = "kernel*.
         if once:
             _keep(path, code)
     if code == _OTHERWISE:
-        return _cached_by_numba(function, signature, _can_keep(path.parent))
+        return _cached_by_numba(function, signature, path)
     kinds = [ctypes.py_object if "[" in kind else _TYPES[kind] for kind in arguments]
     return ctypes.CFUNCTYPE(_TYPES[returned], *kinds)(_load(code))
 
@@ -100,14 +87,38 @@ def entry(function: Callable[..., Any], signature: str, sources: str = "kernel*.
 # --- The cache --------------------------------------------------------------------------------------------------------
 
 
-def _place(function: Callable[..., Any], signature: str, sources: str) -> Path:
+def _stamp(function: Callable[..., Any]) -> str:
+    """Hash of what the machine code is made from.
+
+    That is this file, and of the function and all formulas that it calls the bytecode and the values of the globals,
+    wherever those were imported from.
+    """
+    digest = hashlib.sha256(Path(__file__).read_bytes())
+    waiting: list[tuple[Any, dict[str, Any], object]] = [(function.__code__, function.__globals__, None)]
+    seen = set()
+    while waiting:
+        code, known, options = waiting.pop()
+        if id(code) in seen:  # equal code of two modules may have other globals
+            continue
+        seen.add(id(code))
+        plain = [x for x in code.co_consts if not isinstance(x, CodeType)]
+        digest.update(repr((code.co_code, code.co_names, plain, options)).encode())
+        waiting += [(x, known, None) for x in code.co_consts if isinstance(x, CodeType)]
+        for name in code.co_names:
+            value = known.get(name)
+            if isinstance(value, _Formula):
+                waiting.append((value._function.__code__, value._function.__globals__, value._options))
+            elif isinstance(value, (bool, int, float, str, tuple)):
+                digest.update(repr(value).encode())
+    return digest.hexdigest()
+
+
+def _place(function: Callable[..., Any], signature: str) -> Path:
     """The file of an entry point: another one for every source, processor and version."""
     import llvmlite.binding as llvm
     import platformdirs
 
-    source = Path(function.__code__.co_filename)
-    facts = [source_stamp(source.parent, sources), source.read_bytes() if source.exists() else b""]
-    facts += [function.__qualname__, signature]
+    facts = [_stamp(function), function.__qualname__, signature]
     facts += [metadata.version(name) for name in ("numba", "llvmlite", "numpy")]
     facts += [sys.version, platform.machine(), llvm.get_process_triple(), llvm.get_host_cpu_name(), _features()]
     key = hashlib.sha256(repr(facts).encode()).hexdigest()[:32]
@@ -258,18 +269,22 @@ def _machine_code(function: Callable[..., Any], returned: str, arguments: list[s
 # --- numba's cache ----------------------------------------------------------------------------------------------------
 
 
-def _cached_by_numba(function: Callable[..., Any], signature: str, once: bool) -> Any:
-    """Compiled by numba for one signature, from its cache if it is there; damaged files are written anew."""
+def _cached_by_numba(function: Callable[..., Any], signature: str, path: Path) -> Any:
+    """Compiled by numba for one signature, from its cache if it is there; damaged files are written anew.
+
+    Its files are found by the function's name, and know of no change in a formula or a constant: the name has the key.
+    """
     import numba
     from numba.core import event
 
     class Notice(event.Listener):
         def on_start(self, event: object) -> None:
-            _say(once)
+            _say(_can_keep(path.parent))
 
         def on_end(self, event: object) -> None:
             pass
 
+    function.__qualname__ = path.stem
     with event.install_listener("numba:compile", Notice()):
         with suppress(OSError, RuntimeError):  # no place for the cache, or none left
             cached = numba.njit(cache=True, **_OPTIONS)(function)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from clamp3d.core.jit import entry, formula, source_stamp
+from clamp3d.core.jit import entry, formula
 from clamp3d.core.kernel_distance import inside_rate, is_parallel, nearest, parallel
 from clamp3d.core.kernel_flat import flat_nearest, flat_parallel
 from clamp3d.core.kernel_pose import axis, place, rigid
@@ -59,46 +58,40 @@ def record(T, k, R, half_angle, s, h, H, r, l, flat, pad, out):  # type: ignore[
     put(answer, rate, r, out, k)
 
 
-def _entries(stamp: str) -> tuple[Any, Any]:
-    def distances(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
-        stamp  # noqa: B018
-        s = R * math.sin(half_angle)
-        h = -R * math.cos(half_angle)
-        if flat:
-            for i in range(T.shape[0]):
-                if not rigid(T, i):
-                    return i
-                x, y, z, dx, dy, dz = place(T, i)
-                if is_parallel(R, max(l, r), dx, dy):
-                    out[i] = flat_parallel(R, s, h, H, r, l, x, y, z, dz)[0]
-                else:
-                    out[i] = flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, pad)[0]
-            return -1
+def _distances(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
+    s = R * math.sin(half_angle)
+    h = -R * math.cos(half_angle)
+    if flat:
         for i in range(T.shape[0]):
             if not rigid(T, i):
                 return i
             x, y, z, dx, dy, dz = place(T, i)
-            if is_parallel(R, l, dx, dy):  # inlined here it is free of what only the witnesses need
-                answer = parallel(R, s, h, H, r, l, x, y, z, dz)
+            if is_parallel(R, max(l, r), dx, dy):
+                out[i] = flat_parallel(R, s, h, H, r, l, x, y, z, dz)[0]
             else:
-                answer = nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)
-            out[i] = answer[0]
+                out[i] = flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, pad)[0]
         return -1
-
-    def records(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
-        stamp  # noqa: B018
-        s = R * math.sin(half_angle)
-        h = -R * math.cos(half_angle)
-        for i in range(T.shape[0]):
-            if not rigid(T, i):
-                return i
-            record(T, i, R, half_angle, s, h, H, r, l, flat, pad, out)
-        return -1
-
-    return (
-        entry(distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[::1])"),
-        entry(records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[:,::1])"),
-    )
+    for i in range(T.shape[0]):
+        if not rigid(T, i):
+            return i
+        x, y, z, dx, dy, dz = place(T, i)
+        if is_parallel(R, l, dx, dy):  # inlined here it is free of what only the witnesses need
+            answer = parallel(R, s, h, H, r, l, x, y, z, dz)
+        else:
+            answer = nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)
+        out[i] = answer[0]
+    return -1
 
 
-distances, records = _entries(source_stamp())
+def _records(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
+    s = R * math.sin(half_angle)
+    h = -R * math.cos(half_angle)
+    for i in range(T.shape[0]):
+        if not rigid(T, i):
+            return i
+        record(T, i, R, half_angle, s, h, H, r, l, flat, pad, out)
+    return -1
+
+
+distances = entry(_distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[::1])")
+records = entry(_records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[:,::1])")

@@ -22,9 +22,8 @@ from __future__ import annotations
 
 import math
 from heapq import heappop, heappush
-from typing import Any
 
-from clamp3d.core.jit import entry, formula, source_stamp
+from clamp3d.core.jit import entry, formula
 from clamp3d.core.kernel_features import FLAT_N, phi, section, section_foot
 
 CELLS = 200_000
@@ -266,83 +265,77 @@ def seed_heap(l, m, u0, u1, ordered):  # type: ignore[no-untyped-def] # noqa: E7
     return heap
 
 
-def _entries(stamp: str) -> tuple[Any, Any]:
-    def least(R, half_angle, H, l, m, u0, u1, eps, most, out):  # type: ignore[no-untyped-def] # noqa: E741
-        """Least sdf from u0 to u1: fills out with value, u, t and a proven lower bound of it; cells looked at."""
-        stamp  # noqa: B018
-        s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
-        bend = max_acceleration(l, m)
-        coaxial = m[6] == 0.0 and m[7] == 0.0 and m[9] == 0.0 and m[10] == 0.0 and m[15] != 0.0
-        best, bu, bt = value(R, s, h, H, m, u0, 0.0), u0, 0.0  # of equals the start
-        heap = seed_heap(l, m, u0, u1, False)
-        count = 0
-        bound = math.inf
-        while heap:
-            known, u, t, hu, ht = heap[0]
-            if known >= best - eps or len(heap) + 2 > most:
-                bound = known
-                break
-            heappop(heap)
-            f, low, split_u, du, dt = cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht)
-            count += 1
+def _least(R, half_angle, H, l, m, u0, u1, eps, most, out):  # type: ignore[no-untyped-def] # noqa: E741
+    """Least sdf from u0 to u1: fills out with value, u, t and a proven lower bound of it; cells looked at."""
+    s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
+    bend = max_acceleration(l, m)
+    coaxial = m[6] == 0.0 and m[7] == 0.0 and m[9] == 0.0 and m[10] == 0.0 and m[15] != 0.0
+    best, bu, bt = value(R, s, h, H, m, u0, 0.0), u0, 0.0  # of equals the start
+    heap = seed_heap(l, m, u0, u1, False)
+    count = 0
+    bound = math.inf
+    while heap:
+        known, u, t, hu, ht = heap[0]
+        if known >= best - eps or len(heap) + 2 > most:
+            bound = known
+            break
+        heappop(heap)
+        f, low, split_u, du, dt = cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht)
+        count += 1
+        if f < best:
+            best, bu, bt = f, u, t
+        low = max(low, known)
+        if low >= best - eps:
+            bound = min(bound, low)
+            continue
+        # The corner that the gradient points to, and the two middles of sides: minima lie on the border as often.
+        for i in range(3):
+            cu = min(max(u + (0.0 if i == 2 else du), u0), u1)
+            ct = min(max(t + (0.0 if i == 1 else dt), -l), l)
+            f = value(R, s, h, H, m, cu, ct)
             if f < best:
-                best, bu, bt = f, u, t
-            low = max(low, known)
-            if low >= best - eps:
-                bound = min(bound, low)
-                continue
-            # The corner that the gradient points to, and the two middles of sides: minima lie on the border as often.
-            for i in range(3):
-                cu = min(max(u + (0.0 if i == 2 else du), u0), u1)
-                ct = min(max(t + (0.0 if i == 1 else dt), -l), l)
-                f = value(R, s, h, H, m, cu, ct)
-                if f < best:
-                    best, bu, bt = f, cu, ct
-            halve(heap, low, split_u, u, t, hu, ht, False)
-        out[0], out[1], out[2], out[3] = best, bu, bt, min(bound, best)
-        return count
-
-    def first(R, half_angle, H, l, m, level, eps, most, out):  # type: ignore[no-untyped-def] # noqa: E741
-        """First u with sdf <= level, 2 if none is found: out[0]; out[1]: up to where nothing is below level - eps."""
-        stamp  # noqa: B018
-        s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
-        bend = max_acceleration(l, m)
-        coaxial = m[6] == 0.0 and m[7] == 0.0 and m[9] == 0.0 and m[10] == 0.0 and m[15] != 0.0
-        hit = 2.0
-        heap = seed_heap(l, m, 0.0, 1.0, True)
-        count = 0
-        out[1] = 1.0
-        while heap:
-            begin, u, t, hu, ht = heap[0]
-            if begin >= hit:
-                out[1] = hit
-                break
-            if len(heap) + 2 > most:
-                out[1] = begin
-                break
-            heappop(heap)
-            f, low, split_u, _, dt = cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht)
-            count += 1
-            if u < hit and f <= level:
-                hit = u
-            if low > level - eps and f > level:
-                continue
-            ct = min(max(t + dt, -l), l)
-            for i in range(2):
-                cu = u - hu if i == 0 else u
-                if cu < hit and value(R, s, h, H, m, cu, ct) <= level:
-                    hit = cu
-            if hu <= 2.0**-52:
-                continue
-            # Where it is below, what comes before is asked for: only a shorter time tells more.
-            halve(heap, u - hu, split_u or f <= level, u, t, hu, ht, True)
-        out[0] = hit
-        return count
-
-    return (
-        entry(least, "i8(f8,f8,f8,f8,f8[::1],f8,f8,f8,i8,f8[::1])"),
-        entry(first, "i8(f8,f8,f8,f8,f8[::1],f8,f8,i8,f8[::1])"),
-    )
+                best, bu, bt = f, cu, ct
+        halve(heap, low, split_u, u, t, hu, ht, False)
+    out[0], out[1], out[2], out[3] = best, bu, bt, min(bound, best)
+    return count
 
 
-least, first = _entries(source_stamp())
+def _first(R, half_angle, H, l, m, level, eps, most, out):  # type: ignore[no-untyped-def] # noqa: E741
+    """First u with sdf <= level, 2 if none is found: out[0]; out[1]: up to where nothing is below level - eps."""
+    s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
+    bend = max_acceleration(l, m)
+    coaxial = m[6] == 0.0 and m[7] == 0.0 and m[9] == 0.0 and m[10] == 0.0 and m[15] != 0.0
+    hit = 2.0
+    heap = seed_heap(l, m, 0.0, 1.0, True)
+    count = 0
+    out[1] = 1.0
+    while heap:
+        begin, u, t, hu, ht = heap[0]
+        if begin >= hit:
+            out[1] = hit
+            break
+        if len(heap) + 2 > most:
+            out[1] = begin
+            break
+        heappop(heap)
+        f, low, split_u, _, dt = cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht)
+        count += 1
+        if u < hit and f <= level:
+            hit = u
+        if low > level - eps and f > level:
+            continue
+        ct = min(max(t + dt, -l), l)
+        for i in range(2):
+            cu = u - hu if i == 0 else u
+            if cu < hit and value(R, s, h, H, m, cu, ct) <= level:
+                hit = cu
+        if hu <= 2.0**-52:
+            continue
+        # Where it is below, what comes before is asked for: only a shorter time tells more.
+        halve(heap, u - hu, split_u or f <= level, u, t, hu, ht, True)
+    out[0] = hit
+    return count
+
+
+least = entry(_least, "i8(f8,f8,f8,f8,f8[::1],f8,f8,f8,i8,f8[::1])")
+first = entry(_first, "i8(f8,f8,f8,f8,f8[::1],f8,f8,i8,f8[::1])")

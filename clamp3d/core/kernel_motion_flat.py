@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import math
 from heapq import heappop, heappush
-from typing import Any
 
 import numpy as np
 
-from clamp3d.core.jit import entry, source_stamp
+from clamp3d.core.jit import entry
 from clamp3d.core.kernel_flat import flat_nearest
 from clamp3d.core.kernel_motion import place
 
@@ -21,64 +20,60 @@ MOST = 100_000
 """Poses that are looked at; a search that needs more ends with a wider bound, which it tells."""
 
 
-def _entry(stamp: str) -> Any:
-    def search(R, half_angle, H, r, l, m, speed, u0, u1, level, eps, most, out):  # type: ignore[no-untyped-def] # noqa: E741
-        """Least signed distance from u0 to u1, or (level finite) the first time when it is at most ``level``.
+def _search(R, half_angle, H, r, l, m, speed, u0, u1, level, eps, most, out):  # type: ignore[no-untyped-def] # noqa: E741
+    """Least signed distance from u0 to u1, or (level finite) the first time when it is at most ``level``.
 
-        Fills out with value, time and a lower bound of the value; of a first time (2 if there is none) up to when
-        nothing is below level - eps. Returns how many poses were looked at.
-        """
-        stamp  # noqa: B018
-        s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
-        pad = np.empty((128, 5))
-        a, b = u0, u1
-        fa = fb = best = bound = math.inf
-        at = u0
-        heap = [(-math.inf, u0, u1, 0.0, 0.0)]
+    Fills out with value, time and a lower bound of the value; of a first time (2 if there is none) up to when
+    nothing is below level - eps. Returns how many poses were looked at.
+    """
+    s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
+    pad = np.empty((128, 5))
+    a, b = u0, u1
+    fa = fb = best = bound = math.inf
+    at = u0
+    heap = [(-math.inf, u0, u1, 0.0, 0.0)]
+    heappop(heap)
+    count = 0
+    u = u0
+    while True:
+        p = place(m, u)
+        f = flat_nearest(R, half_angle, s, h, H, r, l, p[0], p[1], p[2], p[3], p[4], p[5], pad)[0]
+        count += 1
+        if f < best:
+            best, at = f, u
+        if level > -math.inf:
+            if f <= level or u >= u1 or count >= most:
+                out[0], out[1], out[2] = f, u if f <= level else 2.0, u
+                return count
+            u = min(u1, u + max(f - level, eps) / speed) if speed > 0.0 else u1
+            continue
+        if count == 1:
+            fa, u = f, u1
+            continue
+        if count == 2:
+            fb = f
+            heappush(heap, (0.5 * (fa + fb - speed * (b - a)), a, b, fa, fb))
+        else:
+            for half in range(2):
+                p0, p1, g0, g1 = (a, u, fa, f) if half == 0 else (u, b, f, fb)
+                low = 0.5 * (g0 + g1 - speed * (p1 - p0))
+                if low >= best - eps or p1 - p0 <= 1e-16:
+                    bound = min(bound, low)
+                else:
+                    heappush(heap, (low, p0, p1, g0, g1))
+        if not heap:
+            break
+        low, a, b, fa, fb = heap[0]
+        if low >= best - eps or count >= most:
+            bound = min(bound, low)
+            break
         heappop(heap)
-        count = 0
-        u = u0
-        while True:
-            p = place(m, u)
-            f = flat_nearest(R, half_angle, s, h, H, r, l, p[0], p[1], p[2], p[3], p[4], p[5], pad)[0]
-            count += 1
-            if f < best:
-                best, at = f, u
-            if level > -math.inf:
-                if f <= level or u >= u1 or count >= most:
-                    out[0], out[1], out[2] = f, u if f <= level else 2.0, u
-                    return count
-                u = min(u1, u + max(f - level, eps) / speed) if speed > 0.0 else u1
-                continue
-            if count == 1:
-                fa, u = f, u1
-                continue
-            if count == 2:
-                fb = f
-                heappush(heap, (0.5 * (fa + fb - speed * (b - a)), a, b, fa, fb))
-            else:
-                for half in range(2):
-                    p0, p1, g0, g1 = (a, u, fa, f) if half == 0 else (u, b, f, fb)
-                    low = 0.5 * (g0 + g1 - speed * (p1 - p0))
-                    if low >= best - eps or p1 - p0 <= 1e-16:
-                        bound = min(bound, low)
-                    else:
-                        heappush(heap, (low, p0, p1, g0, g1))
-            if not heap:
-                break
-            low, a, b, fa, fb = heap[0]
-            if low >= best - eps or count >= most:
-                bound = min(bound, low)
-                break
-            heappop(heap)
-            u = min(max(0.5 * (a + b + (fa - fb) / speed), a), b) if speed > 0.0 else b
-            if not a < u < b:
-                u = 0.5 * (a + b)
-        out[0], out[1], out[2] = best, at, min(bound, best)
-        return count
-
-    return entry(search, "i8(f8,f8,f8,f8,f8,f8[::1],f8,f8,f8,f8,f8,i8,f8[::1])")
+        u = min(max(0.5 * (a + b + (fa - fb) / speed), a), b) if speed > 0.0 else b
+        if not a < u < b:
+            u = 0.5 * (a + b)
+    out[0], out[1], out[2] = best, at, min(bound, best)
+    return count
 
 
-search = _entry(source_stamp())
+search = entry(_search, "i8(f8,f8,f8,f8,f8,f8[::1],f8,f8,f8,f8,f8,i8,f8[::1])")
 """Compiled entry point; see the function."""

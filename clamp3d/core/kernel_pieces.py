@@ -9,9 +9,8 @@ negative on the piece's side of the lip and goes over into the plain distance on
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from clamp3d.core.jit import entry, formula, source_stamp
+from clamp3d.core.jit import entry, formula
 from clamp3d.core.kernel_distance import edge_normal, is_parallel
 from clamp3d.core.kernel_features import (
     ARC,
@@ -319,19 +318,15 @@ def all_pieces(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, out):  # ty
         row[13] = x * gy - y * gx
 
 
-def _entry(stamp: str) -> Any:
-    def pieces(T, R, half_angle, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E741
-        stamp  # noqa: B018
-        if not rigid(T, 0):
-            return False
-        dx, dy, dz = axis(T, 0)
-        s = R * math.sin(half_angle)
-        h = -R * math.cos(half_angle)
-        all_pieces(R, s, h, H, half_angle, r, l, T[0, 0, 3], T[0, 1, 3], T[0, 2, 3], dx, dy, dz, out)
-        return True
-
-    return entry(pieces, "b1(f8[:,:,::1],f8,f8,f8,f8,f8,f8[:,::1])")
+def _pieces(T, R, half_angle, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E741
+    if not rigid(T, 0):
+        return False
+    dx, dy, dz = axis(T, 0)
+    s = R * math.sin(half_angle)
+    h = -R * math.cos(half_angle)
+    all_pieces(R, s, h, H, half_angle, r, l, T[0, 0, 3], T[0, 1, 3], T[0, 2, 3], dx, dy, dz, out)
+    return True
 
 
-pieces = _entry(source_stamp())
+pieces = entry(_pieces, "b1(f8[:,:,::1],f8,f8,f8,f8,f8,f8[:,::1])")
 """Compiled entry point: one pose (1, 4, 4) into (5, 14); False for a pose that is not rigid."""

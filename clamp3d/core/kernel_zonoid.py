@@ -12,9 +12,8 @@ M - c bounds the width of a cell's directions from below by ``n . p``, and outsi
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from clamp3d.core.jit import entry, formula, source_stamp
+from clamp3d.core.jit import entry, formula
 
 CELLS = 4000
 """Cells that may wait, of 6 numbers each."""
@@ -275,106 +274,102 @@ def middle(face, u, v, w):  # type: ignore[no-untyped-def]
     return u / size, v / size, s, rho
 
 
-def _entries(stamp: str) -> Any:
-    def zonoid(c, S, U, tolerance, most, heap, X, out):  # type: ignore[no-untyped-def]
-        """Lower and upper bound of the least width, and its direction, into ``out`` (5,); cells looked at.
+def _zonoid(c, S, U, tolerance, most, heap, X, out):  # type: ignore[no-untyped-def]
+    """Lower and upper bound of the least width, and its direction, into ``out`` (5,); cells looked at.
 
-        ``S`` (m, 3) are half segments, ``U`` (k, 4) the discs' unit normals and radii; ``X`` (m + k, 3) comes back
-        with what each of them adds to the nearest point.
-        """
-        stamp  # noqa: B018
-        m, k = S.shape[0], U.shape[0]
-        far = math.sqrt(c[0] ** 2 + c[1] ** 2 + c[2] ** 2)
-        scale = far
-        best, bx, by, bz = math.inf, 0.0, 0.0, 1.0
-        for i in range(m):
-            scale += math.sqrt(S[i, 0] ** 2 + S[i, 1] ** 2 + S[i, 2] ** 2)
-        for j in range(k):
-            scale += U[j, 3]
-            for sign in (-1.0, 1.0):
-                x, y, z = sign * U[j, 0], sign * U[j, 1], sign * U[j, 2]
-                f = width(x, y, z, c, S, U)
-                if f < best:
-                    best, bx, by, bz = f, x, y, z
-        rounding = 16.0 * _EPS * scale
-        tolerance = max(tolerance, 4.0 * rounding)
-        for i in range(m):
-            for j in range(i):
-                x, y, z = (
-                    S[i, 1] * S[j, 2] - S[i, 2] * S[j, 1],
-                    S[i, 2] * S[j, 0] - S[i, 0] * S[j, 2],
-                    S[i, 0] * S[j, 1] - S[i, 1] * S[j, 0],
-                )
-                size = math.sqrt(x * x + y * y + z * z)
-                if size > 1e-150:
-                    for sign in (-1.0, 1.0):
-                        f = width(sign * x / size, sign * y / size, sign * z / size, c, S, U)
-                        if f < best:
-                            best, bx, by, bz = f, sign * x / size, sign * y / size, sign * z / size
-        ox, oy, oz = (c[0] / far, c[1] / far, c[2] / far) if far > 0.0 else (0.6, 0.64, 0.48)
-        for i in range(-1, m):
-            if k or i < 0:
-                f, x, y, z = polish(ox, oy, oz, c, S, U, i, rounding)
-                if f < best:
-                    best, bx, by, bz = f, x, y, z
-        count, n = 0, 0
-        lower = -math.inf
-        fresh, tilt = True, 0.0
-        for face in range(6):
-            n = push(heap, n, -math.inf, float(face), 0.0, 0.0, 1.0)
-        while True:
-            if fresh:
-                fresh = False
-                tilt, least = 0.0, math.inf
-                for e in (1e-9, 1e-6, 1e-3):
-                    f, off = support(bx, by, bz, e, 60, 0.1 * rounding, c, S, U, X)
-                    size = math.sqrt(f * f + off * off)
-                    lower = max(lower, -size)
-                    if best > 0.0:  # the point to move out along the direction, not the nearest
-                        size = off
-                    if size < least:
-                        tilt, least = e, size
-                    if off <= rounding:
-                        break
-            if n == 0 or lower >= best - tolerance:
-                break
-            low, face, u, v, w = heap[0, 0], heap[0, 1], heap[0, 2], heap[0, 3], heap[0, 4]
-            lower = max(lower, min(low, best - tolerance))
-            if low >= best - tolerance or n + 4 > heap.shape[0] or count >= most:
-                break
-            n = drop(heap, n)
-            w *= 0.5
-            for q in range(4):
-                cu, cv = u + (w if q & 1 else -w), v + (w if q & 2 else -w)
-                x, y, z, rho = middle(face, cu, cv, w)
-                count += 1
-                if ox * x + oy * y + oz * z < -math.sin(min(rho, 0.5 * math.pi)) and far > 0.0:
-                    continue  # the opposite directions are better
-                f, off = support(x, y, z, rho, 3, tolerance, c, S, U, X)
-                at = width(x, y, z, c, S, U)
-                if at < best:
-                    fresh = True
-                    best, bx, by, bz = at, x, y, z
-                    for i in range(-1, m):
-                        if i < 0 or abs(S[i, 0] * x + S[i, 1] * y + S[i, 2] * z) < 2.0 * rho * math.sqrt(
-                            S[i, 0] ** 2 + S[i, 1] ** 2 + S[i, 2] ** 2
-                        ):
-                            at, nx, ny, nz = polish(x, y, z, c, S, U, i, rounding)
-                            if at < best:
-                                best, bx, by, bz = at, nx, ny, nz
+    ``S`` (m, 3) are half segments, ``U`` (k, 4) the discs' unit normals and radii; ``X`` (m + k, 3) comes back
+    with what each of them adds to the nearest point.
+    """
+    m, k = S.shape[0], U.shape[0]
+    far = math.sqrt(c[0] ** 2 + c[1] ** 2 + c[2] ** 2)
+    scale = far
+    best, bx, by, bz = math.inf, 0.0, 0.0, 1.0
+    for i in range(m):
+        scale += math.sqrt(S[i, 0] ** 2 + S[i, 1] ** 2 + S[i, 2] ** 2)
+    for j in range(k):
+        scale += U[j, 3]
+        for sign in (-1.0, 1.0):
+            x, y, z = sign * U[j, 0], sign * U[j, 1], sign * U[j, 2]
+            f = width(x, y, z, c, S, U)
+            if f < best:
+                best, bx, by, bz = f, x, y, z
+    rounding = 16.0 * _EPS * scale
+    tolerance = max(tolerance, 4.0 * rounding)
+    for i in range(m):
+        for j in range(i):
+            x, y, z = (
+                S[i, 1] * S[j, 2] - S[i, 2] * S[j, 1],
+                S[i, 2] * S[j, 0] - S[i, 0] * S[j, 2],
+                S[i, 0] * S[j, 1] - S[i, 1] * S[j, 0],
+            )
+            size = math.sqrt(x * x + y * y + z * z)
+            if size > 1e-150:
+                for sign in (-1.0, 1.0):
+                    f = width(sign * x / size, sign * y / size, sign * z / size, c, S, U)
+                    if f < best:
+                        best, bx, by, bz = f, sign * x / size, sign * y / size, sign * z / size
+    ox, oy, oz = (c[0] / far, c[1] / far, c[2] / far) if far > 0.0 else (0.6, 0.64, 0.48)
+    for i in range(-1, m):
+        if k or i < 0:
+            f, x, y, z = polish(ox, oy, oz, c, S, U, i, rounding)
+            if f < best:
+                best, bx, by, bz = f, x, y, z
+    count, n = 0, 0
+    lower = -math.inf
+    fresh, tilt = True, 0.0
+    for face in range(6):
+        n = push(heap, n, -math.inf, float(face), 0.0, 0.0, 1.0)
+    while True:
+        if fresh:
+            fresh = False
+            tilt, least = 0.0, math.inf
+            for e in (1e-9, 1e-6, 1e-3):
+                f, off = support(bx, by, bz, e, 60, 0.1 * rounding, c, S, U, X)
                 size = math.sqrt(f * f + off * off)
-                turned = math.atan2(off, f) + rho
-                bound = size * math.cos(turned) if turned < math.pi else -size
-                bound = max(bound, low)
-                if bound < best - tolerance:
-                    n = push(heap, n, bound, face, cu, cv, w)
-        if n == 0:
-            lower = max(lower, best - tolerance)
-        support(bx, by, bz, tilt, 60, 0.1 * rounding, c, S, U, X)
-        out[0], out[1], out[2], out[3], out[4] = min(lower, best) - rounding, best + rounding, bx, by, bz
-        return count
+                lower = max(lower, -size)
+                if best > 0.0:  # the point to move out along the direction, not the nearest
+                    size = off
+                if size < least:
+                    tilt, least = e, size
+                if off <= rounding:
+                    break
+        if n == 0 or lower >= best - tolerance:
+            break
+        low, face, u, v, w = heap[0, 0], heap[0, 1], heap[0, 2], heap[0, 3], heap[0, 4]
+        lower = max(lower, min(low, best - tolerance))
+        if low >= best - tolerance or n + 4 > heap.shape[0] or count >= most:
+            break
+        n = drop(heap, n)
+        w *= 0.5
+        for q in range(4):
+            cu, cv = u + (w if q & 1 else -w), v + (w if q & 2 else -w)
+            x, y, z, rho = middle(face, cu, cv, w)
+            count += 1
+            if ox * x + oy * y + oz * z < -math.sin(min(rho, 0.5 * math.pi)) and far > 0.0:
+                continue  # the opposite directions are better
+            f, off = support(x, y, z, rho, 3, tolerance, c, S, U, X)
+            at = width(x, y, z, c, S, U)
+            if at < best:
+                fresh = True
+                best, bx, by, bz = at, x, y, z
+                for i in range(-1, m):
+                    if i < 0 or abs(S[i, 0] * x + S[i, 1] * y + S[i, 2] * z) < 2.0 * rho * math.sqrt(
+                        S[i, 0] ** 2 + S[i, 1] ** 2 + S[i, 2] ** 2
+                    ):
+                        at, nx, ny, nz = polish(x, y, z, c, S, U, i, rounding)
+                        if at < best:
+                            best, bx, by, bz = at, nx, ny, nz
+            size = math.sqrt(f * f + off * off)
+            turned = math.atan2(off, f) + rho
+            bound = size * math.cos(turned) if turned < math.pi else -size
+            bound = max(bound, low)
+            if bound < best - tolerance:
+                n = push(heap, n, bound, face, cu, cv, w)
+    if n == 0:
+        lower = max(lower, best - tolerance)
+    support(bx, by, bz, tilt, 60, 0.1 * rounding, c, S, U, X)
+    out[0], out[1], out[2], out[3], out[4] = min(lower, best) - rounding, best + rounding, bx, by, bz
+    return count
 
-    return entry(zonoid, "i8(f8[::1],f8[:,::1],f8[:,::1],f8,i8,f8[:,::1],f8[:,::1],f8[::1])")
 
-
-zonoid = _entries(source_stamp())
+zonoid = entry(_zonoid, "i8(f8[::1],f8[:,::1],f8[:,::1],f8,i8,f8[:,::1],f8[:,::1],f8[::1])")

@@ -15,6 +15,7 @@ from click.testing import CliRunner
 
 from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.contact import CONTACT, overlap
 from clamp3d.clamp.dimensions import Clamp, GrooveDimensions
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.matrix import PAIRS
@@ -22,6 +23,7 @@ from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.tolerance import monte_carlo
 from clamp3d.cli import group
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.distance import measure
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.shapes import Solid
@@ -249,6 +251,18 @@ def test_seven_parts_meet_on_the_way_only_where_they_may() -> None:
     pairs = [pair for pair in PAIRS if assembly.clamp.connection(*pair) == 0]
     for waypoint in assembly.path:
         assert min(d.lower for d in measure(assembly.scene_at(waypoint), pairs).values()) > 1.0
+
+
+def test_an_overlap_is_told_in_words_with_what_is_certain_of_it() -> None:
+    contact = assemble(load_clamp()).contacts[0]
+    said = {
+        (0.5, 0.5): "",
+        (-0.5 * CONTACT, -0.5 * CONTACT): "",
+        (-1.25, -1.25): f"{contact.a} overlaps {contact.b} by 1.25 mm",
+        (-3.0, -1.25): f"{contact.a} overlaps {contact.b} by at least 1.25 mm",
+    }
+    for (lower, upper), words in said.items():
+        assert overlap(replace(contact, distance=Distance(lower, upper))) == words
 
 
 def test_plain_data_and_frame() -> None:

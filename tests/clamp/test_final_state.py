@@ -104,6 +104,30 @@ def test_gradients_agree_with_differences(clamp):
             assert np.allclose(np.array(numeric).T, gaps.gradient, atol=1e-6)
 
 
+def test_curvatures_agree_with_differences_of_gradients(clamp):
+    rng, section, h = np.random.default_rng(5), Section(clamp, Cas()), 1e-5
+    for pair in itertools.product(("P1", "P2"), ("P6", "P7")):
+        q = section.open_state(33.0, 0.03) + np.append(0.3 * rng.normal(size=6), 0.01 * rng.normal(size=4))
+        own = [p == pair for p in section.gaps(q).pair]
+        force = rng.uniform(0.0, 1.0, sum(own))
+        sides = [[force @ section.gaps(q + s * h * e).gradient[own] for e in np.eye(SIZE)] for s in (1.0, -1.0)]
+        numeric = np.subtract(*sides) / (2.0 * h)
+        assert np.abs(numeric).max() > 0.01
+        assert np.allclose(section.wire_curvature(q, *pair, force, h), numeric, atol=1e-8)
+
+
+@pytest.mark.parametrize("beyond", [-0.5, 0.5, 3.0])
+def test_a_face_ends_at_the_splints_outer_edge(clamp, beyond):
+    section = Section(clamp, Cas())
+    edge, face = 2.0 * section.bolt_x, clamp.up_splint.thickness
+    q = section.open_state(60.0, 0.0)
+    q[2:4] = edge + beyond, face + 7.0
+    gaps = section.gaps(q)
+    least = min(value for value, pair in zip(gaps.value, gaps.pair, strict=True) if pair == ("P1", "P7"))
+    radius = section.pairs["P1", "P7"].cylinder.radius
+    assert least == pytest.approx(math.hypot(max(beyond, 0.0), 7.0) - radius, abs=1e-9)
+
+
 def test_pairs_of_conductors_end_in_a_stated_result():
     """The thinnest, the thickest and a spread of others: what the status says is what the contacts are."""
     names = list(catalogue())[::12]

@@ -97,6 +97,16 @@ def test_touch_as_the_scene_check_sees_it(closing):
             assert abs(row.distance.upper) < 1e-5
 
 
+def test_a_cloud_fills_the_ranges_and_nothing_else(closing):
+    name, other = FREEDOMS[0], FREEDOMS[2]
+    found = closing.cloud({name: 0.5, other: 0.02}, 400, seed=3).misplacement
+    for freedom, column in zip(FREEDOMS, found.T, strict=True):
+        reach = {name: 0.5, other: 0.02}.get(freedom, 0.0)
+        assert np.abs(column).max() <= reach
+        assert np.std(column) == pytest.approx(reach / math.sqrt(3.0), rel=0.1)
+        assert abs(column.mean()) <= 0.1 * reach
+
+
 def test_outcomes_by_mouth(closing):
     m = np.zeros((3, 4))
     m[:, 0] = 0.0, 6.0, 14.0  # in the groove, on a lip, on the face beside the mouth

@@ -14,6 +14,7 @@ from clamp3d.clamp.parts import parts
 from clamp3d.collide.check import check
 from clamp3d.collide.convex import Rod, hull
 from clamp3d.collide.depth_convex import convex_depth
+from clamp3d.collide.depth_cover import Union
 from clamp3d.collide.distance import distance
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
@@ -227,3 +228,14 @@ def test_unique_is_not_claimed_where_rounding_decides(tilt):
     a, b = shapes.box((10, 10, 10)), shapes.box((4, 4, 4))
     assert distance(a, b, translation(0, 0, 9) @ rotation([1, 2, 0], tilt)).unique is not True
     assert distance(a, b, translation(0, 0, 9) @ rotation([1, 2, 0], 0.3)).unique is True
+
+
+def test_cubes_of_translations_are_open_where_no_set_holds_all_of_them():
+    """Two boxes of translations, against the corners of each cube."""
+    low, high = np.array([[-1.0, -1.0, -1.0], [-0.5, -2.0, -1.5]]), np.array([[1.0, 2.0, 1.5], [3.0, 1.0, 2.0]])
+    normals = np.vstack([np.eye(3), -np.eye(3)])
+    sets = [np.column_stack([normals, np.append(top, -bottom)]) for bottom, top in zip(low, high, strict=True)]
+    at, half = np.random.default_rng(0).uniform(-2.0, 3.0, (500, 3)), 0.3
+    held = ((at - half >= low[:, None]) & (at + half <= high[:, None])).all(axis=2).any(axis=0)
+    assert 10 < held.sum() < 490
+    assert np.array_equal(Union(sets, 10.0).open_cubes(at, half), at[~held])

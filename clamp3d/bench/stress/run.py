@@ -11,6 +11,7 @@ from typing import Any
 from clamp3d.bench.machine import Machine, machine
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.family import Family
+from clamp3d.bench.stress.meshes.contacts import CONTACTS
 from clamp3d.bench.stress.meshes.family import MESHES
 from clamp3d.bench.stress.motions.family import MOTIONS
 from clamp3d.bench.stress.outcome import Outcome
@@ -27,7 +28,7 @@ KINDS: dict[str, Mapping[str, Family]] = {
     "flat": FLATS,
     "solid": SOLIDS,
     "motion": MOTIONS,
-    "mesh": MESHES,
+    "mesh": {**MESHES, **CONTACTS},
     "assembly": ASSEMBLIES,
 }
 """Kind -> its families by name."""

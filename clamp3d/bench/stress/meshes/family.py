@@ -121,13 +121,20 @@ def _scene(case: MeshCase) -> Answer:
 def _fcl_alone(case: MeshCase) -> Answer:
     import fcl
 
-    V, F = case.mesh.vertices, case.mesh.faces
     with _silence():
-        model = fcl.BVHModel()
-        model.beginModel(len(V), len(F))
-        model.addSubModel(V, F)
-        model.endModel()
+        model = bvh(case.mesh.vertices, case.mesh.faces)
         return Answer(_fcl_distance([fcl.CollisionObject(model, fcl.Transform())], case))
+
+
+def bvh(V: NDArray[Any], F: NDArray[Any]) -> Any:
+    """FCL's tree of triangles, of the arrays as they are."""
+    import fcl
+
+    model = fcl.BVHModel()
+    model.beginModel(len(V), len(F))
+    model.addSubModel(V, F)
+    model.endModel()
+    return model
 
 
 def _coacd_alone(case: MeshCase) -> Answer:
