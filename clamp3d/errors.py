@@ -50,11 +50,13 @@ class SequenceError(Clamp3dError):
     ----------
     blocks : tuple
         What blocks each way that was tried, the one that leads furthest first.
+    scene : Scene or None
+        The parts that are there, with the motion on the first of these ways.
     """
 
-    def __init__(self, message: object = "", blocks: tuple[Any, ...] = ()) -> None:
+    def __init__(self, message: object = "", blocks: tuple[Any, ...] = (), scene: Any = None) -> None:
         super().__init__(message)
-        self.blocks = blocks
+        self.blocks, self.scene = blocks, scene
 
 
 class MissingLibraryError(Clamp3dError, ImportError):

@@ -128,6 +128,7 @@ class _Plan:
                     f"sequence step {k + 1}, {step}: no way to its place is free, straight or with one bend; "
                     f"the straight one that leads nearest is blocked: {blocks[0]}",
                     blocks,
+                    self._ways.scene(pairs, place, blocks[0]),
                 )
         elif step.kind == "tighten" and "P2" not in step.parts and self.bases[k] is self.bases[0]:
             for name in moving:
@@ -135,7 +136,9 @@ class _Plan:
             block = self._ways.block(pairs, place, "from below", rise)
             if block is not None:
                 raise SequenceError(
-                    f"sequence step {k + 1}, {step}: the nut cannot draw the bolt up: {block}", (block,)
+                    f"sequence step {k + 1}, {step}: the nut cannot draw the bolt up: {block}",
+                    (block,),
+                    self._ways.scene(pairs, place, block),
                 )
 
     def _spread(self) -> None:

@@ -7,19 +7,20 @@ the bodies proves that no overlap on it is deeper than that test resolves (1e-4 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.matrix import Pair, plain
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.scene import CONTACT
+from clamp3d.clamp.scene import CONTACT, clamp_scene
 from clamp3d.clamp.section import WIRES
 from clamp3d.collide.distance import Distance
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.moving_pair import ACCURACY, MovingPair, box_corners, first_time
 from clamp3d.collide.refine import measured
+from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
@@ -131,6 +132,21 @@ class Ways:
         moving = self._moving(pair, place, start, -start)
         met = moving.ask(t, measured, _THRESHOLDS).moved(moving.motion.at(t, moving.start))
         return Block(origin, *pair, met.point_b, t * length, length)
+
+    def scene(self, pairs: Sequence[Pair], place: Poses, block: Block) -> Scene:
+        """The parts of ``pairs`` with the motion that ``block`` blocks, up to the place."""
+        moving, start = {a for a, _ in pairs}, np.eye(4)
+        start[:3, 3] = _out(block.origin, block.way)
+        whole = clamp_scene(self.clamp, {name: start @ T if name in moving else T for name, T in place.items()})
+        shown = {name for pair in pairs for name in pair}
+        motion = Motion.translate(-start[:3, 3], parts=tuple(sorted(moving)), name=f"{block.a} {block.origin}")
+        return replace(
+            whole,
+            parts=tuple(part for part in whole.parts if part.name in shown),
+            allowed=tuple(pair for pair in whole.allowed if {pair.a, pair.b} <= shown),
+            motions=(motion,),
+            name=f"{self.clamp.name} clamp, step not done",
+        )
 
     def _first(self, pairs: Sequence[Pair], place: Poses, start: Array, by: Array) -> tuple[float, Pair | None]:
         """Up to which part of their way ``by`` (3,) the first parts, ``start`` off their place, overlap nothing."""

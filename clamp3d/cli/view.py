@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from clamp3d.cli.options import METHOD, SOURCE, VIEWING, Method, Source, Viewing, declared, option
-from clamp3d.cli.terminal import finish
+from clamp3d.cli.terminal import finish, show
+from clamp3d.errors import SequenceError
 
 
 @declared("view")
@@ -17,7 +20,8 @@ def command(
 
     INPUT is a clamp (a built-in name or a TOML file), a scene file, or a file with parts. Prints the page's address
     and serves it until Ctrl-C (or --timeout). With --html the page is written to a file instead; with --url the scene
-    goes to a meshcat server, which keeps it. Exit code 1 if a clamp does not close as it should, or parts clash.
+    goes to a meshcat server, which keeps it. Exit code 1 if a clamp does not close as it should, or parts clash, or a
+    step of the sequence is blocked: then it is shown how.
     """
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.cli.viewing import check_and_view, run_and_view
@@ -28,7 +32,12 @@ def command(
     serve = viewing.html_file is None
     if isinstance(loaded, Clamp):
         model = method.model(loaded, quiet=quiet)
-        run = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=serve)
+        try:
+            run = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=serve)
+        except SequenceError as error:
+            show(f"not assembled: {error}")
+            check_and_view(error.scene, replace(viewing, overlays=()), quiet=quiet, serve=serve)
+            finish(finding=True)
         finish(finding=not run.clamped or bool(run.undeclared))
     else:
         method.refuse()

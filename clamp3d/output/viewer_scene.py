@@ -274,7 +274,7 @@ class SceneDrawing:
             arrow = draw.arrow(tail, f.direction, length, FORCE, thickness=thickness, on_top=True)
             self.put(f"{path}/arrow", arrow)
             beside = tail - 0.025 * self.size * f.direction
-            self._label(f"{path}/value", f"{f.force:.3f}", beside, "#F3E5F7", 0.7)
+            self._label(f"{path}/value", f"force {f.force:.3f}", beside, "#F3E5F7", 0.7)
 
     def put(self, path: str, what: Object) -> None:
         """Set the object at a path."""

@@ -168,6 +168,15 @@ def test_a_blocked_step_names_pair_place_and_instant(sequence, step, pair, trave
     assert (first.a, first.b) == pair
     assert f"t = {first.travel / first.way:.4f}" in str(refused.value)
     assert travel is None or first.travel == pytest.approx(travel, abs=1e-3)
+    scene = refused.value.scene  # for the viewer: the parts that are there, on the same way
+    (motion,) = scene.motions
+    assert np.linalg.norm(motion.travel) == pytest.approx(first.way, abs=1e-9)
+    assert set(motion.parts) == ({"P7"} if travel is None else {"P3", "P4"})
+    T = {part.name: part.T_world for part in scene.parts}
+    assert set(motion.parts) | {first.b, "P6"} <= set(T)
+    for off, meets in ((0.2, True), (-0.2, False)):
+        moved = at(T[first.a], (first.travel + off) / first.way * motion.travel)
+        assert (volume(first.a, moved, first.b, T[first.b]) > 1e-6) == meets
 
 
 def test_a_splint_that_rests_on_the_line_beside_the_middle_of_its_groove_comes_from_above():
