@@ -71,7 +71,7 @@ def parse_sequence(text: str) -> tuple[Step, ...]:
         steps.append(step)
     missing = [name for name in PARTS if name not in brought and name != "P6"]
     if missing:
-        raise InputError(f"sequence must bring every part but P6: {', '.join(missing)} is in no step of {text!r}")
+        raise InputError(f"sequence must bring every part but P6; missing {', '.join(missing)} in {text!r}")
     if "P5" not in ended:
         steps += [] if "P2" in ended else [Step("P2", (), "close")]
         steps.append(Step("P5", ("P3", "P4"), "tighten"))

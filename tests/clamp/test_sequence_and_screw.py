@@ -32,7 +32,7 @@ def test_the_papers_sequence():
         ),
         ("P1|P2P2", "P2 is named twice"),
         ("P1|P2P3P4P5 -> P6 -> P7", "part of sequence step 2 must be one of P1, P2, P3, P4, P5, P7, got 'P6'"),
-        ("P1|P2P3P4P5 -> P2 -> P5|P3P4", "must bring every part but P6: P7 is in no step"),
+        ("P1|P2P3P4P5 -> P2 -> P5|P3P4", "must bring every part but P6; missing P7 in"),
         ("P1|P2P3P4P5 -> P7 -> P2 -> P2", r"step 4, P2: P2 \(down splint\) is closed already"),
         ("P1|P2P3P4P5 -> P7 -> P2 -> P5|P3P4 -> P3", r"step 5, P3: P3 \(saddle washer\) is closed already"),
         ("P1/P2", "must read like"),
