@@ -23,7 +23,7 @@ CHORD = 0.02
 
 @dataclass(frozen=True, eq=False)
 class BrepSolid(MeshShape):
-    """One solid with exact faces; ``mesh`` is within ``error`` mm of it.
+    """One solid with exact faces; ``mesh`` is within ``error`` mm of it, which may be twice the chord asked for.
 
     Attributes
     ----------

@@ -172,13 +172,11 @@ class _Plan:
                     )
 
     def _swept(self, k: int) -> dict[PartName, tuple[Array, Array]]:
-        """Boxes around the parts' ways in step k."""
+        """Boxes around the parts' ways in step k; the bend of a way is a corner of the box around its ends."""
         before, after = self.offsets(k), self.offsets(k + 1)
-        corners = way_out(self.legs[k])[:-1] if self.legs[k] else []
         found = {}
         for name in PARTS:
             ways = [before[name], after[name]]
-            ways += [after[name] + corner for corner in corners] if name in self.steps[k].parts else []
             boxes = [self._ways.box(name, {name: self.bases[j][name].T()}) for j in (k, k + 1)]
             low = np.min([box[0] + way for box in boxes for way in ways], axis=0)
             high = np.max([box[1] + way for box in boxes for way in ways], axis=0)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.core.pose import Array
 
@@ -175,22 +174,18 @@ class Distances:
         least = f", least {self.upper.min():.9g} mm" if len(self) else ""
         return f"Distances({len(self)} poses{least})"
 
-    @classmethod
-    def of(cls, found: list[Distance]) -> Distances:
-        """From single distances."""
-
-        def rows(name: str) -> NDArray[np.float64]:
-            given = [getattr(d, name) for d in found]
-            return np.array([np.full(3, np.nan) if x is None else x for x in given]).reshape(-1, 3)
-
-        return cls(
-            np.array([d.lower for d in found]),
-            np.array([d.upper for d in found]),
-            rows("point_a"),
-            rows("point_b"),
-            rows("normal"),
-            tuple(d.method for d in found),
-        )
+    def with_rows(self, rows: list[int], found: list[Distance]) -> Distances:
+        """The same with single distances in place of ``rows``."""
+        fields = {}
+        for name in ("lower", "upper", "point_a", "point_b", "normal"):
+            fields[name] = getattr(self, name).copy()
+            for k, d in zip(rows, found, strict=True):
+                value = getattr(d, name)
+                fields[name][k] = np.nan if value is None else value
+        method = list(self.method)
+        for k, d in zip(rows, found, strict=True):
+            method[k] = d.method
+        return Distances(**fields, method=tuple(method))
 
 
 def _finite(x: float) -> float | None:

@@ -15,6 +15,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check_motions import check_motions
 from clamp3d.collide.depth import is_quick, penetration
+from clamp3d.collide.faces_depth import faces_depth
 from clamp3d.collide.model import Model, ModelCache, Progress
 from clamp3d.collide.reasons import failure, undecided
 from clamp3d.collide.refine import contained, measured, refine, with_normal
@@ -50,8 +51,8 @@ def check(
     distances : bool
         Measure every pair to `clamp3d.collide.distance.ACCURACY`, not only until its verdict is certain.
     depths : bool
-        Measure the penetration depth of clashes, as `clamp3d.collide.distance.distance` does; without, and between two
-        solids from CAD, "at least".
+        Measure the penetration depth of clashes, as `clamp3d.collide.distance.distance` does; without, "at least", as
+        between two solids from CAD that no short move parts: a pin in a hole that is too narrow.
     progress : callable, optional
         Is told (stage, done, of).
     cache : ModelCache, optional
@@ -201,6 +202,8 @@ def _pair(
         deep = with_normal(found)
         if verdict is Verdict.CLASH:
             deep = penetration(*pair, deep) if depths and quick else deep.of_overlap()
+            if depths and not quick and x.faces is not None and y.faces is not None:
+                deep = faces_depth(x.faces, y.faces, T_ab, deep)
         if verdict is Verdict.CLASH and contained(*pair, thresholds):
             verdict = Verdict.CONTAINED
     except MissingLibraryError:

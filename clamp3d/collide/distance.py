@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import instance, positive
 from clamp3d.collide.answer import Distance, Distances
-from clamp3d.collide.batch import by_kernel
+from clamp3d.collide.batch import by_kernel, exact
 from clamp3d.collide.depth import is_exact, penetration
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.modelled import modelled
@@ -112,10 +112,10 @@ def distances(
     cache = _checked(cache, model)
     shapes = _bounded(a, b, T)
     x, y = (cache.model(shape) for shape in shapes)
-    found: list[Distance | None] = [None] * len(T) if model is not None else by_kernel(x, y, T)
-    return Distances.of(
-        [_measured(cache, *shapes, T[k], ACCURACY, model) if d is None else d for k, d in enumerate(found)]
-    )
+    known = by_kernel(x, y, T)
+    settled = exact(known) if model is None else np.zeros(len(T), dtype=bool)
+    rows = np.flatnonzero(~settled).tolist()
+    return known.with_rows(rows, [_measured(cache, *shapes, T[k], ACCURACY, model) for k in rows])
 
 
 def _bounded(a: AnyShape, b: AnyShape, T: Array) -> tuple[Shape, Shape]:

@@ -18,6 +18,8 @@ _MOST = 20_000
 """Pieces looked at before a direction ends with what is known."""
 _LEAST = 5e-4
 """So far (mm) may a face beside another reach above it: pieces that leave it in a tangent need not be cut for ever."""
+VERDICT_WIDTH = 0.01
+"""Width of the bounds, by the contact threshold, at which a search for the verdict alone ends without one."""
 _ASKED = 8
 """Triangles below which a point is looked for that only one of two touching solids has."""
 _BESIDE = 8
@@ -53,7 +55,10 @@ class FaceModel:
 
     @cached_property
     def slack(self) -> Array:
-        """By so much (n,) mm can faces beside each face reach above it by the errors of the borders that they share."""
+        """By so much (2 n,) mm can faces beside each face reach above it by the errors of the borders that they share.
+
+        Then the least such height, for places where no border is near.
+        """
         f = self.faces
         rows, sides = np.nonzero(f.sag)
         sag = f.sag[rows, sides]
@@ -70,7 +75,9 @@ class FaceModel:
         deviation = f.deviation.copy()
         np.maximum.at(deviation, self._adjacent[:, 0], f.deviation[self._adjacent[:, 1]])
         scale = float(np.abs(self.bounds).max())
-        return np.asarray(np.maximum(2.1 * found, _LEAST) + 2.0 * deviation + 1e-9 + 1e-12 * scale)
+        rounding = 2.0 * deviation + 1e-9 + 1e-12 * scale
+        same = 1e-6 + 4e-7 * scale  # so far apart can faces of one of the ``groups`` be
+        return np.concatenate([np.maximum(2.1 * found, _LEAST) + rounding, same + rounding])
 
     @cached_property
     def groups(self) -> NDArray[np.int64]:
@@ -111,7 +118,7 @@ class FaceModel:
         return (
             f.corners, self.errors, f.face, box, link, order, root, f.uv, np.ascontiguousarray(f.sag.max(axis=1)),
             f.kind, f.size, self.frames, f.sense, f.deviation, self.groups, self.neighbours,
-            np.zeros((n, m), dtype=np.int8), np.zeros((n, used), dtype=np.int8),
+            np.zeros((2 * n, m), dtype=np.int8), np.zeros((2 * n, used), dtype=np.int8),
         )  # fmt: skip
 
     @cached_property
@@ -141,7 +148,7 @@ class FaceModel:
     @cached_property
     def marked(self) -> NDArray[np.int8]:
         """Which faces' rows of marks are filled."""
-        return np.zeros(len(self.faces.kind), dtype=np.int8)
+        return np.zeros(2 * len(self.faces.kind), dtype=np.int8)
 
 
 def faces_distance(
@@ -266,7 +273,7 @@ def _towards(a: FaceModel, b: FaceModel, T: Array, contact: float, clearance: fl
     frames[:, 0] += t
     pieces = b.faces.corners @ R.T + t, b.faces.uv, b.faces.face, b.faces.sag
     surfaces = b.faces.kind, b.faces.size, np.ascontiguousarray(frames.reshape(-1, 12)), b.faces.deviation
-    width = np.inf if tol is None else tol
+    width = -VERDICT_WIDTH * contact if tol is None else tol
     found, out = _search(a, pieces, b.arrays[3:6], np.ascontiguousarray(T), surfaces, contact, clearance, width, _MOST)
     p, q = (out[1:4].copy(), out[4:7].copy()) if np.isfinite(out[0]) else (None, None)
     return Distance(found, float(out[0]), p, q, level="faces", method="faces", estimate=float(out[8]))

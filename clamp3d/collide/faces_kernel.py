@@ -138,16 +138,17 @@ def _winding(P, x, y, z):
 
 
 @formula
-def _mark(f, solid, marked, slack, work):
-    """Fill the marks against face f, if they are not yet."""
-    if marked[f]:
+def _mark(row, solid, marked, slack, work):
+    """Fill a row of marks, if it is not yet: face f has the rows f and, with as little slack as can be, n + f."""
+    if marked[row]:
         return
     P, _, face, box, link, order, _, buv, bsag, kind, size, frame, sense, deviation, group, _, marks, nodes = solid
+    f = row % len(kind)
     mark_face(
-        P, buv, bsag, face, box, link, order, kind, size, frame, deviation, group, f, sense[f], slack[f],
-        marks[f], nodes[f], work[3 : 3 + _PIECES], work[3 + _PIECES :], work[0],
+        P, buv, bsag, face, box, link, order, kind, size, frame, deviation, group, f, sense[f], slack[row],
+        marks[row], nodes[row], work[3 : 3 + _PIECES], work[3 + _PIECES :], work[0],
     )  # fmt: skip
-    marked[f] = 1
+    marked[row] = 1
 
 
 @formula
@@ -185,7 +186,7 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
             for k in range(3):
                 out[1 + k], out[4 + k] = p[k], q[k]
             out[7] = f
-    outside, tried = -1.0, 0
+    outside, inside, tried = -1.0, False, 0
     for n in range(NEAR + beside.shape[1] * TRIED):
         # The nearest faces first; then those beside them, and beside these.
         if n < NEAR:
@@ -203,44 +204,49 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
         if known:
             continue
         h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
-        t = slack[f] + deviation[f]
         to_frame(frame[f], V, work)
-        least = least_height(kind[f], size[f, 0], size[f, 1], sense[f], work) - t
+        highest = least_height(kind[f], size[f, 0], size[f, 1], sense[f], work)
         if akind[g] == kind[f] and (kind[f] == SPHERE or kind[f] == TORUS):  # the same surface, but for a little
             off = difference(kind[f], asize[g, 0], asize[g, 1], aframe[g], size[f, 0], size[f, 1], frame[f])
-            least = max(least, e - rim - off - t)
-        chosen[tried], heights[tried] = f, least
+            highest = max(highest, e - rim - off)
+        chosen[tried], heights[tried] = f, highest - slack[f] - deviation[f]
         tried += 1
-        if not (least - e > found or (h > t and outside < 0.0) or (h < -t and h + rim < out[0])):
-            continue
-        _mark(f, solid, marked, slack, whole)
-        own_marks = (marks[f], marks[f], nodes[f], nodes[f])
-        at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
-        # Beyond this the inside of a torus within a ball may be in two pieces.
-        reach = size[f, 0] if kind[f] == TORUS else np.inf
-        if least - e > found or (h > t and outside < 0.0):
-            limit = min(max(least, h) + rho + 2.0 * at, reach if sense[f] < 0.0 else np.inf)
-            clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 1, -1.0, x, y, z, limit, stack)
-            if clear > at:
-                found = max(found, min(least, clear - rho) - e)
-                if h > t:
-                    outside = max(outside, min(h - t, clear))
-        if h < -t and h + rim < out[0]:
-            limit = min(2.0 * at - h, reach if sense[f] > 0.0 else np.inf)
-            clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 2, -1.0, x, y, z, limit, stack)
-            if clear > at:  # inside: as deep as the faces are away
-                for i in range(3):
-                    for c in range(3):
-                        work[i, c] = p[c]
-                depth = from_faces(
-                    P, err, face, box, link, order, kind, size, frame, deviation, work, over, -h, point, stack
-                )
-                depth = max(depth, min(-h - t, clear)) - rim
-                if -depth < out[0] and depth > 0.0:
-                    out[0] = -depth
-                    for k in range(3):
-                        out[1 + k] = out[4 + k] = p[k]
-                    out[7] = f
+        for row in (f, len(kind) + f):
+            t = slack[row] + deviation[f]
+            least = highest - t
+            if row > f and not (rho + e < 2.0 * slack[f] and found < min(out[0], goal) - tol):
+                break
+            if not (least - e > found or (h > t and outside < 0.0) or (h < -t and (h + rim < out[0] or not inside))):
+                continue
+            _mark(row, solid, marked, slack, whole)
+            own_marks = (marks[row], marks[row], nodes[row], nodes[row])
+            at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
+            # Beyond this the inside of a torus within a ball may be in two pieces.
+            reach = size[f, 0] if kind[f] == TORUS else np.inf
+            if least - e > found or (h > t and outside < 0.0):
+                limit = min(max(least, h) + rho + 2.0 * at, reach if sense[f] < 0.0 else np.inf)
+                clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 1, -1.0, x, y, z, limit, stack)
+                if clear > at:
+                    found = max(found, min(least, clear - rho) - e)
+                    if h > t:
+                        outside = max(outside, min(h - t, clear))
+            if h < -t and (h + rim < out[0] or not inside):
+                limit = min(2.0 * at - h, reach if sense[f] > 0.0 else np.inf)
+                clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 2, -1.0, x, y, z, limit, stack)
+                inside = inside or clear > at
+                if clear > at and h + rim < out[0]:  # inside: as deep as the faces are away
+                    for i in range(3):
+                        for c in range(3):
+                            work[i, c] = p[c]
+                    depth = from_faces(
+                        P, err, face, box, link, order, kind, size, frame, deviation, work, over, -h, point, stack
+                    )
+                    depth = max(depth, min(-h - t, clear)) - rim
+                    if -depth < out[0] and depth > 0.0:
+                        out[0] = -depth
+                        for k in range(3):
+                            out[1 + k] = out[4 + k] = p[k]
+                        out[7] = f
     if found < -0.5 * contact:
         # In a hollow corner the solid lies below one of two surfaces. A way out of both is along both normals.
         for m in range(tried):
@@ -267,7 +273,8 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
                 clear = nearest_marked(P, err, box, link, order, 0, *rows, 1, -1.0, x, y, z, limit, stack)
                 if clear > at:
                     found = max(found, min(least, clear - rho) - e)
-    if outside < 0.0 and low > 0.0 and found < min(out[0], goal) - tol and _winding(P, x, y, z) < 0.5:
+    unsure = low > 0.0 and found < min(out[0], goal) - tol and not inside and outside < 0.0
+    if unsure and _winding(P, x, y, z) < 0.5:
         outside = low  # clear of all errors: what the triangles say holds
     if outside > 0.0:
         out[8] = max(out[8], outside)
@@ -323,9 +330,9 @@ def _descend(
     near, chosen, heap = space[2 * DEEP : 2 * DEEP + NEAR], space[2 * DEEP + NEAR : SPACE], space[SPACE:]
     heights, over, p, q = over[:TRIED], over[TRIED:], whole[2, 0], whole[2, 1]
     scratch = (near, chosen, heights, over, inner, whole)
-    verdict = np.isinf(tol)
+    verdict = tol < 0.0
     goal = max(contact, clearance) + 1e-9 if verdict else np.inf
-    tol = 0.01 * contact if verdict else tol
+    tol = abs(tol)
     limits = (slack, contact, goal, tol)
     first, waiting = n, 0
     # Down the pieces' own tree: a branch that keeps away from the surface is outside if one of its pieces is.
@@ -367,7 +374,7 @@ def _descend(
             waiting += 1
             looked += 1
     while waiting:
-        low = min(floor, bounds[heap[0]])
+        low = bounds[heap[0]]
         high = out[0]
         known = high - low <= tol
         if verdict:
@@ -385,6 +392,13 @@ def _descend(
         g = faces[i]
         du, v0, v1, _, _ = spans(uvs[i])
         e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
+        length = 0.0
+        for k in range(3):
+            for c in range(3):
+                length = max(length, abs(pieces[i, k, c] - pieces[i, k - 1, c]))
+        if length + e < 0.1 * tol + 0.05 * max(sags[i, 0], sags[i, 1], sags[i, 2]):
+            floor = min(floor, low)  # what is left is not the piece's size: to cut it tells no more
+            continue
         bent = e > 0.25 * (min(high, goal) - low)
         side = longest(pieces[i], uvs[i], akind[g], asize[g, 0], asize[g, 1], bent)
         faces[n] = g

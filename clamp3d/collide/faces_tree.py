@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from clamp3d.collide.faces_math import (
+    CONE,
     OTHER,
     TORUS,
     bend,
@@ -251,17 +252,18 @@ def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, pieces, uvs, wor
         top -= 1
         to_frame(frame[f], pieces[top], work)
         high = -least_height(kind[f], size[f, 0], size[f, 1], -sense, work)
-        if high > slack:
+        if high + rim > slack:  # no part that has a corner as high as this will stay below
             for i in range(3):
-                if sense * height(kind[f], size[f, 0], size[f, 1], work[i, 0], work[i, 1], work[i, 2]) > slack:
+                if sense * height(kind[f], size[f, 0], size[f, 1], work[i, 0], work[i, 1], work[i, 2]) + rim > slack:
                     return True
         du, v0, v1, _, _ = spans(uvs[top])
         e = bend(kind[g], size[g, 0], size[g, 1], du, v1 - v0, v0, v1) if kind[g] != OTHER else 0.0
         if high + e + rim <= slack:
             continue
         left -= 1
-        # Over a torus ``high`` is only a bound, over the others it is reached.
-        reached = kind[f] != TORUS and high + rim > slack and e < 0.1 * (high + rim - slack)
+        # Over a torus, and in the hole of a cone, ``high`` is only a bound; over the others it is reached.
+        attained = kind[f] != TORUS and (kind[f] != CONE or sense > 0.0)
+        reached = attained and high + rim > slack and e < 0.1 * (high + rim - slack)
         if left < 0 or top + 2 > len(pieces) or reached:
             return True
         bent = e > 0.25 * (high + e + rim - slack)

@@ -191,9 +191,12 @@ def first_time(pair: MovingPair, known: float, thresholds: Thresholds, margin: f
     the steps come to an end, of the leftmost one that is still open.
     """
 
+    # How deep an overlap within the accuracy is, meshes take seconds to say, and rarely can: that it is one is enough.
+    overlap = max(margin, -1e-6) if margin >= -ACCURACY else margin
+
     def enough(distance: Distance) -> bool:
         sharp = distance.upper - distance.lower <= ACCURACY
-        return sharp or distance.lower > 2.0 * margin + ACCURACY or distance.upper <= margin
+        return sharp or distance.lower > 2.0 * margin + ACCURACY or distance.upper <= overlap
 
     todo = [(0.0, known)]
     for _ in range(MAX_STEPS):

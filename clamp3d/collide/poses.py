@@ -3,46 +3,74 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.checks import array, instance, items
+from clamp3d.checks import instance, items
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.batch import by_kernel
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.model import Model, ModelCache
 from clamp3d.collide.refine import refine
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import Verdict
-from clamp3d.core.motion import scene_pose
-from clamp3d.core.pose import Array, inverse
+from clamp3d.collide.verdict import NAMES, Verdict
+from clamp3d.core.motion import FARTHEST, scene_pose
+from clamp3d.core.pose import Array, check_pose_array, inverse
 from clamp3d.errors import InputError, MissingLibraryError
 
 _FEW = 32
 """Other parts up to which all of their boxes are compared with those of all poses."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class PoseVerdicts:
-    """One part at n poses against the others it may meet: arrays (n, k) for k ``others``.
+    """One part at n poses against the k ``others`` that it may meet.
 
-    ``lower`` and ``upper`` bound the signed distance in mm, no more closely than the verdict needs; ``verdict`` holds
-    the verdicts' names.
+    ``row``, ``column`` (m,): the poses and others that come near; ``least``, ``most`` (m,) bound their signed distances
+    in mm, no more closely than the verdict needs; ``kind`` (m,) holds the verdicts' names. All else is clear, more than
+    ``reach`` mm apart.
     """
 
     part: str
     others: tuple[str, ...]
-    verdict: Array
-    lower: Array
-    upper: Array
+    poses: int
+    reach: float
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    least: Array
+    most: Array
+    kind: NDArray[np.str_]
+
+    @cached_property
+    def verdict(self) -> NDArray[np.str_]:
+        """Names (n, k) of the verdicts."""
+        return self._whole(Verdict.CLEAR.value, self.kind)
+
+    @cached_property
+    def lower(self) -> Array:
+        """Lower bounds (n, k) of the signed distances, mm."""
+        return self._whole(self.reach, self.least)
+
+    @cached_property
+    def upper(self) -> Array:
+        """Upper bounds (n, k) of the signed distances, mm; infinite where nothing came near."""
+        return self._whole(np.inf, self.most)
 
     @property
-    def worst(self) -> Array:
+    def worst(self) -> NDArray[np.str_]:
         """Worst verdict (n,) of each pose."""
-        order = {v.value: k for k, v in enumerate(Verdict)}
-        ranks = np.vectorize(order.__getitem__, otypes=[np.int64])(self.verdict)
-        return np.asarray(np.array([v.value for v in Verdict])[ranks.min(axis=1)])
+        names = [v.value for v in Verdict]
+        rank = np.full(self.poses, names.index(Verdict.CLEAR.value))
+        np.minimum.at(rank, self.row, np.argsort(names)[np.searchsorted(np.sort(names), self.kind)])
+        return np.asarray(np.array(names)[rank])
+
+    def _whole(self, other: Any, values: NDArray[Any]) -> NDArray[Any]:
+        made = np.full((self.poses, len(self.others)), other, dtype=values.dtype)
+        made[self.row, self.column] = values
+        return made
 
 
 def check_poses(
@@ -98,39 +126,48 @@ def check_poses(
     )
     if i in rest:
         raise InputError(f"others must not hold {part!r} itself")
-    given = array("poses", poses, (None, 4, 4), finite=False)
-    T = np.array([scene_pose(pose, f"poses[{k}]") for k, pose in enumerate(given)]).reshape(-1, 4, 4)
-    n = len(T)
-    lower, upper = np.full((n, len(rest)), np.inf), np.full((n, len(rest)), np.inf)
-    verdict = np.full((n, len(rest)), Verdict.CLEAR.value, dtype=f"<U{max(len(v.value) for v in Verdict)}")
+    T = check_pose_array(poses)
+    for k in np.flatnonzero(np.abs(T[:, :3, 3]).max(axis=1) > FARTHEST)[:1]:
+        scene_pose(T[k], f"poses[{k}]")
     model = shop.model(scene.parts[i].shape)
     models = [shop.model(scene.parts[j].shape) for j in rest]
     poses_of = np.array([scene.parts[j].T_world for j in rest]).reshape(-1, 4, 4)
-    moving = Boxes.of(np.repeat(model.bounds[None], n, axis=0), T)
-    lower[:] = reach = scene.thresholds.reach + 1e-6
-    rows, columns = _near(moving, Boxes.of(np.array([m.bounds for m in models]).reshape(-1, 2, 3), poses_of), reach)
-    for column in np.unique(columns).tolist():
-        other, near = models[column], rows[columns == column]
-        allowance = scene.allowance(part, scene.parts[rest[column]].name)
-        still = Boxes.of(other.bounds[None], poses_of[column][None])
-        gaps = box_gaps(still.joined(moving), np.column_stack([np.zeros(len(near), dtype=np.int64), 1 + near]))
+    moving = Boxes.of(np.repeat(model.bounds[None], len(T), axis=0), T)
+    still = Boxes.of(np.array([m.bounds for m in models]).reshape(-1, 2, 3), poses_of)
+    reach = scene.thresholds.reach + 1e-6
+    row, column = _near(moving, still, reach)
+    both = still.joined(moving)
+    least, most = np.full(len(row), -np.inf), np.full(len(row), np.inf)
+    kind = np.full(len(row), Verdict.UNCERTAIN.value, dtype=NAMES)
+    # Equal parts that may meet this one alike are measured together.
+    alike: dict[tuple[int, float | None], list[int]] = {}
+    for k in np.unique(column).tolist():
+        allowance = scene.allowance(part, scene.parts[rest[k]].name)
+        alike.setdefault((id(models[k]), allowance), []).append(k)
+    for (_, allowance), columns in alike.items():
+        near = np.flatnonzero(np.isin(column, columns))
+        other, local = models[columns[0]], inverse(poses_of[column[near]]) @ T[row[near]]
+        known = by_kernel(other, model, local)
+        least[near], most[near] = known.lower, known.upper
+        kind[near] = scene.thresholds.verdicts(known.lower, known.upper, allowance)
+        left = np.flatnonzero(kind[near] == Verdict.UNCERTAIN.value)
+        near, local = near[left], local[left]
+        least[near] = box_gaps(both, np.column_stack([column[near], len(rest) + row[near]]))
         shop.counters.queries["boxes"] += len(near)
-        lower[near, column] = gaps
-        near = near[gaps < reach]
-        local = inverse(poses_of[column]) @ T[near]
-        for row, place, known in zip(near.tolist(), local, by_kernel(other, model, local), strict=True):
-            found, kind = known or Distance(float(lower[row, column])), Verdict.UNCERTAIN
+        for m, T_other in zip(near.tolist(), local, strict=True):
+            if least[m] >= reach:
+                kind[m] = Verdict.CLEAR.value
+                continue
             try:
-                if known is None:
-                    found = _refined(other, model, place, found, scene, allowance)
-                kind = scene.thresholds.verdict(found, allowance)
+                found = _refined(other, model, T_other, Distance(float(least[m])), scene, allowance)
+                kind[m] = scene.thresholds.verdict(found, allowance).value
+                least[m], most[m] = found.lower, found.upper
             except MissingLibraryError:
                 raise
             except Exception:  # one pose that fails is a finding, not the end of all others
-                kind = Verdict.FAILED
-            lower[row, column], upper[row, column] = found.lower, found.upper
-            verdict[row, column] = kind.value
-    return PoseVerdicts(part, tuple(scene.parts[j].name for j in rest), verdict, lower, upper)
+                kind[m], most[m] = Verdict.FAILED.value, np.inf
+    names = tuple(scene.parts[j].name for j in rest)
+    return PoseVerdicts(part, names, len(T), reach, row, column, least, most, kind)
 
 
 def _near(moving: Boxes, still: Boxes, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -15,12 +15,12 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm, bodies_distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.convex import Rod
-from clamp3d.collide.faces import faces_distance, stands_out
+from clamp3d.collide.faces import VERDICT_WIDTH, faces_distance, stands_out
 from clamp3d.collide.facets import rod_distance
 from clamp3d.collide.meshes import meshes_distance, within
 from clamp3d.collide.model import FINEST, Model
 from clamp3d.collide.open_mesh import open_distance
-from clamp3d.collide.verdict import Thresholds
+from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import SolverError
 
@@ -129,7 +129,9 @@ def _faces(a: Model, b: Model, T: Array, found: Distance, thresholds: Thresholds
         assert b.faces is not None
         new = faces_distance(a.faces, b.faces, T, contact=thresholds.contact, clearance=thresholds.clearance, tol=tol)
         found = _agreed(found, new)
-        if enough(found):
+        # A search that has not come as far as it was asked to has used up its pieces: to ask for more tells no more.
+        wanted = np.inf if thresholds.verdict(found) is not Verdict.UNCERTAIN else VERDICT_WIDTH * thresholds.contact
+        if enough(found) or (wanted if tol is None else tol) < found.upper - found.lower < np.inf:
             break
     return found
 

@@ -13,14 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.core.pose import Array, rotation
-from clamp3d.core.shells import shells
+from clamp3d.core.shells import corners_of, shells, winding_number
 
 _LEVELS = 4
 """Groups that the triangles with errors are put in at most, each four times finer than the one before."""
-_FEW = 64
-"""Points so few are asked one by one: libigl makes its tree for winding numbers anew at each call."""
-_TURNED = rotation([0.3, 0.5, 0.8], 0.7)[:3, :3]
-"""Edges of parts mostly run along the axes, and so do points that are asked."""
+_TURN = rotation([0.3, 0.5, 0.8], 0.7)[:3, :3]
+"""Edges of parts mostly run along the axes: seen along another direction few points that are asked lie below one."""
 _SHARP = np.cos(np.radians(30.0))
 """Cosine of the angle between the normals of two triangles beyond which their edge is one of the part's."""
 
@@ -134,50 +132,31 @@ class Surface:
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
         """Which of the points (k, 3), none of them on the surface, lie inside: winding numbers of those in the box."""
-        points = np.ascontiguousarray(points, dtype=np.float64)
         found = ((points > self.box[0]) & (points < self.box[1])).all(axis=1)
-        rows = np.flatnonzero(found)
-        if len(rows) <= _FEW:
-            counts = [self.winding_number(points[k]) for k in rows]
-            found[rows] = [count is not None and count > 0 for count in counts]
-            rows = rows[[count is None for count in counts]]
-        if len(rows):
-            import igl
-
-            _, V, F, _ = self._tree
-            found[rows] = igl.winding_number(V, F, points[rows]) > 0.5
+        if found.any():
+            found[found] = self.winding_numbers(points[found]) > 0.5
         return np.asarray(found)
 
+    def winding_numbers(self, points: Array) -> Array:
+        """How often the surface winds round points (k, 3) that are not on it."""
+        from clamp3d.core.kernel_winding import crossings
+
+        corners, low, widest = self._turned
+        found = np.empty(len(points))
+        scale = max(self.scale, float(np.abs(points).max(initial=0.0)))
+        crossings(corners, low, widest, np.ascontiguousarray(points @ _TURN.T), scale, found)
+        for k in np.flatnonzero(np.isnan(found)):  # straight below an edge: the sum of solid angles
+            found[k] = winding_number(corners_of(self.vertices, self.faces), points[k])
+        return found
+
     @cached_property
-    def _shadow(self) -> tuple[Array, Array, float]:
-        """The triangles (m, 3, 3) turned so that few points stand straight below an edge, by their least x (m,).
-
-        And the widest of them in x.
-        """
-        corners = (self.vertices @ _TURNED.T)[self.faces]
+    def _turned(self) -> tuple[Array, Array, float]:
+        """The triangles (m, 9), turned, by their least x (m,), and the width in x of the widest."""
+        corners = (self.vertices @ _TURN.T)[self.faces]
         low, high = corners[:, :, 0].min(axis=1), corners[:, :, 0].max(axis=1)
-        order = np.argsort(low)
-        return corners[order], low[order], float((high - low).max())
-
-    def winding_number(self, point: Array) -> int | None:
-        """The winding number at ``point`` (3,): triangles straight above it, counted by the side that they show.
-
-        None where the line meets an edge or the point a triangle, to rounding.
-        """
-        corners, low, widest = self._shadow
-        point = _TURNED @ point
-        start, end = np.searchsorted(low, [point[0] - widest * (1.0 + 1e-9), point[0]])
-        a, b, c = np.moveaxis(corners[start:end] - point, 1, 0)
-        # Twice the signed areas that each edge spans with the point, seen from above; together the triangle's.
-        areas = np.array([u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] for u, v in ((b, c), (c, a), (a, b))])
-        tiny = 1e-13 * self.scale**2
-        hit = (areas > tiny).all(axis=0) | (areas < -tiny).all(axis=0)
-        near = ((areas >= -tiny).all(axis=0) | (areas <= tiny).all(axis=0)) & ~hit
-        above = (areas * np.array([a[:, 2], b[:, 2], c[:, 2]])).sum(axis=0)[hit]  # times twice the triangle's area
-        if near.any() or (abs(above) <= tiny * self.scale).any():
-            return None
-        side = np.sign(areas[0, hit]).astype(int)
-        return int(side[above * side > 0.0].sum())
+        order = np.argsort(low, kind="stable")
+        made = np.ascontiguousarray(corners[order].reshape(-1, 9)), np.ascontiguousarray(low[order])
+        return (*made, float((high - low).max()) * (1.0 + 1e-12))
 
     def certain_depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside, where the nearest triangle alone says so; minus infinity elsewhere.

@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
 from clamp3d.checks import number, positive
 from clamp3d.collide.answer import Distance
+from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
 
 RESOLUTION = 1e-6
@@ -24,6 +28,10 @@ class Verdict(StrEnum):
     CLEARANCE = "clearance"
     ALLOWED = "allowed"
     CLEAR = "clear"
+
+
+NAMES = f"<U{max(len(v.value) for v in Verdict)}"
+"""Data type of an array of the verdicts' names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +87,23 @@ class Thresholds:
                 return Verdict.CLEAR
             return Verdict.ALLOWED if distance.upper < self.reach else Verdict.UNCERTAIN
         return Verdict.CLASH if distance.upper < limit else Verdict.UNCERTAIN
+
+    def verdicts(self, lower: Array, upper: Array, allowance: float | None = None) -> NDArray[np.str_]:
+        """The verdicts' names of many distances by their bounds (n,), each as `verdict` gives it.
+
+        It is asked once for all bounds that lie alike among the numbers at which a verdict can change.
+        """
+        limit = -max(allowance or 0.0, self.contact)
+        middle = np.where(upper - lower <= 2.0 * RESOLUTION, 0.5 * lower + 0.5 * np.minimum(upper, 1e300), np.nan)
+        marks = [limit, limit - RESOLUTION, self.reach]
+        marks += [-self.contact - RESOLUTION, self.contact + RESOLUTION, self.clearance - RESOLUTION]
+        cell = np.zeros(len(lower), dtype=np.int64)
+        for values in (lower, upper, middle):
+            for side in ("left", "right"):  # a bound that equals a mark lies alike with its equals alone
+                cell = (len(marks) + 1) * cell + np.searchsorted(np.sort(marks), values, side)
+        _, first, kind = np.unique(cell, return_index=True, return_inverse=True)
+        names = [self.verdict(Distance(float(lower[k]), float(upper[k])), allowance).value for k in first]
+        return np.array(names, dtype=NAMES)[kind]
 
     def _of(self, distance: float) -> Verdict:
         if distance < -self.contact - RESOLUTION:

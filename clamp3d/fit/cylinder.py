@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 from scipy.optimize import least_squares
 
 from clamp3d.core.pose import Array
@@ -158,7 +158,7 @@ def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> f
     )
     g = np.column_stack([np.ones_like(a), np.sin(a), -np.cos(a), z * np.sin(a), -z * np.cos(a)])
     worst = float(np.einsum("ij,jk,ik->i", g, C, g).max())
-    return float(np.sqrt(5.0 * stats.f.ppf(CONFIDENCE, 5, max(freedom, 1)) * worst))
+    return float(np.sqrt(5.0 * special.fdtri(5, max(freedom, 1), CONFIDENCE) * worst))
 
 
 def patches_of(local: Array) -> list[NDArray[np.intp]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
@@ -113,7 +113,7 @@ def _tolerance(residual: Array) -> float:
     if n < 60:  # the median of few is too rough
         scatter = max(scatter, float(np.sqrt(np.mean(residual**2))))
     scatter *= np.sqrt(n / freedom)
-    return float(scatter * stats.t.isf(3.2e-5, min(freedom, 1000)))
+    return float(-scatter * special.stdtrit(min(freedom, 1000), 3.2e-5))
 
 
 def _support(surface: Surface, faces: IntArray, on: BoolArray) -> IntArray:

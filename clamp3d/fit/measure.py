@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
@@ -150,7 +150,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         "covered_area": area,
         "coverage": min(1.0, area / (2.0 * half * axis.radius * length)),
         # Few points know their own scatter badly: three standard errors shall mean 99.73 % all the same.
-        "covariance": C * (float(stats.t.isf(0.5 * (1.0 - CONFIDENCE), freedom)) / 3.0) ** 2,
+        "covariance": C * (float(special.stdtrit(freedom, 0.5 * (1.0 - CONFIDENCE))) / 3.0) ** 2,
         "covariance_error": surface_error(C, half, length, freedom),
         "form_error": _form_error(points, residual, rms) + 2.0 * surface.mesh.rounding,
         "chord_error": sagitta(axis.radius, region.span),

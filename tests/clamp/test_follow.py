@@ -17,7 +17,7 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.steps import section_poses
-from clamp3d.clamp.ways import DIRECTIONS, Ways, way_out
+from clamp3d.clamp.ways import DIRECTIONS, SPARE, Ways, way_out
 from clamp3d.core.meshing import mesh
 from clamp3d.errors import SequenceError
 from clamp3d.output.report import make_report
@@ -108,9 +108,9 @@ def test_parts_that_come_one_by_one_overlap_nowhere_and_end_in_the_same_clamp(se
     for a, b in itertools.combinations(PARTS, 2):
         if {a, b} != {"P3", "P4"}:
             assert volume(a, first[a].T(), b, first[b].T()) == 0.0, (a, b)
-    ends = {w.step: w for w in run.path}
-    assert list(ends) == list(dict.fromkeys(w.step for w in run.path))
-    assert len(ends) == sequence.count("->") + 1 + 2 * ("P5|" not in sequence)
+    (ends,) = [w.poses for w in run.path if w.label == "nut on the bolt's end"]
+    assert ends["P5"].y + run.clamp.nut.height == pytest.approx(ends["P4"].y, abs=1e-9)
+    assert len({w.step for w in run.path}) == sequence.count("->") + 1 + 2 * ("P5|" not in sequence)
 
 
 def test_the_papers_own_motions_overlap_nowhere():
@@ -148,7 +148,7 @@ def assert_as_volumes_say(part, others):
         ("P7", ("P1", "P3", "P4", "P6"), True),
         ("P4", ("P1", "P3", "P5", "P6"), True),
         ("P3", ("P1", "P5", "P7"), True),
-        ("P1", ("P5", "P6"), False),
+        ("P1", ("P5", "P7", "P6"), False),  # from below the line is in the way before the jumper
     ],
 )
 def test_a_way_is_free_or_blocked_as_volumes_say(part, others, free):
@@ -182,10 +182,11 @@ def test_a_splint_that_rests_on_the_line_beside_the_middle_of_its_groove_comes_f
 
 
 def test_the_nut_comes_down_on_the_bolts_end_and_blocks_the_splint_below_it():
-    """By hand: the splint rises from under the nut until its top is at the nut's seat, as far as both are high."""
-    ways, place = Ways(load_clamp()), open_place()
-    block = ways.block([("P1", "P5")], place, "from above", 100.0)
-    assert block.travel == pytest.approx(100.0 - 26.4 - 27.726, abs=2e-4)
+    """By hand: the splint comes from as far above as both are high, and the free way that waits have."""
+    place = open_place()
+    (block,) = [b for b in Ways(load_clamp()).blocks([("P1", "P5")], place) if b.origin == "from above"]
+    assert block.way == pytest.approx(SPARE + 26.4 + 27.726, abs=1e-9)
+    assert block.travel == pytest.approx(SPARE, abs=2e-4)
     assert block.point[2] == pytest.approx(place["P5"][2, 3], abs=2e-4)
 
 

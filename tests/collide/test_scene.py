@@ -10,17 +10,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check import check, check_full
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.poses import check_poses
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import Verdict
+from clamp3d.collide.verdict import RESOLUTION, Thresholds, Verdict
 from clamp3d.core import shapes
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.meshing import mesh
@@ -248,3 +251,40 @@ def test_pose_sweep_equals_single_checks():
 def test_bad_input(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+MARKS = [m + k * RESOLUTION for m in (-0.3, -0.01, 0.0, 0.01, 0.5) for k in (-2.0, -1.0, 0.0, 1.0, 2.0)]
+BOUND = st.sampled_from([*MARKS, *(0.5 * (x + y) for x, y in itertools.pairwise(sorted(MARKS)))]) | st.floats(-1.0, 1.0)
+
+
+@given(
+    bounds=st.lists(st.tuples(BOUND, BOUND | st.just(math.inf)), min_size=1, max_size=40),
+    allowance=st.sampled_from([None, 0.0, 0.3]),
+    clearance=st.sampled_from([0.0, 0.5]),
+)
+def test_verdicts_of_many_distances_are_those_of_each(bounds, allowance, clearance):
+    lower, upper = (np.array(x) for x in zip(*(sorted(pair) for pair in bounds), strict=True))
+    lower[0] = -math.inf
+    thresholds = Thresholds(clearance=clearance)
+    each = [thresholds.verdict(Distance(*pair), allowance).value for pair in zip(lower, upper, strict=True)]
+    assert thresholds.verdicts(lower, upper, allowance).tolist() == each
+
+
+def test_equal_parts_of_a_scene_are_each_met_where_they_stand():
+    """A row of equal blocks, one of them turned, one allowed to be touched: as the checks of single poses say."""
+    rng = np.random.default_rng(5)
+    block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 20.0)
+    scene = Scene(clearance=0.5)
+    for k in range(40):
+        place = translation(45.0 * k, 0.0, 0.0) @ (rotation((0, 1, 0), 0.1) if k == 3 else np.eye(4))
+        scene = scene.add(f"block{k}", block, place)
+    scene = scene.add("wire", shapes.cylinder(6.5, 30.0)).allow(("wire", "block2"), overlap=0.3)
+    poses = np.array([rotation(rng.normal(size=3), 0.02) for _ in range(40)])
+    poses[:, :3, 3] = rng.uniform(-0.8, 0.8, (40, 3)) + np.outer(rng.integers(0, 5, 40) * 45.0, [1, 0, 0])
+    sweep = check_poses(scene, "wire", poses)
+    for k, T in enumerate(poses):
+        one = check(scene.moved({"wire": T}))
+        assert [one.verdict("wire", name).value for name in sweep.others] == sweep.verdict[k].tolist()
+        assert sweep.worst[k] == min(sweep.verdict[k], key=[v.value for v in Verdict].index)
+    assert (sweep.lower <= sweep.upper).all()
+    assert set(sweep.verdict.ravel()) >= {"clash", "clear", "clearance", "allowed"}

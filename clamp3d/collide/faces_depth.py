@@ -1,0 +1,66 @@
+"""How deep two solids from CAD overlap: a depth that a point has, and a translation after which they are apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from clamp3d.brep.surfaces import OTHER, height
+from clamp3d.collide.answer import Distance
+from clamp3d.collide.depth_cover import nearest_behind
+from clamp3d.collide.faces import FaceModel, faces_distance
+from clamp3d.core.pose import Array, inverse
+
+_ASKS = 3
+"""Translations that are tried, each past one more place that touches."""
+_SHARE, _LEAST = 0.005, 0.001
+"""So much further, by the depth or in mm, whichever is more, b is moved, so that a gap can be seen."""
+_STEP = 1e-6
+
+
+def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distance:
+    """What is soon found of the depth of two solids that overlap by ``-known.upper``, b at ``T`` (4, 4) in a's frame.
+
+    No translation shorter than the depth of any one point parts them; one after which they are apart is long enough.
+    Without such a one ``lower`` stays minus infinity.
+    """
+    found = faces_distance(a, b, T, contact=_LEAST, tol=max(_LEAST, -_SHARE * known.upper))
+    inside = (max(0.0, -known.upper, -found.upper), max(0.0, -found.lower))
+    known = replace(known if known.upper <= found.upper else found, lower=-np.inf, interference=inside)
+    margin, planes, t, place = max(_LEAST, _SHARE * inside[0]), [], np.zeros(3), T.copy()
+    at, deep = found.point_a, -found.upper
+    for step in range(_ASKS):
+        if (way := _way_out(a, b, place, found)) is None:
+            break
+        n, of_b = way
+        planes.append(np.array([*n, float(n @ t) - found.upper + margin]))
+        t = nearest_behind(np.array(planes), t)
+        size = float(np.linalg.norm(t))
+        if size > 2.0 * (inside[0] + margin):  # a long way out, or nothing is behind all the planes
+            break
+        place[:3, 3] = T[:3, 3] + t
+        found = faces_distance(a, b, place, contact=0.25 * margin)
+        if found.lower > 0.0:
+            p, q = (None, None) if step or at is None else (at + deep * n, at) if of_b else (at, at - deep * n)
+            return replace(known, lower=-size, normal=t / size, point_a=p, point_b=q)
+    return known
+
+
+def _way_out(a: FaceModel, b: FaceModel, T: Array, found: Distance) -> tuple[Array, bool] | None:
+    """Unit vector (3,) along which b moves so that the deepest point found is in one solid only, and whether it is b's.
+
+    None if there is none: the nearest face is not one of those with a formula.
+    """
+    if not found.upper < 0.0 or found.point_a is None:
+        return None
+    here, best = inverse(T), (1e-3, np.zeros(3), True)
+    sides = (a, found.point_a, np.eye(3)), (b, here[:3, :3] @ found.point_a + here[:3, 3], -T[:3, :3])
+    for model, point, turn in sides:
+        f, steps = model.faces, np.vstack([point, point + _STEP * np.eye(3), point - _STEP * np.eye(3)])
+        for i in np.flatnonzero(f.kind != OTHER):
+            h = f.sense[i] * height(int(f.kind[i]), f.frame[i], (float(f.size[i, 0]), float(f.size[i, 1])), steps)
+            if abs(h[0] - found.upper) < best[0]:
+                best = abs(float(h[0]) - found.upper), turn @ (h[1:4] - h[4:]), model is a
+    size = float(np.linalg.norm(best[1]))
+    return (best[1] / size, best[2]) if size > 0.0 else None
