@@ -51,4 +51,4 @@ def _crossings(corners, low, widest, points, scale, found):  # type: ignore[no-u
     return 0
 
 
-crossings = entry(_crossings, "i8(f8[:,::1],f8[::1],f8,f8[:,::1],f8,f8[::1])", sources="kernel_winding.py")
+crossings = entry(_crossings, "i8(f8[:,::1],f8[::1],f8,f8[:,::1],f8,f8[::1])")
