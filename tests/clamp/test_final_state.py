@@ -14,7 +14,7 @@ from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.assemblies.minima import minima
 from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble
 from clamp3d.clamp.conductors import catalogue
-from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
+from clamp3d.clamp.final_state import TOLERANCE, _settle_loose, solve_final_state
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import SIZE, Section
 from clamp3d.clamp.stepped import solve_stepped
@@ -205,3 +205,27 @@ def test_a_loose_wire_in_a_sliver_is_put_down_without_overlap():
     state = solve_final_state(Section(case.clamp, Cas()), case.start)
     assert state.loose == ("P7",)
     assert state.gaps.value.min() >= -1e-9
+
+
+def test_wires_of_an_open_state_are_in_the_middle_between_their_arc_centres(clamp):
+    section = Section(clamp, Cas())
+    for tilt in (0.0, 0.05):
+        q = section.open_state(60.0, tilt)
+        pose = section.down_splint(q)
+        for i, wire in enumerate(("P6", "P7")):
+            up, down = section.pairs["P1", wire].T_a_groove, section.pairs["P2", wire].T_a_groove
+            centres = np.array([[up[0, 3], -up[2, 3]], pose.point(down[0, 3], -down[2, 3])])
+            assert q[2 * i : 2 * i + 2] == pytest.approx(centres.mean(axis=0), abs=1e-9)
+
+
+@pytest.mark.parametrize(("wire", "down"), [("P6", -1.0), ("P7", 1.0)])
+def test_a_loose_wire_is_put_where_gravity_leaves_it(clamp, wire, down):
+    """The clamp hangs on the line, so beside it the line goes up; the jumper falls into the down splint."""
+    section = Section(clamp, Cas())
+    q, y = section.open_state(60.0), 2 * ("P6", "P7").index(wire) + 1
+    fallen = _settle_loose(section, q, wire)
+    assert down * (fallen[y] - q[y]) > 1.0
+    assert abs(section.wire_gaps(fallen, wire).value.min()) <= TOLERANCE
+    q[y - 1] += 1e3  # no longer between the splints
+    assert wire in section.escaped(q)
+    assert np.array_equal(_settle_loose(section, q, wire), q)

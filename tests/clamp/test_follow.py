@@ -128,6 +128,7 @@ def assert_as_volumes_say(part, others):
                 assert volume(part, at(place[part], offset), b, place[b]) < TOUCHING, (legs, offset, b)
     blocks = () if legs else ways.blocks(pairs, place)
     assert legs or blocks
+    assert blocks == tuple(sorted(blocks, key=lambda block: block.way - block.travel))
     for block in blocks:
         u = np.array(DIRECTIONS[block.origin])
 

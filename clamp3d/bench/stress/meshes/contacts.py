@@ -85,15 +85,17 @@ def _contact(
 
 
 def _box(low: tuple[float, ...], high: tuple[float, ...]) -> trimesh.Trimesh:
-    return trimesh.creation.box(bounds=[low, high])
+    made: trimesh.Trimesh = trimesh.creation.box(bounds=[low, high])
+    return made
 
 
 def _prism(depth: float, *corners: tuple[float, float]) -> trimesh.Trimesh:
     """An outline in x and z, from y = -depth / 2 to depth / 2."""
     from shapely import Polygon
 
-    made = trimesh.creation.extrude_polygon(Polygon(corners), depth)
-    return made.apply_translation((0.0, 0.0, -0.5 * depth)).apply_transform(_UPRIGHT)
+    made: trimesh.Trimesh = trimesh.creation.extrude_polygon(Polygon(corners), depth)
+    made.apply_translation((0.0, 0.0, -0.5 * depth)).apply_transform(_UPRIGHT)
+    return made
 
 
 def _lowered(rng: np.random.Generator, body: trimesh.Trimesh) -> trimesh.Trimesh:
@@ -102,8 +104,9 @@ def _lowered(rng: np.random.Generator, body: trimesh.Trimesh) -> trimesh.Trimesh
     if rng.random() < 1 / 3:
         R = rotation((0.0, 0.0, 1.0), rng.uniform(0.0, math.pi))
         R = R @ rotation((1.0, 0.0, 0.0), 0.5 * math.pi * int(rng.integers(4)))
-    turned = body.copy().apply_transform(R)
-    return turned.apply_translation(-turned.vertices[turned.vertices[:, 2].argmin()])
+    turned: trimesh.Trimesh = body.copy().apply_transform(R)
+    turned.apply_translation(-turned.vertices[turned.vertices[:, 2].argmin()])
+    return turned
 
 
 def _block(rng: np.random.Generator) -> trimesh.Trimesh:
@@ -137,7 +140,8 @@ MAKERS = Makers("mesh: ")
 def _plain(rng: np.random.Generator) -> Contact:
     """Blocks 1e-6 ... 1e-2 mm off or in each other, by a face, an edge or a corner."""
     floor, gap = _box((-30.0, -30.0, -rng.uniform(5.0, 10.0)), (30.0, 30.0, 0.0)), _gap(rng)
-    return _contact(rng, floor, _block(rng), translation(*rng.uniform(-10.0, 10.0, 2), gap), gap)
+    x, y = rng.uniform(-10.0, 10.0, 2).tolist()
+    return _contact(rng, floor, _block(rng), translation(x, y, gap), gap)
 
 
 @MAKERS.family("seam", _all)
@@ -198,7 +202,8 @@ def _fcl_alone(case: Contact) -> Answer:
         fcl.CollisionObject(bvh(mesh.vertices, mesh.faces), fcl.Transform(T[:3, :3], T[:3, 3]))
         for mesh, T in ((case.a, np.eye(4)), (case.b, case.T))
     ]
-    return Answer(float(fcl.distance(*bodies, fcl.DistanceRequest(), fcl.DistanceResult())))
+    found = float(fcl.distance(*bodies, fcl.DistanceRequest(), fcl.DistanceResult()))
+    return Answer(found if found > 0.0 else -1.0)  # it says 0 where triangles cross
 
 
 class ContactFamily(Family):

@@ -46,10 +46,10 @@ class Answer:
 class OneByOne:
     """A method that answers one mesh at a time."""
 
-    ask: Callable[[MeshCase], Answer]
+    ask: Callable[[Any], Answer]
     measures: Measures = "clearance"
 
-    def measure(self, cases: MeshCases) -> Measured:
+    def measure(self, cases: Any) -> Measured:
         """See `Method`."""
         found = [self.ask(cases[i]) for i in range(len(cases))]
         return Measured(
