@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import OTHER, Faces, height
 from clamp3d.collide.answer import Distance
+from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.pose import Array, inverse
 
 _MOST = 20_000
@@ -163,7 +164,7 @@ def faces_distance(
     if len(a.faces.face) < len(b.faces.face):  # the pieces of the one with fewer first: they often decide
         return faces_distance(b, a, here, contact=contact, clearance=clearance, tol=tol).moved(T).swapped()
     first = _towards(a, b, T, contact, clearance, tol)
-    if tol is None and first.upper < -contact:
+    if tol is None and first.upper < -contact - 2.0 * RESOLUTION:
         return _told(replace(first.swapped(), lower=-np.inf))
     margin = max(contact, clearance)
     low, high = first.lower, first.upper

@@ -36,6 +36,7 @@ from clamp3d.collide.faces_math import (
     to_frame,
 )
 from clamp3d.collide.faces_tree import DEEP, from_faces, mark_face, nearest, nearest_marked
+from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.jit import entry, formula
 
 NEAR = 4
@@ -331,7 +332,7 @@ def _descend(
     heights, over, p, q = over[:TRIED], over[TRIED:], whole[2, 0], whole[2, 1]
     scratch = (near, chosen, heights, over, inner, whole)
     verdict = tol < 0.0
-    goal = max(contact, clearance) + 1e-9 if verdict else np.inf
+    goal = max(contact, clearance) + 2.0 * RESOLUTION if verdict else np.inf
     tol = abs(tol)
     limits = (slack, contact, goal, tol)
     first, waiting = n, 0
@@ -339,7 +340,7 @@ def _descend(
     looked, floor = 0, np.inf
     stack[0], top = 0, 1
     while top > 0:
-        if verdict and out[0] < -contact:
+        if verdict and out[0] < -contact - 2.0 * RESOLUTION:
             return -np.inf
         top -= 1
         i = stack[top]
@@ -381,9 +382,9 @@ def _descend(
             known = (
                 known
                 or low > goal
-                or high < -contact
+                or high < -contact - 2.0 * RESOLUTION
                 or (low >= -contact and high <= contact)
-                or (low > contact and high < clearance)
+                or (low > contact + 2.0 * RESOLUTION and high < clearance - 2.0 * RESOLUTION)
             )
         if known or n >= len(faces) or n - first >= most:
             break
