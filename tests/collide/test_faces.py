@@ -293,7 +293,10 @@ def test_bounds_hold_against_open_cascade(a, b, axis, angle, at):
 
 
 # In the last two an overlap is 10 % short of the contact threshold, at a corner of an arc and along an edge of a cone.
-@pytest.mark.parametrize(("name", "seed"), [*itertools.product(ASSEMBLIES, (None, 1)), ("clip", 2), ("taper", 2)])
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [*itertools.product(ASSEMBLIES, (None, 1)), *((name, 2) for name in ("clip", "taper", "fasteners"))],
+)
 def test_assemblies(name, seed):
     if name in ("bearing", "gears"):
         pytest.importorskip("bd_warehouse")
