@@ -176,15 +176,13 @@ class Distances:
 
     def with_rows(self, rows: list[int], found: list[Distance]) -> Distances:
         """The same with single distances in place of ``rows``."""
-        fields = {}
-        for name in ("lower", "upper", "point_a", "point_b", "normal"):
-            fields[name] = getattr(self, name).copy()
-            for k, d in zip(rows, found, strict=True):
-                value = getattr(d, name)
-                fields[name][k] = np.nan if value is None else value
-        method = list(self.method)
+        names, method = ("lower", "upper", "point_a", "point_b", "normal"), list(self.method)
+        fields = {name: getattr(self, name).copy() for name in names}
         for k, d in zip(rows, found, strict=True):
             method[k] = d.method
+            for name, values in fields.items():
+                value = getattr(d, name)
+                values[k] = np.nan if value is None else value
         return Distances(**fields, method=tuple(method))
 
 

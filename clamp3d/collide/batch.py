@@ -30,7 +30,7 @@ def by_kernel(a: Model, b: Model, T: Array) -> Distances:
         return _nothing(len(T))
     (first,), (second,) = a.bodies, b.bodies
     found = _by_kernel(first, second, T)
-    swapped = _by_kernel(second, first, inverse(T))
+    swapped = _by_kernel(second, first, inverse(T)) if second.bores else None
     if swapped is None:
         return found or _nothing(len(T))
     R, t = T[:, :3, :3], T[:, :3, 3]

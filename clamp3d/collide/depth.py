@@ -39,8 +39,8 @@ _CUBES = 20
 _EXTRA = 8
 """Pieces after which a depth that is `known_well` is not made better."""
 _STEPS = np.array([v for v in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
-_ROOM = 8.0
-"""How far from a common point pieces of large meshes reach, in parts of the shortest way out that is known."""
+_HALF_EXTENT = 8.0
+"""Half extent of the box about a common point that pieces of large meshes are cut to, by the shortest known way out."""
 _FINE = 0.01
 """Chord error (mm) of the mesh that stands for a part without closed form."""
 
@@ -83,10 +83,10 @@ class _Pair:
                 self.best = (size, t, found)
         return found
 
-    def overlap_at(self, t: Array, known: Distance, room: float) -> Array | None:
+    def overlap_at(self, t: Array, known: Distance, half_extent: float) -> Array | None:
         """Planes (k, 4) of a convex set of translations that overlap, ``t`` (3,) among them; None if none is found.
 
-        Of large meshes it is made of what lies within ``room`` mm of a point that the bodies have in common.
+        Of large meshes it is made of what lies in a box about a common point, ``half_extent`` mm to each side.
         """
         named = [x for x in (known.point_a, known.point_b) if x is not None and known.upper < 0.0]
         if len(named) == 2:
@@ -100,7 +100,7 @@ class _Pair:
             ]
             margin, p, x, y = max(found, key=lambda item: item[0], default=(0.0, t, None, None))
             if margin > 0.0 and x is not None and y is not None:
-                A, B = _around(x, p, room), _around(y, (p - t - self.T[:3, 3]) @ self.T[:3, :3], room)
+                A, B = _around(x, p, half_extent), _around(y, (p - t - self.T[:3, 3]) @ self.T[:3, :3], half_extent)
                 if A is not None and B is not None:
                     try:
                         return difference(A, _moved(B, self.T), t)
@@ -238,7 +238,7 @@ def _searched(pair: _Pair, found: Distance, known: Distance) -> Distance:
     sets: list[Array] = []
     t, proven, cubes = np.zeros(3), 0.0, 0
     for step in range(_SETS):
-        new = pair.overlap_at(t, known, _ROOM * -found.lower)
+        new = pair.overlap_at(t, known, _HALF_EXTENT * -found.lower)
         if new is not None:
             sets.append(new)
             union = Union(sets, -found.lower * (1.0 + 1e-9))
@@ -353,8 +353,8 @@ def _bodies(model: Model) -> tuple[Body, ...]:
     return () if mesh is None else (mesh,)
 
 
-def _around(body: Body, x: Array, room: float) -> Hull | None:
-    return around_in_mesh(body, x, room) if isinstance(body, Surface) else around_in_form(body, x)
+def _around(body: Body, x: Array, half_extent: float) -> Hull | None:
+    return around_in_mesh(body, x, half_extent) if isinstance(body, Surface) else around_in_form(body, x)
 
 
 def _innermost(x: Body, y: Body, T: Array, t: Array, point: Array, size: float) -> tuple[float, Array]:

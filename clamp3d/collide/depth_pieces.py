@@ -59,20 +59,20 @@ def _prism(rod: Rod, x: Array) -> Array:
     return np.column_stack([N, d - N @ rod.T[:3, 3]])
 
 
-def around_in_mesh(mesh: Surface, x: Array, room: float) -> Hull | None:
+def around_in_mesh(mesh: Surface, x: Array, half_extent: float) -> Hull | None:
     """Polyhedron around ``x`` (3,), which lies inside the mesh; None if the point is not well inside.
 
-    Of more than `_LARGE` triangles it is cut off ``room`` mm from the point along the axes.
+    Of more than `_LARGE` triangles it is cut to the box of this ``half_extent`` (mm) about the point.
     """
     corners = mesh.vertices[mesh.faces]
     error = np.zeros(len(corners)) if mesh.face_error is None else mesh.face_error
     N, d = mesh_planes(mesh)
     planes = []
     if len(corners) > _LARGE:
-        within = (corners.min(axis=1) - error[:, None] < x + room).all(axis=1)
-        within &= (corners.max(axis=1) + error[:, None] > x - room).all(axis=1)
+        within = (corners.min(axis=1) - error[:, None] < x + half_extent).all(axis=1)
+        within &= (corners.max(axis=1) + error[:, None] > x - half_extent).all(axis=1)
         corners, error, N, d = corners[within], error[within], N[within], d[within]
-        planes = [np.array([*n, -(n @ x) - room]) for n in np.vstack([np.eye(3), -np.eye(3)])]
+        planes = [np.array([*n, -(n @ x) - half_extent]) for n in np.vstack([np.eye(3), -np.eye(3)])]
     feet = closest_on_triangles(corners, x) if len(corners) else corners[:, 0]
     away = np.linalg.norm(feet - x, axis=1)
     height = d - N @ x  # of the triangles' own planes above the point
