@@ -63,9 +63,7 @@ def _is_plate(form: ClosedForm) -> bool:
         if not bore.radius < inside - _SAME * size:
             return False
         middles.append((bore.T[:3, 3], bore.radius))
-    return all(
-        np.linalg.norm(p - q) > r + s + _SAME * size for k, (p, r) in enumerate(middles) for q, s in middles[:k]
-    )
+    return all(np.linalg.norm(p - q) > r + s + _SAME * size for k, (p, r) in enumerate(middles) for q, s in middles[:k])
 
 
 def drilled_depth(a: ClosedForm, b: ClosedForm, T: Array) -> Distance | None:
@@ -84,17 +82,18 @@ def drilled_depth(a: ClosedForm, b: ClosedForm, T: Array) -> Distance | None:
     for bore in a.bores:
         low, t = _into_hole(bore, rod, T, -found.lower)
         shortest = min(-found.upper, low)
-        length = float(np.linalg.norm(t))
-        if low < -found.lower:
-            out = T.copy()
-            out[:3, 3] += t
+        for more in (1.0, 1.0 + 1e-9, 1.0 + 1e-6):
+            out, length = T.copy(), more * float(np.linalg.norm(t))
+            if not 0.0 < length < -found.lower:
+                break
+            out[:3, 3] += more * t
             at = bore_rod(bore, rod, out)
-            if length < -found.lower and at.lower > 0.0:  # the kernel finds it in the hole
-                assert at.point_b is not None
-                normal = t / length if length > 0.0 else at.normal
-                found = Distance(-length, -shortest, at.point_a, at.point_b - t, normal, None, "depth", "hole")
+            if at.lower > 0.0 and at.point_b is not None:  # the kernel finds it in the hole
+                q = at.point_b - more * t
+                found = Distance(-length, 0.0, at.point_a, q, more * t / length, None, "depth", "hole")
+                break
         found = replace(found, upper=-shortest)
-    return found if found.upper < 0.0 else Distance(found.lower, np.inf, None, None, found.normal, None, "depth")
+    return found if found.upper < 0.0 else replace(found, upper=np.inf)
 
 
 def _into_hole(bore: Bore, rod: Rod, T: Array, limit: float) -> tuple[float, Array]:

@@ -165,22 +165,32 @@ def _hole(c, R, H, limit, tolerance, most, heap, A, f, x, w, order, y, Q, at, ou
     if first >= last:
         return 0
     slack = 1e-11 * size
-    n, count, lower = 0, 0, math.inf
+    n, count, lower, floor = 0, 0, math.inf, math.inf
     low = stretch(first, last, best, R, inner, pin, size, slack, A, f, x, w, order, y, Q, at)
-    n = push(heap, n, low, first, last, at[2], at[3])
+    n = push(heap, n, low, first, last, at[2], 0.0)
     while n:
-        low, first, last, z, off = heap[0, 0], heap[0, 1], heap[0, 2], heap[0, 3], heap[0, 4]
+        low, first, last, z = heap[0, 0], heap[0, 1], heap[0, 2], heap[0, 3]
         if low >= best - tolerance or n + 2 > heap.shape[0] or count >= most:
             lower = low
             break
         n = drop(heap, n)
-        stretch(z, z, best, R - 2.0 * slack, inner, pin, size, slack, A, f, x, w, order, y, Q, at)
-        count += 1
-        if at[3] <= slack:
-            length = math.sqrt(at[0] ** 2 + at[1] ** 2 + at[2] ** 2)
-            if length < best:
-                best = length
-                out[2], out[3], out[4] = at[0], at[1], at[2]
+        off = 0.0  # where the pin only just fits, it does a little further along the hole
+        while True:
+            at_z = z if off == 0.0 else min(max(z + off, first), last)
+            stretch(at_z, at_z, best, R - 2.0 * slack, inner, pin, size, slack, A, f, x, w, order, y, Q, at)
+            count += 1
+            if at[3] <= slack:
+                length = math.sqrt(at[0] ** 2 + at[1] ** 2 + at[2] ** 2)
+                if length < best:
+                    best = length
+                    out[2], out[3], out[4] = at[0], at[1], at[2]
+                break
+            off = -off if off > 0.0 else max(tolerance, -100.0 * off)
+            if off > 0.1 * (last - first) or last - first > 1e-2 * size:
+                break
+        if last - first <= tolerance:
+            floor = min(floor, low)
+            continue
         middle = z if min(z - first, last - z) > 0.1 * (last - first) else 0.5 * (first + last)
         for side in range(2):
             u, v = (first, middle) if side == 0 else (middle, last)
@@ -188,8 +198,10 @@ def _hole(c, R, H, limit, tolerance, most, heap, A, f, x, w, order, y, Q, at, ou
             count += 1
             below = max(below, low)
             if below < best - tolerance:
-                n = push(heap, n, below, u, v, at[2], at[3])
-    out[0], out[1] = max(min(lower, best - tolerance) - clear, 0.0), best
+                n = push(heap, n, below, u, v, at[2], 0.0)
+            else:
+                floor = min(floor, below)
+    out[0], out[1] = max(min(lower, floor, best) - clear, 0.0), best
     return count
 
 
