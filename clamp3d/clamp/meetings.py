@@ -16,6 +16,7 @@ from clamp3d.clamp.scene import CONTACT, clamp_scene
 from clamp3d.collide.check import check
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.verdict import Verdict
+from clamp3d.core.linear import norm
 from clamp3d.core.pose import Array, SectionPose
 
 _MEET = (Verdict.CONTACT, Verdict.CLASH, Verdict.CONTAINED)
@@ -24,7 +25,7 @@ _MEET = (Verdict.CONTACT, Verdict.CLASH, Verdict.CONTAINED)
 def meetings(clamp: Clamp, path: Sequence[Waypoint], pairs: Sequence[Pair], cache: ModelCache) -> dict[Pair, str]:
     """Those of ``pairs`` that touch or overlap anywhere on ``path``, with the step in which each does so first."""
     waiting = list(pairs)
-    reach = {name: float(np.linalg.norm(np.abs(part.bounds).max(axis=0))) for name, part in parts(clamp).items()}
+    reach = {name: norm(np.abs(part.bounds).max(axis=0)) for name, part in parts(clamp).items()}
     found: dict[Pair, str] = {}
     for before, after in itertools.pairwise(path):
         for pair in _meet(clamp, before, after, waiting, reach, cache):

@@ -12,6 +12,7 @@ from clamp3d.collide.body import Bore, ClosedForm
 from clamp3d.collide.convex import MEMBER, Rod
 from clamp3d.collide.model import Model
 from clamp3d.core.distance import signed_distances
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 
@@ -73,7 +74,7 @@ def _by_kernel(a: ClosedForm, b: ClosedForm, T: Array) -> Distances | None:
 
 def _bore_rod(bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, T: Array) -> Distances:
     wire, covers = Cylinder(rod.radius, rod.length), bore.covers()
-    places = [np.ascontiguousarray(inverse(P) @ T @ rod.T) for _, P in covers]
+    places = [np.ascontiguousarray(dot(dot(inverse(P), T), rod.T)) for _, P in covers]
     answers = [signed_distances(groove, wire, P, full=True) for (groove, _), P in zip(covers, places, strict=True)]
     k, row = np.array([answer.distance for answer in answers]).argmin(axis=0), np.arange(len(T))
     d, e, p, q, n = (

@@ -17,6 +17,7 @@ from clamp3d.collide.model import Model, ModelCache
 from clamp3d.collide.refine import refine
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import NAMES, Verdict
+from clamp3d.core.linear import dot
 from clamp3d.core.motion import FARTHEST, scene_pose
 from clamp3d.core.pose import Array, check_pose_array, inverse
 from clamp3d.errors import InputError, MissingLibraryError
@@ -146,7 +147,7 @@ def check_poses(
         alike.setdefault((id(models[k]), allowance), []).append(k)
     for (_, allowance), columns in alike.items():
         near = np.flatnonzero(np.isin(column, columns))
-        other, local = models[columns[0]], inverse(poses_of[column[near]]) @ T[row[near]]
+        other, local = models[columns[0]], dot(inverse(poses_of[column[near]]), T[row[near]])
         known = by_kernel(other, model, local)
         least[near], most[near] = known.lower, known.upper
         kind[near] = scene.thresholds.verdicts(known.lower, known.upper, allowance)

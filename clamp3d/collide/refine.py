@@ -21,6 +21,7 @@ from clamp3d.collide.meshes import meshes_distance, within
 from clamp3d.collide.model import FINEST, Model
 from clamp3d.collide.open_mesh import open_distance
 from clamp3d.collide.verdict import Thresholds, Verdict
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import SolverError
 
@@ -94,7 +95,7 @@ def contained(a: Model, b: Model, T: Array, thresholds: Thresholds) -> bool:
     for inner, outer, place in ((b, a, T), (a, b, inverse(T))):
         middle, half = inner.bounds.mean(axis=0), 0.5 * (inner.bounds[1] - inner.bounds[0])
         R = place[:3, :3]
-        centre, reach = R @ middle + place[:3, 3], abs(R) @ half
+        centre, reach = dot(R, middle) + place[:3, 3], dot(abs(R), half)
         box = outer.bounds
         # The box of the inner one touches the outer's on six sides: one outside by more than its own corners can be
         # is enough to say no, and cheap.
@@ -209,5 +210,5 @@ def with_normal(found: Distance) -> Distance:
     p, q = found.point_a, found.point_b
     if p is None or q is None or not found.upper > 1e-6:
         return found
-    size = float(np.linalg.norm(q - p))
+    size = norm(q - p)
     return replace(found, normal=(q - p) / size) if size > 1e-6 else found
