@@ -114,7 +114,7 @@ class Ways:
             for part in _BENDS:
                 corner = _out(origin, part * free)
                 for then, more in self._outward(pairs, place, corner):
-                    if np.dot(_out(then), _out(origin)) == 0.0 and self._free(todo, place, corner, then, more):
+                    if dot(_out(then), _out(origin)) == 0.0 and self._free(todo, place, corner, then, more):
                         return ((origin, part * free), (then, more + SPARE))
         return ()
 

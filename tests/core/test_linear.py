@@ -40,7 +40,9 @@ def test_eigenvectors_of_a_symmetric_matrix(A):
     assert np.abs(vectors.T @ vectors - np.eye(len(A))).max() <= 1e-13
 
 
-@pytest.mark.parametrize(("rows", "columns", "rank"), [(9, 6, 6), (6, 6, 4), (4, 7, 4), (8, 3, 1), (300, 6, 6), (300, 6, 5)])
+@pytest.mark.parametrize(
+    ("rows", "columns", "rank"), [(9, 6, 6), (6, 6, 4), (4, 7, 4), (8, 3, 1), (300, 6, 6), (300, 6, 5)]
+)
 def test_least_squares_are_numpys(rows, columns, rank):
     rng = np.random.default_rng(rows + rank)
     A = rng.normal(size=(rows, rank)) @ rng.normal(size=(rank, columns))
