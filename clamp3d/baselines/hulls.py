@@ -11,6 +11,7 @@ from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.polytopes import PartOrMesh, PerPart, PolytopeModel, Polytopes, part_mesh
 from clamp3d.checks import instance
 from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse
 
 
@@ -77,7 +78,7 @@ def intrusion(decomposition: Decomposition, pair: GroovePair) -> float:
     T = inverse(pair.T_a_groove)
     free = np.inf
     for hull in decomposition.hulls:
-        seen = (hull.vertices @ T[:3, :3].T + T[:3, 3])[:, :2]
+        seen = to_target(T, hull.vertices)[:, :2]
         outline = seen[ConvexHull(seen).vertices]
         along = np.roll(outline, -1, axis=0) - outline
         t = np.clip(-(outline * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
