@@ -183,8 +183,8 @@ class _Motion:
             return np.asarray((axes * np.maximum(size, 0.0)) @ axes.T)
         found = np.zeros((SIZE, SIZE))
         found[W, W] = max(0.0, section.lift(float(q[W]))[2]) * force[-1] * gaps.normal[-1, 1]
-        pose = section.down_splint(q)
-        c, s = math.cos(pose.angle), math.sin(pose.angle)
+        angle = float(q[S]) / section.lever
+        c, s = math.cos(angle), math.sin(angle)
         for k in np.flatnonzero(force):
             (splint, wire), row = gaps.pair[k], gaps.gradient[k]
             if gaps.feature[k] != "arc" or wire not in WIRES:

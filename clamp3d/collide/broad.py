@@ -70,7 +70,8 @@ def box_gaps(boxes: Boxes, pairs: NDArray[np.int64]) -> Array:
     radius = np.linalg.norm(boxes.half, axis=1)
     found = np.maximum(found, np.linalg.norm(d, axis=1) - radius[i] - radius[j])
     A, B = np.swapaxes(boxes.R[i], 1, 2), np.swapaxes(boxes.R[j], 1, 2)  # rows: the boxes' own axes
-    crossed = np.cross(A[:, :, None], B[:, None]).reshape(len(pairs), 9, 3)
+    (ax, ay, az), (bx, by, bz) = np.moveaxis(A[:, :, None], 3, 0), np.moveaxis(B[:, None], 3, 0)
+    crossed = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=3).reshape(len(pairs), 9, 3)
     axes = np.concatenate([A, B, crossed], axis=1)
     size = np.linalg.norm(axes, axis=2)
     axes = axes / np.maximum(size, 1e-300)[..., None]

@@ -19,6 +19,7 @@ from clamp3d.collide.convex import Convex, Hull, Rod
 from clamp3d.collide.depth_convex import Supports, convex_depth, supports
 from clamp3d.collide.depth_cover import Union, difference, nearest_behind
 from clamp3d.collide.depth_pieces import around_in_form, around_in_mesh
+from clamp3d.collide.drilled import drilled_depth, is_drilled
 from clamp3d.collide.model import Model
 from clamp3d.collide.refine import from_boxes, refine
 from clamp3d.collide.surface import Surface
@@ -211,7 +212,7 @@ def _key(model: Model) -> tuple[float, ...]:
 
 def _measured(pair: _Pair, known: Distance) -> Distance:
     a, b, T = pair.a, pair.b, pair.T
-    exact = _convex_pair(a, b, T)
+    exact = _closed_pair(a, b, T)
     if exact is not None and exact.lower >= 0.0:  # a plane parts them
         return replace(known, lower=max(known.lower, 0.0))
     if exact is not None:
@@ -283,6 +284,15 @@ def is_exact(a: Model, b: Model) -> bool:
     return all(piece is not None and piece[0].sum is not None for piece in pieces)
 
 
+def touches_hole(a: Model, b: Model, known: Distance) -> bool:
+    """Whether a pin and a drilled plate have a point in common, to rounding: then their depth is all that is open."""
+    if known.point_a is None or known.upper > TOUCH or a.bodies is None or b.bodies is None:
+        return False
+    return len(a.bodies) == len(b.bodies) == 1 and (
+        is_drilled(a.bodies[0], b.bodies[0]) or is_drilled(b.bodies[0], a.bodies[0])
+    )
+
+
 def _convex_piece(model: Model) -> tuple[Convex, float] | None:
     """The one convex piece that a body is, and its error; None for other bodies."""
     forms = model.bodies
@@ -291,12 +301,16 @@ def _convex_piece(model: Model) -> tuple[Convex, float] | None:
     return forms[0].outers[0], forms[0].error
 
 
-def _convex_pair(a: Model, b: Model, T: Array) -> Distance | None:
-    """The depth of two bodies that are one convex piece each; None for others."""
+def _closed_pair(a: Model, b: Model, T: Array) -> Distance | None:
+    """The depth of two bodies that are one convex piece each, or a pin and a drilled plate; None for others."""
     x, y = _convex_piece(a), _convex_piece(b)
-    if x is None or y is None:
+    if x is not None and y is not None:
+        return convex_depth(x[0], np.eye(4), y[0], T).widened(x[1] + y[1])
+    if x is not None and (found := _closed_pair(b, a, inverse(T))) is not None:
+        return found.moved(T).swapped()
+    if a.bodies is None or b.bodies is None or not len(a.bodies) == len(b.bodies) == 1:
         return None
-    return convex_depth(x[0], np.eye(4), y[0], T).widened(x[1] + y[1])
+    return drilled_depth(a.bodies[0], b.bodies[0], T)
 
 
 def _with_points(pair: _Pair, found: Distance) -> Distance:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from clamp3d.checks import instance, positive
 from clamp3d.collide.answer import Distance, Distances
 from clamp3d.collide.batch import by_kernel, exact
-from clamp3d.collide.depth import is_exact, penetration
+from clamp3d.collide.depth import is_exact, penetration, touches_hole
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.modelled import modelled
 from clamp3d.collide.refine import ACCURACY, from_boxes, measured, refine, with_normal
@@ -183,7 +183,7 @@ def _measured(cache: ModelCache, a: Shape, b: Shape, T: Array, accuracy: float, 
     exact = is_exact(x, y)  # then closed forms know the depth too
 
     def enough(known: Distance) -> bool:
-        return measured(known, accuracy) or (exact and known.point_a is not None)
+        return measured(known, accuracy) or (exact and known.point_a is not None) or touches_hole(x, y, known)
 
     found = with_normal(refine(x, y, T, Distance() if exact else from_boxes(x, y, T), Thresholds(), enough))
     if model is not None and (asked := modelled(x, y, T, found, model)) is not found:

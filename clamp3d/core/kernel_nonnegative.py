@@ -52,13 +52,14 @@ def _reduced(A, b, order, count, Q, y):  # type: ignore[no-untyped-def]
     return True
 
 
-def _nnls(A, b, x, w, order, y, Q):  # type: ignore[no-untyped-def]
+@formula
+def nonnegative(A, n, b, x, w, order, y, Q):  # type: ignore[no-untyped-def]
     """Lawson & Hanson, Solving Least Squares Problems (1974), algorithm NNLS; rounds, or -1 where it does not end.
 
-    ``order`` (n,): the columns of the set that is not 0, then the others; ``w`` (n,), ``y`` (n,) and
-    ``Q`` (m, n + 1) are the workspace.
+    Of ``A`` only the first n columns count. ``order`` (n,): the columns of the set that is not 0, then the others;
+    ``w`` (n,), ``y`` (n,) and ``Q`` (m, n + 1) are the workspace.
     """
-    m, n = A.shape
+    m = A.shape[0]
     scale = 0.0
     for j in range(n):
         order[j] = j
@@ -116,6 +117,11 @@ def _nnls(A, b, x, w, order, y, Q):  # type: ignore[no-untyped-def]
         for k in range(count):
             x[int(order[k])] = y[k]
     return -1
+
+
+def _nnls(A, b, x, w, order, y, Q):  # type: ignore[no-untyped-def]
+    """`nonnegative` with all columns."""
+    return nonnegative(A, A.shape[1], b, x, w, order, y, Q)
 
 
 solve = entry(_nnls, "i8(f8[:,::1],f8[::1],f8[::1],f8[::1],f8[::1],f8[::1],f8[:,::1])")

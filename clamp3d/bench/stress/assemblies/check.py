@@ -16,7 +16,7 @@ from clamp3d.bench.stress.assemblies.outlines import Outlines
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp, Joints, Wire
 from clamp3d.clamp.equilibria import equilibria
-from clamp3d.clamp.final_state import FinalState, solve_final_state
+from clamp3d.clamp.final_state import TOLERANCE, FinalState, solve_final_state
 from clamp3d.clamp.placement import Placement
 from clamp3d.clamp.section import WIRES, D, Section
 from clamp3d.clamp.sensitivity import sensitivity
@@ -134,7 +134,7 @@ def _opened(section: Section, q: Array) -> Array | None:
         opened = q.copy()
         opened[D] += lift
         opened[[1, 3]] += 0.5 * lift
-        if section.gaps(opened).value.min() > 0.0:
+        if section.gaps(opened).value.min() >= -TOLERANCE:  # the round back stays in the saddle's arc
             return opened
     return None
 
