@@ -32,12 +32,10 @@ def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
                 return f"{'overlap' if high < 0.0 else 'gap'} {abs(high):.{places}f} mm"
     for kind, least, most in (("overlap", -upper, -lower), ("gap", lower, upper)):
         if least > 0.0:
-            low = _rounded(least, ROUND_FLOOR)
-            return (
-                f"{kind} {low} to {_rounded(most, ROUND_CEILING)} mm"
-                if most < math.inf
-                else f"{kind} at least {low} mm"
-            )
+            said = _rounded(least, ROUND_FLOOR)
+            if math.isinf(most):
+                return f"{kind} at least {said} mm"
+            return f"{kind} {said} to {_rounded(most, ROUND_CEILING)} mm"
     if math.isfinite(upper) and math.isfinite(lower):
         return f"gap or overlap at most {_rounded(max(upper, -lower), ROUND_CEILING)} mm"
     return f"gap at most {_rounded(upper, ROUND_CEILING)} mm" if math.isfinite(upper) else "not known"
@@ -106,7 +104,7 @@ def headline(result: CheckResult) -> str:
         if (n := sum(row.verdict == verdict for row in found))
     ]
     if clashes:
-        lower, upper = (min(bounds) for bounds in zip(*((r.distance.lower, r.distance.upper) for r in clashes)))
+        lower, upper = (min(getattr(row.distance, end) for row in clashes) for end in ("lower", "upper"))
         moving = sum(row.motion is not None for row in clashes)
         where = "" if not moving else " in motion" if moving == len(clashes) else f" ({moving} in motion)"
         said = f", deepest {gap_text(lower, upper).removeprefix('overlap ')}" if upper < 0.0 else ""
