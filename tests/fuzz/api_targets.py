@@ -207,7 +207,7 @@ def groups() -> tuple[tuple[int, dict[str, Target]], ...]:
         "report": (clamp3d.report, {"source": scene, "folder": "out"}),
         "view": (clamp3d.view, {"shown": scene, "serve": False, "mesh_error": 1.0}),
         "Viewer": (Viewer, {"clamp": clamp, "model": Cas(), "mesh_error": 1.0, "serve": False}),
-        "image_study": (image_study, {"run": run, "count": 5, "px_per_mm": 4.0}),
+        "image_study": (image_study, {"run": run, "count": 5, "seed": 0}),
         "save_figure": (figures.save_figure, {"figure": figures.section_figure(run), "path": "x.svg", "dpi": 50}),
         "section_figure": (figures.section_figure, {"run": run, "waypoint": one_of([None, run.path[1]])}),
         "states_figure": (figures.states_figure, {"run": run}),

@@ -17,9 +17,9 @@ from clamp3d.bench.compare.measure import Measured
 from clamp3d.bench.compare.report import comparison_to_text
 from clamp3d.bench.compare.run import Comparison, pareto
 from clamp3d.bench.compare.scene import chord_error
-from clamp3d.bench.pages import render
 from clamp3d.output.figures import save_figure
 from clamp3d.output.files import write_text
+from clamp3d.output.pages import render
 from clamp3d.output.palette import INK
 
 if TYPE_CHECKING:
@@ -238,4 +238,4 @@ def _page(found: Comparison, figure: Figure) -> str:
     with mpl.rc_context({"svg.hashsalt": "clamp3d"}):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     svg = buffer.getvalue()
-    return render("compare.html", svg=svg[svg.index("<svg") :], tables=comparison_to_text(found))
+    return render("compare.html", "clamp3d.bench", svg=svg[svg.index("<svg") :], tables=comparison_to_text(found))
