@@ -146,7 +146,7 @@ class Ways:
             parts=tuple(part for part in whole.parts if part.name in shown),
             allowed=tuple(pair for pair in whole.allowed if {pair.a, pair.b} <= shown),
             motions=(motion,),
-            name=f"{self.clamp.name} clamp, step not done",
+            name=f"{self.clamp.name} clamp: the step that is blocked",
         )
 
     def _first(self, pairs: Sequence[Pair], place: Poses, start: Array, by: Array) -> tuple[float, Pair | None]:

@@ -141,10 +141,13 @@ def _folder(folder: Path, reader: Reader) -> Parts:
     if not files:
         raise InputError(f"{checks.short(folder)}: no geometry file in the folder; read are {', '.join(FORMATS)}")
     places = read_poses(reader.poses) if reader.poses is not None else [(f.stem, np.eye(4)) for f in files]
-    known = {f.stem: f for f in files}
-    twice = len(files) - len(known)
-    if twice:
-        raise InputError(f"{checks.short(folder)}: {twice} files have the name of another one but for the ending")
+    known: dict[str, Path] = {}
+    for file in files:
+        if (other := known.setdefault(file.stem, file)) is not file:
+            raise InputError(
+                f"{checks.short(folder)}: {other.name} and {file.name} would both be part {checks.shown(file.stem)}; "
+                "give one file, or a folder in which names differ by more than their endings"
+            )
     unknown = [name for name, _ in places if name not in known]
     if unknown:
         listed = ", ".join(list(known)[:8]) + (", ..." if len(known) > 8 else "")
