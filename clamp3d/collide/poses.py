@@ -72,7 +72,7 @@ class PoseVerdicts:
         """Worst verdict (n,) of each pose."""
         names = [v.value for v in Verdict]
         rank = np.full(self.poses, names.index(Verdict.CLEAR.value))
-        np.minimum.at(rank, self.row, np.argsort(names)[np.searchsorted(np.sort(names), self.kind)])
+        np.minimum.at(rank, self.row, np.argsort(names, kind="stable")[np.searchsorted(np.sort(names), self.kind)])
         return np.asarray(np.array(names)[rank])
 
     def _whole(self, other: Any, values: NDArray[Any]) -> NDArray[Any]:
