@@ -17,6 +17,7 @@ from clamp3d.collide.convex import Hull, hull
 from clamp3d.collide.drawn import bodies_of
 from clamp3d.collide.faces import FaceModel
 from clamp3d.collide.surface import Surface, at_edges
+from clamp3d.core.linear import dot
 from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import MeshShape, Shape, Solid
@@ -211,7 +212,7 @@ def looks_convex(vertices: Array, faces: NDArray[np.int64]) -> bool:
     corners = vertices[faces[np.unique(np.arange(64) * 2654435761 % len(faces))]]
     n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     n /= np.maximum(np.linalg.norm(n, axis=1), 1e-300)[:, None]
-    height = (vertices @ n.T).max(axis=0) - np.einsum("ij,ij->i", corners[:, 0], n)
+    height = dot(vertices, n.T).max(axis=0) - np.einsum("ij,ij->i", corners[:, 0], n)
     return bool(height.max() <= 1e-6 * float(np.abs(vertices).max()))
 
 

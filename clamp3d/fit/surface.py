@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Array, IntArray, Mesh
 from clamp3d.fit.cylinder import Axis, perpendicular
 
@@ -76,7 +77,7 @@ def border(surface: Surface, faces: IntArray) -> tuple[BoolArray, IntArray, Bool
 def angles(surface: Surface, axis: Axis, faces: IntArray, u: Array, w: Array) -> Array:
     """Angles (k, 3) of the corners of ``faces`` (k,) about the axis, rad from u towards w."""
     p = surface.V[surface.F[faces]] - axis.point
-    return np.asarray(np.arctan2(p @ w, p @ u))
+    return np.asarray(np.arctan2(dot(p, w), dot(p, u)))
 
 
 def turned(angle: Array, base: Array) -> Array:
