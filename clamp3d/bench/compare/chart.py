@@ -17,7 +17,7 @@ from clamp3d.bench.compare.measure import Measured
 from clamp3d.bench.compare.report import comparison_to_text
 from clamp3d.bench.compare.run import Comparison, pareto
 from clamp3d.bench.compare.scene import chord_error
-from clamp3d.output.figures import save_figure
+from clamp3d.output.figures import save_figure, svg
 from clamp3d.output.files import write_text
 from clamp3d.output.pages import render
 from clamp3d.output.palette import INK
@@ -230,12 +230,5 @@ def _note(found: Comparison, command: str) -> str:
 
 def _page(found: Comparison, figure: Figure) -> str:
     """One HTML page without anything outside itself."""
-    import io
-
-    import matplotlib as mpl
-
-    buffer = io.StringIO()
-    with mpl.rc_context({"svg.hashsalt": "clamp3d"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    svg = buffer.getvalue()
-    return render("compare.html", "clamp3d.bench", svg=svg[svg.index("<svg") :], tables=comparison_to_text(found))
+    drawn = svg(figure).decode("utf-8")
+    return render("compare.html", "clamp3d.bench", svg=drawn[drawn.index("<svg") :], tables=comparison_to_text(found))
