@@ -215,7 +215,8 @@ class Method:
     threshold: float | None = option("Concavity that CoACD may leave: hulls.  [default: 2]", metavar="MM")
     mesh_error: float | None = option("Chord error of hulls and mesh.  [default: 0.05]", metavar="MM")
     solver: str | None = option(
-        "[default: exact for cas and chords, bisection for the others; stepped if a step is given]",
+        "How the final state is found.  [default: exact for cas and chords, bisection for the others; stepped if a "
+        "step is given]",
         type=click.Choice(["exact", "stepped", "bisection"]),
     )
     sequence: str | None = SEQUENCE

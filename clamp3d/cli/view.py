@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from clamp3d.cli.options import METHOD, SOURCE, VIEWING, Method, Source, Viewing, declared, option
-from clamp3d.cli.terminal import finish, show
+from clamp3d.cli.terminal import finish, finish_checked, show
 from clamp3d.errors import SequenceError
 
 
@@ -23,7 +23,6 @@ def command(
     """
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.cli.viewing import check_and_view, run_and_view, view_blocked
-    from clamp3d.collide.result import BAD
 
     settings = method.settings()
     loaded = source.load()
@@ -40,5 +39,4 @@ def command(
     else:
         method.refuse()
         result = check_and_view(loaded, viewing, quiet=quiet, serve=serve)
-        failed, undecided = "failed" in result.counts, "uncertain" in result.counts
-        finish(finding=bool(result.counts.keys() & BAD), failed=failed, undecided=undecided)
+        finish_checked(result.counts)
