@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.batch import by_kernel
-from clamp3d.collide.broad import Boxes, box_gaps
+from clamp3d.collide.broad import FEW, Boxes, box_gaps
 from clamp3d.collide.judge import contained, judge
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
@@ -21,8 +21,6 @@ from clamp3d.core.motion import FARTHEST, scene_pose
 from clamp3d.core.pose import Array, check_pose_array
 from clamp3d.errors import InputError, MissingLibraryError
 
-_FEW = 32
-"""Other parts up to which all of their boxes are compared with those of all poses."""
 _BLOCK = 4096
 """Poses that the kernel is asked together: what is noted of them stays in the processor's own memory."""
 
@@ -198,7 +196,7 @@ def _placed(poses: ArrayLike, bounds: Array) -> tuple[Array, Array]:
 def _near(moving: Array, still: Boxes, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Poses and others (m,) whose boxes along the world's axes come within ``reach`` mm."""
     centre, half = moving[:3], moving[3:]
-    if len(still.centre) <= _FEW:
+    if len(still.centre) <= FEW:
         pairs = zip(still.centre[..., None], (still.reach + reach)[..., None], strict=True)
         near = np.array([(np.abs(centre - c) <= half + r).all(axis=0) for c, r in pairs]).reshape(-1, len(centre.T))
         rows, columns = np.nonzero(near.T)
