@@ -18,6 +18,7 @@ from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.model import Model, ModelCache
 from clamp3d.collide.refine import refine
 from clamp3d.collide.verdict import Thresholds
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, SectionPose, inverse
 
 
@@ -62,7 +63,7 @@ def _meet(models: dict[PartName, Model], before: Waypoint, after: Waypoint, pair
             def enough(known: Distance, limit: float = limit) -> bool:
                 return known.lower > limit or known.upper <= (limit if known.lower > CONTACT else CONTACT)
 
-            boxed, T = Distance(gap, level="boxes", method="bounding boxes"), inverse(poses[a]) @ poses[b]
+            boxed, T = Distance(gap, level="boxes", method="bounding boxes"), dot(inverse(poses[a]), poses[b])
             found = refine(models[a], models[b], T, boxed, Thresholds(CONTACT, limit), enough)
             if found.upper <= CONTACT or (way < CONTACT and found.lower <= limit):
                 yield a, b

@@ -23,6 +23,7 @@ from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import Pair
 from clamp3d.core.distance import Feature
 from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, SectionPose
 from clamp3d.core.primitives import LARGEST
 
@@ -304,10 +305,10 @@ class Section:
         i = 2 * WIRES.index(wire)
         px, py, c, s, slope, bend = self._down(q).tolist() if splint == "P2" else (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         turn = np.array([[c, -s], [s, c]])
-        u, v = (turn @ (q[i : i + 2] - (px, py))).tolist()
+        u, v = dot(turn, q[i : i + 2] - (px, py)).tolist()
 
         def push(u: float, v: float) -> Array:
-            return np.asarray(force @ self._pieces(splint, wire, u, v, c, s)[0][:, 3:5])
+            return np.asarray(dot(force, self._pieces(splint, wire, u, v, c, s)[0][:, 3:5]))
 
         turning = np.column_stack([push(u + h, v) - push(u - h, v), push(u, v + h) - push(u, v - h)]) / (2.0 * h)
         by_q, found = np.zeros((2, SIZE)), np.zeros((SIZE, SIZE))
@@ -322,7 +323,7 @@ class Section:
             found += found.T
             found[S, S] *= 0.5
             found[W, W] += bend * (along * turn[0, 1] + deep * turn[1, 1])
-        return by_q.T @ turning @ by_q + found
+        return dot(dot(by_q.T, turning), by_q) + found
 
     @cached_property
     def _grooves(self) -> dict[Pair, tuple[float, ...]]:

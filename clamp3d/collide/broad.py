@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 
 FEW = 32
@@ -79,7 +80,9 @@ def box_gaps(boxes: Boxes, pairs: NDArray[np.int64]) -> Array:
     axes = np.concatenate([A, B, crossed], axis=1)
     size = np.linalg.norm(axes, axis=2)
     axes = axes / np.maximum(size, 1e-300)[..., None]
-    spread = [(np.abs(axes @ np.swapaxes(X, 1, 2)) * boxes.half[k][:, None]).sum(axis=2) for X, k in ((A, i), (B, j))]
+    spread = [
+        (np.abs(dot(axes, np.swapaxes(X, 1, 2))) * boxes.half[k][:, None]).sum(axis=2) for X, k in ((A, i), (B, j))
+    ]
     apart = np.abs(np.einsum("mkj,mj->mk", axes, d)) - spread[0] - spread[1]
     found = np.maximum(found, np.where(size > 1e-6, apart, -np.inf).max(axis=1))
     return np.asarray(found - 1e-12 * (1.0 + np.abs(d).max(axis=1)))

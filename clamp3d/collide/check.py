@@ -25,6 +25,7 @@ from clamp3d.collide.scene import Scene, name_pairs
 from clamp3d.collide.touching import is_box, touching_boxes
 from clamp3d.collide.verdict import Verdict
 from clamp3d.collide.where import locator
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import InputError, MissingLibraryError, SolverError
 
@@ -184,7 +185,7 @@ def _pair(
 ) -> PairResult:
     a, b = scene.parts[i].name, scene.parts[j].name
     allowance, thresholds = scene.allowance(a, b), scene.thresholds
-    x, y, T_ab = models[i], models[j], inverse(T[i]) @ T[j]
+    x, y, T_ab = models[i], models[j], dot(inverse(T[i]), T[j])
 
     def enough(known: Distance) -> bool:
         return not full and (not distances or measured(known))

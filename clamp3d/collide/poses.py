@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -25,7 +26,7 @@ _BLOCK = 4096
 """Poses that the kernel is asked together: what is noted of them stays in the processor's own memory."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PoseVerdicts:
     """One part at n poses against the k ``others`` that it may meet.
 
@@ -59,12 +60,17 @@ class PoseVerdicts:
         """Upper bounds (n, k) of the signed distances, mm; infinite where nothing came near."""
         return self._whole(np.inf, self.most)
 
+    def __repr__(self) -> str:
+        counts = Counter(self.worst.tolist())
+        said = ", ".join(f"{counts[v.value]} {v.value}" for v in Verdict if counts[v.value]) or "no poses"
+        return f"PoseVerdicts({self.part!r}: {self.poses} poses; {said})"
+
     @property
     def worst(self) -> NDArray[np.str_]:
         """Worst verdict (n,) of each pose."""
         names = [v.value for v in Verdict]
         rank = np.full(self.poses, names.index(Verdict.CLEAR.value))
-        np.minimum.at(rank, self.row, np.argsort(names)[np.searchsorted(np.sort(names), self.kind)])
+        np.minimum.at(rank, self.row, np.argsort(names, kind="stable")[np.searchsorted(np.sort(names), self.kind)])
         return np.asarray(np.array(names)[rank])
 
     def _whole(self, other: Any, values: NDArray[Any]) -> NDArray[Any]:

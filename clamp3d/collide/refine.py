@@ -21,6 +21,7 @@ from clamp3d.collide.meshes import meshes_distance
 from clamp3d.collide.model import FINEST, Model
 from clamp3d.collide.open_mesh import open_distance
 from clamp3d.collide.verdict import Thresholds, Verdict
+from clamp3d.core.linear import norm
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import SolverError
 
@@ -183,5 +184,5 @@ def with_normal(found: Distance) -> Distance:
     p, q = found.point_a, found.point_b
     if p is None or q is None or not found.upper > 1e-6:
         return found
-    size = float(np.linalg.norm(q - p))
+    size = norm(q - p)
     return replace(found, normal=(q - p) / size) if size > 1e-6 else found

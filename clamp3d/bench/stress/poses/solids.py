@@ -2,7 +2,8 @@
 
 Each case is a contact of two features, made from the bodies' definition, at a small gap or overlap. The truth is an
 interval of the signed distance: apart that of the branch and bound of `flat_truth`; in an overlap the depth is at least
-that of the deepest point inside, and at most what parts the bodies in any of many directions.
+that of the deepest point inside, and at most what parts the bodies in any of many directions, or brings the cylinder
+into the hole.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ from clamp3d.core.shapes import Solid
 from clamp3d.testing import assert_distance, directions
 
 _WAYS = directions(200)
+_HALVINGS, _QUICK = 6, 500
+"""Translations into a hole that are tried, and boxes that each may take."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,13 +155,12 @@ class EngineMethod:
 
 
 class SolidFamily(FlatFamily):
-    """A kind of body that a flat-ended cylinder touches. Depths take long: it has a ``part`` of the cases asked for."""
+    """A kind of body that a flat-ended cylinder touches."""
 
     methods: ClassVar[Methods] = {REFERENCE: ("the exact engine, with proven bounds", EngineMethod)}
 
-    def __init__(self, kind: str, part: float, about: str) -> None:
+    def __init__(self, kind: str, about: str) -> None:
         super().__init__(f"solid: {kind}", about, partial(_cases, kind=kind))
-        self.part = part
 
     def _interval(self, cases: Solids, i: int, most: int) -> tuple[float, float]:  # type: ignore[override]
         T, half = cases.T[i], cases.half[i]
@@ -175,7 +177,28 @@ class SolidFamily(FlatFamily):
             own = R * np.hypot(ways[:, 0], ways[:, 1]) + half[2] * np.abs(ways[:, 2])
         along = ways @ d
         other = 0.5 * length * np.abs(along) + r * np.sqrt(np.maximum(1.0 - along * along, 0.0)) - ways @ c
-        return -float((own + other).min()) - rounding, high + rounding
+        shortest = float((own + other).min())
+        if cases.hollow and R > 0.0:
+            shortest = min(shortest, self._into_hole(cases, i))
+        return -shortest - rounding, high + rounding
+
+    def _into_hole(self, cases: Solids, i: int) -> float:
+        """Length of a translation straight towards the hole's axis after which the bodies are apart."""
+        T, scene = cases.T[i].copy(), float(cases.take([i]).scene()[0])
+        c, d = T[:3, 3].copy(), T[:3, 2]
+        way = np.array([*(c - c[2] / d[2] * d)[:2], 0.0]) if abs(d[2]) > 0.1 else np.zeros(3)
+        found, short, long = math.inf, 0.0, 1.0
+        for _ in range(_HALVINGS):  # all the way first
+            part = long if found == math.inf else 0.5 * (short + long)
+            T[:3, 3] = c - part * way
+            size = (float(cases.radius[i]), True, cases.half[i], float(cases.r[i]), float(cases.length[i]))
+            if solid_truth(*size, T, 1e-4 * scene, _QUICK)[0] > 0.0:
+                found, long = part * float(np.linalg.norm(way)), part
+            elif found == math.inf:
+                break
+            else:
+                short = part
+        return found
 
     def difference(self, cases: Solids, truths: Array, i: int) -> float:  # type: ignore[override]
         """See `Family`; and the answer's points, normal and depth hold before an oracle of its own."""
@@ -201,12 +224,8 @@ class SolidFamily(FlatFamily):
 
 
 _FAMILIES = (
-    SolidFamily(
-        "box", 1.0, "features of a cylinder on faces, edges and corners of a box, gaps of +-1e-12 ... 0.1 radii"
-    ),
-    SolidFamily("cylinder", 1.0, "the same on another flat-ended cylinder: sides, rims, ends"),
-    SolidFamily(
-        "hole", 0.005, "the same in and about the hole of a plate: its wall, its rims, the plate's other faces"
-    ),
+    SolidFamily("box", "features of a cylinder on faces, edges and corners of a box, gaps of +-1e-12 ... 0.1 radii"),
+    SolidFamily("cylinder", "the same on another flat-ended cylinder: sides, rims, ends"),
+    SolidFamily("hole", "the same in and about the hole of a plate: its wall, its rims, the plate's other faces"),
 )
 SOLIDS = {family.name: family for family in _FAMILIES}
