@@ -1,10 +1,15 @@
 """Before any test: the contact kernel is compiled once, so that no test measures or prints its compilation."""
 
 import os
+import sys
+from pathlib import Path
 
 from hypothesis import settings
 
 from clamp3d.kernel import Capsule, Cylinder, SweptArc, groove_pieces, signed_distance, translation
+
+# Drawings and sentences of the documentation are tested too.
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 # A run that decides about a change repeats the same examples; a run at the desk looks for new ones.
 settings.register_profile("ci", derandomize=True)

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.polytopes import PartOrMesh, PerPart, PolytopeModel, Polytopes, part_mesh
 from clamp3d.checks import instance
-from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.pose import inverse
 
 
 class Hulls(PolytopeModel):
     """CoACD hulls of the parts' meshes, measured by FCL; any pose.
 
-    A hull fills in what it spans, so the groove is too tight by the intrusion (`intrusion`), which follows CoACD's
+    A hull fills in what it spans, so the groove is too tight by an intrusion, which follows CoACD's
     threshold loosely and can exceed it. Hulls may also leave the part's own corners out (`Decomposition.uncovered`).
     ``decompositions[part]`` is made (or read from the cache) when a part is first measured.
 
@@ -65,26 +61,6 @@ class Hulls(PolytopeModel):
     def meshes_built(self) -> int:
         """How many parts had to be meshed so far."""
         return len(self.decompositions)
-
-
-def intrusion(decomposition: Decomposition, pair: GroovePair) -> float:
-    """How far in mm the hulls reach into the groove: its radius less that of the thickest coaxial wire that is free.
-
-    Exact for the hulls: the distance of the groove's axis, without end, from each hull's outline seen along it.
-    """
-    from scipy.spatial import ConvexHull
-
-    T = inverse(pair.T_a_groove)
-    free = np.inf
-    for hull in decomposition.hulls:
-        seen = (hull.vertices @ T[:3, :3].T + T[:3, 3])[:, :2]
-        outline = seen[ConvexHull(seen).vertices]
-        along = np.roll(outline, -1, axis=0) - outline
-        t = np.clip(-(outline * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
-        nearest = float(np.linalg.norm(outline + t[:, None] * along, axis=1).min())
-        inside = bool((along[:, 0] * outline[:, 1] - along[:, 1] * outline[:, 0] <= 0.0).all())
-        free = min(free, 0.0 if inside else nearest)
-    return pair.groove.radius - free
 
 
 def _polytopes(name: str, decomposition: Decomposition) -> Polytopes:

@@ -65,10 +65,6 @@ class ImageStudy:
     """
 
     exact: float
-    px_per_mm: float
-    marking_error: float
-    calliper_error: float
-    seed: int
     trials: Array
     errors: Array
     automatic: ImageMeasurement
@@ -77,11 +73,6 @@ class ImageStudy:
     def median_error(self) -> float:
         """Median of the absolute errors in mm."""
         return float(np.median(np.abs(self.errors)))
-
-    @property
-    def rms_error(self) -> float:
-        """Root mean square of the errors in mm."""
-        return float(np.sqrt(np.mean(self.errors**2)))
 
     @property
     def worst_error(self) -> float:
@@ -149,46 +140,18 @@ def marked_distances(
     return _distance(marks[:, [[0, 2], [0, 1]]], readings, kind)
 
 
-def image_study(
-    run: Assembly,
-    *,
-    count: int = 100_000,
-    px_per_mm: float = PX_PER_MM,
-    marking_error: float = MARKING_ERROR,
-    calliper_error: float = CALLIPER_ERROR,
-    seed: int = 0,
-    kind: Kind = "height",
-) -> ImageStudy:
-    """Draw the final state of ``run``, measure it ``count`` times by hand marks and once automatically.
+def image_study(run: Assembly, *, count: int = 100_000, seed: int = 0) -> ImageStudy:
+    """Draw the final state of ``run``, measure its height ``count`` times by hand marks and once automatically.
 
-    The first five trials are those to lay beside the paper's. Raises InputError for settings out of range.
+    The first five trials are those to lay beside the paper's. Raises InputError for a count or seed out of range.
     """
     instance("run", run, Assembly)
-    count, seed = whole("count of trials", count, least=1, most=100_000_000), whole("seed", seed, least=0)
-    px_per_mm = _check("px_per_mm", px_per_mm, above=0.0)
-    shown = picture(run, px_per_mm, seed=seed)
-    values = marked_distances(
-        shown, max(count, 5), marking_error=marking_error, calliper_error=calliper_error, seed=seed, kind=kind
-    )
+    count, seed = whole("count of trials", count, least=5, most=100_000_000), whole("seed", seed, least=0)
+    shown = picture(run, PX_PER_MM, seed=seed)
+    values = marked_distances(shown, count, marking_error=MARKING_ERROR, calliper_error=CALLIPER_ERROR, seed=seed)
     left, right, below = find_end_points(shown.image)
-    found = measure_image(
-        [left, below],
-        [left, right],
-        shown.reference,
-        kind=kind,
-        marking_error=FITTING_ERROR,
-        calliper_error=calliper_error,
-    )
-    return ImageStudy(
-        exact=shown.distance,
-        px_per_mm=px_per_mm,
-        marking_error=marking_error,
-        calliper_error=calliper_error,
-        seed=seed,
-        trials=values[:5],
-        errors=values - shown.distance,
-        automatic=found,
-    )
+    found = measure_image([left, below], [left, right], shown.reference, marking_error=FITTING_ERROR)
+    return ImageStudy(shown.distance, values[:5], values - shown.distance, found)
 
 
 def _distance(marks: Array, reference_mm: float | Array, kind: Kind) -> Array:

@@ -8,11 +8,11 @@ from itertools import zip_longest
 from typing import Any
 
 from clamp3d.bench import published
-from clamp3d.bench.pages import render
 from clamp3d.bench.reproduce import OrderRow, PoseRow, RelationRow, Reproduction, WorkRow
 from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.matrix import gap_text
 from clamp3d.collide.distance import Distance
+from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
 
 
@@ -64,6 +64,7 @@ def reproduction_to_text(found: Reproduction) -> str:
     connections = [row for row in found.table1 if row.published or row.declared or row.measured]
     return render(
         "reproduce.txt",
+        "clamp3d.bench",
         table=text_table,
         connections=[
             (f"{r.a}-{r.b}", r.published, r.declared, r.measured, _gap(r.distance), r.relation, r.difference or "same")

@@ -1,7 +1,7 @@
 """Foreign files read in a process of their own, with limits: ``python -m clamp3d.brep.apart FILE OUT NAME MEMORY``.
 
-A damaged STEP file can end the interpreter, and a small archive can unpack to gigabytes. The process is started afresh,
-not forked, and gives its reading back as a file of plain arrays.
+A damaged STEP file can end the interpreter, and a small archive can unpack to gigabytes. The process is a copy of this
+one where that is safe, else started afresh, and gives its reading back as a file of plain arrays.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import signal
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from clamp3d.brep.bodies import Reading, restore, save
@@ -52,7 +53,7 @@ def read_apart(path: Path) -> Reading:
     with tempfile.TemporaryDirectory(prefix="clamp3d-") as folder:
         out = Path(folder) / "bodies"
         arguments = (str(path.absolute()), str(out), str(path), str(int(memory)))
-        code, said = run_child("clamp3d.brep.apart", *arguments, time_limit=seconds)
+        code, said = run_child("clamp3d.brep.apart", *arguments, time_limit=seconds, copy=True)
         told = Path(f"{out}.json")
         if told.exists():
             raise InputError(json.loads(told.read_text())["error"])
@@ -95,11 +96,13 @@ def _ending(code: int) -> str:
 
 
 def _limit(memory: int) -> None:
-    """Keep this process from taking more than ``memory`` bytes, where the system can, and from leaving a core file."""
+    """Keep this process from taking ``memory`` bytes more, where the system can, and from leaving a core file."""
     try:
         import resource
     except ImportError:  # Windows: the time limit alone
         return
+    with suppress(OSError):  # what it has from the process that it is a copy of
+        memory += int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
     for kind, most in (("RLIMIT_DATA", memory), ("RLIMIT_CORE", 0)):
         _, hard = resource.getrlimit(getattr(resource, kind))
         resource.setrlimit(getattr(resource, kind), (most if hard < 0 else min(most, hard), hard))
@@ -109,6 +112,8 @@ def main(source: str, target: str, name: str, memory: str) -> None:
     """Read ``source``; write its bodies to ``target``, or one line about ``name`` beside it."""
     end_with_caller()
     _limit(int(memory))
+    # It lives for one file: to look for garbage and to take down what the library has built takes a third of the time.
+    gc.set_threshold(100_000)
     path = Path(source)
     module, function, _, _ = READERS[path.suffix.lower()]
     error: Exception
@@ -124,7 +129,5 @@ def main(source: str, target: str, name: str, memory: str) -> None:
 
 
 if __name__ == "__main__":
-    # It lives for one file: to look for garbage and to take down what the library has built takes a third of the time.
-    gc.set_threshold(100_000)
     main(*sys.argv[1:])
     os._exit(0)

@@ -11,6 +11,7 @@ import numpy as np
 from clamp3d.brep.bodies import MOST_BODIES, Body, Reading
 from clamp3d.brep.solid import CHORD, BrepSolid
 from clamp3d.brep.tessellate import explore
+from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Array
 from clamp3d.core.shells import volume
 from clamp3d.errors import Clamp3dError, InputError
@@ -71,7 +72,7 @@ def bodies_of(roots: Iterable[Node], chord: float = CHORD) -> tuple[Reading, int
             name = node.named.get(key) or node.name
             if key not in shapes:
                 shapes[key] = _made(key.shape, name, chord)
-            place = T @ matrix(solid.Location())
+            place = dot(T, matrix(solid.Location()))
             made = shapes[key]
             if isinstance(made, str):
                 missing.append(f"{name} ({made})")
@@ -100,7 +101,7 @@ def _leaves(roots: Iterable[Node]) -> Iterator[tuple[Node, Array]]:
         if node is None:
             stack.pop()
             continue
-        T = above @ node.T
+        T = dot(above, node.T)
         if node.shape is not None:
             yield node, T
         if len(stack) > _DEEPEST:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from clamp3d.brep.bodies import Reading
 from clamp3d.brep.placing import Placer
 from clamp3d.checks import readable_file
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Array, IntArray
 from clamp3d.errors import InputError
 
@@ -117,7 +118,7 @@ class _File:
                 raise InputError(f"{self.path}: node {k} is in the tree twice, or more than {_DEEPEST} levels deep")
             visited.add(k)
             node = nodes[k]
-            T = above @ _transform(node)
+            T = dot(above, _transform(node))
             if "mesh" in node:
                 yield node.get("name", ""), node["mesh"], T
             todo += [(child, T, depth + 1) for child in reversed(node.get("children", []))]
@@ -200,7 +201,7 @@ def _transform(node: dict[str, Any]) -> Array:
         T[:] = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
         return T
     if "rotation" in node:
-        x, y, z, w = np.array(node["rotation"], dtype=np.float64) / np.linalg.norm(node["rotation"])
+        x, y, z, w = np.array(node["rotation"], dtype=np.float64) / norm(node["rotation"])
         T[:3, :3] = [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
             [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],

@@ -14,6 +14,7 @@ from clamp3d import checks
 from clamp3d.brep.apart import READERS, read_apart
 from clamp3d.brep.bodies import Body, Reading
 from clamp3d.brep.gltf_file import read_gltf
+from clamp3d.core.linear import to_target
 from clamp3d.core.mesh import Array, IntArray, Mesh, make_mesh
 from clamp3d.core.shapes import MeshShape
 from clamp3d.errors import Clamp3dError, InputError
@@ -105,7 +106,7 @@ def load_mesh(path: str | Path, *, unit: str | None = None) -> Mesh:
         return found.bodies[0].shape.mesh
     meshes = [(body.shape.mesh, body.T) for body in found.bodies]
     offsets = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in meshes)])
-    vertices = np.concatenate([mesh.vertices @ T[:3, :3].T + T[:3, 3] for mesh, T in meshes])
+    vertices = np.concatenate([to_target(T, mesh.vertices) for mesh, T in meshes])
     faces = np.concatenate([mesh.faces + start for (mesh, _), start in zip(meshes, offsets, strict=False)])
     mesh = make_mesh(vertices, faces, name=Path(path).name)
     return replace(mesh, notes=(*found.notes, *mesh.notes))

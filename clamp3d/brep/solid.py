@@ -86,6 +86,18 @@ class BrepSolid(MeshShape):
         """The TopoDS_Shape. Raises MissingLibraryError without Open CASCADE."""
         return from_bytes(self.brep)
 
+    def bounds_at(self, T: Array) -> Array:
+        """Lower and upper corner (2, 3) of the bounding box of the exact faces, placed by ``T`` (4, 4)."""
+        from OCP.Bnd import Bnd_Box
+        from OCP.BRepBndLib import BRepBndLib
+        from OCP.gp import gp_Trsf
+        from OCP.TopLoc import TopLoc_Location
+
+        place, box = gp_Trsf(), Bnd_Box()
+        place.SetValues(*T[:3].ravel().tolist())
+        BRepBndLib.AddOptimal_s(self.solid.Moved(TopLoc_Location(place)), box, False, False)
+        return np.array([[p.X(), p.Y(), p.Z()] for p in (box.CornerMin(), box.CornerMax())])
+
     def tessellated(self, chord: float) -> BrepSolid:
         """The same with triangles within ``chord`` mm, or as near as the mesher comes; itself if it is as near."""
         if self.error <= chord:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.core.linear import atan2, dot, norm
 from clamp3d.core.pose import Array
 
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
@@ -72,7 +73,7 @@ class Faces:
 
 def height(kind: int, frame: Array, size: Size, points: Array) -> Array:
     """Signed distance (k,) of points (k, 3) from the whole surface; positive on the side of the normal or outside."""
-    local = (points - frame[0]) @ frame[1:].T
+    local = dot(points - frame[0], frame[1:].T)
     x, y, z = local.T
     across = np.hypot(x, y)
     if kind == PLANE:
@@ -88,18 +89,18 @@ def height(kind: int, frame: Array, size: Size, points: Array) -> Array:
 
 def parameters(kind: int, frame: Array, size: Size, points: Array) -> Array:
     """Surface parameters (k, 2) of the feet of points (k, 3); u is NaN on the axis of a sphere or cone."""
-    local = (points - frame[0]) @ frame[1:].T
+    local = dot(points - frame[0], frame[1:].T)
     x, y, z = local.T
     if kind in (PLANE, OTHER):
         return np.ascontiguousarray(local[:, :2])
-    across, u = np.hypot(x, y), np.arctan2(y, x)
+    across, u = np.hypot(x, y), atan2(y, x)
     if kind == CYLINDER:
         return np.column_stack([u, z])
     if kind == TORUS:
-        return np.column_stack([u, np.arctan2(z, across - size[0])])
+        return np.column_stack([u, atan2(z, across - size[0])])
     u = np.where(across > 1e-9 * (1.0 + np.abs(z).max()), u, np.nan)
     if kind == SPHERE:
-        return np.column_stack([u, np.arctan2(z, across)])
+        return np.column_stack([u, atan2(z, across)])
     along = (across - size[0]) * math.sin(size[1]) + z * math.cos(size[1])
     return np.column_stack([u, along * math.cos(size[1])])
 
@@ -119,7 +120,7 @@ def points_at(kind: int, frame: Array, size: Size, uv: Array) -> Array:
         else:
             across, z = size[0] + size[1] * np.cos(v), size[1] * np.sin(v)
         local = np.column_stack([across * np.cos(u), across * np.sin(u), z])
-    return np.asarray(local @ frame[1:] + frame[0])
+    return np.asarray(dot(local, frame[1:]) + frame[0])
 
 
 def unwrapped(kind: int, uv: Array) -> Array:
@@ -141,8 +142,8 @@ def sense_of(kind: int, frame: Array, size: Size, corners: Array) -> float:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     k = int(np.argmax(np.einsum("ij,ij->i", normal, normal)))
     middle = corners[k].mean(axis=0)
-    step = 1e-4 * math.sqrt(float(np.linalg.norm(normal[k])))
-    two = np.stack([middle, middle + step * normal[k] / np.linalg.norm(normal[k])])
+    step = 1e-4 * math.sqrt(norm(normal[k]))
+    two = np.stack([middle, middle + step * normal[k] / norm(normal[k])])
     low, high = height(kind, frame, size, two)
     return 1.0 if high > low else -1.0
 

@@ -28,6 +28,7 @@ from clamp3d.brep.surfaces import (
     surface_of,
     unwrapped,
 )
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Array, IntArray
 from clamp3d.errors import Clamp3dError
 
@@ -237,7 +238,7 @@ def _facets(
         uv = np.concatenate([uv, new])
         P = np.concatenate([P, np.reshape([surface.Value(u, v).Coord() for u, v in new.tolist()], (-1, 3))])
     # Two nodes a whole turn apart are at one place: a triangle of theirs can stand for all round it.
-    own = np.where(_spread(uv[F], turns) & (made is None), np.linalg.norm(np.ptp(P, axis=0)), 0.0)
+    own = np.where(_spread(uv[F], turns) & (made is None), norm(np.ptp(P, axis=0)), 0.0)
     if kind != OTHER:
         return F, P, own
     off = None
@@ -258,7 +259,7 @@ def placed(points: Array, place: Any) -> Array:
         return points
     move = place.Transformation()
     M = np.array([[move.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
-    return np.asarray(points @ M[:, :3].T + M[:, 3])
+    return np.asarray(dot(points, M[:, :3].T) + M[:, 3])
 
 
 def _joined(V: Array, F: IntArray, links: list[tuple[int, int]]) -> tuple[Array, IntArray, NDArray[np.bool_]]:
@@ -299,8 +300,11 @@ def _sampled(surface: Any, F: IntArray, nodes: Array, P: Array) -> Array:
     flat = np.einsum("sk,mkd->msd", _SAMPLES, P[F]).reshape(-1, 3)
     made = at(where)
     off = flat - made[:, 0]
-    T = made[:, 1:].transpose(0, 2, 1)
-    step = np.einsum("kij,kj->ki", np.linalg.pinv(T), off)  # the same parameters are not the nearest point's
+    # The same parameters are not the nearest point's. Least squares; at a pole, where a tangent is 0, along the other.
+    (a, b), (_, c) = np.einsum("kid,kjd->ijk", made[:, 1:], made[:, 1:])
+    u, v = np.einsum("kid,kd->ik", made[:, 1:], off)
+    a, c = (1.0 + 1e-12) * a + 1e-100, (1.0 + 1e-12) * c + 1e-100
+    step = np.stack([c * u - b * v, a * v - b * u], axis=1) / (a * c - b * b)[:, None]
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     nearer = at(np.clip(where + step, low, high))[:, 0]
     found = np.minimum(np.linalg.norm(off, axis=1), np.linalg.norm(flat - nearer, axis=1))

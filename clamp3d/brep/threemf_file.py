@@ -17,6 +17,7 @@ import numpy as np
 
 from clamp3d.brep.bodies import MOST_BODIES, Reading
 from clamp3d.brep.placing import Placer
+from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Array
 from clamp3d.errors import InputError
 
@@ -87,7 +88,7 @@ def _meshes(obj: Any, T: Array) -> Iterator[tuple[Any, Array]]:
     for k in range(obj.GetComponentCount()):
         part = obj.GetComponent(k)
         own = _matrix(part.GetTransform()) if part.HasTransform() else np.eye(4)
-        yield from _meshes(part.GetObjectResource(), T @ own)
+        yield from _meshes(part.GetObjectResource(), dot(T, own))
 
 
 def _matrix(transform: Any) -> Array:

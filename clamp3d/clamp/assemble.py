@@ -21,6 +21,7 @@ from clamp3d.clamp.forces import contact_forces
 from clamp3d.clamp.loader import WireSize, load_clamp
 from clamp3d.clamp.matrix import PAIRS, Difference, contact_type
 from clamp3d.clamp.meetings import meetings
+from clamp3d.clamp.out_of_plane import out_of_plane
 from clamp3d.clamp.result import Assembly, Equilibrium, Event, Solver, Start, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import B, D, S, Section, W
@@ -189,8 +190,8 @@ def assemble(
 
 
 def _solved(section: Section, final: FinalState, others: bool, open_by: float, open_tilt: float) -> dict[str, Any]:
-    """What only an exact answer has: its forces and, if asked, what else closing could have ended in."""
-    found: dict[str, Any] = {"forces": contact_forces(section, final)}
+    """What only an exact answer has: forces, second order in space and, if asked, what else closing could end in."""
+    found: dict[str, Any] = {"forces": contact_forces(section, final), "out_of_plane": out_of_plane(section, final)}
     if others:
         found["others"] = _others(section, final)
         found["start_tilts"] = start_tilts(section, final, open_by=open_by, open_tilt=open_tilt)
@@ -241,6 +242,7 @@ def _others(section: Section, final: FinalState) -> tuple[Equilibrium, ...]:
             status=final_status(section, state),
             detail=describe(state, section.escaped(state.q)),
             is_equilibrium=not section.escaped(state.q),
+            out_of_plane=out_of_plane(section, state),
         )
         for state in equilibria(section)
         if not same(state, final)

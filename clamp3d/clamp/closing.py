@@ -19,6 +19,7 @@ import numpy as np
 from clamp3d.clamp.curvature import lagrangian_hessian
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, U, V, W
+from clamp3d.core.linear import dot, eigh, svd
 from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 from clamp3d.core.roots import root
@@ -107,7 +108,7 @@ def descend(
             return q
         h = min(longest / speed, 4.0 * h)
         if not force.any():  # nothing is pushed: no gap closes faster than the motion goes
-            closing = gaps.gradient @ goal > 0.0
+            closing = dot(gaps.gradient, goal) > 0.0
             h = max(h, float(gaps.value[closing].min(initial=math.inf))) if closing.any() else h
     raise SolverError(
         f"closing takes more than {most or _STEPS} steps of {longest:.3g} mm: the down splint's width "
@@ -179,12 +180,12 @@ class _Motion:
         (force over radius difference), on a long one all there is, by differences."""
         section, moving = self.section, self.moving
         if exact:
-            size, axes = np.linalg.eigh(lagrangian_hessian(section, q, gaps, force)[np.ix_(moving, moving)])
-            return np.asarray((axes * np.maximum(size, 0.0)) @ axes.T)
+            size, axes = eigh(lagrangian_hessian(section, q, gaps, force)[np.ix_(moving, moving)])
+            return np.asarray(dot(axes * np.maximum(size, 0.0), axes.T))
         found = np.zeros((SIZE, SIZE))
         found[W, W] = max(0.0, section.lift(float(q[W]))[2]) * force[-1] * gaps.normal[-1, 1]
-        pose = section.down_splint(q)
-        c, s = math.cos(pose.angle), math.sin(pose.angle)
+        angle = float(q[S]) / section.lever
+        c, s = math.cos(angle), math.sin(angle)
         for k in np.flatnonzero(force):
             (splint, wire), row = gaps.pair[k], gaps.gradient[k]
             if gaps.feature[k] != "arc" or wire not in WIRES:
@@ -209,15 +210,16 @@ def _project(offset: Array, hessian: Array, A: Array, value: Array, scale: float
     A least-distance problem, solved by non-negative least squares [Lawson & Hanson, Solving Least Squares Problems,
     1974, chapter 23].
     """
-    back = np.linalg.inv(np.linalg.cholesky(hessian))
-    z0 = back @ offset
+    _, sizes, axes = svd(hessian)
+    back = axes / np.sqrt(sizes)[:, None]
+    z0 = dot(back, offset)
     if not len(A):
-        return -z0 @ back, np.zeros(0)
-    G = A @ back.T
-    lower = (G @ z0 - value) / scale
+        return dot(-z0, back), np.zeros(0)
+    G = dot(A, back.T)
+    lower = (dot(G, z0) - value) / scale
     u = nnls(np.vstack([G.T, lower]), np.append(np.zeros(len(offset)), 1.0))
-    rest = 1.0 - float(lower @ u)
+    rest = 1.0 - float(dot(lower, u))
     if not rest > 1e-12:
         return None, u
     multipliers = u / rest * scale
-    return (multipliers @ G - z0) @ back, multipliers
+    return dot(dot(multipliers, G) - z0, back), multipliers

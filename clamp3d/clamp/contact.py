@@ -20,6 +20,7 @@ from clamp3d.clamp.section import SPLINTS, WIRES
 from clamp3d.collide.distance import Distance, measure
 from clamp3d.collide.model import ModelCache
 from clamp3d.core.arc_circle import classify_arc_circle
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, SectionPose, inverse
 from clamp3d.core.profile import Arc, Edge
 from clamp3d.core.rectangle import Rectangle, hole_bolt
@@ -138,7 +139,9 @@ def measure_contacts(
         kind: ConnectionType = contact_type((a, b)) if d.value <= CONTACT and relation != NONE else 0
         names = [
             surface_name(
-                solids[part], inverse(poses[part].T()) @ [*point, 1.0], CONTACT if d.estimate is None else _MODEL
+                solids[part],
+                dot(inverse(poses[part].T()), np.array([*point, 1.0])),
+                CONTACT if d.estimate is None else _MODEL,
             )
             for part, point in ((a, d.point_a), (b, d.point_b))
             if point is not None
@@ -190,7 +193,7 @@ def _arc_relation(clamp: Clamp, poses: Poses, pair: Pair, gap: float) -> str:
     """Column of Table 3 for a cylinder and the arc that it lies in."""
     arcs = groove_pairs(clamp)
     arc = arcs[pair] if pair in arcs else arcs[pair[1], pair[0]]
-    T = inverse(poses[arc.a].T() @ arc.T_a_groove) @ poses[arc.b].T() @ arc.T_b_cylinder
+    T = dot(dot(inverse(dot(poses[arc.a].T(), arc.T_a_groove)), poses[arc.b].T()), arc.T_b_cylinder)
     groove, radius = arc.groove, arc.cylinder.radius
     x, y = float(T[0, 3]), float(T[1, 3])
     return classify_arc_circle(gap, groove.radius, groove.half_angle, radius, x, y, tolerance=CONTACT).value
@@ -228,7 +231,7 @@ def surface_name(solid: Solid, point: Array, tolerance: float = CONTACT) -> str:
     near: list[tuple[float, str]] = []
     for extrusion in (*solid.bodies, *solid.holes):
         hole = extrusion in solid.holes
-        a, b, along = (float(v) for v in np.asarray(point)[:3] @ extrusion.frame)
+        a, b, along = (float(v) for v in dot(np.asarray(point)[:3], extrusion.frame))
         for edge in extrusion.profile.edges:
             near.append((_edge_distance(edge, a, b), "hole" if hole else _edge_name(edge, a, b)))
         if not hole:

@@ -18,6 +18,7 @@ from clamp3d.clamp.curvature import LEVEL, lagrangian_hessian, least_curvature, 
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section, U
+from clamp3d.core.linear import dot, lstsq
 from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
@@ -166,10 +167,10 @@ def _certify(section: Section, q: Array, start: Array, held: Array, active: floa
         q = _settle_loose(section, q, wire)
     if loose:
         gaps = section.gaps(q)
-    unbalanced = (CLOSING - multipliers @ gaps.gradient)[list(section.free)]
+    unbalanced = (CLOSING - dot(multipliers, gaps.gradient))[list(section.free)]
     residual = max(0.0, float(np.abs(unbalanced).max()) - rounding_of_normals(section, q))
     violation = max(0.0, -float(gaps.value.min()))
-    complementarity = float(multipliers @ np.abs(gaps.value))  # by this much the distance is off
+    complementarity = float(dot(multipliers, np.abs(gaps.value)))  # by this much the distance is off
     curvature = least_curvature(section, q, gaps, multipliers, TOLERANCE)
     optimality = max(optimality, residual, complementarity)
     if section.free == HELD:  # nothing moves while the nut turns
@@ -222,7 +223,7 @@ def _settle_loose(section: Section, q: Array, wire: PartName) -> Array:
             return fallen
         near = gaps.value < depth
         fallen = fallen.copy()
-        fallen[[x, y]] -= np.linalg.lstsq(gaps.gradient[near][:, [x, y]], gaps.value[near], rcond=None)[0]
+        fallen[[x, y]] -= lstsq(gaps.gradient[near][:, [x, y]], gaps.value[near])[0]
     return fallen if depth <= TOLERANCE else q
 
 
@@ -266,9 +267,9 @@ def _polish(section: Section, q: Array, active: float, least: float) -> tuple[Ar
         A = gaps.gradient[rows]
         k, n = len(rows), len(free)
         kkt = np.block([[hessian[np.ix_(free, free)], -A[:, free].T], [A[:, free], np.zeros((k, k))]])
-        rhs = -np.concatenate([(CLOSING - multipliers[rows] @ A)[free], gaps.value[rows]])
+        rhs = -np.concatenate([(CLOSING - dot(multipliers[rows], A))[free], gaps.value[rows]])
         move = np.zeros(SIZE)
-        move[free] = np.linalg.lstsq(kkt, rhs, rcond=1e-12)[0][:n]
+        move[free] = lstsq(kkt, rhs, 1e-12)[0][:n]
         new = float(np.abs(move).max())
         if not new < step:
             break

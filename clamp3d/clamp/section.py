@@ -15,13 +15,17 @@ from functools import cached_property
 
 import numpy as np
 
-from clamp3d.baselines.model import ContactModel, Pieces, check_model
+from clamp3d.baselines.cas import Cas
+from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import Pair
+from clamp3d.core.distance import Feature
 from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, SectionPose
+from clamp3d.core.primitives import LARGEST
 
 SPLINTS: tuple[PartName, PartName] = ("P1", "P2")
 WIRES: tuple[PartName, PartName] = ("P6", "P7")
@@ -60,12 +64,13 @@ class Gaps:
     normal: Array
 
 
-_Rows = tuple[Array, Array, Array, tuple[Pair, ...], tuple[str, ...], Array, Array]
-"""Values, gradients, derivatives (k, 3) by the down splint's x, y and angle, pairs, features, points, normals."""
-_Row = tuple[float, tuple[float, ...], tuple[float, float, float], Pair, str, tuple[float, float], tuple[float, float]]
-_NONE = (0.0, 0.0, 0.0)
 _RIGHT_DOWN = np.array([1.0, -1.0])
 """Times a part's X and Z: its section coordinates."""
+_Named = tuple[Pair, str]
+_FACES: tuple[_Named, _Named] = ((("P1", "P2"), "left edge"), (("P1", "P2"), "right edge"))
+"""The gaps between the inner faces."""
+_FEATURES = {float(feature.value): str(feature) for feature in Feature}
+"""Names of what the kernel says is nearest."""
 
 
 @dataclass
@@ -136,11 +141,15 @@ class Section:
 
     def down_splint(self, q: Array) -> SectionPose:
         """P2 seen from P1."""
-        return SectionPose(*self._down(q))
+        x, y, *_ = self._down(q).tolist()
+        return SectionPose(x, y, float(q[S]) / self.lever)
 
-    def _down(self, q: Array) -> tuple[float, float, float]:
-        b, v, w = q[B : W + 1].tolist()
-        return self.bolt_x + b + v + w, float(q[D]) - self.lift(w)[0] - float(q[U]), float(q[S]) / self.lever
+    def _down(self, q: Array) -> Array:
+        """x, y, cosine and sine of P2 seen from P1, and the derivatives of its lift by w."""
+        _, _, _, _, d, scaled, b, v, w, u = q.tolist()
+        lift, slope, bend = self.lift(w)
+        angle = scaled / self.lever
+        return np.array((self.bolt_x + b + v + w, d - lift - u, math.cos(angle), math.sin(angle), slope, bend))
 
     @property
     def least_slack(self) -> float:
@@ -218,57 +227,74 @@ class Section:
 
     def wire_gaps(self, q: Array, wire: PartName) -> Gaps:
         """Gaps of one wire to both splints, every piece of the contact model, and to the bolt."""
-        return self._moved(q, [self._wire_rows(q, wire, self._down(q))])
+        return self._gaps(q, (wire,), stops=False)
 
     def gaps(self, q: Array) -> Gaps:
         """All gaps at a state: both wires, faces, stops."""
+        return self._gaps(q, WIRES, stops=True)
+
+    def face_gap(self, q: Array) -> float:
+        """The least gap between the inner faces (convex object collision, type 2 of the paper); mm."""
+        return float(self._gaps(q, (), stops=True).value[: len(_FACES)].min())
+
+    def _gaps(self, q: Array, wires: tuple[PartName, ...], *, stops: bool) -> Gaps:
+        from clamp3d.clamp import kernel_section  # compiled on first use
+
+        q = np.ascontiguousarray(q)
         down = self._down(q)
-        wires = [self._wire_rows(q, wire, down) for wire in WIRES]
-        return self._moved(q, [*wires, self._face_rows(down), self._stop_rows(q, down)])
+        px, py, c, s, *_ = down.tolist()
+        pieces: list[tuple[int, Array, Array]] = []
+        pairs: tuple[Pair, ...] = ()
+        features: tuple[str, ...] = ()
+        for wire in wires:
+            i = 2 * WIRES.index(wire)
+            x, y = q[i : i + 2].tolist()
+            dx, dy = x - px, y - py
+            up, named = self._pieces("P1", wire, x, y)
+            below, named_below = self._pieces("P2", wire, dx * c - dy * s, dx * s + dy * c, c, s)
+            pieces.append((i, up, below))
+            pairs += (("P1", wire),) * len(up) + (("P2", wire),) * len(below) + (("P4", wire),)
+            features += (*named, *named_below, "shank")
+        if stops:
+            stop_pairs, stop_features = self._stops
+            pairs, features = pairs + stop_pairs, features + stop_features
+        k = len(pairs)
+        value, gradient, place = np.empty(k), np.zeros((k, SIZE)), np.empty((k, 4))
+        at = 0
+        for i, up, below in pieces:
+            rows = slice(at, at := at + len(up) + len(below) + 1)
+            r = self.pairs["P1", WIRES[i // 2]].cylinder.radius
+            bolt = self.bolt_x, 0.5 * self.clamp.bolt.diameter
+            kernel_section.wire(q, down, i, *bolt, r, self.lever, up, below, value[rows], gradient[rows], place[rows])
+        if stops:
+            joints = self.clamp.joints
+            walls = 2 if joints.washer or joints.saddle else 1  # centred, the slot's lower ends meet the shank first
+            kernel_section.stops(
+                q, down, self._sizes, joints.hole, joints.washer, walls, value[at:], gradient[at:], place[at:]
+            )
+        return Gaps(value, gradient, pairs, features, place[:, :2], place[:, 2:])
 
-    def _moved(self, q: Array, rows: list[_Rows]) -> Gaps:
-        """Rows joined, with what moves the down splint written out in the state's coordinates."""
-        values, gradients, by, pairs, features, points, normals = zip(*rows, strict=True)
-        gradient = np.concatenate(gradients) + np.concatenate(by) @ self._down_by(float(q[W]))
-        point, normal = np.concatenate(points), np.concatenate(normals)
-        return Gaps(np.concatenate(values), gradient, sum(pairs, ()), sum(features, ()), point, normal)
+    @cached_property
+    def _stops(self) -> tuple[tuple[Pair, ...], tuple[str, ...]]:
+        """Pairs and features of the gaps that are no wire's."""
+        joints = self.clamp.joints
+        slot: _Named = (("P2", "P4"), "slot")
+        side: list[_Named] = [(("P2", "P3"), EDGES), *[slot] * (2 if joints.washer or joints.saddle else 1)]
+        side += [(("P1", "P4"), "hole")] * joints.hole + [(("P3", "P4"), "hole")] * joints.washer
+        pairs, features = zip(*_FACES, *side, *side, (("P2", "P3"), SEAT), strict=True)
+        return pairs, features
 
-    def _down_by(self, w: float) -> Array:
-        """Derivatives (3, 10) of the down splint's x, y and angle by q."""
-        found = np.zeros((3, SIZE))
-        found[0, B : W + 1] = found[1, D] = 1.0
-        found[1, W], found[1, U], found[2, S] = -self.lift(w)[1], -1.0, 1.0 / self.lever
-        return found
-
-    def _wire_rows(self, q: Array, wire: PartName, pose: tuple[float, float, float]) -> _Rows:
-        i = 2 * WIRES.index(wire)
-        x, y = q[i : i + 2].tolist()
-        px, py, angle = pose
-        c, s = math.cos(angle), math.sin(angle)
-        dx, dy = x - px, y - py
-        up = self._pieces("P1", wire, x, y)
-        down = self._pieces("P2", wire, dx * c - dy * s, dx * s + dy * c, c, s)
-        k, n = len(up.distance), len(up.distance) + len(down.distance)
-        value, by, point = np.empty(n + 1), np.zeros((n + 1, 3)), np.empty((n + 1, 2))
-        gradient = np.zeros((n + 1, SIZE))
-        value[:k], value[k:n] = up.distance, down.distance
-        gradient[:k, i : i + 2] = up.normal[:, ::2] * _RIGHT_DOWN
-        point[:k] = up.point[:, ::2] * _RIGHT_DOWN
-        # Of the down splint's normals and points the section components in its own axes (right, down), then in P1's.
-        normal, arm = down.normal[:, ::2] * _RIGHT_DOWN, down.point[:, ::2] * _RIGHT_DOWN
-        turn = np.array([[c, -s], [s, c]])
-        gradient[k:n, i : i + 2] = normal @ turn
-        by[k:n, :2] = -gradient[k:n, i : i + 2]
-        by[k:n, 2] = normal[:, 1] * arm[:, 0] - normal[:, 0] * arm[:, 1]
-        point[k:n] = arm @ turn + (px, py)
-        # The shank stands between the wires: each keeps to its side.
-        side = -1.0 if wire == "P6" else 1.0
-        bolt, r = self.clamp.bolt.diameter / 2, self.pairs["P1", wire].cylinder.radius
-        axis = self.bolt_x + float(q[B])
-        value[n], point[n] = side * (x - axis) - bolt - r, (axis + side * bolt, y)
-        gradient[n, i], gradient[n, B] = side, -side
-        pair: tuple[Pair, ...] = (("P1", wire),) * k + (("P2", wire),) * (n - k) + (("P4", wire),)
-        return value, gradient, by, pair, (*up.feature, *down.feature, "shank"), point, gradient[:, i : i + 2].copy()
+    @cached_property
+    def _sizes(self) -> Array:
+        """Dimensions in mm as the kernel of the stops takes them."""
+        up, down, saddle, bolt = self.clamp.up_splint, self.clamp.down_splint, self.clamp.saddle, self.clamp.bolt
+        return np.array(
+            (
+                *(self.bolt_x, 0.5 * bolt.diameter, self.lever, 0.5 * up.width, up.thickness, down.face_depth),
+                *(0.5 * down.slot_width, down.slot_bottom, down.underside_depth),
+                *(0.5 * saddle.width, self._edge_below, down.back_radius, *self.play),
+            )
+        )
 
     def wire_curvature(self, q: Array, splint: PartName, wire: PartName, force: Array, h: float) -> Array:
         """Second derivatives (10, 10) by q of ``force`` (k,) times a wire's gaps to a splint.
@@ -277,36 +303,61 @@ class Section:
         follow from q is written out.
         """
         i = 2 * WIRES.index(wire)
-        px, py, angle = self._down(q) if splint == "P2" else (0.0, 0.0, 0.0)
-        c, s = math.cos(angle), math.sin(angle)
+        px, py, c, s, slope, bend = self._down(q).tolist() if splint == "P2" else (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         turn = np.array([[c, -s], [s, c]])
-        u, v = (turn @ (q[i : i + 2] - (px, py))).tolist()
+        u, v = dot(turn, q[i : i + 2] - (px, py)).tolist()
 
         def push(u: float, v: float) -> Array:
-            return np.asarray(force @ self._pieces(splint, wire, u, v, c, s).normal[:, ::2] * _RIGHT_DOWN)
+            return np.asarray(dot(force, self._pieces(splint, wire, u, v, c, s)[0][:, 3:5]))
 
         turning = np.column_stack([push(u + h, v) - push(u - h, v), push(u, v + h) - push(u, v - h)]) / (2.0 * h)
         by_q, found = np.zeros((2, SIZE)), np.zeros((SIZE, SIZE))
         by_q[:, i : i + 2] = turn
         if splint == "P2":
-            by_q += np.column_stack([-turn, (-v, u)]) @ self._down_by(float(q[W]))
+            by_q[:, B : W + 1] = -turn[:, :1]
+            by_q[:, [D, U]] = np.column_stack([-turn[:, 1], turn[:, 1]])
+            by_q[:, W] += slope * turn[:, 1]
+            by_q[:, S] = np.array((-v, u)) / self.lever
             along, deep = push(u, v)
             found[S] = (deep * by_q[0] - along * by_q[1]) / self.lever
             found += found.T
             found[S, S] *= 0.5
-            found[W, W] += self.lift(float(q[W]))[2] * (along * turn[0, 1] + deep * turn[1, 1])
-        return by_q.T @ turning @ by_q + found
+            found[W, W] += bend * (along * turn[0, 1] + deep * turn[1, 1])
+        return dot(dot(by_q.T, turning), by_q) + found
 
-    def _pieces(self, splint: PartName, wire: PartName, u: float, v: float, c: float = 1.0, s: float = 0.0) -> Pieces:
+    @cached_property
+    def _grooves(self) -> dict[Pair, tuple[float, ...]]:
+        """Of each groove radius, half angle, half length, wire and its half length, centre and sense of the mouth."""
+        found: dict[Pair, tuple[float, ...]] = {}
+        for (splint, wire), pair in self.pairs.items():
+            groove, r, T = pair.groove, pair.cylinder.radius, pair.T_a_groove
+            sizes = groove.radius, groove.half_angle, 0.5 * groove.length, r, 0.5 * pair.cylinder.length
+            mouth = 1.0 if splint == "P1" else -1.0
+            found[splint, wire] = (*sizes, float(T[0, 3]), -float(T[2, 3]), mouth)
+        return found
+
+    def _pieces(
+        self, splint: PartName, wire: PartName, u: float, v: float, c: float = 1.0, s: float = 0.0
+    ) -> tuple[Array, tuple[str, ...]]:
         """The model's pieces for a wire at (u, v) in the splint's own axes (right, down), which is turned by (c, s).
 
-        The faces end at the splint's outer edge: the groove's material has no end.
+        Gap, point and normal of each (k, 6; the last column is not used), and what it is. The faces end at the splint's
+        outer edge: the groove's material has no end.
         """
         pair = self.pairs[splint, wire]
         self.queries.contact += 1
-        found = self.model.pieces(
-            pair, np.array([c, 0.0, s, u, 0.0, 1.0, 0.0, 0.0, -s, 0.0, c, -v, 0.0, 0.0, 0.0, 1.0]).reshape(4, 4)
-        )
+        feature: tuple[str, ...]
+        if type(self.model) is Cas and abs(u) + abs(v) < LARGEST:
+            from clamp3d.clamp.kernel_section import straight  # compiled on first use
+
+            rows, work = np.empty((3, 6)), np.empty((3, 14))
+            straight(*self._grooves[splint, wire], u, v, work, rows)
+            feature = tuple([_FEATURES[code] for code in rows[:, 5].tolist()])
+        else:
+            T = np.array([c, 0.0, s, u, 0.0, 1.0, 0.0, 0.0, -s, 0.0, c, -v, 0.0, 0.0, 0.0, 1.0]).reshape(4, 4)
+            found = self.model.pieces(pair, T)
+            feature, flat = found.feature, (found.point[:, ::2] * _RIGHT_DOWN, found.normal[:, ::2] * _RIGHT_DOWN)
+            rows = np.column_stack([found.distance, *flat, np.zeros(len(feature))])
         half, face, out = (
             (self.bolt_x, self.clamp.up_splint.thickness, 1.0)
             if splint == "P1"
@@ -316,105 +367,14 @@ class Section:
         side = -1.0 if wire == "P6" else 1.0
         beyond = side * (u - middle) - half
         if beyond <= 0.0:
-            return found
+            return rows, feature
         above = max(out * (v - face), 0.0)
-        gap = math.hypot(beyond, above)
-        distance, point, normal = found.distance.copy(), found.point.copy(), found.normal.copy()
-        k = int(np.argmin(distance))
-        distance[distance < gap - pair.cylinder.radius] = _FAR
-        distance[k] = gap - pair.cylinder.radius
-        point[k] = (middle + side * half, 0.0, -face if above else -v)
-        normal[k] = (side * beyond / gap, 0.0, -out * above / gap)
-        feature = tuple(EDGE if i == k else name for i, name in enumerate(found.feature))
-        return Pieces(distance, point, normal, feature)
-
-    def face_gap(self, q: Array) -> float:
-        """The least gap between the inner faces, at an end of their overlap; mm.
-
-        The splints are taken as their rectangles here (convex object collision, type 2 of the paper). The gap between
-        two straight faces is least at an end of their overlap.
-        """
-        return float(self._face_rows(self._down(q))[0].min())
-
-    def _face_rows(self, pose: tuple[float, float, float]) -> _Rows:
-        up, down = self.clamp.up_splint, self.clamp.down_splint
-        v, half = down.face_depth, self.lever
-        px, py, angle = pose
-        c, s = math.cos(angle), math.sin(angle)
-        value, by, point, normal = [], [], [], []
-        for side in (-1.0, 1.0):
-            u = side * half
-            corner_x, edge_x = px + u * c + v * s, self.bolt_x + side * up.width / 2
-            if side * (corner_x - edge_x) <= 0.0:  # P2's corner under P1's face
-                value.append(py - u * s + v * c - up.thickness)
-                by.append((0.0, 1.0, px - corner_x))
-                point.append((corner_x, up.thickness))
-                normal.append((0.0, 1.0))
-            else:  # P1's edge over P2's face
-                x, y = edge_x - px, up.thickness - py
-                value.append(v - (x * s + y * c))
-                by.append((s, c, y * s - x * c))
-                point.append((edge_x, up.thickness))
-                normal.append((s, c))
-        return (
-            np.array(value),
-            np.zeros((2, SIZE)),
-            np.array(by),
-            (("P1", "P2"),) * 2,
-            ("left edge", "right edge"),
-            np.array(point),
-            np.array(normal),
-        )
-
-    def _stop_rows(self, q: Array, pose: tuple[float, float, float]) -> _Rows:
-        """What ends the down splint's tilt and slide, and carries it.
-
-        Its underside on the saddle's edges, its slot on the shank (Table 2 of the paper), the joints' play, and its
-        round back in the saddle's arc.
-        """
-        clamp, down, saddle, joints = self.clamp, self.clamp.down_splint, self.clamp.saddle, self.clamp.joints
-        r = clamp.bolt.diameter / 2
-        (px, py, angle), (b, v, w, u) = pose, q[B:].tolist()
-        c, s = math.cos(angle), math.sin(angle)
-        axis, half = self.bolt_x + b, down.slot_width / 2
-        hole, washer = self.play
-        # The centre of the saddle's arc stands back_clearance above the state's d.
-        edge_y = float(q[D]) + self._edge_below
-        rows: list[_Row] = []
-        # Centred, the slot's lower ends meet the shank first.
-        walls = (self._slot_bottom, down.face_depth) if joints.washer or joints.saddle else (self._slot_bottom,)
-        for side in (-1.0, 1.0):
-            edge_x = axis + v + side * saddle.width / 2
-            x, y = edge_x - px, edge_y - py
-            own = (c, 0.0, s, s, 0.0, 0.0)
-            by = (-s, -c, x * c - y * s)
-            gap = x * s + y * c - down.underside_depth
-            rows.append((gap, own, by, ("P2", "P3"), EDGES, (edge_x, edge_y), (s, c)))
-            for end in walls:
-                x, y = px + side * half * c + end * s, py - side * half * s + end * c
-                gap = side * (x - axis) - r
-                by = (side, 0.0, side * (y - py))
-                rows.append((gap, (0.0, 0.0, -side, 0.0, 0.0, 0.0), by, ("P2", "P4"), "slot", (x, y), (-side, 0.0)))
-            if joints.hole:
-                at, own = (axis + side * r, 0.5 * clamp.up_splint.thickness), (0.0, 0.0, -side, 0.0, 0.0, 0.0)
-                rows.append((hole - side * b, own, _NONE, ("P1", "P4"), "hole", at, (-side, 0.0)))
-            if joints.washer:
-                at, own = (axis - side * r, float(q[D]) + down.back_radius), (0.0, 0.0, 0.0, -side, 0.0, 0.0)
-                rows.append((washer - side * v, own, _NONE, ("P3", "P4"), "hole", at, (side, 0.0)))
-        # The height over the arc, square to it.
-        _, slope, bend = self.lift(w)
-        upright = 1.0 / math.hypot(1.0, slope)
-        nx, own = slope * upright, (0.0, 0.0, 0.0, 0.0, -u * slope * bend * upright**3, upright)
-        at = px + down.back_radius * nx, py + down.back_radius * upright
-        rows.append((u * upright, own, _NONE, ("P2", "P3"), SEAT, at, (nx, upright)))
-        value, own_rows, by_rows, pairs, names, points, normals = zip(*rows, strict=True)
-        gradient = np.zeros((len(rows), SIZE))
-        gradient[:, D:] = own_rows
-        return np.array(value), gradient, np.array(by_rows), pairs, names, np.array(points), np.array(normals)
-
-    @cached_property
-    def _slot_bottom(self) -> float:
-        return self.clamp.down_splint.slot_bottom
+        away = math.hypot(beyond, above)
+        gap = away - pair.cylinder.radius
+        k = int(np.argmin(rows[:, 0]))
+        rows[rows[:, 0] < gap, 0] = _FAR
+        rows[k, :5] = gap, middle + side * half, face if above else v, side * beyond / away, out * above / away
+        return rows, tuple(EDGE if i == k else name for i, name in enumerate(feature))
 
     @cached_property
     def _edge_below(self) -> float:

@@ -22,6 +22,7 @@ from clamp3d.collide.moving_pair import ACCURACY, MovingPair, box_corners, first
 from clamp3d.collide.refine import measured
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds
+from clamp3d.core.linear import dot
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 
@@ -113,7 +114,7 @@ class Ways:
             for part in _BENDS:
                 corner = _out(origin, part * free)
                 for then, more in self._outward(pairs, place, corner):
-                    if np.dot(_out(then), _out(origin)) == 0.0 and self._free(todo, place, corner, then, more):
+                    if dot(_out(then), _out(origin)) == 0.0 and self._free(todo, place, corner, then, more):
                         return ((origin, part * free), (then, more + SPARE))
         return ()
 
@@ -137,7 +138,7 @@ class Ways:
         """The parts of ``pairs`` with the motion that ``block`` blocks, up to the place."""
         moving, start = {a for a, _ in pairs}, np.eye(4)
         start[:3, 3] = _out(block.origin, block.way)
-        whole = clamp_scene(self.clamp, {name: start @ T if name in moving else T for name, T in place.items()})
+        whole = clamp_scene(self.clamp, {name: dot(start, T) if name in moving else T for name, T in place.items()})
         shown = {name for pair in pairs for name in pair}
         motion = Motion.translate(-start[:3, 3], parts=tuple(sorted(moving)), name=f"{block.a} {block.origin}")
         return replace(
@@ -145,7 +146,7 @@ class Ways:
             parts=tuple(part for part in whole.parts if part.name in shown),
             allowed=tuple(pair for pair in whole.allowed if {pair.a, pair.b} <= shown),
             motions=(motion,),
-            name=f"{self.clamp.name} clamp, step not done",
+            name=f"{self.clamp.name} clamp: the step that is blocked",
         )
 
     def _first(self, pairs: Sequence[Pair], place: Poses, start: Array, by: Array) -> tuple[float, Pair | None]:

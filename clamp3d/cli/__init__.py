@@ -63,9 +63,14 @@ class _LazyGroup(click.Group):
             formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
 
 
-@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(
+    cls=_LazyGroup,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
 @click.version_option(clamp3d.__version__, prog_name="clamp3d")
-def group() -> None:
+@click.pass_context
+def group(context: click.Context) -> None:
     """Exact assembly checker for parts with round grooves.
 
     \b
@@ -73,7 +78,10 @@ def group() -> None:
     clamp3d run --line LJ-500 --jumper 16   other wires: by catalogue name or diameter in mm
     clamp3d run my-clamp.toml --json out.json
     clamp3d view                            watch it in a browser
+    clamp3d check assembly.step             which parts clash, touch, keep their clearance
     """
+    if context.invoked_subcommand is None:
+        show(context.get_help())
 
 
 def main() -> None:

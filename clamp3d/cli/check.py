@@ -10,7 +10,7 @@ import click
 from clamp3d.cli.options import JSON, QUIET, Source, argument, declared, group, option
 from clamp3d.cli.progress import bar
 from clamp3d.cli.results import write_result
-from clamp3d.cli.terminal import finish, show
+from clamp3d.cli.terminal import finish_checked, show
 
 
 @declared("check")
@@ -32,8 +32,6 @@ def command(
     """
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.collide.check import check, check_full
-    from clamp3d.collide.result import BAD
-    from clamp3d.collide.verdict import Verdict
     from clamp3d.output.files import write_text
     from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
 
@@ -56,12 +54,7 @@ def command(
         write_result(json_file, check_to_dict(result, complete))
     if html_file is not None:
         write_text(html_file, check_to_html(result, complete))
-    finish(
-        finding=bool(result.counts.keys() & BAD),
-        failed=Verdict.FAILED in result.counts,
-        undecided=Verdict.UNCERTAIN in result.counts,
-        empty=not result.work.pairs,
-    )
+    finish_checked(result.counts, empty=not result.work.pairs)
 
 
 def _pairs(text: str) -> list[tuple[str, str]]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from clamp3d.cli.options import FOLDER, METHOD, QUIET, SOURCE, Method, Source, declared, option
 from clamp3d.cli.progress import narrator
-from clamp3d.cli.terminal import finish, show
+from clamp3d.cli.terminal import finish, finish_checked, show
 from clamp3d.errors import need
 
 
@@ -23,8 +23,8 @@ def command(
     """Write a report for a reviewer into DIR: report.html, report.json, pairs.csv.
 
     INPUT is a clamp (a built-in name or a TOML file), which is assembled first, a scene file, or a file with parts;
-    --method and --solver go with a clamp. Prints the paths of the files. Exit code 1 if parts clash, or a clamp does
-    not close on both wires or parts meet that should not.
+    --method and --solver go with a clamp. Prints the paths of the files. Exit codes are those of check; 1
+    also if a clamp does not close on both wires, or parts of it meet that should not.
     """
     need("matplotlib", "a report")
     settings = method.settings()
@@ -53,4 +53,7 @@ def command(
         paths = write_report(made, output, progress=tell.status)
     for path in paths:
         show(str(path))
-    finish(finding=not made.passed)
+    if made.assembly is not None:
+        finish(finding=not made.passed)
+    else:
+        finish_checked({row.result.verdict for row in (*made.rows, *made.motions)})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import signal
 import sys
+from collections.abc import Collection
 from enum import IntEnum
 from typing import NoReturn
 
@@ -49,6 +50,19 @@ def finish(*, finding: bool, failed: bool = False, undecided: bool = False, empt
         raise click.exceptions.Exit(code)
     if empty:
         raise InputError("there is no pair of parts to judge")
+
+
+def finish_checked(verdicts: Collection[str], *, empty: bool = False) -> None:
+    """End a command by the verdicts of a scene; see `finish`."""
+    from clamp3d.collide.result import BAD
+    from clamp3d.collide.verdict import Verdict
+
+    finish(
+        finding=any(verdict in verdicts for verdict in BAD),
+        failed=Verdict.FAILED in verdicts,
+        undecided=Verdict.UNCERTAIN in verdicts,
+        empty=empty,
+    )
 
 
 STDOUT_TAKEN = "clamp3d.stdout"

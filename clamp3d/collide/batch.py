@@ -11,9 +11,7 @@ from clamp3d.collide.answer import Distances
 from clamp3d.collide.body import Bore, ClosedForm
 from clamp3d.collide.convex import MEMBER, Rod
 from clamp3d.collide.model import Model
-from clamp3d.core.distance import signed_distances
 from clamp3d.core.pose import Array, inverse
-from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 
 _KNOWN = 1e-9
 
@@ -72,42 +70,21 @@ def _by_kernel(a: ClosedForm, b: ClosedForm, T: Array) -> Distances | None:
 
 
 def _bore_rod(bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, T: Array) -> Distances:
-    wire, covers = Cylinder(rod.radius, rod.length), bore.covers()
-    places = [np.ascontiguousarray(inverse(P) @ T @ rod.T) for _, P in covers]
-    answers = [signed_distances(groove, wire, P, full=True) for (groove, _), P in zip(covers, places, strict=True)]
-    k, row = np.array([answer.distance for answer in answers]).argmin(axis=0), np.arange(len(T))
-    d, e, p, q, n = (
-        np.array([getattr(answer, name) for answer in answers])[k, row]
-        for name in ("distance", "error_bound", "point_on_groove", "point_on_cylinder", "normal")
-    )
-    R, t = np.array([P[:3, :3] for _, P in covers])[k], np.array([P[:3, 3] for _, P in covers])[k]
-    p, q, n = (np.einsum("nij,nj->ni", R, x) for x in (p, q, n))
-    p, q = p + t, q + t
+    from clamp3d.collide.poses_kernel import bore_rod
 
-    def depths(x: Array, rows: NDArray[np.int64]) -> tuple[Array, Array]:
-        local = np.einsum("nji,nj->ni", T[rows, :3, :3], x[rows] - T[rows, :3, 3])
-        return a.depth(x[rows]), b.depth(local)
-
-    slack = MEMBER * (1.0 + float(max(np.abs(p).max(initial=0.0), np.abs(q).max(initial=0.0))))
-    apart, upper = d >= -e, np.full(len(T), np.inf)
-    rows = np.flatnonzero(apart)
-    outside = np.minimum(depths(p, rows)[0], depths(q, rows)[1])
-    upper[rows] = np.where(outside >= -slack, (d + e)[rows] + np.maximum(0.0, -4.0 * outside), np.inf)
-    rows = np.flatnonzero(~apart)
-    for x in (p, q, 0.5 * (p + q)):  # a point in both has the depth that it has in either
-        own, other = depths(x, rows)
-        out = np.minimum(own, other)
-        deep = np.minimum(0.0, 4.0 * np.maximum(0.0, -out) - np.maximum(own, other))
-        upper[rows] = np.where(out >= -slack, np.minimum(upper[rows], deep), upper[rows])
-    lower = np.where(d > e, d - e, -0.5 * _KNOWN)
-    lower[rows] = _least([(groove, P[rows]) for (groove, _), P in zip(covers, places, strict=True)], rod)
-    return Distances(lower, upper, p, q, n, ("groove kernel",) * len(T))
+    covers = bore.covers()
+    grooves = np.array([(groove.radius, groove.half_angle, 0.5 * groove.length) for groove, _ in covers])
+    P, found = np.array([place for _, place in covers]), np.empty((len(T), 11))
+    wire = rod.radius, 0.5 * rod.length, np.array([rod.T])
+    bore_rod(grooves, P, *wire, T, *members(a), *members(b), MEMBER, _KNOWN, np.empty((128, 5)), found)
+    method = ("groove kernel",) * len(T)
+    return Distances(found[:, 0], found[:, 1], found[:, 2:5], found[:, 5:8], found[:, 8:11], method)
 
 
-def _least(covers: list[tuple[SweptArc, Array]], rod: Rod) -> Array:
-    """Lower bounds (n,) of overlaps, as `body.bore_rod` has them: by the capsule that holds the rod."""
-    wire = Capsule(rod.radius, rod.length)
-    answers = [signed_distances(groove, wire, P, full=True) for groove, P in covers]
-    d, e = (np.array([getattr(answer, name) for answer in answers]) for name in ("distance", "error_bound"))
-    deep = (d <= e - rod.radius).any(axis=0) & (len(covers) > 1)
-    return np.where(deep, -np.inf, (d - e).min(axis=0))
+def members(form: ClosedForm) -> tuple[Array, Array, Array]:
+    """What `ClosedForm.depth` asks, as the kernel takes it: planes (k, 4), radii and half lengths (m, 2), poses."""
+    planes = [piece.planes for piece in form.outers if not isinstance(piece, Rod)]
+    rods = [piece for piece in form.outers if isinstance(piece, Rod)]
+    rounds = [(rod.radius, 0.5 * rod.length) for rod in rods] + [(bore.radius, -1.0) for bore in form.bores]
+    places = [rod.T for rod in rods] + [bore.T for bore in form.bores]
+    return np.vstack([np.empty((0, 4)), *planes]), np.array(rounds).reshape(-1, 2), np.array(places).reshape(-1, 4, 4)

@@ -18,6 +18,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.convex import MEMBER, Convex, Hull, Rod, convex_distance
 from clamp3d.collide.nearest import segment_pairs, to_faces
 from clamp3d.core.distance import SignedDistance, signed_distance
+from clamp3d.core.linear import dot, norm, to_source, to_target
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 
@@ -45,7 +46,7 @@ class Bore:
         if self.half_angle < math.pi:
             return ((SweptArc(self.radius, self.half_angle, self.length), self.T),)
         half = SweptArc(self.radius, 0.5 * math.pi, self.length)
-        return ((half, self.T), (half, self.T @ _TURN))
+        return ((half, self.T), (half, dot(self.T, _TURN)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,7 @@ class ClosedForm:
             return self.surface(points)
         found = np.min([piece.depth(points) for piece in self.outers], axis=0)
         for bore in self.bores:
-            local = (points - bore.T[:3, 3]) @ bore.T[:3, :3]
+            local = to_source(bore.T, points)
             found = np.minimum(found, np.hypot(local[:, 0], local[:, 1]) - bore.radius)
         return np.asarray(found)
 
@@ -141,8 +142,8 @@ def bore_rod(bore: Bore, rod: Rod, T: Array) -> Distance:
 
     In an overlap the capsule that holds the rod gives a lower bound, and the rod's own answer is how deep a point lies.
     """
-    covers = [(groove, place, inverse(place) @ T @ rod.T) for groove, place in bore.covers()]
-    tilt = np.linalg.norm(np.cross(bore.T[:3, 2], T[:3, :3] @ rod.T[:3, 2]))
+    covers = [(groove, place, dot(dot(inverse(place), T), rod.T)) for groove, place in bore.covers()]
+    tilt = norm(np.cross(bore.T[:3, 2], dot(T[:3, :3], rod.T[:3, 2])))
     flat = [(signed_distance(groove, Cylinder(rod.radius, rod.length), P), place) for groove, place, P in covers]
     answer, place = min(flat, key=lambda found: found[0].distance)
     found = replace(kernel_distance(answer).moved(place), unique=False if tilt < 1e-12 else None)
@@ -168,18 +169,18 @@ def _bore_hull(bore: Bore, piece: Convex, T: Array) -> Distance:
     """
     assert isinstance(piece, Hull)
     found = Distance(np.inf, np.inf)
-    corners, edges, triangles = (x @ T[:3, :3].T + T[:3, 3] for x in piece.near(None))
+    corners, edges, triangles = (to_target(T, x) for x in piece.near(None))
     if len(corners) > 64:
         return Distance()
     for groove, place in bore.covers():
         R, t = place[:3, :3], place[:3, 3]
-        E, V = (edges - t) @ R, (corners - t) @ R
+        E, V = dot(edges - t, R), dot(corners - t, R)
         for start, end in E:
             P = np.eye(4)
-            length = float(np.linalg.norm(end - start))
+            length = norm(end - start)
             z = (end - start) / length
             x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
-            P[:3, 2], P[:3, 0] = z, x / np.linalg.norm(x)
+            P[:3, 2], P[:3, 0] = z, x / norm(x)
             P[:3, 1], P[:3, 3] = np.cross(z, P[:3, 0]), 0.5 * (start + end)
             answer = signed_distance(groove, Capsule(_THIN, length), P)
             if answer.distance < found.upper:
@@ -189,10 +190,10 @@ def _bore_hull(bore: Bore, piece: Convex, T: Array) -> Distance:
         lines = [[(x, h, -H), (x, h, H)] for x in (-s, s)]
         lines += [[(x, h, z), (math.copysign(far, x), h, z)] for x in (-s, s) for z in (-H, H)]
         L = np.array(lines)
-        M = inverse(T) @ place
-        if any(piece.crossed_by(line @ M[:3, :3].T + M[:3, 3]) for line in L):
+        M = dot(inverse(T), place)
+        if any(piece.crossed_by(to_target(M, line)) for line in L):
             return Distance()
-        for d, p, q in (segment_pairs(L, E), to_faces(L.reshape(-1, 3), (triangles - t) @ R)):
+        for d, p, q in (segment_pairs(L, E), to_faces(L.reshape(-1, 3), dot(triangles - t, R))):
             if 0.0 < d < found.upper:
                 e = 8.0 * 2.0**-52 * float(np.abs(V).max() + groove.radius + H)
                 n = (q - p) / d
@@ -229,7 +230,7 @@ def _with_witnesses(known: Distance, a: ClosedForm, b: ClosedForm, T: Array) -> 
 def _deepest_common(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, trials: Array) -> Distance:
     """``known`` with the deepest of ``trials`` (k, 3) that lie in both bodies as its witness, or without points."""
     slack = MEMBER * (1.0 + float(np.abs(trials).max()))
-    in_a, in_b = a.depth(trials), b.depth((trials - T[:3, 3]) @ T[:3, :3])
+    in_a, in_b = a.depth(trials), b.depth(to_source(T, trials))
     both = np.where(np.minimum(in_a, in_b) >= -slack, np.maximum(in_a, in_b), -np.inf)
     k = int(np.argmax(both))
     if both[k] == -np.inf:
@@ -246,7 +247,7 @@ def _attested(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array,
     """
     slack = MEMBER * (1.0 + float(max(np.abs(p).max(), np.abs(q).max())))
     index, outside = np.arange(len(p)), np.zeros(len(p))
-    tests = [(a, p), (b, (q - T[:3, 3]) @ T[:3, :3])]
+    tests = [(a, p), (b, to_source(T, q))]
     for body, points in sorted(tests, key=lambda test: test[0].surface is not None):
         depth = body.depth(points[index])
         on = depth >= -slack
@@ -265,7 +266,7 @@ def _face_to_face(known: Distance, piece: Convex, other: Convex, a: ClosedForm, 
     """
     n, R, t = known.normal, T[:3, :3], T[:3, 3]
     assert n is not None
-    p, q = piece.face(n), other.face(-n @ R) @ R.T + t
+    p, q = piece.face(n), dot(other.face(dot(-n, R)), R.T) + t
     gap = known.lower
     p, q = np.vstack([p, q - gap * n]), np.vstack([p + gap * n, q])
     if gap >= 0.0:
@@ -278,5 +279,5 @@ def _along(piece: Convex, T: Array | None) -> Array:
     """Shifts (k, 3) along a rod's axis in equal steps; none for other pieces."""
     if not isinstance(piece, Rod):
         return np.empty((0, 3))
-    axis = piece.T[:3, 2] if T is None else T[:3, :3] @ piece.T[:3, 2]
+    axis = piece.T[:3, 2] if T is None else dot(T[:3, :3], piece.T[:3, 2])
     return np.outer(np.linspace(-1.0, 1.0, 2 * _SHIFTS - 1) * piece.length, axis)

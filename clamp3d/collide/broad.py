@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 
 
@@ -70,11 +71,14 @@ def box_gaps(boxes: Boxes, pairs: NDArray[np.int64]) -> Array:
     radius = np.linalg.norm(boxes.half, axis=1)
     found = np.maximum(found, np.linalg.norm(d, axis=1) - radius[i] - radius[j])
     A, B = np.swapaxes(boxes.R[i], 1, 2), np.swapaxes(boxes.R[j], 1, 2)  # rows: the boxes' own axes
-    crossed = np.cross(A[:, :, None], B[:, None]).reshape(len(pairs), 9, 3)
+    (ax, ay, az), (bx, by, bz) = np.moveaxis(A[:, :, None], 3, 0), np.moveaxis(B[:, None], 3, 0)
+    crossed = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=3).reshape(len(pairs), 9, 3)
     axes = np.concatenate([A, B, crossed], axis=1)
     size = np.linalg.norm(axes, axis=2)
     axes = axes / np.maximum(size, 1e-300)[..., None]
-    spread = [(np.abs(axes @ np.swapaxes(X, 1, 2)) * boxes.half[k][:, None]).sum(axis=2) for X, k in ((A, i), (B, j))]
+    spread = [
+        (np.abs(dot(axes, np.swapaxes(X, 1, 2))) * boxes.half[k][:, None]).sum(axis=2) for X, k in ((A, i), (B, j))
+    ]
     apart = np.abs(np.einsum("mkj,mj->mk", axes, d)) - spread[0] - spread[1]
     found = np.maximum(found, np.where(size > 1e-6, apart, -np.inf).max(axis=1))
     return np.asarray(found - 1e-12 * (1.0 + np.abs(d).max(axis=1)))

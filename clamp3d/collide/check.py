@@ -16,14 +16,16 @@ from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check_motions import check_motions
 from clamp3d.collide.depth import is_quick, penetration
 from clamp3d.collide.faces_depth import faces_depth
+from clamp3d.collide.judge import judge
 from clamp3d.collide.model import Model, ModelCache, Progress
 from clamp3d.collide.reasons import failure, undecided
-from clamp3d.collide.refine import contained, measured, refine, with_normal
+from clamp3d.collide.refine import measured, with_normal
 from clamp3d.collide.result import BAD, CheckResult, PairResult, Work
 from clamp3d.collide.scene import Scene, name_pairs
 from clamp3d.collide.touching import is_box, touching_boxes
 from clamp3d.collide.verdict import Verdict
 from clamp3d.collide.where import locator
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import InputError, MissingLibraryError, SolverError
 
@@ -183,29 +185,19 @@ def _pair(
 ) -> PairResult:
     a, b = scene.parts[i].name, scene.parts[j].name
     allowance, thresholds = scene.allowance(a, b), scene.thresholds
-    x, y, T_ab = models[i], models[j], inverse(T[i]) @ T[j]
+    x, y, T_ab = models[i], models[j], dot(inverse(T[i]), T[j])
 
-    def certain(known: Distance) -> bool:
-        known_well = not distances or measured(known)
-        return not full and known_well and thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN
+    def enough(known: Distance) -> bool:
+        return not full and (not distances or measured(known))
 
     pair = x, y, T_ab
-    quick = is_quick(x, y)
     try:
-        found = refine(*pair, start, thresholds, certain)
-        verdict = thresholds.verdict(found, allowance)
-        if verdict is Verdict.UNCERTAIN and found.upper < thresholds.reach and quick:
-            # Nothing lies deeper inside than the way out is long.
-            deep = penetration(*pair, with_normal(found))
-            found = replace(found, lower=max(found.lower, deep.lower))
-            verdict = thresholds.verdict(found, allowance)
+        verdict, found = judge(*pair, start, thresholds, allowance, enough)
         deep = with_normal(found)
-        if verdict is Verdict.CLASH:
-            deep = penetration(*pair, deep) if depths and quick else deep.of_overlap()
-            if depths and not quick and x.faces is not None and y.faces is not None:
+        if verdict in BAD:
+            deep = penetration(*pair, deep) if depths and is_quick(x, y) else deep.of_overlap()
+            if depths and not is_quick(x, y) and x.faces is not None and y.faces is not None:
                 deep = faces_depth(x.faces, y.faces, T_ab, deep)
-        if verdict is Verdict.CLASH and contained(*pair, thresholds):
-            verdict = Verdict.CONTAINED
     except MissingLibraryError:
         raise
     except Exception as error:  # one pair that fails is a finding, not the end of all others

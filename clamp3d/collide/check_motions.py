@@ -17,6 +17,7 @@ from clamp3d.collide.result import BAD, PairResult
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Verdict
 from clamp3d.collide.where import locator
+from clamp3d.core.linear import to_target
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 from clamp3d.errors import MissingLibraryError
@@ -93,7 +94,7 @@ def _near(
     t = np.linspace(0.0, 1.0, 33)
     for i in moving:
         points = box_corners(models[i], poses[i])
-        way = np.concatenate([points @ motion.at(s)[:3, :3].T + motion.at(s)[:3, 3] for s in t])
+        way = np.concatenate([to_target(motion.at(s), points) for s in t])
         slack = 0.5 * motion.speed(points) / (len(t) - 1)
         low, high = way.min(axis=0) - slack, way.max(axis=0) + slack
         around = Boxes(

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.nearest import rim_minimum, segment_pairs, to_faces
 from clamp3d.collide.zonoid import Zonoid, box_of, zonoid_distance
+from clamp3d.core.linear import dot, norm, to_source, to_target
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.triangles import closest_points
 
@@ -44,14 +45,14 @@ class Rod:
     def support(self, n: Array) -> Array:
         """The point (3,) that lies furthest along ``n`` (3,)."""
         R, t = self.T[:3, :3], self.T[:3, 3]
-        m = n @ R
+        m = dot(n, R)
         across = float(np.hypot(m[0], m[1]))
         scale = self.radius / across if across > 1e-12 else 0.0
-        return np.asarray(t + R @ np.array([scale * m[0], scale * m[1], np.copysign(0.5 * self.length, m[2])]))
+        return np.asarray(t + dot(R, np.array([scale * m[0], scale * m[1], np.copysign(0.5 * self.length, m[2])])))
 
     def face(self, n: Array) -> Array:
         """Points (k, 3) of what lies furthest along ``n`` (3,): a line on the side, the rim of an end, a point."""
-        m = n @ self.T[:3, :3]
+        m = dot(n, self.T[:3, :3])
         across = float(np.hypot(m[0], m[1]))
         if across < _FLAT:
             turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
@@ -63,18 +64,18 @@ class Rod:
             local = np.column_stack([np.outer(np.ones(65), self.radius / across * m[:2]), z])
         else:
             return self.support(n)[None]
-        return np.asarray(local @ self.T[:3, :3].T + self.T[:3, 3])
+        return np.asarray(to_target(self.T, local))
 
     def flatness(self, n: Array, within: float = _FLAT) -> tuple[int, Array | None]:
         """Dimension of what lies furthest along ``n`` (3,), and its direction if it is a line."""
-        m = n @ self.T[:3, :3]
+        m = dot(n, self.T[:3, :3])
         if float(np.hypot(m[0], m[1])) < within:
             return 2, None
         return (1, self.T[:3, 2]) if abs(m[2]) < within else (0, None)
 
     def depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""
-        local = (points - self.T[:3, 3]) @ self.T[:3, :3]
+        local = to_source(self.T, points)
         return np.asarray(
             np.minimum(self.radius - np.hypot(local[:, 0], local[:, 1]), 0.5 * self.length - np.abs(local[:, 2]))
         )
@@ -82,19 +83,19 @@ class Rod:
     def normals(self, n: Array) -> list[Array]:
         """Directions near ``n`` (3,) in which the surface is flat or round: the axis, and across it."""
         axis = self.T[:3, 2]
-        along = float(n @ axis)
+        along = float(dot(n, axis))
         across = n - along * axis
-        size = float(np.linalg.norm(across))
+        size = norm(across)
         found = [np.copysign(1.0, along) * axis]
         return [*found, across / size] if size > 1e-9 else found
 
     def closest(self, points: Array) -> Array:
         """The points of the rod (k, 3) that are nearest to ``points`` (k, 3)."""
-        local = (points - self.T[:3, 3]) @ self.T[:3, :3]
+        local = to_source(self.T, points)
         out = np.hypot(local[:, 0], local[:, 1])
         local[:, :2] *= np.minimum(1.0, self.radius / np.maximum(out, 1e-300))[:, None]
         local[:, 2] = np.clip(local[:, 2], -0.5 * self.length, 0.5 * self.length)
-        return np.asarray(local @ self.T[:3, :3].T + self.T[:3, 3])
+        return np.asarray(to_target(self.T, local))
 
     @property
     def sum(self) -> Zonoid:
@@ -135,10 +136,10 @@ class Hull:
 
     def support(self, n: Array) -> Array:
         """The vertex (3,) that lies furthest along ``n`` (3,)."""
-        return np.asarray(self.vertices[int(np.argmax(self.vertices @ n))])
+        return np.asarray(self.vertices[int(np.argmax(dot(self.vertices, n)))])
 
     def _highest(self, n: Array, within: float = _FLAT) -> Array:
-        height = self.vertices @ n
+        height = dot(self.vertices, n)
         return np.asarray(self.vertices[height >= height.max() - within * (1.0 + float(np.ptp(height)))][:24])
 
     def face(self, n: Array) -> Array:
@@ -152,23 +153,23 @@ class Hull:
         corners = self._highest(n, within)
         if len(corners) == 2:
             along = corners[1] - corners[0]
-            return 1, along / np.linalg.norm(along)
+            return 1, along / norm(along)
         return (0, None) if len(corners) == 1 else (2, None)
 
     def depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""
-        return np.asarray(-(points @ self.planes[:, :3].T + self.planes[:, 3]).max(axis=1))
+        return np.asarray(-(dot(points, self.planes[:, :3].T) + self.planes[:, 3]).max(axis=1))
 
     def normals(self, n: Array) -> list[Array]:
         """The face normal nearest to ``n`` (3,)."""
-        return [np.asarray(self.planes[int(np.argmax(self.planes[:, :3] @ n)), :3])]
+        return [np.asarray(self.planes[int(np.argmax(dot(self.planes[:, :3], n))), :3])]
 
     def near(self, n: Array | None) -> tuple[Array, Array, Array]:
         """Corners (k, 3), edges (k, 2, 3) and triangles (k, 3, 3), of a large hull only those that face ``n`` (3,)."""
         V = self.vertices
         if n is None or len(V) <= _SMALL:
             return V, V[self.edges], V[self.faces]
-        height = V @ n
+        height = dot(V, n)
         high = height >= height.max() - 0.01 * float(np.ptp(height))
         return V[high], V[self.edges[high[self.edges].any(axis=1)]], V[self.faces[high[self.faces].any(axis=1)]]
 
@@ -182,7 +183,7 @@ class Hull:
 
     def crossed_by(self, ends: Array) -> bool:
         """Whether the segment between ``ends`` (2, 3) meets the polyhedron."""
-        h, k = ends @ self.planes[:, :3].T + self.planes[:, 3]
+        h, k = dot(ends, self.planes[:, :3].T) + self.planes[:, 3]
         if ((h > 0.0) & (k > 0.0)).any():
             return False
         enters, leaves = h > 0.0, k > 0.0
@@ -192,7 +193,7 @@ class Hull:
     def clipped(self, plane: Array) -> Hull | None:
         """What of it lies in the half-space plane[:3] . x + plane[3] >= 0; None if it has no volume."""
         V = self.vertices
-        height = V @ plane[:3] + plane[3]
+        height = dot(V, plane[:3]) + plane[3]
         slack = MEMBER * (1.0 + float(np.abs(V).max()))
         if height.min() >= -slack:
             return self
@@ -221,7 +222,7 @@ def hull(points: Array) -> Hull:
         raise ValueError("the points lie in one plane")
     kept = area > 1e-14 * area.max()
     normal = normal[kept] / area[kept, None]
-    offset = -(vertices @ normal.T).max(axis=0)  # no rounding of a triangle cuts into the hull
+    offset = -dot(vertices, normal.T).max(axis=0)  # no rounding of a triangle cuts into the hull
     return Hull(vertices, np.unique(np.column_stack([normal, offset]).round(14), axis=0), faces)
 
 
@@ -269,24 +270,24 @@ def _unique(a: Convex, Ta: Array, b: Convex, Tb: Array, found: Distance) -> bool
 
 def _several(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array, within: float) -> bool:
     """Whether faces, or parallel lines, look at each other along ``n`` (3,); angles below ``within`` count as none."""
-    (i, u), (j, v) = a.flatness(n @ Ta[:3, :3], within), b.flatness(-n @ Tb[:3, :3], within)
+    (i, u), (j, v) = a.flatness(dot(n, Ta[:3, :3]), within), b.flatness(dot(-n, Tb[:3, :3]), within)
     if i == 0 or j == 0:
         return False
     if u is not None and v is not None:
-        return bool(np.linalg.norm(np.cross(Ta[:3, :3] @ u, Tb[:3, :3] @ v)) <= within)
+        return bool(norm(np.cross(dot(Ta[:3, :3], u), dot(Tb[:3, :3], v))) <= within)
     return True
 
 
 def _placed(points: Array, T: Array) -> Array:
-    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
+    return np.asarray(to_target(T, points))
 
 
 def _hulls(a: Hull, Ta: Array, b: Hull, Tb: Array, n: Array | None) -> Distance:
     """Two polyhedra: corners against faces and edges against edges; of large ones what looks along ``n``."""
     if n is None and max(len(a.vertices), len(b.vertices)) > _SMALL:
         return Distance()
-    Va, Ea, Fa = (_placed(x, Ta) for x in a.near(None if n is None else n @ Ta[:3, :3]))
-    Vb, Eb, Fb = (_placed(x, Tb) for x in b.near(None if n is None else -n @ Tb[:3, :3]))
+    Va, Ea, Fa = (_placed(x, Ta) for x in a.near(None if n is None else dot(n, Ta[:3, :3])))
+    Vb, Eb, Fb = (_placed(x, Tb) for x in b.near(None if n is None else dot(-n, Tb[:3, :3])))
     trials = [segment_pairs(Ea, Eb), to_faces(Va, Fb)]
     d, q, p = to_faces(Vb, Fa)
     d, p, q = min([*trials, (d, p, q)], key=lambda found: found[0])
@@ -307,15 +308,15 @@ def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None, rims: bool
     """A cylinder and a polyhedron: its axis against edges and faces, less the radius; then its rims."""
     if n is None and len(b.vertices) > _SMALL:
         return Distance()
-    _V, E, F = (_placed(x, Tb) for x in b.near(None if n is None else -n @ Tb[:3, :3]))
+    _V, E, F = (_placed(x, Tb) for x in b.near(None if n is None else dot(-n, Tb[:3, :3])))
     ends = _placed(a.ends, Ta)
     d, x, q = min([segment_pairs(ends[None], E), to_faces(ends, F)], key=lambda found: found[0])
     if not d > 1e-9 * a.radius or b.crossed_by(_placed(ends, inverse(Tb))):
         return Distance()
     m = (q - x) / d
-    axis = Ta[:3, :3] @ a.T[:3, 2]
+    axis = dot(Ta[:3, :3], a.T[:3, 2])
     found = Distance()
-    if abs(float(m @ axis)) <= _FLAT:  # square to the axis: on the side
+    if abs(float(dot(m, axis))) <= _FLAT:  # square to the axis: on the side
         p = x + a.radius * m
         low, normal = _slab(a, Ta, b, Tb, m)
         if d >= a.radius:
@@ -333,12 +334,12 @@ def _rims(a: Rod, Ta: Array, b: Convex, Tb: Array) -> Distance:
     back = inverse(Tb)
     found = Distance()
     for end in a.ends:
-        T = Ta @ a.T
+        T = dot(Ta, a.T)
         T[:3, 3] = _placed(end, Ta)
         rim = rim_minimum(lambda x: _placed(b.closest(_placed(x, back)), Tb), T, a.radius)
         if rim is not None:
             p, q = rim
-            found = found.meet(_proven(a, Ta, b, Tb, p, q, float(np.linalg.norm(q - p))))
+            found = found.meet(_proven(a, Ta, b, Tb, p, q, norm(q - p)))
     return found
 
 
@@ -370,7 +371,7 @@ def _object(piece: Convex, T: Array) -> Any:
     import fcl
 
     shape, own = _geometry(piece)
-    P = T @ own
+    P = dot(T, own)
     return fcl.CollisionObject(shape, fcl.Transform(P[:3, :3], P[:3, 3]))
 
 
@@ -384,7 +385,7 @@ def _by_gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
     fcl.distance(oa, ob, fcl.DistanceRequest(enable_nearest_points=True, gjk_solver_type=libccd), answer)
     if answer.min_distance > 0.0:
         p, q = (np.asarray(x, dtype=np.float64) for x in answer.nearest_points)
-        size = float(np.linalg.norm(q - p))
+        size = norm(q - p)
         if 0.0 < size < np.inf:
             n = (q - p) / size
             low, m = _slab(a, Ta, b, Tb, n)
@@ -401,7 +402,7 @@ def _by_gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
     found = Distance()
     for contact in contacts.contacts:
         n, at = np.asarray(contact.normal, dtype=np.float64), np.asarray(contact.pos, dtype=np.float64)
-        size = float(np.linalg.norm(n))
+        size = norm(n)
         if not 0.0 < size < np.inf:
             continue
         low, m = max((_slab(a, Ta, b, Tb, s * n / size) for s in (1.0, -1.0)), key=lambda found: found[0])
@@ -418,7 +419,7 @@ def _touching(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
     best, normal = -np.inf, None
     for piece, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
         axes = piece.T[:3, 2] * np.array([[1.0], [-1.0]]) if isinstance(piece, Rod) else piece.planes[:200, :3]
-        for n in sign * axes @ T[:3, :3].T:
+        for n in dot(sign * axes, T[:3, :3].T):
             gap, m = _slab(a, Ta, b, Tb, n)
             if gap > best:
                 best, normal = gap, m
@@ -426,7 +427,7 @@ def _touching(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
 
 
 def _depth(piece: Convex, T: Array, x: Array) -> float:
-    return float(piece.depth(((x - T[:3, 3]) @ T[:3, :3])[None])[0])
+    return float(piece.depth(to_source(T, x)[None])[0])
 
 
 def _slab(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array) -> tuple[float, Array]:
@@ -434,11 +435,11 @@ def _slab(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array) -> tuple[float, 
     Ra, Rb = Ta[:3, :3], Tb[:3, :3]
     offset = Tb[:3, 3] - Ta[:3, 3]
     best, normal = -np.inf, n
-    trials = [n, *(Ra @ m for m in a.normals(n @ Ra)), *(-(Rb @ m) for m in b.normals(-n @ Rb))]
+    trials = [n, *(dot(Ra, m) for m in a.normals(dot(n, Ra))), *(-dot(Rb, m) for m in b.normals(dot(-n, Rb)))]
     for m in trials:
-        if float(m @ n) > 0.5:
-            ma, mb = m @ Ra, m @ Rb
-            gap = float(m @ offset + mb @ b.support(-mb) - ma @ a.support(ma))
+        if float(dot(m, n)) > 0.5:
+            ma, mb = dot(m, Ra), dot(m, Rb)
+            gap = float(dot(m, offset) + dot(mb, b.support(-mb)) - dot(ma, a.support(ma)))
             gap -= 4.0 * _EPS * float(np.abs(offset).sum() + abs(gap))
             if gap > best:
                 best, normal = gap, m

@@ -24,6 +24,7 @@ from clamp3d.collide.model import Model
 from clamp3d.collide.refine import from_boxes, refine
 from clamp3d.collide.surface import Surface
 from clamp3d.collide.verdict import Thresholds
+from clamp3d.core.linear import dot, norm, to_source, to_target
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import SolverError
 
@@ -77,7 +78,7 @@ class _Pair:
             found = refine(self.a, self.b, T, from_boxes(self.a, self.b, T), Thresholds(1e-6), told, search=False)
         except SolverError:
             return Distance()
-        size = float(np.linalg.norm(t))
+        size = norm(t)
         if found.lower >= -self.slack:
             size += 4.0 * max(0.0, -found.lower) + 1e-13 * self.size
             if self.best is None or size < self.best[0]:
@@ -101,7 +102,7 @@ class _Pair:
             ]
             margin, p, x, y = max(found, key=lambda item: item[0], default=(0.0, t, None, None))
             if margin > 0.0 and x is not None and y is not None:
-                A, B = _around(x, p, half_extent), _around(y, (p - t - self.T[:3, 3]) @ self.T[:3, :3], half_extent)
+                A, B = _around(x, p, half_extent), _around(y, to_source(self.T, p - t), half_extent)
                 if A is not None and B is not None:
                     try:
                         return difference(A, _moved(B, self.T), t)
@@ -140,11 +141,11 @@ class _Pair:
         for _ in range(steps):
             if found.lower >= -self.slack or found.normal is None or not found.upper < 0.0:
                 return
-            planes.append(np.array([*found.normal, float(found.normal @ t) - found.upper + 0.1 * self.slack]))
+            planes.append(np.array([*found.normal, float(dot(found.normal, t)) - found.upper + 0.1 * self.slack]))
             start, t = t, nearest_behind(np.array(planes[-6:]), t)
             if t is start:  # no translation is behind all of them
                 return
-            if self.best is not None and np.linalg.norm(t) >= self.best[0]:
+            if self.best is not None and norm(t) >= self.best[0]:
                 return
             found = self.ask(t)
         self.back(t, found)
@@ -155,18 +156,18 @@ class _Pair:
             return
         self.push(t, found, 8)
         for more in (1e-9, 1e-7, 1e-5, 1e-3, 1e-2):
-            if self.best is not None and self.best[0] <= np.linalg.norm(t) * (1.0 + more):
+            if self.best is not None and self.best[0] <= norm(t) * (1.0 + more):
                 return
             self.ask(t * (1.0 + more))
 
     def back(self, t: Array, found: Distance) -> None:
         """Back towards the origin by the distance that is left, as long as it is worth it."""
-        size = float(np.linalg.norm(t))
+        size = norm(t)
         for _ in range(12):
             if not found.lower > 1e-3 * size:
                 return
             t = t * (1.0 - min(found.lower, size) / size)
-            size = float(np.linalg.norm(t))
+            size = norm(t)
             if size <= 0.0:
                 return
             found = self.ask(t)
@@ -221,7 +222,7 @@ def _measured(pair: _Pair, known: Distance) -> Distance:
     if known.upper >= -pair.slack and pair.freed(known, way):
         assert pair.best is not None
         size, t, _ = pair.best
-        return replace(known, lower=-size, normal=t / np.linalg.norm(t))
+        return replace(known, lower=-size, normal=t / norm(t))
     found = Distance(-length, known.upper, None, None, way, None, known.level, known.method).ordered()
     if found.upper - found.lower <= pair.slack:
         return found
@@ -259,10 +260,10 @@ def _searched(pair: _Pair, found: Distance, known: Distance) -> Distance:
         t, known = way, pair.ask(way)
         if known.lower >= -pair.slack:
             break
-        if step % 3 == 0 or known.upper > -1e-3 * float(np.linalg.norm(t)):  # all but out: by how little?
+        if step % 3 == 0 or known.upper > -1e-3 * norm(t):  # all but out: by how little?
             pair.push(t, known, 6)
         if step % 4 == 3:  # a little further may be out, and near enough
-            size = float(np.linalg.norm(t))
+            size = norm(t)
             pair.ask(t * (1.0 + max(0.5 * RELATIVE, 0.5 * ABSOLUTE / max(size, 1e-300))))
     return _joined(pair, found, proven)
 
@@ -273,7 +274,7 @@ def _joined(pair: _Pair, found: Distance, proven: float = 0.0) -> Distance:
     if pair.best is not None and pair.best[0] <= -found.lower:
         size, t, at = pair.best
         p, q = at.point_a, at.point_b
-        normal = t / np.linalg.norm(t) if size > 0.0 else found.normal
+        normal = t / norm(t) if size > 0.0 else found.normal
         found = Distance(-size, upper, p, None if q is None else q - t, normal, None)
     return replace(found, upper=upper, level="depth", method="convex pieces").ordered()
 
@@ -331,8 +332,8 @@ def _outer(model: Model, T: Array) -> list[tuple[list[Supports], float]]:
     if model.bodies is not None:
         return [([supports(piece, T) for piece in form.outers], form.error) for form in model.bodies]
     mesh = model.outer(_FINE)
-    V = mesh.vertices @ T[:3, :3].T + T[:3, 3]
-    return [([lambda N: V[np.argmax(N @ V.T, axis=1)]], mesh.error)]
+    V = to_target(T, mesh.vertices)
+    return [([lambda N: V[np.argmax(dot(N, V.T), axis=1)]], mesh.error)]
 
 
 def _heights(outer: list[tuple[list[Supports], float]], N: Array) -> Array:
@@ -349,10 +350,10 @@ def _exit(a: Model, b: Model, T: Array) -> tuple[float, Array]:
         for form in model.bodies or ():
             for piece in form.outers:
                 axes = np.array([piece.T[:3, 2], -piece.T[:3, 2]]) if isinstance(piece, Rod) else piece.planes[:60, :3]
-                seeds.append(sign * axes @ P[:3, :3].T)
-    centre = T[:3, :3] @ b.bounds.mean(axis=0) + T[:3, 3] - a.bounds.mean(axis=0)
-    if np.linalg.norm(centre) > 0.0:
-        seeds.append((centre / np.linalg.norm(centre))[None])
+                seeds.append(dot(sign * axes, P[:3, :3].T))
+    centre = to_target(T, b.bounds.mean(axis=0)) - a.bounds.mean(axis=0)
+    if norm(centre) > 0.0:
+        seeds.append((centre / norm(centre))[None])
     N = np.vstack(seeds)
     h = _heights(outer_a, N) + _heights(outer_b, -N)
     k = int(np.argmin(h))
@@ -378,7 +379,7 @@ def _innermost(x: Body, y: Body, T: Array, t: Array, point: Array, size: float) 
     """
 
     def margin(points: Array) -> Array:
-        return np.minimum(x.depth(points), y.depth((points - t - T[:3, 3]) @ T[:3, :3]))
+        return np.minimum(x.depth(points), y.depth(to_source(T, points - t)))
 
     best, here = float(margin(point[None])[0]), point
     step = size
@@ -402,7 +403,7 @@ def _inner(part: Any) -> list[Array]:
     C = V[np.asarray(raw.tri_verts, dtype=np.int64)]
     cross = np.cross(C[:, 1] - C[:, 0], C[:, 2] - C[:, 0])
     size = np.linalg.norm(cross, axis=1)
-    rows = np.argsort(-size)[:3]
+    rows = np.argsort(-size, kind="stable")[:3]
     rows = rows[size[rows] > 0.0]
     thick = part.volume() / max(float(size.sum()) / 2.0, 1e-300)
     middle, normal = C[rows].mean(axis=1), cross[rows] / size[rows, None]
@@ -410,6 +411,6 @@ def _inner(part: Any) -> list[Array]:
 
 
 def _moved(piece: Hull, T: Array) -> Hull:
-    N = piece.planes[:, :3] @ T[:3, :3].T
-    planes = np.column_stack([N, piece.planes[:, 3] - N @ T[:3, 3]])
-    return Hull(piece.vertices @ T[:3, :3].T + T[:3, 3], planes, piece.faces)
+    N = dot(piece.planes[:, :3], T[:3, :3].T)
+    planes = np.column_stack([N, piece.planes[:, 3] - dot(N, T[:3, 3])])
+    return Hull(to_target(T, piece.vertices), planes, piece.faces)

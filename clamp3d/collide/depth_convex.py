@@ -16,6 +16,7 @@ import numpy as np
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.convex import Convex, Hull, Rod
 from clamp3d.collide.zonoid import zonoid_distance
+from clamp3d.core.linear import dot, norm, to_target
 from clamp3d.core.pose import Array
 
 _RIM = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
@@ -34,16 +35,16 @@ Supports = Callable[[Array], Array]
 def supports(piece: Convex, T: Array) -> Supports:
     """Support points of a piece placed by ``T`` (4, 4)."""
     if isinstance(piece, Hull):
-        V = piece.vertices @ T[:3, :3].T + T[:3, 3]
-        return lambda N: V[np.argmax(N @ V.T, axis=1)]
-    P = T @ piece.T
+        V = to_target(T, piece.vertices)
+        return lambda N: V[np.argmax(dot(N, V.T), axis=1)]
+    P = dot(T, piece.T)
     R, t, r, half = P[:3, :3], P[:3, 3], piece.radius, 0.5 * piece.length
 
     def rod(N: Array) -> Array:
-        m = N @ R
+        m = dot(N, R)
         across = np.hypot(m[:, 0], m[:, 1])
         scale = np.where(across > 1e-12, r / np.maximum(across, 1e-300), 0.0)
-        return np.asarray(np.column_stack([scale * m[:, 0], scale * m[:, 1], np.copysign(half, m[:, 2])]) @ R.T + t)
+        return np.asarray(dot(np.column_stack([scale * m[:, 0], scale * m[:, 1], np.copysign(half, m[:, 2])]), R.T) + t)
 
     return rod
 
@@ -54,12 +55,12 @@ def _outline(piece: Convex, T: Array) -> tuple[Array, Array, Array]:
     if isinstance(piece, Hull):
         V = piece.vertices
         E = directions(V[piece.edges[:, 1]] - V[piece.edges[:, 0]])
-        return piece.planes[:, :3] @ R.T, E @ R.T, V @ R.T + t
-    z = R @ piece.T[:3, 2]
+        return dot(piece.planes[:, :3], R.T), dot(E, R.T), dot(V, R.T) + t
+    z = dot(R, piece.T[:3, 2])
     rim = piece.radius * np.column_stack([np.cos(_RIM), np.sin(_RIM)])
     ends = [np.column_stack([rim, np.full(len(rim), s * 0.5 * piece.length)]) for s in (-1.0, 1.0)]
-    P = T @ piece.T
-    return np.array([z, -z]), z[None], np.vstack(ends) @ P[:3, :3].T + P[:3, 3]
+    P = dot(T, piece.T)
+    return np.array([z, -z]), z[None], to_target(P, np.vstack(ends))
 
 
 def directions(E: Array) -> Array:
@@ -122,10 +123,10 @@ def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array, *, tolerance: float
     seeds = [flat, _SPHERE, crossed(Ea[:8], Eb[:8])]
     for piece, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
         if isinstance(piece, Rod):  # across the axis, away from the other's middle
-            z = T[:3, :3] @ piece.T[:3, 2]
-            out = middle - (middle @ z) * z
-            if np.linalg.norm(out) > 1e-9 * scale:
-                seeds.append(np.array([sign, -sign])[:, None] * out / np.linalg.norm(out))
+            z = dot(T[:3, :3], piece.T[:3, 2])
+            out = middle - dot(middle, z) * z
+            if norm(out) > 1e-9 * scale:
+                seeds.append(np.array([sign, -sign])[:, None] * out / norm(out))
     N = np.vstack(seeds)
     P = [difference(N), _faces(flat, Va, Vb)]
     lower, upper, n = expand(difference, N, np.vstack(P), max(tolerance, 2e-11 * scale))
@@ -136,7 +137,7 @@ def _faces(N: Array, Va: Array, Vb: Array) -> Array:
     """Points (k, 3) that span the flat faces of the difference which look along ``N``."""
     found = []
     for n in N:
-        A, B = (V[h >= h.max() - 1e-9 * (1.0 + np.ptp(h))] for V, h in ((Va, Va @ n), (Vb, -(Vb @ n))))
+        A, B = (V[h >= h.max() - 1e-9 * (1.0 + np.ptp(h))] for V, h in ((Va, dot(Va, n)), (Vb, -dot(Vb, n))))
         if len(A) * len(B) <= 4096:
             found.append((A[:, None] - B[None]).reshape(-1, 3))
     return np.vstack(found) if found else np.empty((0, 3))
@@ -164,7 +165,7 @@ def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[
         lower = max(lower, -float(planes[:, 3].max()))
         if upper - lower <= tolerance:
             break
-        near = planes[np.argsort(-planes[:, 3])[:24]]
+        near = planes[np.argsort(-planes[:, 3], kind="stable")[:24]]
         near = near[-near[:, 3] < upper - tolerance]
         new = difference(near[:, :3])
         h = (near[:, :3] * new).sum(axis=1)

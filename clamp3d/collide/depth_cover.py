@@ -12,6 +12,7 @@ import numpy as np
 
 from clamp3d.collide.convex import Hull
 from clamp3d.collide.depth_convex import normals_of, supports
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 
@@ -39,8 +40,8 @@ def difference(a: Hull, b: Hull, inner: Array) -> Array:
         sa, sb = supports(a, here), supports(b, here)
         made = ConvexHull(sa(N) - sb(-N)).equations
         return np.column_stack([made[:, :3], -made[:, 3]])
-    h = (N @ a.vertices.T).max(axis=1) + (-(N @ b.vertices.T)).max(axis=1)
-    over = h - N @ inner
+    h = dot(N, a.vertices.T).max(axis=1) + (-dot(N, b.vertices.T)).max(axis=1)
+    over = h - dot(N, inner)
     if not over.min() > 0.0:
         return np.column_stack([N, h])
     # The corners of the polar set are the planes that bound the set; the others touch an edge or a corner of it.
@@ -53,12 +54,12 @@ def nearest_behind(planes: Array, start: Array) -> Array:
 
     Lawson and Hanson, *Solving Least Squares Problems*, 1974, problem LDP.
     """
-    lack = planes[:, 3] - planes[:, :3] @ start
+    lack = planes[:, 3] - dot(planes[:, :3], start)
     size = float(np.abs(lack).max())
     if not lack.max() > 0.0:
         return start
     E, goal = np.vstack([planes[:, :3].T, lack / size]), np.array([0.0, 0.0, 0.0, 1.0])
-    r = E @ nnls(E, goal) - goal
+    r = dot(E, nnls(E, goal)) - goal
     return start if abs(r[3]) < 1e-14 else np.asarray(start - size * r[:3] / r[3])
 
 
@@ -82,7 +83,7 @@ class Union:
         """How far inside one of the sets translations ``t`` (k, 3) lie at least; negative outside all of them."""
         found = np.full(len(t), -np.inf)
         for N, d in self.sets:
-            np.maximum(found, (d - t @ N.T).min(axis=1), out=found)
+            np.maximum(found, (d - dot(t, N.T)).min(axis=1), out=found)
         return found
 
     def open_cubes(self, at: Array, half: float) -> Array:
@@ -90,7 +91,7 @@ class Union:
         for N, d in self.sets:
             if not len(at):
                 break
-            at = at[(at @ N.T + half * np.abs(N).sum(axis=1) > d).any(axis=1)]
+            at = at[(dot(at, N.T) + half * np.abs(N).sum(axis=1) > d).any(axis=1)]
         return at
 
     def shortest(self, nodes: int) -> tuple[float, Array | None]:
@@ -108,7 +109,7 @@ class Union:
             size, _, planes, t = heap[0]
             if size >= self.limit:
                 return self.limit, None
-            inside = [float((d - N @ t).min()) for N, d in self.sets]
+            inside = [float((d - dot(N, t)).min()) for N, d in self.sets]
             left = [k for k, depth in enumerate(inside) if depth > 1e-12 * self.limit]
             if not left:
                 return size, t
@@ -120,8 +121,8 @@ class Union:
             for n, offset in zip(N, d, strict=True):
                 chosen = np.vstack([planes, [*n, offset]])
                 new = nearest_behind(chosen, np.zeros(3))
-                lack = float((chosen[:, 3] - chosen[:, :3] @ new).max())
-                length = float(np.linalg.norm(new))
+                lack = float((chosen[:, 3] - dot(chosen[:, :3], new)).max())
+                length = norm(new)
                 if lack <= 1e-9 * self.limit and length < self.limit:
                     count += 1
                     heapq.heappush(heap, (max(length, size), count, chosen, new))
@@ -132,9 +133,9 @@ class Union:
         best = t
         for _ in range(8):
             # Of each set the plane that t is furthest behind: all of them together are a convex region outside.
-            rows = [(N[k], d[k]) for N, d in self.sets for k in [int(np.argmax(N @ best - d))]]
+            rows = [(N[k], d[k]) for N, d in self.sets for k in [int(np.argmax(dot(N, best) - d))]]
             new = nearest_behind(np.array([[*n, d] for n, d in rows]), np.zeros(3))
-            if not np.linalg.norm(new) < np.linalg.norm(best) * (1.0 - 1e-9):
+            if not norm(new) < norm(best) * (1.0 - 1e-9):
                 break
             best = new
         return best
@@ -157,10 +158,10 @@ class Union:
             at = self.open_cubes(at[~closed], half)
             outside = at[self.reach(at) <= 0.0]
             size = np.linalg.norm(outside, axis=1)
-            for k in np.argsort(size)[:3]:
+            for k in np.argsort(size, kind="stable")[:3]:
                 t = self.way_out(outside[k])
-                if np.linalg.norm(t) < limit:
-                    best, limit = t, float(np.linalg.norm(t))
+                if norm(t) < limit:
+                    best, limit = t, norm(t)
             seen += len(at)
             if seen > CELLS or half < 1e-9 * self.limit:
                 near = np.linalg.norm(np.maximum(np.abs(at) - half, 0.0), axis=1)

@@ -7,6 +7,7 @@ Tedrake, *Computing large convex regions of obstacle-free space*, 2015).
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from clamp3d.collide.body import ClosedForm
 from clamp3d.collide.convex import Hull, Rod, hull
 from clamp3d.collide.surface import Surface
+from clamp3d.core.linear import dot, norm, to_source
 from clamp3d.core.pose import Array
 
 _AROUND = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
@@ -33,12 +35,12 @@ def around_in_form(form: ClosedForm, x: Array) -> Hull | None:
     for piece in form.outers:
         planes.append(_prism(piece, x) if isinstance(piece, Rod) else piece.planes)
     for bore in form.bores:
-        radial = bore.T[:3, :2] @ ((x - bore.T[:3, 3]) @ bore.T[:3, :2])
-        size = float(np.linalg.norm(radial))
+        radial = dot(bore.T[:3, :2], dot(x - bore.T[:3, 3], bore.T[:3, :2]))
+        size = norm(radial)
         if size <= bore.radius:
             return None
         n = radial / size
-        planes.append(np.array([[*-n, bore.radius + float(n @ bore.T[:3, 3])]]))
+        planes.append(np.array([[*-n, bore.radius + float(dot(n, bore.T[:3, 3]))]]))
     shrunk = np.vstack(planes)
     shrunk[:, 3] += form.error
     return _hull_of(shrunk, x)
@@ -46,17 +48,17 @@ def around_in_form(form: ClosedForm, x: Array) -> Hull | None:
 
 def _prism(rod: Rod, x: Array) -> Array:
     """Planes (k, 4) of a prism in a cylinder, with edges all around and many near ``x`` (3,)."""
-    local = (x - rod.T[:3, 3]) @ rod.T[:3, :3]
-    own = np.arctan2(local[1], local[0])
+    local = to_source(rod.T, x)
+    own = math.atan2(local[1], local[0])
     angle = np.unique(np.concatenate([(own + _AROUND) % (2.0 * np.pi), (own + _CLOSE) % (2.0 * np.pi)]))
     gap = np.diff(np.append(angle, angle[0] + 2.0 * np.pi))
     angle, gap = angle[gap > 1e-9], gap[gap > 1e-9]
     middle = angle + 0.5 * gap
     flat = np.column_stack([np.cos(middle), np.sin(middle), np.zeros(len(middle))])
     ends = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
-    N = np.vstack([flat, ends]) @ rod.T[:3, :3].T
+    N = dot(np.vstack([flat, ends]), rod.T[:3, :3].T)
     d = np.append(-rod.radius * np.cos(0.5 * gap), [-0.5 * rod.length] * 2)
-    return np.column_stack([N, d - N @ rod.T[:3, 3]])
+    return np.column_stack([N, d - dot(N, rod.T[:3, 3])])
 
 
 def around_in_mesh(mesh: Surface, x: Array, half_extent: float) -> Hull | None:
@@ -72,20 +74,20 @@ def around_in_mesh(mesh: Surface, x: Array, half_extent: float) -> Hull | None:
         within = (corners.min(axis=1) - error[:, None] < x + half_extent).all(axis=1)
         within &= (corners.max(axis=1) + error[:, None] > x - half_extent).all(axis=1)
         corners, error, N, d = corners[within], error[within], N[within], d[within]
-        planes = [np.array([*n, -(n @ x) - half_extent]) for n in np.vstack([np.eye(3), -np.eye(3)])]
+        planes = [np.array([*n, -dot(n, x) - half_extent]) for n in np.vstack([np.eye(3), -np.eye(3)])]
     feet = closest_on_triangles(corners, x) if len(corners) else corners[:, 0]
     away = np.linalg.norm(feet - x, axis=1)
-    height = d - N @ x  # of the triangles' own planes above the point
-    left = np.argsort(away - error)
+    height = d - dot(N, x)  # of the triangles' own planes above the point
+    left = np.argsort(away - error, kind="stable")
     while len(left):
         k = left[0]
         if away[k] - error[k] <= LEAST * mesh.scale:
             return None
         own = height[k] >= _OWN * away[k] and height[k] > error[k]
         n = N[k] if own else (feet[k] - x) / away[k]
-        offset = float(d[k] if own else n @ feet[k]) - error[k]
+        offset = float(d[k] if own else dot(n, feet[k])) - error[k]
         planes.append(np.array([*n, -offset]))
-        beyond = (corners[left] @ n).min(axis=1) - error[left] >= offset - 1e-12 * mesh.scale
+        beyond = dot(corners[left], n).min(axis=1) - error[left] >= offset - 1e-12 * mesh.scale
         left = left[~beyond & (left != k)]
     return _hull_of(np.array(planes), x)
 
@@ -112,7 +114,7 @@ def _hull_of(planes: Array, x: Array) -> Hull | None:
     """The polyhedron of all points with n . y + d <= 0; None if ``x`` (3,) is not well inside."""
     from scipy.spatial import HalfspaceIntersection, QhullError
 
-    depth = -(planes[:, :3] @ x + planes[:, 3])
+    depth = -(dot(planes[:, :3], x) + planes[:, 3])
     if not depth.min() > LEAST * float(np.abs(planes[:, 3]).max() + np.abs(x).max()):
         return None
     try:
@@ -121,5 +123,5 @@ def _hull_of(planes: Array, x: Array) -> Hull | None:
         found = hull(made.intersections[np.isfinite(made.intersections).all(axis=1)])
     except (QhullError, ValueError):
         return None
-    moved = np.column_stack([found.planes[:, :3], found.planes[:, 3] - found.planes[:, :3] @ x])
+    moved = np.column_stack([found.planes[:, :3], found.planes[:, 3] - dot(found.planes[:, :3], x)])
     return Hull(found.vertices + x, moved, found.faces)

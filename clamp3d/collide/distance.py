@@ -18,6 +18,7 @@ from clamp3d.collide.refine import ACCURACY, from_boxes, measured, refine, with_
 from clamp3d.collide.scene import Scene, name_pairs
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.contact_model import ContactModel
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, check_pose, check_pose_array, inverse
 from clamp3d.core.primitives import SweptArc
 from clamp3d.core.shapes import AnyShape, Shape, as_shape, groove_block
@@ -163,7 +164,7 @@ def measure(
     found = {}
     for a, b in asked:
         first, second = (scene.parts[scene.index(name)] for name in (a, b))
-        T = inverse(first.T_world) @ second.T_world
+        T = dot(inverse(first.T_world), second.T_world)
         found[a, b] = _measured(cache, first.shape, second.shape, T, accuracy, model).moved(first.T_world)
     return found
 

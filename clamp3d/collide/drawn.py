@@ -10,6 +10,7 @@ import numpy as np
 from clamp3d.collide.body import Bore, ClosedForm
 from clamp3d.collide.convex import Convex, Hull, Rod, hull
 from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.linear import dot, to_target
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.core.shapes import Solid
@@ -76,14 +77,14 @@ def _pose(body: Extrusion, centre: tuple[float, float], middle: float = -math.pi
     y = -np.array([math.cos(middle), math.sin(middle), 0.0])
     R = np.column_stack([[y[1], -y[0], 0.0], y, [0.0, 0.0, 1.0]])
     T = np.eye(4)
-    T[:3, :3] = body.frame @ R
-    T[:3, 3] = body.frame @ np.array([*centre, 0.5 * (body.start + body.end)])
+    T[:3, :3] = dot(body.frame, R)
+    T[:3, 3] = dot(body.frame, np.array([*centre, 0.5 * (body.start + body.end)]))
     return T
 
 
 def _prism(body: Extrusion, corners: Array) -> Array:
     ends = [np.column_stack([corners, np.full(len(corners), z)]) for z in (body.start, body.end)]
-    return np.vstack(ends) @ body.frame.T
+    return dot(np.vstack(ends), body.frame.T)
 
 
 def _beyond_chord(body: Extrusion, arc: Arc) -> Hull:
@@ -101,8 +102,8 @@ def _less(body: ClosedForm, hole: Extrusion) -> list[ClosedForm] | None:
     if circle is not None:
         T = _pose(hole, circle.centre)
         z, middle = T[:3, 2], T[:3, 3]
-        low = max(float(z @ (piece.support(-z) - middle)) for piece in body.outers)
-        high = min(float(z @ (piece.support(z) - middle)) for piece in body.outers)
+        low = max(float(dot(z, piece.support(-z) - middle)) for piece in body.outers)
+        high = min(float(dot(z, piece.support(z) - middle)) for piece in body.outers)
         T[:3, 3] = middle + 0.5 * (low + high) * z
         return [replace(body, bores=(*body.bores, Bore(circle.radius, math.pi, max(high - low, 1e-6), T)))]
     if hole.profile.arcs:
@@ -111,9 +112,9 @@ def _less(body: ClosedForm, hole: Extrusion) -> list[ClosedForm] | None:
     along = np.roll(corners, -1, axis=0) - corners
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
     offsets = -np.einsum("ij,ij->i", normals, corners)
-    if ((corners @ normals.T + offsets) > _FLAT * (1.0 + np.abs(corners).max())).any():
+    if ((dot(corners, normals.T) + offsets) > _FLAT * (1.0 + np.abs(corners).max())).any():
         return None
-    planes = np.column_stack([np.column_stack([normals, 0.0 * offsets]) @ hole.frame.T, offsets])
+    planes = np.column_stack([dot(np.column_stack([normals, 0.0 * offsets]), hole.frame.T), offsets])
     return [piece for plane in planes if (piece := _beyond(body, plane)) is not None]
 
 
@@ -132,14 +133,14 @@ def _beyond(body: ClosedForm, plane: Array) -> ClosedForm | None:
     if len(rods) == len(outers):
         rod = rods[0]
         sides = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-        box = hull(sides * (rod.radius, rod.radius, 0.5 * rod.length) @ rod.T[:3, :3].T + rod.T[:3, 3])
+        box = hull(to_target(rod.T, sides * (rod.radius, rod.radius, 0.5 * rod.length)))
         around = box.clipped(plane)
         if around is None:
             return None
         outers.append(around)
     for rod in rods:
-        offset = -float(plane[:3] @ rod.T[:3, 3] + plane[3])
-        if abs(float(plane[:3] @ rod.T[:3, 2])) < _FLAT and abs(offset) < rod.radius:
+        offset = -float(dot(plane[:3], rod.T[:3, 3]) + plane[3])
+        if abs(float(dot(plane[:3], rod.T[:3, 2]))) < _FLAT and abs(offset) < rod.radius:
             # Where the wall leaves the round side there is a corner: the tangents there make it one of the hull.
             outers = [_tangential(piece, rod, plane[:3], offset) for piece in outers]
     return replace(body, outers=tuple(outers))
@@ -151,5 +152,5 @@ def _tangential(piece: Convex, rod: Rod, wall: Array, offset: float) -> Convex:
     for side in (-1.0, 1.0):
         if isinstance(piece, Hull):
             out = (offset * wall + side * math.sqrt(rod.radius**2 - offset**2) * across) / rod.radius
-            piece = piece.clipped(np.array([*-out, rod.radius + float(out @ rod.T[:3, 3])])) or piece
+            piece = piece.clipped(np.array([*-out, rod.radius + float(dot(out, rod.T[:3, 3]))])) or piece
     return piece

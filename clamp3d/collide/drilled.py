@@ -14,6 +14,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import Bore, ClosedForm, bore_rod
 from clamp3d.collide.convex import Hull, Rod
 from clamp3d.collide.zonoid import zonoid_distance
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.pose import Array, inverse
 
 _SAME = 1e-12
@@ -42,7 +43,7 @@ def _is_plate(form: ClosedForm) -> bool:
     if outer.sum is None:
         return False
     z = form.bores[0].T[:3, 2]
-    along = outer.sum.lines @ z
+    along = dot(outer.sum.lines, z)
     across = np.linalg.norm(outer.sum.lines - along[:, None] * z, axis=1)
     thick = np.abs(along) > across
     size = float(np.abs(form.bounds).max())
@@ -52,18 +53,18 @@ def _is_plate(form: ClosedForm) -> bool:
     middles = []
     for bore in form.bores:
         off = bore.T[:3, 3] - outer.sum.centre
-        level = abs(float(off @ z)) + abs(0.5 * bore.length - half) <= _SAME * size
-        if bore.half_angle != np.pi or np.linalg.norm(np.cross(bore.T[:3, 2], z)) > _SAME or not level:
+        level = abs(float(dot(off, z))) + abs(0.5 * bore.length - half) <= _SAME * size
+        if bore.half_angle != np.pi or norm(np.cross(bore.T[:3, 2], z)) > _SAME or not level:
             return False
         if isinstance(outer, Hull):
-            sides = outer.planes[np.abs(outer.planes[:, :3] @ z) < 0.5]
-            inside = -float((sides[:, :3] @ bore.T[:3, 3] + sides[:, 3]).max())
+            sides = outer.planes[np.abs(dot(outer.planes[:, :3], z)) < 0.5]
+            inside = -float((dot(sides[:, :3], bore.T[:3, 3]) + sides[:, 3]).max())
         else:
-            inside = outer.radius - float(np.linalg.norm(np.cross(off, z)))
+            inside = outer.radius - norm(np.cross(off, z))
         if not bore.radius < inside - _SAME * size:
             return False
         middles.append((bore.T[:3, 3], bore.radius))
-    return all(np.linalg.norm(p - q) > r + s + _SAME * size for k, (p, r) in enumerate(middles) for q, s in middles[:k])
+    return all(norm(p - q) > r + s + _SAME * size for k, (p, r) in enumerate(middles) for q, s in middles[:k])
 
 
 def drilled_depth(a: ClosedForm, b: ClosedForm, T: Array) -> Distance | None:
@@ -83,7 +84,7 @@ def drilled_depth(a: ClosedForm, b: ClosedForm, T: Array) -> Distance | None:
         low, t = _into_hole(bore, rod, T, -found.lower)
         shortest = min(-found.upper, low)
         for more in (1.0, 1.0 + 1e-9, 1.0 + 1e-6):
-            out, length = T.copy(), more * float(np.linalg.norm(t))
+            out, length = T.copy(), more * norm(t)
             if not 0.0 < length < -found.lower:
                 break
             out[:3, 3] += more * t
@@ -100,12 +101,12 @@ def _into_hole(bore: Bore, rod: Rod, T: Array, limit: float) -> tuple[float, Arr
     """Lower bound of the length of translations shorter than ``limit`` mm into the hole, and the shortest (3,)."""
     from clamp3d.core.kernel_hole import CUTS, hole
 
-    local = inverse(bore.T) @ T @ rod.T
+    local = dot(dot(inverse(bore.T), T), rod.T)
     d = local[:3, 2] if local[2, 2] >= 0.0 else -local[:3, 2]
     lean = float(np.hypot(d[0], d[1]))
     e = d[:2] / lean if lean > 0.0 else np.array([1.0, 0.0])
     R = np.array([[e[0], e[1], 0.0], [-e[1], e[0], 0.0], [0.0, 0.0, 1.0]])
-    pin = np.array([*(R @ local[:3, 3]), lean, d[2], rod.radius, 0.5 * rod.length])
+    pin = np.array([*dot(R, local[:3, 3]), lean, d[2], rod.radius, 0.5 * rod.length])
     pin[3:5] /= np.hypot(pin[3], pin[4])
     size = float(np.abs(pin).sum()) + bore.radius + bore.length
     E, f, x, w, order, y = np.empty((4, CUTS)), np.empty(4), *np.empty((4, CUTS))
@@ -128,4 +129,4 @@ def _into_hole(bore: Bore, rod: Rod, T: Array, limit: float) -> tuple[float, Arr
         np.empty(4),
         out,
     )
-    return float(out[0]), bore.T[:3, :3] @ R.T @ out[2:]
+    return float(out[0]), dot(dot(bore.T[:3, :3], R.T), out[2:])

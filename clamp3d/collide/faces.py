@@ -13,6 +13,7 @@ from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import OTHER, Faces, height
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.verdict import RESOLUTION
+from clamp3d.core.linear import dot, to_target
 from clamp3d.core.pose import Array, inverse
 
 _MOST = 20_000
@@ -90,16 +91,16 @@ class FaceModel:
                 continue
             same = (kind == kind[i]) & (sense == sense[i]) & (np.abs(size - size[i]).max(axis=1) < 1e-7)
             z, o = frame[i, 3], frame[i, 0]
-            same &= np.abs(frame[:, 3] @ z) > 1.0 - 1e-14
+            same &= np.abs(dot(frame[:, 3], z)) > 1.0 - 1e-14
             away = frame[:, 0] - o
             if kind[i] == 1:
-                same &= np.linalg.norm(away - np.outer(away @ z, z), axis=1) < 1e-7
+                same &= np.linalg.norm(away - np.outer(dot(away, z), z), axis=1) < 1e-7
             elif kind[i] == 0:
-                same &= (np.abs(away @ z) < 1e-7) & (frame[:, 3] @ z > 0.0)
+                same &= (np.abs(dot(away, z)) < 1e-7) & (dot(frame[:, 3], z) > 0.0)
             else:
                 same &= np.linalg.norm(away, axis=1) < 1e-7
                 if kind[i] == 2:
-                    same &= frame[:, 3] @ z > 0.0
+                    same &= dot(frame[:, 3], z) > 0.0
             found[same] = i
         return found.astype(np.int64)
 
@@ -193,10 +194,10 @@ def _own(b: FaceModel, a: FaceModel, T: Array, outside: float | None, contact: f
     c = b.faces.corners
     normal = np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])
     size = np.linalg.norm(normal, axis=1)
-    for k in np.argsort(-size)[:_ASKED]:
+    for k in np.argsort(-size, kind="stable")[:_ASKED]:
         for depth in (1.0, 0.2, 4.0 * contact):
             p = c[k].mean(axis=0) - depth * normal[k] / size[k]
-            if _at(b, p)[1] < -2.0 * contact and _at(a, T[:3, :3] @ p + T[:3, 3])[0] > 0.0:
+            if _at(b, p)[1] < -2.0 * contact and _at(a, to_target(T, p))[0] > 0.0:
                 return True
     return False
 
@@ -206,7 +207,7 @@ def stands_out(b: FaceModel, a: FaceModel, T: Array, slack: float) -> bool:
 
     A no says nothing.
     """
-    c = b.faces.corners.reshape(-1, 3) @ T[:3, :3].T + T[:3, 3]
+    c = to_target(T, b.faces.corners.reshape(-1, 3))
     rows = {int(k) for k in (*c.argmin(axis=0), *c.argmax(axis=0))}
     return any(_at(a, c[k])[0] > slack + float(b.faces.deviation.max()) for k in rows)
 
@@ -260,7 +261,7 @@ def _may_hold(inner: FaceModel, outer: FaceModel, T: Array) -> bool:
     """Whether the first, placed by ``T``, can lie inside the second: by their boxes."""
     box = inner.bounds
     middle, half = box.mean(axis=0), 0.5 * (box[1] - box[0])
-    centre = T[:3, :3] @ middle + T[:3, 3]
+    centre = to_target(T, middle)
     return not ((centre < outer.bounds[0]) | (centre > outer.bounds[1])).any() and half.min() >= 0.0
 
 
@@ -270,9 +271,9 @@ def _towards(a: FaceModel, b: FaceModel, T: Array, contact: float, clearance: fl
     ``estimate`` is how far at least some point of b is outside of a.
     """
     R, t = T[:3, :3], T[:3, 3]
-    frames = b.faces.frame @ R.T
+    frames = dot(b.faces.frame, R.T)
     frames[:, 0] += t
-    pieces = b.faces.corners @ R.T + t, b.faces.uv, b.faces.face, b.faces.sag
+    pieces = dot(b.faces.corners, R.T) + t, b.faces.uv, b.faces.face, b.faces.sag
     surfaces = b.faces.kind, b.faces.size, np.ascontiguousarray(frames.reshape(-1, 12)), b.faces.deviation
     width = -VERDICT_WIDTH * contact if tol is None else tol
     found, out = _search(a, pieces, b.arrays[3:6], np.ascontiguousarray(T), surfaces, contact, clearance, width, _MOST)

@@ -10,6 +10,7 @@ from clamp3d.brep.surfaces import OTHER, height
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.depth_cover import nearest_behind
 from clamp3d.collide.faces import FaceModel, faces_distance
+from clamp3d.core.linear import dot, norm, to_target
 from clamp3d.core.pose import Array, inverse
 
 _ASKS = 3
@@ -34,9 +35,9 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
         if (way := _way_out(a, b, place, found)) is None:
             break
         n, of_b = way
-        planes.append(np.array([*n, float(n @ t) - found.upper + margin]))
+        planes.append(np.array([*n, float(dot(n, t)) - found.upper + margin]))
         t = nearest_behind(np.array(planes), t)
-        size = float(np.linalg.norm(t))
+        size = norm(t)
         if size > 2.0 * (inside[0] + margin):  # a long way out, or nothing is behind all the planes
             break
         place[:3, 3] = T[:3, 3] + t
@@ -55,12 +56,12 @@ def _way_out(a: FaceModel, b: FaceModel, T: Array, found: Distance) -> tuple[Arr
     if not found.upper < 0.0 or found.point_a is None:
         return None
     here, best = inverse(T), (1e-3, np.zeros(3), True)
-    sides = (a, found.point_a, np.eye(3)), (b, here[:3, :3] @ found.point_a + here[:3, 3], -T[:3, :3])
+    sides = (a, found.point_a, np.eye(3)), (b, to_target(here, found.point_a), -T[:3, :3])
     for model, point, turn in sides:
         f, steps = model.faces, np.vstack([point, point + _STEP * np.eye(3), point - _STEP * np.eye(3)])
         for i in np.flatnonzero(f.kind != OTHER):
             h = f.sense[i] * height(int(f.kind[i]), f.frame[i], (float(f.size[i, 0]), float(f.size[i, 1])), steps)
             if abs(h[0] - found.upper) < best[0]:
-                best = abs(float(h[0]) - found.upper), turn @ (h[1:4] - h[4:]), model is a
-    size = float(np.linalg.norm(best[1]))
+                best = abs(float(h[0]) - found.upper), dot(turn, h[1:4] - h[4:]), model is a
+    size = norm(best[1])
     return (best[1] / size, best[2]) if size > 0.0 else None

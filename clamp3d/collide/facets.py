@@ -15,6 +15,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm
 from clamp3d.collide.convex import Hull, Rod
 from clamp3d.collide.surface import Surface, fcl_tree
+from clamp3d.core.linear import dot, norm, to_target
 from clamp3d.core.pose import Array
 
 _WIDTH = 1e-9
@@ -44,8 +45,8 @@ def rod_distance(facets: Surface, body: ClosedForm, T: Array) -> Distance:
     slack = 1e-12 * (facets.scale + float(np.abs(T[:3, 3]).max()) + rod.length) + _WIDTH
     if distance <= slack:
         return _axis_inside(facets, body, T, 0.0)
-    axis = T[:3, :3] @ rod.T[:3, 2]
-    if _holds(facets, rod.ends @ T[:3, :3].T + T[:3, 3]):
+    axis = dot(T[:3, :3], rod.T[:3, 2])
+    if _holds(facets, to_target(T, rod.ends)):
         return _axis_inside(facets, body, T, distance)
     bounds = Distance(low - rod.radius - slack)
     n = (p - a) / distance
@@ -54,14 +55,14 @@ def rod_distance(facets: Surface, body: ClosedForm, T: Array) -> Distance:
     error = max(uncertainty for _, uncertainty in facets.groups) if low < distance else 0.0
     if distance >= rod.radius:
         # Square to the axis the nearest point is on the side, which flat ends share with round ones.
-        if abs(float(n @ axis)) < 1e-7 and body.depth(((q - t) @ R)[None])[0] >= -slack:
+        if abs(float(dot(n, axis))) < 1e-7 and body.depth(dot(q - t, R)[None])[0] >= -slack:
             return Distance(bounds.lower - body.error, distance - rod.radius + error + slack + body.error, p, q)
         if len(body.outers) == 1 and not body.bores:
             p, q = _nearer(facets, rod, T, p)
-            upper = float(np.linalg.norm(q - p)) + float(facets.error_at(p[None])[0]) + slack
+            upper = norm(q - p) + float(facets.error_at(p[None])[0]) + slack
             return Distance(bounds.lower, max(upper, bounds.lower), p, q).widened(body.error)
         return bounds.widened(body.error)
-    deep = float(body.depth(((p - t) @ R)[None])[0])
+    deep = float(body.depth(dot(p - t, R)[None])[0])
     high = slack + error - deep if deep >= -slack else np.inf
     return Distance(bounds.lower, high, p, p).widened(body.error)
 
@@ -70,9 +71,9 @@ def _nearer(facets: Surface, rod: Rod, T: Array, p: Array) -> tuple[Array, Array
     """Points (3,) of the mesh and of a cylinder with flat ends, each nearest to the other, from ``p`` on."""
     R, t = T[:3, :3], T[:3, 3]
     for _ in range(_TURNS):
-        q = rod.closest(((p - t) @ R)[None])[0] @ R.T + t
+        q = dot(rod.closest(dot(p - t, R)[None])[0], R.T) + t
         foot = facets.nearest(q[None])[2][0]
-        if np.linalg.norm(foot - q) >= np.linalg.norm(p - q) - 1e-13:
+        if norm(foot - q) >= norm(p - q) - 1e-13:
             break
         p = foot
     return p, q
@@ -81,7 +82,7 @@ def _nearer(facets: Surface, rod: Rod, T: Array, p: Array) -> tuple[Array, Array
 def axis_gap(facets: Surface, rod: Rod, T: Array) -> float:
     """Lower bound (mm) of the gap between the mesh and a rod at ``T`` (4, 4); minus infinity if its axis is inside."""
     distance, low, _, _ = _to_axis(facets, rod, T)
-    if distance <= 1e-9 or _holds(facets, rod.ends @ T[:3, :3].T + T[:3, 3]):
+    if distance <= 1e-9 or _holds(facets, to_target(T, rod.ends)):
         return -np.inf
     return low - rod.radius - _WIDTH - 1e-12 * (facets.scale + rod.length + float(np.abs(T[:3, 3]).max()))
 
@@ -107,8 +108,8 @@ def _axis_inside(facets: Surface, body: ClosedForm, T: Array, distance: float) -
     ring = np.vstack([[0.0, 0.0], 0.5 * np.column_stack([np.cos(turn), np.sin(turn)])]) * rod.radius
     z = np.linspace(-0.48, 0.48, 9) * rod.length
     local = np.column_stack([np.tile(ring, (len(z), 1)), np.repeat(z, len(ring))])
-    own = local @ rod.T[:3, :3].T + rod.T[:3, 3]
-    world = own @ T[:3, :3].T + T[:3, 3]
+    own = to_target(rod.T, local)
+    world = to_target(T, own)
     in_body = body.depth(own)
     in_mesh = facets.certain_depth(world)
     both = np.where((in_body >= 0.0) & (in_mesh >= 0.0), np.maximum(in_body, in_mesh), -np.inf)

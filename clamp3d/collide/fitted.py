@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from clamp3d.collide.body import Bore, ClosedForm
 from clamp3d.collide.convex import Rod, hull
 from clamp3d.collide.surface import Surface
+from clamp3d.core.linear import atan2, dot, to_source, to_target
 from clamp3d.core.pose import Array
 from clamp3d.fit.features import FittedSurface
 from clamp3d.fit.fit import FitResult
@@ -35,11 +36,11 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[C
         # Facets are inscribed: their tangents in place of their chords enclose the round surface.
         own = np.unique(F[convex.faces])
         T = convex.T_part_feature
-        local = (V[own] - T[:3, 3]) @ T[:3, :3]
+        local = to_source(T, V[own])
         out = np.hypot(local[:, 0], local[:, 1])
         reach = convex.radius / (1.0 - convex.chord_error / convex.radius) + convex.fit_error
         local[:, :2] *= (np.maximum(reach, out) / out)[:, None]
-        points[own] = local @ T[:3, :3].T + T[:3, 3]
+        points[own] = to_target(T, local)
     used = [bore for feature in (*result.grooves, *result.holes) if (bore := _bore(feature, V, F)) is not None]
     error = max((fit_error(feature, round_) for feature in result.features), default=0.0)
     mesh_error = max((feature.error_bound for feature in result.features), default=0.0)
@@ -52,10 +53,10 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[C
         away, face, _ = model.nearest(x)
         on = (away <= 1e-9 * model.scale) & ~in_feature[face]
         for surface in result.features:  # a point on the fitted surface is on the part, within the error of the fit
-            local = (x - surface.T_part_feature[:3, 3]) @ surface.T_part_feature[:3, :3]
+            local = to_source(surface.T_part_feature, x)
             touch = np.abs(np.hypot(local[:, 0], local[:, 1]) - surface.radius) <= 1e-9 * model.scale
             touch &= np.abs(local[:, 2]) <= 0.5 * surface.length + 1e-9 * model.scale
-            on |= touch & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) <= surface.half_angle + 1e-9)
+            on |= touch & (np.abs(atan2(local[:, 0], -local[:, 1])) <= surface.half_angle + 1e-9)
         found = np.where(on, 0.0, -mesh_error - away)
         # Nearer to the facets than their own error a point proves nothing; further in it does.
         far = np.flatnonzero(~on & (away > mesh_error))
@@ -73,7 +74,7 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[C
 def _bore(feature: FittedSurface, V: Array, F: Faces) -> Bore | None:
     """The groove or hole as a bore of the whole mesh; None if some of the mesh lies in its circle."""
     T = feature.T_part_feature.copy()
-    local = (V - T[:3, 3]) @ T[:3, :3]
+    local = to_source(T, V)
     if _nearest_to_axis(local[:, :2][F]) < feature.radius - feature.error_bound - 1e-9 * feature.radius:
         return None
     low, high, top = float(local[:, 2].min()), float(local[:, 2].max()), float(local[:, 1].max())
@@ -106,7 +107,7 @@ def _rods(result: FitResult, V: Array, F: Faces) -> tuple[list[Rod], list[Faces]
     if not full:
         return [], everything
     T = full[0].T_part_feature
-    local = (V - T[:3, 3]) @ T[:3, :3]
+    local = to_source(T, V)
     z, out = local[:, 2], np.hypot(local[:, 0], local[:, 1])
     holes = np.zeros(len(V), dtype=bool)
     for hole in result.holes:
@@ -125,7 +126,7 @@ def _rods(result: FitResult, V: Array, F: Faces) -> tuple[list[Rod], list[Faces]
             continue
         place = feature.T_part_feature.copy()
         middle = (
-            float(((V[own] - place[:3, 3]) @ place[:3, 2]).min() + ((V[own] - place[:3, 3]) @ place[:3, 2]).max()) / 2
+            float(dot(V[own] - place[:3, 3], place[:3, 2]).min() + dot(V[own] - place[:3, 3], place[:3, 2]).max()) / 2
         )
         place[:3, 3] += middle * place[:3, 2]
         rods.append(Rod(feature.radius, high - low, place))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.core.linear import dot, svd
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 
@@ -43,10 +44,10 @@ def can_meet(
 def _unchanged(motion: Motion, triangles: Array) -> tuple[Array, Array]:
     """Least and greatest values (m, 2) over each triangle of two coordinates that differ by no more than places do."""
     if not motion.angle:
-        across = triangles @ np.linalg.svd(motion.travel[None])[2][1:].T
+        across = dot(triangles, svd(motion.travel[None])[2][1:].T)
         return across.min(axis=1), across.max(axis=1)
     local = triangles - motion.point
-    height = local @ motion.axis
+    height = dot(local, motion.axis)
     flat = local - height[..., None] * motion.axis
     far = np.linalg.norm(flat, axis=2).max(axis=1)
     near = _from_origin(flat, motion.axis)
@@ -63,6 +64,6 @@ def _from_origin(flat: Array, axis: Array) -> Array:
     square = np.maximum((way**2).sum(axis=2), np.finfo(float).tiny)
     t = np.clip(-(start * way).sum(axis=2) / square, 0.0, 1.0)
     edges = np.linalg.norm(start + t[..., None] * way, axis=2).min(axis=1)
-    side = np.cross(start, way) @ axis
+    side = dot(np.cross(start, way), axis)
     holds = (side > 0.0).all(axis=1) | (side < 0.0).all(axis=1)
     return np.where(holds, 0.0, edges)

@@ -18,6 +18,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.model import Model
 from clamp3d.collide.overlap import common, deepest, deepest_at_most
 from clamp3d.collide.surface import Surface
+from clamp3d.core.linear import dot, norm, to_source, to_target
 from clamp3d.core.pose import Array, inverse
 
 _HALVINGS = 16
@@ -51,7 +52,7 @@ def meshes_distance(
         p = _on_surface(a, np.eye(4), inner.point_a, inner.point_b)
         q = _on_surface(b, T, inner.point_b, p)
         off = inner_a.error + inner_b.error + rounding_of(inner_a, inner_b, T)
-        inner = replace(inner, upper=float(np.linalg.norm(q - p)) + off, point_a=p, point_b=q)
+        inner = replace(inner, upper=norm(q - p) + off, point_a=p, point_b=q)
     found = replace(inner, lower=min(outer.lower, inner.upper), normal=None)
     if search and outer.upper < 0.0 and not enough(found):
         outer = surface_distance(a.outer(error), b.outer(error), T, search=True)
@@ -64,7 +65,7 @@ def _on_surface(model: Model, T: Array, inside: Array, outside: Array) -> Array:
     forms = model.bodies
     if forms is None or not model.between:
         return inside
-    start, way = (inside - T[:3, 3]) @ T[:3, :3], (outside - inside) @ T[:3, :3]
+    start, way = to_source(T, inside), dot(outside - inside, T[:3, :3])
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         steps = np.linspace(low, high, 10)[1:-1]
@@ -92,14 +93,14 @@ def surface_distance(
         return _overlap(a, b, T, rounding, enough, search)
     for outer, inner, place, swapped in ((a, b, T, False), (b, a, inverse(T), True)):
         if any_inside(outer, inner, place):  # no surface in common: that shell lies inside as a whole
-            points = inner.vertices[:: max(1, len(inner.vertices) // 50)] @ place[:3, :3].T + place[:3, 3]
+            points = to_target(place, inner.vertices[:: max(1, len(inner.vertices) // 50)])
             away = outer.distance(points) if len(inner.shells) == 1 else np.array([upper])
             k = int(np.argmax(away))
             depth = max(upper, float(away[k])) - a.error - b.error - rounding
-            at = points[k] @ T[:3, :3].T + T[:3, 3] if swapped else points[k]
+            at = to_target(T, points[k]) if swapped else points[k]
             one = len(away) == len(points)
             return Distance(-np.inf, -depth, at if one else None, at if one else None)
-    off = float(a.error_at(p[None])[0] + b.error_at((q - T[:3, 3])[None] @ T[:3, :3])[0])
+    off = float(a.error_at(p[None])[0] + b.error_at(dot((q - T[:3, 3])[None], T[:3, :3]))[0])
     return Distance(lower - rounding, upper + off + rounding, p, q)
 
 
@@ -120,7 +121,7 @@ def any_inside(outer: Surface, inner: Surface, T: Array) -> bool:
 
     A shell with a vertex outside of the other's box is not inside; only for the others winding numbers are asked.
     """
-    points = inner.shell_points @ T[:3, :3].T + T[:3, 3]
+    points = to_target(T, inner.shell_points)
     boxed = ((points >= outer.box[0]) & (points <= outer.box[1])).all(axis=(1, 2))
     return bool(boxed.any()) and bool(outer.contains(points[boxed, 0]).any())
 
@@ -148,13 +149,13 @@ def _vertex_depth(a: Surface, b: Surface, T: Array, meeting: tuple[Rows, Rows], 
     found = Distance()
     for outer, inner, place, rows in ((a, b, T, meeting[1]), (b, a, inverse(T), meeting[0])):
         spread = inner.vertices[:: max(1, len(inner.vertices) // _SPREAD)]
-        points = np.vstack([inner.vertices[np.unique(inner.faces[rows])], spread]) @ place[:3, :3].T + place[:3, 3]
+        points = to_target(place, np.vstack([inner.vertices[np.unique(inner.faces[rows])], spread]))
         points = points[((points >= outer.box[0]) & (points <= outer.box[1])).all(axis=1)]
         if len(points):
             depth = outer.certain_depth(points) - a.error - b.error - rounding
             k = int(np.argmax(depth))
             if -depth[k] < found.upper:
-                at = points[k] if outer is a else points[k] @ T[:3, :3].T + T[:3, 3]
+                at = points[k] if outer is a else to_target(T, points[k])
                 found = Distance(-np.inf, -float(depth[k]), at, at)
     return found
 
@@ -205,10 +206,10 @@ def _parted(a: Surface, b: Surface, T: Array, points: Array, directions: Array) 
     ``points`` (k, 3) are those that they share: the move goes beyond them, and is tried.
     """
     off = a.error + b.error
-    reach = np.ptp(points @ directions.T, axis=0)
+    reach = np.ptp(dot(points, directions.T), axis=0)
     slack = 2.0 * rounding_of(a, b, T)
     for more in (0.0, off) if off > 0.0 else (0.0,):
-        for k in np.argsort(reach)[:_TRIED].tolist():
+        for k in np.argsort(reach, kind="stable")[:_TRIED].tolist():
             length = (float(reach[k]) + more) * (1.0 + 1e-9) + 2.0 * slack
             for sign in (1.0, -1.0):
                 moved = T.copy()
@@ -227,8 +228,8 @@ def within(inner: Model, outer: Model, T: Array, error: float, slack: float) -> 
     if large is None:
         return False
     slack += small.error + large.error + (error if inner.refines else 0.0) + (error if outer.refines else 0.0)
-    corners = small.shell_points.reshape(-1, 3) @ T[:3, :3].T + T[:3, 3]
-    for points in (corners, small.vertices @ T[:3, :3].T + T[:3, 3]):
+    corners = to_target(T, small.shell_points.reshape(-1, 3))
+    for points in (corners, to_target(T, small.vertices)):
         if (points < large.box[0] - slack).any() or (points > large.box[1] + slack).any():
             return False
         some = points[:: max(1, len(points) // 16)]

@@ -17,6 +17,7 @@ from clamp3d.collide.convex import Hull, hull
 from clamp3d.collide.drawn import bodies_of
 from clamp3d.collide.faces import FaceModel
 from clamp3d.collide.surface import Surface, at_edges
+from clamp3d.core.linear import dot
 from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import MeshShape, Shape, Solid
@@ -211,7 +212,7 @@ def looks_convex(vertices: Array, faces: NDArray[np.int64]) -> bool:
     corners = vertices[faces[np.unique(np.arange(64) * 2654435761 % len(faces))]]
     n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     n /= np.maximum(np.linalg.norm(n, axis=1), 1e-300)[:, None]
-    height = (vertices @ n.T).max(axis=0) - np.einsum("ij,ij->i", corners[:, 0], n)
+    height = dot(vertices, n.T).max(axis=0) - np.einsum("ij,ij->i", corners[:, 0], n)
     return bool(height.max() <= 1e-6 * float(np.abs(vertices).max()))
 
 
@@ -230,7 +231,7 @@ def _bulge(shape: MeshShape) -> float:
     wide = 2.0 * facets.area_faces[pairs].max(axis=1) / np.maximum(length, 1e-300)
     smooth = (angles > 1e-6) & (angles < np.radians(65.0))
     # A chord w that turns by t has the sagitta w / 2 tan(t / 4).
-    return float((0.5 * wide * np.tan(0.25 * angles))[smooth].max(initial=0.0))
+    return float((0.5 * wide * np.sin(0.25 * angles) / np.cos(0.25 * angles))[smooth].max(initial=0.0))
 
 
 class ModelCache:

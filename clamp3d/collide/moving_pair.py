@@ -18,6 +18,7 @@ from clamp3d.collide.surface import Surface
 from clamp3d.collide.swept import swept_lower
 from clamp3d.collide.swept_mesh import Standing, swept_gap
 from clamp3d.collide.verdict import Thresholds, Verdict
+from clamp3d.core.linear import dot, to_target
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array, inverse
 
@@ -56,7 +57,7 @@ class MovingPair:
 
     def pose(self, t: float) -> Array:
         """The standing shape in the moving shape's frame."""
-        return inverse(self.back @ self.motion.at(t, self.start))
+        return inverse(dot(self.back, self.motion.at(t, self.start)))
 
     def ask(self, t: float, enough: Callable[[Distance], bool], thresholds: Thresholds) -> Distance:
         """Distance at time ``t``, in the moving shape's frame."""
@@ -103,7 +104,7 @@ class MovingPair:
 
     def _meeting(self, mine: Surface, other: Surface, limit: float) -> _Near:
         """The triangles of the two meshes that may come within ``limit`` mm of the other one on the way."""
-        placed = [s.vertices @ T[:3, :3].T + T[:3, 3] for s, T in ((mine, self.start), (other, self.T_still))]
+        placed = [to_target(T, s.vertices) for s, T in ((mine, self.start), (other, self.T_still))]
         moving, still = (v[s.faces] for v, s in zip(placed, (mine, other), strict=True))
         errors = [np.zeros(len(s.faces)) if s.face_error is None else s.face_error for s in (mine, other)]
         ours, theirs = can_meet(self.motion, (moving, errors[0]), (still, errors[1]), limit)
@@ -116,7 +117,7 @@ def box_corners(model: Model, T: Array) -> Array:
     """Corners (8, 3) of the box around a shape, placed by ``T`` (4, 4)."""
     pick = np.indices((2, 2, 2)).reshape(3, -1).T
     points = np.where(pick == 0, model.bounds[0], model.bounds[1])
-    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
+    return np.asarray(to_target(T, points))
 
 
 def least_distance(pair: MovingPair, thresholds: Thresholds, allowance: float | None) -> tuple[Distance, float]:

@@ -12,6 +12,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.meshes import any_inside, nearest_of, rounding_of
 from clamp3d.collide.model import Model
 from clamp3d.collide.surface import Surface
+from clamp3d.core.linear import to_target
 from clamp3d.core.pose import Array, inverse
 
 _PAIRS = 4000
@@ -56,7 +57,7 @@ def _crossing(a: Surface, b: Surface, T: Array) -> tuple[float, Array | None]:
         return 0.0, None
     rows = np.array([(contact.b1, contact.b2) for contact in answer.contacts])
     P = a.vertices[a.faces[rows[:, 0]]]
-    Q = b.vertices[b.faces[rows[:, 1]]] @ T[:3, :3].T + T[:3, 3]
+    Q = to_target(T, b.vertices[b.faces[rows[:, 1]]])
     best, where = 0.0, None
     for edges, triangles in ((P, Q), (Q, P)):
         for k in range(3):

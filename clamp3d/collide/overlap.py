@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.collide.surface import Surface
+from clamp3d.core.linear import dot, norm, to_target
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.shells import volume
 
@@ -52,7 +53,7 @@ class Common:
         Volume over area is the inner radius of a ball but for a factor of 3. Those that are outside are left out.
         """
         normal, size = self.normals
-        rows = np.argsort(-size)[:_INNER]
+        rows = np.argsort(-size, kind="stable")[:_INNER]
         rows = rows[size[rows] > 0.0]
         depth = 2.0 * max(self.volume, 0.0) / max(float(size.sum()), 1e-300)
         points = self.vertices[self.faces[rows]].mean(axis=1) - depth * normal[rows]
@@ -65,7 +66,7 @@ class Common:
         weight = size.copy()
         while len(found) < most and weight.max(initial=0.0) > 0.0:
             n = normal[int(np.argmax(weight))]
-            same = np.abs(normal @ n) > 1.0 - 1e-6
+            same = np.abs(dot(normal, n)) > 1.0 - 1e-6
             found.append(n)
             weight[same] = 0.0
         return np.array(found).reshape(-1, 3)
@@ -90,7 +91,7 @@ def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Ar
     """
     points = np.vstack([shared.vertices[:: max(1, len(shared.vertices) // _CORNERS)], shared.inner_points()])
     back = inverse(T)
-    local = points @ back[:3, :3].T + back[:3, 3]
+    local = to_target(back, points)
     in_a = a.distance_at_least(points) - b.error_at(local)
     in_b = b.distance_at_least(local) - a.error_at(points)
     found = np.maximum(in_a, in_b)
@@ -113,8 +114,8 @@ def deepest_at_most(a: Surface, b: Surface, T: Array, shared: Common, reached: f
     half = half / count
     whole = np.zeros(len(cells), dtype=bool)  # cells that lie inside as a whole: theirs do too
     while True:
-        radius = float(np.linalg.norm(half))
-        depth = np.maximum(a.distance(cells), b.distance(cells @ back[:3, :3].T + back[:3, 3]))
+        radius = norm(half)
+        depth = np.maximum(a.distance(cells), b.distance(to_target(back, cells)))
         open_ = depth + radius > _CLOSE * reached
         cells, depth, whole = cells[open_], depth[open_], whole[open_]
         away, inside = piece.distance(cells), whole

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,23 +10,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.checks import instance, items
+from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.batch import by_kernel
 from clamp3d.collide.broad import Boxes, box_gaps
-from clamp3d.collide.model import Model, ModelCache
-from clamp3d.collide.refine import refine
+from clamp3d.collide.judge import contained, judge
+from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import NAMES, Verdict
 from clamp3d.core.motion import FARTHEST, scene_pose
-from clamp3d.core.pose import Array, check_pose_array, inverse
+from clamp3d.core.pose import Array, check_pose_array
 from clamp3d.errors import InputError, MissingLibraryError
 
 _FEW = 32
 """Other parts up to which all of their boxes are compared with those of all poses."""
+_BLOCK = 4096
+"""Poses that the kernel is asked together: what is noted of them stays in the processor's own memory."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PoseVerdicts:
     """One part at n poses against the k ``others`` that it may meet.
 
@@ -59,12 +62,17 @@ class PoseVerdicts:
         """Upper bounds (n, k) of the signed distances, mm; infinite where nothing came near."""
         return self._whole(np.inf, self.most)
 
+    def __repr__(self) -> str:
+        counts = Counter(self.worst.tolist())
+        said = ", ".join(f"{counts[v.value]} {v.value}" for v in Verdict if counts[v.value]) or "no poses"
+        return f"PoseVerdicts({self.part!r}: {self.poses} poses; {said})"
+
     @property
     def worst(self) -> NDArray[np.str_]:
         """Worst verdict (n,) of each pose."""
         names = [v.value for v in Verdict]
         rank = np.full(self.poses, names.index(Verdict.CLEAR.value))
-        np.minimum.at(rank, self.row, np.argsort(names)[np.searchsorted(np.sort(names), self.kind)])
+        np.minimum.at(rank, self.row, np.argsort(names, kind="stable")[np.searchsorted(np.sort(names), self.kind)])
         return np.asarray(np.array(names)[rank])
 
     def _whole(self, other: Any, values: NDArray[Any]) -> NDArray[Any]:
@@ -126,42 +134,50 @@ def check_poses(
     )
     if i in rest:
         raise InputError(f"others must not hold {part!r} itself")
-    T = check_pose_array(poses)
-    for k in np.flatnonzero(np.abs(T[:, :3, 3]).max(axis=1) > FARTHEST)[:1]:
-        scene_pose(T[k], f"poses[{k}]")
+    from clamp3d.collide.poses_kernel import between
+
     model = shop.model(scene.parts[i].shape)
     models = [shop.model(scene.parts[j].shape) for j in rest]
-    poses_of = np.array([scene.parts[j].T_world for j in rest]).reshape(-1, 4, 4)
-    moving = Boxes.of(np.repeat(model.bounds[None], len(T), axis=0), T)
-    still = Boxes.of(np.array([m.bounds for m in models]).reshape(-1, 2, 3), poses_of)
+    T, moving = _placed(poses, model.bounds)
+    P = np.array([scene.parts[j].T_world for j in rest]).reshape(-1, 4, 4)
+    still = Boxes.of(np.array([m.bounds for m in models]).reshape(-1, 2, 3), P)
     reach = scene.thresholds.reach + 1e-6
     row, column = _near(moving, still, reach)
-    both = still.joined(moving)
-    least, most = np.full(len(row), -np.inf), np.full(len(row), np.inf)
-    kind = np.full(len(row), Verdict.UNCERTAIN.value, dtype=NAMES)
+    least, most = np.empty(len(row)), np.empty(len(row))
+    kind = np.empty(len(row), dtype=NAMES)
     # Equal parts that may meet this one alike are measured together.
     alike: dict[tuple[int, float | None], list[int]] = {}
-    for k in np.unique(column).tolist():
+    for k in np.unique(column).tolist() if len(rest) > 1 else range(len(rest)):
         allowance = scene.allowance(part, scene.parts[rest[k]].name)
         alike.setdefault((id(models[k]), allowance), []).append(k)
     for (_, allowance), columns in alike.items():
-        near = np.flatnonzero(np.isin(column, columns))
-        other, local = models[columns[0]], inverse(poses_of[column[near]]) @ T[row[near]]
-        known = by_kernel(other, model, local)
-        least[near], most[near] = known.lower, known.upper
-        kind[near] = scene.thresholds.verdicts(known.lower, known.upper, allowance)
-        left = np.flatnonzero(kind[near] == Verdict.UNCERTAIN.value)
-        near, local = near[left], local[left]
-        least[near] = box_gaps(both, np.column_stack([column[near], len(rest) + row[near]]))
-        shop.counters.queries["boxes"] += len(near)
-        for m, T_other in zip(near.tolist(), local, strict=True):
+        other, near = models[columns[0]], np.flatnonzero(np.isin(column, columns))
+
+        def local(rows: NDArray[np.int64]) -> Array:
+            out = np.empty((len(rows), 4, 4))
+            between(P, column[rows], T, row[rows], out)
+            return out
+
+        for some in np.split(near, range(_BLOCK, len(near), _BLOCK)):
+            known = by_kernel(other, model, local(some))
+            least[some], most[some] = known.lower, known.upper
+        kind[near] = scene.thresholds.verdicts(least[near], most[near], allowance)
+        clash = near[kind[near] == Verdict.CLASH.value]
+        kind[clash[contained(other, model, local(clash), scene.thresholds)]] = Verdict.CONTAINED.value
+        left = near[kind[near] == Verdict.UNCERTAIN.value]
+        places = local(left)
+        bounds = np.concatenate([np.repeat(model.bounds[None], len(left), axis=0), other.bounds[None]])
+        pairs = np.column_stack([np.full(len(left), len(left)), np.arange(len(left))])
+        least[left] = box_gaps(Boxes.of(bounds, np.concatenate([places, np.eye(4)[None]])), pairs)
+        shop.counters.queries["boxes"] += len(left)
+        for m, T_other in zip(left.tolist(), places, strict=True):
             if least[m] >= reach:
                 kind[m] = Verdict.CLEAR.value
                 continue
             try:
-                found = _refined(other, model, T_other, Distance(float(least[m])), scene, allowance)
-                kind[m] = scene.thresholds.verdict(found, allowance).value
-                least[m], most[m] = found.lower, found.upper
+                start = Distance(float(least[m]))
+                verdict, found = judge(other, model, T_other, start, scene.thresholds, allowance)
+                kind[m], least[m], most[m] = verdict.value, found.lower, found.upper
             except MissingLibraryError:
                 raise
             except Exception:  # one pose that fails is a finding, not the end of all others
@@ -170,25 +186,35 @@ def check_poses(
     return PoseVerdicts(part, names, len(T), reach, row, column, least, most, kind)
 
 
-def _near(moving: Boxes, still: Boxes, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _placed(poses: ArrayLike, bounds: Array) -> tuple[Array, Array]:
+    """The poses (n, 4, 4), checked, and centre and half sizes (6, n) along the world's axes of a part's box there."""
+    from clamp3d.collide.poses_kernel import boxes
+
+    T = np.require(array("poses", poses, (None, 4, 4), finite=False), np.float64, ["C", "A"])
+    found = np.empty((6, len(T)))
+    sizes = bounds.mean(axis=0), 0.5 * (bounds[1] - bounds[0]), FARTHEST
+    if boxes(T, *sizes, found) >= 0:
+        T = np.require(check_pose_array(T), np.float64, ["C"])
+        bad = boxes(T, *sizes, found)
+        if bad >= 0:
+            scene_pose(T[bad], f"poses[{bad}]")
+    return T, found
+
+
+def _near(moving: Array, still: Boxes, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Poses and others (m,) whose boxes along the world's axes come within ``reach`` mm."""
+    centre, half = moving[:3], moving[3:]
     if len(still.centre) <= _FEW:
-        away = np.abs(moving.centre[:, None] - still.centre) - moving.reach[:, None] - still.reach
-        rows, columns = np.nonzero((away <= reach).all(axis=2))
+        pairs = zip(still.centre[..., None], (still.reach + reach)[..., None], strict=True)
+        near = np.array([(np.abs(centre - c) <= half + r).all(axis=0) for c, r in pairs]).reshape(-1, len(centre.T))
+        rows, columns = np.nonzero(near.T)
         return rows.astype(np.int64), columns.astype(np.int64)
     from rtree import index
 
-    half = still.reach + reach
+    wide = still.reach + reach
     tree = index.Index(
-        (np.arange(len(half)), still.centre - half, still.centre + half), properties=index.Property(dimension=3)
+        (np.arange(len(wide)), still.centre - wide, still.centre + wide), properties=index.Property(dimension=3)
     )
-    found, count = tree.intersection_v(moving.centre - moving.reach, moving.centre + moving.reach)  # type: ignore[no-untyped-call]
-    rows = np.repeat(np.arange(len(moving.centre)), np.asarray(count, dtype=np.int64))
+    found, count = tree.intersection_v((centre - half).T, (centre + half).T)  # type: ignore[no-untyped-call]
+    rows = np.repeat(np.arange(len(centre.T)), np.asarray(count, dtype=np.int64))
     return rows, np.asarray(found, dtype=np.int64)
-
-
-def _refined(a: Model, b: Model, T: Array, start: Distance, scene: Scene, allowance: float | None) -> Distance:
-    def enough(known: Distance) -> bool:
-        return scene.thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN
-
-    return refine(a, b, T, start, scene.thresholds, enough)

@@ -15,19 +15,18 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm, bodies_distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.convex import Rod
-from clamp3d.collide.faces import VERDICT_WIDTH, faces_distance, stands_out
+from clamp3d.collide.faces import VERDICT_WIDTH, faces_distance
 from clamp3d.collide.facets import rod_distance
-from clamp3d.collide.meshes import meshes_distance, within
+from clamp3d.collide.meshes import meshes_distance
 from clamp3d.collide.model import FINEST, Model
 from clamp3d.collide.open_mesh import open_distance
 from clamp3d.collide.verdict import Thresholds, Verdict
+from clamp3d.core.linear import norm
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import SolverError
 
 COARSEST = 0.512
 """First chord error (mm) of a pair that needs meshes; each further one is a whole power of two finer."""
-CONTAINED_ERROR = 0.064
-"""Chord error (mm) of the meshes that containment is asked with."""
 
 _FACE_WIDTHS = (1e-3, 1e-6)
 """Widths (mm) of the interval that are asked for where a verdict alone is not enough."""
@@ -85,30 +84,6 @@ def refine(
         wanted = min(0.5 * error, max(0.25 * margin, error / 16.0))
         while error > max(wanted, FINEST):
             error = max(0.5 * error, FINEST)
-
-
-def contained(a: Model, b: Model, T: Array, thresholds: Thresholds) -> bool:
-    """Whether one of two overlapping parts lies wholly in the other, within the contact threshold."""
-    if not (a.closed and b.closed):
-        return False
-    for inner, outer, place in ((b, a, T), (a, b, inverse(T))):
-        middle, half = inner.bounds.mean(axis=0), 0.5 * (inner.bounds[1] - inner.bounds[0])
-        R = place[:3, :3]
-        centre, reach = R @ middle + place[:3, 3], abs(R) @ half
-        box = outer.bounds
-        # The box of the inner one touches the outer's on six sides: one outside by more than its own corners can be
-        # is enough to say no, and cheap.
-        if (centre + 0.5 * reach < box[0]).any() or (centre - 0.5 * reach > box[1]).any():
-            continue
-        if ((box[1] - box[0]).max() * 1.7321 + thresholds.contact) < 2.0 * half.max():
-            continue
-        x, y = inner.faces, outer.faces
-        if x is not None and y is not None and stands_out(x, y, place, thresholds.contact):
-            continue
-        a.counters.queries["containment"] += 1
-        if within(inner, outer, place, CONTAINED_ERROR, thresholds.contact):
-            return True
-    return False
 
 
 def _agreed(old: Distance, new: Distance) -> Distance:
@@ -209,5 +184,5 @@ def with_normal(found: Distance) -> Distance:
     p, q = found.point_a, found.point_b
     if p is None or q is None or not found.upper > 1e-6:
         return found
-    size = float(np.linalg.norm(q - p))
+    size = norm(q - p)
     return replace(found, normal=(q - p) / size) if size > 1e-6 else found

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from clamp3d.collide.where import Overlap
 
 BAD = (Verdict.CLASH, Verdict.CONTAINED)
+"""Verdicts of parts that overlap."""
+NOT_CLEAN = (*BAD, Verdict.FAILED, Verdict.UNCERTAIN)
 """Verdicts that make a scene not clean."""
 _HTML_ROWS = 30
 
@@ -119,8 +121,8 @@ class CheckResult:
 
     @property
     def clean(self) -> bool:
-        """Whether nothing clashes or failed, at rest or in motion."""
-        return not any(row.verdict in BAD or row.verdict is Verdict.FAILED for row in self.rows)
+        """Whether every pair was decided and none clashes, at rest or in motion; without a pair nothing is clean."""
+        return self.work.pairs > 0 and not any(row.verdict in NOT_CLEAN for row in self.rows)
 
     @property
     def counts(self) -> dict[str, int]:

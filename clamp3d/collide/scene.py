@@ -17,6 +17,9 @@ from clamp3d.core.pose import Array
 from clamp3d.core.shapes import AnyShape, Shape, as_shape
 from clamp3d.errors import InputError
 
+_NAMED = 8
+"""Parts that a scene names when it is printed."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
@@ -89,7 +92,7 @@ class Allowances:
         return max(found) if found else None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Scene:
     """Parts in the world, what counts as contact and clearance, what may touch, and how parts move.
 
@@ -143,6 +146,10 @@ class Scene:
             for name in motion.parts:
                 if name not in seen:
                     raise InputError(f"motion {motion.name!r}: {unknown_part(name, seen)}")
+
+    def __repr__(self) -> str:
+        names = ", ".join([part.name for part in self.parts[:_NAMED]] + ["..."] * (len(self.parts) > _NAMED))
+        return f"Scene({self.name!r}; parts: {names or 'none'}; motions: {len(self.motions)})"
 
     @classmethod
     def of(

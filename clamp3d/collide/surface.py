@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, rotation
 from clamp3d.core.shells import corners_of, shells, winding_number
 
@@ -144,7 +145,7 @@ class Surface:
         corners, low, widest = self._turned
         found = np.empty(len(points))
         scale = max(self.scale, float(np.abs(points).max(initial=0.0)))
-        crossings(corners, low, widest, np.ascontiguousarray(points @ _TURN.T), scale, found)
+        crossings(corners, low, widest, np.ascontiguousarray(dot(points, _TURN.T)), scale, found)
         for k in np.flatnonzero(np.isnan(found)):  # straight below an edge: the sum of solid angles
             found[k] = winding_number(corners_of(self.vertices, self.faces), points[k])
         return found
@@ -152,7 +153,7 @@ class Surface:
     @cached_property
     def _turned(self) -> tuple[Array, Array, float]:
         """The triangles (m, 9), turned, by their least x (m,), and the width in x of the widest."""
-        corners = (self.vertices @ _TURN.T)[self.faces]
+        corners = dot(self.vertices, _TURN.T)[self.faces]
         low, high = corners[:, :, 0].min(axis=1), corners[:, :, 0].max(axis=1)
         order = np.argsort(low, kind="stable")
         made = np.ascontiguousarray(corners[order].reshape(-1, 9)), np.ascontiguousarray(low[order])

@@ -6,12 +6,15 @@ keeps its clearance over any stretch. A polyhedron is swept into the hull of its
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from clamp3d.collide.body import ClosedForm, bore_rod
 from clamp3d.collide.convex import Convex, Hull, Rod, convex_distance, hull
 from clamp3d.collide.facets import axis_gap, hull_gap
 from clamp3d.collide.model import Model
+from clamp3d.core.linear import dot, to_target
 from clamp3d.core.pose import Array, inverse
 
 
@@ -70,17 +73,17 @@ def _bores(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angl
 def _swept_hull(piece: Convex, poses: tuple[Array, ...], angle: float) -> tuple[Hull, float]:
     """Hull of a polyhedron at all three poses, in the standing part's frame, and how far arcs leave it."""
     assert isinstance(piece, Hull)
-    ways = np.array([piece.vertices @ T[:3, :3].T + T[:3, 3] for T in poses])
+    ways = np.array([to_target(T, piece.vertices) for T in poses])
     return hull((ways if angle else ways[::2]).reshape(-1, 3)), _sagitta(ways, angle)
 
 
 def _swept_rod(rod: Rod, poses: tuple[Array, ...], angle: float) -> Rod:
     """A rod, in its own part's frame at the middle pose, that holds the moving one all the time."""
     ends = rod.T[:3, 3] + np.outer([-0.5 * rod.length, 0.5 * rod.length], rod.T[:3, 2])
-    home = inverse(poses[1] @ rod.T)
-    ways = np.array([(ends @ T[:3, :3].T + T[:3, 3]) @ home[:3, :3].T + home[:3, 3] for T in poses])
+    home = inverse(dot(poses[1], rod.T))
+    ways = np.array([to_target(home, to_target(T, ends)) for T in poses])
     local, sag = ways.reshape(-1, 3), _sagitta(ways, angle)
-    axes = [home[:3, :3] @ T[:3, :3] @ rod.T[:3, 2] for T in poses]
+    axes = [dot(dot(home[:3, :3], T[:3, :3]), rod.T[:3, 2]) for T in poses]
     tilt = rod.radius * max(float(np.hypot(axis[0], axis[1])) for axis in axes)
     low, high = float(local[:, 2].min() - sag - tilt), float(local[:, 2].max() + sag + tilt)
     aside = float(np.hypot(local[:, 0], local[:, 1]).max())
@@ -93,4 +96,4 @@ def _sagitta(ways: Array, angle: float) -> float:
     """How far points stray from the straight lines between their places ``ways`` (3, k, 3), on arcs of ``angle``."""
     # An arc of angle a over a chord c: c / 2 tan(a / 4).
     chord = float(np.linalg.norm(np.diff(ways, axis=0), axis=2).max())
-    return 0.5 * chord * float(np.tan(0.25 * abs(angle)))
+    return 0.5 * chord * math.tan(0.25 * abs(angle))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.collide.surface import fcl_tree
+from clamp3d.core.linear import dot
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 
@@ -70,7 +71,7 @@ def swept_gap(
     """
     import fcl
 
-    there = [triangles @ T[:3, :3].T + T[:3, 3] for T in (motion.at(t) for t in stretch)]
+    there = [dot(triangles, T[:3, :3].T) + T[:3, 3] for T in (motion.at(t) for t in stretch)]
     hulls = np.concatenate(there, axis=1)
     errors = errors.copy()
     if motion.angle:  # along arcs the acceleration is at most that of the corner furthest from the axis

@@ -93,17 +93,21 @@ class Thresholds:
 
         It is asked once for all bounds that lie alike among the numbers at which a verdict can change.
         """
+        from clamp3d.collide.poses_kernel import cells
+
         limit = -max(allowance or 0.0, self.contact)
-        middle = np.where(upper - lower <= 2.0 * RESOLUTION, 0.5 * lower + 0.5 * np.minimum(upper, 1e300), np.nan)
         marks = [limit, limit - RESOLUTION, self.reach]
         marks += [-self.contact - RESOLUTION, self.contact + RESOLUTION, self.clearance - RESOLUTION]
-        cell = np.zeros(len(lower), dtype=np.int64)
-        for values in (lower, upper, middle):
-            for side in ("left", "right"):  # a bound that equals a mark lies alike with its equals alone
-                cell = (len(marks) + 1) * cell + np.searchsorted(np.sort(marks), values, side)
-        _, first, kind = np.unique(cell, return_index=True, return_inverse=True)
-        names = [self.verdict(Distance(float(lower[k]), float(upper[k])), allowance).value for k in first]
-        return np.array(names, dtype=NAMES)[kind]
+        cell = np.empty(len(lower), dtype=np.int64)
+        lower, upper = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+        cells(lower, upper, 2.0 * RESOLUTION, np.array(marks), cell)
+        one = np.full((2 * len(marks) + 2) ** 3, -1)
+        one[cell] = np.arange(len(cell))
+        names = np.empty(len(one), dtype=NAMES)
+        for kind in np.flatnonzero(one >= 0):
+            k = one[kind]
+            names[kind] = self.verdict(Distance(float(lower[k]), float(upper[k])), allowance).value
+        return np.asarray(names[cell])
 
     def _of(self, distance: float) -> Verdict:
         if distance < -self.contact - RESOLUTION:

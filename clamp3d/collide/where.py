@@ -11,6 +11,7 @@ import numpy as np
 
 from clamp3d.collide.model import Model
 from clamp3d.collide.overlap import common, deepest
+from clamp3d.core.linear import to_target
 from clamp3d.core.pose import Array
 
 _ERRORS = (0.064, 0.008, 0.001)
@@ -71,8 +72,8 @@ def locate(a: Model, b: Model, T_a: Array, T_ab: Array) -> Overlap | None:
         if inner_a is not None and inner_b is not None:
             inner = common(inner_a, inner_b, T_ab) if a.refines or b.refines else outer
             if inner is not None:
-                point = deepest(inner_a, inner_b, T_ab, inner)[1] @ T_a[:3, :3].T + T_a[:3, 3]
-        world = outer.vertices @ T_a[:3, :3].T + T_a[:3, 3]
+                point = to_target(T_a, deepest(inner_a, inner_b, T_ab, inner)[1])
+        world = to_target(T_a, outer.vertices)
         rounding = 1e-11 * (outer_a.scale + outer_b.scale)
         slack = rounding * float(outer.normals[1].sum())
         low, high = 0.0 if inner is None else max(0.0, inner.volume - slack), outer.volume + slack

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distance
+from clamp3d.core.linear import dot, norm, svd
 from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 
@@ -36,8 +37,8 @@ class Zonoid:
     def at(self, T: Array) -> Zonoid:
         """The same placed by ``T`` (4, 4)."""
         R = T[:3, :3].T
-        discs = np.column_stack([self.discs[:, :3] @ R, self.discs[:, 3]])
-        return Zonoid(self.centre @ R + T[:3, 3], self.lines @ R, discs, self.error)
+        discs = np.column_stack([dot(self.discs[:, :3], R), self.discs[:, 3]])
+        return Zonoid(dot(self.centre, R) + T[:3, 3], dot(self.lines, R), discs, self.error)
 
 
 def box_of(vertices: Array, edges: NDArray[np.int64]) -> Zonoid | None:
@@ -48,7 +49,7 @@ def box_of(vertices: Array, edges: NDArray[np.int64]) -> Zonoid | None:
     if len(at_first) != 3:
         return None
     centre, half = vertices.mean(axis=0), 0.5 * (vertices[at_first] - vertices[0])
-    corners = centre + np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) @ half
+    corners = centre + dot(np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]), half)
     off = np.linalg.norm(corners[:, None] - vertices, axis=2).min(axis=1).max()
     if off > 1e-14 * (1.0 + np.abs(vertices).max()):
         return None
@@ -72,13 +73,13 @@ def zonoid_distance(a: Zonoid, b: Zonoid) -> Distance:
     error = 4.0 * _EPS * size + a.error + b.error
     lower, upper = -float(out[1]) - error, -float(out[0]) + error
     meet, far = c - min(upper, 0.0) * out[2:], max(upper, 0.0)
-    if np.linalg.norm(parts.sum(axis=0) - meet) > far + 1e-11 * size:
+    if norm(parts.sum(axis=0) - meet) > far + 1e-11 * size:
         parts = _nearest(meet, lines, discs, parts, far, size)
     of_a = np.zeros(len(parts), dtype=bool)
     of_a[: len(a.lines)] = of_a[len(lines) : len(lines) + len(a.discs)] = True
     p, q = a.centre + parts[of_a].sum(axis=0), b.centre - parts[~of_a].sum(axis=0)
     if upper >= 0.0:  # what the points attest
-        upper = max(upper, float(np.linalg.norm(q - p)) + error)
+        upper = max(upper, norm(q - p) + error)
     return Distance(lower, upper, p, q, out[2:].copy(), None, "features", "convex")
 
 
@@ -92,16 +93,16 @@ def _nearest(c: Array, lines: Array, discs: Array, parts: Array, far: float, siz
     corners = parts[None]
     for _ in range(_POINTS):
         V, x = corners.sum(axis=1) - c, parts.sum(axis=0) - c
-        w = nnls(np.vstack([V.T / np.linalg.norm(x), np.ones(len(V))]), np.array([0.0, 0.0, 0.0, 1.0]))
+        w = nnls(np.vstack([V.T / norm(x), np.ones(len(V))]), np.array([0.0, 0.0, 0.0, 1.0]))
         corners, w = corners[w > 0.0], w[w > 0.0] / w.sum()
         parts = np.tensordot(w, corners, 1)
         x = parts.sum(axis=0) - c
-        if np.linalg.norm(x) <= far + 1e-13 * size:
+        if norm(x) <= far + 1e-13 * size:
             break
-        across = x - (discs[:, :3] @ x)[:, None] * discs[:, :3]
+        across = x - dot(discs[:, :3], x)[:, None] * discs[:, :3]
         across *= (discs[:, 3] / np.maximum(np.linalg.norm(across, axis=1), 1e-300))[:, None]
-        new = -np.vstack([np.sign(lines @ x)[:, None] * lines, across])
-        if (x - (new.sum(axis=0) - c)) @ x <= 1e-13 * size * np.linalg.norm(x):  # no point is nearer
+        new = -np.vstack([np.sign(dot(lines, x))[:, None] * lines, across])
+        if dot(x - (new.sum(axis=0) - c), x) <= 1e-13 * size * norm(x):  # no point is nearer
             break
         corners = np.concatenate([corners, new[None]])
     return np.asarray(parts)
@@ -110,14 +111,14 @@ def _nearest(c: Array, lines: Array, discs: Array, parts: Array, far: float, siz
 def _parallel(a: Zonoid, b: Zonoid) -> Distance | None:
     """Two cylinders that overlap, axes parallel to 1e-9: coaxial ones come free in any direction across."""
     z, c = a.discs[0, :3], b.centre - a.centre
-    tilt = float(np.linalg.norm(np.cross(z, b.discs[0, :3])))
+    tilt = norm(np.cross(z, b.discs[0, :3]))
     if tilt > _PARALLEL:
         return None
-    along = float(c @ z)
+    along = float(dot(c, z))
     away = c - along * z
-    off = float(np.linalg.norm(away))
-    out = away / off if off > 0.0 else np.linalg.svd(z[None])[2][1]
-    half = [float(np.linalg.norm(x.lines)) for x in (a, b)]
+    off = norm(away)
+    out = away / off if off > 0.0 else svd(z[None])[2][1]
+    half = [norm(x.lines) for x in (a, b)]
     radii = [float(x.discs[0, 3]) for x in (a, b)]
     side, end = sum(radii) - off, sum(half) - abs(along)
     depth = min(side, end)

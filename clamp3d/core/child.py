@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import faulthandler
+import importlib
 import multiprocessing
 import os
+import select
+import signal
 import subprocess
 import sys
 import threading
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable
 
@@ -20,22 +25,28 @@ def run_child(
     *arguments: str,
     time_limit: float,
     watch: Callable[[list[str]], None] = lambda log: None,
+    copy: bool = False,
 ) -> tuple[int | None, list[str]]:
     """Run ``python -m module arguments`` for at most ``time_limit`` s; nothing is left behind when it is interrupted.
 
     Returns its exit code (None: not done in time) and the last lines that it printed, which ``watch`` is told now and
-    then. The module's main function calls `end_with_caller`. It computes in one thread.
+    then. The module's main function calls `end_with_caller`. It computes in one thread. With ``copy`` its function
+    ``main(*arguments)`` is called in a copy of this process, where that is safe: nothing is imported twice.
     """
     # A session of its own keeps Ctrl-C with the caller, who then ends the worker.
-    worker = subprocess.Popen(
-        [sys.executable, "-m", module, *arguments],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        errors="replace",
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)} | _ONE_THREAD,
-        start_new_session=True,
+    worker = (
+        Copy(module, arguments)
+        if copy and can_copy()
+        else subprocess.Popen(
+            [sys.executable, "-m", module, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)} | _ONE_THREAD,
+            start_new_session=True,
+        )
     )
     assert worker.stdin is not None
     assert worker.stdout is not None
@@ -57,6 +68,54 @@ def run_child(
         worker.stdin.close()
         worker.stdout.close()
     return code, [line.strip() for line in log if line.strip()]
+
+
+def can_copy() -> bool:
+    """Whether this process can be forked: on Linux, with no threads but those of NumPy, which end before a fork."""
+    if sys.platform != "linux" or threading.active_count() > 1 or "OCP" in sys.modules:
+        return False
+    return len(os.listdir("/proc/self/task")) <= (os.cpu_count() or 1)
+
+
+class Copy:
+    """A copy of this process that calls a module's main function; what is asked of a `subprocess.Popen`."""
+
+    def __init__(self, module: str, arguments: tuple[str, ...]) -> None:
+        (heard, tells), (hears, told) = os.pipe(), os.pipe()
+        self._pid = os.fork()
+        self._code: int | None = None
+        if self._pid == 0:
+            code = 1
+            try:
+                faulthandler.disable()  # its report would be the caller's
+                os.setsid()
+                for given, number in ((heard, 0), (told, 1), (told, 2)):
+                    os.dup2(given, number)
+                os.close(tells)
+                importlib.import_module(module).main(*arguments)
+                code = 0
+            except BaseException:  # whatever it is, the caller's own work must not go on here
+                os.write(2, traceback.format_exc().encode())
+            finally:
+                os._exit(code)
+        os.close(heard)
+        os.close(told)
+        self.stdin, self.stdout = os.fdopen(tells, "w"), os.fdopen(hears, errors="replace")
+        self._watched = os.pidfd_open(self._pid)
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Its exit code, or minus the signal that ended it. Raises TimeoutExpired after ``timeout`` s."""
+        if self._code is None:
+            if not select.select([self._watched], [], [], timeout)[0]:
+                raise subprocess.TimeoutExpired("", timeout or 0.0)
+            self._code = os.waitstatus_to_exitcode(os.waitpid(self._pid, 0)[1])
+            os.close(self._watched)
+        return self._code
+
+    def kill(self) -> None:
+        """End it at once."""
+        if self._code is None:
+            os.kill(self._pid, signal.SIGKILL)
 
 
 def end_with_caller() -> None:

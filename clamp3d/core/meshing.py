@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from clamp3d.checks import instance
 from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Profile, Side, check_mesh_error
 from clamp3d.core.shapes import Solid
@@ -152,7 +153,7 @@ def _extrude(shape: Extrusion, mesh_error: float, side: Side, overlap: float = 0
         points[:, 2] = np.where(prism.vertices[:, 2] > 0.5, shape.end + overlap, shape.start - overlap)
         # Not trimesh.boolean: it rounds the vertices to single precision.
         solid += manifold3d.Manifold(
-            manifold3d.Mesh64(vert_properties=points @ shape.frame.T, tri_verts=prism.faces.astype(np.uint64))
+            manifold3d.Mesh64(vert_properties=dot(points, shape.frame.T), tri_verts=prism.faces.astype(np.uint64))
         )
     return solid
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.checks import array, items, number, text
+from clamp3d.core.linear import dot, lstsq, norm
 from clamp3d.core.pose import Array, check_pose, inverse, rotation, unit
 from clamp3d.errors import InputError
 
@@ -90,14 +91,14 @@ class Motion:
             return self
         from scipy.spatial.transform import Rotation
 
-        M = self.to @ inverse(start)
+        M = dot(self.to, inverse(start))
         turn = Rotation.from_matrix(M[:3, :3]).as_rotvec()
-        angle, t = float(np.linalg.norm(turn)), M[:3, 3]
+        angle, t = norm(turn), M[:3, 3]
         if angle < 1e-12:
             return replace(self, travel=t, to=None)
         u = turn / angle
-        along = float(t @ u) * u
-        point = np.linalg.lstsq(np.eye(3) - M[:3, :3], t - along, rcond=1e-12)[0]
+        along = float(dot(t, u)) * u
+        point = lstsq(np.eye(3) - M[:3, :3], t - along, 1e-12)[0]
         return replace(self, axis=u, point=point, angle=angle, travel=along, to=None)
 
     def at(self, t: float, start: Array | None = None) -> Array:
@@ -113,19 +114,19 @@ class Motion:
         turn = np.eye(3)
         if self.angle:
             turn = rotation(self.axis, t * self.angle)[:3, :3]
-        T[:3, 3] += (turn - np.eye(3)) @ (T[:3, 3] - self.point) + t * self.travel
-        T[:3, :3] = turn @ T[:3, :3]
+        T[:3, 3] += dot(turn - np.eye(3), T[:3, 3] - self.point) + t * self.travel
+        T[:3, :3] = dot(turn, T[:3, :3])
         return T
 
     def from_axis(self, points: Array) -> Array:
         """Distances (...) in mm of points (..., 3) from the axis."""
         out = points - self.point
-        return np.asarray(np.linalg.norm(out - (out @ self.axis)[..., None] * self.axis, axis=-1))
+        return np.asarray(np.linalg.norm(out - dot(out, self.axis)[..., None] * self.axis, axis=-1))
 
     def speed(self, points: Array) -> float:
         """Bound (mm per unit of t) of the speed of points (k, 3), given where they are at the start."""
         turning = abs(self.angle) * float(self.from_axis(points).max()) if self.angle else 0.0
-        return float(np.linalg.norm(self.travel)) + turning
+        return norm(self.travel) + turning
 
 
 def _names(parts: str | tuple[str, ...]) -> tuple[str, ...]:

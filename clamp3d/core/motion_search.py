@@ -6,6 +6,7 @@ import numpy as np
 
 from clamp3d.checks import positive
 from clamp3d.core.distance import SignedDistance, signed_distance
+from clamp3d.core.linear import norm
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
@@ -41,7 +42,7 @@ class Search:
         self.slack = max(slack, self.rounding)
         self.evaluations = 0
         self._sizes = (groove.radius, groove.half_angle, 0.5 * groove.length, 0.5 * cylinder.length)
-        axis = start[:3, 2] / np.linalg.norm(start[:3, 2])
+        axis = start[:3, 2] / norm(start[:3, 2])
         self._capsule: Search | None = None
         if isinstance(cylinder, Cylinder):
             self._capsule = Search(groove, Capsule(cylinder.radius, cylinder.length), motion, start, resolution)
@@ -99,8 +100,8 @@ class Search:
         R, half_angle, H, half = self._sizes
         r = self.cylinder.radius
         out = np.empty(3)
-        arm = float(np.linalg.norm(np.cross(self.motion.axis, self.start[:3, 3] - self.motion.point)))
-        speed = float(np.linalg.norm(self.motion.travel)) + abs(self.motion.angle) * (arm + float(np.hypot(r, half)))
+        arm = norm(np.cross(self.motion.axis, self.start[:3, 3] - self.motion.point))
+        speed = norm(self.motion.travel) + abs(self.motion.angle) * (arm + float(np.hypot(r, half)))
         self.evaluations += kernel_motion_flat.search(
             R,
             half_angle,
@@ -172,8 +173,8 @@ class Search:
             return self.at(s).distance - level
 
         offset, u = self.start[:3, 3] - self.motion.point, self.motion.axis
-        reach = float(np.linalg.norm(np.cross(u, offset))) + 0.5 * self.cylinder.length
-        speed = max(abs(self.motion.angle) * reach + float(np.linalg.norm(self.motion.travel)), 1e-300)
+        reach = norm(np.cross(u, offset)) + 0.5 * self.cylinder.length
+        speed = max(abs(self.motion.angle) * reach + norm(self.motion.travel), 1e-300)
         step = max(error / speed, 4e-16)
         high = t
         if gap(high) > 0.0:  # by rounding: just behind it

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, number
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.primitives import LARGEST
 from clamp3d.errors import InputError
 
@@ -73,7 +74,7 @@ def check_pose(pose: ArrayLike, name: str = "pose") -> Array:
         raise InputError(f"{name} must have an offset below {LARGEST:g} mm, got {T[:3, 3].tolist()}")
     R = T[:3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
-        deviation = float(np.abs(R @ R.T - np.eye(3)).max())
+        deviation = float(np.abs(dot(R, R.T) - np.eye(3)).max())
     if not deviation <= REPAIR_TOLERANCE:
         raise InputError(f"{name} must be rigid: its rotation part deviates from orthonormal by {deviation:.3g}")
     if np.linalg.det(R) < 0:
@@ -108,7 +109,7 @@ def check_pose_array(poses: ArrayLike, name: str = "poses") -> Array:
     T = array(name, poses, (None, 4, 4), finite=False)
     R = T[:, :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
-        deviation = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+        deviation = np.abs(dot(R, np.swapaxes(R, 1, 2)) - np.eye(3)).max(axis=(1, 2))
         sound = np.isfinite(T).all(axis=(1, 2)) & (np.linalg.det(R) > 0.0) & (deviation <= REPAIR_TOLERANCE)
         sound &= (T[:, 3] == (0.0, 0.0, 0.0, 1.0)).all(axis=1) & (np.abs(T[:, :3, 3]).max(axis=1) < LARGEST)
     if not sound.all():
@@ -141,9 +142,17 @@ def nearest_rigid(T: Array) -> Array:
     >>> bool(np.abs(nearest_rigid(rounded) - rotation((1, 2, 3), 0.5)).max() < 1e-6)
     True
     """
-    left, _, right = np.linalg.svd(T[..., :3, :3])  # SciPy's conversions take a small stretch for a turn
+    R, step = T[..., :3, :3], np.inf  # SciPy's conversions take a small stretch for a turn
+    while step > 1e-15:  # Newton's method for the polar factor
+        x, y, z = np.moveaxis(R, -2, 0)
+        area = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=-2)
+        new = 0.5 * (R + area / (x * area[..., 0, :]).sum(axis=-1)[..., None, None])
+        last, step = step, float(np.abs(new - R).max(initial=0.0))
+        R = new
+        if not step < last:
+            break
     out = T.copy()
-    out[..., :3, :3] = left @ right
+    out[..., :3, :3] = R
     return out
 
 
@@ -163,7 +172,7 @@ def inverse(T: Array) -> Array:
     out = np.zeros_like(T)
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
     out[..., :3, :3] = Rt
-    out[..., :3, 3] = -(Rt @ T[..., :3, 3:])[..., 0]
+    out[..., :3, 3] = -dot(Rt, T[..., :3, 3:])[..., 0]
     out[..., 3, 3] = 1.0
     return out
 
@@ -216,7 +225,7 @@ def unit(axis: Array, name: str = "axis") -> Array:
         raise InputError(f"{name} must not be zero")
     # A power of two changes no digit, and no square overflows or underflows.
     scaled = np.ldexp(axis, -math.frexp(largest)[1]) if not 1e-100 < largest < 1e100 else axis
-    return np.asarray(scaled / np.linalg.norm(scaled))
+    return np.asarray(scaled / norm(scaled))
 
 
 def rotation(axis: ArrayLike, angle: float) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from clamp3d.core.arc_circle import ArcRelation, check_tolerance
 from clamp3d.core.distance import Feature, SignedDistance, as_pose, signed_distance
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.pose import Array, check_pose
 from clamp3d.core.primitives import AnyCylinder, Capsule, SweptArc, check_shapes
 
@@ -109,7 +110,7 @@ def _reaches_hollow(groove: SweptArc, cylinder: AnyCylinder, T: Array) -> bool:
     """
     h, H = -groove.radius * math.cos(groove.half_angle), 0.5 * groove.length
     cy, cz = T[1:3, 3].tolist()
-    dy, dz = (T[1:3, 2] / np.linalg.norm(T[:3, 2])).tolist()
+    dy, dz = (T[1:3, 2] / norm(T[:3, 2])).tolist()
     half = 0.5 * cylinder.length
     if not isinstance(cylinder, Capsule):
         angle = np.linspace(0.0, np.pi, 181)
@@ -169,6 +170,6 @@ def relative_pose(T_world_a: ArrayLike, T_world_b: ArrayLike) -> Array:
     """
     A, B = check_pose(T_world_a, "T_world_a"), check_pose(T_world_b, "T_world_b")
     T = np.eye(4)
-    T[:3, :3] = A[:3, :3].T @ B[:3, :3]
-    T[:3, 3] = A[:3, :3].T @ (B[:3, 3] - A[:3, 3])
+    T[:3, :3] = dot(A[:3, :3].T, B[:3, :3])
+    T[:3, 3] = dot(A[:3, :3].T, B[:3, 3] - A[:3, 3])
     return T

@@ -11,6 +11,7 @@ import numpy as np
 from clamp3d.brep.bodies import Body, Reading
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import CYLINDER, KINDS, PLANE, parameters, unwrapped
+from clamp3d.core.linear import atan2, dot, norm, to_source, to_target
 from clamp3d.core.mesh import Array, IntArray, Mesh
 
 _SAME = 1e-6
@@ -25,7 +26,7 @@ def cad_features(reading: Reading, name: str) -> tuple[Mesh, list[tuple[float, d
     for body in reading.bodies:
         shape = body.shape
         assert isinstance(shape, BrepSolid)
-        vertices.append(shape.mesh.vertices @ body.T[:3, :3].T + body.T[:3, 3])
+        vertices.append(to_target(body.T, shape.mesh.vertices))
         faces.append(shape.mesh.faces + n)
         others.update(KINDS[k] for k in shape.surfaces.kind if k not in (PLANE, CYLINDER))
         for group in _groups(shape):
@@ -59,8 +60,8 @@ def _one(shape: BrepSolid, i: int, j: int) -> bool:
     """Whether two cylindrical faces lie on one cylinder."""
     faces = shape.surfaces
     (o, *_, z), (p, *_, w) = faces.frame[i], faces.frame[j]
-    apart = float(np.linalg.norm(np.cross(p - o, z)))
-    turned = float(np.linalg.norm(np.cross(z, w)))
+    apart = norm(np.cross(p - o, z))
+    turned = norm(np.cross(z, w))
     return (
         bool(faces.sense[i] == faces.sense[j]) and max(abs(faces.size[i, 0] - faces.size[j, 0]), apart, turned) < _SAME
     )
@@ -69,7 +70,7 @@ def _one(shape: BrepSolid, i: int, j: int) -> bool:
 def _measured(body: Body, shape: BrepSolid, group: IntArray) -> tuple[float, dict[str, Any]]:
     faces, rows = shape.surfaces, np.flatnonzero(np.isin(shape.face, group))
     frame, radius = faces.frame[group[0]], float(faces.size[group[0], 0])
-    z = body.T[:3, :3] @ frame[3]
+    z = dot(body.T[:3, :3], frame[3])
     if z[int(np.argmax(np.abs(z)))] < 0.0:  # the sense of an axis is nobody's: as that of a fit
         frame = frame * np.array([[1.0], [1.0], [-1.0], [-1.0]])
     pieces = faces.corners[np.isin(faces.face, group)]
@@ -90,7 +91,7 @@ def _measured(body: Body, shape: BrepSolid, group: IntArray) -> tuple[float, dic
         "radius": radius,
         "half_angle": half,
         "length": high - low,
-        "T_part_feature": body.T @ T,
+        "T_part_feature": dot(body.T, T),
         "residual_rms": off,
         "residual_max": off,
         "points": len(points),
@@ -109,7 +110,7 @@ def _measured(body: Body, shape: BrepSolid, group: IntArray) -> tuple[float, dic
 def _arc(u: Array) -> tuple[float, float]:
     """Middle and half of the arc that triangles' angles (m, 3) cover; half a turn where nothing is left out."""
     start = np.remainder(u.min(axis=1), 2.0 * math.pi)
-    order = np.argsort(start)
+    order = np.argsort(start, kind="stable")
     start, end = start[order], (start + np.ptp(u, axis=1))[order]
     reached = np.maximum.accumulate(end)
     gaps = np.append(start[1:], start[0] + 2.0 * math.pi) - np.maximum(reached, reached[-1] - 2.0 * math.pi)
@@ -124,9 +125,9 @@ def _strays(F: IntArray, V: Array, T: Array, half: float, length: float) -> tupl
     """How far the border strays from the ends of the arc (rad) and of the length (mm), beside these ends."""
     sides = np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     kept, count = np.unique(sides, axis=0, return_counts=True)
-    ends = (V[kept[count == 1]] - T[:3, 3]) @ T[:3, :3]
+    ends = to_source(T, V[kept[count == 1]])
     along = np.abs(np.diff(ends[:, :, 2], axis=1)[:, 0]) > 0.5 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    z, angle = np.abs(ends[:, :, 2]), np.abs(np.arctan2(ends[:, :, 0], -ends[:, :, 1]))
+    z, angle = np.abs(ends[:, :, 2]), np.abs(atan2(ends[:, :, 0], -ends[:, :, 1]))
     rounds = z[~along & (z.min(axis=1) > 0.5 * _NEAR_END * length)]
     lips = angle[along & (angle.min(axis=1) > _NEAR_END * half)] if half < math.pi else np.zeros(0)
     return float((half - lips).max(initial=0.0)), float((0.5 * length - rounds).max(initial=0.0))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.optimize import least_squares
 
+from clamp3d.core.linear import atan2, dot, eigh, lstsq, norm
 from clamp3d.core.pose import Array
 
 CONFIDENCE = 0.9973
@@ -33,7 +34,7 @@ class Axis:
     def radial(self, points: Array) -> tuple[Array, Array]:
         """Unit vectors (n, 3) from the axis to ``points`` (n, 3), and distances (n,) from the axis in mm."""
         q = points - self.point
-        q = q - np.outer(q @ self.direction, self.direction)
+        q = q - np.outer(dot(q, self.direction), self.direction)
         r = np.sqrt(np.einsum("ij,ij->i", q, q))
         return q / np.maximum(r, 1e-300)[:, None], r
 
@@ -47,7 +48,7 @@ def perpendicular(direction: Array) -> tuple[Array, Array]:
     helper = np.zeros(3)
     helper[int(np.argmin(np.abs(direction)))] = 1.0
     u = np.cross(helper, direction)
-    u /= np.linalg.norm(u)
+    u /= norm(u)
     return u, np.cross(direction, u)
 
 
@@ -68,13 +69,13 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
     centroid = points.mean(axis=0)
     w = start.direction
     inward = start.point - centroid
-    inward = inward - (inward @ w) * w
+    inward = inward - dot(inward, w) * w
     size = float(np.abs(points - centroid).max())
-    reach = float(np.linalg.norm(inward))
+    reach = norm(inward)
     # On a full turn the centroid lies on the axis and any direction serves.
     e = inward / reach if reach > 1e-6 * size else perpendicular(w)[0]
     f = np.cross(w, e)
-    local = (points - centroid) @ np.stack([e, f, w], axis=1)
+    local = dot(points - centroid, np.stack([e, f, w], axis=1))
     scale = np.array([1.0, 1.0, 1.0 / size, 1.0 / size, 1.0 / size**2])
 
     def cylinder(x: Array) -> Axis:
@@ -89,7 +90,7 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
     def jacobian(x: Array) -> Array:
         axis = cylinder(x)
         u = axis.radial(local)[0]
-        tilt = -((local - axis.point) @ axis.direction) * axis.direction[2]
+        tilt = -dot(local - axis.point, axis.direction) * axis.direction[2]
         # The centre moves away as the radius grows: 1 + u.e is 1 - cos(angle from the arc's middle), tiny on an arc.
         bend = axis.radius * axis.radius * (np.sign(axis.radius) + u[:, 0])
         return np.asarray(np.column_stack([-u[:, :2], tilt[:, None] * u[:, :2], bend]) * scale)
@@ -105,8 +106,8 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
     if not np.isfinite(x).all() or x[4] * scale[4] * size < 1e-3:
         return None
     axis, to_world = cylinder(x), np.stack([e, f, w])
-    middle = axis.point - (axis.point @ axis.direction) * axis.direction
-    return Axis(centroid + middle @ to_world, axis.direction @ to_world, float(axis.radius))
+    middle = axis.point - dot(axis.point, axis.direction) * axis.direction
+    return Axis(centroid + dot(middle, to_world), dot(axis.direction, to_world), float(axis.radius))
 
 
 def circle(points: Array) -> tuple[Array, float] | None:
@@ -114,7 +115,7 @@ def circle(points: Array) -> tuple[Array, float] | None:
     m = points.mean(axis=0)
     p = points - m
     A = np.column_stack([2.0 * p, np.ones(len(p))])
-    sol, _, rank, _ = np.linalg.lstsq(A, np.einsum("ij,ij->i", p, p), rcond=1e-9)
+    sol, rank = lstsq(A, np.einsum("ij,ij->i", p, p), 1e-9)
     if rank < 3:
         return None
     return m + sol[:2], float(np.sqrt(max(sol[2] + sol[0] ** 2 + sol[1] ** 2, 0.0)))
@@ -123,7 +124,7 @@ def circle(points: Array) -> tuple[Array, float] | None:
 def axis_along(direction: Array, points: Array) -> Axis | None:
     """Cylinder along a unit ``direction`` (3,) by the circle of ``points`` (n, 3) seen along it; None if on a line."""
     u, w = perpendicular(direction)
-    got = circle(np.column_stack([points @ u, points @ w]))
+    got = circle(np.column_stack([dot(points, u), dot(points, w)]))
     if got is None:
         return None
     centre, radius = got
@@ -140,11 +141,11 @@ def covariance(local: Array, radius: float, noise: float) -> Array | None:
     z = local[:, 2:]
     size = float(np.abs(local).max())
     J = np.column_stack([np.ones(len(u)), u, z * u / size])
-    values, vectors = np.linalg.eigh(J.T @ J)
+    values, vectors = eigh(dot(J.T, J))
     if values[0] < 1e-10 * values[-1]:
         return None
     vectors[3:] /= size
-    return np.asarray((vectors / values) @ vectors.T * noise**2)
+    return np.asarray(dot(vectors / values, vectors.T) * noise**2)
 
 
 def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> float:
@@ -163,7 +164,7 @@ def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> f
 
 def patches_of(local: Array) -> list[NDArray[np.intp]]:
     """Points ``local`` (n, 3) of a cylinder's own frame in patches of 25 to 49, by halving along the longer side."""
-    angle = np.arctan2(local[:, 0], -local[:, 1])
+    angle = atan2(local[:, 0], -local[:, 1])
     flat = np.column_stack([angle * np.hypot(local[:, 0], local[:, 1]).mean(), local[:, 2]])
 
     def halved(index: NDArray[np.intp]) -> list[NDArray[np.intp]]:

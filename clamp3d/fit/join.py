@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from clamp3d.core.linear import dot
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
@@ -31,7 +32,7 @@ def join(surface: Surface, regions: list[Region]) -> list[Region]:
 def _joined(surface: Surface, a: Region, b: Region) -> Region | None:
     if a.sign != b.sign or abs(a.axis.radius - b.axis.radius) > 0.2 * a.axis.radius:
         return None
-    if abs(a.axis.direction @ b.axis.direction) < 0.97:
+    if abs(dot(a.axis.direction, b.axis.direction)) < 0.97:
         return None
     V, span = surface.V, max(a.span, b.span)
     large = (a if len(a.points) >= len(b.points) else b).axis
@@ -61,7 +62,7 @@ def _along(surface: Surface, axis: Axis, a: IntArray, b: IntArray) -> tuple[floa
 
     All in mm.
     """
-    spans = [(surface.V[np.unique(surface.F[f])] - axis.point) @ axis.direction for f in (a, b)]
+    spans = [dot(surface.V[np.unique(surface.F[f])] - axis.point, axis.direction) for f in (a, b)]
     (low_a, high_a), (low_b, high_b) = ((float(z.min()), float(z.max())) for z in spans)
     length = max(high_a, high_b) - min(low_a, low_b)
     return max(low_a - high_b, low_b - high_a), length, min(high_a - low_a, high_b - low_b)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy import special
 
+from clamp3d.core.linear import atan2, dot
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
@@ -23,7 +25,7 @@ def arc(surface: Surface, axis: Axis, u: Array, w: Array, faces: IntArray) -> tu
     """Middle (rad, from u towards w) and half angle of the arc that ``faces`` cover; half angle pi for a full turn."""
     a = angles(surface, axis, faces, u, w)
     a = a[:, :1] + turned(a, a[:, :1])
-    a = a[np.argsort(a.min(axis=1))]
+    a = a[np.argsort(a.min(axis=1), kind="stable")]
     # Two turns of the sorted intervals make the circle a line.
     a = np.concatenate([a, a + 2.0 * np.pi])
     low, high = a.min(axis=1), np.maximum.accumulate(a.max(axis=1))
@@ -78,7 +80,7 @@ class _Border:
 
 
 def _quantile(values: Array, weights: Array, share: float) -> float:
-    order = np.argsort(values)
+    order = np.argsort(values, kind="stable")
     total = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(total, share * total[-1])])
 
@@ -105,17 +107,17 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     deepest = np.cos(middle) * u + np.sin(middle) * w
     R = np.stack([np.cross(-deepest, d), -deepest, d], axis=1)
 
-    corners = (surface.V[np.unique(surface.F[region.faces])] - axis.point) @ R
+    corners = dot(surface.V[np.unique(surface.F[region.faces])] - axis.point, R)
     z0, z1 = float(corners[:, 2].min()), float(corners[:, 2].max())
     rim = _border(surface, region.faces)
-    local = (rim.edges - axis.point) @ R
+    local = dot(rim.edges - axis.point, R)
     along = np.abs(local[:, 1, 2] - local[:, 0, 2]) > 0.5 * rim.length
-    z, angle = local[:, :, 2].mean(axis=1), np.arctan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
+    z, angle = local[:, :, 2].mean(axis=1), atan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
     # Off the corners, where the two kinds of border mix.
     v, t = (2.0 * z - z0 - z1) / (z1 - z0), angle / half
     length_error = arc_error = 0.0
     rounds = [~along & (k * v > 0.8) & (np.abs(t) < 0.85) for k in (-1, 1)]
-    step = 0.0 if region.strips else float(np.median(np.ptp((surface.V[surface.F[region.faces]] @ d), axis=1)))
+    step = 0.0 if region.strips else float(np.median(np.ptp(dot(surface.V[surface.F[region.faces]], d), axis=1)))
     if ends := rim.ends(z, rounds, step, z1 - z0):
         z0, z1, length_error = ends
     lips = [along & (k * t > 0.8) & (np.abs(v) < 0.85) for k in (-1, 1)]
@@ -124,16 +126,16 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         a, b, arc_error = ends
         half = 0.5 * (b - a)
         c, s = np.cos(0.5 * (a + b)), np.sin(0.5 * (a + b))
-        R = R @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        R = dot(R, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
     length = z1 - z0
     T = np.eye(4)
     T[:3, :3] = R
     T[:3, 3] = axis.point + 0.5 * (z0 + z1) * d
 
-    points = (surface.V[region.points] - T[:3, 3]) @ R
+    points = dot(surface.V[region.points] - T[:3, 3], R)
     residual = np.hypot(points[:, 0], points[:, 1]) - axis.radius
     freedom = max(len(points) - 5, 1)
-    rms = float(np.sqrt(residual @ residual / freedom))
+    rms = float(np.sqrt(dot(residual, residual) / freedom))
     noise = float(np.hypot(rms, surface.mesh.rounding))
     C = covariance(points, axis.radius, noise * _inflation(surface, region, residual))
     if C is None or length <= 0.0 or half <= 0.0:
@@ -164,7 +166,7 @@ def _facet(surface: Surface, axis: Axis, faces: IntArray) -> float:
     """Median angle (rad) that a triangle covers."""
     u = axis.radial(surface.V[surface.F[faces].reshape(-1)])[0].reshape(-1, 3, 3)
     chord = np.linalg.norm(u - u[:, [1, 2, 0]], axis=2).max(axis=1)
-    return float(np.median(2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))))
+    return 2.0 * math.asin(min(0.5 * float(np.median(chord)), 1.0))
 
 
 def _inflation(surface: Surface, region: Region, residual: Array) -> float:
@@ -178,7 +180,7 @@ def _inflation(surface: Surface, region: Region, residual: Array) -> float:
     F = surface.F[region.faces]
     i, j = number[np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)].T
     both = (i >= 0) & (j >= 0)
-    power = float(residual @ residual) / len(residual)
+    power = float(dot(residual, residual)) / len(residual)
     if both.sum() < 30 or power <= 0.0:
         return 1.0
     c = min(float(np.mean(residual[i[both]] * residual[j[both]])) / power, 0.95)

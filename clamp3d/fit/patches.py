@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
+from clamp3d.core.linear import dot, eigh, norm, svd
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
@@ -42,7 +43,7 @@ def patches(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regi
                 break
             tell("patches", 0.5 * (stage + n / len(order)))
             nearest = _nearest(surface, tree, start, _PATCH_SIZES[-1])
-            facing = nearest[free[nearest] & (surface.normals[nearest] @ surface.normals[start] > 0.5)]
+            facing = nearest[free[nearest] & (dot(surface.normals[nearest], surface.normals[start]) > 0.5)]
             same = [facing[label[facing] == label[start]] for label in gates]
             region = _from_patches(search, same, factor * noise, seeds)
             if region is None:
@@ -95,7 +96,7 @@ def _noise(surface: Surface, tree: cKDTree, sample: IntArray) -> float:
     scatters = []
     for start in sample:
         patch = _nearest(surface, tree, start, _PATCH_SIZES[0])
-        scatter = _quadric_fit(surface, patch[surface.normals[patch] @ surface.normals[start] > 0.5])
+        scatter = _quadric_fit(surface, patch[dot(surface.normals[patch], surface.normals[start]) > 0.5])
         if scatter is not None:
             scatters.append(scatter[2])
     if len(scatters) < 20:
@@ -110,24 +111,25 @@ def _quadric_fit(surface: Surface, patch: IntArray) -> tuple[Array, Array, float
     Returns coefficients (6,) and covariance (6, 6) in units of the size, scatter (mm), size (mm) and frame (4, 3): the
     rows u, w, normal and the middle. None if fewer than 9 vertices or all on two lines.
     """
-    normal = surface.areas[patch] @ surface.normals[patch]
-    length = np.linalg.norm(normal)
+    normal = dot(surface.areas[patch], surface.normals[patch])
+    length = norm(normal)
     points = surface.V[np.unique(surface.F[patch])]
     if length <= 0.0 or len(points) < 9:
         return None
     normal = normal / length
     u, w = perpendicular(normal)
     m = points.mean(axis=0)
-    x, y, z = (points - m) @ u, (points - m) @ w, (points - m) @ normal
+    x, y, z = dot(points - m, u), dot(points - m, w), dot(points - m, normal)
     s = max(float(np.abs(x).max()), float(np.abs(y).max()))
     x, y = x / s, y / s
     A = np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y])
-    sol, _, rank, _ = np.linalg.lstsq(A, z, rcond=0.01)
-    if rank < 6:
+    left, sizes, right = svd(A)
+    if sizes[-1] <= 0.01 * sizes[0]:
         return None
-    res = z - A @ sol
-    scatter = float(np.sqrt(res @ res / (len(points) - 6)))
-    return sol, np.linalg.inv(A.T @ A) * scatter**2, scatter, s, np.stack([u, w, normal, m])
+    sol = dot(dot(left, z) / sizes, right)
+    res = z - dot(A, sol)
+    scatter = float(np.sqrt(dot(res, res) / (len(points) - 6)))
+    return sol, dot(right.T / sizes**2, right) * scatter**2, scatter, s, np.stack([u, w, normal, m])
 
 
 def _quadric(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | None:
@@ -136,7 +138,7 @@ def _quadric(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | Non
     if got is None:  # long strips: all points in two rings leave the curvature along the axis open
         return _from_normals(surface, patch)
     sol, C, scatter, s, (u, w, normal, m) = got
-    values, vectors = np.linalg.eigh(np.array([[2.0 * sol[3], sol[4]], [sol[4], 2.0 * sol[5]]]) / s**2)
+    values, vectors = eigh(np.array([[2.0 * sol[3], sol[4]], [sol[4], 2.0 * sol[5]]]) / s**2)
     big = int(np.argmax(np.abs(values)))
     uncertainty = 2.0 * float(np.sqrt(C[3:, 3:].diagonal().max())) / s**2
     if abs(values[big]) < 6.0 * uncertainty or abs(values[big]) * surface.extent < 0.05:
@@ -154,16 +156,16 @@ def _quadric(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | Non
 def _from_normals(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | None:
     """Cylinder whose axis is the direction that the patch's normals avoid most, and the scatter about it."""
     N = surface.normals[patch]
-    d = np.linalg.eigh((N * surface.areas[patch][:, None]).T @ N)[1][:, 0]
+    d = eigh(dot((N * surface.areas[patch][:, None]).T, N))[1][:, 0]
     points = surface.V[np.unique(surface.F[patch])]
     axis = axis_along(d, points)
     if axis is None:
         return None
-    sign = 1 if surface.lean(axis, patch) @ surface.areas[patch] > 0.0 else -1
+    sign = 1 if dot(surface.lean(axis, patch), surface.areas[patch]) > 0.0 else -1
     scatter = float(np.sqrt(np.mean(axis.residual(points) ** 2)))
     # Along the arc at the middle of the points; round a full turn any direction serves.
     across = np.cross(d, points.mean(axis=0) - axis.point)
-    size = float(np.linalg.norm(across))
+    size = norm(across)
     across = across / size if size > 0.0 else perpendicular(d)[0]
-    reach = min(float(np.ptp(points @ across)) / axis.radius, np.pi)
+    reach = min(float(np.ptp(dot(points, across))) / axis.radius, np.pi)
     return None if sagitta(axis.radius, reach) < 6.0 * scatter else (axis, sign, scatter)

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import IntArray
 from clamp3d.fit.cylinder import axis_along
 from clamp3d.fit.grow import Region, Search, accept, grow
@@ -64,10 +65,10 @@ def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regio
             continue
         fails[[a, b]] += 1
         d = V[surface.edges[k, 1]] - V[surface.edges[k, 0]]
-        d /= np.linalg.norm(d)
+        d /= norm(d)
         # Lines along the axis: the corners of the strips; what else they have (a split strip) lies on chords.
         own = np.concatenate([lines[a], lines[b]])
-        own = own[np.abs(vector[own] @ d) > 0.9999]
+        own = own[np.abs(dot(vector[own], d)) > 0.9999]
         corners = np.unique(ends[own])
         axis = axis_along(d, V[corners])
         # Slack for the axis: a direction from one edge is only as good as its ends.
@@ -77,7 +78,7 @@ def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regio
         # Two strips always lie on a circle: a third one must agree before the expensive growing starts.
         beyond = np.setdiff1d(cell[own], (a, b))
         third = np.concatenate([lines[c] for c in beyond]) if len(beyond) else np.empty(0, dtype=np.int64)
-        far = ends[np.setdiff1d(third[np.abs(vector[third] @ d) > 0.9999], own)]
+        far = ends[np.setdiff1d(third[np.abs(dot(vector[third], d)) > 0.9999], own)]
         if not (np.abs(axis.residual(V[far.reshape(-1)])).reshape(-1, 2) <= 4.0 * loose).all(axis=1).any():
             continue
         seed = np.concatenate([members[a], members[b]])

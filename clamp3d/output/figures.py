@@ -5,6 +5,7 @@ Each function returns a matplotlib figure (no pyplot, no window); `save_figure` 
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,7 +50,6 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
 
     Raises InputError for a suffix other than .svg, .png, .pdf and for a folder that cannot be written.
     """
-    import matplotlib as mpl
     from matplotlib.figure import Figure
 
     instance("figure", figure, Figure)
@@ -57,10 +57,25 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
     suffix = ".svg" if path == STDOUT else path.suffix.lower()
     if suffix not in FORMATS:
         raise InputError(f"figure file must end in {', '.join(FORMATS)}, got {path.name!r}")
-    metadata: dict[str, Any] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix, {})
-    with whole_file(path) as temporary, mpl.rc_context({"svg.hashsalt": "clamp3d"}):
-        figure.savefig(temporary, format=suffix[1:], dpi=dpi, metadata=metadata)
+    with whole_file(path) as temporary:
+        _draw(figure, temporary, suffix[1:], dpi)
     return path
+
+
+def svg(figure: Figure) -> bytes:
+    """The figure as an SVG file."""
+    out = io.BytesIO()
+    _draw(figure, out, "svg", 150)
+    return out.getvalue()
+
+
+def _draw(figure: Figure, file: Any, format: str, dpi: int) -> None:
+    """Save a figure without the time, and with the same names in it each time."""
+    import matplotlib as mpl
+
+    metadata: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(format, {})
+    with mpl.rc_context({"svg.hashsalt": "clamp3d"}):
+        figure.savefig(file, format=format, dpi=dpi, metadata=metadata)
 
 
 def section_figure(run: Assembly, waypoint: Waypoint | None = None) -> Figure:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d import __version__
+from clamp3d.brep.solid import BrepSolid
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.core.meshing import volume_bounds
 from clamp3d.core.shapes import Solid
@@ -74,8 +75,8 @@ def _part(item: PlacedPart, meshed: PosedMesh | None, settings: Mapping[str, Any
             entry[key] = [round(float(bound), 6) for bound in known]
         entry["triangles"] = len(local.faces)
     else:
-        assert drawn is not None  # a mesh has triangles
-        bounds = drawn.bounds_at(item.T)
+        assert isinstance(shape, (Solid, BrepSolid))  # a mesh has triangles
+        bounds = shape.bounds_at(item.T)
     bounds = bounds / MILLIMETRES[settings["unit"]]
     if settings["up"] == "Y":  # axes X, Z, -Y
         bounds = np.array([bounds[0], bounds[1]])[[[0, 0, 1], [1, 1, 0]], [0, 2, 1]] * [1.0, 1.0, -1.0]

@@ -10,9 +10,9 @@ from typing import Any
 from clamp3d.errors import InputError
 
 
-def render(template: str, /, **values: Any) -> str:
-    """Fill in one of the files in ``templates``: texts on pages are escaped, a value that is missing is an error."""
-    return str(_environment().get_template(template).render(**values))
+def render(template: str, /, package: str = "clamp3d.output", **values: Any) -> str:
+    """Fill in one of the files in a package's ``templates``: HTML pages escape texts, a missing value is an error."""
+    return str(_environment(package).get_template(template).render(**values))
 
 
 def now() -> datetime.datetime:
@@ -30,12 +30,12 @@ def now() -> datetime.datetime:
 
 
 @cache
-def _environment() -> Any:
+def _environment(package: str) -> Any:
     import jinja2
 
     return jinja2.Environment(
-        loader=jinja2.PackageLoader("clamp3d.output", "templates"),
-        autoescape=lambda name: name is None or not name.endswith(".txt"),
+        loader=jinja2.PackageLoader(package, "templates"),
+        autoescape=jinja2.select_autoescape(["html"]),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,

@@ -58,14 +58,14 @@ class PlacedPart:
         return np.eye(4) if self.T_world_part is None else self.T_world_part
 
     def posed(self, mesh_error: float) -> PosedMesh:
-        """Its triangles; arcs within ``mesh_error`` mm, the facets of a mesh as they are.
+        """Its triangles; arcs within ``mesh_error`` mm, the facets of a mesh or of a solid from CAD as they are.
 
         Their ``metadata`` holds ``mesh_error`` and ``chord_error``: what was asked for and what it is, mm.
         """
         import trimesh
 
         if isinstance(self.shape, MeshShape):
-            facets, errors = self.shape.mesh, {"mesh_error": 0.0, "chord_error": 0.0}
+            facets, errors = self.shape.mesh, {"mesh_error": 0.0, "chord_error": self.shape.error}
             made = trimesh.Trimesh(facets.vertices, facets.faces, process=False, metadata=errors)
         else:
             made = mesh(self.shape, mesh_error)

@@ -177,12 +177,9 @@ def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list
 
 
 def _data_address(figure: Figure) -> str:
-    import matplotlib as mpl
+    from clamp3d.output.figures import svg
 
-    out = io.BytesIO()
-    with mpl.rc_context({"svg.hashsalt": "clamp3d"}):
-        figure.savefig(out, format="svg", metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(out.getvalue()).decode("ascii")
+    return "data:image/svg+xml;base64," + base64.b64encode(svg(figure)).decode("ascii")
 
 
 def _gap(row: PairRow, digits: int = 6) -> str:

@@ -109,7 +109,8 @@ def _lines(assembly: Assembly) -> Iterator[str]:
             yield from (f"  {row}" for row in rows)
     yield ""
     if assembly.violation is not None:
-        yield (f"proof: largest violated gap {assembly.violation:.1e} mm, optimality {assembly.optimality:.1e} mm")
+        space = f"; out of the plane {assembly.out_of_plane}" if assembly.out_of_plane else ""
+        yield f"proof: largest violated gap {assembly.violation:.1e} mm, optimality {assembly.optimality:.1e} mm{space}"
     yield (
         f"work: {work.parts} parts, {work.pairs} pairs, {work.contact_queries} contact queries, "
         f"{work.motion_steps} motion steps, {work.meshes_built} meshes built"

@@ -8,11 +8,12 @@ from __future__ import annotations
 import itertools
 import re
 import tempfile
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from clamp3d.brep.solid import require_open_cascade
+from clamp3d.brep.solid import BrepSolid, require_open_cascade
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc
@@ -133,15 +134,14 @@ def _document(placed: Sequence[PlacedPart], title: str) -> Any:
     XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)  # metres: the shapes are in mm
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
+    instances = Counter(id(item.shape) for item in placed if isinstance(item.shape, BrepSolid))
     tree = len(placed) > 1 or placed[0].T_world_part is not None
     root = shapes.NewShape() if tree else None
     if tree:
         name(root, title)
     for item in placed:
-        if not isinstance(item.shape, Solid):
-            raise InputError(f"{item.name} is a mesh: STEP holds true faces, not facets; use stl, obj, ply, glb or 3mf")
-        label = shapes.AddShape(solid(item.shape), False)
-        name(label, item.label)
+        label = shapes.AddShape(_exact(item), False)  # one product for all instances of a shape from CAD
+        name(label, item.shape.name if instances[id(item.shape)] > 1 else item.label)
         r, g, b = (channel / 255 for channel in rgb(item.colour))
         colour = Quantity_Color(r, g, b, Quantity_TypeOfColor.Quantity_TOC_sRGB)
         colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorGen)
@@ -149,6 +149,15 @@ def _document(placed: Sequence[PlacedPart], title: str) -> Any:
             name(shapes.AddComponent(root, label, _location(item.T)), item.label)
     shapes.UpdateAssemblies()
     return document
+
+
+def _exact(item: PlacedPart) -> Any:
+    """The TopoDS_Shape of a part: drawn anew, or as it came from CAD. Raises InputError for a mesh."""
+    if isinstance(item.shape, BrepSolid):
+        return item.shape.solid
+    if isinstance(item.shape, Solid):
+        return solid(item.shape)
+    raise InputError(f"{item.name} is a mesh: STEP holds true faces, not facets; use stl, obj, ply, glb or 3mf")
 
 
 def _location(T: Array) -> Any:

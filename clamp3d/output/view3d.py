@@ -126,19 +126,17 @@ def _edges(solid: PosedMesh, camera: Camera) -> NDArray[np.int64]:
 
 def _visible(edges: NDArray[np.int64], view: Array, depth: Array, low: Array, pixels_per_mm: float) -> list[Array]:
     """The stretches (2, 2) of the edges that nothing hides, in mm."""
+    from scipy.ndimage import minimum_filter
+
+    # An edge lies between pixels of its own two faces: seen if it is not behind all the pixels around it.
+    farthest = minimum_filter(depth, 3, mode="nearest")
     stretches: list[Array] = []
     for i, j in edges:
         a, b = view[i], view[j]
         n = max(2, math.ceil(float(np.hypot(*(b - a)[:2])) * pixels_per_mm))
         points = a + np.linspace(0.0, 1.0, n + 1)[:, None] * (b - a)
         column, row = (((points[:, :2] - low) * pixels_per_mm).astype(int)).T
-        # An edge lies between pixels of its own two faces: seen if it is not behind all the pixels around it.
-        around = np.full(len(points), np.inf)
-        for dx in (-1, 0, 1):
-            for dy in (-1, 0, 1):
-                r = np.clip(row + dy, 0, depth.shape[0] - 1)
-                c = np.clip(column + dx, 0, depth.shape[1] - 1)
-                around = np.minimum(around, depth[r, c])
+        around = farthest[np.clip(row, 0, depth.shape[0] - 1), np.clip(column, 0, depth.shape[1] - 1)]
         seen = points[:, 2] >= around - 0.25 / pixels_per_mm
         seen &= (column >= 0) & (row >= 0) & (column <= depth.shape[1]) & (row <= depth.shape[0])
         starts = np.flatnonzero(seen & ~np.append(False, seen[:-1]))

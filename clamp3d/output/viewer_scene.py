@@ -42,8 +42,9 @@ _SIZE = 2.5
 _FIELD_OF_VIEW = 25.0  # deg
 _FRONT, _CORNER = (0.2, 0.24, 1.0), (0.55, 0.5, 1.0)
 """Where the camera stands: to the right, up, and towards the viewer."""
-_CUTTABLE, _MARKED = 60, 200
-"""So many parts are also drawn cut open, and so many pairs marked at a stop; a scene of more is slow to look at."""
+_CUTTABLE, _MARKED, _LABELLED = 60, 200, 12
+"""So many parts are also drawn cut open, and so many pairs marked at a stop; a scene of more is slow to look at. The
+lengths of more marks than the last would hide each other: each is seen when its finding is picked."""
 _MARKS = ("contacts", "gaps", "forces")
 """What is marked at a stop and seen there only."""
 _FORCE, _SHAFT = 0.2, 0.008
@@ -185,7 +186,8 @@ class SceneDrawing:
     def _draw_marks(self, number: int) -> None:
         """Dots and arrows where parts touch, red volumes where they clash, lines with their length across gaps."""
         stop, group = self.timeline.stops[number], self.timeline.group(number)
-        for row in [row for row in stop.rows if row.drawn and row.near][:_MARKED]:
+        marked = [row for row in stop.rows if row.drawn and row.near][:_MARKED]
+        for row in marked:
             d, where = row.distance, f"{ROOT}/{'contacts' if row.touches else 'gaps'}/{group}/{row.a}-{row.b}"
             if row.verdict in BAD:
                 self._clash(where, row, stop.poses)
@@ -198,6 +200,8 @@ class SceneDrawing:
                 if d.normal is not None and not row.what.startswith("screw"):
                     arrow = draw.arrow(d.point_a, d.normal, 0.06 * self.size, darker(row.colour, 0.55))
                     self.put(f"{where}/normal", arrow)
+            if len(marked) > _LABELLED:
+                self.visible(f"{where}/value", False)
 
     def mark_meeting(self, number: int) -> tuple[Array, Array] | None:
         """Box in red where parts meet that first touch at a stop: where their facets overlap soon after it."""

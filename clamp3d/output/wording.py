@@ -18,20 +18,24 @@ if TYPE_CHECKING:
 def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
     """The signed distance between two bounds (mm) as a gap or an overlap, with no digit that is not certain.
 
-    >>> gap_text(-0.0707106782, -0.0707106781), gap_text(-110.0, -56.2341), gap_text(2.5, math.inf)
-    ('overlap 0.070711 mm', 'overlap at least 56.23 mm', 'gap at least 2.5 mm')
-    >>> gap_text(0.0, 0.0), gap_text(-0.02, 0.003), gap_text(-math.inf, 0.25)
-    ('gap 0.000000 mm', 'gap or overlap at most 0.02 mm', 'gap at most 0.25 mm')
+    >>> gap_text(-0.0707106782, -0.0707106781), gap_text(-110.0, -56.2341), gap_text(0.13352, 0.2)
+    ('overlap 0.070711 mm', 'overlap 56.23 to 110 mm', 'gap 0.1335 to 0.2 mm')
+    >>> gap_text(-math.inf, -7.7512), gap_text(2.5, math.inf), gap_text(-math.inf, 0.25)
+    ('overlap at least 7.751 mm', 'gap at least 2.5 mm', 'gap at most 0.25 mm')
+    >>> gap_text(0.0, 0.0), gap_text(-0.02, 0.003)
+    ('gap 0.000000 mm', 'gap or overlap at most 0.02 mm')
     """
     if math.isfinite(lower) and math.isfinite(upper):
         for places in range(digits, 0, -1):
             low, high = round(lower, places) + 0.0, round(upper, places) + 0.0
             if low == high and (high != 0.0 or places == digits or upper - lower <= 2e-6):
                 return f"{'overlap' if high < 0.0 else 'gap'} {abs(high):.{places}f} mm"
-    if upper < 0.0:
-        return f"overlap at least {_rounded(-upper, ROUND_FLOOR)} mm"
-    if lower > 0.0:
-        return f"gap at least {_rounded(lower, ROUND_FLOOR)} mm"
+    for kind, least, most in (("overlap", -upper, -lower), ("gap", lower, upper)):
+        if least > 0.0:
+            said = _rounded(least, ROUND_FLOOR)
+            if math.isinf(most):
+                return f"{kind} at least {said} mm"
+            return f"{kind} {said} to {_rounded(most, ROUND_CEILING)} mm"
     if math.isfinite(upper) and math.isfinite(lower):
         return f"gap or overlap at most {_rounded(max(upper, -lower), ROUND_CEILING)} mm"
     return f"gap at most {_rounded(upper, ROUND_CEILING)} mm" if math.isfinite(upper) else "not known"
@@ -100,11 +104,10 @@ def headline(result: CheckResult) -> str:
         if (n := sum(row.verdict == verdict for row in found))
     ]
     if clashes:
-        deepest = min(clashes, key=lambda row: row.distance.upper).distance
+        lower, upper = (min(getattr(row.distance, end) for row in clashes) for end in ("lower", "upper"))
         moving = sum(row.motion is not None for row in clashes)
         where = "" if not moving else " in motion" if moving == len(clashes) else f" ({moving} in motion)"
-        depth = gap_text(deepest.lower, deepest.upper).removeprefix("overlap ")
-        said = f", deepest {depth}" if deepest.upper < 0.0 else ""
+        said = f", deepest {gap_text(lower, upper).removeprefix('overlap ')}" if upper < 0.0 else ""
         others.insert(0, counted(len(clashes), "clash", "clashes") + where + said)
     checked = counted(result.work.pairs, "pair")
     if result.scene.motions:
@@ -117,8 +120,10 @@ def headline(result: CheckResult) -> str:
 
 
 def severity(result: CheckResult) -> str:
-    """How a result is to be read: "found" (not clean), "note" (clean, with findings) or "clean"."""
-    return "found" if not result.clean else "note" if result.findings else "clean"
+    """How a result is to be read: "found" (a clash or a failure), "note" (undecided, or with findings) or "clean"."""
+    if any(row.verdict in BAD or row.verdict is Verdict.FAILED for row in result.rows):
+        return "found"
+    return "clean" if result.clean and not result.findings else "note"
 
 
 def sentence(row: PairResult, names: dict[str, str]) -> str:

@@ -11,6 +11,7 @@ from clamp3d import checks
 from clamp3d.clamp.loader import parse_toml, read_text
 from clamp3d.collide.scene import Allowed, Part, Scene
 from clamp3d.core import shapes
+from clamp3d.core.linear import dot
 from clamp3d.core.validation import validate
 from clamp3d.errors import Clamp3dError, InputError, escaped
 from clamp3d.scenefile.parts import Parts
@@ -87,4 +88,4 @@ def _clamp_scene(table: ClampTable, folder: Path) -> Scene:
 
     scene = assemble(clamp_source(table.name, folder), line=table.line, jumper=table.jumper).scene
     T = table.pose.T()
-    return scene.moved({part.name: T @ part.T_world for part in scene.parts})
+    return scene.moved({part.name: dot(T, part.T_world) for part in scene.parts})

@@ -15,6 +15,7 @@ from clamp3d.brep.bodies import Reading, unique_names
 from clamp3d.brep.mesh_file import FORMATS, load_bodies
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.scene import Allowed, Part
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import FITS, Fit, MeshShape
 from clamp3d.errors import InputError
@@ -84,7 +85,7 @@ class Parts:
     def prefixed(self, name: str, T: Array) -> Parts:
         """The same moved by ``T`` (4, 4) and called ``name``, or ``name/...`` if there are several."""
         names = {p.name: name if len(self.parts) == 1 else f"{name}/{p.name}" for p in self.parts}
-        parts = (Part(names[p.name], p.shape, T @ p.T_world) for p in self.parts)
+        parts = (Part(names[p.name], p.shape, dot(T, p.T_world)) for p in self.parts)
         allowed = (Allowed(names[x.a], names[x.b], x.overlap) for x in self.allowed)
         return Parts(tuple(parts), self.notes, tuple(allowed))
 
@@ -140,10 +141,13 @@ def _folder(folder: Path, reader: Reader) -> Parts:
     if not files:
         raise InputError(f"{checks.short(folder)}: no geometry file in the folder; read are {', '.join(FORMATS)}")
     places = read_poses(reader.poses) if reader.poses is not None else [(f.stem, np.eye(4)) for f in files]
-    known = {f.stem: f for f in files}
-    twice = len(files) - len(known)
-    if twice:
-        raise InputError(f"{checks.short(folder)}: {twice} files have the name of another one but for the ending")
+    known: dict[str, Path] = {}
+    for file in files:
+        if (other := known.setdefault(file.stem, file)) is not file:
+            raise InputError(
+                f"{checks.short(folder)}: {other.name} and {file.name} would both be part {checks.shown(file.stem)}; "
+                "give one file, or a folder in which names differ by more than their endings"
+            )
     unknown = [name for name, _ in places if name not in known]
     if unknown:
         listed = ", ".join(list(known)[:8]) + (", ..." if len(known) > 8 else "")
@@ -180,7 +184,7 @@ def read_poses(path: Path) -> list[tuple[str, Array]]:
             if len(row) != len(COLUMNS):
                 raise ValueError(f"{len(COLUMNS)} values are needed, got {len(row)}")
             x, y, z, *turn = (checks.number("a value", float(cell)) for cell in row[1:])
-            size = float(np.linalg.norm(turn))
+            size = norm(turn)
             if not abs(size - 1.0) <= 1e-3:
                 raise ValueError(f"the quaternion must have length 1, got {size:.6g}")
             qx, qy, qz, qw = turn

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, nearest_rigid, rotation, turn_of
 
 FROZEN = ConfigDict(extra="forbid")
@@ -55,7 +56,7 @@ class Pose:
                 raise ValueError("matrix: must have 3 rows of 4 numbers, or a fourth row 0, 0, 0, 1")
             R = np.array(rows)[:3, :3]
             with np.errstate(over="ignore", invalid="ignore"):
-                off = float(np.abs(R @ R.T - np.eye(3)).max())
+                off = float(np.abs(dot(R, R.T) - np.eye(3)).max())
             if not off <= _SNAP or np.linalg.det(R) < 0.0:
                 raise ValueError(f"matrix: must be rigid (a rotation and a translation): deviates by {off:.3g}")
         return self

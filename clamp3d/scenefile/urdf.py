@@ -17,6 +17,7 @@ from clamp3d.brep.bodies import part_name, unique_names
 from clamp3d.brep.mesh_file import FORMATS, load_mesh
 from clamp3d.collide.scene import Allowed, Part
 from clamp3d.core import shapes
+from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Array, make_mesh
 from clamp3d.core.pose import nearest_rigid
 from clamp3d.errors import InputError, MissingLibraryError
@@ -45,7 +46,7 @@ def read_urdf(path: Path, reader: Reader) -> Parts:
         own = link.collisions or link.visuals
         T_link = robot.get_transform(link.name)
         for item in own:
-            T = T_link @ (np.eye(4) if item.origin is None else item.origin)
+            T = dot(T_link, np.eye(4) if item.origin is None else item.origin)
             try:
                 shape = _shape(path, item.geometry, reader, files, notes)
             except InputError as error:

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from intrusion import intrusion
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
 from clamp3d.baselines.decomposition import DecompositionParameters
-from clamp3d.baselines.hulls import Hulls, intrusion
+from clamp3d.baselines.hulls import Hulls
 from clamp3d.baselines.meshes import Meshes
 from clamp3d.baselines.model import ContactModel
 from clamp3d.baselines.wedges import Wedges

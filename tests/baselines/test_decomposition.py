@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from intrusion import intrusion
 from scipy.spatial import ConvexHull
 
 from clamp3d.baselines import cache, decomposition
 from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
-from clamp3d.baselines.hulls import intrusion
 from clamp3d.bench.compare.scene import block_pair, grooved_block
 from clamp3d.core.mesh import Mesh
 from clamp3d.core.meshing import mesh

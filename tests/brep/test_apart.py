@@ -1,7 +1,9 @@
 """Files that crash, swell or never end: one line, and this process goes on."""
 
 import os
+import subprocess
 import sys
+import threading
 import zipfile
 
 import numpy as np
@@ -13,6 +15,7 @@ from clamp3d.brep.bodies import unique_names
 from clamp3d.brep.mesh_file import load_bodies
 from clamp3d.brep.placing import Placer
 from clamp3d.brep.threemf_file import read_3mf
+from clamp3d.core import child
 from clamp3d.core.child import run_child
 
 TYPES = (
@@ -90,6 +93,7 @@ def test_components_doubled_again_and_again_are_counted_not_made(tmp_path):
     assert not placed
 
 
+@pytest.mark.parametrize("copied", [False, True])
 @pytest.mark.parametrize(
     ("body", "message"),
     [
@@ -103,9 +107,11 @@ def test_components_doubled_again_and_again_are_counted_not_made(tmp_path):
     ],
 )
 @pytest.mark.skipif(sys.platform != "linux", reason="signals and limits as Linux has them")
-def test_a_reader_that_fails_is_one_line(tmp_path, monkeypatch, body, message):
-    (tmp_path / "stand_in.py").write_text(body)
+def test_a_reader_that_fails_is_one_line(tmp_path, monkeypatch, body, message, copied):
+    (tmp_path / "stand_in.py").write_text(f"def main(*given):\n    {body}\nif __name__ == '__main__':\n    main()\n")
     monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "stand_in", raising=False)
+    monkeypatch.setattr(child, "can_copy", lambda: copied)
     monkeypatch.setattr(apart, "run_child", lambda module, *a, **k: run_child("stand_in", *a, **k))
     if "not read" in message:
         monkeypatch.setenv(apart.LIMITS, "0.015")
@@ -115,6 +121,37 @@ def test_a_reader_that_fails_is_one_line(tmp_path, monkeypatch, body, message):
     with pytest.raises(InputError, match=message) as caught:
         load(path)
     assert str(caught.value).startswith(str(path))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux alone")
+def test_only_a_process_of_one_thread_is_copied(monkeypatch):
+    monkeypatch.delitem(sys.modules, "OCP", raising=False)
+    stop = threading.Event()
+    other = threading.Thread(target=stop.wait)
+    other.start()
+    assert not child.can_copy()
+    stop.set()
+    other.join()
+    alone = (
+        "import clamp3d, clamp3d.core.child as c; clamp3d.load; print(c.can_copy()); import OCP; print(c.can_copy())"
+    )
+    done = subprocess.run([sys.executable, "-c", alone], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "False"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux alone")
+def test_a_copy_ends_with_its_caller_and_keeps_its_output(tmp_path, monkeypatch):
+    (tmp_path / "stand_in.py").write_text(
+        "import os, sys, time\nfrom clamp3d.core.child import end_with_caller\n"
+        "def main(path):\n    end_with_caller()\n    os.write(1, b'said\\n')\n    time.sleep(float(path))\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(child, "can_copy", lambda: True)
+    assert run_child("stand_in", "0", time_limit=10.0, copy=True) == (0, ["said"])
+    assert run_child("stand_in", "60", time_limit=0.3, copy=True) == (None, ["said"])
+    orphan = child.Copy("stand_in", ("60",))
+    orphan.stdin.close()  # as the end of this process would
+    assert orphan.wait(timeout=10.0) == 1
 
 
 def test_a_limit_that_is_no_number_is_refused(tmp_path, monkeypatch):

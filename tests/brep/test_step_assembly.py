@@ -16,7 +16,7 @@ from OCP.gp import gp_Pnt
 from OCP.TopoDS import TopoDS_Compound
 from step_scenes import Tree, location, nested, pin, plate, pose
 
-from clamp3d import InputError, load
+from clamp3d import InputError, export, load
 from clamp3d.brep.part21 import announced
 from clamp3d.core.shells import volume
 
@@ -37,6 +37,17 @@ def test_names_places_and_volumes_of_a_tree(written):
         assert mesh.watertight
         area = part.shape.error * np.abs(mesh.vertices).max() ** 2 * 20
         assert abs(volume(mesh.vertices, mesh.faces) - size) < area
+
+
+def test_an_assembly_is_written_as_it_was_read(written, tmp_path):
+    scene, _ = written
+    again = load(export(scene, tmp_path / "again.step").files[0])
+    assert [part.name for part in again.parts] == [part.name for part in scene.parts]
+    for part, other in zip(scene.parts, again.parts, strict=True):
+        np.testing.assert_allclose(other.T_world, part.T_world, atol=1e-6)
+        sizes = [volume(shape.mesh.vertices, shape.mesh.faces) for shape in (other.shape, part.shape)]
+        assert sizes[0] == pytest.approx(sizes[1], rel=1e-6)
+    assert len({id(part.shape) for part in again.parts}) == len({id(part.shape) for part in scene.parts})
 
 
 def test_instances_share_their_shape(written):

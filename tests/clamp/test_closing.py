@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from outlines import Outlines
+from random_clamps import check_clamps, whole_clamp
 
 from clamp3d.baselines.cas import Cas
-from clamp3d.bench.stress.assemblies.check import check_clamps
-from clamp3d.bench.stress.assemblies.clamps import whole_clamp
-from clamp3d.bench.stress.assemblies.outlines import Outlines
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.equilibria import equilibria

@@ -89,10 +89,10 @@ def test_text_json_page_and_exit_code_tell_one_story(arguments, code, tmp_path):
         done = clamp3d("check", *arguments, "--json", data, "--html", file)
         found, page = json.loads(data.read_text()), file.read_text()
     said = page_text(page)
-    assert done.returncode == (1 if not found["clean"] else 0 if found["work"]["pairs"] else 2)
+    assert done.returncode == (2 if not found["work"]["pairs"] else 0 if found["clean"] else 1)
     assert code is None or done.returncode == code
     clashes = [row for row in found["findings"] if row["verdict"] in ("clash", "contained")]
-    assert found["clean"] == (not clashes)
+    assert found["clean"] == (not clashes and found["work"]["pairs"] > 0)
     first = done.stdout.splitlines()[0]
     assert found["headline"] in first
     assert found["headline"] in " ".join(said.split())

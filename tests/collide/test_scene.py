@@ -228,6 +228,31 @@ def test_pose_sweep_equals_single_checks():
         check_poses(scene, "wire", np.array([np.eye(4), np.diag([1, 1, -1.0, 1])]))
 
 
+def test_poses_inside_are_contained_as_a_check_says():
+    """A short wire in the groove, in the material, half out of it; a small box in a large one, and around it."""
+    block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 30.0)
+    scene = Scene(clearance=0.5).add("block", block).add("box", shapes.box((30, 30, 30)), translation(0, 100, 0))
+    scene = scene.add("crate", shapes.box((90, 90, 90)), translation(300, 0, 0)).add("wire", shapes.cylinder(3.0, 20.0))
+    scene = scene.allow(("wire", "box"), overlap=0.3)
+    places = [
+        (0, -4.1, 0),
+        (0, -13, 0),
+        (12, -12, 0),
+        (12, -12, 20),
+        (0, -20, 0),
+        (0, 100, 0),
+        (0, 113, 0),
+        (300, 1, 2),
+    ]
+    poses = np.array([translation(*place) for place in places] + [rotation((1, 0, 0), 1.5), translation(250, 0, 0)])
+    for part, places in (("wire", poses), ("crate", np.array([translation(0, y, 0) for y in (0.0, 60.0, 100.0)]))):
+        sweep = check_poses(scene, part, places)
+        for k, T in enumerate(places):
+            one = check(scene.moved({part: T}))
+            assert [one.verdict(part, name).value for name in sweep.others] == sweep.verdict[k].tolist()
+        assert {"contained", "clash", "clear"} <= set(sweep.verdict.ravel())
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [

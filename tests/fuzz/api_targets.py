@@ -17,7 +17,6 @@ from clamp3d.baselines.chords import Chords
 from clamp3d.baselines.meshes import Meshes
 from clamp3d.baselines.wedges import Wedges
 from clamp3d.bench.image import image_study, measure_image
-from clamp3d.bench.legends import table2_figure, table3_figure
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Wire
 from clamp3d.clamp.equilibria import equilibria
@@ -208,16 +207,14 @@ def groups() -> tuple[tuple[int, dict[str, Target]], ...]:
         "report": (clamp3d.report, {"source": scene, "folder": "out"}),
         "view": (clamp3d.view, {"shown": scene, "serve": False, "mesh_error": 1.0}),
         "Viewer": (Viewer, {"clamp": clamp, "model": Cas(), "mesh_error": 1.0, "serve": False}),
-        "image_study": (image_study, {"run": run, "count": 5, "px_per_mm": 4.0}),
-        "save_figure": (figures.save_figure, {"figure": table2_figure(), "path": "x.svg", "dpi": 50}),
+        "image_study": (image_study, {"run": run, "count": 5, "seed": 0}),
+        "save_figure": (figures.save_figure, {"figure": figures.section_figure(run), "path": "x.svg", "dpi": 50}),
         "section_figure": (figures.section_figure, {"run": run, "waypoint": one_of([None, run.path[1]])}),
         "states_figure": (figures.states_figure, {"run": run}),
         "contacts_figure": (figures.contacts_figure, {"run": run}),
         "contact_figure": (figures.contact_figure, {"run": run, "contact": run.contacts[0]}),
         "exploded_figure": (figures.exploded_figure, {"clamp": clamp}),
         "steps_figure": (figures.steps_figure, {"run": run}),
-        "table2_figure": (table2_figure, {}),
-        "table3_figure": (table3_figure, {}),
     }
     return (36, numbers), (55, small), (7, slow), (2, slowest)
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from legends import table2_figure, table3_figure
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Path4
 
 from clamp3d.baselines.cas import Cas
-from clamp3d.bench.legends import table2_figure, table3_figure
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.loader import load_clamp

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from clamp3d.baselines import Cas
 from clamp3d.bench.compare.methods import Method, assembly_model, coacd_seconds, load
-from clamp3d.bench.image import image_study
+from clamp3d.bench.image import MARKING_ERROR, PX_PER_MM, image_study
 from clamp3d.bench.picture import find_end_points, picture
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
@@ -87,14 +87,14 @@ def imaged() -> Imaged:
     """The paper's third method on the picture of the exact final state."""
     run = assemble(load_clamp("reference"), Cas())
     study = image_study(run)
-    shown = picture(run, study.px_per_mm, seed=study.seed).image
+    shown = picture(run, PX_PER_MM).image
     start = time.process_time()
     find_end_points(shown)
     seconds = time.process_time() - start
     return Imaged(
         len(study.errors),
-        study.marking_error,
-        study.px_per_mm,
+        MARKING_ERROR,
+        PX_PER_MM,
         study.median_error,
         study.worst_error,
         tuple(float(v) for v in study.trials),

@@ -17,17 +17,14 @@ from clamp3d.bench.compare.measure import Measured
 from clamp3d.bench.compare.report import comparison_to_text
 from clamp3d.bench.compare.run import Comparison, pareto
 from clamp3d.bench.compare.scene import chord_error
-from clamp3d.bench.pages import render
-from clamp3d.errors import InputError
-from clamp3d.output.figures import save_figure
+from clamp3d.output.figures import save_figure, svg
 from clamp3d.output.files import write_text
+from clamp3d.output.pages import render
 from clamp3d.output.palette import INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-FORMATS = (".png", ".svg", ".html")
 
 
 class _Look(NamedTuple):
@@ -81,19 +78,11 @@ def save_comparison(found: Comparison, path: str | Path, command: str) -> Path:
 
     ``command`` is what made it, for the note under the chart. Raises InputError for another suffix.
     """
-    path = check_format(path)
+    path = Path(path)
     figure = comparison_figure(found, command)
     if path.suffix.lower() != ".html":
         return save_figure(figure, path, dpi=200)
     write_text(path, _page(found, figure))
-    return path
-
-
-def check_format(path: str | Path) -> Path:
-    """``path`` if its suffix is one of `FORMATS`. Raises InputError."""
-    path = Path(path)
-    if path.suffix.lower() not in FORMATS:
-        raise InputError(f"chart file must end in {', '.join(FORMATS)}, got {path.name!r}")
     return path
 
 
@@ -241,12 +230,5 @@ def _note(found: Comparison, command: str) -> str:
 
 def _page(found: Comparison, figure: Figure) -> str:
     """One HTML page without anything outside itself."""
-    import io
-
-    import matplotlib as mpl
-
-    buffer = io.StringIO()
-    with mpl.rc_context({"svg.hashsalt": "clamp3d"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    svg = buffer.getvalue()
-    return render("compare.html", svg=svg[svg.index("<svg") :], tables=comparison_to_text(found))
+    drawn = svg(figure).decode("utf-8")
+    return render("compare.html", "clamp3d.bench", svg=drawn[drawn.index("<svg") :], tables=comparison_to_text(found))

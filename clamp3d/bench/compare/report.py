@@ -12,7 +12,7 @@ from clamp3d.bench.compare.measure import Measured
 from clamp3d.bench.compare.methods import Method
 from clamp3d.bench.compare.run import KNOWN, Comparison, NotMeasured, exact_distance
 from clamp3d.bench.complexity import Sweep
-from clamp3d.bench.pages import render
+from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
 
 
@@ -51,6 +51,7 @@ def comparison_to_text(found: Comparison) -> str:
     rows = (*found.contact, *found.peers)
     return render(
         "compare.txt",
+        "clamp3d.bench",
         found=found,
         table=text_table,
         contact=[_contact(row) for row in rows if isinstance(row, Measured)],

@@ -12,7 +12,6 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,8 +65,6 @@ WIDTH, DEPTH = 137.0, 30.0
 BANDS = (0.02, 1e-4, 1e-6)
 """Near contact: poses with a distance of either sign up to so many mm."""
 CLEAR, OVERLAP = "clear", "overlap"
-
-Lean = Literal["parallel", "tilted"]
 
 
 @dataclass(frozen=True, slots=True)

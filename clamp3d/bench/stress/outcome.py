@@ -46,6 +46,17 @@ def examples(what: str, rows: ArrayLike, truth: ArrayLike, answer: ArrayLike = n
     return [Example(int(i), what, float(told[i]), float(said[i])) for i in rows]
 
 
+def wrong_examples(
+    false_hit: Mask, false_miss: Mask, beyond: Mask, error: Array, truth: ArrayLike, answer: Array
+) -> list[Example]:
+    """The worst of what is wrong of each kind, by masks (n,) and ``error`` (n,)."""
+    found = []
+    for what, mask in (("false hit", false_hit), ("false miss", false_miss), ("beyond bound", beyond)):
+        rows = np.flatnonzero(mask)
+        found += examples(what, rows[np.argsort(-error[rows], kind="stable")], truth, answer)
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """Score of one method on one family; counts of cases, errors in mm, ``worst_relative`` in parts of the scene.
@@ -162,10 +173,7 @@ def judge(
     false_hit, false_miss = decided & hit & ~overlap, decided & ~hit & overlap
     counts = have & (measures != "verdict") & (np.asarray(exact >= 0, bool) | (measures == "depth"))
     beyond = counts & (error > answers.bound)
-    found: list[Example] = []
-    for what, mask in (("false hit", false_hit), ("false miss", false_miss), ("beyond bound", beyond)):
-        rows = np.flatnonzero(mask)
-        found += examples(what, rows[np.argsort(-error[rows], kind="stable")], exact, answers.distance)
+    found = wrong_examples(false_hit, false_miss, beyond, error, exact, answers.distance)
     found += examples("crash", answers.crashed, exact) + examples("no answer in time", answers.timeouts, exact)
     found += examples("exception", np.flatnonzero(answers.failed), exact)
     error = np.where(counts, error, np.nan)

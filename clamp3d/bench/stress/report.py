@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from clamp3d.bench.pages import render
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES, COUNTS
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.run import FAMILIES, METHODS, StressRun
+from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
 
 
@@ -81,6 +81,7 @@ def markdown(run: StressRun, command: str) -> str:
     families = list(dict.fromkeys(o.family for o in run.outcomes))
     return render(
         "stress.md",
+        "clamp3d.bench",
         run=run,
         command=command,
         matrices=_MATRICES,

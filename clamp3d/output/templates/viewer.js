@@ -87,6 +87,10 @@ function clamp3dViewer(messages) {
       for (const marks of n ? Object.values(n.children) : []) {
         for (const [pair, mark] of Object.entries(marks.children)) {
           mark.object.visible = !names || pair === names.join("-") || pair === [...names].reverse().join("-");
+          const value = mark.children.value;
+          if (!value) continue;
+          if (value.plain === undefined) value.plain = value.object.visible;
+          value.object.visible = Boolean(names) || value.plain;
         }
       }
     }
@@ -229,7 +233,7 @@ function clamp3dViewer(messages) {
     $("play").firstElementChild.firstElementChild.setAttribute("d", animator.playing ? "M3 2h4v12H3zM9 2h4v12H9z" : "M3 1l11 7-11 7z");
     const moving = next && t > s.leave + 1e-6;
     const at = moving ? next : s;
-    $("label").textContent = (story.stops.indexOf(at) + 1) + "/" + story.stops.length + "  " + (moving ? "on the way: " : "") + at.label;
+    $("label").textContent = (story.stops.indexOf(at) + 1) + "/" + story.stops.length + "  " + (moving ? "moving to: " : "") + at.label;
     $("step").textContent = at.label.startsWith(at.step) ? "" : "step " + at.step;
     if (i !== stop) showStop(i);
     follow();

@@ -156,9 +156,7 @@ METHODS: Methods = {
     ),
     "hulls": (
         "CoACD's hulls of that mesh at a threshold of R / 12, each convex in python-fcl; no bound",
-        partial(
-            SolidMethod, "hulls", partial(in_radii, bound=math.nan), {"threshold": THRESHOLD, "mesh_error": MESH_ERROR}
-        ),
+        partial(SolidMethod, "hulls", _NO_BOUND, {"threshold": THRESHOLD, "mesh_error": MESH_ERROR}),
     ),
 }
 

@@ -9,7 +9,8 @@ import pytest
 
 pytest.importorskip("OCP")
 
-from clamp3d.bench.stress.meshes.pairs import Truth, campaign, draw_pairs, judge
+from random_pairs import Truth, campaign, draw_pairs, judge
+
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.result import PairResult
 from clamp3d.collide.verdict import Verdict

@@ -1,0 +1,100 @@
+"""The verdict of one pair: its distance refined until one is certain, and whether one part lies wholly in the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.collide.answer import Distance
+from clamp3d.collide.batch import members
+from clamp3d.collide.depth import is_quick, penetration
+from clamp3d.collide.faces import stands_out
+from clamp3d.collide.meshes import within
+from clamp3d.collide.model import Model
+from clamp3d.collide.refine import Enough, refine, with_normal
+from clamp3d.collide.verdict import Thresholds, Verdict
+from clamp3d.core.pose import Array, inverse
+
+_ERROR = 0.064
+"""Chord error (mm) of the meshes that containment is asked with."""
+
+
+def judge(
+    a: Model,
+    b: Model,
+    T: Array,
+    start: Distance,
+    thresholds: Thresholds,
+    allowance: float | None,
+    enough: Enough = lambda _: True,
+) -> tuple[Verdict, Distance]:
+    """Verdict and distance of ``b`` at ``T`` (4, 4) in a's frame, from ``start`` on, until certain and ``enough``."""
+
+    def certain(known: Distance) -> bool:
+        return enough(known) and thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN
+
+    found = refine(a, b, T, start, thresholds, certain)
+    verdict = thresholds.verdict(found, allowance)
+    if verdict is Verdict.UNCERTAIN and found.upper < thresholds.reach and is_quick(a, b):
+        # Nothing lies deeper inside than the way out is long.
+        deep = penetration(a, b, T, with_normal(found))
+        found = replace(found, lower=max(found.lower, deep.lower))
+        verdict = thresholds.verdict(found, allowance)
+    if verdict is Verdict.CLASH and contained(a, b, T[None], thresholds).any():
+        verdict = Verdict.CONTAINED
+    return verdict, found
+
+
+def contained(a: Model, b: Model, T: Array, thresholds: Thresholds) -> NDArray[np.bool_]:
+    """Whether one of two overlapping parts lies wholly in the other, within the contact threshold; (n,).
+
+    ``T`` (n, 4, 4) are poses of b in a's frame.
+    """
+    found = np.zeros(len(T), dtype=bool)
+    if not (a.closed and b.closed):
+        return found
+    for inner, outer, places in ((b, a, T), (a, b, inverse(T))):
+        rows = np.flatnonzero(~found)
+        rows = rows[_fits(inner, outer, places[rows], thresholds.contact)]
+        if not len(rows):
+            continue
+        if inner.faces is None or outer.faces is None:
+            rows = rows[~_shows(inner, outer, places[rows], thresholds.contact)]
+        else:
+            faces = inner.faces, outer.faces
+            rows = np.array([k for k in rows if not stands_out(*faces, places[k], thresholds.contact)], dtype=np.intp)
+        a.counters.queries["containment"] += len(rows)
+        found[rows] = [within(inner, outer, places[k], _ERROR, thresholds.contact) for k in rows]
+    return found
+
+
+def _fits(inner: Model, outer: Model, T: Array, contact: float) -> NDArray[np.bool_]:
+    """Whether the boxes of two parts leave open that one holds the other, (n,): cheap, without a mesh."""
+    from clamp3d.collide.poses_kernel import boxes
+
+    middle, half = inner.bounds.mean(axis=0), 0.5 * (inner.bounds[1] - inner.bounds[0])
+    low, high = outer.bounds
+    if (high - low).max() * 1.7321 + contact < 2.0 * half.max():
+        return np.zeros(len(T), dtype=bool)
+    around = np.empty((6, len(T)))
+    boxes(T, middle, half, np.inf, around)
+    centre, reach = around[:3], 0.5 * around[3:]
+    # The box of the inner one touches the outer's on six sides: one outside by more than its own corners can be is
+    # enough to say no.
+    return np.asarray(((centre + reach >= low[:, None]) & (centre - reach <= high[:, None])).all(axis=0))
+
+
+def _shows(inner: Model, outer: Model, T: Array, contact: float) -> NDArray[np.bool_]:
+    """Whether one of a few vertices of a part is certainly out of the other by more than ``contact`` mm, (n,)."""
+    from clamp3d.collide.poses_kernel import stand_out
+
+    forms = outer.bodies
+    if forms is None or len(forms) > 1 or forms[0].surface is not None:
+        return np.zeros(len(T), dtype=bool)
+    small, found = inner.outer(_ERROR), np.empty(len(T), dtype=np.int64)
+    slack = contact + small.error + forms[0].error + (_ERROR if inner.refines else 0.0)
+    points = np.vstack([small.shell_points.reshape(-1, 3), small.vertices[:: max(1, len(small.vertices) // 16)]])
+    stand_out(T, points, *members(forms[0]), slack, found)
+    return np.asarray(found == 1)
