@@ -41,7 +41,7 @@ def test_parallel_pins(body, radius, length, at, depth):
 
 
 def test_leaning_pins_come_free_by_their_depth_and_by_no_less():
-    """A search that knows the bodies' definition alone: moved by less than the depth, in any direction, they overlap."""
+    """By a search that knows the definition alone: moved by less than the depth, in any direction, they overlap."""
     rng = np.random.default_rng(0)
     half, seen = np.array([20.0, 18.0, 4.0]), 0
     plate = shapes.box(2.0 * half, holes=[shapes.Hole(5.0)])
