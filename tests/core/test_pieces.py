@@ -180,7 +180,5 @@ def test_normals_of_all_pieces_are_the_way_out():
         aside = np.flatnonzero((found.distance[3:] < -2.0) & (found.normal[3:, 2] == 0.0)) + 3
         through += len(aside)
         assert np.abs(np.linalg.norm(found.normal, axis=1) - 1.0).max() <= 1e-12
-        assert (
-            np.abs(found.normal - found.gradient[:, :3])[aside, :2].max(initial=0.0) <= 1e-9
-        )  # how the gap grows by a shift
+        assert np.abs(found.normal - found.gradient[:, :3])[aside, :2].max(initial=0.0) <= 1e-9
     assert through > 20
