@@ -69,7 +69,7 @@ class Polytopes:
         above = (middle - reach)[:, None] - self._high
         apart = np.linalg.norm(np.maximum(0.0, np.maximum(below, above)), axis=2)
         out = np.empty(len(poses))
-        for i, order in enumerate(np.argsort(apart, axis=1)):
+        for i, order in enumerate(np.argsort(apart, axis=1, kind="stable")):
             wire.place(poses[i])
             least = np.inf
             for k in order:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.core.linear import dot, norm
+from clamp3d.core.linear import atan2, dot, norm
 from clamp3d.core.pose import Array
 
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
@@ -93,14 +93,14 @@ def parameters(kind: int, frame: Array, size: Size, points: Array) -> Array:
     x, y, z = local.T
     if kind in (PLANE, OTHER):
         return np.ascontiguousarray(local[:, :2])
-    across, u = np.hypot(x, y), np.arctan2(y, x)
+    across, u = np.hypot(x, y), atan2(y, x)
     if kind == CYLINDER:
         return np.column_stack([u, z])
     if kind == TORUS:
-        return np.column_stack([u, np.arctan2(z, across - size[0])])
+        return np.column_stack([u, atan2(z, across - size[0])])
     u = np.where(across > 1e-9 * (1.0 + np.abs(z).max()), u, np.nan)
     if kind == SPHERE:
-        return np.column_stack([u, np.arctan2(z, across)])
+        return np.column_stack([u, atan2(z, across)])
     along = (across - size[0]) * math.sin(size[1]) + z * math.cos(size[1])
     return np.column_stack([u, along * math.cos(size[1])])
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from clamp3d.cli.options import SOURCE, UNITS, Source, declared, option
+from clamp3d.cli.options import SEQUENCE, SOURCE, UNITS, Source, declared, option
 from clamp3d.cli.terminal import show
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def command(
         "separate parts keep their own frames]",
         metavar="open|final|STEP",
     ),
+    sequence: str | None = SEQUENCE,
     mesh_error: float = option("Chord error of meshes.", default=0.01, metavar="MM"),
     unit: str | None = option("Unit of the file.  [default: mm; m for glb]", type=click.Choice(UNITS)),
     quiet: bool = option("No messages.", "--quiet", "-q"),
@@ -47,7 +48,7 @@ def command(
 
     INPUT is a clamp (a built-in name or a TOML file), a scene file, or a file with parts. Prints the paths of the
     files. World axes are Z up, a clamp's wires along Y; GLB is metres and Y up, as its specification demands. STEP
-    holds true arcs, not facets.
+    holds true arcs, not facets. Exit code 1, and no file, if a step of the sequence is blocked.
     """
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.output.export import default_layout, destination, export
@@ -55,12 +56,15 @@ def command(
     chosen, file = destination(output, format)
     loaded: Clamp | Scene | Assembly = source.load()
     whole = file is not None or (layout or default_layout(chosen)) == "assembly"
-    if isinstance(loaded, Clamp) and (whole or state is not None):
+    placed = isinstance(loaded, Clamp) and (whole or state is not None)
+    if sequence is not None and not placed:
+        raise click.UsageError("--sequence goes with a clamp, and with --state or one file for all parts")
+    if isinstance(loaded, Clamp) and placed:
         from clamp3d.clamp.assemble import assemble
         from clamp3d.clamp.states import state as find_state
 
         state = state or "final"
-        loaded = assemble(loaded)
+        loaded = assemble(loaded, sequence=sequence)
         label = find_state(loaded, state).label
         if not quiet:
             show(f"state {state}: {label} ({loaded.status})", err=True)

@@ -195,6 +195,12 @@ SOURCE = group(Source)
 CLAMP = group(ClampSource)
 
 
+SEQUENCE: Any = option(
+    "Order of assembly in place of the clamp's own: steps of a grasped part and its followers.",
+    metavar="'P1|P2P3 -> P4 ...'",
+)
+
+
 @dataclass(frozen=True)
 class Method:
     """How grooves are measured, and how the final state is found."""
@@ -213,10 +219,7 @@ class Method:
         "step is given]",
         type=click.Choice(["exact", "stepped", "bisection"]),
     )
-    sequence: str | None = option(
-        "Order of assembly in place of the clamp's own: steps of a grasped part and its followers.",
-        metavar="'P1|P2P3 -> P4 ...'",
-    )
+    sequence: str | None = SEQUENCE
     step: float | None = option("Move along the bolt, stepped solver.  [default: 1/3]", metavar="MM")
     tilt_step_deg: float | None = option("Turn of the stepped solver.  [default: 1]", metavar="A")
 

@@ -34,7 +34,7 @@ def command(
     """Assemble CLAMP (a built-in name or a TOML file) with its wires, and print where every part ends up.
 
     Exit code 1 if the clamp does not close on both wires, parts meet that should not, or a step of the sequence is
-    blocked: then it is said by what, where and when.
+    blocked: then it is said by what, where and when, and the page shows it.
     """
     settings = method.settings()
     if equilibria and settings["solver"] != "exact":
@@ -54,8 +54,9 @@ def command(
         if json_file is not None:
             write_result(json_file, run.to_dict())
 
+    viewed = view or viewing.html_file is not None or viewing.url is not None
     try:
-        if view or viewing.html_file is not None or viewing.url is not None:
+        if viewed:
             from clamp3d.cli.viewing import run_and_view
 
             result = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=view, done=done)
@@ -69,4 +70,8 @@ def command(
             write_result(
                 json_file, {"status": f"not assembled: {error}", "blocks": [b.to_dict() for b in error.blocks]}
             )
+        if viewed:
+            from clamp3d.cli.viewing import view_blocked
+
+            view_blocked(error, viewing, quiet=quiet, serve=view)
     finish(finding=result is None or not result.clamped or bool(result.undeclared))

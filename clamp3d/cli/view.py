@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from clamp3d.cli.options import METHOD, SOURCE, VIEWING, Method, Source, Viewing, declared, option
 from clamp3d.cli.terminal import finish, finish_checked, show
 from clamp3d.errors import SequenceError
@@ -24,7 +22,7 @@ def command(
     step of the sequence is blocked: then it is shown how.
     """
     from clamp3d.clamp.dimensions import Clamp
-    from clamp3d.cli.viewing import check_and_view, run_and_view
+    from clamp3d.cli.viewing import check_and_view, run_and_view, view_blocked
 
     settings = method.settings()
     loaded = source.load()
@@ -35,7 +33,7 @@ def command(
             run = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=serve)
         except SequenceError as error:
             show(f"not assembled: {error}")
-            check_and_view(error.scene, replace(viewing, overlays=()), quiet=quiet, serve=serve)
+            view_blocked(error, viewing, quiet=quiet, serve=serve)
             finish(finding=True)
         finish(finding=not run.clamped or bool(run.undeclared))
     else:

@@ -15,12 +15,14 @@ from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly, Waypoint
+from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.cli.options import Viewing
 from clamp3d.cli.progress import bar, narrator
 from clamp3d.cli.terminal import show
 from clamp3d.collide.check import check
 from clamp3d.collide.result import CheckResult
 from clamp3d.collide.scene import Scene
+from clamp3d.errors import SequenceError
 from clamp3d.output.files import STDOUT
 from clamp3d.output.viewer import MEASURED, Viewer
 from clamp3d.output.viewer_overlay import overlay
@@ -38,22 +40,34 @@ def run_and_view(
 ) -> Assembly:
     """Assemble with a viewer that shows every waypoint; call ``done`` with the result before the page is waited on.
 
-    ``serve`` starts a server, unless ``--url`` names one. Raises click.UsageError for options that do not go together.
+    A sequence other than the paper's is assembled first: all its ways are found before anything moves, and if one is
+    blocked there is another page to show. ``serve`` starts a server, unless ``--url`` names one. Raises
+    click.UsageError for options that do not go together.
     """
     overlays = dict(overlay(clamp, text) for text in viewing.overlays)
     drawn = {"model": model, "clearance": viewing.clearance, "overlays": overlays}
-    with _viewer(clamp, viewing, serve, quiet, **drawn) as viewer:
+
+    def assembled(*listeners: Callable[[Waypoint], None]) -> Assembly:
         with narrator(quiet) as tell:
 
             def listen(waypoint: Waypoint) -> None:
-                viewer.show(waypoint)
-                tell.waypoint(waypoint)
+                for listener in (*listeners, tell.waypoint):
+                    listener(waypoint)
 
-            run = assemble(clamp, model, on_waypoint=listen, progress=tell.position, **settings)
+            return assemble(clamp, model, on_waypoint=listen, progress=tell.position, **settings)
+
+    known = None if as_published(parse_sequence(settings.get("sequence", clamp.sequence))) else assembled()
+    with _viewer(clamp, viewing, serve, quiet, **drawn) as viewer:
+        run = known or assembled(viewer.show)
         viewer.finish(run)
         _save(viewer, viewing)
         done(run)
     return run
+
+
+def view_blocked(error: SequenceError, viewing: Viewing, *, quiet: bool, serve: bool) -> None:
+    """Show the step that a sequence cannot do: its parts, with the motion that is blocked."""
+    check_and_view(error.scene, replace(viewing, overlays=()), quiet=quiet, serve=serve)
 
 
 def check_and_view(scene: Scene, viewing: Viewing, *, quiet: bool, serve: bool) -> CheckResult:

@@ -403,7 +403,7 @@ def _inner(part: Any) -> list[Array]:
     C = V[np.asarray(raw.tri_verts, dtype=np.int64)]
     cross = np.cross(C[:, 1] - C[:, 0], C[:, 2] - C[:, 0])
     size = np.linalg.norm(cross, axis=1)
-    rows = np.argsort(-size)[:3]
+    rows = np.argsort(-size, kind="stable")[:3]
     rows = rows[size[rows] > 0.0]
     thick = part.volume() / max(float(size.sum()) / 2.0, 1e-300)
     middle, normal = C[rows].mean(axis=1), cross[rows] / size[rows, None]

@@ -165,7 +165,7 @@ def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[
         lower = max(lower, -float(planes[:, 3].max()))
         if upper - lower <= tolerance:
             break
-        near = planes[np.argsort(-planes[:, 3])[:24]]
+        near = planes[np.argsort(-planes[:, 3], kind="stable")[:24]]
         near = near[-near[:, 3] < upper - tolerance]
         new = difference(near[:, :3])
         h = (near[:, :3] * new).sum(axis=1)

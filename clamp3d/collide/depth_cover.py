@@ -158,7 +158,7 @@ class Union:
             at = self.open_cubes(at[~closed], half)
             outside = at[self.reach(at) <= 0.0]
             size = np.linalg.norm(outside, axis=1)
-            for k in np.argsort(size)[:3]:
+            for k in np.argsort(size, kind="stable")[:3]:
                 t = self.way_out(outside[k])
                 if norm(t) < limit:
                     best, limit = t, norm(t)

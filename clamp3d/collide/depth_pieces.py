@@ -7,6 +7,7 @@ Tedrake, *Computing large convex regions of obstacle-free space*, 2015).
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ def around_in_form(form: ClosedForm, x: Array) -> Hull | None:
 def _prism(rod: Rod, x: Array) -> Array:
     """Planes (k, 4) of a prism in a cylinder, with edges all around and many near ``x`` (3,)."""
     local = to_source(rod.T, x)
-    own = np.arctan2(local[1], local[0])
+    own = math.atan2(local[1], local[0])
     angle = np.unique(np.concatenate([(own + _AROUND) % (2.0 * np.pi), (own + _CLOSE) % (2.0 * np.pi)]))
     gap = np.diff(np.append(angle, angle[0] + 2.0 * np.pi))
     angle, gap = angle[gap > 1e-9], gap[gap > 1e-9]
@@ -77,7 +78,7 @@ def around_in_mesh(mesh: Surface, x: Array, half_extent: float) -> Hull | None:
     feet = closest_on_triangles(corners, x) if len(corners) else corners[:, 0]
     away = np.linalg.norm(feet - x, axis=1)
     height = d - dot(N, x)  # of the triangles' own planes above the point
-    left = np.argsort(away - error)
+    left = np.argsort(away - error, kind="stable")
     while len(left):
         k = left[0]
         if away[k] - error[k] <= LEAST * mesh.scale:

@@ -194,7 +194,7 @@ def _own(b: FaceModel, a: FaceModel, T: Array, outside: float | None, contact: f
     c = b.faces.corners
     normal = np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])
     size = np.linalg.norm(normal, axis=1)
-    for k in np.argsort(-size)[:_ASKED]:
+    for k in np.argsort(-size, kind="stable")[:_ASKED]:
         for depth in (1.0, 0.2, 4.0 * contact):
             p = c[k].mean(axis=0) - depth * normal[k] / size[k]
             if _at(b, p)[1] < -2.0 * contact and _at(a, to_target(T, p))[0] > 0.0:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from clamp3d.collide.body import Bore, ClosedForm
 from clamp3d.collide.convex import Rod, hull
 from clamp3d.collide.surface import Surface
-from clamp3d.core.linear import dot, to_source, to_target
+from clamp3d.core.linear import atan2, dot, to_source, to_target
 from clamp3d.core.pose import Array
 from clamp3d.fit.features import FittedSurface
 from clamp3d.fit.fit import FitResult
@@ -56,7 +56,7 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[C
             local = to_source(surface.T_part_feature, x)
             touch = np.abs(np.hypot(local[:, 0], local[:, 1]) - surface.radius) <= 1e-9 * model.scale
             touch &= np.abs(local[:, 2]) <= 0.5 * surface.length + 1e-9 * model.scale
-            on |= touch & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) <= surface.half_angle + 1e-9)
+            on |= touch & (np.abs(atan2(local[:, 0], -local[:, 1])) <= surface.half_angle + 1e-9)
         found = np.where(on, 0.0, -mesh_error - away)
         # Nearer to the facets than their own error a point proves nothing; further in it does.
         far = np.flatnonzero(~on & (away > mesh_error))

@@ -209,7 +209,7 @@ def _parted(a: Surface, b: Surface, T: Array, points: Array, directions: Array) 
     reach = np.ptp(dot(points, directions.T), axis=0)
     slack = 2.0 * rounding_of(a, b, T)
     for more in (0.0, off) if off > 0.0 else (0.0,):
-        for k in np.argsort(reach)[:_TRIED].tolist():
+        for k in np.argsort(reach, kind="stable")[:_TRIED].tolist():
             length = (float(reach[k]) + more) * (1.0 + 1e-9) + 2.0 * slack
             for sign in (1.0, -1.0):
                 moved = T.copy()

@@ -231,7 +231,7 @@ def _bulge(shape: MeshShape) -> float:
     wide = 2.0 * facets.area_faces[pairs].max(axis=1) / np.maximum(length, 1e-300)
     smooth = (angles > 1e-6) & (angles < np.radians(65.0))
     # A chord w that turns by t has the sagitta w / 2 tan(t / 4).
-    return float((0.5 * wide * np.tan(0.25 * angles))[smooth].max(initial=0.0))
+    return float((0.5 * wide * np.sin(0.25 * angles) / np.cos(0.25 * angles))[smooth].max(initial=0.0))
 
 
 class ModelCache:

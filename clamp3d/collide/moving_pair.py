@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,10 +14,11 @@ from clamp3d.collide.invariants import can_meet
 from clamp3d.collide.meshes import any_inside
 from clamp3d.collide.model import Model
 from clamp3d.collide.refine import from_boxes, refine
-from clamp3d.collide.surface import Surface, fcl_tree
+from clamp3d.collide.surface import Surface
 from clamp3d.collide.swept import swept_lower
+from clamp3d.collide.swept_mesh import Standing, swept_gap
 from clamp3d.collide.verdict import Thresholds, Verdict
-from clamp3d.core.linear import dot, norm, to_target
+from clamp3d.core.linear import dot, to_target
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array, inverse
 
@@ -33,13 +34,13 @@ SHELL_ERROR = 0.064
 class _Near(NamedTuple):
     """Triangles that may come within ``limit`` mm of the other mesh on the way; all others never do.
 
-    ``moving``: FCL's trees of those of the moving mesh, by their error in mm and by their distance from the motion's
-    axis, with the greatest speed in mm per unit of t. ``still``: trees and errors of those of the standing one.
+    ``moving`` (m, 3, 3) in the world at t = 0, each with its error (m,) mm.
     """
 
     limit: float
-    moving: tuple[tuple[Any, float, float], ...]
-    still: tuple[tuple[Any, float], ...]
+    moving: Array
+    errors: Array
+    still: Standing
 
 
 class MovingPair:
@@ -80,56 +81,36 @@ class MovingPair:
             self.n_uninformative_swept = 0 if swept > plain else self.n_uninformative_swept + 1
         if swept >= min(wanted, here) - ACCURACY:
             return swept
-        return max(swept, self.by_meshes(half, stretch[1], min(wanted, here)))
+        return max(swept, self.by_meshes(t, half, min(wanted, here)))
 
     @property
     def meshed(self) -> bool:
         """Whether a stretch has been bounded by meshes."""
         return self._near is not None
 
-    def by_meshes(self, half: float, T: Array, wanted: float) -> float:
-        """Lower bound by those triangles that may come within ``wanted``; of them what is near an axis hardly moves."""
-        import fcl
-
+    def by_meshes(self, t: float, half: float, wanted: float) -> float:
+        """Lower bound from t - half to t + half, by those triangles that may come within ``wanted`` on the way."""
         self.counters.queries["swept meshes"] += 1
         mine, other = self.a.outer(SHELL_ERROR), self.b.outer(SHELL_ERROR)
-        back = inverse(T)
         limit = max(wanted - 0.25 * ACCURACY, 0.0)
         if self._near is None or not limit <= self._near.limit <= 2.0 * limit:
             self._near = self._meeting(mine, other, limit)
-        low = self._near.limit
-        place = fcl.Transform(back[:3, :3], back[:3, 3])
-        standing = [(fcl.CollisionObject(tree), off) for tree, off in self._near.still]
-        for tree, error, speed in self._near.moving:
-            moving = fcl.CollisionObject(tree, place)
-            for fixed, off in standing:
-                d = float(fcl.distance(fixed, moving, fcl.DistanceRequest(), fcl.DistanceResult()))
-                if d <= 0.0:
-                    return -np.inf
-                low = min(low, d - error - off - half * speed)
-        if any_inside(other, mine, back) or any_inside(mine, other, T):
+        near = self._near
+        low = swept_gap(near.still, near.moving, near.errors, self.motion, (t - half, t + half), near.limit)
+        T = self.pose(t)
+        if low == -np.inf or any_inside(other, mine, inverse(T)) or any_inside(mine, other, T):
             return -np.inf
         return low - 1e-11 * (mine.scale + other.scale + float(np.abs(T[:3, 3]).max()))
 
     def _meeting(self, mine: Surface, other: Surface, limit: float) -> _Near:
         """The triangles of the two meshes that may come within ``limit`` mm of the other one on the way."""
-        motion = self.motion
         placed = [to_target(T, s.vertices) for s, T in ((mine, self.start), (other, self.T_still))]
         moving, still = (v[s.faces] for v, s in zip(placed, (mine, other), strict=True))
         errors = [np.zeros(len(s.faces)) if s.face_error is None else s.face_error for s in (mine, other)]
-        ours, theirs = can_meet(motion, (moving, errors[0]), (still, errors[1]), limit)
-        out = motion.from_axis(moving).max(axis=1)
-        ring = np.zeros(len(out), dtype=int)
-        if motion.angle and ours.any():
-            ring = np.ceil(4.0 * np.log2(np.maximum(out / max(float(out[ours].min()), 1e-3), 1.0))).astype(int)
-        speed = norm(motion.travel) + abs(motion.angle) * out
-        rings = [(rows & ours & (ring == k), e) for rows, e in mine.levels for k in np.unique(ring[ours])]
-        fixed = [(rows & theirs, e) for rows, e in other.levels]
-        return _Near(
-            limit,
-            tuple((fcl_tree(mine.vertices, mine.faces[k]), e, float(speed[k].max())) for k, e in rings if k.any()),
-            tuple((fcl_tree(other.vertices, other.faces[k]), e) for k, e in fixed if k.any()),
-        )
+        ours, theirs = can_meet(self.motion, (moving, errors[0]), (still, errors[1]), limit)
+        shells = [still[rows].reshape(-1, 3) for rows in other.shells]
+        boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in shells])
+        return _Near(limit, moving[ours], errors[0][ours], Standing(still[theirs], errors[1][theirs], boxes))
 
 
 def box_corners(model: Model, T: Array) -> Array:
@@ -208,7 +189,7 @@ def first_time(pair: MovingPair, known: float, thresholds: Thresholds, margin: f
         todo.pop()
         wanted = margin + 0.5 * ACCURACY
         # Where meshes are used, the few triangles that can meet are asked first: that is cheaper than a distance.
-        clear = pair.meshed and pair.by_meshes(half, pair.pose(middle), wanted) > margin
+        clear = pair.meshed and pair.by_meshes(middle, half, wanted) > margin
         if not clear:
             here = pair.ask(middle, enough, thresholds)
             clear = here.upper > margin and pair.lower(middle, half, here.lower, wanted) > margin

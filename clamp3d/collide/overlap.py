@@ -53,7 +53,7 @@ class Common:
         Volume over area is the inner radius of a ball but for a factor of 3. Those that are outside are left out.
         """
         normal, size = self.normals
-        rows = np.argsort(-size)[:_INNER]
+        rows = np.argsort(-size, kind="stable")[:_INNER]
         rows = rows[size[rows] > 0.0]
         depth = 2.0 * max(self.volume, 0.0) / max(float(size.sum()), 1e-300)
         points = self.vertices[self.faces[rows]].mean(axis=1) - depth * normal[rows]

@@ -6,6 +6,8 @@ keeps its clearance over any stretch. A polyhedron is swept into the hull of its
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from clamp3d.collide.body import ClosedForm, bore_rod
@@ -94,4 +96,4 @@ def _sagitta(ways: Array, angle: float) -> float:
     """How far points stray from the straight lines between their places ``ways`` (3, k, 3), on arcs of ``angle``."""
     # An arc of angle a over a chord c: c / 2 tan(a / 4).
     chord = float(np.linalg.norm(np.diff(ways, axis=0), axis=2).max())
-    return 0.5 * chord * float(np.tan(0.25 * abs(angle)))
+    return 0.5 * chord * math.tan(0.25 * abs(angle))

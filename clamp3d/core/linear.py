@@ -45,6 +45,16 @@ def norm(x: ArrayLike) -> float:
     return math.hypot(*np.ravel(x).tolist())
 
 
+def atan2(y: Array, x: Array) -> Array:
+    """``numpy.arctan2`` of the C library: NumPy has one for each kind of processor.
+
+    >>> atan2(np.array([0.0, 1.0]), np.array([-1.0, 0.0])).round(3).tolist()
+    [3.142, 1.571]
+    """
+    y, x = np.broadcast_arrays(y, x)
+    return np.reshape(list(map(math.atan2, y.ravel().tolist(), x.ravel().tolist())), x.shape)
+
+
 def to_target(T: Array, points: Array) -> Array:
     """Points (n, 3), or one (3,), of the source of the pose ``T_target_source`` as its target sees them; mm.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.core.linear import atan2
 from clamp3d.core.pose import Array
 
 Faces = NDArray[np.int64]
@@ -51,7 +52,7 @@ def winding_number(corners: tuple[Array, Array, Array], point: Array) -> float:
         + a[:, 2] * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
     )
     ab, bc, ca = (np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a)))
-    return float(np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2.0 * np.pi))
+    return float(atan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2.0 * np.pi))
 
 
 def shells(faces: Faces, vertices: int) -> list[NDArray[np.intp]]:

@@ -11,7 +11,7 @@ import numpy as np
 from clamp3d.brep.bodies import Body, Reading
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import CYLINDER, KINDS, PLANE, parameters, unwrapped
-from clamp3d.core.linear import dot, norm, to_source, to_target
+from clamp3d.core.linear import atan2, dot, norm, to_source, to_target
 from clamp3d.core.mesh import Array, IntArray, Mesh
 
 _SAME = 1e-6
@@ -110,7 +110,7 @@ def _measured(body: Body, shape: BrepSolid, group: IntArray) -> tuple[float, dic
 def _arc(u: Array) -> tuple[float, float]:
     """Middle and half of the arc that triangles' angles (m, 3) cover; half a turn where nothing is left out."""
     start = np.remainder(u.min(axis=1), 2.0 * math.pi)
-    order = np.argsort(start)
+    order = np.argsort(start, kind="stable")
     start, end = start[order], (start + np.ptp(u, axis=1))[order]
     reached = np.maximum.accumulate(end)
     gaps = np.append(start[1:], start[0] + 2.0 * math.pi) - np.maximum(reached, reached[-1] - 2.0 * math.pi)
@@ -127,7 +127,7 @@ def _strays(F: IntArray, V: Array, T: Array, half: float, length: float) -> tupl
     kept, count = np.unique(sides, axis=0, return_counts=True)
     ends = to_source(T, V[kept[count == 1]])
     along = np.abs(np.diff(ends[:, :, 2], axis=1)[:, 0]) > 0.5 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    z, angle = np.abs(ends[:, :, 2]), np.abs(np.arctan2(ends[:, :, 0], -ends[:, :, 1]))
+    z, angle = np.abs(ends[:, :, 2]), np.abs(atan2(ends[:, :, 0], -ends[:, :, 1]))
     rounds = z[~along & (z.min(axis=1) > 0.5 * _NEAR_END * length)]
     lips = angle[along & (angle.min(axis=1) > _NEAR_END * half)] if half < math.pi else np.zeros(0)
     return float((half - lips).max(initial=0.0)), float((0.5 * length - rounds).max(initial=0.0))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.optimize import least_squares
 
-from clamp3d.core.linear import dot, eigh, lstsq, norm
+from clamp3d.core.linear import atan2, dot, eigh, lstsq, norm
 from clamp3d.core.pose import Array
 
 CONFIDENCE = 0.9973
@@ -164,7 +164,7 @@ def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> f
 
 def patches_of(local: Array) -> list[NDArray[np.intp]]:
     """Points ``local`` (n, 3) of a cylinder's own frame in patches of 25 to 49, by halving along the longer side."""
-    angle = np.arctan2(local[:, 0], -local[:, 1])
+    angle = atan2(local[:, 0], -local[:, 1])
     flat = np.column_stack([angle * np.hypot(local[:, 0], local[:, 1]).mean(), local[:, 2]])
 
     def halved(index: NDArray[np.intp]) -> list[NDArray[np.intp]]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
 
-from clamp3d.core.linear import dot, lstsq
+from clamp3d.core.linear import atan2, dot, lstsq
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
@@ -67,7 +68,7 @@ def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float
         depth = sagitta(axis.radius, span)
         tolerance = max(tolerance, share * depth)
         near = (off <= tolerance) & (off >= -1.02 * depth - tolerance)
-        slack = float(np.quantile(np.arccos(np.clip(sign * surface.lean(axis, faces), -1.0, 1.0)), 0.9))
+        slack = math.acos(float(np.quantile(np.clip(sign * surface.lean(axis, faces), -1.0, 1.0), 0.1)))
         limit = np.cos(min(max(0.6 * span, 2.5 * slack, 0.02), 0.7))
         mask: BoolArray = search.free & np.asarray(near[F].all(axis=1))
         index = np.flatnonzero(mask)
@@ -132,7 +133,7 @@ def accept(search: Search, region: Region) -> bool:
     """True if the region is long, round and distinct enough to be a cylinder rather than an accident."""
     V, axis = search.surface.V, region.axis
     p = dot(V[region.points] - axis.point, np.stack([*perpendicular(axis.direction), axis.direction], axis=1))
-    angle = np.sort(np.arctan2(p[:, 1], p[:, 0]))
+    angle = np.sort(atan2(p[:, 1], p[:, 0]))
     gaps = np.diff(angle, append=angle[0] + 2.0 * np.pi)
     arc = 2.0 * np.pi - float(gaps.max())
     noise = max(region.tolerance / 4.0, 1e-12)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy import special
 
-from clamp3d.core.linear import dot
+from clamp3d.core.linear import atan2, dot
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
@@ -24,7 +25,7 @@ def arc(surface: Surface, axis: Axis, u: Array, w: Array, faces: IntArray) -> tu
     """Middle (rad, from u towards w) and half angle of the arc that ``faces`` cover; half angle pi for a full turn."""
     a = angles(surface, axis, faces, u, w)
     a = a[:, :1] + turned(a, a[:, :1])
-    a = a[np.argsort(a.min(axis=1))]
+    a = a[np.argsort(a.min(axis=1), kind="stable")]
     # Two turns of the sorted intervals make the circle a line.
     a = np.concatenate([a, a + 2.0 * np.pi])
     low, high = a.min(axis=1), np.maximum.accumulate(a.max(axis=1))
@@ -79,7 +80,7 @@ class _Border:
 
 
 def _quantile(values: Array, weights: Array, share: float) -> float:
-    order = np.argsort(values)
+    order = np.argsort(values, kind="stable")
     total = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(total, share * total[-1])])
 
@@ -111,7 +112,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     rim = _border(surface, region.faces)
     local = dot(rim.edges - axis.point, R)
     along = np.abs(local[:, 1, 2] - local[:, 0, 2]) > 0.5 * rim.length
-    z, angle = local[:, :, 2].mean(axis=1), np.arctan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
+    z, angle = local[:, :, 2].mean(axis=1), atan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
     # Off the corners, where the two kinds of border mix.
     v, t = (2.0 * z - z0 - z1) / (z1 - z0), angle / half
     length_error = arc_error = 0.0
@@ -165,7 +166,7 @@ def _facet(surface: Surface, axis: Axis, faces: IntArray) -> float:
     """Median angle (rad) that a triangle covers."""
     u = axis.radial(surface.V[surface.F[faces].reshape(-1)])[0].reshape(-1, 3, 3)
     chord = np.linalg.norm(u - u[:, [1, 2, 0]], axis=2).max(axis=1)
-    return float(np.median(2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))))
+    return 2.0 * math.asin(min(0.5 * float(np.median(chord)), 1.0))
 
 
 def _inflation(surface: Surface, region: Region, residual: Array) -> float:

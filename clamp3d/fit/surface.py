@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from clamp3d.core.linear import dot
+from clamp3d.core.linear import atan2, dot
 from clamp3d.core.mesh import Array, IntArray, Mesh
 from clamp3d.fit.cylinder import Axis, perpendicular
 
@@ -36,7 +36,7 @@ class Surface:
         self.pairs = np.asarray(tm.face_adjacency, dtype=np.int64).reshape(-1, 2)
         self.edges = np.asarray(tm.face_adjacency_edges, dtype=np.int64).reshape(-1, 2)
         n1, n2 = self.normals[self.pairs[:, 0]], self.normals[self.pairs[:, 1]]
-        self.bend = np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
+        self.bend = atan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
         alone = trimesh.grouping.group_rows(tm.edges_sorted, require_count=1)  # type: ignore[no-untyped-call]
         self.rim, self.rim_faces = tm.edges_sorted[alone], tm.edges_face[alone]
         opposite = np.asarray(tm.face_adjacency_unshared, dtype=np.int64).reshape(-1, 2)
@@ -77,7 +77,7 @@ def border(surface: Surface, faces: IntArray) -> tuple[BoolArray, IntArray, Bool
 def angles(surface: Surface, axis: Axis, faces: IntArray, u: Array, w: Array) -> Array:
     """Angles (k, 3) of the corners of ``faces`` (k,) about the axis, rad from u towards w."""
     p = surface.V[surface.F[faces]] - axis.point
-    return np.asarray(np.arctan2(dot(p, w), dot(p, u)))
+    return np.asarray(atan2(dot(p, w), dot(p, u)))
 
 
 def turned(angle: Array, base: Array) -> Array:

@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from random_clamps import whole_clamp
 
 from clamp3d.baselines.cas import Cas
-from clamp3d.bench.stress.assemblies.clamps import whole_clamp
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.dimensions import PARTS

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from clamp3d.bench.stress.assemblies.outlines import outline
+from outlines import outline
+from random_clamps import whole_clamp
 from scipy.optimize import minimize
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.factory import contact_model
-from clamp3d.bench.stress.assemblies.clamps import whole_clamp
 from clamp3d.clamp.dimensions import Clamp, Wire
 from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state

@@ -225,3 +225,15 @@ def test_large_convex_meshes_are_asked_as_meshes_and_their_depth_is_found():
     assert row.verdict is Verdict.CLASH
     assert -0.1 <= row.distance.lower <= row.distance.upper <= -0.07
     assert row.distance.upper - row.distance.lower <= 0.01
+
+
+def test_winding_numbers_in_a_row_of_equal_boxes():
+    """No triangle is wider than a box: those of the boxes to the left are passed over, and none of its own."""
+    boxes = [trimesh.creation.box((1.0, 1.0, 1.0)) for _ in range(23)]
+    for k, made in enumerate(boxes):
+        made.apply_translation((1.5 * k, 0.0, 0.0))
+    row = trimesh.util.concatenate(boxes)
+    surface = Surface(np.array(row.vertices), np.array(row.faces))
+    inside = [(1.5 * k + x, y, 0.1) for k in range(23) for x in (-0.47, 0.13, 0.47, 0.499) for y in (-0.31, 0.07, 0.43)]
+    assert (surface.winding_numbers(np.array(inside)) == 1.0).all()
+    assert (surface.winding_numbers(np.array([(1.5 * k + 0.75, 0.1, 0.0) for k in range(23)])) == 0.0).all()

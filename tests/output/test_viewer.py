@@ -441,6 +441,22 @@ def test_run_with_view_prints_its_result_and_ends_after_the_timeout(tmp_path):
     assert json.loads(out.read_text())["status"].startswith("not clamped")
 
 
+@pytest.mark.parametrize("command", [["view"], ["run", "--view"]])
+def test_a_blocked_sequence_is_shown_on_one_page(command, tmp_path):
+    page = tmp_path / "page.html"
+    done = subprocess.run(
+        command_line(*command, "--timeout", "0", "--html", str(page), "--sequence", "P1|P2P3P4P5 -> P2 -> P7"),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 1
+    said, *shown = done.stdout.splitlines()
+    assert said.startswith("not assembled: sequence step 3, P7")
+    assert sum(line.startswith("http://") for line in shown) == (command != ["view"])  # a page in a file is not served
+    assert "P7 from" in page.read_text()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -1,0 +1,113 @@
+"""Lower bounds over a stretch of a motion from the hulls that the triangles of a mesh sweep.
+
+A point that moves along a straight line stays on it, so a triangle stays in the hull of its first and last place, and
+one that slides along a face keeps its distance however long the stretch. Arcs leave the hull by their sagitta.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.collide.surface import fcl_tree
+from clamp3d.core.linear import dot
+from clamp3d.core.motion import Motion
+from clamp3d.core.pose import Array
+
+_MOST = 3000
+"""Swept triangles that are measured at once; of more a shorter stretch is asked instead."""
+_PRISM = np.array(
+    [(0, 1, 2), (3, 4, 5), (0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (2, 0, 3), (2, 3, 5)], dtype=np.int64
+)
+_ONE = np.array([(0, 1, 2)], dtype=np.int64)
+_ALL = np.array(list(itertools.combinations(range(6), 3)), dtype=np.int64)
+"""Of six points the faces of any hull are among these."""
+
+
+class Standing:
+    """Triangles (n, 3, 3) of a part that stands still, each with its error (n,) mm, and the boxes of its shells."""
+
+    def __init__(self, triangles: Array, errors: Array, shells: Array) -> None:
+        from rtree import index
+
+        self.triangles, self.errors, self.shells = triangles, errors, shells
+        low, high = triangles.min(axis=1) - errors[:, None], triangles.max(axis=1) + errors[:, None]
+        rows = np.arange(len(triangles))
+        self._tree = index.Index((rows, low, high), properties=index.Property(dimension=3)) if len(rows) else None
+
+    def near(self, low: Array, high: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Which boxes ``low``, ``high`` (m, 3) meet one of a triangle, and which triangles those are."""
+        if self._tree is None or not len(low):
+            return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
+        found, count = self._tree.intersection_v(low, high)  # type: ignore[no-untyped-call]
+        return np.flatnonzero(count), np.unique(np.asarray(found, dtype=np.intp))
+
+
+def swept_gap(
+    standing: Standing, triangles: Array, errors: Array, motion: Motion, stretch: tuple[float, float], most: float
+) -> float:
+    """Distance (mm) that moving triangles certainly keep from standing ones all through a stretch, up to ``most``.
+
+    Parameters
+    ----------
+    standing : Standing
+        What they may meet, in the world.
+    triangles, errors : ndarray (m, 3, 3), (m,)
+        The moving ones at t = 0 in the world, each with how far the true surface may be from it (mm).
+    motion : Motion
+        What moves them.
+    stretch : tuple of float
+        First and last time.
+    most : float
+        A distance (mm) that is enough.
+
+    Returns
+    -------
+    float
+        Minus infinity where they may meet.
+    """
+    import fcl
+
+    there = [dot(triangles, T[:3, :3].T) + T[:3, 3] for T in (motion.at(t) for t in stretch)]
+    hulls = np.concatenate(there, axis=1)
+    errors = errors.copy()
+    if motion.angle:  # along arcs the acceleration is at most that of the corner furthest from the axis
+        out = motion.from_axis(triangles).max(axis=1)
+        errors += 0.125 * (motion.angle * (stretch[1] - stretch[0])) ** 2 * out
+    reach = (errors + most)[:, None]
+    low, high = hulls.min(axis=1), hulls.max(axis=1)
+    rows, other = standing.near(low - reach, high + reach)
+    if not len(rows):
+        return most
+    # A shell that no triangle of a hull's surface meets may still be inside the hull.
+    held = (low[rows, None] <= standing.shells[:, 0]) & (standing.shells[:, 1] <= high[rows, None])
+    if len(rows) > _MOST or held.all(axis=2).any():
+        return -np.inf
+    shape, gap = _ALL if motion.angle else _PRISM, most
+    still = [(_tree(standing.triangles[other[k]], _ONE), error) for k, error in _levels(standing.errors[other])]
+    for k, error in _levels(errors[rows]):
+        moving = _tree(hulls[rows[k]], shape)
+        for fixed, off in still:
+            d = float(fcl.distance(fixed, moving, fcl.DistanceRequest(), fcl.DistanceResult()))
+            if d <= 0.0:
+                return -np.inf
+            gap = min(gap, d - error - off)
+    return gap
+
+
+def _levels(errors: Array) -> list[tuple[NDArray[np.intp], float]]:
+    """Rows of errors (m,) of one order of magnitude, and the largest of each."""
+    level = np.ceil(np.log2(np.maximum(errors, 1e-300)) / 2.0)
+    return [(rows, float(errors[rows].max())) for k in np.unique(level) if len(rows := np.flatnonzero(level == k))]
+
+
+def _tree(points: Array, shape: NDArray[np.int64]) -> Any:
+    """FCL's tree of triangles with the corners ``shape`` (k, 3) among each row of ``points`` (m, c, 3)."""
+    import fcl
+
+    count = points.shape[1]
+    faces = (count * np.arange(len(points))[:, None, None] + shape).reshape(-1, 3)
+    return fcl.CollisionObject(fcl_tree(points.reshape(-1, 3), faces))
