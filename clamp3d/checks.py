@@ -10,6 +10,7 @@ import math
 import numbers
 import os
 import stat
+import sys
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -136,10 +137,10 @@ def array(name: str, value: object, shape: tuple[int | None, ...], *, finite: bo
 
 def _as_floats(value: object) -> NDArray[np.float64] | None:
     """Real numbers of any type as float64, None for what is none."""
-    if isinstance(value, np.ndarray) and value.dtype == np.float64 and not isinstance(value, np.ma.MaskedArray):
-        return value.view(np.ndarray)
-    if isinstance(value, np.ma.MaskedArray):
+    if "numpy.ma" in sys.modules and isinstance(value, np.ma.MaskedArray):  # numpy loads it when it is named
         return None
+    if isinstance(value, np.ndarray) and value.dtype == np.float64:
+        return value.view(np.ndarray)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a masked number in a list: NaN

@@ -22,10 +22,17 @@ from collections.abc import Callable
 import fcl
 import numpy as np
 
+from clamp3d.bench.compare.peers.open_cascade import asked, axis, cylinder
+from clamp3d.collide.model import ModelCache
+from clamp3d.collide.poses import check_poses
+from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.distance import signed_distance, signed_distances
 from clamp3d.core.pieces import groove_pieces
-from clamp3d.core.pose import rotation
+from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
+from clamp3d.core.shapes import cylinder as cylinder_shape
+from clamp3d.core.shapes import groove_block
+from clamp3d.output.step import solid
 
 GROOVE, WIRE = SweptArc(12.0, np.radians(70.0), 50.0), Cylinder(10.5, 80.0)
 BACK, SIDE = 30.0, 40.0  # the block that peers need in place of unbounded material
@@ -159,24 +166,73 @@ class Peers:
 
 
 def ends(repeats: int) -> None:
-    """Batches of cylinders and of capsules at the same poses: (length, tilt, where along the groove, how far about)."""
+    """Cylinders, capsules and Open CASCADE at the same poses: (length, tilt, where along the groove, how far about)."""
     rng = np.random.default_rng(2)
     kinds = {
-        "parallel": (80.0, 0.0, 0.0, 0.5),
-        "tilted, reaching out at both ends": (80.0, 0.05, 0.0, 0.5),
+        "no rim nearest: parallel": (80.0, 0.0, 0.0, 0.5),
+        "no rim nearest: tilted, reaching out at both ends": (80.0, 0.05, 0.0, 0.5),
         "short, tilted, in the groove": (20.0, 0.1, 0.0, 0.5),
         "short, steep, in overlap": (20.0, 1.0, 0.0, 3.0),
         "end at the groove's end": (80.0, 0.05, 65.0, 0.5),
         "end before the groove's end": (80.0, 0.3, 68.0, 3.0),
     }
-    print("\n| flat ends beside a capsule, batch on one core, ns | cylinder | capsule | ratio |\n|---|---|---|---|")
+    block = solid(groove_block(GROOVE, 2.0 * SIDE, BACK))
+    print(
+        "\n| flat ends beside a capsule, one core: least, median, greatest of the runs | batch, ns | capsule, ns "
+        "| ratio | call, us | capsule, us | ratio | Open CASCADE, us | to a call | to a batch |"
+        "\n|---|---|---|---|---|---|---|---|---|---|"
+    )
     for name, (length, tilt, at, about) in kinds.items():
         T = np.array([rotation((*rng.normal(size=2), 0.0), rng.uniform(0.0, tilt)) for _ in range(4000)])
         T[:, :3, 3] = rng.normal(size=(4000, 3)) * about + [0.0, 0.0, at]
-        shapes = Cylinder(10.5, length), Capsule(10.5, length)
-        runs = [lambda s=s, T=T: signed_distances(GROOVE, s, T, workers=1) for s in shapes]
-        flat, round_ = (1e3 * least(run, 4000, 5 * repeats) for run in runs)
-        print(f"| {name} | {flat:.0f} | {round_:.0f} | {flat / round_:.1f} |")
+        flat, round_ = Cylinder(10.5, length), Capsule(10.5, length)
+        by_axis = asked(block, axis(length), 10.5, depth=True).one
+        by_solid = asked(block, cylinder(10.5, length), 0.0, depth=False).one
+        few = T[:200]
+        runs: list[tuple[Callable[[], object], int]] = [
+            (lambda s=flat, T=T: signed_distances(GROOVE, s, T, workers=1), 4000),
+            (lambda s=round_, T=T: signed_distances(GROOVE, s, T, workers=1), 4000),
+            (lambda s=flat, T=few: [signed_distance(GROOVE, s, P) for P in T], 200),
+            (lambda s=round_, T=few: [signed_distance(GROOVE, s, P) for P in T], 200),
+            (lambda f=by_axis, T=few: [f(P) for P in T[:10]], 10),
+            (lambda f=by_solid, T=few: [f(P) for P in T[:10]], 10),
+        ]
+        seen = np.array([[thread_time(run, n) for run, n in runs] for _ in range(3 * repeats)])
+        batch, round_batch, call, round_call = (seen[:, k] for k in range(4))
+        cad = seen[:, 4:].min(axis=1)
+        cells = [1e3 * batch, 1e3 * round_batch, batch / round_batch, call, round_call, call / round_call]
+        print(f"| {name} | {' | '.join(map(spread, [*cells, cad, cad / call, cad / batch]))} |", flush=True)
+
+
+def spread(values: np.ndarray) -> str:
+    """Least, median and greatest."""
+    return " ".join(f"{x:.3g}" for x in (values.min(), np.median(values), values.max()))
+
+
+def thread_time(run: Callable[[], object], units: int) -> float:
+    """CPU time of this thread per unit in microseconds, with its data in the processor's memory."""
+    run()
+    start = time.thread_time()
+    run()
+    return (time.thread_time() - start) / units * 1e6
+
+
+def sweep(repeats: int) -> None:
+    """Verdicts of a wire at 100 000 poses against its groove block, and among 10 000 blocks, beside the batch."""
+    scene = Scene(clearance=0.5).add("wire", cylinder_shape(WIRE.radius, WIRE.length))
+    block = groove_block(GROOVE, 2.0 * SIDE, BACK)
+    parts = [Part(f"b{k}", block, translation(100.0 * k, 0.0, 0.0)) for k in range(10000)]
+    T = np.tile(poses("tilted", 2000), (50, 1, 1))
+    print("\n| verdicts of 100 000 tilted poses, us a pose | least, median, greatest | of the batch |\n|---|---|---|")
+    for count in (1, 10000):
+        many = Scene((*scene.parts, *parts[:count]), clearance=0.5)
+        cache = ModelCache()
+        runs: list[Callable[[], object]] = [
+            lambda s=many, c=cache: check_poses(s, "wire", T, cache=c),
+            lambda: signed_distances(GROOVE, WIRE, T, workers=1),
+        ]
+        seen = np.array([[thread_time(run, len(T)) for run in runs] for _ in range(repeats)])
+        print(f"| among {count} | {spread(seen[:, 0])} | {spread(seen[:, 0] / seen[:, 1])} |", flush=True)
 
 
 def start_up() -> tuple[float, float]:
@@ -240,6 +296,7 @@ def main() -> None:
             f"{table['wedges, culled by hand'][i] / table[names[-1]][i]:.0f} times"
         )
     ends(repeats)
+    sweep(repeats)
     if not options.quick:
         cold, warm = start_up()
         print(

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import csv
-import difflib
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import resources
+from pathlib import Path
 
 from clamp3d.errors import InputError
 
@@ -28,7 +27,7 @@ def catalogue() -> dict[str, Conductor]:
     >>> catalogue()["LJ-630"].diameter
     32.67
     """
-    text = resources.files("clamp3d.clamp").joinpath("data/conductors.csv").read_text(encoding="utf-8")
+    text = Path(__file__).with_name("data").joinpath("conductors.csv").read_text(encoding="utf-8")
     rows = csv.DictReader(text.splitlines())
     return {
         r["designation"]: Conductor(r["designation"], float(r["diameter_mm"]), r["standard"], r["source"]) for r in rows
@@ -49,6 +48,8 @@ def conductor(designation: str) -> Conductor:
     """
     found = _folded().get(designation.strip().casefold())
     if found is None:
+        import difflib
+
         near = difflib.get_close_matches(designation, catalogue(), n=3, cutoff=0.0)
         raise InputError(
             f"unknown conductor {designation!r}; nearest: {', '.join(near)} "

@@ -7,7 +7,6 @@ import re
 import tomllib
 import typing
 from dataclasses import fields
-from importlib import resources
 from pathlib import Path
 from typing import TypeAlias
 
@@ -31,7 +30,7 @@ def builtin_clamps() -> list[str]:
     >>> builtin_clamps()
     ['reference']
     """
-    folder = resources.files("clamp3d.clamp").joinpath("data")
+    folder = Path(__file__).with_name("data")
     return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
@@ -89,7 +88,7 @@ def wire(given: WireSize, name: str = "wire") -> Wire:
 def _read(path: Path) -> tuple[str, str]:
     source = str(path)
     if source in builtin_clamps():
-        return resources.files("clamp3d.clamp").joinpath(f"data/{source}.toml").read_text(encoding="utf-8"), source
+        return Path(__file__).with_name("data").joinpath(f"{source}.toml").read_text(encoding="utf-8"), source
     if path.suffix != ".toml" and not os.path.exists(path):
         built_in = ", ".join(builtin_clamps())
         raise InputError(f"unknown clamp {checks.shown(source)}; built in: {built_in}; or give a .toml file")

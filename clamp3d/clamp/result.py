@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from html import escape
 from typing import Any, Literal, get_args
 
 from clamp3d import __version__
@@ -288,6 +287,8 @@ class Assembly:
         return f"<Assembly {self.clamp.name}: {self.status}, {self.distance:.3f} mm>"
 
     def _repr_html_(self) -> str:
+        from html import escape
+
         rows = "".join(
             f"<tr><td>{c.a}-{c.b}</td><td>{c.declared}</td><td>{c.type}</td><td>{c.relation}</td>"
             f"<td style='text-align:right'>{c.gap:.6f}</td></tr>"

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING
 
 from clamp3d.errors import escaped
 
 if TYPE_CHECKING:
-    from rich.console import Console
     from rich.status import Status
 
     from clamp3d.clamp.result import Waypoint
 
 
 class Narrator:
-    """Tells the user what goes on; says nothing where ``console`` is None."""
+    """Tells the user what goes on: lines by ``say``, and in ``status`` what changes; nothing where they are None."""
 
-    def __init__(self, console: Console | None, status: Status | None) -> None:
-        self._console, self._status = console, status
+    def __init__(self, say: Callable[[str], object] | None, status: Status | None) -> None:
+        self._say, self._status = say, status
 
     def line(self, text: str) -> None:
         """A line that stays."""
-        if self._console is not None:
-            self._console.print(escaped(text), markup=False, highlight=False, soft_wrap=True)
+        if self._say is not None:
+            self._say(escaped(text))
 
     def status(self, text: str) -> None:
         """What is going on now; not shown where stderr is a file."""
@@ -48,21 +49,19 @@ def narrator(quiet: bool) -> Iterator[Narrator]:
     if quiet:
         yield Narrator(None, None)
         return
+    if not sys.stderr.isatty():
+        yield Narrator(partial(print, file=sys.stderr), None)
+        return
     from rich.console import Console
 
     console = Console(stderr=True)
-    if not console.is_terminal:
-        yield Narrator(console, None)
-        return
     with console.status("") as status:
-        yield Narrator(console, status)
+        yield Narrator(partial(console.print, markup=False, highlight=False, soft_wrap=True), status)
 
 
 @contextmanager
 def bar(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
     """A function ``report(stage, done, of)`` that moves a bar; it is silent if stderr is no terminal."""
-    import sys
-
     if quiet or not sys.stderr.isatty():
         yield lambda stage, done, of: None
         return

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 
+FEW = 32
+"""Parts up to which all boxes are compared, without a tree."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Boxes:
@@ -43,13 +46,14 @@ class Boxes:
 
 def near_pairs(boxes: Boxes, reach: float) -> NDArray[np.int64]:
     """Pairs (m, 2), first < second, whose boxes along the world's axes come within ``reach`` mm; sorted."""
-    from rtree import index
-
     n = len(boxes.centre)
-    if n < 2:
-        return np.empty((0, 2), dtype=np.int64)
     half = boxes.reach + 0.5 * reach * (1.0 + 1e-9)
     low, high = boxes.centre - half, boxes.centre + half
+    if n <= FEW:
+        meet = (low[:, None] <= high).all(axis=2)
+        return np.argwhere(np.triu(meet & meet.T, 1))
+    from rtree import index
+
     tree = index.Index((np.arange(n), low, high), properties=index.Property(dimension=3))
     second, count = tree.intersection_v(low, high)  # type: ignore[no-untyped-call]
     first = np.repeat(np.arange(n), count.astype(np.int64))

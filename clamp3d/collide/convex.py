@@ -223,7 +223,8 @@ def hull(points: Array) -> Hull:
     kept = area > 1e-14 * area.max()
     normal = normal[kept] / area[kept, None]
     offset = -dot(vertices, normal.T).max(axis=0)  # no rounding of a triangle cuts into the hull
-    return Hull(vertices, np.unique(np.column_stack([normal, offset]).round(14), axis=0), faces)
+    planes = sorted({tuple(plane) for plane in np.column_stack([normal, offset]).round(14).tolist()})
+    return Hull(vertices, np.array(planes), faces)
 
 
 def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, rims: bool = True) -> Distance:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.batch import by_kernel
-from clamp3d.collide.broad import Boxes, box_gaps
+from clamp3d.collide.broad import FEW, Boxes, box_gaps
 from clamp3d.collide.judge import contained, judge
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
@@ -22,8 +22,6 @@ from clamp3d.core.motion import FARTHEST, scene_pose
 from clamp3d.core.pose import Array, check_pose_array
 from clamp3d.errors import InputError, MissingLibraryError
 
-_FEW = 32
-"""Other parts up to which all of their boxes are compared with those of all poses."""
 _BLOCK = 4096
 """Poses that the kernel is asked together: what is noted of them stays in the processor's own memory."""
 
@@ -202,19 +200,30 @@ def _placed(poses: ArrayLike, bounds: Array) -> tuple[Array, Array]:
 
 
 def _near(moving: Array, still: Boxes, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Poses and others (m,) whose boxes along the world's axes come within ``reach`` mm."""
-    centre, half = moving[:3], moving[3:]
-    if len(still.centre) <= _FEW:
-        pairs = zip(still.centre[..., None], (still.reach + reach)[..., None], strict=True)
-        near = np.array([(np.abs(centre - c) <= half + r).all(axis=0) for c, r in pairs]).reshape(-1, len(centre.T))
-        rows, columns = np.nonzero(near.T)
-        return rows.astype(np.int64), columns.astype(np.int64)
-    from rtree import index
+    """Poses and others (m,) whose boxes along the world's axes come within ``reach`` mm.
 
+    A block of poses, which often follow each other, is compared with all others that come near the block.
+    """
+    low, high = moving[:3] - moving[3:], moving[:3] + moving[3:]
     wide = still.reach + reach
-    tree = index.Index(
-        (np.arange(len(wide)), still.centre - wide, still.centre + wide), properties=index.Property(dimension=3)
-    )
-    found, count = tree.intersection_v((centre - half).T, (centre + half).T)  # type: ignore[no-untyped-call]
-    rows = np.repeat(np.arange(len(centre.T)), np.asarray(count, dtype=np.int64))
-    return rows, np.asarray(found, dtype=np.int64)
+    below, above = still.centre - wide, still.centre + wide
+    rows, columns = [], []
+    tree: Any = None
+    for start in range(0, low.shape[1], _BLOCK):
+        a, b = low[:, start : start + _BLOCK], high[:, start : start + _BLOCK]
+        others = np.flatnonzero(((below <= b.max(axis=1)) & (above >= a.min(axis=1))).all(axis=1))
+        if len(others) <= FEW:
+            near = np.array([((a <= above[k, :, None]) & (b >= below[k, :, None])).all(axis=0) for k in others])
+            row, which = np.nonzero(near.reshape(len(others), a.shape[1]).T)
+            column = others[which]
+        else:
+            from rtree import index
+
+            if tree is None:
+                tree = index.Index((np.arange(len(below)), below, above), properties=index.Property(dimension=3))
+            column, count = tree.intersection_v(a.T, b.T)
+            row = np.repeat(np.arange(a.shape[1]), np.asarray(count, dtype=np.int64))
+        rows.append(row + start)
+        columns.append(column)
+    none = np.empty(0, dtype=np.int64)
+    return np.concatenate([none, *rows]).astype(np.int64), np.concatenate([none, *columns]).astype(np.int64)

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 from clamp3d.collide.answer import Distance
@@ -184,6 +183,8 @@ class CheckResult:
         return f"CheckResult({self.scene.name!r}: {'clean' if self.clean else 'not clean'}; {counts})"
 
     def _repr_html_(self) -> str:
+        from html import escape
+
         head = "".join(f"<th>{name}</th>" for name in ("pair", "motion", "verdict", "distance mm", "by"))
         body = "".join(
             f"<tr><td>{escape(row.a)} - {escape(row.b)}</td><td>{escape(row.motion or '')}</td>"

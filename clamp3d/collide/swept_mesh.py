@@ -82,9 +82,8 @@ def swept_gap(
     rows, other = standing.near(low - reach, high + reach)
     if not len(rows):
         return most
-    low, high = low[rows] - reach[rows], high[rows] + reach[rows]
     # A shell that no triangle of a hull's surface meets may still be inside the hull.
-    held = (low[:, None] <= standing.shells[:, 0]) & (standing.shells[:, 1] <= high[:, None])
+    held = (low[rows, None] <= standing.shells[:, 0]) & (standing.shells[:, 1] <= high[rows, None])
     if len(rows) > _MOST or held.all(axis=2).any():
         return -np.inf
     shape, gap = _ALL if motion.angle else _PRISM, most

@@ -13,7 +13,6 @@ translation that frees the bodies), of which it is a lower bound for a cylinder.
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from enum import IntEnum
 from types import ModuleType
@@ -295,6 +294,8 @@ def signed_distances(
     if threads == 1:
         found = [part(0, n)]
     else:
+        from concurrent.futures import ThreadPoolExecutor
+
         cuts = [n * i // threads for i in range(threads + 1)]
         with ThreadPoolExecutor(threads) as pool:
             found = list(pool.map(part, cuts[:-1], cuts[1:]))

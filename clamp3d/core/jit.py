@@ -13,7 +13,6 @@ import os
 import platform
 import re
 import sys
-import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache, cached_property
@@ -115,16 +114,23 @@ def _stamp(function: Callable[..., Any]) -> str:
 
 def _place(function: Callable[..., Any], signature: str) -> Path:
     """The file of an entry point: another one for every source, processor and version."""
-    import llvmlite.binding as llvm
     import platformdirs
 
-    facts = [_stamp(function), function.__qualname__, signature]
-    facts += [metadata.version(name) for name in ("numba", "llvmlite", "numpy")]
-    facts += [sys.version, platform.machine(), llvm.get_process_triple(), llvm.get_host_cpu_name(), _features()]
+    facts = [_stamp(function), function.__qualname__, signature, *_versions()]
     key = hashlib.sha256(repr(facts).encode()).hexdigest()[:32]
     own = os.environ.get("CLAMP3D_CACHE")
     folder = Path(own).expanduser() if own else platformdirs.user_cache_path("clamp3d", appauthor=False)
     return folder / f"kernel-{function.__name__}-{key}.o"
+
+
+@cache
+def _versions() -> list[str]:
+    """What compiles, and what for."""
+    import llvmlite.binding as llvm
+
+    found = [metadata.version(name) for name in ("numba", "llvmlite", "numpy")]
+    triple, cpu = llvm.get_process_triple(), llvm.get_host_cpu_name()
+    return [*found, sys.version, platform.machine(), triple, cpu, _features()]
 
 
 @cache
@@ -149,6 +155,8 @@ def _read(path: Path) -> bytes | None:
 
 def _keep(path: Path, code: bytes) -> None:
     """Write it whole or not at all; a cache that cannot be written is no error."""
+    import tempfile
+
     with suppress(OSError), tempfile.TemporaryDirectory(dir=path.parent) as folder:
         temporary = Path(folder, "code")
         temporary.write_bytes(hashlib.sha256(code).digest() + code)
@@ -163,6 +171,8 @@ def _say(once: bool) -> None:
 
 
 def _can_keep(folder: Path) -> bool:
+    import tempfile
+
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

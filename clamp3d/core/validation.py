@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 import typing
 from collections.abc import Mapping
@@ -55,6 +54,8 @@ def _one_line(failure: ValidationError, kind: typing.Any, origin: str, tags: Map
     elif error["type"] == "missing":
         line = f"{origin}: {key} is missing"
     elif error["type"] in _UNKNOWN_KEY:
+        import difflib
+
         near = difflib.get_close_matches(str(error["loc"][-1]), _keys_at(kind, error["loc"][:-1], tags), n=1)
         line = f"{origin}: {key} is not a known key" + (f"; did you mean {near[0]}?" if near else "")
     elif isinstance(error["input"], (str, int, float, bool)):

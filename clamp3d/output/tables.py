@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Iterable, Sequence
 
@@ -33,17 +32,15 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, indent:
     P1      1.5
     P12   12.25
     """
-    from rich.console import Console
-    from rich.table import Table
+    from rich.cells import cell_len
 
     cells = [["-" if cell is None else str(cell) for cell in row] for row in rows]
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for i, title in enumerate(head):
-        numbers = all(_NUMBER.fullmatch(row[i]) for row in cells if i < len(row))
-        table.add_column(title, justify="right" if numbers else "left", no_wrap=True)
-    for row in cells:
-        table.add_row(*row)
-    console = Console(file=io.StringIO(), width=10_000, color_system=None, markup=False, emoji=False, highlight=False)
-    with console.capture() as text:
-        console.print(table)
-    return "\n".join((" " * indent + line).rstrip() for line in text.get().splitlines())
+    cells = [row + [""] * (len(head) - len(row)) for row in cells]
+    lines = [""] * (1 + len(cells))
+    for title, *column in zip(head, *cells, strict=True):
+        numbers = all(_NUMBER.fullmatch(cell) for cell in column)
+        width = max(cell_len(cell) for cell in (title, *column))
+        for k, cell in enumerate((title, *column)):
+            blanks = " " * (width - cell_len(cell))
+            lines[k] += (blanks + cell if numbers else cell + blanks) + "  "
+    return "\n".join((" " * indent + line).rstrip() for line in lines)

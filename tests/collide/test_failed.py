@@ -8,8 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from clamp3d.cli import group
-from clamp3d.collide import check as checking
-from clamp3d.collide import moving_pair
+from clamp3d.collide import judge, moving_pair
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.check import check
 from clamp3d.collide.scene import Scene
@@ -37,14 +36,14 @@ pose = { translation = [0, 0, %g] }
 @pytest.fixture
 def broken(monkeypatch):
     """The pair a, b fails; every other one is answered."""
-    refine = checking.refine
+    refine = judge.refine
 
     def ask(a, b, T, *args, **kwargs):
         if abs(abs(T[0, 3]) - 9.999) < 1e-9 and abs(T[2, 3]) < 1e-9:
             raise SolverError("features and boxes disagree")
         return refine(a, b, T, *args, **kwargs)
 
-    monkeypatch.setattr(checking, "refine", ask)
+    monkeypatch.setattr(judge, "refine", ask)
     monkeypatch.setattr(moving_pair, "refine", ask)
 
 
@@ -97,6 +96,9 @@ def test_one_part_alone_is_nothing_to_check(tmp_path):
 
 def test_an_uncertain_verdict_names_the_thresholds_between_its_bounds():
     limits = Thresholds(contact=0.01, clearance=0.5)
-    assert limits.between(Distance(0.2, 0.9)) == ["the clearance of 0.5 mm"]
-    assert limits.between(Distance(-0.03, 0.02)) == ["contact up to 0.01 mm", "contact up to 0.01 mm deep"]
-    assert limits.between(Distance(-0.03, 0.0), 0.02) == ["allowed overlap up to 0.02 mm deep"]
+    assert limits.between(Distance(0.2, 0.9)) == ["a gap of 0.5 mm (clearance)"]
+    assert limits.between(Distance(-0.03, 0.02)) == [
+        "a gap of 0.01 mm (contact)",
+        "an overlap of 0.01 mm (contact)",
+    ]
+    assert limits.between(Distance(-0.03, 0.0), 0.02) == ["an overlap of 0.02 mm (allowed)"]

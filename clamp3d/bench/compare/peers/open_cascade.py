@@ -24,7 +24,8 @@ def _location(T: Array) -> Any:
     return TopLoc_Location(transformation)
 
 
-def _asked(part: Any, wire: Any, radius: float, *, depth: bool) -> Prepared:
+def asked(part: Any, wire: Any, radius: float, *, depth: bool) -> Prepared:
+    """The distance of a shape at any pose from another one, less ``radius`` mm."""
     from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 
     extrema = BRepExtrema_DistShapeShape()
@@ -44,21 +45,22 @@ def _block() -> Any:
     return solid(block()).Moved(_location(inverse(pair().T_a_groove)))
 
 
-def _axis() -> Any:
+def axis(length: float) -> Any:
+    """A wire's axis."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
     from OCP.gp import gp_Pnt
 
-    half = 0.5 * WIRE.length
+    half = 0.5 * length
     return BRepBuilderAPI_MakeEdge(gp_Pnt(0.0, 0.0, -half), gp_Pnt(0.0, 0.0, half)).Edge()
 
 
-def _solid(_: float) -> Prepared:
+def cylinder(radius: float, length: float) -> Any:
+    """A wire with flat ends."""
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
     from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
-    axes = gp_Ax2(gp_Pnt(0.0, 0.0, -0.5 * WIRE.length), gp_Dir(0.0, 0.0, 1.0))
-    wire = BRepPrimAPI_MakeCylinder(axes, WIRE.radius, WIRE.length).Shape()
-    return _asked(_block(), wire, 0.0, depth=False)
+    axes = gp_Ax2(gp_Pnt(0.0, 0.0, -0.5 * length), gp_Dir(0.0, 0.0, 1.0))
+    return BRepPrimAPI_MakeCylinder(axes, radius, length).Shape()
 
 
 def _face(_: float) -> Prepared:
@@ -72,16 +74,21 @@ def _face(_: float) -> Prepared:
     while explorer.More():
         face = TopoDS.Face(explorer.Current())
         if BRepAdaptor_Surface(face).GetType() == GeomAbs_SurfaceType.GeomAbs_Cylinder:
-            return _asked(face, _axis(), WIRE.radius, depth=True)
+            return asked(face, axis(WIRE.length), WIRE.radius, depth=True)
         explorer.Next()
     raise AssertionError("the block has no round face")
 
 
 _NEEDS = ("OCP", "OCP.BRepExtrema", "OCP.BRepPrimAPI")
 SERIES = {
-    "open-cascade": Series(_solid, "cadquery-ocp-novtk", _NEEDS, (None,)),
+    "open-cascade": Series(
+        lambda _: asked(_block(), cylinder(WIRE.radius, WIRE.length), 0.0, depth=False),
+        "cadquery-ocp-novtk",
+        _NEEDS,
+        (None,),
+    ),
     "open-cascade-axis": Series(
-        lambda _: _asked(_block(), _axis(), WIRE.radius, depth=True), "cadquery-ocp-novtk", _NEEDS, (None,)
+        lambda _: asked(_block(), axis(WIRE.length), WIRE.radius, depth=True), "cadquery-ocp-novtk", _NEEDS, (None,)
     ),
     "open-cascade-face": Series(_face, "cadquery-ocp-novtk", _NEEDS, (None,)),
 }
