@@ -1,4 +1,4 @@
-"""Flat-ended cylinders on boxes, holes and other cylinders: the engine is not wrong, and a wrong answer is found out."""
+"""Flat-ended cylinders on boxes, holes and cylinders: the engine is not wrong, and a wrong answer is found out."""
 
 from __future__ import annotations
 
