@@ -251,7 +251,9 @@ class SceneDrawing:
         upright = abs(b[2] - a[2]) >= abs(b[0] - a[0])
         beside = middle + 0.08 * self.size * np.array([-1.0, 0.0, 0.0] if upright else [-1.0, 0.0, 0.7])
         self.put(f"{path}/line", draw.segments([a, b, middle, beside], darker(colour, 0.85), on_top=True))
-        self._label(f"{path}/value", text.removeprefix("gap "), beside, "#FFFFFF", 0.7)
+        self._label(
+            f"{path}/value", text if text.startswith("gap or") else text.removeprefix("gap "), beside, "#FFFFFF", 0.7
+        )
 
     def _label(self, path: str, text: str, at: ArrayLike, colour: str, size: float) -> None:
         self.put(path, draw.label(text, colour, at, size=0.01 * size / self._unit))
