@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from meshcat.servers.tree import SceneTree, find_node, walk
 
 import clamp3d
 from clamp3d.clamp.assemble import assemble
@@ -105,6 +106,21 @@ def animation_of(viewer):
 def keys_of(clip, name):
     track = next(t for t in clip["tracks"] if t["name"] == name)
     return {key["time"]: key["value"] for key in track["keys"]}
+
+
+def test_a_meshcat_server_tells_the_animation_after_all_poses(recorded):
+    """A page that comes later would else be taken back to the start by poses that reach it while it plays."""
+    viewer, _, _ = recorded
+    tree = SceneTree()
+    for command in viewer.commands:
+        node = find_node(tree, [name for name in command["path"].split("/") if name])
+        if command["type"] == "set_animation":
+            node.animation = command
+        elif command["type"] == "set_transform":
+            node.transform = command
+    told = [kind for node in walk(tree) for kind in ("transform", "animation") if getattr(node, kind) is not None]
+    assert told.count("animation") == 1
+    assert told[-1] == "animation"
 
 
 def test_animation_reaches_every_waypoint_in_turn(recorded):
