@@ -71,18 +71,15 @@ class Allowances:
     @classmethod
     def of(cls, allowed: Iterable[Allowed]) -> Allowances:
         """Sorted into names and patterns."""
-        return cls({}, ()).more(allowed)
-
-    def more(self, allowed: Iterable[Allowed]) -> Allowances:
-        """With these too."""
-        exact, patterns = self.exact.copy(), list(self.patterns)
+        exact: dict[tuple[str, str], float] = {}
+        patterns = []
         for item in allowed:
             if any(c in item.a + item.b for c in "*?["):
                 patterns.append(item)
                 continue
             for pair in ((item.a, item.b), (item.b, item.a)):
                 exact[pair] = max(item.overlap, exact.get(pair, 0.0))
-        return Allowances(exact, tuple(patterns))
+        return cls(exact, tuple(patterns))
 
     def overlap(self, a: str, b: str) -> float | None:
         """Largest overlap that is allowed, mm; None if even contact is not meant."""
@@ -120,7 +117,8 @@ class Scene:
     thresholds: Thresholds = field(init=False)
     _index: dict[str, int] = field(init=False, repr=False)
     """Positions by name, shared with the scenes that `add` made of this one: it may hold more names than are here."""
-    _allowances: Allowances = field(init=False, repr=False)
+    _allowances: Allowances | None = field(init=False, repr=False, default=None)
+    """Sorted when they are first asked for: pairs may come one by one."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "thresholds", Thresholds(self.contact, self.clearance))
@@ -139,7 +137,6 @@ class Scene:
         object.__setattr__(self, "_index", seen)
         for item in self.allowed:
             self._check_allowed(item)
-        object.__setattr__(self, "_allowances", Allowances.of(self.allowed))
         for motion in self.motions:
             if not motion.parts:
                 raise InputError(f"motion {motion.name!r} must name at least one part")
@@ -190,7 +187,7 @@ class Scene:
             self._check_allowed(item)
         scene = copy(self)
         object.__setattr__(scene, "allowed", self.allowed + made)
-        object.__setattr__(scene, "_allowances", self._allowances.more(made))
+        object.__setattr__(scene, "_allowances", None)
         return scene
 
     def _check_allowed(self, item: Allowed) -> None:
@@ -218,6 +215,9 @@ class Scene:
 
     def allowance(self, a: str, b: str) -> float | None:
         """Allowed overlap of a pair in mm; None if even contact is not meant."""
+        if self._allowances is None:
+            object.__setattr__(self, "_allowances", Allowances.of(self.allowed))
+            assert self._allowances is not None
         return self._allowances.overlap(a, b)
 
 

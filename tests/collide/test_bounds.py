@@ -188,3 +188,14 @@ def test_a_segment_crosses_a_box_exactly_if_some_of_its_points_are_inside():
             assert box.crossed_by(ends) == (deepest < 0.0)
             counted[int(deepest < 0.0)] += 1
     assert min(counted) > 50
+
+
+@pytest.mark.parametrize("error", [1.0, 0.2])
+def test_a_wall_thinner_than_its_facets_keeps_both_meshes_apart(error):
+    """The tangents of a groove that all but cuts its block in two cross the outline: the mesh within has two parts."""
+    groove = SweptArc(12.0, 1.2, 40.0)
+    shape = shapes.groove_block(groove, 30.0, 12.0 - 12.0 * math.cos(1.2) + 0.02)
+    inner, outer = (getattr(ModelCache().model(shape), side)(error) for side in ("inner", "outer"))
+    middles = inner.vertices[inner.faces].mean(axis=1)
+    assert body(shape).field(np.vstack([inner.vertices, middles])).max() <= 1e-9
+    assert body(shape).field(outer.vertices).min() >= -1e-9

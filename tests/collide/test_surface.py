@@ -19,6 +19,7 @@ from clamp3d.collide.surface import Surface, at_edges
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
 from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.kernel_winding import crossings
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import rotation, translation
@@ -227,13 +228,12 @@ def test_large_convex_meshes_are_asked_as_meshes_and_their_depth_is_found():
     assert row.distance.upper - row.distance.lower <= 0.01
 
 
-def test_winding_numbers_in_a_row_of_equal_boxes():
-    """No triangle is wider than a box: those of the boxes to the left are passed over, and none of its own."""
-    boxes = [trimesh.creation.box((1.0, 1.0, 1.0)) for _ in range(23)]
-    for k, made in enumerate(boxes):
-        made.apply_translation((1.5 * k, 0.0, 0.0))
-    row = trimesh.util.concatenate(boxes)
-    surface = Surface(np.array(row.vertices), np.array(row.faces))
-    inside = [(1.5 * k + x, y, 0.1) for k in range(23) for x in (-0.47, 0.13, 0.47, 0.499) for y in (-0.31, 0.07, 0.43)]
-    assert (surface.winding_numbers(np.array(inside)) == 1.0).all()
-    assert (surface.winding_numbers(np.array([(1.5 * k + 0.75, 0.1, 0.0) for k in range(23)])) == 0.0).all()
+def test_triangles_in_a_row_are_all_found():
+    """As wide as the widest, and asked at the far end: the first of those that count is just not passed over."""
+    for n in range(1, 40):
+        low = np.arange(n, dtype=float)
+        corners = np.tile([0.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0], (n, 1))
+        corners[:, ::3] += low[:, None]
+        points, found = np.column_stack([low + 0.99, np.zeros(n), np.zeros(n)]), np.empty(n)
+        crossings(corners, low, 1.0, points, 1.0, found)
+        assert (found == 1.0).all()
