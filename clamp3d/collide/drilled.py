@@ -21,8 +21,8 @@ _SAME = 1e-12
 """Relative to the size: lengths and directions that differ by less are one."""
 _TOLERANCE = 1e-9
 """Width of a depth that is asked for, relative to the size."""
-_STRETCHES = 5000
-"""Stretches of translations along a hole that are looked at before a wider bound is told."""
+_STRETCHES, _WAITING = 5000, 1000
+"""Stretches of translations along a hole that are looked at before a wider bound is told, and that may wait."""
 
 
 def is_drilled(a: ClosedForm, b: ClosedForm) -> bool:
@@ -109,24 +109,7 @@ def _into_hole(bore: Bore, rod: Rod, T: Array, limit: float) -> tuple[float, Arr
     pin = np.array([*dot(R, local[:3, 3]), lean, d[2], rod.radius, 0.5 * rod.length])
     pin[3:5] /= np.hypot(pin[3], pin[4])
     size = float(np.abs(pin).sum()) + bore.radius + bore.length
-    E, f, x, w, order, y = np.empty((4, CUTS)), np.empty(4), *np.empty((4, CUTS))
-    out = np.empty(5)
-    hole(
-        pin,
-        bore.radius,
-        0.5 * bore.length,
-        limit,
-        _TOLERANCE * size,
-        _STRETCHES,
-        np.empty((1000, 5)),
-        E,
-        f,
-        x,
-        w,
-        order,
-        y,
-        np.empty((4, CUTS + 1)),
-        np.empty(4),
-        out,
-    )
+    heap, rows, out = np.empty((_WAITING, 5)), np.empty((4, CUTS)), np.empty(5)
+    work = (rows, np.empty(4), *np.empty((4, CUTS)), np.empty((4, CUTS + 1)), np.empty(4))
+    hole(pin, bore.radius, 0.5 * bore.length, limit, _TOLERANCE * size, _STRETCHES, heap, *work, out)
     return float(out[0]), dot(dot(bore.T[:3, :3], R.T), out[2:])

@@ -494,3 +494,19 @@ def test_bad_options_are_one_line(arguments, message, tmp_path):
     assert message in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_lengths_of_many_marks_wait_until_one_is_picked():
+    def hidden(n):
+        scene = Scene().add("plate", shapes.box((40.0 * n, 10.0, 2.0)))
+        for k in range(n):
+            scene = scene.add(
+                f"pin_{k}", shapes.box((1.0, 1.0, 2.0)), translation(20.0 * k - 20.0 * n + 20.0, 0.0, 1.5)
+            )
+        viewer = Recorder(check(scene))
+        viewer.finish(check(scene))
+        return [c for c in viewer.commands if c["path"].endswith("/value") and c.get("property") == "visible"]
+
+    assert hidden(3) == []
+    assert len(hidden(13)) == 13
+    assert not any(command["value"] for command in hidden(13))
