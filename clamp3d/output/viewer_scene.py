@@ -129,11 +129,14 @@ class SceneDrawing:
         from meshcat.commands import SetAnimation
 
         self.frame()
-        self.go(0)  # so that it does not matter whether a page reads this or the animation first
+        self.go(0)
         followers = {name: self.paths(name) for name in self._meshes}
         groups = [f"{ROOT}/{marks}" for marks in _MARKS]
         if len(self.timeline.stops) > 1:
-            self._send(SetAnimation(self.timeline.animation(followers, groups)).lower())
+            # A meshcat server tells a page that comes later node by node: at the root the animation would be the first,
+            # and the transforms after it would take the parts back to the start of what already plays.
+            command = SetAnimation(self.timeline.animation(followers, groups)).lower()
+            self._send(command | {"path": f"{ROOT}/animation"})
 
     def frame(self) -> dict[str, Any]:
         """Put the camera in front of all stops; what it is aimed at."""
