@@ -31,8 +31,8 @@ class PoseVerdicts:
     """One part at n poses against the k ``others`` that it may meet.
 
     ``row``, ``column`` (m,): the poses and others that come near; ``least``, ``most`` (m,) bound their signed distances
-    in mm, no more closely than the verdict needs; ``kind`` (m,) holds the verdicts' names. All else is clear, more than
-    ``reach`` mm apart.
+    in mm, no more closely than the verdict needs, and no overlap from below; ``kind`` (m,) holds the verdicts' names.
+    All else is clear, more than ``reach`` mm apart.
     """
 
     part: str
@@ -52,7 +52,7 @@ class PoseVerdicts:
 
     @cached_property
     def lower(self) -> Array:
-        """Lower bounds (n, k) of the signed distances, mm."""
+        """Lower bounds (n, k) of the signed distances, mm; minus infinity where parts may overlap."""
         return self._whole(self.reach, self.least)
 
     @cached_property
@@ -180,6 +180,7 @@ def check_poses(
                 raise
             except Exception:  # one pose that fails is a finding, not the end of all others
                 kind[m], most[m] = Verdict.FAILED.value, np.inf
+    least[least < 0.0] = -np.inf  # how deep a point lies in the other bounds verdicts, not the way out
     names = tuple(scene.parts[j].name for j in rest)
     return PoseVerdicts(part, names, len(T), reach, row, column, least, most, kind)
 

@@ -20,6 +20,7 @@ from clamp3d.clamp.parts import parts
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check import check, check_full
+from clamp3d.collide.distance import distance
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.poses import check_poses
 from clamp3d.collide.scene import Scene
@@ -226,6 +227,21 @@ def test_pose_sweep_equals_single_checks():
     assert set(sweep.verdict.ravel()) >= {"clash", "clear", "clearance"}
     with pytest.raises(InputError, match=r"poses\[1\] must be rigid"):
         check_poses(scene, "wire", np.array([np.eye(4), np.diag([1, 1, -1.0, 1])]))
+
+
+def test_bounds_of_poses_hold_for_the_way_out_too():
+    """Thicker than its groove or hole, a wire is nowhere as deep inside as its way out is long."""
+    plate = shapes.box((60.0, 50.0, 8.0), holes=[shapes.Hole(5.0)])
+    block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 30.0)
+    poses = np.array([translation(0.0, y, 0.0) for y in (0.0, -0.5, 1.0)])
+    for body, radius in ((plate, 5.5), (block, 8.0)):
+        wire = shapes.cylinder(radius, 60.0)
+        sweep = check_poses(Scene().add("body", body).add("wire", wire), "wire", poses)
+        assert set(sweep.worst) == {"clash"}
+        for low, high, T in zip(sweep.lower[:, 0], sweep.upper[:, 0], poses, strict=True):
+            found = distance(body, wire, T)
+            assert low <= found.upper
+            assert found.lower <= high
 
 
 def test_poses_inside_are_contained_as_a_check_says():
