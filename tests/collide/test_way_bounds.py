@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
 from clamp3d import first_contact, min_clearance, shapes
+from clamp3d.collide.distance import distance
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.moving_pair import MovingPair
 from clamp3d.collide.swept import swept_lower
@@ -98,6 +99,20 @@ def test_what_swings_past_strays_from_straight_lines(arm, size, angle, pin, mesh
         P = pose_at(way, t, start)
         reach = size if pin else 0.5 * size * np.abs(P[1, :3]).sum()
         assert low <= T_wall[1, 3] - 1.0 - (P[1, 3] + reach) + (0.3 if mesh and pin else 0.0) + 1e-9
+
+
+@pytest.mark.parametrize("seed", [177, 414, 431, 527, 485])
+def test_turns_that_are_carried_across_their_axis(seed):
+    """Travel can cancel the turn: the places are close to each other, and the bow between them is deep all the same."""
+    rng, block = np.random.default_rng(seed), shapes.box((6.0, 4.0, 2.0))
+    half, aside, axis = rng.uniform(0.1, 0.7), rng.normal(size=3), rng.normal(size=3)
+    T = rotation(rng.normal(size=3), 1.0)
+    T[:3, 3] = aside / np.linalg.norm(aside) * rng.uniform(7.0, 10.0)
+    point, travel = T[:3, 3] + 8.0 * rng.normal(size=3), 12.0 * rng.normal(size=3)
+    way = Motion(axis / np.linalg.norm(axis), point, 2.0 * half, travel)
+    least = min(distance(block, block, way.at(t, T)).upper for t in np.linspace(0.0, 1.0, 17))
+    pair = MovingPair(CACHE.model(block), CACHE.model(block), way, T, np.eye(4))
+    assert pair.lower(0.5, 0.5, distance(block, block, way.at(0.5, T)).lower, math.inf) <= least
 
 
 @settings(SLOW, max_examples=8)
