@@ -7,10 +7,10 @@ import platform
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 
 import clamp3d
+from clamp3d.output.manifest import versions
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,24 +33,14 @@ class Machine:
 
 
 def machine(libraries: Iterable[str]) -> Machine:
-    """This machine, and those of ``libraries`` that are installed on it.
-
-    >>> list(machine(["numpy", "no-such-library"]).versions)
-    ['numpy']
-    """
-    versions = {}
-    for name in libraries:
-        try:
-            versions[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
+    """This machine, and those of ``libraries`` that are installed on it."""
     return Machine(
         f"{platform.system()} {platform.machine()}",
         _processor(),
         os.cpu_count() or 1,
         platform.python_version(),
         clamp3d.__version__,
-        versions,
+        versions(libraries),
     )
 
 

@@ -117,7 +117,8 @@ def _single(file: Path, kind: str, unit: str | None) -> Reading:
     mesh = make_mesh(vertices, faces, name=file.name, scale=UNITS_MM[unit or "mm"], float32=True)
     if unit is None:
         size = float(np.ptp(mesh.vertices, axis=0).max())
-        note = f"{kind[1:].upper()} carries no unit: taken as mm (largest extent {size:.6g} mm)"
+        doubt = f"; if they are metres, unit m makes that {1e3 * size:.6g} mm" if size < 1.0 else ""
+        note = f"{kind[1:].upper()} carries no unit: taken as mm (largest extent {size:.6g} mm{doubt})"
         mesh = replace(mesh, notes=(note, *mesh.notes))
     return Reading((Body(file.stem, MeshShape(mesh, "off", file.name), np.eye(4)),), notes=mesh.notes)
 

@@ -71,6 +71,8 @@ class _Minima:
     """
 
     def __init__(self, section: Section, i: int, tilts: Array) -> None:
+        from clamp3d.clamp.kernel_landscape import downhill  # compiled on first use
+
         wire, bolt = WIRES[i], section.bolt_x
         up, down = section.pairs["P1", wire], section.pairs["P2", wire]
         r, (low, high) = up.cylinder.radius, section.reach(wire)
@@ -86,10 +88,8 @@ class _Minima:
             c, s = math.cos(tilt), math.sin(tilt)
             self.under[k] = np.interp(self.x, np.maximum.accumulate(bolt + u * c + v * s), v * c - u * s)
         least = np.round((self.over - self.under) / (_LEVEL * r)) * (_LEVEL * r)
-        after_left, after_right = _beyond(least[:, ::-1])[:, ::-1], _beyond(least)
-        level = np.pad(least[:, 1:] == least[:, :-1], ((0, 0), (1, 0)))
-        to_right = (after_right < least) & (after_right <= after_left)
-        step = np.where(to_right, 1, np.where((after_left < least) | level, -1, 0))
+        step = np.empty(least.shape, dtype=np.int64)
+        downhill(least, np.empty(_POSITIONS), step)
         row, self.position = np.nonzero(step == 0)
         key = row * _POSITIONS + self.position
         self.least = least[row, self.position]
@@ -105,14 +105,6 @@ class _Minima:
     def at(self, k: int) -> list[int]:
         """The minima at tilt k, but for that in which the wire leaves the clamp."""
         return [m for m in range(self._first[k], self._first[k + 1]) if self.position[m] != self._outside]
-
-
-def _beyond(least: Array) -> Array:
-    """The next other value to the right of each (k, n), infinite where there is none: a slight slope is a stair."""
-    n = least.shape[1]
-    last = np.where(least[:, 1:] != least[:, :-1], np.arange(n - 1), n - 1)
-    last = np.minimum.accumulate(np.pad(last, ((0, 0), (0, 1)), constant_values=n - 1)[:, ::-1], axis=1)[:, ::-1]
-    return np.take_along_axis(np.pad(least, ((0, 0), (0, 1)), constant_values=np.inf), last + 1, axis=1)
 
 
 def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: float) -> Array:

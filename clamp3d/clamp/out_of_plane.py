@@ -29,6 +29,7 @@ from clamp3d.clamp.dimensions import TITLES, PartName
 from clamp3d.clamp.final_state import TOLERANCE, FinalState
 from clamp3d.clamp.matrix import Pair, plain
 from clamp3d.clamp.section import EDGE, SPLINTS, WIRES, B, Section, V
+from clamp3d.core.linear import dot
 from clamp3d.core.pieces import groove_pieces
 from clamp3d.core.pose import Array, unit
 
@@ -115,7 +116,7 @@ def _kept(rates: Array, moves: NDArray[np.bool_]) -> Array:
     rows = np.eye(len(moves))[moves]
     if len(rates):
         _, sizes, rows_of = np.linalg.svd(rates[:, moves])
-        rows = rows_of[int((sizes > 1e-9).sum()) :] @ rows
+        rows = dot(rows_of[int((sizes > 1e-9).sum()) :], rows)
     return np.asarray(rows)
 
 
@@ -132,8 +133,8 @@ def _least(section: Section, final: FinalState, strong: list[int], slopes: Array
         error = max(error, off)
     sizes, axes = np.linalg.eigh(second)
     error *= 2.0 * n
-    motions = tuple(_words(axes[:, k] @ slopes) for k in np.flatnonzero(sizes <= error))
-    least = tuple((axes[:, 0] @ slopes).tolist())
+    motions = tuple(_words(dot(axes[:, k], slopes)) for k in np.flatnonzero(sizes <= error))
+    least = tuple(dot(axes[:, 0], slopes).tolist())
     return OutOfPlane(None if motions else True, float(sizes[0]), error, least, motions)
 
 
@@ -183,10 +184,10 @@ def _in_groove(section: Section, q: Array, splint: PartName, wire: PartName, slo
         axis, down, turn = section.bolt_x + float(q[B]), section.down_splint(q), float(slope[4])
         place[0, 0] -= axis
         long = math.hypot(1.0, turn)
-        place[:, :2] = place[:, :2] @ np.array([[1.0, turn], [-turn, 1.0]]) / long
+        place[:, :2] = dot(place[:, :2], np.array([[1.0, turn], [-turn, 1.0]])) / long
         place[0] += axis - down.x, 0.0, -down.y
         c, s = math.cos(down.angle), math.sin(down.angle)
-        place[:, ::2] = place[:, ::2] @ np.array([[c, s], [-s, c]])
+        place[:, ::2] = dot(place[:, ::2], np.array([[c, s], [-s, c]]))
     place[0, ::2] -= pair.T_a_groove[0, 3], -pair.T_a_groove[2, 3]
     T = np.eye(4)
     z = unit(place[1, [0, 2, 1]] * (1.0, mouth, mouth))

@@ -116,6 +116,24 @@ class Ways:
                 for then, more in self._outward(pairs, place, corner):
                     if dot(_out(then), _out(origin)) == 0.0 and self._free(todo, place, corner, then, more):
                         return ((origin, part * free), (then, more + SPARE))
+        return self._slide(pairs, place)
+
+    def _slide(self, pairs: Sequence[Pair], place: Poses) -> tuple[Leg, ...]:
+        """The first free way out along the wires, past all that is no wire, and then across them; empty if none is.
+
+        Where a part leaves a wire nothing else is beside it, and the wire is as it is at the place: it has no end.
+        """
+        wires, here = [pair for pair in pairs if pair[1] in WIRES], np.zeros(3)
+        others = [pair for pair in pairs if pair not in wires]
+        if not wires or any(a in WIRES for a, _ in pairs):
+            return ()
+        for then, more in self._outward(wires, place, here):
+            if DIRECTIONS[then][1] or not self._free(wires, place, here, then, more):
+                continue
+            for origin, length in self._outward(others, place, here):
+                if DIRECTIONS[origin][1] and self._free(others, place, here, origin, length):
+                    return ((origin, length + SPARE), (then, more + SPARE))
+            break
         return ()
 
     def blocks(self, pairs: Sequence[Pair], place: Poses) -> tuple[Block, ...]:

@@ -75,7 +75,7 @@ def command(
         )
     show(table(result))
     if json_file is not None:
-        write_json(json_file, _clean(result.to_dict()))
+        write_json(json_file, result.to_dict())
     if markdown_file is not None:
         extra = "".join(f' --family "{f}"' for f in families) + "".join(f' --method "{m}"' for m in methods)
         write_text(markdown_file, markdown(result, f"clamp3d stress --n {n} --seed {seed} --check {check}{extra}"))
@@ -85,12 +85,3 @@ def command(
         plot(result, plot_file)
     own = [o for o in result.outcomes if o.method == "cas"]
     finish(finding=any(o.wrong or o.beyond_bound for o in own))
-
-
-def _clean(value: object) -> object:
-    """NaN is no JSON: null in its place."""
-    if isinstance(value, dict):
-        return {k: _clean(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_clean(v) for v in value]
-    return None if isinstance(value, float) and value != value else value

@@ -21,8 +21,8 @@ _SAME = 1e-12
 """Relative to the size: lengths and directions that differ by less are one."""
 _TOLERANCE = 1e-9
 """Width of a depth that is asked for, relative to the size."""
-_STRETCHES = 5000
-"""Stretches of translations along a hole that are looked at before a wider bound is told."""
+_STRETCHES, _WAITING = 5000, 1000
+"""Stretches of translations along a hole that are looked at before a wider bound is told, and that may wait."""
 
 
 def is_drilled(a: ClosedForm, b: ClosedForm) -> bool:
@@ -50,7 +50,6 @@ def _is_plate(form: ClosedForm) -> bool:
     if thick.sum() != 1 or np.where(thick, across, np.abs(along)).max() > _SAME * size:
         return False
     half = float(np.abs(along[thick][0]))
-    middles = []
     for bore in form.bores:
         off = bore.T[:3, 3] - outer.sum.centre
         level = abs(float(dot(off, z))) + abs(0.5 * bore.length - half) <= _SAME * size
@@ -63,8 +62,9 @@ def _is_plate(form: ClosedForm) -> bool:
             inside = outer.radius - norm(np.cross(off, z))
         if not bore.radius < inside - _SAME * size:
             return False
-        middles.append((bore.T[:3, 3], bore.radius))
-    return all(norm(p - q) > r + s + _SAME * size for k, (p, r) in enumerate(middles) for q, s in middles[:k])
+    P, r = np.array([bore.T[:3, 3] for bore in form.bores]), np.array([bore.radius for bore in form.bores])
+    clear = np.sqrt(((P[:, None] - P) ** 2).sum(axis=2)) - r - r[:, None]
+    return bool((clear > _SAME * size)[~np.eye(len(P), dtype=bool)].all())
 
 
 def drilled_depth(a: ClosedForm, b: ClosedForm, T: Array) -> Distance | None:
@@ -109,24 +109,7 @@ def _into_hole(bore: Bore, rod: Rod, T: Array, limit: float) -> tuple[float, Arr
     pin = np.array([*dot(R, local[:3, 3]), lean, d[2], rod.radius, 0.5 * rod.length])
     pin[3:5] /= np.hypot(pin[3], pin[4])
     size = float(np.abs(pin).sum()) + bore.radius + bore.length
-    E, f, x, w, order, y = np.empty((4, CUTS)), np.empty(4), *np.empty((4, CUTS))
-    out = np.empty(5)
-    hole(
-        pin,
-        bore.radius,
-        0.5 * bore.length,
-        limit,
-        _TOLERANCE * size,
-        _STRETCHES,
-        np.empty((1000, 5)),
-        E,
-        f,
-        x,
-        w,
-        order,
-        y,
-        np.empty((4, CUTS + 1)),
-        np.empty(4),
-        out,
-    )
+    heap, rows, out = np.empty((_WAITING, 5)), np.empty((4, CUTS)), np.empty(5)
+    work = (rows, np.empty(4), *np.empty((4, CUTS)), np.empty((4, CUTS + 1)), np.empty(4))
+    hole(pin, bore.radius, 0.5 * bore.length, limit, _TOLERANCE * size, _STRETCHES, heap, *work, out)
     return float(out[0]), dot(dot(bore.T[:3, :3], R.T), out[2:])

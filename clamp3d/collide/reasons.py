@@ -16,7 +16,7 @@ def failure(error: Exception) -> str:
 
 def undecided(models: dict[str, Model], found: Distance, thresholds: Thresholds, allowance: float | None) -> str:
     """Why the distance of two parts, by name, gives no verdict, and what would decide it, in one line."""
-    marks = " and ".join(thresholds.between(found, allowance)) or "no one verdict"
+    marks = " and ".join(thresholds.between(found, allowance))
     advice = []
     for name, model in models.items():
         shape = model.shape
@@ -30,4 +30,4 @@ def undecided(models: dict[str, Model], found: Distance, thresholds: Thresholds,
         elif model.refines:
             advice.append(f"meshes of {name} finer than {FINEST:g} mm")
     would = f"; what would decide: {' or '.join(advice)}" if advice else ""
-    return f"{marks} lies between the bounds{would}"
+    return (f"between the bounds: {marks}" if marks else "the bounds allow several verdicts") + would

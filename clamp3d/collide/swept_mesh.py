@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.collide.surface import fcl_tree
-from clamp3d.core.linear import dot
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 
 _MOST = 3000
-"""Swept triangles that are measured at once; of more a shorter stretch is asked instead."""
+"""Swept triangles whose hulls are measured at once."""
 _PRISM = np.array(
     [(0, 1, 2), (3, 4, 5), (0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (2, 0, 3), (2, 3, 5)], dtype=np.int64
 )
@@ -71,23 +71,29 @@ def swept_gap(
     """
     import fcl
 
-    there = [dot(triangles, T[:3, :3].T) + T[:3, 3] for T in (motion.at(t) for t in stretch)]
-    hulls = np.concatenate(there, axis=1)
-    errors = errors.copy()
-    if motion.angle:  # along arcs the acceleration is at most that of the corner furthest from the axis
-        out = motion.from_axis(triangles).max(axis=1)
-        errors += 0.125 * (motion.angle * (stretch[1] - stretch[0])) ** 2 * out
-    reach = (errors + most)[:, None]
+    span = stretch[1] - stretch[0]
+    out = motion.from_axis(triangles).max(axis=1) if motion.angle else np.zeros(len(triangles))
+
+    def at(t: float) -> Array:
+        T = motion.at(t)
+        return np.asarray(dot(triangles, T[:3, :3].T) + T[:3, 3])
+
+    hulls = np.concatenate([at(t) for t in stretch], axis=1)
+    # Along arcs the acceleration is at most that of the corner furthest from the axis.
+    off_chord = errors + 0.125 * (motion.angle * span) ** 2 * out
+    reach = (off_chord + most)[:, None]
     low, high = hulls.min(axis=1), hulls.max(axis=1)
     rows, other = standing.near(low - reach, high + reach)
     if not len(rows):
         return most
-    low, high = low[rows] - reach[rows], high[rows] + reach[rows]
     # A shell that no triangle of a hull's surface meets may still be inside the hull.
-    held = (low[:, None] <= standing.shells[:, 0]) & (standing.shells[:, 1] <= high[:, None])
-    if len(rows) > _MOST or held.all(axis=2).any():
+    held = (low[rows, None] <= standing.shells[:, 0]) & (standing.shells[:, 1] <= high[rows, None])
+    if held.all(axis=2).any():
         return -np.inf
-    shape, gap = _ALL if motion.angle else _PRISM, most
+    shape, gap, errors = _ALL if motion.angle else _PRISM, most, off_chord
+    if len(rows) > _MOST:  # where they are at the middle, and as far as they travel from there
+        errors = off_chord + 0.5 * span * (norm(motion.travel) + abs(motion.angle) * out)
+        shape, hulls = _ONE, at(0.5 * (stretch[0] + stretch[1]))
     still = [(_tree(standing.triangles[other[k]], _ONE), error) for k, error in _levels(standing.errors[other])]
     for k, error in _levels(errors[rows]):
         moving = _tree(hulls[rows[k]], shape)

@@ -118,11 +118,11 @@ class Thresholds:
 
     def between(self, distance: Distance, allowance: float | None = None) -> list[str]:
         """The thresholds that lie between the bounds of a distance, in words: why its verdict is uncertain."""
-        marks = [(self.contact, f"contact up to {self.contact:g} mm")]
+        marks = [(self.contact, f"a gap of {self.contact:g} mm (contact)")]
         if self.clearance > 0.0:
-            marks.append((self.clearance, f"the clearance of {self.clearance:g} mm"))
+            marks.append((self.clearance, f"a gap of {self.clearance:g} mm (clearance)"))
         depth = self.contact if allowance is None else max(allowance, self.contact)
-        marks.append((-depth, f"{'contact' if allowance is None else 'allowed overlap'} up to {depth:g} mm deep"))
+        marks.append((-depth, f"an overlap of {depth:g} mm ({'contact' if allowance is None else 'allowed'})"))
         return [words for mark, words in marks if distance.lower <= mark <= distance.upper]
 
     def margin(self, distance: float) -> float:

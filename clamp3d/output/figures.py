@@ -65,11 +65,11 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
 def svg(figure: Figure) -> bytes:
     """The figure as an SVG file."""
     out = io.BytesIO()
-    _draw(figure, out, "svg", 150)
+    _draw(figure, out, "svg", "figure")
     return out.getvalue()
 
 
-def _draw(figure: Figure, file: Any, format: str, dpi: int) -> None:
+def _draw(figure: Figure, file: Any, format: str, dpi: Any) -> None:
     """Save a figure without the time, and with the same names in it each time."""
     import matplotlib as mpl
 

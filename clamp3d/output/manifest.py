@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from importlib import metadata
 from itertools import zip_longest
 from typing import Any
@@ -46,7 +47,7 @@ def manifest(
         },
         "parts": {item.name: _part(item, shown, settings) for item, shown in zip_longest(placed, meshed)},
         **({} if clamp is None else {"parameters": dataclasses.asdict(clamp)}),
-        "libraries": {name: _version(name) for name in libraries},
+        "libraries": versions(libraries),
     }
     return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode("utf-8", "backslashreplace")
 
@@ -86,8 +87,14 @@ def _part(item: PlacedPart, meshed: PosedMesh | None, settings: Mapping[str, Any
     return entry
 
 
-def _version(library: str) -> str:
-    try:
-        return metadata.version(library)
-    except metadata.PackageNotFoundError:
-        return "unknown"
+def versions(libraries: Iterable[str]) -> dict[str, str]:
+    """Versions of those of ``libraries`` that are installed.
+
+    >>> list(versions(["numpy", "no-such-library"]))
+    ['numpy']
+    """
+    found = {}
+    for name in libraries:
+        with suppress(metadata.PackageNotFoundError):
+            found[name] = metadata.version(name)
+    return found

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import csv
-import importlib.metadata
 import io
 import json
 import math
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from clamp3d import __version__
 from clamp3d.collide.verdict import Verdict
 from clamp3d.output.files import write_files
+from clamp3d.output.manifest import versions
 from clamp3d.output.pages import now, render
 from clamp3d.output.palette import VERDICT_COLOURS, part_colours
 from clamp3d.output.report import MEASURED_PAIRS, SEVERITIES, PairRow, Report
@@ -73,7 +73,7 @@ def report_to_dict(report: Report) -> dict[str, Any]:
         ]
     return data | {
         "made": f"{now():%Y-%m-%d %H:%M} UTC",
-        "versions": versions(),
+        "versions": _versions(),
         "settings": report.settings,
         "headline": report.headline,
         "passed": report.passed,
@@ -126,7 +126,7 @@ def report_html(report: Report, *, progress: Callable[[str], None] = lambda what
         scene=report.scene,
         assembly=report.assembly,
         made=f"{now():%Y-%m-%d %H:%M} UTC",
-        versions=versions(),
+        versions=_versions(),
         gap=_gap,
         bound=lambda value: f"{value:.1e}" if math.isfinite(value) else "not known",
         vector=lambda v: "" if v is None else ", ".join(f"{x:z.3f}" if abs(x) >= 5e-4 else "0" for x in v),
@@ -143,10 +143,9 @@ def report_html(report: Report, *, progress: Callable[[str], None] = lambda what
     )
 
 
-def versions() -> dict[str, str]:
+def _versions() -> dict[str, str]:
     """Versions of what computed the report."""
-    own = {"clamp3d": __version__, "Python": platform.python_version()}
-    return own | {name: importlib.metadata.version(name) for name in LIBRARIES}
+    return {"clamp3d": __version__, "Python": platform.python_version(), **versions(LIBRARIES)}
 
 
 def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list[tuple[str, PairRow | None]]]:

@@ -25,6 +25,7 @@ from clamp3d.collide.model import ModelCache
 from clamp3d.collide.result import CheckResult
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array
+from clamp3d.core.shapes import MeshShape
 from clamp3d.errors import InputError
 from clamp3d.output.files import write_text
 from clamp3d.output.palette import FORCE, VERDICT_COLOURS
@@ -236,6 +237,11 @@ class Viewer:
         scene, drawing, clamp = self._scene, self._drawing, self._clamp
         measured = "exactly" if self._model is None or self._model.name == "cas" else f"by {self._model.name}"
         accuracy = f"Drawn with facets within {self._mesh_error:g} mm; measured {measured}, not on the facets."
+        if any(isinstance(part.shape, MeshShape) for part in scene.parts):
+            accuracy = (
+                f"Files are drawn with their own facets, other parts within {self._mesh_error:g} mm of their faces."
+            )
+            accuracy += " How each distance was measured stands beside it."
         drawing.caption(accuracy)
         self._story = {
             "title": scene.name if clamp is None else clamp.title,

@@ -129,11 +129,14 @@ class SceneDrawing:
         from meshcat.commands import SetAnimation
 
         self.frame()
-        self.go(0)  # so that it does not matter whether a page reads this or the animation first
+        self.go(0)
         followers = {name: self.paths(name) for name in self._meshes}
         groups = [f"{ROOT}/{marks}" for marks in _MARKS]
         if len(self.timeline.stops) > 1:
-            self._send(SetAnimation(self.timeline.animation(followers, groups)).lower())
+            # A meshcat server tells a page that comes later node by node: at the root the animation would be the first,
+            # and the transforms after it would take the parts back to the start of what already plays.
+            command = SetAnimation(self.timeline.animation(followers, groups)).lower()
+            self._send(command | {"path": f"{ROOT}/animation"})
 
     def frame(self) -> dict[str, Any]:
         """Put the camera in front of all stops; what it is aimed at."""
@@ -248,7 +251,9 @@ class SceneDrawing:
         upright = abs(b[2] - a[2]) >= abs(b[0] - a[0])
         beside = middle + 0.08 * self.size * np.array([-1.0, 0.0, 0.0] if upright else [-1.0, 0.0, 0.7])
         self.put(f"{path}/line", draw.segments([a, b, middle, beside], darker(colour, 0.85), on_top=True))
-        self._label(f"{path}/value", text.removeprefix("gap "), beside, "#FFFFFF", 0.7)
+        self._label(
+            f"{path}/value", text if text.startswith("gap or") else text.removeprefix("gap "), beside, "#FFFFFF", 0.7
+        )
 
     def _label(self, path: str, text: str, at: ArrayLike, colour: str, size: float) -> None:
         self.put(path, draw.label(text, colour, at, size=0.01 * size / self._unit))

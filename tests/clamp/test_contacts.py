@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.contact import CONTACT, overlap
+from clamp3d.clamp.contact import CONTACT, overlap, surface_name
 from clamp3d.clamp.dimensions import Clamp, GrooveDimensions
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.matrix import PAIRS
@@ -286,3 +286,17 @@ def test_a_contact_model_measures_its_own_contacts(unit_deg: float) -> None:
     arcs = [c for c in assembly.contacts if c.declared == 3]
     assert all(abs(c.gap) <= 1e-9 and c.distance.method == "chords" for c in arcs)
     assert all(c.distance.lower <= c.gap <= c.distance.upper for c in arcs)
+
+
+@pytest.mark.parametrize(
+    ("part", "point", "name"),
+    [
+        ("P1", (10.0, 30.0, -10.0), "end face"),
+        ("P1", (0.0, 0.0, -10.0), "flat face"),
+        ("P1", (79.5, 0.0, -10.0), "hole"),
+        ("P6", (0.0, 0.0, 16.335), "round face"),
+        ("P5", (0.0, 14.0, 0.0), "flat face"),
+    ],
+)
+def test_surfaces_have_their_names(part, point, name) -> None:
+    assert surface_name(parts(load_clamp())[part], np.array(point)) == name

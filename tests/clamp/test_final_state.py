@@ -16,6 +16,7 @@ from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble
 from clamp3d.clamp.conductors import catalogue
 from clamp3d.clamp.final_state import TOLERANCE, _settle_loose, solve_final_state
 from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.parts import parts as clamp_parts
 from clamp3d.clamp.section import SIZE, Section
 from clamp3d.clamp.stepped import solve_stepped
 from clamp3d.errors import InputError, SolverError
@@ -229,3 +230,11 @@ def test_a_loose_wire_is_put_where_gravity_leaves_it(clamp, wire, down):
     q[y - 1] += 1e3  # no longer between the splints
     assert wire in section.escaped(q)
     assert np.array_equal(_settle_loose(section, q, wire), q)
+
+
+def test_a_mouth_is_between_the_ends_of_the_groove_that_is_drawn():
+    clamp = load_clamp()
+    section = Section(clamp, Cas())
+    arcs = sorted(clamp_parts(clamp)["P1"].bodies[0].profile.arcs, key=lambda arc: arc.centre[0])
+    for wire, arc in zip(("P6", "P7"), arcs, strict=True):
+        assert section.mouth(wire) == pytest.approx(sorted((arc.start[0], arc.end[0])), abs=1e-9)

@@ -148,7 +148,8 @@ def assert_as_volumes_say(part, others):
         ("P7", ("P1", "P3", "P4", "P6"), True),
         ("P4", ("P1", "P3", "P5", "P6"), True),
         ("P3", ("P1", "P5", "P7"), True),
-        ("P1", ("P5", "P7", "P6"), False),  # from below the line is in the way before the jumper
+        ("P1", ("P5", "P7", "P6"), True),  # comes to the wires beside the nut, and slides along them under it
+        ("P3", ("P1", "P4", "P6"), False),  # the bolt stands in its hole, its head below
     ],
 )
 def test_a_way_is_free_or_blocked_as_volumes_say(part, others, free):

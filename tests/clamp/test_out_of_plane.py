@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from clamp3d.bench.stress.assemblies.outlines import outline
+from outlines import outline
 from random_clamps import whole_clamp
 from scipy.optimize import minimize
 

@@ -15,6 +15,11 @@ def clamp3d(*arguments, **kwargs):
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **kwargs)
 
 
+def test_without_a_command_there_is_help():
+    done = clamp3d()
+    assert (done.returncode, done.stderr, done.stdout) == (0, "", clamp3d("--help").stdout)
+
+
 def test_help_lists_every_command_and_loads_no_numeric_library():
     done = clamp3d("--help")
     assert done.returncode == 0

@@ -100,8 +100,10 @@ class TestExitCodes:
             '[parts.pin]\nshape = "cylinder"\nradius = 4.99\nlength = 20\n'
         )
         done = clamp3d("check", scene, "--json", "-")
-        assert [row["verdict"] for row in json.loads(done.stdout)["pairs"]] == ["uncertain"]
-        assert done.returncode == 3
+        data = json.loads(done.stdout)
+        assert [row["verdict"] for row in data["pairs"]] == ["uncertain"]
+        assert (done.returncode, data["clean"]) == (3, False)
+        assert clamp3d("report", scene, "--output", tmp_path / "report", "-q").returncode == 3
 
     def test_a_fault_of_the_program_is_one_line_and_no_finding(self, monkeypatch, capsys):
         def fail(*args, **kwargs):

@@ -1,5 +1,6 @@
 """Bounds of distances: any pair, every level, meshes, fitted meshes and contact models, against the oracle."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 
 from clamp3d import baselines, distance, shapes
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.convex import Rod
+from clamp3d.collide.convex import Rod, hull
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.refine import from_boxes, refine
 from clamp3d.collide.verdict import Thresholds
@@ -173,3 +174,28 @@ def test_bounding_boxes_hold_the_shape(shape):
     for form in model.forms:
         deep = form.depth(x)
         assert (body(shape).field(x)[deep > 1e-9] <= 1e-9).all()
+
+
+def test_a_segment_crosses_a_box_exactly_if_some_of_its_points_are_inside():
+    box = hull(np.array(list(itertools.product((-2.0, 2.0), (-3.0, 3.0), (-4.0, 4.0)))))
+    rng = np.random.default_rng(2)
+    s = np.linspace(0.0, 1.0, 2001)[:, None]
+    counted = [0, 0]
+    for _ in range(300):
+        ends = rng.uniform(-6.0, 6.0, (2, 3))
+        deepest = (np.abs(ends[0] + s * (ends[1] - ends[0])) - (2.0, 3.0, 4.0)).max(axis=1).min()
+        if abs(deepest) > 0.01:
+            assert box.crossed_by(ends) == (deepest < 0.0)
+            counted[int(deepest < 0.0)] += 1
+    assert min(counted) > 50
+
+
+@pytest.mark.parametrize("error", [1.0, 0.2])
+def test_a_wall_thinner_than_its_facets_keeps_both_meshes_apart(error):
+    """The tangents of a groove that all but cuts its block in two cross the outline: the mesh within has two parts."""
+    groove = SweptArc(12.0, 1.2, 40.0)
+    shape = shapes.groove_block(groove, 30.0, 12.0 - 12.0 * math.cos(1.2) + 0.02)
+    inner, outer = (getattr(ModelCache().model(shape), side)(error) for side in ("inner", "outer"))
+    middles = inner.vertices[inner.faces].mean(axis=1)
+    assert body(shape).field(np.vstack([inner.vertices, middles])).max() <= 1e-9
+    assert body(shape).field(outer.vertices).min() >= -1e-9

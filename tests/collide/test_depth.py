@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.check import check
 from clamp3d.collide.convex import Rod, hull
 from clamp3d.collide.depth_convex import convex_depth
@@ -18,6 +19,7 @@ from clamp3d.collide.depth_cover import Union
 from clamp3d.collide.distance import distance
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
+from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core import shapes
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.pose import inverse, rotation, translation
@@ -239,3 +241,10 @@ def test_cubes_of_translations_are_open_where_no_set_holds_all_of_them():
     held = ((at - half >= low[:, None]) & (at + half <= high[:, None])).all(axis=2).any(axis=0)
     assert 10 < held.sum() < 490
     assert np.array_equal(Union(sets, 10.0).open_cubes(at, half), at[~held])
+
+
+def test_an_overlap_deeper_than_allowed_is_a_clash():
+    thresholds = Thresholds()
+    assert thresholds.verdict(Distance(-0.8, -0.7), allowance=0.5) is Verdict.CLASH
+    assert thresholds.verdict(Distance(-0.8, -0.4), allowance=0.5) is Verdict.UNCERTAIN
+    assert thresholds.verdict(Distance(-0.45, -0.4), allowance=0.5) is Verdict.ALLOWED

@@ -36,6 +36,7 @@ from clamp3d import Scene, check
 from clamp3d.brep.borders import spline_sags
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import KINDS
+from clamp3d.collide import faces_kernel, faces_math
 from clamp3d.collide.faces import FaceModel, faces_distance
 from clamp3d.collide.faces_kernel import _over_triangle
 from clamp3d.collide.faces_math import CYLINDER
@@ -338,3 +339,25 @@ def test_the_foot_on_a_cylinder_is_told_from_those_beside_its_triangle():
         assert over == (parts.min() >= 0.0)
         seen.add(over)
     assert seen == {True, False}
+
+
+def test_a_heap_gives_the_least_first():
+    """The bound of a search is that of its first cell: it must be the least of all."""
+    rng = np.random.default_rng(4)
+    for n in (1, 2, 7, 60):
+        key, heap = rng.integers(0, 30, n).astype(float), np.zeros(n, np.int64)
+        for k in range(n):
+            faces_kernel._push(heap, k, key, k)
+        for k in range(n // 2):  # and with new ones in between
+            assert key[heap[0]] == min(key[heap[: n - k]])
+            faces_kernel._pop(heap, n - k, key)
+        left = n - n // 2
+        taken = [key[faces_kernel._pop(heap, count, key)] for count in range(left, 0, -1)]
+        assert taken == sorted(taken)
+
+
+def test_balls_of_one_centre_and_size_are_one_however_they_are_turned():
+    F, G = (np.concatenate([[1.0, 2.0, 3.0], turn[:3, :3].T.ravel()]) for turn in (np.eye(3), rotation((1, 2, 3), 1.0)))
+    assert faces_math.difference(faces_math.SPHERE, 5.0, 0.0, F, 5.0, 0.0, G) == 0.0
+    assert faces_math.difference(faces_math.SPHERE, 5.0, 0.0, F, 4.5, 0.0, G) == 0.5
+    assert faces_math.difference(faces_math.TORUS, 5.0, 1.0, F, 5.0, 1.0, G) > 1.0

@@ -96,6 +96,9 @@ def test_one_part_alone_is_nothing_to_check(tmp_path):
 
 def test_an_uncertain_verdict_names_the_thresholds_between_its_bounds():
     limits = Thresholds(contact=0.01, clearance=0.5)
-    assert limits.between(Distance(0.2, 0.9)) == ["the clearance of 0.5 mm"]
-    assert limits.between(Distance(-0.03, 0.02)) == ["contact up to 0.01 mm", "contact up to 0.01 mm deep"]
-    assert limits.between(Distance(-0.03, 0.0), 0.02) == ["allowed overlap up to 0.02 mm deep"]
+    assert limits.between(Distance(0.2, 0.9)) == ["a gap of 0.5 mm (clearance)"]
+    assert limits.between(Distance(-0.03, 0.02)) == [
+        "a gap of 0.01 mm (contact)",
+        "an overlap of 0.01 mm (contact)",
+    ]
+    assert limits.between(Distance(-0.03, 0.0), 0.02) == ["an overlap of 0.02 mm (allowed)"]

@@ -7,16 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
+from clamp3d.collide import swept_mesh
 from clamp3d.collide.check import check
 from clamp3d.collide.model import ModelCache
+from clamp3d.collide.motions import first_contact
 from clamp3d.collide.scene import Scene
+from clamp3d.collide.swept_mesh import Standing, swept_gap
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
 from clamp3d.core.distance import signed_distances
+from clamp3d.core.mesh import make_mesh
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.shapes import MeshShape
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
@@ -169,3 +175,50 @@ def test_first_contact_is_never_late_where_a_part_slides_close_by():
     assert row.verdict is Verdict.CLASH
     assert row.contact_at == pytest.approx(0.115, abs=2e-4)
     assert row.contact_at <= 0.115
+
+
+def joined(*boxes):
+    """A mesh of boxes (low, high) that are united."""
+    made = trimesh.boolean.union([trimesh.creation.box(bounds=bounds) for bounds in boxes], engine="manifold")
+    return MeshShape(make_mesh(made.vertices, made.faces), "off")
+
+
+@pytest.mark.parametrize("gap", [0.02, 2e-3, 2e-4])
+@pytest.mark.parametrize("kind", ["slide", "sink", "turn", "screw"])
+def test_first_contact_of_meshes_does_not_depend_on_what_slides_close_by(kind, gap):
+    """A block just above a floor meets a bead on it, a bar that turns there a post: the times are known by hand."""
+    if kind in ("slide", "sink"):  # sinking it is as near as half the gap when it arrives
+        floor = joined(((-100, -30, -10), (100, 30, 0)), ((1.5, -10, -1), (3.5, 10, 1)))
+        part, start = joined(((-10, -10, 0), (10, 10, 20))), translation(-20.0, 0.0, gap)
+        way = Motion.translate((100.0, 0.0, -4.0 * gap if kind == "sink" else 0.0))
+        truth, length = 0.115, 100.0
+    else:
+        floor = joined(((-60, -60, -10), (60, 60, 0)), ((20, 20, -1), (30, 30, 5)))
+        part, start = joined(((-40, -2, 0), (40, 2, 3))), translation(0.0, 0.0, gap)
+        way = Motion.screw((0.0, 0.0, 1.0), 1.2, travel=-0.5 * gap if kind == "screw" else 0.0)
+        # The post's corner (30, 20) comes to lie on the bar's side, 2 mm from the axis.
+        truth, length = (math.atan2(20, 30) - math.asin(2 / math.hypot(20, 30))) / 1.2, 1.2 * math.hypot(20, 30)
+    # In frames that nothing is square to.
+    A = rotation((0.3, 0.5, 0.8), 0.7)
+    turned = replace(way, travel=A[:3, :3] @ way.travel, axis=A[:3, :3] @ way.axis)
+    V = floor.mesh.vertices @ A[:3, :3].T
+    floor = MeshShape(make_mesh(V, floor.mesh.faces), "off")
+    hit = first_contact(floor, part, turned, A @ start)
+    assert hit.touches
+    assert 0.0 <= (truth - hit.t) * length <= 2e-4
+    assert hit.evaluations < 1000
+
+
+def test_a_bead_that_a_face_passes_over_is_met(monkeypatch):
+    """No triangle of the swept hull's surface comes near it: it is inside."""
+    bead = trimesh.creation.box(bounds=[(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)])
+    inside = Standing(bead.triangles, np.zeros(12), bead.bounds[None])
+    face, way = np.array([[(-9.0, -9.0, 5.0), (9.0, -9.0, 5.0), (0.0, 9.0, 5.0)]]), Motion.translate((0.0, 0.0, -10.0))
+    assert swept_gap(inside, face, np.zeros(1), way, (0.0, 1.0), 1.0) == -np.inf
+    assert swept_gap(inside, face, np.zeros(1), way, (0.0, 0.4), 9.0) == pytest.approx(0.9, abs=1e-9)
+    assert swept_gap(inside, face, np.full(1, 0.2), way, (0.0, 0.4), 9.0) == pytest.approx(0.7, abs=1e-9)
+    # Too many for their hulls: 5 - 0.1 - 2 in the middle, less the 2 mm that it moves to either side.
+    monkeypatch.setattr(swept_mesh, "_MOST", 0)
+    assert swept_gap(inside, face, np.zeros(1), way, (0.0, 0.4), 9.0) == pytest.approx(0.9, abs=1e-9)
+    turn = Motion.screw((1.0, 0.0, 0.0), 0.1)
+    assert swept_gap(inside, face, np.zeros(1), turn, (0.0, 1.0), 9.0) <= 4.9

@@ -19,6 +19,7 @@ from clamp3d.collide.surface import Surface, at_edges
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
 from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.kernel_winding import crossings
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import rotation, translation
@@ -225,3 +226,14 @@ def test_large_convex_meshes_are_asked_as_meshes_and_their_depth_is_found():
     assert row.verdict is Verdict.CLASH
     assert -0.1 <= row.distance.lower <= row.distance.upper <= -0.07
     assert row.distance.upper - row.distance.lower <= 0.01
+
+
+def test_triangles_in_a_row_are_all_found():
+    """As wide as the widest, and asked at the far end: the first of those that count is just not passed over."""
+    for n in range(1, 40):
+        low = np.arange(n, dtype=float)
+        corners = np.tile([0.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0], (n, 1))
+        corners[:, ::3] += low[:, None]
+        points, found = np.column_stack([low + 0.99, np.zeros(n), np.zeros(n)]), np.empty(n)
+        crossings(corners, low, 1.0, points, 1.0, found)
+        assert (found == 1.0).all()

@@ -31,7 +31,7 @@ def run(code: str, folder: Path, **env: str) -> tuple[list[str], str]:
         text=True,
         check=True,
         cwd=folder,
-        timeout=120,
+        timeout=600,
     )
     return done.stdout.split(), done.stderr
 

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clamp3d.bench.stress.poses.flat_truth import flat_truth
+from clamp3d.core import kernel_edges
 from clamp3d.core.distance import Feature, signed_distance, signed_distances
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
@@ -204,3 +205,17 @@ def open_cascade_block(groove):
     box = BRepPrimAPI_MakeBox(gp_Pnt(-200.0, -200.0, -H), gp_Pnt(200.0, h, H)).Shape()
     tool = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(0, 0, -H - 1), gp_Dir(0, 0, 1)), groove.radius, 2 * H + 2).Shape()
     return BRepAlgoAPI_Cut(box, tool).Shape()
+
+
+def test_points_of_an_end_arc_that_are_as_near_are_all_found():
+    """A cylinder across the groove's middle, in front of its end: on both sides of the arc alike."""
+    found, work = np.empty((8, 1)), np.empty((200, 2))
+    wire = (1.0, 5.0, 0.0, -2.0, 27.0, 1.0, 0.0, 0.0)
+    count, left = kernel_edges.on_arc(25.0, 12.0, 1.2, *wire, math.inf, 1e-9, 1e-12, work, found)
+    angle = np.linspace(-1.2, 1.2, 200_001)
+    beside, beyond = np.hypot(12.0 * np.cos(angle) - 2.0, 2.0) - 1.0, np.abs(12.0 * np.sin(angle)) - 5.0
+    gap = np.hypot(np.maximum(beside, 0.0), np.maximum(beyond, 0.0))
+    least = np.abs(angle[gap <= gap.min() + 1e-8])
+    assert count == 2
+    assert np.allclose(sorted(found[:2, 0]), [-least.mean(), least.mean()], rtol=0, atol=1e-4)
+    assert left >= gap.min() - 1e-9

@@ -165,3 +165,16 @@ def test_a_wire_that_crosses_an_end_edge_at_level_distance_is_answered_quickly()
         assert least.distance.value == pytest.approx(gap, abs=1e-12)
         assert hit.touches == (gap < 0.0)
         assert least.evaluations + hit.evaluations < 5000
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("slope", [0.5, 1.0, 2.0])
+def test_a_diagonal_way_down_onto_a_flat_face(side, slope):
+    """Least at its end, in closed form: sideways and down, the two must not cancel in the bound."""
+    start = translation(side * 30.0, H + 30.0, 0.0)
+    way = Motion.translate((side * 15.0 / slope, -15.0, 0.0))
+    least = min_clearance(GROOVE, WIRE, way, start)
+    assert least.t == pytest.approx(1.0, abs=1e-12)
+    assert least.distance.value == pytest.approx(15.0 - 10.5, abs=1e-12)
+    low = Motion.translate((side * 25.0 / slope, -25.0, 0.0))
+    assert first_contact(GROOVE, WIRE, low, start).t == pytest.approx((30.0 - 10.5) / 25.0, abs=1e-12)

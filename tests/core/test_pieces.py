@@ -167,3 +167,18 @@ def test_gradients_are_the_differences_where_those_agree_from_both_sides():
                 through[int(sign * here.gradient[row, 2])] += 1
     assert compared > 3000
     assert min(through.values()) > 10
+
+
+def test_normals_of_all_pieces_are_the_way_out():
+    """Also of an end face that the axis goes through, whose way out is sideways."""
+    rng = np.random.default_rng(5)
+    through = 0
+    for _ in range(400):
+        T = rotation(rng.normal(size=3), float(rng.uniform(-1.0, 1.0)))
+        T[:3, 3] = rng.normal(size=3) * [12.0, 12.0, 20.0]
+        found = groove_pieces(SweptArc(12.0, 1.2, 50.0), Capsule(2.0, 80.0), T)
+        aside = np.flatnonzero((found.distance[3:] < -2.0) & (found.normal[3:, 2] == 0.0)) + 3
+        through += len(aside)
+        assert np.abs(np.linalg.norm(found.normal, axis=1) - 1.0).max() <= 1e-12
+        assert np.abs(found.normal - found.gradient[:, :3])[aside, :2].max(initial=0.0) <= 1e-9
+    assert through > 20

@@ -144,3 +144,11 @@ def test_batches_of_other_layers_measure_the_mended_poses():
 @given(hnp.arrays(float, 4, elements=st.floats(-1.0, 1.0)).filter(lambda q: np.abs(q).max() > 0.1))
 def test_turns_of_quaternions_are_scipys(q):
     np.testing.assert_allclose(turn_of(*q.tolist()), Rotation.from_quat(q).as_matrix(), atol=1e-15)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_pose_too_far_away_is_refused_along_each_axis(axis):
+    T = np.tile(np.eye(4), (2, 1, 1))
+    T[1, axis, 3] = 1e300
+    with pytest.raises(InputError, match="offset"):
+        signed_distances(GROOVE, WIRE, T)

@@ -1,5 +1,7 @@
 """The distance of boxes and cylinders in closed form, before truths that know only what the bodies are."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -7,7 +9,7 @@ from scipy.optimize import minimize
 from clamp3d.collide.convex import Rod, convex_distance, hull
 from clamp3d.collide.depth_convex import convex_depth
 from clamp3d.collide.distance import distance
-from clamp3d.core import shapes
+from clamp3d.core import kernel_zonoid, shapes
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Cylinder
 from clamp3d.testing import assert_distance
@@ -121,3 +123,26 @@ def test_points_where_a_search_one_segment_at_a_time_stalls(name):
     gap = d.point_b - d.point_a
     assert gap == pytest.approx(d.value * d.normal, abs=2e-9)
     assert_distance(d, a, b, np.array(T), tolerance=1e-8)
+
+
+def test_the_point_of_a_cell_is_a_point_of_the_sum():
+    """Each segment and disc adds a point of its own; of those that do not turn over in the cell, the furthest."""
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        S, U = rng.normal(size=(3, 3)), rng.normal(size=(2, 4))
+        U[:, :3] /= np.linalg.norm(U[:, :3], axis=1)[:, None]
+        U[:, 3] = rng.uniform(0.5, 2.0, 2)
+        n, c, X = rng.normal(size=3), rng.normal(size=3), np.empty((5, 3))
+        n /= np.linalg.norm(n)
+        rho = float(rng.choice([1e-3, 0.1, 0.6]))
+        height, aside = kernel_zonoid.support(*n, rho, 5, 0.0, c, S, U, X)
+        p = X.sum(axis=0) - c
+        assert height == pytest.approx(p @ n, abs=1e-12)
+        assert aside == pytest.approx(np.linalg.norm(p - (p @ n) * n), abs=1e-12)
+        along = S @ n
+        still = np.abs(along) > math.sin(rho) * np.linalg.norm(S, axis=1)
+        assert np.allclose(X[:3][still], np.sign(along[still])[:, None] * S[still], rtol=0, atol=1e-12)
+        assert np.linalg.norm(np.cross(X[:3], S), axis=1).max() <= 1e-12
+        assert (np.linalg.norm(X[:3], axis=1) <= np.linalg.norm(S, axis=1) + 1e-12).all()
+        assert np.abs((X[3:] * U[:, :3]).sum(axis=1)).max() <= 1e-12  # a disc is square to its axis
+        assert (np.linalg.norm(X[3:], axis=1) <= U[:, 3] + 1e-12).all()

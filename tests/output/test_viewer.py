@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from meshcat.servers.tree import SceneTree, find_node, walk
 
 import clamp3d
 from clamp3d.clamp.assemble import assemble
@@ -105,6 +106,21 @@ def animation_of(viewer):
 def keys_of(clip, name):
     track = next(t for t in clip["tracks"] if t["name"] == name)
     return {key["time"]: key["value"] for key in track["keys"]}
+
+
+def test_a_meshcat_server_tells_the_animation_after_all_poses(recorded):
+    """A page that comes later would else be taken back to the start by poses that reach it while it plays."""
+    viewer, _, _ = recorded
+    tree = SceneTree()
+    for command in viewer.commands:
+        node = find_node(tree, [name for name in command["path"].split("/") if name])
+        if command["type"] == "set_animation":
+            node.animation = command
+        elif command["type"] == "set_transform":
+            node.transform = command
+    told = [kind for node in walk(tree) for kind in ("transform", "animation") if getattr(node, kind) is not None]
+    assert told.count("animation") == 1
+    assert told[-1] == "animation"
 
 
 def test_animation_reaches_every_waypoint_in_turn(recorded):
@@ -478,3 +494,19 @@ def test_bad_options_are_one_line(arguments, message, tmp_path):
     assert message in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_lengths_of_many_marks_wait_until_one_is_picked():
+    def hidden(n):
+        scene = Scene().add("plate", shapes.box((40.0 * n, 10.0, 2.0)))
+        for k in range(n):
+            scene = scene.add(
+                f"pin_{k}", shapes.box((1.0, 1.0, 2.0)), translation(20.0 * k - 20.0 * n + 20.0, 0.0, 1.5)
+            )
+        viewer = Recorder(check(scene))
+        viewer.finish(check(scene))
+        return [c for c in viewer.commands if c["path"].endswith("/value") and c.get("property") == "visible"]
+
+    assert hidden(3) == []
+    assert len(hidden(13)) == 13
+    assert not any(command["value"] for command in hidden(13))

@@ -216,7 +216,7 @@ def test_parts_are_half_way_between_two_stops_at_half_time(page, run):
     a, b = (w.poses["P1"].T()[:3, 3] for w in run.path[:2])
     T = pose_in_browser(page, ["whole", "P1 up splint"])
     np.testing.assert_allclose(T[:3, 3], (a + b) / 2, atol=0.1)  # the slider goes in thousandths of a second
-    assert "on the way" in page.inner_text("#label")
+    assert "moving to" in page.inner_text("#label")
     assert not any(
         visible(page, "contacts", f"{i + 1} {w.label}") for i, w in enumerate(run.path)
     )  # they would be stale

@@ -51,6 +51,12 @@ def test_a_table_that_does_not_fit_is_refused(folder, tmp_path, rows, message):
         load(folder, poses=table(tmp_path / "poses.csv", *rows))
 
 
+def test_two_files_of_one_name_are_refused_by_name(folder):
+    (folder / "bolt.obj").write_text("")
+    with pytest.raises(InputError, match=r"bolt\.obj and bolt\.ply would both be part 'bolt'"):
+        load(folder)
+
+
 def test_other_columns_are_refused(folder, tmp_path):
     with pytest.raises(InputError, match="the first line must be name,x,y,z,qx,qy,qz,qw, got 'a,b'"):
         load(folder, poses=table(tmp_path / "poses.csv", head="a,b"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
@@ -66,6 +67,8 @@ class StressRun:
         out["methods"] = {o.method: METHODS[o.method] for o in self.outcomes}
         for row, outcome in zip(out["outcomes"], self.outcomes, strict=True):
             row["failure_rate"] = outcome.failure_rate
+            for example in row["examples"]:  # a number that is none is null in JSON
+                example |= {key: None for key in ("truth", "answer") if not math.isfinite(example[key])}
         return out
 
 

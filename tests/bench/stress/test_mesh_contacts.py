@@ -11,7 +11,7 @@ from clamp3d.bench.stress.run import FAMILIES
 from clamp3d.bench.stress.worker import run_here
 
 
-@pytest.mark.parametrize(("name", "n"), [(name, 2 if name == "mesh: late contact" else 25) for name in CONTACTS])
+@pytest.mark.parametrize(("name", "n"), [(name, 10 if name == "mesh: late contact" else 25) for name in CONTACTS])
 def test_the_engine_is_never_wrong_and_the_truth_is_found_again_by_manifold(name, n):
     family = FAMILIES[name]
     cases = family.cases(n, 11)

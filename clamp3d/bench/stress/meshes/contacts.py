@@ -31,8 +31,8 @@ from clamp3d.core.shapes import MeshShape
 _ROUNDING = 1e-9
 """Two numbers (mm) about bodies of up to 100 mm that agree to this are one."""
 _EARLY = 2e-4
-"""mm that bodies may be apart at the time that `first_contact` says, if its search has not run out of steps."""
-_OFF = 1e-3
+"""mm that bodies may be apart at the time that `first_contact` says."""
+_OFF = 1e-6
 """A body that slides is further than this (mm) from the floor."""
 _UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
@@ -168,7 +168,7 @@ def _concave(rng: np.random.Generator) -> Contact:
 
 @MAKERS.family("late contact", _all)
 def _late(rng: np.random.Generator) -> Contact:
-    """A bracket slides 2e-3 ... 0.1 mm above a floor and meets a wall on it late: the way until then."""
+    """A bracket slides 2e-6 ... 0.1 mm above a floor and meets a wall on it late: the way until then."""
     b, way = _bracket(rng), float(rng.uniform(5.0, 40.0))
     until = way * float(rng.uniform(0.02, 0.98))
     wall = float(b.bounds[1, 0]) + until
@@ -189,8 +189,7 @@ def _engine(case: Contact) -> Answer:
         return Answer(0.5 * (found.lower + found.upper), 0.5 * (found.upper - found.lower) + _ROUNDING)
     hit = first_contact(a, b, Motion.translate(case.way), case.T)
     length = float(np.linalg.norm(case.way))
-    early = _EARLY if hit.distance.upper <= _EARLY else (1.0 - hit.t) * length  # only that there is none before
-    return Answer(hit.t * length + 0.5 * early, 0.5 * early + _ROUNDING)
+    return Answer(hit.t * length + 0.5 * _EARLY, 0.5 * _EARLY + _ROUNDING)
 
 
 def _fcl_alone(case: Contact) -> Answer:
