@@ -50,7 +50,6 @@ def _is_plate(form: ClosedForm) -> bool:
     if thick.sum() != 1 or np.where(thick, across, np.abs(along)).max() > _SAME * size:
         return False
     half = float(np.abs(along[thick][0]))
-    middles = []
     for bore in form.bores:
         off = bore.T[:3, 3] - outer.sum.centre
         level = abs(float(dot(off, z))) + abs(0.5 * bore.length - half) <= _SAME * size
@@ -63,8 +62,9 @@ def _is_plate(form: ClosedForm) -> bool:
             inside = outer.radius - norm(np.cross(off, z))
         if not bore.radius < inside - _SAME * size:
             return False
-        middles.append((bore.T[:3, 3], bore.radius))
-    return all(norm(p - q) > r + s + _SAME * size for k, (p, r) in enumerate(middles) for q, s in middles[:k])
+    P, r = np.array([bore.T[:3, 3] for bore in form.bores]), np.array([bore.radius for bore in form.bores])
+    clear = np.sqrt(((P[:, None] - P) ** 2).sum(axis=2)) - r - r[:, None]
+    return bool((clear > _SAME * size)[~np.eye(len(P), dtype=bool)].all())
 
 
 def drilled_depth(a: ClosedForm, b: ClosedForm, T: Array) -> Distance | None:
