@@ -190,12 +190,22 @@ def test_a_segment_crosses_a_box_exactly_if_some_of_its_points_are_inside():
     assert min(counted) > 50
 
 
+def _narrow(concave):
+    """Two grooves, or two bumps, whose arcs all but meet: the tangents of each cross the other's."""
+    if concave:
+        return shapes.groove_block(SweptArc(12.0, 1.9, 40.0), 90.0, 30.0, others=[(24.02, 12.0, 1.9)])
+    foot = -12.0 * math.sin(0.6)
+    bumps = [Arc((x, 0.0), 12.0, -0.6, math.pi + 0.6) for x in (12.01, -12.01)]
+    outline = Profile.of((-40.0, foot), (-40.0, -20.0), (40.0, -20.0), (40.0, foot), *bumps)
+    return shapes.Solid("bumps", (Extrusion(outline, "Z", -20.0, 20.0),))
+
+
 @pytest.mark.parametrize("error", [1.0, 0.2])
-def test_a_wall_thinner_than_its_facets_keeps_both_meshes_apart(error):
-    """The tangents of a groove that all but cuts its block in two cross the outline: the mesh within has two parts."""
-    groove = SweptArc(12.0, 1.2, 40.0)
-    shape = shapes.groove_block(groove, 30.0, 12.0 - 12.0 * math.cos(1.2) + 0.02)
+@pytest.mark.parametrize("concave", [True, False])
+def test_a_wall_or_gap_thinner_than_its_facets_keeps_both_meshes_apart(concave, error):
+    shape = _narrow(concave)
     inner, outer = (getattr(ModelCache().model(shape), side)(error) for side in ("inner", "outer"))
     middles = inner.vertices[inner.faces].mean(axis=1)
     assert body(shape).field(np.vstack([inner.vertices, middles])).max() <= 1e-9
-    assert body(shape).field(outer.vertices).min() >= -1e-9
+    x = np.random.default_rng(4).uniform(*body(shape).box, (20_000, 3))
+    assert outer.contains(x[body(shape).field(x) < 0.0]).all()
