@@ -1,7 +1,7 @@
 """Foreign files read in a process of their own, with limits: ``python -m clamp3d.brep.apart FILE OUT NAME MEMORY``.
 
 A damaged STEP file can end the interpreter, and a small archive can unpack to gigabytes. The process is a copy of this
-one where that is safe, else started afresh, and gives its reading back as a file of plain arrays.
+one under the command line, else started afresh, and gives its reading back as a file of plain arrays.
 """
 
 from __future__ import annotations
@@ -50,6 +50,10 @@ def read_apart(path: Path) -> Reading:
     factor = _factor()
     seconds = factor * (_SECONDS + _PER_MEGABYTE * size / 1e6)
     memory = factor * (_MEMORY + _PER_BYTE * size)
+    import numpy.ma  # noqa: F401  both processes need these: once, before one is a copy of the other
+
+    import clamp3d.core.kernel_linear  # noqa: F401
+
     with tempfile.TemporaryDirectory(prefix="clamp3d-") as folder:
         out = Path(folder) / "bodies"
         arguments = (str(path.absolute()), str(out), str(path), str(int(memory)))
@@ -112,8 +116,7 @@ def main(source: str, target: str, name: str, memory: str) -> None:
     """Read ``source``; write its bodies to ``target``, or one line about ``name`` beside it."""
     end_with_caller()
     _limit(int(memory))
-    # It lives for one file: to look for garbage and to take down what the library has built takes a third of the time.
-    gc.set_threshold(100_000)
+    gc.disable()  # it lives for one file
     path = Path(source)
     module, function, _, _ = READERS[path.suffix.lower()]
     error: Exception

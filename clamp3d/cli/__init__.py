@@ -18,6 +18,7 @@ import click
 
 import clamp3d
 from clamp3d.cli.terminal import ExitCode, end_on_signals, show, tolerate_closed_pipes
+from clamp3d.core.child import own_process
 from clamp3d.errors import EXTRAS, Clamp3dError, SequenceError, SolverError, missing, one_line
 
 # Name -> (module, one line for the list of commands). A command's module is loaded when it is called.
@@ -89,6 +90,7 @@ def main() -> None:
     """Entry point: one line for every fault, never a traceback; CLAMP3D_DEBUG=1 shows it."""
     tolerate_closed_pipes()
     end_on_signals()
+    own_process()
     gc.set_threshold(100_000)  # a command is short, and what its libraries load is no garbage: 4 % of a run
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # none has a part in this: to look for them is 2 %
     try:

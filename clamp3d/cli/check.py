@@ -30,20 +30,19 @@ def command(
     built-in name or a TOML file), which is assembled first and measured in all its pairs. Exit code 1 if parts clash,
     else 4 if a pair failed, else 3 if one is undecided, and 2 if there are no two parts.
     """
-    from clamp3d.clamp.dimensions import Clamp
     from clamp3d.collide.check import check, check_full
+    from clamp3d.collide.scene import Scene
     from clamp3d.output.files import write_text
     from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
 
     asked = _pairs(pairs) if pairs is not None else None
     loaded = source.load()
-    is_clamp = isinstance(loaded, Clamp)
-    if isinstance(loaded, Clamp):
+    if isinstance(loaded, Scene):
+        scene, is_clamp = loaded, False
+    else:
         from clamp3d.clamp.assemble import assemble  # takes long to import, and most scenes need none of it
 
-        scene = assemble(loaded).scene
-    else:
-        scene = loaded
+        scene, is_clamp = assemble(loaded).scene, True
     if clearance is not None:
         scene = replace(scene, clearance=clearance)
     with bar(quiet) as report:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.brep.solid import BrepSolid
-from clamp3d.brep.surfaces import OTHER, Faces, height
+from clamp3d.brep.surfaces import OTHER, PLANE, Faces, height
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.linear import dot, to_target
 from clamp3d.core.pose import Array, inverse
 
-_MOST = 20_000
+MOST = 20_000
 """Pieces looked at before a direction ends with what is known."""
 _LEAST = 5e-4
 """So far (mm) may a face beside another reach above it: pieces that leave it in a tangent need not be cut for ever."""
@@ -153,25 +153,78 @@ class FaceModel:
         return np.zeros(2 * len(self.faces.kind), dtype=np.int8)
 
 
+def _flattened(model: FaceModel, low: Array, high: Array) -> FaceModel:
+    """The model with each triangle of its free-form faces that comes into a box a plane of its own.
+
+    Such a plane is as near to the face as the triangle, and says more than its distance where two faces touch.
+    """
+    f, solid = model.faces, model.solid
+    c, e = f.corners, f.error[:, None]
+    near = ((c.min(axis=1) - e <= high) & (c.max(axis=1) + e >= low)).all(axis=1)
+    rows = np.flatnonzero(near & (f.kind[f.face] == OTHER))
+    own = np.flatnonzero(f.kind[solid.face] == OTHER)
+    if not len(rows) or len(own) != np.count_nonzero(f.kind[f.face] == OTHER):
+        return model
+    x = c[rows, 1] - c[rows, 0]
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    z = np.cross(x, c[rows, 2] - c[rows, 0])
+    z /= np.linalg.norm(z, axis=1)[:, None]
+    frames = np.stack([c[rows, 0], x, np.cross(z, x), z], axis=1)
+    face, uv, sag, n = f.face.copy(), f.uv.copy(), f.sag.copy(), len(f.kind)
+    face[rows] = n + np.arange(len(rows))
+    away = c[rows] - c[rows, :1]
+    uv[rows] = np.stack([np.einsum("nij,nj->ni", away, frames[:, k]) for k in (1, 2)], axis=2)
+    sag[rows] = np.maximum(sag[rows], f.error[rows, None])
+    of_mesh = solid.face.copy()
+    of_mesh[own] = face[f.kind[f.face] == OTHER]
+    used, face = np.unique(face, return_inverse=True)  # of some faces nothing is left
+    order = np.argsort(face, kind="stable")
+    one = np.ones(len(rows))
+    columns = (
+        (f.kind, np.full(len(rows), PLANE)), (f.frame, frames), (f.size, np.zeros((len(rows), 2))),
+        (f.sense, one), (f.deviation, f.error[rows]),
+    )  # fmt: skip
+    of_faces = [np.concatenate(column)[used] for column in columns]
+    of_triangles = [np.ascontiguousarray(x[order]) for x in (f.error, c, uv, face, sag)]
+    return FaceModel(replace(solid, surfaces=Faces(*of_faces, *of_triangles), face=np.searchsorted(used, of_mesh)))
+
+
+def flat_where_near(a: FaceModel, b: FaceModel, T: Array, reach: float) -> tuple[FaceModel, FaceModel]:
+    """Both with facets for planes where they are free-form and ``reach`` mm from the other's box, b at ``T``."""
+    made = []
+    for model, other, place in ((a, b, T), (b, a, inverse(T))):
+        middle, half = other.bounds.mean(axis=0), 0.5 * (other.bounds[1] - other.bounds[0])
+        centre, size = to_target(place, middle), dot(abs(place[:3, :3]), half) + reach
+        made.append(_flattened(model, centre - size, centre + size))
+    return made[0], made[1]
+
+
 def faces_distance(
-    a: FaceModel, b: FaceModel, T: Array, *, contact: float, clearance: float = 0.0, tol: float | None = None
+    a: FaceModel,
+    b: FaceModel,
+    T: Array,
+    *,
+    contact: float,
+    clearance: float = 0.0,
+    tol: float | None = None,
+    most: int = MOST,
 ) -> Distance:
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame.
 
     Stops when the bounds are on the same side of ``contact`` and ``clearance`` mm, or no further apart than
-    ``tol``, where that is given.
+    ``tol``, where that is given, or after ``most`` pieces in one direction.
     """
     here = inverse(T)
     if len(a.faces.face) < len(b.faces.face):  # the pieces of the one with fewer first: they often decide
-        return faces_distance(b, a, here, contact=contact, clearance=clearance, tol=tol).moved(T).swapped()
-    first = _towards(a, b, T, contact, clearance, tol)
+        return faces_distance(b, a, here, contact=contact, clearance=clearance, tol=tol, most=most).moved(T).swapped()
+    first = _towards(a, b, T, contact, clearance, tol, most)
     if tol is None and first.upper < -contact - 2.0 * RESOLUTION:
         return _told(replace(first.swapped(), lower=-np.inf))
     margin = max(contact, clearance)
     low, high = first.lower, first.upper
     if low > margin and not _may_hold(a, b, here):
         return _told(first.swapped())
-    second = _towards(b, a, here, contact, clearance, tol).moved(T)
+    second = _towards(b, a, here, contact, clearance, tol, most).moved(T)
     first = first.swapped()
     best = first if first.upper <= second.upper else second
     if low > 0.0 and second.lower > 0.0:
@@ -265,7 +318,9 @@ def _may_hold(inner: FaceModel, outer: FaceModel, T: Array) -> bool:
     return not ((centre < outer.bounds[0]) | (centre > outer.bounds[1])).any() and half.min() >= 0.0
 
 
-def _towards(a: FaceModel, b: FaceModel, T: Array, contact: float, clearance: float, tol: float | None) -> Distance:
+def _towards(
+    a: FaceModel, b: FaceModel, T: Array, contact: float, clearance: float, tol: float | None, most: int
+) -> Distance:
     """Least signed distance from a of b's faces, ``b`` at ``T`` in a's frame; points in a's frame, b's point first.
 
     ``estimate`` is how far at least some point of b is outside of a.
@@ -276,6 +331,6 @@ def _towards(a: FaceModel, b: FaceModel, T: Array, contact: float, clearance: fl
     pieces = dot(b.faces.corners, R.T) + t, b.faces.uv, b.faces.face, b.faces.sag
     surfaces = b.faces.kind, b.faces.size, np.ascontiguousarray(frames.reshape(-1, 12)), b.faces.deviation
     width = -VERDICT_WIDTH * contact if tol is None else tol
-    found, out = _search(a, pieces, b.arrays[3:6], np.ascontiguousarray(T), surfaces, contact, clearance, width, _MOST)
+    found, out = _search(a, pieces, b.arrays[3:6], np.ascontiguousarray(T), surfaces, contact, clearance, width, most)
     p, q = (out[1:4].copy(), out[4:7].copy()) if np.isfinite(out[0]) else (None, None)
     return Distance(found, float(out[0]), p, q, level="faces", method="faces", estimate=float(out[8]))

@@ -17,6 +17,8 @@ _ASKS = 3
 """Translations that are tried, each past one more place that touches."""
 _SHARE, _LEAST = 0.005, 0.001
 """So much further, by the depth or in mm, whichever is more, b is moved, so that a gap can be seen."""
+_PIECES = 4000
+"""Pieces looked at for a depth, and for whether they are apart after a translation."""
 _STEP = 1e-6
 
 
@@ -26,7 +28,7 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
     No translation shorter than the depth of any one point parts them; one after which they are apart is long enough.
     Without such a one ``lower`` stays minus infinity.
     """
-    found = faces_distance(a, b, T, contact=_LEAST, tol=max(_LEAST, -_SHARE * known.upper))
+    found = faces_distance(a, b, T, contact=_LEAST, tol=max(_LEAST, -_SHARE * known.upper), most=_PIECES)
     inside = (max(0.0, -known.upper, -found.upper), max(0.0, -found.lower))
     known = replace(known if known.upper <= found.upper else found, lower=-np.inf, interference=inside)
     margin, planes, t, place = max(_LEAST, _SHARE * inside[0]), [], np.zeros(3), T.copy()
@@ -41,7 +43,7 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
         if size > 2.0 * (inside[0] + margin):  # a long way out, or nothing is behind all the planes
             break
         place[:3, 3] = T[:3, 3] + t
-        found = faces_distance(a, b, place, contact=0.25 * margin)
+        found = faces_distance(a, b, place, contact=0.01 * margin, most=_PIECES)
         if found.lower > 0.0:
             p, q = (None, None) if step or at is None else (at + deep * n, at) if of_b else (at, at - deep * n)
             return replace(known, lower=-size, normal=t / size, point_a=p, point_b=q)

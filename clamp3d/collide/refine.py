@@ -11,11 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from clamp3d.brep.surfaces import OTHER
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm, bodies_distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.convex import Rod
-from clamp3d.collide.faces import VERDICT_WIDTH, faces_distance
+from clamp3d.collide.faces import MOST, VERDICT_WIDTH, faces_distance, flat_where_near
 from clamp3d.collide.facets import rod_distance
 from clamp3d.collide.meshes import meshes_distance
 from clamp3d.collide.model import FINEST, Model
@@ -28,6 +29,8 @@ from clamp3d.errors import SolverError
 COARSEST = 0.512
 """First chord error (mm) of a pair that needs meshes; each further one is a whole power of two finer."""
 
+_FIRST = 2000
+"""Pieces looked at before the facets of free-form faces are taken for planes."""
 _FACE_WIDTHS = (1e-3, 1e-6)
 """Widths (mm) of the interval that are asked for where a verdict alone is not enough."""
 
@@ -98,12 +101,21 @@ def _agreed(old: Distance, new: Distance) -> Distance:
 
 def _faces(a: Model, b: Model, T: Array, found: Distance, thresholds: Thresholds, enough: Enough) -> Distance:
     """Two solids from CAD by their faces: until the verdict is certain, then until ``enough``."""
+    assert a.faces is not None
+    assert b.faces is not None
+    one, other = a.faces, b.faces
+    free = OTHER in one.faces.kind and OTHER in other.faces.kind
     for tol in (None, *_FACE_WIDTHS):
-        a.counters.queries["faces"] += 1
-        assert a.faces is not None
-        assert b.faces is not None
-        new = faces_distance(a.faces, b.faces, T, contact=thresholds.contact, clearance=thresholds.clearance, tol=tol)
-        found = _agreed(found, new)
+        for flat in (False, True) if free and tol is None else (free,):
+            if flat and tol is None:
+                one, other = flat_where_near(one, other, T, thresholds.reach)
+            a.counters.queries["faces"] += 1
+            contact, clearance = thresholds.contact, thresholds.clearance
+            most = MOST if flat == free else _FIRST
+            new = faces_distance(one, other, T, contact=contact, clearance=clearance, tol=tol, most=most)
+            found = _agreed(found, new)
+            if thresholds.verdict(found) is not Verdict.UNCERTAIN:
+                break
         # A search that has not come as far as it was asked to has used up its pieces: to ask for more tells no more.
         wanted = np.inf if thresholds.verdict(found) is not Verdict.UNCERTAIN else VERDICT_WIDTH * thresholds.contact
         if enough(found) or (wanted if tol is None else tol) < found.upper - found.lower < np.inf:

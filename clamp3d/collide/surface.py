@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.core.linear import dot
+from clamp3d.core.mesh import neighbours
 from clamp3d.core.pose import Array, rotation
 from clamp3d.core.shells import corners_of, shells, winding_number
 
@@ -216,11 +217,13 @@ def at_edges(vertices: Array, faces: NDArray[np.int64], error: Array, patch: NDA
     material if that is acute; else within e + f. At a blunt or hollow edge with a flat patch the foot of every point
     lies on the mesh.
     """
-    import trimesh
-
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    pairs, convex = mesh.face_adjacency, np.asarray(mesh.face_adjacency_convex)
-    cosine = np.einsum("ij,ij->i", mesh.face_normals[pairs[:, 0]], mesh.face_normals[pairs[:, 1]])
+    pairs, across = neighbours(faces)
+    a, b, c = corners_of(vertices, faces)
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    one, other = normal[pairs[:, 0]], normal[pairs[:, 1]]
+    convex = np.einsum("ij,ij->i", one, vertices[across[:, 1]] - a[pairs[:, 0]]) <= 1e-8
+    cosine = np.einsum("ij,ij->i", one, other)
     both = error[pairs]
     total = both.sum(axis=1)
     knife = convex & (cosine < 0.0)

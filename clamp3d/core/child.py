@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import faulthandler
 import importlib
-import multiprocessing
 import os
 import select
 import signal
@@ -18,6 +17,7 @@ from collections.abc import Callable
 
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
 """To start NumPy's threads takes 0.04 s of CPU."""
+_owned = False
 
 
 def run_child(
@@ -31,7 +31,7 @@ def run_child(
 
     Returns its exit code (None: not done in time) and the last lines that it printed, which ``watch`` is told now and
     then. The module's main function calls `end_with_caller`. It computes in one thread. With ``copy`` its function
-    ``main(*arguments)`` is called in a copy of this process, where that is safe: nothing is imported twice.
+    ``main(*arguments)`` is called in a copy of this process, where `can_copy` allows it: nothing is imported twice.
     """
     # A session of its own keeps Ctrl-C with the caller, who then ends the worker.
     worker = (
@@ -70,11 +70,20 @@ def run_child(
     return code, [line.strip() for line in log if line.strip()]
 
 
+def own_process() -> None:
+    """Say that this process is the program's own from its first line on, as the command line's is."""
+    global _owned
+    _owned = True
+    for name, value in _ONE_THREAD.items():
+        os.environ.setdefault(name, value)
+
+
 def can_copy() -> bool:
-    """Whether this process can be forked: on Linux, with no threads but those of NumPy, which end before a fork."""
-    if sys.platform != "linux" or threading.active_count() > 1 or "OCP" in sys.modules:
-        return False
-    return len(os.listdir("/proc/self/task")) <= (os.cpu_count() or 1)
+    """Whether this process may be forked: on Linux, where it is our own and has one thread.
+
+    In a program of somebody else's a library can hold locks and devices (CUDA, ROS) that do not outlive a fork.
+    """
+    return _owned and sys.platform == "linux" and len(os.listdir("/proc/self/task")) == 1
 
 
 class Copy:
@@ -130,6 +139,8 @@ def _drained() -> None:
 
 def end_with_parent() -> None:
     """End this process of `multiprocessing` at once when its parent is gone, however that ended."""
+    import multiprocessing
+
     parent = multiprocessing.parent_process()
     if parent is not None:
         _end_after(parent.join)

@@ -315,3 +315,15 @@ def is_closed(F: IntArray) -> bool:
 def _place(directed: IntArray, wrong: NDArray[np.bool_]) -> str:
     k = int(np.argmax(wrong))
     return f"at face {k // 3}, vertices {directed[k, 0]} and {directed[k, 1]}"
+
+
+def neighbours(F: IntArray) -> tuple[IntArray, IntArray]:
+    """Triangles (k, 2) on both sides of each edge that has two, and the corners (k, 2) of these across from the edge.
+
+    >>> [x.tolist() for x in neighbours(np.array([[0, 1, 2], [2, 1, 3]]))]
+    [[[0, 1]], [[0, 3]]]
+    """
+    _, edge, uses = _edges(F)
+    order = np.argsort(edge, kind="stable")
+    sides = order[uses[edge[order]] == 2].reshape(-1, 2)
+    return sides // 3, F[sides // 3, (sides + 2) % 3]
