@@ -238,12 +238,12 @@ def test_bounds_of_poses_hold_for_the_way_out_too():
     plate = shapes.box((60.0, 50.0, 8.0), holes=[shapes.Hole(5.0)])
     block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 30.0)
     poses = np.array([translation(0.0, y, 0.0) for y in (0.0, -0.5, 1.0)])
-    for body, radius in ((plate, 5.5), (block, 8.0)):
+    for holder, radius in ((plate, 5.5), (block, 8.0)):
         wire = shapes.cylinder(radius, 60.0)
-        sweep = check_poses(Scene().add("body", body).add("wire", wire), "wire", poses)
+        sweep = check_poses(Scene().add("body", holder).add("wire", wire), "wire", poses)
         assert set(sweep.worst) == {"clash"}
         for low, high, T in zip(sweep.lower[:, 0], sweep.upper[:, 0], poses, strict=True):
-            found = distance(body, wire, T)
+            found = distance(holder, wire, T)
             assert low <= found.upper
             assert found.lower <= high
 
