@@ -128,7 +128,11 @@ def test_a_reader_that_fails_is_one_line(tmp_path, monkeypatch, body, message, c
     [
         ("import clamp3d", "clamp3d.load(path)", False),  # somebody's program, a notebook: who knows what runs in it
         ("from clamp3d.cli import main", "main()", True),
-        ("from clamp3d.cli import main; import threading as t; t.Thread(target=t.Event().wait, daemon=True).start()", "main()", False),
+        (
+            "from clamp3d.cli import main; import threading as t; t.Thread(target=t.Event().wait, daemon=True).start()",
+            "main()",
+            False,
+        ),
     ],
 )
 def test_only_the_command_lines_own_process_is_copied(tmp_path, first, read, copied):
