@@ -29,7 +29,7 @@ from clamp3d.clamp.dimensions import TITLES, PartName
 from clamp3d.clamp.final_state import TOLERANCE, FinalState
 from clamp3d.clamp.matrix import Pair, plain
 from clamp3d.clamp.section import EDGE, SPLINTS, WIRES, B, Section, V
-from clamp3d.core.linear import dot
+from clamp3d.core.linear import dot, eigh, svd
 from clamp3d.core.pieces import groove_pieces
 from clamp3d.core.pose import Array, unit
 
@@ -115,7 +115,7 @@ def _kept(rates: Array, moves: NDArray[np.bool_]) -> Array:
     """Unit slopes (n, 5) of the parts that move, which change no gap whose ``rates`` (m, 5) are given."""
     rows = np.eye(len(moves))[moves]
     if len(rates):
-        _, sizes, rows_of = np.linalg.svd(rates[:, moves])
+        _, sizes, rows_of = svd(rates[:, moves])
         rows = dot(rows_of[int((sizes > 1e-9).sum()) :], rows)
     return np.asarray(rows)
 
@@ -131,7 +131,7 @@ def _least(section: Section, final: FinalState, strong: list[int], slopes: Array
         found, off = _second(section, final, strong, slopes[a] + slopes[b])
         second[a, b] = second[b, a] = 0.5 * (found - own[a][0] - own[b][0])
         error = max(error, off)
-    sizes, axes = np.linalg.eigh(second)
+    sizes, axes = eigh(second)
     error *= 2.0 * n
     motions = tuple(_words(dot(axes[:, k], slopes)) for k in np.flatnonzero(sizes <= error))
     least = tuple(dot(axes[:, 0], slopes).tolist())

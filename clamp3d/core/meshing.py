@@ -159,7 +159,7 @@ def _extrude(shape: Extrusion, mesh_error: float, side: Side, overlap: float = 0
 
 
 def _polygons(profile: Profile, mesh_error: float, side: Side) -> list[Polygon]:
-    """The outline as polygons: one, or what is left where tangents cut it in pieces."""
+    """The outline as polygons: one, or where tangents cross it the pieces that are left, or that are to be joined."""
     from shapely import Polygon, union_all
 
     whole = Polygon(profile.polygon(mesh_error, side))
@@ -172,5 +172,7 @@ def _polygons(profile: Profile, mesh_error: float, side: Side) -> list[Polygon]:
             chords = [*arc.chords(mesh_error, arc.start), arc.end]
             lenses.append(Polygon([*chords, *reversed(arc.tangents(mesh_error, arc.start))]).buffer(0.0))
     chords = Polygon(profile.polygon(mesh_error))
-    made = chords.union(union_all(lenses)) if side == "outer" else chords.difference(union_all(lenses))
-    return [part for part in getattr(made, "geoms", [made]) if part.geom_type == "Polygon" and not part.is_empty]
+    # Their union in the plane would have cracks along the chords: `_extrude` joins the prisms.
+    made = [chords, *lenses] if side == "outer" else [chords.difference(union_all(lenses))]
+    parts = [part for some in made for part in getattr(some, "geoms", [some])]
+    return [part for part in parts if part.geom_type == "Polygon" and not part.is_empty]

@@ -122,17 +122,16 @@ def test_a_reader_that_fails_is_one_line(tmp_path, monkeypatch, body, message, c
     assert str(caught.value).startswith(str(path))
 
 
+_MAIN = "from clamp3d.cli import main"
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux alone")
 @pytest.mark.parametrize(
     ("first", "read", "copied"),
     [
         ("import clamp3d", "clamp3d.load(path)", False),  # somebody's program, a notebook: who knows what runs in it
-        ("from clamp3d.cli import main", "main()", True),
-        (
-            "from clamp3d.cli import main; import threading as t; t.Thread(target=t.Event().wait, daemon=True).start()",
-            "main()",
-            False,
-        ),
+        (_MAIN, "main()", True),
+        (f"{_MAIN}; import threading as t; t.Thread(target=t.Event().wait, daemon=True).start()", "main()", False),
     ],
 )
 def test_only_the_command_lines_own_process_is_copied(tmp_path, first, read, copied):

@@ -118,7 +118,8 @@ class TestEnd:
             workers = _children(process.pid)
             process.send_signal(signal.SIGTERM)
             out, err = process.communicate(timeout=60)
-        assert (process.returncode, out, err) == (128 + signal.SIGTERM, b"", b"")
+        said = [line for line in err.decode().splitlines() if not line.startswith("clamp3d: compiling")]  # a new cache
+        assert (process.returncode, out, said) == (128 + signal.SIGTERM, b"", [])
         assert list(temporary.iterdir()) == []
         _until(lambda: not any(_alive(worker) for worker in workers))
 

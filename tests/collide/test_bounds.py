@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 
 from clamp3d import baselines, distance, shapes
 from clamp3d.collide.answer import Distance
+from clamp3d.collide.batch import by_kernel
 from clamp3d.collide.convex import Rod, hull
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.refine import from_boxes, refine
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.core.profile import Arc, Profile
@@ -190,12 +192,65 @@ def test_a_segment_crosses_a_box_exactly_if_some_of_its_points_are_inside():
     assert min(counted) > 50
 
 
+def _narrow(concave):
+    """Two grooves, or two bumps, whose arcs all but meet: the tangents of each cross the other's."""
+    if concave:
+        return shapes.groove_block(SweptArc(12.0, 1.9, 40.0), 90.0, 30.0, others=[(24.02, 12.0, 1.9)])
+    foot = -12.0 * math.sin(0.6)
+    bumps = [Arc((x, 0.0), 12.0, -0.6, math.pi + 0.6) for x in (12.01, -12.01)]
+    outline = Profile.of((-40.0, foot), (-40.0, -20.0), (40.0, -20.0), (40.0, foot), *bumps)
+    return shapes.Solid("bumps", (Extrusion(outline, "Z", -20.0, 20.0),))
+
+
 @pytest.mark.parametrize("error", [1.0, 0.2])
-def test_a_wall_thinner_than_its_facets_keeps_both_meshes_apart(error):
-    """The tangents of a groove that all but cuts its block in two cross the outline: the mesh within has two parts."""
-    groove = SweptArc(12.0, 1.2, 40.0)
-    shape = shapes.groove_block(groove, 30.0, 12.0 - 12.0 * math.cos(1.2) + 0.02)
+@pytest.mark.parametrize("concave", [True, False])
+def test_a_wall_or_gap_thinner_than_its_facets_keeps_both_meshes_apart(concave, error):
+    shape = _narrow(concave)
     inner, outer = (getattr(ModelCache().model(shape), side)(error) for side in ("inner", "outer"))
     middles = inner.vertices[inner.faces].mean(axis=1)
     assert body(shape).field(np.vstack([inner.vertices, middles])).max() <= 1e-9
-    assert body(shape).field(outer.vertices).min() >= -1e-9
+    x = np.random.default_rng(4).uniform(*body(shape).box, (20_000, 3))
+    assert outer.contains(x[body(shape).field(x) < 0.0]).all()
+
+
+def _points_of(rod):
+    """Points (n, 3) of a cylinder: on its axis, and on circles that fill it."""
+    r, turn = rod.radius * np.array([0.0, 0.5, 1.0]), np.linspace(0.0, 2.0 * math.pi, 49)[1:]
+    grid = np.array(list(itertools.product(r, turn, rod.length * np.linspace(-0.5, 0.5, 25))))
+    return np.column_stack([grid[:, 0] * np.cos(grid[:, 1]), grid[:, 0] * np.sin(grid[:, 1]), grid[:, 2]])
+
+
+@pytest.mark.parametrize("shape", [DRAWN[k] for k in (0, 1, 4, 6)], ids=lambda shape: shape.name)
+def test_what_grooves_and_holes_say_of_many_poses_holds(shape):
+    """No point of the cylinder is deeper in the body than said, and the points named are as deep, or as near."""
+    rng, whole, cache = np.random.default_rng(11), body(shape), ModelCache()
+    told = {"apart": 0, "overlap": 0, "lower": 0}
+    for radius, length in ((3.0, 20.0), (5.5, 60.0), (1.0, 3.0)):
+        rod = shapes.cylinder(radius, length)
+        inside, points = body(rod), _points_of(Cylinder(radius, length))
+        T = np.array([rotation(rng.normal(size=3), rng.choice([0.01, 0.3, 1.5])) for _ in range(80)])
+        T[:, :3, 3] = rng.normal(size=(80, 3)) * rng.choice([1.0, 9.0], 80)[:, None]
+        swapped = by_kernel(cache.model(rod), cache.model(shape), inverse(T))
+        found = by_kernel(cache.model(shape), cache.model(rod), T)
+        assert np.allclose(found.lower, swapped.lower, rtol=0, atol=1e-9)
+        for k, P in enumerate(T):
+            lower, upper, p, q = found.lower[k], found.upper[k], found.point_a[k], found.point_b[k]
+            told["lower"] += lower > -math.inf
+            if math.isfinite(lower):
+                assert lower <= whole.field(points @ P[:3, :3].T + P[:3, 3]).min() + 1e-9
+            if upper == math.inf:
+                continue
+            if lower > 0.0:
+                assert upper == pytest.approx(swapped.upper[k], abs=1e-9)
+                assert p == pytest.approx(to_target(P, swapped.point_b[k]), abs=1e-6)
+            assert np.linalg.norm(found.normal[k]) == pytest.approx(1.0, abs=1e-9)
+            trials = np.array([p, 0.5 * (p + q), q])
+            in_a, in_b = whole.field(trials), inside.at(P).field(trials)
+            if upper >= 0.0:
+                assert max(in_a[0], in_b[2]) <= 1e-9
+                assert np.linalg.norm(q - p) <= upper + 1e-9
+                assert q - p == pytest.approx(upper * found.normal[k], abs=1e-8)
+            else:
+                assert np.minimum(in_a, in_b)[np.maximum(in_a, in_b) <= 1e-9].min() <= upper + 1e-9
+            told["apart" if upper > 0.0 else "overlap"] += 1
+    assert min(told.values()) >= 20, told

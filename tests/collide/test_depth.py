@@ -22,6 +22,7 @@ from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core import shapes
 from clamp3d.core.mesh import make_mesh
+from clamp3d.core.meshing import mesh
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import SweptArc
 
@@ -182,7 +183,7 @@ def test_moving_by_the_depth_separates_and_by_less_does_not(first, second, seed)
     assert d.lower <= d.upper < 0.0
     if math.isfinite(d.lower):
         out = T.copy()
-        out[:3, 3] -= (d.lower - 1e-5) * d.direction
+        out[:3, 3] -= d.lower * d.direction  # not further: a pin that only just fits would be in the other wall
         assert quick(a, b, out).lower >= -5e-6
     for n in rng.normal(size=(12, 3)):
         less = T.copy()
@@ -191,6 +192,19 @@ def test_moving_by_the_depth_separates_and_by_less_does_not(first, second, seed)
     back = distance(b, a, inverse(T))
     assert back.lower <= d.upper + 1e-9
     assert d.lower <= back.upper + 1e-9
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, -0.7])
+def test_what_touches_within_its_errors_comes_free_along_a_unit_normal(turn):
+    """A wire on the floor of a groove that is known as a mesh only: its facets are 0.05 mm off."""
+    made = mesh(BODIES["groove"], 0.05)
+    block = shapes.MeshShape(make_mesh(made.vertices, made.faces), "off", "block", 0.05)
+    wire = shapes.cylinder(3.0, 18.0)
+    T = translation(4.0 * math.sin(turn), -4.0 * math.cos(turn), 0.0)
+    d = distance(block, wire, T)
+    assert d.lower < 0.0 < d.upper
+    assert np.linalg.norm(d.normal) == pytest.approx(1.0, abs=1e-12)
+    assert quick(BODIES["groove"], wire, translation(*((1e-6 - d.lower) * d.normal)) @ T).lower > 0.0
 
 
 def _extruded(outline, half):

@@ -20,17 +20,21 @@ from clamp3d.clamp.parts import parts
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check import check, check_full
+from clamp3d.collide.judge import contained
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.poses import check_poses
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import RESOLUTION, Thresholds, Verdict
 from clamp3d.core import shapes
+from clamp3d.core.linear import to_target
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.meshing import mesh
 from clamp3d.core.motion import Motion
-from clamp3d.core.pose import rotation, translation
+from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
+from clamp3d.testing import body
+from tests.kinds import faceted_shape
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -251,6 +255,24 @@ def test_poses_inside_are_contained_as_a_check_says():
             one = check(scene.moved({part: T}))
             assert [one.verdict(part, name).value for name in sweep.others] == sweep.verdict[k].tolist()
         assert {"contained", "clash", "clear"} <= set(sweep.verdict.ravel())
+
+
+@pytest.mark.parametrize("facets", [False, True])
+@pytest.mark.parametrize("small", [shapes.box((9.0, 7.0, 5.0)), shapes.cylinder(3.0, 12.0)], ids=["box", "pin"])
+@pytest.mark.parametrize("large", [shapes.box((20.0, 24.0, 16.0)), shapes.cylinder(11.0, 18.0)], ids=["box", "rod"])
+def test_contained_is_what_stands_out_by_no_more_than_the_contact(large, small, facets):
+    """By the corners of a fine mesh of the one on the other's definition; in between is what their chords are off."""
+    rng, cache = np.random.default_rng(8), ModelCache()
+    T = np.array([rotation(rng.normal(size=3), rng.choice([0.0, 0.5, 2.0])) for _ in range(60)])
+    T[:, :3, 3] = rng.normal(size=(60, 3)) * (5.0, 5.0, 3.0)
+    a, b = (cache.model(faceted_shape(x, 0.02) if facets else x) for x in (large, small))
+    found = contained(a, b, T, Thresholds())
+    assert np.array_equal(found, contained(b, a, inverse(T), Thresholds()))
+    corners = mesh(small, 0.001).vertices
+    out = np.array([body(large).field(to_target(P, corners)).max() for P in T])
+    assert found[out <= 0.0].all()
+    assert not found[out > 0.3].any()
+    assert 5 <= found.sum() <= 50
 
 
 @pytest.mark.parametrize(

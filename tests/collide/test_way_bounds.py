@@ -8,9 +8,12 @@ from hypothesis import HealthCheck, Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
 from clamp3d import first_contact, min_clearance, shapes
+from clamp3d.collide import swept_mesh
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.moving_pair import MovingPair
 from clamp3d.collide.swept import swept_lower
+from clamp3d.collide.swept_mesh import Standing, swept_gap
+from clamp3d.core.linear import to_target
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
@@ -171,3 +174,23 @@ def test_both_meshes_may_be_off_by_what_they_state():
     a, b = (CACHE.model(shapes.MeshShape(box, "off", name, error)) for name, error in (("a", 0.3), ("b", 0.4)))
     pair = MovingPair(a, b, Motion.translate((0.0, 0.0, 0.0)), np.eye(4), translation(15.0, 0.0, 0.0))
     assert pair.by_meshes(0.0, 0.0, 10.0) == pytest.approx(5.0 - 0.3 - 0.4, abs=1e-6)
+
+
+@settings(SLOW, max_examples=50)
+@given(ways, st.integers(0, 10**6), st.sampled_from([3000, 0]), st.sampled_from([0.0, 1.0]), st.floats(0.0, 0.7))
+def test_swept_triangles_keep_the_distance_that_is_said(way, seed, most, error, begin):
+    """At no time of the stretch are points of two triangles nearer than that and how far both may be off."""
+    rng = np.random.default_rng(seed)
+    still, moving = (9.0 * rng.normal(size=(n, 1, 3)) + 2.0 * rng.normal(size=(n, 3, 3)) for n in (5, 4))
+    off, moving_off = (error * rng.uniform(size=n) * rng.integers(0, 2, n) for n in (5, 4))
+    standing = Standing(still, off, np.stack([still.min(axis=1), still.max(axis=1)], axis=1))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(swept_mesh, "_MOST", most)
+        gap = swept_gap(standing, moving, moving_off, way, (begin, begin + 0.3), 6.0)
+    assert gap <= 6.0
+    weights = rng.dirichlet(np.full(3, 0.5), 25)
+    p, q = weights @ still, weights @ moving
+    for t in np.linspace(begin, begin + 0.3, 9):
+        at = to_target(pose_at(way, t, np.eye(4)), q.reshape(-1, 3)).reshape(q.shape)
+        apart = np.linalg.norm(p[:, None, :, None] - at[None, :, None], axis=-1).min(axis=(2, 3))
+        assert gap <= (apart - off[:, None] - moving_off).min() + 1e-9

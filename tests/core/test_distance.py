@@ -7,11 +7,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from clamp3d.core import kernel_distance
 from clamp3d.core.distance import Feature, signed_distance, signed_distances
 from clamp3d.core.pose import PoseWarning, rotation, translation
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.relation3d import relative_pose
 from clamp3d.errors import InputError
+from clamp3d.testing import body
 from tests.core.oracle import axis_distance, load, make_oracle, surface_distance
 
 CASES = load()
@@ -415,3 +417,26 @@ def test_axis_level_with_the_flat_faces_touches_them(turned):
     T[:3, 3] = 315.64366617869393, -55.38763045396105, -102.3385888129202
     answer = signed_distance(groove, wire, turned @ T)
     assert abs(answer.distance + wire.radius) <= answer.error_bound
+
+
+EDGE_POINTS = {  # a point in the middle of each edge of a groove of radius 10, half angle a, half length 20
+    Feature.LIP_M: lambda s, h: (-s, h, 3.0),
+    Feature.LIP_N: lambda s, h: (s, h, -3.0),
+    Feature.END_ARC: lambda s, h: (-0.6 * s, -math.sqrt(100.0 - 0.36 * s * s), 20.0),
+    Feature.END_EDGE_M: lambda s, h: (-s - 4.0, h, -20.0),
+    Feature.END_EDGE_N: lambda s, h: (s + 4.0, h, 20.0),
+    Feature.CORNER_M: lambda s, h: (-s, h, 20.0),
+    Feature.CORNER_N: lambda s, h: (s, h, -20.0),
+}
+
+
+@pytest.mark.parametrize("half_angle", [0.6, 1.5, 2.4])
+@pytest.mark.parametrize("feature", EDGE_POINTS)
+def test_the_normal_of_an_edge_leads_straight_away_from_it(feature, half_angle):
+    """For an axis through the edge itself: by the definition alone, a step along it is all of the distance."""
+    s, h = 10.0 * math.sin(half_angle), -10.0 * math.cos(half_angle)
+    point = np.array(EDGE_POINTS[feature](s, h))
+    normal = kernel_distance.edge_normal(feature.value, 10.0, h, *point)
+    assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-12)
+    away = body(SweptArc(10.0, half_angle, 40.0)).field(point + np.outer([1e-3, 0.1], normal))
+    assert away == pytest.approx([1e-3, 0.1], abs=1e-6)

@@ -127,6 +127,7 @@ def test_step_of_the_up_splint(tmp_path):
         (np.eye(3), [[0.0, 1.0, 2.0]], "integers"),
         (np.full((3, 3), np.inf), [[0, 1, 2]], "not finite"),
         (np.zeros((3, 3)), [[0, 1, 2]], "one point"),
+        (0.9e-9 * np.eye(3), [[0, 1, 2]], "extent must be >= 1e-09 mm, got 9e-10 mm"),
         (np.diag([1.0, 0, 0]), [[0, 1, 2], [0, 0, 1]], "no triangle with an area"),
     ],
 )
