@@ -53,7 +53,7 @@ def _unchanged(motion: Motion, triangles: Array) -> tuple[Array, Array]:
     near = _from_origin(flat, motion.axis)
     if motion.travel.any():  # a screw, or a turn that is carried along
         height = np.zeros_like(height)
-        if np.abs(np.cross(motion.travel, motion.axis)).max() > 0.0:
+        if not motion.is_screw:
             near, far = np.zeros_like(near), np.zeros_like(far)
     return np.stack([height.min(axis=1), near], axis=1), np.stack([height.max(axis=1), far], axis=1)
 

@@ -77,7 +77,7 @@ class MovingPair:
         if self.n_uninformative_swept < MAX_UNINFORMATIVE:
             self.counters.queries["swept"] += 1
             angle = self.motion.angle * half
-            swept = max(plain, swept_lower(self.a, self.b, *stretch, angle=angle))
+            swept = max(plain, swept_lower(self.a, self.b, *stretch, angle=angle, screw=self.motion.is_screw))
             self.n_uninformative_swept = 0 if swept > plain else self.n_uninformative_swept + 1
         if swept >= min(wanted, here) - ACCURACY:
             return swept

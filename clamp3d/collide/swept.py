@@ -18,22 +18,28 @@ from clamp3d.core.linear import dot, to_target
 from clamp3d.core.pose import Array, inverse
 
 
-def swept_lower(a: Model, b: Model, before: Array, middle: Array, after: Array, *, angle: float) -> float:
+def swept_lower(
+    a: Model, b: Model, before: Array, middle: Array, after: Array, *, angle: float, screw: bool = True
+) -> float:
     """Distance (mm) that ``b`` certainly keeps from ``a`` while it goes from ``before`` over ``middle`` to ``after``.
 
-    All three (4, 4) in a's frame, evenly spaced on one screw that turns by ``angle`` (rad) between two of them. Minus
-    infinity for half a turn or more.
+    All three (4, 4) in a's frame, evenly spaced on a way that turns by ``angle`` (rad) between two of them: one screw,
+    or a turn of a that is carried across its axis. Minus infinity for half a turn or more.
     """
     if abs(angle) >= 0.5 * np.pi:
         return -np.inf
-    there = (before, middle, after)
+    there: tuple[Array, ...] = (before, middle, after)
     back = tuple(inverse(T) for T in there)
+    if not screw:  # seen from a, the points of b are on spirals, which no arc bounds
+        a, b, there, back = b, a, back, there
     best = np.inf
     for x in a.forms:
         for y in b.forms:
-            low = max(_one_way(x, y, there, angle), _bores(y, x, back, angle))
+            low = _one_way(x, y, there, angle)
+            if screw:
+                low = max(low, _bores(y, x, back, angle))
             best = min(best, low - x.error - y.error)
-    for still, moving, poses in ((a, b, there), (b, a, back)):
+    for still, moving, poses in ((a, b, there), (b, a, back))[: 1 + screw]:
         if still.facets is not None and moving.bodies is not None:
             lows = []
             for body in moving.bodies:
@@ -93,7 +99,8 @@ def _swept_rod(rod: Rod, poses: tuple[Array, ...], angle: float) -> Rod:
 
 
 def _sagitta(ways: Array, angle: float) -> float:
-    """How far points stray from the straight lines between their places ``ways`` (3, k, 3), on arcs of ``angle``."""
-    # An arc of angle a over a chord c: c / 2 tan(a / 4).
-    chord = float(np.linalg.norm(np.diff(ways, axis=0), axis=2).max())
-    return 0.5 * chord * math.tan(0.25 * abs(angle))
+    """How far points stray from straight lines between their places ``ways`` (3, k, 3), ``angle`` of a turn apart."""
+    # Straight travel leaves no second difference; on an arc of angle a and radius r it is 4 r sin^2(a / 2), and the
+    # arc leaves its chord by 2 r sin^2(a / 4).
+    bend = float(np.linalg.norm(ways[0] - 2.0 * ways[1] + ways[2], axis=1).max())
+    return bend / (8.0 * math.cos(0.25 * angle) ** 2)

@@ -123,6 +123,11 @@ class Motion:
         out = points - self.point
         return np.asarray(np.linalg.norm(out - dot(out, self.axis)[..., None] * self.axis, axis=-1))
 
+    @property
+    def is_screw(self) -> bool:
+        """Whether it has one axis all the time: a turn is not carried across its own."""
+        return not self.angle or norm(np.cross(self.travel, self.axis)) <= 1e-14 * norm(self.travel)
+
     def speed(self, points: Array) -> float:
         """Bound (mm per unit of t) of the speed of points (k, 3), given where they are at the start."""
         turning = abs(self.angle) * float(self.from_axis(points).max()) if self.angle else 0.0
