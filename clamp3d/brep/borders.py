@@ -80,14 +80,14 @@ class Borders:
         forward = self.nodes[rows, 0] == F
         for s in range(3):
             parts = np.where(rows[:, s] >= 0, self.count[rows[:, s]], 1)
-            while True:
+            while (parts > 1).any():
                 made = self._fans(s, parts, corners, rows, forward[:, s], sag)
                 turned = np.einsum("ij,ij->i", _normals(made[0]), _normals(corners)[made[1]]) < 0.0
                 if not turned.any():
+                    corners, source, rows, sag = made
+                    forward, origin = forward[source], origin[source]
                     break
                 parts[made[1][turned]] = 1  # too slim for its arc: it stays as it is
-            corners, source, rows, sag = made
-            forward, origin = forward[source], origin[source]
         return corners, sag, origin
 
     def _fans(

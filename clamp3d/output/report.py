@@ -28,8 +28,8 @@ Severity = Literal["error", "warning", "note", "ok"]
 
 CLEARANCE = 5.0
 """Gap in mm up to which two parts of a clamp are told to be near, if none is chosen."""
-MEASURED_PAIRS = 400
-"""Of a scene with more pairs only those are measured whose boxes come near; the others are clear."""
+LISTED = 400
+"""With more rows than these the page leaves out those that are clear."""
 
 SEVERITIES: dict[Severity, str] = {
     "error": "must be mended",
@@ -122,7 +122,9 @@ def report(
     clearance: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> list[Path]:
-    """Measure all pairs and write a report: a page with pictures, its data as JSON, and the pairs as CSV.
+    """Check all pairs and write a report: a page with pictures, its data as JSON, and the pairs as CSV.
+
+    The distances of a scene are those of `check`, as fine as the verdicts need; a clamp's are exact.
 
     Parameters
     ----------
@@ -183,9 +185,8 @@ def make_report(
 
 
 def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
-    few = len(scene.parts) * (len(scene.parts) - 1) // 2 <= MEASURED_PAIRS
     tell = None if progress is None else lambda stage, done, of: progress(f"{stage}: {done} of {of}")
-    result = check(scene, distances=few, progress=tell)
+    result = check(scene, progress=tell)
     names = titles(scene)
 
     def row(pair: PairResult) -> PairRow:

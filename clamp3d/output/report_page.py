@@ -19,7 +19,7 @@ from clamp3d.output.files import write_files
 from clamp3d.output.manifest import versions
 from clamp3d.output.pages import now, render
 from clamp3d.output.palette import VERDICT_COLOURS, part_colours
-from clamp3d.output.report import MEASURED_PAIRS, SEVERITIES, PairRow, Report
+from clamp3d.output.report import LISTED, SEVERITIES, PairRow, Report
 from clamp3d.output.wording import gap_text, meaning, titles
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def report_html(report: Report, *, progress: Callable[[str], None] = lambda what
         vector=lambda v: "" if v is None else ", ".join(f"{x:z.3f}" if abs(x) >= 5e-4 else "0" for x in v),
         degrees=math.degrees,
         pictures=_pictures(report, progress),
-        shown=[row for row in report.rows if len(report.rows) <= MEASURED_PAIRS or row.verdict != "clear"],
+        shown=[row for row in report.rows if len(report.rows) <= LISTED or row.verdict != "clear"],
         names=names,
         titles=titles(report.scene),
         colours=part_colours([part.name for part in report.scene.parts]),

@@ -22,6 +22,7 @@ from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.contact import measure_contacts
 from clamp3d.clamp.matrix import PAIRS
+from clamp3d.collide.check import check
 from clamp3d.collide.distance import measure
 from clamp3d.collide.scene import Scene
 from clamp3d.core import shapes
@@ -281,7 +282,7 @@ def test_a_clashing_scene_says_so_worst_first(clashing, tmp_path):
     }
     assert [f.severity for f in found.findings][-1] == "note"
     rows = {row.name: row for row in found.rows}
-    assert len(rows) == found.n_pairs == 6
+    assert (len(rows), found.n_pairs) == (2, 6)  # those that are far apart have no row
     assert rows["block-wire"].distance.value == pytest.approx(-0.2, abs=1e-6)
     assert (rows["block-near"].verdict, rows["block-near"].severity) == ("clearance", "note")
     assert rows["block-near"].distance.value == pytest.approx(0.3, abs=1e-6)
@@ -323,6 +324,27 @@ def test_a_finding_is_drawn_at_its_moment(monkeypatch):
     a, b = drawn[0]
     assert overlap(a.mesh, a.T, b.mesh, b.T).volume > 100.0
     assert [len(solids) for solids in drawn] == [2, 1, 2, 1]  # whole and enlarged, with what the two have in common
+
+
+def test_a_report_asks_as_much_as_check(monkeypatch):
+    """A pair whose verdict is certain is measured no further: a pin that touches its hole, from CAD."""
+    pytest.importorskip("OCP")
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+
+    from clamp3d.brep.solid import BrepSolid
+
+    pin, plate = BRepPrimAPI_MakeCylinder(3.0, 10.0).Solid(), BRepPrimAPI_MakeBox(10.0, 10.0, 10.0).Shape()
+    scene = Scene().add("pin", BrepSolid.of(pin, "pin"))
+    scene = scene.add("plate", BrepSolid.of(BRepAlgoAPI_Cut(plate, pin).Shape(), "plate"))
+    asked = []
+    monkeypatch.setattr("clamp3d.output.report.check", lambda *a, **k: asked.append(check(*a, **k)) or asked[-1])
+    (row,), wanted = make_report(scene).rows, check(scene)
+    assert row.verdict == "contact"
+    assert asked[0].work.queries == wanted.work.queries
+    assert wanted.work.queries["faces"] == 1
+    assert (row.distance.lower, row.distance.upper) == (wanted.pairs[0].distance.lower, wanted.pairs[0].distance.upper)
+    assert check(scene, distances=True).work.queries["faces"] > 1
 
 
 def test_scenes_without_findings_pairs_or_parts(tmp_path):
