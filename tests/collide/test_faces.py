@@ -202,7 +202,7 @@ def test_touching_is_contact_and_certain(a, b):
 
 
 @pytest.mark.parametrize("aside", [-30.0, 30.0])
-@pytest.mark.parametrize("deep", [0.3, 1.0])
+@pytest.mark.parametrize("deep", [0.02, 0.3])
 def test_an_edge_in_a_hollow_corner_is_as_deep_as_the_corner_is_away(deep, aside):
     """Further in than either wall is: in a frame that nothing is square to, wherever its origin is."""
     hollow, b = cut(box((0, 0, 0), (9, 9, 9)), box((4, 4, 4), (10, 10, 10))), box((4 - deep, 4 - deep, 5), (8, 8, 8))
