@@ -227,15 +227,15 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
             if least - e > found or (h > t and outside < 0.0):
                 limit = min(max(least, h) + rho + 2.0 * at, reach if sense[f] < 0.0 else np.inf)
                 clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 1, -1.0, x, y, z, limit, stack)
-                if clear > at:
+                if clear > at + t:  # what is above the face by more than t is outside there
                     found = max(found, min(least, clear - rho) - e)
                     if h > t:
                         outside = max(outside, min(h - t, clear))
             if h < -t and (h + rim < out[0] or not inside):
                 limit = min(2.0 * at - h, reach if sense[f] > 0.0 else np.inf)
                 clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 2, -1.0, x, y, z, limit, stack)
-                inside = inside or clear > at
-                if clear > at and h + rim < out[0]:  # inside: as deep as the faces are away
+                inside = inside or clear > at + t
+                if clear > at + t and h + rim < out[0]:  # inside: as deep as the faces are away
                     for i in range(3):
                         for c in range(3):
                             work[i, c] = p[c]

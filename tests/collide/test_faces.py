@@ -201,6 +201,15 @@ def test_touching_is_contact_and_certain(a, b):
     assert Thresholds().verdict(found) is Verdict.CONTACT
 
 
+@pytest.mark.parametrize("aside", [-30.0, 30.0])
+@pytest.mark.parametrize("deep", [0.02, 0.3])
+def test_an_edge_in_a_hollow_corner_is_as_deep_as_the_corner_is_away(deep, aside):
+    """Further in than either wall is: in a frame that nothing is square to, wherever its origin is."""
+    hollow, b = cut(box((0, 0, 0), (9, 9, 9)), box((4, 4, 4), (10, 10, 10))), box((4 - deep, 4 - deep, 5), (8, 8, 8))
+    T = shift(aside, 0.7 * aside, 0.4 * aside) @ rotation((1, 2, 3), 0.7)
+    holds(between(moved(hollow, T), moved(b, T), tol=0.05 * deep), -math.sqrt(2.0) * deep)
+
+
 @pytest.mark.parametrize(("deep", "verdict"), [(0.003, Verdict.CONTACT), (0.03, Verdict.CLASH)])
 def test_small_overlaps(deep, verdict):
     plate, hole = box((0, 0, 0), (9, 9, 1)), cut(box((-9, -9, 0), (9, 9, 8)), rod(3, -1, 9))

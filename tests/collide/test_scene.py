@@ -291,6 +291,18 @@ def test_contained_is_what_stands_out_by_no_more_than_the_contact(large, small, 
     assert 5 <= found.sum() <= 50
 
 
+def test_contained_along_the_diagonal_and_within_the_contact():
+    """A rod longer than the box's sides fits along its diagonal; a box as large fits, and 0.008 mm beside its place."""
+    cache, box = ModelCache(), shapes.box((20.0, 24.0, 16.0))
+    way = np.array([20.0, 24.0, 16.0])
+    T = rotation(np.cross([0.0, 0.0, 1.0], way), math.acos(16.0 / np.linalg.norm(way)))
+    rod = shapes.cylinder(0.5, 28.0)
+    assert contained(cache.model(box), cache.model(rod), T[None], Thresholds()).all()
+    places = np.array([translation(x, 0.0, 0.0) for x in (0.0, 0.008, -0.008, 0.012, -0.1)])
+    found = contained(cache.model(box), cache.model(shapes.box((20.0, 24.0, 16.0), name="same")), places, Thresholds())
+    assert found.tolist() == [True, True, True, False, False]
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [

@@ -146,3 +146,34 @@ def test_the_point_of_a_cell_is_a_point_of_the_sum():
         assert (np.linalg.norm(X[:3], axis=1) <= np.linalg.norm(S, axis=1) + 1e-12).all()
         assert np.abs((X[3:] * U[:, :3]).sum(axis=1)).max() <= 1e-12  # a disc is square to its axis
         assert (np.linalg.norm(X[3:], axis=1) <= U[:, 3] + 1e-12).all()
+
+
+@pytest.mark.parametrize("face", range(6))
+def test_a_cell_of_directions_lies_within_its_radius(face):
+    """Down to its corners; and not much wider is said."""
+    rng = np.random.default_rng(face)
+    for w in (1.0, 0.5, 0.125, 1e-3):
+        u, v = rng.integers(0, round(1.0 / w), 2) * 2.0 * w - 1.0 + w
+        *middle, rho = kernel_zonoid.middle(float(face), u, v, w)
+        corners = np.array([(u + x * w, v + y * w) for x in (-1.0, 0.3, 1.0) for y in (-1.0, 0.3, 1.0)])
+        n = np.insert(corners, face % 3, 1.0 if face < 3 else -1.0, axis=1)
+        turned = np.arccos(np.clip(n @ middle / np.linalg.norm(n, axis=1), -1.0, 1.0))
+        assert turned.max() <= rho <= 4.0 * turned.max()
+
+
+def test_no_direction_is_better_than_the_least_width():
+    """By directions all round, of sums flat and round whose widths have many local minima."""
+    rng = np.random.default_rng(7)
+    n = rng.normal(size=(4000, 3))
+    n /= np.linalg.norm(n, axis=1)[:, None]
+    for _ in range(300):
+        S, U = rng.normal(size=(rng.integers(1, 7), 3)), rng.normal(size=(rng.integers(0, 3), 4))
+        U[:, :3] /= np.linalg.norm(U[:, :3], axis=1)[:, None]
+        U[:, 3] = rng.uniform(0.5, 2.0, len(U))
+        c, out = 0.3 * rng.normal(size=3), np.empty(5)
+        kernel_zonoid.zonoid(
+            c, S, U, 1e-6, 20_000, np.empty((kernel_zonoid.CELLS, 5)), np.empty((len(S) + len(U), 3)), out
+        )
+        rims = np.sqrt(np.maximum(1.0 - (n @ U[:, :3].T) ** 2, 0.0)) @ U[:, 3]
+        assert out[0] <= (np.abs(n @ S.T).sum(axis=1) + rims - n @ c).min()
+        assert out[0] <= out[1]
