@@ -67,6 +67,7 @@ def record(T, k, R, half_angle, s, h, H, r, l, flat, pad, out):  # type: ignore[
 def _distances(T, R, half_angle, H, r, l, flat, pad, block, out):  # type: ignore[no-untyped-def] # noqa: E741
     s = R * math.sin(half_angle)
     h = -R * math.cos(half_angle)
+    reach = max(l, r) if flat else l
     for start in range(0, T.shape[0], AT_ONCE):
         count = min(AT_ONCE, T.shape[0] - start)
         tilted = 0
@@ -76,21 +77,21 @@ def _distances(T, R, half_angle, H, r, l, flat, pad, block, out):  # type: ignor
             x, y, z, dx, dy, dz = place(T, start + i)
             block[0, i], block[1, i], block[2, i], block[3, i], block[4, i], block[5, i] = x, y, z, dx, dy, dz
             block[7, i] = 0.0
-            if not is_parallel(R, max(l, r) if flat else l, dx, dy):
+            if not is_parallel(R, reach, dx, dy):
                 tilted += 1
         if 2 * tilted > count:
             for i in range(count):
                 x, y, z, dx, dy, dz = block[0, i], block[1, i], block[2, i], block[3, i], block[4, i], block[5, i]
                 v, t, sure = outside_soon(R, s, h, H, r, l, x, y, z, dx, dy, dz)
-                sure = sure and not is_parallel(R, max(l, r) if flat else l, dx, dy) and (not flat or is_beside(v, t, l))
                 block[6, i] = v
-                block[7, i] = 1.0 if sure else 0.0
+                sure = sure and not is_parallel(R, reach, dx, dy)
+                block[7, i] = 1.0 if sure and (not flat or is_beside(v, t, l)) else 0.0
         for i in range(count):
             if block[7, i] > 0.0:
                 out[start + i] = block[6, i]
                 continue
             x, y, z, dx, dy, dz = block[0, i], block[1, i], block[2, i], block[3, i], block[4, i], block[5, i]
-            if is_parallel(R, max(l, r) if flat else l, dx, dy):
+            if is_parallel(R, reach, dx, dy):
                 if flat:
                     out[start + i] = flat_parallel(R, s, h, H, r, l, x, y, z, dz)[0]
                 else:

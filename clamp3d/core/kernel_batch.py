@@ -38,7 +38,7 @@ def outside_soon(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-u
     All features are computed and the least is selected. It is not certain for an axis that enters S, and where the
     search of an end arc takes loops.
     """
-    dx, dy, dz, e2 = unit(dx, dy, dz)
+    dx, dy, dz, e2 = unit(dx, dy, dz, True)  # of a valid pose
     sure = not (cy - l * abs(dy) <= h and enters(R, s, h, H, l, cx, cy, cz, dx, dy, dz)[0])
     half = l * abs(dz)
     top, bottom = cz + half >= H, cz - half <= -H

@@ -184,10 +184,10 @@ def edge_normal(feature, R, h, qx, qy, qz):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def unit(dx, dy, dz):  # type: ignore[no-untyped-def]
+def unit(dx, dy, dz, near):  # type: ignore[no-untyped-def]
     """A direction that is not parallel to the groove, of length 1, and the square of its part across the groove."""
     e2 = dx * dx + dy * dy
-    n = inverse_root(e2 + dz * dz)
+    n = inverse_root(e2 + dz * dz, near)
     return dx * n, dy * n, dz * n, e2 * (n * n)
 
 
@@ -332,7 +332,7 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
     """Signed distance of a cylinder centred at c with its axis along d (of any length but zero)."""
     if is_parallel(R, l, dx, dy):
         return parallel(R, s, h, H, r, l, cx, cy, cz, dz)
-    dx, dy, dz, e2 = unit(dx, dy, dz)
+    dx, dy, dz, e2 = unit(dx, dy, dz, False)
 
     # A direction is normalised to 3 units, a point of the axis (a product and a sum, |t| <= l) known to 5 units of
     # |c| + l, s and h to 3 units of R, a difference of these and its norm to 3 more: 11, rounded up, and r's own.

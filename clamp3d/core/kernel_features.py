@@ -129,9 +129,12 @@ def corner(kx, ky, kz, cx, cy, cz, dx, dy, dz, l):  # type: ignore[no-untyped-de
 
 
 @inlined
-def inverse_root(g):  # type: ignore[no-untyped-def]
-    """1 / sqrt(g), at g near 1 by its series, whose next term is below the rounding: without waiting for a root."""
-    return 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
+def inverse_root(g, near):  # type: ignore[no-untyped-def]
+    """1 / sqrt(g), at g near 1 by its series, whose next term is below the rounding: without waiting for a root.
+
+    ``near``: whether g is known to be so near.
+    """
+    return 1.5 - 0.5 * g if near or abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
 
 
 @inlined
@@ -219,9 +222,9 @@ def end_arc_reach(ez, R, cz, dz, e, p, along):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def arc_point(C, S, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
+def arc_point(C, S, near, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
     """Squared distance of the axis' inside from a point of the end arc (inf if they do not face), qx, qy, t."""
-    n = inverse_root(C * C + S * S)
+    n = inverse_root(C * C + S * S, near)
     C *= n
     S *= n
     qx = R * (S * ex - C * ey)
@@ -250,30 +253,33 @@ def end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: i
     a = abs(p)
     if abs(q) > TINY or a > k:
         mu = nearer_root(k, a, abs(q))
-        first = arc_point(p / (k + mu), q / mu, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+        both = 1.0 / ((k + mu) * mu)
+        C, S = p * (mu * both), q * ((k + mu) * both)
+        first = arc_point(C, S, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
         nu = farther_root(k, a, abs(q)) if first[0] == math.inf else -1.0
         if nu <= 0.0:
             return first
-        return arc_point(p / (k - nu), -q / nu, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+        return arc_point(p / (k - nu), -q / nu, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
     C = p / k  # the point is on the major axis, within the evolute: two mirrored minima
     S = math.sqrt(max(0.0, 1.0 - C * C))
-    first = arc_point(C, S, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
-    second = arc_point(C, -S, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+    first = arc_point(C, S, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+    second = arc_point(C, -S, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
     return second if second[0] < first[0] else first
 
 
 @inlined
 def end_arc_soon(ez, R, s, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
-    """Squared distance and t of `end_arc` by two steps and without branches; and whether they are enough."""
+    """Squared distance and t of `end_arc` by one step and without branches; and whether that is enough."""
     q = abs(dz) * v
     a = abs(p)
     low, mu = nearer_start(k, a, abs(q))
     mu, done = nearer_step(k, a, abs(q), low, mu)
-    new, then = nearer_step(k, a, abs(q), low, mu)
-    mu = mu if done else new
-    d2, _, _, t = arc_point(p / (k + mu), q / mu, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+    both = 1.0 / ((k + mu) * mu)
+    C, S = p * (mu * both), q * ((k + mu) * both)
+    d2, _, _, t = arc_point(C, S, True, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+    done = done and abs(C * C + S * S - 1.0) <= 1e-8
     # The farther minimum needs a place within the evolute, where a + |q| < k.
-    return d2, t, (done or then) and abs(q) > TINY and (d2 < math.inf or a + abs(q) >= k)
+    return d2, t, done and abs(q) > TINY and (d2 < math.inf or a + abs(q) >= k)
 
 
 @inlined
