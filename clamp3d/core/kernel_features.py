@@ -139,11 +139,13 @@ def inverse_root(g, near):  # type: ignore[no-untyped-def]
 
 @inlined
 def nearer_start(k, a, q):  # type: ignore[no-untyped-def]
-    """Lower bound of the root of ``nearer_root``, and its expansion in k, exact for small tilt."""
+    """Lower bound of the root of ``nearer_root``, and its expansion in k to the second order, exact for small tilt."""
     n2 = a * a + q * q
     n = math.sqrt(n2)
+    over = 1.0 / n2
+    bend = k * (a * a * over)
     low = max(q, n - k)
-    return low, max(low, n - k * (a * a / n2))
+    return low, max(low, n - bend + 1.5 * k * bend * (q * q * over) * (n * over))
 
 
 @inlined
