@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.core.jit import entry, formula, inlined
+from clamp3d.core.jit import entry, formula
 from clamp3d.core.kernel_batch import AT_ONCE, outside_soon
 from clamp3d.core.kernel_distance import (
     inside_rate,
@@ -12,7 +12,7 @@ from clamp3d.core.kernel_distance import (
     nearest,
     parallel,
 )
-from clamp3d.core.kernel_flat import flat_nearest, flat_parallel, is_beside
+from clamp3d.core.kernel_flat import flat_nearest, is_beside
 from clamp3d.core.kernel_pose import axis, place, rigid
 
 RECORD = 19
@@ -65,12 +65,13 @@ def record(T, k, R, half_angle, s, h, H, r, l, flat, pad, out):  # type: ignore[
 
 
 def _distances(T, R, half_angle, H, r, l, flat, pad, block, out):  # type: ignore[no-untyped-def] # noqa: E741
+    """The distances of `record` to the bit; ``block`` (8, AT_ONCE) and ``pad`` are what it works in."""
     s = R * math.sin(half_angle)
     h = -R * math.cos(half_angle)
     reach = max(l, r) if flat else l
     for start in range(0, T.shape[0], AT_ONCE):
         count = min(AT_ONCE, T.shape[0] - start)
-        tilted = 0
+        tilted = 0  # of parallel axes the plane problem is less work
         for i in range(count):
             if not rigid(T, start + i):
                 return start + i
@@ -91,14 +92,10 @@ def _distances(T, R, half_angle, H, r, l, flat, pad, block, out):  # type: ignor
                 out[start + i] = block[6, i]
                 continue
             x, y, z, dx, dy, dz = block[0, i], block[1, i], block[2, i], block[3, i], block[4, i], block[5, i]
-            if is_parallel(R, reach, dx, dy):
-                if flat:
-                    out[start + i] = flat_parallel(R, s, h, H, r, l, x, y, z, dz)[0]
-                else:
-                    out[start + i] = parallel(R, s, h, H, r, l, x, y, z, dz)[0]
-                continue
             if flat:
                 out[start + i] = flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, pad)[0]
+            elif is_parallel(R, reach, dx, dy):
+                out[start + i] = parallel(R, s, h, H, r, l, x, y, z, dz)[0]
             else:
                 out[start + i] = nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)[0]
     return -1
