@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.core.jit import entry, formula, inlined
+from clamp3d.core.jit import entry, formula
+from clamp3d.core.kernel_batch import AT_ONCE, outside_soon
 from clamp3d.core.kernel_distance import (
-    enters,
-    from_outside,
     inside_rate,
     is_parallel,
     nearest,
-    outside,
     parallel,
-    unit,
 )
-from clamp3d.core.kernel_flat import flat_nearest, flat_parallel, is_beside
+from clamp3d.core.kernel_flat import flat_nearest, is_beside
 from clamp3d.core.kernel_pose import axis, place, rigid
 
 RECORD = 19
@@ -67,32 +64,40 @@ def record(T, k, R, half_angle, s, h, H, r, l, flat, pad, out):  # type: ignore[
     put(answer, rate, r, out, k)
 
 
-@inlined
-def distance_alone(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, flat, pad):  # type: ignore[no-untyped-def] # noqa: E741
-    """The distance of `record` to the bit, without what only the witnesses need."""
-    if is_parallel(R, max(l, r) if flat else l, dx, dy):
-        if flat:
-            return flat_parallel(R, s, h, H, r, l, x, y, z, dz)[0]
-        return parallel(R, s, h, H, r, l, x, y, z, dz)[0]
-    ux, uy, uz, e2 = unit(dx, dy, dz)
-    if y - l * abs(uy) > h or not enters(R, s, h, H, l, x, y, z, ux, uy, uz)[0]:
-        best2, t, _, feature, _, _ = outside(R, s, h, H, l, x, y, z, ux, uy, uz, e2)
-        v = from_outside(R, r, best2, feature, x + t * ux, y + t * uy)
-        if not flat or is_beside(v, t, l):
-            return v
-    if flat:
-        return flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, pad)[0]
-    return nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)[0]
-
-
-def _distances(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-untyped-def] # noqa: E741
+def _distances(T, R, half_angle, H, r, l, flat, pad, block, out):  # type: ignore[no-untyped-def] # noqa: E741
+    """The distances of `record` to the bit; ``block`` (8, AT_ONCE) and ``pad`` are what it works in."""
     s = R * math.sin(half_angle)
     h = -R * math.cos(half_angle)
-    for i in range(T.shape[0]):
-        if not rigid(T, i):
-            return i
-        x, y, z, dx, dy, dz = place(T, i)
-        out[i] = distance_alone(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, flat, pad)
+    reach = max(l, r) if flat else l
+    for start in range(0, T.shape[0], AT_ONCE):
+        count = min(AT_ONCE, T.shape[0] - start)
+        tilted = 0  # of parallel axes the plane problem is less work
+        for i in range(count):
+            if not rigid(T, start + i):
+                return start + i
+            x, y, z, dx, dy, dz = place(T, start + i)
+            block[0, i], block[1, i], block[2, i], block[3, i], block[4, i], block[5, i] = x, y, z, dx, dy, dz
+            block[7, i] = 0.0
+            if not is_parallel(R, reach, dx, dy):
+                tilted += 1
+        if 2 * tilted > count:
+            for i in range(count):
+                x, y, z, dx, dy, dz = block[0, i], block[1, i], block[2, i], block[3, i], block[4, i], block[5, i]
+                v, t, sure = outside_soon(R, s, h, H, r, l, x, y, z, dx, dy, dz)
+                block[6, i] = v
+                sure = sure and not is_parallel(R, reach, dx, dy)
+                block[7, i] = 1.0 if sure and (not flat or is_beside(v, t, l)) else 0.0
+        for i in range(count):
+            if block[7, i] > 0.0:
+                out[start + i] = block[6, i]
+                continue
+            x, y, z, dx, dy, dz = block[0, i], block[1, i], block[2, i], block[3, i], block[4, i], block[5, i]
+            if flat:
+                out[start + i] = flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, pad)[0]
+            elif is_parallel(R, reach, dx, dy):
+                out[start + i] = parallel(R, s, h, H, r, l, x, y, z, dz)[0]
+            else:
+                out[start + i] = nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)[0]
     return -1
 
 
@@ -106,5 +111,5 @@ def _records(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-unty
     return -1
 
 
-distances = entry(_distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[::1])")
+distances = entry(_distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[:,::1],f8[::1])")
 records = entry(_records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[:,::1])")

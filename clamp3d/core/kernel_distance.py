@@ -184,29 +184,29 @@ def edge_normal(feature, R, h, qx, qy, qz):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def unit(dx, dy, dz):  # type: ignore[no-untyped-def]
+def unit(dx, dy, dz, near):  # type: ignore[no-untyped-def]
     """A direction that is not parallel to the groove, of length 1, and the square of its part across the groove."""
     e2 = dx * dx + dy * dy
-    n = inverse_root(e2 + dz * dz)
+    n = inverse_root(e2 + dz * dz, near)
     return dx * n, dy * n, dz * n, e2 * (n * n)
 
 
-@formula
+@inlined
+def is_behind(R, s, h, cx, cy, dx, dy, t, falls):  # type: ignore[no-untyped-def]
+    """Whether a point of the axis in the block is in S; ``falls``: whether it may be where the axis passes y = h."""
+    x = cx + t * dx
+    y = cy + t * dy
+    behind = x * x + y * y >= R * R and (h < 0.0 or abs(x) * -h + y * s <= 0.0)
+    return behind or (abs(x) >= s and falls and t == (h - cy) / dy)
+
+
+@inlined
 def enters(R, s, h, H, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untyped-def] # noqa: E741
     """Whether an axis enters S, and its part lo <= t <= hi in the block."""
     lo, hi = clip(h, H, cy, cz, dy, dz, l)
-    behind = False
-    if lo <= hi:
-        # rho is convex along the axis: if any point of the part in the block is behind the arc, an end of it is.
-        for i in range(2):
-            t = lo if i == 0 else hi
-            x = cx + t * dx
-            y = cy + t * dy
-            if (x * x + y * y >= R * R and (h < 0.0 or abs(x) * -h + y * s <= 0.0)) or (
-                abs(x) >= s and (dy < 0.0 if i == 0 else dy > 0.0) and t == (h - cy) / dy
-            ):
-                behind = True
-    return behind, lo, hi
+    # rho is convex along the axis: if any point of the part in the block is behind the arc, an end of it is.
+    behind = is_behind(R, s, h, cx, cy, dx, dy, lo, dy < 0.0) or is_behind(R, s, h, cx, cy, dx, dy, hi, dy > 0.0)
+    return lo <= hi and behind, lo, hi
 
 
 @inlined
@@ -218,7 +218,7 @@ def from_outside(R, r, best2, feature, x, y):  # type: ignore[no-untyped-def]
     return math.sqrt(best2) - r
 
 
-@formula
+@inlined
 def end_point(R, s, h, H, l, cx, cy, cz, dx, dy, dz, t):  # type: ignore[no-untyped-def] # noqa: E741
     """Squared distance of an end of the axis from S, the place along the groove there, the feature."""
     z = cz + t * dz
@@ -234,6 +234,26 @@ def end_point(R, s, h, H, l, cx, cy, cz, dx, dy, dz, t):  # type: ignore[no-unty
         # In the material by the rounding of z alone (an axis in the plane of an end face): it is on the face.
         return end * end, math.copysign(H, z), END_FACE
     return d2, z, f
+
+
+@inlined
+def beyond(R, h, H, x, y, z):  # type: ignore[no-untyped-def]
+    """Squared distance of a point beyond an end from all that is behind the arc's circle, below the flats, within."""
+    g = max(R - math.sqrt(x * x + y * y), y - h, 0.0)
+    e = abs(z) - H
+    return g * g + e * e
+
+
+@inlined
+def corners(ez, s, h, cx, cy, cz, dx, dy, dz, l, best2, bt, bz, feature):  # type: ignore[no-untyped-def] # noqa: E741
+    """The best so far (its first four), or a corner of an end; whether the distance falls from one into the end arc."""
+    d2, t, first = corner(-s, h, ez, cx, cy, cz, dx, dy, dz, l)
+    if d2 < best2:
+        best2, bt, bz, feature = d2, t, ez, CORNER_M
+    d2, t, second = corner(s, h, ez, cx, cy, cz, dx, dy, dz, l)
+    if d2 < best2:
+        best2, bt, bz, feature = d2, t, ez, CORNER_N
+    return best2, bt, bz, feature, first or second
 
 
 @formula
@@ -252,39 +272,32 @@ def outside(R, s, h, H, l, cx, cy, cz, dx, dy, dz, e2):  # type: ignore[no-untyp
     top, bottom = cz + half >= H, cz - half <= -H
     through = top and bottom  # then its ends are far from S
     if not through:
-        for i in range(2):
-            t = -l if i == 0 else l
-            d2, z, f = end_point(R, s, h, H, l, cx, cy, cz, dx, dy, dz, t)
-            if d2 < best2:
-                best2, bt, bz, feature = d2, t, z, f
-    # Corners, and whether the distance falls from one of an end's into the end arc.
-    top_falls = bottom_falls = False
-    for k in range(4):
-        at_top, right = k > 1, k % 2 == 1
-        if top if at_top else bottom:
-            ez = H if at_top else -H
-            d2, t, falls = corner(s if right else -s, h, ez, cx, cy, cz, dx, dy, dz, l)
-            if d2 < best2:
-                best2, bt, bz, feature = d2, t, ez, CORNER_N if right else CORNER_M
-            top_falls = top_falls or (at_top and falls)
-            bottom_falls = bottom_falls or (falls and not at_top)
+        best2, bz, feature = end_point(R, s, h, H, l, cx, cy, cz, dx, dy, dz, -l)
+        bt = -l
+        d2, z, f = end_point(R, s, h, H, l, cx, cy, cz, dx, dy, dz, l)
+        if d2 < best2:
+            best2, bt, bz, feature = d2, l, z, f
+    low_falls = top_falls = False
+    if bottom:
+        best2, bt, bz, feature, low_falls = corners(-H, s, h, cx, cy, cz, dx, dy, dz, l, best2, bt, bz, feature)
+    if top:
+        best2, bt, bz, feature, top_falls = corners(H, s, h, cx, cy, cz, dx, dy, dz, l, best2, bt, bz, feature)
     # Inside of the axis against the lips, and the edges of the ends that it passes.
-    for i in range(2):
-        sx = -s if i == 0 else s
-        cross = (cx - sx) * dy - (cy - h) * dx
-        if cross * cross < best2 * e2:
-            d2, t, z = lip_line(sx, h, H, cx, cy, cz, dx, dy, dz, e2, l)
-            if d2 < best2:
-                best2, bt, bz, feature = d2, t, z, LIP_M if i == 0 else LIP_N
-    if cy + l * abs(dy) >= h and (top or bottom):
-        f2 = dy * dy + dz * dz
-        for i in range(2):
-            ez = -H if i == 0 else H
-            cross = (cy - h) * dz - (cz - ez) * dy
-            if (top if i else bottom) and cross * cross < best2 * f2:
-                d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l)
-                if d2 < best2:
-                    best2, bt, bz, feature = d2, t, ez, END_EDGE_M if x < 0.0 else END_EDGE_N
+    d2, t, z = lip_line(-s, h, H, cx, cy, cz, dx, dy, dz, e2, l, best2)
+    if d2 < best2:
+        best2, bt, bz, feature = d2, t, z, LIP_M
+    d2, t, z = lip_line(s, h, H, cx, cy, cz, dx, dy, dz, e2, l, best2)
+    if d2 < best2:
+        best2, bt, bz, feature = d2, t, z, LIP_N
+    above = cy + l * abs(dy) >= h
+    if above and bottom:
+        d2, t, x = end_edge(-H, s, h, cx, cy, cz, dx, dy, dz, l, best2)
+        if d2 < best2:
+            best2, bt, bz, feature = d2, t, -H, END_EDGE_M if x < 0.0 else END_EDGE_N
+    if above and top:
+        d2, t, x = end_edge(H, s, h, cx, cy, cz, dx, dy, dz, l, best2)
+        if d2 < best2:
+            best2, bt, bz, feature = d2, t, H, END_EDGE_M if x < 0.0 else END_EDGE_N
     # End arcs: where the distance from the circle has one minimum and falls from no corner into the arc, none is on it.
     if top or bottom:
         ex, ey, e, p, along = ellipse(R, cx, cy, dx, dy, e2)
@@ -294,20 +307,20 @@ def outside(R, s, h, H, l, cx, cy, cz, dx, dy, dz, e2):  # type: ignore[no-untyp
         for i in range(2):
             at_top = top_first if i == 0 else not top_first
             least = top_reach if at_top else low_reach
-            if least * least >= best2 or not (top if at_top else bottom):
+            v = top_v if at_top else low_v
+            falls = top_falls if at_top else low_falls
+            if not (top if at_top else bottom) or least * least >= best2:
+                continue
+            if not falls and (abs(p) >= e2 or abs(dz * v) >= e2):
                 continue
             ez = H if at_top else -H
-            v = top_v if at_top else low_v
-            if not (top_falls if at_top else bottom_falls) and (abs(p) >= e2 or abs(dz * v) >= e2):
-                continue
             d2, x, y, t = end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
             if d2 < best2:
                 best2, bt, bz, feature, bx, by = d2, t, ez, END_ARC, x, y
     if through:
         for i in range(2):
             t = -l if i == 0 else l
-            end = abs(cz + t * dz) - H
-            if end * end < best2:
+            if beyond(R, h, H, cx + t * dx, cy + t * dy, cz + t * dz) < best2:
                 d2, z, f = end_point(R, s, h, H, l, cx, cy, cz, dx, dy, dz, t)
                 if d2 < best2:
                     best2, bt, bz, feature, bx, by = d2, t, z, f, 0.0, 0.0
@@ -319,7 +332,7 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
     """Signed distance of a cylinder centred at c with its axis along d (of any length but zero)."""
     if is_parallel(R, l, dx, dy):
         return parallel(R, s, h, H, r, l, cx, cy, cz, dz)
-    dx, dy, dz, e2 = unit(dx, dy, dz)
+    dx, dy, dz, e2 = unit(dx, dy, dz, False)
 
     # A direction is normalised to 3 units, a point of the axis (a product and a sum, |t| <= l) known to 5 units of
     # |c| + l, s and h to 3 units of R, a difference of these and its norm to 3 more: 11, rounded up, and r's own.

@@ -73,47 +73,42 @@ def section_foot(feature, x, y, R, s, h):  # type: ignore[no-untyped-def]
     return sx, h, (x - sx) / gap, (y - h) / gap
 
 
-@formula
+@inlined
 def beyond_end(feature):  # type: ignore[no-untyped-def]
     """Feature of an end face that a section feature ends in."""
-    if feature == ARC:
-        return END_ARC
-    if feature == LIP_M:
-        return CORNER_M
-    if feature == LIP_N:
-        return CORNER_N
-    if feature == FLAT_M:
-        return END_EDGE_M
-    return END_EDGE_N
+    if feature <= LIP_N:
+        return END_ARC if feature < LIP_M else feature + (CORNER_M - LIP_M)
+    return feature + (END_EDGE_M - FLAT_M)
 
 
-@formula
-def lip_line(sx, h, H, cx, cy, cz, dx, dy, dz, e2, l):  # type: ignore[no-untyped-def] # noqa: E741
-    """Squared distance of the axis' inside from the inside of the lip at x = sx (inf if they do not face), t, z."""
+@inlined
+def lip_line(sx, h, H, cx, cy, cz, dx, dy, dz, e2, l, best2):  # type: ignore[no-untyped-def] # noqa: E741
+    """Squared distance of the axis' inside from the inside of the lip at x = sx, t, z.
+
+    It is inf if they do not face or the distance of the lines is no less than the best so far.
+    """
     wx = cx - sx
     wy = cy - h
-    t = -(wx * dx + wy * dy) / e2
-    z = cz + t * dz
-    if abs(t) > l or abs(z) > H:
-        return math.inf, t, z
     cross = wx * dy - wy * dx
-    return cross * cross / e2, t, z
+    over = 1.0 / e2
+    t = -(wx * dx + wy * dy) * over
+    z = cz + t * dz
+    faces = cross * cross < best2 * e2 and abs(t) <= l and abs(z) <= H
+    return cross * cross * over if faces else math.inf, t, z
 
 
-@formula
-def end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l):  # type: ignore[no-untyped-def] # noqa: E741
-    """Squared distance of the axis' inside from the edges {y = h, z = ez, |x| >= s} (inf if they do not face), t, x."""
+@inlined
+def end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l, best2):  # type: ignore[no-untyped-def] # noqa: E741
+    """The same of the edges {y = h, z = ez, |x| >= s}: squared distance, t, x."""
     wy = cy - h
     wz = cz - ez
     f2 = dy * dy + dz * dz
-    if f2 == 0.0:
-        return math.inf, 0.0, 0.0
-    t = -(wy * dy + wz * dz) / f2
-    x = cx + t * dx
-    if abs(t) > l or abs(x) < s:
-        return math.inf, t, x
     cross = wy * dz - wz * dy
-    return cross * cross / f2, t, x
+    over = 1.0 / max(f2, TINY)
+    t = -(wy * dy + wz * dz) * over
+    x = cx + t * dx
+    faces = cross * cross < best2 * f2 and abs(t) <= l and abs(x) >= s
+    return cross * cross * over if faces else math.inf, t, x
 
 
 @inlined
@@ -134,9 +129,38 @@ def corner(kx, ky, kz, cx, cy, cz, dx, dy, dz, l):  # type: ignore[no-untyped-de
 
 
 @inlined
-def inverse_root(g):  # type: ignore[no-untyped-def]
-    """1 / sqrt(g), at g near 1 by its series, whose next term is below the rounding: without waiting for a root."""
-    return 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
+def inverse_root(g, near):  # type: ignore[no-untyped-def]
+    """1 / sqrt(g), at g near 1 by its series, whose next term is below the rounding: without waiting for a root.
+
+    ``near``: whether g is known to be so near.
+    """
+    return 1.5 - 0.5 * g if near or abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
+
+
+@inlined
+def nearer_start(k, a, q):  # type: ignore[no-untyped-def]
+    """Lower bound of the root of ``nearer_root``, and its expansion in k to the second order, exact for small tilt."""
+    n2 = a * a + q * q
+    n = math.sqrt(n2)
+    over = 1.0 / n2
+    bend = k * (a * a * over)
+    low = max(q, n - k)
+    return low, max(low, n - bend + 1.5 * k * bend * (q * q * over) * (n * over))
+
+
+@inlined
+def nearer_step(k, a, q, low, mu):  # type: ignore[no-untyped-def]
+    """Newton's step of ``nearer_root``, and whether it was the last that is needed."""
+    over = 1.0 / ((k + mu) * mu)
+    u = mu * over
+    v = (k + mu) * over
+    x2 = (a * u) * (a * u)
+    y2 = (q * v) * (q * v)
+    g = x2 + y2
+    step = (math.sqrt(g) - 1.0) * g / (x2 * u + y2 * v)
+    mu = max(low, mu + step)
+    # What is left is at most 3/8 k^2 step^2 / (mu^2 (k + mu)): without k the left side's root is linear.
+    return mu, abs(step) * min(k, mu) <= CONVERGED * mu * mu
 
 
 @formula
@@ -144,23 +168,12 @@ def nearer_root(k, a, q):  # type: ignore[no-untyped-def]
     """Root mu > 0 of (a / (k + mu))^2 + (q / mu)^2 = 1, for k, a >= 0 and q > 0 (or a > k).
 
     1 / norm of the left side is concave in mu (a power mean of linear functions): Newton's method on it is below the
-    root after one step, climbs to it without passing it, and converges quadratically [Moré & Sorensen 1983]. It starts
-    from the root's expansion in k, exact for small tilt.
+    root after one step, climbs to it without passing it, and converges quadratically [Moré & Sorensen 1983].
     """
-    n2 = a * a + q * q
-    n = math.sqrt(n2)
-    low = max(q, n - k)
-    mu = max(low, n - k * (a * a / n2))
+    low, mu = nearer_start(k, a, q)
     for _ in range(40):
-        u = 1.0 / (k + mu)
-        v = 1.0 / mu
-        x2 = (a * u) * (a * u)
-        y2 = (q * v) * (q * v)
-        g = x2 + y2
-        step = (math.sqrt(g) - 1.0) * g / (x2 * u + y2 * v)
-        mu = max(low, mu + step)
-        # What is left is at most 3/8 k^2 step^2 / (mu^2 (k + mu)): without k the left side's root is linear.
-        if abs(step) * min(k, mu) <= CONVERGED * mu * mu:
+        mu, done = nearer_step(k, a, q, low, mu)
+        if done:
             break
     return mu
 
@@ -190,23 +203,41 @@ def farther_root(k, a, q):  # type: ignore[no-untyped-def]
     return nu
 
 
-@formula
+@inlined
 def ellipse(R, cx, cy, dx, dy, e2):  # type: ignore[no-untyped-def]
     """What both ends share in ``end_arc``: tilt direction and sine, the axis' place p on the major axis, along it."""
     e = math.sqrt(e2)
-    ex = dx / e
-    ey = dy / e
-    return ex, ey, e, (cy * ex - cx * ey) / R, cx * ex + cy * ey
+    over = 1.0 / e
+    ex = dx * over
+    ey = dy * over
+    return ex, ey, e, (cy * ex - cx * ey) * (1.0 / R), cx * ex + cy * ey
 
 
-@formula
+@inlined
 def end_arc_reach(ez, R, cz, dz, e, p, along):  # type: ignore[no-untyped-def]
     """The axis' place v along the minor axis of the ellipse of ``end_arc``, and a lower bound on its distance."""
-    v = (-dz * along - e * (ez - cz)) / R
+    v = (-dz * along - e * (ez - cz)) * (1.0 / R)
     if dz > 0.0:
         v = -v
     # The ellipse lies outside (for a point inside it) or inside (outside) its scaled copy through the point.
     return v, R * abs(abs(dz) - math.sqrt(dz * dz * p * p + v * v))
+
+
+@inlined
+def arc_point(C, S, near, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
+    """Squared distance of the axis' inside from a point of the end arc (inf if they do not face), qx, qy, t."""
+    n = inverse_root(C * C + S * S, near)
+    C *= n
+    S *= n
+    qx = R * (S * ex - C * ey)
+    qy = R * (S * ey + C * ex)
+    t = (qx - cx) * dx + (qy - cy) * dy + (ez - cz) * dz
+    du = R * (C - p)
+    dv = R * (abs(dz) * S - v)
+    d2 = du * du + dv * dv
+    if qy > h or (h > 0.0 and abs(qx) * -h + qy * s > 0.0) or abs(t) > l:
+        d2 = math.inf  # in the mouth; nearly full arcs: by the angle
+    return d2, qx, qy, t
 
 
 @formula
@@ -220,68 +251,50 @@ def end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: i
     (the local minimum on the other side of the major axis) are minima; solving for them this way loses no digits where
     the quartic's roots run together (axis through the arc's centre, small tilt).
     """
-    b = abs(dz)
-    q = b * v
+    q = abs(dz) * v
     a = abs(p)
-    best2 = math.inf
-    bx = by = bt = 0.0
-    for branch in range(2):
-        if abs(q) > TINY or a > k:
-            if branch == 0:
-                root = nearer_root(k, a, abs(q))
-                C = p / (k + root)
-                S = q / root
-            else:
-                root = farther_root(k, a, abs(q))
-                if root <= 0.0:
-                    break
-                C = p / (k - root)
-                S = -q / root
-            n = inverse_root(C * C + S * S)
-            C *= n
-            S *= n
-        else:  # the point is on the major axis, within the evolute: two mirrored minima
-            C = p / k
-            S = math.sqrt(max(0.0, 1.0 - C * C))
-            if branch == 1:
-                S = -S
-        qx = R * (S * ex - C * ey)
-        qy = R * (S * ey + C * ex)
-        if qy > h or (h > 0.0 and abs(qx) * -h + qy * s > 0.0):  # in the mouth; nearly full arcs: by the angle
-            continue
-        t = (qx - cx) * dx + (qy - cy) * dy + (ez - cz) * dz
-        if abs(t) > l:
-            continue
-        du = R * (C - p)
-        dv = R * (b * S - v)
-        d2 = du * du + dv * dv
-        if d2 < best2:
-            best2, bx, by, bt = d2, qx, qy, t
-        if branch == 0 and abs(q) > TINY:
-            break
-    return best2, bx, by, bt
+    if abs(q) > TINY or a > k:
+        mu = nearer_root(k, a, abs(q))
+        both = 1.0 / ((k + mu) * mu)
+        C, S = p * (mu * both), q * ((k + mu) * both)
+        first = arc_point(C, S, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+        nu = farther_root(k, a, abs(q)) if first[0] == math.inf else -1.0
+        if nu <= 0.0:
+            return first
+        return arc_point(p / (k - nu), -q / nu, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+    C = p / k  # the point is on the major axis, within the evolute: two mirrored minima
+    S = math.sqrt(max(0.0, 1.0 - C * C))
+    first = arc_point(C, S, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+    second = arc_point(C, -S, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+    return second if second[0] < first[0] else first
 
 
-@formula
+@inlined
+def end_arc_soon(ez, R, s, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
+    """Squared distance and t of `end_arc` by one step and without branches; and whether that is enough."""
+    q = abs(dz) * v
+    a = abs(p)
+    low, mu = nearer_start(k, a, abs(q))
+    mu, done = nearer_step(k, a, abs(q), low, mu)
+    both = 1.0 / ((k + mu) * mu)
+    C, S = p * (mu * both), q * ((k + mu) * both)
+    d2, _, _, t = arc_point(C, S, True, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+    done = done and abs(C * C + S * S - 1.0) <= 1e-8
+    # The farther minimum needs a place within the evolute, where a + |q| < k.
+    return d2, t, done and abs(q) > TINY and (d2 < math.inf or a + abs(q) >= k)
+
+
+@inlined
 def clip(h, H, cy, cz, dy, dz, l):  # type: ignore[no-untyped-def] # noqa: E741
     """Part lo <= t <= hi of the axis in the block {y <= h, |z| <= H}; lo > hi if there is none."""
-    lo = -l
-    hi = l
-    if dy > 0.0:
-        hi = min(hi, (h - cy) / dy)
-    elif dy < 0.0:
-        lo = max(lo, (h - cy) / dy)
-    elif cy > h:
-        return 1.0, -1.0
-    if dz > 0.0:
-        hi = min(hi, (H - cz) / dz)
-        lo = max(lo, (-H - cz) / dz)
-    elif dz < 0.0:
-        hi = min(hi, (-H - cz) / dz)
-        lo = max(lo, (H - cz) / dz)
-    elif abs(cz) > H:
-        return 1.0, -1.0
-    return lo, hi
+    over = 1.0 / (dz if abs(dz) > TINY else TINY)
+    down, up = (-H - cz) * over, (H - cz) * over
+    lo, hi = max(-l, min(down, up)), min(l, max(down, up))
+    at = (h - cy) / dy
+    hi = min(hi, at) if dy > 0.0 else hi
+    lo = max(lo, at) if dy < 0.0 else lo
+    none = (dy == 0.0 and cy > h) or (abs(dz) <= TINY and abs(cz) > H)
+    return lo, -math.inf if none else hi
 
 
 @formula

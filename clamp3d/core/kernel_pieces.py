@@ -173,7 +173,7 @@ def side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[
                 sx = -s if j == 0 else s
                 if piece != 0 and piece != j + 1:
                     continue
-                d2, t, z = lip_line(sx, h, H, cx, cy, cz, dx, dy, dz, e2, l)
+                d2, t, z = lip_line(sx, h, H, cx, cy, cz, dx, dy, dz, e2, l, best2)
                 if d2 < best2:
                     best2, bx, by, bz, bt, feature = d2, sx, h, z, t, LIP_M if j == 0 else LIP_N
                 for i in range(2):
@@ -190,7 +190,7 @@ def side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[
                     if d2 < best2:
                         best2, bx, by, bz, bt, feature = d2, x, y, ez, t, END_ARC
                 else:
-                    d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l)
+                    d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l, best2)
                     if d2 < best2 and side * x > 0.0:
                         best2, bx, by, bz, bt, feature = d2, x, h, ez, t, END_EDGE_M if side < 0.0 else END_EDGE_N
             if best2 < best * best:
@@ -251,7 +251,7 @@ def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignor
             qx, qy, _, _ = section_foot(f, cx, cy, R, s, h)
             best2, bx, by, bt, feature = gap * gap, qx, qy, t, beyond_end(f)
     else:
-        d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l)
+        d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l, best2)
         if d2 < best2:
             best2, bx, by, bt, feature = d2, x, h, t, END_EDGE_M if x < 0.0 else END_EDGE_N
         for j in range(2):
