@@ -16,6 +16,8 @@ BORDER = 0.0003
 _MOST = 64
 _SAFETY = 2.0
 """Factor on deviations that are sampled, not computed: of edges that are no lines, circles or plain splines."""
+_SHARES = (0.25, 0.5, 0.75)
+"""Where pieces of such edges are sampled."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,11 +131,10 @@ def _sags(curve: Any, t: Array, points: Array, kind: int, frame: Array, size: Si
         found = spline_sags(curve.BSpline(), np.minimum(t[:-1], t[1:]), np.maximum(t[:-1], t[1:]))
         if found is not None:
             return found
-    off = np.zeros(len(t) - 1)
-    for share in (0.25, 0.5, 0.75):
-        at = (1.0 - share) * t[:-1] + share * t[1:]
-        true = np.array([curve.Value(float(x)).Coord() for x in at])
-        off = np.maximum(off, from_sides(kind, frame, size, points[:-1], points[1:], true))
+    at = np.concatenate([(1.0 - share) * t[:-1] + share * t[1:] for share in _SHARES])
+    true = np.array([curve.Value(x).Coord() for x in at.tolist()])
+    start, end = (np.tile(x, (len(_SHARES), 1)) for x in (points[:-1], points[1:]))
+    off = from_sides(kind, frame, size, start, end, true).reshape(len(_SHARES), -1).max(axis=0)
     return np.where(off > 1e-11, _SAFETY * off, 0.0)
 
 
