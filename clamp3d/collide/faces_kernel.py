@@ -225,7 +225,7 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
             # Beyond this the inside of a torus within a ball may be in two pieces.
             reach = size[f, 0] if kind[f] == TORUS else np.inf
             if least - e > found or (h > t and outside < 0.0):
-                limit = min(max(least, h) + rho + 2.0 * at, reach if sense[f] < 0.0 else np.inf)
+                limit = min(max(least, h) + rho + 2.0 * at + t, reach if sense[f] < 0.0 else np.inf)
                 clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 1, -1.0, x, y, z, limit, stack)
                 if clear > at + t:  # what is above the face by more than t is outside there
                     found = max(found, min(least, clear - rho) - e)
@@ -260,8 +260,9 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
                 turn = sense[f] * sense[g] * _slopes(kind, size, frame, f, g, x, y, z)
                 if turn < -0.8:
                     continue
+                rise = 0.9 * math.sqrt(0.5 * (1.0 + turn))  # above either for a step along both normals
                 if least < 0.0:
-                    least /= 0.9 * math.sqrt(0.5 * (1.0 + turn))
+                    least /= rise
                 _mark(f, solid, marked, slack, whole)
                 _mark(g, solid, marked, slack, whole)
                 # A piece of one that looks over the other: what lies above both there is outside.
@@ -270,9 +271,10 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
                     rows = (marks[other], marks[other], nodes[other], nodes[other])
                     at = nearest_marked(P, err, box, link, order, root[one], *rows, 1, 1.0, x, y, z, at, stack)
                 rows = (marks[f], marks[g], nodes[f], nodes[g])
-                limit = 2.0 * at + rho
+                past = at + 2.0 * max(slack[f] + deviation[f], slack[g] + deviation[g]) / rise  # of the slack of both
+                limit = past + at + rho
                 clear = nearest_marked(P, err, box, link, order, 0, *rows, 1, -1.0, x, y, z, limit, stack)
-                if clear > at:
+                if clear > past:
                     found = max(found, min(least, clear - rho) - e)
     unsure = low > 0.0 and found < min(out[0], goal) - tol and not inside and outside < 0.0
     if unsure and _winding(P, x, y, z) < 0.5:
