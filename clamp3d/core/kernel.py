@@ -71,14 +71,14 @@ def _distances(T, R, half_angle, H, r, l, flat, pad, block, out):  # type: ignor
     reach = max(l, r) if flat else l
     for start in range(0, T.shape[0], AT_ONCE):
         count = min(AT_ONCE, T.shape[0] - start)
-        tilted = 0  # of parallel axes the plane problem is less work
+        tilted = 0  # those worth it: for parallel axes, and far from both ends, there is little to search
         for i in range(count):
             if not rigid(T, start + i):
                 return start + i
             x, y, z, dx, dy, dz = place(T, start + i)
             block[0, i], block[1, i], block[2, i], block[3, i], block[4, i], block[5, i] = x, y, z, dx, dy, dz
             block[7, i] = 0.0
-            if not is_parallel(R, reach, dx, dy):
+            if abs(z) + l * abs(dz) >= H and not is_parallel(R, reach, dx, dy):
                 tilted += 1
         if 2 * tilted > count:
             for i in range(count):
