@@ -19,7 +19,7 @@ from tests.fuzz.api_targets import groups
 from tests.fuzz.cli_calls import FindingError
 from tests.fuzz.values import ANYTHING, Draw, near, pick
 
-_INFINITE = {"curvature", "gap_left", "gap_right", "gap", "high", "lower", "opening", "upper", "uncertainty"}
+_INFINITE = {"curvature", "gap_left", "gap_right", "gap", "high", "least", "lower", "opening", "upper", "uncertainty"}
 """Fields whose documented value is infinite where there is none."""
 
 
