@@ -1,4 +1,4 @@
-"""What a user of Open CASCADE writes for pairs of a STEP file: ``open_cascade_pairs.py FILE [[i, j], ...]``; nothing else.
+"""What a user of Open CASCADE writes for pairs of a STEP file, and nothing else: ``FILE [[i, j], ...]``.
 
 Each pair's distance and, where that is 0, the common volume, of the file's solids in their order.
 """
