@@ -3,7 +3,7 @@
 Definition: ``min over |t| <= length/2 of sdf(c + t d) - r``, where ``sdf`` is the signed distance of a point from the
 groove's solid. Here ``sdf`` is put together from the boundary pieces of the section (arc, two rays) and the prism
 rule. Branch and bound with the proven slope bound of ``sdf`` along the axis finds the stretches that hold the minimum,
-so none deeper than 1e-6 of the scene can hide; golden section goes down in each of them:
+so none deeper than 1e-6 of the scene (at 50 digits: of the groove's radius) can hide; golden section goes down in each:
 
 - `truth`: all cases at once in 80-bit floats (64-bit mantissa: about 2000 times finer than float64).
 - `truth_50_digits`: one case with mpmath at 50 digits.
@@ -37,7 +37,7 @@ def truth(cases: Cases) -> NDArray[Any]:
     if not EXTENDED_WORKS:
         return np.array([float(truth_50_digits(cases, i)) for i in range(len(cases))], Extended)
     scene = _Scene(cases)
-    case, lo, hi, best = _brackets(scene, _MANY)
+    case, lo, hi, best = _brackets(scene, _MANY, scene.size)
     # A bracket may hold a plateau with two ends a rounding apart: look at it more closely before closing in.
     t = lo[:, None] + (hi - lo)[:, None] * (np.arange(_FILL + 1).astype(Extended) / _FILL)
     f = scene.sdf(case[:, None], t)
@@ -100,13 +100,15 @@ def point_sdf(x: Any, y: Any, z: Any, R: Any, sx: Any, h: Any, H: Any) -> NDArra
     return np.asarray(np.where((g <= 0) & (e <= 0), np.maximum(g, e), outside))
 
 
-def _brackets(scene: _Scene, most: int) -> tuple[NDArray[np.intp], NDArray[Any], NDArray[Any], NDArray[Any]]:
+def _brackets(
+    scene: _Scene, most: int, size: NDArray[Any]
+) -> tuple[NDArray[np.intp], NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Stretches (case, lo, hi) of the axes, each with one minimum, and the least sdf of each case that was seen.
 
-    Outside of them sdf is more than 1e-6 of the scene above its least value, by the bound on its slope along the axis.
+    Outside of them sdf is more than 1e-6 of ``size`` above its least value, by the bound on its slope along the axis.
     No stretch is cut across an end face; ``most`` stretches of a case are as fine as it gets.
     """
-    n, half, slack = len(scene.half), scene.half, Extended(1e-6) * scene.size
+    n, half, slack = len(scene.half), scene.half, Extended(1e-6) * size
     with np.errstate(all="ignore"):
         faces = [
             np.where(np.abs(t) < half, t, half)
@@ -195,7 +197,8 @@ def truth_50_digits(cases: Cases, i: int) -> Any:
 
     best = min(sdf(-half), sdf(half))
     goal = mp.mpf(10) ** -45 * (half + 1)
-    _, starts, stops, _ = _brackets(_Scene(cases.take([i])), _MOST)
+    scene = _Scene(cases.take([i]))
+    _, starts, stops, _ = _brackets(scene, _MOST, np.minimum(scene.size, scene.R))  # a long groove may be thin
     for lo, hi in zip(starts, stops, strict=True):
         p, q = max(mp.mpf(float(lo)), -half), min(mp.mpf(float(hi)), half)
         grid = [p + (q - p) * j / _FILL for j in range(_FILL + 1)]
