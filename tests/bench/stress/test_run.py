@@ -98,7 +98,7 @@ def test_truth_of_known_cases(offset, tilt, half_angle, gap):
 
 
 def test_no_minimum_of_a_long_thin_groove_is_missed():
-    """Near a corner of a groove of 4 m by 0.006 mm; that the end arc comes so near the axis was computed at 40 digits."""
+    """Near a corner of a groove of 4 m by 0.006 mm; that its end arc is so near the axis was computed at 40 digits."""
     cases = POSES["mixed sizes"].cases(3000, 7)
     assert float(truth_50_digits(cases, 1496)) == pytest.approx(-9.2076469758107e-09, abs=1e-20)
 
