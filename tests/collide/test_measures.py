@@ -26,7 +26,8 @@ from clamp3d.collide.touching import is_box, touching_boxes
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
-from clamp3d.core.profile import Profile
+from clamp3d.core.profile import Arc, Profile
+from clamp3d.testing import body
 from tests.kinds import BLOCK, DRAWN, faceted_shape
 
 HERE = np.eye(4)
@@ -149,16 +150,15 @@ def test_errors_of_single_faces():
     block = box_mesh((2.0, 2.0, 2.0))
     assert surface_distance(mesh, block, translation(8.0, 0.0, 0.0)).lower == pytest.approx(1.8, abs=1e-9)
     assert surface_distance(mesh, block, translation(-8.0, 0.0, 0.0)).lower == pytest.approx(2.0, abs=1e-9)
-    levels = Surface(
-        mesh.vertices, mesh.faces, np.array([0.0, 1e-3, 0.01, 0.04, 0.2, 0.5, 0.9, 1.0, 0.3, 0.02, 0.0, 0.7])
-    )
+    errors = np.array([0.0, 1e-3, 0.01, 0.04, 0.2, 0.5, 0.9, 1.0, 0.3, 0.02, 0.0, 0.7])
+    levels = Surface(mesh.vertices, mesh.faces, errors)
     for rows, error in levels.levels:
         assert levels.face_error[rows].max() == error
     assert np.sum([rows for rows, _ in levels.levels], axis=0).tolist() == [1] * 12
 
 
 def test_depths_of_points_in_a_mesh():
-    """Of a box with a hollow: what the nearest triangle alone tells is right, and what lies in the hollow is outside."""
+    """Of a box with a hollow: what the nearest triangle alone tells is right; the hollow is outside."""
     outer, inner = trimesh.creation.box((10.0, 10.0, 10.0)), trimesh.creation.box((4.0, 4.0, 4.0))
     mesh = Surface(
         np.vstack([outer.vertices, inner.vertices]),
@@ -241,19 +241,19 @@ def test_cylinders_and_hulls_beside_facets(error):
     turned = translation(12.0, 0.0, 0.0) @ rotation((0.0, 1.0, 0.0), 0.5 * math.pi - 0.5) @ back
     tip = 3.0 * math.cos(0.5) + 2.0 * math.sin(0.5)
     for off in (0.0, 0.1):
-        body = ClosedForm((rod,), (), off)
+        form = ClosedForm((rod,), (), off)
         for T, truth in ((lying, 5.0), (standing, 4.0), (turned, 7.0 - tip)):
-            found = rod_distance(facets, body, T)
+            found = rod_distance(facets, form, T)
             assert found.lower <= truth - error - off + 1e-9
             assert found.upper >= truth + error + off - 1e-9
             assert found.upper <= truth + error + off + 1e-6
             assert axis_gap(facets, rod, T) <= truth - error + 1e-9
-        assert rod_distance(facets, body, lying).lower == pytest.approx(5.0 - error - off, abs=1e-6)
+        assert rod_distance(facets, form, lying).lower == pytest.approx(5.0 - error - off, abs=1e-6)
         assert axis_gap(facets, rod, lying) == pytest.approx(5.0 - error, abs=1e-6)
-        deep = rod_distance(facets, body, translation(6.0, 0.0, 0.0) @ back)
+        deep = rod_distance(facets, form, translation(6.0, 0.0, 0.0) @ back)
         assert deep.lower <= -1.0 - error - off + 1e-6
         assert -1.0 + error + off <= deep.upper + 1e-6
-        inside = rod_distance(facets, body, translation(1.0, 0.0, 0.0) @ back)
+        inside = rod_distance(facets, form, translation(1.0, 0.0, 0.0) @ back)
         assert inside.upper <= -3.0 + error + off
         assert inside.lower == -math.inf
     assert axis_gap(facets, rod, back) == axis_gap(facets, rod, translation(5.0, 0.0, 0.0) @ back) == -math.inf
@@ -261,7 +261,7 @@ def test_cylinders_and_hulls_beside_facets(error):
     assert hull_gap(facets, around) == pytest.approx(3.0 - error, abs=1e-9)
     for shift in (-9.0, -4.0, -3.0):
         moved = Hull(
-            around.vertices + (shift, 0.0, 0.0),
+            around.vertices + np.array([shift, 0.0, 0.0]),
             around.planes - [0, 0, 0, 1] * (around.planes[:, :1] * shift),
             around.faces,
         )
@@ -330,9 +330,9 @@ def test_what_two_bounds_say_together():
     both = wide.meet(low)
     assert (both.lower, both.upper, both.point_b is q, both.normal is n, both.method) == (1.0, 3.0, True, True, "b")
     assert (low.meet(wide).lower, low.meet(wide).upper) == (1.0, 3.0)
-    assert wide.meet(Distance()) is wide
     assert wide.meet(Distance(-1.0, 4.0, normal=n)).normal is n
     near = Distance(1.0, 2.0, p, q, n, True)
+    assert near.meet(Distance()) is near
     assert (near.union(wide).lower, near.union(wide).upper, near.union(wide).unique) == (0.0, 2.0, None)
     assert near.union(Distance(7.0, 9.0)).unique is True
     assert near.union(Distance(2.0, 2.0, p + 1.0, q + 1.0)).unique is False
@@ -347,3 +347,28 @@ def test_what_two_bounds_say_together():
     assert deep.to_dict()["depth_mm"] == 1.5
     model = Distance(1.0, 3.0, estimate=1.5)
     assert (model.value, model.uncertainty) == (1.5, 1.5)
+
+
+SLOT = Extrusion(Profile.of((-2.0, -1.0), (2.0, -1.0), (2.0, 1.5), (-2.0, 1.5)), "Z", -30.0, 30.0)
+HALF_ROUND = Profile.of((-4.0, 0.0), (-4.0, -6.0), (4.0, -6.0), (4.0, 0.0), Arc((0.0, 0.0), 4.0, 0.0, math.pi))
+MORE = [
+    shapes.Solid("slotted plate", (Extrusion(Profile.rectangle(12.0, 9.0), "Z", -2.0, 2.0),), (SLOT,)),
+    shapes.Solid("slotted rod", (Extrusion(Profile.circle(5.0), "Z", -3.0, 3.0),), (SLOT,)),
+    shapes.Solid("round back", (Extrusion(HALF_ROUND, "Y", -3.0, 5.0),)),
+]
+
+
+@pytest.mark.parametrize("shape", [*DRAWN, *MORE], ids=lambda shape: shape.name)
+def test_the_closed_forms_of_a_drawn_solid_are_the_solid(shape):
+    """Every point of one is a point of the other, and the boxes around the forms hold them."""
+    forms, solid = ModelCache().model(shape).bodies, body(shape)
+    x = np.random.default_rng(5).uniform(solid.box[0] - 1.0, solid.box[1] + 1.0, (20_000, 3))
+    field, depth = solid.field(x), np.max([form.depth(x) for form in forms], axis=0)
+    clear = np.abs(depth) > 1e-9
+    if len(forms) > 1:  # on the seams of pieces both are at their borders
+        clear &= np.abs(field) > 1e-2
+    assert ((depth > 0.0) == (field < 0.0))[clear].all()
+    for form in forms:
+        inside = x[form.depth(x) > 0.0]
+        assert (inside >= form.bounds[0] - 1e-9).all()
+        assert (inside <= form.bounds[1] + 1e-9).all()
