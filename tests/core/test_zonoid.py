@@ -172,7 +172,7 @@ def _sum(rng, kind):
     U[:, 3] = rng.uniform(0.5, 2.0, len(U))
     if kind == 3 and len(U):  # nearly square to a segment, or along it
         U[0, :3] = S[0] / np.linalg.norm(S[0])
-        U[-1, :3] = np.cross(U[0, :3], S[-1] + 1e-6 * rng.normal(size=3)) + (0.0, 0.0, 1e-9)
+        U[-1, :3] = np.cross(U[0, :3], S[-1] + 1e-6 * rng.normal(size=3)) + 1e-9
         U[-1, :3] /= np.linalg.norm(U[-1, :3])
     return S, U, rng.choice([0.0, 0.3, 1.0, 5.0]) * rng.normal(size=3)
 
