@@ -14,15 +14,14 @@ import clamp3d
 from clamp3d import figures, kernel, shapes
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
-from clamp3d.baselines.meshes import Meshes
+from clamp3d.baselines.polytopes import Meshes
 from clamp3d.baselines.wedges import Wedges
 from clamp3d.bench.image import image_study, measure_image
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Wire
 from clamp3d.clamp.equilibria import equilibria
-from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.parts import parts
+from clamp3d.clamp.parts import groove_pairs, parts
 from clamp3d.clamp.placement import Placement
 from clamp3d.clamp.section import Section
 from clamp3d.collide.poses import check_poses

@@ -36,8 +36,8 @@ from clamp3d.bench.compare.scene import GROOVE, chord_error, known_poses
 from clamp3d.bench.complexity import Sweep, complexity, fitted, grid_search
 from clamp3d.bench.machine import machine
 from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.parts import wire_pairs
 from clamp3d.cli.compare import command
 from clamp3d.errors import InputError
 
