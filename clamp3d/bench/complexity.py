@@ -20,8 +20,8 @@ from clamp3d.baselines.chords import Chords
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble
 from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.parts import wire_pairs
 from clamp3d.clamp.result import Assembly, Solver
 from clamp3d.clamp.section import Section
 from clamp3d.core.pose import Array, SectionPose, inverse

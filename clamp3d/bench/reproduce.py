@@ -14,9 +14,9 @@ from clamp3d.bench.complexity import fitted, grid_search
 from clamp3d.bench.image import image_study
 from clamp3d.clamp.assemble import STEP, assemble
 from clamp3d.clamp.dimensions import ConnectionType, PartName
+from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.matrix import millimetres
-from clamp3d.clamp.parts import wire_pairs
 from clamp3d.clamp.result import Assembly, Solver
 from clamp3d.collide.distance import Distance
 from clamp3d.core.arc_circle import arc_circle

@@ -12,8 +12,9 @@ import numpy as np
 
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.dimensions import Clamp, ConnectionType, PartName
+from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import ARC_PAIRS, PAIRS, SCREW, Pair, contact_type, plain
-from clamp3d.clamp.parts import groove_pairs, parts
+from clamp3d.clamp.parts import parts
 from clamp3d.clamp.scene import CONTACT, clamp_scene
 from clamp3d.clamp.section import SPLINTS, WIRES
 from clamp3d.collide.distance import Distance, measure

@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from clamp3d.checks import array, choice, instance, number, positive, whole
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp, PartName
-from clamp3d.clamp.parts import groove_pairs
+from clamp3d.clamp.features import groove_pairs
 from clamp3d.core.distance import Feature, signed_distances
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.linear import dot

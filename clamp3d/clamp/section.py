@@ -19,8 +19,8 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import Clamp, PartName
+from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import Pair
-from clamp3d.clamp.parts import groove_pairs
 from clamp3d.core.distance import Feature
 from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.linear import dot

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from clamp3d.baselines.model import check_unit_angle
 from clamp3d.clamp.dimensions import Clamp, PartName
-from clamp3d.clamp.parts import groove_pairs, parts
+from clamp3d.clamp.features import groove_pairs
+from clamp3d.clamp.parts import parts
 from clamp3d.core.meshing import mesh
 from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError

@@ -169,9 +169,9 @@ def where_text(where: Overlap) -> str:
 
     >>> import numpy as np
     >>> from clamp3d.collide.where import Overlap
-    >>> where_text(Overlap((12.3412, 12.3419), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.04]]), None))
+    >>> where_text(Overlap((12.3412, 12.3419), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.04]])))
     'shared volume 12.34 mm3, within X 0 to 3, Y 1 to 4, Z 2 to 5.1 mm'
-    >>> where_text(Overlap((0.2, 12.0), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]), None, True))
+    >>> where_text(Overlap((0.2, 12.0), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]), of_facets=True))
     'shared volume of the facets 0.2 to 12 mm3, within X 0 to 3, Y 1 to 4, Z 2 to 5 mm'
     """
     low, high = where.volume

@@ -18,8 +18,9 @@ from clamp3d.baselines.polytopes import Meshes
 from clamp3d.baselines.wedges import Wedges
 from clamp3d.bench.compare.scene import block_pair, grooved_block
 from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble
+from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.parts import groove_pairs, parts
+from clamp3d.clamp.parts import parts
 from clamp3d.core.meshing import mesh
 from clamp3d.core.pose import Array, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc

@@ -10,8 +10,9 @@ import pytest
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.parts import groove_pairs, parts
+from clamp3d.clamp.parts import parts
 from clamp3d.clamp.placement import FREEDOMS, Outcome, Placement
 from clamp3d.collide.check import check
 from clamp3d.collide.scene import Scene

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from scipy.integrate import dblquad, quad
 
 from clamp3d.clamp.dimensions import PARTS
+from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.parts import groove_pairs, parts
+from clamp3d.clamp.parts import parts
 from clamp3d.core.meshing import chord_error, mesh, volume_bounds
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.errors import InputError

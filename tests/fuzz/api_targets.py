@@ -20,8 +20,9 @@ from clamp3d.bench.image import image_study, measure_image
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Wire
 from clamp3d.clamp.equilibria import equilibria
+from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.parts import groove_pairs, parts
+from clamp3d.clamp.parts import parts
 from clamp3d.clamp.placement import Placement
 from clamp3d.clamp.section import Section
 from clamp3d.collide.poses import check_poses

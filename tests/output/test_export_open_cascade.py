@@ -14,7 +14,8 @@ import pytest
 import trimesh
 
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
-from clamp3d.clamp.parts import groove_pairs, parts
+from clamp3d.clamp.features import groove_pairs
+from clamp3d.clamp.parts import parts
 from clamp3d.collide.scene import Scene
 from clamp3d.core.meshing import volume_bounds
 from clamp3d.core.pose import inverse
