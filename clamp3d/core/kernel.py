@@ -14,7 +14,6 @@ from clamp3d.core.kernel_batch import (
     DY,
     DZ,
     PARALLEL,
-    ROWS,
     SURE,
     VALUE,
     outside_soon,
