@@ -194,3 +194,26 @@ def test_whether_the_nearest_points_are_the_only_ones(T, unique):
 )
 def test_whether_the_nearest_points_of_a_cylinder_are_the_only_ones(T, unique):
     assert convex_distance(CUBE, HERE, Rod(1.0, 4.0, HERE), T).unique is unique
+
+
+def test_points_of_boxes_and_cylinders_attest_their_distance():
+    """Of nearly parallel ones too: the points are in the pieces and no further apart than is said, to rounding."""
+    rng, seen = np.random.default_rng(0), 0
+    for _ in range(250):
+        a, b = (
+            Rod(*rng.uniform(1.0, 9.0, 2), HERE)
+            if rng.random() < 0.55
+            else hull(0.5 * rng.uniform(1.0, 9.0, 3) * CUBE.vertices / np.array([1.0, 2.0, 3.0]))
+            for _ in range(2)
+        )
+        T = rotation(rng.normal(size=3), rng.choice([1e-7, 1e-5, 1e-3, 0.3, 2.0]))
+        T[:3, 3] = rng.normal(size=3) * rng.choice([6.0, 12.0])
+        found = convex_distance(a, HERE, b, T)
+        if found.upper <= 0.0:
+            continue
+        seen += 1
+        p, q = found.point_a, found.point_b
+        assert np.linalg.norm(q - p) <= found.upper + 1e-13
+        assert min(a.depth(p[None])[0], b.depth(to_target(inverse(T), q)[None])[0]) >= -1e-11
+        assert found.upper - found.lower <= 1e-8
+    assert seen > 150
