@@ -186,7 +186,7 @@ def test_depths_of_points_in_a_mesh():
     assert any_inside(mesh, box_mesh((0.5, 0.5, 0.5)), translation(3.5, 0.0, 0.0))
     assert not any_inside(mesh, box_mesh((0.5, 0.5, 0.5)), translation(0.5, 0.0, 0.0))
     two = trimesh.util.concatenate(
-        [trimesh.creation.box((0.5, 0.5, 0.5)).apply_translation(t) for t in ((3.5, 0, 0), (9, 0, 0))]
+        [trimesh.creation.box((0.5, 0.5, 0.5)).apply_translation(t) for t in ((0, 0, 0), (3.5, 0, 0), (9, 0, 0))]
     )
     assert any_inside(mesh, Surface(np.array(two.vertices), np.array(two.faces)), HERE)
 
