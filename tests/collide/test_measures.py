@@ -133,8 +133,9 @@ def test_both_errors_count_once_on_either_side(off, other):
     vertex = surface_distance(a, b, translation(6.0, 0.5, 0.0), lambda _: True)
     assert vertex.upper == pytest.approx(-1.0 + off + other, abs=1e-9)
     assert inside.lower == -math.inf
-    touching = surface_distance(a, b, translation(7.0, 0.0, 0.0))
-    assert (touching.lower, touching.upper) == pytest.approx((-off - other, off + other), abs=1e-9)
+    for rounding in (0.0, 1e-11):
+        touching = surface_distance(a, b, translation(7.0 + rounding, 0.0, 0.0))
+        assert (touching.lower, touching.upper) == pytest.approx((-off - other, off + other), abs=1e-9)
     deep = surface_distance(a, b, translation(6.0, 0.0, 0.0))  # to 1 mm: the corners of the smaller one lie in it
     assert deep.upper == pytest.approx(-1.0 + off + other, abs=1e-6)
     assert deep.lower == pytest.approx(-1.0 - off - other, abs=1e-6)
