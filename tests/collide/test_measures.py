@@ -25,6 +25,7 @@ from clamp3d.collide.overlap import common, deepest, deepest_at_most
 from clamp3d.collide.surface import Surface
 from clamp3d.collide.swept import swept_lower
 from clamp3d.collide.touching import is_box, touching_boxes
+from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
@@ -321,6 +322,22 @@ def test_the_nearest_of_several_forms_counts_on_a_way():
     assert swept_lower(one, several, *stretch, angle=1.6) == -math.inf
 
 
+@pytest.mark.parametrize("when", [0.25, 0.5, 0.75])
+def test_what_swings_past_facets_strays_from_straight_lines(when):
+    """A box and a cylinder on an arm about z, half a millimetre from a wall of facets where the way bows out most."""
+    arm, angle, size = 20.0, 2.8, 0.4
+    wall = SimpleNamespace(forms=(form(cube(0.0), 99.0),), bodies=None, facets=box_mesh((200.0, 2.0, 50.0)))
+    back = translation(0.0, -(arm + size + 0.5 + 1.0), 0.0)
+    stretch = [
+        back @ rotation((0.0, 0.0, 1.0), angle * (t - when)) @ translation(0.0, arm, 0.0) for t in (0.0, 0.5, 1.0)
+    ]
+    block = hull(size * cube(0.0).vertices)
+    for piece in (block, Rod(size, 2.0 * size, HERE)):
+        one = form(piece)
+        swung = SimpleNamespace(forms=(one,), bodies=(one,), facets=None)
+        assert swept_lower(wall, swung, *stretch, angle=0.5 * angle) <= 0.5 + 1e-9
+
+
 # --- Boxes that touch, crossings, bounds ------------------------------------------------------------------------------
 
 
@@ -423,3 +440,19 @@ def test_the_closed_forms_of_a_drawn_solid_are_the_solid(shape):
         inside = x[one.depth(x) > 0.0]
         assert (inside >= one.bounds[0] - 1e-9).all()
         assert (inside <= one.bounds[1] + 1e-9).all()
+
+
+def test_how_far_a_distance_is_from_the_thresholds_and_which_lie_between_bounds():
+    plain, wide = Thresholds(0.01), Thresholds(0.01, 0.5)
+    for x, expected, without in ((0.4, 0.1, 0.39), (0.002, 0.008, 0.008), (-0.3, 0.29, 0.29), (0.7, 0.2, 0.69)):
+        assert wide.margin(x) == pytest.approx(expected, abs=1e-12)
+        assert plain.margin(x) == pytest.approx(without, abs=1e-12)
+    assert (plain.reach, wide.reach) == (0.01, 0.5)
+    assert wide.between(Distance(-0.2, 0.6), 0.1) == [
+        "a gap of 0.01 mm (contact)",
+        "a gap of 0.5 mm (clearance)",
+        "an overlap of 0.1 mm (allowed)",
+    ]
+    assert plain.between(Distance(-0.2, 0.005)) == ["an overlap of 0.01 mm (contact)"]
+    assert plain.between(Distance(-0.005, 0.6), 0.001) == ["a gap of 0.01 mm (contact)"]
+    assert plain.between(Distance(-0.02, -0.005), 0.001) == ["an overlap of 0.01 mm (allowed)"]
