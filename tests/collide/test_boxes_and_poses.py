@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import nnls
 
 from clamp3d import shapes
 from clamp3d.collide import broad, poses
@@ -20,16 +19,10 @@ from clamp3d.collide.scene import Scene
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.testing import body
+from tests.hulls import apart
 from tests.kinds import DRAWN
 
 SIDES = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-
-
-def apart(one, other):
-    """Distance of the convex hulls of two sets of points (Lawson and Hanson 1974, chapter 23)."""
-    ends = (one[:, None] - other[None]).reshape(-1, 3).T
-    weights, _ = nnls(np.vstack([ends, np.ones(ends.shape[1])]), np.array([0.0, 0.0, 0.0, 1.0]))
-    return float(np.linalg.norm(ends @ weights) / weights.sum())
 
 
 def some_poses(rng, n, reach):

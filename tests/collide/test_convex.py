@@ -7,24 +7,17 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
 from clamp3d.collide.convex import Hull, Rod, convex_distance, hull
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.testing import directions
+from tests.hulls import apart
 
 HERE = np.eye(4)
 TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
 CUBE = hull(np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-2.0, 2.0) for z in (-3.0, 3.0)]))
-
-
-def apart(one, other):
-    """Distance of the convex hulls of two sets of points (Lawson and Hanson 1974, chapter 23)."""
-    ends = (one[:, None] - other[None]).reshape(-1, 3).T
-    weights, _ = nnls(np.vstack([ends, np.ones(ends.shape[1])]), np.array([0.0, 0.0, 0.0, 1.0]))
-    return float(np.linalg.norm(ends @ weights) / weights.sum())
 
 
 def corners(piece, T, sides=90, scale=1.0):
