@@ -16,7 +16,7 @@ from clamp3d.clamp.assemble import STEP, assemble
 from clamp3d.clamp.dimensions import ConnectionType, PartName
 from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.matrix import gap_text
+from clamp3d.clamp.matrix import millimetres
 from clamp3d.clamp.result import Assembly, Solver
 from clamp3d.collide.distance import Distance
 from clamp3d.core.arc_circle import arc_circle
@@ -50,7 +50,7 @@ class ConnectionRow:
         """Where the measurement contradicts the paper or the declaration, in words; empty where all agree."""
         claims = {"published": self.published, "declared": self.declared}
         wrong = [f"{name} {kind}" for name, kind in claims.items() if kind != self.measured]
-        apart = f"does not touch: {gap_text(self.distance.lower)} mm apart or more"
+        apart = f"does not touch: {millimetres(self.distance.lower)} mm apart or more"
         found = apart if self.measured == 0 else f"touches as {self.measured}"
         return f"{' and '.join(wrong)}, but {found}" if wrong else ""
 

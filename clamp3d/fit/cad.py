@@ -13,6 +13,7 @@ from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import CYLINDER, KINDS, PLANE, parameters, unwrapped
 from clamp3d.core.linear import atan2, cross, dot, norm, to_source, to_target
 from clamp3d.core.mesh import Array, IntArray, Mesh
+from clamp3d.fit.surface import covered
 
 _SAME = 1e-6
 """Cylinders (mm, rad) nearer than this are one."""
@@ -75,7 +76,7 @@ def _measured(body: Body, shape: BrepSolid, group: IntArray) -> tuple[float, dic
         frame = frame * np.array([[1.0], [1.0], [-1.0], [-1.0]])
     pieces = faces.corners[np.isin(faces.face, group)]
     uv = unwrapped(CYLINDER, parameters(CYLINDER, frame, (radius, 0.0), pieces.reshape(-1, 3)).reshape(-1, 3, 2))
-    middle, half = _arc(uv[:, :, 0])
+    middle, half = covered(uv[:, :, 0], _SAME)
     low, high = float(uv[:, :, 1].min()), float(uv[:, :, 1].max())
     T = np.eye(4)
     T[:3, 1] = -(math.cos(middle) * frame[1] + math.sin(middle) * frame[2])
@@ -105,20 +106,6 @@ def _measured(body: Body, shape: BrepSolid, group: IntArray) -> tuple[float, dic
         "length_error": length_error,
         "faces": rows,
     }
-
-
-def _arc(u: Array) -> tuple[float, float]:
-    """Middle and half of the arc that triangles' angles (m, 3) cover; half a turn where nothing is left out."""
-    start = np.remainder(u.min(axis=1), 2.0 * math.pi)
-    order = np.argsort(start, kind="stable")
-    start, end = start[order], (start + np.ptp(u, axis=1))[order]
-    reached = np.maximum.accumulate(end)
-    gaps = np.append(start[1:], start[0] + 2.0 * math.pi) - np.maximum(reached, reached[-1] - 2.0 * math.pi)
-    k = int(np.argmax(gaps))
-    if gaps[k] < _SAME:
-        return 0.0, math.pi
-    half = math.pi - 0.5 * float(gaps[k])
-    return float(reached[k] + gaps[k]) + half, half
 
 
 def _strays(F: IntArray, V: Array, T: Array, half: float, length: float) -> tuple[float, float]:

@@ -13,8 +13,8 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
 from clamp3d.baselines.decomposition import DecompositionParameters
 from clamp3d.baselines.hulls import Hulls
-from clamp3d.baselines.meshes import Meshes
 from clamp3d.baselines.model import ContactModel
+from clamp3d.baselines.polytopes import Meshes
 from clamp3d.baselines.wedges import Wedges
 from clamp3d.bench.compare.scene import block_pair, grooved_block
 from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble

@@ -142,7 +142,7 @@ def test_worker_ends_when_its_caller_is_gone(tmp_path: Path) -> None:
 def test_crash_of_coacd_is_an_error_not_an_end() -> None:
     nan = Mesh("hull", np.full((8, 3), np.nan), F[:4] * 0, True)
     with pytest.raises(SolverError, match="CoACD gave no hulls for mesh"):
-        decomposition._run(nan, COARSE, "mesh", 60.0, False)
+        decomposition._run(nan, COARSE, "mesh", 60.0, False, None)
 
 
 @pytest.mark.parametrize(

@@ -355,6 +355,29 @@ def test_compare_asks_every_job_and_keeps_going(monkeypatch: pytest.MonkeyPatch)
     assert not any(kind == "peer" for kind, _ in asked)
 
 
+def test_times_are_medians_of_rounds_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def answer(kind: str, method: str, *, time_limit: float) -> Any:
+        if kind != "contact":
+            return NotMeasured(method, None, method, "not asked here")
+        asked.append(method)
+        if method == "chords:5.0" and asked.count(method) == 2:
+            raise JobError("not finished in 90 s")
+        m = Method.parse(method)
+        row = _row(m.family, (3.0, 1.0, 2.0)[asked.count(method) - 1], 1e-4, m.setting)
+        return dataclasses.replace(row, setup=60.0 if m.family == "hulls" else 0.1)
+
+    monkeypatch.setattr(study, "run_job", answer)
+    found = compare()
+    assert asked[: len(METHODS)] == [m.key for m in METHODS]  # in turn, not one after the other
+    assert {asked.count(m.key) for m in METHODS} == {1, 3}
+    times = {row.label: row.one for row in found.measured}
+    for m in METHODS:
+        expected = 3.0 if m.family == "hulls" else 2.5 if m.key == "chords:5.0" else 2.0
+        assert times[m.label] == pytest.approx(expected)
+
+
 def test_command_refuses_before_it_measures(tmp_path: Path) -> None:
     for arguments in (
         ["--plot", "chart.txt"],
