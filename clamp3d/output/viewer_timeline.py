@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.contact import NONE, measure_contacts
@@ -144,6 +143,7 @@ class Timeline:
         """
         from meshcat.animation import Animation, AnimationClip
         from meshcat.path import Path
+        from scipy.spatial.transform import Rotation
 
         clips: dict[Path, AnimationClip] = {}
 
