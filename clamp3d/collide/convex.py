@@ -213,12 +213,13 @@ def hull(points: Array) -> Hull:
     """Convex hull of points (n, 3). Raises ValueError if they lie in one plane."""
     import manifold3d
 
-    made = manifold3d.Manifold.hull_points(np.ascontiguousarray(points, dtype=np.float64)).to_mesh64()
+    solid = manifold3d.Manifold.hull_points(np.ascontiguousarray(points, dtype=np.float64))
+    made = solid.to_mesh64()
     vertices, faces = np.array(made.vert_properties)[:, :3], np.array(made.tri_verts, dtype=np.int64)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     area = np.linalg.norm(normal, axis=1)
-    if not len(faces) or not area.max() > 0.0:
+    if not len(faces) or not solid.volume() > 1e-14 * float(np.ptp(vertices, axis=0).max()) ** 3:
         raise ValueError("the points lie in one plane")
     kept = area > 1e-14 * area.max()
     normal = normal[kept] / area[kept, None]

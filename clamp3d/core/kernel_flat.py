@@ -333,22 +333,33 @@ def way_out(x, y, z, R, s, h, H):  # type: ignore[no-untyped-def]
     return depth, qx, qy, z, nx, ny, 0.0, feature
 
 
-@formula
-def flat_parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def] # noqa: E741
-    """Axis along z: the plane problem of a disc and the section, and the gap along z."""
+@inlined
+def disc_gaps(R, s, h, H, r, l, x, y, z):  # type: ignore[no-untyped-def] # noqa: E741
+    """Axis along z, as the plane problem of a disc and the section, and the gap along z.
+
+    Gap of the axis to the section and its feature, gaps of the side and of an end, their distance; whether the groove
+    goes on where nothing is left of the cylinder: then the distance is another.
+    """
     gap, feature = section(x, y, R, s, h)
-    bound = UNIT * (6.0 * (R + abs(x) + abs(y)) + 4.0 * (H + abs(z) + l) + r)
     beyond = abs(z) - H
-    if gap < 0.0 and beyond <= max(l - r, 0.0):
-        if l >= r:
-            return parallel(R, s, h, H, r, l - r, x, y, z, dz)
-        depth, qx, qy, qz, nx, ny, nz, feature = way_out(x, y, z, R, s, h, H)
-        return -l - depth, qx, qy, qz, nx, ny, nz, feature, 0.0, bound
+    deep = gap < 0.0 and beyond <= max(l - r, 0.0)
     g = gap - r if gap > 0.0 else -r
     if feature == ARC and gap > 0.0:
         g = (R - r) - math.sqrt(x * x + y * y)
     e = max(beyond, 0.0) - l
-    f = phi(g, e)
+    return gap, feature, g, e, phi(g, e), deep
+
+
+@formula
+def flat_parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def] # noqa: E741
+    """Axis along z: the plane problem of a disc and the section, and the gap along z."""
+    gap, feature, g, e, f, deep = disc_gaps(R, s, h, H, r, l, x, y, z)
+    bound = UNIT * (6.0 * (R + abs(x) + abs(y)) + 4.0 * (H + abs(z) + l) + r)
+    if deep:
+        if l >= r:
+            return parallel(R, s, h, H, r, l - r, x, y, z, dz)
+        depth, qx, qy, qz, nx, ny, nz, feature = way_out(x, y, z, R, s, h, H)
+        return -l - depth, qx, qy, qz, nx, ny, nz, feature, 0.0, bound
     up = math.copysign(1.0, dz)
     qx, qy, nx, ny = section_foot(feature, x, y, R, s, h)
     if gap <= 0.0:
@@ -367,7 +378,7 @@ def flat_parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def
     else:
         qz = min(max(z, -H), H)
         nx, ny, nz = 0.0, 0.0, above
-        if beyond >= 0.0:
+        if abs(z) - H >= 0.0:
             feature = END_FACE if gap <= 0.0 else beyond_end(feature)
     return f, qx, qy, qz, nx, ny, nz, feature, (qz - z) * up, bound
 

@@ -262,6 +262,12 @@ def max_acceleration(l, m):  # type: ignore[no-untyped-def] # noqa: E741
 
 
 @formula
+def turns_about_the_groove(m):  # type: ignore[no-untyped-def]
+    """Whether the motion is a turn about the groove's own axis, along which it may travel but not across."""
+    return m[6] == m[7] == m[9] == m[10] == m[12] == m[13] == 0.0 and m[15] != 0.0
+
+
+@formula
 def seed_heap(heap, l, m, u0, u1, ordered):  # type: ignore[no-untyped-def] # noqa: E741
     """The motion from u0 to u1 as a heap of cells, half a radian at most to each; returns how many."""
     pieces = max(1, min(1024, int(abs(m[15]) * (u1 - u0) * 2.0) + 1))
@@ -280,7 +286,7 @@ def _least(R, half_angle, H, l, m, u0, u1, eps, most, heap, out):  # type: ignor
     """
     s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
     bend = max_acceleration(l, m)
-    coaxial = m[6] == 0.0 and m[7] == 0.0 and m[9] == 0.0 and m[10] == 0.0 and m[15] != 0.0
+    coaxial = turns_about_the_groove(m)
     best, bu, bt = value(R, s, h, H, m, u0, 0.0), u0, 0.0  # of equals the start
     n = seed_heap(heap, l, m, u0, u1, False)
     count = 0
@@ -315,7 +321,7 @@ def _first(R, half_angle, H, l, m, level, eps, heap, out):  # type: ignore[no-un
     """First u with sdf <= level, 2 if none is found: out[0]; out[1]: up to where nothing is below level - eps."""
     s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
     bend = max_acceleration(l, m)
-    coaxial = m[6] == 0.0 and m[7] == 0.0 and m[9] == 0.0 and m[10] == 0.0 and m[15] != 0.0
+    coaxial = turns_about_the_groove(m)
     hit = 2.0
     n = seed_heap(heap, l, m, 0.0, 1.0, True)
     count = 0
