@@ -32,6 +32,9 @@ RECORD = 19
 """Numbers per answer: distance, point on groove (3), point on cylinder (3), normal (3), bound, feature, t on axis,
 rate of the distance by the cylinder's twist (6)."""
 
+WORK = ROWS * AT_ONCE
+"""Numbers that the distances alone of a batch are worked out in."""
+
 
 @formula
 def put(answer, rate, inner, out, k):  # type: ignore[no-untyped-def]
@@ -78,7 +81,7 @@ def record(T, k, R, half_angle, s, h, H, r, l, flat, pad, out):  # type: ignore[
 
 
 def _distances(T, R, half_angle, H, r, l, flat, pad, w, out):  # type: ignore[no-untyped-def] # noqa: E741
-    """The distances of `record` to the bit; ``w`` (ROWS * AT_ONCE,) and ``pad`` are what it works in."""
+    """The distances of `record` to the bit; ``w`` (WORK,) and ``pad`` are what it works in."""
     s = R * math.sin(half_angle)
     h = -R * math.cos(half_angle)
     reach = max(l, r) if flat else l
