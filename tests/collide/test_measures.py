@@ -99,7 +99,7 @@ def test_rims_beside_polyhedra_are_known_sharply():
         assert found.upper - found.lower <= 5e-7
 
 
-# --- Overlaps ----------------------------------------
+# --- Overlaps ---------------------------------------------------------------------------------------------------------
 
 
 def test_the_deepest_point_of_an_overlap():
