@@ -90,7 +90,7 @@ def test_poses_whose_boxes_come_near_others(few, block, monkeypatch):
     monkeypatch.setattr(poses, "_BLOCK", block)
     rng = np.random.default_rng(2)
     bounds, T = some_boxes(rng, 12, 12.0)
-    own, way = np.array([[-1.0, -2.0, 0.0], [2.0, 1.0, 3.0]]), some_poses(rng, 40, 12.0)
+    own, way = np.array([[-1.0, -2.0, 0.0], [2.0, -1.0, 5.0]]), some_poses(rng, 40, 12.0)
     placed, found = poses._placed(way, own)
     assert (placed == way).all()
     around = np.array([corners(own, P) for P in way])
@@ -196,3 +196,22 @@ def test_a_pose_seen_from_the_other_side_is_the_inverse():
     turned = found.swapped()
     assert turned.point_a.tolist() == found.point_b.tolist()
     assert turned.normal.tolist() == [-1.0, 0.0, 0.0]
+
+
+def test_equal_others_are_met_where_they_stand_and_as_each_may_be():
+    """Three equal boxes, one turned, one that may be touched deeper: at each pose as with that one alone."""
+    unit = shapes.box((4.0, 6.0, 4.0))
+    scene = Scene(clearance=1.0).add("a", unit).add("b", unit, translation(20.0, 0.0, 0.0))
+    scene = scene.add("c", unit, translation(40.0, 0.0, 0.0) @ rotation((0.0, 0.0, 1.0), 0.5 * math.pi))
+    scene = scene.add("pin", shapes.cylinder(1.0, 9.0)).allow(("pin", "b"), overlap=0.3)
+    way = np.array([translation(x + 2.0 + 1.0 + gap, 0.0, 0.0) for x in (0.0, 20.0, 40.0) for gap in (-0.2, 0.5, 1.5)])
+    sweep = check_poses(scene, "pin", way)
+    assert sweep.worst.tolist() == [
+        *("clash", "clearance", "clear"),
+        *("allowed", "allowed", "clear"),
+        *("clash", "clash", "clearance"),
+    ]
+    assert sweep.verdict[3].tolist() == ["clear", "allowed", "clear"]
+    gaps = sweep.upper[np.arange(9), np.repeat(np.arange(3), 3)]
+    assert gaps[[1, 4]] == pytest.approx(0.5, abs=1e-6)
+    assert gaps[8] == pytest.approx(0.5, abs=1e-6)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from clamp3d import distance
 from clamp3d.collide.body import ClosedForm, bodies_distance
 from clamp3d.collide.convex import Hull, Rod, hull
 from clamp3d.collide.facets import axis_gap, hull_gap, rod_distance
@@ -18,6 +19,7 @@ from clamp3d.collide.surface import Surface
 from clamp3d.collide.swept import swept_lower
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
+from clamp3d.core.primitives import Cylinder, SweptArc
 
 HERE = np.eye(4)
 TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
@@ -212,3 +214,19 @@ def test_what_swings_past_facets_strays_from_straight_lines(when):
         one = form(piece)
         swung = SimpleNamespace(forms=(one,), bodies=(one,), facets=None)
         assert swept_lower(wall, swung, *stretch, angle=0.5 * angle) <= 0.5 + 1e-9
+
+
+def test_a_groove_and_a_cylinder_are_known_to_rounding():
+    """Bounds that hold have to be narrow too: some fifty roundings of the sizes."""
+    rng, seen = np.random.default_rng(0), 0
+    for _ in range(80):
+        groove = SweptArc(rng.uniform(3.0, 15.0), rng.uniform(0.2, 3.0), rng.uniform(2.0, 60.0))
+        wire = Cylinder(rng.uniform(0.5, 12.0), rng.uniform(1.0, 90.0))
+        T = rotation(rng.normal(size=3), rng.choice([0.01, 0.3, 2.0]))
+        T[:3, 3] = 10.0 * rng.normal(size=3)
+        found = distance(groove, wire, T)
+        if found.lower > 0.0:
+            seen += 1
+            size = groove.radius + groove.length + wire.radius + wire.length + np.abs(T[:3, 3]).max()
+            assert found.upper - found.lower <= 1.2e-14 * size
+    assert seen > 15
