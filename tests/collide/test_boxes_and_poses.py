@@ -16,6 +16,7 @@ from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.poses import PoseVerdicts, check_poses
 from clamp3d.collide.scene import Scene
+from clamp3d.collide.verdict import Verdict
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.testing import body
@@ -139,11 +140,12 @@ def test_points_that_stand_out_of_a_body(k):
 
 def test_what_is_noted_of_many_poses():
     """The worst verdict of each pose; bounds where nothing came near, and where something did."""
-    kind = np.array(["contact", "clearance", "clash"])
+    rank = np.array([[*Verdict].index(Verdict(name)) for name in ("contact", "clearance", "clash")], dtype=np.int8)
     found = PoseVerdicts(
         "a", ("b", "c"), 4, 0.5, np.array([0, 0, 2]), np.array([0, 1, 1]), np.array([0.0, 0.2, -1.0]),
-        np.array([0.01, 0.3, -0.5]), kind,
+        np.array([0.01, 0.3, -0.5]), rank,
     )  # fmt: skip
+    assert found.kind.tolist() == ["contact", "clearance", "clash"]
     assert found.worst.tolist() == ["contact", "clear", "clash", "clear"]
     assert found.verdict.tolist() == [["contact", "clearance"], ["clear"] * 2, ["clear", "clash"], ["clear"] * 2]
     assert found.lower.tolist() == [[0.0, 0.2], [0.5, 0.5], [0.5, -1.0], [0.5, 0.5]]
