@@ -10,6 +10,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from clamp3d.collide.convex import Hull, Rod, convex_distance, hull
+from clamp3d.collide.depth_convex import convex_depth
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.testing import directions
@@ -210,3 +211,13 @@ def test_points_of_boxes_and_cylinders_attest_their_distance():
         assert min(a.depth(p[None])[0], b.depth(to_target(inverse(T), q)[None])[0]) >= -1e-11
         assert found.upper - found.lower <= 1e-8
     assert seen > 150
+
+
+@pytest.mark.parametrize("tilt", [0.0, 8e-10, -8e-10])
+def test_the_depth_of_cylinders_that_lean_by_less_than_counts_as_parallel(tilt):
+    """End on end, 0.1 mm in each other: the narrower one's rim goes as much deeper as it leans."""
+    T = translation(0.0, 0.0, 9.9) @ rotation((1.0, 0.0, 0.0), tilt)
+    found = convex_depth(Rod(20.0, 10.0, HERE), HERE, Rod(10.0, 10.0, HERE), T)
+    truth = -0.1 - 10.0 * abs(tilt)
+    assert found.lower - 1e-14 <= truth <= found.upper + 1e-14
+    assert found.upper - found.lower <= 40.0 * abs(tilt) + 1e-12
