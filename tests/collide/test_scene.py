@@ -350,7 +350,7 @@ def test_equal_parts_of_a_scene_are_each_met_where_they_stand():
     rng = np.random.default_rng(5)
     block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 20.0)
     scene = Scene(clearance=0.5)
-    for k in range(40):
+    for k in range(12):  # the wire comes to the first five
         place = translation(45.0 * k, 0.0, 0.0) @ (rotation((0, 1, 0), 0.1) if k == 3 else np.eye(4))
         scene = scene.add(f"block{k}", block, place)
     scene = scene.add("wire", shapes.cylinder(6.5, 30.0)).allow(("wire", "block2"), overlap=0.3)
