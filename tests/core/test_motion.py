@@ -10,7 +10,7 @@ from clamp3d.collide.motions import first_contact, min_clearance
 from clamp3d.core.distance import Feature, signed_distance, signed_distances
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import rotation, translation
-from clamp3d.core.primitives import Capsule, SweptArc
+from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.errors import InputError
 
 GROOVE, WIRE = SweptArc(12.0, math.radians(70.0), 50.0), Capsule(10.5, 80.0)
@@ -136,7 +136,8 @@ def test_against_dense_sampling(half, length, about, tilt, place, axis, angle, t
     assert signed_distance(groove, wire, hit.pose).distance == hit.contact.distance
 
 
-def test_the_first_of_several_contacts_is_found_not_the_deepest():
+@pytest.mark.parametrize("kind", [Capsule, Cylinder])
+def test_the_first_of_several_contacts_is_found_not_the_deepest(kind):
     """On long ways round the groove, also such that carry the turn across its axis, which may be the groove's own."""
     rng = np.random.default_rng(0)
     samples, shallow = np.linspace(0.0, 1.0, 401), 0

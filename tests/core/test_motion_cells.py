@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from clamp3d.core.kernel_motion import apart, cell, ridge, turns_about_the_groove
+from clamp3d.core.kernel_motion import apart, cell, first, least, ridge, turns_about_the_groove
 from clamp3d.core.pose import rotation
 from clamp3d.core.primitives import SweptArc
 from clamp3d.testing import body
@@ -108,3 +108,38 @@ def test_no_point_of_a_cell_is_nearer_than_its_bound(width, given):
         lost.append((field.min() - low) / reach)
         assert lost[-1] <= 1.0 + 0.5 * bend * hu * hu / reach
     assert np.mean(lost) <= given
+
+
+def test_searches_with_little_room_tell_a_wider_bound_but_a_true_one():
+    rng = np.random.default_rng(3)
+    u, early = np.linspace(0.0, 1.0, 301), 0
+    for m in _motions(rng, 80):
+        half_angle, length = rng.uniform(0.2, 3.0), rng.choice([2.0, 30.0])
+        groove, sizes = body(SweptArc(R, half_angle, L)), (R, half_angle, 0.5 * L, length, m)
+        field = groove.field(_points(m, u, np.linspace(-length, length, 101)).reshape(-1, 3)).reshape(len(u), -1)
+        true, ways = field.min(), field.min(axis=1)
+        level = float(rng.choice([-1.0, 0.5, 5.0]))
+        crossed = u[(ways <= level).argmax()] if (ways <= level).any() else 2.0
+        for room in (3, 12, 100, 20_000):
+            heap, out = np.full((max(1024, room) + 2, 5), np.nan), np.empty(4)
+            count = least(*sizes, 0.0, 1.0, 1e-6, room, heap[:-2], out)
+            value, at, along, bound = out
+            assert np.isnan(heap[-2:]).all()
+            assert bound <= min(true + 1e-12, value)
+            assert value == pytest.approx(groove.field(_points(m, [at], [along])[0])[0], abs=1e-11)
+            assert abs(along) <= length
+            if room == 20_000:
+                assert value - bound <= 1e-6
+                assert value <= true + 1e-6
+                assert count < room
+            first(*sizes, level, 1e-6, heap[: room + 1024], out)
+            hit, until = out[:2]
+            early += until < hit
+            assert until <= hit
+            assert not (ways[u < min(until, hit) - 1e-12] <= level - 1e-6).any()
+            assert hit == 2.0 or ways[np.abs(u - hit) <= 0.005].min() <= level + 1.0
+            if room == 20_000 and hit == 2.0 and until == 1.0:
+                assert crossed == 2.0
+            if until >= min(hit, 1.0):
+                assert hit <= crossed + 1e-12
+    assert early > 0
