@@ -35,6 +35,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.baselines import cache as disk
+from clamp3d.checks import choice, whole
 from clamp3d.core.child import run_child
 from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Mesh, closed_mesh
@@ -72,8 +73,7 @@ class DecompositionParameters:
             raise InputError(f"threshold must be > 0, got {self.threshold}")
         if not self.real_metric and self.threshold > 1.0:
             raise InputError(f"threshold must be <= 1 without real_metric, got {self.threshold}")
-        if self.preprocess_mode not in get_args(PreprocessMode):
-            raise InputError(f"unknown preprocess_mode {self.preprocess_mode!r}; available: auto, on, off")
+        choice("preprocess_mode", self.preprocess_mode, get_args(PreprocessMode))
         ranges = {
             "preprocess_resolution": (5, 1000),
             "resolution": (1, 10**6),
@@ -83,8 +83,7 @@ class DecompositionParameters:
             "seed": (0, 2**32 - 1),
         }
         for name, (low, high) in ranges.items():
-            if not low <= getattr(self, name) <= high:
-                raise InputError(f"{name} must be from {low} to {high}, got {getattr(self, name)}")
+            whole(name, getattr(self, name), least=low, most=high)
         if self.max_convex_hull != -1 and self.max_convex_hull < 1:
             raise InputError(f"max_convex_hull must be >= 1, or -1 for no limit, got {self.max_convex_hull}")
 

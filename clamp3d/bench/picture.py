@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Assembly
-from clamp3d.core.pose import Array, SectionPose
+from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
-from clamp3d.output.section import outline
+from clamp3d.output.section import inner_edges, outline
 
 Image = NDArray[np.uint8]
 
@@ -71,7 +71,8 @@ def picture(run: Assembly, px_per_mm: float, *, blur: float = 1.0, grain: float 
     if blur > 0.0:
         image = gaussian(image, blur, channel_axis=-1, preserve_range=True)
     image = image + np.random.default_rng(seed).normal(0.0, grain, image.shape)
-    points = (np.array(_end_points(run)) - low) * px_per_mm - 0.5
+    (left, below), (right, _) = inner_edges(run.clamp, run.poses)
+    points = (np.array([left, right, below]) - low) * px_per_mm - 0.5
     reference = run.clamp.up_splint.width
     return Picture(np.clip(np.rint(image), 0, 255).astype(np.uint8), px_per_mm, points, reference, run.distance)
 
@@ -212,13 +213,3 @@ def _outlines(run: Assembly, name: PartName) -> Iterator[Array]:
     """Outlines (n, 2) of the part's bodies in the section where they stand, seen along the wires."""
     for body in parts(run.clamp)[name].bodies:
         yield np.array([run.poses[name].point(float(u), float(v)) for u, v in outline(body).polygon(0.001)])
-
-
-def _end_points(run: Assembly) -> list[tuple[float, float]]:
-    up, down = run.clamp.up_splint, run.clamp.down_splint
-    p1: SectionPose = run.poses["P1"]
-    return [
-        p1.point(0.0, up.thickness),
-        p1.point(up.width, up.thickness),
-        run.poses["P2"].point(-down.width / 2, down.face_depth),
-    ]

@@ -22,6 +22,7 @@ from clamp3d.collide.distance import Distance
 from clamp3d.core.arc_circle import arc_circle
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.rectangle import Rectangle, hole_bolt
+from clamp3d.errors import need
 
 PLATEAU = (
     "The paper's plateau of 31.863 mm at 1, 5 and 10 degrees is its step, not its geometry: the program moved the down "
@@ -151,6 +152,7 @@ class Reproduction:
 
 def reproduce(progress: Callable[[str], None] = lambda message: None) -> Reproduction:
     """Compute everything; ``progress`` is told what comes next."""
+    need("skimage", "Table 4 with its image detection")
     clamp = load_clamp("reference")
     table4: list[DistanceRow] = []
     table5: list[WorkRow] = []

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.nearest import rim_minimum, segment_pairs, to_faces
 from clamp3d.collide.zonoid import Zonoid, box_of, zonoid_distance
-from clamp3d.core.linear import dot, norm, to_source, to_target
+from clamp3d.core.linear import cross, dot, norm, to_source, to_target
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.triangles import closest_points
 
@@ -276,7 +276,7 @@ def _several(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array, within: float
     if i == 0 or j == 0:
         return False
     if u is not None and v is not None:
-        return bool(norm(np.cross(dot(Ta[:3, :3], u), dot(Tb[:3, :3], v))) <= within)
+        return bool(norm(cross(dot(Ta[:3, :3], u), dot(Tb[:3, :3], v))) <= within)
     return True
 
 

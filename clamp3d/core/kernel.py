@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.core.jit import entry, formula
+from clamp3d.core.jit import entry, formula, prefetch
 from clamp3d.core.kernel_batch import (
     AT_ONCE,
     CX,
@@ -14,6 +14,7 @@ from clamp3d.core.kernel_batch import (
     DY,
     DZ,
     PARALLEL,
+    ROWS,
     SURE,
     VALUE,
     outside_soon,
@@ -30,6 +31,9 @@ from clamp3d.core.kernel_pose import axis, place, rigid
 RECORD = 19
 """Numbers per answer: distance, point on groove (3), point on cylinder (3), normal (3), bound, feature, t on axis,
 rate of the distance by the cylinder's twist (6)."""
+
+WORK = ROWS * AT_ONCE
+"""Numbers that `distances` works in."""
 
 
 @formula
@@ -77,14 +81,18 @@ def record(T, k, R, half_angle, s, h, H, r, l, flat, pad, out):  # type: ignore[
 
 
 def _distances(T, R, half_angle, H, r, l, flat, pad, w, out):  # type: ignore[no-untyped-def] # noqa: E741
-    """The distances of `record` to the bit; ``w`` (ROWS * AT_ONCE,) and ``pad`` are what it works in."""
+    """The distances of `record` to the bit; ``w`` (WORK,) and ``pad`` are what it works in."""
     s = R * math.sin(half_angle)
     h = -R * math.cos(half_angle)
     reach = max(l, r) if flat else l
     for start in range(0, T.shape[0], AT_ONCE):
         count = min(AT_ONCE, T.shape[0] - start)
         parallel = 0
+        size = 8 * T.shape[1] * T.shape[2]
         for i in range(count):
+            ahead = (start + AT_ONCE + i) * size
+            prefetch(T, ahead)
+            prefetch(T, ahead + size // 2)
             if not rigid(T, start + i):
                 return start + i
             x, y, z, dx, dy, dz = place(T, start + i)

@@ -6,7 +6,7 @@ import numpy as np
 
 from clamp3d.checks import positive
 from clamp3d.core.distance import SignedDistance, signed_distance
-from clamp3d.core.linear import norm
+from clamp3d.core.linear import cross, norm
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
@@ -98,7 +98,7 @@ class Search:
         R, half_angle, H, half = self._sizes
         r = self.cylinder.radius
         out, pad, heap = np.empty(3), np.empty((128, 5)), np.empty((kernel_motion_flat.MOST, 5))
-        arm = norm(np.cross(self.motion.axis, self.start[:3, 3] - self.motion.point))
+        arm = norm(cross(self.motion.axis, self.start[:3, 3] - self.motion.point))
         speed = norm(self.motion.travel) + abs(self.motion.angle) * (arm + float(np.hypot(r, half)))
         self.evaluations += kernel_motion_flat.search(
             R,
@@ -170,7 +170,7 @@ class Search:
             return self.at(s).distance - level
 
         offset, u = self.start[:3, 3] - self.motion.point, self.motion.axis
-        reach = norm(np.cross(u, offset)) + 0.5 * self.cylinder.length
+        reach = norm(cross(u, offset)) + 0.5 * self.cylinder.length
         speed = max(abs(self.motion.angle) * reach + norm(self.motion.travel), 1e-300)
         step = max(error / speed, 4e-16)
         high = t

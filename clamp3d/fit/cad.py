@@ -11,7 +11,7 @@ import numpy as np
 from clamp3d.brep.bodies import Body, Reading
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import CYLINDER, KINDS, PLANE, parameters, unwrapped
-from clamp3d.core.linear import atan2, dot, norm, to_source, to_target
+from clamp3d.core.linear import atan2, cross, dot, norm, to_source, to_target
 from clamp3d.core.mesh import Array, IntArray, Mesh
 from clamp3d.fit.surface import covered
 
@@ -61,8 +61,8 @@ def _one(shape: BrepSolid, i: int, j: int) -> bool:
     """Whether two cylindrical faces lie on one cylinder."""
     faces = shape.surfaces
     (o, *_, z), (p, *_, w) = faces.frame[i], faces.frame[j]
-    apart = norm(np.cross(p - o, z))
-    turned = norm(np.cross(z, w))
+    apart = norm(cross(p - o, z))
+    turned = norm(cross(z, w))
     return (
         bool(faces.sense[i] == faces.sense[j]) and max(abs(faces.size[i, 0] - faces.size[j, 0]), apart, turned) < _SAME
     )
@@ -81,7 +81,7 @@ def _measured(body: Body, shape: BrepSolid, group: IntArray) -> tuple[float, dic
     T = np.eye(4)
     T[:3, 1] = -(math.cos(middle) * frame[1] + math.sin(middle) * frame[2])
     T[:3, 2] = frame[3]
-    T[:3, 0] = np.cross(T[:3, 1], T[:3, 2])
+    T[:3, 0] = cross(T[:3, 1], T[:3, 2])
     T[:3, 3] = frame[0] + 0.5 * (low + high) * frame[3]
     (a, b), (c, d) = ((uv[:, k] - uv[:, 0]).T for k in (1, 2))
     area = 0.5 * radius * float(np.abs(a * d - b * c).sum())

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from clamp3d.core.linear import atan2, dot
+from clamp3d.core.linear import atan2, cross, dot
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
@@ -95,7 +95,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     u, w = perpendicular(d)
     middle, half = arc(surface, axis, u, w, region.faces)
     deepest = np.cos(middle) * u + np.sin(middle) * w
-    R = np.stack([np.cross(-deepest, d), -deepest, d], axis=1)
+    R = np.stack([cross(-deepest, d), -deepest, d], axis=1)
 
     corners = dot(surface.V[np.unique(surface.F[region.faces])] - axis.point, R)
     z0, z1 = float(corners[:, 2].min()), float(corners[:, 2].max())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from itertools import combinations
 from typing import Any
 
 from clamp3d import __version__
@@ -90,8 +91,7 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
 
 def _matrix(result: CheckResult) -> list[str]:
     names = [part.name for part in result.scene.parts]
-    rows = {frozenset((row.a, row.b)): row.verdict for row in result.pairs}
-    marks = {(a, b): rows.get(frozenset((a, b)), Verdict.CLEAR) for k, a in enumerate(names) for b in names[k + 1 :]}
+    marks = {(a, b): result.verdict(a, b) for a, b in combinations(names, 2)}
     table = [(a, *(_MARK[marks[a, b]] if (a, b) in marks else "" for b in names)) for a in names]
     used = [v for v in Verdict if v in marks.values()]
     legend = ", ".join(f"{_MARK[v]} {v.value} ({meaning(v.value, result.scene)})" for v in used)

@@ -120,7 +120,7 @@ def balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> Non
 
 def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int] = (-1, 1)) -> None:
     """Distance between the splints at the edges (-1 line side, 1 jumper side), and the tilt of the down splint."""
-    edges = _inner_edges(clamp, poses)
+    edges = inner_edges(clamp, poses)
     for side in sides:
         above, below = edges[side > 0]
         x = (min if side < 0 else max)(above[0], below[0]) + side * 0.09 * clamp.up_splint.width
@@ -130,11 +130,12 @@ def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int
 
 def edge_openings(clamp: Clamp, poses: Poses) -> tuple[float, float]:
     """Height in mm between the splints' inner edges, on the line side (Table 4's distance) and the jumper side."""
-    left, right = ((below[1] - above[1]) for above, below in _inner_edges(clamp, poses))
+    left, right = ((below[1] - above[1]) for above, below in inner_edges(clamp, poses))
     return left, right
 
 
-def _inner_edges(clamp: Clamp, poses: Poses) -> list[tuple[Point, Point]]:
+def inner_edges(clamp: Clamp, poses: Poses) -> list[tuple[Point, Point]]:
+    """Ends of the splints' inner edges in the section, the up splint's and the down splint's: left, then right."""
     up, down = clamp.up_splint, clamp.down_splint
     return [
         (poses["P1"].point(u, up.thickness), poses["P2"].point(v, down.face_depth))

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 from clamp3d.collide.overlap import common
 from clamp3d.collide.surface import Surface
 from clamp3d.core.pose import Array, inverse
-
-if TYPE_CHECKING:
-    import trimesh
 
 
 def cut_open(
@@ -49,6 +45,4 @@ def _surface(mesh: trimesh.Trimesh) -> Surface:
 
 
 def _mesh(vertices: Array, faces: NDArray[np.int64]) -> trimesh.Trimesh:
-    import trimesh
-
     return trimesh.Trimesh(vertices, faces, process=False)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from meshcat.animation import Animation, AnimationClip
+from meshcat.path import Path
 
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.contact import NONE, measure_contacts
@@ -24,9 +25,6 @@ from clamp3d.core.pose import Array, rotation
 from clamp3d.output.palette import VERDICT_COLOURS
 from clamp3d.output.section import edge_openings, part_anchor
 from clamp3d.output.wording import distance_text
-
-if TYPE_CHECKING:
-    from meshcat.animation import Animation
 
 Poses = Mapping[str, Array]
 Measured = Callable[[Scene, Sequence[tuple[str, str]]], Iterable["Row"]]
@@ -142,8 +140,7 @@ class Timeline:
         ``followers`` are the scene's paths that move with a part; the marks of a stop are below each of ``groups`` and
         show while the parts rest.
         """
-        from meshcat.animation import Animation, AnimationClip
-        from meshcat.path import Path
+        from scipy.spatial.transform import Rotation
 
         clips: dict[Path, AnimationClip] = {}
 

@@ -169,9 +169,9 @@ def test_bad_mesh_never_reaches_coacd(
         ({"threshold": 0.0}, "threshold must be > 0, got 0"),
         ({"threshold": math.nan}, "threshold must be > 0"),
         ({"threshold": 2.0, "real_metric": False}, "threshold must be <= 1 without real_metric"),
-        ({"preprocess_mode": "of"}, "unknown preprocess_mode 'of'; available: auto, on, off"),
-        ({"mcts_nodes": 0}, "mcts_nodes must be from 1 to 1000, got 0"),
-        ({"seed": -1}, "seed must be from 0"),
+        ({"preprocess_mode": "of"}, "preprocess_mode must be one of auto, on, off, got 'of'"),
+        ({"mcts_nodes": 0}, "mcts_nodes must be a whole number from 1 to 1000, got 0"),
+        ({"seed": -1}, "seed must be a whole number from 0"),
         ({"max_convex_hull": 0}, "max_convex_hull must be >= 1"),
     ],
 )

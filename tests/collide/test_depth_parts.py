@@ -283,7 +283,8 @@ def test_which_pairs_are_a_pin_and_a_drilled_plate():
         away = [type(b)(b.radius, b.half_angle, b.length, translation(*(0.3 * b.T[:3, 2])) @ b.T) for b in plate.bores]
         lean = [type(b)(b.radius, b.half_angle, b.length, b.T @ rotation((1.0, 0.0, 0.0), 1e-3)) for b in plate.bores]
         arc = [type(b)(b.radius, 3.0, b.length, b.T) for b in plate.bores]
-        for bores in (short, away, lean, arc):
+        mixed = [*plate.bores[:-1], lean[-1]]
+        for bores in (short, away, lean, mixed, arc):
             assert not is_drilled(type(plate)(plate.outers, tuple(bores)), pin)
     for wrong in (
         type(pin)(pin.outers, form(plates[0]).bores),

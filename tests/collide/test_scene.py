@@ -25,7 +25,7 @@ from clamp3d.collide.judge import contained
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.poses import check_poses
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import RESOLUTION, Thresholds, Verdict
+from clamp3d.collide.verdict import RESOLUTION, VERDICTS, Thresholds, Verdict
 from clamp3d.core import shapes
 from clamp3d.core.linear import to_target
 from clamp3d.core.mesh import make_mesh
@@ -342,7 +342,7 @@ def test_verdicts_of_many_distances_are_those_of_each(bounds, allowance, clearan
     lower[0] = -math.inf
     thresholds = Thresholds(clearance=clearance)
     each = [thresholds.verdict(Distance(*pair), allowance).value for pair in zip(lower, upper, strict=True)]
-    assert thresholds.verdicts(lower, upper, allowance).tolist() == each
+    assert [VERDICTS[k].value for k in thresholds.verdicts(lower, upper, allowance)] == each
 
 
 def test_equal_parts_of_a_scene_are_each_met_where_they_stand():

@@ -25,22 +25,26 @@ TIMES = np.linspace(0.0, 1.0, 20_001)
 NONE = Thresholds(1e-6)
 
 
-class Waves:
-    """A pair whose distance at t is a sum of waves, known to within ``error``, with a speed limit and no better bound.
+class Cones:
+    """A pair whose distance comes down to some times, and goes up from them, as fast as its speed allows.
 
-    ``meshed``: as a pair whose stretches have been bounded by meshes is; those then say nothing.
+    It is known to within ``error`` mm, and over a stretch by the speed alone. ``meshed``: as a pair whose stretches
+    have been bounded by meshes is.
     """
 
     def __init__(self, seed: int, error: float, above: float, meshed: bool = False) -> None:
         rng = np.random.default_rng(seed)
-        self.size, self.rate, self.start = rng.normal(size=4), rng.uniform(0.0, 12.0, 4), rng.uniform(0.0, 6.0, 4)
+        self.speed, self.when = rng.uniform(0.5, 20.0), rng.uniform(0.0, 1.0, 6)
+        self.low = rng.uniform(0.0, 0.3, 6) * self.speed
         self.error, self.meshed, self.shift = error, meshed, 0.0
-        self.speed = float(np.abs(self.size * self.rate).sum()) + 1e-3
-        self.shift = above - self.at(TIMES).min()
+        self.shift = above - self.least()
         self.asked: list[float] = []
 
     def at(self, t):
-        return self.shift + np.sin(np.multiply.outer(t, self.rate) + self.start) @ self.size
+        return self.shift + (self.low + self.speed * np.abs(np.subtract.outer(t, self.when))).min(axis=-1)
+
+    def least(self):
+        return float(self.at(self.when).min())
 
     def ask(self, t, enough, thresholds):
         self.asked.append(t)
@@ -55,21 +59,25 @@ class Waves:
         return here - self.speed * half
 
     def by_meshes(self, t, half, wanted):
-        return -math.inf
+        return float(self.at(t)) - self.speed * half
 
 
 pairs = st.builds(
-    Waves, st.integers(0, 10**6), st.sampled_from([0.0, 1e-3, 0.05]), st.sampled_from([0.005, 0.3, 5.0]), st.booleans()
+    Cones,
+    st.integers(0, 10**6),
+    st.sampled_from([0.0, 1e-3, 0.05]),
+    st.sampled_from([0.0, 0.01, 0.3, 5.0]),
+    st.booleans(),
 )
 
 
 @settings(max_examples=60, deadline=None)
 @given(pairs, st.sampled_from([NONE, Thresholds(0.01, 0.5)]))
-def test_the_least_distance_of_waves(pair, thresholds):
+def test_the_least_distance_of_cones(pair, thresholds):
     """No time is below ``lower``; ``upper`` is known at the time named; no wider apart than the answers and 2 %."""
     found, t = least_distance(pair, thresholds, None)
-    truth = float(pair.at(TIMES).min())
-    assert found.lower <= truth + 1e-9
+    truth = pair.least()
+    assert found.lower <= min(truth, found.upper) + 1e-9
     assert found.upper == pytest.approx(float(pair.at(t)) + 0.7 * pair.error, abs=1e-12)
     assert t in pair.asked
     assert truth - 1e-7 <= found.upper
@@ -79,20 +87,21 @@ def test_the_least_distance_of_waves(pair, thresholds):
 
 @settings(max_examples=60, deadline=None)
 @given(pairs, st.sampled_from([0.0, 0.01, 0.2]), st.sampled_from([-0.05, -1e-4, 0.0, 0.1]))
-def test_the_first_time_of_waves(pair, deep, margin):
-    """Waves that come down to the margin: never later than they do, and no earlier than they nearly do."""
-    pair.shift += margin - deep - pair.at(TIMES).min()
-    values = pair.at(TIMES)
-    least, known = values.min(), float(TIMES[np.argmin(values)])
+def test_the_first_time_of_cones(pair, deep, margin):
+    """Cones that come down to the margin: never later than they do, and no earlier than they nearly do."""
+    pair.shift += margin - deep - pair.least()
+    times = np.union1d(TIMES, pair.when)
+    values = pair.at(times)
+    least, known = pair.least(), float(pair.when[np.argmin(pair.at(pair.when))])
     first = first_time(pair, known, NONE, margin)
     assert first <= known
-    assert values[first > TIMES].min(initial=math.inf) >= margin - 1e-9
+    assert values[first > times].min(initial=math.inf) >= margin - 1e-9
     near = values <= margin + 1.1 * pair.error + 1.5 * ACCURACY
-    assert first >= TIMES[near][0] - 1.1 * ACCURACY / pair.speed - 1e-4 or least > margin
+    assert first >= times[near][0] - 1.1 * ACCURACY / pair.speed - 1e-4 or least > margin
 
 
 def test_the_first_time_is_the_end_where_nothing_comes_near():
-    pair = Waves(3, 0.0, 1.0)
+    pair = Cones(3, 0.0, 1.0)
     assert first_time(pair, 0.7, NONE, 0.5) == 0.7
 
 
@@ -100,12 +109,12 @@ def test_a_search_that_takes_too_long_tells_what_it_has_proven(monkeypatch):
     """Only what is before the leftmost open stretch is free; of the least distance the bounds are wide, not wrong."""
     monkeypatch.setattr("clamp3d.collide.moving_pair.MAX_STEPS", 12)
     for seed in range(10):
-        pair = Waves(seed, 0.0, -0.01)
+        pair = Cones(seed, 0.0, -1.0)
         values = pair.at(TIMES)
-        first = first_time(pair, float(TIMES[np.argmin(values)]), NONE, 0.0)
+        first = first_time(pair, float(pair.when[np.argmin(pair.at(pair.when))]), NONE, 0.0)
         assert values[first > TIMES].min(initial=math.inf) >= 0.0
-        pair = Waves(seed, 0.0, 0.1)
-        assert least_distance(pair, NONE, None)[0].lower <= pair.at(TIMES).min()
+        pair = Cones(seed, 0.0, 0.1)
+        assert least_distance(pair, NONE, None)[0].lower <= pair.least() + 1e-9
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.8])
@@ -135,6 +144,37 @@ def test_a_stretch_is_bounded_by_what_each_method_says(angle):
                 # A turn costs the sagitta of the furthest corner, 3.75 mm from the axis.
                 assert bound >= truth - 0.5 * (angle * half) ** 2 * 3.75 - ACCURACY
             assert pair.lower(t, half, here, here - pair.speed * half) == here - pair.speed * half
+
+
+@pytest.mark.parametrize("mesh", [False, True])
+@pytest.mark.parametrize("pin", [False, True])
+@pytest.mark.parametrize("when", [0.25, 0.5, 0.75])
+def test_what_swings_past_between_two_times_is_bounded(when, pin, mesh):
+    """A body on an arm turns by nearly half a circle: it comes closest to a wall where its way bows out most."""
+    size, arm, angle = 0.4, 20.0, 3.0
+    moving, wall = (
+        (shapes.cylinder(size, 2.0 * size) if pin else shapes.box((size, size, size))),
+        shapes.box((200, 2, 50)),
+    )
+    T_wall = translation(0.0, arm + 1.5 * size + 1.1, 0.0)
+    way = Motion.screw((0.0, 0.0, 1.0), angle)
+    start = rotation((0.0, 0.0, 1.0), -when * angle) @ translation(0.0, arm, 0.0)
+    cache = ModelCache()
+    swung, still = cache.model(faceted_shape(moving, 0.3) if mesh else moving), cache.model(wall)
+    pairs = (
+        MovingPair(swung, still, way, start, T_wall),
+        MovingPair(still, swung, Motion.screw((0.0, 0.0, 1.0), -angle), T_wall, start),  # the wall goes round
+    )
+    for t, half in ((0.5, 0.5), (when, 0.2), (0.3, 0.25)):
+        truth = here = math.inf
+        for s in [t, *np.linspace(t - half, t + half, 101)]:
+            P = way.at(s, start)
+            reach = size if pin else 0.5 * size * np.abs(P[1, :2]).sum()
+            gap = T_wall[1, 3] - 1.0 - P[1, 3] - reach
+            truth, here = min(truth, gap), (gap if s == t else here)
+        lost = 0.3 if mesh and pin else 1e-3
+        for pair in pairs:
+            assert pair.lower(t, half, here, here) <= truth + lost
 
 
 def test_what_a_way_has_no_time_for_is_not_asked():

@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
+from clamp3d.bench import complexity as table_5
 from clamp3d.bench.compare import peers as compare_peers
 from clamp3d.bench.compare import run as study
 from clamp3d.bench.compare.assemblies import Assembled, Imaged, assembled, imaged
@@ -33,7 +34,7 @@ from clamp3d.bench.compare.peers.pieces import sectors
 from clamp3d.bench.compare.report import comparison_to_dict, comparison_to_text
 from clamp3d.bench.compare.run import LIBRARIES, Comparison, NotMeasured, compare, pareto
 from clamp3d.bench.compare.scene import GROOVE, chord_error, known_poses
-from clamp3d.bench.complexity import Sweep, complexity, fitted, grid_search
+from clamp3d.bench.complexity import Sweep, fitted, grid_search
 from clamp3d.bench.machine import machine
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.features import wire_pairs
@@ -235,8 +236,16 @@ def test_grid_search_finds_the_final_state_and_counts_as_the_paper_does() -> Non
     assert found.closing is None or found.closing > run.closing + 0.1
 
 
-def test_exponents_of_table_5() -> None:
-    sweeps = complexity(scale=0.3)
+def test_a_quick_search_is_timed_three_times() -> None:
+    asked: list[int] = []
+    counted, seconds = table_5._timed(lambda: (asked.append(1) or len(asked), 0))  # type: ignore[func-returns-value]
+    assert (counted, len(asked)) == ((3, 0), 3)
+    assert 0.0 <= seconds < 0.3
+
+
+def test_exponents_of_table_5(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table_5, "_timed", lambda run: (run(), 1.0))  # what is counted is the same each time
+    sweeps = table_5.complexity(scale=0.3)
     by = {(s.search, s.method, s.varied, s.fixed.split(",")[0]): s for s in sweeps}
     assert by["grid", "cas", "n", "a = 2"].exponents[:2] == pytest.approx((2.0, 2.0))
     assert by["grid", "cas", "n", "a = 3"].exponents[:2] == pytest.approx((3.0, 3.0))

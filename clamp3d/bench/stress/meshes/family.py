@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import coacd
+import fcl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,10 +27,16 @@ from clamp3d.bench.stress.poses.family import FCL_ERROR, MESH_ERROR, THRESHOLD, 
 from clamp3d.bench.stress.poses.family import METHODS as POSE_METHODS
 from clamp3d.bench.stress.poses.flat import MAX_BOXES, FlatFamily, interval
 from clamp3d.bench.stress.worker import Answers, Measured, Measures
+from clamp3d.collide.check import check
+from clamp3d.collide.scene import Scene
 from clamp3d.collide.surface import fcl_tree
+from clamp3d.collide.verdict import Verdict
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.mesh import make_mesh
 from clamp3d.core.pose import inverse
+from clamp3d.core.shapes import MeshShape
+from clamp3d.fit.fit import fit_mesh
 
 _TIME = 15.0
 """Seconds for CoACD in method hulls: less than a child may be silent."""
@@ -77,8 +85,6 @@ def _rounding(case: MeshCase) -> float:
 
 def _fit(case: MeshCase) -> Answer:
     """Groove fitted to the mesh, wire in it by the kernel; what the fit says of its own errors is the bound."""
-    from clamp3d.core.mesh import make_mesh
-    from clamp3d.fit.fit import fit_mesh
 
     mesh = make_mesh(case.mesh.vertices, case.mesh.faces)
     if not mesh.watertight:
@@ -96,11 +102,6 @@ def _fit(case: MeshCase) -> Answer:
 
 def _scene(case: MeshCase) -> Answer:
     """A scene of the mesh and the wire, checked: what the mesh is for a user who wants a verdict."""
-    from clamp3d.collide.check import check
-    from clamp3d.collide.scene import Scene
-    from clamp3d.collide.verdict import Verdict
-    from clamp3d.core.mesh import make_mesh
-    from clamp3d.core.shapes import MeshShape
 
     mesh = make_mesh(case.mesh.vertices, case.mesh.faces)
     if not mesh.watertight:  # the distance that it gets is that of the surfaces, not of what they should enclose
@@ -120,7 +121,6 @@ def _scene(case: MeshCase) -> Answer:
 
 
 def _fcl_alone(case: MeshCase) -> Answer:
-    import fcl
 
     with _silence():
         model = fcl_tree(case.mesh.vertices, case.mesh.faces)
@@ -128,8 +128,6 @@ def _fcl_alone(case: MeshCase) -> Answer:
 
 
 def _coacd_alone(case: MeshCase) -> Answer:
-    import coacd
-    import fcl
 
     coacd.set_log_level("off")
     with _silence():
@@ -157,7 +155,6 @@ def _silence() -> Iterator[None]:
 
 
 def _fcl_distance(objects: list[Any], case: MeshCase) -> float:
-    import fcl
 
     T = case.T_mesh_wire
     shape = fcl.Cylinder(case.wire.radius, case.wire.length)
