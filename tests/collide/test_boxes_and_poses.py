@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import nnls
 
 from clamp3d import shapes
 from clamp3d.collide import broad, poses
@@ -17,19 +16,14 @@ from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.poses import PoseVerdicts, check_poses
 from clamp3d.collide.scene import Scene
+from clamp3d.collide.verdict import Verdict
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.testing import body
+from tests.hulls import apart
 from tests.kinds import DRAWN
 
 SIDES = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-
-
-def apart(one, other):
-    """Distance of the convex hulls of two sets of points (Lawson and Hanson 1974, chapter 23)."""
-    ends = (one[:, None] - other[None]).reshape(-1, 3).T
-    weights, _ = nnls(np.vstack([ends, np.ones(ends.shape[1])]), np.array([0.0, 0.0, 0.0, 1.0]))
-    return float(np.linalg.norm(ends @ weights) / weights.sum())
 
 
 def some_poses(rng, n, reach):
@@ -97,7 +91,7 @@ def test_poses_whose_boxes_come_near_others(few, block, monkeypatch):
     monkeypatch.setattr(poses, "_BLOCK", block)
     rng = np.random.default_rng(2)
     bounds, T = some_boxes(rng, 12, 12.0)
-    own, way = np.array([[-1.0, -2.0, 0.0], [2.0, 1.0, 3.0]]), some_poses(rng, 40, 12.0)
+    own, way = np.array([[-1.0, -2.0, 0.0], [2.0, -1.0, 5.0]]), some_poses(rng, 40, 12.0)
     placed, found = poses._placed(way, own)
     assert (placed == way).all()
     around = np.array([corners(own, P) for P in way])
@@ -146,11 +140,12 @@ def test_points_that_stand_out_of_a_body(k):
 
 def test_what_is_noted_of_many_poses():
     """The worst verdict of each pose; bounds where nothing came near, and where something did."""
-    kind = np.array(["contact", "clearance", "clash"])
+    rank = np.array([[*Verdict].index(Verdict(name)) for name in ("contact", "clearance", "clash")], dtype=np.int8)
     found = PoseVerdicts(
         "a", ("b", "c"), 4, 0.5, np.array([0, 0, 2]), np.array([0, 1, 1]), np.array([0.0, 0.2, -1.0]),
-        np.array([0.01, 0.3, -0.5]), kind,
+        np.array([0.01, 0.3, -0.5]), rank,
     )  # fmt: skip
+    assert found.kind.tolist() == ["contact", "clearance", "clash"]
     assert found.worst.tolist() == ["contact", "clear", "clash", "clear"]
     assert found.verdict.tolist() == [["contact", "clearance"], ["clear"] * 2, ["clear", "clash"], ["clear"] * 2]
     assert found.lower.tolist() == [[0.0, 0.2], [0.5, 0.5], [0.5, -1.0], [0.5, 0.5]]
@@ -203,3 +198,22 @@ def test_a_pose_seen_from_the_other_side_is_the_inverse():
     turned = found.swapped()
     assert turned.point_a.tolist() == found.point_b.tolist()
     assert turned.normal.tolist() == [-1.0, 0.0, 0.0]
+
+
+def test_equal_others_are_met_where_they_stand_and_as_each_may_be():
+    """Three equal boxes, one turned, one that may be touched deeper: at each pose as with that one alone."""
+    unit = shapes.box((4.0, 6.0, 4.0))
+    scene = Scene(clearance=1.0).add("a", unit).add("b", unit, translation(20.0, 0.0, 0.0))
+    scene = scene.add("c", unit, translation(40.0, 0.0, 0.0) @ rotation((0.0, 0.0, 1.0), 0.5 * math.pi))
+    scene = scene.add("pin", shapes.cylinder(1.0, 9.0)).allow(("pin", "b"), overlap=0.3)
+    way = np.array([translation(x + 2.0 + 1.0 + gap, 0.0, 0.0) for x in (0.0, 20.0, 40.0) for gap in (-0.2, 0.5, 1.5)])
+    sweep = check_poses(scene, "pin", way)
+    assert sweep.worst.tolist() == [
+        *("clash", "clearance", "clear"),
+        *("allowed", "allowed", "clear"),
+        *("clash", "clash", "clearance"),
+    ]
+    assert sweep.verdict[3].tolist() == ["clear", "allowed", "clear"]
+    gaps = sweep.upper[np.arange(9), np.repeat(np.arange(3), 3)]
+    assert gaps[[1, 4]] == pytest.approx(0.5, abs=1e-6)
+    assert gaps[8] == pytest.approx(0.5, abs=1e-6)

@@ -7,24 +7,17 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
 from clamp3d.collide.convex import Hull, Rod, convex_distance, hull
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.testing import directions
+from tests.hulls import apart
 
 HERE = np.eye(4)
 TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
 CUBE = hull(np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-2.0, 2.0) for z in (-3.0, 3.0)]))
-
-
-def apart(one, other):
-    """Distance of the convex hulls of two sets of points (Lawson and Hanson 1974, chapter 23)."""
-    ends = (one[:, None] - other[None]).reshape(-1, 3).T
-    weights, _ = nnls(np.vstack([ends, np.ones(ends.shape[1])]), np.array([0.0, 0.0, 0.0, 1.0]))
-    return float(np.linalg.norm(ends @ weights) / weights.sum())
 
 
 def corners(piece, T, sides=90, scale=1.0):
@@ -194,3 +187,26 @@ def test_whether_the_nearest_points_are_the_only_ones(T, unique):
 )
 def test_whether_the_nearest_points_of_a_cylinder_are_the_only_ones(T, unique):
     assert convex_distance(CUBE, HERE, Rod(1.0, 4.0, HERE), T).unique is unique
+
+
+def test_points_of_boxes_and_cylinders_attest_their_distance():
+    """Of nearly parallel ones too: the points are in the pieces and no further apart than is said, to rounding."""
+    rng, seen = np.random.default_rng(0), 0
+    for _ in range(250):
+        a, b = (
+            Rod(*rng.uniform(1.0, 9.0, 2), HERE)
+            if rng.random() < 0.55
+            else hull(0.5 * rng.uniform(1.0, 9.0, 3) * CUBE.vertices / np.array([1.0, 2.0, 3.0]))
+            for _ in range(2)
+        )
+        T = rotation(rng.normal(size=3), rng.choice([1e-7, 1e-5, 1e-3, 0.3, 2.0]))
+        T[:3, 3] = rng.normal(size=3) * rng.choice([6.0, 12.0])
+        found = convex_distance(a, HERE, b, T)
+        if found.upper <= 0.0:
+            continue
+        seen += 1
+        p, q = found.point_a, found.point_b
+        assert np.linalg.norm(q - p) <= found.upper + 1e-13
+        assert min(a.depth(p[None])[0], b.depth(to_target(inverse(T), q)[None])[0]) >= -1e-11
+        assert found.upper - found.lower <= 1e-8
+    assert seen > 150

@@ -23,16 +23,10 @@ from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import SweptArc
 from clamp3d.testing import body
 from clamp3d.testing import directions as spread
+from tests.hulls import apart
 from tests.kinds import BLOCK, DRAWN, faceted_shape
 
 CACHE = ModelCache()
-
-
-def apart(one, other):
-    """Distance of the convex hulls of two sets of points (Lawson and Hanson 1974, chapter 23)."""
-    ends = (one[:, None] - other[None]).reshape(-1, 3).T
-    weights, _ = nnls(np.vstack([ends, np.ones(ends.shape[1])]), np.array([0.0, 0.0, 0.0, 1.0]))
-    return float(np.linalg.norm(ends @ weights) / weights.sum())
 
 
 def box_set(low, high):

@@ -10,12 +10,12 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from scipy.optimize import nnls
 
 from clamp3d.brep import surfaces
 from clamp3d.collide import faces_kernel, faces_math
 from clamp3d.collide.faces_math import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS
 from clamp3d.core import jit
+from tests.hulls import apart
 
 SIZES = {PLANE: (0.0, 0.0), CYLINDER: (2.0, 0.0), CONE: (2.0, 0.4), SPHERE: (3.0, 0.0), TORUS: (4.0, 1.5)}
 KINDS = list(SIZES)
@@ -50,13 +50,6 @@ def normal(kind, size, F, x):
     else:
         n = local - (size[0] * across if kind == TORUS else 0.0)
     return n / np.linalg.norm(n) @ F[1:]
-
-
-def apart(one, other):
-    """Distance of the convex hulls of two sets of points (Lawson and Hanson 1974, chapter 23)."""
-    ends = (one[:, None] - other[None]).reshape(-1, 3).T
-    weights, _ = nnls(np.vstack([ends, np.ones(ends.shape[1])]), np.array([0.0, 0.0, 0.0, 1.0]))
-    return float(np.linalg.norm(ends @ weights) / weights.sum())
 
 
 def some_uv(rng, kind, spread):

@@ -11,13 +11,14 @@ pytest.importorskip("OCP")
 sys.path.insert(0, str(Path(__file__).parents[1] / "brep"))
 
 from assemblies import ball, box, cone, cut, fuse, moved, ring, rod, shift, solid_of
-from test_faces_math import GRID, apart
+from test_faces_math import GRID
 
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import CONE, TORUS, height, points_at
 from clamp3d.collide import faces_tree
 from clamp3d.collide.faces import FaceModel
 from clamp3d.core import jit
+from tests.hulls import apart
 
 SOLIDS = [
     cut(box((-4, -4, -2), (4, 4, 2)), rod(2, -3, 3)),

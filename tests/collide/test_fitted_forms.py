@@ -4,12 +4,14 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 
 from clamp3d import shapes
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.surface import Surface, at_edges
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.linear import to_source
+from clamp3d.core.mesh import make_mesh
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.testing import body
 from tests.kinds import DRAWN, faceted_shape
@@ -26,10 +28,16 @@ KEYED = shapes.Solid(
 STEPPED = shapes.Solid(
     "stepped shaft", (Extrusion(Profile.circle(5.0), "Z", -9.0, 0.0), Extrusion(Profile.circle(3.0), "Z", 0.0, 9.0))
 )
+FLANGED = shapes.Solid(
+    "flanged shaft",
+    tuple(Extrusion(Profile.circle(r), "Z", low, high) for r, low, high in ((5, -9, -1), (8, -1, 1), (5, 1, 9))),
+)
 
 
 @pytest.mark.parametrize("fit", ["bound", "round"])
-@pytest.mark.parametrize("shape", [*DRAWN[:5], *DRAWN[6:], ROUND_BACK, KEYED, STEPPED], ids=lambda shape: shape.name)
+@pytest.mark.parametrize(
+    "shape", [*DRAWN[:5], *DRAWN[6:], ROUND_BACK, KEYED, STEPPED, FLANGED], ids=lambda shape: shape.name
+)
 def test_the_forms_of_a_fitted_mesh_hold_the_part(shape, fit):
     """Points all over its surface: chords of round sides lie inside, so the hull of the corners alone does not."""
     model, solid = ModelCache().model(faceted_shape(shape, 0.3, fit)), body(shape)
@@ -57,15 +65,31 @@ def test_the_forms_of_a_fitted_mesh_hold_the_part(shape, fit):
 def test_points_told_to_be_inside_a_fitted_part_are(fit):
     """As deep as said, and on fitted surfaces within the error; what is said of the outside is no nearer than it is."""
     for shape in (ROUND_BACK, DRAWN[0], DRAWN[6]):
-        solid = body(shape)
+        solid, fine = body(shape), ModelCache().model(shape).outer(0.002)
         for form in ModelCache().model(faceted_shape(shape, 0.3, fit)).bodies:
             if form.surface is None:
                 continue
             x = np.random.default_rng(1).uniform(solid.box[0] - 1.0, solid.box[1] + 1.0, (4000, 3))
             depth, field = form.depth(x), solid.field(x)
             assert (field[depth > 0.0] <= 1e-9).all()
+            assert (depth <= fine.depth(x) + 0.004)[depth > 0.0].all()
             assert (depth > 0.0).any()
             assert (depth[field > 1e-9] <= 0.0).all()
+
+
+@pytest.mark.parametrize("fit", ["bound", "round"])
+def test_a_key_in_a_hole_is_no_air(fit):
+    """What stands into the circle of a hole or of a groove is the part's: the hole does not take it away."""
+    tube = trimesh.creation.annulus(5.0, 9.0, 20.0, sections=64)
+    key = trimesh.creation.box(bounds=[(3.0, -1.0, -10.0), (7.0, 1.0, 10.0)])
+    made = trimesh.boolean.union([tube, key], engine="manifold")
+    x = np.array([(3.5, 0.0, 0.0), (4.0, 0.5, 9.0), (7.0, 0.0, 0.0)])
+    for form in ModelCache().model(shapes.MeshShape(make_mesh(made.vertices, made.faces), fit)).bodies or ():
+        depth = np.min([piece.depth(x) for piece in form.outers], axis=0)
+        for bore in form.bores:
+            local = to_source(bore.T, x)
+            depth = np.minimum(depth, np.hypot(local[:, 0], local[:, 1]) - bore.radius)
+        assert (depth + form.error >= 0.0).all()
 
 
 @pytest.mark.parametrize(("degrees", "wider"), [(28.0, False), (29.5, False), (30.5, True), (32.0, True)])

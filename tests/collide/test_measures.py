@@ -1,4 +1,4 @@
-"""What the engine measures with: segments, facets, overlaps, meshes with errors; against hulls of points and boxes."""
+"""What the engine measures with: segments, rims, overlaps, boxes that touch, bounds; against hulls of points."""
 
 from __future__ import annotations
 
@@ -8,37 +8,29 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from scipy.optimize import nnls
 
 from clamp3d import distance, shapes
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.body import ClosedForm
 from clamp3d.collide.broad import Boxes, box_gaps
-from clamp3d.collide.convex import Hull, Rod, hull
-from clamp3d.collide.facets import axis_gap, hull_gap, rod_distance
-from clamp3d.collide.meshes import any_inside, gap, nearest_of, surface_distance, within
+from clamp3d.collide.convex import Rod
+from clamp3d.collide.meshes import within
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.nearest import rim_minimum, segment_pairs, to_faces
 from clamp3d.collide.open_mesh import _pierced
 from clamp3d.collide.overlap import common, deepest, deepest_at_most
 from clamp3d.collide.surface import Surface
 from clamp3d.collide.touching import is_box, touching_boxes
+from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.testing import body
+from tests.hulls import apart
 from tests.kinds import BLOCK, DRAWN, faceted_shape
 
 HERE = np.eye(4)
 TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
-
-
-def apart(one, other):
-    """Distance of the convex hulls of two sets of points (Lawson and Hanson 1974, chapter 23)."""
-    ends = (one[:, None] - other[None]).reshape(-1, 3).T
-    weights, _ = nnls(np.vstack([ends, np.ones(ends.shape[1])]), np.array([0.0, 0.0, 0.0, 1.0]))
-    return float(np.linalg.norm(ends @ weights) / weights.sum())
 
 
 def box_mesh(size, error=None, point_error=None):
@@ -107,82 +99,7 @@ def test_rims_beside_polyhedra_are_known_sharply():
         assert found.upper - found.lower <= 5e-7
 
 
-# --- Meshes with errors -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("off", "other"), [(0.0, 0.0), (0.3, 0.0), (0.0, 0.4), (0.3, 0.4)])
-def test_both_errors_count_once_on_either_side(off, other):
-    """Boxes 5 mm apart, face to face, in frames that nothing is square to: the gap less, or more, both errors."""
-    a, b = box_mesh((10.0, 10.0, 10.0), off), box_mesh((4.0, 4.0, 4.0), other)
-    for T in (translation(12.0, 0.0, 0.0), translation(0.0, -12.0, 1.0), translation(0.5, 0.0, 12.0)):
-        for x, y, P in ((a, b, T), (b, a, inverse(T))):
-            found = surface_distance(x, y, P)
-            assert found.lower == pytest.approx(5.0 - off - other, abs=1e-9)
-            assert found.upper == pytest.approx(5.0 + off + other, abs=1e-9)
-            assert gap(x, y, P) == pytest.approx(5.0 - off - other, abs=1e-9)
-            least, best, p, q = nearest_of(x, y, P)
-            assert (least, best) == pytest.approx((5.0 - off - other, 5.0), abs=1e-9)
-            assert np.linalg.norm(p - q) == pytest.approx(5.0, abs=1e-9)
-    assert gap(a, b, translation(6.5, 0.0, 0.0)) == -math.inf
-    assert gap(a, b, HERE) == gap(b, a, HERE) == -math.inf
-    assert nearest_of(a, b, translation(6.5, 0.0, 0.0))[:2] == (-math.inf, 0.0)
-    inside = surface_distance(a, b, translation(1.0, 0.0, 0.0))
-    assert -7.0 + off + other - 1e-9 <= inside.upper <= -2.0 + off + other + 1e-9
-    assert inside.lower == -math.inf
-    deep = surface_distance(a, b, translation(6.0, 0.0, 0.0))  # to 1 mm: the corners of the smaller one lie in it
-    assert deep.upper == pytest.approx(-1.0 + off + other, abs=1e-6)
-    assert deep.lower == pytest.approx(-1.0 - off - other, abs=1e-6) or deep.lower == -math.inf
-
-
-def test_errors_of_single_faces():
-    """The face that is off counts where it is near, and not where others are."""
-    made = trimesh.creation.box((10.0, 10.0, 10.0))
-    right = made.face_normals[:, 0] > 0.5
-    mesh = Surface(np.array(made.vertices), np.array(made.faces), np.where(right, 0.2, 0.0))
-    x = np.array([[8.0, 0.0, 0.0], [-8.0, 0.0, 0.0], [0.0, 0.0, 1.0], [4.0, 0.0, 0.0]])
-    assert mesh.distance_at_least(x) == pytest.approx([2.8, 3.0, 4.0, 0.8], abs=1e-12)
-    on = np.array([[5.0, 1.0, 1.0], [-5.0, 1.0, 1.0], [4.9, 5.0, 0.0], [0.0, 5.0, 0.0]])
-    assert mesh.error_at(on) == pytest.approx([0.2, 0.0, 0.2, 0.0], abs=1e-12)
-    assert mesh.error == 0.2
-    assert box_mesh((1.0, 1.0, 1.0)).error_at(on).tolist() == [0.0] * 4
-    small = Surface(mesh.vertices, mesh.faces, mesh.face_error, np.where(right, 0.05, 0.0))
-    assert small.error_at(on) == pytest.approx([0.05, 0.0, 0.05, 0.0], abs=1e-12)
-    block = box_mesh((2.0, 2.0, 2.0))
-    assert surface_distance(mesh, block, translation(8.0, 0.0, 0.0)).lower == pytest.approx(1.8, abs=1e-9)
-    assert surface_distance(mesh, block, translation(-8.0, 0.0, 0.0)).lower == pytest.approx(2.0, abs=1e-9)
-    errors = np.array([0.0, 1e-3, 0.01, 0.04, 0.2, 0.5, 0.9, 1.0, 0.3, 0.02, 0.0, 0.7])
-    levels = Surface(mesh.vertices, mesh.faces, errors)
-    for rows, error in levels.levels:
-        assert levels.face_error[rows].max() == error
-    assert np.sum([rows for rows, _ in levels.levels], axis=0).tolist() == [1] * 12
-
-
-def test_depths_of_points_in_a_mesh():
-    """Of a box with a hollow: what the nearest triangle alone tells is right; the hollow is outside."""
-    outer, inner = trimesh.creation.box((10.0, 10.0, 10.0)), trimesh.creation.box((4.0, 4.0, 4.0))
-    mesh = Surface(
-        np.vstack([outer.vertices, inner.vertices]),
-        np.vstack([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]),
-    )
-    x = np.random.default_rng(2).uniform(-6.0, 6.0, (400, 3))
-    far = np.abs(x).max(axis=1)
-    truth = np.minimum(
-        5.0 - far, np.where(far > 2.0, np.linalg.norm(np.maximum(np.abs(x) - 2.0, 0.0), axis=1), far - 2.0)
-    )
-    inside = truth > 0.0
-    assert mesh.depth(x)[inside] == pytest.approx(truth[inside], abs=1e-12)
-    assert (mesh.depth(x)[~inside] < 0.0).all()
-    certain = mesh.certain_depth(x)
-    known = certain > -np.inf
-    assert certain[known] == pytest.approx(truth[known], abs=1e-12)
-    assert known[inside & (truth == 5.0 - far)].mean() > 0.9
-    assert len(mesh.shells) == 2
-    assert any_inside(mesh, box_mesh((0.5, 0.5, 0.5)), translation(3.5, 0.0, 0.0))
-    assert not any_inside(mesh, box_mesh((0.5, 0.5, 0.5)), translation(0.5, 0.0, 0.0))
-    two = trimesh.util.concatenate(
-        [trimesh.creation.box((0.5, 0.5, 0.5)).apply_translation(t) for t in ((3.5, 0, 0), (9, 0, 0))]
-    )
-    assert any_inside(mesh, Surface(np.array(two.vertices), np.array(two.faces)), HERE)
+# --- Overlaps ---------------------------------------------------------------------------------------------------------
 
 
 def test_the_deepest_point_of_an_overlap():
@@ -222,52 +139,10 @@ def test_what_lies_within_another(kind):
     cache = ModelCache()
     for large_, small_ in ((large, small), (faceted_shape(large, 0.02), faceted_shape(small, 0.02))):
         a, b = cache.model(large_), cache.model(small_)
-        for out in (-5.0, -0.1, 0.3, 2.0, 9.0):
+        for out in (-5.0, -0.1, 0.0, 0.3, 2.0, 9.0):
             for slack in (0.0, 0.5):
                 assert within(b, a, translation(8.0 + out, 0.0, 0.0), 0.016, slack) == (out <= slack)
         assert not within(a, b, HERE, 0.016, 0.0)
-
-
-# --- Cylinders and hulls beside facets --------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("error", [0.0, 0.25])
-def test_cylinders_and_hulls_beside_facets(error):
-    """A rod lying beside a box, standing before it, or through it; its gap is known to the digit."""
-    facets, rod = box_mesh((10.0, 10.0, 10.0), error), Rod(2.0, 6.0, TURNED)
-    back = inverse(TURNED)
-    lying = translation(12.0, 0.0, 0.0) @ back
-    standing = translation(12.0, 0.0, 0.0) @ rotation((0.0, 1.0, 0.0), 0.5 * math.pi) @ back
-    turned = translation(12.0, 0.0, 0.0) @ rotation((0.0, 1.0, 0.0), 0.5 * math.pi - 0.5) @ back
-    tip = 3.0 * math.cos(0.5) + 2.0 * math.sin(0.5)
-    for off in (0.0, 0.1):
-        form = ClosedForm((rod,), (), off)
-        for T, truth in ((lying, 5.0), (standing, 4.0), (turned, 7.0 - tip)):
-            found = rod_distance(facets, form, T)
-            assert found.lower <= truth - error - off + 1e-9
-            assert found.upper >= truth + error + off - 1e-9
-            assert found.upper <= truth + error + off + 1e-6
-            assert axis_gap(facets, rod, T) <= truth - error + 1e-9
-        assert rod_distance(facets, form, lying).lower == pytest.approx(5.0 - error - off, abs=1e-6)
-        assert axis_gap(facets, rod, lying) == pytest.approx(5.0 - error, abs=1e-6)
-        deep = rod_distance(facets, form, translation(6.0, 0.0, 0.0) @ back)
-        assert deep.lower <= -1.0 - error - off + 1e-6
-        assert -1.0 + error + off <= deep.upper + 1e-6
-        inside = rod_distance(facets, form, translation(1.0, 0.0, 0.0) @ back)
-        assert inside.upper <= -3.0 + error + off
-        assert inside.lower == -math.inf
-    assert axis_gap(facets, rod, back) == axis_gap(facets, rod, translation(5.0, 0.0, 0.0) @ back) == -math.inf
-    around = hull(to_target(translation(9.0, 0.0, 0.0), np.array(list(itertools.product((-1.0, 1.0), repeat=3)))))
-    assert hull_gap(facets, around) == pytest.approx(3.0 - error, abs=1e-9)
-    for shift in (-9.0, -4.0, -3.0):
-        moved = Hull(
-            around.vertices + np.array([shift, 0.0, 0.0]),
-            around.planes - [0, 0, 0, 1] * (around.planes[:, :1] * shift),
-            around.faces,
-        )
-        assert hull_gap(facets, moved) == -math.inf
-    wide = hull(30.0 * np.array(list(itertools.product((-1.0, 1.0), repeat=3))))
-    assert hull_gap(facets, wide) == -math.inf
 
 
 # --- Boxes that touch, crossings, bounds ------------------------------------------------------------------------------
@@ -363,12 +238,28 @@ def test_the_closed_forms_of_a_drawn_solid_are_the_solid(shape):
     """Every point of one is a point of the other, and the boxes around the forms hold them."""
     forms, solid = ModelCache().model(shape).bodies, body(shape)
     x = np.random.default_rng(5).uniform(solid.box[0] - 1.0, solid.box[1] + 1.0, (20_000, 3))
-    field, depth = solid.field(x), np.max([form.depth(x) for form in forms], axis=0)
+    field, depth = solid.field(x), np.max([one.depth(x) for one in forms], axis=0)
     clear = np.abs(depth) > 1e-9
     if len(forms) > 1:  # on the seams of pieces both are at their borders
         clear &= np.abs(field) > 1e-2
     assert ((depth > 0.0) == (field < 0.0))[clear].all()
-    for form in forms:
-        inside = x[form.depth(x) > 0.0]
-        assert (inside >= form.bounds[0] - 1e-9).all()
-        assert (inside <= form.bounds[1] + 1e-9).all()
+    for one in forms:
+        inside = x[one.depth(x) > 0.0]
+        assert (inside >= one.bounds[0] - 1e-9).all()
+        assert (inside <= one.bounds[1] + 1e-9).all()
+
+
+def test_how_far_a_distance_is_from_the_thresholds_and_which_lie_between_bounds():
+    plain, wide = Thresholds(0.01), Thresholds(0.01, 0.5)
+    for x, expected, without in ((0.4, 0.1, 0.39), (0.002, 0.008, 0.008), (-0.3, 0.29, 0.29), (0.7, 0.2, 0.69)):
+        assert wide.margin(x) == pytest.approx(expected, abs=1e-12)
+        assert plain.margin(x) == pytest.approx(without, abs=1e-12)
+    assert (plain.reach, wide.reach) == (0.01, 0.5)
+    assert wide.between(Distance(-0.2, 0.6), 0.1) == [
+        "a gap of 0.01 mm (contact)",
+        "a gap of 0.5 mm (clearance)",
+        "an overlap of 0.1 mm (allowed)",
+    ]
+    assert plain.between(Distance(-0.2, 0.005)) == ["an overlap of 0.01 mm (contact)"]
+    assert plain.between(Distance(-0.005, 0.6), 0.001) == ["a gap of 0.01 mm (contact)"]
+    assert plain.between(Distance(-0.02, -0.005), 0.001) == ["an overlap of 0.01 mm (allowed)"]

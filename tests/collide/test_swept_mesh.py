@@ -1,8 +1,4 @@
-"""What swept triangles keep of others: exact on straight ways, never too much on arcs; against the hulls' distance.
-
-Of convex hulls it is told by least squares over weights that are not negative (Lawson and Hanson 1974, chapter 23),
-which knows nothing of trees or boxes.
-"""
+"""What swept triangles keep of others: exact on straight ways, never too much on arcs; against the hulls' distance."""
 
 import math
 
@@ -11,24 +7,17 @@ import pytest
 import trimesh
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
 from clamp3d.collide import swept_mesh
 from clamp3d.collide.swept_mesh import Standing, swept_gap
 from clamp3d.core.motion import Motion
+from tests.hulls import apart
 
 SLOW = settings(
     deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate], suppress_health_check=[*HealthCheck]
 )
 seeds = st.integers(0, 10**6)
-
-
-def apart(one, other):
-    """Distance of the convex hulls of two sets of points."""
-    ends = (one[:, None] - other[None]).reshape(-1, 3).T
-    weights, _ = nnls(np.vstack([ends, np.ones(ends.shape[1])]), np.array([0.0, 0.0, 0.0, 1.0]))
-    return float(np.linalg.norm(ends @ weights) / weights.sum())
 
 
 def standing(triangles, errors):
