@@ -1,6 +1,6 @@
 """``python -m clamp3d``."""
 
-from clamp3d.cli import main
+from clamp3d.cli import program
 
 if __name__ == "__main__":
-    main()
+    program()

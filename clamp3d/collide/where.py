@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, field
+from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from clamp3d.collide.model import Model
-from clamp3d.collide.overlap import common, deepest
+from clamp3d.collide.overlap import Common, common, deepest
+from clamp3d.collide.surface import Surface
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import Array
 
@@ -19,7 +20,7 @@ _ERRORS = (0.064, 0.008, 0.001)
 _SHARE = 0.005
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Overlap:
     """Where two parts overlap.
 
@@ -29,16 +30,21 @@ class Overlap:
         The volume that they share lies between these, mm^3.
     box : ndarray (2, 3)
         Lower and upper corner of a box in the world that holds all of the overlap, mm.
-    point : ndarray (3,) or None
-        A point of the world that lies in both parts; None where no mesh inside them overlaps.
     of_facets : bool
         Whether volume, box and point are those of the given meshes, whose round faces are off by their chords.
+    find : callable
+        Finds ``point``; asked once, by those who want to know it.
     """
 
     volume: tuple[float, float]
     box: Array
-    point: Array | None
     of_facets: bool = False
+    find: Callable[[], Array | None] = field(default=lambda: None, repr=False)
+
+    @cached_property
+    def point(self) -> Array | None:
+        """A point (3,) of the world that lies in both parts; None where no mesh inside them overlaps."""
+        return self.find()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -68,17 +74,24 @@ def locate(a: Model, b: Model, T_a: Array, T_ab: Array) -> Overlap | None:
         if outer is None:
             return found
         inner_a, inner_b = a.inner(error), b.inner(error)
-        inner, point = None, None
-        if inner_a is not None and inner_b is not None:
-            inner = common(inner_a, inner_b, T_ab) if a.refines or b.refines else outer
-            if inner is not None:
-                point = to_target(T_a, deepest(inner_a, inner_b, T_ab, inner)[1])
+        inner = None
+        if inner_a is outer_a and inner_b is outer_b:
+            inner = outer
+        elif inner_a is not None and inner_b is not None:
+            inner = common(inner_a, inner_b, T_ab)
+        within = None if inner is None or inner_a is None or inner_b is None else (inner_a, inner_b, T_ab, inner)
         world = to_target(T_a, outer.vertices)
         rounding = 1e-11 * (outer_a.scale + outer_b.scale)
         slack = rounding * float(outer.normals[1].sum())
         low, high = 0.0 if inner is None else max(0.0, inner.volume - slack), outer.volume + slack
         box = np.array([world.min(axis=0) - rounding, world.max(axis=0) + rounding])
-        found = Overlap((low, high), box, point, outer_a.error + outer_b.error > 0.0)
+        find = partial(_point, T_a, within)
+        found = Overlap((low, high), box, outer_a.error + outer_b.error > 0.0, find)
         if high - low <= _SHARE * high or not (a.refines or b.refines):
             break
     return found
+
+
+def _point(T: Array, within: tuple[Surface, Surface, Array, Common] | None) -> Array | None:
+    """The deepest point of what two meshes share, in the world; None if they share nothing."""
+    return None if within is None else to_target(T, deepest(*within)[1])
