@@ -198,7 +198,9 @@ def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, best
                     inset += step
                     rho, x, y, z, by_r, by_l = rim_arc(which, r, l, cx, cy, cz, dx, dy, dz, e2, e, ex, ey, inset)
                     size = abs(step)
-                    if rho <= 0.0 or size <= 1e-12 * R or (size <= 1e-8 * R and size > 0.7 * last):
+                    if rho <= 0.0 or abs(rho - R) <= 2.0 * UNIT * R:
+                        break
+                    if size <= 1e-12 * R or (size <= 1e-8 * R and size > 0.7 * last):
                         break
                     last = size
                 if rho <= 0.0 or (inset == -lowest and rho < R):
