@@ -35,6 +35,13 @@ def push(rows, n):  # type: ignore[no-untyped-def]
 
 
 @formula
+def put(rows, n, a, b, c, d, e):  # type: ignore[no-untyped-def]
+    """A row of five numbers joins the heap of n rows; returns n + 1."""
+    rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3], rows[n, 4] = a, b, c, d, e
+    return push(rows, n)
+
+
+@formula
 def pop(rows, n):  # type: ignore[no-untyped-def]
     """The first of n rows leaves the heap: it is row n - 1 then; returns n - 1."""
     n -= 1

@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 
 from clamp3d.core.jit import entry, formula
+from clamp3d.core.kernel_heap import pop, put
 from clamp3d.core.kernel_nonnegative import nonnegative
-from clamp3d.core.kernel_zonoid import drop, push
 
 CUTS = 64
 """Directions of one stretch."""
@@ -185,13 +185,13 @@ def _hole(c, R, H, limit, tolerance, most, heap, A, f, x, w, order, y, Q, at, ou
     slack = 1e-11 * size
     n, count, lower, floor = 0, 0, math.inf, math.inf
     low = stretch(first, last, best, R, inner, pin, size, slack, A, f, x, w, order, y, Q, at)
-    n = push(heap, n, low, first, last, at[2], 0.0)
+    n = put(heap, n, low, first, last, at[2], 0.0)
     while n:
         low, first, last, z = heap[0, 0], heap[0, 1], heap[0, 2], heap[0, 3]
         if low >= best - tolerance or n + 2 > heap.shape[0] or count >= most:
             lower = low
             break
-        n = drop(heap, n)
+        n = pop(heap, n)
         off = 0.0  # where the pin only just fits, it does a little further along the hole
         while True:
             at_z = z if off == 0.0 else min(max(z + off, first), last)
@@ -216,7 +216,7 @@ def _hole(c, R, H, limit, tolerance, most, heap, A, f, x, w, order, y, Q, at, ou
             count += 1
             below = max(below, low)
             if below < best - tolerance:
-                n = push(heap, n, below, u, v, at[2], 0.0)
+                n = put(heap, n, below, u, v, at[2], 0.0)
             else:
                 floor = min(floor, below)
     out[0], out[1] = max(min(lower, floor, best) - clear, 0.0), best

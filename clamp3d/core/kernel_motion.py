@@ -24,7 +24,7 @@ import math
 
 from clamp3d.core.jit import entry, formula
 from clamp3d.core.kernel_features import FLAT_N, phi, section, section_foot
-from clamp3d.core.kernel_heap import pop, push
+from clamp3d.core.kernel_heap import pop, put
 
 CELLS = 200_000
 """Cells that may wait. A search that needs more ends with a wider bound, which it tells."""
@@ -231,21 +231,14 @@ def cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht):  # type: ignore[no-untyped
 
 
 @formula
-def wait(heap, n, key, u, t, hu, ht):  # type: ignore[no-untyped-def]
-    """Put a cell into the heap of n; returns n + 1."""
-    heap[n, 0], heap[n, 1], heap[n, 2], heap[n, 3], heap[n, 4] = key, u, t, hu, ht
-    return push(heap, n)
-
-
-@formula
 def halve(heap, n, key, split_u, u, t, hu, ht, ordered):  # type: ignore[no-untyped-def]
     """Put the halves of a cell into the heap of n; by their beginning if it is ordered by that. Returns n + 2."""
     for sign in (-1.0, 1.0):
         if split_u:
             middle = u + 0.5 * sign * hu
-            n = wait(heap, n, middle - 0.5 * hu if ordered else key, middle, t, 0.5 * hu, ht)
+            n = put(heap, n, middle - 0.5 * hu if ordered else key, middle, t, 0.5 * hu, ht)
         else:
-            n = wait(heap, n, key, u, t + 0.5 * sign * ht, hu, 0.5 * ht)
+            n = put(heap, n, key, u, t + 0.5 * sign * ht, hu, 0.5 * ht)
     return n
 
 
@@ -275,7 +268,7 @@ def seed_heap(heap, l, m, u0, u1, ordered):  # type: ignore[no-untyped-def] # no
     n = 0
     for i in range(pieces):
         begin = u0 + 2.0 * i * hu
-        n = wait(heap, n, begin if ordered else -math.inf, begin + hu, 0.0, hu, l)
+        n = put(heap, n, begin if ordered else -math.inf, begin + hu, 0.0, hu, l)
     return n
 
 

@@ -11,8 +11,8 @@ import math
 
 from clamp3d.core.jit import entry
 from clamp3d.core.kernel_flat import flat_nearest
-from clamp3d.core.kernel_heap import pop
-from clamp3d.core.kernel_motion import place, wait
+from clamp3d.core.kernel_heap import pop, put
+from clamp3d.core.kernel_motion import place
 
 MOST = 100_000
 """Poses that are looked at; a search that needs more ends with a wider bound, which it tells."""
@@ -48,7 +48,7 @@ def _search(R, half_angle, H, r, l, m, speed, u0, u1, level, eps, pad, heap, out
             continue
         if count == 2:
             fb = f
-            n = wait(heap, n, 0.5 * (fa + fb - speed * (b - a)), a, b, fa, fb)
+            n = put(heap, n, 0.5 * (fa + fb - speed * (b - a)), a, b, fa, fb)
         else:
             for half in range(2):
                 p0, p1, g0, g1 = (a, u, fa, f) if half == 0 else (u, b, f, fb)
@@ -56,7 +56,7 @@ def _search(R, half_angle, H, r, l, m, speed, u0, u1, level, eps, pad, heap, out
                 if low >= best - eps or p1 - p0 <= 1e-16:
                     bound = min(bound, low)
                 else:
-                    n = wait(heap, n, low, p0, p1, g0, g1)
+                    n = put(heap, n, low, p0, p1, g0, g1)
         if n == 0:
             break
         low, a, b, fa, fb = heap[0, 0], heap[0, 1], heap[0, 2], heap[0, 3], heap[0, 4]

@@ -76,8 +76,8 @@ def test_a_clamp_that_does_not_close_is_a_finding():
         (["run", "--json"], "requires an argument"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_code_2(arguments, message):
-    done = clamp3d(*arguments)
-    assert done.returncode == 2
-    assert message in done.stderr.splitlines()[-1]
-    assert "Traceback" not in done.stderr
+def test_bad_input_is_one_line_and_exit_code_2(arguments, message, main):
+    code, _, err = main(*arguments)
+    assert code == 2
+    assert message in err.splitlines()[-1]
+    assert "Traceback" not in err

@@ -142,10 +142,7 @@ def test_the_first_of_several_contacts_is_found_not_the_deepest(kind):
     rng = np.random.default_rng(0)
     samples, shallow = np.linspace(0.0, 1.0, 401), 0
     for k in range(100):
-        groove, wire = (
-            SweptArc(12.0, float(rng.uniform(0.3, 2.8)), 40.0),
-            Capsule(*rng.uniform((0.3, 1.0), (3.0, 20.0))),
-        )
+        groove, wire = SweptArc(12.0, rng.uniform(0.3, 2.8), 40.0), kind(*rng.uniform((0.3, 1.0), (3.0, 20.0)))
         T = rotation(rng.normal(size=3), rng.uniform(0.0, 3.0))
         T[:3, 3] = rng.normal(size=3) * 25.0
         axis, point = ((0.0, 0.0, 1.0), np.zeros(3)) if k % 2 else (rng.normal(size=3), rng.normal(size=3) * 10.0)

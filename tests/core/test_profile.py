@@ -7,6 +7,7 @@ import pytest
 import shapely
 from shapely import Polygon
 
+from clamp3d.core.meshing import _polygons
 from clamp3d.core.profile import Arc, Profile, Segment, chord_angle, chord_count, sagitta
 from clamp3d.errors import InputError
 
@@ -89,6 +90,19 @@ def test_polygons_keep_their_error_and_their_side():
     assert one_sided > 40
 
 
+@pytest.mark.parametrize("side", ["inner", "outer"])
+def test_what_is_left_of_a_thin_lune_is_polygons(side):
+    """Wall of 0.007 mm, chords off by 3.2 mm: the tangents of one arc run along the chords of the other."""
+    half, inner = 0.7944527575456962, 0.7936696486020092
+    outer, centre, radius = 18.429118643281132, -0.020243191978309483, 18.443308203518242
+    profile = Profile.of(Arc((0.0, 0.0), outer, -half, half), Arc((centre, 0.0), radius, inner, -inner))
+    pieces = _polygons(profile, 3.244780302252709, side)
+    assert pieces
+    assert all(piece.geom_type == "Polygon" and piece.area > 0.0 for piece in pieces)
+    area = shapely.union_all(pieces).area
+    assert area < profile.area if side == "inner" else area > profile.area
+
+
 def test_chords_are_as_few_as_their_width_allows():
     rng = np.random.default_rng(2)
     for _ in range(500):
@@ -99,6 +113,16 @@ def test_chords_are_as_few_as_their_width_allows():
         assert abs(angle) <= n * widest * (1.0 + 1e-8)
         assert n == 1 or (n - 1) * widest <= abs(angle)
     assert chord_angle(1.0, 5.0) == pytest.approx(2.0 * math.pi)
+
+
+def test_hexagons_and_rectangles_have_their_sides():
+    hexagon = Profile.hexagon(30.0)
+    corners = np.array([edge.start for edge in hexagon.edges])
+    assert np.hypot(*corners.T) == pytest.approx(30.0 / math.sqrt(3.0), abs=1e-12)
+    assert [math.dist(edge.start, edge.end) for edge in hexagon.edges] == pytest.approx([30.0 / math.sqrt(3.0)] * 6)
+    assert hexagon.bounds[1] == pytest.approx((30.0 / math.sqrt(3.0), 15.0))
+    assert Profile.rectangle(4.0, 6.0, (1.0, -2.0)).bounds == ((-1.0, -5.0), (3.0, 1.0))
+    assert Profile.rectangle(4.0, 6.0, (1.0, -2.0)).area == 24.0
 
 
 def test_outlines_that_are_open_or_clockwise_are_refused():

@@ -177,6 +177,38 @@ def _sum(rng, kind):
     return S, U, rng.choice([0.0, 0.3, 1.0, 5.0]) * rng.normal(size=3)
 
 
+def test_a_direction_is_led_to_a_local_minimum_of_the_width():
+    """Of round sums, whose width is smooth; on the circle square to a segment, where that is the edge that counts."""
+    rng = np.random.default_rng(8)
+    reached = 0
+    for k in range(300):
+        U, S = rng.normal(size=(3, 4)), rng.normal(size=(1, 3)) if k % 2 else np.empty((0, 3))
+        U[:, :3] /= np.linalg.norm(U[:, :3], axis=1)[:, None]
+        U[:, 3], c, on = rng.uniform(0.5, 2.0, 3), rng.choice([0.3, 5.0]) * rng.normal(size=3), len(S) - 1
+        start = rng.normal(size=3)
+        start /= np.linalg.norm(start)
+
+        def widths(n, S=S, U=U, c=c):
+            rims = np.linalg.norm(np.cross(n[:, None], U[:, :3]), axis=2) @ U[:, 3]
+            return np.abs(n @ S.T).sum(axis=1) + rims - n @ c
+
+        f, *n = kernel_zonoid.polish(*start, c, S, U, on, 1e-14)
+        n = np.array(n)
+        near = n + 1e-3 * rng.normal(size=(200, 3))
+        if len(S):
+            edge = S[0] / np.linalg.norm(S[0])
+            assert abs(n @ edge) <= 1e-12
+            start -= (start @ edge) * edge
+            start /= np.linalg.norm(start)
+            near -= (near @ edge)[:, None] * edge
+        near /= np.linalg.norm(near, axis=1)[:, None]
+        assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-12)
+        assert f == pytest.approx(widths(n[None])[0], abs=1e-12)
+        assert f <= widths(start[None])[0] + 1e-12
+        reached += f <= widths(near).min() + 1e-12
+    assert reached >= 265
+
+
 def _least(c, S, U, tolerance, most=20_000, cells=kernel_zonoid.CELLS):
     """The kernel's bounds, direction and nearest point of the sum, and the cells that it looked at."""
     parts, out, heap = np.empty((len(S) + len(U), 3)), np.empty(5), np.full((cells + 8, 5), np.nan)

@@ -414,10 +414,11 @@ def test_command_takes_scenes_and_meshes(tmp_path):
         ((str(ROOT / "examples/hinge/scene.toml"), "--method", "chords", "-o", "x"), "go with a clamp"),
     ],
 )
-def test_bad_input_is_one_line_and_writes_nothing(arguments, message, tmp_path):
+def test_bad_input_is_one_line_and_writes_nothing(arguments, message, tmp_path, monkeypatch, main):
     (tmp_path / "file").write_text("in the way")
-    done = command_line(*arguments, "-q", folder=tmp_path)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+    monkeypatch.chdir(tmp_path)
+    code, _, err = main("report", *arguments, "-q")
+    assert code == 2
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
