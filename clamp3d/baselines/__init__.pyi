@@ -3,7 +3,7 @@ from .chords import Chords as Chords
 from .factory import METHODS as METHODS
 from .factory import contact_model as contact_model
 from .hulls import Hulls as Hulls
-from .meshes import Meshes as Meshes
 from .model import ContactModel as ContactModel
 from .model import Pieces as Pieces
+from .polytopes import Meshes as Meshes
 from .wedges import Wedges as Wedges

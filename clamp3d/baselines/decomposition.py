@@ -25,6 +25,7 @@ import hashlib
 import json
 import math
 import tempfile
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
@@ -34,15 +35,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.baselines import cache as disk
+from clamp3d.checks import choice, whole
 from clamp3d.core.child import run_child
 from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.core.pose import Array
-from clamp3d.errors import InputError, MissingLibraryError, SolverError
+from clamp3d.errors import InputError, SolverError
 
 PreprocessMode = Literal["auto", "on", "off"]
 
-_FORMAT = 1  # of the cache files
+_FORMAT = 2  # of the cache files
 _COVERED = 1e-6  # mm
 
 
@@ -71,8 +73,7 @@ class DecompositionParameters:
             raise InputError(f"threshold must be > 0, got {self.threshold}")
         if not self.real_metric and self.threshold > 1.0:
             raise InputError(f"threshold must be <= 1 without real_metric, got {self.threshold}")
-        if self.preprocess_mode not in get_args(PreprocessMode):
-            raise InputError(f"unknown preprocess_mode {self.preprocess_mode!r}; available: auto, on, off")
+        choice("preprocess_mode", self.preprocess_mode, get_args(PreprocessMode))
         ranges = {
             "preprocess_resolution": (5, 1000),
             "resolution": (1, 10**6),
@@ -82,8 +83,7 @@ class DecompositionParameters:
             "seed": (0, 2**32 - 1),
         }
         for name, (low, high) in ranges.items():
-            if not low <= getattr(self, name) <= high:
-                raise InputError(f"{name} must be from {low} to {high}, got {getattr(self, name)}")
+            whole(name, getattr(self, name), least=low, most=high)
         if self.max_convex_hull != -1 and self.max_convex_hull < 1:
             raise InputError(f"max_convex_hull must be >= 1, or -1 for no limit, got {self.max_convex_hull}")
 
@@ -123,25 +123,20 @@ def decompose(
     CoACD runs in a process of its own for at most ``time_limit`` s; nothing is left behind when it is interrupted.
     ``progress`` on stderr: None shows it on a terminal. Answers are kept on disk (`clamp3d.baselines.cache`) unless
     ``cache`` is false. Raises InputError for a mesh that is not closed (`closed_mesh`), SolverError if CoACD does not
-    finish in time or ends without an answer, MissingLibraryError if it is not installed.
+    finish in time or ends without an answer.
     """
     solid = closed_mesh(vertices, faces, name)
     parameters = parameters or DecompositionParameters()
     if not time_limit > 0.0:
         raise InputError(f"time_limit must be > 0 s, got {time_limit}")
-    try:
-        version = metadata.version("coacd")
-    except metadata.PackageNotFoundError:
-        raise MissingLibraryError("method 'hulls' needs coacd: pip install coacd") from None
+    version = metadata.version("coacd")
     mesh_hash = _sha256(solid.vertices.astype("<f8").tobytes(), solid.faces.astype("<i8").tobytes())
     settings = json.dumps({"format": _FORMAT, "coacd": version, **asdict(parameters)}, sort_keys=True)
     key = f"decomposition-{_sha256(mesh_hash.encode(), settings.encode())[:32]}"
     found = _load(key) if cache else None
     cached = found is not None
     if found is None:
-        found = _run(solid, parameters, name, time_limit, progress)
-        if cache:
-            _store(key, *found)
+        found = _run(solid, parameters, name, time_limit, progress, key if cache else None)
     hulls, seconds = found
     outside = _outside(solid.vertices, hulls)
     return Decomposition(
@@ -165,20 +160,10 @@ def _sha256(*parts: bytes) -> str:
 
 
 def _load(key: str) -> tuple[tuple[Mesh, ...], float] | None:
-    entry = disk.load(key)
-    if entry is None:
-        return None
-    try:
-        return _hulls(entry[0]), float(entry[1]["seconds"])
-    except (KeyError, TypeError, ValueError):
-        return None
-
-
-def _store(key: str, hulls: tuple[Mesh, ...], seconds: float) -> None:
-    arrays = {"count": np.array(len(hulls))}
-    for i, hull in enumerate(hulls):
-        arrays |= {f"v{i}": hull.vertices, f"f{i}": hull.faces}
-    disk.store(key, arrays, {"seconds": seconds})
+    arrays = disk.load(key)
+    with suppress(KeyError, TypeError, ValueError):
+        return None if arrays is None else (_hulls(arrays), float(arrays["seconds"]))
+    return None
 
 
 def _hulls(arrays: Any) -> tuple[Mesh, ...]:
@@ -200,8 +185,14 @@ def _outside(points: Array, hulls: tuple[Mesh, ...]) -> Array:
 
 
 def _run(
-    solid: Mesh, parameters: DecompositionParameters, name: str, time_limit: float, progress: bool | None
+    solid: Mesh,
+    parameters: DecompositionParameters,
+    name: str,
+    time_limit: float,
+    progress: bool | None,
+    key: str | None,
 ) -> tuple[tuple[Mesh, ...], float]:
+    """Hulls and seconds of a run; its file is kept in the cache under ``key``, if there is one."""
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -230,10 +221,13 @@ def _run(
             )
         try:
             with np.load(target, allow_pickle=False) as file:
-                return _hulls(file), float(file["seconds"])
+                found = _hulls(file), float(file["seconds"])
         except (OSError, ValueError, KeyError) as error:
             why = (said or ["nothing"])[-1] if code else str(error)
             raise SolverError(f"CoACD gave no hulls for {name} (exit code {code}): {why}") from None
+        if key is not None:
+            disk.keep(key, target)
+        return found
 
 
 def _stage(log: list[str]) -> str:

@@ -21,15 +21,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import fcl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clamp3d.collide.surface import fcl_tree
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder
 from clamp3d.core.shells import corners_of, winding_number
-from clamp3d.errors import InputError, MissingLibraryError
+from clamp3d.errors import InputError
 
 UNIT = 16384.0
 """FCL units per mm. See the module."""
@@ -73,7 +75,6 @@ class Shape:
 
 def convex(vertices: ArrayLike, faces: ArrayLike, name: str = "convex shape") -> Shape:
     """A convex polytope (`fcl.Convex`) from its triangles; InputError if it is open, inside out or not convex."""
-    fcl = _fcl()
     solid = _solid(vertices, faces, name)
     V, F = solid.vertices, solid.faces
     corners = V[F]
@@ -93,7 +94,7 @@ def encoded(faces: NDArray[Any]) -> NDArray[Any]:
 
 def bvh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Shape:
     """A closed triangle mesh (`fcl.BVHModel`); InputError if it is empty, open or inside out."""
-    return _shape("mesh", *_bvh_model(_solid(vertices, faces, name)))
+    return _tree("mesh", _solid(vertices, faces, name))
 
 
 def facets(mesh: Shape) -> list[Shape]:
@@ -106,7 +107,7 @@ def facets(mesh: Shape) -> list[Shape]:
     out = []
     for group in (*flat, *alone[:, None]):
         used, index = np.unique(F[group], return_inverse=True)
-        out.append(_shape("surface", *_bvh_model(Mesh("facet", V[used], index.reshape(-1, 3), False))))
+        out.append(_tree("surface", Mesh("facet", V[used], index.reshape(-1, 3), False)))
     return out
 
 
@@ -126,8 +127,8 @@ class Wire:
             self.core = Wire(Cylinder(cylinder.radius - e, cylinder.length - 2.0 * e), is_core=True)
         self.cylinder = cylinder
         self.T = np.eye(4)
-        shape = _fcl().Cylinder(cylinder.radius * UNIT, cylinder.length * UNIT)
-        self.collision_object = _fcl().CollisionObject(shape, transform(self.T))
+        shape = fcl.Cylinder(cylinder.radius * UNIT, cylinder.length * UNIT)
+        self.collision_object = fcl.CollisionObject(shape, transform(self.T))
 
     def place(self, T_a_wire: Array) -> None:
         """Put the wire at a pose (4, 4) that has passed `check_pose` or `check_pose_array`."""
@@ -137,13 +138,12 @@ class Wire:
 
 def transform(T: Array) -> Any:
     """`fcl.Transform` (float64) of a checked pose (4, 4) in mm."""
-    return _fcl().Transform(T[:3, :3], T[:3, 3] * UNIT)
+    return fcl.Transform(T[:3, :3], T[:3, 3] * UNIT)
 
 
 def distance(shape: Shape, wire: Wire) -> float:
     """Signed distance in mm as of `measure`, and faster where the two are apart."""
     if shape.kind != "mesh":
-        fcl = _fcl()
         result = fcl.DistanceResult()
         fcl.distance(shape.collision_object, wire.collision_object, fcl.DistanceRequest(), result)
         if result.min_distance > 0.0:
@@ -190,7 +190,6 @@ def contained(shape: Shape, wire: Wire) -> bool:
 
 def _nearest(shape: Shape, wire: Wire) -> Measurement:
     """What FCL says without a sign: the distance, or one that is not positive where the two overlap."""
-    fcl = _fcl()
     result = fcl.DistanceResult()
     fcl.distance(shape.collision_object, wire.collision_object, fcl.DistanceRequest(True), result)
     d = float(result.min_distance) / UNIT
@@ -204,7 +203,6 @@ def _nearest(shape: Shape, wire: Wire) -> Measurement:
 
 def _deepest(shape: Shape, wire: Wire) -> Measurement:
     """The deepest of FCL's contacts: one for a convex shape, one for each triangle crossed for a mesh."""
-    fcl = _fcl()
     request = fcl.CollisionRequest(num_max_contacts=len(shape.solid.faces), enable_contact=True)
     result = fcl.CollisionResult()
     fcl.collide(shape.collision_object, wire.collision_object, request, result)
@@ -260,15 +258,11 @@ def _from_axis(point: Array, wire: Wire) -> tuple[Array, float]:
 
 def _shape(kind: Kind, solid: Mesh, geometry: Any) -> Shape:
     bounds = np.array([solid.vertices.min(axis=0), solid.vertices.max(axis=0)])
-    return Shape(kind, solid, bounds, _fcl().CollisionObject(geometry, transform(np.eye(4))))
+    return Shape(kind, solid, bounds, fcl.CollisionObject(geometry, transform(np.eye(4))))
 
 
-def _bvh_model(solid: Mesh) -> tuple[Mesh, Any]:
-    model = _fcl().BVHModel()
-    model.beginModel(len(solid.faces), len(solid.vertices))
-    model.addSubModel(solid.vertices * UNIT, solid.faces)
-    model.endModel()
-    return solid, model
+def _tree(kind: Kind, solid: Mesh) -> Shape:
+    return _shape(kind, solid, fcl_tree(solid.vertices * UNIT, solid.faces))
 
 
 def _solid(vertices: ArrayLike, faces: ArrayLike, name: str) -> Mesh:
@@ -282,11 +276,3 @@ def _check_size(name: str, size: float) -> None:
         raise InputError(
             f"{name} must be from {MIN_SIZE:g} to {MAX_SIZE:g} mm for FCL, whose tolerances are absolute, got {size:g}"
         )
-
-
-def _fcl() -> Any:
-    try:
-        import fcl
-    except ImportError:
-        raise MissingLibraryError("methods wedges, hulls and mesh need python-fcl: pip install python-fcl") from None
-    return fcl

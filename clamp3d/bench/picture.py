@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Assembly
-from clamp3d.core.pose import Array, SectionPose
+from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
+from clamp3d.output.section import inner_edges, outline
 
 Image = NDArray[np.uint8]
 
@@ -59,26 +60,19 @@ class Picture:
 
 
 def picture(run: Assembly, px_per_mm: float, *, blur: float = 1.0, grain: float = 3.0, seed: int = 0) -> Picture:
-    """The final state of ``run`` at ``px_per_mm``, with ``blur`` in px and ``grain`` in grey levels (one sigma each).
-
-    Raises InputError for a scale that makes no usable picture or negative blur or grain.
-    """
+    """The final state of ``run`` at ``px_per_mm``, with ``blur`` in px and ``grain`` in grey levels (one sigma)."""
     from skimage.filters import gaussian
 
-    if not (math.isfinite(px_per_mm) and 1.0 <= px_per_mm <= 50.0):
-        raise InputError(f"px_per_mm must be between 1 and 50, got {px_per_mm}")
-    for name, value in (("blur", blur), ("grain", grain)):
-        if not (math.isfinite(value) and value >= 0.0):
-            raise InputError(f"{name} must be finite and >= 0, got {value}")
-    outlines = [(name, outline) for name in PAINT for outline in _outlines(run, name)]
-    everything = np.concatenate([outline for _, outline in outlines])
+    outlines = [(name, points) for name in PAINT for points in _outlines(run, name)]
+    everything = np.concatenate([points for _, points in outlines])
     low, high = everything.min(0) - _MARGIN, everything.max(0) + _MARGIN
     columns, rows = np.ceil((high - low) * px_per_mm).astype(int)
-    image = _paint([(name, (outline - low) * px_per_mm - 0.5) for name, outline in outlines], columns, rows)
+    image = _paint([(name, (points - low) * px_per_mm - 0.5) for name, points in outlines], columns, rows)
     if blur > 0.0:
         image = gaussian(image, blur, channel_axis=-1, preserve_range=True)
     image = image + np.random.default_rng(seed).normal(0.0, grain, image.shape)
-    points = (np.array(_end_points(run)) - low) * px_per_mm - 0.5
+    (left, below), (right, _) = inner_edges(run.clamp, run.poses)
+    points = (np.array([left, right, below]) - low) * px_per_mm - 0.5
     reference = run.clamp.up_splint.width
     return Picture(np.clip(np.rint(image), 0, 255).astype(np.uint8), px_per_mm, points, reference, run.distance)
 
@@ -204,8 +198,8 @@ def _paint(outlines: list[tuple[PartName, Array]], columns: int, rows: int) -> A
     ax.set_axis_off()
     ax.set_xlim(-0.5, columns - 0.5)
     ax.set_ylim(rows - 0.5, -0.5)
-    for name, outline in outlines:
-        ax.add_patch(Polygon(outline, fc=_rgb(PAINT[name]), ec="none", lw=0.0, snap=False))
+    for name, points in outlines:
+        ax.add_patch(Polygon(points, fc=_rgb(PAINT[name]), ec="none", lw=0.0, snap=False))
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].astype(np.float64)
 
@@ -218,19 +212,4 @@ def _rgb(paint: tuple[float, float, float]) -> tuple[float, float, float]:
 def _outlines(run: Assembly, name: PartName) -> Iterator[Array]:
     """Outlines (n, 2) of the part's bodies in the section where they stand, seen along the wires."""
     for body in parts(run.clamp)[name].bodies:
-        if body.axis == "Y":
-            outline = body.profile.polygon(0.001)
-        else:
-            (a0, _), (a1, _) = body.profile.bounds
-            outline = np.array([(a0, -body.end), (a1, -body.end), (a1, -body.start), (a0, -body.start)])
-        yield np.array([run.poses[name].point(float(u), float(v)) for u, v in outline])
-
-
-def _end_points(run: Assembly) -> list[tuple[float, float]]:
-    up, down = run.clamp.up_splint, run.clamp.down_splint
-    p1: SectionPose = run.poses["P1"]
-    return [
-        p1.point(0.0, up.thickness),
-        p1.point(up.width, up.thickness),
-        run.poses["P2"].point(-down.width / 2, down.face_depth),
-    ]
+        yield np.array([run.poses[name].point(float(u), float(v)) for u, v in outline(body).polygon(0.001)])

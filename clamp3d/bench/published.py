@@ -22,7 +22,6 @@ TABLE_1: dict[tuple[PartName, PartName], ConnectionType] = {
 }
 """Connection matrix, entries that are not 0."""
 
-TABLE_2 = ("none", "one point", "two points on one side", "two points on different sides")
 TABLE_3 = ("inside", "outside", "intersect", "exterior contact", "interior contact")
 
 ACTUAL_DISTANCE = 31.630

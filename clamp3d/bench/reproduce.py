@@ -16,12 +16,13 @@ from clamp3d.clamp.assemble import STEP, assemble
 from clamp3d.clamp.dimensions import ConnectionType, PartName
 from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.matrix import gap_text
+from clamp3d.clamp.matrix import millimetres
 from clamp3d.clamp.result import Assembly, Solver
 from clamp3d.collide.distance import Distance
 from clamp3d.core.arc_circle import arc_circle
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.rectangle import Rectangle, hole_bolt
+from clamp3d.errors import need
 
 PLATEAU = (
     "The paper's plateau of 31.863 mm at 1, 5 and 10 degrees is its step, not its geometry: the program moved the down "
@@ -49,7 +50,7 @@ class ConnectionRow:
         """Where the measurement contradicts the paper or the declaration, in words; empty where all agree."""
         claims = {"published": self.published, "declared": self.declared}
         wrong = [f"{name} {kind}" for name, kind in claims.items() if kind != self.measured]
-        apart = f"does not touch: {gap_text(self.distance.lower)} mm apart or more"
+        apart = f"does not touch: {millimetres(self.distance.lower)} mm apart or more"
         found = apart if self.measured == 0 else f"touches as {self.measured}"
         return f"{' and '.join(wrong)}, but {found}" if wrong else ""
 
@@ -151,6 +152,7 @@ class Reproduction:
 
 def reproduce(progress: Callable[[str], None] = lambda message: None) -> Reproduction:
     """Compute everything; ``progress`` is told what comes next."""
+    need("skimage", "Table 4 with its image detection")
     clamp = load_clamp("reference")
     table4: list[DistanceRow] = []
     table5: list[WorkRow] = []

@@ -10,7 +10,7 @@ from typing import Any
 from clamp3d.bench import published
 from clamp3d.bench.reproduce import OrderRow, PoseRow, RelationRow, Reproduction, WorkRow
 from clamp3d.clamp.dimensions import TITLES
-from clamp3d.clamp.matrix import gap_text
+from clamp3d.clamp.matrix import millimetres
 from clamp3d.collide.distance import Distance
 from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
@@ -89,7 +89,7 @@ def _relations(rows: Sequence[RelationRow]) -> list[Sequence[object]]:
 
 def _gap(distance: Distance) -> str:
     """A distance to the digits that are certain, or the interval that holds it."""
-    low, high = gap_text(distance.lower), gap_text(distance.upper)
+    low, high = millimetres(distance.lower), millimetres(distance.upper)
     return high if low == high or distance.uncertainty <= 1e-6 else f"{low} to {high}"
 
 

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from clamp3d.brep.bodies import Reading
 from clamp3d.brep.placing import Placer
 from clamp3d.checks import readable_file
-from clamp3d.core.linear import dot, norm
+from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Array, IntArray
+from clamp3d.core.pose import turn_of
 from clamp3d.errors import InputError
 
 _Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -201,12 +202,7 @@ def _transform(node: dict[str, Any]) -> Array:
         T[:] = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
         return T
     if "rotation" in node:
-        x, y, z, w = np.array(node["rotation"], dtype=np.float64) / norm(node["rotation"])
-        T[:3, :3] = [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
+        T[:3, :3] = turn_of(*np.array(node["rotation"], dtype=np.float64))
     T[:3, :3] *= np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64)
     T[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
     return T

@@ -43,10 +43,10 @@ def contact_type(pair: Pair) -> ConnectionType:
     return 3 if pair in ARC_PAIRS else 1 if pair == SCREW else 2
 
 
-def gap_text(gap: float) -> str:
+def millimetres(gap: float) -> str:
     """A gap in mm for people: three digits, more where it is smaller than they show, and 0 for rounding.
 
-    >>> gap_text(1.0), gap_text(-2.5e-5), gap_text(3e-15)
+    >>> millimetres(1.0), millimetres(-2.5e-5), millimetres(3e-15)
     ('1.000', '-2.5e-05', '0')
     """
     return "0" if abs(gap) < 5e-10 else f"{gap:.3g}" if abs(gap) < 1e-3 else f"{gap:.3f}"
@@ -88,7 +88,7 @@ class Difference:
         pair = f"{self.a}-{self.b} ({TITLES[self.a]}, {TITLES[self.b]})"
         declared = f"declared {self.declared} ({TYPES[self.declared]})"
         if self.gap is not None and self.measured == 0:
-            return f"{pair} {declared} but does not touch: {gap_text(self.gap)} mm apart in {self.where}"
+            return f"{pair} {declared} but does not touch: {millimetres(self.gap)} mm apart in {self.where}"
         return f"{pair} {declared} but met as {self.measured} ({TYPES[self.measured]}) in {self.where}"
 
     def to_dict(self) -> dict[str, Any]:

@@ -89,10 +89,8 @@ def solve_bisection(
 ) -> SteppedState:
     """Close the clamp in steps, then halve step and tilt step until the step is at most ``resolution`` mm.
 
-    Raises as `solve_stepped`, and InputError for a resolution that is not positive.
+    Raises as `solve_stepped`.
     """
-    if not (math.isfinite(resolution) and resolution > 0.0):
-        raise InputError(f"resolution must be > 0 mm, got {resolution:g}")
     state = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
     q, tried = state.q, state.motion_steps
     limit = section.clamp.tilt_stop

@@ -11,17 +11,19 @@ import numpy as np
 from clamp3d.clamp.contact import Contact, measure_contacts
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import PAIRS, Pair
-from clamp3d.clamp.motion import travel_to_contact
 from clamp3d.clamp.result import Event, Waypoint
 from clamp3d.clamp.section import SIZE, WIRES, B, D, S, Section, U, V, W
 from clamp3d.collide.model import ModelCache
 from clamp3d.core.pose import Array, SectionPose
+from clamp3d.errors import SolverError
 
 Poses = dict[PartName, SectionPose]
 Meetings = list[tuple[Pair, Array]]
 """Pairs of parts, each with the state (10,) in which they meet."""
 _SPARE = 20.0
 """Free way in mm between a wire and the open clamp before it comes in."""
+_TOUCH = 1e-10
+_MAX_ADVANCES = 100_000
 
 
 @dataclass
@@ -136,9 +138,31 @@ def tighten_nut(section: Section, start: Array, held: Array, end: Array, met: Me
 
 def first_touch(section: Section, q: Array, limit: float) -> Meetings:
     """Where the down splint, rising straight along the bolt, first touches a wire within ``limit`` mm."""
-    reach = {wire: travel_to_contact(section, q, wire, -_unit(D), "P2", limit=limit) for wire in WIRES}
-    travel, touch = min(reach.values(), key=lambda found: found[0])
-    return [] if touch is None else [(touch, q - travel * _unit(D))]
+    travels = {wire: _rise(section, q, wire, limit) for wire in WIRES}
+    wire = min(travels, key=travels.__getitem__)
+    return [] if travels[wire] >= limit else [(("P2", wire), q - travels[wire] * _unit(D))]
+
+
+def _rise(section: Section, q: Array, wire: PartName, limit: float) -> float:
+    """Travel in mm along the bolt until the down splint touches a wire, ``limit`` if that is further.
+
+    By conservative advancement: no gap can close faster than the motion goes, so advancing by the least gap never
+    passes a contact, however thin. Raises SolverError if the start overlaps or nothing ends the motion.
+    """
+    travel = 0.0
+    for _ in range(_MAX_ADVANCES):
+        gaps = section.wire_gaps(q - travel * _unit(D), wire)
+        gap = min(float(v) for v, pair in zip(gaps.value, gaps.pair, strict=True) if pair[0] == "P2")
+        if gap <= _TOUCH:
+            if travel == 0.0 and gap < -_TOUCH:
+                raise SolverError(f"P2 and {wire} overlap by {-gap:.3g} mm before the motion starts")
+            return travel
+        travel += gap
+        if travel >= limit:
+            return limit
+        if gap > 1e6:
+            break
+    raise SolverError(f"{wire} never reaches P2 on its way in; do the grooves face the wires?")
 
 
 def _unit(i: int) -> Array:

@@ -111,7 +111,7 @@ def declared(name: str) -> Callable[[Callable[..., None]], click.Command]:
         for key, parameter in inspect.signature(function).parameters.items():
             if isinstance(parameter.default, _Group):
                 groups[key] = parameter.default
-                types = inspect.get_annotations(parameter.default.kind)
+                types = {field.name: str(field.type) for field in fields(parameter.default.kind)}
                 parameters += [make(member, types[member]) for member, make in parameter.default.members.items()]
             else:
                 parameters.append(parameter.default(key, parameter.annotation))
@@ -131,12 +131,25 @@ JSON = option("Write the result as JSON; - is stdout.", "--json")
 
 
 @dataclass(frozen=True)
-class Source:
-    """What a command is to work on."""
+class ClampSource:
+    """The clamp that a command is to work on."""
 
-    source: str = argument(metavar="[INPUT]", default="reference", required=False)
+    source: str = argument(metavar="[CLAMP]", default="reference", required=False)
     line: str | None = option("Power line: catalogue name or diameter in mm.", metavar="CONDUCTOR")
     jumper: str | None = option("Jumper: catalogue name or diameter in mm.", metavar="CONDUCTOR")
+
+    def clamp(self) -> Clamp:
+        """The clamp; anything else is an error."""
+        from clamp3d.clamp.loader import load_clamp
+
+        return load_clamp(self.source, line=self.line, jumper=self.jumper)
+
+
+@dataclass(frozen=True)
+class Source(ClampSource):
+    """What a command is to work on: a clamp, a scene or a file with parts."""
+
+    source: str = argument(metavar="[INPUT]", default="reference", required=False)
     input_unit: str | None = option("Unit of a mesh file.  [default: mm; m for glTF]", type=click.Choice(UNITS))
     fit: str | None = option(
         "Round surfaces of a mesh file: off: its facets are the part; bound, round: fitted.  [default: off]",
@@ -174,21 +187,6 @@ def _joints(text: str | None) -> dict[str, float]:
             raise click.BadParameter(f"must read like elbow=1.57,slide=20, got {item!r}", param_hint="--joints")
         found[name.strip()] = number(value)
     return found
-
-
-@dataclass(frozen=True)
-class ClampSource:
-    """The clamp that a command is to work on."""
-
-    source: str = argument(metavar="[CLAMP]", default="reference", required=False)
-    line: str | None = option("Power line: catalogue name or diameter in mm.", metavar="CONDUCTOR")
-    jumper: str | None = option("Jumper: catalogue name or diameter in mm.", metavar="CONDUCTOR")
-
-    def clamp(self) -> Clamp:
-        """The clamp; anything else is an error."""
-        from clamp3d.clamp.loader import load_clamp
-
-        return load_clamp(self.source, line=self.line, jumper=self.jumper)
 
 
 SOURCE = group(Source)
@@ -234,14 +232,9 @@ class Method:
         if self.solver == "exact" and by_step:
             raise click.UsageError("--step and --tilt-step-deg go with --solver stepped, not exact")
         default = "stepped" if by_step else "exact" if self.method in ("cas", "chords") else "bisection"
-        settings: dict[str, Any] = {"solver": self.solver or default}
-        if self.sequence is not None:
-            settings["sequence"] = self.sequence
-        if self.step is not None:
-            settings["step"] = self.step
-        if self.tilt_step_deg is not None:
-            settings["tilt_step"] = math.radians(self.tilt_step_deg)
-        return settings
+        tilt_step = None if self.tilt_step_deg is None else math.radians(self.tilt_step_deg)
+        given = {"sequence": self.sequence, "step": self.step, "tilt_step": tilt_step}
+        return {"solver": self.solver or default} | {key: value for key, value in given.items() if value is not None}
 
     def model(self, clamp: Clamp, *, quiet: bool = False) -> ContactModel:
         """The contact model. Raises click.UsageError for options that do not go together."""

@@ -17,7 +17,7 @@ def command(
     clearance: float | None = option(
         "Gap that parts must keep.  [default: 5 for a clamp; the scene's own]", metavar="MM"
     ),
-    output: Path = option("", "--output", "-o", type=FOLDER, required=True, metavar="DIR"),
+    output: Path = option("Folder for the three files.", "--output", "-o", type=FOLDER, required=True, metavar="DIR"),
     quiet: bool = QUIET,
 ) -> None:
     """Write a report for a reviewer into DIR: report.html, report.json, pairs.csv.

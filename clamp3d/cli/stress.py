@@ -39,7 +39,7 @@ def command(
 
     Exit code 1 if the project's own method, cas, has a wrong verdict or an error beyond its bound.
     """
-    from clamp3d.bench.stress.report import markdown, table
+    from clamp3d.bench.stress.report import markdown, plot, table
     from clamp3d.bench.stress.run import FAMILIES, METHODS, run_stress
     from clamp3d.errors import InputError
 
@@ -80,8 +80,6 @@ def command(
         extra = "".join(f' --family "{f}"' for f in families) + "".join(f' --method "{m}"' for m in methods)
         write_text(markdown_file, markdown(result, f"clamp3d stress --n {n} --seed {seed} --check {check}{extra}"))
     if plot_file is not None:
-        from clamp3d.bench.stress.plot import plot
-
         plot(result, plot_file)
     own = [o for o in result.outcomes if o.method == "cas"]
     finish(finding=any(o.wrong or o.beyond_bound for o in own))

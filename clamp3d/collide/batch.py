@@ -73,7 +73,7 @@ def _bore_rod(bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, T: Array) -> D
     from clamp3d.collide.poses_kernel import bore_rod
 
     covers = bore.covers()
-    grooves = np.array([(groove.radius, groove.half_angle, 0.5 * groove.length) for groove, _ in covers])
+    grooves = np.array([(groove.radius, groove.half_angle, 0.5 * groove.length, 0.0, 0.0) for groove, _ in covers])
     P, found = np.array([place for _, place in covers]), np.empty((len(T), 11))
     wire = rod.radius, 0.5 * rod.length, np.array([rod.T])
     bore_rod(grooves, P, *wire, T, *members(a), *members(b), MEMBER, _KNOWN, np.empty((128, 5)), found)

@@ -18,7 +18,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.convex import MEMBER, Convex, Hull, Rod, convex_distance
 from clamp3d.collide.nearest import segment_pairs, to_faces
 from clamp3d.core.distance import SignedDistance, signed_distance
-from clamp3d.core.linear import dot, norm, to_source, to_target
+from clamp3d.core.linear import cross, dot, norm, to_source, to_target
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 
@@ -143,7 +143,7 @@ def bore_rod(bore: Bore, rod: Rod, T: Array) -> Distance:
     In an overlap the capsule that holds the rod gives a lower bound, and the rod's own answer is how deep a point lies.
     """
     covers = [(groove, place, dot(dot(inverse(place), T), rod.T)) for groove, place in bore.covers()]
-    tilt = norm(np.cross(bore.T[:3, 2], dot(T[:3, :3], rod.T[:3, 2])))
+    tilt = norm(cross(bore.T[:3, 2], dot(T[:3, :3], rod.T[:3, 2])))
     flat = [(signed_distance(groove, Cylinder(rod.radius, rod.length), P), place) for groove, place, P in covers]
     answer, place = min(flat, key=lambda found: found[0].distance)
     found = replace(kernel_distance(answer).moved(place), unique=False if tilt < 1e-12 else None)
@@ -179,9 +179,9 @@ def _bore_hull(bore: Bore, piece: Convex, T: Array) -> Distance:
             P = np.eye(4)
             length = norm(end - start)
             z = (end - start) / length
-            x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+            x = cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
             P[:3, 2], P[:3, 0] = z, x / norm(x)
-            P[:3, 1], P[:3, 3] = np.cross(z, P[:3, 0]), 0.5 * (start + end)
+            P[:3, 1], P[:3, 3] = cross(z, P[:3, 0]), 0.5 * (start + end)
             answer = signed_distance(groove, Capsule(_THIN, length), P)
             if answer.distance < found.upper:
                 found = kernel_distance(answer).moved(place)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.nearest import rim_minimum, segment_pairs, to_faces
 from clamp3d.collide.zonoid import Zonoid, box_of, zonoid_distance
-from clamp3d.core.linear import dot, norm, to_source, to_target
+from clamp3d.core.linear import cross, dot, norm, to_source, to_target
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.triangles import closest_points
 
@@ -213,12 +213,13 @@ def hull(points: Array) -> Hull:
     """Convex hull of points (n, 3). Raises ValueError if they lie in one plane."""
     import manifold3d
 
-    made = manifold3d.Manifold.hull_points(np.ascontiguousarray(points, dtype=np.float64)).to_mesh64()
+    solid = manifold3d.Manifold.hull_points(np.ascontiguousarray(points, dtype=np.float64))
+    made = solid.to_mesh64()
     vertices, faces = np.array(made.vert_properties)[:, :3], np.array(made.tri_verts, dtype=np.int64)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     area = np.linalg.norm(normal, axis=1)
-    if not len(faces) or not area.max() > 0.0:
+    if not len(faces) or not solid.volume() > 1e-14 * float(np.ptp(vertices, axis=0).max()) ** 3:
         raise ValueError("the points lie in one plane")
     kept = area > 1e-14 * area.max()
     normal = normal[kept] / area[kept, None]
@@ -275,7 +276,7 @@ def _several(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array, within: float
     if i == 0 or j == 0:
         return False
     if u is not None and v is not None:
-        return bool(norm(np.cross(dot(Ta[:3, :3], u), dot(Tb[:3, :3], v))) <= within)
+        return bool(norm(cross(dot(Ta[:3, :3], u), dot(Tb[:3, :3], v))) <= within)
     return True
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from clamp3d.collide.body import Bore, ClosedForm
 from clamp3d.collide.convex import Convex, Hull, Rod, hull
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.linear import dot, to_target
+from clamp3d.core.linear import cross, dot, to_target
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.core.shapes import Solid
@@ -148,7 +148,7 @@ def _beyond(body: ClosedForm, plane: Array) -> ClosedForm | None:
 
 def _tangential(piece: Convex, rod: Rod, wall: Array, offset: float) -> Convex:
     """A hull around a rod cut by the tangent planes where a ``wall`` parallel to the rod's axis meets its side."""
-    across = np.cross(rod.T[:3, 2], wall)
+    across = cross(rod.T[:3, 2], wall)
     for side in (-1.0, 1.0):
         if isinstance(piece, Hull):
             out = (offset * wall + side * math.sqrt(rod.radius**2 - offset**2) * across) / rod.radius

@@ -14,7 +14,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import Bore, ClosedForm, bore_rod
 from clamp3d.collide.convex import Hull, Rod
 from clamp3d.collide.zonoid import zonoid_distance
-from clamp3d.core.linear import dot, norm
+from clamp3d.core.linear import cross, dot, norm
 from clamp3d.core.pose import Array, inverse
 
 _SAME = 1e-12
@@ -53,13 +53,13 @@ def _is_plate(form: ClosedForm) -> bool:
     for bore in form.bores:
         off = bore.T[:3, 3] - outer.sum.centre
         level = abs(float(dot(off, z))) + abs(0.5 * bore.length - half) <= _SAME * size
-        if bore.half_angle != np.pi or norm(np.cross(bore.T[:3, 2], z)) > _SAME or not level:
+        if bore.half_angle != np.pi or norm(cross(bore.T[:3, 2], z)) > _SAME or not level:
             return False
         if isinstance(outer, Hull):
             sides = outer.planes[np.abs(dot(outer.planes[:, :3], z)) < 0.5]
             inside = -float((dot(sides[:, :3], bore.T[:3, 3]) + sides[:, 3]).max())
         else:
-            inside = outer.radius - norm(np.cross(off, z))
+            inside = outer.radius - norm(cross(off, z))
         if not bore.radius < inside - _SAME * size:
             return False
     P, r = np.array([bore.T[:3, 3] for bore in form.bores]), np.array([bore.radius for bore in form.bores])

@@ -17,13 +17,16 @@ from clamp3d.collide.broad import FEW, Boxes, box_gaps
 from clamp3d.collide.judge import contained, judge
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import NAMES, Verdict
+from clamp3d.collide.verdict import VERDICTS, Verdict
 from clamp3d.core.motion import FARTHEST, scene_pose
 from clamp3d.core.pose import Array, check_pose_array
 from clamp3d.errors import InputError, MissingLibraryError
 
-_BLOCK = 4096
+_BLOCK = 8192
 """Poses that the kernel is asked together: what is noted of them stays in the processor's own memory."""
+
+_NAMES = np.array([verdict.value for verdict in VERDICTS])
+_CLASH, _UNCERTAIN, _CLEAR = map(VERDICTS.index, (Verdict.CLASH, Verdict.UNCERTAIN, Verdict.CLEAR))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,8 +34,8 @@ class PoseVerdicts:
     """One part at n poses against the k ``others`` that it may meet.
 
     ``row``, ``column`` (m,): the poses and others that come near; ``least``, ``most`` (m,) bound their signed distances
-    in mm, no more closely than the verdict needs, and no overlap from below; ``kind`` (m,) holds the verdicts' names.
-    All else is clear, more than ``reach`` mm apart.
+    in mm, no more closely than the verdict needs, and no overlap from below; ``rank`` (m,) holds the verdicts by their
+    places from worst to best, ``kind`` (m,) their names. All else is clear, more than ``reach`` mm apart.
     """
 
     part: str
@@ -43,7 +46,12 @@ class PoseVerdicts:
     column: NDArray[np.int64]
     least: Array
     most: Array
-    kind: NDArray[np.str_]
+    rank: NDArray[np.int8]
+
+    @cached_property
+    def kind(self) -> NDArray[np.str_]:
+        """Names (m,) of the verdicts of what comes near."""
+        return np.asarray(_NAMES[self.rank])
 
     @cached_property
     def verdict(self) -> NDArray[np.str_]:
@@ -68,10 +76,9 @@ class PoseVerdicts:
     @property
     def worst(self) -> NDArray[np.str_]:
         """Worst verdict (n,) of each pose."""
-        names = [v.value for v in Verdict]
-        rank = np.full(self.poses, names.index(Verdict.CLEAR.value))
-        np.minimum.at(rank, self.row, np.argsort(names, kind="stable")[np.searchsorted(np.sort(names), self.kind)])
-        return np.asarray(np.array(names)[rank])
+        worst = np.full(self.poses, _CLEAR)
+        np.minimum.at(worst, self.row, self.rank)
+        return np.asarray(_NAMES[worst])
 
     def _whole(self, other: Any, values: NDArray[Any]) -> NDArray[Any]:
         made = np.full((self.poses, len(self.others)), other, dtype=values.dtype)
@@ -135,14 +142,16 @@ def check_poses(
     from clamp3d.collide.poses_kernel import between
 
     model = shop.model(scene.parts[i].shape)
-    models = [shop.model(scene.parts[j].shape) for j in rest]
+    shapes = {id(scene.parts[j].shape): scene.parts[j].shape for j in rest}
+    found = {key: shop.model(shape) for key, shape in shapes.items()}
+    models = [found[id(scene.parts[j].shape)] for j in rest]
     T, moving = _placed(poses, model.bounds)
-    P = np.array([scene.parts[j].T_world for j in rest]).reshape(-1, 4, 4)
-    still = Boxes.of(np.array([m.bounds for m in models]).reshape(-1, 2, 3), P)
+    P = np.concatenate([np.empty((0, 4)), *(scene.parts[j].T_world for j in rest)]).reshape(-1, 4, 4)
+    still = Boxes.of(np.concatenate([np.empty((0, 3)), *(m.bounds for m in models)]).reshape(-1, 2, 3), P)
     reach = scene.thresholds.reach + 1e-6
     row, column = _near(moving, still, reach)
     least, most = np.empty(len(row)), np.empty(len(row))
-    kind = np.empty(len(row), dtype=NAMES)
+    rank = np.empty(len(row), dtype=np.int8)
     # Equal parts that may meet this one alike are measured together.
     alike: dict[tuple[int, float | None], list[int]] = {}
     for k in np.unique(column).tolist() if len(rest) > 1 else range(len(rest)):
@@ -157,32 +166,32 @@ def check_poses(
             return out
 
         for some in np.split(near, range(_BLOCK, len(near), _BLOCK)):
-            known = by_kernel(other, model, local(some))
-            least[some], most[some] = known.lower, known.upper
-        kind[near] = scene.thresholds.verdicts(least[near], most[near], allowance)
-        clash = near[kind[near] == Verdict.CLASH.value]
-        kind[clash[contained(other, model, local(clash), scene.thresholds)]] = Verdict.CONTAINED.value
-        left = near[kind[near] == Verdict.UNCERTAIN.value]
+            bounds = by_kernel(other, model, local(some))
+            least[some], most[some] = bounds.lower, bounds.upper
+        rank[near] = scene.thresholds.verdicts(least[near], most[near], allowance)
+        clash = near[rank[near] == _CLASH]
+        rank[clash[contained(other, model, local(clash), scene.thresholds)]] = VERDICTS.index(Verdict.CONTAINED)
+        left = near[rank[near] == _UNCERTAIN]
         places = local(left)
-        bounds = np.concatenate([np.repeat(model.bounds[None], len(left), axis=0), other.bounds[None]])
+        around = np.concatenate([np.repeat(model.bounds[None], len(left), axis=0), other.bounds[None]])
         pairs = np.column_stack([np.full(len(left), len(left)), np.arange(len(left))])
-        least[left] = box_gaps(Boxes.of(bounds, np.concatenate([places, np.eye(4)[None]])), pairs)
+        least[left] = box_gaps(Boxes.of(around, np.concatenate([places, np.eye(4)[None]])), pairs)
         shop.counters.queries["boxes"] += len(left)
         for m, T_other in zip(left.tolist(), places, strict=True):
             if least[m] >= reach:
-                kind[m] = Verdict.CLEAR.value
+                rank[m] = _CLEAR
                 continue
             try:
                 start = Distance(float(least[m]))
-                verdict, found = judge(other, model, T_other, start, scene.thresholds, allowance)
-                kind[m], least[m], most[m] = verdict.value, found.lower, found.upper
+                verdict, known = judge(other, model, T_other, start, scene.thresholds, allowance)
+                rank[m], least[m], most[m] = VERDICTS.index(verdict), known.lower, known.upper
             except MissingLibraryError:
                 raise
             except Exception:  # one pose that fails is a finding, not the end of all others
-                kind[m], most[m] = Verdict.FAILED.value, np.inf
+                rank[m], most[m] = VERDICTS.index(Verdict.FAILED), np.inf
     least[least < 0.0] = -np.inf  # how deep a point lies in the other bounds verdicts, not the way out
     names = tuple(scene.parts[j].name for j in rest)
-    return PoseVerdicts(part, names, len(T), reach, row, column, least, most, kind)
+    return PoseVerdicts(part, names, len(T), reach, row, column, least, most, rank)
 
 
 def _placed(poses: ArrayLike, bounds: Array) -> tuple[Array, Array]:
@@ -205,26 +214,30 @@ def _near(moving: Array, still: Boxes, reach: float) -> tuple[NDArray[np.int64],
 
     A block of poses, which often follow each other, is compared with all others that come near the block.
     """
-    low, high = moving[:3] - moving[3:], moving[:3] + moving[3:]
+    from clamp3d.collide.poses_kernel import meet
+
     wide = still.reach + reach
     below, above = still.centre - wide, still.centre + wide
     rows, columns = [], []
     tree: Any = None
-    for start in range(0, low.shape[1], _BLOCK):
-        a, b = low[:, start : start + _BLOCK], high[:, start : start + _BLOCK]
-        others = np.flatnonzero(((below <= b.max(axis=1)) & (above >= a.min(axis=1))).all(axis=1))
+    for start in range(0, moving.shape[1], _BLOCK):
+        part = np.ascontiguousarray(moving[:, start : start + _BLOCK])
+        low, high = part[:3] - part[3:], part[:3] + part[3:]
+        others = np.flatnonzero(((below <= high.max(axis=1)) & (above >= low.min(axis=1))).all(axis=1))
         if len(others) <= FEW:
-            near = np.array([((a <= above[k, :, None]) & (b >= below[k, :, None])).all(axis=0) for k in others])
-            row, which = np.nonzero(near.reshape(len(others), a.shape[1]).T)
-            column = others[which]
+            row, column = np.empty((2, part.shape[1] * len(others)), dtype=np.int64)
+            count = meet(part, below, above, others, row, column)
+            row, column = row[:count], column[:count]
         else:
             from rtree import index
 
             if tree is None:
                 tree = index.Index((np.arange(len(below)), below, above), properties=index.Property(dimension=3))
-            column, count = tree.intersection_v(a.T, b.T)
-            row = np.repeat(np.arange(a.shape[1]), np.asarray(count, dtype=np.int64))
+            column, each = tree.intersection_v(low.T, high.T)
+            row = np.repeat(np.arange(part.shape[1]), np.asarray(each, dtype=np.int64))
         rows.append(row + start)
         columns.append(column)
     none = np.empty(0, dtype=np.int64)
-    return np.concatenate([none, *rows]).astype(np.int64), np.concatenate([none, *columns]).astype(np.int64)
+    found = (np.concatenate([none, *parts]) for parts in (rows, columns))
+    row, column = (part.astype(np.int64, copy=False) for part in found)
+    return row, column

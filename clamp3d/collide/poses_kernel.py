@@ -5,10 +5,13 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.core.jit import entry, formula, inlined
+from clamp3d.core.jit import entry, formula, inlined, prefetch
 from clamp3d.core.kernel_distance import nearest
 from clamp3d.core.kernel_flat import flat_nearest
 from clamp3d.core.kernel_pose import rigid
+
+_AHEAD = 32
+"""Poses between the one that is looked at and the one that is fetched."""
 
 
 @inlined
@@ -38,6 +41,8 @@ def _boxes(T, middle, half, far, out):
     Nor may one lie further than ``far`` off.
     """
     for k in range(T.shape[0]):
+        prefetch(T, 128 * (k + _AHEAD))
+        prefetch(T, 128 * (k + _AHEAD) + 64)
         if not rigid(T, k):
             return k
         x, y, z = there(T, k, middle[0], middle[1], middle[2])
@@ -49,9 +54,30 @@ def _boxes(T, middle, half, far, out):
     return -1
 
 
+def _meet(moving, below, above, others, row, column):
+    """Pairs of boxes that meet: poses with centre and half sizes (6, n), and ``others`` from ``below`` to ``above``.
+
+    The pairs go to ``row`` and ``column``, by pose; returns their number.
+    """
+    count = 0
+    for k in range(moving.shape[1]):
+        for i in range(others.shape[0]):
+            j = others[i]
+            meets = True
+            for axis in range(3):
+                low, high = moving[axis, k] - moving[3 + axis, k], moving[axis, k] + moving[3 + axis, k]
+                meets = meets and low <= above[j, axis] and high >= below[j, axis]
+            row[count], column[count] = k, j
+            count += 1 if meets else 0
+    return count
+
+
 def _between(A, column, T, row, out):
     """Poses (m, 4, 4) of those ``row`` of ``T`` as seen from those ``column`` of ``A``."""
     for k in range(row.shape[0]):
+        ahead = 128 * row[min(k + _AHEAD, row.shape[0] - 1)]
+        prefetch(T, ahead)
+        prefetch(T, ahead + 64)
         a, b = column[k], row[k]
         x, y, z = back(A, a, T[b, 0, 3], T[b, 1, 3], T[b, 2, 3])
         for i in range(3):
@@ -103,15 +129,16 @@ def axis_in(P, c, T, k, rod):
 def _bore_rod(grooves, P, r, l, rod, T, planes, rounds, places, planes_b, rounds_b, places_b, member, known, pad, out):  # noqa: E741
     """Bounds, points on both bodies and normal (m, 11) of a bore and a rod, as `body.bore_rod` has them.
 
-    ``grooves`` (c, 3) at ``P`` hold the body: radius, half angle, half length. ``upper`` is finite where the points lie
-    on the bodies; what they are measured to lie outside is added.
+    ``grooves`` (c, 5) at ``P`` hold the body: radius, half angle, half length, and room for s and h. ``upper`` is
+    finite where the points lie on the bodies; what they are measured to lie outside is added.
     """
+    for c in range(P.shape[0]):
+        grooves[c, 3], grooves[c, 4] = grooves[c, 0] * math.sin(grooves[c, 1]), -grooves[c, 0] * math.cos(grooves[c, 1])
     for k in range(T.shape[0]):
         d = math.inf
         e = px = py = pz = nx = ny = nz = 0.0
         for c in range(P.shape[0]):
-            R, angle, H = grooves[c, 0], grooves[c, 1], grooves[c, 2]
-            s, h = R * math.sin(angle), -R * math.cos(angle)
+            R, angle, H, s, h = grooves[c, 0], grooves[c, 1], grooves[c, 2], grooves[c, 3], grooves[c, 4]
             x, y, z, dx, dy, dz = axis_in(P, c, T, k, rod)
             new = flat_nearest(R, angle, s, h, H, r, l, x, y, z, dx, dy, dz, pad)
             if new[0] < d:
@@ -141,8 +168,7 @@ def _bore_rod(grooves, P, r, l, rod, T, planes, rounds, places, planes_b, rounds
                     upper = min(upper, min(0.0, 4.0 * max(0.0, -outside) - max(own, other)))
             lower = math.inf
             for c in range(P.shape[0]):  # by the capsule that holds the rod
-                R, angle, H = grooves[c, 0], grooves[c, 1], grooves[c, 2]
-                s, h = R * math.sin(angle), -R * math.cos(angle)
+                R, H, s, h = grooves[c, 0], grooves[c, 2], grooves[c, 3], grooves[c, 4]
                 x, y, z, dx, dy, dz = axis_in(P, c, T, k, rod)
                 round_ = nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)
                 lower = min(lower, round_[0] - round_[9])
@@ -189,6 +215,7 @@ def _cells(lower, upper, width, marks, out):
 _POSES, _ROWS, _TABLE = "f8[:,:,::1]", "i8[::1]", "f8[:,::1]"
 _BODY = f"{_TABLE},{_TABLE},{_POSES}"
 boxes = entry(_boxes, f"i8({_POSES},f8[::1],f8[::1],f8,{_TABLE})")
+meet = entry(_meet, f"i8({_TABLE},{_TABLE},{_TABLE},{_ROWS},{_ROWS},{_ROWS})")
 between = entry(_between, f"i8({_POSES},{_ROWS},{_POSES},{_ROWS},{_POSES})")
 bore_rod = entry(_bore_rod, f"i8({_TABLE},{_POSES},f8,f8,{_POSES},{_POSES},{_BODY},{_BODY},f8,f8,{_TABLE},{_TABLE})")
 stand_out = entry(_stand_out, f"i8({_POSES},{_TABLE},{_BODY},f8,{_ROWS})")

@@ -30,8 +30,8 @@ class Verdict(StrEnum):
     CLEAR = "clear"
 
 
-NAMES = f"<U{max(len(v.value) for v in Verdict)}"
-"""Data type of an array of the verdicts' names."""
+VERDICTS = tuple(Verdict)
+"""Verdicts by number, as arrays keep them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +88,8 @@ class Thresholds:
             return Verdict.ALLOWED if distance.upper < self.reach else Verdict.UNCERTAIN
         return Verdict.CLASH if distance.upper < limit else Verdict.UNCERTAIN
 
-    def verdicts(self, lower: Array, upper: Array, allowance: float | None = None) -> NDArray[np.str_]:
-        """The verdicts' names of many distances by their bounds (n,), each as `verdict` gives it.
+    def verdicts(self, lower: Array, upper: Array, allowance: float | None = None) -> NDArray[np.int8]:
+        """The places in VERDICTS of many distances by their bounds (n,), each as `verdict` gives it.
 
         It is asked once for all bounds that lie alike among the numbers at which a verdict can change.
         """
@@ -103,11 +103,11 @@ class Thresholds:
         cells(lower, upper, 2.0 * RESOLUTION, np.array(marks), cell)
         one = np.full((2 * len(marks) + 2) ** 3, -1)
         one[cell] = np.arange(len(cell))
-        names = np.empty(len(one), dtype=NAMES)
+        found = np.empty(len(one), dtype=np.int8)
         for kind in np.flatnonzero(one >= 0):
             k = one[kind]
-            names[kind] = self.verdict(Distance(float(lower[k]), float(upper[k])), allowance).value
-        return np.asarray(names[cell])
+            found[kind] = VERDICTS.index(self.verdict(Distance(float(lower[k]), float(upper[k])), allowance))
+        return np.asarray(found[cell])
 
     def _of(self, distance: float) -> Verdict:
         if distance < -self.contact - RESOLUTION:

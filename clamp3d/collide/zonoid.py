@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distance
-from clamp3d.core.linear import dot, norm, svd
+from clamp3d.core.linear import cross, dot, norm, svd
 from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 
@@ -111,7 +111,7 @@ def _nearest(c: Array, lines: Array, discs: Array, parts: Array, far: float, siz
 def _parallel(a: Zonoid, b: Zonoid) -> Distance | None:
     """Two cylinders that overlap, axes parallel to 1e-9: coaxial ones come free in any direction across."""
     z, c = a.discs[0, :3], b.centre - a.centre
-    tilt = norm(np.cross(z, b.discs[0, :3]))
+    tilt = norm(cross(z, b.discs[0, :3]))
     if tilt > _PARALLEL:
         return None
     along = float(dot(c, z))

@@ -288,7 +288,7 @@ def signed_distances(
     threads = min(workers or os.cpu_count() or 1, max(1, n // 4096))
 
     def part(start: int, stop: int) -> int:
-        extra = () if full else (np.empty((8, kernel().AT_ONCE)),)
+        extra = () if full else (np.empty(kernel().WORK),)
         bad = run(T[start:stop], *sizes, np.empty((128, 5)), *extra, out[start:stop])
         return bad if bad < 0 else start + int(bad)
 

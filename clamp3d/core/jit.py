@@ -15,7 +15,7 @@ import re
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from importlib import metadata
 from pathlib import Path
 from types import CodeType
@@ -51,6 +51,33 @@ class _Formula:
         return self._compiled(*arguments)
 
 
+class _Prefetch(_Formula):
+    """One instruction that neither Python nor numba has a word for."""
+
+    @cached_property
+    def _compiled(self) -> Any:
+        import numba
+        from llvmlite import ir
+        from numba import types
+        from numba.extending import intrinsic
+
+        @intrinsic
+        def instruction(typing_context, array, offset):  # type: ignore[no-untyped-def]
+            def build(context, builder, signature, given):  # type: ignore[no-untyped-def]
+                number, pointer = ir.IntType(32), ir.IntType(8).as_pointer()
+                start = builder.bitcast(context.make_array(signature.args[0])(context, builder, given[0]).data, pointer)
+                kind = ir.FunctionType(ir.VoidType(), [pointer, number, number, number])
+                fetch = builder.module.declare_intrinsic("llvm.prefetch", [pointer], kind)
+                builder.call(
+                    fetch, [builder.gep(start, [given[1]]), number(0), number(3), number(1)]
+                )  # read, keep, data
+                return context.get_dummy_value()
+
+            return types.void(array, offset), build
+
+        return numba.njit(**_OPTIONS, **self._options)(lambda array, offset: instruction(array, offset))  # type: ignore[call-arg]
+
+
 def formula(function: Callable[..., Any]) -> Any:
     """Decorator of a formula: compiled into its callers, not kept by itself."""
     return _Formula(function)
@@ -59,6 +86,11 @@ def formula(function: Callable[..., Any]) -> Any:
 def inlined(function: Callable[..., Any]) -> Any:
     """The same for a small formula: built into each caller, which drops what it does not use."""
     return _Formula(function, forceinline=True)
+
+
+@partial(_Prefetch, forceinline=True)
+def prefetch(array: Any, offset: int) -> None:
+    """Have what lies ``offset`` bytes into an array, or beyond it, brought near before it is asked for."""
 
 
 def entry(function: Callable[..., Any], signature: str) -> Any:

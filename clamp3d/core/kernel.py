@@ -4,20 +4,36 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.core.jit import entry, formula
-from clamp3d.core.kernel_batch import AT_ONCE, outside_soon
+from clamp3d.core.jit import entry, formula, prefetch
+from clamp3d.core.kernel_batch import (
+    AT_ONCE,
+    CX,
+    CY,
+    CZ,
+    DX,
+    DY,
+    DZ,
+    PARALLEL,
+    ROWS,
+    SURE,
+    VALUE,
+    outside_soon,
+    parallel_soon,
+)
 from clamp3d.core.kernel_distance import (
     inside_rate,
     is_parallel,
     nearest,
-    parallel,
 )
-from clamp3d.core.kernel_flat import flat_nearest, is_beside
+from clamp3d.core.kernel_flat import flat_nearest
 from clamp3d.core.kernel_pose import axis, place, rigid
 
 RECORD = 19
 """Numbers per answer: distance, point on groove (3), point on cylinder (3), normal (3), bound, feature, t on axis,
 rate of the distance by the cylinder's twist (6)."""
+
+WORK = ROWS * AT_ONCE
+"""Numbers that `distances` works in."""
 
 
 @formula
@@ -64,40 +80,41 @@ def record(T, k, R, half_angle, s, h, H, r, l, flat, pad, out):  # type: ignore[
     put(answer, rate, r, out, k)
 
 
-def _distances(T, R, half_angle, H, r, l, flat, pad, block, out):  # type: ignore[no-untyped-def] # noqa: E741
-    """The distances of `record` to the bit; ``block`` (8, AT_ONCE) and ``pad`` are what it works in."""
+def _distances(T, R, half_angle, H, r, l, flat, pad, w, out):  # type: ignore[no-untyped-def] # noqa: E741
+    """The distances of `record` to the bit; ``w`` (WORK,) and ``pad`` are what it works in."""
     s = R * math.sin(half_angle)
     h = -R * math.cos(half_angle)
     reach = max(l, r) if flat else l
     for start in range(0, T.shape[0], AT_ONCE):
         count = min(AT_ONCE, T.shape[0] - start)
-        tilted = 0  # those worth it: for parallel axes, and far from both ends, there is little to search
+        parallel = 0
+        size = 8 * T.shape[1] * T.shape[2]
         for i in range(count):
+            ahead = (start + AT_ONCE + i) * size
+            prefetch(T, ahead)
+            prefetch(T, ahead + size // 2)
             if not rigid(T, start + i):
                 return start + i
             x, y, z, dx, dy, dz = place(T, start + i)
-            block[0, i], block[1, i], block[2, i], block[3, i], block[4, i], block[5, i] = x, y, z, dx, dy, dz
-            block[7, i] = 0.0
-            if abs(z) + l * abs(dz) >= H and not is_parallel(R, reach, dx, dy):
-                tilted += 1
-        if 2 * tilted > count:
-            for i in range(count):
-                x, y, z, dx, dy, dz = block[0, i], block[1, i], block[2, i], block[3, i], block[4, i], block[5, i]
-                v, t, sure = outside_soon(R, s, h, H, r, l, x, y, z, dx, dy, dz)
-                block[6, i] = v
-                sure = sure and not is_parallel(R, reach, dx, dy)
-                block[7, i] = 1.0 if sure and (not flat or is_beside(v, t, l)) else 0.0
+            alone = is_parallel(R, reach, dx, dy)
+            w[CX + i], w[CY + i], w[CZ + i], w[DX + i], w[DY + i], w[DZ + i] = x, y, z, dx, dy, dz
+            w[PARALLEL + i] = 1.0 if alone else 0.0
+            parallel += 1 if alone else 0
+        if parallel < count:
+            outside_soon(w, count, R, s, h, H, r, l, flat)
+        if parallel > 0:
+            parallel_soon(w, count, R, s, h, H, r, l, flat)
+        left = 0
         for i in range(count):
-            if block[7, i] > 0.0:
-                out[start + i] = block[6, i]
-                continue
-            x, y, z, dx, dy, dz = block[0, i], block[1, i], block[2, i], block[3, i], block[4, i], block[5, i]
-            if flat:
-                out[start + i] = flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, pad)[0]
-            elif is_parallel(R, reach, dx, dy):
-                out[start + i] = parallel(R, s, h, H, r, l, x, y, z, dz)[0]
-            else:
-                out[start + i] = nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)[0]
+            out[start + i] = w[VALUE + i]
+            left += 0 if w[SURE + i] > 0.0 else 1
+        for i in range(count if left > 0 else 0):
+            if not w[SURE + i] > 0.0:
+                x, y, z, dx, dy, dz = place(T, start + i)
+                if flat:
+                    out[start + i] = flat_nearest(R, half_angle, s, h, H, r, l, x, y, z, dx, dy, dz, pad)[0]
+                else:
+                    out[start + i] = nearest(R, s, h, H, r, l, x, y, z, dx, dy, dz)[0]
     return -1
 
 
@@ -111,5 +128,5 @@ def _records(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-unty
     return -1
 
 
-distances = entry(_distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[:,::1],f8[::1])")
+distances = entry(_distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[::1],f8[::1])")
 records = entry(_records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[:,::1])")

@@ -1,11 +1,16 @@
-"""The distance of many poses: the common case without branches, so that the compiler does several poses at a time."""
+"""The distances of many poses: a block at a time, one step for the whole block after the other.
+
+A step is a short loop without branches over numbers that lie side by side, so the compiler takes several poses at once,
+and the processor begins with the next ones before it is done with these. A step that no pose of a block needs is left
+out. What the steps cannot tell for certain the single call's formula does.
+"""
 
 from __future__ import annotations
 
 import math
 
 from clamp3d.core.jit import inlined
-from clamp3d.core.kernel_distance import beyond, enters, unit
+from clamp3d.core.kernel_distance import beyond, enters, parallel, unit
 from clamp3d.core.kernel_features import (
     ARC,
     corner,
@@ -16,9 +21,37 @@ from clamp3d.core.kernel_features import (
     lip_line,
     section,
 )
+from clamp3d.core.kernel_flat import disc_gaps, is_beside
 
-AT_ONCE = 64
+AT_ONCE = 128
 """Poses of a block."""
+
+ROWS = 25
+"""Numbers that are kept of a pose of the block, each kind side by side; yes is 1, no is 0."""
+CX, CY, CZ, DX, DY, DZ, E2, SURE, TOP, BOTTOM, ENDS2, BEST2, AT, IN_ARC, LOW_FALLS, TOP_FALLS = range(
+    0, 16 * AT_ONCE, AT_ONCE
+)
+EX, EY, P, LOW_V, TOP_V, LOW_REACH, TOP_REACH, PARALLEL, VALUE = range(16 * AT_ONCE, ROWS * AT_ONCE, AT_ONCE)
+
+
+@inlined
+def yes(condition):  # type: ignore[no-untyped-def]
+    """A truth value as a number."""
+    return 1.0 if condition else 0.0
+
+
+@inlined
+def position_and_axis(w, i):  # type: ignore[no-untyped-def]
+    """Position and axis of pose i of a block."""
+    return w[CX + i], w[CY + i], w[CZ + i], w[DX + i], w[DY + i], w[DZ + i]
+
+
+@inlined
+def better(w, i, less, d2, t, arc):  # type: ignore[no-untyped-def]
+    """Note a feature as the best so far of pose i where it is."""
+    w[BEST2 + i] = d2 if less else w[BEST2 + i]
+    w[AT + i] = t if less else w[AT + i]
+    w[IN_ARC + i] = arc if less else w[IN_ARC + i]
 
 
 @inlined
@@ -32,60 +65,169 @@ def end_point_soon(R, s, h, H, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def outside_soon(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untyped-def] # noqa: E741
-    """Signed distance and place on the axis as `outside` has them, to the bit, and whether that is certain.
+def set_out(w, count, R, s, h, H, l):  # type: ignore[no-untyped-def] # noqa: E741
+    """Unit axes, and what they reach: how many poses reach the low end, the top end, both; the flats beside the arc."""
+    low = high = both = wide = 0
+    for i in range(count):
+        cx, cy, cz, dx, dy, dz = position_and_axis(w, i)
+        dx, dy, dz, e2 = unit(dx, dy, dz, True)  # of a valid pose
+        sure = not (cy - l * abs(dy) <= h and enters(R, s, h, H, l, cx, cy, cz, dx, dy, dz)[0])
+        half = l * abs(dz)
+        top, bottom = cz + half >= H, cz - half <= -H
+        low2 = beyond(R, h, H, cx - l * dx, cy - l * dy, cz - l * dz)
+        top2 = beyond(R, h, H, cx + l * dx, cy + l * dy, cz + l * dz)
+        w[DX + i], w[DY + i], w[DZ + i], w[E2 + i] = dx, dy, dz, e2
+        w[SURE + i], w[TOP + i], w[BOTTOM + i] = yes(sure), yes(top), yes(bottom)
+        w[ENDS2 + i] = min(low2, top2) if top and bottom else math.inf
+        w[BEST2 + i] = math.inf
+        w[AT + i] = w[IN_ARC + i] = w[LOW_FALLS + i] = w[TOP_FALLS + i] = 0.0
+        low += 1 if bottom else 0
+        high += 1 if top else 0
+        both += 1 if top and bottom else 0
+        wide += 1 if abs(cx) + l * abs(dx) >= s and cy + l * abs(dy) >= h and (top or bottom) else 0
+    return low, high, both, wide
 
-    All features are computed and the least is selected. It is not certain for an axis that enters S, and where the
-    search of an end arc takes loops.
-    """
-    dx, dy, dz, e2 = unit(dx, dy, dz, True)  # of a valid pose
-    sure = not (cy - l * abs(dy) <= h and enters(R, s, h, H, l, cx, cy, cz, dx, dy, dz)[0])
-    half = l * abs(dz)
-    top, bottom = cz + half >= H, cz - half <= -H
-    through = top and bottom
-    x, y, z = cx - l * dx, cy - l * dy, cz - l * dz
-    low2 = beyond(R, h, H, x, y, z)
-    best2, arc, known = end_point_soon(R, s, h, H, x, y, z)
-    x, y, z = cx + l * dx, cy + l * dy, cz + l * dz
-    top2 = beyond(R, h, H, x, y, z)
-    d2, d2_arc, d2_known = end_point_soon(R, s, h, H, x, y, z)
-    sure = sure and (through or (known and d2_known))
-    less = d2 < best2
-    best2, bt, arc = d2 if less else best2, l if less else -l, d2_arc if less else arc
-    best2 = math.inf if through else best2
-    low_falls = top_falls = False
-    for i in range(4):
-        sx, ez = s if i % 2 else -s, H if i > 1 else -H
-        d2, t, falls = corner(sx, h, ez, cx, cy, cz, dx, dy, dz, l)
-        less = (top if i > 1 else bottom) and d2 < best2
-        best2, bt, arc = d2 if less else best2, t if less else bt, arc and not less
-        low_falls = low_falls or (falls and i < 2)
-        top_falls = top_falls or (falls and i > 1)
-    for i in range(2):
-        d2, t, _ = lip_line(s if i else -s, h, H, cx, cy, cz, dx, dy, dz, e2, l, best2)
-        less = d2 < best2
-        best2, bt, arc = d2 if less else best2, t if less else bt, arc and not less
-    above = cy + l * abs(dy) >= h
-    for i in range(2):
-        d2, t, _ = end_edge(H if i else -H, s, h, cx, cy, cz, dx, dy, dz, l, best2)
-        less = (top if i else bottom) and above and d2 < best2
-        best2, bt, arc = d2 if less else best2, t if less else bt, arc and not less
-    ex, ey, e, p, along = ellipse(R, cx, cy, dx, dy, e2)
-    low_v, low_reach = end_arc_reach(-H, R, cz, dz, e, p, along)
-    top_v, top_reach = end_arc_reach(H, R, cz, dz, e, p, along)
-    top_first = top and (not bottom or top_reach < low_reach)
-    for i in range(2):
-        at_top = top_first if i == 0 else not top_first
-        least = top_reach if at_top else low_reach
+
+@inlined
+def axis_ends(w, count, R, s, h, H, l):  # type: ignore[no-untyped-def] # noqa: E741
+    """The ends of the axes against S, where not both are far from it."""
+    for i in range(count):
+        cx, cy, cz, dx, dy, dz = position_and_axis(w, i)
+        d2, arc, known = end_point_soon(R, s, h, H, cx - l * dx, cy - l * dy, cz - l * dz)
+        top2, top_arc, top_known = end_point_soon(R, s, h, H, cx + l * dx, cy + l * dy, cz + l * dz)
+        asked = not (w[TOP + i] > 0.0 and w[BOTTOM + i] > 0.0)
+        less = top2 < d2
+        arc = top_arc if less else arc
+        w[BEST2 + i] = (top2 if less else d2) if asked else math.inf
+        w[AT + i] = l if less else -l
+        w[IN_ARC + i] = yes(arc)
+        w[SURE + i] = w[SURE + i] if not asked or (known and top_known) else 0.0
+
+
+@inlined
+def corners(w, count, s, h, ez, l, reached, falls):  # type: ignore[no-untyped-def] # noqa: E741
+    """The corners of the end z = ez, for poses that reach it."""
+    for i in range(count):
+        cx, cy, cz, dx, dy, dz = position_and_axis(w, i)
+        asked = w[reached + i] > 0.0
+        d2, t, first = corner(-s, h, ez, cx, cy, cz, dx, dy, dz, l)
+        better(w, i, asked and d2 < w[BEST2 + i], d2, t, 0.0)
+        d2, t, second = corner(s, h, ez, cx, cy, cz, dx, dy, dz, l)
+        better(w, i, asked and d2 < w[BEST2 + i], d2, t, 0.0)
+        w[falls + i] = yes(first or second)
+
+
+@inlined
+def lips(w, count, s, h, H, l):  # type: ignore[no-untyped-def] # noqa: E741
+    """The lips."""
+    for i in range(count):
+        cx, cy, cz, dx, dy, dz = position_and_axis(w, i)
+        d2, t, _ = lip_line(-s, h, H, cx, cy, cz, dx, dy, dz, w[E2 + i], l, w[BEST2 + i])
+        better(w, i, d2 < w[BEST2 + i], d2, t, 0.0)
+        d2, t, _ = lip_line(s, h, H, cx, cy, cz, dx, dy, dz, w[E2 + i], l, w[BEST2 + i])
+        better(w, i, d2 < w[BEST2 + i], d2, t, 0.0)
+
+
+@inlined
+def end_edges(w, count, s, h, ez, l, reached):  # type: ignore[no-untyped-def] # noqa: E741
+    """The edges of the end z = ez, for poses that reach it and are not below them."""
+    for i in range(count):
+        cx, cy, cz, dx, dy, dz = position_and_axis(w, i)
+        d2, t, _ = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l, w[BEST2 + i])
+        asked = w[reached + i] > 0.0 and cy + l * abs(dy) >= h
+        better(w, i, asked and d2 < w[BEST2 + i], d2, t, 0.0)
+
+
+@inlined
+def seen_along(w, count, R, H):  # type: ignore[no-untyped-def]
+    """The end arcs seen along the axes, and lower bounds on their distances: infinite where none is asked for."""
+    for i in range(count):
+        cx, cy, cz, dx, dy, dz = position_and_axis(w, i)
+        e2 = w[E2 + i]
+        ex, ey, e, p, along = ellipse(R, cx, cy, dx, dy, e2)
+        low_v, low_reach = end_arc_reach(-H, R, cz, dz, e, p, along)
+        top_v, top_reach = end_arc_reach(H, R, cz, dz, e, p, along)
+        low = w[LOW_FALLS + i] > 0.0 or not (abs(p) >= e2 or abs(dz * low_v) >= e2)
+        top = w[TOP_FALLS + i] > 0.0 or not (abs(p) >= e2 or abs(dz * top_v) >= e2)
+        w[EX + i], w[EY + i], w[P + i], w[LOW_V + i], w[TOP_V + i] = ex, ey, p, low_v, top_v
+        w[LOW_REACH + i] = low_reach if w[BOTTOM + i] > 0.0 and low else math.inf
+        w[TOP_REACH + i] = top_reach if w[TOP + i] > 0.0 and top else math.inf
+
+
+@inlined
+def end_arcs(w, count, R, s, h, H, l, nearer):  # type: ignore[no-untyped-def] # noqa: E741
+    """Of both end arcs the ``nearer`` one by its bound, or the other."""
+    asked = 0
+    for i in range(count):
+        low, top, best2 = w[LOW_REACH + i], w[TOP_REACH + i], w[BEST2 + i]
+        least = min(low, top) if nearer else max(low, top)
+        asked += 1 if least * least < best2 else 0
+    if asked == 0:
+        return
+    for i in range(count):
+        cx, cy, cz, dx, dy, dz = position_and_axis(w, i)
+        ex, ey, p, e2 = w[EX + i], w[EY + i], w[P + i], w[E2 + i]
+        low, top, low_v, top_v, best2 = w[LOW_REACH + i], w[TOP_REACH + i], w[LOW_V + i], w[TOP_V + i], w[BEST2 + i]
+        least = min(low, top) if nearer else max(low, top)
+        at_top = top < low if nearer else not top < low
         v = top_v if at_top else low_v
         ez = H if at_top else -H
-        asked = (top if at_top else bottom) and least * least < best2
-        asked = asked and ((top_falls if at_top else low_falls) or not (abs(p) >= e2 or abs(dz * v) >= e2))
         d2, t, known = end_arc_soon(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
-        sure = sure and (known or not asked)
-        less = asked and d2 < best2
-        best2, bt, arc = d2 if less else best2, t if less else bt, arc and not less
-    sure = sure and not (through and min(low2, top2) < best2)
-    x, y = cx + bt * dx, cy + bt * dy
-    root = math.sqrt(x * x + y * y if arc else best2)
-    return (R - r) - root if arc else root - r, bt, sure
+        wanted = least * least < best2
+        w[SURE + i] = w[SURE + i] if known or not wanted else 0.0
+        better(w, i, wanted and d2 < best2, d2, t, 0.0)
+
+
+@inlined
+def values(w, count, R, r, l, flat):  # type: ignore[no-untyped-def] # noqa: E741
+    """Signed distances of the best features found, as `from_outside` has them; with flat ends if they are the same."""
+    for i in range(count):
+        x, y = w[CX + i] + w[AT + i] * w[DX + i], w[CY + i] + w[AT + i] * w[DY + i]
+        arc = w[IN_ARC + i] > 0.0
+        root = math.sqrt(x * x + y * y if arc else w[BEST2 + i])
+        v = (R - r) - root if arc else root - r
+        same = not flat or is_beside(v, w[AT + i], l)
+        w[VALUE + i] = v
+        w[SURE + i] = w[SURE + i] if same and not w[ENDS2 + i] < w[BEST2 + i] else 0.0
+
+
+@inlined
+def outside_soon(w, count, R, s, h, H, r, l, flat):  # type: ignore[no-untyped-def] # noqa: E741
+    """Signed distances and places on the axes of a block, as `outside` has them, to the bit, and whether certain.
+
+    It is not certain for an axis that enters S, and where the search of an end arc
+    takes loops.
+    """
+    low, high, both, wide = set_out(w, count, R, s, h, H, l)
+    if both < count:
+        axis_ends(w, count, R, s, h, H, l)
+    if low > 0:
+        corners(w, count, s, h, -H, l, BOTTOM, LOW_FALLS)
+    if high > 0:
+        corners(w, count, s, h, H, l, TOP, TOP_FALLS)
+    lips(w, count, s, h, H, l)
+    if wide > 0:
+        end_edges(w, count, s, h, -H, l, BOTTOM)
+        end_edges(w, count, s, h, H, l, TOP)
+    if low > 0 or high > 0:
+        seen_along(w, count, R, H)
+        end_arcs(w, count, R, s, h, H, l, True)
+        end_arcs(w, count, R, s, h, H, l, False)
+    values(w, count, R, r, l, flat)
+
+
+@inlined
+def parallel_soon(w, count, R, s, h, H, r, l, flat):  # type: ignore[no-untyped-def] # noqa: E741
+    """The same for axes that count as parallel; the others of the block are left as they are."""
+    if flat:
+        for i in range(count):
+            _, _, _, _, v, deep = disc_gaps(R, s, h, H, r, l, w[CX + i], w[CY + i], w[CZ + i])
+            alone = w[PARALLEL + i] > 0.0
+            w[VALUE + i] = v if alone else w[VALUE + i]
+            w[SURE + i] = yes(not deep) if alone else w[SURE + i]
+        return
+    for i in range(count):
+        v = parallel(R, s, h, H, r, l, w[CX + i], w[CY + i], w[CZ + i], w[DZ + i])[0]
+        alone = w[PARALLEL + i] > 0.0
+        w[VALUE + i] = v if alone else w[VALUE + i]
+        w[SURE + i] = 1.0 if alone else w[SURE + i]

@@ -63,6 +63,9 @@ def on_line(r, l, kx, ky, kz, ux, uz, dx, dy, dz, lo, hi, limit):  # type: ignor
             continue
         p, q = a, b
         s = 0.5 * (a + b)
+        if rim == 1 and along != 0.0:  # just beyond the end, where it begins to pull against the side
+            near = (side * l * (1.0 + 1e-6) - t0) / along
+            s = near if min(a, b) < near < max(a, b) else s
         for k in range(60):
             x = kx + s * ux
             z = kz + s * uz

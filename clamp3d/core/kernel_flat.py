@@ -78,20 +78,18 @@ def plane_point(a, dn, en, r, l):  # type: ignore[no-untyped-def] # noqa: E741
 
 
 @formula
-def rim_arc(which, R, r, l, cx, cy, cz, dx, dy, dz, inset):  # type: ignore[no-untyped-def] # noqa: E741
+def rim_arc(which, r, l, cx, cy, cz, dx, dy, dz, e2, e, ex, ey, inset):  # type: ignore[no-untyped-def] # noqa: E741
     """Local maxima of the distance from the groove's axis on the rims of the cylinder less ``inset``.
 
     ``which``: 0, 1 the farthest points of the two rims, 2, 3 the other local maxima. Returns the point's distance from
     the groove's axis (-1 if there is none), the point, and the rates of that distance by radius and half length.
-    Seen along the groove a rim is an ellipse; its farthest points are found like the nearest ones of `end_arc`.
+    Seen along the groove a rim is an ellipse; its farthest points are found like the nearest ones of `end_arc`. Its
+    minor axis is (ex, ey), the direction of the axis' part across the groove, of length e; the major one (-ey, ex).
     """
     up = 1.0 if which % 2 == 0 else -1.0
     along = up * (l - inset)
     rim = r - inset
     x, y, z = cx + along * dx, cy + along * dy, cz + along * dz
-    e2 = dx * dx + dy * dy
-    e = math.sqrt(e2)
-    ex, ey = dx / e, dy / e  # the minor axis; the major one is (-ey, ex)
     b = abs(dz)
     p = (ex * y - ey * x) / rim
     v = (ex * x + ey * y) / rim
@@ -126,14 +124,13 @@ def rim_arc(which, R, r, l, cx, cy, cz, dx, dy, dz, inset):  # type: ignore[no-u
 
 
 @formula
-def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, slack, eps, work, found, rows):  # type: ignore[no-untyped-def] # noqa: E741
+def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, best, slack, eps, work, found, rows):  # type: ignore[no-untyped-def] # noqa: E741
     """Points of the groove where f may be least, into rows; only those below the best + ``slack`` are sure to be there.
 
-    ``least`` is a lower bound: what reaches it ends the search. Returns their number, and a lower bound of what a
-    search that ended early may have left.
+    ``least`` is a lower bound: what reaches it ends the search. ``best`` is an upper one that the least f is below by
+    more than rounding. Returns their number, and a lower bound of what a search that ended early may have left.
     """
     n = 0
-    best = math.inf
     left = math.inf
     e2 = dx * dx + dy * dy
     e = math.sqrt(e2)
@@ -166,9 +163,14 @@ def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, slac
                 best = min(best, f)
     # Arc surface: a rim from inside.
     if e > 0.0:
+        ex, ey = dx / e, dy / e
         for k in range(4):
             which = k if cx * dx + cy * dy >= 0.0 else k ^ 1  # the end that is farther from the groove's axis first
-            rho, x, y, z, by_r, by_l = rim_arc(which, R, r, l, cx, cy, cz, dx, dy, dz, 0.0)
+            along = l if which % 2 == 0 else -l
+            x, y = cx + along * dx, cy + along * dy
+            if R - math.sqrt(x * x + y * y) - r > best + slack + 4.0 * eps:
+                continue
+            rho, x, y, z, by_r, by_l = rim_arc(which, r, l, cx, cy, cz, dx, dy, dz, e2, e, ex, ey, 0.0)
             if not (rho > 0.0 and R - rho <= best + slack):  # nor if a square has overflowed
                 continue
             inset = 0.0
@@ -176,7 +178,7 @@ def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, slac
                 if slack == 0.0 and best < 0.0 and which < 2:  # less than the best inset frees this rim, or it goes on
                     inset = -best
                     if inset < -lowest:
-                        rho, x, y, z, by_r, by_l = rim_arc(which, R, r, l, cx, cy, cz, dx, dy, dz, inset)
+                        rho, x, y, z, by_r, by_l = rim_arc(which, r, l, cx, cy, cz, dx, dy, dz, e2, e, ex, ey, inset)
                     if inset == -lowest or rho <= R:
                         continue
                 last = math.inf
@@ -191,12 +193,14 @@ def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, slac
                         inset = -lowest
                         rho = -1.0
                         if r > l:
-                            rho, x, y, z, _, _ = rim_arc(which, R, r, l, cx, cy, cz, dx, dy, dz, inset)
+                            rho, x, y, z, _, _ = rim_arc(which, r, l, cx, cy, cz, dx, dy, dz, e2, e, ex, ey, inset)
                         break
                     inset += step
-                    rho, x, y, z, by_r, by_l = rim_arc(which, R, r, l, cx, cy, cz, dx, dy, dz, inset)
+                    rho, x, y, z, by_r, by_l = rim_arc(which, r, l, cx, cy, cz, dx, dy, dz, e2, e, ex, ey, inset)
                     size = abs(step)
-                    if rho <= 0.0 or size <= 1e-12 * R or (size <= 1e-8 * R and size > 0.7 * last):
+                    if rho <= 0.0 or abs(rho - R) <= 2.0 * UNIT * R:
+                        break
+                    if size <= 1e-12 * R or (size <= 1e-8 * R and size > 0.7 * last):
                         break
                     last = size
                 if rho <= 0.0 or (inset == -lowest and rho < R):
@@ -215,7 +219,7 @@ def candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, slac
                 f = R - rho
             n = note(rows, n, f, x, y, z, ARC)
             best = min(best, f)
-    if slack == 0.0 and best <= least:
+    if n > 0 and slack == 0.0 and best <= least:
         return n, left
 
     # Edges: lips, end edges, end arcs.
@@ -333,22 +337,33 @@ def way_out(x, y, z, R, s, h, H):  # type: ignore[no-untyped-def]
     return depth, qx, qy, z, nx, ny, 0.0, feature
 
 
-@formula
-def flat_parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def] # noqa: E741
-    """Axis along z: the plane problem of a disc and the section, and the gap along z."""
+@inlined
+def disc_gaps(R, s, h, H, r, l, x, y, z):  # type: ignore[no-untyped-def] # noqa: E741
+    """Axis along z, as the plane problem of a disc and the section, and the gap along z.
+
+    Gap of the axis to the section and its feature, gaps of the side and of an end, their distance; whether the groove
+    goes on where nothing is left of the cylinder: then the distance is another.
+    """
     gap, feature = section(x, y, R, s, h)
-    bound = UNIT * (6.0 * (R + abs(x) + abs(y)) + 4.0 * (H + abs(z) + l) + r)
     beyond = abs(z) - H
-    if gap < 0.0 and beyond <= max(l - r, 0.0):
-        if l >= r:
-            return parallel(R, s, h, H, r, l - r, x, y, z, dz)
-        depth, qx, qy, qz, nx, ny, nz, feature = way_out(x, y, z, R, s, h, H)
-        return -l - depth, qx, qy, qz, nx, ny, nz, feature, 0.0, bound
+    deep = gap < 0.0 and beyond <= max(l - r, 0.0)
     g = gap - r if gap > 0.0 else -r
     if feature == ARC and gap > 0.0:
         g = (R - r) - math.sqrt(x * x + y * y)
     e = max(beyond, 0.0) - l
-    f = phi(g, e)
+    return gap, feature, g, e, phi(g, e), deep
+
+
+@formula
+def flat_parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def] # noqa: E741
+    """Axis along z: the plane problem of a disc and the section, and the gap along z."""
+    gap, feature, g, e, f, deep = disc_gaps(R, s, h, H, r, l, x, y, z)
+    bound = UNIT * (6.0 * (R + abs(x) + abs(y)) + 4.0 * (H + abs(z) + l) + r)
+    if deep:
+        if l >= r:
+            return parallel(R, s, h, H, r, l - r, x, y, z, dz)
+        depth, qx, qy, qz, nx, ny, nz, feature = way_out(x, y, z, R, s, h, H)
+        return -l - depth, qx, qy, qz, nx, ny, nz, feature, 0.0, bound
     up = math.copysign(1.0, dz)
     qx, qy, nx, ny = section_foot(feature, x, y, R, s, h)
     if gap <= 0.0:
@@ -367,7 +382,7 @@ def flat_parallel(R, s, h, H, r, l, x, y, z, dz):  # type: ignore[no-untyped-def
     else:
         qz = min(max(z, -H), H)
         nx, ny, nz = 0.0, 0.0, above
-        if beyond >= 0.0:
+        if abs(z) - H >= 0.0:
             feature = END_FACE if gap <= 0.0 else beyond_end(feature)
     return f, qx, qy, qz, nx, ny, nz, feature, (qz - z) * up, bound
 
@@ -422,7 +437,14 @@ def flat_nearest(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, pad):  # 
             return -l - depth, qx, qy, qz, nx, ny, nz, feature, 0.0, bound, nx, ny, nz
     bound = 2.0 * bound + 4.0 * UNIT * r
     eps = UNIT * (abs(cx) + abs(cy) + abs(cz) + l + H + R + r)
-    count, rest = candidates(R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, 0.0, eps, work, found, rows)
+    # No more than where the capsule is nearest: what cannot be below that is not looked for.
+    w, t = from_axis(qx - cx, qy - cy, qz - cz, dx, dy, dz)
+    start = phi(w - r, abs(t) - l)
+    count, rest = candidates(
+        R, half_angle, s, h, H, r, l, cx, cy, cz, dx, dy, dz, least, start + bound, 0.0, eps, work, found, rows
+    )
+    if count == 0:
+        count = note(rows, 0, start, qx, qy, qz, feature)
     k = 0
     for i in range(1, count):
         if rows[i, 0] < rows[k, 0]:

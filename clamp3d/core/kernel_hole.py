@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 
 from clamp3d.core.jit import entry, formula
+from clamp3d.core.kernel_heap import pop, put
 from clamp3d.core.kernel_nonnegative import nonnegative
-from clamp3d.core.kernel_zonoid import drop, push
 
 CUTS = 64
 """Directions of one stretch."""
@@ -90,6 +90,22 @@ def outermost(angle, x, y, low, high, pin):  # type: ignore[no-untyped-def]
 
 
 @formula
+def corner(k, far, best, at, H, pin):  # type: ignore[no-untyped-def]
+    """How far the outermost point is from the hole's axis and its angle, if corner ``k`` is further than ``far``."""
+    cx, cy, cz, s, c, r, l = pin  # noqa: E741
+    end, plane = l if k & 1 else -l, H if k & 2 else -H
+    h = cz + at[2] + end * c - plane
+    if abs(h) >= r * s:
+        return far, best
+    u = h / s
+    v = math.sqrt(r * r - u * u)
+    x, y = cx + at[0] + end * s + u * c, cy + at[1] + (v if k & 4 else -v)
+    if x * x + y * y <= far * far:
+        return far, best
+    return outermost(math.atan2(y, x), at[0], at[1], -H - at[2], H - at[2], pin)
+
+
+@formula
 def cut(j, a, b, start, stop, R, H, pin, size, A):  # type: ignore[no-untyped-def]
     """Column j of A: the half-space of all translations, z from ``start`` to ``stop``, that direction (a, b) leaves."""
     h = furthest(a, b, -H - start, H - start, pin)[0]
@@ -138,6 +154,8 @@ def stretch(start, stop, most, R, H, pin, size, slack, A, f, x, w, order, y, Q, 
             e, angle = outermost((2.0 * math.pi / _FAN) * (k + 0.5), at[0], at[1], -H - at[2], H - at[2], pin)
             if e > far:
                 far, best = e, angle
+        for k in range(8):  # a corner may be furthest between two of them: where a face of the plate cuts a rim
+            far, best = corner(k, far, best, at, H, pin)
         at[3] = far - R
         if at[3] <= slack or n == A.shape[1]:
             return low
@@ -167,13 +185,13 @@ def _hole(c, R, H, limit, tolerance, most, heap, A, f, x, w, order, y, Q, at, ou
     slack = 1e-11 * size
     n, count, lower, floor = 0, 0, math.inf, math.inf
     low = stretch(first, last, best, R, inner, pin, size, slack, A, f, x, w, order, y, Q, at)
-    n = push(heap, n, low, first, last, at[2], 0.0)
+    n = put(heap, n, low, first, last, at[2], 0.0)
     while n:
         low, first, last, z = heap[0, 0], heap[0, 1], heap[0, 2], heap[0, 3]
         if low >= best - tolerance or n + 2 > heap.shape[0] or count >= most:
             lower = low
             break
-        n = drop(heap, n)
+        n = pop(heap, n)
         off = 0.0  # where the pin only just fits, it does a little further along the hole
         while True:
             at_z = z if off == 0.0 else min(max(z + off, first), last)
@@ -198,7 +216,7 @@ def _hole(c, R, H, limit, tolerance, most, heap, A, f, x, w, order, y, Q, at, ou
             count += 1
             below = max(below, low)
             if below < best - tolerance:
-                n = push(heap, n, below, u, v, at[2], 0.0)
+                n = put(heap, n, below, u, v, at[2], 0.0)
             else:
                 floor = min(floor, below)
     out[0], out[1] = max(min(lower, floor, best) - clear, 0.0), best

@@ -21,10 +21,10 @@ that (``sag``). Lower bounds over a cell:
 from __future__ import annotations
 
 import math
-from heapq import heappop, heappush
 
 from clamp3d.core.jit import entry, formula
 from clamp3d.core.kernel_features import FLAT_N, phi, section, section_foot
+from clamp3d.core.kernel_heap import pop, put
 
 CELLS = 200_000
 """Cells that may wait. A search that needs more ends with a wider bound, which it tells."""
@@ -231,14 +231,15 @@ def cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht):  # type: ignore[no-untyped
 
 
 @formula
-def halve(heap, key, split_u, u, t, hu, ht, ordered):  # type: ignore[no-untyped-def]
-    """Put the halves of a cell into the heap; by their beginning if it is ordered by that."""
+def halve(heap, n, key, split_u, u, t, hu, ht, ordered):  # type: ignore[no-untyped-def]
+    """Put the halves of a cell into the heap of n; by their beginning if it is ordered by that. Returns n + 2."""
     for sign in (-1.0, 1.0):
         if split_u:
             middle = u + 0.5 * sign * hu
-            heappush(heap, (middle - 0.5 * hu if ordered else key, middle, t, 0.5 * hu, ht))
+            n = put(heap, n, middle - 0.5 * hu if ordered else key, middle, t, 0.5 * hu, ht)
         else:
-            heappush(heap, (key, u, t + 0.5 * sign * ht, hu, 0.5 * ht))
+            n = put(heap, n, key, u, t + 0.5 * sign * ht, hu, 0.5 * ht)
+    return n
 
 
 @formula
@@ -254,32 +255,41 @@ def max_acceleration(l, m):  # type: ignore[no-untyped-def] # noqa: E741
 
 
 @formula
-def seed_heap(l, m, u0, u1, ordered):  # type: ignore[no-untyped-def] # noqa: E741
-    """The motion from u0 to u1 as a heap of cells, half a radian at most to each."""
+def turns_about_the_groove(m):  # type: ignore[no-untyped-def]
+    """Whether the motion is a turn about the groove's own axis, along which it may travel but not across."""
+    return m[6] == m[7] == m[9] == m[10] == m[12] == m[13] == 0.0 and m[15] != 0.0
+
+
+@formula
+def seed_heap(heap, l, m, u0, u1, ordered):  # type: ignore[no-untyped-def] # noqa: E741
+    """The motion from u0 to u1 as a heap of cells, half a radian at most to each; returns how many."""
     pieces = max(1, min(1024, int(abs(m[15]) * (u1 - u0) * 2.0) + 1))
     hu = 0.5 * (u1 - u0) / pieces
-    heap = [(u0 if ordered else -math.inf, u0 + hu, 0.0, hu, l)]
-    for i in range(1, pieces):
+    n = 0
+    for i in range(pieces):
         begin = u0 + 2.0 * i * hu
-        heappush(heap, (begin if ordered else -math.inf, begin + hu, 0.0, hu, l))
-    return heap
+        n = put(heap, n, begin if ordered else -math.inf, begin + hu, 0.0, hu, l)
+    return n
 
 
-def _least(R, half_angle, H, l, m, u0, u1, eps, most, out):  # type: ignore[no-untyped-def] # noqa: E741
-    """Least sdf from u0 to u1: fills out with value, u, t and a proven lower bound of it; cells looked at."""
+def _least(R, half_angle, H, l, m, u0, u1, eps, most, heap, out):  # type: ignore[no-untyped-def] # noqa: E741
+    """Least sdf from u0 to u1: fills out with value, u, t and a proven lower bound of it; cells looked at.
+
+    ``heap`` (n, 5) has room for ``most`` cells that wait, and for 1024 at least.
+    """
     s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
     bend = max_acceleration(l, m)
-    coaxial = m[6] == 0.0 and m[7] == 0.0 and m[9] == 0.0 and m[10] == 0.0 and m[15] != 0.0
+    coaxial = turns_about_the_groove(m)
     best, bu, bt = value(R, s, h, H, m, u0, 0.0), u0, 0.0  # of equals the start
-    heap = seed_heap(l, m, u0, u1, False)
+    n = seed_heap(heap, l, m, u0, u1, False)
     count = 0
     bound = math.inf
-    while heap:
-        known, u, t, hu, ht = heap[0]
-        if known >= best - eps or len(heap) + 2 > most:
+    while n > 0:
+        known, u, t, hu, ht = heap[0, 0], heap[0, 1], heap[0, 2], heap[0, 3], heap[0, 4]
+        if known >= best - eps or n + 2 > most:
             bound = known
             break
-        heappop(heap)
+        n = pop(heap, n)
         f, low, split_u, du, dt = cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht)
         count += 1
         if f < best:
@@ -295,29 +305,29 @@ def _least(R, half_angle, H, l, m, u0, u1, eps, most, out):  # type: ignore[no-u
             f = value(R, s, h, H, m, cu, ct)
             if f < best:
                 best, bu, bt = f, cu, ct
-        halve(heap, low, split_u, u, t, hu, ht, False)
+        n = halve(heap, n, low, split_u, u, t, hu, ht, False)
     out[0], out[1], out[2], out[3] = best, bu, bt, min(bound, best)
     return count
 
 
-def _first(R, half_angle, H, l, m, level, eps, most, out):  # type: ignore[no-untyped-def] # noqa: E741
+def _first(R, half_angle, H, l, m, level, eps, heap, out):  # type: ignore[no-untyped-def] # noqa: E741
     """First u with sdf <= level, 2 if none is found: out[0]; out[1]: up to where nothing is below level - eps."""
     s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
     bend = max_acceleration(l, m)
-    coaxial = m[6] == 0.0 and m[7] == 0.0 and m[9] == 0.0 and m[10] == 0.0 and m[15] != 0.0
+    coaxial = turns_about_the_groove(m)
     hit = 2.0
-    heap = seed_heap(l, m, 0.0, 1.0, True)
+    n = seed_heap(heap, l, m, 0.0, 1.0, True)
     count = 0
     out[1] = 1.0
-    while heap:
-        begin, u, t, hu, ht = heap[0]
+    while n > 0:
+        begin, u, t, hu, ht = heap[0, 0], heap[0, 1], heap[0, 2], heap[0, 3], heap[0, 4]
         if begin >= hit:
             out[1] = hit
             break
-        if len(heap) + 2 > most:
+        if n + 2 > len(heap):
             out[1] = begin
             break
-        heappop(heap)
+        n = pop(heap, n)
         f, low, split_u, _, dt = cell(R, s, h, H, m, bend, coaxial, u, t, hu, ht)
         count += 1
         if u < hit and f <= level:
@@ -332,10 +342,10 @@ def _first(R, half_angle, H, l, m, level, eps, most, out):  # type: ignore[no-un
         if hu <= 2.0**-52:
             continue
         # Where it is below, what comes before is asked for: only a shorter time tells more.
-        halve(heap, u - hu, split_u or f <= level, u, t, hu, ht, True)
+        n = halve(heap, n, u - hu, split_u or f <= level, u, t, hu, ht, True)
     out[0] = hit
     return count
 
 
-least = entry(_least, "i8(f8,f8,f8,f8,f8[::1],f8,f8,f8,i8,f8[::1])")
-first = entry(_first, "i8(f8,f8,f8,f8,f8[::1],f8,f8,i8,f8[::1])")
+least = entry(_least, "i8(f8,f8,f8,f8,f8[::1],f8,f8,f8,i8,f8[:,::1],f8[::1])")
+first = entry(_first, "i8(f8,f8,f8,f8,f8[::1],f8,f8,f8[:,::1],f8[::1])")

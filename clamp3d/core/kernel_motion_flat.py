@@ -8,32 +8,28 @@ told. Times at which the capsule about the cylinder is free are known already (`
 from __future__ import annotations
 
 import math
-from heapq import heappop, heappush
-
-import numpy as np
 
 from clamp3d.core.jit import entry
 from clamp3d.core.kernel_flat import flat_nearest
+from clamp3d.core.kernel_heap import pop, put
 from clamp3d.core.kernel_motion import place
 
 MOST = 100_000
 """Poses that are looked at; a search that needs more ends with a wider bound, which it tells."""
 
 
-def _search(R, half_angle, H, r, l, m, speed, u0, u1, level, eps, most, out):  # type: ignore[no-untyped-def] # noqa: E741
+def _search(R, half_angle, H, r, l, m, speed, u0, u1, level, eps, pad, heap, out):  # type: ignore[no-untyped-def] # noqa: E741
     """Least signed distance from u0 to u1, or (level finite) the first time when it is at most ``level``.
 
     Fills out with value, time and a lower bound of the value; of a first time (2 if there is none) up to when
-    nothing is below level - eps. Returns how many poses were looked at.
+    nothing is below level - eps. Returns how many poses were looked at: no more than ``heap`` (n, 5) has rows, which
+    with ``pad`` (128, 5) is what it works in.
     """
     s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
-    pad = np.empty((128, 5))
     a, b = u0, u1
     fa = fb = best = bound = math.inf
     at = u0
-    heap = [(-math.inf, u0, u1, 0.0, 0.0)]
-    heappop(heap)
-    count = 0
+    n = count = 0
     u = u0
     while True:
         p = place(m, u)
@@ -42,7 +38,7 @@ def _search(R, half_angle, H, r, l, m, speed, u0, u1, level, eps, most, out):  #
         if f < best:
             best, at = f, u
         if level > -math.inf:
-            if f <= level or u >= u1 or count >= most:
+            if f <= level or u >= u1 or count >= len(heap):
                 out[0], out[1], out[2] = f, u if f <= level else 2.0, u
                 return count
             u = min(u1, u + max(f - level, eps) / speed) if speed > 0.0 else u1
@@ -52,7 +48,7 @@ def _search(R, half_angle, H, r, l, m, speed, u0, u1, level, eps, most, out):  #
             continue
         if count == 2:
             fb = f
-            heappush(heap, (0.5 * (fa + fb - speed * (b - a)), a, b, fa, fb))
+            n = put(heap, n, 0.5 * (fa + fb - speed * (b - a)), a, b, fa, fb)
         else:
             for half in range(2):
                 p0, p1, g0, g1 = (a, u, fa, f) if half == 0 else (u, b, f, fb)
@@ -60,14 +56,14 @@ def _search(R, half_angle, H, r, l, m, speed, u0, u1, level, eps, most, out):  #
                 if low >= best - eps or p1 - p0 <= 1e-16:
                     bound = min(bound, low)
                 else:
-                    heappush(heap, (low, p0, p1, g0, g1))
-        if not heap:
+                    n = put(heap, n, low, p0, p1, g0, g1)
+        if n == 0:
             break
-        low, a, b, fa, fb = heap[0]
-        if low >= best - eps or count >= most:
+        low, a, b, fa, fb = heap[0, 0], heap[0, 1], heap[0, 2], heap[0, 3], heap[0, 4]
+        if low >= best - eps or count >= len(heap):
             bound = min(bound, low)
             break
-        heappop(heap)
+        n = pop(heap, n)
         u = min(max(0.5 * (a + b + (fa - fb) / speed), a), b) if speed > 0.0 else b
         if not a < u < b:
             u = 0.5 * (a + b)
@@ -75,5 +71,5 @@ def _search(R, half_angle, H, r, l, m, speed, u0, u1, level, eps, most, out):  #
     return count
 
 
-search = entry(_search, "i8(f8,f8,f8,f8,f8,f8[::1],f8,f8,f8,f8,f8,i8,f8[::1])")
+search = entry(_search, "i8(f8,f8,f8,f8,f8,f8[::1],f8,f8,f8,f8,f8,f8[:,::1],f8[:,::1],f8[::1])")
 """Compiled entry point; see the function."""

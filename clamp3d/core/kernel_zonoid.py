@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 
 from clamp3d.core.jit import entry, formula
+from clamp3d.core.kernel_heap import pop, put
 
 CELLS = 4000
 """Cells that may wait, of 6 numbers each."""
@@ -228,38 +229,6 @@ def triple(ax, ay, az, bx, by, bz, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @formula
-def push(heap, n, low, face, u, v, w):  # type: ignore[no-untyped-def]
-    """Add a cell to the first n rows of a heap, the lowest bound first."""
-    k = n
-    while k > 0 and heap[(k - 1) // 2, 0] > low:
-        up = (k - 1) // 2
-        for i in range(5):
-            heap[k, i] = heap[up, i]
-        k = up
-    heap[k, 0], heap[k, 1], heap[k, 2], heap[k, 3], heap[k, 4] = low, face, u, v, w
-    return n + 1
-
-
-@formula
-def drop(heap, n):  # type: ignore[no-untyped-def]
-    """Take the first of n cells away."""
-    n -= 1
-    k = 0
-    while 2 * k + 1 < n:
-        down = 2 * k + 1
-        if down + 1 < n and heap[down + 1, 0] < heap[down, 0]:
-            down += 1
-        if heap[down, 0] >= heap[n, 0]:
-            break
-        for i in range(5):
-            heap[k, i] = heap[down, i]
-        k = down
-    for i in range(5):
-        heap[k, i] = heap[n, i]
-    return n
-
-
-@formula
 def middle(face, u, v, w):  # type: ignore[no-untyped-def]
     """Unit vector at the middle of a cell, a square of half width w on a side of the cube, and the cell's radius."""
     size = math.sqrt(1.0 + u * u + v * v)
@@ -318,7 +287,7 @@ def _zonoid(c, S, U, tolerance, most, heap, X, out):  # type: ignore[no-untyped-
     lower = -math.inf
     fresh, tilt = True, 0.0
     for face in range(6):
-        n = push(heap, n, -math.inf, float(face), 0.0, 0.0, 1.0)
+        n = put(heap, n, -math.inf, float(face), 0.0, 0.0, 1.0)
     while True:
         if fresh:
             fresh = False
@@ -339,7 +308,7 @@ def _zonoid(c, S, U, tolerance, most, heap, X, out):  # type: ignore[no-untyped-
         lower = max(lower, min(low, best - tolerance))
         if low >= best - tolerance or n + 4 > heap.shape[0] or count >= most:
             break
-        n = drop(heap, n)
+        n = pop(heap, n)
         w *= 0.5
         for q in range(4):
             cu, cv = u + (w if q & 1 else -w), v + (w if q & 2 else -w)
@@ -364,7 +333,7 @@ def _zonoid(c, S, U, tolerance, most, heap, X, out):  # type: ignore[no-untyped-
             bound = size * math.cos(turned) if turned < math.pi else -size
             bound = max(bound, low)
             if bound < best - tolerance:
-                n = push(heap, n, bound, face, cu, cv, w)
+                n = put(heap, n, bound, face, cu, cv, w)
     if n == 0:
         lower = max(lower, best - tolerance)
     support(bx, by, bz, tilt, 60, 0.1 * rounding, c, S, U, X)

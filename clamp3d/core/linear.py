@@ -45,6 +45,17 @@ def norm(x: ArrayLike) -> float:
     return math.hypot(*np.ravel(x).tolist())
 
 
+def cross(a: Array, b: Array) -> Array:
+    """``numpy.cross`` of two vectors (3,), which it takes ten times as long for: it is made for arrays of them.
+
+    >>> cross(np.array([1.0, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])).tolist()
+    [0.0, 0.0, 2.0]
+    """
+    x, y, z = a.tolist()
+    u, v, w = b.tolist()
+    return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
+
+
 def atan2(y: Array, x: Array) -> Array:
     """``numpy.arctan2`` of the C library: NumPy has one for each kind of processor.
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.checks import array, items, number, text
-from clamp3d.core.linear import dot, lstsq, norm
+from clamp3d.core.linear import cross, dot, lstsq, norm
 from clamp3d.core.pose import Array, check_pose, inverse, rotation, unit
 from clamp3d.errors import InputError
 
@@ -126,7 +126,7 @@ class Motion:
     @property
     def is_screw(self) -> bool:
         """Whether it has one axis all the time: a turn is not carried across its own."""
-        return not self.angle or norm(np.cross(self.travel, self.axis)) <= 1e-14 * norm(self.travel)
+        return not self.angle or norm(cross(self.travel, self.axis)) <= 1e-14 * norm(self.travel)
 
     def speed(self, points: Array) -> float:
         """Bound (mm per unit of t) of the speed of points (k, 3), given where they are at the start."""

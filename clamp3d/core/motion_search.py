@@ -6,7 +6,7 @@ import numpy as np
 
 from clamp3d.checks import positive
 from clamp3d.core.distance import SignedDistance, signed_distance
-from clamp3d.core.linear import norm
+from clamp3d.core.linear import cross, norm
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
@@ -72,14 +72,12 @@ class Search:
             return self._flat_least(self._capsule)
         from clamp3d.core import kernel_motion
 
-        out = np.empty(4)
-        self.evaluations += kernel_motion.least(
-            *self._sizes, self._numbers, 0.0, 1.0, self.slack, kernel_motion.CELLS, out
-        )
+        out, heap = np.empty(4), np.empty((kernel_motion.CELLS, 5))
+        self.evaluations += kernel_motion.least(*self._sizes, self._numbers, 0.0, 1.0, self.slack, len(heap), heap, out)
         best, t, _, bound = out.tolist()
         # Down to the rounding where that is cheap: what only just touches is to be known as that.
         low, high = max(0.0, t - _NEAR), min(1.0, t + _NEAR)
-        self.evaluations += kernel_motion.least(*self._sizes, self._numbers, low, high, self.rounding, _FEW, out)
+        self.evaluations += kernel_motion.least(*self._sizes, self._numbers, low, high, self.rounding, _FEW, heap, out)
         if out[0] <= best:
             best, t = out[:2].tolist()
         return t, max(best - bound, self.slack)
@@ -99,8 +97,8 @@ class Search:
 
         R, half_angle, H, half = self._sizes
         r = self.cylinder.radius
-        out = np.empty(3)
-        arm = norm(np.cross(self.motion.axis, self.start[:3, 3] - self.motion.point))
+        out, pad, heap = np.empty(3), np.empty((128, 5)), np.empty((kernel_motion_flat.MOST, 5))
+        arm = norm(cross(self.motion.axis, self.start[:3, 3] - self.motion.point))
         speed = norm(self.motion.travel) + abs(self.motion.angle) * (arm + float(np.hypot(r, half)))
         self.evaluations += kernel_motion_flat.search(
             R,
@@ -114,7 +112,8 @@ class Search:
             1.0,
             level,
             self.flat_slack,
-            kernel_motion_flat.MOST,
+            pad,
+            heap,
             out,
         )
         return out.tolist()
@@ -139,12 +138,10 @@ class Search:
             return self._flat_first(self._capsule, level)
         from clamp3d.core import kernel_motion
 
-        out = np.empty(2)
+        out, heap = np.empty(2), np.empty((kernel_motion.CELLS, 5))
         r = self.cylinder.radius
         for _ in range(4):
-            self.evaluations += kernel_motion.first(
-                *self._sizes, self._numbers, level + r, self.slack, kernel_motion.CELLS, out
-            )
+            self.evaluations += kernel_motion.first(*self._sizes, self._numbers, level + r, self.slack, heap, out)
             hit, until = out.tolist()
             if until >= min(hit, 1.0):
                 return hit if hit <= 1.0 else None
@@ -173,7 +170,7 @@ class Search:
             return self.at(s).distance - level
 
         offset, u = self.start[:3, 3] - self.motion.point, self.motion.axis
-        reach = norm(np.cross(u, offset)) + 0.5 * self.cylinder.length
+        reach = norm(cross(u, offset)) + 0.5 * self.cylinder.length
         speed = max(abs(self.motion.angle) * reach + norm(self.motion.travel), 1e-300)
         step = max(error / speed, 4e-16)
         high = t

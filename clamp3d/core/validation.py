@@ -77,4 +77,4 @@ def _keys_at(kind: typing.Any, loc: tuple[int | str, ...], tags: Mapping[str, ty
         options = [a for a in typing.get_args(kind) if a is not type(None)]
         if type(None) in typing.get_args(kind) and len(options) == 1:
             kind = options[0]
-    return list(getattr(kind, "__dataclass_fields__", {}))
+    return list(getattr(kind, "__pydantic_fields__", {}))

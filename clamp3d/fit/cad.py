@@ -11,8 +11,9 @@ import numpy as np
 from clamp3d.brep.bodies import Body, Reading
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import CYLINDER, KINDS, PLANE, parameters, unwrapped
-from clamp3d.core.linear import atan2, dot, norm, to_source, to_target
+from clamp3d.core.linear import atan2, cross, dot, norm, to_source, to_target
 from clamp3d.core.mesh import Array, IntArray, Mesh
+from clamp3d.fit.surface import covered
 
 _SAME = 1e-6
 """Cylinders (mm, rad) nearer than this are one."""
@@ -60,8 +61,8 @@ def _one(shape: BrepSolid, i: int, j: int) -> bool:
     """Whether two cylindrical faces lie on one cylinder."""
     faces = shape.surfaces
     (o, *_, z), (p, *_, w) = faces.frame[i], faces.frame[j]
-    apart = norm(np.cross(p - o, z))
-    turned = norm(np.cross(z, w))
+    apart = norm(cross(p - o, z))
+    turned = norm(cross(z, w))
     return (
         bool(faces.sense[i] == faces.sense[j]) and max(abs(faces.size[i, 0] - faces.size[j, 0]), apart, turned) < _SAME
     )
@@ -75,12 +76,12 @@ def _measured(body: Body, shape: BrepSolid, group: IntArray) -> tuple[float, dic
         frame = frame * np.array([[1.0], [1.0], [-1.0], [-1.0]])
     pieces = faces.corners[np.isin(faces.face, group)]
     uv = unwrapped(CYLINDER, parameters(CYLINDER, frame, (radius, 0.0), pieces.reshape(-1, 3)).reshape(-1, 3, 2))
-    middle, half = _arc(uv[:, :, 0])
+    middle, half = covered(uv[:, :, 0], _SAME)
     low, high = float(uv[:, :, 1].min()), float(uv[:, :, 1].max())
     T = np.eye(4)
     T[:3, 1] = -(math.cos(middle) * frame[1] + math.sin(middle) * frame[2])
     T[:3, 2] = frame[3]
-    T[:3, 0] = np.cross(T[:3, 1], T[:3, 2])
+    T[:3, 0] = cross(T[:3, 1], T[:3, 2])
     T[:3, 3] = frame[0] + 0.5 * (low + high) * frame[3]
     (a, b), (c, d) = ((uv[:, k] - uv[:, 0]).T for k in (1, 2))
     area = 0.5 * radius * float(np.abs(a * d - b * c).sum())
@@ -105,20 +106,6 @@ def _measured(body: Body, shape: BrepSolid, group: IntArray) -> tuple[float, dic
         "length_error": length_error,
         "faces": rows,
     }
-
-
-def _arc(u: Array) -> tuple[float, float]:
-    """Middle and half of the arc that triangles' angles (m, 3) cover; half a turn where nothing is left out."""
-    start = np.remainder(u.min(axis=1), 2.0 * math.pi)
-    order = np.argsort(start, kind="stable")
-    start, end = start[order], (start + np.ptp(u, axis=1))[order]
-    reached = np.maximum.accumulate(end)
-    gaps = np.append(start[1:], start[0] + 2.0 * math.pi) - np.maximum(reached, reached[-1] - 2.0 * math.pi)
-    k = int(np.argmax(gaps))
-    if gaps[k] < _SAME:
-        return 0.0, math.pi
-    half = math.pi - 0.5 * float(gaps[k])
-    return float(reached[k] + gaps[k]) + half, half
 
 
 def _strays(F: IntArray, V: Array, T: Array, half: float, length: float) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.optimize import least_squares
 
-from clamp3d.core.linear import atan2, dot, eigh, lstsq, norm
+from clamp3d.core.linear import atan2, cross, dot, eigh, lstsq, norm
 from clamp3d.core.pose import Array
 
 CONFIDENCE = 0.9973
@@ -47,9 +47,9 @@ def perpendicular(direction: Array) -> tuple[Array, Array]:
     """Two unit vectors (3,) that make a right-handed frame with ``direction``."""
     helper = np.zeros(3)
     helper[int(np.argmin(np.abs(direction)))] = 1.0
-    u = np.cross(helper, direction)
+    u = cross(helper, direction)
     u /= norm(u)
-    return u, np.cross(direction, u)
+    return u, cross(direction, u)
 
 
 def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -> Axis | None:
@@ -74,7 +74,7 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
     reach = norm(inward)
     # On a full turn the centroid lies on the axis and any direction serves.
     e = inward / reach if reach > 1e-6 * size else perpendicular(w)[0]
-    f = np.cross(w, e)
+    f = cross(w, e)
     local = dot(points - centroid, np.stack([e, f, w], axis=1))
     scale = np.array([1.0, 1.0, 1.0 / size, 1.0 / size, 1.0 / size**2])
 

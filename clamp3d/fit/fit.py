@@ -16,9 +16,8 @@ from clamp3d.core.linear import to_source
 from clamp3d.core.mesh import Array, Mesh
 from clamp3d.fit.cad import cad_features
 from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
-from clamp3d.fit.join import join
 from clamp3d.fit.measure import measure
-from clamp3d.fit.regions import find_regions
+from clamp3d.fit.regions import find_regions, join
 from clamp3d.fit.surface import Surface
 
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from clamp3d.core.linear import atan2, dot
+from clamp3d.core.linear import atan2, cross, dot
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, patches_of, perpendicular, surface_error
 from clamp3d.fit.grow import Region
-from clamp3d.fit.surface import BoolArray, Surface, angles, border, turned
+from clamp3d.fit.surface import BoolArray, Surface, angles, border, covered, turned
 
 FULL_TURN_GAP = np.radians(30.0)
 """A surface whose largest uncovered angle is below this goes all the way round."""
@@ -24,17 +24,7 @@ FULL_TURN_GAP = np.radians(30.0)
 def arc(surface: Surface, axis: Axis, u: Array, w: Array, faces: IntArray) -> tuple[float, float]:
     """Middle (rad, from u towards w) and half angle of the arc that ``faces`` cover; half angle pi for a full turn."""
     a = angles(surface, axis, faces, u, w)
-    a = a[:, :1] + turned(a, a[:, :1])
-    a = a[np.argsort(a.min(axis=1), kind="stable")]
-    # Two turns of the sorted intervals make the circle a line.
-    a = np.concatenate([a, a + 2.0 * np.pi])
-    low, high = a.min(axis=1), np.maximum.accumulate(a.max(axis=1))
-    gaps = low[1:] - high[:-1]
-    k = int(np.argmax(gaps))
-    if gaps[k] < FULL_TURN_GAP:
-        return 0.0, float(np.pi)
-    start, end = low[k + 1], high[k] + 2.0 * np.pi
-    return float(0.5 * (start + end)), float(0.5 * (end - start))
+    return covered(a[:, :1] + turned(a, a[:, :1]), FULL_TURN_GAP)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +95,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     u, w = perpendicular(d)
     middle, half = arc(surface, axis, u, w, region.faces)
     deepest = np.cos(middle) * u + np.sin(middle) * w
-    R = np.stack([np.cross(-deepest, d), -deepest, d], axis=1)
+    R = np.stack([cross(-deepest, d), -deepest, d], axis=1)
 
     corners = dot(surface.V[np.unique(surface.F[region.faces])] - axis.point, R)
     z0, z1 = float(corners[:, 2].min()), float(corners[:, 2].max())

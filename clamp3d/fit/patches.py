@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from clamp3d.core.linear import dot, eigh, norm, svd
+from clamp3d.core.linear import cross, dot, eigh, norm, svd
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
@@ -164,7 +164,7 @@ def _from_normals(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] 
     sign = 1 if dot(surface.lean(axis, patch), surface.areas[patch]) > 0.0 else -1
     scatter = float(np.sqrt(np.mean(axis.residual(points) ** 2)))
     # Along the arc at the middle of the points; round a full turn any direction serves.
-    across = np.cross(d, points.mean(axis=0) - axis.point)
+    across = cross(d, points.mean(axis=0) - axis.point)
     size = norm(across)
     across = across / size if size > 0.0 else perpendicular(d)[0]
     reach = min(float(np.ptp(dot(points, across))) / axis.radius, np.pi)

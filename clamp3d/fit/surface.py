@@ -85,6 +85,20 @@ def turned(angle: Array, base: Array) -> Array:
     return np.asarray((angle - base + np.pi) % (2.0 * np.pi) - np.pi)
 
 
+def covered(u: Array, least: float) -> tuple[float, float]:
+    """Middle and half of the arc that triangles' angles (m, 3) cover, rad; half a turn if no gap is ``least`` wide."""
+    start = np.remainder(u.min(axis=1), 2.0 * np.pi)
+    order = np.argsort(start, kind="stable")
+    start, end = start[order], (start + np.ptp(u, axis=1))[order]
+    reached = np.maximum.accumulate(end)
+    gaps = np.append(start[1:], start[0] + 2.0 * np.pi) - np.maximum(reached, reached[-1] - 2.0 * np.pi)
+    k = int(np.argmax(gaps))
+    if gaps[k] < least:
+        return 0.0, np.pi
+    half = np.pi - 0.5 * float(gaps[k])
+    return float(reached[k] + gaps[k]) + half, half
+
+
 def facet_span(surface: Surface, axis: Axis, faces: IntArray, cells: IntArray) -> Array:
     """Angle (rad) about the axis of each planar cell that has some of ``faces``, counting those faces only."""
     angle = angles(surface, axis, faces, *perpendicular(axis.direction))

@@ -28,7 +28,7 @@ from clamp3d.output.section import (
     edge_openings,
     label_wires,
 )
-from clamp3d.output.wording import gap_text
+from clamp3d.output.wording import distance_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -152,7 +152,7 @@ def contact_figure(run: Assembly, contact: Contact) -> Figure:
 def _enlarge(ax: Axes, run: Assembly, contact: Contact, number: str = "") -> None:
     """The two parts about their contact point; grooves in the section beside the bolt, where they are whole."""
     half = 0.045 * run.clamp.up_splint.width
-    below = gap_text(contact.distance.lower, contact.distance.upper)
+    below = distance_text(contact.distance)
     in_arc = 3 in (contact.declared, contact.type)  # along a line, the section too
     if contact.point is not None and abs(contact.point[1]) > CONTACT and not in_arc:
         below += f", {abs(contact.point[1]):.1f} mm {'before' if contact.point[1] < 0.0 else 'behind'} the section"

@@ -22,7 +22,7 @@ from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.output.assembly_steps import StepRow, TighteningRow, step_rows, tightening_rows
 from clamp3d.output.pages import render
-from clamp3d.output.wording import circumstances, gap_text, headline, sentence, titles
+from clamp3d.output.wording import distance_text, finding_text, headline, sentence, titles
 
 Severity = Literal["error", "warning", "note", "ok"]
 
@@ -195,9 +195,7 @@ def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
     rows = {id(pair): row(pair) for pair in result.rows}
     findings = []
     for pair in result.findings:
-        where = circumstances(pair)
-        text = sentence(pair, names) + (f"; {where}" if where else "")
-        findings.append(Finding(rows[id(pair)].severity, text, rows[id(pair)]))
+        findings.append(Finding(rows[id(pair)].severity, finding_text(pair, names), rows[id(pair)]))
     return Report(
         scene=scene,
         headline=headline(result),
@@ -223,8 +221,7 @@ def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
     names = titles(scene)
     for row in sorted(rows, key=lambda row: row.distance.upper):
         if row.severity != "ok" and row not in told:
-            gap = gap_text(row.distance.lower, row.distance.upper)
-            text = f"{names[row.result.a]} and {names[row.result.b]} {row.remark}: {gap}"
+            text = f"{names[row.result.a]} and {names[row.result.b]} {row.remark}: {distance_text(row.distance)}"
             findings.append(Finding(row.severity, text if row.remark else sentence(row.result, names), row))
     findings.sort(key=lambda finding: list(SEVERITIES).index(finding.severity))
     passed = assembly.clamped and not any(finding.severity == "error" for finding in findings)

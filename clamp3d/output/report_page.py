@@ -20,7 +20,7 @@ from clamp3d.output.manifest import versions
 from clamp3d.output.pages import now, render
 from clamp3d.output.palette import VERDICT_COLOURS, part_colours
 from clamp3d.output.report import LISTED, SEVERITIES, PairRow, Report
-from clamp3d.output.wording import gap_text, meaning, titles
+from clamp3d.output.wording import distance_text, meaning, titles
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -127,7 +127,7 @@ def report_html(report: Report, *, progress: Callable[[str], None] = lambda what
         assembly=report.assembly,
         made=f"{now():%Y-%m-%d %H:%M} UTC",
         versions=_versions(),
-        gap=_gap,
+        gap=distance_text,
         bound=lambda value: f"{value:.1e}" if math.isfinite(value) else "not known",
         vector=lambda v: "" if v is None else ", ".join(f"{x:z.3f}" if abs(x) >= 5e-4 else "0" for x in v),
         degrees=math.degrees,
@@ -179,10 +179,6 @@ def _data_address(figure: Figure) -> str:
     from clamp3d.output.figures import svg
 
     return "data:image/svg+xml;base64," + base64.b64encode(svg(figure)).decode("ascii")
-
-
-def _gap(row: PairRow, digits: int = 6) -> str:
-    return gap_text(row.distance.lower, row.distance.upper, digits=digits)
 
 
 def _pair_to_dict(row: PairRow) -> dict[str, Any]:

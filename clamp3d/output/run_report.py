@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.forces import HELD
-from clamp3d.clamp.matrix import gap_text
+from clamp3d.clamp.matrix import millimetres
 from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.output.tables import text_table
@@ -72,7 +72,7 @@ def _lines(assembly: Assembly) -> Iterator[str]:
                 f"{c.a}-{c.b}",
                 c.type,
                 c.relation,
-                gap_text(c.gap),
+                millimetres(c.gap),
                 *(("", "") if c.point is None else (f"{c.point[0]:z.3f}", f"{-c.point[2]:z.3f}")),
                 c.feature,
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from itertools import combinations
 from typing import Any
 
 from clamp3d import __version__
@@ -10,13 +11,11 @@ from clamp3d.collide.result import CheckResult, Work
 from clamp3d.collide.verdict import Verdict
 from clamp3d.output.tables import text_table
 from clamp3d.output.wording import (
-    circumstances,
     counted,
-    counts_text,
-    gap_text,
+    distance_text,
+    finding_text,
     headline,
     meaning,
-    sentence,
     titles,
     worst_first,
 )
@@ -50,9 +49,10 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
     t, n, names = result.thresholds, len(result.scene.parts), titles(result.scene)
     clearance = f"clearance {t.clearance:g} mm" if t.clearance else "no clearance asked for"
     moving = f" at rest and {len(result.motions)} in motion" if result.motions else ""
+    counts = ", ".join(f"{count} {name}" for name, count in result.counts.items()) or "no pairs"
     lines = [
         f"{result.scene.name}: {headline(result)}",
-        f"{counted(n, 'part')}, {counted(result.work.pairs, 'pair')}{moving}: {counts_text(result)}; "
+        f"{counted(n, 'part')}, {counted(result.work.pairs, 'pair')}{moving}: {counts}; "
         f"contact up to {t.contact:g} mm, {clearance}",
     ]
     lines += [f"  note: {note}" for note in result.scene.notes[:_NOTES]]
@@ -60,16 +60,14 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
         lines.append(f"  ... and {len(result.scene.notes) - _NOTES} more notes (--json lists all)")
     # What merely touches at rest stands in the table of pairs.
     told = [row for row in result.findings if row.verdict is not Verdict.CONTACT or row.motion is not None]
-    for row in told[:_ROWS]:
-        where = circumstances(row)
-        lines.append(f"  {sentence(row, names)}" + (f"; {where}" if where else ""))
+    lines += [f"  {finding_text(row, names)}" for row in told[:_ROWS]]
     if len(told) > _ROWS:
         lines.append(f"  ... and {len(told) - _ROWS} more (--json or --html lists all)")
     if 2 <= n <= _MATRIX and result.asked is None:
         lines += ["", *_matrix(result)]
     pairs = worst_first(result.pairs)[: _ROWS // 2]
     if pairs:
-        table = [(f"{r.a} - {r.b}", r.verdict.value, _gap(r.distance), r.distance.method) for r in pairs]
+        table = [(f"{r.a} - {r.b}", r.verdict.value, distance_text(r.distance), r.distance.method) for r in pairs]
         lines += ["", text_table(("pair", "verdict", "distance", "by"), table, indent=2)]
     if len(result.pairs) > len(pairs):
         lines.append(f"  ... and {len(result.pairs) - len(pairs)} more (--json or --html lists all)")
@@ -80,7 +78,7 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
                 str(r.motion),
                 f"{r.a} - {r.b}",
                 r.verdict.value,
-                _gap(r.distance),
+                distance_text(r.distance),
                 "" if r.t is None else f"{r.t:.4f}",
                 "" if r.contact_at is None else f"{r.contact_at:.4f}",
                 r.distance.method,
@@ -91,14 +89,9 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
     return "\n".join([*lines, "", *work_text(result.work, full)])
 
 
-def _gap(distance: Any) -> str:
-    return gap_text(distance.lower, distance.upper)
-
-
 def _matrix(result: CheckResult) -> list[str]:
     names = [part.name for part in result.scene.parts]
-    rows = {frozenset((row.a, row.b)): row.verdict for row in result.pairs}
-    marks = {(a, b): rows.get(frozenset((a, b)), Verdict.CLEAR) for k, a in enumerate(names) for b in names[k + 1 :]}
+    marks = {(a, b): result.verdict(a, b) for a, b in combinations(names, 2)}
     table = [(a, *(_MARK[marks[a, b]] if (a, b) in marks else "" for b in names)) for a in names]
     used = [v for v in Verdict if v in marks.values()]
     legend = ", ".join(f"{_MARK[v]} {v.value} ({meaning(v.value, result.scene)})" for v in used)

@@ -120,7 +120,7 @@ def balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> Non
 
 def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int] = (-1, 1)) -> None:
     """Distance between the splints at the edges (-1 line side, 1 jumper side), and the tilt of the down splint."""
-    edges = _inner_edges(clamp, poses)
+    edges = inner_edges(clamp, poses)
     for side in sides:
         above, below = edges[side > 0]
         x = (min if side < 0 else max)(above[0], below[0]) + side * 0.09 * clamp.up_splint.width
@@ -130,11 +130,12 @@ def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int
 
 def edge_openings(clamp: Clamp, poses: Poses) -> tuple[float, float]:
     """Height in mm between the splints' inner edges, on the line side (Table 4's distance) and the jumper side."""
-    left, right = ((below[1] - above[1]) for above, below in _inner_edges(clamp, poses))
+    left, right = ((below[1] - above[1]) for above, below in inner_edges(clamp, poses))
     return left, right
 
 
-def _inner_edges(clamp: Clamp, poses: Poses) -> list[tuple[Point, Point]]:
+def inner_edges(clamp: Clamp, poses: Poses) -> list[tuple[Point, Point]]:
+    """Ends of the splints' inner edges in the section, the up splint's and the down splint's: left, then right."""
     up, down = clamp.up_splint, clamp.down_splint
     return [
         (poses["P1"].point(u, up.thickness), poses["P2"].point(v, down.face_depth))
@@ -160,8 +161,8 @@ def part_anchor(clamp: Clamp, name: PartName, *, right: bool = True) -> tuple[fl
     import shapely
 
     part = parts(clamp)[name]
-    shapes = [body.profile if body.axis == "Y" else _silhouette(body) for body in part.bodies]
-    area = shapely.union_all([shapely.Polygon(shape.polygon(0.01 * clamp.bolt.diameter)) for shape in shapes])
+    fine = 0.01 * clamp.bolt.diameter
+    area = shapely.union_all([shapely.Polygon(outline(body).polygon(fine)) for body in part.bodies])
     for hole in part.holes:
         (u0, _), (u1, _) = hole.profile.bounds
         area = area.difference(shapely.box(u0, -hole.end, u1, -hole.start))
@@ -212,7 +213,7 @@ def _draw_part(
     where = place + ax.transData
     style: dict[str, Any] = {"lw": line_width, "ec": edge, "zorder": z}
     for body in part.bodies:
-        path = arc_path(body.profile) if body.axis == "Y" else arc_path(_silhouette(body))
+        path = arc_path(outline(body))
         patch = PathPatch(path, fc=colour, hatch=_HATCH.get(part.name), hatch_linewidth=0.45, transform=where, **style)
         patch.set_hatchcolor(darker(colour, 0.75))
         ax.add_patch(patch)
@@ -228,15 +229,16 @@ def _draw_part(
                     wall_patch = PathPatch(wall, fc=_pale(colour), transform=ax.transData, **style)
                     wall_patch.set_clip_path(patch)
                     ax.add_patch(wall_patch)
-            outline = PathPatch(path, fc="none", transform=where, **style)
-            ax.add_patch(outline)
+            ax.add_patch(PathPatch(path, fc="none", transform=where, **style))
         else:
             for u in _front_edges(body.profile):
                 ax.plot([u, u], [-body.end, -body.start], color=edge, lw=0.6 * line_width, transform=where, zorder=z)
 
 
-def _silhouette(body: Extrusion) -> Profile:
-    """Outline in (u, v) of a body that is drawn along Z, seen along the wires."""
+def outline(body: Extrusion) -> Profile:
+    """Outline in (u, v) of a body as it is seen along the wires."""
+    if body.axis == "Y":
+        return body.profile
     (a0, _), (a1, _) = body.profile.bounds
     return Profile.rectangle(a1 - a0, body.length, (0.5 * (a0 + a1), -0.5 * (body.start + body.end)))
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from clamp3d.brep.solid import BrepSolid, require_open_cascade
+from clamp3d.brep.tessellate import explore
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc
@@ -107,14 +108,7 @@ def _prism(shape: Extrusion, overlap: float = 0.0) -> Any:
 
 
 def _only_solid(shape: Any, part: Solid) -> Any:
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-
-    explorer = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
-    solids = []
-    while explorer.More():
-        solids.append(explorer.Current())
-        explorer.Next()
+    solids = list(explore(shape, "SOLID"))
     if len(solids) != 1:
         raise Clamp3dError(f"Open CASCADE makes {len(solids)} solids of {part.name}, expected 1")
     return solids[0]
@@ -146,7 +140,7 @@ def _document(placed: Sequence[PlacedPart], title: str) -> Any:
         colour = Quantity_Color(r, g, b, Quantity_TypeOfColor.Quantity_TOC_sRGB)
         colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorGen)
         if tree:
-            name(shapes.AddComponent(root, label, _location(item.T)), item.label)
+            name(shapes.AddComponent(root, label, location(item.T)), item.label)
     shapes.UpdateAssemblies()
     return document
 
@@ -160,7 +154,8 @@ def _exact(item: PlacedPart) -> Any:
     raise InputError(f"{item.name} is a mesh: STEP holds true faces, not facets; use stl, obj, ply, glb or 3mf")
 
 
-def _location(T: Array) -> Any:
+def location(T: Array) -> Any:
+    """A pose (4, 4) in mm as a TopLoc_Location."""
     from OCP.gp import gp_Trsf
     from OCP.TopLoc import TopLoc_Location
 

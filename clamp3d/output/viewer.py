@@ -29,11 +29,10 @@ from clamp3d.core.shapes import MeshShape
 from clamp3d.errors import InputError
 from clamp3d.output.files import write_text
 from clamp3d.output.palette import FORCE, VERDICT_COLOURS
-from clamp3d.output.viewer_clamp import UNCUT, ClampStory
 from clamp3d.output.viewer_page import live_page, panel, whole_page
 from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
 from clamp3d.output.viewer_server import CommandLog, LocalServer, RemoteServer
-from clamp3d.output.viewer_timeline import FIRST, Row, Stop, scene_stops
+from clamp3d.output.viewer_timeline import FIRST, UNCUT, ClampStory, Row, Stop, scene_stops
 from clamp3d.output.wording import (
     circumstances,
     headline,

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
+import trimesh
+from numpy.typing import NDArray
 
+from clamp3d.collide.overlap import common
+from clamp3d.collide.surface import Surface
 from clamp3d.core.pose import Array, inverse
-
-if TYPE_CHECKING:
-    import trimesh
 
 
 def cut_open(
@@ -21,10 +20,10 @@ def cut_open(
     """
     normal = T_world[:3, :3].T @ [0.0, 1.0, 0.0]
     offset = y - float(T_world[1, 3])
-    half = _manifold(mesh).trim_by_plane(tuple(normal), offset)
-    behind = _mesh(half)
-    if behind is None:
+    half = _surface(mesh).manifold.trim_by_plane(tuple(normal), offset).to_mesh64()
+    if not len(half.tri_verts):
         return None, None
+    behind = _mesh(np.asarray(half.vert_properties)[:, :3], np.asarray(half.tri_verts, int))
     height = behind.vertices @ normal - offset
     on_cut = (np.abs(height[behind.faces]) < 1e-9 * (1.0 + np.abs(behind.vertices).max())).all(axis=1)
     pieces = []
@@ -37,24 +36,13 @@ def cut_open(
 
 def overlap(a: trimesh.Trimesh, T_a: Array, b: trimesh.Trimesh, T_b: Array) -> trimesh.Trimesh | None:
     """What two parts at their poses have in common, in the frame of ``a``; None where their facets do not meet."""
-    placed = _manifold(b).transform((inverse(T_a) @ T_b)[:3])
-    return _mesh(_manifold(a) ^ placed)
+    found = common(_surface(a), _surface(b), inverse(T_a) @ T_b)
+    return None if found is None else _mesh(found.vertices, found.faces)
 
 
-def _manifold(mesh: trimesh.Trimesh) -> Any:
-    import manifold3d
-
-    return manifold3d.Manifold(
-        manifold3d.Mesh64(
-            vert_properties=np.array(mesh.vertices, dtype=np.float64), tri_verts=np.array(mesh.faces, dtype=np.uint64)
-        )
-    )
+def _surface(mesh: trimesh.Trimesh) -> Surface:
+    return Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
-def _mesh(solid: Any) -> trimesh.Trimesh | None:
-    import trimesh
-
-    made = solid.to_mesh64()
-    if not len(made.tri_verts):
-        return None
-    return trimesh.Trimesh(np.asarray(made.vert_properties)[:, :3], np.asarray(made.tri_verts, int), process=False)
+def _mesh(vertices: Array, faces: NDArray[np.int64]) -> trimesh.Trimesh:
+    return trimesh.Trimesh(vertices, faces, process=False)

@@ -6,17 +6,15 @@ import io
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import meshcat.geometry as g
 import numpy as np
+import trimesh
 from numpy.typing import ArrayLike
 
 from clamp3d.core.pose import Array
 from clamp3d.output.palette import INK
-
-if TYPE_CHECKING:
-    import trimesh
-    from meshcat.geometry import Material, Object
 
 _CREASE = math.radians(25.0)
 """Faces that meet at less are shaded as one round surface; sharper edges are drawn as lines."""
@@ -24,7 +22,7 @@ _FRONT = 10
 """Render order of what is drawn over the solids; labels come after it."""
 
 
-def command(path: str, what: Object) -> dict[str, Any]:
+def command(path: str, what: g.Object) -> dict[str, Any]:
     """What sets an object at a path; one that is to be seen through the solids is drawn after them."""
     data: dict[str, Any] = what.lower()
     if not data["materials"][0].get("depthTest", True):
@@ -32,16 +30,14 @@ def command(path: str, what: Object) -> dict[str, Any]:
     return {"type": "set_object", "path": path, "object": data}
 
 
-def solid(mesh: trimesh.Trimesh, colour: str) -> Object:
+def solid(mesh: trimesh.Trimesh, colour: str) -> g.Object:
     """A mesh with smooth round faces and sharp edges, in mm of its part's frame."""
-    import trimesh
-    from meshcat.geometry import Mesh, TriangularMeshGeometry
 
     smooth = trimesh.graph.smooth_shade(mesh, angle=_CREASE)
-    return Mesh(TriangularMeshGeometry(smooth.vertices, smooth.faces), _phong(colour))
+    return g.Mesh(g.TriangularMeshGeometry(smooth.vertices, smooth.faces), _phong(colour))
 
 
-def edges(mesh: trimesh.Trimesh, colour: str) -> Object:
+def edges(mesh: trimesh.Trimesh, colour: str) -> g.Object:
     """The sharp edges of a mesh as lines."""
     sharp = mesh.face_adjacency_angles > _CREASE
     return segments(mesh.vertices[mesh.face_adjacency_edges[sharp]].reshape(-1, 3), colour)
@@ -49,38 +45,35 @@ def edges(mesh: trimesh.Trimesh, colour: str) -> Object:
 
 def facets(
     mesh: trimesh.Trimesh, colour: str, *, opacity: float = 1.0, lit: bool = True, on_top: bool = False
-) -> Object:
+) -> g.Object:
     """Flat facets seen from both sides. Without light the colour is as is."""
-    from meshcat.geometry import Mesh, MeshBasicMaterial, TriangularMeshGeometry
 
-    geometry = TriangularMeshGeometry(mesh.vertices, mesh.faces)
+    geometry = g.TriangularMeshGeometry(mesh.vertices, mesh.faces)
     if not lit:
-        return Mesh(geometry, MeshBasicMaterial(color=_number(colour)))
+        return g.Mesh(geometry, g.MeshBasicMaterial(color=_number(colour)))
     seen = {"depthTest": False, "transparent": True} if on_top else {}
-    return Mesh(geometry, _phong(colour, flatShading=True, opacity=opacity, depthWrite=opacity == 1.0, **seen))
+    return g.Mesh(geometry, _phong(colour, flatShading=True, opacity=opacity, depthWrite=opacity == 1.0, **seen))
 
 
-def segments(points: ArrayLike, colour: str, *, on_top: bool = False) -> Object:
+def segments(points: ArrayLike, colour: str, *, on_top: bool = False) -> g.Object:
     """Straight lines between the points (2 n, 3) two by two."""
-    from meshcat.geometry import LineBasicMaterial, LineSegments, PointsGeometry
 
     # three.js draws what is transparent after the solids
-    material = LineBasicMaterial(color=_number(colour), depthTest=not on_top, transparent=on_top)
-    return LineSegments(PointsGeometry(np.asarray(points, dtype=np.float32).T), material)
+    material = g.LineBasicMaterial(color=_number(colour), depthTest=not on_top, transparent=on_top)
+    return g.LineSegments(g.PointsGeometry(np.asarray(points, dtype=np.float32).T), material)
 
 
-def box(low: Array, high: Array, colour: str) -> Object:
+def box(low: Array, high: Array, colour: str) -> g.Object:
     """The twelve edges of a box from corner to corner, drawn over the solids."""
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     pairs = [(i, j) for i in range(8) for j in range(i) if np.abs(corners[i] - corners[j]).sum() == 1]
     return segments(low + corners[np.array(pairs).ravel()] * (high - low), colour, on_top=True)
 
 
-def dot(radius: float, colour: str) -> Object:
+def dot(radius: float, colour: str) -> g.Object:
     """A ball of ``radius`` mm about the origin, drawn over the solids."""
-    from meshcat.geometry import Mesh, Sphere
 
-    return Mesh(Sphere(radius), _phong(colour, depthTest=False, transparent=True))
+    return g.Mesh(g.Sphere(radius), _phong(colour, depthTest=False, transparent=True))
 
 
 def arrow(
@@ -91,12 +84,11 @@ def arrow(
     *,
     thickness: float | None = None,
     on_top: bool = False,
-) -> Object:
+) -> g.Object:
     """An arrow of ``length`` mm from ``start`` (3,) along the unit ``direction`` (3,).
 
     Its shaft is ``thickness`` mm thick, by default in proportion.
     """
-    import trimesh
 
     radius = 0.035 * length if thickness is None else 0.5 * thickness
     head = min(8.5 * radius, 0.8 * length)
@@ -112,17 +104,15 @@ def arrow(
 
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
     """Several meshes as one."""
-    import trimesh
 
     made: trimesh.Trimesh = trimesh.util.concatenate(list(meshes))  # type: ignore[assignment]
     return made
 
 
-def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str = INK) -> Object:
+def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str = INK) -> g.Object:
     """A text on a rounded ground that always faces the viewer and keeps its size on the screen; ``at`` (3,) mm."""
-    from meshcat.geometry import GenericMaterial, ImageTexture, Object, PngImage, Sphere
 
-    class Sprite(Object):  # type: ignore[misc]
+    class Sprite(g.Object):  # type: ignore[misc]
         _type = "Sprite"
 
         def lower(self) -> dict[str, Any]:
@@ -132,7 +122,7 @@ def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str 
             data["object"] |= {"matrix": matrix.T.ravel().tolist(), "renderOrder": _FRONT + 1}
             return data
 
-    class SpriteMaterial(GenericMaterial):  # type: ignore[misc]
+    class SpriteMaterial(g.GenericMaterial):  # type: ignore[misc]
         _type = "SpriteMaterial"
 
     png, aspect = _text_image(text, colour, ink)
@@ -140,9 +130,9 @@ def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str 
     height = 100.0 * 0.014 * size
     matrix = np.diag([height * aspect, height, 1.0, 1.0])
     matrix[:3, 3] = at
-    picture = ImageTexture(PngImage(png))
+    picture = g.ImageTexture(g.PngImage(png))
     return Sprite(
-        Sphere(1.0),  # not sent
+        g.Sphere(1.0),  # not sent
         SpriteMaterial(map=picture, transparent=True, depthTest=False, depthWrite=False, sizeAttenuation=False),
     )
 
@@ -165,11 +155,10 @@ def _text_image(text: str, colour: str, ink: str) -> tuple[bytes, float]:
     return out.getvalue(), width / height
 
 
-def _phong(colour: str, **properties: Any) -> Material:
-    from meshcat.geometry import MeshPhongMaterial
+def _phong(colour: str, **properties: Any) -> g.Material:
 
     # Seen from both sides (meshcat's default): the inside of cut tubes and of overlays.
-    return MeshPhongMaterial(color=_number(colour), specular=0x222222, shininess=25, **properties)
+    return g.MeshPhongMaterial(color=_number(colour), specular=0x222222, shininess=25, **properties)
 
 
 def _number(colour: str) -> int:

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import Any
 
-from clamp3d.baselines.model import check_unit_angle
-from clamp3d.clamp.dimensions import Clamp, PartName
+import trimesh
+
+from clamp3d.baselines import contact_model
+from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.parts import parts
-from clamp3d.core.meshing import mesh
-from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
 
-if TYPE_CHECKING:
-    import trimesh
-
-MESH_ERROR = 0.05
-"""Chord error in mm of the meshes that are decomposed."""
-_KINDS = {"wedges": ("UNIT_ANGLE_DEG", 10.0), "hulls": ("THRESHOLD_MM", 2.0)}
+_KINDS = {
+    "wedges": ("UNIT_ANGLE_DEG", 10.0, "wedges of {:g} deg"),
+    "hulls": ("THRESHOLD_MM", 2.0, "hulls of CoACD at {:g} mm"),
+}
 
 
 def overlay(clamp: Clamp, text: str) -> tuple[str, dict[str, list[trimesh.Trimesh]]]:
@@ -36,34 +34,12 @@ def overlay(clamp: Clamp, text: str) -> tuple[str, dict[str, list[trimesh.Trimes
         raise InputError(
             f"unknown overlay {text!r}; available: {', '.join(f'{k}[={v[0]}]' for k, v in _KINDS.items())}"
         )
-    unit, value = _KINDS[kind]
+    unit, value, title = _KINDS[kind]
     try:
         value = float(size) if size else value
     except ValueError:
         raise InputError(f"overlay {kind}: {unit} must be a number, got {size!r}") from None
-    solids = parts(clamp)
-    names: dict[PartName, None] = dict.fromkeys(a for a, _ in groove_pairs(clamp))
-    if kind == "wedges":
-        unit_angle = check_unit_angle(math.radians(value))
-        return f"wedges of {value:g} deg", {name: _wedges(solids[name], unit_angle) for name in names}
-    return f"hulls of CoACD at {value:g} mm", {name: _hulls(solids[name], value) for name in names}
-
-
-def _wedges(part: Solid, unit_angle: float) -> list[trimesh.Trimesh]:
-    """The wedges of the convex partitioning of a part."""
-    import trimesh
-
-    from clamp3d.baselines.wedges import wedge_solids
-
-    return [trimesh.Trimesh(vertices, faces) for _, vertices, faces in wedge_solids(part, unit_angle)]
-
-
-def _hulls(part: Solid, threshold: float) -> list[trimesh.Trimesh]:
-    """The hulls that CoACD makes of a part's mesh, taken from the cache if it has them."""
-    import trimesh
-
-    from clamp3d.baselines.decomposition import DecompositionParameters, decompose
-
-    solid = mesh(part, MESH_ERROR)
-    made = decompose(solid.vertices, solid.faces, DecompositionParameters(threshold=threshold), name=part.name)
-    return [trimesh.Trimesh(hull.vertices, hull.faces) for hull in made.hulls]
+    setting: dict[str, Any] = {"unit_angle": math.radians(value)} if kind == "wedges" else {"threshold": value}
+    model: Any = contact_model(kind, parts(clamp), **setting)
+    made = {a: [shape.solid for shape in model.parts[a].shapes] for a, _ in groove_pairs(clamp)}
+    return title.format(value), {a: [trimesh.Trimesh(s.vertices, s.faces) for s in own] for a, own in made.items()}

@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import base64
-import importlib.util
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from clamp3d import __version__
-from clamp3d.errors import MissingLibraryError
 from clamp3d.output.pages import render
-from clamp3d.output.wording import gap_text
+from clamp3d.output.wording import distance_text
 
 
 def viewer_files() -> Path:
-    """Folder with meshcat's built viewer. Raises MissingLibraryError if meshcat is not installed."""
-    spec = importlib.util.find_spec("meshcat")
-    if spec is None or not spec.submodule_search_locations:
-        raise MissingLibraryError("the viewer needs meshcat: pip install meshcat")
-    return Path(spec.submodule_search_locations[0]) / "viewer" / "dist"
+    """Folder with meshcat's built viewer."""
+    import meshcat
+
+    return Path(meshcat.__file__).parent / "viewer" / "dist"
 
 
 def panel(context: dict[str, Any]) -> str:
     """What the page says beside the picture, as HTML that can be read without any script."""
-    return render("viewer.panel.html", **context, version=__version__, gap=gap_text, degrees=math.degrees)
+    return render("viewer.panel.html", **context, version=__version__, gap=distance_text, degrees=math.degrees)
 
 
 def live_page(title: str, told: str) -> str:

@@ -10,9 +10,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import trimesh
+from meshcat.commands import SetAnimation
+from meshcat.geometry import Object
 from numpy.typing import ArrayLike
 
 from clamp3d.clamp.forces import Force
@@ -27,14 +30,10 @@ from clamp3d.output.viewer_cut import cut_open, overlap
 from clamp3d.output.viewer_timeline import FIRST, Row, Stop, Timeline
 from clamp3d.output.wording import part_title
 
-if TYPE_CHECKING:
-    import trimesh
-    from meshcat.geometry import Object
-
 ROOT = "/clamp3d"
 Command = dict[str, Any]
 Send = Callable[[Command], None]
-Pieces = Mapping[str, Sequence["trimesh.Trimesh"]]
+Pieces = Mapping[str, Sequence[trimesh.Trimesh]]
 """Convex pieces of a baseline by part, each in its part's frame."""
 
 _SIZE = 2.5
@@ -126,8 +125,6 @@ class SceneDrawing:
 
     def play(self) -> None:
         """Rewind and play all stops once."""
-        from meshcat.commands import SetAnimation
-
         self.frame()
         self.go(0)
         followers = {name: self.paths(name) for name in self._meshes}

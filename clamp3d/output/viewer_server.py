@@ -12,14 +12,18 @@ import ipaddress
 import socket
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import tornado.httpserver
+import tornado.netutil
+import tornado.web
+import tornado.websocket
+import umsgpack
+import zmq
 
 from clamp3d.checks import shown, text, whole
 from clamp3d.errors import Clamp3dError, InputError
 from clamp3d.output.viewer_page import viewer_files
-
-if TYPE_CHECKING:
-    import tornado.web
 
 PORT = 7000
 """First port tried, meshcat's own; the next free one is taken unless the user named it."""
@@ -45,8 +49,6 @@ class CommandLog:
 
     def add(self, command: Command) -> bytes:
         """Keep ``command`` and return it as the message (msgpack) that the viewer reads."""
-        import umsgpack
-
         key = (command["type"], command["path"], command.get("property", ""))
         self._messages.pop(key, None)
         self._messages[key] = umsgpack.packb(command)
@@ -99,8 +101,6 @@ class LocalServer:
             runner.run(self._serve(sockets))
 
     async def _serve(self, sockets: list[socket.socket]) -> None:
-        import tornado.httpserver
-
         server = tornado.httpserver.HTTPServer(self._application())
         server.add_sockets(sockets)
         self._ready.set()
@@ -114,9 +114,6 @@ class LocalServer:
             client.ws_connection.stream.close()
 
     def _application(self) -> tornado.web.Application:
-        import tornado.web
-        import tornado.websocket
-
         owner = self
 
         class Own(tornado.web.RequestHandler):
@@ -164,10 +161,8 @@ class LocalServer:
 
 def _bind(host: str, port: int | None) -> list[socket.socket]:
     """Sockets on ``port``, or on the first free one. Raises InputError if there is none."""
-    import tornado.netutil
-
-    if port is not None and not 0 <= whole("port", port, least=0) <= 65535:
-        raise InputError(f"port must be from 0 to 65535, got {port}")
+    if port is not None:
+        whole("port", port, least=0, most=65535)
     try:  # once, not for every port
         socket.getaddrinfo(host or "(none)", None)
     except (OSError, ValueError):
@@ -189,8 +184,6 @@ class RemoteServer:
     """
 
     def __init__(self, zmq_url: str) -> None:
-        import zmq
-
         if not zmq_url.startswith(("tcp://", "ipc://")):
             raise InputError(f"--url must be the zmq_url that meshcat-server prints (tcp://HOST:PORT), got {zmq_url!r}")
         self.zmq_url, self._context = zmq_url, zmq.Context()
@@ -216,8 +209,6 @@ class RemoteServer:
         self._context.destroy(linger=0)
 
     def _ask(self, *frames: bytes) -> str:
-        import zmq
-
         try:
             self._socket.send_multipart(frames)
             answer: str = self._socket.recv().decode("utf-8", "replace")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from typing import TYPE_CHECKING
 
+from clamp3d.collide.distance import Distance
 from clamp3d.collide.result import BAD, CheckResult, PairResult
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.collide.verdict import Verdict
@@ -39,6 +40,11 @@ def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
     if math.isfinite(upper) and math.isfinite(lower):
         return f"gap or overlap at most {_rounded(max(upper, -lower), ROUND_CEILING)} mm"
     return f"gap at most {_rounded(upper, ROUND_CEILING)} mm" if math.isfinite(upper) else "not known"
+
+
+def distance_text(distance: Distance, *, digits: int = 6) -> str:
+    """`gap_text` of a distance's bounds."""
+    return gap_text(distance.lower, distance.upper, digits=digits)
 
 
 def _rounded(value: float, rounding: str) -> str:
@@ -129,7 +135,7 @@ def severity(result: CheckResult) -> str:
 def sentence(row: PairResult, names: dict[str, str]) -> str:
     """A finding in words."""
     a, b, d = names[row.a], names[row.b], row.distance
-    gap = gap_text(d.lower, d.upper)
+    gap = distance_text(d)
     said = {
         "contained": f"{a} and {b}: one lies inside the other, {gap}",
         "clash": f"{a} and {b} clash: {gap}",
@@ -151,6 +157,11 @@ def circumstances(row: PairResult) -> str:
     if row.where is not None:
         said.append(where_text(row.where))
     return "; ".join([*said, row.reason] if row.reason else said)
+
+
+def finding_text(row: PairResult, names: dict[str, str]) -> str:
+    """A finding in words, and where it is."""
+    return "; ".join(filter(None, (sentence(row, names), circumstances(row))))
 
 
 def where_text(where: Overlap) -> str:
@@ -181,11 +192,6 @@ def _tenths(value: float, rounding: str) -> str:
     near = round(value, 6) + 0.0
     text = f"{Decimal(repr(near)).quantize(Decimal('0.1'), rounding=rounding) + 0:f}"
     return text.removesuffix(".0")
-
-
-def counts_text(result: CheckResult) -> str:
-    """How many pairs have which verdict, in words."""
-    return ", ".join(f"{count} {name}" for name, count in result.counts.items()) or "no pairs"
 
 
 def worst_first(rows: Sequence[PairResult]) -> list[PairResult]:

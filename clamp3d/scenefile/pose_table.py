@@ -6,22 +6,24 @@ import math
 from typing import Annotated
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, nearest_rigid, rotation, turn_of
 
-FROZEN = ConfigDict(extra="forbid")
-"""Of every table: a key that is not known is an error."""
 _SNAP = 1e-4
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Vector = tuple[Number, Number, Number]
 Angle = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False, strict=True)]
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
-class Pose:
+class Table(BaseModel):
+    """A table of a scene file: a key that is not known is an error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Pose(Table):
     """A pose in the world: ``matrix`` (4 rows of 4, or 3 of 4), or ``translation`` with one kind of turn.
 
     ``rpy_deg``: roll, pitch, yaw about the fixed axes X, Y, Z in this order (URDF). ``axis`` with ``angle_deg``.

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
-from pydantic.dataclasses import dataclass
 
 from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import ClampPart, Length, Offset, check_conductor
@@ -19,11 +18,10 @@ from clamp3d.core.motion import Motion
 from clamp3d.core.primitives import SweptArc
 from clamp3d.errors import InputError
 from clamp3d.scenefile.parts import Parts, Reader, names_like, read_parts
-from clamp3d.scenefile.pose_table import FROZEN, Angle, Number, Pose, Vector
+from clamp3d.scenefile.pose_table import Angle, Number, Pose, Table, Vector
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
-class HoleTable:
+class HoleTable(Table):
     """A round hole right through, along y or z, at (x, z) or (x, y)."""
 
     radius: Length | None = None
@@ -41,8 +39,7 @@ class HoleTable:
         return shapes.Hole(_half(self.radius, self.diameter), self.at, self.axis)
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
-class GrooveTable:
+class GrooveTable(Table):
     """A further groove of a block, ``x`` mm beside the first one."""
 
     x: Offset
@@ -50,16 +47,13 @@ class GrooveTable:
     half_angle_deg: Annotated[float, Field(gt=0.0, lt=180.0, strict=True)]
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
-class _Placed:
+class _Placed(Table):
     pose: Pose = Field(default_factory=Pose)
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
 class CylinderTable(_Placed):
     """``shape = "cylinder"``: axis on z, centred; the diameter may be a conductor's."""
 
-    TAG: ClassVar[str] = "cylinder"
     shape: Literal["cylinder"]
     length: Length
     radius: Length | None = None
@@ -79,11 +73,9 @@ class CylinderTable(_Placed):
         return shapes.cylinder(_half(self.radius, diameter), self.length, bore=(self.bore_diameter or 0.0) / 2)
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
 class BoxTable(_Placed):
     """``shape = "box"``: centred, with round holes."""
 
-    TAG: ClassVar[str] = "box"
     shape: Literal["box"]
     size: tuple[Length, Length, Length]
     holes: list[HoleTable] = Field(default_factory=list)
@@ -93,11 +85,9 @@ class BoxTable(_Placed):
         return shapes.box(self.size, holes=[h.hole() for h in self.holes])
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
 class GrooveBlockTable(_Placed):
     """``shape = "groove-block"``: in the groove's frame, arc about the origin, axis on z, mouth to +y."""
 
-    TAG: ClassVar[str] = "groove-block"
     shape: Literal["groove-block"]
     radius: Length
     half_angle_deg: Annotated[float, Field(gt=0.0, lt=180.0, strict=True)]
@@ -115,11 +105,9 @@ class GrooveBlockTable(_Placed):
         return shapes.groove_block(groove, self.width, self.height, others=others, holes=holes)
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
 class ClampPartTable(_Placed):
     """``shape = "clamp-part"``: one of the seven parts of a clamp, in its own frame."""
 
-    TAG: ClassVar[str] = "clamp-part"
     shape: Literal["clamp-part"]
     part: ClampPart
     clamp: str = "reference"
@@ -133,11 +121,9 @@ class ClampPartTable(_Placed):
         return parts(load_clamp(clamp_source(self.clamp, folder), line=self.line, jumper=self.jumper))[self.part]
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
 class MeshTable(_Placed):
     """``shape = "mesh"``: a file of one body beside the scene, as a mesh; see `MeshShape` for ``fit``."""
 
-    TAG: ClassVar[str] = "mesh"
     shape: Literal["mesh"]
     file: str
     unit: Literal["mm", "cm", "m", "in"] | None = None
@@ -159,11 +145,9 @@ class MeshTable(_Placed):
         return shapes.MeshShape(body.shape.mesh, self.fit, self.file, self.chord)
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
 class FileTable(_Placed):
     """A ``file`` and no ``shape``: all bodies of it, as `clamp3d.load` reads them, moved by ``pose``."""
 
-    TAG: ClassVar[str] = "file"
     file: str
     unit: Literal["mm", "cm", "m", "in"] | None = None
     fit: shapes.Fit | None = None
@@ -179,8 +163,14 @@ class FileTable(_Placed):
         return read_parts(folder / self.file, Reader(poses=poses, **{key: getattr(self, key) for key in keys}))
 
 
-_TABLES = (CylinderTable, BoxTable, GrooveBlockTable, ClampPartTable, MeshTable, FileTable)
-TAGS = {f"shape {table.TAG}": table for table in _TABLES}
+TAGS: dict[str, type[Table]] = {
+    "shape cylinder": CylinderTable,
+    "shape box": BoxTable,
+    "shape groove-block": GrooveBlockTable,
+    "shape clamp-part": ClampPartTable,
+    "shape mesh": MeshTable,
+    "shape file": FileTable,
+}
 
 
 def _tag(data: Any) -> str | None:
@@ -200,13 +190,12 @@ PartTable = Annotated[
         _tag,
         custom_error_type="shape",
         custom_error_message="must have shape = one of "
-        + ", ".join(f'"{table.TAG}"' for table in _TABLES if table is not FileTable)
+        + ", ".join(f'"{tag[6:]}"' for tag in TAGS if tag != "shape file")
         + ", or a file",
     ),
 ]
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
 class ClampTable(_Placed):
     """``[clamp]``: the parts P1 to P7 of a clamp as `clamp3d run` leaves them; their connections are allowed."""
 
@@ -215,16 +204,14 @@ class ClampTable(_Placed):
     jumper: Any = None
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
-class AllowedTable:
+class AllowedTable(Table):
     """``[[allowed]]``: two part names, or patterns, that may touch, and overlap by ``overlap`` mm."""
 
     parts: tuple[str, str]
     overlap: Annotated[float, Field(ge=0.0, strict=True)] = 0.0
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
-class TurnTable:
+class TurnTable(Table):
     """A turn about an axis in the world, with travel along it: mm in all, or ``pitch`` mm a turn."""
 
     axis: Vector
@@ -242,8 +229,7 @@ class TurnTable:
         return self
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
-class MotionTable:
+class MotionTable(Table):
     """``[[motions]]``, one after another: ``parts`` move together by ``translate``, ``rotate``, ``screw`` or ``to``."""
 
     parts: Annotated[list[str], Field(min_length=1)]
@@ -275,8 +261,7 @@ class MotionTable:
         return Motion.screw(turn.axis, angle, point=turn.point, travel=travel, parts=parts, name=name)
 
 
-@dataclass(frozen=True, config=FROZEN, kw_only=True)
-class SceneTable:
+class SceneTable(Table):
     """The whole file."""
 
     unit: Literal["mm"] = "mm"

@@ -20,7 +20,7 @@ from clamp3d.core import shapes
 from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Array, make_mesh
 from clamp3d.core.pose import nearest_rigid
-from clamp3d.errors import InputError, MissingLibraryError
+from clamp3d.errors import InputError, need
 from clamp3d.scenefile.parts import Parts, Reader
 
 _ANY = 1e4
@@ -69,10 +69,9 @@ def read_urdf(path: Path, reader: Reader) -> Parts:
 
 def _robot(path: Path) -> Any:
     checks.readable_file(path, _MOST_BYTES)
-    try:
-        import yourdfpy
-    except ImportError:
-        raise MissingLibraryError("URDF needs yourdfpy: pip install 'clamp3d[urdf]'") from None
+    need("yourdfpy", "URDF")
+    import yourdfpy
+
     try:
         return yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True, load_collision_meshes=False)
     except Exception as error:  # it raises whatever lxml and its own parser meet

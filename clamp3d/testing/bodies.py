@@ -88,28 +88,34 @@ def _prism(across: Array, along: Array) -> Array:
 def _outline(profile: Profile) -> Callable[[Array], Array]:
     """Signed distance of points (n, 2) from an outline, from the definition of its segments and arcs."""
 
+    arcs = [edge for edge in profile.edges if isinstance(edge, Arc)]
+    edges = [edge for edge in profile.edges if not isinstance(edge, Arc)] + arcs
+    k = len(edges) - len(arcs)
+    # All edges at once: columns (edges, 1) of their numbers against rows of points.
+    su, sv, eu, ev = (np.array([(*edge.start, *edge.end) for edge in edges]).T)[..., None]
+    lu, lv = eu - su, ev - sv
+    square = (lu * lu + lv * lv)[:k]
+    given = [(*arc.centre, arc.radius, 0.5 * (arc.start_angle + arc.end_angle), arc.sweep) for arc in arcs]
+    mu, mv, radius, middle, sweep = np.array(given).reshape(-1, 5).T[..., None]
+    sign, whole = np.sign(sweep), np.abs(sweep) >= 2.0 * math.pi - 1e-9
+    closed = np.concatenate([np.zeros((k, 1), bool), whole])
+
     def distance(x: Array) -> Array:
-        least, turn = np.full(len(x), np.inf), np.zeros(len(x))
-        for edge in profile.edges:
-            start, end = np.array(edge.start), np.array(edge.end)
-            a, b = x - start, x - end
-            along = end - start
-            if isinstance(edge, Arc):
-                c = x - edge.centre
-                rho, off = np.hypot(*c.T), np.arctan2(c[:, 1], c[:, 0]) - 0.5 * (edge.start_angle + edge.end_angle)
-                on = np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi) <= 0.5 * abs(edge.sweep)
-                ends = np.minimum(np.hypot(*a.T), np.hypot(*b.T))
-                least = np.minimum(least, np.where(on, np.abs(rho - edge.radius), ends))
-                # Between an arc and its chord the arc turns once more round the point than the chord does.
-                side = (along[0] * a[:, 1] - along[1] * a[:, 0]) * np.sign(edge.sweep)
-                whole = abs(edge.sweep) >= 2.0 * math.pi - 1e-9
-                turn += np.sign(edge.sweep) * ((rho < edge.radius) & ((side < 0.0) | whole))
-                if whole:
-                    continue
-            else:
-                s = np.clip(a @ along / (along @ along), 0.0, 1.0)[:, None]
-                least = np.minimum(least, np.hypot(*(a - s * along).T))
-            turn += np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)) / (2.0 * math.pi)
+        u, v = x.T
+        au, av, bu, bv = u - su, v - sv, u - eu, v - ev
+        turn = np.where(closed, 0.0, np.arctan2(au * bv - av * bu, au * bu + av * bv)).sum(axis=0) / (2.0 * math.pi)
+        least = np.full(len(x), np.inf)
+        if k:
+            s = np.clip((au[:k] * lu[:k] + av[:k] * lv[:k]) / square, 0.0, 1.0)
+            least = np.hypot(au[:k] - s * lu[:k], av[:k] - s * lv[:k]).min(axis=0)
+        if arcs:
+            rho, off = np.hypot(u - mu, v - mv), np.arctan2(v - mv, u - mu) - middle
+            on = np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi) <= 0.5 * np.abs(sweep)
+            ends = np.minimum(np.hypot(au[k:], av[k:]), np.hypot(bu[k:], bv[k:]))
+            least = np.minimum(least, np.where(on, np.abs(rho - radius), ends).min(axis=0))
+            # Between an arc and its chord the arc turns once more round the point than the chord does.
+            side = (lu[k:] * av[k:] - lv[k:] * au[k:]) * sign
+            turn += (sign * ((rho < radius) & ((side < 0.0) | whole))).sum(axis=0)
         return np.asarray(np.where(np.round(turn) != 0, -least, least))
 
     return distance

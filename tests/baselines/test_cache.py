@@ -7,30 +7,25 @@ from hypothesis import strategies as st
 
 from clamp3d.baselines import cache
 
-ARRAYS = {"v0": np.arange(300.0).reshape(100, 3), "count": np.array(1)}
+ARRAYS = {"v0": np.arange(300.0).reshape(100, 3), "seconds": np.array(1.5)}
 
 
 @pytest.fixture
 def path(tmp_path, monkeypatch):
-    monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path))
-    cache.store("key", ARRAYS, {"seconds": 1.5})
-    return tmp_path / "key.npz"
+    monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path / "cache"))
+    np.savez(tmp_path / "made.npz", **ARRAYS)
+    cache.keep("key", tmp_path / "made.npz")
+    return tmp_path / "cache" / "key.npz"
 
 
 def same(found):
-    arrays, metadata = found
-    return (
-        metadata == {"seconds": 1.5}
-        and arrays.keys() == ARRAYS.keys()
-        and all(np.array_equal(arrays[key], ARRAYS[key]) for key in ARRAYS)
-    )
+    return found.keys() == ARRAYS.keys() and all(np.array_equal(found[key], ARRAYS[key]) for key in ARRAYS)
 
 
 @settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_a_damaged_entry_is_none_or_whole(path, data):
-    cache.store("key", ARRAYS, {"seconds": 1.5})
-    content = bytearray(path.read_bytes())
+    content = bytearray((path.parent.parent / "made.npz").read_bytes())
     for _ in range(data.draw(st.integers(1, 3))):
         at = data.draw(st.integers(0, len(content) - 1))
         content[at] = data.draw(st.integers(0, 255))
@@ -41,3 +36,4 @@ def test_a_damaged_entry_is_none_or_whole(path, data):
 
 def test_an_entry_is_found_again(path):
     assert same(cache.load("key"))
+    assert [file.name for file in path.parent.iterdir()] == ["key.npz"]

@@ -142,7 +142,7 @@ def test_worker_ends_when_its_caller_is_gone(tmp_path: Path) -> None:
 def test_crash_of_coacd_is_an_error_not_an_end() -> None:
     nan = Mesh("hull", np.full((8, 3), np.nan), F[:4] * 0, True)
     with pytest.raises(SolverError, match="CoACD gave no hulls for mesh"):
-        decomposition._run(nan, COARSE, "mesh", 60.0, False)
+        decomposition._run(nan, COARSE, "mesh", 60.0, False, None)
 
 
 @pytest.mark.parametrize(
@@ -169,9 +169,9 @@ def test_bad_mesh_never_reaches_coacd(
         ({"threshold": 0.0}, "threshold must be > 0, got 0"),
         ({"threshold": math.nan}, "threshold must be > 0"),
         ({"threshold": 2.0, "real_metric": False}, "threshold must be <= 1 without real_metric"),
-        ({"preprocess_mode": "of"}, "unknown preprocess_mode 'of'; available: auto, on, off"),
-        ({"mcts_nodes": 0}, "mcts_nodes must be from 1 to 1000, got 0"),
-        ({"seed": -1}, "seed must be from 0"),
+        ({"preprocess_mode": "of"}, "preprocess_mode must be one of auto, on, off, got 'of'"),
+        ({"mcts_nodes": 0}, "mcts_nodes must be a whole number from 1 to 1000, got 0"),
+        ({"seed": -1}, "seed must be a whole number from 0"),
         ({"max_convex_hull": 0}, "max_convex_hull must be >= 1"),
     ],
 )

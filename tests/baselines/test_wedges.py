@@ -114,5 +114,3 @@ def test_unit_angle_and_part_are_checked() -> None:
         part_wedges(clamp["P6"], 0.1)
     with pytest.raises(InputError, match="part P4 must be one body"):
         part_wedges(clamp["P4"], 0.1)
-    with pytest.raises(InputError, match=r"block depth must be > 7\.8957"):
-        grooved_block(SweptArc(12.0, math.radians(70.0), 60.0), width=137.0, depth=7.0)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from clamp3d.bench import published
 from clamp3d.bench.reproduce import ConnectionRow, Reproduction, connection_rows, reproduce
 from clamp3d.bench.reproduce_report import reproduction_to_dict, reproduction_to_text
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
+from clamp3d.cli import group
 
 
 @pytest.fixture(scope="module")
@@ -91,3 +95,23 @@ def test_orders_that_the_counts_refute(found: Reproduction) -> None:
     }
     data = reproduction_to_dict(found)
     assert [row["refuted"] for row in data["table5_orders"]] == list(refuted.values())
+
+
+def test_the_command_matches_the_paper(found: Reproduction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("clamp3d.bench.reproduce.reproduce", lambda progress: found)
+    path = tmp_path / "r.json"
+    done = CliRunner().invoke(group, ["reproduce", "--json", str(path)])
+    assert done.exit_code == 0, done.output
+    assert "DIFFERS" not in done.stdout
+    data = json.loads(path.read_text())
+    stepped = {r["unit_angle_deg"]: r for r in data["table4"] if r["solver"] == "stepped"}
+    assert stepped[None]["distance_mm"] == pytest.approx(published.CAS_DISTANCE, abs=0.002)
+    for unit, distance in published.CHORD_DISTANCES.items():
+        assert stepped[unit]["distance_mm"] == pytest.approx(distance, abs=0.002)
+        assert stepped[unit]["published_mm"] == distance
+    assert {r["solver"] for r in data["table4"]} == {"stepped", "exact"}
+    for row in data["final_state"]:
+        assert row["x"] == pytest.approx(row["published_x"], abs=5e-4)
+        assert row["y"] == pytest.approx(row["published_y"], abs=5e-4)
+        assert row["angle_deg"] == pytest.approx(row["published_angle_deg"], abs=0.01)
+    assert "1/3 mm" in data["plateau"]

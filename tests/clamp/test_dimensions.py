@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from clamp3d.clamp.dimensions import Wire
@@ -26,3 +27,97 @@ def test_wrong_values_in_python_are_one_line_too(make, message):
     with pytest.raises(InputError) as found:
         make(load_clamp())
     assert str(found.value) == message
+
+
+def _changed(thing, path, value):
+    """The thing with the value at a dotted path replaced."""
+    name, _, rest = path.partition(".")
+    return replace(thing, **{name: _changed(getattr(thing, name), rest, value) if rest else value})
+
+
+def _half_mouth(radius, into):
+    """Half of the widest place of a groove whose centre lies ``into`` the material, by points of its circle."""
+    turn = np.linspace(-math.pi, math.pi, 2_000_001)
+    return radius * np.abs(np.sin(turn))[radius * np.cos(turn) <= into + 1e-9].max()
+
+
+_UP, _DOWN = _half_mouth(23.8012, 27.726 - 48.7901), _half_mouth(23.8012, 3.4624 - 24.5505)
+_EDGE = math.hypot(22.0, math.sqrt(49.23**2 - 22.0**2) - 1.23), math.atan2(22.0, math.sqrt(49.23**2 - 22.0**2) - 1.23)
+_FLAT = 48.0 * math.cos(math.radians(40.0))
+
+
+@pytest.mark.parametrize(
+    ("path", "limit", "side", "message"),
+    [
+        ("up_splint.line_groove.offset", 68.5 - _UP, -1, "line_groove: the arc leaves the splint at its edge"),
+        ("up_splint.jumper_groove.offset", 11.0 + _UP, 1, "jumper_groove: the arc meets the bolt hole"),
+        ("up_splint.line_groove.centre_depth", 27.726 + 23.8012, -1, "line_groove: the arc does not reach its face"),
+        ("down_splint.jumper_groove.offset", 68.5 - _half_mouth(23.8012, 4.9057 - 24.5505), -1, "the arc leaves"),
+        ("down_splint.line_groove.offset", 21.0 + _DOWN, 1, "line_groove: the arc meets the bolt hole"),
+        ("down_splint.line_groove.centre_depth", 24.5505 - 23.8012, 1, "line_groove: the arc does not reach its face"),
+        ("down_splint.line_groove.centre_depth", _FLAT - 23.8012, -1, "line_groove: the arc cuts the underside"),
+        ("down_splint.face_depth", _FLAT, -1, "face_depth must be above the flat underside"),
+        ("down_splint.width", 96.0 * math.sin(math.radians(40.0)), 1, "width must be >= the round back's"),
+        ("down_splint.slot_length", 20.0, 1, "down_splint.slot_length must be > bolt.diameter"),
+        ("down_splint.slot_width", 20.0, 1, "down_splint.slot_width must be > bolt.diameter"),
+        ("down_splint.back_half_angle_deg", math.degrees(_EDGE[1]), 1, "back_half_angle_deg must be >= 27"),
+        (
+            "down_splint.max_tilt_deg",
+            math.degrees(math.acos(_FLAT / _EDGE[0]) - _EDGE[1]),
+            -1,
+            "where the saddle's edge stops the tilt",
+        ),
+        ("saddle.width", 2.0 * 49.23, -1, "width must be < 2 radius"),
+        ("saddle.hole_diameter", 44.0, -1, "hole_diameter must be < width"),
+        ("saddle.hole_diameter", 20.0, 1, "saddle.hole_diameter must be > bolt.diameter"),
+        ("saddle.radius", 48.0, 1, "saddle.radius must be > down_splint.back_radius"),
+        ("up_splint.hole_diameter", 20.0, 1, "up_splint.hole_diameter must be > bolt.diameter"),
+        ("nut.across_flats", 20.0, 1, "nut.across_flats must be > bolt.diameter"),
+        ("line.diameter", 2.0 * 137.0, -1, "line: the diameter must be less than twice up_splint.width"),
+        ("jumper.diameter", 2.0 * 137.0, -1, "jumper: the diameter must be less than twice up_splint.width"),
+    ],
+)
+def test_each_rule_holds_up_to_its_limit_and_no_further(path, limit, side, message):
+    """Which follows from where the bodies meet; ``side``: whether the value must be above the limit or below."""
+    clamp = load_clamp(line=30.0, jumper=30.0)
+
+    def complaint(value):
+        try:
+            _changed(clamp, path, value)
+        except InputError as error:
+            return str(error)
+        return ""
+
+    assert message in complaint(limit * (1.0 - 1e-6 * side))
+    assert message not in complaint(limit * (1.0 + 1e-6 * side))
+
+
+def test_a_groove_deeper_than_half_is_widest_inside_the_splint():
+    """Its centre lies in the material: there its whole radius counts, not its mouth. And it must not cut the top."""
+    up = load_clamp().up_splint
+    wide = _half_mouth(23.8012, 60.0 - 52.274)
+    assert wide == pytest.approx(23.8012, abs=1e-9)
+
+    def made(offset, depth=52.274):
+        groove = replace(up.line_groove, centre_depth=depth, offset=offset)
+        replace(up, thickness=60.0, line_groove=groove, jumper_groove=groove)
+
+    for offset, out, message in ((68.5 - wide, 1e-6, "leaves the splint"), (11.0 + wide, -1e-6, "meets the bolt hole")):
+        made(offset - out)
+        with pytest.raises(InputError, match=message):
+            made(offset + out)
+    made(40.0, 60.0 - 23.8012 + 1e-6)
+    with pytest.raises(InputError, match="does not reach its face"):
+        made(40.0, 60.0 - 23.8012 - 1e-6)
+
+
+def test_a_groove_must_not_cut_the_top_face():
+    up = load_clamp().up_splint
+
+    def made(depth):
+        groove = replace(up.line_groove, centre_depth=depth, offset=40.0)
+        replace(up, thickness=30.0, line_groove=groove, jumper_groove=groove)
+
+    made(23.8012 + 1e-6)
+    with pytest.raises(InputError, match="the arc cuts the top face"):
+        made(23.8012 - 1e-6)

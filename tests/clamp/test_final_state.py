@@ -17,8 +17,8 @@ from clamp3d.clamp.conductors import catalogue
 from clamp3d.clamp.final_state import TOLERANCE, _settle_loose, solve_final_state
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts as clamp_parts
-from clamp3d.clamp.section import SIZE, Section
-from clamp3d.clamp.stepped import solve_stepped
+from clamp3d.clamp.section import SIZE, D, Section
+from clamp3d.clamp.stepped import solve_bisection, solve_stepped
 from clamp3d.errors import InputError, SolverError
 
 # Reference clamp, exact distances with each arc replaced by chords; computed independently to +-0.002 mm.
@@ -91,6 +91,24 @@ def test_stepped_distance_is_table_4(clamp, unit):
     assert math.degrees(section.down_splint(found.q).angle) == pytest.approx(12.0)
     assert found.motion_steps > 0
     assert section.queries.contact > found.motion_steps
+
+
+def test_bisection_ends_within_its_resolution_of_the_exact_state(clamp):
+    section = Section(clamp, Cas())
+    least = solve_final_state(section).q[D]
+    steps = {}
+    for resolution in (0.05, 1e-3):
+        tried = []
+        found = solve_bisection(
+            section, resolution=resolution, step=STEP, tilt_step=TILT_STEP, progress=lambda *a, t=tried: t.append(a)
+        )
+        assert -1e-9 <= found.q[D] - least <= resolution
+        assert found.gaps.value.min() >= -1e-9
+        assert [made for made, _ in tried] == sorted({made for made, _ in tried})
+        assert found.motion_steps >= tried[-1][0]
+        assert tried[-1][1] == pytest.approx(found.q[D], abs=1e-12)
+        steps[resolution] = found.motion_steps
+    assert steps[1e-3] > steps[0.05] > solve_stepped(section, step=STEP, tilt_step=TILT_STEP).motion_steps
 
 
 def test_gradients_agree_with_differences(clamp):

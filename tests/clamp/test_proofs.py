@@ -1,5 +1,6 @@
 """What the proof of a final state rests on, each part alone: a step less and a wrong answer would be called proven."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -100,6 +101,8 @@ def test_a_splint_that_turns_past_a_wire_meets_it_between_two_waypoints():
     beside = (0.7 * reach, 0.0)
     turned = path(0.9, -0.9, beside)  # the splint lies along x when it is level
     assert meetings(clamp, turned, [("P1", "P6")], ModelCache()) == {("P1", "P6"): "P1 (after)"}
+    for pairs in itertools.permutations([("P1", "P6"), ("P1", "P5"), ("P1", "P4")]):  # the others are far away
+        assert meetings(clamp, turned, pairs, ModelCache()) == {("P1", "P6"): "P1 (after)"}
     away = path(0.9, -0.9, (0.7 * reach, 4.0 * reach))
     assert meetings(clamp, away, [("P1", "P6")], ModelCache()) == {}
     assert meetings(clamp, path(0.9, 0.9, beside), [("P1", "P6")], ModelCache()) == {}

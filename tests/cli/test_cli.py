@@ -76,27 +76,8 @@ def test_a_clamp_that_does_not_close_is_a_finding():
         (["run", "--json"], "requires an argument"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_code_2(arguments, message):
-    done = clamp3d(*arguments)
-    assert done.returncode == 2
-    assert message in done.stderr.splitlines()[-1]
-    assert "Traceback" not in done.stderr
-
-
-def test_reproduce_matches_the_paper(tmp_path):
-    path = tmp_path / "r.json"
-    done = clamp3d("reproduce", "--json", path)
-    assert done.returncode == 0, done.stderr
-    assert "DIFFERS" not in done.stdout
-    data = json.loads(path.read_text())
-    stepped = {r["unit_angle_deg"]: r for r in data["table4"] if r["solver"] == "stepped"}
-    assert stepped[None]["distance_mm"] == pytest.approx(published.CAS_DISTANCE, abs=0.002)
-    for unit, distance in published.CHORD_DISTANCES.items():
-        assert stepped[unit]["distance_mm"] == pytest.approx(distance, abs=0.002)
-        assert stepped[unit]["published_mm"] == distance
-    assert {r["solver"] for r in data["table4"]} == {"stepped", "exact"}
-    for row in data["final_state"]:
-        assert row["x"] == pytest.approx(row["published_x"], abs=5e-4)
-        assert row["y"] == pytest.approx(row["published_y"], abs=5e-4)
-        assert row["angle_deg"] == pytest.approx(row["published_angle_deg"], abs=0.01)
-    assert "1/3 mm" in data["plateau"]
+def test_bad_input_is_one_line_and_exit_code_2(arguments, message, main):
+    code, _, err = main(*arguments)
+    assert code == 2
+    assert message in err.splitlines()[-1]
+    assert "Traceback" not in err

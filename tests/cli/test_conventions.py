@@ -35,13 +35,6 @@ def every_command():
     return {name: cli.group.get_command(context, name) for name in cli.COMMANDS}
 
 
-def main(monkeypatch, capsys, *arguments):
-    monkeypatch.setattr(sys, "argv", ["clamp3d", *map(str, arguments)])
-    with pytest.raises(SystemExit) as stop:
-        cli.main()
-    return stop.value.code, *capsys.readouterr()
-
-
 class TestFiles:
     def test_every_file_option_writes_to_stdout_for_a_dash(self):
         options = [
@@ -105,42 +98,42 @@ class TestExitCodes:
         assert (done.returncode, data["clean"]) == (3, False)
         assert clamp3d("report", scene, "--output", tmp_path / "report", "-q").returncode == 3
 
-    def test_a_fault_of_the_program_is_one_line_and_no_finding(self, monkeypatch, capsys):
+    def test_a_fault_of_the_program_is_one_line_and_no_finding(self, monkeypatch, main):
         def fail(*args, **kwargs):
             return [][1]
 
         monkeypatch.setattr("clamp3d.clamp.conductors.catalogue", fail)
-        code, out, err = main(monkeypatch, capsys, "conductors")
+        code, out, err = main("conductors")
         assert (code, out) == (4, "")
         assert err.startswith("clamp3d: error: inside clamp3d: IndexError: list index out of range")
         assert len(err.splitlines()) == 1
         monkeypatch.setenv("CLAMP3D_DEBUG", "1")
-        code, out, err = main(monkeypatch, capsys, "conductors")
+        code, out, err = main("conductors")
         assert code == 4
         assert "Traceback (most recent call last)" in err
 
-    def test_out_of_memory_is_no_finding(self, monkeypatch, capsys):
+    def test_out_of_memory_is_no_finding(self, monkeypatch, main):
         def fail(*args, **kwargs):
             raise MemoryError
 
         monkeypatch.setattr("clamp3d.clamp.conductors.catalogue", fail)
-        code, out, err = main(monkeypatch, capsys, "conductors")
+        code, out, err = main("conductors")
         assert (code, out, err.count("\n")) == (4, "", 1)
         assert "MemoryError" in err
 
-    def test_a_solver_without_proof(self, monkeypatch, capsys):
+    def test_a_solver_without_proof(self, monkeypatch, main):
         def fail(*args, **kwargs):
             raise SolverError("optimality is 1e-3")
 
         monkeypatch.setattr("clamp3d.clamp.conductors.catalogue", fail)
-        assert main(monkeypatch, capsys, "conductors") == (4, "", "clamp3d: error: optimality is 1e-3\n")
+        assert main("conductors") == (4, "", "clamp3d: error: optimality is 1e-3\n")
 
-    def test_interrupted(self, monkeypatch, capsys):
+    def test_interrupted(self, monkeypatch, main):
         def fail(*args, **kwargs):
             raise KeyboardInterrupt
 
         monkeypatch.setattr("clamp3d.clamp.conductors.catalogue", fail)
-        assert main(monkeypatch, capsys, "conductors") == (130, "", "\nclamp3d: interrupted\n")
+        assert main("conductors") == (130, "", "\nclamp3d: interrupted\n")
 
 
 class TestClosedPipe:
@@ -204,7 +197,7 @@ class TestNumbers:
         assert np.round(steps[0]["distance_mm"], 3) == 31.530
 
 
-def test_a_warning_is_one_line_on_stderr(monkeypatch, capsys):
+def test_a_warning_is_one_line_on_stderr(monkeypatch, main):
     """Without the file, the category and the line of source that Python's own form shows."""
 
     def mended():
@@ -212,5 +205,5 @@ def test_a_warning_is_one_line_on_stderr(monkeypatch, capsys):
         return {}
 
     monkeypatch.setattr("clamp3d.clamp.conductors.catalogue", mended)
-    code, _, err = main(monkeypatch, capsys, "conductors")
+    code, _, err = main("conductors")
     assert (code, err) == (0, "warning: T_world has rounding errors\\nof 1e-6\n")

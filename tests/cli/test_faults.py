@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+from clamp3d.baselines.cache import cache_dir
+
 BOX = '[parts.{name}]\nshape = "box"\nsize = [10, 10, 10]\npose = {{ translation = [{x}, 0, 0] }}\n'
 MOTION = '[[motions]]\nname = {name}\nparts = ["b"]\ntranslate = [5, 0, 0]\n'
 COMMAND = [sys.executable, "-m", "clamp3d"]
@@ -108,7 +110,11 @@ class TestEnd:
         """The decomposition of a splint takes tens of seconds in a process of its own, with files in a folder."""
         temporary = tmp_path / "tmp"
         temporary.mkdir()
-        env = {"TMPDIR": str(temporary), "CLAMP3D_CACHE": str(tmp_path / "cache")}
+        cache = tmp_path / "cache"  # with the compiled kernels, without decompositions
+        cache.mkdir()
+        for kernel in cache_dir().glob("kernel-*.o"):
+            (cache / kernel.name).symlink_to(kernel)
+        env = {"TMPDIR": str(temporary), "CLAMP3D_CACHE": str(cache)}
         env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **env}
         with subprocess.Popen(
             [*COMMAND, "run", "-q", "--method", "hulls"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=env

@@ -59,17 +59,21 @@ def features(*wanted):
         pytest.skip(f"this processor has no {', '.join(lacking)}")
 
 
+PLAIN = "X86_V3 X86_V4 AVX512_ICL AVX512_SPR AVX2 FMA3 AVX512F"
+"""What NumPy is to do without: its kernels for SSE then."""
+
+
 @pytest.mark.parametrize(
-    ("core", "needed"), [("Nehalem", ()), ("Haswell", ("AVX2", "FMA3")), ("SkylakeX", ("AVX512F", "AVX512_SKX"))]
+    ("core", "needed", "others"),
+    [
+        ("Nehalem", ("AVX2",), {"NPY_DISABLE_CPU_FEATURES": PLAIN}),
+        ("Haswell", ("AVX2", "FMA3"), {}),
+        ("SkylakeX", ("AVX512F", "AVX512_SKX"), {}),
+    ],
 )
-def test_results_do_not_depend_on_the_kernels_of_blas(core, needed):
+def test_results_do_not_depend_on_the_kernels_of_blas_and_numpy(core, needed, others):
     features(*needed)
-    assert results(OPENBLAS_CORETYPE=core) == results()
-
-
-def test_results_do_not_depend_on_the_kernels_of_numpy():
-    features("AVX2")
-    assert results(NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR AVX2 FMA3 AVX512F") == results()
+    assert results(OPENBLAS_CORETYPE=core, **others) == results()
 
 
 def test_results_do_not_depend_on_threads():

@@ -8,8 +8,6 @@ import sys
 import pytest
 import trimesh
 
-from clamp3d import cli
-
 BOXES = """
 [parts.a]
 shape = "box"
@@ -23,18 +21,11 @@ pose = { translation = [9.5, 0, 0], rpy_deg = [0, 30, 10] }
 
 
 @pytest.fixture
-def call(tmp_path, monkeypatch, capsys):
+def call(tmp_path, monkeypatch, main):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(BOXES)
     trimesh.creation.icosphere(subdivisions=2, radius=5.0).export(tmp_path / "ball.stl")
-
-    def run(*arguments):
-        monkeypatch.setattr("sys.argv", ["clamp3d", *arguments])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        return stop.value.code, capsys.readouterr()
-
-    return run
+    return main
 
 
 @pytest.mark.parametrize(
@@ -54,9 +45,9 @@ def call(tmp_path, monkeypatch, capsys):
 def test_every_value_is_found_again(call, tmp_path, arguments, kept):
     call(*arguments, "--json", "result.json")
     assert json.loads((tmp_path / "result.json").read_text())["command"] == kept
-    code, said = call("verify", "result.json", "--tolerance", "0")
-    assert (code, said.err) == (0, "")
-    assert said.out.endswith("values computed again, all equal\n")
+    code, out, err = call("verify", "result.json", "--tolerance", "0")
+    assert (code, err) == (0, "")
+    assert out.endswith("values computed again, all equal\n")
 
 
 @pytest.mark.parametrize(
@@ -89,9 +80,9 @@ def test_a_changed_value_is_a_finding(call, tmp_path):
     data["clean"] = True
     del data["thresholds"]["contact_mm"]
     file.write_text(json.dumps(data))
-    code, said = call("verify", "result.json")
+    code, out, _ = call("verify", "result.json")
     assert code == 1
-    lines = said.out.splitlines()
+    lines = out.splitlines()
     assert lines[:3] == [
         "thresholds.contact_mm: nothing in the file, 0.01 now",
         "clean: True in the file, False now",
@@ -100,7 +91,7 @@ def test_a_changed_value_is_a_finding(call, tmp_path):
     assert (
         "3 differ by more than 1e-09; the largest difference of a number is 1e-06, of parts.a.T_world.0.3" in lines[3]
     )
-    assert call("verify", "result.json", "--tolerance", "1e-5")[1].out.splitlines()[0].startswith("thresholds")
+    assert call("verify", "result.json", "--tolerance", "1e-5")[1].splitlines()[0].startswith("thresholds")
 
 
 @pytest.mark.parametrize(
@@ -115,12 +106,12 @@ def test_a_changed_value_is_a_finding(call, tmp_path):
 )
 def test_what_is_no_result_is_bad_input(call, tmp_path, text, rule):
     (tmp_path / "result.json").write_text(text)
-    code, said = call("verify", "result.json")
-    assert (code, said.out) == (2, "")
-    assert rule in said.err
-    assert len(said.err.splitlines()) == 1
+    code, out, err = call("verify", "result.json")
+    assert (code, out) == (2, "")
+    assert rule in err
+    assert len(err.splitlines()) == 1
 
 
 def test_a_file_that_is_not_there(call):
-    code, said = call("verify", "none.json")
-    assert (code, said.err) == (2, "clamp3d: error: none.json: cannot be read: No such file or directory\n")
+    code, _, err = call("verify", "none.json")
+    assert (code, err) == (2, "clamp3d: error: none.json: cannot be read: No such file or directory\n")

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from clamp3d.collide import swept_mesh
 from clamp3d.collide.check import check
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.motions import first_contact
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.swept_mesh import Standing, swept_gap
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
 from clamp3d.core.distance import signed_distances
@@ -207,18 +205,3 @@ def test_first_contact_of_meshes_does_not_depend_on_what_slides_close_by(kind, g
     assert hit.touches
     assert 0.0 <= (truth - hit.t) * length <= 2e-4
     assert hit.evaluations < 1000
-
-
-def test_a_bead_that_a_face_passes_over_is_met(monkeypatch):
-    """No triangle of the swept hull's surface comes near it: it is inside."""
-    bead = trimesh.creation.box(bounds=[(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)])
-    inside = Standing(bead.triangles, np.zeros(12), bead.bounds[None])
-    face, way = np.array([[(-9.0, -9.0, 5.0), (9.0, -9.0, 5.0), (0.0, 9.0, 5.0)]]), Motion.translate((0.0, 0.0, -10.0))
-    assert swept_gap(inside, face, np.zeros(1), way, (0.0, 1.0), 1.0) == -np.inf
-    assert swept_gap(inside, face, np.zeros(1), way, (0.0, 0.4), 9.0) == pytest.approx(0.9, abs=1e-9)
-    assert swept_gap(inside, face, np.full(1, 0.2), way, (0.0, 0.4), 9.0) == pytest.approx(0.7, abs=1e-9)
-    # Too many for their hulls: 5 - 0.1 - 2 in the middle, less the 2 mm that it moves to either side.
-    monkeypatch.setattr(swept_mesh, "_MOST", 0)
-    assert swept_gap(inside, face, np.zeros(1), way, (0.0, 0.4), 9.0) == pytest.approx(0.9, abs=1e-9)
-    turn = Motion.screw((1.0, 0.0, 0.0), 0.1)
-    assert swept_gap(inside, face, np.zeros(1), turn, (0.0, 1.0), 9.0) <= 4.9

@@ -8,13 +8,10 @@ from hypothesis import HealthCheck, Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
 from clamp3d import first_contact, min_clearance, shapes
-from clamp3d.collide import swept_mesh
 from clamp3d.collide.distance import distance
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.moving_pair import MovingPair
 from clamp3d.collide.swept import swept_lower
-from clamp3d.collide.swept_mesh import Standing, swept_gap
-from clamp3d.core.linear import to_target
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
@@ -34,10 +31,6 @@ screws = st.builds(
     vector,
     st.floats(-25.0, 25.0),
 )
-turns = st.builds(
-    lambda axis, angle, by: Motion.screw(axis, angle, travel=by), vector, st.floats(-2.5, 2.5), st.floats(-5, 5)
-)
-share = st.floats(0.0, 1.0)
 straight = st.builds(lambda by: Motion.translate(np.multiply(40.0, by)), vector)
 ways = st.one_of(screws, straight)
 
@@ -192,31 +185,3 @@ def test_both_meshes_may_be_off_by_what_they_state():
     a, b = (CACHE.model(shapes.MeshShape(box, "off", name, error)) for name, error in (("a", 0.3), ("b", 0.4)))
     pair = MovingPair(a, b, Motion.translate((0.0, 0.0, 0.0)), np.eye(4), translation(15.0, 0.0, 0.0))
     assert pair.by_meshes(0.0, 0.0, 10.0) == pytest.approx(5.0 - 0.3 - 0.4, abs=1e-6)
-
-
-@settings(SLOW, max_examples=100)
-@given(
-    st.one_of(straight, turns),
-    st.integers(0, 10**6),
-    st.sampled_from([3000, 0]),
-    st.sampled_from([0.0, 1.0]),
-    st.floats(0.0, 0.7),
-)
-def test_swept_triangles_keep_the_distance_that_is_said(way, seed, most, error, begin):
-    """At no time of the stretch are points of two triangles nearer than that and how far both may be off."""
-    rng = np.random.default_rng(seed)
-    m, n = rng.integers(1, 4, 2)
-    still = 6.0 * rng.normal(size=(m, 1, 3)) + rng.choice([0.3, 3.0]) * rng.normal(size=(m, 3, 3))
-    moving = 3.0 * rng.normal(size=(n, 1, 3)) + 4.0 * rng.normal(size=(n, 3, 3))
-    off, moving_off = error * rng.uniform(size=m), error * rng.uniform(size=n)
-    standing = Standing(still, off, np.stack([still.min(axis=1), still.max(axis=1)], axis=1))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(swept_mesh, "_MOST", most)
-        gap = swept_gap(standing, moving, moving_off, way, (begin, begin + 0.3), 6.0)
-    assert gap <= 6.0
-    weights = rng.dirichlet(np.full(3, 0.3), 40)
-    p, q = weights @ still, weights @ moving
-    for t in np.linspace(begin, begin + 0.3, 5):
-        at = to_target(pose_at(way, t, np.eye(4)), q.reshape(-1, 3)).reshape(q.shape)
-        apart = np.linalg.norm(p[:, None, :, None] - at[None, :, None], axis=-1).min(axis=(2, 3))
-        assert gap <= (apart - off[:, None] - moving_off).min() + 1e-9

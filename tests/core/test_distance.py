@@ -82,6 +82,30 @@ def test_batch_has_the_bits_of_single():
             assert np.array_equal(getattr(one, name), getattr(full, name)[i]), name
 
 
+@pytest.mark.parametrize(
+    ("tilt", "middle", "spread"),
+    [
+        (0.0, (0.0, 0.0, 0.0), 1.0),
+        (0.0, (0.0, 0.0, 62.0), 8.0),
+        (0.03, (0.0, 0.0, 0.0), 1.0),
+        (0.3, (0.0, 0.0, 40.0), 3.0),
+        (0.3, (0.0, 30.0, 0.0), 2.0),
+        (1.5, (30.0, 0.0, 0.0), 5.0),
+        (1.5, (0.0, 0.0, 0.0), 20.0),
+    ],
+)
+def test_batch_of_poses_that_are_alike_has_the_bits_of_single(tilt, middle, spread):
+    """Whole blocks of poses leave out what none of them needs; the last block is shorter."""
+    rng = np.random.default_rng(1)
+    poses = np.array([rotation((*rng.normal(size=2), 0.0), rng.uniform(0.0, tilt)) for _ in range(421)])
+    poses[:, :3, 3] = middle + spread * rng.normal(size=(len(poses), 3))
+    for half_angle in (0.5, 1.2, 2.0):
+        for wire in (Capsule(10.5, 80.0), Cylinder(10.5, 80.0), Capsule(3.0, 10.0), Cylinder(3.0, 10.0)):
+            groove = SweptArc(12.0, half_angle, 50.0)
+            one_by_one = [signed_distance(groove, wire, pose).distance for pose in poses[::5]]
+            assert signed_distances(groove, wire, poses)[::5].tolist() == one_by_one
+
+
 @pytest.mark.parametrize("wire", [Capsule(10.5, 80.0), Cylinder(10.5, 20.0)])
 def test_position_and_axis_alone_have_the_bits_of_poses(wire):
     rng = np.random.default_rng(1)

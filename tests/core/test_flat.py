@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clamp3d.bench.stress.poses.flat_truth import flat_truth
-from clamp3d.core import kernel_edges
+from clamp3d.core import kernel_edges, kernel_flat
 from clamp3d.core.distance import Feature, signed_distance, signed_distances
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
@@ -153,6 +153,45 @@ def test_ends_before_an_end_face(T, wanted, feature):
     found = signed_distance(SweptArc(12.0, math.radians(70.0), 60.0), Cylinder(10.5, 80.0), T)
     assert found.distance == pytest.approx(wanted, abs=1e-13)
     assert found.feature is feature
+
+
+@pytest.mark.parametrize("feature", list(Feature))
+def test_normals_and_rates_at_points_of_every_feature(feature):
+    """Outside from the point to the cylinder; inside to its side or end, and where both are as near between the two."""
+    rng, s, h = np.random.default_rng(int(feature)), 12.0 * math.sin(1.2), -12.0 * math.cos(1.2)
+    tied = 0
+    for k in range(300):
+        q, r, l = rng.normal(size=3) * 12.0, 3.0, 5.0  # noqa: E741
+        if feature == Feature.ARC:
+            q[:2] *= 12.0 / np.hypot(*q[:2])
+        d = np.eye(3)[k % 3] if k % 2 else rng.normal(size=3)
+        d /= np.linalg.norm(d)
+        across = np.cross(d, rng.normal(size=3) if k % 5 else np.roll(np.eye(3)[k % 3], 1))
+        across /= np.linalg.norm(across)
+        e, g = rng.choice([-1.0, 0.5, -4.0]), rng.choice([-1.0, 0.5, -0.25])
+        if k % 3 == 0:
+            e = g = -1.0
+        at = rng.choice([-1.0, 1.0]) * (l + e)
+        c = q - at * d - (r + g) * across
+        f = math.hypot(max(g, 0.0), max(e, 0.0)) or max(g, e)
+        *found, t = kernel_flat.witness(f, *q, int(feature), 12.0, s, h, r, l, *c, *d, 1e-14)
+        normal, rate = np.array(found[:3]), np.array(found[3:])
+        assert t == pytest.approx(at, abs=1e-12)
+        end, side = -math.copysign(1.0, at) * d, -across
+        assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-12)
+        if f > 0.0:
+            assert normal == pytest.approx((max(g, 0.0) * side + max(e, 0.0) * end) / f, abs=1e-12)
+            assert (rate == normal).all()
+        elif g != e:
+            assert normal == pytest.approx(side if g > e else end, abs=1e-12)
+            assert (rate == normal).all()
+        else:
+            tied += 1
+            share = float((rate - end) @ (side - end)) / 2.0
+            assert -1e-12 <= share <= 1.0 + 1e-12
+            assert rate == pytest.approx(share * side + (1.0 - share) * end, abs=1e-12)
+            assert min(np.abs(normal - side).max(), np.abs(normal - end).max()) <= 1e-12
+    assert tied > 50
 
 
 @settings(max_examples=200, deadline=None)

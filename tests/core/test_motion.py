@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from clamp3d.collide.motions import first_contact, min_clearance
 from clamp3d.core.distance import Feature, signed_distance, signed_distances
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import rotation, translation
-from clamp3d.core.primitives import Capsule, SweptArc
+from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.errors import InputError
 
 GROOVE, WIRE = SweptArc(12.0, math.radians(70.0), 50.0), Capsule(10.5, 80.0)
@@ -133,6 +134,32 @@ def test_against_dense_sampling(half, length, about, tilt, place, axis, angle, t
         assert (values[samples < hit.t - 1e-9] > 0.0).all()
     assert np.abs(hit.pose - motion.at(hit.t, T)).max() == 0.0
     assert signed_distance(groove, wire, hit.pose).distance == hit.contact.distance
+
+
+@pytest.mark.parametrize("kind", [Capsule, Cylinder])
+def test_the_first_of_several_contacts_is_found_not_the_deepest(kind):
+    """On long ways round the groove, also such that carry the turn across its axis, which may be the groove's own."""
+    rng = np.random.default_rng(0)
+    samples, shallow = np.linspace(0.0, 1.0, 401), 0
+    for k in range(100):
+        groove, wire = SweptArc(12.0, rng.uniform(0.3, 2.8), 40.0), kind(*rng.uniform((0.3, 1.0), (3.0, 20.0)))
+        T = rotation(rng.normal(size=3), rng.uniform(0.0, 3.0))
+        T[:3, 3] = rng.normal(size=3) * 25.0
+        axis, point = ((0.0, 0.0, 1.0), np.zeros(3)) if k % 2 else (rng.normal(size=3), rng.normal(size=3) * 10.0)
+        screw = Motion.screw(axis, float(rng.normal() * 6.0), point=point)
+        motion = replace(screw, travel=rng.normal(size=3) * 30.0)
+        values = signed_distances(groove, wire, np.array([motion.at(s, T) for s in samples]))
+        assert min_clearance(groove, wire, motion, T).distance.lower <= values.min() + 1e-9
+        below = values < -1e-6
+        if below[0] or not below.any():
+            continue
+        starts = np.flatnonzero(below[1:] & ~below[:-1])
+        shallow += len(starts) > 1 and values[: starts[1]].min() > values.min()
+        hit = first_contact(groove, wire, motion, T)
+        assert hit.t <= samples[below.argmax()]
+        assert abs(hit.distance.value) < 1e-9
+        assert (values[samples < hit.t - 1e-9] > 0.0).all()
+    assert shallow >= 5
 
 
 def test_bad_motions_are_named():

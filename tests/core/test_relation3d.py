@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from clamp3d.core.arc_circle import ArcRelation, arc_circle
 from clamp3d.core.pose import rotation, translation
-from clamp3d.core.primitives import Capsule, SweptArc
+from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.relation3d import Relation3D, groove_relation, relative_pose
 from clamp3d.errors import InputError
 from tests.core.test_distance import scenes
@@ -99,6 +99,36 @@ def test_inside_means_a_common_point_with_the_hollow(scene):
         assert relation is Relation3D.INSIDE
     elif gap > wire.length / 4000 + 1e-9:
         assert relation is Relation3D.OUTSIDE
+
+
+def test_a_flat_ended_cylinder_is_inside_if_it_reaches_the_block():
+    """By turns to the nearest point of the block and of the cylinder, which lead to where they are nearest."""
+    rng = np.random.default_rng(4)
+    said = {Relation3D.INSIDE: 0, Relation3D.OUTSIDE: 0}
+    for _ in range(200):
+        wire, T = (
+            Cylinder(rng.uniform(0.5, 6.0), rng.uniform(0.5, 20.0)),
+            rotation(rng.normal(size=3), rng.uniform(0, 3)),
+        )
+        T[:3, 3] = rng.uniform((-4.0, H - 2.0, -33.0), (4.0, H + 12.0, 33.0))
+        relation = groove_relation(GROOVE, wire, T, tolerance=1e-9).relation
+        if relation not in said:
+            continue
+        p = T[:3, 3]
+        for _ in range(200):
+            q = np.array([p[0], min(p[1], H), np.clip(p[2], -25.0, 25.0)])
+            m = (q - T[:3, 3]) @ T[:3, :3]
+            m[:2] *= min(1.0, wire.radius / max(math.hypot(m[0], m[1]), 1e-300))
+            m[2] = np.clip(m[2], -0.5 * wire.length, 0.5 * wire.length)
+            p = T[:3, 3] + T[:3, :3] @ m
+        n, d = (p - q) * (0.0, 1.0, 1.0), T[:3, 2]  # the block has no end along x
+        n /= max(np.linalg.norm(n), 1e-300)
+        near = n @ T[:3, 3] - 0.5 * wire.length * abs(n @ d) - wire.radius * np.linalg.norm(np.cross(n, d))
+        apart = near - n[1] * H - abs(n[2]) * 25.0  # how far the plane square to n keeps them apart
+        if apart > 1e-9 or np.linalg.norm(p - q) < 1e-9:
+            said[relation] += 1
+            assert relation is (Relation3D.OUTSIDE if apart > 1e-9 else Relation3D.INSIDE)
+    assert min(said.values()) > 20
 
 
 def test_relative_pose():

@@ -161,19 +161,88 @@ def test_a_cell_of_directions_lies_within_its_radius(face):
         assert turned.max() <= rho <= 4.0 * turned.max()
 
 
+def _sum(rng, kind):
+    """Half segments (m, 3), discs (k, 4) and a point: flat and round sums, some with parallel or tiny parts."""
+    S, U = rng.normal(size=(rng.integers(1, 7), 3)), rng.normal(size=(rng.choice([0, 1, 2, 6]), 4))
+    if kind == 1:  # two boxes that lie alike
+        S = np.vstack([np.diag(rng.uniform(0.5, 2.0, 3)), np.diag(rng.uniform(0.5, 2.0, 3))])
+    if kind == 2:  # slabs and needles
+        S *= 10.0 ** rng.uniform(-6.0, 0.0, (len(S), 1))
+    U[:, :3] /= np.linalg.norm(U[:, :3], axis=1)[:, None]
+    U[:, 3] = rng.uniform(0.5, 2.0, len(U))
+    if kind == 3 and len(U):  # nearly square to a segment, or along it
+        U[0, :3] = S[0] / np.linalg.norm(S[0])
+        U[-1, :3] = np.cross(U[0, :3], S[-1] + 1e-6 * rng.normal(size=3)) + 1e-9
+        U[-1, :3] /= np.linalg.norm(U[-1, :3])
+    return S, U, rng.choice([0.0, 0.3, 1.0, 5.0]) * rng.normal(size=3)
+
+
+def test_a_direction_is_led_to_a_local_minimum_of_the_width():
+    """Of round sums, whose width is smooth; on the circle square to a segment, where that is the edge that counts."""
+    rng = np.random.default_rng(8)
+    reached = 0
+    for k in range(300):
+        U, S = rng.normal(size=(3, 4)), rng.normal(size=(1, 3)) if k % 2 else np.empty((0, 3))
+        U[:, :3] /= np.linalg.norm(U[:, :3], axis=1)[:, None]
+        U[:, 3], c, on = rng.uniform(0.5, 2.0, 3), rng.choice([0.3, 5.0]) * rng.normal(size=3), len(S) - 1
+        start = rng.normal(size=3)
+        start /= np.linalg.norm(start)
+
+        def widths(n, S=S, U=U, c=c):
+            rims = np.linalg.norm(np.cross(n[:, None], U[:, :3]), axis=2) @ U[:, 3]
+            return np.abs(n @ S.T).sum(axis=1) + rims - n @ c
+
+        f, *n = kernel_zonoid.polish(*start, c, S, U, on, 1e-14)
+        n = np.array(n)
+        near = n + 1e-3 * rng.normal(size=(200, 3))
+        if len(S):
+            edge = S[0] / np.linalg.norm(S[0])
+            assert abs(n @ edge) <= 1e-12
+            start -= (start @ edge) * edge
+            start /= np.linalg.norm(start)
+            near -= (near @ edge)[:, None] * edge
+        near /= np.linalg.norm(near, axis=1)[:, None]
+        assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-12)
+        assert f == pytest.approx(widths(n[None])[0], abs=1e-12)
+        assert f <= widths(start[None])[0] + 1e-12
+        reached += f <= widths(near).min() + 1e-12
+    assert reached >= 265
+
+
+def _least(c, S, U, tolerance, most=20_000, cells=kernel_zonoid.CELLS):
+    """The kernel's bounds, direction and nearest point of the sum, and the cells that it looked at."""
+    parts, out, heap = np.empty((len(S) + len(U), 3)), np.empty(5), np.full((cells + 8, 5), np.nan)
+    count = kernel_zonoid.zonoid(c, S, U, tolerance, most, heap[:cells], parts, out)
+    assert np.isnan(heap[cells:]).all()
+    return out[0], out[1], out[2:], parts.sum(axis=0) - c, count
+
+
 def test_no_direction_is_better_than_the_least_width():
-    """By directions all round, of sums flat and round whose widths have many local minima."""
+    """By directions all round. Whoever lets it look at few cells only is told a wider bound, but a true one."""
     rng = np.random.default_rng(7)
     n = rng.normal(size=(4000, 3))
     n /= np.linalg.norm(n, axis=1)[:, None]
-    for _ in range(300):
-        S, U = rng.normal(size=(rng.integers(1, 7), 3)), rng.normal(size=(rng.integers(0, 3), 4))
-        U[:, :3] /= np.linalg.norm(U[:, :3], axis=1)[:, None]
-        U[:, 3] = rng.uniform(0.5, 2.0, len(U))
-        c, out = 0.3 * rng.normal(size=3), np.empty(5)
-        kernel_zonoid.zonoid(
-            c, S, U, 1e-6, 20_000, np.empty((kernel_zonoid.CELLS, 5)), np.empty((len(S) + len(U), 3)), out
-        )
-        rims = np.sqrt(np.maximum(1.0 - (n @ U[:, :3].T) ** 2, 0.0)) @ U[:, 3]
-        assert out[0] <= (np.abs(n @ S.T).sum(axis=1) + rims - n @ c).min()
-        assert out[0] <= out[1]
+    apart = inside = 0
+    for k in range(400):
+        S, U, c = _sum(rng, k % 4)
+
+        def widths(n, S=S, U=U, c=c):
+            rims = np.linalg.norm(np.cross(n[:, None], U[:, :3]), axis=2) @ U[:, 3]
+            return np.abs(n @ S.T).sum(axis=1) + rims - n @ c
+
+        size = np.abs(S).sum() + U[:, 3].sum() + np.abs(c).sum()
+        lower, upper, at, p, count = _least(c, S, U, 1e-6 * size)
+        apart, inside = apart + (upper < 0.0), inside + (lower > 0.0)
+        assert np.linalg.norm(at) == pytest.approx(1.0, abs=1e-12)
+        assert upper == pytest.approx(widths(at[None])[0], abs=1e-13 * size)
+        assert lower <= min(widths(n).min(), upper)
+        assert count == 20_000 or upper - lower <= 1.000001e-6 * size
+        if upper < 0.0:  # the nearest point attests it from the other side
+            assert np.linalg.norm(p) >= -upper - 1e-13 * size
+        assert upper - 2e-3 * size <= p @ at <= upper + 1e-13 * size
+        for rough, most, cells in ((1e-6, 1, 4000), (1e-6, 24, 4000), (1e-6, 100, 12), (0.03, 20_000, 4000)):
+            below, above, *_ = _least(c, S, U, rough * size, most, cells)
+            assert below <= upper
+            assert above >= lower
+            assert most < 20_000 or above - below <= 1.000001 * rough * size
+    assert min(apart, inside) >= 50

@@ -41,7 +41,15 @@ def test_mypy_sees_what_a_user_gets(tmp_path):
     for name, (script, _) in REVEALED.items():
         (tmp_path / f"{name}.py").write_text(textwrap.dedent(script))
     done = subprocess.run(
-        [sys.executable, "-m", "mypy", "--strict", "--config-file=", f"--cache-dir={ROOT / '.mypy_cache'}", "."],
+        [
+            sys.executable,
+            "-m",
+            "mypy",
+            "--strict",
+            "--config-file=",
+            f"--cache-dir={ROOT / '.mypy_cache' / 'user'}",
+            ".",
+        ],
         cwd=tmp_path,
         env={"MYPYPATH": "", "PYTHONPATH": str(ROOT)},
         capture_output=True,

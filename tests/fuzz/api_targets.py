@@ -14,7 +14,7 @@ import clamp3d
 from clamp3d import figures, kernel, shapes
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
-from clamp3d.baselines.meshes import Meshes
+from clamp3d.baselines.polytopes import Meshes
 from clamp3d.baselines.wedges import Wedges
 from clamp3d.bench.image import image_study, measure_image
 from clamp3d.clamp.assemble import assemble

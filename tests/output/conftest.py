@@ -1,12 +1,17 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import PARTS, Clamp
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.collide.scene import Scene
+from clamp3d.output.report import Report, make_report
+from clamp3d.output.report_page import report_html
 
 
 @pytest.fixture(scope="session")
@@ -31,3 +36,23 @@ def odd_poses() -> dict[str, np.ndarray]:
 def odd_scene(reference: Clamp, odd_poses: dict[str, np.ndarray]) -> Scene:
     """The seven parts at those poses."""
     return clamp_scene(reference, odd_poses)
+
+
+@pytest.fixture(scope="session")
+def reference_report() -> Report:
+    return make_report(assemble(others=True))
+
+
+@pytest.fixture(scope="session")
+def odd_report(reference_report: Report) -> Report:
+    """The report of a clamp whose name is not to be taken for markup."""
+    clamp = replace(reference_report.assembly.clamp, name="<b>x</b>&", description="<script>alert(1)</script>")
+    return replace(reference_report, assembly=replace(reference_report.assembly, clamp=clamp))
+
+
+@pytest.fixture(scope="session")
+def odd_page(odd_report: Report) -> str:
+    """Its page, which takes seconds to draw."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+        return report_html(odd_report)

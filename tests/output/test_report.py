@@ -41,27 +41,8 @@ WIRES = [{}, {"line": "LJ-500", "jumper": "LJ-185"}, {"line": "LJ-300", "jumper"
 
 
 @pytest.fixture(scope="module")
-def reference():
-    return make_report(assemble(others=True))
-
-
-@pytest.fixture(scope="module")
 def loose():
     return make_report(assemble(**LOOSE))
-
-
-@pytest.fixture(scope="module")
-def odd(reference):
-    """The report of a clamp whose name is not to be taken for markup."""
-    clamp = replace(reference.assembly.clamp, name="<b>x</b>&", description="<script>alert(1)</script>")
-    return replace(reference, assembly=replace(reference.assembly, clamp=clamp))
-
-
-@pytest.fixture(scope="module")
-def page(odd):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-        return report_html(odd)
 
 
 @pytest.fixture(scope="module")
@@ -124,37 +105,37 @@ def test_all_distances_are_those_of_the_engine_and_of_open_cascade(wires, tmp_pa
         np.testing.assert_allclose(between, pair["distance_mm"] * np.array(pair["normal"]), atol=2e-6)
 
 
-def test_pairs_of_the_reference_clamp(reference):
-    assert [(row.result.a, row.result.b) for row in reference.rows] == list(PAIRS)
+def test_pairs_of_the_reference_clamp(reference_report):
+    assert [(row.result.a, row.result.b) for row in reference_report.rows] == list(PAIRS)
     by_verdict = {}
-    for row in reference.rows:
+    for row in reference_report.rows:
         by_verdict.setdefault(row.verdict, set()).add(row.name)
     touching = {"P1-P5", "P1-P6", "P1-P7", "P2-P3", "P2-P6", "P2-P7", "P3-P4", "P4-P5"}
     assert by_verdict["allowed"] == touching | {"P1-P4", "P2-P4"}  # declared, and nearer than the clearance
     assert by_verdict["clearance"] == {"P1-P2"}
     assert set(by_verdict) == {"allowed", "clearance", "clear"}
-    assert reference.passed
-    assert {row.name for row in reference.rows if row.severity != "ok"} == {"P1-P2", "P1-P4", "P2-P4"}
+    assert reference_report.passed
+    assert {row.name for row in reference_report.rows if row.severity != "ok"} == {"P1-P2", "P1-P4", "P2-P4"}
 
 
-def test_notes_tell_of_other_equilibria_and_of_what_is_declared_and_does_not_touch(reference, page):
+def test_notes_tell_of_other_equilibria_and_of_what_is_declared_and_does_not_touch(reference_report, odd_page):
     """`run` listed other end states while the report said "Findings: None"."""
-    assert {finding.severity for finding in reference.findings} == {"note"}
-    others = reference.assembly.others
+    assert {finding.severity for finding in reference_report.findings} == {"note"}
+    others = reference_report.assembly.others
     assert len(others) == 1
-    texts = [finding.text for finding in reference.findings]
+    texts = [finding.text for finding in reference_report.findings]
     for other in others:
         assert str(other) in texts
-        assert str(other) in page
+        assert str(other) in odd_page
     for pair in ("P1-P4", "P2-P4"):
-        (finding,) = (f for f in reference.findings if f.row is not None and f.row.name == pair)
+        (finding,) = (f for f in reference_report.findings if f.row is not None and f.row.name == pair)
         assert "does not touch: 1.000 mm apart" in finding.text
-    (near,) = (f for f in reference.findings if f.row is not None and f.row.name == "P1-P2")
+    (near,) = (f for f in reference_report.findings if f.row is not None and f.row.name == "P1-P2")
     assert near.text == "P1 up splint and P2 down splint are nearer than 5 mm, and nothing joins them: gap 3.729354 mm"
 
 
-def test_a_wire_through_the_bolt_is_a_clash_not_a_pass(reference):
-    assembly = reference.assembly
+def test_a_wire_through_the_bolt_is_a_clash_not_a_pass(reference_report):
+    assembly = reference_report.assembly
     poses = dict(assembly.poses)
     poses["P7"] = replace(poses["P7"], x=poses["P4"].x, y=poses["P4"].y + 60.0)
     contacts = measure_contacts(assembly.clamp, poses)
@@ -195,9 +176,9 @@ def test_a_state_found_by_chords_is_not_told_to_touch():
         assert row.distance.upper >= truth.lower - 1e-9
 
 
-def test_steps_are_what_a_line_worker_sees(reference):
-    steps = reference.steps
-    assert [s.waypoint for s in steps] == [*reference.assembly.path]
+def test_steps_are_what_a_line_worker_sees(reference_report):
+    steps = reference_report.steps
+    assert [s.waypoint for s in steps] == [*reference_report.assembly.path]
     first, last = steps[0], steps[-1]
     assert first.parallel
     assert first.opening_line == pytest.approx(first.opening_jumper)
@@ -207,29 +188,29 @@ def test_steps_are_what_a_line_worker_sees(reference):
     assert last.opening_line == pytest.approx(31.530, abs=5e-4)  # published
     assert last.opening_jumper == pytest.approx(3.05, abs=5e-3)
     assert math.degrees(last.tilt) == pytest.approx(12.0, abs=1e-3)
-    assert last.turns == pytest.approx(reference.assembly.turns)
+    assert last.turns == pytest.approx(reference_report.assembly.turns)
     assert steps[-2].turns == 0.0
-    stages = reference.tightening
+    stages = reference_report.tightening
     assert stages[-1].turns == pytest.approx(last.turns)
     assert [s.saddle_gap for s in stages] == sorted((s.saddle_gap for s in stages), reverse=True)
     assert stages[-1].saddle_gap == 0.0
     assert np.diff([s.way for s in stages]) == pytest.approx(stages[-1].way / 4)
 
 
-def test_findings_of_a_clamp_name_their_pair(reference, loose):
-    found = [finding for made in (reference, loose) for finding in made.assembly.findings]
+def test_findings_of_a_clamp_name_their_pair(reference_report, loose):
+    found = [finding for made in (reference_report, loose) for finding in made.assembly.findings]
     named = [(f.a, f.b) for f in found if f.a is not None]
     assert named
     assert named == [m.groups() for f in found if (m := re.match(r"(P\d)-(P\d) ", f.text))]
-    for made in (reference, loose):
+    for made in (reference_report, loose):
         told = {f.text: f.row for f in made.findings}
         for f in made.assembly.findings:
             assert (f.a is None) == (told[f.text] is None)
 
 
-def test_csv_and_json_tell_the_same(reference):
-    data = json.loads(json.dumps(report_to_dict(reference), allow_nan=False))
-    lines = list(csv.DictReader(io.StringIO(report_csv(reference))))
+def test_csv_and_json_tell_the_same(reference_report):
+    data = json.loads(json.dumps(report_to_dict(reference_report), allow_nan=False))
+    lines = list(csv.DictReader(io.StringIO(report_csv(reference_report))))
     assert len(lines) == len(data["pairs"]) == 21
     for line, pair in zip(lines, data["pairs"], strict=True):
         for key in ("a", "b", "verdict", "relation", "method"):
@@ -251,24 +232,25 @@ def pictures(page):
     return [s.partition("base64,")[2] for s in sources(page) if s.startswith("data:image/svg")]
 
 
-def test_page_holds_everything_itself(reference, page):
-    assert all(s.startswith(("data:", "#")) for s in sources(page))
-    assert "url(" not in page
-    assert "@import" not in page
-    assert len(pictures(page)) == 2 + 9  # states, steps, and every pair that touches or is declared to but the thread
-    for picture in pictures(page):
+def test_page_holds_everything_itself(reference_report, odd_page):
+    assert all(s.startswith(("data:", "#")) for s in sources(odd_page))
+    assert "url(" not in odd_page
+    assert "@import" not in odd_page
+    # states, steps, and every pair that touches or is declared to but the thread
+    assert len(pictures(odd_page)) == 2 + 9
+    for picture in pictures(odd_page):
         root = ElementTree.fromstring(base64.b64decode(picture))
         assert root.tag.endswith("svg")
         assert len(list(root.iter())) > 100
-    for row in reference.rows:
-        assert page.count(f'id="{row.name}"') == 1
-    assert len(re.findall(r'<td style="--c:#[0-9A-F]{6}" class="v-[a-z]+"><a href=', page)) == 21
+    for row in reference_report.rows:
+        assert odd_page.count(f'id="{row.name}"') == 1
+    assert len(re.findall(r'<td style="--c:#[0-9A-F]{6}" class="v-[a-z]+"><a href=', odd_page)) == 21
 
 
-def test_names_are_text_not_markup(page, clashing):
-    assert "<b>x</b>" not in page
-    assert "<script>" not in page
-    assert "&lt;b&gt;x&lt;/b&gt;&amp;" in page
+def test_names_are_text_not_markup(odd_page, clashing):
+    assert "<b>x</b>" not in odd_page
+    assert "<script>" not in odd_page
+    assert "&lt;b&gt;x&lt;/b&gt;&amp;" in odd_page
     assert "<i>clash" not in report_html(make_report(clashing))
 
 
@@ -360,21 +342,21 @@ def test_scenes_without_findings_pairs_or_parts(tmp_path):
     assert "Parts of pairs that are not clear: 2 of 41 parts." in page
 
 
-def test_equal_reports_are_equal_files(odd, page, tmp_path, monkeypatch):
+def test_equal_reports_are_equal_files(odd_report, odd_page, tmp_path, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-    assert [p.name for p in write_report(odd, tmp_path)] == list(FILES)
-    assert (tmp_path / "report.html").read_text() == page
-    assert "2023-11-14 22:13 UTC" in page
+    assert [p.name for p in write_report(odd_report, tmp_path)] == list(FILES)
+    assert (tmp_path / "report.html").read_text() == odd_page
+    assert "2023-11-14 22:13 UTC" in odd_page
 
 
-def test_folder_that_cannot_be_written_leaves_nothing(reference, tmp_path, monkeypatch):
+def test_folder_that_cannot_be_written_leaves_nothing(reference_report, tmp_path, monkeypatch):
     monkeypatch.setattr(
         "clamp3d.output.report_page._pictures", lambda *_: {kind: [] for kind in ("overview", "steps", "pairs")}
     )
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "pairs.csv").mkdir()
     with pytest.raises(InputError, match=r"pairs\.csv"):
-        write_report(reference, tmp_path / "out")
+        write_report(reference_report, tmp_path / "out")
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["pairs.csv"]
 
 
@@ -432,10 +414,11 @@ def test_command_takes_scenes_and_meshes(tmp_path):
         ((str(ROOT / "examples/hinge/scene.toml"), "--method", "chords", "-o", "x"), "go with a clamp"),
     ],
 )
-def test_bad_input_is_one_line_and_writes_nothing(arguments, message, tmp_path):
+def test_bad_input_is_one_line_and_writes_nothing(arguments, message, tmp_path, monkeypatch, main):
     (tmp_path / "file").write_text("in the way")
-    done = command_line(*arguments, "-q", folder=tmp_path)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+    monkeypatch.chdir(tmp_path)
+    code, _, err = main("report", *arguments, "-q")
+    assert code == 2
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
     assert [p.name for p in tmp_path.iterdir()] == ["file"]

@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import os
 import random
 import re
 import signal
@@ -18,7 +17,6 @@ import numpy as np
 import pytest
 from meshcat.servers.tree import SceneTree, find_node, walk
 
-import clamp3d
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.conductors import catalogue
 from clamp3d.clamp.forces import HELD
@@ -487,12 +485,12 @@ def test_a_blocked_sequence_is_shown_on_one_page(command, tmp_path):
         (["view", "--host", "203.0.113.7", "--timeout", "0"], "203.0.113.7"),
     ],
 )
-def test_bad_options_are_one_line(arguments, message, tmp_path):
-    environment = os.environ | {"PYTHONPATH": os.path.dirname(os.path.dirname(clamp3d.__file__))}
-    done = subprocess.run(command_line(*arguments), capture_output=True, text=True, cwd=tmp_path, env=environment)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+def test_bad_options_are_one_line(arguments, message, tmp_path, monkeypatch, main):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = main(*arguments)
+    assert code == 2
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
 
 

@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
+from clamp3d.bench import complexity as table_5
 from clamp3d.bench.compare import peers as compare_peers
 from clamp3d.bench.compare import run as study
 from clamp3d.bench.compare.assemblies import Assembled, Imaged, assembled, imaged
@@ -33,7 +34,7 @@ from clamp3d.bench.compare.peers.pieces import sectors
 from clamp3d.bench.compare.report import comparison_to_dict, comparison_to_text
 from clamp3d.bench.compare.run import LIBRARIES, Comparison, NotMeasured, compare, pareto
 from clamp3d.bench.compare.scene import GROOVE, chord_error, known_poses
-from clamp3d.bench.complexity import Sweep, complexity, fitted, grid_search
+from clamp3d.bench.complexity import Sweep, fitted, grid_search
 from clamp3d.bench.machine import machine
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.features import wire_pairs
@@ -235,8 +236,16 @@ def test_grid_search_finds_the_final_state_and_counts_as_the_paper_does() -> Non
     assert found.closing is None or found.closing > run.closing + 0.1
 
 
-def test_exponents_of_table_5() -> None:
-    sweeps = complexity(scale=0.3)
+def test_a_quick_search_is_timed_three_times() -> None:
+    asked: list[int] = []
+    counted, seconds = table_5._timed(lambda: (asked.append(1) or len(asked), 0))  # type: ignore[func-returns-value]
+    assert (counted, len(asked)) == ((3, 0), 3)
+    assert 0.0 <= seconds < 0.3
+
+
+def test_exponents_of_table_5(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table_5, "_timed", lambda run: (run(), 1.0))  # what is counted is the same each time
+    sweeps = table_5.complexity(scale=0.3)
     by = {(s.search, s.method, s.varied, s.fixed.split(",")[0]): s for s in sweeps}
     assert by["grid", "cas", "n", "a = 2"].exponents[:2] == pytest.approx((2.0, 2.0))
     assert by["grid", "cas", "n", "a = 3"].exponents[:2] == pytest.approx((3.0, 3.0))
@@ -344,6 +353,29 @@ def test_compare_asks_every_job_and_keeps_going(monkeypatch: pytest.MonkeyPatch)
     asked.clear()
     compare()
     assert not any(kind == "peer" for kind, _ in asked)
+
+
+def test_times_are_medians_of_rounds_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def answer(kind: str, method: str, *, time_limit: float) -> Any:
+        if kind != "contact":
+            return NotMeasured(method, None, method, "not asked here")
+        asked.append(method)
+        if method == "chords:5.0" and asked.count(method) == 2:
+            raise JobError("not finished in 90 s")
+        m = Method.parse(method)
+        row = _row(m.family, (3.0, 1.0, 2.0)[asked.count(method) - 1], 1e-4, m.setting)
+        return dataclasses.replace(row, setup=60.0 if m.family == "hulls" else 0.1)
+
+    monkeypatch.setattr(study, "run_job", answer)
+    found = compare()
+    assert asked[: len(METHODS)] == [m.key for m in METHODS]  # in turn, not one after the other
+    assert {asked.count(m.key) for m in METHODS} == {1, 3}
+    times = {row.label: row.one for row in found.measured}
+    for m in METHODS:
+        expected = 3.0 if m.family == "hulls" else 2.5 if m.key == "chords:5.0" else 2.0
+        assert times[m.label] == pytest.approx(expected)
 
 
 def test_command_refuses_before_it_measures(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from clamp3d.bench.stress.poses.family import POSES
 from clamp3d.bench.stress.poses.flat import FLATS
 from clamp3d.bench.stress.poses.solids import SOLIDS
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, EXTENDED_WORKS, point_sdf, truth, truth_50_digits
+from clamp3d.bench.stress.report import plot
 from clamp3d.bench.stress.run import KINDS, run_family, run_stress
 from clamp3d.bench.stress.worker import Answers, Measured, run_isolated
 from clamp3d.cli import group
@@ -193,6 +195,15 @@ def test_command(tmp_path):
     assert data["machine"]["cores"]
     assert "| ties | 0 of 40 |" in files["a.md"].read_text()
     assert files["a.png"].read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_picture_shows_every_kind_of_family(tmp_path):
+    run = run_stress(["ties"], ["cas"], n=20, check=0)
+    outcomes = tuple(replace(run.outcomes[0], family=next(iter(families))) for families in KINDS.values())
+    plot(replace(run, outcomes=outcomes), tmp_path / "a.svg")
+    drawn = (tmp_path / "a.svg").read_text()
+    titles = ("single poses", "flat ends", "finite bodies", "motions", "meshes", "whole clamps")
+    assert [title for title in titles if f"<!-- {title} -->" not in drawn] == []
 
 
 def test_command_prints_a_case_that_runs(capsys):

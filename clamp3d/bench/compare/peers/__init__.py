@@ -14,9 +14,8 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from clamp3d.bench.compare.methods import Method, Prepared
+from clamp3d.bench.compare.methods import Method, Prepared, Series
 from clamp3d.bench.compare.peers import coal, fcl, manifold3d, mujoco, open_cascade, trimesh
-from clamp3d.bench.compare.peers.series import Series
 
 SERIES: Mapping[str, Series] = MappingProxyType(
     coal.SERIES | mujoco.SERIES | fcl.SERIES | trimesh.SERIES | manifold3d.SERIES | open_cascade.SERIES

@@ -10,9 +10,8 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from clamp3d.bench.compare.methods import Prepared
+from clamp3d.bench.compare.methods import SECTOR_ANGLES_DEG, Prepared, Series, ready
 from clamp3d.bench.compare.peers.pieces import TRIANGLES, boxes, prisms, sectors
-from clamp3d.bench.compare.peers.series import SECTOR_ANGLES_DEG, Series, ready
 from clamp3d.bench.compare.scene import WIRE
 from clamp3d.core.pose import Array
 

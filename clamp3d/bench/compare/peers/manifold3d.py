@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.bench.compare.methods import Prepared
-from clamp3d.bench.compare.peers.series import Series, ready
+from clamp3d.bench.compare.methods import Prepared, Series, ready
 from clamp3d.bench.compare.peers.trimesh import NEEDS, block_mesh, sections
 from clamp3d.bench.compare.scene import WIRE
 from clamp3d.core.pose import Array

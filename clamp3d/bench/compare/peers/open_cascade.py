@@ -9,19 +9,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from clamp3d.bench.compare.methods import Prepared
-from clamp3d.bench.compare.peers.series import Series, ready
+from clamp3d.bench.compare.methods import Prepared, Series, ready
 from clamp3d.bench.compare.scene import WIRE, block, pair
+from clamp3d.brep.tessellate import explore
 from clamp3d.core.pose import Array, inverse
-
-
-def _location(T: Array) -> Any:
-    from OCP.gp import gp_Trsf
-    from OCP.TopLoc import TopLoc_Location
-
-    transformation = gp_Trsf()
-    transformation.SetValues(*T[:3].ravel().tolist())
-    return TopLoc_Location(transformation)
+from clamp3d.output.step import location, solid
 
 
 def asked(part: Any, wire: Any, radius: float, *, depth: bool) -> Prepared:
@@ -32,7 +24,7 @@ def asked(part: Any, wire: Any, radius: float, *, depth: bool) -> Prepared:
     extrema.LoadS1(part)
 
     def one(T: Array) -> float:
-        extrema.LoadS2(wire.Moved(_location(T)))
+        extrema.LoadS2(wire.Moved(location(T)))
         extrema.Perform()
         return float(extrema.Value()) - radius
 
@@ -40,9 +32,7 @@ def asked(part: Any, wire: Any, radius: float, *, depth: bool) -> Prepared:
 
 
 def _block() -> Any:
-    from clamp3d.output.step import solid
-
-    return solid(block()).Moved(_location(inverse(pair().T_a_groove)))
+    return solid(block()).Moved(location(inverse(pair().T_a_groove)))
 
 
 def axis(length: float) -> Any:
@@ -66,16 +56,10 @@ def cylinder(radius: float, length: float) -> Any:
 def _face(_: float) -> Prepared:
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_SurfaceType
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS
 
-    explorer = TopExp_Explorer(_block(), TopAbs_ShapeEnum.TopAbs_FACE)
-    while explorer.More():
-        face = TopoDS.Face(explorer.Current())
+    for face in explore(_block(), "FACE"):
         if BRepAdaptor_Surface(face).GetType() == GeomAbs_SurfaceType.GeomAbs_Cylinder:
             return asked(face, axis(WIRE.length), WIRE.radius, depth=True)
-        explorer.Next()
     raise AssertionError("the block has no round face")
 
 

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.bench.compare.methods import Prepared
-from clamp3d.bench.compare.peers.series import Series, ready
+from clamp3d.bench.compare.methods import Prepared, Series, ready
 from clamp3d.bench.compare.scene import WIRE, block, chord_error, pair
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import chord_count

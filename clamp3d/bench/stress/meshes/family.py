@@ -13,21 +13,30 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import coacd
+import fcl
 import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.baselines.fcl_shapes import encoded
-from clamp3d.bench.stress.family import Family, Methods
+from clamp3d.bench.stress.family import Methods
 from clamp3d.bench.stress.meshes import faults
 from clamp3d.bench.stress.meshes.cases import Fault, MeshCase, MeshCases, make_cases
 from clamp3d.bench.stress.outcome import TOUCHING, Outcome, judge
 from clamp3d.bench.stress.poses.family import FCL_ERROR, MESH_ERROR, THRESHOLD, fcl_model
 from clamp3d.bench.stress.poses.family import METHODS as POSE_METHODS
-from clamp3d.bench.stress.poses.flat import interval, intervals
+from clamp3d.bench.stress.poses.flat import MAX_BOXES, FlatFamily, interval
 from clamp3d.bench.stress.worker import Answers, Measured, Measures
+from clamp3d.collide.check import check
+from clamp3d.collide.scene import Scene
+from clamp3d.collide.surface import fcl_tree
+from clamp3d.collide.verdict import Verdict
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.pose import Array, inverse
+from clamp3d.core.mesh import make_mesh
+from clamp3d.core.pose import inverse
+from clamp3d.core.shapes import MeshShape
+from clamp3d.fit.fit import fit_mesh
 
 _TIME = 15.0
 """Seconds for CoACD in method hulls: less than a child may be silent."""
@@ -76,8 +85,6 @@ def _rounding(case: MeshCase) -> float:
 
 def _fit(case: MeshCase) -> Answer:
     """Groove fitted to the mesh, wire in it by the kernel; what the fit says of its own errors is the bound."""
-    from clamp3d.core.mesh import make_mesh
-    from clamp3d.fit.fit import fit_mesh
 
     mesh = make_mesh(case.mesh.vertices, case.mesh.faces)
     if not mesh.watertight:
@@ -95,11 +102,6 @@ def _fit(case: MeshCase) -> Answer:
 
 def _scene(case: MeshCase) -> Answer:
     """A scene of the mesh and the wire, checked: what the mesh is for a user who wants a verdict."""
-    from clamp3d.collide.check import check
-    from clamp3d.collide.scene import Scene
-    from clamp3d.collide.verdict import Verdict
-    from clamp3d.core.mesh import make_mesh
-    from clamp3d.core.shapes import MeshShape
 
     mesh = make_mesh(case.mesh.vertices, case.mesh.faces)
     if not mesh.watertight:  # the distance that it gets is that of the surfaces, not of what they should enclose
@@ -119,27 +121,13 @@ def _scene(case: MeshCase) -> Answer:
 
 
 def _fcl_alone(case: MeshCase) -> Answer:
-    import fcl
 
     with _silence():
-        model = bvh(case.mesh.vertices, case.mesh.faces)
+        model = fcl_tree(case.mesh.vertices, case.mesh.faces)
         return Answer(_fcl_distance([fcl.CollisionObject(model, fcl.Transform())], case))
 
 
-def bvh(V: NDArray[Any], F: NDArray[Any]) -> Any:
-    """FCL's tree of triangles, of the arrays as they are."""
-    import fcl
-
-    model = fcl.BVHModel()
-    model.beginModel(len(V), len(F))
-    model.addSubModel(V, F)
-    model.endModel()
-    return model
-
-
 def _coacd_alone(case: MeshCase) -> Answer:
-    import coacd
-    import fcl
 
     coacd.set_log_level("off")
     with _silence():
@@ -167,7 +155,6 @@ def _silence() -> Iterator[None]:
 
 
 def _fcl_distance(objects: list[Any], case: MeshCase) -> float:
-    import fcl
 
     T = case.T_mesh_wire
     shape = fcl.Cylinder(case.wire.radius, case.wire.length)
@@ -205,7 +192,7 @@ def _any_unit(rng: np.random.Generator) -> float:
     return float(rng.choice([1e-3, 1.0, 1000.0 / 25.4, 1e3]))
 
 
-class MeshFamily(Family):
+class MeshFamily(FlatFamily):
     """A kind of fault: ``make`` spoils the mesh of a case, ``unit`` draws the size of its millimetre.
 
     Every method works in a child process: the libraries under them end it.
@@ -213,7 +200,6 @@ class MeshFamily(Family):
 
     methods = METHODS
     part = 0.01
-    truth_error = 1e-12
 
     def __init__(self, name: str, about: str, make: Fault, unit: Callable[[np.random.Generator], float]) -> None:
         super().__init__(name, about, lambda rng, n: None)
@@ -223,16 +209,13 @@ class MeshFamily(Family):
         """See `Family`."""
         return make_cases(self.name, seed, n, self._fault, self._unit)
 
-    def truths(self, cases: MeshCases) -> Array:
-        """Intervals (n, 2) in mm."""
-        return intervals(cases.poses)
+    def interval(self, cases: MeshCases, i: int, most: int = MAX_BOXES) -> tuple[float, float]:  # type: ignore[override]
+        """See `FlatFamily`."""
+        return interval(cases.poses, i, most)
 
-    def difference(self, cases: MeshCases, truths: NDArray[Any], i: int) -> float:
-        """See `Family`."""
-        low, high = interval(cases.poses, i)
-        return max(low - float(truths[i, 1]), float(truths[i, 0]) - high, 0.0) / float(cases.scene()[i])
-
-    def judge(self, name: str, cases: MeshCases, truths: NDArray[Any], answers: Answers) -> Outcome:
+    def judge(  # type: ignore[override]
+        self, name: str, cases: MeshCases, truths: NDArray[Any], answers: Answers
+    ) -> Outcome:
         """See `Family`; a verdict within the method's own bound of touching is not wrong."""
         band = np.maximum(TOUCHING * cases.scene(), np.nan_to_num(answers.bound, nan=0.0))
         measures = self.methods[name][1]().measures
@@ -256,7 +239,7 @@ class MeshFamily(Family):
             "except clamp3d.InputError as error:",
             '    print("refused:", error)',
         ]
-        low, high = interval(cases.poses, i)
+        low, high = self.interval(cases, i)
         return "\n".join([*lines, f"# truth: from {low!r} to {high!r} mm"])
 
 

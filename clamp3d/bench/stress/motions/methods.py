@@ -16,6 +16,7 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
+import fcl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,7 +31,6 @@ from clamp3d.collide.motions import first_contact, min_clearance
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import SweptArc
-from clamp3d.errors import MissingLibraryError
 
 _SMALLEST, _LARGEST = 1e-4, 1e4
 """Lengths in mm: FCL's tolerances are absolute, 1e-6."""
@@ -42,13 +42,6 @@ class FclMethod:
     """Wedges of 5 degrees around the groove against a capsule. It is tight by the chord error."""
 
     measures: Measures = "verdict"
-
-    def __init__(self) -> None:
-        try:
-            import fcl
-        except ImportError:
-            raise MissingLibraryError("FCL continuous needs python-fcl: pip install python-fcl") from None
-        self._fcl: Any = fcl
 
     def measure(self, cases: Motions) -> Measured:
         """See `Method`: -1 where FCL finds contact, 1 where it does not."""
@@ -63,7 +56,7 @@ class FclMethod:
         distance = np.full(n, np.nan)
         if not unfit.all():
             pieces = self._pieces(groove, reach[~unfit].max(0))
-            capsule = self._fcl.Capsule(wire.radius, wire.length)
+            capsule = fcl.Capsule(wire.radius, wire.length)
             for i in np.flatnonzero(~unfit):
                 distance[i] = -1.0 if self._hits(pieces, capsule, cases, int(i)) else 1.0
         why = f"FCL's tolerances are absolute: lengths from {_SMALLEST:g} to {_LARGEST:g} mm only"
@@ -74,12 +67,11 @@ class FclMethod:
         part = block(groove, np.array([[reach[0], -reach[1], 0.0]]))
         out = []
         for _, V, F in wedge_solids(part, UNIT):
-            shape = self._fcl.Convex(V, len(F), encoded(F))
-            out.append(self._fcl.CollisionObject(shape, self._fcl.Transform()))
+            shape = fcl.Convex(V, len(F), encoded(F))
+            out.append(fcl.CollisionObject(shape, fcl.Transform()))
         return out
 
     def _hits(self, pieces: list[Any], capsule: Any, cases: Motions, i: int) -> bool:
-        fcl = self._fcl
         turns = cases.angle[i] != 0.0
         parts = max(1, math.ceil(abs(float(cases.angle[i])) / _QUARTER))
         request = fcl.ContinuousCollisionRequest(

@@ -20,12 +20,10 @@ from clamp3d.bench.stress.poses.cases import Cases
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, truth, truth_50_digits
 from clamp3d.bench.stress.worker import Measured, Measures, run_here
 from clamp3d.core.distance import SignedDistances, signed_distances
-from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import SweptArc
-from clamp3d.core.profile import Arc, Profile
 from clamp3d.core.relation3d import relative_pose
-from clamp3d.core.shapes import Solid
+from clamp3d.core.shapes import Solid, groove_block
 
 _WORLD = 5e-16
 """Rounding of a position by `relative_pose`, in parts of the distance between the two origins."""
@@ -124,14 +122,11 @@ def fcl_model(
 
 def block(groove: SweptArc, points: Array) -> Solid:
     """A block with the groove, in the groove's own frame, that reaches beyond ``points`` (n, 3) and the groove."""
-    R, a, H = groove.radius, groove.half_angle, 0.5 * groove.length
-    s, h = R * math.sin(a), -R * math.cos(a)
+    R = groove.radius
+    s, h = R * math.sin(groove.half_angle), -R * math.cos(groove.half_angle)
     wide = 1.1 * max(s, float(np.abs(points[:, 0]).max(initial=0.0))) + R
     low = -1.1 * max(R, float((-points[:, 1]).max(initial=0.0))) - R
-    arc = Arc((0.0, 0.0), R, a - 0.5 * math.pi, -a - 0.5 * math.pi)
-    profile = Profile.of((-wide, low), (wide, low), (wide, h), arc, (-wide, h))
-    body = Extrusion(profile, "Z", -H, H)
-    return Solid("P1", (body,), title="block with a groove", volume=body.volume)
+    return groove_block(groove, 2.0 * wide, h - low, name="P1")
 
 
 def in_radii(groove: SweptArc, bound: float) -> float:

@@ -76,11 +76,6 @@ def _discs(rng: np.random.Generator, n: int) -> Cases:
     return _on_rims(rng, n, draw.shapes(rng, k, R=R, r=r, length=r * 10.0 ** rng.uniform(-3.0, -0.3, k)))
 
 
-def intervals(cases: Cases) -> Array:
-    """Intervals (n, 2) in mm that hold the signed distances."""
-    return np.array([interval(cases, i, _BOXES) for i in range(len(cases))]).reshape(-1, 2)
-
-
 def interval(cases: Cases, i: int, most: int = MAX_BOXES) -> tuple[float, float]:
     """The interval in mm that holds the signed distance of case i."""
     case = _alone(cases, i)
@@ -116,14 +111,15 @@ class FlatFamily(Family):
 
     def truths(self, cases: Cases) -> Array:
         """Intervals (n, 2) in mm."""
-        return np.array([self._interval(cases, i, _BOXES) for i in range(len(cases))]).reshape(-1, 2)
+        return np.array([self.interval(cases, i, _BOXES) for i in range(len(cases))]).reshape(-1, 2)
 
-    def _interval(self, cases: Cases, i: int, most: int) -> tuple[float, float]:
+    def interval(self, cases: Cases, i: int, most: int = MAX_BOXES) -> tuple[float, float]:
+        """The interval in mm that holds the truth of case i, of as many boxes as ``most``."""
         return interval(cases, i, most)
 
     def difference(self, cases: Cases, truths: Array, i: int) -> float:
         """See `Family`: how far the interval is from a second, finer one."""
-        low, high = self._interval(cases, i, MAX_BOXES)
+        low, high = self.interval(cases, i)
         return max(low - float(truths[i, 1]), float(truths[i, 0]) - high, 0.0) / float(cases.scene()[i])
 
     def judge(self, name: str, cases: Cases, truths: Array, answers: Answers) -> Outcome:
@@ -144,7 +140,7 @@ class FlatFamily(Family):
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
         cases = self.cases(n, seed)
-        low, high = self._interval(cases, i, MAX_BOXES)
+        low, high = self.interval(cases, i)
         return f"{cases.snippet(i)}\n# truth: from {low!r} to {high!r} mm"
 
 

@@ -162,7 +162,8 @@ class SolidFamily(FlatFamily):
     def __init__(self, kind: str, about: str) -> None:
         super().__init__(f"solid: {kind}", about, partial(_cases, kind=kind))
 
-    def _interval(self, cases: Solids, i: int, most: int) -> tuple[float, float]:  # type: ignore[override]
+    def interval(self, cases: Solids, i: int, most: int = MAX_BOXES) -> tuple[float, float]:  # type: ignore[override]
+        """See `FlatFamily`."""
         T, half = cases.T[i], cases.half[i]
         R, r, length = float(cases.radius[i]), float(cases.r[i]), float(cases.length[i])
         rounding = NARROW * float(cases.take([i]).scene()[0])
@@ -209,7 +210,7 @@ class SolidFamily(FlatFamily):
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
         cases = self.cases(n, seed)
-        low, high = self._interval(cases, i, MAX_BOXES)
+        low, high = self.interval(cases, i)
         size, R = (2.0 * cases.half[i]).tolist(), float(cases.radius[i])
         body = f"shapes.box({size}" + (f", holes=[shapes.Hole({R!r})])" if R > 0.0 else ")")
         lines = [

@@ -1,0 +1,212 @@
+"""Convex pieces: their geometry against points, their signed distance against hulls and prisms of many sides."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import ConvexHull
+
+from clamp3d.collide.convex import Hull, Rod, convex_distance, hull
+from clamp3d.core.linear import to_target
+from clamp3d.core.pose import inverse, rotation, translation
+from clamp3d.testing import directions
+from tests.hulls import apart
+
+HERE = np.eye(4)
+TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
+CUBE = hull(np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-2.0, 2.0) for z in (-3.0, 3.0)]))
+
+
+def corners(piece, T, sides=90, scale=1.0):
+    """Corners (k, 3) of a piece at ``T``; of a rod a prism in it, or with a larger ``scale`` around it."""
+    if isinstance(piece, Hull):
+        return to_target(T, piece.vertices)
+    turn = 2.0 * math.pi * np.arange(sides) / sides
+    rim = scale * piece.radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    ends = [np.column_stack([rim, np.full(sides, z * piece.length)]) for z in (-0.5, 0.5)]
+    return to_target(T @ piece.T, np.vstack(ends))
+
+
+def signed(one, other):
+    """Signed distance of two hulls of points: minus the least translation that parts them, in an overlap."""
+    gap = apart(one, other)
+    if gap > 1e-9:
+        return gap
+    return float(ConvexHull((one[:, None] - other[None]).reshape(-1, 3)).equations[:, 3].max())
+
+
+def some_piece(rng):
+    if rng.random() < 0.4:
+        return Rod(rng.uniform(0.5, 3.0), rng.uniform(0.5, 9.0), TURNED @ rotation(rng.normal(size=3), 1.0))
+    return hull(rng.normal(size=(rng.choice([4, 8, 30, 70]), 3)) * rng.uniform(0.5, 3.0, 3))
+
+
+def some_pair(seed):
+    """Two pieces, one of them placed so that they are apart or overlap by a step from 1e-6 to 3 mm."""
+    rng = np.random.default_rng(seed)
+    a, b = some_piece(rng), some_piece(rng)
+    if isinstance(a, Rod) and isinstance(b, Rod):
+        b = CUBE if seed % 2 else hull(rng.normal(size=(12, 3)))
+    T = rotation(rng.normal(size=3), rng.uniform(0.0, 3.0)) if seed % 3 else np.eye(4)
+    n = rng.normal(size=3)
+    n /= np.linalg.norm(n)
+    reach = (corners(a, HERE) @ n).max() - (corners(b, T) @ n).min()
+    return a, b, translation(*((reach + rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6.0, 0.5)) * n)) @ T
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_signed_distance_of_two_pieces(seed):
+    """Between bounds that hold, sharp where they are apart, with points of both pieces and the normal between them."""
+    a, b, T = some_pair(seed)
+    widest = 1.0 / math.cos(math.pi / 90)
+    least, most = (signed(corners(a, HERE, scale=s), corners(b, T, scale=s)) for s in (widest, 1.0))
+    for found in (convex_distance(a, HERE, b, T), convex_distance(b, T, a, HERE)):
+        assert found.lower <= most + 1e-8
+        assert found.lower <= found.upper
+        if least > 1e-8:
+            assert found.upper >= least - 1e-8
+            assert found.upper - found.lower <= 1e-8 * (1.0 + found.upper)
+        elif most < -1e-8:
+            assert found.upper <= 1e-9
+    found = convex_distance(a, HERE, b, T)
+    if found.point_a is None or found.upper == math.inf:
+        return
+    p, q = found.point_a, found.point_b
+    assert min(a.depth(p[None])[0], b.depth(to_target(inverse(T), q)[None])[0]) >= -1e-7
+    assert np.linalg.norm(found.normal) == pytest.approx(1.0, abs=1e-9)
+    if found.lower > 1e-6:
+        assert np.linalg.norm(q - p) == pytest.approx(found.upper, abs=1e-8)
+        assert (q - p) == pytest.approx(found.upper * found.normal, abs=1e-5)
+    elif found.upper < 0.0:  # a point of both is as deep in one of them: no shorter move parts them
+        assert least <= found.upper + 1e-8
+
+
+@pytest.mark.parametrize("piece", [Rod(2.0, 6.0, TURNED), Rod(3.0, 0.5, HERE), CUBE], ids=["rod", "disc", "box"])
+def test_what_is_furthest_nearest_and_inside(piece):
+    T, rng = (piece.T if isinstance(piece, Rod) else HERE), np.random.default_rng(0)
+    points = corners(piece, HERE, 720) if isinstance(piece, Rod) else piece.vertices
+    for n in [*directions(20), T[:3, 2], -T[:3, 2], T[:3, 0], -T[:3, 1]]:
+        top = (points @ n).max()
+        assert piece.support(n) @ n == pytest.approx(top, abs=1e-4)
+        assert piece.support(n) @ n >= top - 1e-12
+        face = piece.face(n)
+        assert face @ n == pytest.approx(np.full(len(face), piece.support(n) @ n), abs=1e-7)
+        assert piece.depth(np.vstack([face, piece.support(n)[None]])).min() >= -1e-9
+        named = piece.normals(n)
+        assert all(np.linalg.norm(m) == pytest.approx(1.0, abs=1e-12) for m in named)
+        dimension, line = piece.flatness(n)
+        assert np.linalg.matrix_rank(face - face[0], tol=1e-7) == dimension
+        assert line is None if dimension != 1 else abs(line @ n) < 1e-9
+    for flat in (T[:3, 2], -T[:3, 2]):
+        assert max(flat @ m for m in piece.normals(flat + 0.1 * T[:3, 0])) == pytest.approx(1.0, abs=1e-12)
+    x = to_target(T, 4.0 * rng.normal(size=(300, 3)))
+    local = np.abs(to_target(inverse(T), x))
+    if isinstance(piece, Rod):
+        sides = np.column_stack([np.hypot(local[:, 0], local[:, 1]) - piece.radius, local[:, 2] - 0.5 * piece.length])
+    else:
+        sides = local - np.array([1.0, 2.0, 3.0])
+    assert piece.depth(x) == pytest.approx(-sides.max(axis=1), abs=1e-12)
+    out = sides.max(axis=1) > 0.0
+    feet = piece.closest(x[out])
+    assert np.linalg.norm(feet - x[out], axis=1) == pytest.approx(np.linalg.norm(np.maximum(sides, 0.0), axis=1)[out])
+    assert piece.depth(feet).min() >= -1e-9
+    if isinstance(piece, Rod):
+        inside = piece.closest(x[~out])
+        assert inside == pytest.approx(x[~out], abs=1e-12)
+        assert piece.ends == pytest.approx(to_target(T, np.array([[0, 0, -1.0], [0, 0, 1.0]]) * 0.5 * piece.length))
+
+
+@pytest.mark.parametrize("count", [4, 9, 60])
+def test_edges_and_planes_of_a_hull(count):
+    """Against Qhull: its planes, and between them Euler's count of edges; near a direction what faces it is kept."""
+    made = hull(np.random.default_rng(count).normal(size=(count, 3)))
+    truth = ConvexHull(made.vertices)
+    planes = np.unique(truth.equations.round(9), axis=0)
+    assert np.unique(made.planes.round(9), axis=0) == pytest.approx(planes, abs=2e-9)
+    assert len(made.edges) == len(made.vertices) + len(made.faces) - 2
+    for n in directions(12):
+        V, E, F = made.near(n)
+        top = made.vertices @ n
+        if len(made.vertices) <= 40:
+            assert (len(V), len(E), len(F)) == (len(made.vertices), len(made.edges), len(made.faces))
+            continue
+        high = top >= top.max() - 0.01 * np.ptp(top)
+        assert {*map(tuple, V)} == {*map(tuple, made.vertices[high])}
+        assert len(E) == sum(high[list(edge)].any() for edge in made.edges)
+        assert len(F) == sum(high[list(face)].any() for face in made.faces)
+    assert len(CUBE.edges) == 12
+    assert len(CUBE.planes) == 6
+    with pytest.raises(ValueError, match="one plane"):
+        hull(to_target(TURNED, np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)])))
+    with pytest.raises(ValueError, match="one plane"):
+        hull(np.array([(0, 0, 0), (1, 1, 1), (2, 2, 2), (3, 3, 3)]))
+
+
+def test_what_is_left_before_a_plane():
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        n = rng.normal(size=3)
+        plane = np.append(n / np.linalg.norm(n), rng.uniform(-2.5, 2.5))
+        left = CUBE.clipped(plane)
+        truth = trimesh.intersections.slice_mesh_plane(
+            trimesh.convex.convex_hull(CUBE.vertices), plane[:3], -plane[3] * plane[:3], cap=True
+        )
+        if left is None:
+            assert truth.is_empty
+            continue
+        assert ConvexHull(left.vertices).volume == pytest.approx(truth.volume, rel=1e-9)
+        assert (left.vertices @ plane[:3] + plane[3]).min() >= -1e-9
+    assert CUBE.clipped(np.array([0.0, 0.0, 1.0, 3.0])) is CUBE
+    assert CUBE.clipped(np.array([0.0, 0.0, 1.0, -3.0])) is None
+
+
+@pytest.mark.parametrize(
+    ("T", "unique"),
+    [
+        (translation(0.0, 0.0, 7.0), False),  # face to face
+        (translation(0.0, 0.0, 7.0) @ rotation((1.0, 0.0, 0.0), 0.2), False),  # an edge along a face
+        (translation(0.0, 0.0, 8.0) @ rotation((1.0, 2.0, 3.0), 0.4), True),
+        (translation(6.0, 0.0, 0.0) @ rotation((1.0, 0.0, 0.0), 0.4) @ rotation((0.0, 0.0, 1.0), 0.5), False),
+        (translation(0.0, 0.0, 7.0) @ rotation((1.0, 2.0, 0.0), 1e-7), None),  # rounding decides
+    ],
+)
+def test_whether_the_nearest_points_are_the_only_ones(T, unique):
+    assert convex_distance(CUBE, HERE, CUBE, T).unique is unique
+
+
+@pytest.mark.parametrize(
+    ("T", "unique"),
+    [
+        (translation(0.0, 0.0, 7.0), False),  # an end over a face
+        (translation(0.0, 0.0, 7.0) @ rotation((1.0, 0.0, 0.0), 0.5 * math.pi), False),  # its side along a face
+        (translation(0.0, 0.0, 9.0) @ rotation((1.0, 0.0, 0.0), 0.4), True),  # the lowest point of a rim
+    ],
+)
+def test_whether_the_nearest_points_of_a_cylinder_are_the_only_ones(T, unique):
+    assert convex_distance(CUBE, HERE, Rod(1.0, 4.0, HERE), T).unique is unique
+
+
+def test_points_of_boxes_and_cylinders_attest_their_distance():
+    """Of nearly parallel ones too: the points are in the pieces and no further apart than is said, to rounding."""
+    rng, seen = np.random.default_rng(0), 0
+    for _ in range(250):
+        a, b = (
+            Rod(*rng.uniform(1.0, 9.0, 2), HERE)
+            if rng.random() < 0.55
+            else hull(0.5 * rng.uniform(1.0, 9.0, 3) * CUBE.vertices / np.array([1.0, 2.0, 3.0]))
+            for _ in range(2)
+        )
+        T = rotation(rng.normal(size=3), rng.choice([1e-7, 1e-5, 1e-3, 0.3, 2.0]))
+        T[:3, 3] = rng.normal(size=3) * rng.choice([6.0, 12.0])
+        found = convex_distance(a, HERE, b, T)
+        if found.upper <= 0.0:
+            continue
+        seen += 1
+        p, q = found.point_a, found.point_b
+        assert np.linalg.norm(q - p) <= found.upper + 1e-13
+        assert min(a.depth(p[None])[0], b.depth(to_target(inverse(T), q)[None])[0]) >= -1e-11
+        assert found.upper - found.lower <= 1e-8
+    assert seen > 150
