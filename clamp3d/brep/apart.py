@@ -117,6 +117,8 @@ def main(source: str, target: str, name: str, memory: str) -> None:
     end_with_caller()
     _limit(int(memory))
     gc.disable()  # it lives for one file
+    if hasattr(sys, "setdlopenflags"):
+        sys.setdlopenflags(os.RTLD_LAZY)  # of the functions of a large library few are called: 5 % of its loading
     path = Path(source)
     module, function, _, _ = READERS[path.suffix.lower()]
     error: Exception

@@ -115,9 +115,11 @@ def _made(solid: Any, name: str, chord: float) -> BrepSolid | str:
         made = BrepSolid.of(solid, name, chord=chord)
         if not made.mesh.watertight:
             return "its faces do not close"
-        if volume(made.mesh.vertices, made.mesh.faces) < 0.0:
+        size = volume(made.mesh.vertices, made.mesh.faces)
+        if size < 0.0:
             made = BrepSolid.of(solid.Reversed(), name, chord=chord)
-        if not volume(made.mesh.vertices, made.mesh.faces) > 0.0:
+            size = volume(made.mesh.vertices, made.mesh.faces)
+        if not size > 0.0:
             return "encloses no volume"
     except Clamp3dError as error:
         return str(error)

@@ -269,7 +269,7 @@ def _at(a: FaceModel, point: Array) -> tuple[float, float]:
     """Bounds of a point's signed distance from a solid."""
     box, none = np.concatenate([point, point, [0.0]])[None], np.zeros(1, dtype=np.int64)
     pieces = np.tile(point, (1, 3, 1)), np.zeros((1, 3, 2)), none, np.zeros((1, 3))
-    tree = box, np.array([[0, 1]]), none
+    tree = box, np.array([[0, 1]]), none, none
     surface = np.array([OTHER]), np.zeros((1, 2)), np.zeros((1, 12)), np.zeros(1)
     low, out = _search(a, pieces, tree, np.eye(4), surface, 1.0, 0.0, 1e-3, 0)
     return low, float(out[0])
@@ -293,15 +293,16 @@ def _search(
     """
     from clamp3d.collide.faces_kernel import RESULT, SPACE, TRIED, WORK, descend
 
-    n, out = len(pieces[0]), np.zeros(RESULT)
+    n, nodes, out = len(pieces[0]), len(tree[0]), np.zeros(RESULT)
     rows = [np.empty((n + most, *given.shape[1:]), dtype=given.dtype) for given in pieces]
     for row, given in zip(rows, pieces, strict=True):
         row[:n] = given
     out[0] = np.inf
     found = descend(
-        *rows, np.empty(n + most), n, *tree, T, *surfaces,
+        *rows, np.empty(n + most + nodes), n, *tree, T, *surfaces,
         *a.arrays, a.marked, a.slack, contact, clearance, tol, most,
-        np.empty(TRIED + len(a.faces.kind)), np.empty((WORK, 3, 3)), np.empty(SPACE + n + most, dtype=np.int64), out,
+        np.empty(TRIED + len(a.faces.kind)), np.empty((WORK, 3, 3)),
+        np.empty(SPACE + n + most + 2 * nodes, dtype=np.int64), out,
     )  # fmt: skip
     return float(found), out
 
@@ -331,6 +332,6 @@ def _towards(
     pieces = dot(b.faces.corners, R.T) + t, b.faces.uv, b.faces.face, b.faces.sag
     surfaces = b.faces.kind, b.faces.size, np.ascontiguousarray(frames.reshape(-1, 12)), b.faces.deviation
     width = -VERDICT_WIDTH * contact if tol is None else tol
-    found, out = _search(a, pieces, b.arrays[3:6], np.ascontiguousarray(T), surfaces, contact, clearance, width, most)
+    found, out = _search(a, pieces, b.arrays[3:7], np.ascontiguousarray(T), surfaces, contact, clearance, width, most)
     p, q = (out[1:4].copy(), out[4:7].copy()) if np.isfinite(out[0]) else (None, None)
     return Distance(found, float(out[0]), p, q, level="faces", method="faces", estimate=float(out[8]))

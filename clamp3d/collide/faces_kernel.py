@@ -8,6 +8,8 @@ Three better bounds, each proven for the piece as it lies:
 - where no face of the solid within a ball reaches above the surface of one of them, the solid in the ball lies below
   that surface, so the piece's signed distance is at least its least height over the surface;
 - inside, the same with the surroundings in place of the solid says that a point has material all round it.
+
+Pieces of one face are bounded together first, and looked at one by one only where that bound is the least of all.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -24,9 +26,9 @@ from clamp3d.collide.faces_math import (
     PLANE,
     SPHERE,
     TORUS,
+    band_over,
     bend,
     cut,
-    difference,
     height_at,
     least_height,
     longest,
@@ -48,8 +50,8 @@ RESULT = 10
 _PIECES = 24
 """Pieces that may wait while one is cut to see whether it reaches above a surface."""
 WORK = 3 + 2 * _PIECES
-"""Triangles (3, 3) that the search takes for itself; ``SPACE``: numbers, besides one for each piece."""
-SPACE = 2 * DEEP + NEAR + TRIED
+"""Triangles (3, 3) that the search takes for itself; ``SPACE``: numbers, besides one for each piece and two a node."""
+SPACE = DEEP + NEAR + TRIED
 
 
 @formula
@@ -207,9 +209,10 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
         h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
         to_frame(frame[f], V, work)
         highest = least_height(kind[f], size[f, 0], size[f, 1], sense[f], work)
-        if akind[g] == kind[f] and (kind[f] == SPHERE or kind[f] == TORUS):  # the same surface, but for a little
-            off = difference(kind[f], asize[g, 0], asize[g, 1], aframe[g], size[f, 0], size[f, 1], frame[f])
-            highest = max(highest, e - rim - off)
+        if akind[g] != PLANE and akind[g] != OTHER:  # as round as it is: perhaps the same surface, but for a little
+            band = akind[g], asize[g, 0], asize[g, 1], aframe[g], v0, v1
+            round_ = band_over(*band, kind[f], size[f, 0], size[f, 1], frame[f], sense[f])
+            highest = max(highest, e - rim + round_)
         chosen[tried], heights[tried] = f, highest - slack[f] - deviation[f]
         tried += 1
         for row in (f, len(kind) + f):
@@ -293,6 +296,63 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
 
 
 @formula
+def _block(pieces, uvs, sags, g, own, solid, marked, slack, rows, near, known, stack, whole):
+    """Lower bound for the pieces ``rows`` of face g, all at once, ``known`` if there is no better one; and the lowest.
+
+    As for one piece, with a ball round the middle of their box, whole[2, 0], that must hold them all.
+    """
+    akind, asize, aframe, adeviation = own
+    P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, _, marks, nodes = solid
+    work, p = whole[0], whole[2, 0]
+    x, y, z = p[0], p[1], p[2]
+    rho, rim, bent, low, high = 0.0, 0.0, 0.0, np.inf, -np.inf
+    for k in rows:
+        for i in range(3):
+            rho = max(rho, (pieces[k, i, 0] - x) ** 2 + (pieces[k, i, 1] - y) ** 2 + (pieces[k, i, 2] - z) ** 2)
+            rim = max(rim, sags[k, i])
+        du, v0, v1, _, _ = spans(uvs[k])
+        low, high = min(low, v0), max(high, v1)
+        bent = max(bent, bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1))
+    rim += adeviation[g]
+    rho = math.sqrt(rho) + bent + rim
+    found, best = known, rows[0]
+    for f in near:
+        if f < 0 or kind[f] == OTHER:
+            continue
+        t, least = slack[f] + deviation[f], -np.inf
+        if akind[g] != PLANE and akind[g] != OTHER:
+            band = akind[g], asize[g, 0], asize[g, 1], aframe[g], low, high
+            least = band_over(*band, kind[f], size[f, 0], size[f, 1], frame[f], sense[f]) - rim
+        flat = np.inf
+        for k in rows:
+            if flat <= max(least, found + t):
+                break
+            du, v0, v1, _, _ = spans(uvs[k])
+            to_frame(frame[f], pieces[k], work)
+            e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1) + rim
+            h = least_height(kind[f], size[f, 0], size[f, 1], sense[f], work) - e
+            if h < flat:
+                flat, best = h, k
+        least = max(least, flat) - t
+        if least <= found:
+            continue
+        _mark(f, solid, marked, slack, whole)
+        own_marks = (marks[f], marks[f], nodes[f], nodes[f])
+        at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
+        # Beyond ``reach`` the inside of a torus within a ball may be in two pieces.
+        reach = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf
+        limit = min(rho + abs(least) + 2.0 * (at + t), reach)
+        clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 1, -1.0, x, y, z, limit, stack)
+        if clear <= at + t:
+            continue
+        if least >= 0.0:
+            found = max(found, min(least, clear - rho))
+        elif rho - least <= clear:  # from the lowest the way up, out of the solid, stays within the ball
+            found = least
+    return found, best
+
+
+@formula
 def _push(heap, count, key, item):
     """One more item on a heap of ``count``, that with the least key first."""
     k = count
@@ -319,7 +379,7 @@ def _pop(heap, count, key):
 
 
 def _descend(
-    pieces, uvs, faces, sags, bounds, n, bbox, blink, border, T,
+    pieces, uvs, faces, sags, bounds, n, bbox, blink, border, broot, T,
     akind, asize, aframe, adeviation,
     P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
     marks, nodes, marked, slack, contact, clearance, tol, most, over, whole, space, out,
@@ -329,53 +389,22 @@ def _descend(
         P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
         marks, nodes,
     )  # fmt: skip
-    stack, inner = space[:DEEP], space[DEEP : 2 * DEEP]
-    near, chosen, heap = space[2 * DEEP : 2 * DEEP + NEAR], space[2 * DEEP + NEAR : SPACE], space[SPACE:]
+    inner, near, chosen = space[:DEEP], space[DEEP : DEEP + NEAR], space[DEEP + NEAR : SPACE]
+    # What waits, that with the least bound first: pieces, and after their numbers the nodes of their tree.
+    after, first = len(faces), n
+    owner, heap = space[SPACE : SPACE + len(bbox)], space[SPACE + len(bbox) :]
     heights, over, p, q = over[:TRIED], over[TRIED:], whole[2, 0], whole[2, 1]
     scratch = (near, chosen, heights, over, inner, whole)
     verdict = tol < 0.0
     goal = max(contact, clearance) + 2.0 * RESOLUTION if verdict else np.inf
     tol = abs(tol)
     limits = (slack, contact, goal, tol)
-    first, waiting = n, 0
-    # Down the pieces' own tree: a branch that keeps away from the surface is outside if one of its pieces is.
-    looked, floor = 0, np.inf
-    stack[0], top = 0, 1
-    while top > 0:
-        if verdict and out[0] < -contact - 2.0 * RESOLUTION:
-            return -np.inf
-        top -= 1
-        i = stack[top]
-        leaf, radius = blink[i, 1] > 0, 0.0
-        for c in range(3):
-            q[c] = 0.5 * (bbox[i, c] + bbox[i, 3 + c])
-            radius += 0.25 * (bbox[i, 3 + c] - bbox[i, c]) ** 2
-        for c in range(3):
-            p[c] = T[c, 0] * q[0] + T[c, 1] * q[1] + T[c, 2] * q[2] + T[c, 3]
-        radius = math.sqrt(radius) + bbox[i, 6]
-        target = min(goal, out[0])
-        _, low, _ = nearest(
-            P, err, face, box, link, order, p[0], p[1], p[2], max(target, 0.0) + radius + contact, near, inner
-        )
-        if low - radius > target:
-            k = i
-            while blink[k, 1] < 0:
-                k = blink[k, 0]
-            k = border[blink[k, 0]]
-            looked += 1
-            if _piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out) > 0.0:
-                floor = min(floor, low - radius)
-                continue
-        if not leaf:
-            stack[top], stack[top + 1] = blink[i, 0], -blink[i, 1]
-            top += 2
-            continue
-        for j in range(blink[i, 0], blink[i, 0] + blink[i, 1]):
-            k = border[j]
-            bounds[k] = _piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out)
-            _push(heap, waiting, bounds, k)
-            waiting += 1
-            looked += 1
+    for i in range(len(bbox)):
+        owner[i] = -1  # of several faces
+    for g in range(len(broot)):
+        owner[broot[g]] = g
+    looked, floor, waiting = 0, np.inf, 1
+    heap[0], bounds[after] = after, -np.inf
     while waiting:
         low = bounds[heap[0]]
         high = out[0]
@@ -388,10 +417,56 @@ def _descend(
                 or (low >= -contact and high <= contact)
                 or (low > contact + 2.0 * RESOLUTION and high < clearance - 2.0 * RESOLUTION)
             )
-        if known or n >= len(faces) or n - first >= most:
+        if known or (heap[0] < after and (n >= len(faces) or n - first >= most)):
             break
-        i = _pop(heap, waiting, bounds)
+        item = _pop(heap, waiting, bounds)
         waiting -= 1
+        if item >= after:
+            i = item - after
+            if blink[i, 1] > 0:
+                for j in range(blink[i, 0], blink[i, 0] + blink[i, 1]):
+                    k = border[j]
+                    new = _piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out)
+                    bounds[k] = max(low, new)
+                    _push(heap, waiting, bounds, k)
+                    waiting += 1
+                    looked += 1
+                continue
+            for child in (blink[i, 0], -blink[i, 1]):
+                if owner[child] < 0:
+                    owner[child] = owner[i]
+                start, end = child, child
+                while blink[start, 1] < 0:
+                    start = blink[start, 0]
+                while blink[end, 1] < 0:
+                    end = -blink[end, 1]
+                radius = 0.0
+                for c in range(3):
+                    q[c] = 0.5 * (bbox[child, c] + bbox[child, 3 + c])
+                    radius += 0.25 * (bbox[child, 3 + c] - bbox[child, c]) ** 2
+                for c in range(3):
+                    p[c] = T[c, 0] * q[0] + T[c, 1] * q[1] + T[c, 2] * q[2] + T[c, 3]
+                radius = math.sqrt(radius) + bbox[child, 6]
+                target = max(min(goal, out[0]), 0.0) + radius + contact
+                _, away, _ = nearest(P, err, face, box, link, order, p[0], p[1], p[2], target, near, inner)
+                if away - radius > min(goal, out[0]):  # it keeps away: it is outside if one of its pieces is
+                    k = border[blink[start, 0]]
+                    looked += 1
+                    if _piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out) > 0.0:
+                        floor = min(floor, away - radius)
+                        continue
+                new, g = low, owner[child]
+                if g >= 0:
+                    rows = border[blink[start, 0] : blink[end, 0] + blink[end, 1]]
+                    new, k = _block(pieces, uvs, sags, g, own, solid, marked, slack, rows, near, low, inner, whole)
+                    if low < new < min(goal, out[0]):  # some point of it is wanted too
+                        _piece(pieces[k], uvs[k], g, sags[k], own, solid, marked, limits, scratch, out)
+                        looked += 1
+                bounds[after + child] = new
+                _push(heap, waiting, bounds, after + child)
+                waiting += 1
+            continue
+        i = item
         g = faces[i]
         du, v0, v1, _, _ = spans(uvs[i])
         e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
@@ -430,7 +505,7 @@ _SOLID = (
 )
 descend = entry(
     _descend,
-    "f8(f8[:,:,::1],f8[:,:,::1],i8[::1],f8[:,::1],f8[::1],i8,f8[:,::1],i8[:,::1],i8[::1],f8[:,::1],"
+    "f8(f8[:,:,::1],f8[:,:,::1],i8[::1],f8[:,::1],f8[::1],i8,f8[:,::1],i8[:,::1],i8[::1],i8[::1],f8[:,::1],"
     f"i8[::1],f8[:,::1],f8[:,::1],f8[::1],{_SOLID},"
     "i1[::1],f8[::1],f8,f8,f8,i8,f8[::1],f8[:,:,::1],i8[::1],f8[::1])",
 )

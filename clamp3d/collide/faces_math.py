@@ -261,14 +261,42 @@ def height_at(kind, a, b, F, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @formula
-def difference(kind, a, b, F, c, d, G):  # type: ignore[no-untyped-def]
-    """How far points of one ball or torus (sizes a, b, frame F) are at most from another (c, d, G)."""
+def _sine(F, G):  # type: ignore[no-untyped-def]
+    """Sine of the angle between the axes of two frames."""
+    x, y, z = F[10] * G[11] - F[11] * G[10], F[11] * G[9] - F[9] * G[11], F[9] * G[10] - F[10] * G[9]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@formula
+def _round_over(a, b, F, c, d, G, sense, v):  # type: ignore[no-untyped-def]
+    """Lower bound of sense * height of the circle at v of one cylinder or cone over another; see `band_over`."""
+    tilt = _sine(F, G)
+    x, y, z = F[0] - G[0] + v * F[9], F[1] - G[1] + v * F[10], F[2] - G[2] + v * F[11]
+    up = x * G[9] + y * G[10] + z * G[11]
+    off = math.sqrt((x - up * G[9]) ** 2 + (y - up * G[10]) ** 2 + (z - up * G[11]) ** 2)
+    radius = a + v * math.tan(b)
+    across = radius * math.sqrt(max(0.0, 1.0 - tilt * tilt)) - off if sense > 0.0 else radius + off
+    return sense * ((across - c) * math.cos(d) - up * math.sin(d)) - radius * tilt * abs(math.sin(d))
+
+
+@formula
+def band_over(kind, a, b, F, v0, v1, other, c, d, G, sense):  # type: ignore[no-untyped-def]
+    """Lower bound of sense * height over a round surface (other, c, d, G) of a band of one (kind, a, b, F), v0 to v1.
+
+    For cylinders and cones, two balls and two tori; minus infinity for others. It is as good as their axes are near.
+    """
+    # A circle square to an axis that turns by t shrinks to cos t across the other axis and rises by sin t of its
+    # radius; all this is concave along the axis, so the ends of the band are lowest.
+    if (kind == CYLINDER or kind == CONE) and (other == CYLINDER or other == CONE):
+        one, two = b if kind == CONE else 0.0, d if other == CONE else 0.0
+        return min(_round_over(a, one, F, c, two, G, sense, v0), _round_over(a, one, F, c, two, G, sense, v1))
+    if kind != other or (kind != SPHERE and kind != TORUS):
+        return -np.inf
     move = math.sqrt((F[0] - G[0]) ** 2 + (F[1] - G[1]) ** 2 + (F[2] - G[2]) ** 2)
     if kind == SPHERE:
-        return move + abs(a - c)
-    x, y, z = F[10] * G[11] - F[11] * G[10], F[11] * G[9] - F[9] * G[11], F[9] * G[10] - F[10] * G[9]
-    turn = math.sqrt(x * x + y * y + z * z)  # the sine; an axis has two directions, so the angle is below pi / 2
-    return move + abs(a - c) + 1.5 * max(a, c) * turn + abs(b - d)
+        return sense * (a - c) - move
+    turn = _sine(F, G)  # an axis has two directions: below pi / 2 the chord is below sin (1 + sin^2)
+    return sense * (b - d) - move - abs(a - c) - a * turn * (1.0 + turn * turn)
 
 
 @formula

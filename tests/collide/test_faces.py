@@ -39,7 +39,7 @@ from clamp3d.brep.surfaces import KINDS
 from clamp3d.collide import faces_kernel, faces_math
 from clamp3d.collide.faces import FaceModel, faces_distance
 from clamp3d.collide.faces_kernel import _over_triangle
-from clamp3d.collide.faces_math import CYLINDER
+from clamp3d.collide.faces_math import CONE, CYLINDER, SPHERE, TORUS
 from clamp3d.collide.verdict import Thresholds, Verdict
 
 CONTACT = 0.01
@@ -366,8 +366,38 @@ def test_a_heap_gives_the_least_first():
         assert taken == sorted(taken)
 
 
-def test_balls_of_one_centre_and_size_are_one_however_they_are_turned():
-    F, G = (np.concatenate([[1.0, 2.0, 3.0], turn[:3, :3].T.ravel()]) for turn in (np.eye(3), rotation((1, 2, 3), 1.0)))
-    assert faces_math.difference(faces_math.SPHERE, 5.0, 0.0, F, 5.0, 0.0, G) == 0.0
-    assert faces_math.difference(faces_math.SPHERE, 5.0, 0.0, F, 4.5, 0.0, G) == 0.5
-    assert faces_math.difference(faces_math.TORUS, 5.0, 1.0, F, 5.0, 1.0, G) > 1.0
+BANDS = [  # kind, sizes, v from and to
+    (CYLINDER, 5.0, 0.0, -3.0, 4.0),
+    (CYLINDER, 4.98, 0.0, -3.0, 4.0),
+    (CONE, 5.0, 0.1, -3.0, 4.0),
+    (CONE, 5.0, -0.5, -3.0, 4.0),
+    (CONE, 2.0, 0.5, -3.0, 4.0),
+    (SPHERE, 5.0, 0.0, -1.5, 1.2),
+    (TORUS, 5.0, 1.0, -3.0, 3.0),
+]
+
+
+@pytest.mark.parametrize("turn", [0.0, 3e-4, 0.3, math.pi])
+@pytest.mark.parametrize("away", [0.0, 0.03])
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_no_point_of_a_band_is_lower_than_its_bound_over_a_surface(sense, away, turn):
+    """Against points spread over the band; where the axes are one the bound is the least of them."""
+    rng = np.random.default_rng(7)
+    G = np.concatenate([[1.0, 2.0, 3.0], np.eye(3).ravel()])
+    way = rng.normal(size=3)
+    origin = G[:3] + away * way / np.linalg.norm(way)
+    F = np.concatenate([origin, rotation((3, 2, 0), turn)[:3, :3].T.ravel()])
+    for kind, a, b, low, high in BANDS:
+        for other, c, d, _, _ in BANDS:
+            bound = faces_math.band_over(kind, a, b, F, low, high, other, c, d, G, sense)
+            if not np.isfinite(bound):
+                assert kind != other
+                continue
+            least, p = np.inf, np.empty(3)
+            for u in np.linspace(0.0, 2.0 * math.pi, 37):
+                for v in (low, *rng.uniform(low, high, 5), high):
+                    faces_math.surface_point(kind, a, b, F, u, v, p)
+                    least = min(least, sense * faces_math.height_at(other, c, d, G, *p))
+            assert bound <= least + 1e-12
+            if away == turn == 0.0:
+                assert bound > least - 1e-12 or (kind in (SPHERE, TORUS) and a != c)
