@@ -33,9 +33,11 @@ from clamp3d.collide.faces_math import (
     least_height,
     longest,
     point_triangle,
+    raise_by,
     spans,
     surface_point,
     to_frame,
+    way_out,
 )
 from clamp3d.collide.faces_tree import DEEP, from_faces, mark_face, nearest, nearest_marked
 from clamp3d.collide.verdict import RESOLUTION
@@ -111,17 +113,44 @@ def _witness(kind, a, b, F, P, uv, x, y, z, q):
 
 
 @formula
-def _slopes(kind, size, frame, f, g, x, y, z):
-    """Cosine of the angle between the gradients of two surfaces' heights at a point."""
-    eps, turn = 1e-6, 0.0
+def _slopes(kind, size, frame, sense, f, g, x, y, z, between):
+    """Cosine of the angle between two faces' normals at a point; their sum, of length 1, into ``between`` (3)."""
+    eps, turn, length = 1e-6, 0.0, 0.0
     for i in range(3):
         dx, dy, dz = (eps if i == 0 else 0.0), (eps if i == 1 else 0.0), (eps if i == 2 else 0.0)
         a = height_at(kind[f], size[f, 0], size[f, 1], frame[f], x + dx, y + dy, z + dz)
         a -= height_at(kind[f], size[f, 0], size[f, 1], frame[f], x - dx, y - dy, z - dz)
         b = height_at(kind[g], size[g, 0], size[g, 1], frame[g], x + dx, y + dy, z + dz)
         b -= height_at(kind[g], size[g, 0], size[g, 1], frame[g], x - dx, y - dy, z - dz)
-        turn += a * b / (4.0 * eps * eps)
+        a, b = sense[f] * a / (2.0 * eps), sense[g] * b / (2.0 * eps)
+        turn += a * b
+        length += (a + b) * (a + b)
+        between[i] = a + b
+    for i in range(3):
+        between[i] /= max(math.sqrt(length), 1e-12)
     return turn
+
+
+@formula
+def _all_above(kind, size, frame, sense, f, V, way, step, work):
+    """How far above a surface the whole triangle V (3, 3) is after a step along ``way`` (3)."""
+    for i in range(3):
+        for c in range(3):
+            work[1, i, c] = V[i, c] + step * way[c]
+    to_frame(frame[f], work[1], work[0])
+    return least_height(kind[f], size[f, 0], size[f, 1], sense[f], work[0])
+
+
+@formula
+def _below(least, rho, clear):
+    """Lower bound of what is within rho of a ball's middle and ``least`` over a surface that the solid is below in it.
+
+    Outside, nothing of the solid is nearer than the surface and the ball's edge. Inside, the way out has to end within
+    the ball, for beyond it the solid may go on.
+    """
+    if least >= 0.0:
+        return min(least, clear - rho)
+    return least if rho - least <= clear else -np.inf
 
 
 @formula
@@ -207,20 +236,24 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
         if known:
             continue
         h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
-        to_frame(frame[f], V, work)
-        highest = least_height(kind[f], size[f, 0], size[f, 1], sense[f], work)
-        if akind[g] != PLANE and akind[g] != OTHER:  # as round as it is: perhaps the same surface, but for a little
-            band = akind[g], asize[g, 0], asize[g, 1], aframe[g], v0, v1
-            round_ = band_over(*band, kind[f], size[f, 0], size[f, 1], frame[f], sense[f])
-            highest = max(highest, e - rim + round_)
-        chosen[tried], heights[tried] = f, highest - slack[f] - deviation[f]
+        chosen[tried] = f
         tried += 1
         for row in (f, len(kind) + f):
             t = slack[row] + deviation[f]
-            least = highest - t
+            to_frame(frame[f], V, work)
+            a, raised = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
+            least = least_height(kind[f], a, size[f, 1], sense[f], work)
+            if akind[g] != PLANE and akind[g] != OTHER:  # as round as it is: perhaps the same surface, but for a little
+                band = akind[g], asize[g, 0], asize[g, 1], aframe[g], v0, v1
+                least = max(least, e - rim + band_over(*band, kind[f], a, size[f, 1], frame[f], sense[f]))
+            least -= raised
+            if row == f:
+                heights[tried - 1] = least
             if row > f and not (rho + e < 2.0 * slack[f] and found < min(out[0], goal) - tol):
                 break
-            if not (least - e > found or (h > t and outside < 0.0) or (h < -t and (h + rim < out[0] or not inside))):
+            deep = way_out(kind[f], size[f, 0], size[f, 1], sense[f], frame[f], t, x, y, z)
+            wanted = deep > 0.0 and (rim - deep < out[0] or not inside)
+            if not (least - e > found or (h > t and outside < 0.0) or wanted):
                 continue
             _mark(row, solid, marked, slack, whole)
             own_marks = (marks[row], marks[row], nodes[row], nodes[row])
@@ -228,24 +261,25 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
             # Beyond this the inside of a torus within a ball may be in two pieces.
             reach = size[f, 0] if kind[f] == TORUS else np.inf
             if least - e > found or (h > t and outside < 0.0):
-                limit = min(max(least, h) + rho + 2.0 * at + t, reach if sense[f] < 0.0 else np.inf)
+                needed = max(h, abs(least) if least - e > found else 0.0)
+                limit = min(needed + rho + 2.0 * at + t, reach if sense[f] < 0.0 else np.inf)
                 clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 1, -1.0, x, y, z, limit, stack)
                 if clear > at + t:  # what is above the face by more than t is outside there
-                    found = max(found, min(least, clear - rho) - e)
+                    found = max(found, _below(least, rho, clear) - e)
                     if h > t:
                         outside = max(outside, min(h - t, clear))
-            if h < -t and (h + rim < out[0] or not inside):
-                limit = min(2.0 * at - h, reach if sense[f] > 0.0 else np.inf)
+            if wanted:
+                limit = min(2.0 * at + deep + t, reach if sense[f] > 0.0 else np.inf)
                 clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 2, -1.0, x, y, z, limit, stack)
                 inside = inside or clear > at + t
-                if clear > at + t and h + rim < out[0]:  # inside: as deep as the faces are away
+                if clear > at + t and rim - deep < out[0]:  # inside: as deep as the faces are away
                     for i in range(3):
                         for c in range(3):
                             work[i, c] = p[c]
                     depth = from_faces(
-                        P, err, face, box, link, order, kind, size, frame, deviation, work, over, -h, point, stack
+                        P, err, face, box, link, order, kind, size, frame, deviation, work, over, deep + t, point, stack
                     )
-                    depth = max(depth, min(-h - t, clear)) - rim
+                    depth = max(depth, min(deep, clear)) - rim
                     if -depth < out[0] and depth > 0.0:
                         out[0] = -depth
                         for k in range(3):
@@ -256,29 +290,35 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
         for m in range(tried):
             f = chosen[m]
             for n in range(m):
-                g = chosen[n]
+                o = chosen[n]
                 least = min(heights[m], heights[n])
-                if least - e <= found or kind[f] == TORUS or kind[g] == TORUS:
+                if least - e <= found or kind[f] == TORUS or kind[o] == TORUS:
                     continue
-                turn = sense[f] * sense[g] * _slopes(kind, size, frame, f, g, x, y, z)
+                turn = _slopes(kind, size, frame, sense, f, o, x, y, z, q)
                 if turn < -0.8:
                     continue
                 rise = 0.9 * math.sqrt(0.5 * (1.0 + turn))  # above either for a step along both normals
                 if least < 0.0:
                     least /= rise
+                    above = True
+                    for one in (f, o):
+                        up = _all_above(kind, size, frame, sense, one, V, q, -least, whole)
+                        above = above and up > slack[one] + deviation[one]
+                    if not above or least - e <= found:
+                        continue
                 _mark(f, solid, marked, slack, whole)
-                _mark(g, solid, marked, slack, whole)
+                _mark(o, solid, marked, slack, whole)
                 # A piece of one that looks over the other: what lies above both there is outside.
                 at = np.inf
-                for one, other in ((f, g), (g, f)):
+                for one, other in ((f, o), (o, f)):
                     rows = (marks[other], marks[other], nodes[other], nodes[other])
                     at = nearest_marked(P, err, box, link, order, root[one], *rows, 1, 1.0, x, y, z, at, stack)
-                rows = (marks[f], marks[g], nodes[f], nodes[g])
-                past = at + 2.0 * max(slack[f] + deviation[f], slack[g] + deviation[g]) / rise  # of the slack of both
-                limit = past + at + rho
+                rows = (marks[f], marks[o], nodes[f], nodes[o])
+                past = at + 2.0 * max(slack[f] + deviation[f], slack[o] + deviation[o]) / rise  # of the slack of both
+                limit = past + max(at, -least) + rho
                 clear = nearest_marked(P, err, box, link, order, 0, *rows, 1, -1.0, x, y, z, limit, stack)
                 if clear > past:
-                    found = max(found, min(least, clear - rho) - e)
+                    found = max(found, _below(least, rho, clear) - e)
     unsure = low > 0.0 and found < min(out[0], goal) - tol and not inside and outside < 0.0
     if unsure and _winding(P, x, y, z) < 0.5:
         outside = low  # clear of all errors: what the triangles say holds
@@ -320,20 +360,21 @@ def _block(pieces, uvs, sags, g, own, solid, marked, slack, rows, near, known, s
         if f < 0 or kind[f] == OTHER:
             continue
         t, least = slack[f] + deviation[f], -np.inf
+        a, raised = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
         if akind[g] != PLANE and akind[g] != OTHER:
             band = akind[g], asize[g, 0], asize[g, 1], aframe[g], low, high
-            least = band_over(*band, kind[f], size[f, 0], size[f, 1], frame[f], sense[f]) - rim
+            least = band_over(*band, kind[f], a, size[f, 1], frame[f], sense[f]) - rim
         flat = np.inf
         for k in rows:
-            if flat <= max(least, found + t):
+            if flat <= max(least, found + raised):
                 break
             du, v0, v1, _, _ = spans(uvs[k])
             to_frame(frame[f], pieces[k], work)
             e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1) + rim
-            h = least_height(kind[f], size[f, 0], size[f, 1], sense[f], work) - e
+            h = least_height(kind[f], a, size[f, 1], sense[f], work) - e
             if h < flat:
                 flat, best = h, k
-        least = max(least, flat) - t
+        least = max(least, flat) - raised
         if least <= found:
             continue
         _mark(f, solid, marked, slack, whole)
@@ -345,10 +386,7 @@ def _block(pieces, uvs, sags, g, own, solid, marked, slack, rows, near, known, s
         clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 1, -1.0, x, y, z, limit, stack)
         if clear <= at + t:
             continue
-        if least >= 0.0:
-            found = max(found, min(least, clear - rho))
-        elif rho - least <= clear:  # from the lowest the way up, out of the solid, stays within the ball
-            found = least
+        found = max(found, _below(least, rho, clear))
     return found, best
 
 

@@ -1,7 +1,8 @@
 """Compiled formulas for faces: heights over surfaces, their extremes over triangles, distances of flat pieces.
 
 The height of a point over a surface is its signed distance from the whole, untrimmed surface: that of points, lines and
-circles less a radius. It is never more than the distance from the trimmed face, and it has slope 1.
+circles less a radius. It is never more than the distance from the trimmed face, and it has slope 1. Below a surface it
+is the way out of all that lies below, except beyond the tip of a conical hole: see `off_cone`.
 """
 
 # ruff: noqa: E741
@@ -29,6 +30,19 @@ def height(kind, a, b, x, y, z):  # type: ignore[no-untyped-def]
     if kind == SPHERE:
         return math.sqrt(h * h + z * z) - a
     return math.sqrt((h - a) * (h - a) + z * z) - b
+
+
+@formula
+def off_cone(a, b, h, z):  # type: ignore[no-untyped-def]
+    """Distance of a point at distance h from the axis from the solid cone; inside it is the height, below zero.
+
+    Beyond the tip the height over the slanted line is less: of the point D beyond it on the axis, D times a sine.
+    """
+    up, along = (h - a) * math.cos(b) - z * math.sin(b), (h - a) * math.sin(b) + z * math.cos(b)
+    past = -a / math.sin(b) - along
+    if b < 0.0:
+        past = -past
+    return math.sqrt(up * up + past * past) if past > 0.0 else up
 
 
 @formula
@@ -75,7 +89,10 @@ def _tangent(kind, a, b, V, x, y, z):  # type: ignore[no-untyped-def]
 
 @formula
 def least_height(kind, a, b, sense, V):  # type: ignore[no-untyped-def]
-    """Lower bound of sense * height over the flat triangle V (3, 3), in the surface's own frame."""
+    """Lower bound over the flat triangle V (3, 3), in the surface's own frame, of the distance from what is below.
+
+    Above the surface that of sense * height, below it less the way out.
+    """
     if kind == PLANE:
         return min(sense * V[0, 2], sense * V[1, 2], sense * V[2, 2])
     top = -np.inf
@@ -90,7 +107,10 @@ def least_height(kind, a, b, sense, V):  # type: ignore[no-untyped-def]
         d, _, _ = point_triangle(0.0, 0.0, 0.0, V)
         return d - a
     if kind == CONE:
-        if sense < 0.0:
+        if sense < 0.0:  # the distance from a cone is convex
+            top = -np.inf
+            for i in range(3):
+                top = max(top, off_cone(a, b, math.sqrt(V[i, 0] * V[i, 0] + V[i, 1] * V[i, 1]), V[i, 2]))
             return -top
         low = _tangent(kind, a, b, V, cx, cy, cz)
         for i in range(3):
@@ -109,6 +129,17 @@ def least_height(kind, a, b, sense, V):  # type: ignore[no-untyped-def]
     if sense < 0.0:
         return max(-top - bend, -middle - math.sqrt(w))
     return max(_tangent(kind, a, b, V, cx, cy, cz) - bend, middle - math.sqrt(w))
+
+
+@formula
+def raise_by(kind, a, b, sense, t):  # type: ignore[no-untyped-def]
+    """First size of the surface raised by t to its outer side, and what is left to take off a height over it.
+
+    A conical hole's tip moves further than t, so that hole is made narrower; of the others the height is less by t.
+    """
+    if kind == CONE and sense < 0.0:
+        return a - t / math.cos(b), 0.0
+    return a, t
 
 
 @formula
@@ -261,6 +292,16 @@ def height_at(kind, a, b, F, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @formula
+def way_out(kind, a, b, sense, F, t, x, y, z):  # type: ignore[no-untyped-def]
+    """How far a point is from all that is above a surface with frame F (12) lowered by t; below zero if it is above."""
+    if kind == CONE and sense < 0.0:
+        x, y, z = x - F[0], y - F[1], z - F[2]
+        X, Y = x * F[3] + y * F[4] + z * F[5], x * F[6] + y * F[7] + z * F[8]
+        return off_cone(a + t / math.cos(b), b, math.sqrt(X * X + Y * Y), x * F[9] + y * F[10] + z * F[11])
+    return -sense * height_at(kind, a, b, F, x, y, z) - t
+
+
+@formula
 def _sine(F, G):  # type: ignore[no-untyped-def]
     """Sine of the angle between the axes of two frames."""
     x, y, z = F[10] * G[11] - F[11] * G[10], F[11] * G[9] - F[9] * G[11], F[9] * G[10] - F[10] * G[9]
@@ -269,19 +310,21 @@ def _sine(F, G):  # type: ignore[no-untyped-def]
 
 @formula
 def _round_over(a, b, F, c, d, G, sense, v):  # type: ignore[no-untyped-def]
-    """Lower bound of sense * height of the circle at v of one cylinder or cone over another; see `band_over`."""
+    """What `band_over` says of the circle at v of one cylinder or cone over another."""
     tilt = _sine(F, G)
     x, y, z = F[0] - G[0] + v * F[9], F[1] - G[1] + v * F[10], F[2] - G[2] + v * F[11]
     up = x * G[9] + y * G[10] + z * G[11]
     off = math.sqrt((x - up * G[9]) ** 2 + (y - up * G[10]) ** 2 + (z - up * G[11]) ** 2)
     radius = a + v * math.tan(b)
     across = radius * math.sqrt(max(0.0, 1.0 - tilt * tilt)) - off if sense > 0.0 else radius + off
+    if sense < 0.0 and d != 0.0:
+        return -off_cone(c, d, across, up) - radius * tilt
     return sense * ((across - c) * math.cos(d) - up * math.sin(d)) - radius * tilt * abs(math.sin(d))
 
 
 @formula
 def band_over(kind, a, b, F, v0, v1, other, c, d, G, sense):  # type: ignore[no-untyped-def]
-    """Lower bound of sense * height over a round surface (other, c, d, G) of a band of one (kind, a, b, F), v0 to v1.
+    """Lower bound, as `least_height`, over a round surface (other, c, d, G) of a band of one (kind, a, b, F), v0 to v1.
 
     For cylinders and cones, two balls and two tori; minus infinity for others. It is as good as their axes are near.
     """

@@ -377,6 +377,31 @@ BANDS = [  # kind, sizes, v from and to
 ]
 
 
+def _from_cone(c, d, r, z):
+    """Signed distance in the half plane through the axis: inside to the slanted line, outside to its half that is."""
+    tip, slant = np.array([0.0, -c / math.tan(d)]), math.copysign(1.0, d) * np.array([math.sin(d), math.cos(d)])
+    away = np.array([r, z]) - tip
+    out = np.linalg.norm(away - max(0.0, away @ slant) * slant)
+    return -out if r < c + z * math.tan(d) else out
+
+
+@pytest.mark.parametrize("half", [0.02, 0.25, 1.0, 3.0])
+@pytest.mark.parametrize("deep", [0.012, 0.05, 0.3])
+def test_a_pin_pushed_into_a_conical_hole_is_as_deep_as_its_tip(half, deep):
+    """The tip is as deep as the pin was pushed, the flanks are less deep by a sine."""
+    hole = cut(box((-9, -9, -9), (9, 9, 0)), cone(0.0, 3.0 * half, -3.0, 0.0))
+    pin = moved(cone(0.0, 3.0 * half, -3.0, 0.0), shift(0, 0, -deep))
+    a, b = (FaceModel(BrepSolid.of(solid_of(shape), "part")) for shape in (hole, pin))
+    for one, other in ((a, b), (b, a)):
+        found = faces_distance(one, other, np.eye(4), contact=0.01, tol=0.001)
+        assert found.lower <= -deep + 1e-7
+        assert found.upper >= -deep - 1e-7
+        assert found.upper - found.lower < 0.004
+        quick = faces_distance(one, other, np.eye(4), contact=0.01)
+        assert quick.lower <= -deep + 1e-7
+        assert -deep - 1e-7 <= quick.upper < -0.01  # a clash
+
+
 @pytest.mark.parametrize("turn", [0.0, 3e-4, 0.3, math.pi])
 @pytest.mark.parametrize("away", [0.0, 0.03])
 @pytest.mark.parametrize("sense", [1.0, -1.0])
@@ -398,6 +423,9 @@ def test_no_point_of_a_band_is_lower_than_its_bound_over_a_surface(sense, away, 
                 for v in (low, *rng.uniform(low, high, 5), high):
                     faces_math.surface_point(kind, a, b, F, u, v, p)
                     least = min(least, sense * faces_math.height_at(other, c, d, G, *p))
+                    if other == CONE and sense < 0.0:  # in the hole of a cone: less the distance from the cone
+                        local = G[3:].reshape(3, 3) @ (p - G[:3])
+                        least = min(least, -_from_cone(c, d, math.hypot(local[0], local[1]), local[2]))
             assert bound <= least + 1e-12
             if away == turn == 0.0:
                 assert bound > least - 1e-12 or (kind in (SPHERE, TORUS) and a != c)
