@@ -15,7 +15,7 @@ from clamp3d.core.pose import Array, inverse
 
 _ASKS = 3
 """Translations that are tried, each past one more place that touches."""
-_SHARE, _LEAST = 0.005, 0.0015
+_SHARE, _LEAST = 0.005, 0.001
 """So much further, by the depth or in mm, whichever is more, b is moved, so that a gap can be seen."""
 _PIECES = 4000
 """Pieces looked at for a depth, and for whether they are apart after a translation."""
