@@ -168,5 +168,6 @@ def _place(error: Exception) -> str:
 
 
 def _fail(message: str, code: ExitCode) -> ExitCode:
-    print(f"clamp3d: error: {one_line(message)}", file=sys.stderr)
+    with suppress(OSError):  # a full disk: the code still tells
+        print(f"clamp3d: error: {one_line(message)}", file=sys.stderr)
     return code

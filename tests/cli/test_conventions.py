@@ -171,6 +171,15 @@ class TestFullDisk:
         assert "No space left on device" in errors[0]
         assert "Traceback" not in done.stderr
 
+    def test_a_full_disk_for_errors_keeps_the_exit_code(self, tmp_path):
+        command = [sys.executable, "-m", "clamp3d", "check", "none.toml"]
+        env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        with open("/dev/full", "w") as full:
+            done = subprocess.run(
+                command, stdout=subprocess.PIPE, stderr=full, text=True, timeout=120, check=False, cwd=tmp_path, env=env
+            )
+        assert (done.returncode, done.stdout) == (2, "")
+
 
 class TestTextFromFiles:
     def test_control_characters_do_not_reach_the_terminal(self, tmp_path):
