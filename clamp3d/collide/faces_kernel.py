@@ -39,7 +39,7 @@ from clamp3d.collide.faces_math import (
     to_frame,
     way_out,
 )
-from clamp3d.collide.faces_tree import DEEP, from_faces, mark_face, nearest, nearest_marked
+from clamp3d.collide.faces_tree import DEEP, THIN, from_faces, mark_face, nearest, nearest_marked
 from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.jit import entry, formula
 
@@ -184,6 +184,18 @@ def _mark(row, solid, marked, slack, work):
 
 
 @formula
+def _clear(solid, row, other, bit, x, y, z, limit, stack):
+    """How far about a point, at most ``limit``, no piece has the ``bit`` in both rows of marks, or THIN in either."""
+    P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, marks, nodes = solid
+    both = (marks[row], marks[other], nodes[row], nodes[other])
+    found = nearest_marked(P, err, box, link, order, 0, *both, bit, -1.0, x, y, z, limit, stack)
+    for k in (row, other):
+        own = (marks[k], marks[k], nodes[k], nodes[k])
+        found = nearest_marked(P, err, box, link, order, 0, *own, THIN, -1.0, x, y, z, found, stack)
+    return found
+
+
+@formula
 def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
     """Lower bound for one piece; a better upper bound goes into ``out``."""
     akind, asize, aframe, adeviation = own
@@ -263,14 +275,14 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
             if least - e > found or (h > t and outside < 0.0):
                 needed = max(h, abs(least) if least - e > found else 0.0)
                 limit = min(needed + rho + 2.0 * at + t, reach if sense[f] < 0.0 else np.inf)
-                clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 1, -1.0, x, y, z, limit, stack)
+                clear = _clear(solid, row, row, 1, x, y, z, limit, stack)
                 if clear > at + t:  # what is above the face by more than t is outside there
                     found = max(found, _below(least, rho, clear) - e)
                     if h > t:
                         outside = max(outside, min(h - t, clear))
             if wanted:
                 limit = min(2.0 * at + deep + t, reach if sense[f] > 0.0 else np.inf)
-                clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 2, -1.0, x, y, z, limit, stack)
+                clear = _clear(solid, row, row, 2, x, y, z, limit, stack)
                 inside = inside or clear > at + t
                 if clear > at + t and rim - deep < out[0]:  # inside: as deep as the faces are away
                     for i in range(3):
@@ -313,10 +325,9 @@ def _piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
                 for one, other in ((f, o), (o, f)):
                     rows = (marks[other], marks[other], nodes[other], nodes[other])
                     at = nearest_marked(P, err, box, link, order, root[one], *rows, 1, 1.0, x, y, z, at, stack)
-                rows = (marks[f], marks[o], nodes[f], nodes[o])
                 past = at + 2.0 * max(slack[f] + deviation[f], slack[o] + deviation[o]) / rise  # of the slack of both
                 limit = past + max(at, -least) + rho
-                clear = nearest_marked(P, err, box, link, order, 0, *rows, 1, -1.0, x, y, z, limit, stack)
+                clear = _clear(solid, f, o, 1, x, y, z, limit, stack)
                 if clear > past:
                     found = max(found, _below(least, rho, clear) - e)
     unsure = low > 0.0 and found < min(out[0], goal) - tol and not inside and outside < 0.0
@@ -383,7 +394,7 @@ def _block(pieces, uvs, sags, g, own, solid, marked, slack, rows, near, known, s
         # Beyond ``reach`` the inside of a torus within a ball may be in two pieces.
         reach = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf
         limit = min(rho + abs(least) + 2.0 * (at + t), reach)
-        clear = nearest_marked(P, err, box, link, order, 0, *own_marks, 1, -1.0, x, y, z, limit, stack)
+        clear = _clear(solid, f, f, 1, x, y, z, limit, stack)
         if clear <= at + t:
             continue
         found = max(found, _below(least, rho, clear))
@@ -487,7 +498,7 @@ def _descend(
                 radius = math.sqrt(radius) + bbox[child, 6]
                 target = max(min(goal, out[0]), 0.0) + radius + contact
                 _, away, _ = nearest(P, err, face, box, link, order, p[0], p[1], p[2], target, near, inner)
-                if away - radius > min(goal, out[0]):  # it keeps away: it is outside if one of its pieces is
+                if away - radius > max(min(goal, out[0]), 0.0):  # no face is in it: outside if one of its pieces is
                     k = border[blink[start, 0]]
                     looked += 1
                     if _piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out) > 0.0:

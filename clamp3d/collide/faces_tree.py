@@ -29,6 +29,9 @@ from clamp3d.core.jit import entry, formula
 
 LEAF = 4
 DEEP = 128
+THIN = 4
+"""Mark of pieces that stay within the slack of a face's surface and look the other way: of a thin wall or slit."""
+_STEP = 1e-4
 
 
 @formula
@@ -274,12 +277,28 @@ def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, pieces, uvs, wor
 
 
 @formula
+def _faces_away(V, kind, size, frame, f, sense):
+    """Whether the triangle V looks the other way than the surface of face f where its middle is."""
+    ux, uy, uz = V[1, 0] - V[0, 0], V[1, 1] - V[0, 1], V[1, 2] - V[0, 2]
+    vx, vy, vz = V[2, 0] - V[0, 0], V[2, 1] - V[0, 1], V[2, 2] - V[0, 2]
+    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    length = math.sqrt(x * x + y * y + z * z)
+    if length == 0.0:
+        return False
+    x, y, z = _STEP * x / length, _STEP * y / length, _STEP * z / length
+    cx, cy, cz = (V[0, 0] + V[1, 0] + V[2, 0]) / 3, (V[0, 1] + V[1, 1] + V[2, 1]) / 3, (V[0, 2] + V[1, 2] + V[2, 2]) / 3
+    rise = height_at(kind[f], size[f, 0], size[f, 1], frame[f], cx + x, cy + y, cz + z)
+    rise -= height_at(kind[f], size[f, 0], size[f, 1], frame[f], cx - x, cy - y, cz - z)
+    return sense * rise < -_STEP
+
+
+@formula
 def mark_face(
     P, uv, sag, face, box, link, order, kind, size, frame, deviation, group, f, sense, slack, mark, nodes, pieces, uvs,
     work,
 ):  # fmt: skip
     """Marks of the triangles (m,) and tree nodes (n,) against the surface of face f: 1 for pieces that reach above it,
-    2 for those that reach below."""
+    2 for those that reach below, 4 for those that do neither but look the other way: there is a thin wall or slit."""
     # What is known of a node's triangles goes down with it: bits 1 and 2 as in the marks, 4 and 8 where they are open.
     nodes[0] = 12
     for i in range(len(nodes)):
@@ -311,6 +330,9 @@ def mark_face(
                     mark[t] |= 1
                 if _reaches(P[t], uv[t], g, rim, kind, size, frame, f, -sense, slack, pieces, uvs, work):
                     mark[t] |= 2
+            thin = mark[t] == 0 and group[g] != group[f]
+            if thin and _faces_away(P[t], kind, size, frame, f, sense):
+                mark[t] = THIN
     for i in range(len(nodes) - 1, -1, -1):
         nodes[i] = 0
         if link[i, 1] < 0:

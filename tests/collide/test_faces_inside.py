@@ -134,3 +134,31 @@ def test_points_in_and_about_round_solids(shape, truth):
             assert low > 0.0
             assert high <= value + 0.05
     assert told >= 5
+
+
+THINS = {  # a solid, and points with a lower and an upper bound of how far they are out of it
+    "slit between cylinders": (
+        cut(rod(9.0, -5.0, 5.0), cut(rod(5.001, -3.0, 3.0), rod(5.0, -4.0, 4.0))),
+        [((6.5, 0.0, 0.1), -1.499), ((3.0, 0.5, 0.0), -1.95862)],
+    ),
+    "slit between planes": (
+        cut(box((-5, -5, -5), (5, 5, 5)), box((-4, -4, 0), (4, 4, 4e-4))),
+        [((0.0, 0.1, 1.0), -0.9996), ((0.2, 0.1, -1.0), -1.0)],
+    ),
+    "sheet": (box((-4, -4, 0), (4, 4, 4e-4)), [((0.0, 0.1, 1.0), 0.9996), ((0.2, 0.1, -1.0), 1.0)]),
+    "sliver of a cone": (
+        cut(cone(1.5907863596721536, 1.7984556983573556, -4.0, 4.0), box((-9, -9, -9), (1.778939940408196, 9, 9))),
+        [((-1.28369101, 0.56953457, -3.36829077), 7.31298938), ((-1.4, 0.0, -3.0), 7.01055)],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", THINS)
+def test_what_is_behind_a_thin_wall_or_slit_is_as_far_away_as_it_is(name):
+    """Both sides of it are within what a face may be off, so that neither is seen to end what the other begins."""
+    shape, points = THINS[name]
+    model = FaceModel(BrepSolid.of(solid_of(shape), name))
+    for point, truth in points:
+        low, high = _at(model, np.array(point))
+        assert low <= truth + 1e-4
+        assert high >= truth - 1e-4
