@@ -170,7 +170,9 @@ def _hulls(arrays: Any) -> tuple[Mesh, ...]:
     count = int(arrays["count"])
     if count < 1:
         raise ValueError("no hulls")
-    return tuple(closed_mesh(arrays[f"v{i}"], arrays[f"f{i}"], f"hull {i}") for i in range(count))
+    # CoACD 1.0.10 gives the same hulls in another order each time.
+    found = sorted(((arrays[f"v{i}"], arrays[f"f{i}"]) for i in range(count)), key=lambda hull: hull[0].tolist())
+    return tuple(closed_mesh(vertices, faces, f"hull {i}") for i, (vertices, faces) in enumerate(found))
 
 
 def _outside(points: Array, hulls: tuple[Mesh, ...]) -> Array:

@@ -124,7 +124,8 @@ class TestEnd:
             workers = _children(process.pid)
             process.send_signal(signal.SIGTERM)
             out, err = process.communicate(timeout=60)
-        said = [line for line in err.decode().splitlines() if not line.startswith("clamp3d: compiling")]  # a new cache
+        lines = err.decode().splitlines()
+        said = [line for line in lines if line and not line.startswith("clamp3d: compiling")]  # a new cache
         assert (process.returncode, out, said) == (128 + signal.SIGTERM, b"", [])
         assert list(temporary.iterdir()) == []
         _until(lambda: not any(_alive(worker) for worker in workers))
