@@ -7,6 +7,7 @@ certain), 4 failed inside (a fault of the program, or a solver that could not pr
 from __future__ import annotations
 
 import atexit
+import errno
 import gc
 import importlib
 import os
@@ -120,6 +121,8 @@ def main() -> None:
             from clamp3d.checks import short
 
             status = _fail(f"{short(error.filename)}: {error.strerror}", ExitCode.BAD_INPUT)
+        elif isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EFBIG):
+            status = _fail(f"cannot write to stdout: {error.strerror}", ExitCode.BAD_INPUT)
         elif isinstance(error, (Clamp3dError, OSError)):
             status = _fail(str(error), ExitCode.BAD_INPUT)
         else:

@@ -291,7 +291,8 @@ def _search(
     ``pieces``: corners, parameters, faces, sags of borders, in a's frame; ``tree`` over them, in their own frame;
     ``surfaces``: kind, size, frame, deviation. At most ``most`` pieces are added.
     """
-    from clamp3d.collide.faces_kernel import RESULT, SPACE, TRIED, WORK, descend
+    from clamp3d.collide.faces_bounds import TRIED
+    from clamp3d.collide.faces_kernel import RESULT, SPACE, WORK, descend
 
     n, nodes, out = len(pieces[0]), len(tree[0]), np.zeros(RESULT)
     rows = [np.empty((n + most, *given.shape[1:]), dtype=given.dtype) for given in pieces]

@@ -38,8 +38,8 @@ from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import KINDS
 from clamp3d.collide import faces_kernel, faces_math
 from clamp3d.collide.faces import FaceModel, faces_distance
-from clamp3d.collide.faces_kernel import _over_triangle
 from clamp3d.collide.faces_math import CONE, CYLINDER, SPHERE, TORUS
+from clamp3d.collide.faces_witness import over_triangle
 from clamp3d.collide.verdict import Thresholds, Verdict
 
 CONTACT = 0.01
@@ -345,7 +345,7 @@ def test_the_foot_on_a_cylinder_is_told_from_those_beside_its_triangle():
         (u, v), out = foot, radius * rng.uniform(0.1, 2.0)
         x = origin + out * math.cos(u) * axes[0] + out * math.sin(u) * axes[1] + v * axes[2]
         parts = np.linalg.solve(np.vstack([uv.T, np.ones(3)]), np.append(foot, 1.0))
-        over = _over_triangle(CYLINDER, radius, 0.0, np.concatenate([origin, *axes]), uv, *x)
+        over = over_triangle(CYLINDER, radius, 0.0, np.concatenate([origin, *axes]), uv, *x)
         assert over == (parts.min() >= 0.0)
         seen.add(over)
     assert seen == {True, False}

@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from clamp3d.brep import surfaces
-from clamp3d.collide import faces_kernel, faces_math
+from clamp3d.collide import faces_bounds, faces_math, faces_witness
 from clamp3d.collide.faces_math import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS
 from clamp3d.core import jit
 from tests.hulls import apart
@@ -201,7 +201,7 @@ def test_the_angle_between_two_surfaces(one, other):
         F, x = np.array([frame(rng), frame(rng)]), 3.0 * rng.normal(size=3)
         cosine = normal(one, size[0], F[0], x) @ normal(other, size[1], F[1], x)
         between, sense = np.empty(3), rng.choice([-1.0, 1.0], 2)
-        found = faces_kernel._slopes(kind, size, F.reshape(2, 12), sense, 0, 1, *x, between)
+        found = faces_bounds._slopes(kind, size, F.reshape(2, 12), sense, 0, 1, *x, between)
         assert found == pytest.approx(sense.prod() * cosine, abs=1e-5)
         both = sense[0] * normal(one, size[0], F[0], x) + sense[1] * normal(other, size[1], F[1], x)
         assert between == pytest.approx(both / np.linalg.norm(both), abs=1e-4)
@@ -213,9 +213,9 @@ def test_how_often_triangles_wind_round_a_point():
     held = ring.contains(points)
     assert 5 < held.sum() < 75
     for x, inside in zip(points, held, strict=True):
-        assert faces_kernel._winding(ring.triangles, *x) == pytest.approx(float(inside), abs=1e-9)
-    assert faces_kernel._winding(ring.triangles, 3.0, 0.0, 0.0) == pytest.approx(1.0, abs=1e-9)
-    assert faces_kernel._winding(ring.triangles, 0.0, 0.0, 0.0) == pytest.approx(0.0, abs=1e-9)
+        assert faces_witness.winding(ring.triangles, *x) == pytest.approx(float(inside), abs=1e-9)
+    assert faces_witness.winding(ring.triangles, 3.0, 0.0, 0.0) == pytest.approx(1.0, abs=1e-9)
+    assert faces_witness.winding(ring.triangles, 0.0, 0.0, 0.0) == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("kind", [*KINDS, OTHER])
@@ -227,7 +227,7 @@ def test_the_witness_is_a_point_of_the_piece(kind):
         for x, (u, v) in zip(P, uv, strict=True):
             faces_math.surface_point(kind, a, b, F.ravel(), u, v, x)
         point = rng.dirichlet(np.ones(3)) @ P + rng.normal(size=3) * (1.0 if k % 2 else 0.05)
-        d = faces_kernel._witness(kind, a, b, F.ravel(), P, uv, *point, q)
+        d = faces_witness.witness(kind, a, b, F.ravel(), P, uv, *point, q)
         assert d == pytest.approx(np.linalg.norm(q - point), abs=1e-6)
         if kind == OTHER:
             assert d == pytest.approx(apart(point[None], P), abs=1e-7)
