@@ -355,7 +355,7 @@ def test_compare_asks_every_job_and_keeps_going(monkeypatch: pytest.MonkeyPatch)
     assert not any(kind == "peer" for kind, _ in asked)
 
 
-def test_times_are_medians_of_rounds_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_times_are_the_least_of_rounds_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
 
     def answer(kind: str, method: str, *, time_limit: float) -> Any:
@@ -374,7 +374,7 @@ def test_times_are_medians_of_rounds_in_turn(monkeypatch: pytest.MonkeyPatch) ->
     assert {asked.count(m.key) for m in METHODS} == {1, 3}
     times = {row.label: row.one for row in found.measured}
     for m in METHODS:
-        expected = 3.0 if m.family == "hulls" else 2.5 if m.key == "chords:5.0" else 2.0
+        expected = 3.0 if m.family == "hulls" else 2.0 if m.key == "chords:5.0" else 1.0
         assert times[m.label] == pytest.approx(expected)
 
 
