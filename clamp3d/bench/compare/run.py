@@ -81,8 +81,8 @@ def compare(
 ) -> Comparison:
     """Measure all methods, one process after the other; ``progress`` is told jobs done, jobs in all and what is next.
 
-    Times on the poses are the least of `ROUNDS` processes each, in all some minutes. A method that fails or does not end
-    in time becomes a row that says so.
+    Times on the poses are the least of `ROUNDS` processes each, in all some minutes. A method that fails or does not
+    end in time becomes a row that says so.
     """
     start = time.monotonic()
     peer_methods = PEER_METHODS if peers else ()
