@@ -3,15 +3,28 @@
 import math
 
 import numpy as np
+import trimesh
 from hypothesis import strategies as st
 
+from clamp3d.collide.surface import Surface
 from clamp3d.core import shapes
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.meshing import mesh
-from clamp3d.core.pose import rotation
+from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import SweptArc
 from clamp3d.core.profile import Profile
+
+TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
+"""A pose that nothing is square to."""
+
+
+def box_mesh(size, error=None, point_error=None):
+    """The mesh of a box, with one error for all its triangles."""
+    made = trimesh.creation.box(size)
+    errors = [None if e is None else np.full(12, e) for e in (error, point_error)]
+    return Surface(np.array(made.vertices), np.array(made.faces), *errors)
+
 
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0, name="block")
 DRAWN = [

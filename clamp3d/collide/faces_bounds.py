@@ -26,6 +26,7 @@ from clamp3d.collide.faces_math import (
     height_at,
     least_height,
     raise_by,
+    slope_at,
     spans,
     surface_point,
     to_frame,
@@ -46,14 +47,10 @@ PIECES = 24
 @formula
 def _slopes(kind, size, frame, sense, f, g, x, y, z, between):
     """Cosine of the angle between two faces' normals at a point; their sum, of length 1, into ``between`` (3)."""
-    eps, turn, length = 1e-6, 0.0, 0.0
+    turn, length = 0.0, 0.0
     for i in range(3):
-        dx, dy, dz = (eps if i == 0 else 0.0), (eps if i == 1 else 0.0), (eps if i == 2 else 0.0)
-        a = height_at(kind[f], size[f, 0], size[f, 1], frame[f], x + dx, y + dy, z + dz)
-        a -= height_at(kind[f], size[f, 0], size[f, 1], frame[f], x - dx, y - dy, z - dz)
-        b = height_at(kind[g], size[g, 0], size[g, 1], frame[g], x + dx, y + dy, z + dz)
-        b -= height_at(kind[g], size[g, 0], size[g, 1], frame[g], x - dx, y - dy, z - dz)
-        a, b = sense[f] * a / (2.0 * eps), sense[g] * b / (2.0 * eps)
+        a = sense[f] * slope_at(kind[f], size[f, 0], size[f, 1], frame[f], i, x, y, z)
+        b = sense[g] * slope_at(kind[g], size[g, 0], size[g, 1], frame[g], i, x, y, z)
         turn += a * b
         length += (a + b) * (a + b)
         between[i] = a + b

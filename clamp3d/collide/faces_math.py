@@ -292,6 +292,15 @@ def height_at(kind, a, b, F, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @formula
+def slope_at(kind, a, b, F, axis, x, y, z):  # type: ignore[no-untyped-def]
+    """Rate of the height over a surface with frame F (12) along a coordinate axis: a part of its normal there."""
+    eps = 1e-6
+    dx, dy, dz = (eps if axis == 0 else 0.0), (eps if axis == 1 else 0.0), (eps if axis == 2 else 0.0)
+    rise = height_at(kind, a, b, F, x + dx, y + dy, z + dz) - height_at(kind, a, b, F, x - dx, y - dy, z - dz)
+    return rise / (2.0 * eps)
+
+
+@formula
 def way_out(kind, a, b, sense, F, t, x, y, z):  # type: ignore[no-untyped-def]
     """How far a point is from all that is above a surface with frame F (12) lowered by t; below zero if it is above."""
     if kind == CONE and sense < 0.0:

@@ -7,7 +7,17 @@ import math
 
 import numpy as np
 
-from clamp3d.collide.faces_math import CONE, CYLINDER, OTHER, PLANE, SPHERE, height_at, point_triangle, surface_point
+from clamp3d.collide.faces_math import (
+    CONE,
+    CYLINDER,
+    OTHER,
+    PLANE,
+    SPHERE,
+    height_at,
+    point_triangle,
+    slope_at,
+    surface_point,
+)
 from clamp3d.core.jit import formula
 
 
@@ -44,11 +54,9 @@ def over_triangle(kind, a, b, F, uv, x, y, z):
 def witness(kind, a, b, F, P, uv, x, y, z, q):
     """A point q (3) of the surface piece of triangle P near a point; returns their distance."""
     if kind != OTHER and over_triangle(kind, a, b, F, uv, x, y, z):
-        eps, h = 1e-6, height_at(kind, a, b, F, x, y, z)
-        gx = (height_at(kind, a, b, F, x + eps, y, z) - height_at(kind, a, b, F, x - eps, y, z)) / (2.0 * eps)
-        gy = (height_at(kind, a, b, F, x, y + eps, z) - height_at(kind, a, b, F, x, y - eps, z)) / (2.0 * eps)
-        gz = (height_at(kind, a, b, F, x, y, z + eps) - height_at(kind, a, b, F, x, y, z - eps)) / (2.0 * eps)
-        q[0], q[1], q[2] = x - h * gx, y - h * gy, z - h * gz
+        at, h = (x, y, z), height_at(kind, a, b, F, x, y, z)
+        for k in range(3):
+            q[k] = at[k] - h * slope_at(kind, a, b, F, k, x, y, z)
         return abs(h)
     _, v, w = point_triangle(x, y, z, P)
     r = 1.0 - v - w

@@ -129,8 +129,8 @@ def axis_in(P, c, T, k, rod):
 def _bore_rod(grooves, P, r, l, rod, T, planes, rounds, places, planes_b, rounds_b, places_b, member, known, pad, out):  # noqa: E741
     """Bounds, points on both bodies and normal (m, 11) of a bore and a rod, as `body.bore_rod` has them.
 
-    ``grooves`` (c, 5) at ``P`` hold the body: radius, half angle, half length, and room for s and h. ``upper`` is
-    finite where the points lie on the bodies; what they are measured to lie outside is added.
+    ``grooves`` (c, 5) at ``P`` hold the body: radius, half angle, half length, and s and h, which are
+    worked out. ``upper`` is finite where the points lie on the bodies; what they are measured to lie outside is added.
     """
     for c in range(P.shape[0]):
         grooves[c, 3], grooves[c, 4] = grooves[c, 0] * math.sin(grooves[c, 1]), -grooves[c, 0] * math.cos(grooves[c, 1])

@@ -275,7 +275,7 @@ def seed_heap(heap, l, m, u0, u1, ordered):  # type: ignore[no-untyped-def] # no
 def _least(R, half_angle, H, l, m, u0, u1, eps, most, heap, out):  # type: ignore[no-untyped-def] # noqa: E741
     """Least sdf from u0 to u1: fills out with value, u, t and a proven lower bound of it; cells looked at.
 
-    ``heap`` (n, 5) has room for ``most`` cells that wait, and for 1024 at least.
+    ``heap`` (n, 5) holds the open cells: up to ``most``, and n is 1024 at least.
     """
     s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
     bend = max_acceleration(l, m)

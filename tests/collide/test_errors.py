@@ -20,15 +20,9 @@ from clamp3d.collide.swept import swept_lower
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
+from tests.kinds import TURNED, box_mesh
 
 HERE = np.eye(4)
-TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
-
-
-def box_mesh(size, error=None, point_error=None):
-    made = trimesh.creation.box(size)
-    errors = [None if e is None else np.full(12, e) for e in (error, point_error)]
-    return Surface(np.array(made.vertices), np.array(made.faces), *errors)
 
 
 # --- Meshes with errors -----------------------------------------------------------------------------------------------

@@ -18,7 +18,6 @@ from clamp3d.collide.model import ModelCache
 from clamp3d.collide.nearest import rim_minimum, segment_pairs, to_faces
 from clamp3d.collide.open_mesh import _pierced
 from clamp3d.collide.overlap import common, deepest, deepest_at_most
-from clamp3d.collide.surface import Surface
 from clamp3d.collide.touching import is_box, touching_boxes
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.extrusion import Extrusion
@@ -27,16 +26,9 @@ from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.testing import body
 from tests.hulls import apart
-from tests.kinds import BLOCK, DRAWN, faceted_shape
+from tests.kinds import BLOCK, DRAWN, TURNED, box_mesh, faceted_shape
 
 HERE = np.eye(4)
-TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
-
-
-def box_mesh(size, error=None, point_error=None):
-    made = trimesh.creation.box(size)
-    errors = [None if e is None else np.full(12, e) for e in (error, point_error)]
-    return Surface(np.array(made.vertices), np.array(made.faces), *errors)
 
 
 # --- Segments, faces, rims --------------------------------------------------------------------------------------------
