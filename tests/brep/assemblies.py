@@ -3,6 +3,7 @@
 import itertools
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from OCP.Bnd import Bnd_Box
@@ -264,9 +265,8 @@ def write_step(parts, path):
 
 def deepest(common, solid):
     """The largest distance that a corner of the common part's mesh has from the solid's boundary."""
-    shell = next(iter(explore(solid, "SHELL")))
-    points = mesh_corners(common)
-    return max((from_shell(p, shell) for p in points[:: max(1, len(points) // 60)]), default=0.0)
+    from_boundary, points = from_shell(solid), mesh_corners(common)
+    return max((from_boundary(p) for p in points[:: max(1, len(points) // 60)]), default=0.0)
 
 
 def deepest_corner(a, b):
@@ -275,12 +275,13 @@ def deepest_corner(a, b):
     The classifier has faults: it takes points beside a plate with twelve half holes for the middle of it. So what seems
     deep must be wound round by the triangles too.
     """
-    shell, points = next(iter(explore(b, "SHELL"))), mesh_corners(a)
-    mesh, found = BrepSolid.of(solid_of(b), "solid").mesh, 0.0
+    from_boundary, points, place, found = from_shell(b), mesh_corners(a), BRepClass3d_SolidClassifier(b), 0.0
+    mesh = cache(lambda: BrepSolid.of(solid_of(b), "solid").mesh)
     for point in points[:: max(1, len(points) // 100)]:
-        if BRepClass3d_SolidClassifier(b, point, 1e-7).State() == TopAbs_State.TopAbs_IN:
-            depth = from_shell(point, shell)
-            if depth > found and (depth < 0.1 or winding(mesh, np.array(point.Coord())) > 0.5):
+        place.Perform(point, 1e-7)
+        if place.State() == TopAbs_State.TopAbs_IN:
+            depth = from_boundary(point)
+            if depth > found and (depth < 0.1 or winding(mesh(), np.array(point.Coord())) > 0.5):
                 found = depth
     return found
 
@@ -304,9 +305,17 @@ def mesh_corners(shape):
     return points
 
 
-def from_shell(point, shell):
-    """Distance of a gp_Pnt from a shell."""
-    return separation(BRepBuilderAPI_MakeVertex(point).Vertex(), shell)
+def from_shell(solid):
+    """The distance of a gp_Pnt from a solid's shell, as a function: the shell is made ready once."""
+    between = BRepExtrema_DistShapeShape()
+    between.LoadS2(next(iter(explore(solid, "SHELL"))))
+
+    def distance(point):
+        between.LoadS1(BRepBuilderAPI_MakeVertex(point).Vertex())
+        between.Perform()
+        return between.Value()
+
+    return distance
 
 
 ASSEMBLIES = {made.__name__: made for made in (fasteners, hinge, clip, taper, bearing, gears)}
