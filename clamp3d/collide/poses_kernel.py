@@ -52,13 +52,32 @@ def _boxes(T, middle, half, far, out):
     return -1
 
 
-def _meet(moving, below, above, others, row, column):
-    """Pairs of boxes that meet: poses with centre and half sizes (6, n), and ``others`` from ``below`` to ``above``.
+def _around(moving, start, stop, below, above, others):
+    """Into ``others`` the boxes from ``below`` to ``above`` (m, 3) that come near poses ``start`` to ``stop``.
 
-    The pairs go to ``row`` and ``column``, by pose; returns their number.
+    ``moving`` (6, n): centre and half sizes of their boxes. Returns the number.
     """
+    low_x = low_y = low_z = math.inf
+    high_x = high_y = high_z = -math.inf
+    for k in range(start, stop):
+        low_x, high_x = min(low_x, moving[0, k] - moving[3, k]), max(high_x, moving[0, k] + moving[3, k])
+        low_y, high_y = min(low_y, moving[1, k] - moving[4, k]), max(high_y, moving[1, k] + moving[4, k])
+        low_z, high_z = min(low_z, moving[2, k] - moving[5, k]), max(high_z, moving[2, k] + moving[5, k])
     count = 0
-    for k in range(moving.shape[1]):
+    for j in range(below.shape[0]):
+        meets = below[j, 0] <= high_x and above[j, 0] >= low_x
+        meets = meets and below[j, 1] <= high_y and above[j, 1] >= low_y
+        others[count] = j
+        count += 1 if meets and below[j, 2] <= high_z and above[j, 2] >= low_z else 0
+    return count
+
+
+def _meet(moving, start, stop, below, above, others, row, column, count):
+    """Pairs of boxes that meet: poses ``start`` to ``stop``, and ``others`` from ``below`` to ``above``.
+
+    The pairs go to ``row`` and ``column`` from ``count`` on, by pose; returns where they end.
+    """
+    for k in range(start, stop):
         for i in range(others.shape[0]):
             j = others[i]
             meets = True
@@ -136,29 +155,28 @@ def _stand_out(T, points, planes, rounds, places, slack, out):
     return 0
 
 
+@inlined
+def place_among(value, marks):
+    """How a number lies among six: one that equals a mark lies alike with its equals alone, and a NaN for itself."""
+    place = 0
+    for j in range(6):
+        place += (1 if value > marks[j] else 0) + (1 if value >= marks[j] else 0)
+    return place if value == value else 13
+
+
 def _cells(lower, upper, width, marks, out):
-    """How each pair of bounds, and its middle where they are closer than ``width``, lies among sorted ``marks``."""
+    """How each pair of bounds, and its middle where they are closer than ``width``, lies among six ``marks``."""
     for k in range(lower.shape[0]):
-        middle = math.nan
-        if upper[k] - lower[k] <= width:
-            middle = 0.5 * (lower[k] + upper[k])
-        cell = 0
-        for i in range(3):
-            value = lower[k] if i == 0 else (upper[k] if i == 1 else middle)
-            place = 0
-            for j in range(marks.shape[0]):  # a bound that equals a mark lies alike with its equals alone
-                place += (1 if value > marks[j] else 0) + (1 if value >= marks[j] else 0)
-            if value != value:
-                place = 2 * marks.shape[0] + 1
-            cell = (2 * marks.shape[0] + 2) * cell + place
-        out[k] = cell
+        middle = 0.5 * (lower[k] + upper[k]) if upper[k] - lower[k] <= width else math.nan
+        out[k] = (14 * place_among(lower[k], marks) + place_among(upper[k], marks)) * 14 + place_among(middle, marks)
     return 0
 
 
 _POSES, _ROWS, _TABLE = "f8[:,:,::1]", "i8[::1]", "f8[:,::1]"
 _BODY = f"{_TABLE},{_TABLE},{_POSES}"
 boxes = entry(_boxes, f"i8({_POSES},f8[::1],f8[::1],f8,{_TABLE})")
-meet = entry(_meet, f"i8({_TABLE},{_TABLE},{_TABLE},{_ROWS},{_ROWS},{_ROWS})")
+around = entry(_around, f"i8({_TABLE},i8,i8,{_TABLE},{_TABLE},{_ROWS})")
+meet = entry(_meet, f"i8({_TABLE},i8,i8,{_TABLE},{_TABLE},{_ROWS},{_ROWS},{_ROWS},i8)")
 between = entry(_between, f"i8({_POSES},{_ROWS},{_POSES},{_ROWS},{_POSES})")
 stand_out = entry(_stand_out, f"i8({_POSES},{_TABLE},{_BODY},f8,{_ROWS})")
 cells = entry(_cells, "i8(f8[::1],f8[::1],f8,f8[::1],i8[::1])")
