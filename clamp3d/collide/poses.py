@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.batch import Pairs, bounds_by_kernel
-from clamp3d.collide.broad import FEW, Boxes, box_gaps
+from clamp3d.collide.broad import FEW, FIRST, Boxes, box_gaps, box_sizes, world_boxes
 from clamp3d.collide.judge import contained, judge
 from clamp3d.collide.model import Model, ModelCache
 from clamp3d.collide.scene import Scene
@@ -132,13 +132,15 @@ def check_poses(
         instance("cache", cache, ModelCache)
     shop = cache or ModelCache()
     i = scene.index(part)
+    placed = scene.placed
     if others is None:
-        rest = np.delete(np.arange(len(scene.parts)), i)
+        names = placed.names[:i] + placed.names[i + 1 :]
+        rest = np.delete(np.arange(len(placed.names)), i)
     else:
-        rest = np.array([scene.index(name) for name in items("others", others, "part names")], dtype=np.int64)
+        names = items("others", others, "part names")
+        rest = np.array([scene.index(name) for name in names], dtype=np.int64)
     if i in rest:
         raise InputError(f"others must not hold {part!r} itself")
-    placed = scene.placed
     which = placed.which[rest]
     models = {k: shop.model(placed.shapes[k]) for k in np.flatnonzero(np.bincount(which)).tolist()}
     bounds = np.zeros((len(placed.shapes), 2, 3))
@@ -148,11 +150,11 @@ def check_poses(
     T, moving = _placed(poses, model.bounds)
     P = placed.poses[rest]
     reach = scene.thresholds.reach + 1e-6
-    row, column = _near(moving, Boxes.of(bounds[which], P), reach)
+    row, column = _near(moving, world_boxes(bounds, P, which), reach)
     # Equal parts that may meet this one alike are measured together.
     alike: dict[tuple[int, float | None], list[int]] = {}
     for k in np.flatnonzero(np.bincount(column)).tolist():
-        allowance = scene.allowance(part, scene.parts[rest[k]].name)
+        allowance = scene.allowance(part, names[k])
         alike.setdefault((id(models[int(which[k])]), allowance), []).append(k)
     least, most, rank = np.empty(len(row)), np.empty(len(row)), np.empty(len(row), dtype=np.int8)
     for (_, allowance), columns in alike.items():
@@ -164,7 +166,6 @@ def check_poses(
         else:
             least[some], most[some], rank[some] = judged
     least[least < 0.0] = -np.inf  # how deep a point lies in the other bounds verdicts, not the way out
-    names = tuple(scene.parts[j].name for j in rest.tolist())
     return PoseVerdicts(part, names, len(T), reach, row, column, least, most, rank)
 
 
@@ -210,25 +211,25 @@ def _placed(poses: ArrayLike, bounds: Array) -> tuple[Array, Array]:
 
     T = np.require(array("poses", poses, (None, 4, 4), finite=False), np.float64, ["C", "A"])
     found = np.empty((6, len(T)))
-    sizes = bounds.mean(axis=0), 0.5 * (bounds[1] - bounds[0]), FARTHEST
-    if boxes(T, *sizes, found) >= 0:
+    sizes = box_sizes(bounds[None])
+    if boxes(T, sizes, FIRST, FARTHEST, found) >= 0:
         T = np.require(check_pose_array(T), np.float64, ["C"])
-        bad = boxes(T, *sizes, found)
+        bad = boxes(T, sizes, FIRST, FARTHEST, found)
         if bad >= 0:
             scene_pose(T[bad], f"poses[{bad}]")
     return T, found
 
 
-def _near(moving: Array, still: Boxes, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Poses and others (m,) whose boxes along the world's axes come within ``reach`` mm.
+def _near(moving: Array, still: Array, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Poses and others (m,) whose boxes along the world's axes (6, n), (6, k) come within ``reach`` mm.
 
     A block of poses, which often follow each other, is compared with all others that come near the block.
     """
     from clamp3d.collide.poses_kernel import around, meet
 
-    wide = still.reach + reach
-    below, above = still.centre - wide, still.centre + wide
-    others, blocks, found = np.empty(len(below), dtype=np.int64), [], 0
+    wide = still[3:] + reach
+    below, above = still[:3] - wide, still[:3] + wide
+    others, blocks, found = np.empty(still.shape[1], dtype=np.int64), [], 0
     tree: Any = None
     for start in range(0, moving.shape[1], _BLOCK):
         stop = min(start + _BLOCK, moving.shape[1])
@@ -238,7 +239,8 @@ def _near(moving: Array, still: Boxes, reach: float) -> tuple[NDArray[np.int64],
             from rtree import index
 
             if tree is None:
-                tree = index.Index((np.arange(len(below)), below, above), properties=index.Property(dimension=3))
+                all_others = np.arange(len(others)), below.T, above.T
+                tree = index.Index(all_others, properties=index.Property(dimension=3))
             part = moving[:, start:stop]
             column, each = tree.intersection_v((part[:3] - part[3:]).T, (part[:3] + part[3:]).T)
             row = np.repeat(np.arange(start, stop), np.asarray(each, dtype=np.int64))

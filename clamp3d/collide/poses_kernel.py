@@ -33,27 +33,31 @@ def back(T, k, x, y, z):
     )
 
 
-def _boxes(T, middle, half, far, out):
-    """Centre and half sizes (6, n) along the world's axes of a box at poses; the first that is not rigid, or -1.
+def _boxes(T, sizes, which, far, out):
+    """Centre and half sizes (6, n) along the world's axes of boxes at poses; the first that is not rigid, or -1.
 
-    Nor may one lie further than ``far`` off.
+    ``sizes`` (m, 6): centre and half sizes in the bodies' own frames; ``which`` (n,) or (1,): those of each pose, or of
+    all. No pose may lie further than ``far`` off; if that is infinite all poses are taken as they are.
     """
     for k in range(T.shape[0]):
         prefetch(T, 128 * (k + AHEAD))
         prefetch(T, 128 * (k + AHEAD) + 64)
-        if not rigid(T, k):
+        if far < math.inf and not (
+            rigid(T, k) and abs(T[k, 0, 3]) <= far and abs(T[k, 1, 3]) <= far and abs(T[k, 2, 3]) <= far
+        ):
             return k
-        x, y, z = there(T, k, middle[0], middle[1], middle[2])
+        j = which[min(k, which.shape[0] - 1)]
+        x, y, z = there(T, k, sizes[j, 0], sizes[j, 1], sizes[j, 2])
         for i in range(3):
-            if not abs(T[k, i, 3]) <= far:
-                return k
-            out[3 + i, k] = abs(T[k, i, 0]) * half[0] + abs(T[k, i, 1]) * half[1] + abs(T[k, i, 2]) * half[2]
+            out[3 + i, k] = (
+                abs(T[k, i, 0]) * sizes[j, 3] + abs(T[k, i, 1]) * sizes[j, 4] + abs(T[k, i, 2]) * sizes[j, 5]
+            )
         out[0, k], out[1, k], out[2, k] = x, y, z
     return -1
 
 
 def _around(moving, start, stop, below, above, others):
-    """Into ``others`` the boxes from ``below`` to ``above`` (m, 3) that come near poses ``start`` to ``stop``.
+    """Into ``others`` the boxes from ``below`` to ``above`` (3, m) that come near poses ``start`` to ``stop``.
 
     ``moving`` (6, n): centre and half sizes of their boxes. Returns the number.
     """
@@ -64,11 +68,11 @@ def _around(moving, start, stop, below, above, others):
         low_y, high_y = min(low_y, moving[1, k] - moving[4, k]), max(high_y, moving[1, k] + moving[4, k])
         low_z, high_z = min(low_z, moving[2, k] - moving[5, k]), max(high_z, moving[2, k] + moving[5, k])
     count = 0
-    for j in range(below.shape[0]):
-        meets = below[j, 0] <= high_x and above[j, 0] >= low_x
-        meets = meets and below[j, 1] <= high_y and above[j, 1] >= low_y
+    for j in range(below.shape[1]):
+        meets = below[0, j] <= high_x and above[0, j] >= low_x
+        meets = meets and below[1, j] <= high_y and above[1, j] >= low_y
         others[count] = j
-        count += 1 if meets and below[j, 2] <= high_z and above[j, 2] >= low_z else 0
+        count += 1 if meets and below[2, j] <= high_z and above[2, j] >= low_z else 0
     return count
 
 
@@ -83,7 +87,7 @@ def _meet(moving, start, stop, below, above, others, row, column, count):
             meets = True
             for axis in range(3):
                 low, high = moving[axis, k] - moving[3 + axis, k], moving[axis, k] + moving[3 + axis, k]
-                meets = meets and low <= above[j, axis] and high >= below[j, axis]
+                meets = meets and low <= above[axis, j] and high >= below[axis, j]
             row[count], column[count] = k, j
             count += 1 if meets else 0
     return count
@@ -164,19 +168,24 @@ def place_among(value, marks):
     return place if value == value else 13
 
 
-def _cells(lower, upper, width, marks, out):
-    """How each pair of bounds, and its middle where they are closer than ``width``, lies among six ``marks``."""
+def _cells(lower, upper, width, marks, one, out):
+    """How each pair of bounds, and its middle where they are closer than ``width``, lies among six ``marks``.
+
+    Into ``one`` (14 ** 3,) the place of one pair for each way that there is.
+    """
     for k in range(lower.shape[0]):
         middle = 0.5 * (lower[k] + upper[k]) if upper[k] - lower[k] <= width else math.nan
         out[k] = (14 * place_among(lower[k], marks) + place_among(upper[k], marks)) * 14 + place_among(middle, marks)
+    for k in range(lower.shape[0]):
+        one[out[k]] = k
     return 0
 
 
 _POSES, _ROWS, _TABLE = "f8[:,:,::1]", "i8[::1]", "f8[:,::1]"
 _BODY = f"{_TABLE},{_TABLE},{_POSES}"
-boxes = entry(_boxes, f"i8({_POSES},f8[::1],f8[::1],f8,{_TABLE})")
+boxes = entry(_boxes, f"i8({_POSES},{_TABLE},{_ROWS},f8,{_TABLE})")
 around = entry(_around, f"i8({_TABLE},i8,i8,{_TABLE},{_TABLE},{_ROWS})")
 meet = entry(_meet, f"i8({_TABLE},i8,i8,{_TABLE},{_TABLE},{_ROWS},{_ROWS},{_ROWS},i8)")
 between = entry(_between, f"i8({_POSES},{_ROWS},{_POSES},{_ROWS},{_POSES})")
 stand_out = entry(_stand_out, f"i8({_POSES},{_TABLE},{_BODY},f8,{_ROWS})")
-cells = entry(_cells, "i8(f8[::1],f8[::1],f8,f8[::1],i8[::1])")
+cells = entry(_cells, f"i8(f8[::1],f8[::1],f8,f8[::1],{_ROWS},{_ROWS})")

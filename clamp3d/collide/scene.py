@@ -93,8 +93,9 @@ class Allowances:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """All parts of a scene as arrays: ``poses`` (n, 4, 4), different ``shapes``, and by part which one it has (n,)."""
+    """All parts of a scene as arrays: ``names``, ``poses`` (n, 4, 4), different ``shapes``, ``which`` of them (n,)."""
 
+    names: tuple[str, ...]
     poses: Array
     shapes: tuple[Shape, ...]
     which: NDArray[np.int64]
@@ -105,7 +106,8 @@ class Placed:
         shapes = {id(part.shape): part.shape for part in parts}
         number = {key: k for k, key in enumerate(shapes)}
         which = np.array([number[id(part.shape)] for part in parts], dtype=np.int64)
-        return cls(np.array([part.T_world for part in parts]).reshape(-1, 4, 4), tuple(shapes.values()), which)
+        poses = np.array([part.T_world for part in parts]).reshape(-1, 4, 4)
+        return cls(tuple(part.name for part in parts), poses, tuple(shapes.values()), which)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
