@@ -30,6 +30,7 @@ from clamp3d.brep.surfaces import (
 )
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Array, IntArray
+from clamp3d.core.triangles import distinct
 from clamp3d.errors import Clamp3dError
 
 ANGLE = 0.35
@@ -225,7 +226,7 @@ def _facets(
     uv = np.array([found.UVNode(i).Coord() for i in range(1, len(P) + 1)])
     regular = kind != PLANE if kind != OTHER else surface.GetType() == GeomAbs_SurfaceType.GeomAbs_SurfaceOfExtrusion
     if regular and border:
-        made = gridded(uv, np.unique(np.concatenate(border)), lambda span: divisions(kind, size, span, chord))
+        made = gridded(uv, distinct(np.concatenate(border)), lambda span: divisions(kind, size, span, chord))
     n = found.NbTriangles() if made is None else min(8, found.NbTriangles())
     F = np.array([found.Triangle(i).Get() for i in range(1, n + 1)], dtype=np.int64) - 1
     turns = np.array([

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from clamp3d.core.linear import atan2
 from clamp3d.core.pose import Array
+from clamp3d.core.triangles import distinct
 
 Faces = NDArray[np.int64]
 
@@ -80,7 +81,7 @@ def inside_out(vertices: Array, faces: Faces) -> list[NDArray[np.intp]]:
             continue
         rest = np.ones(len(faces), dtype=bool)
         rest[rows] = False
-        asked = np.unique(faces[rows])
+        asked = distinct(faces[rows])
         asked = asked[:: max(1, len(asked) // _ASKED)]
         outer = corners_of(vertices, faces[rest])
         if not rest.any() or min(winding_number(outer, vertices[k]) for k in asked) < 0.9:
