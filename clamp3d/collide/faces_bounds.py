@@ -34,7 +34,7 @@ from clamp3d.collide.faces_math import (
     to_frame,
     way_out,
 )
-from clamp3d.collide.faces_tree import THIN, from_faces, mark_face, nearest, nearest_marked
+from clamp3d.collide.faces_tree import PIECES, THIN, from_faces, nearest, nearest_below, nearest_marked
 from clamp3d.collide.faces_witness import winding, witness
 from clamp3d.core.jit import formula
 
@@ -42,8 +42,6 @@ NEAR = 4
 """Faces whose surfaces are tried as separating ones, those nearest to the piece."""
 TRIED = 16
 """Faces tried in all, with those beside the nearest."""
-PIECES = 24
-"""Pieces that may wait while one is cut to see whether it reaches above a surface."""
 WORK = 6 + 2 * PIECES
 """Triangles (3, 3) that the search takes for itself."""
 
@@ -86,41 +84,19 @@ def _below(least, rho, clear):
 
 
 @formula
-def _mark(row, solid, marked, slack, work):
-    """Fill a row of marks, if it is not yet: face f has the rows f and, with as little slack as can be, n + f."""
-    if marked[row]:
-        return
-    P, _, face, box, link, order, _, buv, bsag, kind, size, frame, sense, deviation, group, _, marks, nodes = solid
-    f = row % len(kind)
-    mark_face(
-        P, buv, bsag, face, box, link, order, kind, size, frame, deviation, group, f, sense[f], slack[row],
-        marks[row], nodes[row], work[3 : 3 + PIECES], work[3 + PIECES :], work[0],
-    )  # fmt: skip
-    marked[row] = 1
+def _clear(solid, row, other, slack, x, y, z, limit, whole, stack):
+    """How far about a point, at most ``limit``, no piece reaches above both surfaces, or is THIN over either."""
+    return nearest_marked(solid, row, other, 0, 1, THIN, -1.0, slack, x, y, z, limit, whole, stack)
 
 
 @formula
-def _clear(solid, row, other, bit, x, y, z, limit, stack):
-    """How far about a point, at most ``limit``, no piece has the ``bit`` in both rows of marks, or THIN in either."""
-    P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, marks, nodes = solid
-    both = (marks[row], marks[other], nodes[row], nodes[other])
-    found = nearest_marked(P, err, box, link, order, 0, *both, bit, -1.0, x, y, z, limit, stack)
-    for k in (row, other):
-        own = (marks[k], marks[k], nodes[k], nodes[k])
-        found = nearest_marked(P, err, box, link, order, 0, *own, THIN, -1.0, x, y, z, found, stack)
-    return found
-
-
-@formula
-def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
+def piece(V, uv, g, sag, own, solid, limits, scratch, out):
     """Lower bound for one piece; a better upper bound goes into ``out``."""
     akind, asize, aframe, adeviation = own
     slack, contact, goal, tol = limits
     near, chosen, heights, over, stack, whole = scratch
     work, point, p, q = whole[0], whole[1], whole[2, 0], whole[2, 1]
-    P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, _, beside, marks, nodes = (
-        solid
-    )
+    P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, _, beside, _, _ = solid
     du, v0, v1, u, v = spans(uv)
     e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
     rim = max(sag[0], sag[1], sag[2]) + adeviation[g]
@@ -181,22 +157,20 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
             wanted = deep > 0.0 and (rim - deep < out[0] or not inside)
             if not (least - e > found or (h > t and outside < 0.0) or wanted):
                 continue
-            _mark(row, solid, marked, slack, whole)
-            own_marks = (marks[row], marks[row], nodes[row], nodes[row])
-            at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
+            at = nearest_below(P, err, box, link, order, root[f], x, y, z, stack)
             # Beyond this the inside of a torus within a ball may be in two pieces.
             reach = size[f, 0] if kind[f] == TORUS else np.inf
             if least - e > found or (h > t and outside < 0.0):
                 needed = max(h, abs(least) if least - e > found else 0.0)
                 limit = min(needed + rho + 2.0 * at + t, reach if sense[f] < 0.0 else np.inf)
-                clear = _clear(solid, row, row, 1, x, y, z, limit, stack)
+                clear = _clear(solid, row, row, slack, x, y, z, limit, whole, stack)
                 if clear > at + t:  # what is above the face by more than t is outside there
                     found = max(found, _below(least, rho, clear) - e)
                     if h > t:
                         outside = max(outside, min(h - t, clear))
             if wanted:
                 limit = min(2.0 * at + deep + t, reach if sense[f] > 0.0 else np.inf)
-                clear = _clear(solid, row, row, 2, x, y, z, limit, stack)
+                clear = nearest_marked(solid, row, row, 0, 2, THIN, -1.0, slack, x, y, z, limit, whole, stack)
                 inside = inside or clear > at + t
                 if clear > at + t and rim - deep < out[0]:  # inside: as deep as the faces are away
                     for i in range(3):
@@ -232,16 +206,15 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
                         above = above and up > slack[one] + deviation[one]
                     if not above or least - e <= found:
                         continue
-                _mark(f, solid, marked, slack, whole)
-                _mark(o, solid, marked, slack, whole)
                 # A piece of one that looks over the other: what lies above both there is outside.
                 at = np.inf
                 for one, other in ((f, o), (o, f)):
-                    rows = (marks[other], marks[other], nodes[other], nodes[other])
-                    at = nearest_marked(P, err, box, link, order, root[one], *rows, 1, 1.0, x, y, z, at, stack)
+                    at = nearest_marked(
+                        solid, other, other, root[one], 1, 0, 1.0, slack, x, y, z, at, whole, stack
+                    )  # fmt: skip
                 past = at + 2.0 * max(slack[f] + deviation[f], slack[o] + deviation[o]) / rise  # of the slack of both
                 limit = past + max(at, -least) + rho
-                clear = _clear(solid, f, o, 1, x, y, z, limit, stack)
+                clear = _clear(solid, f, o, slack, x, y, z, limit, whole, stack)
                 if clear > past:
                     found = max(found, _below(least, rho, clear) - e)
     unsure = low > 0.0 and found < min(out[0], goal) - tol and not inside and outside < 0.0
@@ -351,7 +324,7 @@ def _lowest(pieces, uvs, sags, g, rows, own, solid, count, known, wanted, near, 
 
 
 @formula
-def block(pieces, uvs, sags, g, own, solid, marked, limits, rows, known, high, scratch, place):
+def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, place):
     """Lower bound for the pieces ``rows`` of face g, all at once, ``known`` if there is no better one.
 
     As for one piece, with a ball round the middle of their box, whole[2, 0], that must hold them all; but each point
@@ -359,7 +332,7 @@ def block(pieces, uvs, sags, g, own, solid, marked, limits, rows, known, high, s
     """
     akind, asize, _, adeviation = own
     nearest_ones, chosen, raised, raised_size, stack, whole = scratch
-    P, err, _, box, link, order, root, _, _, kind, size, _, sense, deviation, _, _, marks, nodes = solid
+    P, err, _, box, link, order, root, _, _, kind, size, _, sense, deviation, _, _, _, _ = solid
     slack, _, goal, tol = limits
     wanted = min(goal, high - 0.5 * tol)
     x, y, z = whole[2, 0, 0], whole[2, 0, 1], whole[2, 0, 2]
@@ -384,17 +357,15 @@ def block(pieces, uvs, sags, g, own, solid, marked, limits, rows, known, high, s
         f = chosen[m]
         if lowest <= known:
             break
-        own_marks = (marks[f], marks[f], nodes[f], nodes[f])
-        at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
+        at = nearest_below(P, err, box, link, order, root[f], x, y, z, stack)
         # Beyond ``reach`` the inside of a torus within a ball may be in two pieces.
         reach = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf
         for row in (len(kind) + f, f):
             t = slack[row] + deviation[f]
             if min(rho + max(-lowest, 0.0), at + t) >= reach:
                 break
-            _mark(row, solid, marked, slack, whole)
             limit = min(rho + 2.0 * abs(lowest) + 2.0 * (at + t), reach)
-            clear = _clear(solid, row, row, 1, x, y, z, limit, stack)
+            clear = _clear(solid, row, row, slack, x, y, z, limit, whole, stack)
             if clear > at + t and clear >= rho + max(-lowest, 0.0):
                 raised_size[count], raised[count] = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
                 whole[2, 1 + count // 3, count % 3] = clear
