@@ -173,14 +173,14 @@ def nearest(P, err, face, box, link, order, x, y, z, cut, near, stack):
 
 
 @formula
-def nearest_below(P, err, box, link, order, root, x, y, z, stack):
-    """Upper bound of a point's distance from the pieces below the node ``root``."""
+def nearest_below(P, err, box, link, order, root, share, x, y, z, stack):
+    """Upper bound of a point's distance from the pieces below the node ``root``; times ``share`` it is a lower one."""
     stack[0], top = root, 1
     low = np.inf
     while top > 0:
         top -= 1
         i = stack[top]
-        if _box_distance(box, i, x, y, z, x, y, z) >= low:
+        if _box_distance(box, i, x, y, z, x, y, z) >= share * low:
             continue
         if link[i, 1] < 0:
             top = _put_children(box, link, i, x, y, z, x, y, z, stack, top)
@@ -349,7 +349,7 @@ def nearest_marked(solid, row, other, root, bit, thin, side, slack, x, y, z, cut
     Of those that have the ``bit`` in both rows of marks, or ``thin`` in either. ``side`` -1 for a lower bound, 1 for an
     upper one. Marks are found out where the search comes to, and kept.
     """
-    P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, _, nodes = solid
+    P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, marks, nodes = solid
     stack[0], top = root, 1
     low = cut
     while top > 0:
@@ -367,15 +367,18 @@ def nearest_marked(solid, row, other, root, bit, thin, side, slack, x, y, z, cut
         left, first, second = 0, 0, 0
         for j in range(link[i, 0], link[i, 0] + link[i, 1]):
             t = order[j]
-            d, _, _ = point_triangle(x, y, z, P[t])
-            if d + side * err[t] >= low:
-                left += 1
-                continue
-            a = _mark(solid, row, slack, one, t, whole)
-            b = a if other == row else _mark(solid, other, slack, two, t, whole)
+            a, b = marks[row, t], marks[other, t]
+            if a == NEW or b == NEW:
+                d, _, _ = point_triangle(x, y, z, P[t])
+                if d + side * err[t] >= low:
+                    left += 1
+                    continue
+                a = _mark(solid, row, slack, one, t, whole)
+                b = a if other == row else _mark(solid, other, slack, two, t, whole)
             first, second = first | a, second | b
             if a & b & bit != 0 or (a | b) & thin != 0:
-                low = d + side * err[t]
+                d, _, _ = point_triangle(x, y, z, P[t])
+                low = min(low, d + side * err[t])
         if left == 0:
             if one == OPEN:
                 nodes[row, i] = first
