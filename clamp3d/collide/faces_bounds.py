@@ -86,19 +86,15 @@ def _below(least, rho, clear):
 
 
 @formula
-def _clear(solid, row, bit, slack, x, y, z, needed, most, whole, stack):
+def _clear(solid, row, bit, slack, at, x, y, z, needed, most, whole, stack):
     """How far about a point no piece has the mark ``bit``, or THIN, in a row of marks; -1 if that tells nothing.
 
-    Looked at is ``needed``, at most ``most``, and a little past the face itself: it has to be in there, by its slack.
+    The face is within ``at`` of the point: it has to be in that ball, by its slack. Looked at is ``needed`` past it, at
+    most ``most``.
     """
-    P, err, _, box, link, order, root, _, _, kind, _, _, _, deviation, _, _, _, _ = solid
-    f = row % len(kind)
-    t = slack[row] + deviation[f]
-    at = nearest_below(P, err, box, link, order, root[f], 0.5, x, y, z, stack)
+    t = slack[row] + solid[13][row % len(solid[13])]
     limit = min(needed + 2.0 * (at + t), most)
     clear = nearest_marked(solid, row, row, 0, bit, THIN, -1.0, slack, x, y, z, limit, whole, stack)
-    if clear <= at + t:
-        at = nearest_below(P, err, box, link, order, root[f], 1.0, x, y, z, stack)
     return clear if clear > at + t else -1.0
 
 
@@ -155,7 +151,10 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
         h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
         chosen[tried] = f
         tried += 1
-        for row in (len(kind) + f, f):  # what the first tells the second need not be asked for
+        at, told = -1.0, True
+        for row in (f, len(kind) + f):
+            if not told:  # what is near with much slack is with little
+                break
             t = slack[row] + deviation[f]
             to_frame(frame[f], V, work)
             a, raised = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
@@ -170,19 +169,24 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
             wanted = deep > 0.0 and (rim - deep < out[0] or not inside)
             if not (least - e > found or (h > t and outside < 0.0) or wanted):
                 continue
+            told = False
+            if at < 0.0:
+                at = nearest_below(P, err, box, link, order, root[f], x, y, z, stack)
             # Beyond this the inside of a torus within a ball may be in two pieces.
             reach = size[f, 0] if kind[f] == TORUS else np.inf
             if least - e > found or (h > t and outside < 0.0):
                 needed = max(h, abs(least) if least - e > found else 0.0) + rho
                 most = reach if sense[f] < 0.0 else np.inf
-                clear = _clear(solid, row, 1, slack, x, y, z, needed, most, whole, stack)
+                clear = _clear(solid, row, 1, slack, at, x, y, z, needed, most, whole, stack)
+                told = clear > 0.0 and found < min(out[0], goal) - 0.25 * tol
                 if clear > 0.0:  # what is above the face by more than t is outside there
                     found = max(found, _below(least, rho, clear) - e)
                     if h > t:
                         outside = max(outside, min(h - t, clear))
             if wanted:
                 most = reach if sense[f] > 0.0 else np.inf
-                clear = _clear(solid, row, 2, slack, x, y, z, deep, most, whole, stack)
+                clear = _clear(solid, row, 2, slack, at, x, y, z, deep, most, whole, stack)
+                told = told or clear > 0.0
                 inside = inside or clear > 0.0
                 if clear > 0.0 and rim - deep < out[0]:  # inside: as deep as the faces are away
                     for i in range(3):
@@ -344,7 +348,7 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
     """
     akind, asize, _, adeviation = own
     nearest_ones, chosen, raised, raised_size, stack, whole = scratch
-    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, deviation, _, beside, _, _ = solid
+    P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, beside, _, _ = solid
     slack, _, goal, tol = limits
     wanted = min(goal, high - 0.5 * tol)
     x, y, z = whole[2, 0, 0], whole[2, 0, 1], whole[2, 0, 2]
@@ -379,11 +383,11 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
         if f < 0 or max(lowest, highest) <= known:
             break
         most = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf  # as for one piece
-        fits = False
+        fits, at = False, nearest_below(P, err, box, link, order, root[f], x, y, z, stack)
         for row in (len(kind) + f, f):
             needed = rho + max(-highest, 0.0)
             if not fits and needed < most:
-                clear = _clear(solid, row, 1, slack, x, y, z, needed + abs(highest), most, whole, stack)
+                clear = _clear(solid, row, 1, slack, at, x, y, z, needed + abs(highest), most, whole, stack)
                 if clear >= needed:
                     fits = True
                     t = slack[row] + deviation[f]

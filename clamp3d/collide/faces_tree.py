@@ -173,14 +173,14 @@ def nearest(P, err, face, box, link, order, x, y, z, cut, near, stack):
 
 
 @formula
-def nearest_below(P, err, box, link, order, root, share, x, y, z, stack):
-    """Upper bound of a point's distance from the pieces below the node ``root``; times ``share`` it is a lower one."""
+def nearest_below(P, err, box, link, order, root, x, y, z, stack):
+    """Upper bound of a point's distance from the pieces below the node ``root``."""
     stack[0], top = root, 1
     low = np.inf
     while top > 0:
         top -= 1
         i = stack[top]
-        if _box_distance(box, i, x, y, z, x, y, z) >= share * low:
+        if _box_distance(box, i, x, y, z, x, y, z) >= low:
             continue
         if link[i, 1] < 0:
             top = _put_children(box, link, i, x, y, z, x, y, z, stack, top)
