@@ -91,10 +91,11 @@ def check(
     counters = shop.counters
     built, queries = counters.built.copy(), counters.queries.copy()
     times = [time.perf_counter()]
-    models = [shop.model(part.shape) for part in scene.parts]
-    n = len(models)
-    T = np.array([part.T_world for part in scene.parts]).reshape(n, 4, 4)
-    boxes = Boxes.of(np.array([m.bounds for m in models]).reshape(n, 2, 3), T)
+    placed = scene.placed
+    of_shape = [shop.model(shape) for shape in placed.shapes]
+    models = [of_shape[k] for k in placed.which.tolist()]
+    n, T = len(models), placed.poses
+    boxes = Boxes.of(np.array([m.bounds for m in of_shape]).reshape(-1, 2, 3)[placed.which], T)
     asked = None if pairs is None else _asked(scene, pairs)
     every = n * (n - 1) // 2 if asked is None else len(asked)
     if full or distances:
