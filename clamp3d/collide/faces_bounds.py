@@ -23,8 +23,10 @@ from clamp3d.collide.faces_math import (
     TORUS,
     band_over,
     bend,
+    cut,
     height_at,
     least_height,
+    longest,
     raise_by,
     slope_at,
     spans,
@@ -32,7 +34,7 @@ from clamp3d.collide.faces_math import (
     to_frame,
     way_out,
 )
-from clamp3d.collide.faces_tree import THIN, from_faces, mark_face, nearest, nearest_marked
+from clamp3d.collide.faces_tree import PIECES, THIN, from_faces, nearest, nearest_below, nearest_marked
 from clamp3d.collide.faces_witness import winding, witness
 from clamp3d.core.jit import formula
 
@@ -40,8 +42,10 @@ NEAR = 4
 """Faces whose surfaces are tried as separating ones, those nearest to the piece."""
 TRIED = 16
 """Faces tried in all, with those beside the nearest."""
-PIECES = 24
-"""Pieces that may wait while one is cut to see whether it reaches above a surface."""
+MOST_OVER = 6
+"""Faces at most that many pieces are bounded over together."""
+WORK = 6 + 2 * PIECES
+"""Triangles (3, 3) that the search takes for itself."""
 
 
 @formula
@@ -82,41 +86,26 @@ def _below(least, rho, clear):
 
 
 @formula
-def _mark(row, solid, marked, slack, work):
-    """Fill a row of marks, if it is not yet: face f has the rows f and, with as little slack as can be, n + f."""
-    if marked[row]:
-        return
-    P, _, face, box, link, order, _, buv, bsag, kind, size, frame, sense, deviation, group, _, marks, nodes = solid
-    f = row % len(kind)
-    mark_face(
-        P, buv, bsag, face, box, link, order, kind, size, frame, deviation, group, f, sense[f], slack[row],
-        marks[row], nodes[row], work[3 : 3 + PIECES], work[3 + PIECES :], work[0],
-    )  # fmt: skip
-    marked[row] = 1
+def _clear(solid, row, bit, slack, at, x, y, z, needed, most, whole, stack):
+    """How far about a point no piece has the mark ``bit``, or THIN, in a row of marks; -1 if that tells nothing.
+
+    The face is within ``at`` of the point: it has to be in that ball, by its slack. Looked at is ``needed`` past it, at
+    most ``most``.
+    """
+    t = slack[row] + solid[13][row % len(solid[13])]
+    limit = min(needed + 2.0 * (at + t), most)
+    clear = nearest_marked(solid, row, row, 0, bit, THIN, -1.0, slack, x, y, z, limit, whole, stack)
+    return clear if clear > at + t else -1.0
 
 
 @formula
-def _clear(solid, row, other, bit, x, y, z, limit, stack):
-    """How far about a point, at most ``limit``, no piece has the ``bit`` in both rows of marks, or THIN in either."""
-    P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, marks, nodes = solid
-    both = (marks[row], marks[other], nodes[row], nodes[other])
-    found = nearest_marked(P, err, box, link, order, 0, *both, bit, -1.0, x, y, z, limit, stack)
-    for k in (row, other):
-        own = (marks[k], marks[k], nodes[k], nodes[k])
-        found = nearest_marked(P, err, box, link, order, 0, *own, THIN, -1.0, x, y, z, found, stack)
-    return found
-
-
-@formula
-def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
+def piece(V, uv, g, sag, own, solid, limits, scratch, out):
     """Lower bound for one piece; a better upper bound goes into ``out``."""
     akind, asize, aframe, adeviation = own
     slack, contact, goal, tol = limits
     near, chosen, heights, over, stack, whole = scratch
     work, point, p, q = whole[0], whole[1], whole[2, 0], whole[2, 1]
-    P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, _, beside, marks, nodes = (
-        solid
-    )
+    P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, _, beside, _, _ = solid
     du, v0, v1, u, v = spans(uv)
     e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
     rim = max(sag[0], sag[1], sag[2]) + adeviation[g]
@@ -162,7 +151,10 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
         h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
         chosen[tried] = f
         tried += 1
+        at, told = -1.0, True
         for row in (f, len(kind) + f):
+            if not told:  # what is near with much slack is with little
+                break
             t = slack[row] + deviation[f]
             to_frame(frame[f], V, work)
             a, raised = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
@@ -173,30 +165,30 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
             least -= raised
             if row == f:
                 heights[tried - 1] = least
-            if row > f and not (rho + e < 2.0 * slack[f] and found < min(out[0], goal) - tol):
-                break
             deep = way_out(kind[f], size[f, 0], size[f, 1], sense[f], frame[f], t, x, y, z)
             wanted = deep > 0.0 and (rim - deep < out[0] or not inside)
             if not (least - e > found or (h > t and outside < 0.0) or wanted):
                 continue
-            _mark(row, solid, marked, slack, whole)
-            own_marks = (marks[row], marks[row], nodes[row], nodes[row])
-            at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
+            told = False
+            if at < 0.0:
+                at = nearest_below(P, err, box, link, order, root[f], x, y, z, stack)
             # Beyond this the inside of a torus within a ball may be in two pieces.
             reach = size[f, 0] if kind[f] == TORUS else np.inf
             if least - e > found or (h > t and outside < 0.0):
-                needed = max(h, abs(least) if least - e > found else 0.0)
-                limit = min(needed + rho + 2.0 * at + t, reach if sense[f] < 0.0 else np.inf)
-                clear = _clear(solid, row, row, 1, x, y, z, limit, stack)
-                if clear > at + t:  # what is above the face by more than t is outside there
+                needed = max(h, abs(least) if least - e > found else 0.0) + rho
+                most = reach if sense[f] < 0.0 else np.inf
+                clear = _clear(solid, row, 1, slack, at, x, y, z, needed, most, whole, stack)
+                told = clear > 0.0 and found < min(out[0], goal) - 0.25 * tol
+                if clear > 0.0:  # what is above the face by more than t is outside there
                     found = max(found, _below(least, rho, clear) - e)
                     if h > t:
                         outside = max(outside, min(h - t, clear))
             if wanted:
-                limit = min(2.0 * at + deep + t, reach if sense[f] > 0.0 else np.inf)
-                clear = _clear(solid, row, row, 2, x, y, z, limit, stack)
-                inside = inside or clear > at + t
-                if clear > at + t and rim - deep < out[0]:  # inside: as deep as the faces are away
+                most = reach if sense[f] > 0.0 else np.inf
+                clear = _clear(solid, row, 2, slack, at, x, y, z, deep, most, whole, stack)
+                told = told or clear > 0.0
+                inside = inside or clear > 0.0
+                if clear > 0.0 and rim - deep < out[0]:  # inside: as deep as the faces are away
                     for i in range(3):
                         for c in range(3):
                             work[i, c] = p[c]
@@ -230,16 +222,15 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
                         above = above and up > slack[one] + deviation[one]
                     if not above or least - e <= found:
                         continue
-                _mark(f, solid, marked, slack, whole)
-                _mark(o, solid, marked, slack, whole)
                 # A piece of one that looks over the other: what lies above both there is outside.
                 at = np.inf
                 for one, other in ((f, o), (o, f)):
-                    rows = (marks[other], marks[other], nodes[other], nodes[other])
-                    at = nearest_marked(P, err, box, link, order, root[one], *rows, 1, 1.0, x, y, z, at, stack)
+                    at = nearest_marked(
+                        solid, other, other, root[one], 1, 0, 1.0, slack, x, y, z, at, whole, stack
+                    )  # fmt: skip
                 past = at + 2.0 * max(slack[f] + deviation[f], slack[o] + deviation[o]) / rise  # of the slack of both
                 limit = past + max(at, -least) + rho
-                clear = _clear(solid, f, o, 1, x, y, z, limit, stack)
+                clear = nearest_marked(solid, f, o, 0, 1, THIN, -1.0, slack, x, y, z, limit, whole, stack)
                 if clear > past:
                     found = max(found, _below(least, rho, clear) - e)
     unsure = low > 0.0 and found < min(out[0], goal) - tol and not inside and outside < 0.0
@@ -259,55 +250,167 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
 
 
 @formula
-def block(pieces, uvs, sags, g, own, solid, marked, slack, rows, near, known, stack, whole):
-    """Lower bound for the pieces ``rows`` of face g, all at once, ``known`` if there is no better one; and the lowest.
+def _over(V, uv, g, rim, own, solid, count, scratch):
+    """Lower bound, as `least_height`, of the highest that a piece of face g is over any of the first faces chosen."""
+    akind, asize, aframe, _ = own
+    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
+    _, chosen, raised, raised_size, _, whole = scratch
+    du, v0, v1, _, _ = spans(uv)
+    e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1) + rim
+    high = -np.inf
+    for m in range(count):
+        f = chosen[m]
+        to_frame(frame[f], V, whole[0])
+        h = least_height(kind[f], raised_size[m], size[f, 1], sense[f], whole[0]) - e
+        if akind[g] != PLANE and akind[g] != OTHER:
+            band = akind[g], asize[g, 0], asize[g, 1], aframe[g], v0, v1
+            h = max(h, band_over(*band, kind[f], raised_size[m], size[f, 1], frame[f], sense[f]) - rim)
+        high = max(high, h - raised[m])
+    return high
 
-    As for one piece, with a ball round the middle of their box, whole[2, 0], that must hold them all.
+
+@formula
+def _point_over(point, solid, count, chosen, raised):
+    """How high a point (3) is over the highest of the first faces chosen, as they are raised."""
+    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
+    high = -np.inf
+    for m in range(count):
+        f = chosen[m]
+        h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], point[0], point[1], point[2])
+        high = max(high, h - raised[m])
+    return high
+
+
+@formula
+def _put(place, point, uv, sag):
+    """A point, its parameters and the sag there as a piece without size."""
+    for i in range(3):
+        for c in range(3):
+            place[0, i, c] = point[c]
+        place[1, i, 0], place[1, i, 1], place[2, 0, i] = uv[0], uv[1], sag
+
+
+@formula
+def _lowest(pieces, uvs, sags, g, rows, own, solid, count, known, wanted, near, scratch, place):
+    """Lower bound of the highest that any point of the pieces ``rows`` of face g is over the first faces chosen.
+
+    The pieces are cut, with no other question to the solid, until that is ``wanted``, or a point, into ``place``
+    (3, 3, 3), is that low but for ``near``. Its parameters are next in ``place``, and the sag where it is. Less than
+    ``known`` is not wanted either. Returns also how low that point is.
     """
     akind, asize, aframe, adeviation = own
-    P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, _, marks, nodes = solid
-    work, p = whole[0], whole[2, 0]
-    x, y, z = p[0], p[1], p[2]
-    rho, rim, bent, low, high = 0.0, 0.0, 0.0, np.inf, -np.inf
+    _, chosen, raised, _, _, whole = scratch
+    cuts, cut_uvs = whole[3 : 3 + PIECES], whole[3 + PIECES : 3 + 2 * PIECES]
+    high = np.inf
+    for k in rows:
+        for i in range(3):
+            h = _point_over(pieces[k, i], solid, count, chosen, raised)
+            if h < high:
+                high = h
+                _put(place, pieces[k, i], uvs[k, i], 0.0)
+    if high <= known:
+        return known, high
+    found, left = np.inf, 64 + 2 * len(rows)
+    for k in rows:
+        rim = max(sags[k, 0], sags[k, 1], sags[k, 2]) + adeviation[g]
+        for i in range(3):
+            for c in range(3):
+                cuts[0, i, c] = pieces[k, i, c]
+            cut_uvs[0, i, 0], cut_uvs[0, i, 1] = uvs[k, i, 0], uvs[k, i, 1]
+        top = 1
+        while top > 0:
+            top -= 1
+            V, uv = cuts[top], cut_uvs[top]
+            low = _over(V, uv, g, rim, own, solid, count, scratch)
+            if low >= min(high - near, wanted, found) or top + 2 > len(cuts) or left == 0:
+                found = min(found, low)
+                continue
+            left -= 1
+            du, v0, v1, _, _ = spans(uv)
+            e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
+            bent = e > 0.25 * (min(high, wanted) - low)
+            side = longest(V, uv, akind[g], asize[g, 0], asize[g, 1], bent)
+            cut(V, uv, side, akind[g], asize[g, 0], asize[g, 1], aframe[g], cuts[top + 1], cut_uvs[top + 1])
+            h = _point_over(cuts[top + 1, side], solid, count, chosen, raised)
+            if h < high:
+                high = h
+                _put(place, cuts[top + 1, side], cut_uvs[top + 1, side], rim - adeviation[g])
+            top += 2
+    return found, high
+
+
+@formula
+def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, place):
+    """Lower bound for the pieces ``rows`` of face g, all at once, ``known`` if there is no better one.
+
+    As for one piece, with a ball round the middle of their box, whole[2, 0], that must hold them all; but each point
+    may have another one of the nearest faces under it. Returns also how low one of their points is over these.
+    """
+    akind, asize, _, adeviation = own
+    nearest_ones, chosen, raised, raised_size, stack, whole = scratch
+    P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, beside, _, _ = solid
+    slack, _, goal, tol = limits
+    wanted = min(goal, high - 0.5 * tol)
+    x, y, z = whole[2, 0, 0], whole[2, 0, 1], whole[2, 0, 2]
+    rho, rim, bent = 0.0, 0.0, 0.0
     for k in rows:
         for i in range(3):
             rho = max(rho, (pieces[k, i, 0] - x) ** 2 + (pieces[k, i, 1] - y) ** 2 + (pieces[k, i, 2] - z) ** 2)
             rim = max(rim, sags[k, i])
         du, v0, v1, _, _ = spans(uvs[k])
-        low, high = min(low, v0), max(high, v1)
         bent = max(bent, bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1))
-    rim += adeviation[g]
-    rho = math.sqrt(rho) + bent + rim
-    found, best = known, rows[0]
-    for f in near:
-        if f < 0 or kind[f] == OTHER:
-            continue
-        t, least = slack[f] + deviation[f], -np.inf
-        a, raised = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
-        if akind[g] != PLANE and akind[g] != OTHER:
-            band = akind[g], asize[g, 0], asize[g, 1], aframe[g], low, high
-            least = band_over(*band, kind[f], a, size[f, 1], frame[f], sense[f]) - rim
-        flat = np.inf
-        for k in rows:
-            if flat <= max(least, found + raised):
+    rho = math.sqrt(rho) + bent + rim + adeviation[g]
+    # From the nearest face on, those are taken in that the lowest point of the pieces, over those so far, is above.
+    count, refused, k = 0, 0, rows[len(rows) // 2]
+    _put(place, pieces[k, 0], uvs[k, 0], 0.0)
+    found, lowest = -np.inf, -np.inf
+    while count < MOST_OVER and found < wanted:
+        f, highest = -1, lowest + 0.1 * tol
+        for n in range(NEAR + NEAR * beside.shape[1]):
+            one = nearest_ones[n] if n < NEAR else nearest_ones[(n - NEAR) // beside.shape[1]]
+            if n >= NEAR and one >= 0:
+                one = beside[one, (n - NEAR) % beside.shape[1]]
+            if one < 0 or kind[one] == OTHER:
+                continue
+            h = sense[one] * height_at(
+                kind[one], size[one, 0], size[one, 1], frame[one], place[0, 0, 0], place[0, 0, 1], place[0, 0, 2]
+            )
+            for m in range(len(chosen)):
+                if chosen[m] == one and (m < count or m >= len(chosen) - refused):
+                    h = -np.inf
+            if h > highest:
+                f, highest = one, h
+        if f < 0 or max(lowest, highest) <= known:
+            break
+        most = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf  # as for one piece
+        fits, at = False, nearest_below(P, err, box, link, order, root[f], x, y, z, stack)
+        for row in (len(kind) + f, f):
+            needed = rho + max(-highest, 0.0)
+            if not fits and needed < most:
+                clear = _clear(solid, row, 1, slack, at, x, y, z, needed + abs(highest), most, whole, stack)
+                if clear >= needed:
+                    fits = True
+                    t = slack[row] + deviation[f]
+                    raised_size[count], raised[count] = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
+                    whole[2, 1 + count // 3, count % 3] = clear
+        if not fits:
+            refused += 1
+            chosen[len(chosen) - refused] = f
+            if refused == len(chosen) - MOST_OVER:
                 break
-            du, v0, v1, _, _ = spans(uvs[k])
-            to_frame(frame[f], pieces[k], work)
-            e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1) + rim
-            h = least_height(kind[f], a, size[f, 1], sense[f], work) - e
-            if h < flat:
-                flat, best = h, k
-        least = max(least, flat) - raised
-        if least <= found:
             continue
-        _mark(f, solid, marked, slack, whole)
-        own_marks = (marks[f], marks[f], nodes[f], nodes[f])
-        at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
-        # Beyond ``reach`` the inside of a torus within a ball may be in two pieces.
-        reach = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf
-        limit = min(rho + abs(least) + 2.0 * (at + t), reach)
-        clear = _clear(solid, f, f, 1, x, y, z, limit, stack)
-        if clear <= at + t:
-            continue
-        found = max(found, _below(least, rho, clear))
-    return found, best
+        chosen[count] = f
+        near = 0.25 * tol + (0.05 * abs(lowest) if -np.inf < lowest and goal < np.inf else 0.0)
+        new, deep = _lowest(
+            pieces, uvs, sags, g, rows, own, solid, count + 1, known, wanted, near, scratch, place
+        )  # fmt: skip
+        # Each point of the pieces is above one of the faces by ``new``, and in the ball where that counts.
+        held = new
+        for m in range(count + 1):
+            clear = whole[2, 1 + m // 3, m % 3]
+            if clear - rho < -min(new, 0.0):
+                held = -np.inf
+            held = min(held, max(clear - rho, 0.0)) if new >= 0.0 else held
+        found, lowest = max(found, held), deep
+        count += 1
+    return max(known, found), lowest if count > 0 else np.inf

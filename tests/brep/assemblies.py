@@ -26,7 +26,9 @@ from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf
 from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_State
 from OCP.TopLoc import TopLoc_Location
+from step_scenes import Tree, location
 
+from clamp3d.brep.cad import Key, matrix
 from clamp3d.brep.solid import BrepSolid, require_open_cascade
 from clamp3d.brep.tessellate import explore
 
@@ -165,7 +167,10 @@ def gears():
 
 
 def nudged(parts, seed, least=0.003, most=0.05):
-    """Each part moved by ``least`` to ``most`` mm in some direction, and turned by up to 1e-3 rad every third time."""
+    """Each part moved by ``least`` to ``most`` mm in some direction, and turned by up to 1e-3 rad every third time.
+
+    Instances stay instances, and are turned about the origins of their products.
+    """
     rng = np.random.default_rng(seed)
     made = {}
     for k, (name, shape) in enumerate(parts.items()):
@@ -175,7 +180,10 @@ def nudged(parts, seed, least=0.003, most=0.05):
             x, y, z = rng.normal(size=3) * 3e-4
             T[:3, :3] = np.linalg.qr(np.eye(3) + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]))[0]
             T[:3, :3] *= np.sign(np.diag(T[:3, :3]))
-        made[name] = moved(shape, T)
+        if (at := shape.Location()).IsIdentity():
+            made[name] = moved(shape, T)
+        else:
+            made[name] = shape.Located(location(matrix(at) @ T))
     return made
 
 
@@ -243,14 +251,15 @@ def judged(verdict, lower, upper, known):
 
 
 def write_step(parts, path):
-    """The parts as a STEP file of named products, in their order."""
-    from step_scenes import Tree
-
+    """The parts as a STEP file of named products, in their order; one shape in several places is one product."""
     require_open_cascade()
-    tree = Tree()
+    tree, products = Tree(), {}
     root = tree.product("assembly")
     for name, shape in parts.items():
-        tree.put(root, tree.product(name, solid_of(shape)), np.eye(4))
+        solid = solid_of(shape)
+        if (key := Key(solid)) not in products:
+            products[key] = tree.product(name.removesuffix("_0"), key.shape)
+        tree.put(root, products[key], matrix(solid.Location()), name)
     return tree.write(path)
 
 
