@@ -32,7 +32,8 @@ from clamp3d.collide.faces_math import (
     to_frame,
     way_out,
 )
-from clamp3d.collide.faces_tree import THIN, from_faces, mark_face, nearest, nearest_marked
+from clamp3d.collide.faces_open import is_open, mark_open
+from clamp3d.collide.faces_tree import from_faces, mark_face, nearest, nearest_marked
 from clamp3d.collide.faces_witness import winding, witness
 from clamp3d.core.jit import formula
 
@@ -82,7 +83,7 @@ def _below(least, rho, clear):
 
 
 @formula
-def _mark(row, solid, marked, slack, work):
+def _mark(row, solid, marked, slack, work, stack):
     """Fill a row of marks, if it is not yet: face f has the rows f and, with as little slack as can be, n + f."""
     if marked[row]:
         return
@@ -92,18 +93,16 @@ def _mark(row, solid, marked, slack, work):
         P, buv, bsag, face, box, link, order, kind, size, frame, deviation, group, f, sense[f], slack[row],
         marks[row], nodes[row], work[3 : 3 + PIECES], work[3 + PIECES :], work[0],
     )  # fmt: skip
+    mark_open(solid, row, f, slack[row] + deviation[f], work[2, 1], stack)
     marked[row] = 1
 
 
 @formula
 def _clear(solid, row, other, bit, x, y, z, limit, stack):
-    """How far about a point, at most ``limit``, no piece has the ``bit`` in both rows of marks, or THIN in either."""
+    """How far about a point, at most ``limit``, no piece has the ``bit`` in both rows of marks."""
     P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, marks, nodes = solid
     both = (marks[row], marks[other], nodes[row], nodes[other])
-    found = nearest_marked(P, err, box, link, order, 0, *both, bit, -1.0, x, y, z, limit, stack)
-    for k in (row, other):
-        own = (marks[k], marks[k], nodes[k], nodes[k])
-        found = nearest_marked(P, err, box, link, order, 0, *own, THIN, -1.0, x, y, z, found, stack)
+    found, _ = nearest_marked(P, err, box, link, order, 0, *both, bit, -1.0, x, y, z, limit, stack)
     return found
 
 
@@ -179,24 +178,26 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
             wanted = deep > 0.0 and (rim - deep < out[0] or not inside)
             if not (least - e > found or (h > t and outside < 0.0) or wanted):
                 continue
-            _mark(row, solid, marked, slack, whole)
+            _mark(row, solid, marked, slack, whole, stack)
             own_marks = (marks[row], marks[row], nodes[row], nodes[row])
-            at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
+            at, _ = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
             # Beyond this the inside of a torus within a ball may be in two pieces.
             reach = size[f, 0] if kind[f] == TORUS else np.inf
             if least - e > found or (h > t and outside < 0.0):
                 needed = max(h, abs(least) if least - e > found else 0.0)
                 limit = min(needed + rho + 2.0 * at + t, reach if sense[f] < 0.0 else np.inf)
                 clear = _clear(solid, row, row, 1, x, y, z, limit, stack)
-                if clear > at + t:  # what is above the face by more than t is outside there
+                if clear > at + t and is_open(solid, row, f, t, -1, 0.0, clear, x, y, z, q, stack):
+                    # What is above the face by more than t is outside there.
                     found = max(found, _below(least, rho, clear) - e)
                     if h > t:
                         outside = max(outside, min(h - t, clear))
             if wanted:
                 limit = min(2.0 * at + deep + t, reach if sense[f] > 0.0 else np.inf)
                 clear = _clear(solid, row, row, 2, x, y, z, limit, stack)
-                inside = inside or clear > at + t
-                if clear > at + t and rim - deep < out[0]:  # inside: as deep as the faces are away
+                within = clear > at + t and is_open(solid, row, f, t, -1, 0.0, clear, x, y, z, q, stack)
+                inside = inside or within
+                if within and rim - deep < out[0]:  # inside: as deep as the faces are away
                     for i in range(3):
                         for c in range(3):
                             work[i, c] = p[c]
@@ -230,21 +231,22 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
                         above = above and up > slack[one] + deviation[one]
                     if not above or least - e <= found:
                         continue
-                _mark(f, solid, marked, slack, whole)
-                _mark(o, solid, marked, slack, whole)
-                # A piece of one that looks over the other: what lies above both there is outside.
-                at = np.inf
+                _mark(f, solid, marked, slack, whole, stack)
+                _mark(o, solid, marked, slack, whole, stack)
+                # Where a piece of one looks over the other, what lies above both is outside.
                 for one, other in ((f, o), (o, f)):
                     rows = (marks[other], marks[other], nodes[other], nodes[other])
-                    at = nearest_marked(P, err, box, link, order, root[one], *rows, 1, 1.0, x, y, z, at, stack)
-                past = at + 2.0 * max(slack[f] + deviation[f], slack[o] + deviation[o]) / rise  # of the slack of both
-                limit = past + max(at, -least) + rho
-                clear = _clear(solid, f, o, 1, x, y, z, limit, stack)
-                if clear > past:
-                    found = max(found, _below(least, rho, clear) - e)
+                    at, j = nearest_marked(P, err, box, link, order, root[one], *rows, 1, 1.0, x, y, z, np.inf, stack)
+                    if j < 0:
+                        continue
+                    t, over_other = slack[one] + deviation[one], slack[other] + deviation[other]
+                    clear = _clear(solid, f, o, 1, x, y, z, 2.0 * at + 8.0 * (t + over_other) - least + rho, stack)
+                    if clear > at + t and is_open(solid, one, one, t, other, over_other, clear, x, y, z, q, stack):
+                        found = max(found, _below(least, rho, clear) - e)
+                        break
     unsure = low > 0.0 and found < min(out[0], goal) - tol and not inside and outside < 0.0
-    if unsure and winding(P, x, y, z) < 0.5:
-        outside = low  # clear of all errors: what the triangles say holds
+    if unsure and abs(winding(P, x, y, z)) < 1e-6:
+        outside = low  # clear of all errors: what the triangles say holds; if they do not close it is no whole number
     if outside > 0.0:
         out[8] = max(out[8], outside)
         found = max(found, low - rho - e)
@@ -300,14 +302,14 @@ def block(pieces, uvs, sags, g, own, solid, marked, slack, rows, near, known, st
         least = max(least, flat) - raised
         if least <= found:
             continue
-        _mark(f, solid, marked, slack, whole)
+        _mark(f, solid, marked, slack, whole, stack)
         own_marks = (marks[f], marks[f], nodes[f], nodes[f])
-        at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
+        at, _ = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
         # Beyond ``reach`` the inside of a torus within a ball may be in two pieces.
         reach = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf
         limit = min(rho + abs(least) + 2.0 * (at + t), reach)
         clear = _clear(solid, f, f, 1, x, y, z, limit, stack)
-        if clear <= at + t:
+        if clear <= at + t or not is_open(solid, f, f, t, -1, 0.0, clear, x, y, z, whole[2, 1], stack):
             continue
         found = max(found, _below(least, rho, clear))
     return found, best

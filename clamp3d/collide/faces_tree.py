@@ -29,9 +29,6 @@ from clamp3d.core.jit import entry, formula
 
 LEAF = 4
 DEEP = 128
-THIN = 4
-"""Mark of pieces that stay within the slack of a face's surface and look the other way: of a thin wall or slit."""
-_STEP = 1e-4
 
 
 @formula
@@ -115,7 +112,7 @@ tree = entry(
 
 
 @formula
-def _box_distance(box, i, x0, y0, z0, x1, y1, z1):
+def box_distance(box, i, x0, y0, z0, x1, y1, z1):
     """Distance of a node's box from the box that the last six are the lower and upper corner of."""
     dx = max(0.0, box[i, 0] - x1, x0 - box[i, 3])
     dy = max(0.0, box[i, 1] - y1, y0 - box[i, 4])
@@ -127,7 +124,7 @@ def _box_distance(box, i, x0, y0, z0, x1, y1, z1):
 def _put_children(box, link, i, x0, y0, z0, x1, y1, z1, stack, top):
     """The children of a node onto the stack, the one that is nearer to the box last; returns how many are on it."""
     a, b = link[i, 0], -link[i, 1]
-    if _box_distance(box, a, x0, y0, z0, x1, y1, z1) < _box_distance(box, b, x0, y0, z0, x1, y1, z1):
+    if box_distance(box, a, x0, y0, z0, x1, y1, z1) < box_distance(box, b, x0, y0, z0, x1, y1, z1):
         a, b = b, a
     stack[top], stack[top + 1] = a, b
     return top + 2
@@ -146,7 +143,7 @@ def nearest(P, err, face, box, link, order, x, y, z, cut, near, stack):
     while top > 0:
         top -= 1
         i = stack[top]
-        if _box_distance(box, i, x, y, z, x, y, z) - box[i, 6] > low:
+        if box_distance(box, i, x, y, z, x, y, z) - box[i, 6] > low:
             continue
         if link[i, 1] < 0:
             top = _put_children(box, link, i, x, y, z, x, y, z, stack, top)
@@ -170,17 +167,17 @@ def nearest(P, err, face, box, link, order, x, y, z, cut, near, stack):
 
 @formula
 def nearest_marked(P, err, box, link, order, root, mark, other, nodes, rest, bit, side, x, y, z, cut, stack):
-    """Bound of a point's distance, at most ``cut``, from the pieces below the node ``root``.
+    """Bound of a point's distance, at most ``cut``, from the pieces below the node ``root``, and the nearest one or -1.
 
     ``side`` -1 for a lower bound, 1 for an upper one. Of those that are marked with ``bit`` in both rows of marks, or
     of all where it is 0: ``mark`` and ``other`` (m,) are rows of triangles, ``nodes`` and ``rest`` (n,) of tree nodes.
     """
     stack[0], top = root, 1
-    low = cut
+    low, found = cut, -1
     while top > 0:
         top -= 1
         i = stack[top]
-        least = _box_distance(box, i, x, y, z, x, y, z) + min(side, 0.0) * box[i, 6]
+        least = box_distance(box, i, x, y, z, x, y, z) + min(side, 0.0) * box[i, 6]
         if nodes[i] & rest[i] & bit != bit or least >= low:
             continue
         if link[i, 1] < 0:
@@ -190,8 +187,9 @@ def nearest_marked(P, err, box, link, order, root, mark, other, nodes, rest, bit
             t = order[j]
             if mark[t] & other[t] & bit == bit:
                 d, _, _ = point_triangle(x, y, z, P[t])
-                low = min(low, d + side * err[t])
-    return low
+                if d + side * err[t] < low:
+                    low, found = d + side * err[t], t
+    return low, found
 
 
 @formula
@@ -210,7 +208,7 @@ def from_faces(P, err, face, box, link, order, kind, size, frame, deviation, V, 
     while top > 0:
         top -= 1
         i = stack[top]
-        if _box_distance(box, i, x0, y0, z0, x1, y1, z1) - box[i, 6] >= low:
+        if box_distance(box, i, x0, y0, z0, x1, y1, z1) - box[i, 6] >= low:
             continue
         if link[i, 1] < 0:
             top = _put_children(box, link, i, x0, y0, z0, x1, y1, z1, stack, top)
@@ -277,28 +275,12 @@ def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, pieces, uvs, wor
 
 
 @formula
-def _faces_away(V, kind, size, frame, f, sense):
-    """Whether the triangle V looks the other way than the surface of face f where its middle is."""
-    ux, uy, uz = V[1, 0] - V[0, 0], V[1, 1] - V[0, 1], V[1, 2] - V[0, 2]
-    vx, vy, vz = V[2, 0] - V[0, 0], V[2, 1] - V[0, 1], V[2, 2] - V[0, 2]
-    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    length = math.sqrt(x * x + y * y + z * z)
-    if length == 0.0:
-        return False
-    x, y, z = _STEP * x / length, _STEP * y / length, _STEP * z / length
-    cx, cy, cz = (V[0, 0] + V[1, 0] + V[2, 0]) / 3, (V[0, 1] + V[1, 1] + V[2, 1]) / 3, (V[0, 2] + V[1, 2] + V[2, 2]) / 3
-    rise = height_at(kind[f], size[f, 0], size[f, 1], frame[f], cx + x, cy + y, cz + z)
-    rise -= height_at(kind[f], size[f, 0], size[f, 1], frame[f], cx - x, cy - y, cz - z)
-    return sense * rise < -_STEP
-
-
-@formula
 def mark_face(
     P, uv, sag, face, box, link, order, kind, size, frame, deviation, group, f, sense, slack, mark, nodes, pieces, uvs,
     work,
 ):  # fmt: skip
     """Marks of the triangles (m,) and tree nodes (n,) against the surface of face f: 1 for pieces that reach above it,
-    2 for those that reach below, 4 for those that do neither but look the other way: there is a thin wall or slit."""
+    2 for those that reach below."""
     # What is known of a node's triangles goes down with it: bits 1 and 2 as in the marks, 4 and 8 where they are open.
     nodes[0] = 12
     for i in range(len(nodes)):
@@ -330,9 +312,6 @@ def mark_face(
                     mark[t] |= 1
                 if _reaches(P[t], uv[t], g, rim, kind, size, frame, f, -sense, slack, pieces, uvs, work):
                     mark[t] |= 2
-            thin = mark[t] == 0 and group[g] != group[f]
-            if thin and _faces_away(P[t], kind, size, frame, f, sense):
-                mark[t] = THIN
     for i in range(len(nodes) - 1, -1, -1):
         nodes[i] = 0
         if link[i, 1] < 0:

@@ -112,7 +112,9 @@ def test_what_is_nearest():
                 least = (d + side * err)[mine].min(initial=7.0)
                 there = 0 if f < 0 else root[f]
                 rows = P, err, box, link, order, there, marks, rest, nodes, others
-                assert faces_tree.nearest_marked(*rows, bit, side, *x, 7.0, stack) == pytest.approx(least, abs=1e-7)
+                low, found = faces_tree.nearest_marked(*rows, bit, side, *x, 7.0, stack)
+                assert low == pytest.approx(least, abs=1e-7)
+                assert found < 0 if least == 7.0 else (d + side * err)[found] == pytest.approx(least, abs=1e-7)
 
 
 @pytest.mark.parametrize("k", range(len(SOLIDS)))
