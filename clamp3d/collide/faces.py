@@ -221,10 +221,10 @@ def faces_distance(
     if tol is None and first.upper < -contact - 2.0 * RESOLUTION:
         return _told(replace(first.swapped(), lower=-np.inf))
     margin = max(contact, clearance)
-    low, high = first.lower, first.upper
+    low = first.lower
     if low > margin and not _may_hold(a, b, here):
         return _told(first.swapped())
-    second = _towards(b, a, here, contact, clearance, tol, most).moved(T)
+    second = _towards(b, a, here, contact, clearance, tol, most, (low, first.upper)).moved(T)
     first = first.swapped()
     best = first if first.upper <= second.upper else second
     if low > 0.0 and second.lower > 0.0:
@@ -271,7 +271,7 @@ def _at(a: FaceModel, point: Array) -> tuple[float, float]:
     pieces = np.tile(point, (1, 3, 1)), np.zeros((1, 3, 2)), none, np.zeros((1, 3))
     tree = box, np.array([[0, 1]]), none, none
     surface = np.array([OTHER]), np.zeros((1, 2)), np.zeros((1, 12)), np.zeros(1)
-    low, out = _search(a, pieces, tree, np.eye(4), surface, 1.0, 0.0, 1e-3, 0)
+    low, out = _search(a, pieces, tree, np.eye(4), surface, 1.0, 0.0, 1e-3, 0, (np.inf, np.inf))
     return low, float(out[0])
 
 
@@ -285,11 +285,13 @@ def _search(
     clearance: float,
     tol: float,
     most: int,
+    known: tuple[float, float],
 ) -> tuple[float, Array]:
     """Lower bound of the signed distance from ``a`` of another solid's pieces, and what else the search tells.
 
     ``pieces``: corners, parameters, faces, sags of borders, in a's frame; ``tree`` over them, in their own frame;
-    ``surfaces``: kind, size, frame, deviation. At most ``most`` pieces are added.
+    ``surfaces``: kind, size, frame, deviation. At most ``most`` pieces are added. ``known``: bounds that the search the
+    other way has found; what is above the first, and no point below the second, is not looked for.
     """
     from clamp3d.collide.faces_bounds import TRIED
     from clamp3d.collide.faces_kernel import RESULT, SPACE, WORK, descend
@@ -298,10 +300,10 @@ def _search(
     rows = [np.empty((n + most, *given.shape[1:]), dtype=given.dtype) for given in pieces]
     for row, given in zip(rows, pieces, strict=True):
         row[:n] = given
-    out[0] = np.inf
+    out[0] = known[1]
     found = descend(
         *rows, np.empty(n + most + nodes), n, *tree, T, *surfaces,
-        *a.arrays, a.marked, a.slack, contact, clearance, tol, most,
+        *a.arrays, a.marked, a.slack, contact, clearance, tol, most, known[0],
         np.empty(TRIED + len(a.faces.kind)), np.empty((WORK, 3, 3)),
         np.empty(SPACE + n + most + 2 * nodes, dtype=np.int64), out,
     )  # fmt: skip
@@ -321,11 +323,19 @@ def _may_hold(inner: FaceModel, outer: FaceModel, T: Array) -> bool:
 
 
 def _towards(
-    a: FaceModel, b: FaceModel, T: Array, contact: float, clearance: float, tol: float | None, most: int
+    a: FaceModel,
+    b: FaceModel,
+    T: Array,
+    contact: float,
+    clearance: float,
+    tol: float | None,
+    most: int,
+    known: tuple[float, float] = (np.inf, np.inf),
 ) -> Distance:
     """Least signed distance from a of b's faces, ``b`` at ``T`` in a's frame; points in a's frame, b's point first.
 
-    ``estimate`` is how far at least some point of b is outside of a.
+    ``estimate`` is how far at least some point of b is outside of a. ``known`` as in `_search`: ``upper`` is the second
+    of it, without points, where none is found below it.
     """
     R, t = T[:3, :3], T[:3, 3]
     frames = dot(b.faces.frame, R.T)
@@ -333,6 +343,7 @@ def _towards(
     pieces = dot(b.faces.corners, R.T) + t, b.faces.uv, b.faces.face, b.faces.sag
     surfaces = b.faces.kind, b.faces.size, np.ascontiguousarray(frames.reshape(-1, 12)), b.faces.deviation
     width = -VERDICT_WIDTH * contact if tol is None else tol
-    found, out = _search(a, pieces, b.arrays[3:7], np.ascontiguousarray(T), surfaces, contact, clearance, width, most)
-    p, q = (out[1:4].copy(), out[4:7].copy()) if np.isfinite(out[0]) else (None, None)
+    place = np.ascontiguousarray(T)
+    found, out = _search(a, pieces, b.arrays[3:7], place, surfaces, contact, clearance, width, most, known)
+    p, q = (out[1:4].copy(), out[4:7].copy()) if out[0] < known[1] else (None, None)
     return Distance(found, float(out[0]), p, q, level="faces", method="faces", estimate=float(out[8]))

@@ -23,8 +23,10 @@ from clamp3d.collide.faces_math import (
     TORUS,
     band_over,
     bend,
+    cut,
     height_at,
     least_height,
+    longest,
     raise_by,
     slope_at,
     spans,
@@ -43,6 +45,8 @@ TRIED = 16
 """Faces tried in all, with those beside the nearest."""
 PIECES = 24
 """Pieces that may wait while one is cut to see whether it reaches above a surface."""
+WORK = 6 + 2 * PIECES
+"""Triangles (3, 3) that the search takes for itself."""
 
 
 @formula
@@ -93,7 +97,7 @@ def _mark(row, solid, marked, slack, work, stack):
         P, buv, bsag, face, box, link, order, kind, size, frame, deviation, group, f, sense[f], slack[row],
         marks[row], nodes[row], work[3 : 3 + PIECES], work[3 + PIECES :], work[0],
     )  # fmt: skip
-    mark_open(solid, row, f, slack[row] + deviation[f], work[2, 1], stack)
+    mark_open(solid, row, f, slack[row] + deviation[f], work[1, 0], stack)
     marked[row] = 1
 
 
@@ -161,7 +165,7 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
         h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
         chosen[tried] = f
         tried += 1
-        for row in (f, len(kind) + f):
+        for row in (len(kind) + f, f):  # what the first tells the second need not be asked for
             t = slack[row] + deviation[f]
             to_frame(frame[f], V, work)
             a, raised = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
@@ -172,8 +176,6 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
             least -= raised
             if row == f:
                 heights[tried - 1] = least
-            if row > f and not (rho + e < 2.0 * slack[f] and found < min(out[0], goal) - tol):
-                break
             deep = way_out(kind[f], size[f, 0], size[f, 1], sense[f], frame[f], t, x, y, z)
             wanted = deep > 0.0 and (rim - deep < out[0] or not inside)
             if not (least - e > found or (h > t and outside < 0.0) or wanted):
@@ -240,7 +242,8 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
                     if j < 0:
                         continue
                     t, over_other = slack[one] + deviation[one], slack[other] + deviation[other]
-                    clear = _clear(solid, f, o, 1, x, y, z, 2.0 * at + 8.0 * (t + over_other) - least + rho, stack)
+                    limit = 2.0 * at + 8.0 * (t + over_other) + abs(least) + rho
+                    clear = _clear(solid, f, o, 1, x, y, z, limit, stack)
                     if clear > at + t and is_open(solid, one, one, t, other, over_other, clear, x, y, z, q, stack):
                         found = max(found, _below(least, rho, clear) - e)
                         break
@@ -261,55 +264,164 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
 
 
 @formula
-def block(pieces, uvs, sags, g, own, solid, marked, slack, rows, near, known, stack, whole):
-    """Lower bound for the pieces ``rows`` of face g, all at once, ``known`` if there is no better one; and the lowest.
+def _over(V, uv, g, rim, own, solid, count, scratch):
+    """Lower bound, as `least_height`, of the highest that a piece of face g is over any of the first faces chosen."""
+    akind, asize, aframe, _ = own
+    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
+    _, chosen, raised, raised_size, _, whole = scratch
+    du, v0, v1, _, _ = spans(uv)
+    e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1) + rim
+    high = -np.inf
+    for m in range(count):
+        f = chosen[m]
+        to_frame(frame[f], V, whole[0])
+        h = least_height(kind[f], raised_size[m], size[f, 1], sense[f], whole[0]) - e
+        if akind[g] != PLANE and akind[g] != OTHER:
+            band = akind[g], asize[g, 0], asize[g, 1], aframe[g], v0, v1
+            h = max(h, band_over(*band, kind[f], raised_size[m], size[f, 1], frame[f], sense[f]) - rim)
+        high = max(high, h - raised[m])
+    return high
 
-    As for one piece, with a ball round the middle of their box, whole[2, 0], that must hold them all.
+
+@formula
+def _point_over(point, solid, count, chosen, raised):
+    """How high a point (3) is over the highest of the first faces chosen, as they are raised."""
+    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
+    high = -np.inf
+    for m in range(count):
+        f = chosen[m]
+        h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], point[0], point[1], point[2])
+        high = max(high, h - raised[m])
+    return high
+
+
+@formula
+def _put(place, point, uv, sag):
+    """A point, its parameters and the sag there as a piece without size."""
+    for i in range(3):
+        for c in range(3):
+            place[0, i, c] = point[c]
+        place[1, i, 0], place[1, i, 1], place[2, 0, i] = uv[0], uv[1], sag
+
+
+@formula
+def _lowest(pieces, uvs, sags, g, rows, own, solid, count, known, wanted, near, scratch, place):
+    """Lower bound of the highest that any point of the pieces ``rows`` of face g is over the first faces chosen.
+
+    The pieces are cut, with no other question to the solid, until that is ``wanted``, or a point, into ``place``
+    (3, 3, 3), is that low but for ``near``. Its parameters are next in ``place``, and the sag where it is. Less than
+    ``known`` is not wanted either. Returns also how low that point is.
     """
     akind, asize, aframe, adeviation = own
-    P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, _, marks, nodes = solid
-    work, p = whole[0], whole[2, 0]
-    x, y, z = p[0], p[1], p[2]
-    rho, rim, bent, low, high = 0.0, 0.0, 0.0, np.inf, -np.inf
+    _, chosen, raised, _, _, whole = scratch
+    cuts, cut_uvs = whole[3 : 3 + PIECES], whole[3 + PIECES : 3 + 2 * PIECES]
+    high = np.inf
+    for k in rows:
+        for i in range(3):
+            h = _point_over(pieces[k, i], solid, count, chosen, raised)
+            if h < high:
+                high = h
+                _put(place, pieces[k, i], uvs[k, i], 0.0)
+    if high <= known:
+        return known, high
+    found, left = np.inf, 64 + 2 * len(rows)
+    for k in rows:
+        rim = max(sags[k, 0], sags[k, 1], sags[k, 2]) + adeviation[g]
+        for i in range(3):
+            for c in range(3):
+                cuts[0, i, c] = pieces[k, i, c]
+            cut_uvs[0, i, 0], cut_uvs[0, i, 1] = uvs[k, i, 0], uvs[k, i, 1]
+        top = 1
+        while top > 0:
+            top -= 1
+            V, uv = cuts[top], cut_uvs[top]
+            low = _over(V, uv, g, rim, own, solid, count, scratch)
+            if low >= min(high - near, wanted, found) or top + 2 > len(cuts) or left == 0:
+                found = min(found, low)
+                continue
+            left -= 1
+            du, v0, v1, _, _ = spans(uv)
+            e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
+            bent = e > 0.25 * (min(high, wanted) - low)
+            side = longest(V, uv, akind[g], asize[g, 0], asize[g, 1], bent)
+            cut(V, uv, side, akind[g], asize[g, 0], asize[g, 1], aframe[g], cuts[top + 1], cut_uvs[top + 1])
+            h = _point_over(cuts[top + 1, side], solid, count, chosen, raised)
+            if h < high:
+                high = h
+                _put(place, cuts[top + 1, side], cut_uvs[top + 1, side], rim - adeviation[g])
+            top += 2
+    return found, high
+
+
+@formula
+def block(pieces, uvs, sags, g, own, solid, marked, limits, rows, known, high, scratch, place):
+    """Lower bound for the pieces ``rows`` of face g, all at once, ``known`` if there is no better one.
+
+    As for one piece, with a ball round the middle of their box, whole[2, 0], that must hold them all; but each point
+    may have another one of the nearest faces under it. Returns also how low one of their points is over these.
+    """
+    akind, asize, _, adeviation = own
+    nearest_ones, chosen, raised, raised_size, stack, whole = scratch
+    P, err, _, box, link, order, root, _, _, kind, size, _, sense, deviation, _, _, marks, nodes = solid
+    slack, _, goal, tol = limits
+    wanted = min(goal, high - 0.5 * tol)
+    x, y, z = whole[2, 0, 0], whole[2, 0, 1], whole[2, 0, 2]
+    rho, rim, bent = 0.0, 0.0, 0.0
     for k in rows:
         for i in range(3):
             rho = max(rho, (pieces[k, i, 0] - x) ** 2 + (pieces[k, i, 1] - y) ** 2 + (pieces[k, i, 2] - z) ** 2)
             rim = max(rim, sags[k, i])
         du, v0, v1, _, _ = spans(uvs[k])
-        low, high = min(low, v0), max(high, v1)
         bent = max(bent, bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1))
-    rim += adeviation[g]
-    rho = math.sqrt(rho) + bent + rim
-    found, best = known, rows[0]
-    for f in near:
-        if f < 0 or kind[f] == OTHER:
-            continue
-        t, least = slack[f] + deviation[f], -np.inf
-        a, raised = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
-        if akind[g] != PLANE and akind[g] != OTHER:
-            band = akind[g], asize[g, 0], asize[g, 1], aframe[g], low, high
-            least = band_over(*band, kind[f], a, size[f, 1], frame[f], sense[f]) - rim
-        flat = np.inf
-        for k in rows:
-            if flat <= max(least, found + raised):
-                break
-            du, v0, v1, _, _ = spans(uvs[k])
-            to_frame(frame[f], pieces[k], work)
-            e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1) + rim
-            h = least_height(kind[f], a, size[f, 1], sense[f], work) - e
-            if h < flat:
-                flat, best = h, k
-        least = max(least, flat) - raised
-        if least <= found:
-            continue
-        _mark(f, solid, marked, slack, whole, stack)
+    rho = math.sqrt(rho) + bent + rim + adeviation[g]
+    count = 0
+    for f in nearest_ones:
+        if f >= 0 and kind[f] != OTHER:
+            chosen[count], raised[count] = f, 0.0
+            count += 1
+    lowest = np.inf
+    for k in rows[:: max(1, len(rows) // 8)]:
+        lowest = min(lowest, _point_over(pieces[k, 0], solid, count, chosen, raised))
+    tried, count = count, 0
+    for m in range(tried):
+        f = chosen[m]
+        if lowest <= known:
+            break
         own_marks = (marks[f], marks[f], nodes[f], nodes[f])
         at, _ = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
         # Beyond ``reach`` the inside of a torus within a ball may be in two pieces.
         reach = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf
-        limit = min(rho + abs(least) + 2.0 * (at + t), reach)
-        clear = _clear(solid, f, f, 1, x, y, z, limit, stack)
-        if clear <= at + t or not is_open(solid, f, f, t, -1, 0.0, clear, x, y, z, whole[2, 1], stack):
-            continue
-        found = max(found, _below(least, rho, clear))
-    return found, best
+        for row in (len(kind) + f, f):
+            t = slack[row] + deviation[f]
+            if min(rho + max(-lowest, 0.0), at + t) >= reach:
+                break
+            _mark(row, solid, marked, slack, whole, stack)
+            limit = min(rho + 2.0 * abs(lowest) + 2.0 * (at + t), reach)
+            clear = _clear(solid, row, row, 1, x, y, z, limit, stack)
+            enough = clear > at + t and clear >= rho + max(-lowest, 0.0)
+            if enough and is_open(solid, row, f, t, -1, 0.0, clear, x, y, z, whole[1, 0], stack):
+                raised_size[count], raised[count] = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
+                whole[2, 1 + count // 3, count % 3] = clear
+                chosen[count] = f
+                count += 1
+                break
+    while count > 0:
+        near = 0.25 * tol + (0.05 * abs(lowest) if goal < np.inf else 0.0)
+        found, lowest = _lowest(
+            pieces, uvs, sags, g, rows, own, solid, count, known, wanted, near, scratch, place
+        )  # fmt: skip
+        if found <= known:
+            break
+        # Each point of the pieces is above one of these faces by ``found``, and in the ball where that counts.
+        kept = 0
+        for m in range(count):
+            clear = whole[2, 1 + m // 3, m % 3]
+            if clear - rho >= -min(found, 0.0):
+                found = min(found, clear - rho) if found >= 0.0 else found
+                chosen[kept], raised[kept], raised_size[kept] = chosen[m], raised[m], raised_size[m]
+                whole[2, 1 + kept // 3, kept % 3] = clear
+                kept += 1
+        if kept == count:
+            return max(known, found), lowest
+        count = kept
+    return known, np.inf

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from clamp3d.collide.faces_bounds import NEAR, PIECES, TRIED, block, piece
+from clamp3d.collide.faces_bounds import NEAR, TRIED, WORK, block, piece
 from clamp3d.collide.faces_math import bend, cut, longest, spans
 from clamp3d.collide.faces_tree import DEEP, nearest
 from clamp3d.collide.verdict import RESOLUTION
@@ -18,9 +18,8 @@ from clamp3d.core.jit import entry, formula
 
 RESULT = 10
 """Upper bound, points on the piece (3) and the solid (3), face, farthest distance that is certainly outside, pieces."""
-WORK = 3 + 2 * PIECES
-"""Triangles (3, 3) that the search takes for itself; ``SPACE``: numbers, besides one for each piece and two a node."""
 SPACE = DEEP + NEAR + TRIED
+"""Numbers that it takes, besides one for each piece and two a node."""
 
 
 @formula
@@ -53,7 +52,7 @@ def _descend(
     pieces, uvs, faces, sags, bounds, n, bbox, blink, border, broot, T,
     akind, asize, aframe, adeviation,
     P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
-    marks, nodes, marked, slack, contact, clearance, tol, most, over, whole, space, out,
+    marks, nodes, marked, slack, contact, clearance, tol, most, other, over, whole, space, out,
 ):  # fmt: skip
     own = (akind, asize, aframe, adeviation)
     solid = (
@@ -65,6 +64,7 @@ def _descend(
     after, first = len(faces), n
     owner, heap = space[SPACE : SPACE + len(bbox)], space[SPACE + len(bbox) :]
     heights, over, p, q = over[:TRIED], over[TRIED:], whole[2, 0], whole[2, 1]
+    place = whole[WORK - 3 :]
     scratch = (near, chosen, heights, over, inner, whole)
     verdict = tol < 0.0
     goal = max(contact, clearance) + 2.0 * RESOLUTION if verdict else np.inf
@@ -77,9 +77,8 @@ def _descend(
     looked, floor, waiting = 0, np.inf, 1
     heap[0], bounds[after] = after, -np.inf
     while waiting:
-        low = bounds[heap[0]]
-        high = out[0]
-        known = high - low <= tol
+        low, high = bounds[heap[0]], out[0]
+        known = high - low <= tol or low >= other
         if verdict:
             known = (
                 known
@@ -129,9 +128,10 @@ def _descend(
                 new, g = low, owner[child]
                 if g >= 0:
                     rows = border[blink[start, 0] : blink[end, 0] + blink[end, 1]]
-                    new, k = block(pieces, uvs, sags, g, own, solid, marked, slack, rows, near, low, inner, whole)
-                    if low < new < min(goal, out[0]):  # some point of it is wanted too
-                        piece(pieces[k], uvs[k], g, sags[k], own, solid, marked, limits, scratch, out)
+                    high = out[0]
+                    new, deep = block(pieces, uvs, sags, g, own, solid, marked, limits, rows, low, high, scratch, place)
+                    if deep < min(goal, high):  # the lowest point of it is wanted too
+                        piece(place[0], place[1], g, place[2, 0], own, solid, marked, limits, scratch, out)
                         looked += 1
                 bounds[after + child] = new
                 _push(heap, waiting, bounds, after + child)
@@ -178,5 +178,5 @@ descend = entry(
     _descend,
     "f8(f8[:,:,::1],f8[:,:,::1],i8[::1],f8[:,::1],f8[::1],i8,f8[:,::1],i8[:,::1],i8[::1],i8[::1],f8[:,::1],"
     f"i8[::1],f8[:,::1],f8[:,::1],f8[::1],{_SOLID},"
-    "i1[::1],f8[::1],f8,f8,f8,i8,f8[::1],f8[:,:,::1],i8[::1],f8[::1])",
+    "i1[::1],f8[::1],f8,f8,f8,i8,f8,f8[::1],f8[:,:,::1],i8[::1],f8[::1])",
 )

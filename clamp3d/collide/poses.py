@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.batch import by_kernel
+from clamp3d.collide.batch import bounds_by_kernel
 from clamp3d.collide.broad import FEW, Boxes, box_gaps
 from clamp3d.collide.judge import contained, judge
 from clamp3d.collide.model import ModelCache
@@ -165,9 +165,7 @@ def check_poses(
             between(P, column[rows], T, row[rows], out)
             return out
 
-        for some in np.split(near, range(_BLOCK, len(near), _BLOCK)):
-            bounds = by_kernel(other, model, local(some))
-            least[some], most[some] = bounds.lower, bounds.upper
+        least[near], most[near] = bounds_by_kernel(other, model, (P, column[near], T, row[near]))
         rank[near] = scene.thresholds.verdicts(least[near], most[near], allowance)
         clash = near[rank[near] == _CLASH]
         rank[clash[contained(other, model, local(clash), scene.thresholds)]] = VERDICTS.index(Verdict.CONTAINED)
