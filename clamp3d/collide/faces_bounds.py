@@ -248,8 +248,10 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
                         found = max(found, _below(least, rho, clear) - e)
                         break
     unsure = low > 0.0 and found < min(out[0], goal) - tol and not inside and outside < 0.0
-    if unsure and abs(winding(P, x, y, z)) < 1e-6:
-        outside = low  # clear of all errors: what the triangles say holds; if they do not close it is no whole number
+    if unsure and abs(winding(P, x, y, z)) < 0.1:
+        # Clear of all errors: what the triangles say holds. Cracks at borders, within the errors, tell little; if more
+        # of the triangles is missing this is no whole number.
+        outside = low
     if outside > 0.0:
         out[8] = max(out[8], outside)
         found = max(found, low - rho - e)

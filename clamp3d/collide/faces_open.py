@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.collide.faces_math import OTHER, height_at, point_triangle
+from clamp3d.collide.faces_math import OTHER, PLANE, height_at, point_triangle, slope_at
 from clamp3d.collide.faces_tree import box_distance, nearest_marked
 from clamp3d.collide.faces_witness import weighted
 from clamp3d.core.jit import formula
@@ -19,8 +19,17 @@ OPEN = 4
 
 
 @formula
-def _beside(P, err, face, box, link, order, kind, size, frame, deviation, group, f, x, y, z, reach, stack):
-    """Whether a piece of another surface than that of face f may be within ``reach`` of a point."""
+def _looks_alike(kind, size, frame, sense, f, g, x, y, z):
+    """Whether the flat face g looks the way of face f but for 60 degrees: a way out crosses it, one in does not."""
+    turn = 0.0
+    for i in range(3):
+        turn += frame[g, 9 + i] * slope_at(kind[f], size[f, 0], size[f, 1], frame[f], i, x, y, z)
+    return kind[g] == PLANE and sense[f] * sense[g] * turn > 0.5
+
+
+@formula
+def _beside(P, err, face, box, link, order, kind, size, frame, sense, deviation, group, f, x, y, z, reach, stack):
+    """Whether a piece of another surface than that of face f, which may look another way, may be near a point."""
     stack[0], top = 0, 1
     while top > 0:
         top -= 1
@@ -41,7 +50,8 @@ def _beside(P, err, face, box, link, order, kind, size, frame, deviation, group,
                 continue
             if kind[g] == OTHER:
                 return True
-            if abs(height_at(kind[g], size[g, 0], size[g, 1], frame[g], x, y, z)) - deviation[g] <= reach:
+            near = abs(height_at(kind[g], size[g, 0], size[g, 1], frame[g], x, y, z)) - deviation[g] <= reach
+            if near and not _looks_alike(kind, size, frame, sense, f, g, x, y, z):
                 return True
     return False
 
@@ -49,10 +59,10 @@ def _beside(P, err, face, box, link, order, kind, size, frame, deviation, group,
 @formula
 def _place(solid, f, j, v, w, room, q, stack):
     """Put q (3) on face f where its triangle j has the weights v, w; whether no other surface is within ``room``."""
-    P, err, face, box, link, order, _, uv, _, kind, size, frame, _, deviation, group, _, _, _ = solid
+    P, err, face, box, link, order, _, uv, _, kind, size, frame, sense, deviation, group, _, _, _ = solid
     weighted(kind[f], size[f, 0], size[f, 1], frame[f], P[j], uv[j], v, w, q)
     tree = P, err, face, box, link, order
-    return not _beside(*tree, kind, size, frame, deviation, group, f, q[0], q[1], q[2], room, stack)
+    return not _beside(*tree, kind, size, frame, sense, deviation, group, f, q[0], q[1], q[2], room, stack)
 
 
 @formula
