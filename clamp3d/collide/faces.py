@@ -15,6 +15,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.linear import dot, to_target
 from clamp3d.core.pose import Array, inverse
+from clamp3d.core.triangles import distinct
 
 MOST = 20_000
 """Pieces looked at before a direction ends with what is known."""
@@ -107,7 +108,7 @@ class FaceModel:
     @cached_property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
         """What the compiled search reads of the solid that distances are measured from."""
-        from clamp3d.collide.faces_tree import tree
+        from clamp3d.collide.faces_tree import NEW, tree
 
         f, m, n = self.faces, len(self.faces.face), len(self.faces.kind)
         box, link = np.empty((2 * m + 2 * n, 7)), np.empty((2 * m + 2 * n, 2), dtype=np.int64)
@@ -120,7 +121,7 @@ class FaceModel:
         return (
             f.corners, self.errors, f.face, box, link, order, root, f.uv, np.ascontiguousarray(f.sag.max(axis=1)),
             f.kind, f.size, self.frames, f.sense, f.deviation, self.groups, self.neighbours,
-            np.zeros((2 * n, m), dtype=np.int8), np.zeros((2 * n, used), dtype=np.int8),
+            np.full((2 * n, m), NEW, dtype=np.int8), np.full((2 * n, used), NEW, dtype=np.int8),
         )  # fmt: skip
 
     @cached_property
@@ -136,7 +137,7 @@ class FaceModel:
     def _adjacent(self) -> NDArray[np.int64]:
         """Pairs (k, 2) of faces that share a corner, both ways, sorted."""
         faces = len(self.faces.kind)
-        at = np.unique(self.solid.mesh.faces * faces + self.solid.face[:, None])
+        at = distinct(self.solid.mesh.faces * faces + self.solid.face[:, None])
         corner, face = at // faces, at % faces
         order = np.arange(len(at))
         last = np.searchsorted(corner, corner, side="right")
@@ -144,13 +145,8 @@ class FaceModel:
         for step in range(1, int((last - order).max(initial=1))):
             first = order[order + step < last]
             pairs += [face[first] * faces + face[first + step], face[first + step] * faces + face[first]]
-        found = np.unique(np.concatenate(pairs)) if pairs else np.zeros(0, dtype=np.int64)
+        found = distinct(np.concatenate(pairs)) if pairs else np.zeros(0, dtype=np.int64)
         return np.column_stack([found // faces, found % faces])
-
-    @cached_property
-    def marked(self) -> NDArray[np.int8]:
-        """Which faces' rows of marks are filled."""
-        return np.zeros(2 * len(self.faces.kind), dtype=np.int8)
 
 
 def _flattened(model: FaceModel, low: Array, high: Array) -> FaceModel:
@@ -303,7 +299,7 @@ def _search(
     out[0] = known[1]
     found = descend(
         *rows, np.empty(n + most + nodes), n, *tree, T, *surfaces,
-        *a.arrays, a.marked, a.slack, contact, clearance, tol, most, known[0],
+        *a.arrays, a.slack, contact, clearance, tol, most, known[0],
         np.empty(TRIED + len(a.faces.kind)), np.empty((WORK, 3, 3)),
         np.empty(SPACE + n + most + 2 * nodes, dtype=np.int64), out,
     )  # fmt: skip

@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 
 from clamp3d.collide.faces_math import OTHER, PLANE, height_at, point_triangle, slope_at
-from clamp3d.collide.faces_tree import box_distance, nearest_marked
+from clamp3d.collide.faces_tree import box_distance, put_children
 from clamp3d.collide.faces_witness import weighted
 from clamp3d.core.jit import formula
 
-OPEN = 4
-"""Mark of the triangles of the face itself whose middle has no other surface within the slack."""
+_TRIED = 24
+"""Points of a face that are tried."""
 
 
 @formula
@@ -57,70 +57,53 @@ def _beside(P, err, face, box, link, order, kind, size, frame, sense, deviation,
 
 
 @formula
-def _place(solid, f, j, v, w, room, q, stack):
-    """Put q (3) on face f where its triangle j has the weights v, w; whether no other surface is within ``room``."""
-    P, err, face, box, link, order, _, uv, _, kind, size, frame, sense, deviation, group, _, _, _ = solid
-    weighted(kind[f], size[f, 0], size[f, 1], frame[f], P[j], uv[j], v, w, q)
-    tree = P, err, face, box, link, order
-    return not _beside(*tree, kind, size, frame, sense, deviation, group, f, q[0], q[1], q[2], room, stack)
-
-
-@formula
-def mark_open(solid, row, f, t, q, stack):
-    """Marks of face f's own triangles in a row that is for heights of more than ``t`` over it."""
-    face, link, order, sag, deviation, marks, nodes = (
-        solid[2], solid[4], solid[5], solid[8], solid[13], solid[16], solid[17],
-    )  # fmt: skip
-    for i in range(len(link) - 1, -1, -1):
-        if link[i, 1] < 0:
-            nodes[row, i] |= (nodes[row, link[i, 0]] | nodes[row, -link[i, 1]]) & OPEN
-            continue
-        for j in range(link[i, 0], link[i, 0] + link[i, 1]):
-            k = order[j]
-            if face[k] == f and _place(solid, f, k, 1.0 / 3.0, 1.0 / 3.0, _room(t, sag[k], deviation[f]), q, stack):
-                marks[row, k] |= OPEN
-                nodes[row, i] |= OPEN
-
-
-@formula
-def _room(t, sag, deviation):
-    """How far from a point of a face's piece a way from the trimmed face to more than ``t`` above it can lead."""
-    return t + sag + 2.0 * deviation
-
-
-@formula
-def is_open(solid, row, f, t, other, least, reach, x, y, z, q, stack):
+def is_open(solid, f, t, other, least, reach, x, y, z, q, stack):
     """Whether a point of face f has no other surface so near that it could hide on which side is outside.
 
     From there a way of a little more than ``t`` leads straight up out of the solid to what is higher above the face
     than that, and one straight down into it; both within ``reach`` of the point x, y, z. The way up is ``least``
-    above the face ``other``, if that is not negative. Tried are the triangle that is nearest, where it is nearest and
-    on the way from there to its middle, and the nearest with an open middle.
+    above the face ``other``, if that is not negative. Tried are, of the triangles nearest first, where they are
+    nearest and on the way from there to their middles.
     """
-    P, err, _, box, link, order, root, _, sag, kind, size, frame, sense, deviation, _, _, marks, nodes = solid
-    own = (marks[row], marks[row], nodes[row], nodes[row])
-    for bit in (0, OPEN):
-        _, j = nearest_marked(P, err, box, link, order, root[f], *own, bit, 1.0, x, y, z, reach, stack)
-        if j < 0:
-            return False
-        room = _room(t, sag[j], deviation[f])
-        _, v, w = point_triangle(x, y, z, P[j])
-        length = 0.0
-        for k in range(3):
-            foot = P[j, 0, k] + v * (P[j, 1, k] - P[j, 0, k]) + w * (P[j, 2, k] - P[j, 0, k])
-            length += ((P[j, 0, k] + P[j, 1, k] + P[j, 2, k]) / 3.0 - foot) ** 2
-        length = math.sqrt(length)
-        step, share = 0.0, 0.0
-        while share < 1.0:
-            share = min(1.0, step / length) if length > 0.0 else 1.0
-            free = _place(solid, f, j, v + share * (1.0 / 3.0 - v), w + share * (1.0 / 3.0 - w), room, q, stack)
-            if math.sqrt((x - q[0]) ** 2 + (y - q[1]) ** 2 + (z - q[2]) ** 2) + room > reach:
-                break
-            if free and (
-                other < 0
-                or sense[other] * height_at(kind[other], size[other, 0], size[other, 1], frame[other], q[0], q[1], q[2])
-                > least + room
-            ):
-                return True
-            step = max(2.0 * room, 4.0 * step)
+    P, err, face, box, link, order, root, uv, sag, kind, size, frame, sense, deviation, group, _, _, _ = solid
+    tree = P, err, face, box, link, order
+    half, tried = len(stack) // 2, 0
+    stack[0], top = root[f], 1
+    while top > 0:
+        top -= 1
+        i = stack[top]
+        if box_distance(box, i, x, y, z, x, y, z) >= reach:
+            continue
+        if link[i, 1] < 0:
+            top = put_children(box, link, i, x, y, z, x, y, z, stack, top)
+            continue
+        for m in range(link[i, 0], link[i, 0] + link[i, 1]):
+            j = order[m]
+            # A way from the trimmed face to more than t above it is so long at most.
+            room = t + sag[j] + 2.0 * deviation[f]
+            _, v, w = point_triangle(x, y, z, P[j])
+            length = 0.0
+            for k in range(3):
+                foot = P[j, 0, k] + v * (P[j, 1, k] - P[j, 0, k]) + w * (P[j, 2, k] - P[j, 0, k])
+                length += ((P[j, 0, k] + P[j, 1, k] + P[j, 2, k]) / 3.0 - foot) ** 2
+            length = math.sqrt(length)
+            step, share = 0.0, 0.0
+            while share < 1.0:
+                share = min(1.0, step / length) if length > 0.0 else 1.0
+                step = max(2.0 * room, 4.0 * step)
+                v1, w1 = v + share * (1.0 / 3.0 - v), w + share * (1.0 / 3.0 - w)
+                weighted(kind[f], size[f, 0], size[f, 1], frame[f], P[j], uv[j], v1, w1, q)
+                if math.sqrt((x - q[0]) ** 2 + (y - q[1]) ** 2 + (z - q[2]) ** 2) + room > reach:
+                    break
+                if other >= 0:
+                    h = height_at(kind[other], size[other, 0], size[other, 1], frame[other], q[0], q[1], q[2])
+                    if sense[other] * h <= least + room:
+                        continue
+                if not _beside(
+                    *tree, kind, size, frame, sense, deviation, group, f, q[0], q[1], q[2], room, stack[half:]
+                ):  # fmt: skip
+                    return True
+                tried += 1
+                if tried == _TRIED:
+                    return False
     return False
