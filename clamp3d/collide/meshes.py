@@ -239,5 +239,14 @@ def within(inner: Model, outer: Model, T: Array, error: float, slack: float) -> 
     outside = small.manifold.transform(np.ascontiguousarray(T[:3])) - large.manifold
     if outside.is_empty():
         return True
-    points = np.array(outside.to_mesh64().vert_properties, dtype=np.float64)[:, :3]
-    return bool(large.distance(points).max() <= slack)
+    rest = outside.to_mesh64()
+    points = np.array(rest.vert_properties, dtype=np.float64)[:, :3]
+    if large.distance(points).max() > slack:
+        return False
+    # What fills a hole of the other may have all its corners on the hole's rim: points below its triangles are not.
+    corners = points[np.array(rest.tri_verts, dtype=np.int64)]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    below = corners.mean(axis=1) - 1.5 * slack * normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    below = below[large.distance(below) > slack]
+    below = below[~large.contains(below)]
+    return not bool(small.contains(to_target(inverse(T), below)).any())

@@ -16,6 +16,7 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakePolyg
 from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
 from OCP.gp import gp_Pnt, gp_Vec
 
+from clamp3d import Scene, check
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.faces import FaceModel, _at
 from clamp3d.core.pose import rotation
@@ -216,3 +217,11 @@ def test_random_slits_against_open_cascade(seed):
             assert not (high < 0.0 and not inside)
             told += low > 0.0 or high < 0.0
     assert told > 15
+
+
+def test_a_pin_that_fills_a_thin_tube_is_not_contained_in_it():
+    """What of the pin is out of the tube has all its corners on the tube's bore; a pin in a thick wall is contained."""
+    tube = BrepSolid.of(solid_of(cut(rod(50.1, -20.0, 20.0), rod(50.0, -30.0, 30.0))), "tube")
+    for pin, verdict in ((rod(50.05, -10.0, 10.0), "clash"), (cut(rod(50.08, -9, 9), rod(50.02, -9, 9)), "contained")):
+        scene = Scene().add("tube", tube).add("pin", BrepSolid.of(solid_of(pin), "pin"))
+        assert check(scene).verdict("tube", "pin").value == verdict
