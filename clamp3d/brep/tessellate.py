@@ -151,7 +151,7 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
         if found is None:
             raise Clamp3dError(f"Open CASCADE makes no triangles of face {number + 1}")
         P = placed(np.array([found.Node(i).Coord() for i in range(1, found.NbNodes() + 1)]), place)
-        edges, border = [], []
+        edges, border, poles = [], [], []
         tolerance = BRep_Tool.Tolerance_s(face)
         for edge in explore(face, "EDGE"):
             polygon = BRep_Tool.PolygonOnTriangulation_s(edge, found, place)
@@ -161,6 +161,7 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
             at = np.array([polygon.Node(i) for i in range(1, polygon.NbNodes() + 1)]) - 1
             border.append(at)
             if BRep_Tool.Degenerated_s(edge):
+                poles.append(at)
                 links += [(start + int(at[0]), start + int(k)) for k in at[1:]]
                 continue
             twins = first_seen.setdefault(hash(edge), [])
@@ -171,7 +172,7 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
                 links += list(zip(twin.tolist(), (start + at).tolist(), strict=True))
             t = np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
             edges.append(Borders.of(edge, at, t, P[at], kind, frame, size))
-        F, P, own = _facets(face, found, P, kind, size, border, chord)
+        F, P, own = _facets(face, found, P, kind, size, border, poles, chord)
         if kind == OTHER:
             deviation = float(own.max())
         else:
@@ -230,7 +231,7 @@ def _with_errors(
 
 
 def _facets(
-    face: Any, found: Any, P: Array, kind: int, size: Size, border: list[IntArray], chord: float
+    face: Any, found: Any, P: Array, kind: int, size: Size, border: list[IntArray], poles: list[IntArray], chord: float
 ) -> tuple[IntArray, Array, Array]:
     """Triangles of a face, its nodes, and how far each triangle can be from it besides what a round face bends.
 
@@ -258,14 +259,26 @@ def _facets(
             surface.LastVParameter() - surface.FirstVParameter() if surface.IsVClosed() else np.inf,
         ])  # fmt: skip
         # Two nodes a whole turn apart are at one place: a triangle of theirs can stand for all round it.
-        own = np.where(_spread(uv[F], turns), norm(np.ptp(P, axis=0)), 0.0)
+        own = np.where(_spread(_without_poles(uv, F, poles), turns), norm(np.ptp(P, axis=0)), 0.0)
     if kind != OTHER:
         return F, P, own
     off = None
     if regular and surface.BasisCurve().GetType() == GeomAbs_CurveType.GeomAbs_BSplineCurve:
         u = uv[F, 0]
         off = spline_sags(surface.BasisCurve().BSpline(), u.min(axis=1), u.max(axis=1))
-    return F, P, np.maximum(own, _sampled(surface, F, uv, P) if off is None else off)
+    return F, P, np.maximum(own, _sampled(surface, F, _without_poles(uv, F, poles), P) if off is None else off)
+
+
+def _without_poles(uv: Array, F: IntArray, poles: list[IntArray]) -> Array:
+    """Parameters (m, 3, 2) of triangles' corners; a pole, where one of them is any, has that of the other corners."""
+    found = uv[F]
+    for nodes in poles:
+        k = int(np.argmax(np.ptp(uv[nodes], axis=0)))
+        other = ~np.isin(F, nodes)
+        count = np.maximum(other.sum(axis=1), 1)
+        mean = np.where(other, found[:, :, k], 0.0).sum(axis=1) / count
+        found[:, :, k] = np.where(other, found[:, :, k], mean[:, None])
+    return found
 
 
 def _spread(uv: Array, turns: Array) -> NDArray[np.bool_]:
@@ -302,7 +315,7 @@ _SAMPLES = np.array([[1, 1, 1], [3, 3, 0], [0, 3, 3], [3, 0, 3], [4, 1, 1], [1, 
 _SAMPLES /= _SAMPLES.sum(axis=1, keepdims=True)
 
 
-def _sampled(surface: Any, F: IntArray, nodes: Array, P: Array) -> Array:
+def _sampled(surface: Any, F: IntArray, uv: Array, P: Array) -> Array:
     """Twice the largest distance (m,) of points of triangles from the surface, found from the same parameters on."""
     from OCP.gp import gp_Pnt, gp_Vec
 
@@ -316,7 +329,7 @@ def _sampled(surface: Any, F: IntArray, nodes: Array, P: Array) -> Array:
             made[k] = point.Coord(), along.Coord(), across.Coord()
         return made
 
-    where = np.einsum("sk,mkd->msd", _SAMPLES, nodes[F]).reshape(-1, 2)
+    where = np.einsum("sk,mkd->msd", _SAMPLES, uv).reshape(-1, 2)
     flat = np.einsum("sk,mkd->msd", _SAMPLES, P[F]).reshape(-1, 3)
     made = at(where)
     off = flat - made[:, 0]
@@ -325,7 +338,7 @@ def _sampled(surface: Any, F: IntArray, nodes: Array, P: Array) -> Array:
     u, v = np.einsum("kid,kd->ik", made[:, 1:], off)
     a, c = (1.0 + 1e-12) * a + 1e-100, (1.0 + 1e-12) * c + 1e-100
     step = np.stack([c * u - b * v, a * v - b * u], axis=1) / (a * c - b * b)[:, None]
-    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    low, high = uv.min(axis=(0, 1)), uv.max(axis=(0, 1))
     nearer = at(np.clip(where + step, low, high))[:, 0]
     found = np.minimum(np.linalg.norm(off, axis=1), np.linalg.norm(flat - nearer, axis=1))
     return np.asarray(_SAFETY * found.reshape(len(F), -1).max(axis=1))
