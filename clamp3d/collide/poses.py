@@ -151,6 +151,7 @@ def check_poses(
     P = placed.poses[rest]
     reach = scene.thresholds.reach + 1e-6
     row, column = _near(moving, world_boxes(bounds, P, which), reach)
+    del moving  # the largest array by far: its memory serves the next ones
     # Equal parts that may meet this one alike are measured together.
     alike: dict[tuple[int, float | None], list[int]] = {}
     for k in np.flatnonzero(np.bincount(column)).tolist():
