@@ -44,20 +44,20 @@ def exact(found: Distances) -> NDArray[np.bool_]:
 
 def _by_kernel(a: Model, b: Model, pairs: Pairs, points: bool) -> Array:
     """Bounds, and with ``points`` points and normals in a's frame, NaN where unknown: (2 or 11, m)."""
-    found = np.full((11 if points else 2, len(pairs[1])), np.nan)
-    found[0], found[1] = -np.inf, np.inf
-    if a.bodies is None or b.bodies is None or not len(a.bodies) == len(b.bodies) == 1:
-        return found
-    if any(form.error or form.surface is not None for form in (*a.bodies, *b.bodies)):
-        return found
-    (first,), (second,) = a.bodies, b.bodies
-    known = [_bore_rod(bore, rod, first, second, pairs, points) for bore, rod in _asked(first, second)]
-    swapped = (*pairs[2:], *pairs[:2])
-    for bore, rod in _asked(second, first):
-        known.append(_bore_rod(bore, rod, second, first, swapped, points))
-        if points:
-            _seen_from_first(known[-1], pairs)
-    return reduce(_better, known) if known else found
+    known = []
+    if a.bodies is not None and b.bodies is not None and len(a.bodies) == len(b.bodies) == 1:
+        (first,), (second,) = a.bodies, b.bodies
+        if not any(form.error or form.surface is not None for form in (first, second)):
+            known = [_bore_rod(bore, rod, first, second, pairs, points) for bore, rod in _asked(first, second)]
+            for bore, rod in _asked(second, first):
+                known.append(_bore_rod(bore, rod, second, first, (*pairs[2:], *pairs[:2]), points))
+                if points:
+                    _seen_from_first(known[-1], pairs)
+    if known:
+        return reduce(_better, known)
+    nothing = np.full((11 if points else 2, len(pairs[1])), np.nan)
+    nothing[0], nothing[1] = -np.inf, np.inf
+    return nothing
 
 
 def _asked(a: ClosedForm, b: ClosedForm) -> list[tuple[Bore, Rod]]:

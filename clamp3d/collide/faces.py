@@ -108,7 +108,7 @@ class FaceModel:
     @cached_property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
         """What the compiled search reads of the solid that distances are measured from."""
-        from clamp3d.collide.faces_tree import tree
+        from clamp3d.collide.faces_tree import NEW, tree
 
         f, m, n = self.faces, len(self.faces.face), len(self.faces.kind)
         box, link = np.empty((2 * m + 2 * n, 7)), np.empty((2 * m + 2 * n, 2), dtype=np.int64)
@@ -121,7 +121,7 @@ class FaceModel:
         return (
             f.corners, self.errors, f.face, box, link, order, root, f.uv, np.ascontiguousarray(f.sag.max(axis=1)),
             f.kind, f.size, self.frames, f.sense, f.deviation, self.groups, self.neighbours,
-            np.zeros((2 * n, m), dtype=np.int8), np.zeros((2 * n, used), dtype=np.int8),
+            np.full((2 * n, m), NEW, dtype=np.int8), np.full((2 * n, used), NEW, dtype=np.int8),
         )  # fmt: skip
 
     @cached_property
@@ -147,11 +147,6 @@ class FaceModel:
             pairs += [face[first] * faces + face[first + step], face[first + step] * faces + face[first]]
         found = distinct(np.concatenate(pairs)) if pairs else np.zeros(0, dtype=np.int64)
         return np.column_stack([found // faces, found % faces])
-
-    @cached_property
-    def marked(self) -> NDArray[np.int8]:
-        """Which faces' rows of marks are filled."""
-        return np.zeros(2 * len(self.faces.kind), dtype=np.int8)
 
 
 def _flattened(model: FaceModel, low: Array, high: Array) -> FaceModel:
@@ -304,7 +299,7 @@ def _search(
     out[0] = known[1]
     found = descend(
         *rows, np.empty(n + most + nodes), n, *tree, T, *surfaces,
-        *a.arrays, a.marked, a.slack, contact, clearance, tol, most, known[0],
+        *a.arrays, a.slack, contact, clearance, tol, most, known[0],
         np.empty(TRIED + len(a.faces.kind)), np.empty((WORK, 3, 3)),
         np.empty(SPACE + n + most + 2 * nodes, dtype=np.int64), out,
     )  # fmt: skip

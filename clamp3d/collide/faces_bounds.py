@@ -34,7 +34,7 @@ from clamp3d.collide.faces_math import (
     to_frame,
     way_out,
 )
-from clamp3d.collide.faces_tree import THIN, from_faces, mark_face, nearest, nearest_marked
+from clamp3d.collide.faces_tree import PIECES, THIN, from_faces, nearest, nearest_below, nearest_marked
 from clamp3d.collide.faces_witness import winding, witness
 from clamp3d.core.jit import formula
 
@@ -42,8 +42,8 @@ NEAR = 4
 """Faces whose surfaces are tried as separating ones, those nearest to the piece."""
 TRIED = 16
 """Faces tried in all, with those beside the nearest."""
-PIECES = 24
-"""Pieces that may wait while one is cut to see whether it reaches above a surface."""
+MOST_OVER = 6
+"""Faces at most that many pieces are bounded over together."""
 WORK = 6 + 2 * PIECES
 """Triangles (3, 3) that the search takes for itself."""
 
@@ -86,41 +86,26 @@ def _below(least, rho, clear):
 
 
 @formula
-def _mark(row, solid, marked, slack, work):
-    """Fill a row of marks, if it is not yet: face f has the rows f and, with as little slack as can be, n + f."""
-    if marked[row]:
-        return
-    P, _, face, box, link, order, _, buv, bsag, kind, size, frame, sense, deviation, group, _, marks, nodes = solid
-    f = row % len(kind)
-    mark_face(
-        P, buv, bsag, face, box, link, order, kind, size, frame, deviation, group, f, sense[f], slack[row],
-        marks[row], nodes[row], work[3 : 3 + PIECES], work[3 + PIECES :], work[0],
-    )  # fmt: skip
-    marked[row] = 1
+def _clear(solid, row, bit, slack, at, x, y, z, needed, most, whole, stack):
+    """How far about a point no piece has the mark ``bit``, or THIN, in a row of marks; -1 if that tells nothing.
+
+    The face is within ``at`` of the point: it has to be in that ball, by its slack. Looked at is ``needed`` past it, at
+    most ``most``.
+    """
+    t = slack[row] + solid[13][row % len(solid[13])]
+    limit = min(needed + 2.0 * (at + t), most)
+    clear = nearest_marked(solid, row, row, 0, bit, THIN, -1.0, slack, x, y, z, limit, whole, stack)
+    return clear if clear > at + t else -1.0
 
 
 @formula
-def _clear(solid, row, other, bit, x, y, z, limit, stack):
-    """How far about a point, at most ``limit``, no piece has the ``bit`` in both rows of marks, or THIN in either."""
-    P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, marks, nodes = solid
-    both = (marks[row], marks[other], nodes[row], nodes[other])
-    found = nearest_marked(P, err, box, link, order, 0, *both, bit, -1.0, x, y, z, limit, stack)
-    for k in (row, other):
-        own = (marks[k], marks[k], nodes[k], nodes[k])
-        found = nearest_marked(P, err, box, link, order, 0, *own, THIN, -1.0, x, y, z, found, stack)
-    return found
-
-
-@formula
-def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
+def piece(V, uv, g, sag, own, solid, limits, scratch, out):
     """Lower bound for one piece; a better upper bound goes into ``out``."""
     akind, asize, aframe, adeviation = own
     slack, contact, goal, tol = limits
     near, chosen, heights, over, stack, whole = scratch
     work, point, p, q = whole[0], whole[1], whole[2, 0], whole[2, 1]
-    P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, _, beside, marks, nodes = (
-        solid
-    )
+    P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, _, beside, _, _ = solid
     du, v0, v1, u, v = spans(uv)
     e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
     rim = max(sag[0], sag[1], sag[2]) + adeviation[g]
@@ -166,7 +151,10 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
         h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
         chosen[tried] = f
         tried += 1
-        for row in (len(kind) + f, f):  # what the first tells the second need not be asked for
+        at, told = -1.0, True
+        for row in (f, len(kind) + f):
+            if not told:  # what is near with much slack is with little
+                break
             t = slack[row] + deviation[f]
             to_frame(frame[f], V, work)
             a, raised = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
@@ -181,24 +169,26 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
             wanted = deep > 0.0 and (rim - deep < out[0] or not inside)
             if not (least - e > found or (h > t and outside < 0.0) or wanted):
                 continue
-            _mark(row, solid, marked, slack, whole)
-            own_marks = (marks[row], marks[row], nodes[row], nodes[row])
-            at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
+            told = False
+            if at < 0.0:
+                at = nearest_below(P, err, box, link, order, root[f], x, y, z, stack)
             # Beyond this the inside of a torus within a ball may be in two pieces.
             reach = size[f, 0] if kind[f] == TORUS else np.inf
             if least - e > found or (h > t and outside < 0.0):
-                needed = max(h, abs(least) if least - e > found else 0.0)
-                limit = min(needed + rho + 2.0 * at + t, reach if sense[f] < 0.0 else np.inf)
-                clear = _clear(solid, row, row, 1, x, y, z, limit, stack)
-                if clear > at + t:  # what is above the face by more than t is outside there
+                needed = max(h, abs(least) if least - e > found else 0.0) + rho
+                most = reach if sense[f] < 0.0 else np.inf
+                clear = _clear(solid, row, 1, slack, at, x, y, z, needed, most, whole, stack)
+                told = clear > 0.0 and found < min(out[0], goal) - 0.25 * tol
+                if clear > 0.0:  # what is above the face by more than t is outside there
                     found = max(found, _below(least, rho, clear) - e)
                     if h > t:
                         outside = max(outside, min(h - t, clear))
             if wanted:
-                limit = min(2.0 * at + deep + t, reach if sense[f] > 0.0 else np.inf)
-                clear = _clear(solid, row, row, 2, x, y, z, limit, stack)
-                inside = inside or clear > at + t
-                if clear > at + t and rim - deep < out[0]:  # inside: as deep as the faces are away
+                most = reach if sense[f] > 0.0 else np.inf
+                clear = _clear(solid, row, 2, slack, at, x, y, z, deep, most, whole, stack)
+                told = told or clear > 0.0
+                inside = inside or clear > 0.0
+                if clear > 0.0 and rim - deep < out[0]:  # inside: as deep as the faces are away
                     for i in range(3):
                         for c in range(3):
                             work[i, c] = p[c]
@@ -232,16 +222,15 @@ def piece(V, uv, g, sag, own, solid, marked, limits, scratch, out):
                         above = above and up > slack[one] + deviation[one]
                     if not above or least - e <= found:
                         continue
-                _mark(f, solid, marked, slack, whole)
-                _mark(o, solid, marked, slack, whole)
                 # A piece of one that looks over the other: what lies above both there is outside.
                 at = np.inf
                 for one, other in ((f, o), (o, f)):
-                    rows = (marks[other], marks[other], nodes[other], nodes[other])
-                    at = nearest_marked(P, err, box, link, order, root[one], *rows, 1, 1.0, x, y, z, at, stack)
+                    at = nearest_marked(
+                        solid, other, other, root[one], 1, 0, 1.0, slack, x, y, z, at, whole, stack
+                    )  # fmt: skip
                 past = at + 2.0 * max(slack[f] + deviation[f], slack[o] + deviation[o]) / rise  # of the slack of both
                 limit = past + max(at, -least) + rho
-                clear = _clear(solid, f, o, 1, x, y, z, limit, stack)
+                clear = nearest_marked(solid, f, o, 0, 1, THIN, -1.0, slack, x, y, z, limit, whole, stack)
                 if clear > past:
                     found = max(found, _below(least, rho, clear) - e)
     unsure = low > 0.0 and found < min(out[0], goal) - tol and not inside and outside < 0.0
@@ -351,7 +340,7 @@ def _lowest(pieces, uvs, sags, g, rows, own, solid, count, known, wanted, near, 
 
 
 @formula
-def block(pieces, uvs, sags, g, own, solid, marked, limits, rows, known, high, scratch, place):
+def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, place):
     """Lower bound for the pieces ``rows`` of face g, all at once, ``known`` if there is no better one.
 
     As for one piece, with a ball round the middle of their box, whole[2, 0], that must hold them all; but each point
@@ -359,7 +348,7 @@ def block(pieces, uvs, sags, g, own, solid, marked, limits, rows, known, high, s
     """
     akind, asize, _, adeviation = own
     nearest_ones, chosen, raised, raised_size, stack, whole = scratch
-    P, err, _, box, link, order, root, _, _, kind, size, _, sense, deviation, _, _, marks, nodes = solid
+    P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, beside, _, _ = solid
     slack, _, goal, tol = limits
     wanted = min(goal, high - 0.5 * tol)
     x, y, z = whole[2, 0, 0], whole[2, 0, 1], whole[2, 0, 2]
@@ -371,53 +360,57 @@ def block(pieces, uvs, sags, g, own, solid, marked, limits, rows, known, high, s
         du, v0, v1, _, _ = spans(uvs[k])
         bent = max(bent, bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1))
     rho = math.sqrt(rho) + bent + rim + adeviation[g]
-    count = 0
-    for f in nearest_ones:
-        if f >= 0 and kind[f] != OTHER:
-            chosen[count], raised[count] = f, 0.0
-            count += 1
-    lowest = np.inf
-    for k in rows[:: max(1, len(rows) // 8)]:
-        lowest = min(lowest, _point_over(pieces[k, 0], solid, count, chosen, raised))
-    tried, count = count, 0
-    for m in range(tried):
-        f = chosen[m]
-        if lowest <= known:
+    # From the nearest face on, those are taken in that the lowest point of the pieces, over those so far, is above.
+    count, refused, k = 0, 0, rows[len(rows) // 2]
+    _put(place, pieces[k, 0], uvs[k, 0], 0.0)
+    found, lowest = -np.inf, -np.inf
+    while count < MOST_OVER and found < wanted:
+        f, highest = -1, lowest + 0.1 * tol
+        for n in range(NEAR + NEAR * beside.shape[1]):
+            one = nearest_ones[n] if n < NEAR else nearest_ones[(n - NEAR) // beside.shape[1]]
+            if n >= NEAR and one >= 0:
+                one = beside[one, (n - NEAR) % beside.shape[1]]
+            if one < 0 or kind[one] == OTHER:
+                continue
+            h = sense[one] * height_at(
+                kind[one], size[one, 0], size[one, 1], frame[one], place[0, 0, 0], place[0, 0, 1], place[0, 0, 2]
+            )
+            for m in range(len(chosen)):
+                if chosen[m] == one and (m < count or m >= len(chosen) - refused):
+                    h = -np.inf
+            if h > highest:
+                f, highest = one, h
+        if f < 0 or max(lowest, highest) <= known:
             break
-        own_marks = (marks[f], marks[f], nodes[f], nodes[f])
-        at = nearest_marked(P, err, box, link, order, root[f], *own_marks, 0, 1.0, x, y, z, np.inf, stack)
-        # Beyond ``reach`` the inside of a torus within a ball may be in two pieces.
-        reach = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf
+        most = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf  # as for one piece
+        fits, at = False, nearest_below(P, err, box, link, order, root[f], x, y, z, stack)
         for row in (len(kind) + f, f):
-            t = slack[row] + deviation[f]
-            if min(rho + max(-lowest, 0.0), at + t) >= reach:
+            needed = rho + max(-highest, 0.0)
+            if not fits and needed < most:
+                clear = _clear(solid, row, 1, slack, at, x, y, z, needed + abs(highest), most, whole, stack)
+                if clear >= needed:
+                    fits = True
+                    t = slack[row] + deviation[f]
+                    raised_size[count], raised[count] = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
+                    whole[2, 1 + count // 3, count % 3] = clear
+        if not fits:
+            refused += 1
+            chosen[len(chosen) - refused] = f
+            if refused == len(chosen) - MOST_OVER:
                 break
-            _mark(row, solid, marked, slack, whole)
-            limit = min(rho + 2.0 * abs(lowest) + 2.0 * (at + t), reach)
-            clear = _clear(solid, row, row, 1, x, y, z, limit, stack)
-            if clear > at + t and clear >= rho + max(-lowest, 0.0):
-                raised_size[count], raised[count] = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
-                whole[2, 1 + count // 3, count % 3] = clear
-                chosen[count] = f
-                count += 1
-                break
-    while count > 0:
-        near = 0.25 * tol + (0.05 * abs(lowest) if goal < np.inf else 0.0)
-        found, lowest = _lowest(
-            pieces, uvs, sags, g, rows, own, solid, count, known, wanted, near, scratch, place
+            continue
+        chosen[count] = f
+        near = 0.25 * tol + (0.05 * abs(lowest) if -np.inf < lowest and goal < np.inf else 0.0)
+        new, deep = _lowest(
+            pieces, uvs, sags, g, rows, own, solid, count + 1, known, wanted, near, scratch, place
         )  # fmt: skip
-        if found <= known:
-            break
-        # Each point of the pieces is above one of these faces by ``found``, and in the ball where that counts.
-        kept = 0
-        for m in range(count):
+        # Each point of the pieces is above one of the faces by ``new``, and in the ball where that counts.
+        held = new
+        for m in range(count + 1):
             clear = whole[2, 1 + m // 3, m % 3]
-            if clear - rho >= -min(found, 0.0):
-                found = min(found, clear - rho) if found >= 0.0 else found
-                chosen[kept], raised[kept], raised_size[kept] = chosen[m], raised[m], raised_size[m]
-                whole[2, 1 + kept // 3, kept % 3] = clear
-                kept += 1
-        if kept == count:
-            return max(known, found), lowest
-        count = kept
-    return known, np.inf
+            if clear - rho < -min(new, 0.0):
+                held = -np.inf
+            held = min(held, max(clear - rho, 0.0)) if new >= 0.0 else held
+        found, lowest = max(found, held), deep
+        count += 1
+    return max(known, found), lowest if count > 0 else np.inf

@@ -52,7 +52,7 @@ def _descend(
     pieces, uvs, faces, sags, bounds, n, bbox, blink, border, broot, T,
     akind, asize, aframe, adeviation,
     P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
-    marks, nodes, marked, slack, contact, clearance, tol, most, other, over, whole, space, out,
+    marks, nodes, slack, contact, clearance, tol, most, other, over, whole, space, out,
 ):  # fmt: skip
     own = (akind, asize, aframe, adeviation)
     solid = (
@@ -96,7 +96,7 @@ def _descend(
             if blink[i, 1] > 0:
                 for j in range(blink[i, 0], blink[i, 0] + blink[i, 1]):
                     k = border[j]
-                    new = piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out)
+                    new = piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, limits, scratch, out)
                     bounds[k] = max(low, new)
                     _push(heap, waiting, bounds, k)
                     waiting += 1
@@ -122,16 +122,16 @@ def _descend(
                 if away - radius > max(min(goal, out[0]), 0.0):  # no face is in it: outside if one of its pieces is
                     k = border[blink[start, 0]]
                     looked += 1
-                    if piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, marked, limits, scratch, out) > 0.0:
+                    if piece(pieces[k], uvs[k], faces[k], sags[k], own, solid, limits, scratch, out) > 0.0:
                         floor = min(floor, away - radius)
                         continue
                 new, g = low, owner[child]
                 if g >= 0:
                     rows = border[blink[start, 0] : blink[end, 0] + blink[end, 1]]
                     high = out[0]
-                    new, deep = block(pieces, uvs, sags, g, own, solid, marked, limits, rows, low, high, scratch, place)
+                    new, deep = block(pieces, uvs, sags, g, own, solid, limits, rows, low, high, scratch, place)
                     if deep < min(goal, high):  # the lowest point of it is wanted too
-                        piece(place[0], place[1], g, place[2, 0], own, solid, marked, limits, scratch, out)
+                        piece(place[0], place[1], g, place[2, 0], own, solid, limits, scratch, out)
                         looked += 1
                 bounds[after + child] = new
                 _push(heap, waiting, bounds, after + child)
@@ -160,7 +160,7 @@ def _descend(
         sags[n, (side + 2) % 3] = 0.0
         sags[i, (side + 1) % 3] = 0.0
         for k in (i, n):
-            new = piece(pieces[k], uvs[k], g, sags[k], own, solid, marked, limits, scratch, out)
+            new = piece(pieces[k], uvs[k], g, sags[k], own, solid, limits, scratch, out)
             bounds[k] = max(low, new)
             _push(heap, waiting, bounds, k)
             waiting += 1
@@ -178,5 +178,5 @@ descend = entry(
     _descend,
     "f8(f8[:,:,::1],f8[:,:,::1],i8[::1],f8[:,::1],f8[::1],i8,f8[:,::1],i8[:,::1],i8[::1],i8[::1],f8[:,::1],"
     f"i8[::1],f8[:,::1],f8[:,::1],f8[::1],{_SOLID},"
-    "i1[::1],f8[::1],f8,f8,f8,i8,f8,f8[::1],f8[:,:,::1],i8[::1],f8[::1])",
+    "f8[::1],f8,f8,f8,i8,f8,f8[::1],f8[:,:,::1],i8[::1],f8[::1])",
 )

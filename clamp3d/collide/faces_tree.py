@@ -29,8 +29,12 @@ from clamp3d.core.jit import entry, formula
 
 LEAF = 4
 DEEP = 128
+NEW, OPEN = -1, 15
+"""Marks not asked for yet, and of a tree node some of whose triangles have to be asked: it can be any of them."""
 THIN = 4
 """Mark of pieces that stay within the slack of a face's surface and look the other way: of a thin wall or slit."""
+PIECES = 24
+"""Pieces that may wait while one is cut to see whether it reaches above a surface."""
 _STEP = 1e-4
 
 
@@ -169,28 +173,22 @@ def nearest(P, err, face, box, link, order, x, y, z, cut, near, stack):
 
 
 @formula
-def nearest_marked(P, err, box, link, order, root, mark, other, nodes, rest, bit, side, x, y, z, cut, stack):
-    """Bound of a point's distance, at most ``cut``, from the pieces below the node ``root``.
-
-    ``side`` -1 for a lower bound, 1 for an upper one. Of those that are marked with ``bit`` in both rows of marks, or
-    of all where it is 0: ``mark`` and ``other`` (m,) are rows of triangles, ``nodes`` and ``rest`` (n,) of tree nodes.
-    """
+def nearest_below(P, err, box, link, order, root, x, y, z, stack):
+    """Upper bound of a point's distance from the pieces below the node ``root``."""
     stack[0], top = root, 1
-    low = cut
+    low = np.inf
     while top > 0:
         top -= 1
         i = stack[top]
-        least = _box_distance(box, i, x, y, z, x, y, z) + min(side, 0.0) * box[i, 6]
-        if nodes[i] & rest[i] & bit != bit or least >= low:
+        if _box_distance(box, i, x, y, z, x, y, z) >= low:
             continue
         if link[i, 1] < 0:
             top = _put_children(box, link, i, x, y, z, x, y, z, stack, top)
             continue
         for j in range(link[i, 0], link[i, 0] + link[i, 1]):
             t = order[j]
-            if mark[t] & other[t] & bit == bit:
-                d, _, _ = point_triangle(x, y, z, P[t])
-                low = min(low, d + side * err[t])
+            d, _, _ = point_triangle(x, y, z, P[t])
+            low = min(low, d + err[t])
     return low
 
 
@@ -241,7 +239,7 @@ def from_faces(P, err, face, box, link, order, kind, size, frame, deviation, V, 
 
 
 @formula
-def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, pieces, uvs, work):
+def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, left, pieces, uvs, work):
     """Whether a piece of face g may reach above the surface of face f (with ``sense`` turned: below) by ``slack``.
 
     The piece is cut until its own bend no longer matters, at most so often that the stack ``pieces`` (n, 3, 3) is full.
@@ -250,7 +248,7 @@ def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, pieces, uvs, wor
         for k in range(3):
             pieces[0, i, k] = V[i, k]
         uvs[0, i, 0], uvs[0, i, 1] = uv[i, 0], uv[i, 1]
-    top, left = 1, 400
+    top = 1
     while top > 0:
         top -= 1
         to_frame(frame[f], pieces[top], work)
@@ -293,50 +291,97 @@ def _faces_away(V, kind, size, frame, f, sense):
 
 
 @formula
-def mark_face(
-    P, uv, sag, face, box, link, order, kind, size, frame, deviation, group, f, sense, slack, mark, nodes, pieces, uvs,
-    work,
-):  # fmt: skip
-    """Marks of the triangles (m,) and tree nodes (n,) against the surface of face f: 1 for pieces that reach above it,
-    2 for those that reach below, 4 for those that do neither but look the other way: there is a thin wall or slit."""
-    # What is known of a node's triangles goes down with it: bits 1 and 2 as in the marks, 4 and 8 where they are open.
-    nodes[0] = 12
-    for i in range(len(nodes)):
-        state = nodes[i]
-        if state & 12:
-            x, y, z = 0.5 * (box[i, 0] + box[i, 3]), 0.5 * (box[i, 1] + box[i, 4]), 0.5 * (box[i, 2] + box[i, 5])
-            half = (box[i, 3] - box[i, 0]) ** 2 + (box[i, 4] - box[i, 1]) ** 2 + (box[i, 5] - box[i, 2]) ** 2
-            radius = 0.5 * math.sqrt(half) + box[i, 6]
-            h = sense * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
-            if h - radius > slack:
-                state = 1
-            elif h + radius < -slack:
-                state = 2
-            elif abs(h) + radius <= slack:
-                state = 0
-        nodes[i] = state
-        if link[i, 1] < 0:
-            nodes[link[i, 0]] = nodes[-link[i, 1]] = state
+def _state(solid, row, slack, i):
+    """What marks the triangles of a tree node can have in a row, all of them together; `OPEN` where it is not known."""
+    _, _, _, box, link, _, _, _, _, kind, size, frame, sense, _, _, _, _, nodes = solid
+    known = nodes[row]
+    if known[i] == NEW:
+        f = row % len(kind)
+        x, y, z = 0.5 * (box[i, 0] + box[i, 3]), 0.5 * (box[i, 1] + box[i, 4]), 0.5 * (box[i, 2] + box[i, 5])
+        half = (box[i, 3] - box[i, 0]) ** 2 + (box[i, 4] - box[i, 1]) ** 2 + (box[i, 5] - box[i, 2]) ** 2
+        radius = 0.5 * math.sqrt(half) + box[i, 6]
+        h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
+        known[i] = OPEN
+        if h - radius > slack[row]:
+            known[i] = 1
+        elif h + radius < -slack[row]:
+            known[i] = 2
+    if known[i] == OPEN and link[i, 1] < 0:
+        one, two = known[link[i, 0]], known[-link[i, 1]]
+        if one != NEW and one != OPEN and two != NEW and two != OPEN:
+            known[i] = one | two
+    return known[i]
+
+
+@formula
+def _mark(solid, row, slack, state, t, whole):
+    """Mark of a triangle, in a node with such a state, against the surface of face f = ``row``, or ``row`` - n.
+
+    1 for a piece that reaches above it by the row's slack, 2 for one that reaches below, both for one that does either;
+    THIN for one that does neither but looks the other way: there is a thin wall or slit.
+    """
+    P, _, face, _, _, _, _, uv, sag, kind, size, frame, sense, deviation, group, _, marks, _ = solid
+    known = marks[row]
+    if known[t] == NEW:
+        f, g = row % len(kind), face[t]
+        known[t] = 0
+        if group[g] != group[f]:
+            known[t] = state
+            if state == OPEN:
+                rim, mark = sag[t] + deviation[g], 0
+                for bit in range(1, 3):
+                    way = sense[f] if bit == 1 else -sense[f]
+                    if _reaches(
+                        P[t], uv[t], g, rim, kind, size, frame, f, way, slack[row], 400 if row == f else 24,
+                        whole[3 : 3 + PIECES], whole[3 + PIECES :], whole[0],
+                    ):  # fmt: skip
+                        mark |= bit
+                if mark == 0 and _faces_away(P[t], kind, size, frame, f, sense[f]):
+                    mark = THIN
+                known[t] = mark
+    return known[t]
+
+
+@formula
+def nearest_marked(solid, row, other, root, bit, thin, side, slack, x, y, z, cut, whole, stack):
+    """Bound of a point's distance, at most ``cut``, from marked pieces below the node ``root``.
+
+    Of those that have the ``bit`` in both rows of marks, or ``thin`` in either. ``side`` -1 for a lower bound, 1 for an
+    upper one. Marks are found out where the search comes to, and kept.
+    """
+    P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, marks, nodes = solid
+    stack[0], top = root, 1
+    low = cut
+    while top > 0:
+        top -= 1
+        i = stack[top]
+        if _box_distance(box, i, x, y, z, x, y, z) + min(side, 0.0) * box[i, 6] >= low:
             continue
+        one = _state(solid, row, slack, i)
+        two = one if other == row else _state(solid, other, slack, i)
+        if one & two & bit == 0 and (one | two) & thin == 0:
+            continue
+        if link[i, 1] < 0:
+            top = _put_children(box, link, i, x, y, z, x, y, z, stack, top)
+            continue
+        left, first, second = 0, 0, 0
         for j in range(link[i, 0], link[i, 0] + link[i, 1]):
             t = order[j]
-            g = face[t]
-            mark[t] = state & 3
-            if group[g] == group[f]:
-                mark[t] = 0
-            elif state & 12:
-                rim = sag[t] + deviation[g]
-                if _reaches(P[t], uv[t], g, rim, kind, size, frame, f, sense, slack, pieces, uvs, work):
-                    mark[t] |= 1
-                if _reaches(P[t], uv[t], g, rim, kind, size, frame, f, -sense, slack, pieces, uvs, work):
-                    mark[t] |= 2
-            thin = mark[t] == 0 and group[g] != group[f]
-            if thin and _faces_away(P[t], kind, size, frame, f, sense):
-                mark[t] = THIN
-    for i in range(len(nodes) - 1, -1, -1):
-        nodes[i] = 0
-        if link[i, 1] < 0:
-            nodes[i] = nodes[link[i, 0]] | nodes[-link[i, 1]]
-        else:
-            for j in range(link[i, 0], link[i, 0] + link[i, 1]):
-                nodes[i] |= mark[order[j]]
+            a, b = marks[row, t], marks[other, t]
+            if a == NEW or b == NEW:
+                d, _, _ = point_triangle(x, y, z, P[t])
+                if d + side * err[t] >= low:
+                    left += 1
+                    continue
+                a = _mark(solid, row, slack, one, t, whole)
+                b = a if other == row else _mark(solid, other, slack, two, t, whole)
+            first, second = first | a, second | b
+            if a & b & bit != 0 or (a | b) & thin != 0:
+                d, _, _ = point_triangle(x, y, z, P[t])
+                low = min(low, d + side * err[t])
+        if left == 0:
+            if one == OPEN:
+                nodes[row, i] = first
+            if other != row and two == OPEN:
+                nodes[other, i] = second
+    return low

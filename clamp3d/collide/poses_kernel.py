@@ -33,38 +33,61 @@ def back(T, k, x, y, z):
     )
 
 
-def _boxes(T, middle, half, far, out):
-    """Centre and half sizes (6, n) along the world's axes of a box at poses; the first that is not rigid, or -1.
+def _boxes(T, sizes, which, far, out):
+    """Centre and half sizes (6, n) along the world's axes of boxes at poses; the first that is not rigid, or -1.
 
-    Nor may one lie further than ``far`` off.
+    ``sizes`` (m, 6): centre and half sizes in the bodies' own frames; ``which`` (n,) or (1,): those of each pose, or of
+    all. No pose may lie further than ``far`` off; if that is infinite all poses are taken as they are.
     """
     for k in range(T.shape[0]):
         prefetch(T, 128 * (k + AHEAD))
         prefetch(T, 128 * (k + AHEAD) + 64)
-        if not rigid(T, k):
+        if far < math.inf and not (
+            rigid(T, k) and abs(T[k, 0, 3]) <= far and abs(T[k, 1, 3]) <= far and abs(T[k, 2, 3]) <= far
+        ):
             return k
-        x, y, z = there(T, k, middle[0], middle[1], middle[2])
+        j = which[min(k, which.shape[0] - 1)]
+        x, y, z = there(T, k, sizes[j, 0], sizes[j, 1], sizes[j, 2])
         for i in range(3):
-            if not abs(T[k, i, 3]) <= far:
-                return k
-            out[3 + i, k] = abs(T[k, i, 0]) * half[0] + abs(T[k, i, 1]) * half[1] + abs(T[k, i, 2]) * half[2]
+            out[3 + i, k] = (
+                abs(T[k, i, 0]) * sizes[j, 3] + abs(T[k, i, 1]) * sizes[j, 4] + abs(T[k, i, 2]) * sizes[j, 5]
+            )
         out[0, k], out[1, k], out[2, k] = x, y, z
     return -1
 
 
-def _meet(moving, below, above, others, row, column):
-    """Pairs of boxes that meet: poses with centre and half sizes (6, n), and ``others`` from ``below`` to ``above``.
+def _around(moving, start, stop, below, above, others):
+    """Into ``others`` the boxes from ``below`` to ``above`` (3, m) that come near poses ``start`` to ``stop``.
 
-    The pairs go to ``row`` and ``column``, by pose; returns their number.
+    ``moving`` (6, n): centre and half sizes of their boxes. Returns the number.
     """
+    low_x = low_y = low_z = math.inf
+    high_x = high_y = high_z = -math.inf
+    for k in range(start, stop):
+        low_x, high_x = min(low_x, moving[0, k] - moving[3, k]), max(high_x, moving[0, k] + moving[3, k])
+        low_y, high_y = min(low_y, moving[1, k] - moving[4, k]), max(high_y, moving[1, k] + moving[4, k])
+        low_z, high_z = min(low_z, moving[2, k] - moving[5, k]), max(high_z, moving[2, k] + moving[5, k])
     count = 0
-    for k in range(moving.shape[1]):
+    for j in range(below.shape[1]):
+        meets = below[0, j] <= high_x and above[0, j] >= low_x
+        meets = meets and below[1, j] <= high_y and above[1, j] >= low_y
+        others[count] = j
+        count += 1 if meets and below[2, j] <= high_z and above[2, j] >= low_z else 0
+    return count
+
+
+def _meet(moving, start, stop, below, above, others, row, column, count):
+    """Pairs of boxes that meet: poses ``start`` to ``stop``, and ``others`` from ``below`` to ``above``.
+
+    The pairs go to ``row`` and ``column`` from ``count`` on, by pose; returns where they end.
+    """
+    for k in range(start, stop):
         for i in range(others.shape[0]):
             j = others[i]
             meets = True
             for axis in range(3):
                 low, high = moving[axis, k] - moving[3 + axis, k], moving[axis, k] + moving[3 + axis, k]
-                meets = meets and low <= above[j, axis] and high >= below[j, axis]
+                meets = meets and low <= above[axis, j] and high >= below[axis, j]
             row[count], column[count] = k, j
             count += 1 if meets else 0
     return count
@@ -136,29 +159,33 @@ def _stand_out(T, points, planes, rounds, places, slack, out):
     return 0
 
 
-def _cells(lower, upper, width, marks, out):
-    """How each pair of bounds, and its middle where they are closer than ``width``, lies among sorted ``marks``."""
+@inlined
+def place_among(value, marks):
+    """How a number lies among six: one that equals a mark lies alike with its equals alone, and a NaN for itself."""
+    place = 0
+    for j in range(6):
+        place += (1 if value > marks[j] else 0) + (1 if value >= marks[j] else 0)
+    return place if value == value else 13
+
+
+def _cells(lower, upper, width, marks, one, out):
+    """How each pair of bounds, and its middle where they are closer than ``width``, lies among six ``marks``.
+
+    Into ``one`` (14 ** 3,) the place of one pair for each way that there is.
+    """
     for k in range(lower.shape[0]):
-        middle = math.nan
-        if upper[k] - lower[k] <= width:
-            middle = 0.5 * (lower[k] + upper[k])
-        cell = 0
-        for i in range(3):
-            value = lower[k] if i == 0 else (upper[k] if i == 1 else middle)
-            place = 0
-            for j in range(marks.shape[0]):  # a bound that equals a mark lies alike with its equals alone
-                place += (1 if value > marks[j] else 0) + (1 if value >= marks[j] else 0)
-            if value != value:
-                place = 2 * marks.shape[0] + 1
-            cell = (2 * marks.shape[0] + 2) * cell + place
-        out[k] = cell
+        middle = 0.5 * (lower[k] + upper[k]) if upper[k] - lower[k] <= width else math.nan
+        out[k] = (14 * place_among(lower[k], marks) + place_among(upper[k], marks)) * 14 + place_among(middle, marks)
+    for k in range(lower.shape[0]):
+        one[out[k]] = k
     return 0
 
 
 _POSES, _ROWS, _TABLE = "f8[:,:,::1]", "i8[::1]", "f8[:,::1]"
 _BODY = f"{_TABLE},{_TABLE},{_POSES}"
-boxes = entry(_boxes, f"i8({_POSES},f8[::1],f8[::1],f8,{_TABLE})")
-meet = entry(_meet, f"i8({_TABLE},{_TABLE},{_TABLE},{_ROWS},{_ROWS},{_ROWS})")
+boxes = entry(_boxes, f"i8({_POSES},{_TABLE},{_ROWS},f8,{_TABLE})")
+around = entry(_around, f"i8({_TABLE},i8,i8,{_TABLE},{_TABLE},{_ROWS})")
+meet = entry(_meet, f"i8({_TABLE},i8,i8,{_TABLE},{_TABLE},{_ROWS},{_ROWS},{_ROWS},i8)")
 between = entry(_between, f"i8({_POSES},{_ROWS},{_POSES},{_ROWS},{_POSES})")
 stand_out = entry(_stand_out, f"i8({_POSES},{_TABLE},{_BODY},f8,{_ROWS})")
-cells = entry(_cells, "i8(f8[::1],f8[::1],f8,f8[::1],i8[::1])")
+cells = entry(_cells, f"i8(f8[::1],f8[::1],f8,f8[::1],{_ROWS},{_ROWS})")

@@ -1,4 +1,4 @@
-"""Machines with bearings, gears and seals of bd_warehouse: two shafts with gears, a planetary set, a hydraulic cylinder."""
+"""Machines with bearings, gears and seals of bd_warehouse: a gearbox, planets, a spindle, a hydraulic cylinder."""
 
 import math
 from collections import Counter
@@ -92,7 +92,7 @@ def gearbox():
 
 
 def planets():
-    """A planetary set of module 1: sun, three planets on capped bearings and pins, ring gear between two covers, screws."""
+    """A planetary set of module 1: sun, three planets on capped bearings and pins, ring gear between covers, screws."""
     sun, planet, ring, thick = 18, 15, 48, 4.0
     bearing = SingleRowCappedDeepGrooveBallBearing("M4-11-4")
     screw, parts = SocketHeadCapScrew("M4-0.7", 20, "iso4762"), {}
@@ -141,7 +141,7 @@ def planets():
 
 
 def spindle():
-    """Two tapered roller bearings back to back on a shaft, in a housing with a cover, held by a retaining ring; screws."""
+    """Two tapered roller bearings back to back on a shaft with a retaining ring, in a housing with two covers."""
     bearing, snap = SingleRowTaperedRollerBearing("M20-42-15"), ExternalSnapRing("20")
     screw, parts = SocketHeadCapScrew("M5-0.8", 16, "iso4762"), {}
     holes = PolarLocations(28.0, 6).locations

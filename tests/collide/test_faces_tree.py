@@ -89,7 +89,7 @@ def test_what_is_nearest():
     rng, stack = np.random.default_rng(1), np.empty(faces_tree.DEEP, dtype=np.int64)
     for m, faces in ((1, 1), (12, 3), (50, 9)):
         P, err, face, box, link, order, root = some_tree(rng, m, faces)
-        marks, rest = rng.integers(0, 4, m).astype(np.int8), rng.integers(0, 4, m).astype(np.int8)
+        marks, rest = rng.choice([0, 1, 2, 3, 4], (2, m)).astype(np.int8)
         nodes, others = (
             np.array([np.bitwise_or.reduce(row[below(link, order, i)]) for i in range(len(link))])
             for row in (marks, rest)
@@ -107,12 +107,17 @@ def test_what_is_nearest():
             assert len(set(named)) == len(named)
             assert faces_tree.nearest(*tree, *x, low - 0.1, near, stack)[1] == low - 0.1
             assert near[0] == -1
-            for bit, side, f in ((0, -1.0, -1), (1, -1.0, -1), (2, -1.0, -1), (1, 1.0, -1), (0, 1.0, 0), (2, 1.0, 0)):
-                mine = ((marks & rest & bit) == bit) & ((f < 0) | (face == f))
-                least = (d + side * err)[mine].min(initial=7.0)
+            least = [(d + err)[face == f].min() for f in range(faces)]
+            assert [faces_tree.nearest_below(P, err, box, link, order, i, *x, stack) for i in root] == pytest.approx(least)
+            rows, whole = np.stack([marks, rest]), np.empty((9, 3, 3))
+            above = np.stack([nodes, others])
+            solid = P, err, face, box, link, order, root, *[None] * 9, rows, above
+            for bit, thin, side, f in ((1, 0, -1.0, -1), (2, 4, -1.0, -1), (1, 0, 1.0, 0), (2, 4, 1.0, 0)):
+                mine = ((marks & rest & bit) != 0) | (((marks | rest) & thin) != 0)
+                least = (d + side * err)[mine & ((f < 0) | (face == f))].min(initial=7.0)
                 there = 0 if f < 0 else root[f]
-                rows = P, err, box, link, order, there, marks, rest, nodes, others
-                assert faces_tree.nearest_marked(*rows, bit, side, *x, 7.0, stack) == pytest.approx(least, abs=1e-7)
+                asked = there, bit, thin, side, np.zeros(2), *x, 7.0, whole, stack
+                assert faces_tree.nearest_marked(solid, 0, 1, *asked) == pytest.approx(least, abs=1e-7)
 
 
 @pytest.mark.parametrize("k", range(len(SOLIDS)))
@@ -137,27 +142,30 @@ def test_triangles_keep_the_distance_from_faces_that_is_said(k):
 def test_marks_tell_which_pieces_reach_above_and_below_a_face(k):
     """By points of each piece; a torus and the hollow of a cone may mark a little too much, none marks too little."""
     model = FaceModel(BrepSolid.of(solid_of(SOLIDS[k]), "solid"))
-    P, _, face, box, link, order, _, uv, sag, kind, size, frames, sense, deviation, group = model.arrays[:15]
-    f, m, slack = model.faces, len(face), 0.01
-    pieces, uvs, work = np.empty((24, 3, 3)), np.empty((24, 3, 3)), np.empty((3, 3))
+    solid, f, rng = model.arrays, model.faces, np.random.default_rng(k)
+    P, err, face, _, link, order, _, uv, sag, kind, size, _, sense, deviation, group, _, marks, nodes = solid
+    m, slack, whole = len(face), np.full(2 * len(kind), 0.01), np.empty((3 + 2 * faces_tree.PIECES, 3, 3))
+    stack = np.empty(faces_tree.DEEP, dtype=np.int64)
     on = np.array(
         [points_at(int(kind[i]), f.frame[i], tuple(size[i]), GRID[::7] @ x) for i, x in zip(face, uv, strict=True)]
     )
     for i in range(len(kind)):
-        mark, nodes = np.full(m, 9, dtype=np.int8), np.full(len(link), 9, dtype=np.int8)
-        faces_tree.mark_face(
-            P, uv, sag, face, box, link, order, kind, size, frames, deviation, group, i, sense[i], slack,
-            mark, nodes, pieces, uvs, work,
-        )  # fmt: skip
+        mark = np.array([faces_tree._mark(solid, i, slack, faces_tree.OPEN, t, whole) for t in range(m)])
         h = sense[i] * height(int(kind[i]), f.frame[i], tuple(size[i]), on.reshape(-1, 3)).reshape(m, -1)
         rim, own = sag + deviation[face], group[face] == group[i]
         assert (mark[own] == 0).all()
         for bit, way in ((1, h), (2, -h)):
             reaches = way.max(axis=1)
-            assert (mark[~own & (reaches + rim > slack + 1e-9)] & bit).all()
+            assert (mark[~own & (reaches + rim > slack[i] + 1e-9)] & bit).all()
             easy = kind[i] != TORUS and (kind[i] != CONE or way is h)
-            least = slack - (0.02 if easy else 0.5)
+            least = slack[i] - (0.02 if easy else 0.5)
             assert not (mark[reaches + rim < least] & bit).any()
-        assert [nodes[n] for n in range(len(link))] == [
-            np.bitwise_or.reduce(mark[below(link, order, n)]) for n in range(len(link))
-        ]
+        marks[i] = faces_tree.NEW  # a search asks for those on its way, and remembers them
+        for bit, thin in ((1, faces_tree.THIN), (2, 0)) * 4:
+            x = rng.uniform(*model.bounds)
+            d = np.array([apart(x[None], V) for V in P]) - err
+            least = d[(mark & (bit | thin)) != 0].min(initial=9.0)
+            asked = 0, bit, thin, -1.0, slack, *x, 9.0, whole, stack
+            assert faces_tree.nearest_marked(solid, i, i, *asked) == pytest.approx(least, abs=1e-7)
+        for n in np.flatnonzero((nodes[i] != faces_tree.NEW) & (nodes[i] != faces_tree.OPEN)):
+            assert nodes[i, n] == np.bitwise_or.reduce(mark[below(link, order, n)])
