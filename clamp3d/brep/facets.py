@@ -19,7 +19,7 @@ _SAFETY = 2.0
 
 
 def facets(
-    face: Any, found: Any, P: Array, kind: int, size: Size, border: list[IntArray], chord: float
+    face: Any, found: Any, P: Array, kind: int, size: Size, border: list[IntArray], poles: list[IntArray], chord: float
 ) -> tuple[IntArray, Array, Array]:
     """Triangles of a face, its nodes, and how far each triangle can be from it besides what a round face bends.
 
@@ -41,20 +41,35 @@ def facets(
         uv = np.concatenate([uv, new])
         P = np.concatenate([P, np.reshape([surface.Value(u, v).Coord() for u, v in new.tolist()], (-1, 3))])
     own = np.zeros(len(F))
-    if kind != PLANE and made is None and (surface.IsUClosed() or surface.IsVClosed()):
+    if kind == PLANE:
+        return F, P, own
+    at = _without_poles(uv, F, poles)
+    if made is None and (surface.IsUClosed() or surface.IsVClosed()):
         turns = np.array([
             surface.LastUParameter() - surface.FirstUParameter() if surface.IsUClosed() else np.inf,
             surface.LastVParameter() - surface.FirstVParameter() if surface.IsVClosed() else np.inf,
         ])  # fmt: skip
         # Two nodes a whole turn apart are at one place: a triangle of theirs can stand for all round it.
-        own = np.where(_spread(uv[F], turns), norm(np.ptp(P, axis=0)), 0.0)
+        own = np.where(_spread(at, turns), norm(np.ptp(P, axis=0)), 0.0)
     if kind != OTHER:
         return F, P, own
     off = None
     if regular and surface.BasisCurve().GetType() == GeomAbs_CurveType.GeomAbs_BSplineCurve:
         u = uv[F, 0]
         off = spline_sags(surface.BasisCurve().BSpline(), u.min(axis=1), u.max(axis=1))
-    return F, P, np.maximum(own, _sampled(surface, F, uv, P) if off is None else off)
+    return F, P, np.maximum(own, _sampled(surface, F, at, P) if off is None else off)
+
+
+def _without_poles(uv: Array, F: IntArray, poles: list[IntArray]) -> Array:
+    """Parameters (m, 3, 2) of triangles' corners; a pole, where one of them is any, has that of the other corners."""
+    found = uv[F]
+    for nodes in poles:
+        k = int(np.argmax(np.ptp(uv[nodes], axis=0)))
+        other = ~np.isin(F, nodes)
+        count = np.maximum(other.sum(axis=1), 1)
+        mean = np.where(other, found[:, :, k], 0.0).sum(axis=1) / count
+        found[:, :, k] = np.where(other, found[:, :, k], mean[:, None])
+    return found
 
 
 def _spread(uv: Array, turns: Array) -> NDArray[np.bool_]:
@@ -66,7 +81,7 @@ _SAMPLES = np.array([[1, 1, 1], [3, 3, 0], [0, 3, 3], [3, 0, 3], [4, 1, 1], [1, 
 _SAMPLES /= _SAMPLES.sum(axis=1, keepdims=True)
 
 
-def _sampled(surface: Any, F: IntArray, nodes: Array, P: Array) -> Array:
+def _sampled(surface: Any, F: IntArray, uv: Array, P: Array) -> Array:
     """Twice the largest distance (m,) of points of triangles from the surface, found from the same parameters on."""
     from OCP.gp import gp_Pnt, gp_Vec
 
@@ -80,7 +95,7 @@ def _sampled(surface: Any, F: IntArray, nodes: Array, P: Array) -> Array:
             made[k] = point.Coord(), along.Coord(), across.Coord()
         return made
 
-    where = np.einsum("sk,mkd->msd", _SAMPLES, nodes[F]).reshape(-1, 2)
+    where = np.einsum("sk,mkd->msd", _SAMPLES, uv).reshape(-1, 2)
     flat = np.einsum("sk,mkd->msd", _SAMPLES, P[F]).reshape(-1, 3)
     made = at(where)
     off = flat - made[:, 0]
@@ -89,7 +104,7 @@ def _sampled(surface: Any, F: IntArray, nodes: Array, P: Array) -> Array:
     u, v = np.einsum("kid,kd->ik", made[:, 1:], off)
     a, c = (1.0 + 1e-12) * a + 1e-100, (1.0 + 1e-12) * c + 1e-100
     step = np.stack([c * u - b * v, a * v - b * u], axis=1) / (a * c - b * b)[:, None]
-    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    low, high = uv.min(axis=(0, 1)), uv.max(axis=(0, 1))
     nearer = at(np.clip(where + step, low, high))[:, 0]
     found = np.minimum(np.linalg.norm(off, axis=1), np.linalg.norm(flat - nearer, axis=1))
     return np.asarray(_SAFETY * found.reshape(len(F), -1).max(axis=1))

@@ -148,7 +148,7 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
         if found is None:
             raise Clamp3dError(f"Open CASCADE makes no triangles of face {number + 1}")
         P = placed(np.array([found.Node(i).Coord() for i in range(1, found.NbNodes() + 1)]), place)
-        edges, border = [], []
+        edges, border, poles = [], [], []
         tolerance = BRep_Tool.Tolerance_s(face)
         for edge in explore(face, "EDGE"):
             polygon = BRep_Tool.PolygonOnTriangulation_s(edge, found, place)
@@ -158,6 +158,7 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
             at = np.array([polygon.Node(i) for i in range(1, polygon.NbNodes() + 1)]) - 1
             border.append(at)
             if BRep_Tool.Degenerated_s(edge):
+                poles.append(at)
                 links += [(start + int(at[0]), start + int(k)) for k in at[1:]]
                 continue
             twins = first_seen.setdefault(hash(edge), [])
@@ -168,7 +169,7 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
                 links += list(zip(twin.tolist(), (start + at).tolist(), strict=True))
             t = np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
             edges.append(Borders.of(edge, at, t, P[at], kind, frame, size))
-        F, P, own = facets(face, found, P, kind, size, border, chord)
+        F, P, own = facets(face, found, P, kind, size, border, poles, chord)
         if kind == OTHER:
             deviation = float(own.max())
         else:

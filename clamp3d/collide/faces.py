@@ -75,10 +75,10 @@ class FaceModel:
                 for corner in (start, end):
                     on |= np.abs(height(int(f.kind[i]), f.frame[i], size, corner)) < near
             found[i] = sag[on].max(initial=0.0)
-        deviation = f.deviation.copy()
-        np.maximum.at(deviation, self._adjacent[:, 0], f.deviation[self._adjacent[:, 1]])
+        beside = np.zeros(len(f.kind))
+        np.maximum.at(beside, self._adjacent[:, 0], f.deviation[self._adjacent[:, 1]])
         scale = float(np.abs(self.bounds).max())
-        rounding = 2.0 * deviation + 1e-9 + 1e-12 * scale
+        rounding = f.deviation + beside + 1e-9 + 1e-12 * scale
         same = 1e-6 + 4e-7 * scale  # so far apart can faces of one of the ``groups`` be
         return np.concatenate([np.maximum(2.1 * found, _LEAST) + rounding, same + rounding])
 

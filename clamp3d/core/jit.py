@@ -1,15 +1,14 @@
 """How the compiled formulas are built, and kept: as machine code in the cache folder, loaded without numba.
 
 numba's own cache would do, but to read it numba has to be imported with its compiler and its type libraries (0.5 s of
-CPU, more than most commands work); machine code needs none of it (`clamp3d.core.object_code`), or llvmlite alone. What
-cannot be kept that way (a formula that allocates memory, other arrays than those in C order) goes into numba's cache.
+CPU, more than most commands work); machine code needs llvmlite alone (0.05 s). What cannot be kept that way (a formula
+that allocates memory, other arrays than those in C order) goes into numba's cache.
 """
 
 from __future__ import annotations
 
 import ctypes
 import hashlib
-import importlib.util
 import os
 import platform
 import re
@@ -17,12 +16,10 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache, cached_property, partial
-from itertools import takewhile
+from importlib import metadata
 from pathlib import Path
 from types import CodeType
 from typing import Any
-
-from clamp3d.core import object_code
 
 # IEEE arithmetic as written (no re-association), and division by zero gives inf instead of a Python exception.
 _OPTIONS: dict[str, Any] = {"fastmath": False, "error_model": "numpy", "nogil": True}
@@ -161,33 +158,11 @@ def _place(function: Callable[..., Any], signature: str) -> Path:
 @cache
 def _versions() -> list[str]:
     """What compiles, and what for."""
-    found = [_version(name) for name in ("numba", "llvmlite", "numpy")]
-    return [*found, sys.version, platform.machine(), *_processor()]
-
-
-def _version(library: str) -> str:
-    """The file in which a library says its version; importlib.metadata takes 0.01 s to be imported."""
-    spec = importlib.util.find_spec(library)
-    if spec is not None and spec.origin:
-        for name in ("_version.py", "version.py"):
-            with suppress(OSError):
-                return Path(spec.origin).with_name(name).read_text()
-    from importlib import metadata
-
-    return metadata.version(library)
-
-
-def _processor() -> list[str]:
-    """Its make and what it can do, in the system's words, or else in LLVM's, which has to be loaded for them."""
-    facts = ("vendor_id", "cpu family", "model", "stepping", "flags")
-    with suppress(OSError), Path("/proc/cpuinfo").open() as file:
-        first = list(takewhile(str.strip, file))
-        found = [line for line in first if line.startswith(facts)]
-        if any(line.startswith("flags") for line in found):
-            return found
     import llvmlite.binding as llvm
 
-    return [llvm.get_process_triple(), llvm.get_host_cpu_name(), _features()]
+    found = [metadata.version(name) for name in ("numba", "llvmlite", "numpy")]
+    triple, cpu = llvm.get_process_triple(), llvm.get_host_cpu_name()
+    return [*found, sys.version, platform.machine(), triple, cpu, _features()]
 
 
 @cache
@@ -262,16 +237,11 @@ def _machine() -> Any:
 
 def _load(code: bytes) -> int:
     """Address of the one function in ``code``."""
-    name, _, binary = code.partition(b"\n")
-    address = object_code.load(binary, name.decode())
-    return _loaded_by_llvm(binary, name.decode()) if address is None else address
-
-
-def _loaded_by_llvm(binary: bytes, name: str) -> int:
     import llvmlite.binding as llvm
 
     engine = _engine()
-    engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
+    name = code[: code.index(b"\n")].decode()
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code[len(name) + 1 :]))
     engine.finalize_object()
     return int(engine.get_function_address(name))
 

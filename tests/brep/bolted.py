@@ -135,7 +135,7 @@ def pipes():
         with Locations((-21, 0, high - 2 * radius + 6), (21, 0, high - 2 * radius + 6)):
             ClearanceHole(screw, depth=20, counter_sunk=False)
     foot = high - 2 * radius + 6
-    across = [(-110, -60), (-30, -60), (60, 60), (120, 60), (-110, -10), (20, 90), (80, 90)]
+    across = [(-110, -60), (-30, -60), (60, 60), (120, 60), (-90, -10), (20, 90), (80, 90)]
     along = [(20, 0)]
     clips = [Pos(x, y, 0) * Rot(0, 0, 90) for x, y in across] + [Pos(x, y, 0) for x, y in along]
     holes = [at * Pos(x, 0, 0) for at in clips for x in (-21, 21)]

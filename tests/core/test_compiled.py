@@ -1,9 +1,7 @@
 """The compiled kernel's start: cached on disk, announced when it is cold, and never an error without a cache."""
 
 import ctypes
-import math
 import os
-import platform
 import shutil
 import stat
 import subprocess
@@ -14,13 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clamp3d.core import jit, object_code
+from clamp3d.core import jit
 
 PACKAGE = Path(__file__).parents[2] / "clamp3d"
-OWN = sys.platform == "linux" and platform.machine() == "x86_64"
-"""Whether machine code is brought into memory without LLVM."""
-COMPILERS = {"numba", "scipy", *(["llvmlite"] if OWN else [])}
-LOADED = f"print(*sorted({COMPILERS} & set(sys.modules)))"
+LOADED = "print(*sorted({'numba', 'scipy'} & set(sys.modules)))"
 CALL = (
     "import sys, numpy as np; from clamp3d.kernel import *;"
     f"print(signed_distance(SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), np.eye(4)).distance); {LOADED}"
@@ -87,49 +82,6 @@ def test_an_entry_is_the_function_and_kept_as_machine_code(folder, capsys):
         check(made, 0.0)
         assert isinstance(made, ctypes._CFuncPtr)
         assert capsys.readouterr().err.count("compiling the contact kernel, once for this machine") == said
-
-
-def _turns(a, out):
-    for i in range(a.shape[0]):
-        out[i] = math.atan2(math.sin(a[i]), math.cos(a[i])) + math.hypot(math.tan(0.3 * a[i]), a[0])
-
-
-@pytest.fixture
-def turns(folder) -> tuple[str, bytes]:
-    """Name and object file of an entry point that calls the C library."""
-    jit.entry(_turns, "void(f8[::1],f8[::1])")
-    (file,) = folder.glob("kernel-*.o")
-    code = jit._read(file)
-    assert code is not None
-    name, _, binary = code.partition(b"\n")
-    return name.decode(), binary
-
-
-def check_turns(address: int) -> None:
-    a, out = np.array([0.25, 2.0, -3.0]), np.empty(3)
-    ctypes.CFUNCTYPE(None, ctypes.py_object, ctypes.py_object)(address)(a, out)
-    assert out.tolist() == [x + math.hypot(math.tan(0.3 * x), 0.25) for x in a.tolist()]
-
-
-@pytest.mark.skipif(not OWN, reason="there LLVM loads machine code")
-def test_an_object_file_in_memory_is_the_function(turns):
-    name, binary = turns
-    address = object_code.load(binary, name)
-    assert address is not None
-    check_turns(address)
-
-
-def test_what_is_not_understood_is_left_to_llvm(turns, monkeypatch):
-    name, binary = turns
-    assert object_code.load(binary, "another") is None
-    assert object_code.load(b"MZ" + binary[2:], name) is None
-    if OWN:
-        assert object_code.load(binary.replace(b"\0hypot\0", b"\0hipot\0"), name) is None
-        monkeypatch.setattr(object_code, "_WHOLE_WORD", 2)  # as if the file had relocations of another type
-    else:
-        monkeypatch.setattr(object_code, "load", lambda code, function: None)
-    assert object_code.load(binary, name) is None
-    check_turns(jit._load(name.encode() + b"\n" + binary))
 
 
 def test_a_formula_that_allocates_is_kept_by_numba(tmp_path):
