@@ -11,6 +11,10 @@ from hypothesis import settings
 from clamp3d import cli
 from clamp3d.kernel import Capsule, Cylinder, SweptArc, groove_pieces, signed_distance, translation
 
+# Tests start Python hundreds of times: it would compile the package each time where it is told to keep nothing.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 # Drawings and sentences of the documentation are tested too.
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 

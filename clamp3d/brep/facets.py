@@ -41,23 +41,20 @@ def facets(
         uv = np.concatenate([uv, new])
         P = np.concatenate([P, np.reshape([surface.Value(u, v).Coord() for u, v in new.tolist()], (-1, 3))])
     own = np.zeros(len(F))
-    if kind == PLANE:
-        return F, P, own
-    at = _without_poles(uv, F, poles)
-    if made is None and (surface.IsUClosed() or surface.IsVClosed()):
+    if kind != PLANE and made is None and (surface.IsUClosed() or surface.IsVClosed()):
         turns = np.array([
             surface.LastUParameter() - surface.FirstUParameter() if surface.IsUClosed() else np.inf,
             surface.LastVParameter() - surface.FirstVParameter() if surface.IsVClosed() else np.inf,
         ])  # fmt: skip
         # Two nodes a whole turn apart are at one place: a triangle of theirs can stand for all round it.
-        own = np.where(_spread(at, turns), norm(np.ptp(P, axis=0)), 0.0)
+        own = np.where(_spread(_without_poles(uv, F, poles), turns), norm(np.ptp(P, axis=0)), 0.0)
     if kind != OTHER:
         return F, P, own
     off = None
     if regular and surface.BasisCurve().GetType() == GeomAbs_CurveType.GeomAbs_BSplineCurve:
         u = uv[F, 0]
         off = spline_sags(surface.BasisCurve().BSpline(), u.min(axis=1), u.max(axis=1))
-    return F, P, np.maximum(own, _sampled(surface, F, at, P) if off is None else off)
+    return F, P, np.maximum(own, _sampled(surface, F, _without_poles(uv, F, poles), P) if off is None else off)
 
 
 def _without_poles(uv: Array, F: IntArray, poles: list[IntArray]) -> Array:
