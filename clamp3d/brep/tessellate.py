@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.brep.borders import BORDER, Borders, spline_sags
-from clamp3d.brep.grid import divisions, gridded
+from clamp3d.brep.borders import BORDER, Borders
+from clamp3d.brep.facets import facets
 from clamp3d.brep.surfaces import (
     OTHER,
     PLANE,
@@ -30,16 +30,13 @@ from clamp3d.brep.surfaces import (
     surface_of,
     unwrapped,
 )
-from clamp3d.core.linear import dot, norm
+from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Array, IntArray
-from clamp3d.core.triangles import distinct
 from clamp3d.errors import Clamp3dError
 
 ANGLE = 0.35
 """Largest turn (rad) of a facet's neighbour, so that a small fillet gets facets enough to be seen as round."""
 _RETRIES = 4
-_SAFETY = 2.0
-"""Factor on the deviations of free-form faces, which are sampled, not computed."""
 
 Surface = tuple[int, Array, Size, float]
 """Kind, frame, sizes and deviation of a face's surface."""
@@ -172,7 +169,7 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
                 links += list(zip(twin.tolist(), (start + at).tolist(), strict=True))
             t = np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
             edges.append(Borders.of(edge, at, t, P[at], kind, frame, size))
-        F, P, own = _facets(face, found, P, kind, size, border, poles, chord)
+        F, P, own = facets(face, found, P, kind, size, border, poles, chord)
         if kind == OTHER:
             deviation = float(own.max())
         else:
@@ -230,62 +227,6 @@ def _with_errors(
     return error + np.maximum(np.maximum(sag[:, 0], sag[:, 1]), sag[:, 2]) + tolerance, corners, uv
 
 
-def _facets(
-    face: Any, found: Any, P: Array, kind: int, size: Size, border: list[IntArray], poles: list[IntArray], chord: float
-) -> tuple[IntArray, Array, Array]:
-    """Triangles of a face, its nodes, and how far each triangle can be from it besides what a round face bends.
-
-    In rows, where its border allows it; of a free-form face only what is extruded.
-    """
-    from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
-
-    surface, made = BRepAdaptor_Surface(face), None
-    uv = np.zeros((0, 2)) if kind == PLANE else np.array([found.UVNode(i).Coord() for i in range(1, len(P) + 1)])
-    regular = kind != PLANE if kind != OTHER else surface.GetType() == GeomAbs_SurfaceType.GeomAbs_SurfaceOfExtrusion
-    if regular and border:
-        made = gridded(uv, distinct(np.concatenate(border)), lambda span: divisions(kind, size, span, chord))
-    n = found.NbTriangles() if made is None else min(8, found.NbTriangles())
-    F = np.array([found.Triangle(i).Get() for i in range(1, n + 1)], dtype=np.int64) - 1
-    if made is not None:
-        (a, b), (grid, new) = (uv[F[:, k]] - uv[F[:, 0]] for k in (1, 2)), made
-        F = grid if (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() > 0.0 else grid[:, ::-1]
-        uv = np.concatenate([uv, new])
-        P = np.concatenate([P, np.reshape([surface.Value(u, v).Coord() for u, v in new.tolist()], (-1, 3))])
-    own = np.zeros(len(F))
-    if kind != PLANE and made is None and (surface.IsUClosed() or surface.IsVClosed()):
-        turns = np.array([
-            surface.LastUParameter() - surface.FirstUParameter() if surface.IsUClosed() else np.inf,
-            surface.LastVParameter() - surface.FirstVParameter() if surface.IsVClosed() else np.inf,
-        ])  # fmt: skip
-        # Two nodes a whole turn apart are at one place: a triangle of theirs can stand for all round it.
-        own = np.where(_spread(_without_poles(uv, F, poles), turns), norm(np.ptp(P, axis=0)), 0.0)
-    if kind != OTHER:
-        return F, P, own
-    off = None
-    if regular and surface.BasisCurve().GetType() == GeomAbs_CurveType.GeomAbs_BSplineCurve:
-        u = uv[F, 0]
-        off = spline_sags(surface.BasisCurve().BSpline(), u.min(axis=1), u.max(axis=1))
-    return F, P, np.maximum(own, _sampled(surface, F, _without_poles(uv, F, poles), P) if off is None else off)
-
-
-def _without_poles(uv: Array, F: IntArray, poles: list[IntArray]) -> Array:
-    """Parameters (m, 3, 2) of triangles' corners; a pole, where one of them is any, has that of the other corners."""
-    found = uv[F]
-    for nodes in poles:
-        k = int(np.argmax(np.ptp(uv[nodes], axis=0)))
-        other = ~np.isin(F, nodes)
-        count = np.maximum(other.sum(axis=1), 1)
-        mean = np.where(other, found[:, :, k], 0.0).sum(axis=1) / count
-        found[:, :, k] = np.where(other, found[:, :, k], mean[:, None])
-    return found
-
-
-def _spread(uv: Array, turns: Array) -> NDArray[np.bool_]:
-    """Whether parameters (m, k, 2) of each row are nearly half a turn apart or more."""
-    return np.asarray((np.ptp(uv, axis=1) > 0.45 * turns).any(axis=1))
-
-
 def placed(points: Array, place: Any) -> Array:
     """Points (n, 3) moved by a TopLoc_Location."""
     if place.IsIdentity():
@@ -309,36 +250,3 @@ def _joined(V: Array, F: IntArray, links: list[tuple[int, int]]) -> tuple[Array,
     whole = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
     used, rows = np.unique(F[whole], return_inverse=True)
     return V[used], rows.reshape(-1, 3), whole
-
-
-_SAMPLES = np.array([[1, 1, 1], [3, 3, 0], [0, 3, 3], [3, 0, 3], [4, 1, 1], [1, 4, 1], [1, 1, 4]], dtype=np.float64)
-_SAMPLES /= _SAMPLES.sum(axis=1, keepdims=True)
-
-
-def _sampled(surface: Any, F: IntArray, uv: Array, P: Array) -> Array:
-    """Twice the largest distance (m,) of points of triangles from the surface, found from the same parameters on."""
-    from OCP.gp import gp_Pnt, gp_Vec
-
-    point, along, across = gp_Pnt(), gp_Vec(), gp_Vec()
-
-    def at(uv: Array) -> Array:
-        """Points (k, 0) of the surface and its tangents there (k, 1), (k, 2)."""
-        made = np.empty((len(uv), 3, 3))
-        for k, (u, v) in enumerate(uv.tolist()):
-            surface.D1(u, v, point, along, across)
-            made[k] = point.Coord(), along.Coord(), across.Coord()
-        return made
-
-    where = np.einsum("sk,mkd->msd", _SAMPLES, uv).reshape(-1, 2)
-    flat = np.einsum("sk,mkd->msd", _SAMPLES, P[F]).reshape(-1, 3)
-    made = at(where)
-    off = flat - made[:, 0]
-    # The same parameters are not the nearest point's. Least squares; at a pole, where a tangent is 0, along the other.
-    (a, b), (_, c) = np.einsum("kid,kjd->ijk", made[:, 1:], made[:, 1:])
-    u, v = np.einsum("kid,kd->ik", made[:, 1:], off)
-    a, c = (1.0 + 1e-12) * a + 1e-100, (1.0 + 1e-12) * c + 1e-100
-    step = np.stack([c * u - b * v, a * v - b * u], axis=1) / (a * c - b * b)[:, None]
-    low, high = uv.min(axis=(0, 1)), uv.max(axis=(0, 1))
-    nearer = at(np.clip(where + step, low, high))[:, 0]
-    found = np.minimum(np.linalg.norm(off, axis=1), np.linalg.norm(flat - nearer, axis=1))
-    return np.asarray(_SAFETY * found.reshape(len(F), -1).max(axis=1))

@@ -133,6 +133,33 @@ def test_a_line_less_is_never_a_body_less(tmp_path):
             assert sorted(found) == pytest.approx(sorted(size for _, size, _ in truth), rel=2e-2), line
 
 
+@pytest.mark.parametrize(
+    ("text", "instead", "told"),
+    [
+        ("\nDATA;", "\nDATA; /* it's no text; #1 = ( */", None),
+        ("DIRECTION('',", "DIRECTION('it''s (, #999999',", None),
+        ("DIRECTION('',", "DIRECTION('', ,", "lacks a value"),
+        ("DIRECTION('',", "DIRECTION(\n,", "lacks a value"),
+        ("DIRECTION('',", "DIRECTION('it's',", "a text in it does not end"),
+        ("DIRECTION('',", "DIRECTION(('',", "does not end"),
+        ("DIRECTION('',", "DIRECTION(#999999,", "#999999 is referred to and not there"),
+        ("DIRECTION('',", "DIRECTION 7 = ('',", "does not end"),
+        ("\n#12 ", "\n#11 ", "#11 is defined twice"),
+        ("\nENDSEC;\nEND-", "\nEND-", "no DATA section that ends"),
+    ],
+)
+def test_a_text_that_is_not_whole_is_told(tmp_path, text, instead, told):
+    file = nested(np.random.default_rng(7))[0].write(tmp_path / "machine.step")
+    known, before = announced(file), file.read_text()
+    assert text in before
+    file.write_text(before.replace(text, instead, 1))
+    if told is None:
+        assert announced(file) == known
+    else:
+        with pytest.raises(InputError, match=told):
+            announced(file)
+
+
 FORKED = """
 import os
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
