@@ -23,6 +23,7 @@ from clamp3d.collide.faces_math import (
     TORUS,
     band_over,
     bend,
+    bend_over,
     cut,
     height_at,
     least_height,
@@ -256,12 +257,14 @@ def _over(V, uv, g, rim, own, solid, count, scratch):
     _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
     _, chosen, raised, raised_size, _, whole = scratch
     du, v0, v1, _, _ = spans(uv)
-    e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1) + rim
     high = -np.inf
     for m in range(count):
         f = chosen[m]
         to_frame(frame[f], V, whole[0])
-        h = least_height(kind[f], raised_size[m], size[f, 1], sense[f], whole[0]) - e
+        e = bend_over(
+            akind[g], asize[g, 0], asize[g, 1], aframe[g], du, v1 - v0, v0, v1, kind[f], frame[f]
+        )  # fmt: skip
+        h = least_height(kind[f], raised_size[m], size[f, 1], sense[f], whole[0]) - e - rim
         if akind[g] != PLANE and akind[g] != OTHER:
             band = akind[g], asize[g, 0], asize[g, 1], aframe[g], v0, v1
             h = max(h, band_over(*band, kind[f], raised_size[m], size[f, 1], frame[f], sense[f]) - rim)
@@ -366,8 +369,9 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
     found, lowest = -np.inf, -np.inf
     while count < MOST_OVER and found < wanted:
         f, highest = -1, lowest + 0.1 * tol
-        for n in range(NEAR + NEAR * beside.shape[1]):
-            one = nearest_ones[n] if n < NEAR else nearest_ones[(n - NEAR) // beside.shape[1]]
+        for n in range(NEAR + (NEAR + count) * beside.shape[1]):
+            m = n if n < NEAR else (n - NEAR) // beside.shape[1]
+            one = nearest_ones[m] if m < NEAR else chosen[m - NEAR]
             if n >= NEAR and one >= 0:
                 one = beside[one, (n - NEAR) % beside.shape[1]]
             if one < 0 or kind[one] == OTHER:

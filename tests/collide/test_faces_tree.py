@@ -108,7 +108,9 @@ def test_what_is_nearest():
             assert faces_tree.nearest(*tree, *x, low - 0.1, near, stack)[1] == low - 0.1
             assert near[0] == -1
             least = [(d + err)[face == f].min() for f in range(faces)]
-            assert [faces_tree.nearest_below(P, err, box, link, order, i, *x, stack) for i in root] == pytest.approx(least)
+            assert [faces_tree.nearest_below(P, err, box, link, order, i, *x, stack) for i in root] == pytest.approx(
+                least
+            )
             rows, whole = np.stack([marks, rest]), np.empty((9, 3, 3))
             above = np.stack([nodes, others])
             solid = P, err, face, box, link, order, root, *[None] * 9, rows, above
