@@ -100,6 +100,15 @@ def _clear(solid, row, bit, slack, at, x, y, z, needed, most, whole, stack):
 
 
 @formula
+def _enough(high, limits):
+    """Lower bound above which no better one is needed, with an upper bound ``high`` of all."""
+    _, contact, goal, tol = limits
+    if goal < np.inf and high <= contact:  # asked for a verdict: contact or clash
+        return -contact
+    return min(goal, high - 0.25 * tol)
+
+
+@formula
 def piece(V, uv, g, sag, own, solid, limits, scratch, out):
     """Lower bound for one piece; a better upper bound goes into ``out``."""
     akind, asize, aframe, adeviation = own
@@ -179,7 +188,7 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                 needed = max(h, abs(least) if least - e > found else 0.0) + rho
                 most = reach if sense[f] < 0.0 else np.inf
                 clear = _clear(solid, row, 1, slack, at, x, y, z, needed, most, whole, stack)
-                told = clear > 0.0 and found < min(out[0], goal) - 0.25 * tol
+                told = clear > 0.0 and found < _enough(out[0], limits)
                 if clear > 0.0:  # what is above the face by more than t is outside there
                     found = max(found, _below(least, rho, clear) - e)
                     if h > t:
@@ -353,7 +362,7 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
     nearest_ones, chosen, raised, raised_size, stack, whole = scratch
     P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, beside, _, _ = solid
     slack, _, goal, tol = limits
-    wanted = min(goal, high - 0.5 * tol)
+    wanted = _enough(high, limits)
     x, y, z = whole[2, 0, 0], whole[2, 0, 1], whole[2, 0, 2]
     rho, rim, bent = 0.0, 0.0, 0.0
     for k in rows:
