@@ -1,5 +1,6 @@
 """Before any test: the contact kernel is compiled once, so that no test measures or prints its compilation."""
 
+import importlib
 import os
 import sys
 from pathlib import Path
@@ -10,6 +11,10 @@ from hypothesis import settings
 from clamp3d import cli
 from clamp3d.kernel import Capsule, Cylinder, SweptArc, groove_pieces, signed_distance, translation
 
+# Tests start Python hundreds of times: it would compile the package each time where it is told to keep nothing.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 # Drawings and sentences of the documentation are tested too.
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
@@ -18,7 +23,19 @@ settings.register_profile("ci", derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 
+# What compiles when it is imported. It takes minutes where no cache has it.
+ROOT = Path(cli.__file__).parents[2]
+KERNELS = sorted(path for path in (ROOT / "clamp3d").rglob("*.py") if "= entry(" in path.read_text("utf-8"))
+
+
 def pytest_sessionstart(session):
+    worker = getattr(session.config, "workerinput", None)
+    if worker is None and session.config.getoption("numprocesses", None):
+        return  # the workers run the tests
+    if worker is not None:  # each begins with kernels of its own, and then finds those of the others in the cache
+        own = KERNELS[int(worker["workerid"].removeprefix("gw")) :: worker["workercount"]]
+        for path in (*own, *KERNELS):
+            importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
     groove, wire = SweptArc(7.0, 1.0, 50.0), Cylinder(6.0, 80.0)
     signed_distance(groove, wire, translation(0.0, 3.0, 0.0))
     groove_pieces(groove, Capsule(6.0, 80.0), translation(0.0, 3.0, 0.0))

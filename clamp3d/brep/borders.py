@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.brep.surfaces import OTHER, PLANE, Size, from_sides
+from clamp3d.brep.surfaces import OTHER, PLANE, Size, from_sides, height, normals
 from clamp3d.core.mesh import Array, IntArray
 
 BORDER = 0.0003
@@ -16,6 +17,8 @@ BORDER = 0.0003
 _MOST = 64
 _SAFETY = 2.0
 """Factor on deviations that are sampled, not computed: of edges that are no lines, circles or plain splines."""
+_ROUNDING = 1e-11
+"""What is nearer (mm) than this is as good as there."""
 _SHARES = (0.25, 0.5, 0.75)
 """Where pieces of such edges are sampled."""
 
@@ -51,68 +54,76 @@ class Borders:
 
         curve = BRepAdaptor_Curve(edge)
         sag = _sags(curve, t, ends, kind, frame, size)
-        count = np.ceil(np.sqrt(sag / BORDER)).clip(1, _MOST if kind != OTHER else 1).astype(np.int64)
+        nodes = np.stack([at[:-1], at[1:]], axis=1)
+        if kind == OTHER or sag.max() <= BORDER:
+            return cls(nodes, sag, np.ones(len(sag), np.int64), np.arange(len(sag)), ends, np.append(sag, 0.0))
+        count = np.ceil(np.sqrt(sag / BORDER)).clip(1, _MOST).astype(np.int64)
         start = np.cumsum(count) - count
-        points, fine = ends, sag
-        if (count > 1).any():
-            step = np.arange(count.sum()) - np.repeat(start, count)
-            along = np.append(np.repeat(t[:-1], count) + step * np.repeat(np.diff(t) / count, count), t[-1])
-            points = np.array([curve.Value(float(x)).Coord() for x in along])
-            points[start], points[-1] = ends[:-1], ends[-1]
-            fine = _sags(curve, along, points, kind, frame, size)
-        return cls(np.column_stack([at[:-1], at[1:]]), sag, count, start, points, np.append(fine, 0.0))
+        step = np.arange(count.sum()) - np.repeat(start, count)
+        along = np.append(np.repeat(t[:-1], count) + step * np.repeat(np.diff(t) / count, count), t[-1])
+        points = np.array([curve.Value(x).Coord() for x in along.tolist()])
+        points[start], points[-1] = ends[:-1], ends[-1]
+        fine = _sags(curve, along, points, kind, frame, size)
+        return cls(nodes, sag, count, start, points, np.append(fine, 0.0))
 
     def at_sides(self, F: IntArray, n: int) -> IntArray:
         """Row of the piece that each triangle's side is (m, 3), of triangles of ``n`` nodes; -1 for none."""
-        pairs = np.sort(self.nodes, axis=1)
-        keys = pairs[:, 0] * n + pairs[:, 1]
+        keys = self.nodes.min(axis=1) * n + self.nodes.max(axis=1)
         order = np.lexsort((-self.sag, keys))  # of two with the same ends the larger sag
-        side = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=2), axis=2)
-        wanted = side[:, :, 0] * n + side[:, :, 1]
+        ends = F[:, [1, 2, 0]]
+        wanted = np.minimum(F, ends) * n + np.maximum(F, ends)
         row = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
         return np.asarray(np.where(keys[row] == wanted, row, -1))
 
-    def split(self, F: IntArray, rows: IntArray, P: Array) -> tuple[Array, Array, IntArray]:
-        """Triangles F (m, 3) of nodes P cut into fans at the sides ``rows`` (m, 3) that bulge.
+    def split(self, F: IntArray, rows: IntArray, P: Array) -> tuple[IntArray, Array, IntArray]:
+        """Triangles F (m, 3) of P, nodes and then `points`, cut into fans at the sides ``rows`` (m, 3) that bulge.
 
-        Returns their corners (k, 3, 3), the sags of their sides (k, 3) and the triangle that each came from (k,).
+        Returns their corners (k, 3) in P, the sags of their sides (k, 3) and the triangle that each came from (k,).
         """
         sag = np.where(rows >= 0, self.sag[rows], 0.0)
-        corners, origin = P[F], np.arange(len(F))
+        origin, first = np.arange(len(F)), len(P) - len(self.points)
         forward = self.nodes[rows, 0] == F
+        outward = None
         for s in range(3):
             parts = np.where(rows[:, s] >= 0, self.count[rows[:, s]], 1)
             while (parts > 1).any():
-                made = self._fans(s, parts, corners, rows, forward[:, s], sag)
-                turned = np.einsum("ij,ij->i", _normals(made[0]), _normals(corners)[made[1]]) < 0.0
+                outward = normals(P[F]) if outward is None else outward
+                made = self._fans(s, parts, F, rows, forward[:, s], sag, first)
+                after = normals(P[made[0]])
+                turned = np.einsum("ij,ij->i", after, outward[made[1]]) < 0.0
                 if not turned.any():
-                    corners, source, rows, sag = made
-                    forward, origin = forward[source], origin[source]
+                    F, source, rows, sag = made
+                    forward, origin, outward = forward[source], origin[source], after
                     break
                 parts[made[1][turned]] = 1  # too slim for its arc: it stays as it is
-        return corners, sag, origin
+        return F, sag, origin
 
     def _fans(
-        self, s: int, parts: IntArray, corners: Array, rows: IntArray, forward: NDArray[np.bool_], sag: Array
-    ) -> tuple[Array, IntArray, IntArray, Array]:
-        """Each triangle as ``parts`` (m,) ones along its side ``s``, and the triangle that each came from."""
+        self,
+        s: int,
+        parts: IntArray,
+        F: IntArray,
+        rows: IntArray,
+        forward: NDArray[np.bool_],
+        sag: Array,
+        first: int,
+    ) -> tuple[IntArray, IntArray, IntArray, Array]:
+        """Each triangle as ``parts`` (m,) ones along its side ``s``, and the triangle that each came from.
+
+        ``first``: number of the first of the points as a node.
+        """
         source = np.repeat(np.arange(len(parts)), parts)
         step = np.arange(len(source)) - np.repeat(np.cumsum(parts) - parts, parts)
-        corners, rows, sag = corners[source], rows[source], sag[source]
+        F, rows, sag = F[source], rows[source], sag[source]
         cut = parts[source] > 1
         left = parts[source] - 1 - step
         low = self.start[rows[:, s]] + np.where(forward[source], step, left)
-        ends = np.column_stack([low, low + 1])[cut]
-        ends[~forward[source][cut]] = ends[~forward[source][cut]][:, ::-1]
-        corners[cut, s], corners[cut, (s + 1) % 3] = self.points[ends[:, 0]], self.points[ends[:, 1]]
+        turned = ~forward[source][cut]
+        F[cut, s], F[cut, (s + 1) % 3] = first + low[cut] + turned, first + low[cut] + ~turned
         sag[cut, s] = self.fine[low[cut]]
         for inner, side in ((left > 0, (s + 1) % 3), (step > 0, (s + 2) % 3)):
             sag[cut & inner, side], rows[cut & inner, side] = 0.0, -1
-        return corners, source, rows, sag
-
-
-def _normals(corners: Array) -> Array:
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return F, source, rows, sag
 
 
 def _sags(curve: Any, t: Array, points: Array, kind: int, frame: Array, size: Size) -> Array:
@@ -127,6 +138,9 @@ def _sags(curve: Any, t: Array, points: Array, kind: int, frame: Array, size: Si
         return np.asarray(curve.Circle().Radius() * (1.0 - np.cos(turn)))
     if what == Kind.GeomAbs_Ellipse and kind in (PLANE, OTHER):  # a circle stretched: at most by the longer half axis
         return np.asarray(curve.Ellipse().MajorRadius() * (1.0 - np.cos(turn)))
+    if what == Kind.GeomAbs_Circle and _is_around(curve.Circle(), frame):
+        off = np.abs(height(kind, frame, size, points[:1]))
+        return np.where(np.repeat(off, len(turn)) > _ROUNDING, _SAFETY * off, 0.0)
     if what == Kind.GeomAbs_BSplineCurve and kind in (PLANE, OTHER):
         found = spline_sags(curve.BSpline(), np.minimum(t[:-1], t[1:]), np.maximum(t[:-1], t[1:]))
         if found is not None:
@@ -135,7 +149,17 @@ def _sags(curve: Any, t: Array, points: Array, kind: int, frame: Array, size: Si
     true = np.array([curve.Value(x).Coord() for x in at.tolist()])
     start, end = (np.tile(x, (len(_SHARES), 1)) for x in (points[:-1], points[1:]))
     off = from_sides(kind, frame, size, start, end, true).reshape(len(_SHARES), -1).max(axis=0)
-    return np.where(off > 1e-11, _SAFETY * off, 0.0)
+    return np.where(off > _ROUNDING, _SAFETY * off, 0.0)
+
+
+def _is_around(circle: Any, frame: Array) -> bool:
+    """Whether a circle goes around the axis of a round surface: its parameters lie on a line then."""
+    axis, middle = circle.Axis().Direction().Coord(), circle.Location().Coord()
+    o, _, _, z = frame.tolist()
+    tilt = math.hypot(*(axis[i] * z[i - 1] - axis[i - 1] * z[i] for i in range(3)))
+    out = [x - y for x, y in zip(middle, o, strict=True)]
+    aside = math.hypot(*(out[i] * z[i - 1] - out[i - 1] * z[i] for i in range(3)))
+    return aside + tilt * float(circle.Radius()) < 0.1 * _ROUNDING
 
 
 def spline_sags(spline: Any, start: Array, end: Array) -> Array | None:

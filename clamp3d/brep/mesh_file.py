@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,6 @@ import numpy as np
 from clamp3d import checks
 from clamp3d.brep.apart import READERS, read_apart
 from clamp3d.brep.bodies import Body, Reading
-from clamp3d.brep.gltf_file import read_gltf
 from clamp3d.core.linear import to_target
 from clamp3d.core.mesh import Array, IntArray, Mesh, make_mesh
 from clamp3d.core.shapes import MeshShape
@@ -34,8 +32,6 @@ FORMATS: dict[str, str | None] = {
     ".stp": "stated",
 }
 """Readable formats; the value is the unit that the format itself fixes (None: the file does not say)."""
-
-_SILENT = logging.NullHandler()
 
 
 def load_bodies(path: str | Path, *, unit: str | None = None, partial: bool = False) -> Reading:
@@ -77,6 +73,8 @@ def load_bodies(path: str | Path, *, unit: str | None = None, partial: bool = Fa
     if kind in READERS:
         found = read_apart(file)
     elif kind in (".glb", ".gltf"):
+        from clamp3d.brep.gltf_file import read_gltf
+
         found = read_gltf(file, UNITS_MM[unit or "m"])
     else:
         found = _single(file, kind, unit)
@@ -125,10 +123,14 @@ def _single(file: Path, kind: str, unit: str | None) -> Reading:
 
 def _read(file: Path, kind: str) -> tuple[Array, IntArray]:
     """Vertices (n, 3) and faces (m, 3) of a file that is one mesh."""
+    import logging
+
     import trimesh
 
     # What it logs about a file goes to who has asked for logs, not on stderr.
-    logging.getLogger("trimesh").addHandler(_SILENT)
+    logger = logging.getLogger("trimesh")
+    if not logger.handlers:
+        logger.addHandler(logging.NullHandler())
     options: dict[str, Any] = {"skip_materials": True} if kind == ".obj" else {}
     try:
         with np.errstate(all="ignore"):  # numbers that are none are looked for below

@@ -48,9 +48,9 @@ class BrepSolid(MeshShape):
         return cls.made(name, to_bytes(solid), tessellate(solid, chord))
 
     @classmethod
-    def made(cls, name: str, brep: bytes, triangles: Tessellation) -> BrepSolid:
-        """From its bytes and the triangles that were made of it."""
-        mesh = _mesh(name, triangles)
+    def made(cls, name: str, brep: bytes, triangles: Tessellation, closed: bool | None = None) -> BrepSolid:
+        """From its bytes and the triangles that were made of it; finds out if these are ``closed`` unless told."""
+        mesh = _mesh(name, triangles, is_closed(triangles.faces) if closed is None else closed)
         error = float(triangles.errors.max())
         return cls(
             mesh,
@@ -71,6 +71,7 @@ class BrepSolid(MeshShape):
             "faces": self.mesh.faces,
             "face": self.face,
             "errors": self.errors,
+            "closed": np.array(self.mesh.watertight),
             **self.surfaces.to_arrays(),
         }
 
@@ -79,7 +80,7 @@ class BrepSolid(MeshShape):
         """From what `to_arrays` gave."""
         faces = Faces.from_arrays(arrays)
         triangles = Tessellation(arrays["vertices"], arrays["faces"], arrays["face"], arrays["errors"], faces)
-        return cls.made(name, arrays["brep"].tobytes(), triangles)
+        return cls.made(name, arrays["brep"].tobytes(), triangles, bool(arrays["closed"]))
 
     @cached_property
     def solid(self) -> Any:
@@ -149,10 +150,9 @@ def from_bytes(brep: bytes) -> Any:
     return shape
 
 
-def _mesh(name: str, triangles: Tessellation) -> Mesh:
+def _mesh(name: str, triangles: Tessellation, closed: bool) -> Mesh:
     V, F = triangles.vertices, triangles.faces
     if not np.isfinite(V).all():
         raise InputError(f"{name}: a vertex is not finite")
-    closed = is_closed(F)
     notes = () if closed else ("the triangles of the solid do not close",)
     return Mesh(name, V, F, closed, float(np.abs(V).max()) * 2.0**-50, notes)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.core.linear import atan2, dot, norm
+from clamp3d.core.linear import atan2, crosses, dot, norm
 from clamp3d.core.pose import Array
 
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
@@ -135,11 +135,16 @@ def unwrapped(kind: int, uv: Array) -> Array:
     return made
 
 
+def normals(corners: Array) -> Array:
+    """Normals (m, 3) of triangles (m, 3, 3), as long as twice their areas."""
+    return crosses(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def sense_of(kind: int, frame: Array, size: Size, corners: Array) -> float:
     """Whether the triangles' outward normals point up the surface's height."""
     if kind == OTHER:
         return 1.0
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = normals(corners)
     k = int(np.argmax(np.einsum("ij,ij->i", normal, normal)))
     middle = corners[k].mean(axis=0)
     step = 1e-4 * math.sqrt(norm(normal[k]))
@@ -151,19 +156,11 @@ def sense_of(kind: int, frame: Array, size: Size, corners: Array) -> float:
 def surface_of(face: Any) -> tuple[int, Array, Size, float]:
     """Kind, frame, sizes and deviation of a face's surface, recognised where it is free-form."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.GeomAbs import GeomAbs_SurfaceType as Type
 
     surface = BRepAdaptor_Surface(face)
-    kind = surface.GetType()
-    known = {
-        Type.GeomAbs_Plane: (PLANE, "Plane"),
-        Type.GeomAbs_Cylinder: (CYLINDER, "Cylinder"),
-        Type.GeomAbs_Cone: (CONE, "Cone"),
-        Type.GeomAbs_Sphere: (SPHERE, "Sphere"),
-        Type.GeomAbs_Torus: (TORUS, "Torus"),
-    }
-    if kind in known:
-        number, name = known[kind]
+    number = KINDS.index(kind) if (kind := surface.GetType().name.removeprefix("GeomAbs_").lower()) in KINDS else OTHER
+    if number != OTHER:
+        name = KINDS[number].capitalize()
         made = _canonical(number, getattr(surface, name)())
         if number != TORUS or made[1][0] > made[1][1]:
             return number, *made, 0.0
@@ -228,7 +225,7 @@ def bends(kind: int, size: Size, uv: Array, corners: Array) -> Array:
     def turn(k: int) -> Array:
         u = uv[:, :, k]
         with np.errstate(invalid="ignore"):
-            span = np.fmax.reduce(u, axis=1) - np.fmin.reduce(u, axis=1)
+            span = np.fmax(np.fmax(u[:, 0], u[:, 1]), u[:, 2]) - np.fmin(np.fmin(u[:, 0], u[:, 1]), u[:, 2])
         return np.asarray(1.0 - np.cos(0.5 * np.minimum(np.nan_to_num(span), math.pi)))
 
     if kind == CYLINDER:
@@ -246,7 +243,7 @@ def _enclosing(P: Array) -> Array:
     """Radius (m,) of the smallest ball around each of triangles (m, 3, 3)."""
     side = np.linalg.norm(np.roll(P, -1, axis=1) - P, axis=2)
     long = side.max(axis=1)
-    twice_area = np.linalg.norm(np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0]), axis=1)
+    twice_area = np.linalg.norm(normals(P), axis=1)
     around = side.prod(axis=1) / np.maximum(2.0 * twice_area, 1e-300)
     obtuse = 2.0 * long**2 >= (side**2).sum(axis=1)
     return np.asarray(np.where(obtuse, 0.5 * long, np.minimum(around, long)))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from clamp3d.brep.surfaces import (
     Size,
     bends,
     height,
+    normals,
     parameters,
     sense_of,
     surface_of,
@@ -30,6 +32,7 @@ from clamp3d.brep.surfaces import (
 )
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Array, IntArray
+from clamp3d.core.triangles import distinct
 from clamp3d.errors import Clamp3dError
 
 ANGLE = 0.35
@@ -60,17 +63,23 @@ class Tessellation:
 
 def explore(shape: Any, kind: str, outside: str = "SHAPE") -> Iterator[Any]:
     """Sub-shapes of a ``kind`` ("SOLID", "FACE", ...), ``outside`` of those of another, in the explorer's order."""
+    explorer, cast, kinds = _explorer(kind, outside)
+    found = explorer(shape, *kinds)
+    while found.More():
+        yield cast(found.Current())
+        found.Next()
+
+
+@cache
+def _explorer(kind: str, outside: str) -> tuple[Any, ...]:
+    """Open CASCADE's explorer, what makes a shape one of a kind, and its words for the kinds."""
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopoDS import TopoDS
 
     name = kind.capitalize()
     cast = getattr(TopoDS, f"{name}_s", None) or getattr(TopoDS, name)
-    kinds = (getattr(TopAbs_ShapeEnum, f"TopAbs_{k}") for k in (kind, outside))
-    explorer = TopExp_Explorer(shape, *kinds)
-    while explorer.More():
-        yield cast(explorer.Current())
-        explorer.Next()
+    return TopExp_Explorer, cast, [getattr(TopAbs_ShapeEnum, f"TopAbs_{k}") for k in (kind, outside)]
 
 
 def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
@@ -142,7 +151,7 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
         if found is None:
             raise Clamp3dError(f"Open CASCADE makes no triangles of face {number + 1}")
         P = placed(np.array([found.Node(i).Coord() for i in range(1, found.NbNodes() + 1)]), place)
-        edges, border = [], []
+        edges, border, poles = [], [], []
         tolerance = BRep_Tool.Tolerance_s(face)
         for edge in explore(face, "EDGE"):
             polygon = BRep_Tool.PolygonOnTriangulation_s(edge, found, place)
@@ -152,6 +161,7 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
             at = np.array([polygon.Node(i) for i in range(1, polygon.NbNodes() + 1)]) - 1
             border.append(at)
             if BRep_Tool.Degenerated_s(edge):
+                poles.append(at)
                 links += [(start + int(at[0]), start + int(k)) for k in at[1:]]
                 continue
             twins = first_seen.setdefault(hash(edge), [])
@@ -162,42 +172,41 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
                 links += list(zip(twin.tolist(), (start + at).tolist(), strict=True))
             t = np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
             edges.append(Borders.of(edge, at, t, P[at], kind, frame, size))
-        F, P, own = _facets(face, found, P, kind, size, border, chord)
+        F, P, own = _facets(face, found, P, kind, size, border, poles, chord)
         if kind == OTHER:
             deviation = float(own.max())
         else:
             deviation = max(deviation, float(np.abs(height(kind, frame, size, P)).max()))
         if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED:
             F = F[:, ::-1]
-        corners, sag = P[F], np.zeros(F.shape)
+        nodes.append(P)
+        sag, table = np.zeros(F.shape), F
         if edges:
             borders = Borders.joined(edges)
             rows = borders.at_sides(F, len(P))
             sag = np.where(rows >= 0, borders.sag[rows], 0.0)
-        source = np.arange(len(F))
-        for table in (coarse, fine):
-            if table is fine and kind != OTHER and edges:
-                corners, sag, source = borders.split(F, rows, P)
-            uv = unwrapped(kind, parameters(kind, frame, size, corners.reshape(-1, 3)).reshape(-1, 3, 2))
-            error = own[source]
-            if kind != OTHER:
-                error = np.maximum(error, bends(kind, size, uv, corners) + deviation)
-            error = error + sag.max(axis=1) + tolerance
-            table.append((error, corners, uv, np.full(len(error), number), sag))
+            P = np.concatenate([P, borders.points])
+        at = parameters(kind, frame, size, P)
+
+        seen = _with_errors(F, P, at, sag, own, (kind, size, deviation), tolerance)
+        coarse.append((seen[0], np.full(len(F), number), F + start))
+        if edges and kind != OTHER:
+            table, sag, source = borders.split(F, rows, P)
+            if table is not F:
+                seen = _with_errors(table, P, at, sag, own[source], (kind, size, deviation), tolerance)
+        fine.append((*seen, np.full(len(table), number), sag))
         deviations.append(deviation)
-        nodes.append(P)
-        coarse[-1] += (F + start,)
-        start += len(P)
+        start += len(nodes[-1])
     if not nodes:
         raise Clamp3dError("the solid has no faces")
-    errors, _, _, owner, _, F = (np.concatenate(column) for column in zip(*coarse, strict=True))
+    errors, owner, F = (np.concatenate(column) for column in zip(*coarse, strict=True))
     V, F, whole = _joined(np.concatenate(nodes), F, links)
     exact = [np.concatenate(column) for column in zip(*fine, strict=True)]
-    corners = exact[1]
-    kept = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) > 1e-14
+    kept = np.linalg.norm(normals(exact[1]), axis=1) > 1e-14
     exact = [np.ascontiguousarray(x[kept]) for x in exact]
+    ends = np.searchsorted(exact[3], np.arange(len(surfaces) + 1))
     senses = [
-        sense_of(kind, frame, size, exact[1][exact[3] == number])
+        sense_of(kind, frame, size, exact[1][ends[number] : ends[number + 1]])
         for number, (kind, frame, size, _) in enumerate(surfaces)
     ]
     made = Faces(
@@ -211,8 +220,18 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
     return Tessellation(V, F, owner[whole], errors[whole], made)
 
 
+def _with_errors(
+    F: IntArray, P: Array, at: Array, sag: Array, own: Array, surface: tuple[int, Size, float], tolerance: float
+) -> tuple[Array, Array, Array]:
+    """How far triangles F (m, 3) of P, whose parameters are ``at``, can be from their face; their corners; their uv."""
+    kind, size, deviation = surface
+    corners, uv = P[F], unwrapped(kind, at[F])
+    error = own if kind == OTHER else np.maximum(own, bends(kind, size, uv, corners) + deviation)
+    return error + np.maximum(np.maximum(sag[:, 0], sag[:, 1]), sag[:, 2]) + tolerance, corners, uv
+
+
 def _facets(
-    face: Any, found: Any, P: Array, kind: int, size: Size, border: list[IntArray], chord: float
+    face: Any, found: Any, P: Array, kind: int, size: Size, border: list[IntArray], poles: list[IntArray], chord: float
 ) -> tuple[IntArray, Array, Array]:
     """Triangles of a face, its nodes, and how far each triangle can be from it besides what a round face bends.
 
@@ -222,30 +241,44 @@ def _facets(
     from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
 
     surface, made = BRepAdaptor_Surface(face), None
-    uv = np.array([found.UVNode(i).Coord() for i in range(1, len(P) + 1)])
+    uv = np.zeros((0, 2)) if kind == PLANE else np.array([found.UVNode(i).Coord() for i in range(1, len(P) + 1)])
     regular = kind != PLANE if kind != OTHER else surface.GetType() == GeomAbs_SurfaceType.GeomAbs_SurfaceOfExtrusion
     if regular and border:
-        made = gridded(uv, np.unique(np.concatenate(border)), lambda span: divisions(kind, size, span, chord))
+        made = gridded(uv, distinct(np.concatenate(border)), lambda span: divisions(kind, size, span, chord))
     n = found.NbTriangles() if made is None else min(8, found.NbTriangles())
     F = np.array([found.Triangle(i).Get() for i in range(1, n + 1)], dtype=np.int64) - 1
-    turns = np.array([
-        surface.LastUParameter() - surface.FirstUParameter() if surface.IsUClosed() else np.inf,
-        surface.LastVParameter() - surface.FirstVParameter() if surface.IsVClosed() else np.inf,
-    ])  # fmt: skip
     if made is not None:
         (a, b), (grid, new) = (uv[F[:, k]] - uv[F[:, 0]] for k in (1, 2)), made
         F = grid if (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() > 0.0 else grid[:, ::-1]
         uv = np.concatenate([uv, new])
         P = np.concatenate([P, np.reshape([surface.Value(u, v).Coord() for u, v in new.tolist()], (-1, 3))])
-    # Two nodes a whole turn apart are at one place: a triangle of theirs can stand for all round it.
-    own = np.where(_spread(uv[F], turns) & (made is None), norm(np.ptp(P, axis=0)), 0.0)
+    own = np.zeros(len(F))
+    if kind != PLANE and made is None and (surface.IsUClosed() or surface.IsVClosed()):
+        turns = np.array([
+            surface.LastUParameter() - surface.FirstUParameter() if surface.IsUClosed() else np.inf,
+            surface.LastVParameter() - surface.FirstVParameter() if surface.IsVClosed() else np.inf,
+        ])  # fmt: skip
+        # Two nodes a whole turn apart are at one place: a triangle of theirs can stand for all round it.
+        own = np.where(_spread(_without_poles(uv, F, poles), turns), norm(np.ptp(P, axis=0)), 0.0)
     if kind != OTHER:
         return F, P, own
     off = None
     if regular and surface.BasisCurve().GetType() == GeomAbs_CurveType.GeomAbs_BSplineCurve:
         u = uv[F, 0]
         off = spline_sags(surface.BasisCurve().BSpline(), u.min(axis=1), u.max(axis=1))
-    return F, P, np.maximum(own, _sampled(surface, F, uv, P) if off is None else off)
+    return F, P, np.maximum(own, _sampled(surface, F, _without_poles(uv, F, poles), P) if off is None else off)
+
+
+def _without_poles(uv: Array, F: IntArray, poles: list[IntArray]) -> Array:
+    """Parameters (m, 3, 2) of triangles' corners; a pole, where one of them is any, has that of the other corners."""
+    found = uv[F]
+    for nodes in poles:
+        k = int(np.argmax(np.ptp(uv[nodes], axis=0)))
+        other = ~np.isin(F, nodes)
+        count = np.maximum(other.sum(axis=1), 1)
+        mean = np.where(other, found[:, :, k], 0.0).sum(axis=1) / count
+        found[:, :, k] = np.where(other, found[:, :, k], mean[:, None])
+    return found
 
 
 def _spread(uv: Array, turns: Array) -> NDArray[np.bool_]:
@@ -282,7 +315,7 @@ _SAMPLES = np.array([[1, 1, 1], [3, 3, 0], [0, 3, 3], [3, 0, 3], [4, 1, 1], [1, 
 _SAMPLES /= _SAMPLES.sum(axis=1, keepdims=True)
 
 
-def _sampled(surface: Any, F: IntArray, nodes: Array, P: Array) -> Array:
+def _sampled(surface: Any, F: IntArray, uv: Array, P: Array) -> Array:
     """Twice the largest distance (m,) of points of triangles from the surface, found from the same parameters on."""
     from OCP.gp import gp_Pnt, gp_Vec
 
@@ -296,7 +329,7 @@ def _sampled(surface: Any, F: IntArray, nodes: Array, P: Array) -> Array:
             made[k] = point.Coord(), along.Coord(), across.Coord()
         return made
 
-    where = np.einsum("sk,mkd->msd", _SAMPLES, nodes[F]).reshape(-1, 2)
+    where = np.einsum("sk,mkd->msd", _SAMPLES, uv).reshape(-1, 2)
     flat = np.einsum("sk,mkd->msd", _SAMPLES, P[F]).reshape(-1, 3)
     made = at(where)
     off = flat - made[:, 0]
@@ -305,7 +338,7 @@ def _sampled(surface: Any, F: IntArray, nodes: Array, P: Array) -> Array:
     u, v = np.einsum("kid,kd->ik", made[:, 1:], off)
     a, c = (1.0 + 1e-12) * a + 1e-100, (1.0 + 1e-12) * c + 1e-100
     step = np.stack([c * u - b * v, a * v - b * u], axis=1) / (a * c - b * b)[:, None]
-    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    low, high = uv.min(axis=(0, 1)), uv.max(axis=(0, 1))
     nearer = at(np.clip(where + step, low, high))[:, 0]
     found = np.minimum(np.linalg.norm(off, axis=1), np.linalg.norm(flat - nearer, axis=1))
     return np.asarray(_SAFETY * found.reshape(len(F), -1).max(axis=1))

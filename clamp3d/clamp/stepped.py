@@ -89,7 +89,8 @@ def solve_bisection(
 ) -> SteppedState:
     """Close the clamp in steps, then halve step and tilt step until the step is at most ``resolution`` mm.
 
-    Raises as `solve_stepped`.
+    No move of one step is free from the state found, as far as tilts were tried: its distance d is at least the least
+    one there is. How much more is not bounded. Raises as `solve_stepped`.
     """
     state = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
     q, tried = state.q, state.motion_steps
@@ -99,13 +100,14 @@ def solve_bisection(
         found: Array | None = q
         while found is not None:
             q, found = found, None
-            tilt = float(q[S]) / section.lever
-            for candidate in (tilt, tilt + tilt_step, tilt - tilt_step):
-                if abs(candidate) <= limit:
-                    tried += 1
-                    found = _place(section, q, float(q[D]) - step, candidate, settle=True)
-                    if found is not None:
-                        break
+            tilt, turn = float(q[S]) / section.lever, 0.0
+            while found is None and turn <= 2.0 * limit:
+                # A move down may need a turn of many tilt steps: those of twice the size are next.
+                for candidate in {tilt + turn: None, tilt - turn: None}:
+                    if found is None and abs(candidate) <= limit:
+                        tried += 1
+                        found = _place(section, q, float(q[D]) - step, candidate, settle=True)
+                turn = max(tilt_step, 2.0 * turn)
             if found is not None and progress is not None:
                 progress(tried, float(found[D]))
     return SteppedState(q, section.gaps(q), tried)

@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +29,11 @@ UNITS = ("mm", "cm", "m", "in")
 def number(text: str | float) -> float:
     """A finite number, as the type of an option; ``1/3`` is one too."""
     try:
-        found = float(Fraction(text)) if "/" in str(text) else float(text)
+        if "/" in str(text):
+            from fractions import Fraction
+
+            text = float(Fraction(text))
+        found = float(text)
     except (ValueError, ZeroDivisionError, OverflowError):
         found = math.nan
     if not math.isfinite(found):

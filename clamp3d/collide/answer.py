@@ -99,7 +99,8 @@ class Distance:
         """The interval enlarged by ``error`` mm on both sides."""
         if error == 0.0:
             return self
-        return replace(self, lower=self.lower - error, upper=self.upper + error)
+        inside = self.interference and (max(0.0, self.interference[0] - error), self.interference[1] + error)
+        return replace(self, lower=self.lower - error, upper=self.upper + error, interference=inside)
 
     def of_overlap(self) -> Distance:
         """What the engine says of an overlap, whose ``lower`` is not one of the depth, without it."""

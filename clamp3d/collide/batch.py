@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,12 @@ from clamp3d.collide.answer import Distances
 from clamp3d.collide.body import Bore, ClosedForm
 from clamp3d.collide.convex import MEMBER, Rod
 from clamp3d.collide.model import Model
-from clamp3d.core.pose import Array, inverse
+from clamp3d.core.pose import Array
 
 _KNOWN = 1e-9
+
+Pairs = tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]
+"""Poses (i, 4, 4) of a first body and which of them (m,) is meant, then those of a second."""
 
 
 def by_kernel(a: Model, b: Model, T: Array) -> Distances:
@@ -22,19 +25,15 @@ def by_kernel(a: Model, b: Model, T: Array) -> Distances:
     Where other faces may decide both bounds are infinite; of an overlap they are those of the interference. `exact`
     tells the rows whose distance is known.
     """
-    if a.bodies is None or b.bodies is None or not len(a.bodies) == len(b.bodies) == 1:
-        return _nothing(len(T))
-    if any(form.error or form.surface is not None for form in (*a.bodies, *b.bodies)):
-        return _nothing(len(T))
-    (first,), (second,) = a.bodies, b.bodies
-    found = _by_kernel(first, second, T)
-    swapped = _by_kernel(second, first, inverse(T)) if second.bores else None
-    if swapped is None:
-        return found or _nothing(len(T))
-    R, t = T[:, :3, :3], T[:, :3, 3]
-    q, p = (np.einsum("nij,nj->ni", R, x) + t for x in (swapped.point_a, swapped.point_b))
-    swapped = replace(swapped, point_a=p, point_b=q, normal=-np.einsum("nij,nj->ni", R, swapped.normal))
-    return swapped if found is None else _better(found, swapped)
+    n = len(T)
+    found = _by_kernel(a, b, (np.eye(4)[None], np.zeros(n, dtype=np.int64), T, np.arange(n)), points=True)
+    return Distances(found[0], found[1], found[2:5].T, found[5:8].T, found[8:11].T, ("groove kernel",) * n)
+
+
+def bounds_by_kernel(a: Model, b: Model, pairs: Pairs) -> tuple[Array, Array]:
+    """The bounds (m,) of `by_kernel` alone, for the poses of both bodies in the world."""
+    found = _by_kernel(a, b, pairs, points=False)
+    return found[0], found[1]
 
 
 def exact(found: Distances) -> NDArray[np.bool_]:
@@ -43,42 +42,57 @@ def exact(found: Distances) -> NDArray[np.bool_]:
         return np.asarray((found.upper - found.lower <= _KNOWN) & (found.lower >= -_KNOWN))
 
 
-def _nothing(n: int) -> Distances:
-    unknown = np.full((n, 3), np.nan)
-    return Distances(np.full(n, -np.inf), np.full(n, np.inf), unknown, unknown, unknown, ("groove kernel",) * n)
+def _by_kernel(a: Model, b: Model, pairs: Pairs, points: bool) -> Array:
+    """Bounds, and with ``points`` points and normals in a's frame, NaN where unknown: (2 or 11, m)."""
+    known = []
+    if a.bodies is not None and b.bodies is not None and len(a.bodies) == len(b.bodies) == 1:
+        (first,), (second,) = a.bodies, b.bodies
+        if not any(form.error or form.surface is not None for form in (first, second)):
+            known = [_bore_rod(bore, rod, first, second, pairs, points) for bore, rod in _asked(first, second)]
+            for bore, rod in _asked(second, first):
+                known.append(_bore_rod(bore, rod, second, first, (*pairs[2:], *pairs[:2]), points))
+                if points:
+                    _seen_from_first(known[-1], pairs)
+    if known:
+        return reduce(_better, known)
+    nothing = np.full((11 if points else 2, len(pairs[1])), np.nan)
+    nothing[0], nothing[1] = -np.inf, np.inf
+    return nothing
 
 
-def _better(x: Distances, y: Distances) -> Distances:
+def _asked(a: ClosedForm, b: ClosedForm) -> list[tuple[Bore, Rod]]:
+    """Bores of ``a`` against cylinders among the pieces of ``b``."""
+    return [(bore, rod) for bore in a.bores for rod in b.outers if isinstance(rod, Rod)]
+
+
+def _seen_from_first(found: Array, pairs: Pairs) -> None:
+    """Points and normals (11, m) in the second body's frame, from it to the first, in place the other way about."""
+    from clamp3d.collide.poses_kernel import between
+
+    T = np.empty((found.shape[1], 4, 4))
+    between(*pairs, T)
+    R, t = T[:, :3, :3], T[:, :3, 3].T
+    q, p, n = (np.einsum("nij,jn->in", R, found[k : k + 3]) for k in (2, 5, 8))
+    found[2:5], found[5:8], found[8:11] = p + t, q + t, -n
+
+
+def _better(x: Array, y: Array) -> Array:
     """The bounds that either knows, with the points of the smaller upper one."""
-    first = x.upper <= y.upper
-    p, q, n = (
-        np.where(first[:, None], u, v)
-        for u, v in ((x.point_a, y.point_a), (x.point_b, y.point_b), (x.normal, y.normal))
-    )
-    return Distances(np.maximum(x.lower, y.lower), np.minimum(x.upper, y.upper), p, q, n, x.method)
-
-
-def _by_kernel(a: ClosedForm, b: ClosedForm, T: Array) -> Distances | None:
-    """Bores of ``a`` against cylinders among the pieces of ``b``; None if there are none."""
-    found = None
-    for bore in a.bores:
-        for rod in b.outers:
-            if isinstance(rod, Rod):
-                new = _bore_rod(bore, rod, a, b, T)
-                found = new if found is None else _better(found, new)
+    found = np.where(x[1] <= y[1], x, y)
+    found[0] = np.maximum(x[0], y[0])
     return found
 
 
-def _bore_rod(bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, T: Array) -> Distances:
-    from clamp3d.collide.poses_kernel import bore_rod
+def _bore_rod(bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, pairs: Pairs, points: bool) -> Array:
+    from clamp3d.collide.bore_kernel import WORK, bore_rod
 
     covers = bore.covers()
     grooves = np.array([(groove.radius, groove.half_angle, 0.5 * groove.length, 0.0, 0.0) for groove, _ in covers])
-    P, found = np.array([place for _, place in covers]), np.empty((len(T), 11))
+    P, found = np.array([place for _, place in covers]), np.empty((11 if points else 2, len(pairs[1])))
     wire = rod.radius, 0.5 * rod.length, np.array([rod.T])
-    bore_rod(grooves, P, *wire, T, *members(a), *members(b), MEMBER, _KNOWN, np.empty((128, 5)), found)
-    method = ("groove kernel",) * len(T)
-    return Distances(found[:, 0], found[:, 1], found[:, 2:5], found[:, 5:8], found[:, 8:11], method)
+    work = np.empty(WORK), np.empty((128, 5))
+    bore_rod(grooves, P, *wire, *pairs, *members(a), *members(b), MEMBER, _KNOWN, *work, found)
+    return found
 
 
 def members(form: ClosedForm) -> tuple[Array, Array, Array]:

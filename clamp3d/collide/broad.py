@@ -13,6 +13,9 @@ from clamp3d.core.pose import Array
 FEW = 32
 """Parts up to which all boxes are compared, without a tree."""
 
+FIRST = np.zeros(1, dtype=np.int64)
+"""Which box all of many poses have."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Boxes:
@@ -42,6 +45,23 @@ class Boxes:
     def reach(self) -> Array:
         """Half sizes (n, 3) of the boxes along the world's axes around them."""
         return np.asarray(np.einsum("nij,nj->ni", np.abs(self.R), self.half))
+
+
+def box_sizes(bounds: Array) -> Array:
+    """Centre and half sizes (m, 6) of boxes (m, 2, 3)."""
+    return np.hstack([0.5 * (bounds[:, 0] + bounds[:, 1]), 0.5 * (bounds[:, 1] - bounds[:, 0])])
+
+
+def world_boxes(bounds: Array, T: Array, which: NDArray[np.int64] = FIRST) -> Array:
+    """Centre and half sizes (6, n) along the world's axes of the boxes at poses (n, 4, 4).
+
+    ``bounds`` (m, 2, 3): boxes in their own frames; ``which`` (n,): those of the poses, the first of all by default.
+    """
+    from clamp3d.collide.poses_kernel import boxes
+
+    around = np.empty((6, len(T)))
+    boxes(T, box_sizes(bounds), which, np.inf, around)
+    return around
 
 
 def near_pairs(boxes: Boxes, reach: float) -> NDArray[np.int64]:

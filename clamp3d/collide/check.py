@@ -20,6 +20,7 @@ from clamp3d.collide.judge import judge
 from clamp3d.collide.model import Model, ModelCache, Progress
 from clamp3d.collide.reasons import failure, undecided
 from clamp3d.collide.refine import measured, with_normal
+from clamp3d.collide.repeats import Repeats
 from clamp3d.collide.result import BAD, CheckResult, PairResult, Work
 from clamp3d.collide.scene import Scene, name_pairs
 from clamp3d.collide.touching import is_box, touching_boxes
@@ -90,10 +91,11 @@ def check(
     counters = shop.counters
     built, queries = counters.built.copy(), counters.queries.copy()
     times = [time.perf_counter()]
-    models = [shop.model(part.shape) for part in scene.parts]
-    n = len(models)
-    T = np.array([part.T_world for part in scene.parts]).reshape(n, 4, 4)
-    boxes = Boxes.of(np.array([m.bounds for m in models]).reshape(n, 2, 3), T)
+    placed = scene.placed
+    of_shape = [shop.model(shape) for shape in placed.shapes]
+    models = [of_shape[k] for k in placed.which.tolist()]
+    n, T = len(models), placed.poses
+    boxes = Boxes.of(np.array([m.bounds for m in of_shape]).reshape(-1, 2, 3)[placed.which], T)
     asked = None if pairs is None else _asked(scene, pairs)
     every = n * (n - 1) // 2 if asked is None else len(asked)
     if full or distances:
@@ -107,7 +109,7 @@ def check(
     gaps = box_gaps(boxes, chosen)
     counters.queries["boxes"] += len(chosen)
     times.append(time.perf_counter())
-    rows, decided = [], Counter({"broad phase": every - len(chosen)})
+    rows, decided, repeats = [], Counter({"broad phase": every - len(chosen)}), Repeats(models)
     box = {model: is_box(model) for model in set(models)}
     known = {} if full else touching_boxes(boxes, np.array([box[m] for m in models], dtype=bool), chosen, gaps)
     for k, ((i, j), gap) in enumerate(zip(chosen.tolist(), gaps.tolist(), strict=True)):
@@ -116,7 +118,7 @@ def check(
         row = _touching(scene, i, j, known[k]) if k in known else None
         if row is None:
             start = Distance(gap, level="boxes", method="bounding boxes")
-            row = _pair(scene, i, j, models, T, start, full, distances, depths)
+            row = _pair(scene, i, j, models, T, start, full, distances, depths, repeats)
         decided[row.distance.level] += 1
         rows.append(row)
     times.append(time.perf_counter())
@@ -182,6 +184,7 @@ def _pair(
     full: bool,
     distances: bool,
     depths: bool,
+    repeats: Repeats,
 ) -> PairResult:
     a, b = scene.parts[i].name, scene.parts[j].name
     allowance, thresholds = scene.allowance(a, b), scene.thresholds
@@ -191,6 +194,9 @@ def _pair(
         return not full and (not distances or measured(known))
 
     pair = x, y, T_ab
+    known = repeats.find(*pair)
+    if known is not None and thresholds.verdict(known[1], allowance) is known[0] and enough(known[1]):
+        return _row(scene, i, j, pair, T[i], *known)
     try:
         verdict, found = judge(*pair, start, thresholds, allowance, enough)
         deep = with_normal(found)
@@ -202,9 +208,19 @@ def _pair(
         raise
     except Exception as error:  # one pair that fails is a finding, not the end of all others
         return PairResult(a, b, Verdict.FAILED, start, reason=failure(error))
-    row = PairResult(a, b, verdict, deep.moved(T[i]))
+    repeats.keep(*pair, verdict, deep)
+    return _row(scene, i, j, pair, T[i], verdict, deep)
+
+
+def _row(
+    scene: Scene, i: int, j: int, pair: tuple[Model, Model, Array], T: Array, verdict: Verdict, found: Distance
+) -> PairResult:
+    """The row of two parts, the first one placed by ``T`` (4, 4), from what is known in its frame."""
+    a, b = scene.parts[i].name, scene.parts[j].name
+    x, y, T_ab = pair
+    row = PairResult(a, b, verdict, found.moved(T))
     if verdict in BAD:
-        return replace(row, locate=locator(x, y, T[i], T_ab))
+        return replace(row, locate=locator(x, y, T, T_ab))
     if verdict is Verdict.UNCERTAIN:
-        return replace(row, reason=undecided({a: x, b: y}, deep, thresholds, allowance))
+        return replace(row, reason=undecided({a: x, b: y}, found, scene.thresholds, scene.allowance(a, b)))
     return row

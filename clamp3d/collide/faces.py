@@ -15,6 +15,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.linear import dot, to_target
 from clamp3d.core.pose import Array, inverse
+from clamp3d.core.triangles import distinct
 
 MOST = 20_000
 """Pieces looked at before a direction ends with what is known."""
@@ -74,10 +75,10 @@ class FaceModel:
                 for corner in (start, end):
                     on |= np.abs(height(int(f.kind[i]), f.frame[i], size, corner)) < near
             found[i] = sag[on].max(initial=0.0)
-        deviation = f.deviation.copy()
-        np.maximum.at(deviation, self._adjacent[:, 0], f.deviation[self._adjacent[:, 1]])
+        beside = np.zeros(len(f.kind))
+        np.maximum.at(beside, self._adjacent[:, 0], f.deviation[self._adjacent[:, 1]])
         scale = float(np.abs(self.bounds).max())
-        rounding = 2.0 * deviation + 1e-9 + 1e-12 * scale
+        rounding = f.deviation + beside + 1e-9 + 1e-12 * scale
         same = 1e-6 + 4e-7 * scale  # so far apart can faces of one of the ``groups`` be
         return np.concatenate([np.maximum(2.1 * found, _LEAST) + rounding, same + rounding])
 
@@ -136,7 +137,7 @@ class FaceModel:
     def _adjacent(self) -> NDArray[np.int64]:
         """Pairs (k, 2) of faces that share a corner, both ways, sorted."""
         faces = len(self.faces.kind)
-        at = np.unique(self.solid.mesh.faces * faces + self.solid.face[:, None])
+        at = distinct(self.solid.mesh.faces * faces + self.solid.face[:, None])
         corner, face = at // faces, at % faces
         order = np.arange(len(at))
         last = np.searchsorted(corner, corner, side="right")
@@ -144,7 +145,7 @@ class FaceModel:
         for step in range(1, int((last - order).max(initial=1))):
             first = order[order + step < last]
             pairs += [face[first] * faces + face[first + step], face[first + step] * faces + face[first]]
-        found = np.unique(np.concatenate(pairs)) if pairs else np.zeros(0, dtype=np.int64)
+        found = distinct(np.concatenate(pairs)) if pairs else np.zeros(0, dtype=np.int64)
         return np.column_stack([found // faces, found % faces])
 
 

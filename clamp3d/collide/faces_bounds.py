@@ -35,7 +35,8 @@ from clamp3d.collide.faces_math import (
     to_frame,
     way_out,
 )
-from clamp3d.collide.faces_tree import PIECES, THIN, from_faces, nearest, nearest_below, nearest_marked
+from clamp3d.collide.faces_open import is_open
+from clamp3d.collide.faces_tree import PIECES, from_faces, nearest, nearest_below, nearest_marked
 from clamp3d.collide.faces_witness import winding, witness
 from clamp3d.core.jit import formula
 
@@ -88,15 +89,18 @@ def _below(least, rho, clear):
 
 @formula
 def _clear(solid, row, bit, slack, at, x, y, z, needed, most, whole, stack):
-    """How far about a point no piece has the mark ``bit``, or THIN, in a row of marks; -1 if that tells nothing.
+    """How far about a point no piece has the mark ``bit`` in a row of marks; -1 if that tells nothing.
 
     The face is within ``at`` of the point: it has to be in that ball, by its slack. Looked at is ``needed`` past it, at
     most ``most``.
     """
-    t = slack[row] + solid[13][row % len(solid[13])]
+    f = row % len(solid[13])
+    t = slack[row] + solid[13][f]
     limit = min(needed + 2.0 * (at + t), most)
-    clear = nearest_marked(solid, row, row, 0, bit, THIN, -1.0, slack, x, y, z, limit, whole, stack)
-    return clear if clear > at + t else -1.0
+    clear = nearest_marked(solid, row, row, 0, bit, -1.0, slack, x, y, z, limit, whole, stack)
+    if clear > at + t and is_open(solid, f, t, -1, 0.0, clear, x, y, z, whole[1, 0], stack):
+        return clear
+    return -1.0
 
 
 @formula
@@ -232,20 +236,26 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                         above = above and up > slack[one] + deviation[one]
                     if not above or least - e <= found:
                         continue
-                # A piece of one that looks over the other: what lies above both there is outside.
-                at = np.inf
+                # Where a piece of one looks over the other, what lies above both is outside.
                 for one, other in ((f, o), (o, f)):
                     at = nearest_marked(
-                        solid, other, other, root[one], 1, 0, 1.0, slack, x, y, z, at, whole, stack
+                        solid, other, other, root[one], 1, 1.0, slack, x, y, z, np.inf, whole, stack
                     )  # fmt: skip
-                past = at + 2.0 * max(slack[f] + deviation[f], slack[o] + deviation[o]) / rise  # of the slack of both
-                limit = past + max(at, -least) + rho
-                clear = nearest_marked(solid, f, o, 0, 1, THIN, -1.0, slack, x, y, z, limit, whole, stack)
-                if clear > past:
-                    found = max(found, _below(least, rho, clear) - e)
+                    if at == np.inf:
+                        continue
+                    t, over_other = slack[one] + deviation[one], slack[other] + deviation[other]
+                    limit = 2.0 * at + 8.0 * (t + over_other) + abs(least) + rho
+                    clear = nearest_marked(solid, f, o, 0, 1, -1.0, slack, x, y, z, limit, whole, stack)
+                    if clear > at + t and is_open(
+                        solid, one, t, other, over_other, clear, x, y, z, whole[1, 0], stack
+                    ):  # fmt: skip
+                        found = max(found, _below(least, rho, clear) - e)
+                        break
     unsure = low > 0.0 and found < min(out[0], goal) - tol and not inside and outside < 0.0
-    if unsure and winding(P, x, y, z) < 0.5:
-        outside = low  # clear of all errors: what the triangles say holds
+    if unsure and abs(winding(P, x, y, z)) < 0.1:
+        # Clear of all errors: what the triangles say holds. Cracks at borders, within the errors, tell little; if more
+        # of the triangles is missing this is no whole number.
+        outside = low
     if outside > 0.0:
         out[8] = max(out[8], outside)
         found = max(found, low - rho - e)

@@ -10,6 +10,7 @@ from clamp3d.brep.surfaces import OTHER, height
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.depth_cover import nearest_behind
 from clamp3d.collide.faces import FaceModel, faces_distance
+from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.linear import dot, norm, to_target
 from clamp3d.core.pose import Array, inverse
 
@@ -44,7 +45,7 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
             break
         place[:3, 3] = T[:3, 3] + t
         found = faces_distance(a, b, place, contact=0.01 * margin, most=_PIECES)
-        if found.lower > 0.0:
+        if found.lower > RESOLUTION:  # so also where the pose differs by rounding
             p, q = (None, None) if step or at is None else (at + deep * n, at) if of_b else (at, at - deep * n)
             return replace(known, lower=-size, normal=t / size, point_a=p, point_b=q)
     return known

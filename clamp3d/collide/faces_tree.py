@@ -32,11 +32,8 @@ LEAF = 4
 DEEP = 128
 NEW, OPEN = -1, 15
 """Marks not asked for yet, and of a tree node some of whose triangles have to be asked: it can be any of them."""
-THIN = 4
-"""Mark of pieces that stay within the slack of a face's surface and look the other way: of a thin wall or slit."""
 PIECES = 24
 """Pieces that may wait while one is cut to see whether it reaches above a surface."""
-_STEP = 1e-4
 
 
 @formula
@@ -120,7 +117,7 @@ tree = entry(
 
 
 @formula
-def _box_distance(box, i, x0, y0, z0, x1, y1, z1):
+def box_distance(box, i, x0, y0, z0, x1, y1, z1):
     """Distance of a node's box from the box that the last six are the lower and upper corner of."""
     dx = max(0.0, box[i, 0] - x1, x0 - box[i, 3])
     dy = max(0.0, box[i, 1] - y1, y0 - box[i, 4])
@@ -129,10 +126,10 @@ def _box_distance(box, i, x0, y0, z0, x1, y1, z1):
 
 
 @formula
-def _put_children(box, link, i, x0, y0, z0, x1, y1, z1, stack, top):
+def put_children(box, link, i, x0, y0, z0, x1, y1, z1, stack, top):
     """The children of a node onto the stack, the one that is nearer to the box last; returns how many are on it."""
     a, b = link[i, 0], -link[i, 1]
-    if _box_distance(box, a, x0, y0, z0, x1, y1, z1) < _box_distance(box, b, x0, y0, z0, x1, y1, z1):
+    if box_distance(box, a, x0, y0, z0, x1, y1, z1) < box_distance(box, b, x0, y0, z0, x1, y1, z1):
         a, b = b, a
     stack[top], stack[top + 1] = a, b
     return top + 2
@@ -151,10 +148,10 @@ def nearest(P, err, face, box, link, order, x, y, z, cut, near, stack):
     while top > 0:
         top -= 1
         i = stack[top]
-        if _box_distance(box, i, x, y, z, x, y, z) - box[i, 6] > low:
+        if box_distance(box, i, x, y, z, x, y, z) - box[i, 6] > low:
             continue
         if link[i, 1] < 0:
-            top = _put_children(box, link, i, x, y, z, x, y, z, stack, top)
+            top = put_children(box, link, i, x, y, z, x, y, z, stack, top)
             continue
         for j in range(link[i, 0], link[i, 0] + link[i, 1]):
             t = order[j]
@@ -181,10 +178,10 @@ def nearest_below(P, err, box, link, order, root, x, y, z, stack):
     while top > 0:
         top -= 1
         i = stack[top]
-        if _box_distance(box, i, x, y, z, x, y, z) >= low:
+        if box_distance(box, i, x, y, z, x, y, z) >= low:
             continue
         if link[i, 1] < 0:
-            top = _put_children(box, link, i, x, y, z, x, y, z, stack, top)
+            top = put_children(box, link, i, x, y, z, x, y, z, stack, top)
             continue
         for j in range(link[i, 0], link[i, 0] + link[i, 1]):
             t = order[j]
@@ -209,10 +206,10 @@ def from_faces(P, err, face, box, link, order, kind, size, frame, deviation, V, 
     while top > 0:
         top -= 1
         i = stack[top]
-        if _box_distance(box, i, x0, y0, z0, x1, y1, z1) - box[i, 6] >= low:
+        if box_distance(box, i, x0, y0, z0, x1, y1, z1) - box[i, 6] >= low:
             continue
         if link[i, 1] < 0:
-            top = _put_children(box, link, i, x0, y0, z0, x1, y1, z1, stack, top)
+            top = put_children(box, link, i, x0, y0, z0, x1, y1, z1, stack, top)
             continue
         for j in range(link[i, 0], link[i, 0] + link[i, 1]):
             t = order[j]
@@ -278,22 +275,6 @@ def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, left, pieces, uv
 
 
 @formula
-def _faces_away(V, kind, size, frame, f, sense):
-    """Whether the triangle V looks the other way than the surface of face f where its middle is."""
-    ux, uy, uz = V[1, 0] - V[0, 0], V[1, 1] - V[0, 1], V[1, 2] - V[0, 2]
-    vx, vy, vz = V[2, 0] - V[0, 0], V[2, 1] - V[0, 1], V[2, 2] - V[0, 2]
-    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    length = math.sqrt(x * x + y * y + z * z)
-    if length == 0.0:
-        return False
-    x, y, z = _STEP * x / length, _STEP * y / length, _STEP * z / length
-    cx, cy, cz = (V[0, 0] + V[1, 0] + V[2, 0]) / 3, (V[0, 1] + V[1, 1] + V[2, 1]) / 3, (V[0, 2] + V[1, 2] + V[2, 2]) / 3
-    rise = height_at(kind[f], size[f, 0], size[f, 1], frame[f], cx + x, cy + y, cz + z)
-    rise -= height_at(kind[f], size[f, 0], size[f, 1], frame[f], cx - x, cy - y, cz - z)
-    return sense * rise < -_STEP
-
-
-@formula
 def _state(solid, row, slack, i):
     """What marks the triangles of a tree node can have in a row, all of them together; `OPEN` where it is not known."""
     _, _, _, box, link, _, _, _, _, kind, size, frame, sense, _, _, _, _, nodes = solid
@@ -320,8 +301,7 @@ def _state(solid, row, slack, i):
 def _mark(solid, row, slack, state, t, whole):
     """Mark of a triangle, in a node with such a state, against the surface of face f = ``row``, or ``row`` - n.
 
-    1 for a piece that reaches above it by the row's slack, 2 for one that reaches below, both for one that does either;
-    THIN for one that does neither but looks the other way: there is a thin wall or slit.
+    1 for a piece that reaches above it by the row's slack, 2 for one that reaches below, both for one that does either.
     """
     P, _, face, _, _, _, _, uv, sag, kind, size, frame, sense, deviation, group, _, marks, _ = solid
     known = marks[row]
@@ -339,18 +319,16 @@ def _mark(solid, row, slack, state, t, whole):
                         whole[3 : 3 + PIECES], whole[3 + PIECES :], whole[0],
                     ):  # fmt: skip
                         mark |= bit
-                if mark == 0 and _faces_away(P[t], kind, size, frame, f, sense[f]):
-                    mark = THIN
                 known[t] = mark
     return known[t]
 
 
 @formula
-def nearest_marked(solid, row, other, root, bit, thin, side, slack, x, y, z, cut, whole, stack):
+def nearest_marked(solid, row, other, root, bit, side, slack, x, y, z, cut, whole, stack):
     """Bound of a point's distance, at most ``cut``, from marked pieces below the node ``root``.
 
-    Of those that have the ``bit`` in both rows of marks, or ``thin`` in either. ``side`` -1 for a lower bound, 1 for an
-    upper one. Marks are found out where the search comes to, and kept.
+    Of those that have the ``bit`` in both rows of marks. ``side`` -1 for a lower bound, 1 for an upper one. Marks are
+    found out where the search comes to, and kept.
     """
     P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, marks, nodes = solid
     stack[0], top = root, 1
@@ -358,14 +336,14 @@ def nearest_marked(solid, row, other, root, bit, thin, side, slack, x, y, z, cut
     while top > 0:
         top -= 1
         i = stack[top]
-        if _box_distance(box, i, x, y, z, x, y, z) + min(side, 0.0) * box[i, 6] >= low:
+        if box_distance(box, i, x, y, z, x, y, z) + min(side, 0.0) * box[i, 6] >= low:
             continue
         one = _state(solid, row, slack, i)
         two = one if other == row else _state(solid, other, slack, i)
-        if one & two & bit == 0 and (one | two) & thin == 0:
+        if one & two & bit == 0:
             continue
         if link[i, 1] < 0:
-            top = _put_children(box, link, i, x, y, z, x, y, z, stack, top)
+            top = put_children(box, link, i, x, y, z, x, y, z, stack, top)
             continue
         left, first, second = 0, 0, 0
         for j in range(link[i, 0], link[i, 0] + link[i, 1]):
@@ -379,7 +357,7 @@ def nearest_marked(solid, row, other, root, bit, thin, side, slack, x, y, z, cut
                 a = _mark(solid, row, slack, one, t, whole)
                 b = a if other == row else _mark(solid, other, slack, two, t, whole)
             first, second = first | a, second | b
-            if a & b & bit != 0 or (a | b) & thin != 0:
+            if a & b & bit != 0:
                 d, _, _ = point_triangle(x, y, z, P[t])
                 low = min(low, d + side * err[t])
         if left == 0:

@@ -51,14 +51,8 @@ def over_triangle(kind, a, b, F, uv, x, y, z):
 
 
 @formula
-def witness(kind, a, b, F, P, uv, x, y, z, q):
-    """A point q (3) of the surface piece of triangle P near a point; returns their distance."""
-    if kind != OTHER and over_triangle(kind, a, b, F, uv, x, y, z):
-        at, h = (x, y, z), height_at(kind, a, b, F, x, y, z)
-        for k in range(3):
-            q[k] = at[k] - h * slope_at(kind, a, b, F, k, x, y, z)
-        return abs(h)
-    _, v, w = point_triangle(x, y, z, P)
+def weighted(kind, a, b, F, P, uv, v, w, q):
+    """The point q (3) of the surface piece of triangle P that has the weights v, w of its second and third corner."""
     r = 1.0 - v - w
     for k in range(3):
         q[k] = r * P[0, k] + v * P[1, k] + w * P[2, k]
@@ -72,6 +66,18 @@ def witness(kind, a, b, F, P, uv, x, y, z, q):
                 n += weights[i]
         if n > 0.0:
             surface_point(kind, a, b, F, s / n, t, q)
+
+
+@formula
+def witness(kind, a, b, F, P, uv, x, y, z, q):
+    """A point q (3) of the surface piece of triangle P near a point; returns their distance."""
+    if kind != OTHER and over_triangle(kind, a, b, F, uv, x, y, z):
+        at, h = (x, y, z), height_at(kind, a, b, F, x, y, z)
+        for k in range(3):
+            q[k] = at[k] - h * slope_at(kind, a, b, F, k, x, y, z)
+        return abs(h)
+    _, v, w = point_triangle(x, y, z, P)
+    weighted(kind, a, b, F, P, uv, v, w, q)
     return math.sqrt((x - q[0]) ** 2 + (y - q[1]) ** 2 + (z - q[2]) ** 2)
 
 

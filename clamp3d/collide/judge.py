@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.batch import members
+from clamp3d.collide.broad import world_boxes
 from clamp3d.collide.depth import is_quick, penetration
 from clamp3d.collide.faces import stands_out
 from clamp3d.collide.meshes import within
@@ -72,14 +73,10 @@ def contained(a: Model, b: Model, T: Array, thresholds: Thresholds) -> NDArray[n
 
 def _fits(inner: Model, outer: Model, T: Array, contact: float) -> NDArray[np.bool_]:
     """Whether the boxes of two parts leave open that one holds the other, (n,): cheap, without a mesh."""
-    from clamp3d.collide.poses_kernel import boxes
-
-    middle, half = inner.bounds.mean(axis=0), 0.5 * (inner.bounds[1] - inner.bounds[0])
     low, high = outer.bounds
-    if (high - low).max() * 1.7321 + contact < 2.0 * half.max():
+    if (high - low).max() * 1.7321 + contact < (inner.bounds[1] - inner.bounds[0]).max():
         return np.zeros(len(T), dtype=bool)
-    around = np.empty((6, len(T)))
-    boxes(T, middle, half, np.inf, around)
+    around = world_boxes(inner.bounds[None], T)
     centre, reach = around[:3], 0.5 * around[3:]
     # The box of the inner one touches the outer's on six sides: one outside by more than its own corners can be is
     # enough to say no.

@@ -21,6 +21,7 @@ from clamp3d.core.linear import dot
 from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import MeshShape, Shape, Solid
+from clamp3d.core.triangles import distinct
 
 if TYPE_CHECKING:
     from clamp3d.fit.fit import FitResult
@@ -209,7 +210,7 @@ class Model:
 def looks_convex(vertices: Array, faces: NDArray[np.int64]) -> bool:
     """Whether no vertex (n, 3) lies before one of a few triangles (m, 3): false proves that a mesh is not convex."""
     # Rows far apart, in no step with the rings that a mesh may be made of.
-    corners = vertices[faces[np.unique(np.arange(64) * 2654435761 % len(faces))]]
+    corners = vertices[faces[distinct(np.arange(64) * 2654435761 % len(faces))]]
     n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     n /= np.maximum(np.linalg.norm(n, axis=1), 1e-300)[:, None]
     height = dot(vertices, n.T).max(axis=0) - np.einsum("ij,ij->i", corners[:, 0], n)

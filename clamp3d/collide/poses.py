@@ -12,18 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.batch import by_kernel
-from clamp3d.collide.broad import FEW, Boxes, box_gaps
+from clamp3d.collide.batch import Pairs, bounds_by_kernel
+from clamp3d.collide.broad import FEW, FIRST, Boxes, box_gaps, box_sizes, world_boxes
 from clamp3d.collide.judge import contained, judge
-from clamp3d.collide.model import ModelCache
+from clamp3d.collide.model import Model, ModelCache
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import VERDICTS, Verdict
+from clamp3d.collide.verdict import VERDICTS, Thresholds, Verdict
 from clamp3d.core.motion import FARTHEST, scene_pose
 from clamp3d.core.pose import Array, check_pose_array
 from clamp3d.errors import InputError, MissingLibraryError
 
 _BLOCK = 8192
-"""Poses that the kernel is asked together: what is noted of them stays in the processor's own memory."""
+"""Poses that are compared together with what comes near any of them."""
 
 _NAMES = np.array([verdict.value for verdict in VERDICTS])
 _CLASH, _UNCERTAIN, _CLEAR = map(VERDICTS.index, (Verdict.CLASH, Verdict.UNCERTAIN, Verdict.CLEAR))
@@ -132,66 +132,77 @@ def check_poses(
         instance("cache", cache, ModelCache)
     shop = cache or ModelCache()
     i = scene.index(part)
-    rest = (
-        [scene.index(name) for name in items("others", others, "part names")]
-        if others is not None
-        else [k for k in range(len(scene.parts)) if k != i]
-    )
+    placed = scene.placed
+    if others is None:
+        names = placed.names[:i] + placed.names[i + 1 :]
+        rest = np.delete(np.arange(len(placed.names)), i)
+    else:
+        names = items("others", others, "part names")
+        rest = np.array([scene.index(name) for name in names], dtype=np.int64)
     if i in rest:
         raise InputError(f"others must not hold {part!r} itself")
-    from clamp3d.collide.poses_kernel import between
-
+    which = placed.which[rest]
+    models = {k: shop.model(placed.shapes[k]) for k in np.flatnonzero(np.bincount(which)).tolist()}
+    bounds = np.zeros((len(placed.shapes), 2, 3))
+    for k, found in models.items():
+        bounds[k] = found.bounds
     model = shop.model(scene.parts[i].shape)
-    shapes = {id(scene.parts[j].shape): scene.parts[j].shape for j in rest}
-    found = {key: shop.model(shape) for key, shape in shapes.items()}
-    models = [found[id(scene.parts[j].shape)] for j in rest]
     T, moving = _placed(poses, model.bounds)
-    P = np.concatenate([np.empty((0, 4)), *(scene.parts[j].T_world for j in rest)]).reshape(-1, 4, 4)
-    still = Boxes.of(np.concatenate([np.empty((0, 3)), *(m.bounds for m in models)]).reshape(-1, 2, 3), P)
+    P = placed.poses[rest]
     reach = scene.thresholds.reach + 1e-6
-    row, column = _near(moving, still, reach)
-    least, most = np.empty(len(row)), np.empty(len(row))
-    rank = np.empty(len(row), dtype=np.int8)
+    row, column = _near(moving, world_boxes(bounds, P, which), reach)
     # Equal parts that may meet this one alike are measured together.
     alike: dict[tuple[int, float | None], list[int]] = {}
-    for k in np.unique(column).tolist() if len(rest) > 1 else range(len(rest)):
-        allowance = scene.allowance(part, scene.parts[rest[k]].name)
-        alike.setdefault((id(models[k]), allowance), []).append(k)
+    for k in np.flatnonzero(np.bincount(column)).tolist():
+        allowance = scene.allowance(part, names[k])
+        alike.setdefault((id(models[int(which[k])]), allowance), []).append(k)
+    least, most, rank = np.empty(len(row)), np.empty(len(row)), np.empty(len(row), dtype=np.int8)
     for (_, allowance), columns in alike.items():
-        other, near = models[columns[0]], np.flatnonzero(np.isin(column, columns))
-
-        def local(rows: NDArray[np.int64]) -> Array:
-            out = np.empty((len(rows), 4, 4))
-            between(P, column[rows], T, row[rows], out)
-            return out
-
-        for some in np.split(near, range(_BLOCK, len(near), _BLOCK)):
-            bounds = by_kernel(other, model, local(some))
-            least[some], most[some] = bounds.lower, bounds.upper
-        rank[near] = scene.thresholds.verdicts(least[near], most[near], allowance)
-        clash = near[rank[near] == _CLASH]
-        rank[clash[contained(other, model, local(clash), scene.thresholds)]] = VERDICTS.index(Verdict.CONTAINED)
-        left = near[rank[near] == _UNCERTAIN]
-        places = local(left)
-        around = np.concatenate([np.repeat(model.bounds[None], len(left), axis=0), other.bounds[None]])
-        pairs = np.column_stack([np.full(len(left), len(left)), np.arange(len(left))])
-        least[left] = box_gaps(Boxes.of(around, np.concatenate([places, np.eye(4)[None]])), pairs)
-        shop.counters.queries["boxes"] += len(left)
-        for m, T_other in zip(left.tolist(), places, strict=True):
-            if least[m] >= reach:
-                rank[m] = _CLEAR
-                continue
-            try:
-                start = Distance(float(least[m]))
-                verdict, known = judge(other, model, T_other, start, scene.thresholds, allowance)
-                rank[m], least[m], most[m] = VERDICTS.index(verdict), known.lower, known.upper
-            except MissingLibraryError:
-                raise
-            except Exception:  # one pose that fails is a finding, not the end of all others
-                rank[m], most[m] = VERDICTS.index(Verdict.FAILED), np.inf
+        some = slice(None) if len(alike) == 1 else np.flatnonzero(np.isin(column, columns))
+        other = models[int(which[columns[0]])]
+        judged = _judged(other, model, (P, column[some], T, row[some]), scene.thresholds, allowance)
+        if len(alike) == 1:
+            least, most, rank = judged
+        else:
+            least[some], most[some], rank[some] = judged
     least[least < 0.0] = -np.inf  # how deep a point lies in the other bounds verdicts, not the way out
-    names = tuple(scene.parts[j].name for j in rest)
     return PoseVerdicts(part, names, len(T), reach, row, column, least, most, rank)
+
+
+def _judged(
+    a: Model, b: Model, pairs: Pairs, thresholds: Thresholds, allowance: float | None
+) -> tuple[Array, Array, NDArray[np.int8]]:
+    """Bounds of the signed distances (m,) of two parts at pairs of poses, and the places of their verdicts."""
+    from clamp3d.collide.poses_kernel import between
+
+    def local(rows: NDArray[np.int64]) -> Array:
+        A, column, T, row = pairs
+        out = np.empty((len(rows), 4, 4))
+        between(A, column[rows], T, row[rows], out)
+        return out
+
+    least, most = bounds_by_kernel(a, b, pairs)
+    rank = thresholds.verdicts(least, most, allowance)
+    clash = np.flatnonzero(rank == _CLASH)
+    rank[clash[contained(a, b, local(clash), thresholds)]] = VERDICTS.index(Verdict.CONTAINED)
+    left = np.flatnonzero(rank == _UNCERTAIN)
+    places = local(left)
+    around = np.concatenate([np.repeat(b.bounds[None], len(left), axis=0), a.bounds[None]])
+    each = np.column_stack([np.full(len(left), len(left)), np.arange(len(left))])
+    least[left] = box_gaps(Boxes.of(around, np.concatenate([places, np.eye(4)[None]])), each)
+    a.counters.queries["boxes"] += len(left)
+    for m, T in zip(left.tolist(), places, strict=True):
+        if least[m] >= thresholds.reach + 1e-6:
+            rank[m] = _CLEAR
+            continue
+        try:
+            verdict, known = judge(a, b, T, Distance(float(least[m])), thresholds, allowance)
+            rank[m], least[m], most[m] = VERDICTS.index(verdict), known.lower, known.upper
+        except MissingLibraryError:
+            raise
+        except Exception:  # one pose that fails is a finding, not the end of all others
+            rank[m], most[m] = VERDICTS.index(Verdict.FAILED), np.inf
+    return least, most, rank
 
 
 def _placed(poses: ArrayLike, bounds: Array) -> tuple[Array, Array]:
@@ -200,44 +211,47 @@ def _placed(poses: ArrayLike, bounds: Array) -> tuple[Array, Array]:
 
     T = np.require(array("poses", poses, (None, 4, 4), finite=False), np.float64, ["C", "A"])
     found = np.empty((6, len(T)))
-    sizes = bounds.mean(axis=0), 0.5 * (bounds[1] - bounds[0]), FARTHEST
-    if boxes(T, *sizes, found) >= 0:
+    sizes = box_sizes(bounds[None])
+    if boxes(T, sizes, FIRST, FARTHEST, found) >= 0:
         T = np.require(check_pose_array(T), np.float64, ["C"])
-        bad = boxes(T, *sizes, found)
+        bad = boxes(T, sizes, FIRST, FARTHEST, found)
         if bad >= 0:
             scene_pose(T[bad], f"poses[{bad}]")
     return T, found
 
 
-def _near(moving: Array, still: Boxes, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Poses and others (m,) whose boxes along the world's axes come within ``reach`` mm.
+def _near(moving: Array, still: Array, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Poses and others (m,) whose boxes along the world's axes (6, n), (6, k) come within ``reach`` mm.
 
     A block of poses, which often follow each other, is compared with all others that come near the block.
     """
-    from clamp3d.collide.poses_kernel import meet
+    from clamp3d.collide.poses_kernel import around, meet
 
-    wide = still.reach + reach
-    below, above = still.centre - wide, still.centre + wide
-    rows, columns = [], []
+    wide = still[3:] + reach
+    below, above = still[:3] - wide, still[:3] + wide
+    others, blocks, found = np.empty(still.shape[1], dtype=np.int64), [], 0
     tree: Any = None
     for start in range(0, moving.shape[1], _BLOCK):
-        part = np.ascontiguousarray(moving[:, start : start + _BLOCK])
-        low, high = part[:3] - part[3:], part[:3] + part[3:]
-        others = np.flatnonzero(((below <= high.max(axis=1)) & (above >= low.min(axis=1))).all(axis=1))
-        if len(others) <= FEW:
-            row, column = np.empty((2, part.shape[1] * len(others)), dtype=np.int64)
-            count = meet(part, below, above, others, row, column)
-            row, column = row[:count], column[:count]
-        else:
+        stop = min(start + _BLOCK, moving.shape[1])
+        column = others[: around(moving, start, stop, below, above, others)].copy()
+        row = None
+        if len(column) > FEW:
             from rtree import index
 
             if tree is None:
-                tree = index.Index((np.arange(len(below)), below, above), properties=index.Property(dimension=3))
-            column, each = tree.intersection_v(low.T, high.T)
-            row = np.repeat(np.arange(part.shape[1]), np.asarray(each, dtype=np.int64))
-        rows.append(row + start)
-        columns.append(column)
-    none = np.empty(0, dtype=np.int64)
-    found = (np.concatenate([none, *parts]) for parts in (rows, columns))
-    row, column = (part.astype(np.int64, copy=False) for part in found)
-    return row, column
+                all_others = np.arange(len(others)), below.T, above.T
+                tree = index.Index(all_others, properties=index.Property(dimension=3))
+            part = moving[:, start:stop]
+            column, each = tree.intersection_v((part[:3] - part[3:]).T, (part[:3] + part[3:]).T)
+            row = np.repeat(np.arange(start, stop), np.asarray(each, dtype=np.int64))
+        blocks.append((start, stop, row, column))
+        found += len(column) if row is not None else (stop - start) * len(column)
+    rows, columns = np.empty((2, found), dtype=np.int64)
+    count = 0
+    for start, stop, row, column in blocks:
+        if row is None:
+            count = meet(moving, start, stop, below, above, column, rows, columns, count)
+        else:
+            rows[count : count + len(row)], columns[count : count + len(row)] = row, column
+            count += len(row)
+    return rows[:count], columns[:count]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import instance, items, number, shown, text
 from clamp3d.collide.verdict import Thresholds
@@ -23,7 +23,7 @@ _NAMED = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A part and where it stands: ``T_world`` (4, 4), the origin by default.
+    """A part and where it stands: ``T_world`` (4, 4), the origin by default, kept as a copy that cannot be written to.
 
     Raises InputError for an empty name or one with a space or one of ``: , * ?``, for what is no shape, and for a pose
     that is not rigid.
@@ -38,7 +38,9 @@ class Part:
         if not self.name or any(c in self.name for c in ":,*? \t\n"):
             raise InputError(f"part name must not be empty or hold a space or one of : , * ?, got {shown(self.name)}")
         object.__setattr__(self, "shape", as_shape(self.shape))
-        object.__setattr__(self, "T_world", scene_pose(self.T_world, f"pose of {self.name}"))
+        T = np.array(scene_pose(self.T_world, f"pose of {self.name}"), order="C")
+        T.flags.writeable = False
+        object.__setattr__(self, "T_world", T)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +91,25 @@ class Allowances:
         return max(found) if found else None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """All parts of a scene as arrays: ``names``, ``poses`` (n, 4, 4), different ``shapes``, ``which`` of them (n,)."""
+
+    names: tuple[str, ...]
+    poses: Array
+    shapes: tuple[Shape, ...]
+    which: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, parts: tuple[Part, ...]) -> Placed:
+        """The parts, in their order."""
+        shapes = {id(part.shape): part.shape for part in parts}
+        number = {key: k for k, key in enumerate(shapes)}
+        which = np.array([number[id(part.shape)] for part in parts], dtype=np.int64)
+        poses = np.array([part.T_world for part in parts]).reshape(-1, 4, 4)
+        return cls(tuple(part.name for part in parts), poses, tuple(shapes.values()), which)
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Scene:
     """Parts in the world, what counts as contact and clearance, what may touch, and how parts move.
@@ -119,6 +140,7 @@ class Scene:
     """Positions by name, shared with the scenes that `add` made of this one: it may hold more names than are here."""
     _allowances: Allowances | None = field(init=False, repr=False, default=None)
     """Sorted when they are first asked for: pairs may come one by one."""
+    _placed: Placed | None = field(init=False, repr=False, compare=False, default=None)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "thresholds", Thresholds(self.contact, self.clearance))
@@ -174,6 +196,7 @@ class Scene:
             raise InputError(f"part {part.name!r} is there twice; names must differ")
         # What is in the scene was checked when it came in.
         scene = copy(self)
+        object.__setattr__(scene, "_placed", None)
         object.__setattr__(scene, "parts", (*self.parts, part))
         if len(self._index) > n:  # another scene was made of this one before
             object.__setattr__(scene, "_index", {p.name: i for i, p in enumerate(self.parts)})
@@ -212,6 +235,14 @@ class Scene:
         if i is None or i >= len(self.parts):
             raise InputError(unknown_part(name, (p.name for p in self.parts)))
         return i
+
+    @property
+    def placed(self) -> Placed:
+        """Its parts as arrays, made when they are first asked for."""
+        if self._placed is None:
+            object.__setattr__(self, "_placed", Placed.of(self.parts))
+            assert self._placed is not None
+        return self._placed
 
     def allowance(self, a: str, b: str) -> float | None:
         """Allowed overlap of a pair in mm; None if even contact is not meant."""

@@ -100,9 +100,8 @@ class Thresholds:
         marks += [-self.contact - RESOLUTION, self.contact + RESOLUTION, self.clearance - RESOLUTION]
         cell = np.empty(len(lower), dtype=np.int64)
         lower, upper = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-        cells(lower, upper, 2.0 * RESOLUTION, np.array(marks), cell)
         one = np.full((2 * len(marks) + 2) ** 3, -1)
-        one[cell] = np.arange(len(cell))
+        cells(lower, upper, 2.0 * RESOLUTION, np.array(marks), one, cell)
         found = np.empty(len(one), dtype=np.int8)
         for kind in np.flatnonzero(one >= 0):
             k = one[kind]

@@ -101,7 +101,7 @@ def _distances(T, R, half_angle, H, r, l, flat, pad, w, out):  # type: ignore[no
             w[PARALLEL + i] = 1.0 if alone else 0.0
             parallel += 1 if alone else 0
         if parallel < count:
-            outside_soon(w, count, R, s, h, H, r, l, flat)
+            outside_soon(w, count, R, s, h, H, r, l, flat, False)
         if parallel > 0:
             parallel_soon(w, count, R, s, h, H, r, l, flat)
         left = 0

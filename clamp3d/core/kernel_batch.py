@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from clamp3d.core.jit import inlined
-from clamp3d.core.kernel_distance import beyond, enters, parallel, unit
+from clamp3d.core.kernel_distance import across, beyond, enters, parallel, rounding, unit
 from clamp3d.core.kernel_features import (
     ARC,
     corner,
@@ -26,12 +26,14 @@ from clamp3d.core.kernel_flat import disc_gaps, is_beside
 AT_ONCE = 128
 """Poses of a block."""
 
-ROWS = 25
+ROWS = 32
 """Numbers that are kept of a pose of the block, each kind side by side; yes is 1, no is 0."""
 CX, CY, CZ, DX, DY, DZ, E2, SURE, TOP, BOTTOM, ENDS2, BEST2, AT, IN_ARC, LOW_FALLS, TOP_FALLS = range(
     0, 16 * AT_ONCE, AT_ONCE
 )
-EX, EY, P, LOW_V, TOP_V, LOW_REACH, TOP_REACH, PARALLEL, VALUE = range(16 * AT_ONCE, ROWS * AT_ONCE, AT_ONCE)
+EX, EY, P, LOW_V, TOP_V, LOW_REACH, TOP_REACH, PARALLEL, VALUE, QX, QY, QZ, NX, NY, NZ, BOUND = range(
+    16 * AT_ONCE, ROWS * AT_ONCE, AT_ONCE
+)
 
 
 @inlined
@@ -47,11 +49,14 @@ def position_and_axis(w, i):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def better(w, i, less, d2, t, arc):  # type: ignore[no-untyped-def]
-    """Note a feature as the best so far of pose i where it is."""
+def better(w, i, less, d2, t, qx, qz, points):  # type: ignore[no-untyped-def]
+    """Note an edge as the best so far of pose i where it is, and with ``points`` its point; end arcs note their y."""
     w[BEST2 + i] = d2 if less else w[BEST2 + i]
     w[AT + i] = t if less else w[AT + i]
-    w[IN_ARC + i] = arc if less else w[IN_ARC + i]
+    w[IN_ARC + i] = 0.0 if less else w[IN_ARC + i]
+    if points:
+        w[QX + i] = qx if less else w[QX + i]
+        w[QZ + i] = qz if less else w[QZ + i]
 
 
 @inlined
@@ -105,37 +110,37 @@ def axis_ends(w, count, R, s, h, H, l):  # type: ignore[no-untyped-def] # noqa: 
 
 
 @inlined
-def corners(w, count, s, h, ez, l, reached, falls):  # type: ignore[no-untyped-def] # noqa: E741
+def corners(w, count, s, h, ez, l, reached, falls, points):  # type: ignore[no-untyped-def] # noqa: E741
     """The corners of the end z = ez, for poses that reach it."""
     for i in range(count):
         cx, cy, cz, dx, dy, dz = position_and_axis(w, i)
         asked = w[reached + i] > 0.0
         d2, t, first = corner(-s, h, ez, cx, cy, cz, dx, dy, dz, l)
-        better(w, i, asked and d2 < w[BEST2 + i], d2, t, 0.0)
+        better(w, i, asked and d2 < w[BEST2 + i], d2, t, -s, ez, points)
         d2, t, second = corner(s, h, ez, cx, cy, cz, dx, dy, dz, l)
-        better(w, i, asked and d2 < w[BEST2 + i], d2, t, 0.0)
+        better(w, i, asked and d2 < w[BEST2 + i], d2, t, s, ez, points)
         w[falls + i] = yes(first or second)
 
 
 @inlined
-def lips(w, count, s, h, H, l):  # type: ignore[no-untyped-def] # noqa: E741
+def lips(w, count, s, h, H, l, points):  # type: ignore[no-untyped-def] # noqa: E741
     """The lips."""
     for i in range(count):
         cx, cy, cz, dx, dy, dz = position_and_axis(w, i)
-        d2, t, _ = lip_line(-s, h, H, cx, cy, cz, dx, dy, dz, w[E2 + i], l, w[BEST2 + i])
-        better(w, i, d2 < w[BEST2 + i], d2, t, 0.0)
-        d2, t, _ = lip_line(s, h, H, cx, cy, cz, dx, dy, dz, w[E2 + i], l, w[BEST2 + i])
-        better(w, i, d2 < w[BEST2 + i], d2, t, 0.0)
+        d2, t, z = lip_line(-s, h, H, cx, cy, cz, dx, dy, dz, w[E2 + i], l, w[BEST2 + i])
+        better(w, i, d2 < w[BEST2 + i], d2, t, -s, z, points)
+        d2, t, z = lip_line(s, h, H, cx, cy, cz, dx, dy, dz, w[E2 + i], l, w[BEST2 + i])
+        better(w, i, d2 < w[BEST2 + i], d2, t, s, z, points)
 
 
 @inlined
-def end_edges(w, count, s, h, ez, l, reached):  # type: ignore[no-untyped-def] # noqa: E741
+def end_edges(w, count, s, h, ez, l, reached, points):  # type: ignore[no-untyped-def] # noqa: E741
     """The edges of the end z = ez, for poses that reach it and are not below them."""
     for i in range(count):
         cx, cy, cz, dx, dy, dz = position_and_axis(w, i)
-        d2, t, _ = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l, w[BEST2 + i])
+        d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l, w[BEST2 + i])
         asked = w[reached + i] > 0.0 and cy + l * abs(dy) >= h
-        better(w, i, asked and d2 < w[BEST2 + i], d2, t, 0.0)
+        better(w, i, asked and d2 < w[BEST2 + i], d2, t, x, ez, points)
 
 
 @inlined
@@ -155,7 +160,7 @@ def seen_along(w, count, R, H):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def end_arcs(w, count, R, s, h, H, l, nearer):  # type: ignore[no-untyped-def] # noqa: E741
+def end_arcs(w, count, R, s, h, H, l, nearer, points):  # type: ignore[no-untyped-def] # noqa: E741
     """Of both end arcs the ``nearer`` one by its bound, or the other."""
     asked = 0
     for i in range(count):
@@ -172,10 +177,12 @@ def end_arcs(w, count, R, s, h, H, l, nearer):  # type: ignore[no-untyped-def] #
         at_top = top < low if nearer else not top < low
         v = top_v if at_top else low_v
         ez = H if at_top else -H
-        d2, t, known = end_arc_soon(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
+        d2, x, y, t, known = end_arc_soon(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
         wanted = least * least < best2
         w[SURE + i] = w[SURE + i] if known or not wanted else 0.0
-        better(w, i, wanted and d2 < best2, d2, t, 0.0)
+        better(w, i, wanted and d2 < best2, d2, t, x, ez, points)
+        if points:
+            w[QY + i] = y if wanted and d2 < best2 else w[QY + i]
 
 
 @inlined
@@ -192,28 +199,50 @@ def values(w, count, R, r, l, flat):  # type: ignore[no-untyped-def] # noqa: E74
 
 
 @inlined
-def outside_soon(w, count, R, s, h, H, r, l, flat):  # type: ignore[no-untyped-def] # noqa: E741
+def witnesses(w, count, R, h, H, r, l):  # type: ignore[no-untyped-def] # noqa: E741
+    """Points on the groove, normals and error bounds of what is certain, as `nearest` has them for an axis' inside.
+
+    An axis that passes through the edge itself is left to it.
+    """
+    for i in range(count):
+        cx, cy, cz, dx, dy, dz = position_and_axis(w, i)
+        t, bound = w[AT + i], rounding(R, H, r, l, cx, cy, cz)
+        nx, ny, nz = cx + t * dx - w[QX + i], cy + t * dy - w[QY + i], cz + t * dz - w[QZ + i]
+        apart = nx * nx + ny * ny + nz * nz > bound * bound
+        nx, ny, nz, n = across(nx, ny, nz, dx, dy, dz)
+        w[NX + i], w[NY + i], w[NZ + i] = nx / n, ny / n, nz / n
+        w[BOUND + i] = bound
+        w[SURE + i] = w[SURE + i] if apart and n > 0.0 else 0.0
+
+
+@inlined
+def outside_soon(w, count, R, s, h, H, r, l, flat, points):  # type: ignore[no-untyped-def] # noqa: E741
     """Signed distances and places on the axes of a block, as `outside` has them, to the bit, and whether certain.
 
-    It is not certain for an axis that enters S, and where the search of an end arc
-    takes loops.
+    It is not certain for an axis that enters S, and where the search of an end arc takes loops. ``points``: the
+    witnesses too, for flat ends, of which nothing is certain but where an axis' inside is nearest to an edge.
     """
     low, high, both, wide = set_out(w, count, R, s, h, H, l)
+    if points:
+        for i in range(count):
+            w[QY + i] = h
     if both < count:
         axis_ends(w, count, R, s, h, H, l)
     if low > 0:
-        corners(w, count, s, h, -H, l, BOTTOM, LOW_FALLS)
+        corners(w, count, s, h, -H, l, BOTTOM, LOW_FALLS, points)
     if high > 0:
-        corners(w, count, s, h, H, l, TOP, TOP_FALLS)
-    lips(w, count, s, h, H, l)
+        corners(w, count, s, h, H, l, TOP, TOP_FALLS, points)
+    lips(w, count, s, h, H, l, points)
     if wide > 0:
-        end_edges(w, count, s, h, -H, l, BOTTOM)
-        end_edges(w, count, s, h, H, l, TOP)
+        end_edges(w, count, s, h, -H, l, BOTTOM, points)
+        end_edges(w, count, s, h, H, l, TOP, points)
     if low > 0 or high > 0:
         seen_along(w, count, R, H)
-        end_arcs(w, count, R, s, h, H, l, True)
-        end_arcs(w, count, R, s, h, H, l, False)
+        end_arcs(w, count, R, s, h, H, l, True, points)
+        end_arcs(w, count, R, s, h, H, l, False, points)
     values(w, count, R, r, l, flat)
+    if points:
+        witnesses(w, count, R, h, H, r, l)
 
 
 @inlined

@@ -332,16 +332,33 @@ def outside(R, s, h, H, l, cx, cy, cz, dx, dy, dz, e2):  # type: ignore[no-untyp
     return best2, bt, bz, feature, bx, by
 
 
+@inlined
+def rounding(R, H, r, l, cx, cy, cz):  # type: ignore[no-untyped-def] # noqa: E741
+    """Bound on the rounding error of the distance of an axis.
+
+    A direction is normalised to 3 units, a point of the axis (a product and a sum, |t| <= l) known to 5 units of
+    |c| + l, s and h to 3 units of R, a difference of these and its norm to 3 more: 11, rounded up, and r's own.
+    """
+    return UNIT * (12.0 * (abs(cx) + abs(cy) + abs(cz) + 2.0 * l + H + R) + r)
+
+
+@inlined
+def across(nx, ny, nz, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """The part of a vector across a unit axis, and its length."""
+    along = nx * dx + ny * dy + nz * dz
+    nx -= along * dx
+    ny -= along * dy
+    nz -= along * dz
+    return nx, ny, nz, math.sqrt(nx * nx + ny * ny + nz * nz)
+
+
 @formula
 def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untyped-def] # noqa: E741
     """Signed distance of a cylinder centred at c with its axis along d (of any length but zero)."""
     if is_parallel(R, l, dx, dy):
         return parallel(R, s, h, H, r, l, cx, cy, cz, dz)
     dx, dy, dz, e2 = unit(dx, dy, dz, False)
-
-    # A direction is normalised to 3 units, a point of the axis (a product and a sum, |t| <= l) known to 5 units of
-    # |c| + l, s and h to 3 units of R, a difference of these and its norm to 3 more: 11, rounded up, and r's own.
-    bound = UNIT * (12.0 * (abs(cx) + abs(cy) + abs(cz) + 2.0 * l + H + R) + r)
+    bound = rounding(R, H, r, l, cx, cy, cz)
     if cy - l * abs(dy) <= h:
         behind, lo, hi = enters(R, s, h, H, l, cx, cy, cz, dx, dy, dz)
         if behind:
@@ -375,12 +392,9 @@ def nearest(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz):  # type: ignore[no-untype
         nx, ny, nz = edge_normal(feature, R, h, bx, by, bz)
     # Inside the axis the normal is across it, at an end it points back from it: with the axis close to the edge itself
     # the difference above knows that to few digits only.
-    along = nx * dx + ny * dy + nz * dz
-    if abs(bt) < l or along * bt > 0.0:
-        nx -= along * dx
-        ny -= along * dy
-        nz -= along * dz
     n = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if abs(bt) < l or (nx * dx + ny * dy + nz * dz) * bt > 0.0:
+        nx, ny, nz, n = across(nx, ny, nz, dx, dy, dz)
     if n == 0.0:
         nx, ny, nz, n = -dy, dx, 0.0, math.sqrt(e2)
     return value, bx, by, bz, nx / n, ny / n, nz / n, feature, bt, bound

@@ -271,17 +271,17 @@ def end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: i
 
 @inlined
 def end_arc_soon(ez, R, s, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
-    """Squared distance and t of `end_arc` by one step and without branches; and whether that is enough."""
+    """What `end_arc` gives, by one step and without branches; and whether that is enough."""
     q = abs(dz) * v
     a = abs(p)
     low, mu = nearer_start(k, a, abs(q))
     mu, done = nearer_step(k, a, abs(q), low, mu)
     both = 1.0 / ((k + mu) * mu)
     C, S = p * (mu * both), q * ((k + mu) * both)
-    d2, _, _, t = arc_point(C, S, True, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
+    d2, qx, qy, t = arc_point(C, S, True, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
     done = done and abs(C * C + S * S - 1.0) <= 1e-8
     # The farther minimum needs a place within the evolute, where a + |q| < k.
-    return d2, t, done and abs(q) > TINY and (d2 < math.inf or a + abs(q) >= k)
+    return d2, qx, qy, t, done and abs(q) > TINY and (d2 < math.inf or a + abs(q) >= k)
 
 
 @inlined

@@ -3,7 +3,7 @@
 Outside the material each gap is the plain distance of the axis from the piece (its edges included) minus the
 cylinder's radius, so the least of them is the signed distance. With the axis inside the material a piece's gap is
 negative on the piece's side of the lip and goes over into the plain distance on the other side:
-``cos`` of the angle about the lip makes that smooth.
+``cos`` of the angle about the lip makes that smooth, and the distance less on the way from one to the other.
 """
 
 from __future__ import annotations

@@ -42,10 +42,13 @@ class GroovePieces:
 def groove_pieces(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) -> GroovePieces:
     """Signed gap of each closed boundary piece of a groove to a cylinder.
 
-    While the capsule's axis is outside the material, ``min(distance)`` is ``signed_distance(...).distance``. With the
-    axis inside, the gaps of the pieces it came through stay negative and fall further, with normals that lead back
-    out; the other pieces keep their plain distance. Each gap is continuous, and smooth where its nearest point is
-    unique; the one exception is an axis that enters through an end face: there the side pieces change sign at once.
+    While the capsule's axis is outside the material, each gap is the plain distance of the axis from the piece less the
+    radius, and ``min(distance)`` is ``signed_distance(...).distance``. With the axis inside, the gaps of the pieces it
+    came through stay negative and fall further, with normals that lead back out. In between, about a lip, the distance
+    of arc and flat face is multiplied by a cosine, from 1 to -1, so it is less than the plain distance; and where the
+    axis goes through a flat face, that distance is of the axis' ends and the face's edges, so it may be more.
+    Each gap is continuous, and smooth where its nearest point is unique; the one exception is an axis that enters
+    through an end face: there the side pieces change sign at once.
     A cylinder along the groove that sticks out of it has its end pieces equal to the nearest side piece: take rows 0
     to 2 alone for such cylinders.
 

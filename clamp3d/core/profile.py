@@ -198,7 +198,7 @@ class Profile:
     Raises
     ------
     InputError
-        If the edges do not join, or the outline runs clockwise.
+        If the edges do not join, or the outline runs clockwise or crosses itself.
 
     Examples
     --------
@@ -218,6 +218,13 @@ class Profile:
                 )
         if not self.edges or self.area <= 0.0:
             raise InputError("outline must run counter-clockwise and enclose an area > 0 mm^2")
+        from clamp3d.core.crossing import first_crossing, turning  # which needs the edges of this module
+
+        if crossing := first_crossing(self.edges):
+            i, j, (a, b) = crossing
+            raise InputError(f"outline must not cross itself: edges {i} and {j} cross at ({a:.6g}, {b:.6g}) mm")
+        if abs(rounds := turning(self.edges) / (2.0 * math.pi) - 1.0) > 0.5:
+            raise InputError(f"outline must not cross itself: it turns {rounds + 1.0:.3g} times in one round, not once")
 
     @classmethod
     def of(cls, *pieces: Point | Arc) -> Profile:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.core.linear import atan2
+from clamp3d.core.linear import atan2, crosses
 from clamp3d.core.pose import Array
+from clamp3d.core.triangles import distinct
 
 Faces = NDArray[np.int64]
 
@@ -27,8 +28,8 @@ def volume(vertices: Array, faces: Faces) -> float:
     low, high = used.min(axis=0), used.max(axis=0)
     # The middle as origin: far from it the volumes cancel badly.
     a, b, c = np.moveaxis(vertices[faces] - 0.5 * (low + high), 1, 0)
-    found = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
-    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    found = float(np.einsum("ij,ij->i", a, crosses(b, c)).sum() / 6.0)
+    area = 0.5 * float(np.linalg.norm(crosses(b - a, c - a), axis=1).sum())
     return found if abs(found) > _FLAT * area * float((high - low).max()) else 0.0
 
 
@@ -80,7 +81,7 @@ def inside_out(vertices: Array, faces: Faces) -> list[NDArray[np.intp]]:
             continue
         rest = np.ones(len(faces), dtype=bool)
         rest[rows] = False
-        asked = np.unique(faces[rows])
+        asked = distinct(faces[rows])
         asked = asked[:: max(1, len(asked) // _ASKED)]
         outer = corners_of(vertices, faces[rest])
         if not rest.any() or min(winding_number(outer, vertices[k]) for k in asked) < 0.9:

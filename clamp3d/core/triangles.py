@@ -1,10 +1,23 @@
-"""Points of triangles, without trimesh, whose import takes 0.5 s of CPU."""
+"""Points and numbers of triangles, without trimesh and numpy.ma, whose import takes 0.5 s and 0.008 s of CPU."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.core.pose import Array
+
+
+def distinct(values: NDArray[Any]) -> NDArray[Any]:
+    """What is in an array, once each and sorted: ``numpy.unique``, which asks numpy.ma whether its array is masked.
+
+    >>> distinct(np.array([[3, 1], [1, 2]])).tolist()
+    [1, 2, 3]
+    """
+    found = np.sort(values, axis=None)
+    return found[np.append(True, found[1:] != found[:-1])] if len(found) else found
 
 
 def closest_points(triangles: Array, points: Array) -> Array:

@@ -32,15 +32,22 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, indent:
     P1      1.5
     P12   12.25
     """
-    from rich.cells import cell_len
-
     cells = [["-" if cell is None else str(cell) for cell in row] for row in rows]
     cells = [row + [""] * (len(head) - len(row)) for row in cells]
     lines = [""] * (1 + len(cells))
     for title, *column in zip(head, *cells, strict=True):
         numbers = all(_NUMBER.fullmatch(cell) for cell in column)
-        width = max(cell_len(cell) for cell in (title, *column))
+        width = max(_width(cell) for cell in (title, *column))
         for k, cell in enumerate((title, *column)):
-            blanks = " " * (width - cell_len(cell))
+            blanks = " " * (width - _width(cell))
             lines[k] += (blanks + cell if numbers else cell + blanks) + "  "
     return "\n".join((" " * indent + line).rstrip() for line in lines)
+
+
+def _width(cell: str) -> int:
+    """Columns of a terminal that a text takes."""
+    if cell.isascii() and cell.isprintable():
+        return len(cell)
+    from rich.cells import cell_len
+
+    return cell_len(cell)

@@ -3,6 +3,7 @@
 import itertools
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from OCP.Bnd import Bnd_Box
@@ -25,7 +26,9 @@ from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf
 from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_State
 from OCP.TopLoc import TopLoc_Location
+from step_scenes import Tree, location
 
+from clamp3d.brep.cad import Key, matrix
 from clamp3d.brep.solid import BrepSolid, require_open_cascade
 from clamp3d.brep.tessellate import explore
 
@@ -164,7 +167,10 @@ def gears():
 
 
 def nudged(parts, seed, least=0.003, most=0.05):
-    """Each part moved by ``least`` to ``most`` mm in some direction, and turned by up to 1e-3 rad every third time."""
+    """Each part moved by ``least`` to ``most`` mm in some direction, and turned by up to 1e-3 rad every third time.
+
+    Instances stay instances, and are turned about the origins of their products.
+    """
     rng = np.random.default_rng(seed)
     made = {}
     for k, (name, shape) in enumerate(parts.items()):
@@ -174,7 +180,10 @@ def nudged(parts, seed, least=0.003, most=0.05):
             x, y, z = rng.normal(size=3) * 3e-4
             T[:3, :3] = np.linalg.qr(np.eye(3) + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]))[0]
             T[:3, :3] *= np.sign(np.diag(T[:3, :3]))
-        made[name] = moved(shape, T)
+        if (at := shape.Location()).IsIdentity():
+            made[name] = moved(shape, T)
+        else:
+            made[name] = shape.Located(location(matrix(at) @ T))
     return made
 
 
@@ -242,22 +251,22 @@ def judged(verdict, lower, upper, known):
 
 
 def write_step(parts, path):
-    """The parts as a STEP file of named products, in their order."""
-    from step_scenes import Tree
-
+    """The parts as a STEP file of named products, in their order; one shape in several places is one product."""
     require_open_cascade()
-    tree = Tree()
+    tree, products = Tree(), {}
     root = tree.product("assembly")
     for name, shape in parts.items():
-        tree.put(root, tree.product(name, solid_of(shape)), np.eye(4))
+        solid = solid_of(shape)
+        if (key := Key(solid)) not in products:
+            products[key] = tree.product(name.removesuffix("_0"), key.shape)
+        tree.put(root, products[key], matrix(solid.Location()), name)
     return tree.write(path)
 
 
 def deepest(common, solid):
     """The largest distance that a corner of the common part's mesh has from the solid's boundary."""
-    shell = next(iter(explore(solid, "SHELL")))
-    points = mesh_corners(common)
-    return max((from_shell(p, shell) for p in points[:: max(1, len(points) // 60)]), default=0.0)
+    from_boundary, points = from_shell(solid), mesh_corners(common)
+    return max((from_boundary(p) for p in points[:: max(1, len(points) // 60)]), default=0.0)
 
 
 def deepest_corner(a, b):
@@ -266,12 +275,13 @@ def deepest_corner(a, b):
     The classifier has faults: it takes points beside a plate with twelve half holes for the middle of it. So what seems
     deep must be wound round by the triangles too.
     """
-    shell, points = next(iter(explore(b, "SHELL"))), mesh_corners(a)
-    mesh, found = BrepSolid.of(solid_of(b), "solid").mesh, 0.0
+    from_boundary, points, place, found = from_shell(b), mesh_corners(a), BRepClass3d_SolidClassifier(b), 0.0
+    mesh = cache(lambda: BrepSolid.of(solid_of(b), "solid").mesh)
     for point in points[:: max(1, len(points) // 100)]:
-        if BRepClass3d_SolidClassifier(b, point, 1e-7).State() == TopAbs_State.TopAbs_IN:
-            depth = from_shell(point, shell)
-            if depth > found and (depth < 0.1 or winding(mesh, np.array(point.Coord())) > 0.5):
+        place.Perform(point, 1e-7)
+        if place.State() == TopAbs_State.TopAbs_IN:
+            depth = from_boundary(point)
+            if depth > found and (depth < 0.1 or winding(mesh(), np.array(point.Coord())) > 0.5):
                 found = depth
     return found
 
@@ -295,9 +305,17 @@ def mesh_corners(shape):
     return points
 
 
-def from_shell(point, shell):
-    """Distance of a gp_Pnt from a shell."""
-    return separation(BRepBuilderAPI_MakeVertex(point).Vertex(), shell)
+def from_shell(solid):
+    """The distance of a gp_Pnt from a solid's shell, as a function: the shell is made ready once."""
+    between = BRepExtrema_DistShapeShape()
+    between.LoadS2(next(iter(explore(solid, "SHELL"))))
+
+    def distance(point):
+        between.LoadS1(BRepBuilderAPI_MakeVertex(point).Vertex())
+        between.Perform()
+        return between.Value()
+
+    return distance
 
 
 ASSEMBLIES = {made.__name__: made for made in (fasteners, hinge, clip, taper, bearing, gears)}

@@ -111,6 +111,14 @@ def test_bisection_ends_within_its_resolution_of_the_exact_state(clamp):
     assert steps[1e-3] > steps[0.05] > solve_stepped(section, step=STEP, tilt_step=TILT_STEP).motion_steps
 
 
+def test_bisection_turns_by_more_than_one_tilt_step_where_a_move_needs_it(clamp):
+    """A distance step that needs a turn of many small tilt steps: it stopped 1 mm early."""
+    section = Section(clamp, Cas())
+    found = solve_bisection(section, resolution=1e-3, step=2.0, tilt_step=math.radians(0.1))
+    assert -1e-9 <= found.q[D] - solve_final_state(section).q[D] <= 1e-3
+    assert found.gaps.value.min() >= -1e-9
+
+
 def test_gradients_agree_with_differences(clamp):
     rng = np.random.default_rng(3)
     for model in (Cas(), Chords(math.radians(7.0))):

@@ -12,7 +12,7 @@ from clamp3d import shapes
 from clamp3d.collide import broad, poses
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.batch import members
-from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
+from clamp3d.collide.broad import Boxes, box_gaps, near_pairs, world_boxes
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.poses import PoseVerdicts, check_poses
 from clamp3d.collide.scene import Scene
@@ -99,11 +99,24 @@ def test_poses_whose_boxes_come_near_others(few, block, monkeypatch):
     assert found[3:] == pytest.approx(0.5 * np.ptp(around, axis=1).T, abs=1e-9)
     others = np.array([corners(b, P) for b, P in zip(bounds, T, strict=True)])
     for reach in (0.0, 1.5):
-        row, column = poses._near(found, Boxes.of(bounds, T), reach)
+        row, column = poses._near(found, world_boxes(bounds, T, np.arange(12)), reach)
         gap = np.maximum(
             around.min(axis=1)[:, None] - others.max(axis=1), others.min(axis=1) - around.max(axis=1)[:, None]
         ).max(axis=2)
         assert sorted(zip(row.tolist(), column.tolist(), strict=True)) == list(map(tuple, np.argwhere(gap <= reach)))
+
+
+def test_boxes_at_poses_that_two_roundings_have_passed_through():
+    """Seen from one another two poses are off by the sum of what each may be: they have boxes like all others."""
+    rng = np.random.default_rng(6)
+    bounds, T = some_boxes(rng, 30, 9.0)
+    T[:, :3, :3] *= 1.0 + 8e-10
+    around = np.array([corners(b, P) for b, P in zip(bounds, T, strict=True)])
+    found = world_boxes(bounds, T, np.arange(30))
+    assert found == pytest.approx(np.hstack([around.mean(axis=1), 0.5 * np.ptp(around, axis=1)]).T, abs=1e-9)
+    first = world_boxes(bounds[:1], T)
+    assert (first[:, 0] == found[:, 0]).all()
+    assert first[3:, 5] == pytest.approx(0.5 * np.ptp(corners(bounds[0], T[5]), axis=0), abs=1e-9)
 
 
 def test_poses_as_others_see_them():

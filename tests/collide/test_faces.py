@@ -201,6 +201,28 @@ def test_touching_is_contact_and_certain(a, b):
     assert Thresholds().verdict(found) is Verdict.CONTACT
 
 
+@pytest.mark.parametrize("flat", [1.5, 0.0], ids=["flat top", "pole"])
+def test_a_free_form_face_beside_the_one_that_touches_leaves_the_contact_certain(flat):
+    """An ellipsoid, as a screw's head, on a plate: its facets may be 0.005 mm off, those at the pole too."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeRevol
+    from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Elips, gp_Pnt
+
+    height, middle = 3.0 * math.sqrt(1.0 - (flat / 4.75) ** 2), gp_Pnt(0, 0, 0)
+    top = [gp_Pnt(x, 0, height) for x in ((flat, 0) if flat else (0,))]
+    points = [*top, middle, gp_Pnt(4.75, 0, 0)]
+    oval = gp_Elips(gp_Ax2(middle, gp_Dir(0, -1, 0), gp_Dir(1, 0, 0)), 4.75, 3.0)
+    wire = BRepBuilderAPI_MakeWire(BRepBuilderAPI_MakeEdge(oval, points[-1], points[0]).Edge())
+    for two in itertools.pairwise(points):
+        wire.Add(BRepBuilderAPI_MakeEdge(*two).Edge())
+    axis = gp_Ax1(middle, gp_Dir(0, 0, 1))
+    head = BRepPrimAPI_MakeRevol(BRepBuilderAPI_MakeFace(wire.Wire()).Face(), axis).Shape()
+    assert 0.002 < model(head).faces.deviation.max() < 0.006
+    found = between(box((-9, -9, -2), (9, 9, 0)), head)
+    holds(found, 0.0)
+    assert Thresholds().verdict(found) is Verdict.CONTACT
+
+
 @pytest.mark.parametrize("aside", [-30.0, 30.0])
 @pytest.mark.parametrize("deep", [0.02, 0.3])
 def test_an_edge_in_a_hollow_corner_is_as_deep_as_the_corner_is_away(deep, aside):

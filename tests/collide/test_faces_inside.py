@@ -19,6 +19,7 @@ from OCP.gp import gp_Pnt, gp_Vec
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.faces import FaceModel, _at
 from clamp3d.core.pose import rotation
+from clamp3d.errors import Clamp3dError
 
 LONG = 20.0
 """Half length of the prisms: their ends are further away than their sides."""
@@ -162,3 +163,56 @@ def test_what_is_behind_a_thin_wall_or_slit_is_as_far_away_as_it_is(name):
         low, high = _at(model, np.array(point))
         assert low <= truth + 1e-4
         assert high >= truth - 1e-4
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("wall", [False, True])
+def test_a_slit_or_wall_that_is_thin_in_part_hides_what_is_behind_it(seed, wall):
+    """Its roof is within what its floor may be off, and goes on to far below it: in one face, bent or flat.
+
+    A point above the roof is above the floor too, with nothing in between that reaches further above the floor.
+    """
+    rng = np.random.default_rng(seed)
+    width, high = rng.uniform(0.8, 2.0), rng.uniform(1e-4, 4.5e-4)
+    drop = rng.uniform(0.1, 0.9) * high / width
+    end = rng.uniform(5.0, 7.0)
+    roof = [(end, high - drop * end), (0.0, high)]
+    outline = np.array([(0.0, 0.0), (width, 0.0), (width + 0.2, -1.0), (end, -1.0), *roof]) - [3.0, 0.0]
+    big = 2.5 * np.array(SQUARE)
+    points = np.column_stack([rng.uniform(-3.0, width - 3.0, 12), rng.choice([-1, 1], 12) * rng.uniform(0.3, 2.0, 12)])
+    check_points(outline if wall else big, [] if wall else [outline], points)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_slits_against_open_cascade(seed):
+    """Slits and walls of balls, rods and cones from 1e-6 mm on: no point is told to be on the wrong side."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepClass3d import BRepClass3d_SolidClassifier
+    from OCP.TopAbs import TopAbs_State
+
+    rng, told = np.random.default_rng(seed), 0
+    for k in range(6):
+        w, r, h = 10.0 ** rng.uniform(-6.0, -2.0), 10.0 ** rng.uniform(0.0, 1.7), 10.0 ** rng.uniform(0.0, 1.3)
+        tilt = rotation(rng.normal(size=3), 10.0 ** rng.uniform(-7.0, -3.0))
+        shell = [
+            cut(rod(r + w, -h, h), moved(rod(r, -2.0 * h, 2.0 * h), tilt)),
+            cut(ball(r + w), ball(r)),
+            cut(cone(r + w, 0.5 * r + w, -h, h), moved(cone(r, 0.5 * r, -h, h), tilt)),
+        ][k % 3]
+        block = box((-2 * r, -2 * r, -2 * h - 2 * r), (2 * r, 2 * r, 2 * h + 2 * r))
+        shape = solid_of(cut(block, shell) if k > 2 else shell)
+        try:
+            model = FaceModel(BrepSolid.of(shape, "thin"))
+        except Clamp3dError:  # a face so thin that the mesher leaves it out
+            continue
+        if not BRepCheck_Analyzer(shape).IsValid() or not model.solid.mesh.watertight:
+            continue
+        corners = model.faces.corners
+        near = corners[rng.integers(0, len(corners), 15)].mean(axis=1)
+        for x in near + rng.normal(size=(15, 3)) * 10.0 ** rng.uniform(-3.0, math.log10(r), (15, 1)):
+            low, high = _at(model, x)
+            inside = BRepClass3d_SolidClassifier(shape, gp_Pnt(*x.tolist()), 1e-9).State() == TopAbs_State.TopAbs_IN
+            assert not (low > 0.0 and inside)
+            assert not (high < 0.0 and not inside)
+            told += low > 0.0 or high < 0.0
+    assert told > 15

@@ -114,11 +114,11 @@ def test_what_is_nearest():
             rows, whole = np.stack([marks, rest]), np.empty((9, 3, 3))
             above = np.stack([nodes, others])
             solid = P, err, face, box, link, order, root, *[None] * 9, rows, above
-            for bit, thin, side, f in ((1, 0, -1.0, -1), (2, 4, -1.0, -1), (1, 0, 1.0, 0), (2, 4, 1.0, 0)):
-                mine = ((marks & rest & bit) != 0) | (((marks | rest) & thin) != 0)
+            for bit, side, f in ((1, -1.0, -1), (2, -1.0, -1), (1, 1.0, 0), (2, 1.0, 0)):
+                mine = (marks & rest & bit) != 0
                 least = (d + side * err)[mine & ((f < 0) | (face == f))].min(initial=7.0)
                 there = 0 if f < 0 else root[f]
-                asked = there, bit, thin, side, np.zeros(2), *x, 7.0, whole, stack
+                asked = there, bit, side, np.zeros(2), *x, 7.0, whole, stack
                 assert faces_tree.nearest_marked(solid, 0, 1, *asked) == pytest.approx(least, abs=1e-7)
 
 
@@ -163,11 +163,11 @@ def test_marks_tell_which_pieces_reach_above_and_below_a_face(k):
             least = slack[i] - (0.02 if easy else 0.5)
             assert not (mark[reaches + rim < least] & bit).any()
         marks[i] = faces_tree.NEW  # a search asks for those on its way, and remembers them
-        for bit, thin in ((1, faces_tree.THIN), (2, 0)) * 4:
+        for bit in (1, 2) * 4:
             x = rng.uniform(*model.bounds)
             d = np.array([apart(x[None], V) for V in P]) - err
-            least = d[(mark & (bit | thin)) != 0].min(initial=9.0)
-            asked = 0, bit, thin, -1.0, slack, *x, 9.0, whole, stack
+            least = d[(mark & bit) != 0].min(initial=9.0)
+            asked = 0, bit, -1.0, slack, *x, 9.0, whole, stack
             assert faces_tree.nearest_marked(solid, i, i, *asked) == pytest.approx(least, abs=1e-7)
         for n in np.flatnonzero((nodes[i] != faces_tree.NEW) & (nodes[i] != faces_tree.OPEN)):
             assert nodes[i, n] == np.bitwise_or.reduce(mark[below(link, order, n)])

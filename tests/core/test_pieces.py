@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 
 from clamp3d.core.distance import Feature, signed_distance
 from clamp3d.core.pieces import groove_pieces
@@ -215,3 +215,29 @@ def test_normals_of_all_pieces_are_the_way_out():
         assert np.abs(np.linalg.norm(found.normal, axis=1) - 1.0).max() <= 1e-12
         assert np.abs(found.normal - found.gradient[:, :3])[aside, :2].max(initial=0.0) <= 1e-9
     assert through > 20
+
+
+def test_flat_faces_have_their_plain_distance_outside_and_inside_no_more_but_where_they_are_pierced():
+    """Against the distance of the axis from half a strip, which is convex along the axis."""
+    rng, less, more = np.random.default_rng(0), 0, 0
+    for _ in range(400):
+        groove = SweptArc(10.0, rng.uniform(0.4, 2.8), 20.0)
+        wire, T = Capsule(1.0, rng.uniform(4.0, 80.0)), rotation(rng.normal(size=3), rng.uniform(0.0, 3.0))
+        T[:3, 3] = rng.uniform(-20.0, 20.0, 3)
+        found, deep = groove_pieces(groove, wire, T).distance, signed_distance(groove, wire, T).axis_inside
+        s, h = 10.0 * math.sin(groove.half_angle), -10.0 * math.cos(groove.half_angle)
+        for side, gap in zip((-1.0, 1.0), found[1:3], strict=True):
+
+            def away(t, side=side, T=T, s=s, h=h):
+                x, y, z = T[:3, 3] + t * T[:3, 2]
+                return math.hypot(max(s - side * x, 0.0), y - h, max(abs(z) - 10.0, 0.0))
+
+            half = 0.5 * wire.length
+            plain = minimize_scalar(away, bounds=(-half, half), method="bounded", options={"xatol": 1e-10}).fun
+            plain = min(plain, away(-half), away(half)) - wire.radius
+            pierced = plain + wire.radius < 1e-6
+            assert gap <= plain + 1e-7 or (deep and pierced)
+            assert gap >= plain - 1e-6 or deep
+            less, more = less + (-wire.radius < gap < plain - 1e-3), more + (gap > plain + 1e-3)
+    assert less > 20
+    assert more > 5

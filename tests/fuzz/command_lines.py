@@ -185,7 +185,7 @@ def _line(draw: Draw, folder: Path, name: str) -> tuple[list[str], list[Path]]:
         old += there
         args += [f"{flag}={value}"] if chance(draw, 4) else [flag, value]
     if name in _LONG:
-        args += [*pick(draw, *_BAD), "--nonsense"]
+        args += ["--nonsense", *pick(draw, *_BAD)]  # in this order: an option without its value would take the other's
     elif chance(draw, 20):
         args.insert(draw(st.integers(1, len(args))), pick(draw, "--nonsense", "--", "surplus", "", "-x", "--json"))
     return args, old

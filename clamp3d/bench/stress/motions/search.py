@@ -6,13 +6,14 @@ has slope 1. That finds where it is low; golden section within golden section fi
 
 from __future__ import annotations
 
-import heapq
 import math
 
 import numpy as np
 
 from clamp3d.core.jit import entry
 from clamp3d.core.jit import formula as _compiled
+from clamp3d.core.kernel_heap import pop, push
+from clamp3d.core.pose import Array
 
 _GOLDEN = 0.6180339887498949
 _STARTS = 4
@@ -124,8 +125,19 @@ def polish(m, u, t, wu, wt, u0, u1, l, g, p, speed, limit):  # type: ignore[no-u
 
 
 @_compiled
-def least(g, l, m, u0, u1, hints, size, cells, p):  # type: ignore[no-untyped-def] # noqa: E741
-    """Least value for u0 <= u <= u1, |t| <= l with u and t; last, how much lower it could be by slope alone."""
+def wait(waiting, n, a, b, c, d, e, f):  # type: ignore[no-untyped-def]
+    """Six numbers join the heap of n rows; returns n + 1."""
+    row = waiting[n]
+    row[0], row[1], row[2], row[3], row[4], row[5] = a, b, c, d, e, f
+    return push(waiting, n)
+
+
+@_compiled
+def least(g, l, m, u0, u1, hints, size, cells, p, waiting, started):  # type: ignore[no-untyped-def] # noqa: E741
+    """Least value for u0 <= u <= u1, |t| <= l with u and t; last, how much lower it could be by slope alone.
+
+    ``waiting`` (cells + 1, 6) and ``started`` (_STARTS, 4) are what it works in.
+    """
     far = 0.0
     for i in range(2):
         t = -l if i == 0 else l
@@ -155,11 +167,13 @@ def least(g, l, m, u0, u1, hints, size, cells, p):  # type: ignore[no-untyped-de
                 best, bu, bt = f, u, t
     # Cells wait as (least that the slope allows, u, t, half widths of both, value in the middle).
     frame(m, 0.5 * (u0 + u1), p)
-    waiting = [(-math.inf, 0.5 * (u0 + u1), 0.0, 0.5 * (u1 - u0), l, on_axis(p, 0.0, g))]
+    n = wait(waiting, 0, -math.inf, 0.5 * (u0 + u1), 0.0, 0.5 * (u1 - u0), l, on_axis(p, 0.0, g))
     for _ in range(cells):
-        if waiting[0][0] >= best - 1e-9 * size:
+        if waiting[0, 0] >= best - 1e-9 * size:
             break
-        low, u, t, hu, ht, f = heapq.heappop(waiting)
+        n = pop(waiting, n)
+        row = waiting[n]
+        low, u, t, hu, ht, f = row[0], row[1], row[2], row[3], row[4], row[5]
         if f < best:
             best, bu, bt = f, u, t
         by_u = speed * hu > ht
@@ -168,33 +182,49 @@ def least(g, l, m, u0, u1, hints, size, cells, p):  # type: ignore[no-untyped-de
             cu, ct = (u + sign * hu, t) if by_u else (u, t + sign * ht)
             frame(m, cu, p)
             f = on_axis(p, ct, g)
-            heapq.heappush(waiting, (max(low, f - (speed * hu + ht)), cu, ct, hu, ht, f))
-    slack = max(0.0, best - waiting[0][0])
-    # From the lowest cells, no two of them side by side.
-    started = [(math.inf, math.inf, 0.0, 0.0)]
-    for f, u, t, hu, ht, low in sorted([(cell[5], cell[1], cell[2], cell[3], cell[4], cell[0]) for cell in waiting]):
+            n = wait(waiting, n, max(low, f - (speed * hu + ht)), cu, ct, hu, ht, f)
+    slack = max(0.0, best - waiting[0, 0])
+    # From the lowest cells, no two of them side by side: the same heap, by the value in the middle.
+    for i in range(n):
+        row = waiting[i]
+        wait(waiting, i, row[5], row[1], row[2], row[3], row[4], row[0])
+    starts = 0
+    while n > 0 and starts < _STARTS:
+        n = pop(waiting, n)
+        row = waiting[n]
+        u, t, hu, ht, low = row[1], row[2], row[3], row[4], row[5]
         beside = False
-        for su, st, du, dt in started:
+        for i in range(starts):
+            su, st, du, dt = started[i, 0], started[i, 1], started[i, 2], started[i, 3]
             beside = beside or (abs(u - su) <= 6.0 * du and abs(t - st) <= 6.0 * dt)
         if low < best and not beside:
-            started.append((u, t, hu, ht))
+            started[starts, 0], started[starts, 1], started[starts, 2], started[starts, 3] = u, t, hu, ht
+            starts += 1
             f, pu, pt = polish(m, u, t, 3.0 * hu, 3.0 * ht, u0, u1, l, g, p, speed, best)
             if f < best:
                 best, bu, bt = f, pu, pt
-            if len(started) > _STARTS:
-                break
     return best, bu, bt, slack
 
 
-def _least_of(shapes, motions, u0, u1, hints, sizes, cells, out):  # type: ignore[no-untyped-def]
+def _least_of(shapes, motions, u0, u1, hints, sizes, cells, work, waiting, started, out):  # type: ignore[no-untyped-def]
     """`least` of n motions (n, 16) and shapes (n, 4): R, half angle, H, half length; out (n, 4)."""
-    p, g = np.empty(6), np.empty(4)
+    p, g = work[0], work[1]
     for i in range(len(motions)):
         R, a = shapes[i, 0], shapes[i, 1]
         g[0], g[1], g[2], g[3] = R, R * math.sin(a), -R * math.cos(a), shapes[i, 2]
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = least(
-            g, shapes[i, 3], motions[i], u0[i], u1[i], hints[i], sizes[i], cells, p
+            g, shapes[i, 3], motions[i], u0[i], u1[i], hints[i], sizes[i], cells, p, waiting, started
         )
 
 
-least_of = entry(_least_of, "void(f8[:,::1],f8[:,::1],f8[::1],f8[::1],f8[:,::1],f8[::1],i8,f8[:,::1])")
+_compiled_least_of = entry(
+    _least_of,
+    "void(f8[:,::1],f8[:,::1],f8[::1],f8[::1],f8[:,::1],f8[::1],i8,f8[:,::1],f8[:,::1],f8[:,::1],f8[:,::1])",
+)
+
+
+def least_of(shapes: Array, motions: Array, u0: Array, u1: Array, hints: Array, sizes: Array, cells: int) -> Array:
+    """`least` of n motions (n, 16) and shapes (n, 4): R, half angle, H, half length; returns (n, 4)."""
+    out, work = np.empty((len(motions), 4)), (np.empty((2, 6)), np.empty((cells + 1, 6)), np.empty((_STARTS, 4)))
+    _compiled_least_of(shapes, motions, u0, u1, hints, sizes, cells, *work, out)
+    return out

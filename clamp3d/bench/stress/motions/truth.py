@@ -49,12 +49,10 @@ def truth(cases: Motions, until: Array | None = None, hints: Array | None = None
     end = np.ones(n) if until is None else np.asarray(until, float)
     built = np.where(np.isfinite(cases.instant), cases.instant, -1.0)[:, None]
     first = np.ascontiguousarray(built if hints is None else np.concatenate([built, hints], 1))
-    out = np.empty((n, 4))
-    least_of(shapes, _numbers(cases, np.zeros(n)), np.zeros(n), end, first, size, cells, out)
-    base, slack = out[:, 1].copy(), out[:, 3].copy()
+    _, base, _, slack = least_of(shapes, _numbers(cases, np.zeros(n)), np.zeros(n), end, first, size, cells).T
     # From the lowest place of all once more, to the last digit.
-    least_of(shapes, _numbers(cases, base), -base, end - base, np.zeros((n, 1)), size, 1, out)
-    return Least(out[:, 0] - s.r[k], base + out[:, 1], out[:, 2], slack)
+    value, instant, along, _ = least_of(shapes, _numbers(cases, base), -base, end - base, np.zeros((n, 1)), size, 1).T
+    return Least(value - s.r[k], base + instant, along, slack)
 
 
 def _numbers(cases: Motions, base: Array) -> Array:
