@@ -289,8 +289,8 @@ def _search(
     ``surfaces``: kind, size, frame, deviation. At most ``most`` pieces are added. ``known``: bounds that the search the
     other way has found; what is above the first, and no point below the second, is not looked for.
     """
-    from clamp3d.collide.faces_bounds import TRIED
-    from clamp3d.collide.faces_kernel import RESULT, SPACE, WORK, descend
+    from clamp3d.collide.faces_bounds import TRIED, WORK
+    from clamp3d.collide.faces_kernel import RESULT, SPACE, descend
 
     n, nodes, out = len(pieces[0]), len(tree[0]), np.zeros(RESULT)
     rows = [np.empty((n + most, *given.shape[1:]), dtype=given.dtype) for given in pieces]
