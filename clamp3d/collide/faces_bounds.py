@@ -23,6 +23,7 @@ from clamp3d.collide.faces_math import (
     TORUS,
     band_over,
     bend,
+    bend_over,
     cut,
     height_at,
     least_height,
@@ -100,6 +101,15 @@ def _clear(solid, row, bit, slack, at, x, y, z, needed, most, whole, stack):
     if clear > at + t and is_open(solid, f, t, -1, 0.0, clear, x, y, z, whole[1, 0], stack):
         return clear
     return -1.0
+
+
+@formula
+def _enough(high, limits):
+    """Lower bound above which no better one is needed, with an upper bound ``high`` of all."""
+    _, contact, goal, tol = limits
+    if goal < np.inf and high <= contact:  # asked for a verdict: contact or clash
+        return -contact
+    return min(goal, high - 0.25 * tol)
 
 
 @formula
@@ -182,7 +192,7 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                 needed = max(h, abs(least) if least - e > found else 0.0) + rho
                 most = reach if sense[f] < 0.0 else np.inf
                 clear = _clear(solid, row, 1, slack, at, x, y, z, needed, most, whole, stack)
-                told = clear > 0.0 and found < min(out[0], goal) - 0.25 * tol
+                told = clear > 0.0 and found < _enough(out[0], limits)
                 if clear > 0.0:  # what is above the face by more than t is outside there
                     found = max(found, _below(least, rho, clear) - e)
                     if h > t:
@@ -266,12 +276,14 @@ def _over(V, uv, g, rim, own, solid, count, scratch):
     _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
     _, chosen, raised, raised_size, _, whole = scratch
     du, v0, v1, _, _ = spans(uv)
-    e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1) + rim
     high = -np.inf
     for m in range(count):
         f = chosen[m]
         to_frame(frame[f], V, whole[0])
-        h = least_height(kind[f], raised_size[m], size[f, 1], sense[f], whole[0]) - e
+        e = bend_over(
+            akind[g], asize[g, 0], asize[g, 1], aframe[g], du, v1 - v0, v0, v1, kind[f], frame[f]
+        )  # fmt: skip
+        h = least_height(kind[f], raised_size[m], size[f, 1], sense[f], whole[0]) - e - rim
         if akind[g] != PLANE and akind[g] != OTHER:
             band = akind[g], asize[g, 0], asize[g, 1], aframe[g], v0, v1
             h = max(h, band_over(*band, kind[f], raised_size[m], size[f, 1], frame[f], sense[f]) - rim)
@@ -360,7 +372,7 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
     nearest_ones, chosen, raised, raised_size, stack, whole = scratch
     P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, beside, _, _ = solid
     slack, _, goal, tol = limits
-    wanted = min(goal, high - 0.5 * tol)
+    wanted = _enough(high, limits)
     x, y, z = whole[2, 0, 0], whole[2, 0, 1], whole[2, 0, 2]
     rho, rim, bent = 0.0, 0.0, 0.0
     for k in rows:
@@ -376,8 +388,9 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
     found, lowest = -np.inf, -np.inf
     while count < MOST_OVER and found < wanted:
         f, highest = -1, lowest + 0.1 * tol
-        for n in range(NEAR + NEAR * beside.shape[1]):
-            one = nearest_ones[n] if n < NEAR else nearest_ones[(n - NEAR) // beside.shape[1]]
+        for n in range(NEAR + (NEAR + count) * beside.shape[1]):
+            m = n if n < NEAR else (n - NEAR) // beside.shape[1]
+            one = nearest_ones[m] if m < NEAR else chosen[m - NEAR]
             if n >= NEAR and one >= 0:
                 one = beside[one, (n - NEAR) % beside.shape[1]]
             if one < 0 or kind[one] == OTHER:

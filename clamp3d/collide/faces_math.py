@@ -370,6 +370,17 @@ def bend(kind, a, b, du, dv, v0, v1):  # type: ignore[no-untyped-def]
 
 
 @formula
+def bend_over(kind, a, b, F, du, dv, v0, v1, other, G):  # type: ignore[no-untyped-def]
+    """Bound of how much higher or lower over another surface (other, G) a piece is than its flat triangle.
+
+    At the same parameters the two differ by at most the bend; of a cylinder or cone square to its axis, so that over a
+    plane it counts by the sine of the angle between axis and normal.
+    """
+    e = bend(kind, a, b, du, dv, v0, v1)
+    return e * _sine(F, G) if other == PLANE and (kind == CYLINDER or kind == CONE) else e
+
+
+@formula
 def spans(uv):  # type: ignore[no-untyped-def]
     """Span of u and the range of v over a triangle of parameters, and its middle."""
     lu, hu, su, n = np.inf, -np.inf, 0.0, 0

@@ -14,7 +14,8 @@ from clamp3d.collide.faces_math import (
     CONE,
     OTHER,
     TORUS,
-    bend,
+    band_over,
+    bend_over,
     cut,
     height,
     height_at,
@@ -255,8 +256,10 @@ def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, left, pieces, uv
                 if sense * height(kind[f], size[f, 0], size[f, 1], work[i, 0], work[i, 1], work[i, 2]) + rim > slack:
                     return True
         du, v0, v1, _, _ = spans(uvs[top])
-        e = bend(kind[g], size[g, 0], size[g, 1], du, v1 - v0, v0, v1) if kind[g] != OTHER else 0.0
-        if high + e + rim <= slack:
+        e = bend_over(kind[g], size[g, 0], size[g, 1], frame[g], du, v1 - v0, v0, v1, kind[f], frame[f])
+        band = kind[g], size[g, 0], size[g, 1], frame[g], v0, v1
+        most = min(high + e, -band_over(*band, kind[f], size[f, 0], size[f, 1], frame[f], -sense))
+        if most + rim <= slack:
             continue
         left -= 1
         # Over a torus, and in the hole of a cone, ``high`` is only a bound; over the others it is reached.

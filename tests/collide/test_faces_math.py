@@ -146,6 +146,12 @@ def test_how_far_a_surface_bends_away_from_its_flat_pieces(kind):
         bound = faces_math.bend(kind, a, b, du, v1 - v0, v0, v1)
         assert off <= bound + 1e-12
         tight = max(tight, off / bound)
+        G = frame(rng)
+        G[1:] = np.linalg.qr(F[[3, 1, 2]].T + rng.choice([0.0, 1e-3, 0.5]) * rng.normal(size=(3, 3)))[0].T[[1, 2, 0]]
+        rise = abs((surfaces.points_at(kind, F, (a, b), GRID @ uv) - GRID @ P) @ G[3]).max()
+        less = faces_math.bend_over(kind, a, b, F.ravel(), du, v1 - v0, v0, v1, PLANE, G.ravel())
+        assert rise <= less + 1e-12
+        assert less <= bound
         if k % 3 == 1 and kind in (CYLINDER, CONE):
             assert bound <= 1e-3  # their lines along the axis are straight
     assert tight > 0.8
