@@ -68,11 +68,11 @@ def on_edges(shape):
 
 def signed(points, shape):
     """Least signed distance (mm) of points from a solid, by Open CASCADE."""
-    shell, least = next(iter(explore(solid_of(shape), "SHELL"))), np.inf
+    apart, least = from_shell(solid_of(shape)), np.inf
     for x in points:
         point = gp_Pnt(*map(float, x))
         inside = BRepClass3d_SolidClassifier(solid_of(shape), point, 1e-9).State() == TopAbs_State.TopAbs_IN
-        least = min(least, from_shell(point, shell) * (-1.0 if inside else 1.0))
+        least = min(least, apart(point) * (-1.0 if inside else 1.0))
     return least
 
 
