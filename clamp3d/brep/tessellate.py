@@ -36,7 +36,11 @@ from clamp3d.errors import Clamp3dError
 
 ANGLE = 0.35
 """Largest turn (rad) of a facet's neighbour, so that a small fillet gets facets enough to be seen as round."""
+FREE = 0.02
+"""Largest chord error (mm) of free-form faces: their triangles stand for them to the end, others say where to look."""
 _RETRIES = 4
+_BULGE = 10.0 * BORDER
+"""Sag (mm) of a border that is not split, because its triangle is too slim, above which borders are meshed finer."""
 
 Surface = tuple[int, Array, Size, float]
 """Kind, frame, sizes and deviation of a face's surface."""
@@ -82,7 +86,7 @@ def _explorer(kind: str, outside: str) -> tuple[Any, ...]:
 def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
     """Triangles of a TopoDS_Shape within ``chord`` mm of its faces, where the mesher gets there in a few tries.
 
-    Those of ``surfaces`` are; the ``faces``, whose borders are not split, are within twice that.
+    Those of free-form faces are, and within `FREE`; others, whose surfaces are known, are within twice that.
     The mesher runs in this thread: Open CASCADE's parallel one hangs in a forked process. Raises Clamp3dError if a
     face gets no triangles.
     """
@@ -93,27 +97,35 @@ def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
     faces = list(explore(solid, "FACE"))
     surfaces = [surface_of(face) for face in faces]
     wanted, inner = 0.45 * chord, any(_is_trimmed(face, kind) for face, (kind, *_) in zip(faces, surfaces, strict=True))
+    free = np.array([kind == OTHER for kind, *_ in surfaces])
+    allowed, finer = min(chord, FREE), 1.0
     for _ in range(_RETRIES):
         BRepTools.Clean_s(solid)
         asked = IMeshTools_Parameters()
         asked.Angle = asked.AngleInterior = angle
-        asked.Deflection, asked.DeflectionInterior = min(BORDER, wanted), wanted
-        for face, (kind, *_) in zip(faces, surfaces, strict=True):
-            if kind == OTHER:  # their facets stand for them to the end
+        asked.DeflectionInterior = wanted * allowed / chord
+        asked.Deflection = min(BORDER, asked.DeflectionInterior)
+        for face, is_free in zip(faces, free.tolist(), strict=True):
+            if is_free:
                 BRepMesh_IncrementalMesh(face, asked)
-        asked.Deflection = 0.3 * wanted if inner else wanted  # borders are split in turn, where triangles allow it
+        # Borders are split in turn, where triangles allow it.
+        asked.Deflection = finer * (0.3 * wanted if inner else wanted)
+        asked.DeflectionInterior = wanted
         if not inner:  # most faces need none, or are meshed in rows
             asked.InternalVerticesMode, asked.DeflectionInterior, asked.AngleInterior = False, 1e3, 3.0
         BRepMesh_IncrementalMesh(solid, asked)
         made = _collected(faces, surfaces, wanted)
-        worst = max(float(made.surfaces.error.max()), 0.5 * float(made.errors.max()))
-        if worst <= chord:
+        of_free = made.surfaces.error[free[made.surfaces.face]].max(initial=0.0)
+        worst = max(of_free / allowed, 0.5 * float(made.errors.max()) / chord)
+        bulge = made.surfaces.sag[~free[made.surfaces.face]].max(initial=0.0)
+        if bulge > _BULGE and finer == 1.0:
+            finer = 0.2
+        elif worst <= 1.0:
             break
-        if not inner:
+        elif not inner:
             inner = True
-            continue
-        # Below a tenth of what is asked for it is the file's own tolerance that is in the way.
-        wanted, angle = max(0.7 * wanted * chord / worst, 0.1 * chord), 0.7 * angle
+        else:  # below a tenth of what is asked for it is the file's own tolerance that is in the way
+            wanted, angle = max(0.7 * wanted / worst, 0.1 * chord), 0.7 * angle
     return made
 
 

@@ -79,8 +79,8 @@ def signed(points, shape):
 @pytest.mark.parametrize("k", range(len(PAIRS)))
 def test_no_point_of_a_face_is_nearer_or_deeper_than_its_bound(k):
     shape, other, T = PAIRS[k]
-    a = FaceModel(BrepSolid.of(solid_of(shape), "a"))
-    b = FaceModel(BrepSolid.of(solid_of(moved(other, T)), "b")).faces
+    a = FaceModel(BrepSolid.of(solid_of(shape), "a", chord=0.02))
+    b = FaceModel(BrepSolid.of(solid_of(moved(other, T)), "b", chord=0.02)).faces
     frames, n, near = np.ascontiguousarray(b.frame.reshape(-1, 12)), len(a.faces.kind), np.empty(4, dtype=np.int64)
     own, stack = (b.kind, b.size, frames, b.deviation), np.empty(faces_tree.DEEP, dtype=np.int64)
     chosen, over = np.empty(faces_bounds.TRIED, dtype=np.int64), np.empty(faces_bounds.TRIED)
