@@ -40,8 +40,10 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
             break
         n, of_b = way
         planes.append(np.array([*n, float(dot(n, t)) - found.upper + margin]))
-        t = nearest_behind(np.array(planes), t)
+        before, t = t, nearest_behind(np.array(planes), t)
         size = norm(t)
+        if norm(t - before) < RESOLUTION:  # it would be asked the same again
+            break
         if size > 2.0 * (inside[0] + margin):  # a long way out, or nothing is behind all the planes
             break
         place[:3, 3] = T[:3, 3] + t
