@@ -23,6 +23,8 @@ _LEAST = 5e-4
 """So far (mm) may a face beside another reach above it: pieces that leave it in a tangent need not be cut for ever."""
 VERDICT_WIDTH = 0.01
 """Width of the bounds, by the contact threshold, at which a search for the verdict alone ends without one."""
+_FEW = 100
+"""Pieces looked at each way before the rest of those for a depth is spent."""
 _ASKED = 8
 """Triangles below which a point is looked for that only one of two touching solids has."""
 _BESIDE = 8
@@ -213,15 +215,25 @@ def faces_distance(
     here = inverse(T)
     if len(a.faces.face) < len(b.faces.face):  # the pieces of the one with fewer first: they often decide
         return faces_distance(b, a, here, contact=contact, clearance=clearance, tol=tol, most=most).moved(T).swapped()
-    first = _towards(a, b, T, contact, clearance, tol, most)
+    few = most if tol is None else min(most, _FEW)
+    first = _towards(a, b, T, contact, clearance, tol, few)
     if tol is None and first.upper < -contact - 2.0 * RESOLUTION:
         return _told(replace(first.swapped(), lower=-np.inf))
     margin = max(contact, clearance)
-    low = first.lower
-    if low > margin and not _may_hold(a, b, here):
+    if first.lower > margin and not _may_hold(a, b, here):
         return _told(first.swapped())
-    second = _towards(b, a, here, contact, clearance, tol, most, (low, first.upper)).moved(T)
-    first = first.swapped()
+    if tol is None or first.upper - first.lower <= tol:
+        second = _towards(b, a, here, contact, clearance, tol, most, (first.lower, first.upper))
+    else:  # the deepest point is perhaps soon found the other way: then little of this way is left to look at
+        second = _towards(b, a, here, contact, clearance, tol, few, (np.inf, first.upper))
+        high = min(first.upper, second.upper)
+        if first.lower < high - tol:
+            least = second.lower if second.lower >= high - tol else np.inf
+            first = _closer(first, _towards(a, b, T, contact, clearance, tol, most, (least, high)))
+        high = min(first.upper, high)
+        if second.lower < min(high - tol, first.lower):
+            second = _closer(second, _towards(b, a, here, contact, clearance, tol, most, (first.lower, high)))
+    first, second, low = first.swapped(), second.moved(T), first.lower
     best = first if first.upper <= second.upper else second
     if low > 0.0 and second.lower > 0.0:
         return _told(replace(best, lower=max(low, second.lower)))
@@ -304,6 +316,14 @@ def _search(
         np.empty(SPACE + n + most + 2 * nodes, dtype=np.int64), out,
     )  # fmt: skip
     return float(found), out
+
+
+def _closer(known: Distance, again: Distance) -> Distance:
+    """What two searches the same way tell together."""
+    best = known if again.point_a is None else again  # without points: nothing lower than what was known
+    return replace(
+        best, lower=max(known.lower, again.lower), estimate=max(known.estimate or 0.0, again.estimate or 0.0)
+    )
 
 
 def _told(found: Distance) -> Distance:

@@ -18,8 +18,10 @@ import math
 import numpy as np
 
 from clamp3d.collide.faces_math import (
+    CYLINDER,
     OTHER,
     PLANE,
+    SPHERE,
     TORUS,
     band_over,
     bend,
@@ -51,18 +53,40 @@ WORK = 6 + 2 * PIECES
 
 
 @formula
-def _slopes(kind, size, frame, sense, f, g, x, y, z, between):
-    """Cosine of the angle between two faces' normals at a point; their sum, of length 1, into ``between`` (3)."""
-    turn, length = 0.0, 0.0
+def _turn(kind, size, frame, sense, f, g, x, y, z):
+    """Cosine of the angle between two faces' normals at a point."""
+    turn = 0.0
+    for i in range(3):
+        a = sense[f] * slope_at(kind[f], size[f, 0], size[f, 1], frame[f], i, x, y, z)
+        turn += a * sense[g] * slope_at(kind[g], size[g, 0], size[g, 1], frame[g], i, x, y, z)
+    return turn
+
+
+@formula
+def _way_above_both(high, other, turn, kind, size, frame, sense, f, g, x, y, z, way):
+    """Length of the shortest step that raises a point by minus its heights ``high``, ``other`` over two planes.
+
+    Its direction goes into ``way`` (3). ``turn`` is the cosine between their normals.
+    """
+    one, two = -high, -other
+    if one > 0.0 and two <= one * turn:  # along the first normal, or the second, or both
+        two = 0.0
+    elif two > 0.0 and one <= two * turn:
+        one = 0.0
+    elif one <= 0.0 and two <= 0.0:
+        one, two = 0.0, 0.0
+    else:
+        one, two = (one - two * turn) / (1.0 - turn * turn), (two - one * turn) / (1.0 - turn * turn)
+    length = 0.0
     for i in range(3):
         a = sense[f] * slope_at(kind[f], size[f, 0], size[f, 1], frame[f], i, x, y, z)
         b = sense[g] * slope_at(kind[g], size[g, 0], size[g, 1], frame[g], i, x, y, z)
-        turn += a * b
-        length += (a + b) * (a + b)
-        between[i] = a + b
+        way[i] = one * a + two * b
+        length += way[i] * way[i]
+    length = math.sqrt(length)
     for i in range(3):
-        between[i] /= max(math.sqrt(length), 1e-12)
-    return turn
+        way[i] /= max(length, 1e-12)
+    return length + 1e-7
 
 
 @formula
@@ -76,15 +100,31 @@ def _all_above(kind, size, frame, sense, f, V, way, step, work):
 
 
 @formula
-def _below(least, rho, clear):
+def _below(least, rho, clear, feet):
     """Lower bound of what is within rho of a ball's middle and ``least`` over a surface that the solid is below in it.
 
     Outside, nothing of the solid is nearer than the surface and the ball's edge. Inside, the way out has to end within
-    the ball, for beyond it the solid may go on.
+    the ball, for beyond it the solid may go on: ``feet`` says that its end is within rho of the middle.
     """
     if least >= 0.0:
         return min(least, clear - rho)
-    return least if rho - least <= clear else -np.inf
+    return least if rho - (0.0 if feet else least) <= clear else -np.inf
+
+
+@formula
+def _has_feet(kind, sense):
+    """Whether what is above a surface is convex and has a foot of every point: `_foot` brings no two points apart."""
+    return kind == PLANE or ((kind == CYLINDER or kind == SPHERE) and sense < 0.0)
+
+
+@formula
+def _foot(kind, size, frame, sense, f, t, x, y, z, foot):
+    """The point (3) nearest to x, y, z of what is ``t`` or more above the surface of face f."""
+    h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)
+    foot[0], foot[1], foot[2] = x, y, z
+    if h < t and _has_feet(kind[f], sense[f]):
+        for i in range(3):
+            foot[i] += (t - h) * sense[f] * slope_at(kind[f], size[f, 0], size[f, 1], frame[f], i, x, y, z)
 
 
 @formula
@@ -145,7 +185,7 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
             for k in range(3):
                 out[1 + k], out[4 + k] = p[k], q[k]
             out[7] = f
-    outside, inside, tried = -1.0, False, 0
+    outside, inside, measured, tried = -1.0, False, False, 0
     for n in range(NEAR + beside.shape[1] * TRIED):
         # The nearest faces first; then those beside them, and beside these.
         if n < NEAR:
@@ -180,7 +220,7 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
             if row == f:
                 heights[tried - 1] = least
             deep = way_out(kind[f], size[f, 0], size[f, 1], sense[f], frame[f], t, x, y, z)
-            wanted = deep > 0.0 and (rim - deep < out[0] or not inside)
+            wanted = deep > 0.0 and (rim - deep < out[0] or not inside or (rim - high < out[0] and not measured))
             if not (least - e > found or (h > t and outside < 0.0) or wanted):
                 continue
             told = False
@@ -189,12 +229,16 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
             # Beyond this the inside of a torus within a ball may be in two pieces.
             reach = size[f, 0] if kind[f] == TORUS else np.inf
             if least - e > found or (h > t and outside < 0.0):
-                needed = max(h, abs(least) if least - e > found else 0.0) + rho
+                feet, off = _has_feet(kind[f], sense[f]), at
+                _foot(kind, size, frame, sense, f, t, x, y, z, q)
+                if h < t and feet:
+                    off = nearest_below(P, err, box, link, order, root[f], q[0], q[1], q[2], stack)
+                needed = max(h, 0.0 if feet or least - e <= found else abs(least)) + rho
                 most = reach if sense[f] < 0.0 else np.inf
-                clear = _clear(solid, row, 1, slack, at, x, y, z, needed, most, whole, stack)
+                clear = _clear(solid, row, 1, slack, off, q[0], q[1], q[2], needed, most, whole, stack)
                 told = clear > 0.0 and found < _enough(out[0], limits)
                 if clear > 0.0:  # what is above the face by more than t is outside there
-                    found = max(found, _below(least, rho, clear) - e)
+                    found = max(found, _below(least, rho, clear, feet) - e)
                     if h > t:
                         outside = max(outside, min(h - t, clear))
             if wanted:
@@ -202,12 +246,27 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                 clear = _clear(solid, row, 2, slack, at, x, y, z, deep, most, whole, stack)
                 told = told or clear > 0.0
                 inside = inside or clear > 0.0
-                if clear > 0.0 and rim - deep < out[0]:  # inside: as deep as the faces are away
+                if clear > 0.0 and rim - max(deep, high) < out[0]:  # inside: as deep as the faces are away
+                    measured = True
                     for i in range(3):
                         for c in range(3):
                             work[i, c] = p[c]
                     depth = from_faces(
-                        P, err, face, box, link, order, kind, size, frame, deviation, work, over, deep + t, point, stack
+                        P,
+                        err,
+                        face,
+                        box,
+                        link,
+                        order,
+                        kind,
+                        size,
+                        frame,
+                        deviation,
+                        work,
+                        over,
+                        max(deep + t, high),
+                        point,
+                        stack,
                     )
                     depth = max(depth, min(deep, clear)) - rim
                     if -depth < out[0] and depth > 0.0:
@@ -224,32 +283,39 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                 least = min(heights[m], heights[n])
                 if least - e <= found or kind[f] == TORUS or kind[o] == TORUS:
                     continue
-                turn = _slopes(kind, size, frame, sense, f, o, x, y, z, q)
+                turn = _turn(kind, size, frame, sense, f, o, x, y, z)
                 if turn < -0.8:
                     continue
-                rise = 0.9 * math.sqrt(0.5 * (1.0 + turn))  # above either for a step along both normals
+                step = 0.0
                 if least < 0.0:
-                    least /= rise
-                    above = True
-                    for one in (f, o):
-                        up = _all_above(kind, size, frame, sense, one, V, q, -least, whole)
-                        above = above and up > slack[one] + deviation[one]
-                    if not above or least - e <= found:
+                    step = _way_above_both(heights[m], heights[n], turn, kind, size, frame, sense, f, o, x, y, z, q)
+                    above = False
+                    for more in (1.001, 1.01, 1.1):  # round surfaces turn away from their normals at the middle
+                        above = more * step + e < -found
+                        for one in (f, o):
+                            up = _all_above(kind, size, frame, sense, one, V, q, more * step, whole) if above else 0.0
+                            above = above and up > slack[one] + deviation[one]
+                        if above:
+                            step *= more
+                            break
+                    if not above:
                         continue
+                    least = -step
+                xs, ys, zs = x + step * q[0], y + step * q[1], z + step * q[2]
                 # Where a piece of one looks over the other, what lies above both is outside.
                 for one, other in ((f, o), (o, f)):
                     at = nearest_marked(
-                        solid, other, other, root[one], 1, 1.0, slack, x, y, z, np.inf, whole, stack
+                        solid, other, other, root[one], 1, 1.0, slack, xs, ys, zs, np.inf, whole, stack
                     )  # fmt: skip
                     if at == np.inf:
                         continue
                     t, over_other = slack[one] + deviation[one], slack[other] + deviation[other]
-                    limit = 2.0 * at + 8.0 * (t + over_other) + abs(least) + rho
-                    clear = nearest_marked(solid, f, o, 0, 1, -1.0, slack, x, y, z, limit, whole, stack)
+                    limit = 2.0 * at + 8.0 * (t + over_other) + max(least, 0.0) + rho
+                    clear = nearest_marked(solid, f, o, 0, 1, -1.0, slack, xs, ys, zs, limit, whole, stack)
                     if clear > at + t and is_open(
-                        solid, one, t, other, over_other, clear, x, y, z, whole[1, 0], stack
+                        solid, one, t, other, over_other, clear, xs, ys, zs, whole[1, 0], stack
                     ):  # fmt: skip
-                        found = max(found, _below(least, rho, clear) - e)
+                        found = max(found, _below(least, rho, clear, True) - e)
                         break
     unsure = low > 0.0 and found < min(out[0], goal) - tol and not inside and outside < 0.0
     if unsure and abs(winding(P, x, y, z)) < 0.1:
@@ -407,11 +473,15 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
         if f < 0 or max(lowest, highest) <= known:
             break
         most = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf  # as for one piece
-        fits, at = False, nearest_below(P, err, box, link, order, root[f], x, y, z, stack)
+        fits, feet, middle = False, _has_feet(kind[f], sense[f]), place[2, 1]
         for row in (len(kind) + f, f):
-            needed = rho + max(-highest, 0.0)
+            needed = rho + (0.0 if feet else max(-highest, 0.0))
             if not fits and needed < most:
-                clear = _clear(solid, row, 1, slack, at, x, y, z, needed + abs(highest), most, whole, stack)
+                _foot(kind, size, frame, sense, f, slack[row] + deviation[f], x, y, z, middle)
+                at = nearest_below(P, err, box, link, order, root[f], middle[0], middle[1], middle[2], stack)
+                clear = _clear(
+                    solid, row, 1, slack, at, middle[0], middle[1], middle[2], needed + abs(highest), most, whole, stack
+                )  # fmt: skip
                 if clear >= needed:
                     fits = True
                     t = slack[row] + deviation[f]
@@ -431,10 +501,8 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
         # Each point of the pieces is above one of the faces by ``new``, and in the ball where that counts.
         held = new
         for m in range(count + 1):
-            clear = whole[2, 1 + m // 3, m % 3]
-            if clear - rho < -min(new, 0.0):
-                held = -np.inf
-            held = min(held, max(clear - rho, 0.0)) if new >= 0.0 else held
+            clear, one = whole[2, 1 + m // 3, m % 3], chosen[m]
+            held = min(held, _below(new, rho, clear, _has_feet(kind[one], sense[one])))
         found, lowest = max(found, held), deep
         count += 1
     return max(known, found), lowest if count > 0 else np.inf

@@ -13,6 +13,7 @@ from clamp3d.collide.faces import FaceModel, faces_distance
 from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.linear import dot, norm, to_target
 from clamp3d.core.pose import Array, inverse
+from clamp3d.core.triangles import closest_points
 
 _ASKS = 3
 """Translations that are tried, each past one more place that touches."""
@@ -39,8 +40,10 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
             break
         n, of_b = way
         planes.append(np.array([*n, float(dot(n, t)) - found.upper + margin]))
-        t = nearest_behind(np.array(planes), t)
+        before, t = t, nearest_behind(np.array(planes), t)
         size = norm(t)
+        if norm(t - before) < RESOLUTION:  # it would be asked the same again
+            break
         if size > 2.0 * (inside[0] + margin):  # a long way out, or nothing is behind all the planes
             break
         place[:3, 3] = T[:3, 3] + t
@@ -54,7 +57,7 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
 def _way_out(a: FaceModel, b: FaceModel, T: Array, found: Distance) -> tuple[Array, bool] | None:
     """Unit vector (3,) along which b moves so that the deepest point found is in one solid only, and whether it is b's.
 
-    None if there is none: the nearest face is not one of those with a formula.
+    None if there is none: the nearest face is not one of those with a formula, and no corner or edge is as near.
     """
     if not found.upper < 0.0 or found.point_a is None:
         return None
@@ -66,5 +69,12 @@ def _way_out(a: FaceModel, b: FaceModel, T: Array, found: Distance) -> tuple[Arr
             h = f.sense[i] * height(int(f.kind[i]), f.frame[i], (float(f.size[i, 0]), float(f.size[i, 1])), steps)
             if abs(h[0] - found.upper) < best[0]:
                 best = abs(float(h[0]) - found.upper), dot(turn, h[1:4] - h[4:]), model is a
+    if not best[1].any():  # further in than any one surface says: in a hollow corner
+        for model, point, turn in sides:
+            c = model.faces.corners
+            away = closest_points(c, np.broadcast_to(point, (len(c), 3))) - point
+            foot = away[(away * away).sum(axis=1).argmin()]
+            if abs(norm(foot) + found.upper) < best[0]:
+                best = abs(norm(foot) + found.upper), dot(turn, foot), model is a
     size = norm(best[1])
     return (best[1] / size, best[2]) if size > 0.0 else None

@@ -451,3 +451,29 @@ def test_no_point_of_a_band_is_lower_than_its_bound_over_a_surface(sense, away, 
             assert bound <= least + 1e-12
             if away == turn == 0.0:
                 assert bound > least - 1e-12 or (kind in (SPHERE, TORUS) and a != c)
+
+
+def test_a_bush_pressed_into_the_corner_of_a_counterbore_is_as_deep_as_both_walls_tell():
+    """Its edge is in the floor and in the wall at once: deeper than in either, and no piece of it is left uncertain."""
+    seat = cut(box((-20, -20, 0), (20, 20, 12)), fuse(rod(10, -1, 6), rod(14, 5, 13)))
+    found = between(seat, cut(rod(14, 4.97, 9), rod(12, 4, 10)), shift(0.02, 0.02, 0.0), tol=1e-3, most=4000)
+    deepest = math.hypot(0.03, math.hypot(0.02, 0.02))
+    assert found.lower <= -deepest <= found.upper
+    assert found.upper - found.lower < 2.5e-3
+    assert found.upper < -0.03 - 0.008
+
+
+def test_a_bolt_head_in_a_washer_is_as_deep_as_its_face_says_beside_the_shank():
+    """The way out of the washer's pieces ends beside the shank, nearer to it than they are deep."""
+    bolt, washer = fuse(rod(4, -9, 1), rod(7, 0, 5)), cut(rod(6.5, -1.4, 0.0), rod(4.2, -2, 1))
+    found = between(bolt, washer, shift(0.05, 0.02, 0.2), tol=1e-3, most=800)
+    holds(found, -0.2)
+    assert found.upper - found.lower < 2.5e-3
+
+
+def test_a_washer_a_little_farther_from_its_plate_than_the_threshold_is_clear():
+    """Its rim and the hole's are where the errors of borders are, 0.0006 mm: they are not what is nearest."""
+    plate, T = cut(box((-20, -20, -9), (20, 20, 0)), rod(5.5, -10, 1)), rotation((1, 0.3, 0), 1e-4)
+    T[2, 3] = 0.01035 + 1e-4 * 10.5
+    found = between(plate, cut(rod(10, 0, 2), rod(5.25, -1, 3)), T)
+    assert Thresholds().verdict(found) is Verdict.CLEAR

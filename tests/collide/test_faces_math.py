@@ -13,6 +13,7 @@ import trimesh
 
 from clamp3d.brep import surfaces
 from clamp3d.collide import faces_bounds, faces_math, faces_witness
+from clamp3d.collide.depth_cover import nearest_behind
 from clamp3d.collide.faces_math import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS
 from clamp3d.core import jit
 from tests.hulls import apart
@@ -200,17 +201,20 @@ def test_the_halves_of_a_piece_are_the_piece(kind):
 
 @pytest.mark.parametrize("one", KINDS)
 @pytest.mark.parametrize("other", KINDS)
-def test_the_angle_between_two_surfaces(one, other):
+def test_the_angle_between_two_surfaces_and_the_way_out_of_both(one, other):
     rng = np.random.default_rng(6)
     kind, size = np.array([one, other]), np.array([SIZES[one], SIZES[other]])
     for _ in range(3):
         F, x = np.array([frame(rng), frame(rng)]), 3.0 * rng.normal(size=3)
         cosine = normal(one, size[0], F[0], x) @ normal(other, size[1], F[1], x)
-        between, sense = np.empty(3), rng.choice([-1.0, 1.0], 2)
-        found = faces_bounds._slopes(kind, size, F.reshape(2, 12), sense, 0, 1, *x, between)
-        assert found == pytest.approx(sense.prod() * cosine, abs=1e-5)
-        both = sense[0] * normal(one, size[0], F[0], x) + sense[1] * normal(other, size[1], F[1], x)
-        assert between == pytest.approx(both / np.linalg.norm(both), abs=1e-4)
+        way, sense, heights = np.empty(3), rng.choice([-1.0, 1.0], 2), rng.uniform(-1.0, 0.2, 2)
+        faces = kind, size, F.reshape(2, 12), sense, 0, 1, *x
+        turn = faces_bounds._turn(*faces)
+        assert turn == pytest.approx(sense.prod() * cosine, abs=1e-5)
+        length = faces_bounds._way_above_both(*heights, turn, *faces, way)
+        n = [sense[0] * normal(one, size[0], F[0], x), sense[1] * normal(other, size[1], F[1], x)]
+        planes = np.column_stack([n, -heights])
+        assert length * way == pytest.approx(nearest_behind(planes, np.zeros(3)), abs=1e-3 / (1.0 - turn * turn))
 
 
 def test_how_often_triangles_wind_round_a_point():
