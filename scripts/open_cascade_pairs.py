@@ -25,9 +25,7 @@ solids, explorer = [], TopExp_Explorer(reader.OneShape(), TopAbs_ShapeEnum.TopAb
 while explorer.More():
     solids.append(explorer.Current())
     explorer.Next()
-reading = sum(os.times()[:2])
 for i, j in json.loads(sys.argv[2]):
     if BRepExtrema_DistShapeShape(solids[i], solids[j]).Value() <= 1e-7:
         BRepGProp.VolumeProperties_s(BRepAlgoAPI_Common(solids[i], solids[j]).Shape(), GProp_GProps())
-print(reading, flush=True)
 os._exit(0)  # to take it all down costs time and serves nobody

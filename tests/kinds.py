@@ -58,7 +58,7 @@ def faceted_shape(solid: shapes.Solid, error: float, fit: shapes.Fit = "off") ->
     return shapes.MeshShape(make_mesh(made.vertices, made.faces), fit, solid.name)
 
 
-def _pose(axis: tuple[float, ...], angle: float, at: tuple[float, ...]) -> np.ndarray:
+def pose(axis: tuple[float, ...], angle: float, at: tuple[float, ...]) -> np.ndarray:
     T = rotation(axis, angle)
     T[:3, 3] = at
     return T
@@ -68,4 +68,4 @@ def poses(reach: float) -> st.SearchStrategy:
     """Rigid poses (4, 4) with offsets up to ``reach`` mm along each axis; upright ones are as likely as any."""
     angle = st.one_of(st.floats(0.0, 2.0 * math.pi), st.sampled_from([0.0, 1e-3, math.pi / 2, math.pi]))
     axis = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
-    return st.builds(_pose, axis, angle, st.tuples(*[st.floats(-reach, reach)] * 3))
+    return st.builds(pose, axis, angle, st.tuples(*[st.floats(-reach, reach)] * 3))

@@ -16,9 +16,9 @@ from clamp3d.errors import InputError
 
 MOST_ENTITIES = 20_000_000
 _NOISE = re.compile(r"'(?:[^']|'')*'|/\*.*?\*/", re.DOTALL)
-_HEADER = re.compile(r"(?<!\w)HEADER\s*;.*?FILE_SCHEMA\s*\(.*?ENDSEC\s*;", re.DOTALL)
-_DATA = re.compile(r"(?<!\w)DATA\s*(?:\([^;]*\)\s*)?;")
 _END = re.compile(r"ENDSEC\s*;")
+_HEADER = (re.compile(r"(?<!\w)HEADER\s*;"), re.compile(r"FILE_SCHEMA\s*\("), _END)
+_DATA = re.compile(r"(?<!\w)DATA\s*(?:\((?:[^;()]|\([^;()]*\))*\)\s*)?;")
 _RECORD = re.compile(r"\s*#\s*(\d+)\s*=\s*(.*)", re.DOTALL)
 _NAMES = re.compile(r"(?<![\w.])([A-Z][A-Z0-9_]*)\s*\(")
 _REFERRED = re.compile(r"#\s*(\d+)(?!\d|\s*=)")
@@ -71,15 +71,18 @@ def announced(path: Path) -> Announced:
         raise _damaged(path, "a text in it does not end")
     if not re.search(r"END-ISO-10303-21\s*;", text):
         raise _damaged(path, "its end is missing")
-    if not _HEADER.search(text):
-        raise _damaged(path, "its header is not whole")
+    at = 0
+    for mark in _HEADER:
+        if (found := mark.search(text, at)) is None:
+            raise _damaged(path, "its header is not whole")
+        at = found.end()
     sections = list(_sections(text))
     if not sections:
         raise _damaged(path, "it has no DATA section that ends")
     every: list[str] = []
     solids = 0
     kinds: dict[int, str] = {}
-    referred = {int(number) for section in sections for number in _REFERRED.findall(section)}
+    referred = {_number(path, number) for section in sections for number in _REFERRED.findall(section)}
     lacking = any(_lacks(section) for section in sections)
     for record in (record for section in sections for record in section.split(";") if record.strip()):
         number, content = _entity(path, record, lacking)
@@ -124,12 +127,19 @@ def _entity(path: Path, record: str, lacking: bool) -> tuple[int, str]:
     found = _RECORD.match(record)
     if found is None:
         raise _damaged(path, f"no entity at {' '.join(record.split())[:60]!r}")
-    number, content = int(found[1]), found[2].rstrip()
+    number, content = _number(path, found[1]), found[2].rstrip()
     if not content.endswith(")") or content.count("(") != content.count(")") or "=" in content:
         raise _damaged(path, f"#{number} does not end")
     if lacking and _LACKING.search(content):
         raise _damaged(path, f"#{number} lacks a value")
     return number, content
+
+
+def _number(path: Path, digits: str) -> int:
+    try:
+        return int(digits)
+    except ValueError:  # Python reads 4300 digits
+        raise _damaged(path, f"#{digits[:20]}... has {len(digits)} digits") from None
 
 
 def _damaged(path: Path, what: str) -> InputError:

@@ -59,7 +59,9 @@ class Distance:
 
     @property
     def uncertainty(self) -> float:
-        """How far ``value`` can be off, mm."""
+        """How far ``value`` can be off, mm; infinite where a bound is."""
+        if math.isinf(self.lower) or math.isinf(self.upper):
+            return math.inf
         return max(self.upper - self.value, self.value - self.lower)
 
     @property
@@ -139,10 +141,18 @@ class Distance:
             "method": self.method,
         }
 
+    @property
+    def text(self) -> str:
+        """The value and how far it can be off; the inequality where only one bound is known."""
+        if math.isfinite(self.uncertainty):
+            return f"{self.value:.12g} mm, uncertainty {self.uncertainty:.1e}"
+        said = "" if self.estimate is None else f"{self.estimate:.12g} mm by the model, "
+        if math.isfinite(self.upper):
+            return f"{said}at most {self.upper:.12g} mm"
+        return f"{said}at least {self.lower:.12g} mm" if math.isfinite(self.lower) else f"{said}no bounds known"
+
     def __repr__(self) -> str:
-        if math.isinf(self.lower):
-            return f"Distance(at most {self.upper:.12g} mm, {self.method!r})"
-        return f"Distance({self.value:.12g} mm, uncertainty {self.uncertainty:.1e}, {self.method!r})"
+        return f"Distance({self.text}, {self.method!r})"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -222,9 +222,12 @@ def _with_witnesses(known: Distance, a: ClosedForm, b: ClosedForm, T: Array) -> 
     shifts = none if a.surface is not None or b.surface is not None else np.vstack([none, *lines])
     trials = np.vstack([x + shifts for x in (p, q, 0.5 * (p + q))])
     found = _deepest_common(known, a, b, T, trials)
-    if found.upper <= known.upper + MEMBER and found.point_a is not None and known.normal is not None:
-        return replace(found, point_a=p, point_b=q) if np.abs(found.point_a - p).max() == 0.0 else found
-    return found
+    kept = found.point_a is not None and np.array_equal(found.point_a, p)
+    if not kept or known.normal is None or found.upper > known.upper + MEMBER:
+        return found
+    # The piece's point q may be where a groove or a hole has taken the body away.
+    on_b = b.depth(to_source(T, q[None]))[0] >= -MEMBER * (1.0 + float(np.abs(q).max()))
+    return replace(found, point_a=p, point_b=q) if on_b else found
 
 
 def _deepest_common(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, trials: Array) -> Distance:

@@ -366,8 +366,8 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
     """Lower bound for the pieces ``rows`` of face g, all at once, ``known`` if there is no better one.
 
     As for one piece, with a ball round the middle of their box, whole[2, 0], that must hold them all. Where the solid
-    in the ball is below each of several surfaces, a point is as far from it as the highest of its heights over them says;
-    so the least of the highest, over all points, is a bound. Returns also how low one of their points is.
+    in the ball is below each of several surfaces, a point is as far from it as the highest of its heights over them
+    says; so the least of the highest, over all points, is a bound. Returns also how low one of their points is.
     """
     akind, asize, _, adeviation = own
     nearest_ones, chosen, raised, raised_size, stack, whole = scratch

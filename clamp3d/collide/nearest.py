@@ -28,7 +28,8 @@ def segment_pairs(a: Array, b: Array) -> Found:
     uu, vv = np.maximum((u * u).sum(-1), 1e-300), np.maximum((v * v).sum(-1), 1e-300)
     uv, ur, vr = (u * v).sum(-1), (u * r).sum(-1), (v * r).sum(-1)
     square = uu * vv - uv * uv
-    inner = np.clip((uv * vr - ur * vv) / np.maximum(square, 1e-300), 0.0, 1.0)
+    with np.errstate(over="ignore"):  # long segments that are parallel but for rounding: any point, then the ends
+        inner = np.clip((uv * vr - ur * vv) / np.maximum(square, 1e-300), 0.0, 1.0)
     # The ends too: of nearly parallel lines the inner point is known to few digits.
     start = np.stack([inner, np.zeros_like(inner), np.ones_like(inner)])
     t = np.clip((uv * start + vr) / vv, 0.0, 1.0)

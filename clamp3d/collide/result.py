@@ -185,10 +185,10 @@ class CheckResult:
     def _repr_html_(self) -> str:
         from html import escape
 
-        head = "".join(f"<th>{name}</th>" for name in ("pair", "motion", "verdict", "distance mm", "by"))
+        head = "".join(f"<th>{name}</th>" for name in ("pair", "motion", "verdict", "distance", "by"))
         body = "".join(
             f"<tr><td>{escape(row.a)} - {escape(row.b)}</td><td>{escape(row.motion or '')}</td>"
-            f"<td>{row.verdict.value}</td><td>{row.distance.value:.6g}</td><td>{escape(row.distance.method)}</td></tr>"
+            f"<td>{row.verdict.value}</td><td>{row.distance.text}</td><td>{escape(row.distance.method)}</td></tr>"
             for row in self.findings[:_HTML_ROWS]
         )
         more = len(self.findings) - _HTML_ROWS

@@ -62,11 +62,12 @@ def on_line(r, l, kx, ky, kz, ux, uz, dx, dy, dz, lo, hi, limit):  # type: ignor
         if rim == 0 and not (ga <= ea and gb >= eb):
             continue
         p, q = a, b
+        tried = False
         s = 0.5 * (a + b)
         if rim == 1 and along != 0.0:  # just beyond the end, where it begins to pull against the side
             near = (side * l * (1.0 + 1e-6) - t0) / along
             s = near if min(a, b) < near < max(a, b) else s
-        for k in range(60):
+        for _ in range(60):
             x = kx + s * ux
             z = kz + s * uz
             t = x * dx + ky * dy + z * dz
@@ -96,11 +97,10 @@ def on_line(r, l, kx, ky, kz, ux, uz, dx, dy, dz, lo, hi, limit):  # type: ignor
             if abs(step) <= 1e-16 * (abs(s) + math.sqrt(k2)):
                 break
             new = s - step
-            if k == 0 and rim == 1 and not min(a, b) < new < max(a, b):  # at an end of the line, often
-                new = a if rising else b
-                p, q = a, b
-            elif not min(p, q) < new < max(p, q):
-                new = 0.5 * (p + q)
+            if not min(p, q) < new < max(p, q):
+                # At an end of the line, often: it is tried, once.
+                new = (p if rising else q) if rim == 1 and not tried else 0.5 * (p + q)
+                tried = True
             if new == s:
                 break
             s = new

@@ -144,7 +144,9 @@ def test_a_line_less_is_never_a_body_less(tmp_path):
         ("DIRECTION('',", "DIRECTION(('',", "does not end"),
         ("DIRECTION('',", "DIRECTION(#999999,", "#999999 is referred to and not there"),
         ("DIRECTION('',", "DIRECTION 7 = ('',", "does not end"),
+        ("DIRECTION('',", f"DIRECTION(#{'1' * 5000},", "#1+[.]{3} has 5000 digits"),
         ("\n#12 ", "\n#11 ", "#11 is defined twice"),
+        ("\nDATA;", "\nDATA ('of one part', ('AP214'));", None),
         ("\nENDSEC;\nEND-", "\nEND-", "no DATA section that ends"),
     ],
 )
@@ -158,6 +160,18 @@ def test_a_text_that_is_not_whole_is_told(tmp_path, text, instead, told):
     else:
         with pytest.raises(InputError, match=told):
             announced(file)
+
+
+@pytest.mark.parametrize(
+    ("before", "again", "told"),
+    [("", "HEADER;", "its header is not whole"), ("HEADER;FILE_SCHEMA(('x'));ENDSEC;", "DATA(", "no DATA section")],
+)
+def test_a_text_that_begins_again_and_again_is_read_once(tmp_path, before, again, told):
+    """To look from each beginning to the end of the text takes an hour."""
+    file = tmp_path / "endless.step"
+    file.write_text(f"ISO-10303-21;{before}{400_000 * again}END-ISO-10303-21;")
+    with pytest.raises(InputError, match=told):
+        announced(file)
 
 
 FORKED = """

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, example, given, settings
 from hypothesis import strategies as st
 
 from clamp3d import baselines, distance, shapes
@@ -22,7 +22,7 @@ from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.testing import assert_distance, body
-from tests.kinds import BLOCK, DRAWN, faceted_shape, poses
+from tests.kinds import BLOCK, DRAWN, faceted_shape, pose, poses
 
 SLOW = settings(
     deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate], suppress_health_check=[HealthCheck.too_slow]
@@ -49,6 +49,8 @@ def test_a_bare_groove_and_a_cylinder(groove, wire, T):
 
 @settings(SLOW, max_examples=8)
 @given(SOME, SOME, poses(22.0))
+# A corner of the block is deepest in the hull of the other, and what it is nearest to is where that has a groove.
+@example(DRAWN[1], DRAWN[2], pose((-0.06, -1.0, 0.0), 3.718, (-2.0825, -14.016, -17.5304)))
 def test_every_level_on_the_way_to_an_answer(a, b, T):
     seen: list[Distance] = []
     cache = ModelCache()

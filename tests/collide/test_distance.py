@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,12 +9,13 @@ from hypothesis import strategies as st
 from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.parts import parts
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.batch import by_kernel, exact
 from clamp3d.collide.check import check
 from clamp3d.collide.distance import distance, distances, measure
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.motions import first_contact, min_clearance
-from clamp3d.collide.result import CheckResult
+from clamp3d.collide.result import CheckResult, PairResult
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
@@ -263,3 +265,24 @@ def test_many_poses_of_flat_ends_in_a_hole_are_measured_at_once():
         assert found.upper[k] >= truth.lower - 1e-9
         if settled[k]:
             assert distance(plate, disc, T[k], cache=cache).value == pytest.approx(known.value[k], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "estimate", "said"),
+    [
+        (9.99, math.inf, None, "at least 9.99 mm"),
+        (-3.0, math.inf, None, "at least -3 mm"),
+        (-math.inf, -2.0, None, "at most -2 mm"),
+        (-math.inf, math.inf, None, "no bounds known"),
+        (-math.inf, math.inf, 0.5, "0.5 mm by the model, no bounds known"),
+        (0.25, 0.5, None, "0.5 mm, uncertainty 2.5e-01"),
+    ],
+)
+def test_what_is_known_from_one_side_alone_is_said_as_an_inequality(lower, upper, estimate, said):
+    found = Distance(lower, upper, estimate=estimate, method="boxes")
+    assert repr(found) == f"Distance({said}, 'boxes')"
+    assert found.uncertainty == (0.25 if lower == 0.25 else math.inf)
+    assert f"distance={found!r}" in repr(PairResult("a", "b", Verdict.CLEARANCE, found))
+    scene = Scene().add("a", shapes.cylinder(1.0, 2.0)).add("b", shapes.cylinder(1.0, 2.0))
+    result = replace(check(scene), pairs=(PairResult("a", "b", Verdict.CLEARANCE, found),))
+    assert f"<td>{said}</td>" in result._repr_html_()

@@ -61,6 +61,19 @@ def test_nearest_points_of_segments_and_faces():
         assert np.linalg.norm(points - p, axis=1).min() == 0.0
 
 
+def test_long_segments_that_are_parallel_but_for_rounding():
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        along, turn, aside = rng.normal(size=(3, 3))
+        a = 3e4 * np.array([[-along, along]])
+        b = 3e4 * np.array([[-along - 1e-9 * turn, along + 1e-9 * turn]]) + 1e5 * aside
+        square = 1e10 * (aside @ aside - (aside @ along) ** 2 / (along @ along))
+        d, p, q = segment_pairs(a, b)
+        assert d == pytest.approx(np.linalg.norm(p - q))
+        if abs(1e5 * aside @ along) < 5e4 * (along @ along):
+            assert d == pytest.approx(math.sqrt(square), abs=1e-3)
+
+
 def test_the_point_of_a_rim_nearest_to_a_body():
     rng = np.random.default_rng(1)
     turn = np.linspace(0.0, 2.0 * math.pi, 20_001)

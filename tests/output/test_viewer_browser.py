@@ -15,7 +15,12 @@ import pytest
 
 from clamp3d.clamp.assemble import assemble
 from clamp3d.collide.check import check
+from clamp3d.core import shapes
+from clamp3d.core.mesh import make_mesh
+from clamp3d.core.meshing import mesh
 from clamp3d.core.pose import translation
+from clamp3d.fit.fit import fit_mesh
+from clamp3d.output.fit_report import fit_to_html
 from clamp3d.output.palette import PART_COLOURS
 from clamp3d.output.scene_report import check_to_html
 from clamp3d.output.viewer import Viewer, view
@@ -369,6 +374,24 @@ def test_page_in_dark_mode_is_dark_and_readable(browser, hinge):
     assert image[-5, 5].max() < 70  # the panel
     for selector in ("h1", "#headline", ".finding b", ".small", "td", "h2"):
         assert contrast(page, selector) > 4.5, selector  # WCAG 2.2, level AA
+    page.context.close()
+
+
+@pytest.mark.parametrize(("scheme", "dark"), [("dark", True), ("light", False)])
+def test_page_of_a_fit_follows_the_scheme(browser, tmp_path, scheme, dark):
+    path = tmp_path / "fit.html"
+    tube = mesh(shapes.cylinder(5.0, 20.0))
+    path.write_text(fit_to_html(fit_mesh(make_mesh(tube.vertices, tube.faces))), encoding="utf-8")
+    page = open_page(browser, path.as_uri(), offline=True, color_scheme=scheme)
+    page.wait_for_timeout(300)
+    image = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
+    corner = page.locator("#view").bounding_box()
+    for x, y in ((5, 5), (int(corner["x"]) + 5, int(corner["y"]) + 5)):  # the page, and behind the part
+        assert (image[y, x].max() < 70) == dark
+        assert (image[y, x].min() > 200) == (not dark)
+    for selector in ("h1", "p", "td", "th", "dd", ".pm"):
+        assert contrast(page, selector) > 4.5, selector
+    assert page.problems == []
     page.context.close()
 
 

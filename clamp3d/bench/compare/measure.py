@@ -95,7 +95,7 @@ def measure(
     if not np.allclose(ready.many(timed), values[half], rtol=0.0, atol=1e-12 + 0.5 * error.max()):
         raise AssertionError(f"{method.label}: one and many differ")
     grown = resident()  # before the batch, whose poses and answers are the caller's
-    times = min(MANY, max(len(timed), int(budget / one))) // len(timed) if ready.batched else 1
+    times = min(MANY, max(len(timed), int(budget / max(one, 1e-9)))) // len(timed) if ready.batched else 1
     batch = np.tile(timed, (times, 1, 1))
     many = repeated(lambda: ready.many(batch), budget) / len(batch)
     run = ready.threaded
