@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from clamp3d.brep.borders import spline_sags
 from clamp3d.brep.grid import divisions, gridded
 from clamp3d.brep.surfaces import OTHER, PLANE, Size
-from clamp3d.core.linear import norm
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Array, IntArray
 from clamp3d.core.triangles import distinct
 
@@ -26,7 +26,7 @@ def facets(
     In rows, where its border allows it; of a free-form face only what is extruded.
     """
     from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
+    from OCP.GeomAbs import GeomAbs_SurfaceType
 
     surface, made = BRepAdaptor_Surface(face), None
     uv = np.zeros((0, 2)) if kind == PLANE else np.array([found.UVNode(i).Coord() for i in range(1, len(P) + 1)])
@@ -50,11 +50,36 @@ def facets(
         own = np.where(_spread(_without_poles(uv, F, poles), turns), norm(np.ptp(P, axis=0)), 0.0)
     if kind != OTHER:
         return F, P, own
-    off = None
-    if regular and surface.BasisCurve().GetType() == GeomAbs_CurveType.GeomAbs_BSplineCurve:
-        u = uv[F, 0]
-        off = spline_sags(surface.BasisCurve().BSpline(), u.min(axis=1), u.max(axis=1))
-    return F, P, np.maximum(own, _sampled(surface, F, _without_poles(uv, F, poles), P) if off is None else off)
+    corners = _without_poles(uv, F, poles)
+    off = _swept(surface, corners, P[F])
+    return F, P, np.maximum(own, _sampled(surface, F, corners, P) if off is None else off)
+
+
+def _swept(surface: Any, uv: Array, corners: Array) -> Array | None:
+    """How far triangles (m, 3, 3) with parameters ``uv`` (m, 3, 2) can be from an extruded or turned plain spline.
+
+    A mean of points on a turned curve has the mean of their heights along the axis, and is as far from the axis as the
+    mean of their distances from it, less the sagitta of an arc of that radius over the angle between them, at most.
+    None for other surfaces.
+    """
+    from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
+
+    turned = surface.GetType() == GeomAbs_SurfaceType.GeomAbs_SurfaceOfRevolution
+    if not turned and surface.GetType() != GeomAbs_SurfaceType.GeomAbs_SurfaceOfExtrusion:
+        return None
+    curve = surface.BasisCurve()
+    if curve.GetType() != GeomAbs_CurveType.GeomAbs_BSplineCurve:
+        return None
+    along = uv[:, :, int(turned)]
+    off = spline_sags(curve.BSpline(), along.min(axis=1), along.max(axis=1))
+    if off is None or not turned:
+        return off
+    axis = surface.AxeOfRevolution()
+    z = np.array(axis.Direction().Coord())
+    away = corners - np.array(axis.Location().Coord())
+    radius = np.linalg.norm(away - dot(away, z)[:, :, None] * z, axis=2).max(axis=1)
+    span = np.ptp(uv[:, :, 0], axis=1)
+    return np.asarray(off + radius * np.where(span < np.pi, 1.0 - np.cos(0.5 * span), 2.0))
 
 
 def _without_poles(uv: Array, F: IntArray, poles: list[IntArray]) -> Array:

@@ -1,8 +1,8 @@
 """Triangles of an Open CASCADE solid, each with a bound of its distance from the face that it stands for.
 
 Open CASCADE takes a deflection as a wish. What the triangles really keep is computed afterwards from their parameters:
-on planes, cylinders, cones, spheres and tori (and free-form surfaces that are one of these) in closed form, on extruded
-splines from their control points, on others from samples, doubled.
+on planes, cylinders, cones, spheres and tori (and free-form surfaces that are one of these) in closed form, on splines
+extruded or turned from their control points, on others from samples, doubled.
 """
 
 from __future__ import annotations
