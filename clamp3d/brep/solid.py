@@ -17,8 +17,8 @@ from clamp3d.core.mesh import Array, IntArray, Mesh, is_closed
 from clamp3d.core.shapes import MeshShape
 from clamp3d.errors import InputError, MissingLibraryError
 
-CHORD = 0.1
-"""Chord error (mm) of the triangles that a solid comes with; what is measured on known surfaces needs no finer ones."""
+CHORD = 0.02
+"""Chord error (mm) of the triangles that a solid comes with."""
 
 
 @dataclass(frozen=True, eq=False)

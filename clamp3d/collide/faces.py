@@ -221,6 +221,8 @@ def faces_distance(
         return _told(replace(first.swapped(), lower=-np.inf))
     margin = max(contact, clearance)
     if first.lower > margin and not _may_hold(a, b, here):
+        if tol is not None and first.upper - first.lower > tol and few < most:
+            first = _towards(a, b, T, contact, clearance, tol, most)
         return _told(first.swapped())
     if tol is None or first.upper - first.lower <= tol:
         second = _towards(b, a, here, contact, clearance, tol, most, (first.lower, first.upper))

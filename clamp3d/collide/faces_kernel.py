@@ -154,11 +154,11 @@ def _descend(
         cut(
             pieces[i], uvs[i], side, akind[g], asize[g, 0], asize[g, 1], aframe[g], pieces[n], uvs[n]
         )  # fmt: skip
-        # The piece keeps the half at corner ``side``; the cut itself is no border.
+        # The piece keeps the half at corner ``side``. The cut is no border, but where it begins on one it is off by its sag.
         for c in range(3):
             sags[n, c] = sags[i, c]
-        sags[n, (side + 2) % 3] = 0.0
-        sags[i, (side + 1) % 3] = 0.0
+        sags[n, (side + 2) % 3] = sags[i, side]
+        sags[i, (side + 1) % 3] = sags[i, side]
         for k in (i, n):
             new = piece(pieces[k], uvs[k], g, sags[k], own, solid, limits, scratch, out)
             bounds[k] = max(low, new)

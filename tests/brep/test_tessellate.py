@@ -19,9 +19,9 @@ from clamp3d.brep.tessellate import FREE, explore, tessellate
 
 
 def test_known_surfaces_take_few_triangles():
-    seal = tessellate(solid_of(ring(150, 5)), CHORD)
+    seal = tessellate(solid_of(ring(150, 5)), 0.1)
     assert len(seal.faces) < 20_000  # 62 000 for a chord of 0.02 mm
-    assert seal.errors.max() <= 2.0 * CHORD
+    assert seal.errors.max() <= 0.2
 
 
 def test_free_form_faces_are_within_their_own_chord():
