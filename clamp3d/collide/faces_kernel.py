@@ -154,7 +154,8 @@ def _descend(
         cut(
             pieces[i], uvs[i], side, akind[g], asize[g, 0], asize[g, 1], aframe[g], pieces[n], uvs[n]
         )  # fmt: skip
-        # The piece keeps the half at corner ``side``. The cut is no border, but where it begins on one it is off by its sag.
+        # The piece keeps the half at corner ``side``. The cut is no border, but one that begins on a border is off
+        # by its sag there.
         for c in range(3):
             sags[n, c] = sags[i, c]
         sags[n, (side + 2) % 3] = sags[i, side]
