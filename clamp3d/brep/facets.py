@@ -41,16 +41,19 @@ def facets(
         uv = np.concatenate([uv, new])
         P = np.concatenate([P, np.reshape([surface.Value(u, v).Coord() for u, v in new.tolist()], (-1, 3))])
     own = np.zeros(len(F))
-    if kind != PLANE and made is None and (surface.IsUClosed() or surface.IsVClosed()):
+    closed = kind != PLANE and made is None and (surface.IsUClosed() or surface.IsVClosed())
+    if not closed and kind != OTHER:
+        return F, P, own
+    corners = _without_poles(uv, F, poles)
+    if closed:
         turns = np.array([
             surface.LastUParameter() - surface.FirstUParameter() if surface.IsUClosed() else np.inf,
             surface.LastVParameter() - surface.FirstVParameter() if surface.IsVClosed() else np.inf,
         ])  # fmt: skip
         # Two nodes a whole turn apart are at one place: a triangle of theirs can stand for all round it.
-        own = np.where(_spread(_without_poles(uv, F, poles), turns), norm(np.ptp(P, axis=0)), 0.0)
+        own = np.where(_spread(corners, turns), norm(np.ptp(P, axis=0)), 0.0)
     if kind != OTHER:
         return F, P, own
-    corners = _without_poles(uv, F, poles)
     off = _swept(surface, corners, P[F])
     return F, P, np.maximum(own, _sampled(surface, F, corners, P) if off is None else off)
 

@@ -80,7 +80,7 @@ def is_open(solid, f, t, other, least, reach, x, y, z, q, stack):
         for m in range(link[i, 0], link[i, 0] + link[i, 1]):
             j = order[m]
             # A way from the trimmed face to more than t above it is so long at most.
-            room = t + sag[j] + 2.0 * deviation[f]
+            way = t + sag[j] + 2.0 * deviation[f]
             _, v, w = point_triangle(x, y, z, P[j])
             length = 0.0
             for k in range(3):
@@ -90,17 +90,17 @@ def is_open(solid, f, t, other, least, reach, x, y, z, q, stack):
             step, share = 0.0, 0.0
             while share < 1.0:
                 share = min(1.0, step / length) if length > 0.0 else 1.0
-                step = max(2.0 * room, 4.0 * step)
+                step = max(2.0 * way, 4.0 * step)
                 v1, w1 = v + share * (1.0 / 3.0 - v), w + share * (1.0 / 3.0 - w)
                 weighted(kind[f], size[f, 0], size[f, 1], frame[f], P[j], uv[j], v1, w1, q)
-                if math.sqrt((x - q[0]) ** 2 + (y - q[1]) ** 2 + (z - q[2]) ** 2) + room > reach:
+                if math.sqrt((x - q[0]) ** 2 + (y - q[1]) ** 2 + (z - q[2]) ** 2) + way > reach:
                     break
                 if other >= 0:
                     h = height_at(kind[other], size[other, 0], size[other, 1], frame[other], q[0], q[1], q[2])
-                    if sense[other] * h <= least + room:
+                    if sense[other] * h <= least + way:
                         continue
                 if not _beside(
-                    *tree, kind, size, frame, sense, deviation, group, f, q[0], q[1], q[2], room, stack[half:]
+                    *tree, kind, size, frame, sense, deviation, group, f, q[0], q[1], q[2], way, stack[half:]
                 ):  # fmt: skip
                     return True
                 tried += 1
