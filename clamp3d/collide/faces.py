@@ -303,7 +303,8 @@ def _search(
     ``surfaces``: kind, size, frame, deviation. At most ``most`` pieces are added. ``known``: bounds that the search the
     other way has found; what is above the first, and no point below the second, is not looked for.
     """
-    from clamp3d.collide.faces_bounds import TRIED, WORK
+    from clamp3d.collide.faces_block import WORK
+    from clamp3d.collide.faces_bounds import TRIED
     from clamp3d.collide.faces_kernel import RESULT, SPACE, descend
 
     n, nodes, out = len(pieces[0]), len(tree[0]), np.zeros(RESULT)

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from clamp3d.collide.faces_bounds import NEAR, TRIED, WORK, block, piece
+from clamp3d.collide.faces_block import WORK, block
+from clamp3d.collide.faces_bounds import NEAR, TRIED, piece
 from clamp3d.collide.faces_math import bend, cut, longest, spans
 from clamp3d.collide.faces_tree import DEEP, nearest
 from clamp3d.collide.verdict import RESOLUTION

@@ -19,7 +19,7 @@ from test_faces_math import GRID
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import points_at
 from clamp3d.brep.tessellate import explore
-from clamp3d.collide import faces_bounds, faces_tree
+from clamp3d.collide import faces_block, faces_bounds, faces_tree
 from clamp3d.collide.faces import FaceModel
 from clamp3d.core import jit
 
@@ -84,7 +84,7 @@ def test_no_point_of_a_face_is_nearer_or_deeper_than_its_bound(k):
     frames, n, near = np.ascontiguousarray(b.frame.reshape(-1, 12)), len(a.faces.kind), np.empty(4, dtype=np.int64)
     own, stack = (b.kind, b.size, frames, b.deviation), np.empty(faces_tree.DEEP, dtype=np.int64)
     chosen, over = np.empty(faces_bounds.TRIED, dtype=np.int64), np.empty(faces_bounds.TRIED)
-    whole = np.zeros((faces_bounds.WORK, 3, 3))
+    whole = np.zeros((faces_block.WORK, 3, 3))
     place, scratch = whole[-3:], (near, chosen, over, np.empty(n), stack, whole)
     placed_faces, tight = list(explore(solid_of(moved(other, T)), "FACE")), 0
     for g in range(len(b.kind)):
@@ -94,7 +94,7 @@ def test_no_point_of_a_face_is_nearer_or_deeper_than_its_bound(k):
         faces_tree.nearest(*a.arrays[:6], *middle, np.inf, near, stack)
         limits = a.slack, 0.01, np.inf, 1e-5
         asked = b.corners, b.uv, b.sag, g, own, a.arrays, limits, rows, -np.inf, np.inf, scratch, place
-        bound, low = faces_bounds.block(*asked)
+        bound, low = faces_block.block(*asked)
         inner = rows[(b.sag[rows] == 0.0).all(axis=1)]
         uv = [b.uv[rows].reshape(-1, 2), *(GRID[::29] @ b.uv[i] for i in inner)]
         points = points_at(int(b.kind[g]), b.frame[g], tuple(b.size[g]), np.concatenate(uv))

@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from clamp3d.brep import surfaces
-from clamp3d.collide import faces_bounds, faces_math, faces_witness
+from clamp3d.collide import faces_ball, faces_math, faces_witness
 from clamp3d.collide.depth_cover import nearest_behind
 from clamp3d.collide.faces_math import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS
 from clamp3d.core import jit
@@ -209,9 +209,9 @@ def test_the_angle_between_two_surfaces_and_the_way_out_of_both(one, other):
         cosine = normal(one, size[0], F[0], x) @ normal(other, size[1], F[1], x)
         way, sense, heights = np.empty(3), rng.choice([-1.0, 1.0], 2), rng.uniform(-1.0, 0.2, 2)
         faces = kind, size, F.reshape(2, 12), sense, 0, 1, *x
-        turn = faces_bounds._turn(*faces)
+        turn = faces_ball.cosine(*faces)
         assert turn == pytest.approx(sense.prod() * cosine, abs=1e-5)
-        length = faces_bounds._way_above_both(*heights, turn, *faces, way)
+        length = faces_ball.way_above_both(*heights, turn, *faces, way)
         n = [sense[0] * normal(one, size[0], F[0], x), sense[1] * normal(other, size[1], F[1], x)]
         planes = np.column_stack([n, -heights])
         assert length * way == pytest.approx(nearest_behind(planes, np.zeros(3)), abs=1e-3 / (1.0 - turn * turn))
