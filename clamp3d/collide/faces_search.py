@@ -1,0 +1,100 @@
+"""Search for the least signed distance from one solid that a point of another's faces has; it can be taken up again."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.collide.answer import Distance
+from clamp3d.core.linear import dot
+from clamp3d.core.pose import Array
+
+if TYPE_CHECKING:
+    from clamp3d.collide.faces import FaceModel
+
+VERDICT_WIDTH = 0.01
+"""Width of the bounds, by the contact threshold, at which a search for the verdict alone ends without one."""
+
+
+class Descent:
+    """The compiled branch and bound for one solid's pieces, with all that waits in it.
+
+    ``pieces``: corners, parameters, faces, sags of borders, in a's frame; ``tree`` over them, in their own frame, which
+    is placed by ``T`` (4, 4); ``surfaces``: kind, size, frame, deviation. ``wanted``: contact and clearance threshold,
+    and the width of the bounds at which it ends, minus that to end where the verdict is certain.
+    """
+
+    def __init__(
+        self,
+        a: FaceModel,
+        pieces: tuple[NDArray[Any], ...],
+        tree: tuple[NDArray[Any], ...],
+        T: Array,
+        surfaces: tuple[NDArray[Any], ...],
+        wanted: tuple[float, float, float],
+        most: int,
+    ) -> None:
+        from clamp3d.collide.faces_block import WORK
+        from clamp3d.collide.faces_bounds import TRIED
+        from clamp3d.collide.faces_kernel import RESULT, SPACE
+
+        n, nodes, self.out = len(pieces[0]), len(tree[0]), np.zeros(RESULT)
+        rows = [np.empty((n + most, *given.shape[1:]), dtype=given.dtype) for given in pieces]
+        for row, given in zip(rows, pieces, strict=True):
+            row[:n] = given
+        self.out[0], self._first, self._state = np.inf, n, np.zeros(3, dtype=np.int64)
+        self._given = (*rows, np.empty(n + most + nodes), n, *tree, T, *surfaces, *a.arrays, a.slack, *wanted)
+        self._work = (
+            np.empty(TRIED + len(a.faces.kind)), np.empty((WORK, 3, 3)),
+            np.empty(SPACE + n + most + 2 * nodes, dtype=np.int64), self._state, self.out,
+        )  # fmt: skip
+
+    def go(self, most: int, above: float) -> float:
+        """Lower bound after at most ``most`` pieces in all; what is known to be ``above`` that is not looked at."""
+        from clamp3d.collide.faces_kernel import descend
+
+        return float(descend(*self._given, most, above, *self._work))
+
+    @property
+    def added(self) -> int:
+        """Pieces added so far."""
+        return int(self._state[0]) - self._first
+
+
+class Search:
+    """Least signed distance from ``a`` of b's faces, ``b`` at ``T`` (4, 4) in a's frame.
+
+    It ends when the bounds are on the same side of ``contact`` and ``clearance`` mm, or no further apart than ``tol``,
+    where that is given. At most ``most`` pieces are added in all.
+    """
+
+    def __init__(
+        self, a: FaceModel, b: FaceModel, T: Array, contact: float, clearance: float, tol: float | None, most: int
+    ) -> None:
+        R, t = T[:3, :3], T[:3, 3]
+        frames = dot(b.faces.frame, R.T)
+        frames[:, 0] += t
+        pieces = dot(b.faces.corners, R.T) + t, b.faces.uv, b.faces.face, b.faces.sag
+        surfaces = b.faces.kind, b.faces.size, np.ascontiguousarray(frames.reshape(-1, 12)), b.faces.deviation
+        wanted = contact, clearance, -VERDICT_WIDTH * contact if tol is None else tol
+        self._descent = Descent(a, pieces, b.arrays[3:7], np.ascontiguousarray(T), surfaces, wanted, most)
+        self._upper, self._most, self.done = np.inf, most, False
+        self._points: tuple[Array, Array] | tuple[None, None] = None, None
+
+    def more(self, most: int, least: float = np.inf, upper: float = np.inf) -> Distance:
+        """What is known with at most ``most`` pieces in all; points in a's frame, b's point first.
+
+        What is above ``least``, and points not below ``upper``, both found by a search the other way, are not looked
+        for: without points where none is found below. ``estimate`` is how far at least some point of b is outside of a.
+        """
+        out, most = self._descent.out, min(most, self._most)
+        out[0] = min(out[0], upper)
+        before = out[0]
+        lower = self._descent.go(most, least)
+        if out[0] < before:
+            self._upper, self._points = float(out[0]), (out[1:4].copy(), out[4:7].copy())
+        self.done = self._descent.added < most
+        p, q = self._points if self._upper <= out[0] else (None, None)
+        return Distance(lower, float(out[0]), p, q, level="faces", method="faces", estimate=float(out[8]))
