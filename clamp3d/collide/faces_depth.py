@@ -21,6 +21,8 @@ _SHARE, _LEAST = 0.005, 0.001
 """So much further, by the depth or in mm, whichever is more, b is moved, so that a gap can be seen."""
 _PIECES = 4000
 """Pieces looked at for a depth, and for whether they are apart after a translation."""
+_FEW = 100
+"""Pieces looked at for a depth before a translation is tried."""
 _STEP = 1e-6
 
 
@@ -30,9 +32,22 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
     No translation shorter than the depth of any one point parts them; one after which they are apart is long enough.
     Without such a one ``lower`` stays minus infinity.
     """
-    found = faces_distance(a, b, T, contact=_LEAST, tol=max(_LEAST, -_SHARE * known.upper), most=_PIECES)
-    inside = (max(0.0, -known.upper, -found.upper), max(0.0, -found.lower))
-    known = replace(known if known.upper <= found.upper else found, lower=-np.inf, interference=inside)
+    tol, inside, most = max(_LEAST, -_SHARE * known.upper), (0.0, np.inf), _FEW
+    while True:
+        found = faces_distance(a, b, T, contact=_LEAST, tol=tol, most=most)
+        inside = max(inside[0], -known.upper, -found.upper), min(inside[1], max(0.0, -found.lower))
+        known = replace(known if known.upper <= found.upper else found, lower=-np.inf, interference=inside)
+        parted = _parted(a, b, T, known, found)
+        # The deepest of few points is mostly deep enough: no translation much shorter than this one parts them.
+        last = most == _PIECES or found.upper - found.lower <= tol
+        if last or -parted.lower - inside[0] <= 1.5 * max(_LEAST, _SHARE * inside[0]):
+            return parted
+        most = _PIECES
+
+
+def _parted(a: FaceModel, b: FaceModel, T: Array, known: Distance, found: Distance) -> Distance:
+    """``known`` with a translation after which they are apart, past the point of ``found`` first; as it is without."""
+    inside = known.interference or (0.0, np.inf)
     margin, planes, t, place = max(_LEAST, _SHARE * inside[0]), [], np.zeros(3), T.copy()
     at, deep = found.point_a, -found.upper
     for step in range(_ASKS):
@@ -50,7 +65,8 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
         found = faces_distance(a, b, place, contact=0.01 * margin, most=_PIECES)
         if found.lower > RESOLUTION:  # so also where the pose differs by rounding
             p, q = (None, None) if step or at is None else (at + deep * n, at) if of_b else (at, at - deep * n)
-            return replace(known, lower=-size, normal=t / size, point_a=p, point_b=q)
+            inside = inside[0], min(inside[1], size)  # no point is deeper than a way that parts them is long
+            return replace(known, lower=-size, normal=t / size, point_a=p, point_b=q, interference=inside)
     return known
 
 
