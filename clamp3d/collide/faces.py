@@ -204,17 +204,20 @@ def faces_distance(
     clearance: float = 0.0,
     tol: float | None = None,
     most: int = MOST,
+    brief: bool = False,
 ) -> Distance:
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame.
 
     Stops when the bounds are on the same side of ``contact`` and ``clearance`` mm, or no further apart than
-    ``tol``, where that is given, or after ``most`` pieces in one direction.
+    ``tol``, where that is given, or after ``most`` pieces in one direction; if ``brief`` also where more of them tell
+    next to nothing more.
     """
     here = inverse(T)
     if len(a.faces.face) < len(b.faces.face):  # the pieces of the one with fewer first: they often decide
-        return faces_distance(b, a, here, contact=contact, clearance=clearance, tol=tol, most=most).moved(T).swapped()
-    one = Search(a, b, T, contact, clearance, tol, most)
-    other = Search(b, a, here, contact, clearance, tol, most)
+        turned = faces_distance(b, a, here, contact=contact, clearance=clearance, tol=tol, most=most, brief=brief)
+        return turned.moved(T).swapped()
+    one = Search(a, b, T, contact, clearance, tol, most, brief)
+    other = Search(b, a, here, contact, clearance, tol, most, brief)
     clash, margin, few = -contact - 2.0 * RESOLUTION if tol is None else -np.inf, max(contact, clearance), _FEW
     first = one.more(few)
     if first.upper < clash:

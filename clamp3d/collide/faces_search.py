@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 VERDICT_WIDTH = 0.01
 """Width of the bounds, by the contact threshold, at which a search for the verdict alone ends without one."""
+_LOOK, _GAIN = 200, 0.98
+"""A brief search ends where twice as many pieces, from so many on, leave more than this share of what was not known."""
 
 
 class Descent:
@@ -67,11 +69,20 @@ class Search:
     """Least signed distance from ``a`` of b's faces, ``b`` at ``T`` (4, 4) in a's frame.
 
     It ends when the bounds are on the same side of ``contact`` and ``clearance`` mm, or no further apart than ``tol``,
-    where that is given. At most ``most`` pieces are added in all.
+    where that is given. At most ``most`` pieces are added in all; a ``brief`` search ends before where twice as many
+    tell next to nothing more.
     """
 
     def __init__(
-        self, a: FaceModel, b: FaceModel, T: Array, contact: float, clearance: float, tol: float | None, most: int
+        self,
+        a: FaceModel,
+        b: FaceModel,
+        T: Array,
+        contact: float,
+        clearance: float,
+        tol: float | None,
+        most: int,
+        brief: bool = False,
     ) -> None:
         R, t = T[:3, :3], T[:3, 3]
         frames = dot(b.faces.frame, R.T)
@@ -80,7 +91,8 @@ class Search:
         surfaces = b.faces.kind, b.faces.size, np.ascontiguousarray(frames.reshape(-1, 12)), b.faces.deviation
         wanted = contact, clearance, -VERDICT_WIDTH * contact if tol is None else tol
         self._descent = Descent(a, pieces, b.arrays[3:7], np.ascontiguousarray(T), surfaces, wanted, most)
-        self._upper, self._most, self.done = np.inf, most, False
+        self._upper, self._most, self._brief, self.done = np.inf, most, brief, False
+        self._goal = max(contact, clearance) if tol is None else np.inf
         self._points: tuple[Array, Array] | tuple[None, None] = None, None
 
     def more(self, most: int, least: float = np.inf, upper: float = np.inf) -> Distance:
@@ -92,9 +104,15 @@ class Search:
         out, most = self._descent.out, min(most, self._most)
         out[0] = min(out[0], upper)
         before = out[0]
-        lower = self._descent.go(most, least)
+        part, gap = min(most, _LOOK) if self._brief else most, np.inf
+        while True:
+            lower = self._descent.go(part, least)
+            self.done = self._descent.added < part
+            left = min(out[0], self._goal) - lower
+            if self.done or part == most or left > _GAIN * gap:
+                break
+            part, gap = min(2 * part, most), left
         if out[0] < before:
             self._upper, self._points = float(out[0]), (out[1:4].copy(), out[4:7].copy())
-        self.done = self._descent.added < most
         p, q = self._points if self._upper <= out[0] else (None, None)
         return Distance(lower, float(out[0]), p, q, level="faces", method="faces", estimate=float(out[8]))
