@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import OTHER, PLANE, Faces, height
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.faces_search import Descent, Search
+from clamp3d.collide.faces_search import FEW, Descent, Search
 from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.linear import dot, to_target
 from clamp3d.core.pose import Array, inverse
@@ -21,8 +21,6 @@ MOST = 20_000
 """Pieces looked at before a direction ends with what is known."""
 _LEAST = 5e-4
 """So far (mm) may a face beside another reach above it: pieces that leave it in a tangent need not be cut for ever."""
-_FEW = 100
-"""Pieces looked at each way before the rest of those for a depth is spent."""
 _ASKED = 8
 """Triangles below which a point is looked for that only one of two touching solids has."""
 _BESIDE = 8
@@ -204,13 +202,13 @@ def faces_distance(
     clearance: float = 0.0,
     tol: float | None = None,
     most: int = MOST,
-    brief: bool = False,
+    brief: float | None = None,
 ) -> Distance:
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame.
 
     Stops when the bounds are on the same side of ``contact`` and ``clearance`` mm, or no further apart than
-    ``tol``, where that is given, or after ``most`` pieces in one direction; if ``brief`` also where more of them tell
-    next to nothing more.
+    ``tol``, where that is given, or after ``most`` pieces in one direction, or where more of them tell next to
+    nothing more: soon, if the bounds are then further apart than ``brief`` mm, where that is given.
     """
     here = inverse(T)
     if len(a.faces.face) < len(b.faces.face):  # the pieces of the one with fewer first: they often decide
@@ -218,14 +216,14 @@ def faces_distance(
         return turned.moved(T).swapped()
     one = Search(a, b, T, contact, clearance, tol, most, brief)
     other = Search(b, a, here, contact, clearance, tol, most, brief)
-    clash, margin, few = -contact - 2.0 * RESOLUTION if tol is None else -np.inf, max(contact, clearance), _FEW
+    clash, margin, few = -contact - 2.0 * RESOLUTION if tol is None else -np.inf, max(contact, clearance), FEW
     first = one.more(few)
     if first.upper < clash:
         return _told(replace(first.swapped(), lower=-np.inf))
     if first.lower > margin and not _may_hold(a, b, here):
         return _told((first if tol is None else one.more(most)).swapped())
     # The other way tells perhaps at once: then little of this way is left to look at.
-    second = other.more(*((most, first.lower, first.upper) if one.done else (few, np.inf, first.upper)))
+    second = other.more(most, first.lower, first.upper) if one.done else other.more(few, upper=first.upper)
     if second.upper < clash:
         return _told(replace(second.moved(T), lower=-np.inf))
     if second.lower > margin and tol is None and not _may_hold(b, a, T):

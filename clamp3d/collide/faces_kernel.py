@@ -56,8 +56,9 @@ def _descend(
     pieces, uvs, faces, sags, bounds, first, bbox, blink, border, broot, T,
     akind, asize, aframe, adeviation,
     P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
-    marks, nodes, slack, contact, clearance, tol, most, other, over, whole, space, state, out,
+    marks, nodes, slack, contact, clearance, tol, most, looks, other, over, whole, space, state, out,
 ):  # fmt: skip
+    # At most ``most`` pieces are added in all, and few more than ``looks`` looked at.
     # ``state``: how many pieces there are, how many items wait, and whether the search has begun: it can be taken up
     # again, with the same thresholds and width, where it stopped.
     own = (akind, asize, aframe, adeviation)
@@ -95,7 +96,7 @@ def _descend(
                 or (low >= -contact and high <= contact)
                 or (low > contact + 2.0 * RESOLUTION and high < clearance - 2.0 * RESOLUTION)
             )
-        if known or (heap[0] < after and (n >= len(faces) or n - first >= most)):
+        if known or looked > looks or (heap[0] < after and (n >= len(faces) or n - first >= most)):
             break
         item = _pop(heap, waiting, bounds)
         waiting -= 1
@@ -187,5 +188,5 @@ descend = entry(
     _descend,
     "f8(f8[:,:,::1],f8[:,:,::1],i8[::1],f8[:,::1],f8[::1],i8,f8[:,::1],i8[:,::1],i8[::1],i8[::1],f8[:,::1],"
     f"i8[::1],f8[:,::1],f8[:,::1],f8[::1],{_SOLID},"
-    "f8[::1],f8,f8,f8,i8,f8,f8[::1],f8[:,:,::1],i8[::1],i8[::1],f8[::1])",
+    "f8[::1],f8,f8,f8,i8,i8,f8,f8[::1],f8[:,:,::1],i8[::1],i8[::1],f8[::1])",
 )

@@ -16,8 +16,15 @@ if TYPE_CHECKING:
 
 VERDICT_WIDTH = 0.01
 """Width of the bounds, by the contact threshold, at which a search for the verdict alone ends without one."""
-_LOOK, _GAIN = 200, 0.98
-"""A brief search ends where twice as many pieces, from so many on, leave more than this share of what was not known."""
+FEW = 100
+"""Pieces added each way before the rest of those that may be is spent."""
+_LOOKS = 4
+"""Pieces looked at, those of the file among them, for each that may be added while few are asked for."""
+_HURRY, _PATIENCE = 200, 3200
+"""So many pieces are added, for a depth and for a verdict, before a search can end because it gains too little."""
+_GAIN = 0.98
+"""Twice as many pieces that leave more than this share of the way to the next threshold tell next to nothing."""
+_ANY = 2**62
 
 
 class Descent:
@@ -46,18 +53,23 @@ class Descent:
         rows = [np.empty((n + most, *given.shape[1:]), dtype=given.dtype) for given in pieces]
         for row, given in zip(rows, pieces, strict=True):
             row[:n] = given
-        self.out[0], self._first, self._state = np.inf, n, np.zeros(3, dtype=np.int64)
+        self.out[0], self._first, self._state, self.done = np.inf, n, np.zeros(3, dtype=np.int64), False
         self._given = (*rows, np.empty(n + most + nodes), n, *tree, T, *surfaces, *a.arrays, a.slack, *wanted)
         self._work = (
             np.empty(TRIED + len(a.faces.kind)), np.empty((WORK, 3, 3)),
             np.empty(SPACE + n + most + 2 * nodes, dtype=np.int64), self._state, self.out,
         )  # fmt: skip
 
-    def go(self, most: int, above: float) -> float:
-        """Lower bound after at most ``most`` pieces in all; what is known to be ``above`` that is not looked at."""
+    def go(self, most: int, above: float, looks: int = _ANY) -> float:
+        """Lower bound after at most ``most`` pieces in all; what is known to be ``above`` that is not looked at.
+
+        ``looks`` limits the pieces that are looked at, those of the file among them.
+        """
         from clamp3d.collide.faces_kernel import descend
 
-        return float(descend(*self._given, most, above, *self._work))
+        found = float(descend(*self._given, most, looks, above, *self._work))
+        self.done = self.added < most and self.out[9] <= looks
+        return found
 
     @property
     def added(self) -> int:
@@ -69,8 +81,8 @@ class Search:
     """Least signed distance from ``a`` of b's faces, ``b`` at ``T`` (4, 4) in a's frame.
 
     It ends when the bounds are on the same side of ``contact`` and ``clearance`` mm, or no further apart than ``tol``,
-    where that is given. At most ``most`` pieces are added in all; a ``brief`` search ends before where twice as many
-    tell next to nothing more.
+    where that is given. At most ``most`` pieces are added in all. A search ends before where twice as many tell next to
+    nothing more: one for a depth soon, if its bounds are then further apart than ``brief`` mm.
     """
 
     def __init__(
@@ -82,7 +94,7 @@ class Search:
         clearance: float,
         tol: float | None,
         most: int,
-        brief: bool = False,
+        brief: float | None = None,
     ) -> None:
         R, t = T[:3, :3], T[:3, 3]
         frames = dot(b.faces.frame, R.T)
@@ -92,7 +104,7 @@ class Search:
         wanted = contact, clearance, -VERDICT_WIDTH * contact if tol is None else tol
         self._descent = Descent(a, pieces, b.arrays[3:7], np.ascontiguousarray(T), surfaces, wanted, most)
         self._upper, self._most, self._brief, self.done = np.inf, most, brief, False
-        self._goal = max(contact, clearance) if tol is None else np.inf
+        self._steps = (-contact, contact, clearance) if tol is None else ()
         self._points: tuple[Array, Array] | tuple[None, None] = None, None
 
     def more(self, most: int, least: float = np.inf, upper: float = np.inf) -> Distance:
@@ -104,12 +116,13 @@ class Search:
         out, most = self._descent.out, min(most, self._most)
         out[0] = min(out[0], upper)
         before = out[0]
-        part, gap = min(most, _LOOK) if self._brief else most, np.inf
+        looks = _LOOKS * most if most <= FEW else _ANY
+        part, gap = min(most, _PATIENCE if self._brief is None else _HURRY), np.inf
         while True:
-            lower = self._descent.go(part, least)
-            self.done = self._descent.added < part
-            left = min(out[0], self._goal) - lower
-            if self.done or part == most or left > _GAIN * gap:
+            lower = self._descent.go(part, least, looks)
+            self.done = self._descent.done
+            left = min([x for x in (*self._steps, float(out[0])) if x > lower], default=lower) - lower
+            if self.done or part == most or (left > _GAIN * gap and left > (self._brief or 0.0)):
                 break
             part, gap = min(2 * part, most), left
         if out[0] < before:
