@@ -231,11 +231,11 @@ def faces_distance(
     if not one.done:
         first = one.more(most, second.lower if other.done else np.inf, min(first.upper, second.upper))
         if first.lower > margin and not _may_hold(a, b, here):
-            return _told(first.swapped())
+            return _told(replace(_best(first.swapped(), second.moved(T)), lower=first.lower))
     if not other.done and not first.upper < clash:
         second = other.more(most, first.lower, min(first.upper, second.upper))
     first, second, low = first.swapped(), second.moved(T), first.lower
-    best = first if first.upper <= second.upper else second
+    best = _best(first, second)
     if low > 0.0 and second.lower > 0.0:
         return _told(replace(best, lower=max(low, second.lower)))
     low = min(low, second.lower)
@@ -282,6 +282,12 @@ def _at(a: FaceModel, point: Array) -> tuple[float, float]:
     surface = np.array([OTHER]), np.zeros((1, 2)), np.zeros((1, 12)), np.zeros(1)
     search = Descent(a, pieces, tree, np.eye(4), surface, (1.0, 0.0, 1e-3), 0)
     return search.go(0, np.inf), float(search.out[0])
+
+
+def _best(first: Distance, second: Distance) -> Distance:
+    """That of two with the lesser upper bound and points: one that found nothing below the other's has none."""
+    known = first.point_a is not None and first.upper <= second.upper
+    return first if known or second.point_a is None else second
 
 
 def _told(found: Distance) -> Distance:

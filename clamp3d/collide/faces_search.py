@@ -20,7 +20,7 @@ FEW = 100
 """Pieces added each way before the rest of those that may be is spent."""
 _LOOKS = 4
 """Pieces looked at, those of the file among them, for each that may be added while few are asked for."""
-_HURRY, _PATIENCE = 200, 3200
+_HURRY, _PATIENCE = 400, 3200
 """So many pieces are added, for a depth and for a verdict, before a search can end because it gains too little."""
 _GAIN = 0.98
 """Twice as many pieces that leave more than this share of the way to the next threshold tell next to nothing."""
