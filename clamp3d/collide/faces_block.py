@@ -12,10 +12,12 @@ import math
 import numpy as np
 
 from clamp3d.collide.faces_ball import below, clear_around, enough, foot_above, has_feet
-from clamp3d.collide.faces_bounds import NEAR
+from clamp3d.collide.faces_bounds import NEAR, TRIED
+from clamp3d.collide.faces_hollow import MOST_AROUND, above_all, hollow
 from clamp3d.collide.faces_math import (
     OTHER,
     PLANE,
+    SPHERE,
     TORUS,
     band_over,
     bend,
@@ -32,9 +34,28 @@ from clamp3d.collide.faces_tree import PIECES, nearest_below
 from clamp3d.core.jit import formula
 
 MOST_OVER = 6
-"""Faces at most that many pieces are bounded over together."""
+"""Faces or hollow corners at most that many pieces are bounded over together."""
+_ROOM = TRIED // 3
+"""Faces of them all at most."""
 WORK = 6 + 2 * PIECES
 """Triangles (3, 3) that the search takes for itself."""
+
+
+@formula
+def _highest(count, solid, chosen, raised):
+    """The highest of the heights over the first faces chosen, kept behind what these are raised by, or hollow corners.
+
+    Behind that is a ball's radius for each, 0 for a face that goes with the one before it.
+    """
+    _, _, _, _, _, _, _, _, _, kind, _, frame, sense, _, _, _, _, _ = solid
+    heights, clear, high, first = raised[_ROOM : 2 * _ROOM], raised[2 * _ROOM :], -np.inf, 0
+    for last in range(1, count + 1):
+        if last == count or clear[last] > 0.0:
+            h = heights[first]
+            if last > first + 1:
+                h = above_all(heights, first, last, chosen, kind, frame, sense)
+            high, first = max(high, h), last
+    return high
 
 
 @formula
@@ -42,33 +63,32 @@ def _over(V, uv, g, rim, own, solid, count, scratch):
     """Lower bound, as `least_height`, of the highest that a piece of face g is over any of the first faces chosen."""
     akind, asize, aframe, _ = own
     _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
-    _, chosen, raised, raised_size, _, whole = scratch
+    _, chosen, raised, _, _, whole = scratch
     du, v0, v1, _, _ = spans(uv)
-    high = -np.inf
     for m in range(count):
         f = chosen[m]
         to_frame(frame[f], V, whole[0])
+        a, up = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], raised[m])
         e = bend_over(
             akind[g], asize[g, 0], asize[g, 1], aframe[g], du, v1 - v0, v0, v1, kind[f], frame[f]
         )  # fmt: skip
-        h = least_height(kind[f], raised_size[m], size[f, 1], sense[f], whole[0]) - e - rim
+        h = least_height(kind[f], a, size[f, 1], sense[f], whole[0]) - e - rim
         if akind[g] != PLANE and akind[g] != OTHER:
             band = akind[g], asize[g, 0], asize[g, 1], aframe[g], v0, v1
-            h = max(h, band_over(*band, kind[f], raised_size[m], size[f, 1], frame[f], sense[f]) - rim)
-        high = max(high, h - raised[m])
-    return high
+            h = max(h, band_over(*band, kind[f], a, size[f, 1], frame[f], sense[f]) - rim)
+        raised[_ROOM + m] = h - up
+    return _highest(count, solid, chosen, raised)
 
 
 @formula
 def _point_over(point, solid, count, chosen, raised):
     """How high a point (3) is over the highest of the first faces chosen, as they are raised."""
     _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
-    high = -np.inf
     for m in range(count):
         f = chosen[m]
         h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], point[0], point[1], point[2])
-        high = max(high, h - raised[m])
-    return high
+        raised[_ROOM + m] = h - raised[m]
+    return _highest(count, solid, chosen, raised)
 
 
 @formula
@@ -137,7 +157,7 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
     low one of their points is.
     """
     akind, asize, _, adeviation = own
-    nearest_ones, chosen, raised, raised_size, stack, whole = scratch
+    nearest_ones, chosen, raised, _, stack, whole = scratch
     P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, beside, _, _ = solid
     slack, _, goal, tol = limits
     wanted = enough(high, limits)
@@ -151,10 +171,11 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
         bent = max(bent, bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1))
     rho = math.sqrt(rho) + bent + rim + adeviation[g]
     # From the nearest face on, those are taken in that the lowest point of the pieces, over those so far, is above.
-    count, refused, k = 0, 0, rows[len(rows) // 2]
+    clears = raised[2 * _ROOM :]
+    count, taken, refused, k = 0, 0, 0, rows[len(rows) // 2]
     _put(place, pieces[k, 0], uvs[k, 0], 0.0)
     found, lowest = -np.inf, -np.inf
-    while count < MOST_OVER and found < wanted:
+    while taken < MOST_OVER and count + MOST_AROUND <= _ROOM and found < wanted:
         f, highest = -1, lowest + 0.1 * tol
         for n in range(NEAR + (NEAR + count) * beside.shape[1]):
             m = n if n < NEAR else (n - NEAR) // beside.shape[1]
@@ -174,36 +195,41 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
         if f < 0 or max(lowest, highest) <= known:
             break
         most = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf  # as for one piece
-        fits, feet, middle = False, has_feet(kind[f], sense[f]), place[2, 1]
+        fits, feet, middle = 0, has_feet(kind[f], sense[f]), place[2, 1]
+        chosen[count] = f
         for row in (len(kind) + f, f):
             needed = rho + (0.0 if feet else max(-highest, 0.0))
-            if not fits and needed < most:
+            if fits == 0 and needed < most:
                 foot_above(kind, size, frame, sense, f, slack[row] + deviation[f], x, y, z, middle)
                 at = nearest_below(P, err, box, link, order, root[f], middle[0], middle[1], middle[2], stack)
                 clear = clear_around(
                     solid, row, 1, slack, at, middle[0], middle[1], middle[2], needed + abs(highest), most, whole, stack
                 )  # fmt: skip
                 if clear >= needed:
-                    fits = True
-                    t = slack[row] + deviation[f]
-                    raised_size[count], raised[count] = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
-                    whole[2, 1 + count // 3, count % 3] = clear
-        if not fits:
+                    fits, raised[count], clears[count] = 1, slack[row] + deviation[f], clear
+        for first in (len(kind), 0):
+            if fits == 0 and feet and kind[f] != SPHERE:
+                fits, clear = hollow(
+                    solid, chosen, count, first, slack, place[0, 0], x, y, z, rho, raised, raised[_ROOM:], whole, stack
+                )  # fmt: skip
+                for m in range(fits):
+                    clears[count + m] = clear if m == 0 else 0.0
+        if fits == 0:
             refused += 1
             chosen[len(chosen) - refused] = f
-            if refused == len(chosen) - MOST_OVER:
+            if refused == len(chosen) - _ROOM:
                 break
             continue
-        chosen[count] = f
+        count += fits
+        taken += 1
         near = 0.25 * tol + (0.05 * abs(lowest) if -np.inf < lowest and goal < np.inf else 0.0)
-        new, deep = _lowest(
-            pieces, uvs, sags, g, rows, own, solid, count + 1, known, wanted, near, scratch, place
-        )  # fmt: skip
+        new, deep = _lowest(pieces, uvs, sags, g, rows, own, solid, count, known, wanted, near, scratch, place)
         # Each point of the pieces is above one of the faces by ``new``, and in the ball where that counts.
         held = new
-        for m in range(count + 1):
-            clear, one = whole[2, 1 + m // 3, m % 3], chosen[m]
-            held = min(held, below(new, rho, clear, has_feet(kind[one], sense[one])))
+        for m in range(count):
+            if clears[m] > 0.0:
+                alone = m + 1 == count or clears[m + 1] > 0.0
+                feet = alone and has_feet(kind[chosen[m]], sense[chosen[m]])
+                held = min(held, below(new, rho, clears[m], feet))
         found, lowest = max(found, held), deep
-        count += 1
     return max(known, found), lowest if count > 0 else np.inf

@@ -48,8 +48,10 @@ from clamp3d.core.jit import formula
 
 NEAR = 4
 """Faces whose surfaces are tried as separating ones, those nearest to the piece."""
-TRIED = 16
-"""Faces tried in all, with those beside the nearest."""
+TRIED = 36
+"""Room for faces that are tried, three numbers each for those that pieces are bounded over."""
+_MOST_TRIED = 16
+"""Faces tried in all for one piece, with those beside the nearest."""
 
 
 @formula
@@ -86,13 +88,13 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                 out[1 + k], out[4 + k] = p[k], q[k]
             out[7] = f
     outside, inside, measured, tried = -1.0, False, False, 0
-    for n in range(NEAR + beside.shape[1] * TRIED):
+    for n in range(NEAR + beside.shape[1] * _MOST_TRIED):
         # The nearest faces first; then those beside them, and beside these.
         if n < NEAR:
             f = near[n]
         else:
             m = (n - NEAR) // beside.shape[1]
-            if m >= tried or tried == TRIED or not (outside < 0.0 and (low > 0.0 or found < -contact)):
+            if m >= tried or tried == _MOST_TRIED or not (outside < 0.0 and (low > 0.0 or found < -contact)):
                 break
             f = beside[chosen[m], (n - NEAR) % beside.shape[1]]
         if f < 0 or kind[f] == OTHER:
@@ -212,8 +214,9 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                     t, over_other = slack[one] + deviation[one], slack[other] + deviation[other]
                     limit = 2.0 * at + 8.0 * (t + over_other) + max(least, 0.0) + rho
                     clear = nearest_marked(solid, f, o, 0, 1, -1.0, slack, xs, ys, zs, limit, whole, stack)
+                    near[0], whole[1, 1, 0] = other, over_other
                     if clear > at + t and is_open(
-                        solid, one, t, other, over_other, clear, xs, ys, zs, whole[1, 0], stack
+                        solid, one, t, near[:1], whole[1, 1, :1], clear, xs, ys, zs, whole[1, 0], stack
                     ):  # fmt: skip
                         found = max(found, below(least, rho, clear, True) - e)
                         break
