@@ -304,7 +304,7 @@ def _search(
     other way has found; what is above the first, and no point below the second, is not looked for.
     """
     from clamp3d.collide.faces_block import WORK
-    from clamp3d.collide.faces_bounds import TRIED
+    from clamp3d.collide.faces_hollow import TRIED
     from clamp3d.collide.faces_kernel import RESULT, SPACE, descend
 
     n, nodes, out = len(pieces[0]), len(tree[0]), np.zeros(RESULT)

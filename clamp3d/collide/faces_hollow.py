@@ -15,11 +15,29 @@ import math
 
 import numpy as np
 
-from clamp3d.collide.faces_math import CYLINDER, PLANE, height_at, point_triangle
+from clamp3d.collide.faces_math import (
+    CYLINDER,
+    OTHER,
+    PLANE,
+    band_over,
+    bend_over,
+    height_at,
+    least_height,
+    point_triangle,
+    raise_by,
+    spans,
+    to_frame,
+)
 from clamp3d.collide.faces_open import is_open
 from clamp3d.collide.faces_tree import _mark, _state, box_distance, put_children
 from clamp3d.core.jit import formula
 
+MOST_TRIED = 16
+"""Faces tried for one piece, with those beside the nearest."""
+ROOM = 12
+"""Faces at most that pieces are bounded over together."""
+TRIED = MOST_TRIED + 3 * ROOM
+"""Room for both: of the latter also what they are raised by, the heights over them and the radii of their balls."""
 MOST_AROUND = 4
 """Faces of a hollow corner at most."""
 _EXACT = 1e-6
@@ -97,10 +115,61 @@ def above_all(high, first, count, chosen, kind, frame, sense):
 
 
 @formula
-def _reaching(solid, chosen, first, count, rows, slack, x, y, z, cut, whole, stack):
-    """Lower bound of a point's distance, at most ``cut``, from pieces that reach above all faces chosen from ``first`` on.
+def _highest(count, solid, chosen, raised):
+    """The highest of the heights over the first faces chosen, kept behind what these are raised by, or hollow corners.
 
-    And the nearest such triangle, -1 if there is none. ``rows`` as in `hollow`.
+    Behind that is a ball's radius for each, 0 for a face that goes with the one before it.
+    """
+    _, _, _, _, _, _, _, _, _, kind, _, frame, sense, _, _, _, _, _ = solid
+    heights, clear, high, first = raised[ROOM : 2 * ROOM], raised[2 * ROOM :], -np.inf, 0
+    for last in range(1, count + 1):
+        if last == count or clear[last] > 0.0:
+            h = heights[first]
+            if last > first + 1:
+                h = above_all(heights, first, last, chosen, kind, frame, sense)
+            high, first = max(high, h), last
+    return high
+
+
+@formula
+def piece_over(V, uv, g, rim, own, solid, count, scratch):
+    """Lower bound, as `least_height`, of the highest that a piece of face g is over any of the first faces chosen."""
+    akind, asize, aframe, _ = own
+    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
+    _, chosen, raised, _, _, whole = scratch
+    du, v0, v1, _, _ = spans(uv)
+    for m in range(count):
+        f = chosen[m]
+        to_frame(frame[f], V, whole[0])
+        a, up = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], raised[m])
+        e = bend_over(
+            akind[g], asize[g, 0], asize[g, 1], aframe[g], du, v1 - v0, v0, v1, kind[f], frame[f]
+        )  # fmt: skip
+        h = least_height(kind[f], a, size[f, 1], sense[f], whole[0]) - e - rim
+        if akind[g] != PLANE and akind[g] != OTHER:
+            band = akind[g], asize[g, 0], asize[g, 1], aframe[g], v0, v1
+            h = max(h, band_over(*band, kind[f], a, size[f, 1], frame[f], sense[f]) - rim)
+        raised[ROOM + m] = h - up
+    return _highest(count, solid, chosen, raised)
+
+
+@formula
+def point_over(point, solid, count, chosen, raised):
+    """How high a point (3) is over the highest of the first faces chosen, as they are raised."""
+    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
+    for m in range(count):
+        f = chosen[m]
+        h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], point[0], point[1], point[2])
+        raised[ROOM + m] = h - raised[m]
+    return _highest(count, solid, chosen, raised)
+
+
+@formula
+def _reaching(solid, chosen, first, count, rows, slack, x, y, z, cut, whole, stack):
+    """Lower bound of a point's distance, at most ``cut``, from pieces that reach above all of several faces.
+
+    Those chosen from ``first`` on to ``count``; ``rows`` as in `hollow`. And the nearest such triangle, -1 if there is
+    none.
     """
     P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, _, _ = solid
     stack[0], top = 0, 1
@@ -134,12 +203,12 @@ def _reaching(solid, chosen, first, count, rows, slack, x, y, z, cut, whole, sta
 
 
 @formula
-def hollow(solid, chosen, first, rows, slack, point, x, y, z, rho, raised, high, whole, stack):
+def hollow(solid, chosen, first, rows, slack, point, least, x, y, z, rho, raised, high, whole, stack):
     """How many faces, of which the first is chosen, have in a ball about x, y, z the solid below at least one of them.
 
     0 if none are found. They go into ``chosen`` from ``first`` on, how far they are raised into ``raised``. ``rows`` is
     0 for these by the faces' slack, or the number of faces for rounding alone. Returns also the ball's radius: ``rho``
-    and more, for the way out of a ``point`` (3).
+    and more, for the way out of a ``point`` (3). Not wanted if that is not above all by more than ``least``.
     """
     _, _, face, _, _, _, _, _, _, kind, size, frame, sense, deviation, _, _, _, _ = solid
     count = first + 1
@@ -152,12 +221,17 @@ def hollow(solid, chosen, first, rows, slack, point, x, y, z, rho, raised, high,
             high[m] = sense[f] * h - raised[m]
             t = max(t, raised[m])
         way = above_all(high, first, count, chosen, kind, frame, sense)
-        if way == -np.inf:
+        if way <= least:
             return 0, 0.0
+        # First what is near the point, which tells which corner it is in; then what else is in the ball.
         limit = 1.1 * rho + 2.0 * max(0.0, -way) + 4.0 * t
-        clear, found = _reaching(solid, chosen, first, count, rows, slack, x, y, z, limit, whole, stack)
-        if found < 0:
-            break
+        _, found = _reaching(
+            solid, chosen, first, count, rows, slack, point[0], point[1], point[2], rho + limit, whole, stack
+        )
+        if found < 0 or not goes_with(kind, frame, sense, chosen, first, count, face[found]):
+            clear, found = _reaching(solid, chosen, first, count, rows, slack, x, y, z, limit, whole, stack)
+            if found < 0:
+                break
         if not goes_with(kind, frame, sense, chosen, first, count, face[found]):
             return 0, 0.0
         chosen[count] = face[found]
