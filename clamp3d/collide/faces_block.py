@@ -156,7 +156,8 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
         for first in (len(kind), 0):
             if fits == 0 and feet and kind[f] != SPHERE and seeds < MOST_SEEDS:
                 fits, clear = hollow(
-                    solid, chosen, count, first, slack, place[0, 0], max(known, lowest), x, y, z, rho, raised, raised[ROOM:], whole, stack
+                    solid, chosen, count, first, slack, place[0, 0], max(known, lowest), x, y, z, rho,
+                    raised, raised[ROOM:], whole, stack,
                 )  # fmt: skip
                 seeds += 1
                 for m in range(fits):
