@@ -115,7 +115,9 @@ def test_which_faces_make_a_corner():
     rng = np.random.default_rng(10)
     F = frame(rng)
     tilted = np.vstack([F[0], np.linalg.qr((F[1:] + 0.1 * rng.normal(size=(3, 3))).T)[0].T])
+    end = np.cross(F[3], tilted[3]) / np.linalg.norm(np.cross(F[3], tilted[3]))
     faces = {
+        "end": (PLANE, np.vstack([F[0], F[3], np.cross(end, F[3]), end]), 1.0),
         "plane": (PLANE, F, 1.0), "side": (PLANE, axes(F, (1, 2, 0)), 1.0),
         "hole": (CYLINDER, F, -1.0),
         "rod": (CYLINDER, F, 1.0), "cone": (CONE, F, -1.0), "ball": (SPHERE, F, -1.0),
@@ -123,9 +125,20 @@ def test_which_faces_make_a_corner():
     }  # fmt: skip
     kind, frames, sense = (np.array(column) for column in zip(*faces.values(), strict=True))
     names, frames = list(faces), frames.reshape(-1, 12)
-    able = {frozenset(pair) for pair in (("plane", "side"), ("plane", "tilted"), ("side", "tilted"), ("plane", "hole"))}
+    able = {
+        frozenset(pair)
+        for pair in (
+            ("plane", "side"),
+            ("plane", "tilted"),
+            ("side", "tilted"),
+            ("plane", "hole"),
+            ("end", "plane"),
+            ("end", "tilted"),
+            ("end", "side"),
+        )
+    }
     for one, other in itertools.permutations(names, 2):
-        if one in ("rod", "cone", "ball"):
+        if one in ("rod", "cone", "ball") or {one, other} == {"end", "side"}:
             continue
         chosen = np.array([names.index(one)])
         told = faces_hollow.goes_with(kind, frames, sense, chosen, 0, 1, names.index(other))
@@ -134,6 +147,7 @@ def test_which_faces_make_a_corner():
         ("plane", "tilted", "side"),
         ("tilted", "plane", "side"),
         ("plane", "side", "tilted"),
+        ("plane", "tilted", "end"),
         ("plane", "hole", "side"),
     ):
         chosen = np.array([names.index(one) for one in three[:2]])
