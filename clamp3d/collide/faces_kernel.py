@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from clamp3d.collide.faces_block import WORK, block
-from clamp3d.collide.faces_bounds import NEAR, TRIED, piece
+from clamp3d.collide.faces_bounds import NEAR, piece
+from clamp3d.collide.faces_hollow import TRIED
 from clamp3d.collide.faces_math import bend, cut, longest, spans
 from clamp3d.collide.faces_tree import DEEP, nearest
 from clamp3d.collide.verdict import RESOLUTION

@@ -46,7 +46,7 @@ class Descent:
         most: int,
     ) -> None:
         from clamp3d.collide.faces_block import WORK
-        from clamp3d.collide.faces_bounds import TRIED
+        from clamp3d.collide.faces_hollow import TRIED
         from clamp3d.collide.faces_kernel import RESULT, SPACE
 
         n, nodes, self.out = len(pieces[0]), len(tree[0]), np.zeros(RESULT)
