@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d import checks
-from clamp3d.core.shells import inside_out, volume
+from clamp3d.core.linear import dot
+from clamp3d.core.shells import inside_out, joined, volume
 from clamp3d.errors import InputError
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+_ASLANT = np.array([0.48, 0.6, 0.64])
+"""A unit vector that no axis or diagonal is at right angles to."""
+_BETWEEN = 9
 
 LARGEST, SMALLEST = 1e12, 1e-9
 """Largest coordinate and least extent in mm: beyond them products of three lengths lose their digits or vanish."""
@@ -94,8 +100,6 @@ def make_mesh(
     >>> make_mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]).watertight
     True
     """
-    import trimesh
-
     checks.text("name of a mesh", name)
     scale, float32 = checks.positive("scale", scale), checks.flag("float32", float32)
     float32 = float32 or getattr(vertices, "dtype", None) == np.float32
@@ -114,16 +118,19 @@ def make_mesh(
     single = _without_doubles(F)
     if len(single) < len(F):
         notes.append(f"{len(F) - len(single)} doubled triangles left out")
-    mesh = trimesh.Trimesh(V, single, process=False)
-    if len(mesh.faces) == 0:
+    if len(single) == 0:
         raise InputError(f"{name}: no triangle with an area")
-    mesh.remove_unreferenced_vertices()
-    if not mesh.is_winding_consistent:
-        before = mesh.faces.copy()
+    used, index = np.unique(single, return_inverse=True)
+    V, F = V[used], index.reshape(-1, 3).astype(np.int64)
+    _, edge, uses = _edges(F)
+    if _balance(F, edge)[uses == 2].any():
+        import trimesh  # takes longer to load than most meshes to read
+
+        mesh = trimesh.Trimesh(V, F, process=False)
         trimesh.repair.fix_winding(mesh)  # type: ignore[no-untyped-call]
-        turned = int(np.any(before != np.asarray(mesh.faces), axis=1).sum())
-        notes.append(f"{turned} triangles turned to one winding")
-    V, F = np.asarray(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+        turned = np.array(mesh.faces, dtype=np.int64)
+        notes.append(f"{int(np.any(turned != F, axis=1).sum())} triangles turned to one winding")
+        F = turned
     watertight, fault = _closure(V, F)
     if fault:
         notes.append(fault)
@@ -192,7 +199,7 @@ def closed_mesh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Me
         if wrong.any():
             place = _place(directed, wrong[edge])
             raise InputError(f"{name} must be watertight: {wrong.sum()} of {len(uses)} edges {what}, {place}")
-    balance = np.bincount(edge, weights=np.where(directed[:, 0] < directed[:, 1], 1, -1)) != 0
+    balance = _balance(F, edge) != 0
     if balance.any():
         place = _place(directed, balance[edge])
         raise InputError(f"{name} must have one winding: {balance.sum()} edges run the same way in both faces, {place}")
@@ -247,14 +254,32 @@ def _indices(name: str, faces: ArrayLike) -> IntArray:
 
 def _merge(V: Array, F: IntArray, tolerance: float) -> tuple[Array, IntArray]:
     """Merge vertices closer than ``tolerance`` (a tree, not a grid: a grid parts equal points at its lines)."""
-    from scipy.spatial import cKDTree
-    from trimesh.graph import connected_component_labels
-
     unique, inverse = np.unique(V, axis=0, return_inverse=True)
-    pairs = cKDTree(unique).query_pairs(tolerance, output_type="ndarray")
-    label = connected_component_labels(pairs, len(unique))  # type: ignore[no-untyped-call]
-    keep = np.unique(label, return_index=True)[1]
-    return unique[keep], label[inverse.reshape(-1)][F].astype(np.int64)
+    F = inverse.reshape(-1)[F].astype(np.int64)
+    if not _may_be_close(unique, tolerance):
+        return unique, F
+    from scipy.spatial import cKDTree
+
+    label = joined(cKDTree(unique).query_pairs(tolerance, output_type="ndarray"), len(unique))
+    keep, number = np.unique(label, return_inverse=True)
+    return unique[keep], number[F]
+
+
+def _may_be_close(V: Array, tolerance: float) -> bool:
+    """Whether two points (n, 3) may be within ``tolerance``; quick where they are not.
+
+    Along any direction they are no further apart than they are; few other points lie between them there.
+    """
+    along = dot(V - V[0], _ASLANT)
+    order = np.argsort(along, kind="stable")
+    V, along = V[order], along[order]
+    for k in range(1, _BETWEEN):
+        rows = np.flatnonzero(along[k:] - along[:-k] <= 2.0 * tolerance)
+        if not len(rows):
+            return False
+        if (np.linalg.norm(V[rows + k] - V[rows], axis=1) <= 2.0 * tolerance).any():
+            return True
+    return True
 
 
 def _folded(F: IntArray) -> NDArray[np.bool_]:
@@ -268,6 +293,12 @@ def _edges(F: IntArray) -> tuple[IntArray, NDArray[np.intp], NDArray[np.intp]]:
     key = directed.min(axis=1) * (F.max() + 1) + directed.max(axis=1)  # one number for both ends: quick to sort
     _, edge, uses = np.unique(key, return_inverse=True, return_counts=True)
     return directed, edge, uses
+
+
+def _balance(F: IntArray, edge: NDArray[np.intp]) -> NDArray[Any]:
+    """How much more often each ``edge`` of `_edges` is run along from its smaller end than from the other."""
+    forward = np.roll(F, -1, axis=1) > F
+    return np.bincount(edge, weights=np.where(forward.ravel(), 1, -1))
 
 
 def _without_doubles(F: IntArray) -> IntArray:
@@ -288,9 +319,9 @@ def _without_doubles(F: IntArray) -> IntArray:
 
 def _closure(V: Array, F: IntArray) -> tuple[bool, str]:
     """Whether triangles enclose a volume, and what is odd about their edges."""
-    directed, edge, uses = _edges(F)
+    _, edge, uses = _edges(F)
     rim, crossed = int((uses == 1).sum()), int((uses > 2).sum())
-    balance = np.bincount(edge, weights=np.where(directed[:, 0] < directed[:, 1], 1, -1))
+    balance = _balance(F, edge)
     if not balance.any():
         if not crossed:
             return True, ""
@@ -307,8 +338,8 @@ def _closure(V: Array, F: IntArray) -> tuple[bool, str]:
 
 def is_closed(F: IntArray) -> bool:
     """Whether every edge of faces (m, 3) has two of them, which run along it in opposite directions."""
-    directed, edge, uses = _edges(F)
-    balance = np.bincount(edge, weights=np.where(directed[:, 0] < directed[:, 1], 1, -1))
+    _, edge, uses = _edges(F)
+    balance = _balance(F, edge)
     return bool((uses == 2).all() and not balance.any())
 
 

@@ -56,14 +56,27 @@ def winding_number(corners: tuple[Array, Array, Array], point: Array) -> float:
     return float(atan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2.0 * np.pi))
 
 
+def joined(groups: Faces, n: int) -> Faces:
+    """The least number (n,) among 0 to ``n`` - 1 that each is joined to by ``groups`` (m, k), over others or directly.
+
+    >>> joined(np.array([[3, 1], [4, 3], [0, 2]]), 5).tolist()
+    [0, 1, 0, 1, 1]
+    """
+    label = np.arange(n)
+    while True:
+        own = label[groups]
+        least = np.broadcast_to(own.min(axis=1, keepdims=True, initial=n), own.shape)
+        apart = own != least
+        if not apart.any():
+            return label
+        np.minimum.at(label, own[apart], least[apart])
+        while not np.array_equal(up := label[label], label):
+            label = up
+
+
 def shells(faces: Faces, vertices: int) -> list[NDArray[np.intp]]:
     """Rows of ``faces`` of each connected surface; ``vertices`` is how many there are."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    i, j = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
-    graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(vertices, vertices))
-    label = connected_components(graph, directed=False)[1][faces[:, 0]]
+    label = joined(faces, vertices)[faces[:, 0]]
     order = np.argsort(label, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 
