@@ -14,7 +14,7 @@ from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
 from clamp3d.fit.features import FittedSurface
 from clamp3d.testing.bodies import AnyBody, Body, body
-from clamp3d.testing.search import common, separation
+from clamp3d.testing.search import Common, common, nearest
 
 _WAYS = 8
 """Directions in which bodies are moved to see whether less than their depth parts them."""
@@ -56,13 +56,14 @@ def assert_distance(
             assert out <= tolerance, f"point on {name} is {out:.3g} mm outside"
         if found.upper >= 0.0:
             assert np.linalg.norm(q - p) <= found.upper + tolerance, "the points are further apart than upper"
-    truth = separation(x, y, cells=cells)
+    shared = _shared(x, y, cells)
+    truth = nearest(x, y, shared)
     if truth.upper > 0.0:
         assert found.lower <= truth.upper + tolerance, f"lower {found.lower} > attained {truth.upper}"
         # Zero is what the search begins with: it proves nothing of a shallow overlap.
         assert truth.lower <= max(found.upper + tolerance, 0.0), f"upper {found.upper} < proven {truth.lower}"
     else:
-        deep = common(x, y, cells=cells).upper
+        deep = _deepest(x, y, shared, cells)
         assert found.lower <= 2.0 * deep + tolerance, f"lower {found.lower}, but they share a ball of {-deep} mm"
     if found.upper < -tolerance:
         ways = directions(_WAYS) if n is None else np.vstack([n, directions(_WAYS)])
@@ -73,6 +74,16 @@ def assert_distance(
         assert abs(float(np.linalg.norm(n)) - 1.0) <= 1e-9, "the normal is no unit vector"
         closed = common(x, _moved(y, -found.lower * n), cells=cells).upper
         assert closed >= -0.5 * tolerance, f"moved by {-found.lower} along the normal they overlap by {-2.0 * closed}"
+
+
+def _shared(x: Body, y: Body, cells: int) -> Common:
+    """The search of `separation`."""
+    return common(x, y, accuracy=0.005, cells=cells)
+
+
+def _deepest(x: Body, y: Body, found: Common, cells: int) -> float:
+    """The least field that was found in both: a coarser search, which comes further, looks again if one has not ended."""
+    return found.upper if found.ended else min(found.upper, common(x, y, cells=cells).upper)
 
 
 def _moved(it: Body, by: Array) -> Body:
@@ -102,8 +113,10 @@ def assert_lower_on_way(
         return
     x, y = body(a), body(b)
     for k, T in enumerate(poses):
-        truth = separation(x, y.at(T), cells=cells)
-        value = truth.upper if truth.upper > 0.0 else 2.0 * common(x, y.at(T), cells=cells).upper
+        placed = y.at(T)
+        shared = _shared(x, placed, cells)
+        apart = nearest(x, placed, shared).upper
+        value = apart if apart > 0.0 else 2.0 * _deepest(x, placed, shared, cells)
         assert lower <= value + tolerance, f"lower {lower} on the way, but {value} at pose {k}"
 
 

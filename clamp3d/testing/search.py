@@ -22,12 +22,13 @@ class Common:
     """The least of ``max(field_a, field_b)`` over all points lies between ``lower`` and ``upper``, mm.
 
     Negative: the bodies share a ball of that radius; positive: they are at least twice as far apart. ``points`` (k, 3)
-    are the lowest that were looked at, the first has ``upper``.
+    are the lowest that were looked at, the first has ``upper``. ``ended``: before the cells were used up.
     """
 
     lower: float
     upper: float
     points: Array
+    ended: bool
 
 
 def common(
@@ -66,7 +67,7 @@ def common(
         half = np.where(np.arange(3) == k, 0.5 * half, half)
         shift = np.eye(3)[k] * half[k]
         centre = np.concatenate([centre - shift, centre + shift])
-    return Common(min(floor, best - accuracy), best, kept)
+    return Common(min(floor, best - accuracy), best, kept, not len(centre))
 
 
 def _region(x: Body, y: Body) -> tuple[Array, Array]:
@@ -88,7 +89,11 @@ def separation(
     The points are found by descent from the lowest ones of the search: perhaps not the nearest ones, but real ones.
     """
     x, y = body(a), body(b) if T_a_b is None else body(b).at(T_a_b)
-    found = common(x, y, accuracy=0.5 * accuracy, cells=cells)
+    return nearest(x, y, common(x, y, accuracy=0.5 * accuracy, cells=cells))
+
+
+def nearest(x: Body, y: Body, found: Common) -> Distance:
+    """`separation` from what `common` has ``found``."""
     if found.upper <= 0.0:
         return Distance(0.0, 0.0, found.points[0], found.points[0])
     q = found.points
