@@ -82,7 +82,7 @@ def _shared(x: Body, y: Body, cells: int) -> Common:
 
 
 def _deepest(x: Body, y: Body, found: Common, cells: int) -> float:
-    """The least field that was found in both: a coarser search, which comes further, looks again if one has not ended."""
+    """The least field found in both: where a search has not ended a coarser one, which comes further, looks again."""
     return found.upper if found.ended else min(found.upper, common(x, y, cells=cells).upper)
 
 
