@@ -30,6 +30,19 @@ def boxes(folder, distance, names=("a", "b")):
     return path
 
 
+@pytest.fixture
+def whole_main(monkeypatch, capfd):
+    """``main`` with what libraries write past Python: all that a process would write to its stdout and stderr."""
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["clamp3d", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        return stop.value.code, *capfd.readouterr()
+
+    return run
+
+
 def every_command():
     context = click.Context(cli.group)
     return {name: cli.group.get_command(context, name) for name in cli.COMMANDS}
@@ -56,26 +69,33 @@ class TestFiles:
             ("fit", "ball.stl", "--json", "-"),
         ],
     )
-    def test_json_on_stdout_is_nothing_but_json(self, arguments, tmp_path):
+    def test_json_on_stdout_is_nothing_but_json(self, arguments, tmp_path, monkeypatch, whole_main):
         boxes(tmp_path, 20.0)
         trimesh.creation.icosphere(subdivisions=1).export(tmp_path / "ball.stl")
         before = sorted(tmp_path.iterdir())
-        done = clamp3d(*arguments, cwd=tmp_path, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
-        assert done.returncode == 0, done.stderr
-        assert isinstance(json.loads(done.stdout), dict)
-        assert len(done.stderr.splitlines()) >= 2  # the text for people
+        monkeypatch.chdir(tmp_path)
+        code, out, err = whole_main(*arguments)
+        assert code == 0, err
+        assert isinstance(json.loads(out), dict)
+        assert len(err.splitlines()) >= 2  # the text for people
         assert sorted(tmp_path.iterdir()) == before
 
-    def test_a_page_on_stdout(self, tmp_path):
-        done = clamp3d("check", boxes(tmp_path, 20.0), "--html", "-")
-        assert done.returncode == 0
-        assert done.stdout.lower().startswith("<!doctype html>")
-        assert done.stdout.rstrip().endswith("</html>")
+    def test_json_of_a_process_is_nothing_but_json(self, tmp_path):
+        done = clamp3d("check", boxes(tmp_path, 20.0), "--json", "-")
+        assert done.returncode == 0, done.stderr
+        assert isinstance(json.loads(done.stdout), dict)
+        assert len(done.stderr.splitlines()) >= 2
 
-    def test_only_one_file_can_be_stdout(self, tmp_path):
-        done = clamp3d("check", boxes(tmp_path, 20.0), "--html", "-", "--json", "-")
-        assert (done.returncode, done.stdout) == (2, "")
-        assert "only one file can be stdout" in done.stderr
+    def test_a_page_on_stdout(self, tmp_path, whole_main):
+        code, out, _ = whole_main("check", boxes(tmp_path, 20.0), "--html", "-")
+        assert code == 0
+        assert out.lower().startswith("<!doctype html>")
+        assert out.rstrip().endswith("</html>")
+
+    def test_only_one_file_can_be_stdout(self, tmp_path, whole_main):
+        code, out, err = whole_main("check", boxes(tmp_path, 20.0), "--html", "-", "--json", "-")
+        assert (code, out) == (2, "")
+        assert "only one file can be stdout" in err
 
 
 class TestExitCodes:
@@ -83,7 +103,7 @@ class TestExitCodes:
     def test_clean_and_finding(self, distance, code, tmp_path):
         assert clamp3d("check", boxes(tmp_path, distance)).returncode == code
 
-    def test_undecided(self, tmp_path):
+    def test_undecided(self, tmp_path, whole_main):
         """A coarse tube whose facets do not say whether the pin in it, 0.01 mm thinner, touches."""
         tube = trimesh.creation.annulus(5.0, 9.0, 10.0, sections=24)
         tube.export(tmp_path / "tube.stl")
@@ -92,11 +112,11 @@ class TestExitCodes:
             'contact = 1e-3\n[parts.tube]\nshape = "mesh"\nfile = "tube.stl"\nfit = "bound"\n'
             '[parts.pin]\nshape = "cylinder"\nradius = 4.99\nlength = 20\n'
         )
-        done = clamp3d("check", scene, "--json", "-")
-        data = json.loads(done.stdout)
+        code, out, _ = whole_main("check", scene, "--json", "-")
+        data = json.loads(out)
         assert [row["verdict"] for row in data["pairs"]] == ["uncertain"]
-        assert (done.returncode, data["clean"]) == (3, False)
-        assert clamp3d("report", scene, "--output", tmp_path / "report", "-q").returncode == 3
+        assert (code, data["clean"]) == (3, False)
+        assert whole_main("report", scene, "--output", tmp_path / "report", "-q")[0] == 3
 
     def test_a_fault_of_the_program_is_one_line_and_no_finding(self, monkeypatch, main):
         def fail(*args, **kwargs):
@@ -182,12 +202,12 @@ class TestFullDisk:
 
 
 class TestTextFromFiles:
-    def test_control_characters_do_not_reach_the_terminal(self, tmp_path):
+    def test_control_characters_do_not_reach_the_terminal(self, tmp_path, whole_main):
         names = ("\x1b[31mred", "bell\x07\u202e")
-        done = clamp3d("check", boxes(tmp_path, 9.0, names))
-        assert done.returncode == 1
-        assert "\\x1b[31mred" in done.stdout
-        assert all(c.isprintable() or c == "\n" for c in done.stdout + done.stderr)
+        code, out, err = whole_main("check", boxes(tmp_path, 9.0, names))
+        assert code == 1
+        assert "\\x1b[31mred" in out
+        assert all(c.isprintable() or c == "\n" for c in out + err)
 
 
 class TestNumbers:
@@ -200,10 +220,10 @@ class TestNumbers:
         with pytest.raises(click.BadParameter, match="must be a finite number or a fraction like 1/3, got"):
             number(text)
 
-    def test_a_third_of_a_millimetre_is_the_papers_step(self):
-        steps = [json.loads(clamp3d("run", "-q", *more, "--json", "-").stdout) for more in (("--step", "1/3"),)]
-        assert steps[0]["solver"] == "stepped"
-        assert np.round(steps[0]["distance_mm"], 3) == 31.530
+    def test_a_third_of_a_millimetre_is_the_papers_step(self, main):
+        found = json.loads(main("run", "-q", "--step", "1/3", "--json", "-")[1])
+        assert found["solver"] == "stepped"
+        assert np.round(found["distance_mm"], 3) == 31.530
 
 
 def test_a_warning_is_one_line_on_stderr(monkeypatch, main):
