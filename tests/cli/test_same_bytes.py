@@ -59,6 +59,7 @@ def features(*wanted):
         pytest.skip(f"this processor has no {', '.join(lacking)}")
 
 
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
 PLAIN = "X86_V3 X86_V4 AVX512_ICL AVX512_SPR AVX2 FMA3 AVX512F"
 """What NumPy is to do without: its kernels for SSE then."""
 
@@ -68,7 +69,7 @@ PLAIN = "X86_V3 X86_V4 AVX512_ICL AVX512_SPR AVX2 FMA3 AVX512F"
     [
         ("Nehalem", ("AVX2",), {"NPY_DISABLE_CPU_FEATURES": PLAIN}),
         ("Haswell", ("AVX2", "FMA3"), {}),
-        ("SkylakeX", ("AVX512F", "AVX512_SKX"), {}),
+        ("SkylakeX", ("AVX512F", "AVX512_SKX"), ONE_THREAD),  # its own kernels, where a processor has them
     ],
 )
 def test_results_do_not_depend_on_the_kernels_of_blas_and_numpy(core, needed, others):
@@ -77,7 +78,11 @@ def test_results_do_not_depend_on_the_kernels_of_blas_and_numpy(core, needed, ot
 
 
 def test_results_do_not_depend_on_threads():
-    assert results(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1", NUMBA_NUM_THREADS="1") == results()
+    from numpy._core._multiarray_umath import __cpu_features__ as known
+
+    # Where the kernels are those of SkylakeX anyway, they are named, as above: that run serves for both.
+    own = {"OPENBLAS_CORETYPE": "SkylakeX"} if known.get("AVX512_SKX") else {}
+    assert results(**own, **ONE_THREAD) == results()
 
 
 def test_what_depends_on_the_processor_is_not_called():
