@@ -174,7 +174,7 @@ def _golden(scene: _Scene, i: Any, a: NDArray[Any], b: NDArray[Any], best: NDArr
 def truth_50_digits(cases: Cases, i: int) -> Any:
     """Signed distance of case i as an mpmath number: branch and bound in long doubles, golden section at 50 digits.
 
-    Raises MissingLibraryError without mpmath.
+    It is good to 1e-32 of the shortest length. Raises MissingLibraryError without mpmath.
     """
     mp = fifty_digits()
     k = int(cases.shape[i])
@@ -196,7 +196,7 @@ def truth_50_digits(cases: Cases, i: int) -> Any:
         return point([c[j] + t * d[j] for j in range(3)])
 
     best = min(sdf(-half), sdf(half))
-    goal = mp.mpf(10) ** -45 * (half + 1)
+    goal = mp.mpf(10) ** -32 * min(half, R, L)  # a distance has slope 1: more digits than two floats can hold
     scene = _Scene(cases.take([i]))
     _, starts, stops, _ = _brackets(scene, _MOST, np.minimum(scene.size, scene.R))  # a long groove may be thin
     for lo, hi in zip(starts, stops, strict=True):
