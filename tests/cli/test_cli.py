@@ -54,10 +54,10 @@ def test_quiet_says_nothing_on_stderr():
     assert clamp3d("run", "--quiet").stderr == ""
 
 
-def test_a_clamp_that_does_not_close_is_a_finding():
-    done = clamp3d("run", "--line", "LJ-16", "--jumper", "LJ-16", "-q")
-    assert done.returncode == 1
-    assert "not clamped: faces meet" in done.stdout
+def test_a_clamp_that_does_not_close_is_a_finding(main):
+    code, out, _ = main("run", "--line", "LJ-16", "--jumper", "LJ-16", "-q")
+    assert code == 1
+    assert "not clamped: faces meet" in out
 
 
 @pytest.mark.parametrize(

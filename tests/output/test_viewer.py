@@ -439,18 +439,15 @@ def test_view_serves_until_interrupted_and_leaves_nothing():
     assert not answers(int(re.search(r":(\d+)/", url)[1]))
 
 
-def test_run_with_view_prints_its_result_and_ends_after_the_timeout(tmp_path):
+def test_run_with_view_prints_its_result_and_ends_after_the_timeout(tmp_path, main):
     out = tmp_path / "run.json"
-    done = subprocess.run(
-        command_line("run", "--view", "--timeout", "0", "--json", str(out), "--line", "LGJ-10/2", "--jumper", "LJ-150"),
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert done.returncode == 1  # not clamped
-    assert done.stdout.startswith("http://127.0.0.1:")
-    assert "not clamped" in done.stdout
+    wires = ("--line", "LGJ-10/2", "--jumper", "LJ-150")
+    code, said, _ = main("run", "--view", "--timeout", "0", "--json", out, *wires)
+    assert code == 1  # not clamped
+    assert said.startswith("http://127.0.0.1:")
+    assert "not clamped" in said
     assert json.loads(out.read_text())["status"].startswith("not clamped")
+    assert not answers(int(re.search(r":(\d+)/", said)[1]))
 
 
 @pytest.mark.parametrize("command", [["view"], ["run", "--view"]])
