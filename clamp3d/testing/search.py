@@ -13,6 +13,8 @@ from clamp3d.testing.bodies import AnyBody, Body, body
 
 _PROJECTIONS, _FOLLOWED = 8, 3
 """How often near points are projected to and fro between two bodies, and how many of them are followed to the end."""
+_STRIDES, _ROUNDS = np.array([0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0]), 40
+"""How much further than a projection leads is tried, for projections that creep, and how often at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,37 +97,28 @@ def separation(
         q = _onto(y, p)
         gaps = np.linalg.norm(q - p, axis=1)
         q = q[np.argsort(gaps)[: max(_FOLLOWED, len(q) // 2)]]
-    trials = np.concatenate([q, *(_polished(x, y, point) for point in q)])
-    p = _onto(x, trials)
-    q = _onto(y, p)
-    # What the last projection has left outside is added: from there the bodies are no further.
-    outside = np.maximum(x.field(p), 0.0) + np.maximum(y.field(q), 0.0)
-    gaps = np.where(outside <= 1e-9 * (1.0 + np.abs(p).max()), np.linalg.norm(q - p, axis=1) + outside, np.inf)
+    best, quiet = np.full(len(q), math.inf), 0
+    for _ in range(_ROUNDS):
+        on = _onto(y, _onto(x, q))
+        p, trials, gaps = _projected(x, y, (on[:, None] + _STRIDES[:, None] * (on - q)[:, None]).reshape(-1, 3))
+        row, least = np.arange(len(q)), gaps.reshape(len(q), -1).argmin(axis=1)
+        q, gaps = trials.reshape(len(q), -1, 3)[row, least], gaps.reshape(len(q), -1)[row, least]
+        quiet = 0 if (gaps < best - 1e-11).any() else quiet + 1
+        if quiet == 2:
+            break
+        best = np.minimum(best, gaps)
+    p, q, gaps = _projected(x, y, q)
     k = int(np.argmin(gaps))
     return Distance(max(0.0, 2.0 * found.lower), float(gaps[k]), p[k], q[k], method="branch and bound")
 
 
-def _polished(x: Body, y: Body, start: Array) -> Array:
-    """Points (2, 3) near ``start`` (3,) on the two bodies that a descent finds nearest to each other."""
-    from scipy.optimize import minimize
-
-    def inside(v: Array) -> list[float]:
-        return [-float(x.field(v[None, :3])[0]), -float(y.field(v[None, 3:])[0])]
-
-    def slopes(v: Array) -> Array:
-        out = np.zeros((2, 6))
-        out[0, :3], out[1, 3:] = -_slope(x, v[None, :3])[0], -_slope(y, v[None, 3:])[0]
-        return out
-
-    found = minimize(
-        lambda v: np.sum((v[:3] - v[3:]) ** 2),
-        np.concatenate([_onto(x, start[None])[0], start]),
-        jac=lambda v: 2.0 * np.concatenate([v[:3] - v[3:], v[3:] - v[:3]]),
-        constraints={"type": "ineq", "fun": inside, "jac": slopes},
-        method="SLSQP",
-        options={"maxiter": 40, "ftol": 1e-13},
-    )
-    return np.asarray(found.x.reshape(2, 3))
+def _projected(x: Body, y: Body, points: Array) -> tuple[Array, Array, Array]:
+    """Points (n, 3) moved onto x, from there onto y, and how far apart that shows the bodies to be at most (n,)."""
+    p = _onto(x, points)
+    q = _onto(y, p)
+    # What the last projection has left outside is added: from there the bodies are no further.
+    outside = np.maximum(x.field(p), 0.0) + np.maximum(y.field(q), 0.0)
+    return p, q, np.where(outside <= 1e-9 * (1.0 + np.abs(p).max()), np.linalg.norm(q - p, axis=1) + outside, np.inf)
 
 
 def _slope(it: Body, x: Array) -> Array:
@@ -139,7 +132,7 @@ def _onto(it: Body, x: Array) -> Array:
     """Points (n, 3) moved down the field until they are on the body."""
     for _ in range(6):
         out = it.field(x)
-        far = np.flatnonzero(out > 0.0)
+        far = np.flatnonzero(out > 1e-14 * (1.0 + np.abs(x).max()))  # less is rounding
         if not len(far):
             break
         x = x.copy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -221,3 +222,18 @@ def test_the_depth_of_cylinders_that_lean_by_less_than_counts_as_parallel(tilt):
     truth = -0.1 - 10.0 * abs(tilt)
     assert found.lower - 1e-14 <= truth <= found.upper + 1e-14
     assert found.upper - found.lower <= 40.0 * abs(tilt) + 1e-12
+
+
+def test_the_depth_of_parallel_cylinders_is_known_to_rounding():
+    """Of two discs end on end: against sums without rounding."""
+    rng = np.random.default_rng(12)
+    for _ in range(200):
+        (r, s), (length, other), off = (
+            rng.uniform(30.0, 60.0, 2).tolist(),
+            rng.uniform(5.0, 10.0, 2).tolist(),
+            rng.uniform(1.0, 5.0),
+        )
+        found = convex_depth(Rod(r, length, HERE), HERE, Rod(s, other, HERE), translation(0.0, 0.0, off))
+        depth = (Fraction(length) + Fraction(other)) / 2 - Fraction(off)
+        assert found.lower <= -depth <= found.upper
+        assert found.upper - found.lower < 2e-12

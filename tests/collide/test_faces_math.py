@@ -164,6 +164,29 @@ def test_a_pole_has_no_parameter_around_the_axis():
     assert faces_math.spans(np.full((3, 2), np.nan))[0] == 0.0
 
 
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+@pytest.mark.parametrize(("kind", "other"), [(CYLINDER, CONE), (CONE, CYLINDER), (SPHERE, SPHERE), (TORUS, TORUS)])
+def test_bands_over_surfaces_of_their_own_kind(kind, other, sense):
+    """No point of a band is lower; attained by balls of any position, by the others where their axes are one."""
+    rng, (a, b) = np.random.default_rng(9), SIZES[kind]
+    c, d = SIZES[other][0] + 0.3, SIZES[other][1] + (0.2 if other == TORUS else 0.0)
+    for k in range(12):
+        F, shift, lean = frame(rng), 0.1 * rng.normal(size=3), 0.05 * rng.normal(size=(3, 3))
+        if kind != SPHERE and k % 2 == 0:
+            shift, lean = 0.0 * shift, 0.0 * lean
+        G = np.vstack([F[0] + shift, np.linalg.qr((F[1:] + lean).T)[0].T])
+        G[1:] *= np.sign((F[1:] * G[1:]).sum(axis=1))[:, None]
+        v0, v1 = (-0.5 * math.pi, 0.5 * math.pi) if kind == SPHERE else sorted(rng.uniform(-1.0, 1.0, 2))
+        uv = np.array(list(itertools.product(np.linspace(-math.pi, math.pi, 61), np.linspace(v0, v1, 31))))
+        local = (surfaces.points_at(kind, F, (a, b), uv) - G[0]) @ G[1:].T
+        there = min(below(other, c, d, sense, x) for x in local)
+        low = faces_math.band_over(kind, a, b, F.ravel(), v0, v1, other, c, d, G.ravel(), sense)
+        assert low <= there + 1e-12
+        if kind == SPHERE or k % 2 == 0:
+            # Two tori on one axis: the difference of their rings counts whole, in whatever direction it is.
+            assert low >= there - (0.01 if kind == SPHERE else 2.0 * abs(a - c) if kind == TORUS else 1e-9)
+
+
 @pytest.mark.parametrize("kind", [*KINDS, OTHER])
 def test_the_halves_of_a_piece_are_the_piece(kind):
     """Their parameters share the new corner, which is on the surface; together they cover as much as before."""

@@ -49,20 +49,28 @@ class Valleys:
         d = wire.least(self.x, tilts)
         self.d = d = np.where(np.isnan(d), np.inf, d)
         n, k = d.shape
-        left, right = np.full((n, k), np.inf), np.full((n, k), np.inf)  # the next other value, beyond a level stretch
-        for i in range(1, k):
-            left[:, i] = np.where(d[:, i - 1] == d[:, i], left[:, i - 1], d[:, i - 1])
-        for i in range(k - 2, -1, -1):
-            right[:, i] = np.where(d[:, i + 1] == d[:, i], right[:, i + 1], d[:, i + 1])
+        column, row = np.arange(k), np.arange(n)[:, None]
         level = np.hstack([np.zeros((n, 1), bool), d[:, 1:] == d[:, :-1]])
+        # The next other value to either side, beyond a level stretch.
+        first = np.maximum.accumulate(np.where(level, 0, column), axis=1)
+        ends = np.hstack([~level[:, 1:], np.ones((n, 1), bool)])
+        last = np.minimum.accumulate(np.where(ends, column, k)[:, ::-1], axis=1)[:, ::-1]
+        left = np.where(first > 0, d[row, first - 1], np.inf)
+        right = np.where(last < k - 1, d[row, np.minimum(last + 1, k - 1)], np.inf)
         step = np.where(right < d, 1, np.where((left < d) | level, -1, 0))
-        bottom = np.arange(k) + step
+        bottom = column + step
         while True:
             further = np.take_along_axis(bottom, bottom, 1)
             if np.array_equal(further, bottom):
                 break
             bottom = further
         self.bottom = bottom
+
+    def column(self, row: int, x: float) -> int:
+        """Column in which a wire at x ends at one tilt."""
+        d = self.d[row]
+        j = min(max(int(self.x[row].searchsorted(x)), 1), len(d) - 1)
+        return int(self.bottom[row, j if d[j] < d[j - 1] else j - 1])
 
     def settle(self, rows: NDArray[np.intp], x: Array) -> NDArray[np.intp]:
         """Columns (m,) in which wires at x (m,) end at the tilts ``rows`` (m,)."""
@@ -118,7 +126,7 @@ def _lowest(envelope: Envelope, tilt: float, width: float, x6: float, x7: float)
             for side in (range(_POINTS // 2, -1, -1), range(_POINTS // 2, _POINTS)):
                 at = x[w]
                 for k in side:
-                    column = int(valleys.settle(np.array([k]), np.array([at]))[0])
+                    column = valleys.column(k, at)
                     at = places[k, w] = float(valleys.x[k, column])
                     level[k] = max(level[k], valleys.d[k, column])
         level += envelope.lifted(tilts)

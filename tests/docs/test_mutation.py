@@ -1,0 +1,36 @@
+"""Tests that are named in docs/mutation.json as those that see a wrong change exist: CI runs some of them each time."""
+
+import ast
+import json
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@cache
+def names(path: str) -> set[str]:
+    """The tests of a file, by its text alone."""
+    file = ROOT / path
+    tree = ast.parse(file.read_text(encoding="utf-8") if file.exists() else "")
+    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def missing(test: str) -> bool:
+    path, _, name = test.partition("::")
+    return name.partition("[")[0] not in names(path)
+
+
+def test_every_test_that_is_named_exists():
+    rows = json.loads((ROOT / "docs" / "mutation.json").read_text(encoding="utf-8"))
+    named = [row["test"] for row in rows if "test" in row]
+    assert len(named) > 50
+    assert not [test for test in named if missing(test)]
+
+
+@pytest.mark.parametrize("test", ["tests/docs/test_mutation.py::test_gone", "tests/test_gone.py::test_it"])
+def test_one_that_is_gone_is_seen(test):
+    assert missing(test)
+    assert not missing("tests/docs/test_mutation.py::test_one_that_is_gone_is_seen[x]")
