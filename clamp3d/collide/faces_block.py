@@ -13,62 +13,26 @@ import numpy as np
 
 from clamp3d.collide.faces_ball import below, clear_around, enough, foot_above, has_feet
 from clamp3d.collide.faces_bounds import NEAR
+from clamp3d.collide.faces_hollow import MOST_AROUND, MOST_TRIED, ROOM, hollow, piece_over, point_over
 from clamp3d.collide.faces_math import (
     OTHER,
-    PLANE,
+    SPHERE,
     TORUS,
-    band_over,
     bend,
-    bend_over,
     cut,
     height_at,
-    least_height,
     longest,
-    raise_by,
     spans,
-    to_frame,
 )
 from clamp3d.collide.faces_tree import PIECES, nearest_below
 from clamp3d.core.jit import formula
 
 MOST_OVER = 6
-"""Faces at most that many pieces are bounded over together."""
+"""Faces or hollow corners at most that many pieces are bounded over together."""
+MOST_SEEDS = 6
+"""Searches for hollow corners at most, two from each face."""
 WORK = 6 + 2 * PIECES
 """Triangles (3, 3) that the search takes for itself."""
-
-
-@formula
-def _over(V, uv, g, rim, own, solid, count, scratch):
-    """Lower bound, as `least_height`, of the highest that a piece of face g is over any of the first faces chosen."""
-    akind, asize, aframe, _ = own
-    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
-    _, chosen, raised, raised_size, _, whole = scratch
-    du, v0, v1, _, _ = spans(uv)
-    high = -np.inf
-    for m in range(count):
-        f = chosen[m]
-        to_frame(frame[f], V, whole[0])
-        e = bend_over(
-            akind[g], asize[g, 0], asize[g, 1], aframe[g], du, v1 - v0, v0, v1, kind[f], frame[f]
-        )  # fmt: skip
-        h = least_height(kind[f], raised_size[m], size[f, 1], sense[f], whole[0]) - e - rim
-        if akind[g] != PLANE and akind[g] != OTHER:
-            band = akind[g], asize[g, 0], asize[g, 1], aframe[g], v0, v1
-            h = max(h, band_over(*band, kind[f], raised_size[m], size[f, 1], frame[f], sense[f]) - rim)
-        high = max(high, h - raised[m])
-    return high
-
-
-@formula
-def _point_over(point, solid, count, chosen, raised):
-    """How high a point (3) is over the highest of the first faces chosen, as they are raised."""
-    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
-    high = -np.inf
-    for m in range(count):
-        f = chosen[m]
-        h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], point[0], point[1], point[2])
-        high = max(high, h - raised[m])
-    return high
 
 
 @formula
@@ -94,7 +58,7 @@ def _lowest(pieces, uvs, sags, g, rows, own, solid, count, known, wanted, near, 
     high = np.inf
     for k in rows:
         for i in range(3):
-            h = _point_over(pieces[k, i], solid, count, chosen, raised)
+            h = point_over(pieces[k, i], solid, count, chosen, raised)
             if h < high:
                 high = h
                 _put(place, pieces[k, i], uvs[k, i], 0.0)
@@ -111,7 +75,7 @@ def _lowest(pieces, uvs, sags, g, rows, own, solid, count, known, wanted, near, 
         while top > 0:
             top -= 1
             V, uv = cuts[top], cut_uvs[top]
-            low = _over(V, uv, g, rim, own, solid, count, scratch)
+            low = piece_over(V, uv, g, rim, own, solid, count, scratch)
             if low >= min(high - near, wanted, found) or top + 2 > len(cuts) or left == 0:
                 found = min(found, low)
                 continue
@@ -121,7 +85,7 @@ def _lowest(pieces, uvs, sags, g, rows, own, solid, count, known, wanted, near, 
             bent = e > 0.25 * (min(high, wanted) - low)
             side = longest(V, uv, akind[g], asize[g, 0], asize[g, 1], bent)
             cut(V, uv, side, akind[g], asize[g, 0], asize[g, 1], aframe[g], cuts[top + 1], cut_uvs[top + 1])
-            h = _point_over(cuts[top + 1, side], solid, count, chosen, raised)
+            h = point_over(cuts[top + 1, side], solid, count, chosen, raised)
             if h < high:
                 high = h
                 _put(place, cuts[top + 1, side], cut_uvs[top + 1, side], rim - adeviation[g])
@@ -137,7 +101,9 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
     low one of their points is.
     """
     akind, asize, _, adeviation = own
-    nearest_ones, chosen, raised, raised_size, stack, whole = scratch
+    nearest_ones, chosen, raised, _, stack, whole = scratch
+    chosen, raised = chosen[MOST_TRIED:], raised[MOST_TRIED:]
+    over = (nearest_ones, chosen, raised, scratch[3], stack, whole)
     P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, beside, _, _ = solid
     slack, _, goal, tol = limits
     wanted = enough(high, limits)
@@ -151,10 +117,11 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
         bent = max(bent, bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1))
     rho = math.sqrt(rho) + bent + rim + adeviation[g]
     # From the nearest face on, those are taken in that the lowest point of the pieces, over those so far, is above.
-    count, refused, k = 0, 0, rows[len(rows) // 2]
+    clears = raised[2 * ROOM :]
+    count, taken, refused, seeds, k = 0, 0, 0, 0, rows[len(rows) // 2]
     _put(place, pieces[k, 0], uvs[k, 0], 0.0)
     found, lowest = -np.inf, -np.inf
-    while count < MOST_OVER and found < wanted:
+    while taken < MOST_OVER and count + MOST_AROUND <= ROOM and found < wanted:
         f, highest = -1, lowest + 0.1 * tol
         for n in range(NEAR + (NEAR + count) * beside.shape[1]):
             m = n if n < NEAR else (n - NEAR) // beside.shape[1]
@@ -174,36 +141,43 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
         if f < 0 or max(lowest, highest) <= known:
             break
         most = size[f, 0] if kind[f] == TORUS and sense[f] < 0.0 else np.inf  # as for one piece
-        fits, feet, middle = False, has_feet(kind[f], sense[f]), place[2, 1]
+        fits, feet, middle = 0, has_feet(kind[f], sense[f]), place[2, 1]
+        chosen[count] = f
         for row in (len(kind) + f, f):
             needed = rho + (0.0 if feet else max(-highest, 0.0))
-            if not fits and needed < most:
+            if fits == 0 and needed < most:
                 foot_above(kind, size, frame, sense, f, slack[row] + deviation[f], x, y, z, middle)
                 at = nearest_below(P, err, box, link, order, root[f], middle[0], middle[1], middle[2], stack)
                 clear = clear_around(
                     solid, row, 1, slack, at, middle[0], middle[1], middle[2], needed + abs(highest), most, whole, stack
                 )  # fmt: skip
                 if clear >= needed:
-                    fits = True
-                    t = slack[row] + deviation[f]
-                    raised_size[count], raised[count] = raise_by(kind[f], size[f, 0], size[f, 1], sense[f], t)
-                    whole[2, 1 + count // 3, count % 3] = clear
-        if not fits:
+                    fits, raised[count], clears[count] = 1, slack[row] + deviation[f], clear
+        for first in (len(kind), 0):
+            if fits == 0 and feet and kind[f] != SPHERE and seeds < MOST_SEEDS:
+                fits, clear = hollow(
+                    solid, chosen, count, first, slack, place[0, 0], max(known, lowest), x, y, z, rho,
+                    raised, raised[ROOM:], whole, stack,
+                )  # fmt: skip
+                seeds += 1
+                for m in range(fits):
+                    clears[count + m] = clear if m == 0 else 0.0
+        if fits == 0:
             refused += 1
             chosen[len(chosen) - refused] = f
-            if refused == len(chosen) - MOST_OVER:
+            if refused == len(chosen) - ROOM:
                 break
             continue
-        chosen[count] = f
+        count += fits
+        taken += 1
         near = 0.25 * tol + (0.05 * abs(lowest) if -np.inf < lowest and goal < np.inf else 0.0)
-        new, deep = _lowest(
-            pieces, uvs, sags, g, rows, own, solid, count + 1, known, wanted, near, scratch, place
-        )  # fmt: skip
+        new, deep = _lowest(pieces, uvs, sags, g, rows, own, solid, count, known, wanted, near, over, place)
         # Each point of the pieces is above one of the faces by ``new``, and in the ball where that counts.
         held = new
-        for m in range(count + 1):
-            clear, one = whole[2, 1 + m // 3, m % 3], chosen[m]
-            held = min(held, below(new, rho, clear, has_feet(kind[one], sense[one])))
+        for m in range(count):
+            if clears[m] > 0.0:
+                alone = m + 1 == count or clears[m + 1] > 0.0
+                feet = alone and has_feet(kind[chosen[m]], sense[chosen[m]])
+                held = min(held, below(new, rho, clears[m], feet))
         found, lowest = max(found, held), deep
-        count += 1
     return max(known, found), lowest if count > 0 else np.inf

@@ -24,12 +24,15 @@ from clamp3d.collide.faces_ball import (
     cosine,
     enough,
     foot_above,
+    from_point,
     has_feet,
     way_above_both,
 )
+from clamp3d.collide.faces_hollow import MOST_TRIED, ROOM, hollow, piece_over
 from clamp3d.collide.faces_math import (
     OTHER,
     PLANE,
+    SPHERE,
     TORUS,
     band_over,
     bend,
@@ -48,8 +51,6 @@ from clamp3d.core.jit import formula
 
 NEAR = 4
 """Faces whose surfaces are tried as separating ones, those nearest to the piece."""
-TRIED = 16
-"""Faces tried in all, with those beside the nearest."""
 
 
 @formula
@@ -58,7 +59,7 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
     akind, asize, aframe, adeviation = own
     slack, contact, goal, tol = limits
     near, chosen, heights, over, stack, whole = scratch
-    work, point, p, q = whole[0], whole[1], whole[2, 0], whole[2, 1]
+    work, p, q = whole[0], whole[2, 0], whole[2, 1]
     P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, _, beside, _, _ = solid
     du, v0, v1, u, v = spans(uv)
     e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
@@ -86,13 +87,13 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                 out[1 + k], out[4 + k] = p[k], q[k]
             out[7] = f
     outside, inside, measured, tried = -1.0, False, False, 0
-    for n in range(NEAR + beside.shape[1] * TRIED):
+    for n in range(NEAR + beside.shape[1] * MOST_TRIED):
         # The nearest faces first; then those beside them, and beside these.
         if n < NEAR:
             f = near[n]
         else:
             m = (n - NEAR) // beside.shape[1]
-            if m >= tried or tried == TRIED or not (outside < 0.0 and (low > 0.0 or found < -contact)):
+            if m >= tried or tried == MOST_TRIED or not (outside < 0.0 and (low > 0.0 or found < -contact)):
                 break
             f = beside[chosen[m], (n - NEAR) % beside.shape[1]]
         if f < 0 or kind[f] == OTHER:
@@ -148,33 +149,34 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                 inside = inside or clear > 0.0
                 if clear > 0.0 and rim - max(deep, high) < out[0]:  # inside: as deep as the faces are away
                     measured = True
-                    for i in range(3):
-                        for c in range(3):
-                            work[i, c] = p[c]
-                    depth = from_faces(
-                        P,
-                        err,
-                        face,
-                        box,
-                        link,
-                        order,
-                        kind,
-                        size,
-                        frame,
-                        deviation,
-                        work,
-                        over,
-                        max(deep + t, high),
-                        point,
-                        stack,
-                    )
+                    depth = from_point(solid, x, y, z, max(deep + t, high), whole, stack)
                     depth = max(depth, min(deep, clear)) - rim
                     if -depth < out[0] and depth > 0.0:
                         out[0] = -depth
                         for k in range(3):
                             out[1 + k] = out[4 + k] = p[k]
                         out[7] = f
-    if found < -0.5 * contact:
+    # In a hollow corner the solid is below one of several surfaces. Any of them leads to the others.
+    around, up, fits, seeds = chosen[MOST_TRIED:], heights[MOST_TRIED:], 0, 0
+    for m in range(tried):
+        f = chosen[m]
+        if fits > 0 or seeds == 2 or found > min(-0.5 * contact, enough(out[0], limits)):
+            break
+        if not has_feet(kind[f], sense[f]) or kind[f] == SPHERE or heights[m] < found + 0.25 * tol:
+            continue
+        seeds += 1
+        for first in (len(kind), 0):
+            around[0] = f
+            if fits == 0:
+                fits, clear = hollow(
+                    solid, around, 0, first, slack, p, found, x, y, z, rho + e, up, up[ROOM:], whole, stack
+                )
+                if fits > 0:
+                    for n in range(fits):
+                        up[2 * ROOM + n] = 0.0
+                    least = piece_over(V, uv, g, rim, own, solid, fits, (near, around, up, over, stack, whole))
+                    found = max(found, below(least, rho + e, clear, False))
+    if found < -0.5 * contact and fits == 0:
         # In a hollow corner the solid lies below one of two surfaces. A way out of both is along both normals.
         for m in range(tried):
             f = chosen[m]
@@ -212,8 +214,9 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                     t, over_other = slack[one] + deviation[one], slack[other] + deviation[other]
                     limit = 2.0 * at + 8.0 * (t + over_other) + max(least, 0.0) + rho
                     clear = nearest_marked(solid, f, o, 0, 1, -1.0, slack, xs, ys, zs, limit, whole, stack)
+                    near[0], whole[1, 1, 0] = other, over_other
                     if clear > at + t and is_open(
-                        solid, one, t, other, over_other, clear, xs, ys, zs, whole[1, 0], stack
+                        solid, one, t, near[:1], whole[1, 1, :1], clear, xs, ys, zs, whole[1, 0], stack
                     ):  # fmt: skip
                         found = max(found, below(least, rho, clear, True) - e)
                         break

@@ -57,13 +57,13 @@ def _beside(P, err, face, box, link, order, kind, size, frame, sense, deviation,
 
 
 @formula
-def is_open(solid, f, t, other, least, reach, x, y, z, q, stack):
+def is_open(solid, f, t, others, least, reach, x, y, z, q, stack):
     """Whether a point of face f has no other surface so near that it could hide on which side is outside.
 
     From there a way of a little more than ``t`` leads straight up out of the solid to what is higher above the face
-    than that, and one straight down into it; both within ``reach`` of the point x, y, z. The way up is ``least``
-    above the face ``other``, if that is not negative. Tried are, of the triangles nearest first, where they are
-    nearest and on the way from there to their middles.
+    than that, and one straight down into it; both within ``reach`` of the point x, y, z. The way up is ``least`` (k,)
+    above all the faces ``others`` (k,) but f. Tried are, of the triangles nearest first, where they are nearest and on
+    the way from there to their middles.
     """
     P, err, face, box, link, order, root, uv, sag, kind, size, frame, sense, deviation, group, _, _, _ = solid
     tree = P, err, face, box, link, order
@@ -95,10 +95,13 @@ def is_open(solid, f, t, other, least, reach, x, y, z, q, stack):
                 weighted(kind[f], size[f, 0], size[f, 1], frame[f], P[j], uv[j], v1, w1, q)
                 if math.sqrt((x - q[0]) ** 2 + (y - q[1]) ** 2 + (z - q[2]) ** 2) + way > reach:
                     break
-                if other >= 0:
-                    h = height_at(kind[other], size[other, 0], size[other, 1], frame[other], q[0], q[1], q[2])
-                    if sense[other] * h <= least + way:
-                        continue
+                above = True
+                for n in range(len(others)):
+                    g = others[n]
+                    h = sense[g] * height_at(kind[g], size[g, 0], size[g, 1], frame[g], q[0], q[1], q[2])
+                    above = above and (g == f or h > least[n] + way)
+                if not above:
+                    continue
                 if not _beside(
                     *tree, kind, size, frame, sense, deviation, group, f, q[0], q[1], q[2], way, stack[half:]
                 ):  # fmt: skip
