@@ -1,5 +1,6 @@
 """Before any test: the contact kernel is compiled once, so that no test measures or prints its compilation."""
 
+import gc
 import importlib
 import os
 import sys
@@ -39,6 +40,17 @@ def pytest_sessionstart(session):
     groove, wire = SweptArc(7.0, 1.0, 50.0), Cylinder(6.0, 80.0)
     signed_distance(groove, wire, translation(0.0, 3.0, 0.0))
     groove_pieces(groove, Capsule(6.0, 80.0), translation(0.0, 3.0, 0.0))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """What is collected stays to the end: it is not searched for garbage over and over again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import OTHER, PLANE, Faces, height
 from clamp3d.collide.answer import Distance
+from clamp3d.collide.faces_search import FEW, Descent, Search
 from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.linear import dot, to_target
 from clamp3d.core.pose import Array, inverse
@@ -21,10 +21,6 @@ MOST = 20_000
 """Pieces looked at before a direction ends with what is known."""
 _LEAST = 5e-4
 """So far (mm) may a face beside another reach above it: pieces that leave it in a tangent need not be cut for ever."""
-VERDICT_WIDTH = 0.01
-"""Width of the bounds, by the contact threshold, at which a search for the verdict alone ends without one."""
-_FEW = 100
-"""Pieces looked at each way before the rest of those for a depth is spent."""
 _ASKED = 8
 """Triangles below which a point is looked for that only one of two touching solids has."""
 _BESIDE = 8
@@ -206,37 +202,40 @@ def faces_distance(
     clearance: float = 0.0,
     tol: float | None = None,
     most: int = MOST,
+    brief: float | None = None,
 ) -> Distance:
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame.
 
     Stops when the bounds are on the same side of ``contact`` and ``clearance`` mm, or no further apart than
-    ``tol``, where that is given, or after ``most`` pieces in one direction.
+    ``tol``, where that is given, or after ``most`` pieces in one direction, or where more of them tell next to
+    nothing more: soon, if the bounds are then further apart than ``brief`` mm, where that is given.
     """
     here = inverse(T)
     if len(a.faces.face) < len(b.faces.face):  # the pieces of the one with fewer first: they often decide
-        return faces_distance(b, a, here, contact=contact, clearance=clearance, tol=tol, most=most).moved(T).swapped()
-    few = most if tol is None else min(most, _FEW)
-    first = _towards(a, b, T, contact, clearance, tol, few)
-    if tol is None and first.upper < -contact - 2.0 * RESOLUTION:
+        turned = faces_distance(b, a, here, contact=contact, clearance=clearance, tol=tol, most=most, brief=brief)
+        return turned.moved(T).swapped()
+    one = Search(a, b, T, contact, clearance, tol, most, brief)
+    other = Search(b, a, here, contact, clearance, tol, most, brief)
+    clash, margin, few = -contact - 2.0 * RESOLUTION if tol is None else -np.inf, max(contact, clearance), FEW
+    first = one.more(few)
+    if first.upper < clash:
         return _told(replace(first.swapped(), lower=-np.inf))
-    margin = max(contact, clearance)
     if first.lower > margin and not _may_hold(a, b, here):
-        if tol is not None and first.upper - first.lower > tol and few < most:
-            first = _towards(a, b, T, contact, clearance, tol, most)
-        return _told(first.swapped())
-    if tol is None or first.upper - first.lower <= tol:
-        second = _towards(b, a, here, contact, clearance, tol, most, (first.lower, first.upper))
-    else:  # the deepest point is perhaps soon found the other way: then little of this way is left to look at
-        second = _towards(b, a, here, contact, clearance, tol, few, (np.inf, first.upper))
-        high = min(first.upper, second.upper)
-        if first.lower < high - tol:
-            least = second.lower if second.lower >= high - tol else np.inf
-            first = _closer(first, _towards(a, b, T, contact, clearance, tol, most, (least, high)))
-        high = min(first.upper, high)
-        if second.lower < min(high - tol, first.lower):
-            second = _closer(second, _towards(b, a, here, contact, clearance, tol, most, (first.lower, high)))
+        return _told((first if tol is None else one.more(most)).swapped())
+    # The other way tells perhaps at once: then little of this way is left to look at.
+    second = other.more(most, first.lower, first.upper) if one.done else other.more(few, upper=first.upper)
+    if second.upper < clash:
+        return _told(replace(second.moved(T), lower=-np.inf))
+    if second.lower > margin and tol is None and not _may_hold(b, a, T):
+        return _told(second.moved(T))
+    if not one.done:
+        first = one.more(most, second.lower if other.done else np.inf, min(first.upper, second.upper))
+        if first.lower > margin and not _may_hold(a, b, here):
+            return _told(replace(_best(first.swapped(), second.moved(T)), lower=first.lower))
+    if not other.done and not first.upper < clash:
+        second = other.more(most, first.lower, min(first.upper, second.upper))
     first, second, low = first.swapped(), second.moved(T), first.lower
-    best = first if first.upper <= second.upper else second
+    best = _best(first, second)
     if low > 0.0 and second.lower > 0.0:
         return _told(replace(best, lower=max(low, second.lower)))
     low = min(low, second.lower)
@@ -281,52 +280,14 @@ def _at(a: FaceModel, point: Array) -> tuple[float, float]:
     pieces = np.tile(point, (1, 3, 1)), np.zeros((1, 3, 2)), none, np.zeros((1, 3))
     tree = box, np.array([[0, 1]]), none, none
     surface = np.array([OTHER]), np.zeros((1, 2)), np.zeros((1, 12)), np.zeros(1)
-    low, out = _search(a, pieces, tree, np.eye(4), surface, 1.0, 0.0, 1e-3, 0, (np.inf, np.inf))
-    return low, float(out[0])
+    search = Descent(a, pieces, tree, np.eye(4), surface, (1.0, 0.0, 1e-3), 0)
+    return search.go(0, np.inf), float(search.out[0])
 
 
-def _search(
-    a: FaceModel,
-    pieces: tuple[NDArray[Any], ...],
-    tree: tuple[NDArray[Any], ...],
-    T: Array,
-    surfaces: tuple[NDArray[Any], ...],
-    contact: float,
-    clearance: float,
-    tol: float,
-    most: int,
-    known: tuple[float, float],
-) -> tuple[float, Array]:
-    """Lower bound of the signed distance from ``a`` of another solid's pieces, and what else the search tells.
-
-    ``pieces``: corners, parameters, faces, sags of borders, in a's frame; ``tree`` over them, in their own frame;
-    ``surfaces``: kind, size, frame, deviation. At most ``most`` pieces are added. ``known``: bounds that the search the
-    other way has found; what is above the first, and no point below the second, is not looked for.
-    """
-    from clamp3d.collide.faces_block import WORK
-    from clamp3d.collide.faces_hollow import TRIED
-    from clamp3d.collide.faces_kernel import RESULT, SPACE, descend
-
-    n, nodes, out = len(pieces[0]), len(tree[0]), np.zeros(RESULT)
-    rows = [np.empty((n + most, *given.shape[1:]), dtype=given.dtype) for given in pieces]
-    for row, given in zip(rows, pieces, strict=True):
-        row[:n] = given
-    out[0] = known[1]
-    found = descend(
-        *rows, np.empty(n + most + nodes), n, *tree, T, *surfaces,
-        *a.arrays, a.slack, contact, clearance, tol, most, known[0],
-        np.empty(TRIED + len(a.faces.kind)), np.empty((WORK, 3, 3)),
-        np.empty(SPACE + n + most + 2 * nodes, dtype=np.int64), out,
-    )  # fmt: skip
-    return float(found), out
-
-
-def _closer(known: Distance, again: Distance) -> Distance:
-    """What two searches the same way tell together."""
-    best = known if again.point_a is None else again  # without points: nothing lower than what was known
-    return replace(
-        best, lower=max(known.lower, again.lower), estimate=max(known.estimate or 0.0, again.estimate or 0.0)
-    )
+def _best(first: Distance, second: Distance) -> Distance:
+    """That of two with the lesser upper bound and points: one that found nothing below the other's has none."""
+    known = first.point_a is not None and first.upper <= second.upper
+    return first if known or second.point_a is None else second
 
 
 def _told(found: Distance) -> Distance:
@@ -339,30 +300,3 @@ def _may_hold(inner: FaceModel, outer: FaceModel, T: Array) -> bool:
     middle, half = box.mean(axis=0), 0.5 * (box[1] - box[0])
     centre = to_target(T, middle)
     return not ((centre < outer.bounds[0]) | (centre > outer.bounds[1])).any() and half.min() >= 0.0
-
-
-def _towards(
-    a: FaceModel,
-    b: FaceModel,
-    T: Array,
-    contact: float,
-    clearance: float,
-    tol: float | None,
-    most: int,
-    known: tuple[float, float] = (np.inf, np.inf),
-) -> Distance:
-    """Least signed distance from a of b's faces, ``b`` at ``T`` in a's frame; points in a's frame, b's point first.
-
-    ``estimate`` is how far at least some point of b is outside of a. ``known`` as in `_search`: ``upper`` is the second
-    of it, without points, where none is found below it.
-    """
-    R, t = T[:3, :3], T[:3, 3]
-    frames = dot(b.faces.frame, R.T)
-    frames[:, 0] += t
-    pieces = dot(b.faces.corners, R.T) + t, b.faces.uv, b.faces.face, b.faces.sag
-    surfaces = b.faces.kind, b.faces.size, np.ascontiguousarray(frames.reshape(-1, 12)), b.faces.deviation
-    width = -VERDICT_WIDTH * contact if tol is None else tol
-    place = np.ascontiguousarray(T)
-    found, out = _search(a, pieces, b.arrays[3:7], place, surfaces, contact, clearance, width, most, known)
-    p, q = (out[1:4].copy(), out[4:7].copy()) if out[0] < known[1] else (None, None)
-    return Distance(found, float(out[0]), p, q, level="faces", method="faces", estimate=float(out[8]))

@@ -10,6 +10,7 @@ from clamp3d.brep.surfaces import OTHER, height
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.depth_cover import nearest_behind
 from clamp3d.collide.faces import FaceModel, faces_distance
+from clamp3d.collide.faces_search import FEW
 from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.linear import dot, norm, to_target
 from clamp3d.core.pose import Array, inverse
@@ -21,6 +22,10 @@ _SHARE, _LEAST = 0.005, 0.001
 """So much further, by the depth or in mm, whichever is more, b is moved, so that a gap can be seen."""
 _PIECES = 4000
 """Pieces looked at for a depth, and for whether they are apart after a translation."""
+_FREE = 400
+"""Pieces looked at of two solids that both have free-form faces: how deep they are in each other is known coarsely."""
+_COARSE = 0.1
+"""Width of the bounds, by the depth, that are asked for where the first translations do not part them."""
 _STEP = 1e-6
 
 
@@ -30,10 +35,28 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
     No translation shorter than the depth of any one point parts them; one after which they are apart is long enough.
     Without such a one ``lower`` stays minus infinity.
     """
-    found = faces_distance(a, b, T, contact=_LEAST, tol=max(_LEAST, -_SHARE * known.upper), most=_PIECES)
-    inside = (max(0.0, -known.upper, -found.upper), max(0.0, -found.lower))
-    known = replace(known if known.upper <= found.upper else found, lower=-np.inf, interference=inside)
-    margin, planes, t, place = max(_LEAST, _SHARE * inside[0]), [], np.zeros(3), T.copy()
+    free = [float(x.faces.deviation[x.faces.kind == OTHER].max(initial=0.0)) for x in (a, b)]
+    most = _FREE if min(free) > 0.0 else _PIECES
+    tol, inside, parted = max(_LEAST, -_SHARE * known.upper), (0.0, np.inf), known
+    for pieces in (FEW, most):
+        found = faces_distance(a, b, T, contact=_LEAST, tol=tol, most=pieces, brief=tol)
+        inside = max(inside[0], -known.upper, -found.upper), min(inside[1], max(0.0, -found.lower))
+        known = replace(known if known.upper <= found.upper else found, lower=-np.inf, interference=inside)
+        margin = max(tol, _SHARE * inside[0])
+        parted = _parted(a, b, T, known, found, margin, most)
+        # The deepest of few points is mostly deep enough: no translation much shorter than this one parts them.
+        if parted.lower > -np.inf or found.upper - found.lower <= tol:
+            break
+        tol = max(tol, _COARSE * inside[0], 2.0 * sum(free))
+    return parted
+
+
+def _parted(
+    a: FaceModel, b: FaceModel, T: Array, known: Distance, found: Distance, margin: float, most: int
+) -> Distance:
+    """``known`` with a translation after which they are apart, past the point of ``found`` first; as it is without."""
+    inside = known.interference or (0.0, np.inf)
+    planes, t, place = [], np.zeros(3), T.copy()
     at, deep = found.point_a, -found.upper
     for step in range(_ASKS):
         if (way := _way_out(a, b, place, found)) is None:
@@ -47,10 +70,11 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
         if size > 2.0 * (inside[0] + margin):  # a long way out, or nothing is behind all the planes
             break
         place[:3, 3] = T[:3, 3] + t
-        found = faces_distance(a, b, place, contact=0.01 * margin, most=_PIECES)
+        found = faces_distance(a, b, place, contact=0.01 * margin, most=most, brief=margin)
         if found.lower > RESOLUTION:  # so also where the pose differs by rounding
             p, q = (None, None) if step or at is None else (at + deep * n, at) if of_b else (at, at - deep * n)
-            return replace(known, lower=-size, normal=t / size, point_a=p, point_b=q)
+            inside = inside[0], min(inside[1], size)  # no point is deeper than a way that parts them is long
+            return replace(known, lower=-size, normal=t / size, point_a=p, point_b=q, interference=inside)
     return known
 
 

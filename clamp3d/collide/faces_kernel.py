@@ -18,8 +18,11 @@ from clamp3d.collide.faces_tree import DEEP, nearest
 from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.jit import entry, formula
 
-RESULT = 10
-"""Upper bound, points on the piece (3) and the solid (3), face, farthest distance that is certainly outside, pieces."""
+RESULT = 11
+"""Upper bound, points on the piece (3) and the solid (3), face, farthest distance that is certainly outside, pieces.
+
+Then the least bound of what is no longer looked at.
+"""
 SPACE = DEEP + NEAR + TRIED
 """Numbers that it takes, besides one for each piece and two a node."""
 
@@ -51,11 +54,14 @@ def _pop(heap, count, key):
 
 
 def _descend(
-    pieces, uvs, faces, sags, bounds, n, bbox, blink, border, broot, T,
+    pieces, uvs, faces, sags, bounds, first, bbox, blink, border, broot, T,
     akind, asize, aframe, adeviation,
     P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
-    marks, nodes, slack, contact, clearance, tol, most, other, over, whole, space, out,
+    marks, nodes, slack, contact, clearance, tol, most, looks, other, over, whole, space, state, out,
 ):  # fmt: skip
+    # At most ``most`` pieces are added in all, and few more than ``looks`` looked at.
+    # ``state``: how many pieces there are, how many items wait, and whether the search has begun: it can be taken up
+    # again, with the same thresholds and width, where it stopped.
     own = (akind, asize, aframe, adeviation)
     solid = (
         P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
@@ -63,7 +69,7 @@ def _descend(
     )  # fmt: skip
     inner, near, chosen = space[:DEEP], space[DEEP : DEEP + NEAR], space[DEEP + NEAR : SPACE]
     # What waits, that with the least bound first: pieces, and after their numbers the nodes of their tree.
-    after, first = len(faces), n
+    after = len(faces)
     owner, heap = space[SPACE : SPACE + len(bbox)], space[SPACE + len(bbox) :]
     heights, over, p, q = over[:TRIED], over[TRIED:], whole[2, 0], whole[2, 1]
     place = whole[WORK - 3 :]
@@ -72,12 +78,14 @@ def _descend(
     goal = max(contact, clearance) + 2.0 * RESOLUTION if verdict else np.inf
     tol = abs(tol)
     limits = (slack, contact, goal, tol)
-    for i in range(len(bbox)):
-        owner[i] = -1  # of several faces
-    for g in range(len(broot)):
-        owner[broot[g]] = g
-    looked, floor, waiting = 0, np.inf, 1
-    heap[0], bounds[after] = after, -np.inf
+    if state[2] == 0:
+        for i in range(len(bbox)):
+            owner[i] = -1  # of several faces
+        for g in range(len(broot)):
+            owner[broot[g]] = g
+        state[0], state[1], state[2] = first, 1, 1
+        heap[0], bounds[after], out[10] = after, -np.inf, np.inf
+    looked, floor, n, waiting = out[9], out[10], state[0], state[1]
     while waiting:
         low, high = bounds[heap[0]], out[0]
         known = high - low <= tol or low >= other
@@ -89,7 +97,7 @@ def _descend(
                 or (low >= -contact and high <= contact)
                 or (low > contact + 2.0 * RESOLUTION and high < clearance - 2.0 * RESOLUTION)
             )
-        if known or (heap[0] < after and (n >= len(faces) or n - first >= most)):
+        if known or looked > looks or (heap[0] < after and (n >= len(faces) or n - first >= most)):
             break
         item = _pop(heap, waiting, bounds)
         waiting -= 1
@@ -169,7 +177,7 @@ def _descend(
             waiting += 1
         n += 1
         looked += 2
-    out[9] = looked
+    out[9], out[10], state[0], state[1] = looked, floor, n, waiting
     return min(floor, bounds[heap[0]]) if waiting else floor
 
 
@@ -181,5 +189,5 @@ descend = entry(
     _descend,
     "f8(f8[:,:,::1],f8[:,:,::1],i8[::1],f8[:,::1],f8[::1],i8,f8[:,::1],i8[:,::1],i8[::1],i8[::1],f8[:,::1],"
     f"i8[::1],f8[:,::1],f8[:,::1],f8[::1],{_SOLID},"
-    "f8[::1],f8,f8,f8,i8,f8,f8[::1],f8[:,:,::1],i8[::1],f8[::1])",
+    "f8[::1],f8,f8,f8,i8,i8,f8,f8[::1],f8[:,:,::1],i8[::1],i8[::1],f8[::1])",
 )

@@ -16,7 +16,8 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm, bodies_distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.convex import Rod
-from clamp3d.collide.faces import MOST, VERDICT_WIDTH, faces_distance, flat_where_near
+from clamp3d.collide.faces import MOST, faces_distance, flat_where_near
+from clamp3d.collide.faces_search import VERDICT_WIDTH
 from clamp3d.collide.facets import rod_distance
 from clamp3d.collide.meshes import meshes_distance
 from clamp3d.collide.model import FINEST, Model

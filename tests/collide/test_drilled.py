@@ -55,15 +55,15 @@ def test_leaning_pins_come_free_by_their_depth_and_by_no_less():
         assert found.upper - found.lower <= 1e-6
         seen += found.method == "hole"
 
-        def apart(t, pin=pin, T=T):
-            low, high = solid_truth(5.0, True, half, pin.radius, pin.length, translation(*t) @ T, 1e-7, 20_000)
-            return low > -1e-3, high > 1e-6  # where they touch along a line it takes long to tell
+        def bounds(t, most, pin=pin, T=T):
+            return solid_truth(5.0, True, half, pin.radius, pin.length, translation(*t) @ T, 1e-7, most)
 
-        assert apart(-found.lower * found.normal)[0]
+        # Where they touch along a line it takes long to tell.
+        assert bounds(-found.lower * found.normal, 20_000)[0] > -1e-3
         near = found.normal + 0.1 * rng.normal(size=(20, 3))
         near /= np.linalg.norm(near, axis=1)[:, None]
-        for way in (found.normal, *near, *around):
-            assert not apart(-0.99 * found.upper * way)[1]
+        for way in (found.normal, *near, *around):  # mostly a point of both is found at once
+            assert any(bounds(-0.99 * found.upper * way, most)[1] <= 1e-6 for most in (300, 20_000))
     assert seen > 10
 
 

@@ -20,6 +20,7 @@ from clamp3d.collide.swept import swept_lower
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.kernel import signed_distance
 from tests.kinds import TURNED, box_mesh
 
 HERE = np.eye(4)
@@ -218,6 +219,8 @@ def test_a_groove_and_a_cylinder_are_known_to_rounding():
         wire = Cylinder(rng.uniform(0.5, 12.0), rng.uniform(1.0, 90.0))
         T = rotation(rng.normal(size=3), rng.choice([0.01, 0.3, 2.0]))
         T[:3, 3] = 10.0 * rng.normal(size=3)
+        if signed_distance(groove, wire, T).distance <= 0.0:
+            continue  # the depth is another search's
         found = distance(groove, wire, T)
         if found.lower > 0.0:
             seen += 1

@@ -371,17 +371,18 @@ def command_line(*arguments, folder):
     )
 
 
-def test_command_reports_a_clamp_of_ones_own(tmp_path):
+def test_command_reports_a_clamp_of_ones_own(tmp_path, monkeypatch, main):
+    monkeypatch.chdir(tmp_path)
     text = resources.files("clamp3d.clamp").joinpath("data/reference.toml").read_text()
     text = text.replace('name = "reference"', 'name = "mine"').replace("length = 60.0", "length = 75.0")
     (tmp_path / "mine.toml").write_text(text.replace("hole_diameter = 22.0", "hole_diameter = 21.0"))
     arguments = ("--line", "24", "--jumper", "18", "-o", "out", "--clearance", "2")
-    done = command_line("mine.toml", *arguments, folder=tmp_path)
-    assert done.returncode in (0, 1), done.stderr
-    assert done.stdout.split() == [f"out/{name}" for name in FILES]
+    code, out, err = main("report", "mine.toml", *arguments)
+    assert code in (0, 1), err
+    assert out.split() == [f"out/{name}" for name in FILES]
     data = json.loads((tmp_path / "out" / "report.json").read_text())
     assert data["clamp"] == "mine"
-    assert data["passed"] == (done.returncode == 0)
+    assert data["passed"] == (code == 0)
     assert data["other_ends"] is not None
     hole = next(p for p in data["pairs"] if (p["a"], p["b"]) == ("P1", "P4"))
     assert hole["distance_mm"] == pytest.approx(0.5, abs=1e-6)
@@ -394,13 +395,14 @@ def test_command_says_not_clamped_by_its_exit_code(tmp_path):
     assert "Not passed: not clamped" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_command_takes_scenes_and_meshes(tmp_path):
+def test_command_takes_scenes_and_meshes(tmp_path, monkeypatch, main):
+    monkeypatch.chdir(tmp_path)
     hinge = ROOT / "examples" / "hinge"
-    assert command_line(str(hinge / "scene.toml"), "-q", "-o", "out", folder=tmp_path).returncode == 1
+    assert main("report", hinge / "scene.toml", "-q", "-o", "out")[0] == 1
     data = json.loads((tmp_path / "out" / "report.json").read_text())
     assert {(p["a"], p["b"]) for p in data["pairs"]} == {("leaf-a", "leaf-b"), ("leaf-a", "pin"), ("leaf-b", "pin")}
     assert [m["verdict"] for m in data["motions"]].count("clash") == 1
-    assert command_line(str(hinge / "pin.stl"), "-q", "-o", "pin", folder=tmp_path).returncode == 0
+    assert main("report", hinge / "pin.stl", "-q", "-o", "pin")[0] == 0
     assert "mesh pin.stl of 216 triangles" in (tmp_path / "pin" / "report.html").read_text()
 
 

@@ -401,13 +401,11 @@ def command_line(*arguments):
     return [sys.executable, "-m", "clamp3d", *arguments]
 
 
-def test_page_is_one_file_that_names_no_other(tmp_path):
+def test_page_is_one_file_that_names_no_other(tmp_path, main):
     page = tmp_path / "run.html"
-    done = subprocess.run(
-        command_line("view", "--html", str(page), "--draw-error", "0.1", "-q"), capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == [str(page)]
+    code, out, err = main("view", "--html", page, "--draw-error", "0.1", "-q")
+    assert code == 0, err
+    assert out.split() == [str(page)]
     text = page.read_text()
     ours = re.sub(r"<script>.*?</script>", "", text, count=1, flags=re.DOTALL)  # without meshcat itself
     assert not re.search(r"""(src|href)=["'](?!data:)""", ours)
@@ -456,16 +454,11 @@ def test_run_with_view_prints_its_result_and_ends_after_the_timeout(tmp_path):
 
 
 @pytest.mark.parametrize("command", [["view"], ["run", "--view"]])
-def test_a_blocked_sequence_is_shown_on_one_page(command, tmp_path):
+def test_a_blocked_sequence_is_shown_on_one_page(command, tmp_path, main):
     page = tmp_path / "page.html"
-    done = subprocess.run(
-        command_line(*command, "--timeout", "0", "--html", str(page), "--sequence", "P1|P2P3P4P5 -> P2 -> P7"),
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert done.returncode == 1
-    said, *shown = done.stdout.splitlines()
+    code, out, _ = main(*command, "--timeout", "0", "--html", page, "--sequence", "P1|P2P3P4P5 -> P2 -> P7")
+    assert code == 1
+    said, *shown = out.splitlines()
     assert said.startswith("not assembled: sequence step 3, P7")
     assert sum(line.startswith("http://") for line in shown) == (command != ["view"])  # a page in a file is not served
     assert "P7 from" in page.read_text()
