@@ -33,7 +33,7 @@ def number(text: str | float) -> float:
             from fractions import Fraction
 
             text = float(Fraction(text))
-        found = float(text)
+        found = math.nan if "_" in str(text) else float(text)  # 1_0 is no number outside of Python
     except (ValueError, ZeroDivisionError, OverflowError):
         found = math.nan
     if not math.isfinite(found):

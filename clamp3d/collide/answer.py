@@ -24,7 +24,9 @@ class Distance:
     ----------
     lower, upper : float
         The distance lies between these, mm; positive apart, in an overlap minus the depth. Infinite where nothing is
-        known: of an overlap of which only ``upper`` is, the depth is at least ``-upper``.
+        known: of an overlap of which only ``upper`` is, the depth is at least ``-upper``. In a row of `check` whose
+        verdict is contact or allowed they bound minus the interference, which decides it: ``lower`` then says how deep
+        a point of one body can be inside the other, and the way out may be longer.
     point_a, point_b : ndarray (3,) or None
         Points on the two bodies: the nearest ones, in an overlap those that part last as b moves out; None if unknown.
     normal : ndarray (3,) or None

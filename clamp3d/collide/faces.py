@@ -215,13 +215,13 @@ def faces_distance(
         turned = faces_distance(b, a, here, contact=contact, clearance=clearance, tol=tol, most=most, brief=brief)
         return turned.moved(T).swapped()
     one = Search(a, b, T, contact, clearance, tol, most, brief)
-    other = Search(b, a, here, contact, clearance, tol, most, brief)
     clash, margin, few = -contact - 2.0 * RESOLUTION if tol is None else -np.inf, max(contact, clearance), FEW
     first = one.more(few)
     if first.upper < clash:
         return _told(replace(first.swapped(), lower=-np.inf))
     if first.lower > margin and not _may_hold(a, b, here):
         return _told((first if tol is None else one.more(most)).swapped())
+    other = Search(b, a, here, contact, clearance, tol, most, brief)
     # The other way tells perhaps at once: then little of this way is left to look at.
     second = other.more(most, first.lower, first.upper) if one.done else other.more(few, upper=first.upper)
     if second.upper < clash:

@@ -13,21 +13,15 @@ import numpy as np
 
 from clamp3d.collide.faces_math import (
     CYLINDER,
-    OTHER,
     PLANE,
     SPHERE,
-    bend,
-    cut,
     height_at,
     least_height,
-    longest,
-    point_triangle,
     slope_at,
-    spans,
     to_frame,
 )
 from clamp3d.collide.faces_open import is_open
-from clamp3d.collide.faces_tree import PIECES, box_distance, nearest_marked, put_children
+from clamp3d.collide.faces_tree import nearest_marked
 from clamp3d.core.jit import formula
 
 
@@ -120,61 +114,6 @@ def clear_around(solid, row, bit, slack, at, x, y, z, needed, most, whole, stack
     if clear > at + t and is_open(solid, f, t, stack[:0], slack[:0], clear, x, y, z, whole[1, 0], stack):
         return clear
     return -1.0
-
-
-@formula
-def from_point(solid, x, y, z, limit, whole, stack):
-    """Lower bound of a point's distance from all faces, at most ``limit``: pieces are cut until their bend is small."""
-    P, err, face, box, link, order, _, uvs, sag, kind, size, frame, _, deviation, _, _, _, _ = solid
-    pieces, cut_uvs = whole[3 : 3 + PIECES], whole[3 + PIECES : 3 + 2 * PIECES]
-    stack[0], top, low = 0, 1, limit
-    while top > 0:
-        top -= 1
-        i = stack[top]
-        if box_distance(box, i, x, y, z, x, y, z) - box[i, 6] >= low:
-            continue
-        if link[i, 1] < 0:
-            top = put_children(box, link, i, x, y, z, x, y, z, stack, top)
-            continue
-        for j in range(link[i, 0], link[i, 0] + link[i, 1]):
-            t = order[j]
-            f = face[t]
-            d, _, _ = point_triangle(x, y, z, P[t])
-            d -= err[t]
-            if d >= low:
-                continue
-            if kind[f] == OTHER or kind[f] == PLANE:
-                if kind[f] == PLANE:
-                    d = max(d, abs(height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)) - deviation[f])
-                low = min(low, d)
-                continue
-            over = abs(height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z)) - deviation[f]
-            if over >= low:
-                continue
-            for m in range(3):
-                for c in range(3):
-                    pieces[0, m, c] = P[t, m, c]
-                cut_uvs[0, m, 0], cut_uvs[0, m, 1] = uvs[t, m, 0], uvs[t, m, 1]
-            left, more = 40, 1
-            while more > 0:
-                more -= 1
-                V, uv = pieces[more], cut_uvs[more]
-                du, v0, v1, _, _ = spans(uv)
-                e = bend(kind[f], size[f, 0], size[f, 1], du, v1 - v0, v0, v1)
-                d, _, _ = point_triangle(x, y, z, V)
-                d = max(d - e - sag[t] - deviation[f], over)
-                if d >= low:
-                    continue
-                if e < 1e-3 * low or left == 0 or more + 2 > len(pieces):
-                    low = d
-                    continue
-                left -= 1
-                side = longest(V, uv, kind[f], size[f, 0], size[f, 1], True)
-                cut(
-                    V, uv, side, kind[f], size[f, 0], size[f, 1], frame[f], pieces[more + 1], cut_uvs[more + 1]
-                )  # fmt: skip
-                more += 2
-    return low
 
 
 @formula

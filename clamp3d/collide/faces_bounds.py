@@ -24,7 +24,6 @@ from clamp3d.collide.faces_ball import (
     cosine,
     enough,
     foot_above,
-    from_point,
     has_feet,
     way_above_both,
 )
@@ -149,7 +148,13 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                 inside = inside or clear > 0.0
                 if clear > 0.0 and rim - max(deep, high) < out[0]:  # inside: as deep as the faces are away
                     measured = True
-                    depth = from_point(solid, x, y, z, max(deep + t, high), whole, stack)
+                    for i in range(3):
+                        for c in range(3):
+                            whole[1, i, c] = p[c]
+                    depth = from_faces(
+                        P, err, face, box, link, order, kind, size, frame, deviation, whole[1], over,
+                        max(deep + t, high), work, stack,
+                    )  # fmt: skip
                     depth = max(depth, min(deep, clear)) - rim
                     if -depth < out[0] and depth > 0.0:
                         out[0] = -depth

@@ -35,7 +35,12 @@ class PairResult:
         What the distance means under the scene's thresholds.
     distance : Distance
         The signed distance between its bounds, points in the world. A pair that was refined no further than its
-        verdict needed has wide bounds. In a motion: the least distance; of a clash that at ``t``, from above only.
+        verdict needed has wide bounds: of parts that certainly touch they may say no more than that the gap or the
+        overlap is within the contact threshold. An overlap that is contact or allowed is given by minus its
+        interference, the greatest depth of a point of one part in the other (a pin of 5 in a hole of 4.97: -0.03,
+        though its way out is its length), that of a clash by minus its penetration depth, with ``lower`` minus
+        infinity where that was not measured. In a motion: the least distance; of a clash that at ``t``, from above
+        only.
     motion : str or None
         Name of the motion; None at rest.
     t, contact_at : float or None

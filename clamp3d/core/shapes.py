@@ -81,6 +81,10 @@ class Hole:
         choice("hole axis", self.axis, ("y", "z"))
 
 
+FARTHEST_OFF = 1e5
+"""A mesh that may be so far (mm) from its surface says nothing of it; the bounds of much larger ones overflow."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshShape:
     """A mesh, and what to make of its round surfaces.
@@ -100,8 +104,8 @@ class MeshShape:
         instance("mesh", self.mesh, Mesh)
         choice("fit", self.fit, FITS)
         text("name of a mesh", self.name)
-        if not number("error of a mesh", self.error) >= 0.0:
-            raise InputError(f"error of a mesh must be >= 0 mm, got {self.error}")
+        if not 0.0 <= number("error of a mesh", self.error) < FARTHEST_OFF:
+            raise InputError(f"error of a mesh must be >= 0 and < {FARTHEST_OFF:g} mm, got {self.error}")
 
 
 Shape: TypeAlias = Solid | MeshShape

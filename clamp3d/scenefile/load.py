@@ -10,6 +10,7 @@ from clamp3d import checks
 from clamp3d.brep.bodies import part_name
 from clamp3d.collide.scene import Scene
 from clamp3d.core.shapes import Fit
+from clamp3d.errors import InputError
 from clamp3d.scenefile.parts import Parts, Reader, has_bodies, read_parts, refuse_wires, to_parts
 
 if TYPE_CHECKING:
@@ -96,6 +97,8 @@ def load(
         reading, name = read_object(source)
         return _scene(to_parts(reading.complete(name, partial=partial), reader), name)
     path = checks.path("source", source)
+    if not os.fspath(source):  # else it would be the folder that one is in
+        raise InputError("source must not be empty")
     if has_bodies(path) and not (os.path.isdir(path) and _is_builtin(str(path))):
         refuse_wires(path, "a file of bodies", wires)
         return _scene(read_parts(path, reader), path.resolve().name if os.path.isdir(path) else path.stem)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -11,13 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from clamp3d import checks
-from clamp3d.brep.bodies import Reading, unique_names
+from clamp3d.brep.bodies import Reading, part_name, unique_names
 from clamp3d.brep.mesh_file import FORMATS, load_bodies
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.scene import Allowed, Part
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.pose import Array
-from clamp3d.core.shapes import FITS, Fit, MeshShape
+from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, MeshShape
 from clamp3d.errors import InputError
 
 COLUMNS = ("name", "x", "y", "z", "qx", "qy", "qz", "qw")
@@ -54,8 +55,8 @@ class Reader:
     def __post_init__(self) -> None:
         if self.fit is not None:
             checks.choice("fit", self.fit, FITS)
-        if self.chord is not None and not checks.number("chord", self.chord) >= 0.0:
-            raise InputError(f"chord must be >= 0 mm, got {self.chord}")
+        if self.chord is not None and not 0.0 <= checks.number("chord", self.chord) < FARTHEST_OFF:
+            raise InputError(f"chord must be >= 0 and < {FARTHEST_OFF:g} mm, got {self.chord}")
 
     def refuse(self, what: str, *options: str) -> None:
         """Raise InputError if one of the ``options`` was given, which do not go with ``what``."""
@@ -162,7 +163,7 @@ def _folder(folder: Path, reader: Reader) -> Parts:
         if name not in read:
             read[name] = read_parts(known[name], replace(reader, poses=None))
             notes += [f"{name}: {note}" for note in read[name].notes]
-        bodies += [(p.name, p) for p in read[name].prefixed(name, T).parts]
+        bodies += [(p.name, p) for p in read[name].prefixed(part_name(name), T).parts]
     names = unique_names(name for name, _ in bodies)
     return Parts(tuple(replace(p, name=n) for n, (_, p) in zip(names, bodies, strict=True)), tuple(notes))
 
@@ -173,26 +174,39 @@ def read_poses(path: Path) -> list[tuple[str, Array]]:
     from clamp3d.scenefile.pose_table import Pose
 
     rows = csv.reader(read_text(path).splitlines())
-    head = [cell.strip() for cell in next(rows, [])]
-    if tuple(head) != COLUMNS:
-        raise InputError(f"{path}: the first line must be {','.join(COLUMNS)}, got {checks.shown(','.join(head))}")
     found = []
-    for number, row in enumerate(rows, 2):
-        if not any(cell.strip() for cell in row):
-            continue
-        try:
+    try:
+        head = [cell.strip() for cell in next(rows, [])]
+        if tuple(head) != COLUMNS:
+            raise InputError(f"{path}: the first line must be {','.join(COLUMNS)}, got {checks.shown(','.join(head))}")
+        for row in rows:
+            if not any(cell.strip() for cell in row):
+                continue
             if len(row) != len(COLUMNS):
                 raise ValueError(f"{len(COLUMNS)} values are needed, got {len(row)}")
-            x, y, z, *turn = (checks.number("a value", float(cell)) for cell in row[1:])
+            x, y, z, *turn = (_number(column, cell) for column, cell in zip(COLUMNS[1:], row[1:], strict=True))
             size = norm(turn)
             if not abs(size - 1.0) <= 1e-3:
                 raise ValueError(f"the quaternion must have length 1, got {size:.6g}")
             qx, qy, qz, qw = turn
             found.append((row[0].strip(), Pose(translation=(x, y, z), quaternion=(qx, qy, qz, qw)).T()))
-        except ValueError as error:
-            raise InputError(f"{path}: line {number}: {error}") from None
+    except (ValueError, csv.Error) as error:
+        if isinstance(error, InputError) and str(error).startswith(f"{path}: "):
+            raise
+        raise InputError(f"{path}: line {rows.line_num}: {error}") from None
     if not found:
         raise InputError(f"{path}: no pose in the table")
+    return found
+
+
+def _number(column: str, cell: str) -> float:
+    """The number in a cell; Python's underscores between digits are none of a table's."""
+    try:
+        found = math.nan if "_" in cell else float(cell)
+    except ValueError:
+        found = math.nan
+    if not math.isfinite(found):
+        raise ValueError(f"{column} must be a finite number, got {checks.shown(cell.strip())}")
     return found
 
 

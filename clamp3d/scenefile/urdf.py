@@ -6,6 +6,7 @@ touch.
 
 from __future__ import annotations
 
+import logging
 import math
 from pathlib import Path
 from typing import Any
@@ -72,6 +73,10 @@ def _robot(path: Path) -> Any:
     need("yourdfpy", "URDF")
     import yourdfpy
 
+    # What it logs about a file goes to who has asked for logs, not on stderr.
+    logger = logging.getLogger("yourdfpy")
+    if not logger.handlers:
+        logger.addHandler(logging.NullHandler())
     try:
         return yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True, load_collision_meshes=False)
     except Exception as error:  # it raises whatever lxml and its own parser meet

@@ -215,7 +215,7 @@ class TestNumbers:
     def test_fractions(self, text, value):
         assert number(text) == value
 
-    @pytest.mark.parametrize("text", ["1/0", "x", "", "nan", "inf", "1e400", "1/2/3", "1,5"])
+    @pytest.mark.parametrize("text", ["1/0", "x", "", "nan", "inf", "1e400", "1/2/3", "1,5", "1_0"])
     def test_anything_else_is_refused(self, text):
         with pytest.raises(click.BadParameter, match="must be a finite number or a fraction like 1/3, got"):
             number(text)

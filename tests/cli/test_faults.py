@@ -29,6 +29,13 @@ def scene(tmp_path):
     return path
 
 
+def test_what_a_library_logs_of_a_damaged_robot_is_not_told(tmp_path):
+    pytest.importorskip("yourdfpy")
+    (tmp_path / "arm.urdf").write_text("")
+    done = clamp3d("check", tmp_path / "arm.urdf")
+    assert (done.returncode, done.stderr.count(b"\n")) == (2, 1), done.stderr
+
+
 class TestText:
     @pytest.mark.parametrize(
         "env", [{"PYTHONIOENCODING": "latin-1"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}]

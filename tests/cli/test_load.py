@@ -84,6 +84,7 @@ def test_the_unit_of_a_mesh(tmp_path):
         ("scene.toml", {"line": "LJ-500"}, "line goes with a clamp; scene.toml is a scene"),
         ("cube.stl", {"jumper": "16"}, "jumper goes with a clamp; cube.stl is a file of bodies"),
         ("reference", {"unit": "mm"}, "unit goes with a mesh file, not with reference"),
+        ("", {}, "source must not be empty"),
         (3, {}, "source must be a path, a clamp's name, or an object of CadQuery, build123d, Open CASCADE or"),
     ],
 )

@@ -142,7 +142,7 @@ def test_borders_that_bulge_over_their_chords_leave_a_bound(k, kind, lost):
 
 @pytest.mark.parametrize("k", [0, 2, 6, 8])
 def test_pieces_cut_on_coarse_borders_are_off_by_their_bulge(monkeypatch, k):
-    """A search cuts pieces with chords of the border as sides: those of a hole's rim lie in the hole, not in the solid.
+    """A search cuts pieces whose sides are chords of the border: those of a hole's rim lie in the hole.
 
     It tells no less depth than the deepest point of the edges has, and no more: here no other is deeper.
     """

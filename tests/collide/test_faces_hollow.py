@@ -11,13 +11,9 @@ import pytest
 pytest.importorskip("OCP")
 sys.path.insert(0, str(Path(__file__).parents[1] / "brep"))
 
-from assemblies import box, cut, from_shell, ring, rod, solid_of
-from OCP.gp import gp_Pnt
 from test_faces_math import frame
 
-from clamp3d.brep.solid import BrepSolid
-from clamp3d.collide import faces_ball, faces_block, faces_hollow, faces_math, faces_tree
-from clamp3d.collide.faces import FaceModel
+from clamp3d.collide import faces_hollow, faces_math
 from clamp3d.collide.faces_math import CONE, CYLINDER, PLANE, SPHERE
 from clamp3d.core import jit
 
@@ -152,24 +148,3 @@ def test_which_faces_make_a_corner():
     ):
         chosen = np.array([names.index(one) for one in three[:2]])
         assert not faces_hollow.goes_with(kind, frames, sense, chosen, 0, 2, names.index(three[2])), three
-
-
-SOLIDS = [
-    cut(box((-9, -9, 0), (9, 9, 9)), rod(3, -1, 10), rod(5, 3, 10)),
-    cut(rod(9, -4, 4), ring(9, 1.5)),
-    box((0, 0, 0), (4, 5, 6)),
-]
-
-
-@pytest.mark.parametrize("k", range(len(SOLIDS)))
-def test_how_far_a_point_is_from_all_faces(k):
-    """No further than Open CASCADE says, and as far but for the errors of borders and a thousandth."""
-    a, apart = FaceModel(BrepSolid.of(solid_of(SOLIDS[k]), "a", chord=0.05)), from_shell(solid_of(SOLIDS[k]))
-    rng, stack = np.random.default_rng(11), np.empty(faces_tree.DEEP, dtype=np.int64)
-    whole, sag = np.zeros((faces_block.WORK, 3, 3)), float(a.faces.sag.max())
-    for j in rng.integers(0, len(a.faces.corners), 25):
-        x = rng.dirichlet(np.ones(3)) @ a.faces.corners[j] + rng.choice([0.02, 0.3]) * rng.normal(size=3)
-        true = apart(gp_Pnt(*map(float, x)))
-        told = faces_ball.from_point(a.arrays, *x, np.inf, whole, stack)
-        assert true - 2.0 * sag - 2e-3 * true - 1e-6 <= told <= true + 1e-7
-        assert faces_ball.from_point(a.arrays, *x, 0.5 * true, whole, stack) <= 0.5 * true

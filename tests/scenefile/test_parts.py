@@ -6,6 +6,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from clamp3d import InputError, check, load
+from clamp3d.core.shapes import MeshShape
 
 
 @pytest.fixture
@@ -42,13 +43,30 @@ def test_a_folder_of_meshes_with_poses(folder, tmp_path):
         (["bolt,1,2,3,0,0,0,1", "nut,1,2,3,0,0,0,1"], "no file for 'nut' in .*; there are bolt, plate"),
         (["bolt,1,2,3,0,0,0,2", "plate,0,0,0,0,0,0,1"], "line 2: the quaternion must have length 1, got 2"),
         (["bolt,1,2,3,0,0,1"], "line 2: 8 values are needed, got 7"),
-        (["bolt,1,2,nan,0,0,0,1"], "line 2: "),
+        (["bolt,1,2,nan,0,0,0,1"], "line 2: z must be a finite number, got 'nan'"),
+        (["bolt,1,2,0,0,0,0,1", "plate,1_0,0,0,0,0,0,1"], "line 3: x must be a finite number, got '1_0'"),
+        (["bolt" * 50_000 + ",1,2,0,0,0,0,1"], "line 2: field larger than field limit"),
         ([], "no pose in the table"),
     ],
 )
 def test_a_table_that_does_not_fit_is_refused(folder, tmp_path, rows, message):
     with pytest.raises(InputError, match=message):
         load(folder, poses=table(tmp_path / "poses.csv", *rows))
+
+
+def test_files_whose_names_no_part_can_have(folder):
+    (folder / "bolt.ply").rename(folder / "M8 x 20, A:2.ply")
+    trimesh.creation.box((1.0, 1.0, 1.0)).export(folder / "M8-x-20-A-2.stl")
+    assert [p.name for p in load(folder).parts] == ["M8-x-20-A-2_1", "M8-x-20-A-2_2", "plate"]
+
+
+@pytest.mark.parametrize("chord", [1e5, 1e308])
+def test_no_chord_error_is_so_large_that_bounds_overflow(folder, chord):
+    with pytest.raises(InputError, match="chord must be >= 0 and < 100000 mm"):
+        load(folder, chord=chord)
+    mesh = load(folder).parts[0].shape.mesh
+    with pytest.raises(InputError, match="error of a mesh must be >= 0 and < 100000 mm"):
+        MeshShape(mesh, "off", error=chord)
 
 
 def test_two_files_of_one_name_are_refused_by_name(folder):
