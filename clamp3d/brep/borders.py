@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,25 @@ _ROUNDING = 1e-11
 """What is nearer (mm) than this is as good as there."""
 _SHARES = (0.25, 0.5, 0.75)
 """Where pieces of such edges are sampled."""
+Bends = tuple[Array, Array]
+"""Knots, and sizes of the control points of the second derivative."""
+
+
+class Curve:
+    """The curve of an edge, a BRepAdaptor_Curve, for both faces beside it: what both ask for is worked out once."""
+
+    def __init__(self, adaptor: Any) -> None:
+        self.adaptor, self.kind = adaptor, adaptor.GetType()
+
+    @cached_property
+    def bends(self) -> Bends | None:
+        """Those of a B-spline curve."""
+        return _bends(self.adaptor.BSpline())
+
+    def at(self, t: Array) -> Array:
+        """Points (k, 3) at parameters (k,)."""
+        value = self.adaptor.Value
+        return np.array([value(x).Coord() for x in t.tolist()])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,20 +68,19 @@ class Borders:
         return cls(nodes, sag, count, np.concatenate(start), points, fine)
 
     @classmethod
-    def of(cls, edge: Any, at: IntArray, t: Array, ends: Array, kind: int, frame: Array, size: Size) -> Borders:
+    def of(cls, curve: Curve, at: IntArray, t: Array, ends: Array, kind: int, frame: Array, size: Size) -> Borders:
         """Of one edge, with the face's nodes ``at`` (k + 1,) at its parameters ``t`` and places ``ends``."""
-        from OCP.BRepAdaptor import BRepAdaptor_Curve
-
-        curve = BRepAdaptor_Curve(edge)
+        k = len(t) - 1
+        nodes = np.empty((k, 2), dtype=np.int64)
+        nodes[:, 0], nodes[:, 1] = at[:-1], at[1:]
         sag = _sags(curve, t, ends, kind, frame, size)
-        nodes = np.stack([at[:-1], at[1:]], axis=1)
         if kind == OTHER or sag.max() <= BORDER:
-            return cls(nodes, sag, np.ones(len(sag), np.int64), np.arange(len(sag)), ends, np.append(sag, 0.0))
+            return cls(nodes, sag, np.ones(k, np.int64), np.arange(k), ends, np.append(sag, 0.0))
         count = np.ceil(np.sqrt(sag / BORDER)).clip(1, _MOST).astype(np.int64)
         start = np.cumsum(count) - count
         step = np.arange(count.sum()) - np.repeat(start, count)
         along = np.append(np.repeat(t[:-1], count) + step * np.repeat(np.diff(t) / count, count), t[-1])
-        points = np.array([curve.Value(x).Coord() for x in along.tolist()])
+        points = curve.at(along)
         points[start], points[-1] = ends[:-1], ends[-1]
         fine = _sags(curve, along, points, kind, frame, size)
         return cls(nodes, sag, count, start, points, np.append(fine, 0.0))
@@ -126,27 +145,32 @@ class Borders:
         return F, source, rows, sag
 
 
-def _sags(curve: Any, t: Array, points: Array, kind: int, frame: Array, size: Size) -> Array:
-    """How far each piece (k,) of an edge can be from the line on the surface that is straight in its parameters, mm."""
-    from OCP.GeomAbs import GeomAbs_CurveType as Kind
+@cache
+def _kinds() -> Any:
+    from OCP.GeomAbs import GeomAbs_CurveType
 
-    what = curve.GetType()
+    return GeomAbs_CurveType
+
+
+def _sags(curve: Curve, t: Array, points: Array, kind: int, frame: Array, size: Size) -> Array:
+    """How far each piece (k,) of an edge can be from the line on the surface that is straight in its parameters, mm."""
+    what, Kind = curve.kind, _kinds()
     if what == Kind.GeomAbs_Line:
         return np.zeros(len(points) - 1)
     turn = 0.5 * np.minimum(np.abs(np.diff(t)), np.pi)
     if what == Kind.GeomAbs_Circle and kind in (PLANE, OTHER):
-        return np.asarray(curve.Circle().Radius() * (1.0 - np.cos(turn)))
+        return np.asarray(curve.adaptor.Circle().Radius() * (1.0 - np.cos(turn)))
     if what == Kind.GeomAbs_Ellipse and kind in (PLANE, OTHER):  # a circle stretched: at most by the longer half axis
-        return np.asarray(curve.Ellipse().MajorRadius() * (1.0 - np.cos(turn)))
-    if what == Kind.GeomAbs_Circle and _is_around(curve.Circle(), frame):
+        return np.asarray(curve.adaptor.Ellipse().MajorRadius() * (1.0 - np.cos(turn)))
+    if what == Kind.GeomAbs_Circle and _is_around(curve.adaptor.Circle(), frame):
         off = np.abs(height(kind, frame, size, points[:1]))
         return np.where(np.repeat(off, len(turn)) > _ROUNDING, _SAFETY * off, 0.0)
     if what == Kind.GeomAbs_BSplineCurve and kind in (PLANE, OTHER):
-        found = spline_sags(curve.BSpline(), np.minimum(t[:-1], t[1:]), np.maximum(t[:-1], t[1:]))
+        found = _stretches(curve.bends, np.minimum(t[:-1], t[1:]), np.maximum(t[:-1], t[1:]))
         if found is not None:
             return found
     at = np.concatenate([(1.0 - share) * t[:-1] + share * t[1:] for share in _SHARES])
-    true = np.array([curve.Value(x).Coord() for x in at.tolist()])
+    true = curve.at(at)
     start, end = (np.tile(x, (len(_SHARES), 1)) for x in (points[:-1], points[1:]))
     off = from_sides(kind, frame, size, start, end, true).reshape(len(_SHARES), -1).max(axis=0)
     return np.where(off > _ROUNDING, _SAFETY * off, 0.0)
@@ -169,6 +193,11 @@ def spline_sags(spline: Any, start: Array, end: Array) -> Array | None:
     largest second derivative, and that lies in the hull of its control points (Piegl, Tiller, The NURBS Book, 3.3).
     None for a rational or periodic spline, for one of lines, and where it has a kink inside a stretch.
     """
+    return _stretches(_bends(spline), start, end)
+
+
+def _bends(spline: Any) -> Bends | None:
+    """Knots and sizes of the control points of the second derivative of a plain Geom_BSplineCurve."""
     p = spline.Degree()
     if p < 2 or spline.IsRational() or spline.IsPeriodic():
         return None
@@ -180,7 +209,13 @@ def spline_sags(spline: Any, start: Array, end: Array) -> Array | None:
         step, width = np.diff(D, axis=0), (knots[degree:] - knots[:-degree])[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
             D = np.where(step == 0.0, 0.0, degree * step / width)
-    size = np.linalg.norm(D, axis=1)
-    active = (knots[: len(D)] < end[:, None]) & (knots[len(knots) - len(D) :] > start[:, None])
+    return knots, np.linalg.norm(D, axis=1)
+
+
+def _stretches(bends: Bends | None, start: Array, end: Array) -> Array | None:
+    if bends is None:
+        return None
+    knots, size = bends
+    active = (knots[: len(size)] < end[:, None]) & (knots[len(knots) - len(size) :] > start[:, None])
     sag = (end - start) ** 2 / 8.0 * np.where(active, size, 0.0).max(axis=1)
     return sag if np.isfinite(sag).all() else None

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.brep.borders import BORDER, Borders
+from clamp3d.brep.borders import BORDER, Borders, Curve
 from clamp3d.brep.facets import facets
 from clamp3d.brep.surfaces import (
     OTHER,
@@ -144,15 +144,16 @@ def _is_trimmed(face: Any, kind: int) -> bool:
 
 def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tessellation:
     from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.TopAbs import TopAbs_Orientation
     from OCP.TopLoc import TopLoc_Location
 
     coarse: list[tuple[NDArray[Any], ...]] = []
     fine: list[tuple[NDArray[Any], ...]] = []
     nodes: list[Array] = []
-    links: list[tuple[int, int]] = []
+    links: list[IntArray] = []
     deviations: list[float] = []
-    first_seen: dict[int, list[tuple[Any, IntArray]]] = {}
+    first_seen: dict[int, list[tuple[Any, IntArray, Curve]]] = {}
     start = 0
     for number, (face, (kind, frame, size, deviation)) in enumerate(zip(faces, surfaces, strict=True)):
         place = TopLoc_Location()
@@ -167,20 +168,23 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
             if polygon is None:
                 continue
             tolerance = max(tolerance, BRep_Tool.Tolerance_s(edge))
-            at = np.array([polygon.Node(i) for i in range(1, polygon.NbNodes() + 1)]) - 1
+            count = range(1, polygon.NbNodes() + 1)
+            at = np.array([polygon.Node(i) for i in count]) - 1
             border.append(at)
             if BRep_Tool.Degenerated_s(edge):
                 poles.append(at)
-                links += [(start + int(at[0]), start + int(k)) for k in at[1:]]
+                links.append(np.stack([np.full(len(at), start + at[0]), start + at]))
                 continue
             twins = first_seen.setdefault(hash(edge), [])
-            twin = next((other for known, other in twins if known.IsSame(edge)), None)
+            twin = next((twin for twin in twins if twin[0].IsSame(edge)), None)
             if twin is None:
-                twins.append((edge, start + at))
+                twin = edge, start + at, Curve(BRepAdaptor_Curve(edge))
+                twins.append(twin)
             else:
-                links += list(zip(twin.tolist(), (start + at).tolist(), strict=True))
-            t = np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
-            edges.append(Borders.of(edge, at, t, P[at], kind, frame, size))
+                links.append(np.stack([twin[1], start + at]))
+            edges.append(
+                Borders.of(twin[2], at, np.array(list(map(polygon.Parameter, count))), P[at], kind, frame, size)
+            )
         F, P, own = facets(face, found, P, kind, size, border, poles, chord)
         if kind == OTHER:
             deviation = float(own.max())
@@ -248,11 +252,11 @@ def placed(points: Array, place: Any) -> Array:
     return np.asarray(dot(points, M[:, :3].T) + M[:, 3])
 
 
-def _joined(V: Array, F: IntArray, links: list[tuple[int, int]]) -> tuple[Array, IntArray, NDArray[np.bool_]]:
+def _joined(V: Array, F: IntArray, links: list[IntArray]) -> tuple[Array, IntArray, NDArray[np.bool_]]:
     """Nodes that two faces share along an edge made one, without triangles that this folds; which ones are left."""
     label = np.arange(len(V))
     if links:
-        i, j = np.array(links).T
+        i, j = np.concatenate(links, axis=1)
         while (label[i] != label[j]).any():  # the least number of those that are one
             least = np.minimum(label[i], label[j])
             np.minimum.at(label, i, least)

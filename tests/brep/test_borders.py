@@ -11,7 +11,7 @@ from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt
 
-from clamp3d.brep.borders import _sags
+from clamp3d.brep.borders import Curve, _sags
 from clamp3d.brep.surfaces import CONE, CYLINDER, SPHERE, TORUS, from_sides
 
 FRAME = np.array([[1.0, -2.0, 3.0], *np.eye(3)])
@@ -29,7 +29,7 @@ def sags(kind, out=0.0, aside=0.0, axis=(0.0, 0.0, 1.0)):
     for share in np.linspace(0.0, 1.0, 21):
         true = np.array([curve.Value(x).Coord() for x in ((1.0 - share) * t[:-1] + share * t[1:]).tolist()])
         seen = np.maximum(seen, from_sides(kind, FRAME, SIZES[kind], ends[:-1], ends[1:], true))
-    return _sags(curve, t, ends, kind, FRAME, SIZES[kind]), seen
+    return _sags(Curve(curve), t, ends, kind, FRAME, SIZES[kind]), seen
 
 
 @pytest.mark.parametrize("kind", SIZES)
