@@ -229,10 +229,14 @@ def faces_distance(
     if second.lower > margin and tol is None and not _may_hold(b, a, T):
         return _told(second.moved(T))
     if not one.done:
+        if second.upper < first.upper:  # with a lower point known, pieces have other bounds: from the start
+            one = Search(a, b, T, contact, clearance, tol, most, brief)
         first = one.more(most, second.lower if other.done else np.inf, min(first.upper, second.upper))
         if first.lower > margin and not _may_hold(a, b, here):
             return _told(replace(_best(first.swapped(), second.moved(T)), lower=first.lower))
     if not other.done and not first.upper < clash:
+        if first.upper < second.upper:
+            other = Search(b, a, here, contact, clearance, tol, most, brief)
         second = other.more(most, first.lower, min(first.upper, second.upper))
     first, second, low = first.swapped(), second.moved(T), first.lower
     best = _best(first, second)

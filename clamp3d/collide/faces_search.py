@@ -82,7 +82,7 @@ class Search:
 
     It ends when the bounds are on the same side of ``contact`` and ``clearance`` mm, or no further apart than ``tol``,
     where that is given. At most ``most`` pieces are added in all. A search ends before where twice as many tell next to
-    nothing more: one for a depth soon, if its bounds are then further apart than ``brief`` mm.
+    nothing more: soon, if ``brief`` is given and its bounds are then further apart than that (mm).
     """
 
     def __init__(
