@@ -37,14 +37,13 @@ def faces_depth(a: FaceModel, b: FaceModel, T: Array, known: Distance) -> Distan
     """
     free = [float(x.faces.deviation[x.faces.kind == OTHER].max(initial=0.0)) for x in (a, b)]
     most = _FREE if min(free) > 0.0 else _PIECES
-    free_form = max(free) > 0.0
     tol, inside, parted = max(_LEAST, -_SHARE * known.upper), (0.0, np.inf), known
     for pieces in (FEW, most):
-        found = faces_distance(a, b, T, contact=_LEAST, tol=tol, most=pieces, brief=tol if free_form else None)
+        found = faces_distance(a, b, T, contact=_LEAST, tol=tol, most=pieces, brief=tol)
         inside = max(inside[0], -known.upper, -found.upper), min(inside[1], max(0.0, -found.lower))
         known = replace(known if known.upper <= found.upper else found, lower=-np.inf, interference=inside)
         margin = max(tol, _SHARE * inside[0])
-        parted = _parted(a, b, T, known, found, margin, most, margin if free_form else None)
+        parted = _parted(a, b, T, known, found, margin, most)
         # The deepest of few points is mostly deep enough: no translation much shorter than this one parts them.
         if parted.lower > -np.inf or found.upper - found.lower <= tol:
             break
@@ -60,7 +59,6 @@ def _parted(
     found: Distance,
     margin: float,
     most: int,
-    brief: float | None,
 ) -> Distance:
     """``known`` with a translation after which they are apart, past the point of ``found`` first; as it is without."""
     inside = known.interference or (0.0, np.inf)
@@ -78,7 +76,7 @@ def _parted(
         if size > 2.0 * (inside[0] + margin):  # a long way out, or nothing is behind all the planes
             break
         place[:3, 3] = T[:3, 3] + t
-        found = faces_distance(a, b, place, contact=0.01 * margin, most=most, brief=brief)
+        found = faces_distance(a, b, place, contact=0.01 * margin, most=most, brief=margin)
         if found.lower > RESOLUTION:  # so also where the pose differs by rounding
             p, q = (None, None) if step or at is None else (at + deep * n, at) if of_b else (at, at - deep * n)
             inside = inside[0], min(inside[1], size)  # no point is deeper than a way that parts them is long

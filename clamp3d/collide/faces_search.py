@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.brep.surfaces import OTHER
 from clamp3d.collide.answer import Distance
 from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
@@ -104,6 +105,8 @@ class Search:
         wanted = contact, clearance, -VERDICT_WIDTH * contact if tol is None else tol
         self._descent = Descent(a, pieces, b.arrays[3:7], np.ascontiguousarray(T), surfaces, wanted, most)
         self._upper, self._most, self._brief, self.done = np.inf, most, brief, False
+        free = any((x.faces.kind == OTHER).any() for x in (a, b))
+        self._patience = most if not free else _PATIENCE if brief is None else _HURRY
         self._steps = (-contact, contact, clearance) if tol is None else ()
         self._points: tuple[Array, Array] | tuple[None, None] = None, None
 
@@ -117,7 +120,7 @@ class Search:
         out[0] = min(out[0], upper)
         before = out[0]
         looks = _LOOKS * most if most <= FEW else _ANY
-        part, gap = min(most, _PATIENCE if self._brief is None else _HURRY), np.inf
+        part, gap = min(most, self._patience), np.inf
         while True:
             lower = self._descent.go(part, least, looks)
             self.done = self._descent.done
