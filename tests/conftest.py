@@ -53,14 +53,25 @@ def pytest_collection():
         gc.freeze()
 
 
-@pytest.fixture
-def main(monkeypatch, capsys):
-    """The command line in this process, where a new one would only import everything again: code, stdout, stderr."""
+def main_in_this_process(monkeypatch, captured):
+    """A function that calls the command line: code, stdout, stderr, as ``capsys`` or ``capfd`` has captured them."""
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["clamp3d", *map(str, arguments)])
         with pytest.raises(SystemExit) as stop:
             cli.main()
-        return stop.value.code, *capsys.readouterr()
+        return stop.value.code, *captured.readouterr()
 
     return run
+
+
+@pytest.fixture
+def main(monkeypatch, capsys):
+    """The command line in this process, where a new one would only import everything again: code, stdout, stderr."""
+    return main_in_this_process(monkeypatch, capsys)
+
+
+@pytest.fixture
+def whole_main(monkeypatch, capfd):
+    """``main`` with what libraries write past Python: all that a process would write to its stdout and stderr."""
+    return main_in_this_process(monkeypatch, capfd)

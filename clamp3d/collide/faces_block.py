@@ -13,7 +13,7 @@ import numpy as np
 
 from clamp3d.collide.faces_ball import below, clear_around, enough, foot_above, has_feet
 from clamp3d.collide.faces_bounds import NEAR
-from clamp3d.collide.faces_hollow import MOST_AROUND, MOST_TRIED, ROOM, hollow, piece_over, point_over
+from clamp3d.collide.faces_hollow import CAPACITY, MOST_AROUND, MOST_TRIED, hollow, piece_over, point_over
 from clamp3d.collide.faces_math import (
     OTHER,
     SPHERE,
@@ -117,11 +117,11 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
         bent = max(bent, bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1))
     rho = math.sqrt(rho) + bent + rim + adeviation[g]
     # From the nearest face on, those are taken in that the lowest point of the pieces, over those so far, is above.
-    clears = raised[2 * ROOM :]
+    clears = raised[2 * CAPACITY :]
     count, taken, refused, seeds, k = 0, 0, 0, 0, rows[len(rows) // 2]
     _put(place, pieces[k, 0], uvs[k, 0], 0.0)
     found, lowest = -np.inf, -np.inf
-    while taken < MOST_OVER and count + MOST_AROUND <= ROOM and found < wanted:
+    while taken < MOST_OVER and count + MOST_AROUND <= CAPACITY and found < wanted:
         f, highest = -1, lowest + 0.1 * tol
         for n in range(NEAR + (NEAR + count) * beside.shape[1]):
             m = n if n < NEAR else (n - NEAR) // beside.shape[1]
@@ -157,7 +157,7 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
             if fits == 0 and feet and kind[f] != SPHERE and seeds < MOST_SEEDS:
                 fits, clear = hollow(
                     solid, chosen, count, first, slack, place[0, 0], max(known, lowest), x, y, z, rho,
-                    raised, raised[ROOM:], whole, stack,
+                    raised, raised[CAPACITY:], whole, stack,
                 )  # fmt: skip
                 seeds += 1
                 for m in range(fits):
@@ -165,7 +165,7 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
         if fits == 0:
             refused += 1
             chosen[len(chosen) - refused] = f
-            if refused == len(chosen) - ROOM:
+            if refused == len(chosen) - CAPACITY:
                 break
             continue
         count += fits

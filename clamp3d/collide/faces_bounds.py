@@ -27,7 +27,7 @@ from clamp3d.collide.faces_ball import (
     has_feet,
     way_above_both,
 )
-from clamp3d.collide.faces_hollow import MOST_TRIED, ROOM, hollow, piece_over
+from clamp3d.collide.faces_hollow import CAPACITY, MOST_TRIED, hollow, piece_over
 from clamp3d.collide.faces_math import (
     OTHER,
     PLANE,
@@ -174,11 +174,11 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
             around[0] = f
             if fits == 0:
                 fits, clear = hollow(
-                    solid, around, 0, first, slack, p, found, x, y, z, rho + e, up, up[ROOM:], whole, stack
+                    solid, around, 0, first, slack, p, found, x, y, z, rho + e, up, up[CAPACITY:], whole, stack
                 )
                 if fits > 0:
                     for n in range(fits):
-                        up[2 * ROOM + n] = 0.0
+                        up[2 * CAPACITY + n] = 0.0
                     least = piece_over(V, uv, g, rim, own, solid, fits, (near, around, up, over, stack, whole))
                     found = max(found, below(least, rho + e, clear, False))
     if found < -0.5 * contact and fits == 0:

@@ -34,9 +34,9 @@ from clamp3d.core.jit import formula
 
 MOST_TRIED = 16
 """Faces tried for one piece, with those beside the nearest."""
-ROOM = 12
+CAPACITY = 12
 """Faces at most that pieces are bounded over together."""
-TRIED = MOST_TRIED + 3 * ROOM
+TRIED = MOST_TRIED + 3 * CAPACITY
 """Room for both: of the latter also what they are raised by, the heights over them and the radii of their balls."""
 MOST_AROUND = 4
 """Faces of a hollow corner at most."""
@@ -121,7 +121,7 @@ def _highest(count, solid, chosen, raised):
     Behind that is a ball's radius for each, 0 for a face that goes with the one before it.
     """
     _, _, _, _, _, _, _, _, _, kind, _, frame, sense, _, _, _, _, _ = solid
-    heights, clear, high, first = raised[ROOM : 2 * ROOM], raised[2 * ROOM :], -np.inf, 0
+    heights, clear, high, first = raised[CAPACITY : 2 * CAPACITY], raised[2 * CAPACITY :], -np.inf, 0
     for last in range(1, count + 1):
         if last == count or clear[last] > 0.0:
             h = heights[first]
@@ -149,7 +149,7 @@ def piece_over(V, uv, g, rim, own, solid, count, scratch):
         if akind[g] != PLANE and akind[g] != OTHER:
             band = akind[g], asize[g, 0], asize[g, 1], aframe[g], v0, v1
             h = max(h, band_over(*band, kind[f], a, size[f, 1], frame[f], sense[f]) - rim)
-        raised[ROOM + m] = h - up
+        raised[CAPACITY + m] = h - up
     return _highest(count, solid, chosen, raised)
 
 
@@ -160,7 +160,7 @@ def point_over(point, solid, count, chosen, raised):
     for m in range(count):
         f = chosen[m]
         h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], point[0], point[1], point[2])
-        raised[ROOM + m] = h - raised[m]
+        raised[CAPACITY + m] = h - raised[m]
     return _highest(count, solid, chosen, raised)
 
 

@@ -30,19 +30,6 @@ def boxes(folder, distance, names=("a", "b")):
     return path
 
 
-@pytest.fixture
-def whole_main(monkeypatch, capfd):
-    """``main`` with what libraries write past Python: all that a process would write to its stdout and stderr."""
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["clamp3d", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        return stop.value.code, *capfd.readouterr()
-
-    return run
-
-
 def every_command():
     context = click.Context(cli.group)
     return {name: cli.group.get_command(context, name) for name in cli.COMMANDS}
