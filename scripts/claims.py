@@ -111,8 +111,8 @@ def _by_hand(arc: Mapping[str, Any], others: list[Any]) -> str:
     face = min((row for row in chosen if row not in pieces), key=lambda row: float(row["one"]))
     return (
         f"Where somebody looks up by hand which piece can be nearest, {_name(best)} takes {_us(best['one'])} for "
-        f"{_error(best):.1e} mm, {_beside(best['one'], arc['one'])} one call of the arc, and {_name(face)}, told the "
-        f"face, {_us(face['one'])} without an error ({face['one'] / arc['one']:.0f} times as long)."
+        f"{_error(best):.1e} mm, {_beside(best['one'], arc['one'])} one call of the arc, and {_name(face)}, told "
+        f"where, {_us(face['one'])} without an error ({face['one'] / arc['one']:.1f} times as long)."
     )
 
 
@@ -131,10 +131,10 @@ def _verdicts(arc: Mapping[str, Any], others: list[Any]) -> str:
 
 
 def _start(arc: Mapping[str, Any], others: list[Any]) -> str:
-    light = min((row for row in others if row["method"] == "coal-sector"), key=lambda row: float(row["load"]))
+    light = min(others, key=lambda row: float(row["load"]))
     return (
         f"The arc is *not* the best choice for anything but round grooves and cylinders, nor for a script that asks "
-        f"once: its library loads in {arc['load']:.2f} s ({_name(light)}: {light['load']:.2f} s)."
+        f"once: its library loads in {arc['load']:.2g} s ({_name(light).split(' (')[0]}: {light['load']:.1g} s)."
     )
 
 

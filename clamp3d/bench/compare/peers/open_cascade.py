@@ -4,11 +4,12 @@ Of the block it is given the faces that the wire can come near, as the others ar
 asked first whether it holds a corner of the other. Neither `Extrema_ExtFlag_MIN` nor `Extrema_ExtAlgo_Tree` is quicker.
 The cylinder has no depth. ``axis`` asks the wire's axis, less the radius: exact apart and in an overlap as long as the
 axis is outside the material. ``face`` knows that the groove's face decides, and that the axis is nearest to it at one
-of its ends: it asks their two arcs.
+of its ends: it asks `GeomAPI_ExtremaCurveCurve` for their two arcs, without topology.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -56,28 +57,40 @@ def cylinder(radius: float, length: float) -> Any:
     return BRepPrimAPI_MakeCylinder(axes, radius, length).Shape()
 
 
-def _near() -> list[Any]:
-    """The faces of the groove and beside its mouth, the groove's first."""
+def _near() -> Any:
+    """The faces of the groove and beside its mouth."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_SurfaceType
 
-    round_, flat = [], []
-    for face in explore(_block(), "FACE"):
+    def near(face: Any) -> bool:
         surface = BRepAdaptor_Surface(face)
         if surface.GetType() == GeomAbs_SurfaceType.GeomAbs_Cylinder:
-            round_.append(face)
-        elif abs(surface.Plane().Axis().Direction().Y()) > 0.5 and surface.Plane().Location().Y() > -GROOVE.radius:
-            flat.append(face)
-    return round_ + flat
+            return True
+        plane = surface.Plane()
+        return abs(plane.Axis().Direction().Y()) > 0.5 and bool(plane.Location().Y() > -GROOVE.radius)
+
+    return _together(filter(near, explore(_block(), "FACE")))
 
 
-def _arcs() -> list[Any]:
-    """The groove's two arcs."""
-    from OCP.BRepAdaptor import BRepAdaptor_Curve
-    from OCP.GeomAbs import GeomAbs_CurveType
+def _arcs(_: float) -> Prepared:
+    from OCP.Geom import Geom_Circle, Geom_Line
+    from OCP.GeomAPI import GeomAPI_ExtremaCurveCurve
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
-    edges = explore(_near()[0], "EDGE")
-    return [edge for edge in edges if BRepAdaptor_Curve(edge).GetType() == GeomAbs_CurveType.GeomAbs_Circle]
+    ahead, ends = gp_Dir(0.0, 0.0, 1.0), (-0.5 * GROOVE.length, 0.5 * GROOVE.length)
+    circles = [Geom_Circle(gp_Ax2(gp_Pnt(0.0, 0.0, z), ahead, gp_Dir(1.0, 0.0, 0.0)), GROOVE.radius) for z in ends]
+    line, half = Geom_Line(gp_Pnt(0.0, 0.0, 0.0), ahead), 0.5 * WIRE.length
+    limits = -half, half, 1.5 * math.pi - GROOVE.half_angle, 1.5 * math.pi + GROOVE.half_angle
+
+    def lowest(circle: Any) -> float:  # anew each time: after ``Init`` it would tell the last one's
+        return float(GeomAPI_ExtremaCurveCurve(line, circle, *limits).TotalLowerDistance())
+
+    def one(T: Array) -> float:
+        line.SetLocation(gp_Pnt(*T[:3, 3].tolist()))
+        line.SetDirection(gp_Dir(*T[:3, 2].tolist()))
+        return min(lowest(circles[0]), lowest(circles[1])) - WIRE.radius
+
+    return ready(one, 1, depth=True)
 
 
 def _together(shapes: Iterable[Any]) -> Any:
@@ -91,17 +104,15 @@ def _together(shapes: Iterable[Any]) -> Any:
     return made
 
 
-def _series(block: Callable[[], list[Any]], wire: Callable[[], Any], radius: float, *, depth: bool) -> Series:
-    needs = ("OCP", "OCP.BRepExtrema", "OCP.BRepPrimAPI")
-    return Series(
-        lambda _: asked(_together(block()), wire(), radius, depth=depth), "cadquery-ocp-novtk", needs, (None,)
-    )
+def _series(make: Callable[[float], Prepared]) -> Series:
+    needs = ("OCP", "OCP.BRepExtrema", "OCP.BRepPrimAPI", "OCP.GeomAPI")
+    return Series(make, "cadquery-ocp-novtk", needs, (None,))
 
 
 SERIES = {
     "open-cascade": _series(
-        _near, lambda: _together(explore(cylinder(WIRE.radius, WIRE.length), "FACE")), 0.0, depth=False
+        lambda _: asked(_near(), _together(explore(cylinder(WIRE.radius, WIRE.length), "FACE")), 0.0, depth=False)
     ),
-    "open-cascade-axis": _series(_near, lambda: axis(WIRE.length), WIRE.radius, depth=True),
-    "open-cascade-face": _series(_arcs, lambda: axis(WIRE.length), WIRE.radius, depth=True),
+    "open-cascade-axis": _series(lambda _: asked(_near(), axis(WIRE.length), WIRE.radius, depth=True)),
+    "open-cascade-face": _series(_arcs),
 }
