@@ -17,6 +17,7 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
+from clamp3d.collide import judge
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.batch import in_frame_of_first
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
@@ -303,6 +304,34 @@ def test_contained_along_the_diagonal_and_within_the_contact():
     same = cache.model(shapes.box((20.0, 24.0, 16.0), name="same"))
     found = contained(cache.model(box), same, in_frame_of_first(places), Thresholds())
     assert found.tolist() == [True, True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("length", "asked"),
+    [(80.0, False), (40.0, True)],
+    ids=["longer than the block's diagonal, and of less volume", "shorter than the block"],
+)
+def test_containment_is_asked_where_sizes_leave_it_open(length, asked, monkeypatch):
+    """Of the clash of a wire in its groove: neither part fits in the other's box if the wire is long."""
+    seen = []
+    monkeypatch.setattr(judge, "within", lambda *pair: seen.append(pair) or False)
+    monkeypatch.setattr(judge, "_fits", lambda inner, outer, T: seen.append(inner.name) or np.ones(len(T), dtype=bool))
+    block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 20.0)
+    scene = Scene().add("block", block).add("wire", shapes.cylinder(6.5, length))
+    sweep = check_poses(scene, "wire", np.array([translation(0.0, y, 0.0) for y in (-0.6, -5.0, 0.0)]))
+    assert sweep.worst.tolist() == ["clash", "clash", "clear"]
+    assert [name for name in seen if isinstance(name, str)] == (["cylinder"] if asked else [])
+
+
+@pytest.mark.parametrize("allowance", [None, 0.0, 0.3])
+def test_what_an_upper_bound_alone_says_is_a_clash(allowance):
+    """Whatever the lower bound; a little above, the lower one decides."""
+    thresholds = Thresholds(clearance=0.5)
+    limit = thresholds.clash(allowance)
+    for upper in (limit - 1e-12, limit - 1e-6, limit - 1.0):
+        for lower in (-math.inf, upper - 3.0, upper - 1e-7, upper):
+            assert thresholds.verdict(Distance(lower, upper), allowance) is Verdict.CLASH
+    assert thresholds.verdict(Distance(limit + 2e-6, limit + 2e-6), allowance) is not Verdict.CLASH
 
 
 @pytest.mark.parametrize(
