@@ -18,6 +18,7 @@ from clamp3d.collide.scene import Part, Scene
 from clamp3d.core import shapes
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.linear import dot
+from clamp3d.core.motion import FARTHEST
 from clamp3d.core.pose import PoseWarning, inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
@@ -140,7 +141,7 @@ def test_what_certainly_clashes_needs_no_lower_bound(kind):
 
 @pytest.mark.parametrize("bad", [0, 17, 39])
 def test_the_first_bad_pose_is_named_wherever_it_is(bad, monkeypatch):
-    """In the first block of poses, in a later one, at the very end; rounding errors there are mended."""
+    """In the first block of poses, in a later one, at the very end; rounding errors are mended."""
     monkeypatch.setattr(poses, "_BLOCK", 8)
     scene = Scene().add("plate", shapes.box((50.0, 50.0, 4.0))).add("pin", shapes.cylinder(5.0, 20.0))
     T = np.array([translation(0.0, 0.0, 12.0 + 0.1 * k) for k in range(40)])
@@ -154,6 +155,9 @@ def test_the_first_bad_pose_is_named_wherever_it_is(bad, monkeypatch):
     rough[bad, :3, :3] *= 1.1
     with pytest.raises(InputError, match=rf"poses\[{bad}\] must be rigid"):
         check_poses(scene, "pin", rough)
+    T[bad, 0, 3] = 2.0 * FARTHEST
+    with pytest.raises(InputError, match=rf"poses\[{bad}\] must"):
+        check_poses(scene, "pin", T)
 
 
 def test_poses_as_positions_and_axes_are_refused():
