@@ -69,7 +69,7 @@ def _near() -> Any:
         plane = surface.Plane()
         return abs(plane.Axis().Direction().Y()) > 0.5 and bool(plane.Location().Y() > -GROOVE.radius)
 
-    return _together(filter(near, explore(_block(), "FACE")))
+    return together(filter(near, explore(_block(), "FACE")))
 
 
 def _arcs(_: float) -> Prepared:
@@ -93,7 +93,8 @@ def _arcs(_: float) -> Prepared:
     return ready(one, 1, depth=True)
 
 
-def _together(shapes: Iterable[Any]) -> Any:
+def together(shapes: Iterable[Any]) -> Any:
+    """Shapes as one."""
     from OCP.BRep import BRep_Builder
     from OCP.TopoDS import TopoDS_Compound
 
@@ -111,7 +112,7 @@ def _series(make: Callable[[float], Prepared]) -> Series:
 
 SERIES = {
     "open-cascade": _series(
-        lambda _: asked(_near(), _together(explore(cylinder(WIRE.radius, WIRE.length), "FACE")), 0.0, depth=False)
+        lambda _: asked(_near(), together(explore(cylinder(WIRE.radius, WIRE.length), "FACE")), 0.0, depth=False)
     ),
     "open-cascade-axis": _series(lambda _: asked(_near(), axis(WIRE.length), WIRE.radius, depth=True)),
     "open-cascade-face": _series(_arcs),
