@@ -46,7 +46,7 @@ TITLES: dict[PartName, str] = {
     "P7": "jumper",
 }
 
-_FROZEN = ConfigDict(extra="forbid")
+_FROZEN = ConfigDict(extra="forbid", defer_build=True)
 
 
 @one_line_errors
