@@ -46,7 +46,7 @@ TITLES: dict[PartName, str] = {
     "P7": "jumper",
 }
 
-_FROZEN = ConfigDict(extra="forbid", defer_build=True)
+_FROZEN = ConfigDict(extra="forbid")
 
 
 @one_line_errors

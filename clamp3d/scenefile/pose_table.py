@@ -20,7 +20,7 @@ Angle = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False, strict=True
 class Table(BaseModel):
     """A table of a scene file: a key that is not known is an error."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Pose(Table):
