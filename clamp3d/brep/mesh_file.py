@@ -12,6 +12,7 @@ import numpy as np
 from clamp3d import checks
 from clamp3d.brep.apart import READERS, read_apart
 from clamp3d.brep.bodies import Body, Reading
+from clamp3d.brep.stl_file import read_stl
 from clamp3d.core.linear import to_target
 from clamp3d.core.mesh import Array, IntArray, Mesh, make_mesh
 from clamp3d.core.shapes import MeshShape
@@ -123,6 +124,15 @@ def _single(file: Path, kind: str, unit: str | None) -> Reading:
 
 def _read(file: Path, kind: str) -> tuple[Array, IntArray]:
     """Vertices (n, 3) and faces (m, 3) of a file that is one mesh."""
+    plain = read_stl(file.read_bytes()) if kind == ".stl" else None
+    if plain is None:
+        return _read_by_trimesh(file, kind)
+    if not len(plain[1]):
+        raise InputError(f"{file}: no triangles in the file")
+    return plain
+
+
+def _read_by_trimesh(file: Path, kind: str) -> tuple[Array, IntArray]:
     import logging
 
     import trimesh

@@ -8,7 +8,6 @@ Tedrake, *Computing large convex regions of obstacle-free space*, 2015).
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from clamp3d.collide.convex import Hull, Rod, hull
 from clamp3d.collide.surface import Surface
 from clamp3d.core.linear import dot, norm, to_source
 from clamp3d.core.pose import Array
+from clamp3d.core.triangles import closest_points
 
 _AROUND = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
 _CLOSE = np.array([-0.05, -2e-3, -1e-4, -5e-6, 0.0, 5e-6, 1e-4, 2e-3, 0.05])
@@ -104,10 +104,7 @@ def mesh_planes(mesh: Surface) -> tuple[Array, Array]:
 
 def closest_on_triangles(corners: Array, x: Array) -> Array:
     """Points (m, 3) of triangles (m, 3, 3) that are nearest to ``x`` (3,)."""
-    from trimesh.triangles import closest_point
-
-    found: Any = closest_point(corners, np.broadcast_to(x, (len(corners), 3)))  # type: ignore[no-untyped-call]
-    return np.asarray(found, dtype=np.float64)
+    return closest_points(corners, np.broadcast_to(x, (len(corners), 3)))
 
 
 def _hull_of(planes: Array, x: Array) -> Hull | None:

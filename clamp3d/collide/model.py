@@ -17,7 +17,8 @@ from clamp3d.collide.convex import Hull, hull
 from clamp3d.collide.drawn import bodies_of
 from clamp3d.collide.faces import FaceModel
 from clamp3d.collide.surface import Surface, at_edges
-from clamp3d.core.linear import dot
+from clamp3d.core.linear import atan2, dot
+from clamp3d.core.mesh import edges_of
 from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import MeshShape, Shape, Solid
@@ -231,12 +232,14 @@ def _nowhere(points: Array) -> Array:
 
 def _bulge(shape: MeshShape) -> float:
     """How far round surfaces through the vertices can stand out of the facets, mm, from widths and bends alone."""
-    import trimesh
-
-    facets = trimesh.Trimesh(shape.mesh.vertices, shape.mesh.faces, process=False)
-    angles, pairs, edges = facets.face_adjacency_angles, facets.face_adjacency, facets.face_adjacency_edges
-    length = np.linalg.norm(np.diff(facets.vertices[edges], axis=1)[:, 0], axis=1)
-    wide = 2.0 * facets.area_faces[pairs].max(axis=1) / np.maximum(length, 1e-300)
+    V, F = shape.mesh.vertices, shape.mesh.faces
+    edges, pairs, _ = edges_of(F, 2)
+    normals = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])[pairs]
+    twice_area = np.linalg.norm(normals, axis=2)
+    across = np.linalg.norm(np.cross(normals[:, 0], normals[:, 1]), axis=1)
+    angles = atan2(across, np.einsum("ij,ij->i", normals[:, 0], normals[:, 1]))
+    length = np.linalg.norm(V[edges[:, 1]] - V[edges[:, 0]], axis=1)
+    wide = twice_area.max(axis=1) / np.maximum(length, 1e-300)
     smooth = (angles > 1e-6) & (angles < np.radians(65.0))
     # A chord w that turns by t has the sagitta w / 2 tan(t / 4).
     return float((0.5 * wide * np.sin(0.25 * angles) / np.cos(0.25 * angles))[smooth].max(initial=0.0))

@@ -67,8 +67,11 @@ class MovingPair:
         self.n_uninformative = self.n_uninformative + 1 if found.level == "meshes" else 0
         return found
 
-    def lower(self, t: float, half: float, here: float, wanted: float) -> float:
-        """Lower bound from t - half to t + half, ``here`` being that at t; no better than ``wanted``."""
+    def lower(self, t: float, half: float, here: float, wanted: float, meshes: float | None = None) -> float:
+        """Lower bound from t - half to t + half, ``here`` being that at t; no better than ``wanted``.
+
+        ``meshes``: what they have said of this stretch, where they have been asked.
+        """
         plain = here - self.speed * half
         if plain >= wanted:
             return plain
@@ -81,7 +84,7 @@ class MovingPair:
             self.n_uninformative_swept = 0 if swept > plain else self.n_uninformative_swept + 1
         if swept >= min(wanted, here) - ACCURACY:
             return swept
-        return max(swept, self.by_meshes(t, half, min(wanted, here)))
+        return max(swept, self.by_meshes(t, half, min(wanted, here)) if meshes is None else meshes)
 
     @property
     def meshed(self) -> bool:
@@ -189,10 +192,11 @@ def first_time(pair: MovingPair, known: float, thresholds: Thresholds, margin: f
         todo.pop()
         wanted = margin + 0.5 * ACCURACY
         # Where meshes are used, the few triangles that can meet are asked first: that is cheaper than a distance.
-        clear = pair.meshed and pair.by_meshes(middle, half, wanted) > margin
+        low = pair.by_meshes(middle, half, wanted) if pair.meshed else None
+        clear = low is not None and low > margin
         if not clear:
             here = pair.ask(middle, enough, thresholds)
-            clear = here.upper > margin and pair.lower(middle, half, here.lower, wanted) > margin
+            clear = here.upper > margin and pair.lower(middle, half, here.lower, wanted, low) > margin
         if not clear:
             todo += [(middle, stop), (start, middle)]
         elif not todo:

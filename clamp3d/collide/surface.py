@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.core.linear import dot
-from clamp3d.core.mesh import neighbours
+from clamp3d.core.mesh import edges_of
 from clamp3d.core.pose import Array, rotation
 from clamp3d.core.shells import corners_of, shells, winding_number
 
@@ -217,7 +217,7 @@ def at_edges(vertices: Array, faces: NDArray[np.int64], error: Array, patch: NDA
     material if that is acute; else within e + f. At a blunt or hollow edge with a flat patch the foot of every point
     lies on the mesh.
     """
-    pairs, across = neighbours(faces)
+    _, pairs, across = edges_of(faces, 2)
     a, b, c = corners_of(vertices, faces)
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]

@@ -290,7 +290,7 @@ def _folded(F: IntArray) -> NDArray[np.bool_]:
 def _edges(F: IntArray) -> tuple[IntArray, NDArray[np.intp], NDArray[np.intp]]:
     """Edges (3m, 2) face by face, the number (3m,) of each without direction, and how many faces each of those has."""
     directed = F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    key = directed.min(axis=1) * (F.max() + 1) + directed.max(axis=1)  # one number for both ends: quick to sort
+    key = directed.max(axis=1) * (F.max() + 1) + directed.min(axis=1)  # one number for both ends: quick to sort
     _, edge, uses = np.unique(key, return_inverse=True, return_counts=True)
     return directed, edge, uses
 
@@ -348,13 +348,16 @@ def _place(directed: IntArray, wrong: NDArray[np.bool_]) -> str:
     return f"at face {k // 3}, vertices {directed[k, 0]} and {directed[k, 1]}"
 
 
-def neighbours(F: IntArray) -> tuple[IntArray, IntArray]:
-    """Triangles (k, 2) on both sides of each edge that has two, and the corners (k, 2) of these across from the edge.
+def edges_of(F: IntArray, uses: int) -> tuple[IntArray, IntArray, IntArray]:
+    """The edges that have ``uses`` of the triangles (m, 3), in the order of their larger ends, then of the smaller.
 
-    >>> [x.tolist() for x in neighbours(np.array([[0, 1, 2], [2, 1, 3]]))]
-    [[[0, 1]], [[0, 3]]]
+    Ends (k, 2) of each, the smaller one first; its triangles (k, uses) in the order of ``F``, and the corners (k, uses)
+    of these across from it.
+
+    >>> [x.tolist() for x in edges_of(np.array([[0, 1, 2], [2, 1, 3]]), 2)]
+    [[[1, 2]], [[0, 1]], [[0, 3]]]
     """
-    _, edge, uses = _edges(F)
+    directed, edge, found = _edges(F)
     order = np.argsort(edge, kind="stable")
-    sides = order[uses[edge[order]] == 2].reshape(-1, 2)
-    return sides // 3, F[sides // 3, (sides + 2) % 3]
+    sides = order[found[edge[order]] == uses].reshape(-1, uses)
+    return np.sort(directed[sides[:, 0]], axis=1), sides // 3, F[sides // 3, (sides + 2) % 3]

@@ -62,16 +62,11 @@ def joined(groups: Faces, n: int) -> Faces:
     >>> joined(np.array([[3, 1], [4, 3], [0, 2]]), 5).tolist()
     [0, 1, 0, 1, 1]
     """
+    from clamp3d.core import kernel_joined
+
     label = np.arange(n)
-    while True:
-        own = label[groups]
-        least = np.broadcast_to(own.min(axis=1, keepdims=True, initial=n), own.shape)
-        apart = own != least
-        if not apart.any():
-            return label
-        np.minimum.at(label, own[apart], least[apart])
-        while not np.array_equal(up := label[label], label):
-            label = up
+    kernel_joined.join(np.ascontiguousarray(groups, np.int64), label)
+    return label
 
 
 def shells(faces: Faces, vertices: int) -> list[NDArray[np.intp]]:

@@ -8,17 +8,19 @@ shallow arc, whose centre is hardly known, stays a well scaled problem, and a pl
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
-from scipy.optimize import least_squares
 
 from clamp3d.core.linear import atan2, cross, dot, eigh, lstsq, norm
 from clamp3d.core.pose import Array
+from clamp3d.errors import SolverError
 
+_ROUNDS, _DIGITS = 60, 1e-13
 CONFIDENCE = 0.9973
 """Probability of the covariance part of every error bound: three standard deviations of a normal distribution."""
 
@@ -95,19 +97,53 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
         bend = axis.radius * axis.radius * (np.sign(axis.radius) + u[:, 0])
         return np.asarray(np.column_stack([-u[:, :2], tilt[:, None] * u[:, :2], bend]) * scale)
 
-    first = np.array([reach - start.radius, 0.0, 0.0, 0.0, 1.0 / start.radius])
-    options: dict[str, Any] = {"method": "lm", "xtol": 1e-13, "ftol": 1e-13, "gtol": 1e-13, "max_nfev": 60}
-    if robust_scale is not None:
-        options = {"method": "trf", "loss": "cauchy", "f_scale": robust_scale, "max_nfev": 25}
+    first = np.array([reach - start.radius, 0.0, 0.0, 0.0, 1.0 / start.radius]) / scale
     try:
-        x = least_squares(residual, first / scale, jacobian, **options).x
-    except (ValueError, np.linalg.LinAlgError):
+        if robust_scale is None:
+            x = _least_squares(residual, jacobian, first)
+        else:
+            from scipy.optimize import least_squares
+
+            options: dict[str, Any] = {"loss": "cauchy", "f_scale": robust_scale, "max_nfev": 25}
+            x = least_squares(residual, first, jacobian, **options).x
+    except (ValueError, np.linalg.LinAlgError, SolverError):
         return None
     if not np.isfinite(x).all() or x[4] * scale[4] * size < 1e-3:
         return None
     axis, to_world = cylinder(x), np.stack([e, f, w])
     middle = axis.point - dot(axis.point, axis.direction) * axis.direction
     return Axis(centroid + dot(middle, to_world), dot(axis.direction, to_world), float(axis.radius))
+
+
+def _least_squares(residual: Callable[[Array], Array], jacobian: Callable[[Array], Array], x: Array) -> Array:
+    """The unknowns (k,) near ``x`` with the least sum of squares of ``residual`` (n,), to rounding.
+
+    Levenberg and Marquardt's iteration, in units in which all columns of the Jacobian (n, k) have length 1. SciPy's
+    is the same one; to import it takes longer than to fit the round surfaces of a CAD part.
+    """
+    r = residual(x)
+    square, damping, size = float(dot(r, r)), 1e-6, np.zeros(len(x))
+    for _ in range(_ROUNDS):
+        J = jacobian(x)
+        size = np.maximum(size, np.maximum(np.sqrt(np.einsum("ij,ij->j", J, J)), 1e-300))
+        J = J / size
+        values, vectors = eigh(dot(J.T, J))
+        slope = dot(dot(r, J), vectors)
+        while True:
+            step = -dot(vectors, slope / (np.maximum(values, 0.0) + damping)) / size
+            tried = residual(x + step)
+            new = float(dot(tried, tried))
+            small = norm(size * step) <= _DIGITS * norm(size * x)
+            if new < square:
+                break
+            if small or damping > 1e6:
+                return x
+            damping = 10.0 * damping
+        gain = square - new
+        x, r, square, damping = x + step, tried, new, 0.1 * damping
+        if small or gain <= _DIGITS * new:
+            break
+    return x
 
 
 def circle(points: Array) -> tuple[Array, float] | None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from clamp3d.core.linear import cross, dot, eigh, norm, svd
 from clamp3d.core.mesh import IntArray
@@ -15,8 +15,13 @@ from clamp3d.fit.cylinder import Axis, axis_along, fit_axis, perpendicular
 from clamp3d.fit.grow import Region, Search, accept, grow
 from clamp3d.fit.surface import BoolArray, Surface
 
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
 _PATCH_SIZES = (24, 96, 384, 1536)
 _GATES = tuple(np.radians(a) for a in (12.0, 25.0, 46.0))
+_LEAST = 8
+"""Fewest triangles of a patch: flat sides and what was found before leave fewer of a CAD mesh."""
 _MAX_SEEDS = 250
 
 
@@ -27,6 +32,11 @@ def patches(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regi
         return
     todo = free & (np.bincount(cells)[cells] <= 4)
     gates = [surface.labels(surface.bend < g) for g in _GATES]
+    widest = gates[-1]
+    if not (todo & (np.bincount(widest[free], minlength=len(todo))[widest] >= _LEAST)).any():
+        return
+    from scipy.spatial import cKDTree
+
     tree = cKDTree(surface.centres)
     rng = np.random.default_rng(0)
     order = rng.permutation(np.flatnonzero(todo))
@@ -64,7 +74,7 @@ def _from_patches(search: Search, same: list[IntArray], limit: float, seeds: Boo
             continue
         for size in sorted({min(size, len(near)) for size in _PATCH_SIZES}):
             patch = near[:size]
-            guess = _quadric(surface, patch) if size >= 8 else None
+            guess = _quadric(surface, patch) if size >= _LEAST else None
             if guess is None:
                 continue
             start, sign, scatter = guess

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
-from clamp3d.core.linear import atan2, dot
-from clamp3d.core.mesh import Array, IntArray, Mesh
+from clamp3d.core.linear import atan2, crosses, dot
+from clamp3d.core.mesh import Array, IntArray, Mesh, edges_of
+from clamp3d.core.shells import joined
 from clamp3d.fit.cylinder import Axis, perpendicular
 
 BoolArray = NDArray[np.bool_]
@@ -23,23 +23,21 @@ class Surface:
     """
 
     def __init__(self, mesh: Mesh) -> None:
-        import trimesh
-
         self.mesh = mesh
         # The normals of slivers are rounding.
         self.rows = np.flatnonzero(~mesh.slivers)
         self.V, self.F = mesh.vertices, mesh.faces[self.rows]
-        tm = trimesh.Trimesh(self.V, self.F, process=False)
-        self.normals = np.asarray(tm.face_normals)
-        self.areas = np.asarray(tm.area_faces)
-        self.centres = np.asarray(tm.triangles_center)
-        self.pairs = np.asarray(tm.face_adjacency, dtype=np.int64).reshape(-1, 2)
-        self.edges = np.asarray(tm.face_adjacency_edges, dtype=np.int64).reshape(-1, 2)
+        corners = self.V[self.F]
+        normals = crosses(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1])
+        twice = np.sqrt((normals * normals).sum(axis=1))
+        self.normals = normals * (1.0 / np.maximum(twice, 1e-300))[:, None]
+        self.areas = 0.5 * twice
+        self.centres = corners.mean(axis=1)
+        self.edges, self.pairs, opposite = edges_of(self.F, 2)
+        self.rim, rim_faces, _ = edges_of(self.F, 1)
+        self.rim_faces = rim_faces[:, 0]
         n1, n2 = self.normals[self.pairs[:, 0]], self.normals[self.pairs[:, 1]]
-        self.bend = atan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
-        alone = trimesh.grouping.group_rows(tm.edges_sorted, require_count=1)  # type: ignore[no-untyped-call]
-        self.rim, self.rim_faces = tm.edges_sorted[alone], tm.edges_face[alone]
-        opposite = np.asarray(tm.face_adjacency_unshared, dtype=np.int64).reshape(-1, 2)
+        self.bend = atan2(np.linalg.norm(crosses(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
         # Off-plane distance of each far corner: unlike an angle it does not blow up on slivers.
         on_edge = self.V[self.edges[:, 0]]
         self.step = np.maximum(
@@ -55,11 +53,8 @@ class Surface:
         return np.asarray(np.einsum("ij,ij->i", self.normals[faces], axis.radial(self.centres[faces])[0]))
 
     def labels(self, keep: BoolArray) -> IntArray:
-        """Component (m,) of each face when only the neighbour pairs ``keep`` (p,) connect."""
-        from trimesh.graph import connected_component_labels
-
-        label = connected_component_labels(self.pairs[keep], len(self.F))  # type: ignore[no-untyped-call]
-        return np.asarray(label, dtype=np.int64)
+        """Component (m,) of each face, called by its first one, when only the neighbour pairs ``keep`` (p,) connect."""
+        return joined(self.pairs[keep], len(self.F))
 
     def cells(self, tolerance: float) -> IntArray:
         """Label (m,) of the planar cell of each face; neighbours within ``tolerance`` of one plane share a cell."""
@@ -104,5 +99,8 @@ def facet_span(surface: Surface, axis: Axis, faces: IntArray, cells: IntArray) -
     angle = angles(surface, axis, faces, *perpendicular(axis.direction))
     names, first, cell = np.unique(cells[faces], return_index=True, return_inverse=True)
     about = turned(angle, angle[first, :1][cell])
-    index = np.arange(len(names))
-    return np.asarray(ndimage.maximum(about.max(axis=1), cell, index) - ndimage.minimum(about.min(axis=1), cell, index))
+    # Cell by cell: the largest and the least angle of each.
+    order = np.argsort(cell, kind="stable")
+    start = np.searchsorted(cell[order], np.arange(len(names)))
+    largest = np.maximum.reduceat(about.max(axis=1)[order], start)
+    return np.asarray(largest - np.minimum.reduceat(about.min(axis=1)[order], start))

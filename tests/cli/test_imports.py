@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import trimesh
@@ -28,7 +29,29 @@ def test_slow_libraries_are_not_imported(arguments, tmp_path):
         pose = trimesh.transformations.translation_matrix([0.0, 0.0, z])
         meshes.add_geometry(trimesh.creation.cylinder(0.01, 0.02), transform=pose)
     meshes.export(tmp_path / "scene.glb")
-    code = (
+    modules = {name.partition(".")[0] for name in imported(arguments, tmp_path)}
+    assert "numpy" in modules
+    assert not modules & SLOW
+
+
+@pytest.mark.parametrize("text", [False, True])
+def test_fitted_stl_files_are_checked_without_trimesh_and_optimizers(text, tmp_path):
+    """The hinge: its meshes are read, their round surfaces found, and a clash on the way is measured."""
+    hinge = Path(__file__).parents[2] / "examples" / "hinge"
+    (tmp_path / "scene.toml").write_text((hinge / "scene.toml").read_text())
+    for file in hinge.glob("*.stl"):
+        made = trimesh.load(file, process=False)
+        (tmp_path / file.name).write_bytes(
+            trimesh.exchange.stl.export_stl_ascii(made).encode() if text else file.read_bytes()
+        )
+    found = imported(("check", "scene.toml", "--quiet"), tmp_path, 1)
+    assert "clamp3d.fit.fit" in found
+    assert not {"trimesh", "networkx", "scipy.ndimage", "scipy.optimize"} & found
+
+
+def imported(arguments, folder, code=0):
+    """Names of the modules that a command of this exit code has imported when it is run again."""
+    program = (
         "import atexit, sys; from clamp3d.cli import main\n"
         "atexit.register(lambda: print('MODULES', *sys.modules))\n"
         "main()"
@@ -36,8 +59,12 @@ def test_slow_libraries_are_not_imported(arguments, tmp_path):
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     for _ in range(2):  # the first one may have to compile
         done = subprocess.run(
-            [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True, cwd=tmp_path, env=env
+            [sys.executable, "-c", program, *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=folder,
+            env=env,
         )
-    modules = {name.partition(".")[0] for name in done.stdout.partition("MODULES")[2].split()}
-    assert "numpy" in modules
-    assert not modules & SLOW
+        assert done.returncode == code, done.stderr
+    return set(done.stdout.partition("MODULES")[2].split())

@@ -39,6 +39,7 @@ class Cones:
         self.error, self.meshed, self.shift = error, meshed, 0.0
         self.shift = above - self.least()
         self.asked: list[float] = []
+        self.stretches: list[tuple[float, float]] = []
 
     def at(self, t):
         return self.shift + (self.low + self.speed * np.abs(np.subtract.outer(t, self.when))).min(axis=-1)
@@ -53,12 +54,15 @@ class Cones:
         enough(known)
         return known
 
-    def lower(self, t, half, here, wanted):
+    def lower(self, t, half, here, wanted, meshes=None):
         assert t - half >= -1e-12
         assert t + half <= 1.0 + 1e-12
+        if meshes is None:
+            self.by_meshes(t, half, wanted)
         return here - self.speed * half
 
     def by_meshes(self, t, half, wanted):
+        self.stretches.append((t, half))
         return float(self.at(t)) - self.speed * half
 
 
@@ -103,6 +107,13 @@ def test_the_first_time_of_cones(pair, deep, margin):
 def test_the_first_time_is_the_end_where_nothing_comes_near():
     pair = Cones(3, 0.0, 1.0)
     assert first_time(pair, 0.7, NONE, 0.5) == 0.7
+
+
+def test_meshes_are_asked_once_about_a_stretch():
+    for seed in range(5):
+        pair = Cones(seed, 0.0, -1.0, meshed=True)
+        first_time(pair, float(pair.when[np.argmin(pair.at(pair.when))]), NONE, 0.0)
+        assert len(pair.stretches) == len(set(pair.stretches)) > 5
 
 
 def test_a_search_that_takes_too_long_tells_what_it_has_proven(monkeypatch):

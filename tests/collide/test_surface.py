@@ -13,7 +13,7 @@ from shapely import Polygon
 
 from clamp3d.collide.check import check
 from clamp3d.collide.meshes import meshes_distance, surface_distance
-from clamp3d.collide.model import ModelCache
+from clamp3d.collide.model import ModelCache, _bulge
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.surface import Surface, at_edges
 from clamp3d.collide.verdict import Verdict
@@ -237,3 +237,16 @@ def test_triangles_in_a_row_are_all_found():
         points, found = np.column_stack([low + 0.99, np.zeros(n), np.zeros(n)]), np.empty(n)
         crossings(corners, low, 1.0, points, 1.0, found)
         assert (found == 1.0).all()
+
+
+@pytest.mark.parametrize(
+    "made", [trimesh.creation.cylinder(6.0, 20.0, sections=24), trimesh.creation.icosphere(3, 5.0)]
+)
+def test_bulge_between_facets_is_the_sagitta_of_their_bend(made):
+    """Of a cylinder's strips the sagitta of a chord; of others as trimesh's angles and areas say."""
+    shape = mesh_shape(made, "round")
+    facets = trimesh.Trimesh(shape.mesh.vertices, shape.mesh.faces, process=False)
+    length = np.linalg.norm(np.diff(facets.vertices[facets.face_adjacency_edges], axis=1)[:, 0], axis=1)
+    angle, wide = facets.face_adjacency_angles, 2.0 * facets.area_faces[facets.face_adjacency].max(axis=1) / length
+    smooth = (angle > 1e-6) & (angle < np.radians(65.0))
+    assert _bulge(shape) == pytest.approx((0.5 * wide * np.tan(0.25 * angle))[smooth].max(), rel=1e-6)
