@@ -13,7 +13,8 @@ from clamp3d import checks
 from clamp3d.brep.mesh_file import FORMATS
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.loader import builtin_clamps, load_clamp, parse_toml, read_text
-from clamp3d.collide.scene import Allowed, Part, Scene
+from clamp3d.collide.allowed import Allowed
+from clamp3d.collide.scene import Part, Scene
 from clamp3d.core import shapes
 from clamp3d.core.linear import dot
 from clamp3d.core.validation import validate

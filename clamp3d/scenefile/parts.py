@@ -15,7 +15,8 @@ from clamp3d import checks
 from clamp3d.brep.bodies import Reading, part_name, unique_names
 from clamp3d.brep.mesh_file import FORMATS, load_bodies
 from clamp3d.brep.solid import BrepSolid
-from clamp3d.collide.scene import Allowed, Part
+from clamp3d.collide.allowed import Allowed
+from clamp3d.collide.scene import Part
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, MeshShape
