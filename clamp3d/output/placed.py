@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clamp3d.checks import items
+from clamp3d.checks import items, text
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.collide.scene import Scene, unknown_part
@@ -85,9 +85,10 @@ def place(source: Clamp | Scene, names: Iterable[str] | None = None) -> tuple[Pl
     colours = part_colours([name for name, _, _ in given])
     found = [PlacedPart(name, shape, T, colours[name]) for name, shape, T in given]
     known = [part.name for part in found]
-    chosen = known if names is None else items("names", names, "part names")
+    given_names = known if names is None else items("names", names, "part names")
+    chosen = dict.fromkeys(text("each of names", name) for name in given_names)
     for name in chosen:
-        if name not in known:
+        if name not in colours:
             raise InputError(unknown_part(name, known))
     if not chosen:
         raise InputError(f"names must name at least one part, available: {', '.join(known) or 'none'}")

@@ -215,8 +215,9 @@ def names_like(patterns: Iterable[str], names: Iterable[str]) -> list[str]:
     """Names that are in ``patterns``, or fit one of them; a pattern that fits none stays, to be told as unknown."""
     from fnmatch import fnmatchcase
 
-    known, found = list(names), []
+    known = dict.fromkeys(names)
+    found: dict[str, None] = {}
     for pattern in patterns:
         fits = [pattern] if pattern in known else [name for name in known if fnmatchcase(name, pattern)]
-        found += [name for name in fits or [pattern] if name not in found]
-    return found
+        found |= dict.fromkeys(fits or [pattern])
+    return list(found)
