@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.collide.scene import Allowed, Part, Scene
+from clamp3d.collide.allowed import Allowed
+from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.pose import Array
 
 CONTACT = 1e-6

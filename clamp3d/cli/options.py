@@ -128,7 +128,6 @@ def declared(name: str) -> Callable[[Callable[..., None]], click.Command]:
     return decorate
 
 
-CLEARANCE = option("Gap from which parts are clear.", default=5.0, metavar="MM")
 QUIET = option("No progress.", "--quiet", "-q")
 JSON = option("Write the result as JSON; - is stdout.", "--json")
 
@@ -281,7 +280,12 @@ class Viewing:
         metavar="NAME[=SIZE]",
     )
     draw_error: float = option("Chord error of drawn facets.", default=0.01, metavar="MM")
-    clearance: float = CLEARANCE
+    clearance: float = option(
+        "Gap from which parts are clear.  [default: 5 for a clamp; the scene's own]",
+        default=5.0,
+        show_default=False,
+        metavar="MM",
+    )
 
 
 VIEWING = group(Viewing)

@@ -18,8 +18,8 @@ def command(
 
     INPUT is a clamp (a built-in name or a TOML file), a scene file, or a file with parts. Prints the page's address
     and serves it until Ctrl-C (or --timeout). With --html the page is written to a file instead; with --url the scene
-    goes to a meshcat server, which keeps it. Exit code 1 if a clamp does not close as it should, or parts clash, or a
-    step of the sequence is blocked: then it is shown how.
+    goes to a meshcat server, which keeps it. Exit codes are those of check; 1 also if a clamp does not close as it
+    should, or a step of the sequence is blocked: then it is shown how.
     """
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.cli.viewing import check_and_view, run_and_view, view_blocked

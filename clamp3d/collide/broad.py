@@ -11,7 +11,7 @@ from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 
 FEW = 32
-"""Parts up to which all boxes are compared, without a tree."""
+"""So few boxes are compared with all others, without a tree."""
 
 FIRST = np.zeros(1, dtype=np.int64)
 """Which box all of many poses have."""
@@ -35,11 +35,12 @@ class Boxes:
 
     def joined(self, other: Boxes) -> Boxes:
         """These, then those of ``other``."""
-        return Boxes(
-            np.concatenate([self.centre, other.centre]),
-            np.concatenate([self.half, other.half]),
-            np.concatenate([self.R, other.R]),
-        )
+        return Boxes(*(np.concatenate(both) for both in zip(self.arrays, other.arrays, strict=True)))
+
+    @property
+    def arrays(self) -> tuple[Array, Array, Array]:
+        """Centres, half sizes and rotations."""
+        return self.centre, self.half, self.R
 
     @property
     def reach(self) -> Array:
@@ -66,20 +67,24 @@ def world_boxes(bounds: Array, T: Array, which: NDArray[np.int64] = FIRST) -> Ar
 
 def near_pairs(boxes: Boxes, reach: float) -> NDArray[np.int64]:
     """Pairs (m, 2), first < second, whose boxes along the world's axes come within ``reach`` mm; sorted."""
-    n = len(boxes.centre)
-    half = boxes.reach + 0.5 * reach * (1.0 + 1e-9)
-    low, high = boxes.centre - half, boxes.centre + half
-    if n <= FEW:
-        meet = (low[:, None] <= high).all(axis=2)
-        return np.argwhere(np.triu(meet & meet.T, 1))
+    pairs = near_between(boxes, boxes, reach)
+    return np.asarray(pairs[pairs[:, 0] < pairs[:, 1]])
+
+
+def near_between(boxes: Boxes, others: Boxes, reach: float) -> NDArray[np.int64]:
+    """Pairs (m, 2) of one of ``boxes`` and one of ``others`` within ``reach`` mm of each other, as `near_pairs`."""
+    grown = 0.5 * reach * (1.0 + 1e-9)
+    low, high = boxes.centre - (boxes.reach + grown), boxes.centre + (boxes.reach + grown)
+    lows, highs = others.centre - (others.reach + grown), others.centre + (others.reach + grown)
+    if min(len(low), len(lows)) <= FEW:
+        return np.argwhere(((low[:, None] <= highs) & (lows <= high[:, None])).all(axis=2))
     from rtree import index
 
-    tree = index.Index((np.arange(n), low, high), properties=index.Property(dimension=3))
+    tree = index.Index((np.arange(len(lows)), lows, highs), properties=index.Property(dimension=3))
     second, count = tree.intersection_v(low, high)  # type: ignore[no-untyped-call]
-    first = np.repeat(np.arange(n), count.astype(np.int64))
+    first = np.repeat(np.arange(len(low)), count.astype(np.int64))
     second = np.asarray(second, dtype=np.int64)
-    pairs = np.column_stack([first, second])[first < second]
-    return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))])
+    return np.column_stack([first, second])[np.lexsort((second, first))]
 
 
 def box_gaps(boxes: Boxes, pairs: NDArray[np.int64]) -> Array:

@@ -119,7 +119,8 @@ def check(
         if row is None:
             start = Distance(gap, level="boxes", method="bounding boxes")
             row = _pair(scene, i, j, models, T, start, full, distances, depths, repeats)
-        decided[row.distance.level] += 1
+        if row.verdict not in (Verdict.FAILED, Verdict.UNCERTAIN):
+            decided[row.distance.level] += 1
         rows.append(row)
     times.append(time.perf_counter())
     moved = check_motions(scene, models, asked, progress, depths)

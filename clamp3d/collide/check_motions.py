@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.broad import Boxes, near_pairs
+from clamp3d.collide.broad import Boxes, near_between
 from clamp3d.collide.depth import is_quick, penetration
 from clamp3d.collide.model import Model, Progress
 from clamp3d.collide.moving_pair import MovingPair, box_corners, first_time, least_distance
@@ -38,18 +38,23 @@ def check_motions(
     speed of the part's fastest point and by swept shapes: no thin part is stepped over.
     """
     poses = [part.T_world.copy() for part in scene.parts]
+    boxes = Boxes.of(np.array([model.bounds for model in models]).reshape(-1, 2, 3), np.array(poses).reshape(-1, 4, 4))
     rows: list[PairResult] = []
     keep = None if asked is None else set(asked)
     for motion in scene.motions:
         moving = [scene.index(name) for name in motion.parts]
         resolved = motion.resolved(poses[moving[0]])
-        near = [p for p in _near(scene, models, poses, moving, resolved) if keep is None or tuple(sorted(p)) in keep]
+        found = _near(scene, models, poses, boxes, moving, resolved)
+        near = [p for p in found if keep is None or tuple(sorted(p)) in keep]
         for k, (i, j) in enumerate(near):
             if progress is not None:
                 progress(f"motion {motion.name}", k, len(near))
             rows.append(_row(scene, models, poses, resolved, i, j, depths))
         for i in moving:
             poses[i] = resolved.at(1.0, poses[i])
+        there = Boxes.of(np.array([models[i].bounds for i in moving]), np.array([poses[i] for i in moving]))
+        for old, new in zip(boxes.arrays, there.arrays, strict=True):
+            old[moving] = new
     return tuple(rows)
 
 
@@ -82,26 +87,24 @@ def _row(
 
 
 def _near(
-    scene: Scene, models: list[Model], poses: list[Array], moving: list[int], motion: Motion
+    scene: Scene, models: list[Model], poses: list[Array], boxes: Boxes, moving: list[int], motion: Motion
 ) -> list[tuple[int, int]]:
-    """Pairs (moving, standing) that come within reach: boxes around the ways against the standing boxes."""
-    standing = [i for i in range(len(models)) if i not in moving]
-    if not standing:
+    """Pairs (moving, standing) that come within reach: boxes around the ways against the standing ``boxes``."""
+    stands = np.ones(len(models), dtype=bool)
+    stands[moving] = False
+    standing = np.flatnonzero(stands)
+    if not len(standing):
         return []
-    bounds = np.array([models[i].bounds for i in standing])
-    still = Boxes.of(bounds, np.array([poses[i] for i in standing]))
-    found = []
     t = np.linspace(0.0, 1.0, 33)
-    for i in moving:
+    places = [motion.at(s) for s in t]
+    corners = np.empty((len(moving), 2, 3))
+    for k, i in enumerate(moving):
         points = box_corners(models[i], poses[i])
-        way = np.concatenate([to_target(motion.at(s), points) for s in t])
+        way = np.concatenate([to_target(T, points) for T in places])
         slack = 0.5 * motion.speed(points) / (len(t) - 1)
-        low, high = way.min(axis=0) - slack, way.max(axis=0) + slack
-        around = Boxes(
-            np.vstack([0.5 * (low + high), still.centre]),
-            np.vstack([0.5 * (high - low), still.half]),
-            np.concatenate([np.eye(3)[None], still.R]),
-        )
-        pairs = near_pairs(around, scene.thresholds.reach)
-        found += [(i, standing[j - 1]) for a, j in pairs.tolist() if a == 0]
-    return found
+        corners[k] = way.min(axis=0) - slack, way.max(axis=0) + slack
+    low, high = corners[:, 0], corners[:, 1]
+    ways = Boxes(0.5 * (low + high), 0.5 * (high - low), np.broadcast_to(np.eye(3), (len(moving), 3, 3)))
+    still = Boxes(*(values[standing] for values in boxes.arrays))
+    pairs = near_between(ways, still, scene.thresholds.reach)
+    return [(moving[k], int(standing[j])) for k, j in pairs.tolist()]

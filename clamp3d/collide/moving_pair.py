@@ -63,6 +63,7 @@ class MovingPair:
         """Distance at time ``t``, in the moving shape's frame."""
         T = self.pose(t)
         forms = self.n_uninformative < MAX_UNINFORMATIVE
+        self.counters.queries["boxes"] += 1
         found = refine(self.a, self.b, T, from_boxes(self.a, self.b, T), thresholds, enough, forms=forms)
         self.n_uninformative = self.n_uninformative + 1 if found.level == "meshes" else 0
         return found

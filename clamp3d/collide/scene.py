@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from fnmatch import fnmatchcase
+from itertools import islice
+from threading import Lock
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.checks import instance, items, number, shown, text
+from clamp3d.checks import instance, items, shown, text
+from clamp3d.collide.allowed import Allowances, Allowed
+from clamp3d.collide.links import Linked, as_tuple, linked
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.motion import Motion, scene_pose
 from clamp3d.core.pose import Array
@@ -19,6 +23,10 @@ from clamp3d.errors import InputError
 
 _NAMED = 8
 """Parts that a scene names when it is printed."""
+_GROWN = {"parts": "_parts", "allowed": "_allowed"}
+"""Fields that are put together when they are first asked for, and what of."""
+_INDEX_LOCK = Lock()
+"""Held while names are added to an index, which scenes in several threads may share."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,53 +50,9 @@ class Part:
         T.flags.writeable = False
         object.__setattr__(self, "T_world", T)
 
-
-@dataclass(frozen=True, slots=True)
-class Allowed:
-    """Contact of ``a`` with ``b`` (names, or patterns with * and ?) is meant, and overlap up to ``overlap`` mm."""
-
-    a: str
-    b: str
-    overlap: float = 0.0
-
-    def __post_init__(self) -> None:
-        text("allowed part", self.a)
-        text("allowed part", self.b)
-        object.__setattr__(self, "overlap", number("allowed overlap", self.overlap, rule="be >= 0 mm"))
-        if not self.overlap >= 0.0:
-            raise InputError(f"allowed overlap must be >= 0 mm, got {self.overlap}")
-
-    def fits(self, a: str, b: str) -> bool:
-        """Whether it speaks of these two, in either order."""
-        return any(fnmatchcase(x, self.a) and fnmatchcase(y, self.b) for x, y in ((a, b), (b, a)))
-
-
-@dataclass(frozen=True, slots=True)
-class Allowances:
-    """Allowed overlaps (mm) by names in either order, and those that are given with patterns."""
-
-    exact: dict[tuple[str, str], float]
-    patterns: tuple[Allowed, ...]
-
-    @classmethod
-    def of(cls, allowed: Iterable[Allowed]) -> Allowances:
-        """Sorted into names and patterns."""
-        exact: dict[tuple[str, str], float] = {}
-        patterns = []
-        for item in allowed:
-            if any(c in item.a + item.b for c in "*?["):
-                patterns.append(item)
-                continue
-            for pair in ((item.a, item.b), (item.b, item.a)):
-                exact[pair] = max(item.overlap, exact.get(pair, 0.0))
-        return cls(exact, tuple(patterns))
-
-    def overlap(self, a: str, b: str) -> float | None:
-        """Largest overlap that is allowed, mm; None if even contact is not meant."""
-        found = [item.overlap for item in self.patterns if item.fits(a, b)]
-        if (a, b) in self.exact:
-            found.append(self.exact[a, b])
-        return max(found) if found else None
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Made again: an array that was pickled could be written to.
+        return type(self), (self.name, self.shape, self.T_world)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,9 +101,13 @@ class Scene:
     name: str = "scene"
     notes: tuple[str, ...] = ()
     thresholds: Thresholds = field(init=False)
-    _index: dict[str, int] = field(init=False, repr=False)
+    _parts: Linked[Part] = field(init=False, repr=False, compare=False)
+    _allowed: Linked[Allowed] = field(init=False, repr=False, compare=False)
+    _n: int = field(init=False, repr=False, compare=False)
+    """How many parts."""
+    _index: dict[str, int] = field(init=False, repr=False, compare=False)
     """Positions by name, shared with the scenes that `add` made of this one: it may hold more names than are here."""
-    _allowances: Allowances | None = field(init=False, repr=False, default=None)
+    _allowances: Allowances | None = field(init=False, repr=False, compare=False, default=None)
     """Sorted when they are first asked for: pairs may come one by one."""
     _placed: Placed | None = field(init=False, repr=False, compare=False, default=None)
 
@@ -158,6 +126,9 @@ class Scene:
                 raise InputError(f"part {part.name!r} is there twice; names must differ")
             seen[part.name] = len(seen)
         object.__setattr__(self, "_index", seen)
+        object.__setattr__(self, "_n", len(seen))
+        for key, source in _GROWN.items():
+            object.__setattr__(self, source, getattr(self, key))
         for item in self.allowed:
             self._check_allowed(item)
         for motion in self.motions:
@@ -166,6 +137,29 @@ class Scene:
             for name in motion.parts:
                 if name not in seen:
                     raise InputError(f"motion {motion.name!r}: {unknown_part(name, seen)}")
+
+    if not TYPE_CHECKING:  # to which any name would pass for an attribute
+
+        def __getattr__(self, name: str) -> Any:
+            """Put together what was added since it was last asked for."""
+            if name not in _GROWN:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+            found = as_tuple(getattr(self, _GROWN[name]))
+            object.__setattr__(self, name, found)
+            object.__setattr__(self, _GROWN[name], found)
+            return found
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Without the names of other scenes.
+        return type(self), tuple(getattr(self, key.name) for key in fields(self) if key.init)
+
+    def _changed(self, **values: object) -> Scene:
+        """The scene with other values in its fields, which are known to fit; its parts are not put together for it."""
+        scene = object.__new__(type(self))
+        for key in self.__dataclass_fields__:
+            if key not in _GROWN:
+                object.__setattr__(scene, key, values[key] if key in values else getattr(self, key))
+        return scene
 
     def __repr__(self) -> str:
         names = ", ".join([part.name for part in self.parts[:_NAMED]] + ["..."] * (len(self.parts) > _NAMED))
@@ -192,32 +186,29 @@ class Scene:
             part = Part(part, as_shape(shape), np.eye(4) if T_world is None else T_world)  # type: ignore[arg-type]
         elif shape is not None or T_world is not None:
             raise InputError("add() takes a Part alone, or a name with a shape and a pose")
-        n = len(self.parts)
-        if self._index.get(part.name, n) < n:
+        if self._has(part.name):
             raise InputError(f"part {part.name!r} is there twice; names must differ")
-        # What is in the scene was checked when it came in.
-        scene = copy(self)
-        object.__setattr__(scene, "_placed", None)
-        object.__setattr__(scene, "parts", (*self.parts, part))
-        if len(self._index) > n:  # another scene was made of this one before
-            object.__setattr__(scene, "_index", {p.name: i for i, p in enumerate(self.parts)})
-        scene._index[part.name] = n
-        return scene
+        n = self._n
+        with _INDEX_LOCK:
+            # Where another scene was made of this one before, the names behind its own are of that one.
+            index = self._index if len(self._index) == n else dict(islice(self._index.items(), n))
+            index[part.name] = n
+        return self._changed(_parts=linked(self._parts, (part,)), _n=n + 1, _index=index, _placed=None)
 
     def allow(self, *pairs: tuple[str, str], overlap: float = 0.0) -> Scene:
         """The scene with contact of these pairs allowed, and overlap up to ``overlap`` mm."""
         made = tuple(Allowed(a, b, overlap) for a, b in name_pairs("pairs", pairs))
         for item in made:
             self._check_allowed(item)
-        scene = copy(self)
-        object.__setattr__(scene, "allowed", self.allowed + made)
-        object.__setattr__(scene, "_allowances", None)
-        return scene
+        return self._changed(_allowed=linked(self._allowed, made), _allowances=None)
 
     def _check_allowed(self, item: Allowed) -> None:
         for name in (item.a, item.b):
-            if name not in self._index and not any(fnmatchcase(part.name, name) for part in self.parts):
+            if not self._has(name) and not any(fnmatchcase(part.name, name) for part in self.parts):
                 raise InputError(f"allowed: {unknown_part(name, (part.name for part in self.parts))}")
+
+    def _has(self, name: str) -> bool:
+        return self._index.get(name, self._n) < self._n
 
     def moved(self, poses: Mapping[str, ArrayLike]) -> Scene:
         """The scene with parts at other poses ``{name: T_world}``."""
@@ -232,10 +223,9 @@ class Scene:
 
     def index(self, name: str) -> int:
         """Position of a part in ``parts``. Raises InputError for an unknown name."""
-        i = self._index.get(text("part", name))
-        if i is None or i >= len(self.parts):
+        if not self._has(text("part", name)):
             raise InputError(unknown_part(name, (p.name for p in self.parts)))
-        return i
+        return self._index[name]
 
     @property
     def placed(self) -> Placed:

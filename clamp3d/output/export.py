@@ -21,7 +21,7 @@ from clamp3d.output import mesh_formats
 from clamp3d.output.files import file_stem, write_files
 from clamp3d.output.manifest import manifest
 from clamp3d.output.mesh_formats import MILLIMETRES
-from clamp3d.output.placed import PlacedPart, PosedMesh, place
+from clamp3d.output.placed import PlacedPart, PosedMesh, place, posed
 from clamp3d.output.step import step
 
 Format: TypeAlias = Literal["stl", "obj", "ply", "glb", "3mf", "step"]
@@ -151,7 +151,7 @@ def export(
     settings["mesh_error_mm"] = None if chosen == "step" else mesh_error
 
     title = "".join(c if c.isprintable() else " " for c in name)
-    meshed = [] if chosen == "step" else [item.posed(mesh_error) for item in placed]
+    meshed = [] if chosen == "step" else posed(placed, mesh_error)
     files: dict[str, tuple[bytes, Sequence[str]]] = {}
     if layout == "assembly":
         stem = file.stem if file else file_stem(name)

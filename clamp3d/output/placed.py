@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clamp3d.checks import items
+from clamp3d.checks import items, text
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.collide.scene import Scene, unknown_part
@@ -57,19 +57,29 @@ class PlacedPart:
         """The pose, the identity where there is none."""
         return np.eye(4) if self.T_world_part is None else self.T_world_part
 
-    def posed(self, mesh_error: float) -> PosedMesh:
-        """Its triangles; arcs within ``mesh_error`` mm, the facets of a mesh or of a solid from CAD as they are.
 
-        Their ``metadata`` holds ``mesh_error`` and ``chord_error``: what was asked for and what it is, mm.
-        """
-        import trimesh
+def posed(parts: Iterable[PlacedPart], mesh_error: float) -> list[PosedMesh]:
+    """The triangles of parts, made once for all parts of a shape.
 
-        if isinstance(self.shape, MeshShape):
-            facets, errors = self.shape.mesh, {"mesh_error": 0.0, "chord_error": self.shape.error}
-            made = trimesh.Trimesh(facets.vertices, facets.faces, process=False, metadata=errors)
-        else:
-            made = mesh(self.shape, mesh_error)
-        return PosedMesh(made, self.T, self.colour, self.label)
+    Arcs are within ``mesh_error`` mm, the facets of a mesh or of a solid from CAD are as they are. ``metadata`` of a
+    mesh holds ``mesh_error`` and ``chord_error``: what was asked for and what it is, mm.
+    """
+    made: dict[Shape, trimesh.Trimesh] = {}
+    found = []
+    for part in parts:
+        if part.shape not in made:
+            made[part.shape] = _triangles(part.shape, mesh_error)
+        found.append(PosedMesh(made[part.shape], part.T, part.colour, part.label))
+    return found
+
+
+def _triangles(shape: Shape, mesh_error: float) -> trimesh.Trimesh:
+    import trimesh
+
+    if not isinstance(shape, MeshShape):
+        return mesh(shape, mesh_error)
+    errors = {"mesh_error": 0.0, "chord_error": shape.error}
+    return trimesh.Trimesh(shape.mesh.vertices, shape.mesh.faces, process=False, metadata=errors)
 
 
 def place(source: Clamp | Scene, names: Iterable[str] | None = None) -> tuple[PlacedPart, ...]:
@@ -85,9 +95,10 @@ def place(source: Clamp | Scene, names: Iterable[str] | None = None) -> tuple[Pl
     colours = part_colours([name for name, _, _ in given])
     found = [PlacedPart(name, shape, T, colours[name]) for name, shape, T in given]
     known = [part.name for part in found]
-    chosen = known if names is None else items("names", names, "part names")
+    given_names = known if names is None else items("names", names, "part names")
+    chosen = dict.fromkeys(text("each of names", name) for name in given_names)
     for name in chosen:
-        if name not in known:
+        if name not in colours:
             raise InputError(unknown_part(name, known))
     if not chosen:
         raise InputError(f"names must name at least one part, available: {', '.join(known) or 'none'}")

@@ -17,7 +17,7 @@ from clamp3d.core.shapes import Solid
 from clamp3d.errors import Clamp3dError
 from clamp3d.output.figures import blank
 from clamp3d.output.palette import INK, VERDICT_COLOURS
-from clamp3d.output.placed import PosedMesh, place
+from clamp3d.output.placed import PosedMesh, place, posed
 from clamp3d.output.view3d import Camera, draw_solids
 from clamp3d.output.viewer_cut import overlap
 
@@ -106,7 +106,7 @@ def _solids(scene: Scene, names: Sequence[str]) -> dict[str, PosedMesh]:
     found = {}
     for item in place(scene, names):
         extent = float(np.ptp(item.shape.bounds, axis=0).max()) if isinstance(item.shape, Solid) else 0.0
-        found[item.name] = item.posed(max(MIN_MESH_ERROR, _MESH_ERROR * extent))
+        (found[item.name],) = posed([item], max(MIN_MESH_ERROR, _MESH_ERROR * extent))
     return found
 
 

@@ -277,9 +277,9 @@ class Viewer:
         drawing.property(ROOT, "story", self._story | {"panel": self._panel})
 
     def _send(self, command: Command) -> None:
-        message = self._log.add(command)
+        messages = self._log.add(command)
         if self._server is not None:
-            self._server.send(command, message)
+            self._server.send(command, messages)
 
 
 def view(shown: Scene | Assembly | CheckResult, *, serve: bool = True, **options: Any) -> Viewer:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import meshcat.geometry as g
@@ -30,17 +30,40 @@ def command(path: str, what: g.Object) -> dict[str, Any]:
     return {"type": "set_object", "path": path, "object": data}
 
 
-def solid(mesh: trimesh.Trimesh, colour: str) -> g.Object:
-    """A mesh with smooth round faces and sharp edges, in mm of its part's frame."""
+class _Packed(g.Geometry):  # type: ignore[misc]
+    """A geometry for any number of objects: what is sent of it is made once."""
 
-    smooth = trimesh.graph.smooth_shade(mesh, angle=_CREASE)
-    return g.Mesh(g.TriangularMeshGeometry(smooth.vertices, smooth.faces), _phong(colour))
+    def __init__(self, geometry: g.Geometry) -> None:
+        self.uuid, self._data = geometry.uuid, geometry.lower({})
+
+    def lower(self, _: object) -> dict[str, Any]:
+        data: dict[str, Any] = self._data
+        return data
 
 
-def edges(mesh: trimesh.Trimesh, colour: str) -> g.Object:
-    """The sharp edges of a mesh as lines."""
-    sharp = mesh.face_adjacency_angles > _CREASE
-    return segments(mesh.vertices[mesh.face_adjacency_edges[sharp]].reshape(-1, 3), colour)
+class Drawn:
+    """What all parts of one shape share: smooth round faces and sharp edges of its mesh, in mm of their frames."""
+
+    def __init__(self, mesh: trimesh.Trimesh) -> None:
+        self._mesh = mesh
+
+    @cached_property
+    def _faces(self) -> g.Geometry:
+        smooth = trimesh.graph.smooth_shade(self._mesh, angle=_CREASE)
+        return _Packed(g.TriangularMeshGeometry(smooth.vertices, smooth.faces))
+
+    @cached_property
+    def _edges(self) -> g.Geometry:
+        sharp = self._mesh.face_adjacency_angles > _CREASE
+        return _Packed(_points(self._mesh.vertices[self._mesh.face_adjacency_edges[sharp]].reshape(-1, 3)))
+
+    def solid(self, colour: str) -> g.Object:
+        """The mesh in a colour."""
+        return g.Mesh(self._faces, _phong(colour))
+
+    def edges(self, colour: str) -> g.Object:
+        """Its sharp edges as lines."""
+        return g.LineSegments(self._edges, _lines(colour))
 
 
 def facets(
@@ -57,10 +80,16 @@ def facets(
 
 def segments(points: ArrayLike, colour: str, *, on_top: bool = False) -> g.Object:
     """Straight lines between the points (2 n, 3) two by two."""
+    return g.LineSegments(_points(points), _lines(colour, on_top=on_top))
 
+
+def _points(points: ArrayLike) -> g.Geometry:
+    return g.PointsGeometry(np.asarray(points, dtype=np.float32).T)
+
+
+def _lines(colour: str, *, on_top: bool = False) -> g.Material:
     # three.js draws what is transparent after the solids
-    material = g.LineBasicMaterial(color=_number(colour), depthTest=not on_top, transparent=on_top)
-    return g.LineSegments(g.PointsGeometry(np.asarray(points, dtype=np.float32).T), material)
+    return g.LineBasicMaterial(color=_number(colour), depthTest=not on_top, transparent=on_top)
 
 
 def box(low: Array, high: Array, colour: str) -> g.Object:

@@ -25,7 +25,7 @@ from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.pose import Array
 from clamp3d.output import viewer_objects as draw
 from clamp3d.output.palette import FORCE, INK, VERDICT_COLOURS, darker
-from clamp3d.output.placed import place
+from clamp3d.output.placed import place, posed
 from clamp3d.output.viewer_cut import cut_open, overlap
 from clamp3d.output.viewer_timeline import FIRST, Row, Stop, Timeline
 from clamp3d.output.wording import part_title
@@ -71,7 +71,10 @@ class SceneDrawing:
     ) -> None:
         self._send = send
         placed = place(scene)
-        self._meshes = {part.name: part.posed(mesh_error).mesh for part in placed}
+        self._meshes = {part.name: p.mesh for part, p in zip(placed, posed(placed, mesh_error), strict=True)}
+        shared = {id(mesh): mesh for mesh in self._meshes.values()}
+        self._drawn = {key: draw.Drawn(mesh) for key, mesh in shared.items()}
+        self._corners = {key: np.array(list(itertools.product(*mesh.bounds.T))) for key, mesh in shared.items()}
         self.colours = {part.name: part.colour for part in placed}
         self.cut = cut_y is not None and len(scene.parts) <= _CUTTABLE
         self._trees = ("whole", "cutaway") if self.cut else ("whole",)
@@ -84,7 +87,7 @@ class SceneDrawing:
         self._stage()
         for part in scene.parts:
             self._draw_part(part, cut_y, part.name in uncut)
-            middle = self._meshes[part.name].bounds.mean(axis=0)
+            middle = self._corners[id(self._meshes[part.name])].mean(axis=0)
             anchor = middle if anchors is None else anchors[part.name]
             self._label(f"{ROOT}/labels/{part.name}", part.name, anchor, self.colours[part.name], 0.85)
         for name, pieces in self.overlays.items():
@@ -101,8 +104,7 @@ class SceneDrawing:
         corners = []
         for poses in states:
             for name, T in poses.items():
-                ends = np.array(list(itertools.product(*self._meshes[name].bounds.T)))
-                corners.append(ends @ T[:3, :3].T + T[:3, 3])
+                corners.append(self._corners[id(self._meshes[name])] @ T[:3, :3].T + T[:3, 3])
         points = np.vstack(corners or [np.zeros((1, 3)), np.ones((1, 3))])
         return points.min(axis=0), points.max(axis=0)
 
@@ -166,8 +168,9 @@ class SceneDrawing:
         halves = cut_open(whole, part.T_world, cut_y) if self.cut and not uncut and cut_y is not None else (whole, None)
         for tree, (body, cap) in zip(self._trees, ((whole, None), halves), strict=False):
             if body is not None:
-                self.put(f"{ROOT}/{tree}/{key}/solid", draw.solid(body, colour))
-                self.put(f"{ROOT}/{tree}/{key}/edges", draw.edges(body, edge))
+                drawn = self._drawn[id(whole)] if body is whole else draw.Drawn(body)
+                self.put(f"{ROOT}/{tree}/{key}/solid", drawn.solid(colour))
+                self.put(f"{ROOT}/{tree}/{key}/edges", drawn.edges(edge))
             if cap is not None:
                 self.put(f"{ROOT}/{tree}/{key}/cut", draw.facets(cap, colour, lit=False))
         if self.cut:
@@ -181,7 +184,7 @@ class SceneDrawing:
                 if some:
                     joined = draw.joined(some)
                     self.put(f"{path}/{part}/pieces {i + 1}", draw.facets(joined, colour, opacity=0.35))
-                    self.put(f"{path}/{part}/edges {i + 1}", draw.edges(joined, darker(colour, 0.6)))
+                    self.put(f"{path}/{part}/edges {i + 1}", draw.Drawn(joined).edges(darker(colour, 0.6)))
 
     def _draw_marks(self, number: int) -> None:
         """Dots and arrows where parts touch, red volumes where they clash, lines with their length across gaps."""

@@ -11,7 +11,7 @@ import contextlib
 import ipaddress
 import socket
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import tornado.httpserver
@@ -37,6 +37,8 @@ Command = dict[str, Any]
 class CommandLog:
     """The commands that still matter, in order: a later one replaces an earlier one of the same kind at its place.
 
+    The geometry of objects is a command of its own, which our page knows: it is kept once, however many have it.
+
     >>> log = CommandLog()
     >>> for x in (1.0, 2.0):
     ...     _ = log.add({"type": "set_property", "path": "/a", "property": "scale", "value": [x, x, x]})
@@ -47,12 +49,20 @@ class CommandLog:
     def __init__(self) -> None:
         self._messages: dict[tuple[str, str, str], bytes] = {}
 
-    def add(self, command: Command) -> bytes:
-        """Keep ``command`` and return it as the message (msgpack) that the viewer reads."""
+    def add(self, command: Command) -> list[bytes]:
+        """Keep ``command`` and return what of it is new, as messages (msgpack) that our page reads."""
+        new = []
+        if command["type"] == "set_object":
+            command = command | {"object": dict(command["object"])}
+            for geometry in command["object"].pop("geometries"):
+                key = ("set_geometry", geometry["uuid"], "")
+                if key not in self._messages:
+                    new.append(umsgpack.packb({"type": key[0], "path": key[1], "geometry": geometry}))
+                    self._messages[key] = new[-1]
         key = (command["type"], command["path"], command.get("property", ""))
         self._messages.pop(key, None)
         self._messages[key] = umsgpack.packb(command)
-        return self._messages[key]
+        return [*new, self._messages[key]]
 
     def messages(self) -> list[bytes]:
         """All messages that build the scene, oldest first."""
@@ -80,9 +90,9 @@ class LocalServer:
         self._thread.start()
         self._ready.wait()
 
-    def send(self, command: Command, message: bytes) -> None:
-        """Pass a command to every page that is open; never waits for a browser."""
-        self._loop.call_soon_threadsafe(lambda: [client.push(message) for client in list(self._clients)])
+    def send(self, command: Command, messages: Sequence[bytes]) -> None:
+        """Pass a command to every page that is open, as its messages; never waits for a browser."""
+        self._loop.call_soon_threadsafe(lambda: [c.push(message) for c in list(self._clients) for message in messages])
 
     def close(self) -> None:
         """Stop listening, drop the pages, end the thread. A second call does nothing."""
@@ -200,9 +210,9 @@ class RemoteServer:
             self.close()
             raise
 
-    def send(self, command: Command, message: bytes) -> None:
-        """Pass a command on. Raises Clamp3dError if the server has gone."""
-        self._ask(command["type"].encode(), command["path"].encode(), message)
+    def send(self, command: Command, messages: Sequence[bytes]) -> None:
+        """Pass a command on, whole as meshcat knows it. Raises Clamp3dError if the server has gone."""
+        self._ask(command["type"].encode(), command["path"].encode(), umsgpack.packb(command))
 
     def close(self) -> None:
         """Leave the server to itself. A second call does nothing."""

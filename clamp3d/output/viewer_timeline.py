@@ -198,7 +198,7 @@ def _motion_stops(
     rows = [row for row in result.motions if row.motion == motion.name]
 
     def at(t: float) -> Poses:
-        return {name: going.at(t, T) if name in motion.parts else T for name, T in start.items()}
+        return {**start, **{name: going.at(t, start[name]) for name in motion.parts}}
 
     def way(t0: float, t1: float) -> tuple[tuple[float, Poses], ...]:
         n = max(1, math.ceil(abs(going.angle) * (t1 - t0) / _TURN))

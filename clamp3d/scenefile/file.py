@@ -13,7 +13,8 @@ from clamp3d import checks
 from clamp3d.brep.mesh_file import FORMATS
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.loader import builtin_clamps, load_clamp, parse_toml, read_text
-from clamp3d.collide.scene import Allowed, Part, Scene
+from clamp3d.collide.allowed import Allowed
+from clamp3d.collide.scene import Part, Scene
 from clamp3d.core import shapes
 from clamp3d.core.linear import dot
 from clamp3d.core.validation import validate
@@ -51,6 +52,7 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
     allowed: list[Allowed] = []
     notes: list[str] = []
     files: dict[tuple[object, ...], shapes.AnyShape] = {}
+    read: dict[str, Parts] = {}
     where = ""
 
     def take(found: Parts, of: str) -> None:
@@ -68,7 +70,10 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
         for part_name, part in table.parts.items():
             where = f"parts.{part_name}"
             if isinstance(part, FileTable):
-                take(part.read(folder).prefixed(part_name, part.pose.T()), part_name)
+                same = part.model_dump_json(exclude={"pose"})
+                if same not in read:  # nor are files of several bodies read twice
+                    read[same] = part.read(folder)
+                take(read[same].prefixed(part_name, part.pose.T()), part_name)
                 continue
             if isinstance(part, MeshTable):  # one file is one shape, however often it is used
                 key = (part.file, part.unit, part.fit, part.chord)

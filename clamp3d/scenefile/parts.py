@@ -15,7 +15,8 @@ from clamp3d import checks
 from clamp3d.brep.bodies import Reading, part_name, unique_names
 from clamp3d.brep.mesh_file import FORMATS, load_bodies
 from clamp3d.brep.solid import BrepSolid
-from clamp3d.collide.scene import Allowed, Part
+from clamp3d.collide.allowed import Allowed
+from clamp3d.collide.scene import Part
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, MeshShape
@@ -214,8 +215,9 @@ def names_like(patterns: Iterable[str], names: Iterable[str]) -> list[str]:
     """Names that are in ``patterns``, or fit one of them; a pattern that fits none stays, to be told as unknown."""
     from fnmatch import fnmatchcase
 
-    known, found = list(names), []
+    known = dict.fromkeys(names)
+    found: dict[str, None] = {}
     for pattern in patterns:
         fits = [pattern] if pattern in known else [name for name in known if fnmatchcase(name, pattern)]
-        found += [name for name in fits or [pattern] if name not in found]
-    return found
+        found |= dict.fromkeys(fits or [pattern])
+    return list(found)

@@ -16,7 +16,8 @@ import numpy as np
 from clamp3d import checks
 from clamp3d.brep.bodies import part_name, unique_names
 from clamp3d.brep.mesh_file import FORMATS, load_mesh
-from clamp3d.collide.scene import Allowed, Part
+from clamp3d.collide.allowed import Allowed
+from clamp3d.collide.scene import Part
 from clamp3d.core import shapes
 from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Array, make_mesh

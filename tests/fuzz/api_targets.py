@@ -25,8 +25,8 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.placement import Placement
 from clamp3d.clamp.section import Section
+from clamp3d.collide.allowed import Allowed
 from clamp3d.collide.poses import check_poses
-from clamp3d.collide.scene import Allowed
 from clamp3d.core import pose as poses
 from clamp3d.core.meshing import mesh
 from clamp3d.core.motion import Motion

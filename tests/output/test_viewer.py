@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+import umsgpack
 from meshcat.servers.tree import SceneTree, find_node, walk
 
 from clamp3d.clamp.assemble import assemble
@@ -25,10 +27,11 @@ from clamp3d.collide.check import check
 from clamp3d.collide.distance import measure
 from clamp3d.collide.scene import Scene
 from clamp3d.core import shapes
+from clamp3d.core.meshing import mesh
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import translation
 from clamp3d.errors import Clamp3dError, InputError
-from clamp3d.output import viewer_server
+from clamp3d.output import placed, viewer_server
 from clamp3d.output.viewer import Viewer, view
 from clamp3d.output.viewer_server import CommandLog, LocalServer, RemoteServer
 
@@ -191,10 +194,11 @@ def dots_of(viewer):
 def test_every_dot_lies_on_both_bodies(recorded):
     import trimesh
 
-    from clamp3d.output.placed import place
+    from clamp3d.output.placed import place, posed
 
     viewer, assembly, _ = recorded
-    meshes = {part.name: part.posed(0.002).mesh for part in place(assembly.scene)}
+    placed = place(assembly.scene)
+    meshes = {part.name: found.mesh for part, found in zip(placed, posed(placed, 0.002), strict=True)}
     dots = list(dots_of(viewer))
     assert len([dot for dot in dots if dot[0] == len(assembly.path) - 1]) == 8
     for number, pair, point in dots:
@@ -336,6 +340,50 @@ def test_log_keeps_what_a_late_page_needs_and_no_more():
         log.add({"type": "set_transform", "path": "/a/b", "matrix": [float(x)] * 16})
     log.add({"type": "set_property", "path": "/a/b", "property": "visible", "value": True})
     assert len(log.messages()) == 2
+
+
+def test_equal_parts_are_meshed_and_written_once(monkeypatch):
+    made = []
+    monkeypatch.setattr(placed, "mesh", lambda shape, error: made.append(shape) or mesh(shape, error))
+    drawn = []
+    smooth = trimesh.graph.smooth_shade
+    monkeypatch.setattr(trimesh.graph, "smooth_shade", lambda *a, **k: drawn.append(1) or smooth(*a, **k))
+    scene = Scene()
+    for k in range(70):  # more than are cut open
+        shape = shapes.cylinder(3, 10) if k % 3 == 0 else shapes.box((5, 5, 5))  # equal, not the same
+        scene = scene.add(f"p{k}", shape, translation(20.0 * k, 0, 0))
+    with view(scene, serve=False) as viewer:
+        messages = [umsgpack.unpackb(message) for message in viewer._log.messages()]
+    assert len(made) == 2
+    assert len(drawn) == 2
+    sent = [message for message in messages if message["type"] == "set_geometry"]
+    assert len(sent) == 4  # faces and edges
+    seen: set[str] = set()
+    used = set()
+    for message in messages:  # a geometry comes before what has it
+        if message["type"] == "set_geometry":
+            assert message["geometry"]["uuid"] == message["path"]
+            seen.add(message["path"])
+        elif message["type"] == "set_object":
+            assert "geometries" not in message["object"]
+            if uuid := message["object"]["object"].get("geometry"):
+                assert uuid in seen
+                used.add(uuid)
+    assert used == seen
+
+
+def test_a_meshcat_server_that_was_there_before_is_told_whole_objects(monkeypatch):
+    told = []
+    monkeypatch.setattr(RemoteServer, "__init__", lambda self, url: setattr(self, "url", url))
+    monkeypatch.setattr(RemoteServer, "_ask", lambda self, *frames: told.append(frames))
+    monkeypatch.setattr(RemoteServer, "close", lambda self: None)
+    scene = Scene().add("a", shapes.box((1, 1, 1))).add("b", shapes.box((1, 1, 1)), translation(5, 0, 0))
+    view(scene, url="tcp://127.0.0.1:6000").close()
+    commands = [umsgpack.unpackb(frames[2]) for frames in told]
+    assert {command["type"] for command in commands} <= {"set_object", "set_transform", "set_property", "delete"}
+    solids = [c["object"] for c in commands if c["type"] == "set_object" and c["path"].endswith("/solid")]
+    assert len(solids) == 4  # whole and cut open
+    assert all(solid["geometries"][0]["uuid"] == solid["object"]["geometry"] for solid in solids)
 
 
 def test_page_under_a_foreign_name_is_refused():

@@ -7,6 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from clamp3d import InputError, check, load
 from clamp3d.core.shapes import MeshShape
+from clamp3d.scenefile import tables
+from clamp3d.scenefile.parts import read_parts
 
 
 @pytest.fixture
@@ -177,3 +179,19 @@ def test_a_mesh_table_takes_one_body_only(tmp_path):
         load(tmp_path / "scene.toml")
     (tmp_path / "scene.toml").write_text('[parts.a]\nfile = "two.glb"\n')
     assert [p.name for p in load(tmp_path / "scene.toml").parts] == ["a/geometry_0", "a/geometry_1"]
+
+
+def test_a_file_that_a_scene_names_often_is_read_once_for_each_way_to_read_it(folder, tmp_path, monkeypatch):
+    read = []
+    monkeypatch.setattr(tables, "read_parts", lambda path, reader: read.append(path.name) or read_parts(path, reader))
+    text = "".join(
+        f'[parts.b{k}]\nfile = "cell/plate.stl"\npose.translation = [{10 * k}, 0, 0]\nunit = "{unit}"\n'
+        for k, unit in enumerate(["mm", "mm", "cm", "mm"])
+    )
+    (tmp_path / "scene.toml").write_text(text)
+    scene = load(tmp_path / "scene.toml")
+    assert read == ["plate.stl"] * 2
+    a, b, c, d = scene.parts
+    assert a.shape is b.shape is d.shape
+    assert np.ptp(c.shape.mesh.vertices, axis=0).tolist() == [20, 40, 60]
+    assert [part.T_world[0, 3] for part in scene.parts] == [0, 10, 20, 30]

@@ -266,10 +266,24 @@ function clamp3dViewer(messages) {
     if (!touched) setTimeout(() => { viewer.set_3d_pane_size(); if (!touched) home(0, true); }, 30);
   }
 
+  // Parts of one shape share its geometry: it comes once, by its uuid, and is made for the first object that has it.
+  const geometries = {};
+  function setObject(command) {
+    const uuid = command.object.object.geometry, own = geometries[uuid];
+    const none = { uuid, type: "BufferGeometry", data: { attributes: {} } };
+    handle({ ...command, object: { ...command.object, geometries: own ? [own.made ? none : own.data] : [] } });
+    if (!own) return;
+    const object = viewer.scene_tree.find([...split(command.path), "<object>"]).object;
+    if (own.made) object.geometry = own.made;
+    else Object.assign(own, { made: object.geometry, data: null });
+  }
+
   const handle = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
     if (command.type === "set_property" && command.path === "/Background") return background();
-    handle(command);
+    if (command.type === "set_geometry") geometries[command.path] = { data: command.geometry };
+    else if (command.type === "set_object") setObject(command);
+    else handle(command);
     if (command.type === "set_property" && command.property === "story" && command.path === "/clamp3d") tell(command.value);
     else if (command.type === "set_property" && command.property === "visible") {
       // A switch that the user has set outlasts what the program sends.
