@@ -16,6 +16,7 @@ from clamp3d.collide.meshes import within
 from clamp3d.collide.model import Model
 from clamp3d.collide.refine import Enough, refine, with_normal
 from clamp3d.collide.verdict import Thresholds, Verdict
+from clamp3d.core.linear import norm
 from clamp3d.core.pose import Array
 
 _ERROR = 0.064
@@ -77,7 +78,7 @@ def _could_hold(inner: Model, outer: Model, contact: float) -> bool:
     """Whether the sizes of two parts leave open that one holds the other at some pose, as `within` takes it."""
     length, volume = inner.least_size
     room = np.ptp(outer.bounds, axis=0) + 2.0 * (contact + 4.0 * _ERROR)
-    return bool(np.linalg.norm(room) >= length and room.prod() >= volume)
+    return bool(norm(room) >= length and room.prod() >= volume)
 
 
 def _fits(inner: Model, outer: Model, T: Array) -> NDArray[np.bool_]:
