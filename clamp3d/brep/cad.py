@@ -88,7 +88,8 @@ def bodies_of(roots: Iterable[Node], chord: float = CHORD) -> tuple[Reading, int
             missing.append(f"{node.name} ({'a surface' if surfaces == 1 else f'{surfaces} surfaces'}, not a solid)")
         elif not solids:
             loose += 1
-    notes = (f"{loose} products hold curves or points only: left out",) if loose else ()
+    said = "1 product holds" if loose == 1 else f"{loose} products hold"
+    notes = (f"{said} curves or points only: left out",) if loose else ()
     return Reading(tuple(bodies), tuple(missing), notes), len(shapes)
 
 

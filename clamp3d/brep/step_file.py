@@ -96,10 +96,12 @@ def _children(label: Any) -> Iterator[Any]:
 
 
 def _name(label: Any) -> str:
+    """A label's name; none where Open CASCADE has put the label's own address, as in ``=>[0:1:1:2]``."""
     from OCP.TDataStd import TDataStd_Name
 
     found = TDataStd_Name()
-    return str(found.Get().ToExtString()).strip() if label.FindAttribute(TDataStd_Name.GetID_s(), found) else ""
+    name = str(found.Get().ToExtString()).strip() if label.FindAttribute(TDataStd_Name.GetID_s(), found) else ""
+    return "" if name.startswith("=>[") else name
 
 
 def _lost(document: Any, found: Announced, solids: int) -> Iterator[str]:

@@ -15,7 +15,7 @@ CHART = Output((".png", ".svg", ".html"))
 def command(
     json_file: Path | None = JSON,
     plot_file: Path | None = option("Draw the chart: .png, .svg or .html.", "--plot", type=CHART),
-    peers: bool = option("Also measure coal, trimesh, MuJoCo, manifold3d and Open CASCADE."),
+    peers: bool = option("Also measure coal, python-fcl, trimesh, MuJoCo, manifold3d and Open CASCADE."),
     quiet: bool = QUIET,
 ) -> None:
     """Measure every contact method on the same poses and the same assembly: accuracy against speed.

@@ -19,20 +19,36 @@ Pairs = tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]
 """Poses (i, 4, 4) of a first body and which of them (m,) is meant, then those of a second."""
 
 
+def in_frame_of_first(T: Array) -> Pairs:
+    """The pairs of a second body at poses (n, 4, 4) in the first one's frame."""
+    return np.eye(4)[None], np.zeros(len(T), dtype=np.int64), T, np.arange(len(T))
+
+
+def relative(pairs: Pairs) -> Array:
+    """The second body's poses (m, 4, 4) in the first one's frame."""
+    from clamp3d.collide.poses_kernel import between
+
+    T = np.empty((len(pairs[1]), 4, 4))
+    between(*pairs, T)
+    return T
+
+
 def by_kernel(a: Model, b: Model, T: Array) -> Distances:
     """What grooves and holes against cylinders say of the distances of ``b`` at ``T`` (n, 4, 4) in a's frame.
 
     Where other faces may decide both bounds are infinite; of an overlap they are those of the interference. `exact`
     tells the rows whose distance is known.
     """
-    n = len(T)
-    found = _by_kernel(a, b, (np.eye(4)[None], np.zeros(n, dtype=np.int64), T, np.arange(n)), points=True)
-    return Distances(found[0], found[1], found[2:5].T, found[5:8].T, found[8:11].T, ("groove kernel",) * n)
+    found = _by_kernel(a, b, in_frame_of_first(T), points=True)
+    return Distances(found[0], found[1], found[2:5].T, found[5:8].T, found[8:11].T, ("groove kernel",) * len(T))
 
 
-def bounds_by_kernel(a: Model, b: Model, pairs: Pairs) -> tuple[Array, Array]:
-    """The bounds (m,) of `by_kernel` alone, for the poses of both bodies in the world."""
-    found = _by_kernel(a, b, pairs, points=False)
+def bounds_by_kernel(a: Model, b: Model, pairs: Pairs, clash: float = -np.inf) -> tuple[Array, Array]:
+    """The bounds (m,) of `by_kernel` alone, for the poses of both bodies in the world.
+
+    What overlaps by more than ``-clash`` mm need have no lower bound.
+    """
+    found = _by_kernel(a, b, pairs, points=False, clash=clash)
     return found[0], found[1]
 
 
@@ -42,15 +58,15 @@ def exact(found: Distances) -> NDArray[np.bool_]:
         return np.asarray((found.upper - found.lower <= _KNOWN) & (found.lower >= -_KNOWN))
 
 
-def _by_kernel(a: Model, b: Model, pairs: Pairs, points: bool) -> Array:
+def _by_kernel(a: Model, b: Model, pairs: Pairs, points: bool, clash: float = -np.inf) -> Array:
     """Bounds, and with ``points`` points and normals in a's frame, NaN where unknown: (2 or 11, m)."""
     known = []
     if a.bodies is not None and b.bodies is not None and len(a.bodies) == len(b.bodies) == 1:
         (first,), (second,) = a.bodies, b.bodies
         if not any(form.error or form.surface is not None for form in (first, second)):
-            known = [_bore_rod(bore, rod, first, second, pairs, points) for bore, rod in _asked(first, second)]
+            known = [_bore_rod(bore, rod, first, second, pairs, points, clash) for bore, rod in _asked(first, second)]
             for bore, rod in _asked(second, first):
-                known.append(_bore_rod(bore, rod, second, first, (*pairs[2:], *pairs[:2]), points))
+                known.append(_bore_rod(bore, rod, second, first, (*pairs[2:], *pairs[:2]), points, clash))
                 if points:
                     _seen_from_first(known[-1], pairs)
     if known:
@@ -67,10 +83,7 @@ def _asked(a: ClosedForm, b: ClosedForm) -> list[tuple[Bore, Rod]]:
 
 def _seen_from_first(found: Array, pairs: Pairs) -> None:
     """Points and normals (11, m) in the second body's frame, from it to the first, in place the other way about."""
-    from clamp3d.collide.poses_kernel import between
-
-    T = np.empty((found.shape[1], 4, 4))
-    between(*pairs, T)
+    T = relative(pairs)
     R, t = T[:, :3, :3], T[:, :3, 3].T
     q, p, n = (np.einsum("nij,jn->in", R, found[k : k + 3]) for k in (2, 5, 8))
     found[2:5], found[5:8], found[8:11] = p + t, q + t, -n
@@ -83,7 +96,9 @@ def _better(x: Array, y: Array) -> Array:
     return found
 
 
-def _bore_rod(bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, pairs: Pairs, points: bool) -> Array:
+def _bore_rod(
+    bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, pairs: Pairs, points: bool, clash: float = -np.inf
+) -> Array:
     from clamp3d.collide.bore_kernel import WORK, bore_rod
 
     covers = bore.covers()
@@ -91,7 +106,7 @@ def _bore_rod(bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, pairs: Pairs, 
     P, found = np.array([place for _, place in covers]), np.empty((11 if points else 2, len(pairs[1])))
     wire = rod.radius, 0.5 * rod.length, np.array([rod.T])
     work = np.empty(WORK), np.empty((128, 5))
-    bore_rod(grooves, P, *wire, *pairs, *members(a), *members(b), MEMBER, _KNOWN, *work, found)
+    bore_rod(grooves, P, *wire, *pairs, *members(a), *members(b), MEMBER, _KNOWN, clash, *work, found)
     return found
 
 

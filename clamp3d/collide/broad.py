@@ -53,7 +53,7 @@ def box_sizes(bounds: Array) -> Array:
 
 
 def world_boxes(bounds: Array, T: Array, which: NDArray[np.int64] = FIRST) -> Array:
-    """Centre and half sizes (6, n) along the world's axes of the boxes at poses (n, 4, 4).
+    """Lower and upper corners (6, n) along the world's axes of the boxes at poses (n, 4, 4).
 
     ``bounds`` (m, 2, 3): boxes in their own frames; ``which`` (n,): those of the poses, the first of all by default.
     """

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.batch import members
+from clamp3d.collide.batch import Pairs, in_frame_of_first, members, relative
 from clamp3d.collide.broad import world_boxes
 from clamp3d.collide.depth import is_quick, penetration
 from clamp3d.collide.faces import stands_out
@@ -16,7 +16,7 @@ from clamp3d.collide.meshes import within
 from clamp3d.collide.model import Model
 from clamp3d.collide.refine import Enough, refine, with_normal
 from clamp3d.collide.verdict import Thresholds, Verdict
-from clamp3d.core.pose import Array, inverse
+from clamp3d.core.pose import Array
 
 _ERROR = 0.064
 """Chord error (mm) of the meshes that containment is asked with."""
@@ -43,41 +43,48 @@ def judge(
         deep = penetration(a, b, T, with_normal(found))
         found = replace(found, lower=max(found.lower, deep.lower))
         verdict = thresholds.verdict(found, allowance)
-    if verdict is Verdict.CLASH and contained(a, b, T[None], thresholds).any():
+    if verdict is Verdict.CLASH and contained(a, b, in_frame_of_first(T[None]), thresholds).any():
         verdict = Verdict.CONTAINED
     return verdict, found
 
 
-def contained(a: Model, b: Model, T: Array, thresholds: Thresholds) -> NDArray[np.bool_]:
-    """Whether one of two overlapping parts lies wholly in the other, within the contact threshold; (n,).
+def contained(a: Model, b: Model, pairs: Pairs, thresholds: Thresholds) -> NDArray[np.bool_]:
+    """Whether one of two overlapping parts lies wholly in the other, within the contact threshold; (m,).
 
-    ``T`` (n, 4, 4) are poses of b in a's frame.
+    ``pairs`` are the poses of both.
     """
-    found = np.zeros(len(T), dtype=bool)
+    found = np.zeros(len(pairs[1]), dtype=bool)
     if not (a.closed and b.closed):
         return found
-    for inner, outer, places in ((b, a, T), (a, b, inverse(T))):
-        rows = np.flatnonzero(~found)
-        rows = rows[_fits(inner, outer, places[rows], thresholds.contact)]
-        if not len(rows):
+    for inner, outer, (A, column, T, row) in ((b, a, pairs), (a, b, (*pairs[2:], *pairs[:2]))):
+        if not _could_hold(inner, outer, thresholds.contact):
             continue
+        rows = np.flatnonzero(~found)
+        places = relative((A, column[rows], T, row[rows]))
+        fits = _fits(inner, outer, places)
+        rows, places = rows[fits], places[fits]
         if inner.faces is None or outer.faces is None:
-            rows = rows[~_shows(inner, outer, places[rows], thresholds.contact)]
+            open_ = ~_shows(inner, outer, places, thresholds.contact)
         else:
             faces = inner.faces, outer.faces
-            rows = np.array([k for k in rows if not stands_out(*faces, places[k], thresholds.contact)], dtype=np.intp)
-        a.counters.queries["containment"] += len(rows)
-        found[rows] = [within(inner, outer, places[k], _ERROR, thresholds.contact) for k in rows]
+            open_ = np.array([not stands_out(*faces, P, thresholds.contact) for P in places], dtype=bool)
+        a.counters.queries["containment"] += int(open_.sum())
+        found[rows[open_]] = [within(inner, outer, P, _ERROR, thresholds.contact) for P in places[open_]]
     return found
 
 
-def _fits(inner: Model, outer: Model, T: Array, contact: float) -> NDArray[np.bool_]:
+def _could_hold(inner: Model, outer: Model, contact: float) -> bool:
+    """Whether the sizes of two parts leave open that one holds the other at some pose, as `within` takes it."""
+    length, volume = inner.least_size
+    room = np.ptp(outer.bounds, axis=0) + 2.0 * (contact + 4.0 * _ERROR)
+    return bool(np.linalg.norm(room) >= length and room.prod() >= volume)
+
+
+def _fits(inner: Model, outer: Model, T: Array) -> NDArray[np.bool_]:
     """Whether the boxes of two parts leave open that one holds the other, (n,): cheap, without a mesh."""
     low, high = outer.bounds
-    if (high - low).max() * 1.7321 + contact < (inner.bounds[1] - inner.bounds[0]).max():
-        return np.zeros(len(T), dtype=bool)
     around = world_boxes(inner.bounds[None], T)
-    centre, reach = around[:3], 0.5 * around[3:]
+    centre, reach = 0.5 * (around[:3] + around[3:]), 0.25 * (around[3:] - around[:3])
     # The box of the inner one touches the outer's on six sides: one outside by more than its own corners can be is
     # enough to say no.
     return np.asarray(((centre + reach >= low[:, None]) & (centre - reach <= high[:, None])).all(axis=0))

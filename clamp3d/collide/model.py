@@ -72,6 +72,13 @@ class Model:
         return np.array([V.min(axis=0) - reach, V.max(axis=0) + reach])
 
     @cached_property
+    def least_size(self) -> tuple[float, float]:
+        """Length (mm) and volume (mm^3) that the true part has at least, where they cost nothing; else 0."""
+        if not isinstance(self.shape, Solid) or self.shape.holes:
+            return 0.0, 0.0
+        return float(np.ptp(self.bounds, axis=0).max()), sum(body.volume for body in self.shape.bodies)
+
+    @cached_property
     def bodies(self) -> tuple[ClosedForm, ...] | None:
         """The shape in closed form; None if it has none."""
         if isinstance(self.shape, Solid):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.batch import Pairs, bounds_by_kernel
+from clamp3d.collide.batch import Pairs, bounds_by_kernel, relative
 from clamp3d.collide.broad import FEW, FIRST, Boxes, box_gaps, box_sizes, world_boxes
 from clamp3d.collide.judge import contained, judge
 from clamp3d.collide.model import Model, ModelCache
@@ -146,12 +146,9 @@ def check_poses(
     bounds = np.zeros((len(placed.shapes), 2, 3))
     for k, found in models.items():
         bounds[k] = found.bounds
-    model = shop.model(scene.parts[i].shape)
-    T, moving = _placed(poses, model.bounds)
-    P = placed.poses[rest]
+    model, P = shop.model(scene.parts[i].shape), placed.poses[rest]
     reach = scene.thresholds.reach + 1e-6
-    row, column = _near(moving, world_boxes(bounds, P, which), reach)
-    del moving  # the largest array by far: its memory serves the next ones
+    T, row, column = _near(poses, model.bounds, world_boxes(bounds, P, which), reach)
     # Equal parts that may meet this one alike are measured together.
     alike: dict[tuple[int, float | None], list[int]] = {}
     for k in np.flatnonzero(np.bincount(column)).tolist():
@@ -174,20 +171,14 @@ def _judged(
     a: Model, b: Model, pairs: Pairs, thresholds: Thresholds, allowance: float | None
 ) -> tuple[Array, Array, NDArray[np.int8]]:
     """Bounds of the signed distances (m,) of two parts at pairs of poses, and the places of their verdicts."""
-    from clamp3d.collide.poses_kernel import between
-
-    def local(rows: NDArray[np.int64]) -> Array:
-        A, column, T, row = pairs
-        out = np.empty((len(rows), 4, 4))
-        between(A, column[rows], T, row[rows], out)
-        return out
-
-    least, most = bounds_by_kernel(a, b, pairs)
+    A, column, T, row = pairs
+    least, most = bounds_by_kernel(a, b, pairs, thresholds.clash(allowance))
     rank = thresholds.verdicts(least, most, allowance)
     clash = np.flatnonzero(rank == _CLASH)
-    rank[clash[contained(a, b, local(clash), thresholds)]] = VERDICTS.index(Verdict.CONTAINED)
+    inside = contained(a, b, (A, column[clash], T, row[clash]), thresholds)
+    rank[clash[inside]] = VERDICTS.index(Verdict.CONTAINED)
     left = np.flatnonzero(rank == _UNCERTAIN)
-    places = local(left)
+    places = relative((A, column[left], T, row[left]))
     around = np.concatenate([np.repeat(b.bounds[None], len(left), axis=0), a.bounds[None]])
     each = np.column_stack([np.full(len(left), len(left)), np.arange(len(left))])
     least[left] = box_gaps(Boxes.of(around, np.concatenate([places, np.eye(4)[None]])), each)
@@ -206,53 +197,54 @@ def _judged(
     return least, most, rank
 
 
-def _placed(poses: ArrayLike, bounds: Array) -> tuple[Array, Array]:
-    """The poses (n, 4, 4), checked, and centre and half sizes (6, n) along the world's axes of a part's box there."""
-    from clamp3d.collide.poses_kernel import boxes
+def _near(
+    poses: ArrayLike, bounds: Array, still: Array, reach: float
+) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+    """The poses (n, 4, 4), checked, and those poses and others (m,) whose boxes come within ``reach`` mm.
 
+    ``bounds`` (2, 3) is the box of the part in its own frame, ``still`` (6, k) are those of the others in the world.
+    """
     T = np.require(array("poses", poses, (None, 4, 4), finite=False), np.float64, ["C", "A"])
-    found = np.empty((6, len(T)))
-    sizes = box_sizes(bounds[None])
-    if boxes(T, sizes, FIRST, FARTHEST, found) >= 0:
+    bad, row, column = _meeting(T, bounds, still, reach)
+    if bad >= 0:
         T = np.require(check_pose_array(T), np.float64, ["C"])
-        bad = boxes(T, sizes, FIRST, FARTHEST, found)
+        bad, row, column = _meeting(T, bounds, still, reach)
         if bad >= 0:
             scene_pose(T[bad], f"poses[{bad}]")
-    return T, found
+    return T, row, column
 
 
-def _near(moving: Array, still: Array, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Poses and others (m,) whose boxes along the world's axes (6, n), (6, k) come within ``reach`` mm.
+def _meeting(T: Array, bounds: Array, still: Array, reach: float) -> tuple[int, NDArray[np.int64], NDArray[np.int64]]:
+    """The first pose that is not rigid or too far off, or -1; and what comes near before, as `_near` has it.
 
     A block of poses, which often follow each other, is compared with all others that come near the block.
     """
-    from clamp3d.collide.poses_kernel import around, meet
+    from clamp3d.collide.poses_kernel import around, boxes, meet
 
-    wide = still[3:] + reach
-    below, above = still[:3] - wide, still[:3] + wide
-    others, blocks, found = np.empty(still.shape[1], dtype=np.int64), [], 0
+    below, above, sizes = still[:3] - reach, still[3:] + reach, box_sizes(bounds[None])
+    moving, others = np.empty((6, min(_BLOCK, len(T)))), np.empty(still.shape[1], dtype=np.int64)
+    pairs, count = np.empty((2, len(T)), dtype=np.int64), 0
     tree: Any = None
-    for start in range(0, moving.shape[1], _BLOCK):
-        stop = min(start + _BLOCK, moving.shape[1])
-        column = others[: around(moving, start, stop, below, above, others)].copy()
-        row = None
-        if len(column) > FEW:
+    for start in range(0, len(T), _BLOCK):
+        some = T[start : start + _BLOCK]
+        bad = boxes(some, sizes, FIRST, FARTHEST, moving)
+        if bad >= 0:
+            return start + bad, *pairs[:, :count]
+        near, n = others[: around(moving, len(some), below, above, others)], len(some)
+        most = n * len(near)
+        if len(near) > FEW:
             from rtree import index
 
             if tree is None:
-                all_others = np.arange(len(others)), below.T, above.T
-                tree = index.Index(all_others, properties=index.Property(dimension=3))
-            part = moving[:, start:stop]
-            column, each = tree.intersection_v((part[:3] - part[3:]).T, (part[:3] + part[3:]).T)
-            row = np.repeat(np.arange(start, stop), np.asarray(each, dtype=np.int64))
-        blocks.append((start, stop, row, column))
-        found += len(column) if row is not None else (stop - start) * len(column)
-    rows, columns = np.empty((2, found), dtype=np.int64)
-    count = 0
-    for start, stop, row, column in blocks:
-        if row is None:
-            count = meet(moving, start, stop, below, above, column, rows, columns, count)
+                tree = index.Index((np.arange(len(others)), below.T, above.T), properties=index.Property(dimension=3))
+            column, each = tree.intersection_v(moving[:3, :n].T, moving[3:, :n].T)
+            most = len(column)
+        if count + most > pairs.shape[1]:
+            pairs = np.concatenate([pairs[:, :count], np.empty((2, count + most), dtype=np.int64)], axis=1)
+        if len(near) > FEW:
+            pairs[0, count : count + most] = np.repeat(np.arange(start, start + n), np.asarray(each, dtype=np.int64))
+            pairs[1, count : count + most] = column
+            count += most
         else:
-            rows[count : count + len(row)], columns[count : count + len(row)] = row, column
-            count += len(row)
-    return rows[:count], columns[:count]
+            count += meet(moving, n, below, above, near, start, pairs[0, count:], pairs[1, count:])
+    return -1, *pairs[:, :count]

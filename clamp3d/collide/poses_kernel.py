@@ -33,8 +33,26 @@ def back(T, k, x, y, z):
     )
 
 
+@inlined
+def frame(P, c):
+    """Rotation, by rows, and place of P[c]: read once, for a loop that stores numbers does not know that they last."""
+    return (
+        (P[c, 0, 0], P[c, 0, 1], P[c, 0, 2]),
+        (P[c, 1, 0], P[c, 1, 1], P[c, 1, 2]),
+        (P[c, 2, 0], P[c, 2, 1], P[c, 2, 2]),
+        (P[c, 0, 3], P[c, 1, 3], P[c, 2, 3]),
+    )
+
+
+@inlined
+def turned_back(at, x, y, z):
+    """A vector as seen from the frame ``at``."""
+    (a, b, c), (d, e, f), (g, h, k), _ = at
+    return a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + k * z
+
+
 def _boxes(T, sizes, which, far, out):
-    """Centre and half sizes (6, n) along the world's axes of boxes at poses; the first that is not rigid, or -1.
+    """Lower and upper corners (6, n) along the world's axes of boxes at poses; the first that is not rigid, or -1.
 
     ``sizes`` (m, 6): centre and half sizes in the bodies' own frames; ``which`` (n,) or (1,): those of each pose, or of
     all. No pose may lie further than ``far`` off; if that is infinite all poses are taken as they are.
@@ -47,26 +65,23 @@ def _boxes(T, sizes, which, far, out):
         ):
             return k
         j = which[min(k, which.shape[0] - 1)]
-        x, y, z = there(T, k, sizes[j, 0], sizes[j, 1], sizes[j, 2])
+        centre = there(T, k, sizes[j, 0], sizes[j, 1], sizes[j, 2])
         for i in range(3):
-            out[3 + i, k] = (
-                abs(T[k, i, 0]) * sizes[j, 3] + abs(T[k, i, 1]) * sizes[j, 4] + abs(T[k, i, 2]) * sizes[j, 5]
-            )
-        out[0, k], out[1, k], out[2, k] = x, y, z
+            half = abs(T[k, i, 0]) * sizes[j, 3] + abs(T[k, i, 1]) * sizes[j, 4] + abs(T[k, i, 2]) * sizes[j, 5]
+            out[i, k], out[3 + i, k] = centre[i] - half, centre[i] + half
     return -1
 
 
-def _around(moving, start, stop, below, above, others):
-    """Into ``others`` the boxes from ``below`` to ``above`` (3, m) that come near poses ``start`` to ``stop``.
+def _around(moving, n, below, above, others):
+    """Into ``others`` the boxes from ``below`` to ``above`` (3, m) that come near any of the first n ``moving`` (6, n).
 
-    ``moving`` (6, n): centre and half sizes of their boxes. Returns the number.
+    Returns their number.
     """
     low_x = low_y = low_z = math.inf
     high_x = high_y = high_z = -math.inf
-    for k in range(start, stop):
-        low_x, high_x = min(low_x, moving[0, k] - moving[3, k]), max(high_x, moving[0, k] + moving[3, k])
-        low_y, high_y = min(low_y, moving[1, k] - moving[4, k]), max(high_y, moving[1, k] + moving[4, k])
-        low_z, high_z = min(low_z, moving[2, k] - moving[5, k]), max(high_z, moving[2, k] + moving[5, k])
+    for k in range(n):
+        low_x, low_y, low_z = min(low_x, moving[0, k]), min(low_y, moving[1, k]), min(low_z, moving[2, k])
+        high_x, high_y, high_z = max(high_x, moving[3, k]), max(high_y, moving[4, k]), max(high_z, moving[5, k])
     count = 0
     for j in range(below.shape[1]):
         meets = below[0, j] <= high_x and above[0, j] >= low_x
@@ -76,20 +91,19 @@ def _around(moving, start, stop, below, above, others):
     return count
 
 
-def _meet(moving, start, stop, below, above, others, row, column, count):
-    """Pairs of boxes that meet: poses ``start`` to ``stop``, and ``others`` from ``below`` to ``above``.
+def _meet(moving, n, below, above, others, start, row, column):
+    """Pairs of boxes that meet: the first n ``moving`` (6, n), and ``others`` from ``below`` to ``above`` (3, m).
 
-    The pairs go to ``row`` and ``column`` from ``count`` on, by pose; returns where they end.
+    They go to ``row``, which counts from ``start`` on, and ``column``, by pose; returns their number.
     """
-    for k in range(start, stop):
+    count = 0
+    for k in range(n):
         for i in range(others.shape[0]):
             j = others[i]
-            meets = True
-            for axis in range(3):
-                low, high = moving[axis, k] - moving[3 + axis, k], moving[axis, k] + moving[3 + axis, k]
-                meets = meets and low <= above[axis, j] and high >= below[axis, j]
-            row[count], column[count] = k, j
-            count += 1 if meets else 0
+            meets = moving[0, k] <= above[0, j] and moving[3, k] >= below[0, j]
+            meets = meets and moving[1, k] <= above[1, j] and moving[4, k] >= below[1, j]
+            row[count], column[count] = start + k, j
+            count += 1 if meets and moving[2, k] <= above[2, j] and moving[5, k] >= below[2, j] else 0
     return count
 
 
@@ -126,20 +140,20 @@ def _between(A, column, T, row, out):
 
 
 @inlined
-def depth_behind(planes, k, x, y, z):
-    """How deep a point lies behind one of ``planes`` (k, 4)."""
-    return -(planes[k, 0] * x + planes[k, 1] * y + planes[k, 2] * z + planes[k, 3])
+def depth_behind(plane, x, y, z):
+    """How deep a point lies behind a plane (4,)."""
+    a, b, c, d = plane
+    return -(a * x + b * y + c * z + d)
 
 
 @inlined
-def depth_in_round(rounds, places, k, x, y, z):
-    """How deep a point lies in one of ``rounds`` (m, 2): radius and half length of cylinders on z of ``places``.
-
-    Hollow ones have a negative half length.
-    """
-    u, v, w = back(places, k, x, y, z)
-    out = math.sqrt(u * u + v * v) - rounds[k, 0]
-    return min(-out, rounds[k, 1] - abs(w)) if rounds[k, 1] >= 0.0 else out
+def depth_in_round(round_, place, x, y, z):
+    """How deep a point lies in a cylinder on z of ``place``: radius and half length, which is negative for a hollow."""
+    radius, half = round_
+    ox, oy, oz = place[3]
+    u, v, w = turned_back(place, x - ox, y - oy, z - oz)
+    out = math.sqrt(u * u + v * v) - radius
+    return min(-out, half - abs(w)) if half >= 0.0 else out
 
 
 def _stand_out(T, points, planes, rounds, places, slack, out):
@@ -150,9 +164,9 @@ def _stand_out(T, points, planes, rounds, places, slack, out):
             x, y, z = there(T, k, points[i, 0], points[i, 1], points[i, 2])
             least = math.inf
             for j in range(planes.shape[0]):
-                least = min(least, depth_behind(planes, j, x, y, z))
+                least = min(least, depth_behind((planes[j, 0], planes[j, 1], planes[j, 2], planes[j, 3]), x, y, z))
             for j in range(rounds.shape[0]):
-                least = min(least, depth_in_round(rounds, places, j, x, y, z))
+                least = min(least, depth_in_round((rounds[j, 0], rounds[j, 1]), frame(places, j), x, y, z))
             if least < -slack:
                 out[k] = 1
                 break
@@ -184,8 +198,8 @@ def _cells(lower, upper, width, marks, one, out):
 _POSES, _ROWS, _TABLE = "f8[:,:,::1]", "i8[::1]", "f8[:,::1]"
 _BODY = f"{_TABLE},{_TABLE},{_POSES}"
 boxes = entry(_boxes, f"i8({_POSES},{_TABLE},{_ROWS},f8,{_TABLE})")
-around = entry(_around, f"i8({_TABLE},i8,i8,{_TABLE},{_TABLE},{_ROWS})")
-meet = entry(_meet, f"i8({_TABLE},i8,i8,{_TABLE},{_TABLE},{_ROWS},{_ROWS},{_ROWS},i8)")
+around = entry(_around, f"i8({_TABLE},i8,{_TABLE},{_TABLE},{_ROWS})")
+meet = entry(_meet, f"i8({_TABLE},i8,{_TABLE},{_TABLE},{_ROWS},i8,{_ROWS},{_ROWS})")
 between = entry(_between, f"i8({_POSES},{_ROWS},{_POSES},{_ROWS},{_POSES})")
 stand_out = entry(_stand_out, f"i8({_POSES},{_TABLE},{_BODY},f8,{_ROWS})")
 cells = entry(_cells, f"i8(f8[::1],f8[::1],f8,f8[::1],{_ROWS},{_ROWS})")

@@ -102,12 +102,13 @@ class Placed:
 
     @classmethod
     def of(cls, parts: tuple[Part, ...]) -> Placed:
-        """The parts, in their order."""
-        shapes = {id(part.shape): part.shape for part in parts}
-        number = {key: k for k, key in enumerate(shapes)}
+        """The parts, in their order; equal shapes are one."""
+        place: dict[Shape, int] = {}
+        unique = {id(part.shape): part.shape for part in parts}
+        number = {key: place.setdefault(shape, len(place)) for key, shape in unique.items()}
         which = np.array([number[id(part.shape)] for part in parts], dtype=np.int64)
         poses = np.array([part.T_world for part in parts]).reshape(-1, 4, 4)
-        return cls(tuple(part.name for part in parts), poses, tuple(shapes.values()), which)
+        return cls(tuple(part.name for part in parts), poses, tuple(place), which)
 
 
 @dataclass(frozen=True, slots=True, repr=False)

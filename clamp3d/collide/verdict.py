@@ -56,6 +56,10 @@ class Thresholds:
         """Pairs further apart than this (mm) are clear."""
         return max(self.contact, self.clearance)
 
+    def clash(self, allowance: float | None = None) -> float:
+        """Below this (mm) an upper bound alone says clash."""
+        return -max(allowance or 0.0, self.contact) - RESOLUTION
+
     def verdict(self, distance: Distance, allowance: float | None = None) -> Verdict:
         """The verdict that all distances between the bounds of ``distance`` share, else uncertain.
 

@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("OCP")
 
 from OCP.BRep import BRep_Builder
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from OCP.TopoDS import TopoDS_Compound
@@ -65,6 +66,27 @@ def test_several_solids_of_one_product_are_several_parts(tmp_path):
     tree.product("welded", both)
     scene = load(tree.write(tmp_path / "welded.step"))
     assert [part.name for part in scene.parts] == ["welded_1", "welded_2"]
+
+
+def test_what_has_no_name_is_called_after_what_holds_it(tmp_path):
+    tree = Tree()
+    root, blank = tree.product("top"), tree.product(" ", pin())
+    tree.put(root, blank, np.eye(4), name="=>[0:1:1:2]")  # as Open CASCADE names an instance that nobody named
+    tree.put(root, tree.product("lid", plate()), pose(np.random.default_rng(5)), name="=>[0:1:1:3]")
+    assert [part.name for part in load(tree.write(tmp_path / "blank.step")).parts] == ["top", "lid"]
+
+
+@pytest.mark.parametrize(("loose", "said"), [(1, "1 product holds"), (2, "2 products hold")])
+def test_curves_are_left_out_and_said(tmp_path, loose, said):
+    tree = Tree()
+    root = tree.product("top")
+    tree.put(root, tree.product("pin", pin()), np.eye(4))
+    for k in range(loose):
+        line = BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, k), gp_Pnt(5, 0, k)).Edge()
+        tree.put(root, tree.product(f"axis {k}", line), np.eye(4))
+    scene = load(tree.write(tmp_path / "axis.step"))
+    assert [part.name for part in scene.parts] == ["pin"]
+    assert scene.notes == (f"{said} curves or points only: left out",)
 
 
 def shell_beside(tmp_path):

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clamp3d.collide import batch
-from clamp3d.collide.batch import by_kernel
+from clamp3d.collide import batch, poses
+from clamp3d.collide.batch import bounds_by_kernel, by_kernel, in_frame_of_first
 from clamp3d.collide.body import Bore
 from clamp3d.collide.check import check
 from clamp3d.collide.model import ModelCache
@@ -18,8 +18,10 @@ from clamp3d.collide.scene import Part, Scene
 from clamp3d.core import shapes
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.linear import dot
-from clamp3d.core.pose import inverse, rotation, translation
+from clamp3d.core.motion import FARTHEST
+from clamp3d.core.pose import PoseWarning, inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.errors import InputError
 from clamp3d.testing import body
 
 GROOVES = {
@@ -53,8 +55,7 @@ def test_the_batch_has_the_points_and_bounds_of_single_calls(name):
     for radius, length in ((10.5, 80.0), (6.8, 80.0), (3.0, 20.0), (6.8, 5.0), (1.0, 0.3)):
         T, wire, rod = placed(rng, 5000, 12.0), Cylinder(radius, length), body_of(shapes.cylinder(radius, length))
         single = signed_distances(groove, wire, T, full=True, workers=1)
-        pairs = np.eye(4)[None], np.zeros(len(T), dtype=np.int64), T, np.arange(len(T))
-        found = batch._bore_rod(bore, rod.outers[0], form, rod, pairs, points=True)
+        found = batch._bore_rod(bore, rod.outers[0], form, rod, in_frame_of_first(T), points=True)
         lower, upper, p, q, n = found[0], found[1], found[2:5].T, found[5:8].T, found[8:11].T
         assert np.array_equal(p, single.point_on_groove)
         assert np.array_equal(q, single.point_on_cylinder)
@@ -118,6 +119,60 @@ def test_verdicts_of_many_poses_are_those_of_the_check(name, radius, length, see
             assert row.distance.lower <= sweep.upper[k, column] + 1e-9
 
 
+@pytest.mark.parametrize("kind", ["groove", "hole"])
+def test_what_certainly_clashes_needs_no_lower_bound(kind):
+    """All else is as without a limit, to the bit."""
+    rng, cache = np.random.default_rng(11), ModelCache()
+    holder = {
+        "groove": shapes.groove_block(GROOVES["wide"], 40.0, 30.0),
+        "hole": shapes.box((40.0, 40.0, 10.0), holes=[shapes.Hole(12.0)]),
+    }[kind]
+    a, b = cache.model(holder), cache.model(shapes.cylinder(11.0, 60.0))
+    pairs = in_frame_of_first(placed(rng, 2000, 3.0))
+    lower, upper = bounds_by_kernel(a, b, pairs)
+    least, most = bounds_by_kernel(a, b, pairs, clash=-0.2)
+    certain = upper < -0.2
+    assert 200 < certain.sum() < 1800
+    assert (least[certain] == -np.inf).all()
+    assert np.isfinite(lower[certain]).any()
+    assert np.array_equal(least[~certain], lower[~certain])
+    assert np.array_equal(most, upper)
+
+
+@pytest.mark.parametrize("bad", [0, 17, 39])
+def test_the_first_bad_pose_is_named_wherever_it_is(bad, monkeypatch):
+    """In the first block of poses, in a later one, at the very end; rounding errors are mended."""
+    monkeypatch.setattr(poses, "_BLOCK", 8)
+    scene = Scene().add("plate", shapes.box((50.0, 50.0, 4.0))).add("pin", shapes.cylinder(5.0, 20.0))
+    T = np.array([translation(0.0, 0.0, 12.0 + 0.1 * k) for k in range(40)])
+    sweep = check_poses(scene, "pin", T)
+    rough = T.copy()
+    rough[bad, 0, 0] += 1e-7
+    with pytest.warns(PoseWarning, match=rf"poses\[{bad}\]"):
+        again = check_poses(scene, "pin", rough)
+    assert np.array_equal(sweep.row, again.row)
+    assert np.allclose(sweep.lower, again.lower, atol=1e-6)
+    rough[bad, :3, :3] *= 1.1
+    with pytest.raises(InputError, match=rf"poses\[{bad}\] must be rigid"):
+        check_poses(scene, "pin", rough)
+    T[bad, 0, 3] = 2.0 * FARTHEST
+    with pytest.raises(InputError, match=rf"poses\[{bad}\] must"):
+        check_poses(scene, "pin", T)
+
+
+def test_poses_as_positions_and_axes_are_refused():
+    scene = Scene().add("plate", shapes.box((50.0, 50.0, 4.0))).add("pin", shapes.cylinder(5.0, 20.0))
+    with pytest.raises(InputError, match=r"poses must have shape \(n, 4, 4\), got \(5, 2, 3\)"):
+        check_poses(scene, "pin", np.zeros((5, 2, 3)))
+
+
+def test_no_poses_have_no_verdicts():
+    scene = Scene().add("plate", shapes.box((50.0, 50.0, 4.0))).add("pin", shapes.cylinder(5.0, 20.0))
+    sweep = check_poses(scene, "pin", np.empty((0, 4, 4)))
+    assert sweep.worst.shape == (0,)
+    assert sweep.verdict.shape == sweep.lower.shape == sweep.upper.shape == (0, 1)
+
+
 def test_a_part_keeps_its_pose_when_the_array_it_came_from_changes():
     T = np.eye(4)
     part = Part("pin", shapes.cylinder(5.0, 20.0), T)
@@ -128,11 +183,12 @@ def test_a_part_keeps_its_pose_when_the_array_it_came_from_changes():
 
 
 def test_the_poses_of_a_scene_follow_its_parts():
-    """Asked before and after another part comes, and after one has moved."""
+    """Asked before and after another part comes, and after one has moved; equal shapes are one."""
     plate, pin = shapes.box((50.0, 50.0, 4.0)), shapes.cylinder(5.0, 20.0)
     one = Scene().add("plate", plate)
     assert one.placed.poses.shape == (1, 4, 4)
-    two = one.add("pin", pin, translation(0.0, 0.0, 12.0)).add("twin", plate, translation(0.0, 0.0, 50.0))
+    twin = shapes.box((50.0, 50.0, 4.0), name="twin")
+    two = one.add("pin", pin, translation(0.0, 0.0, 12.0)).add("twin", twin, translation(0.0, 0.0, 50.0))
     assert two.placed.poses[:, 2, 3].tolist() == [0.0, 12.0, 50.0]
     assert two.placed.which.tolist() == [0, 1, 0]
     assert two.placed.shapes == (plate, pin)

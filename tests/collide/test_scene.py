@@ -17,7 +17,9 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
+from clamp3d.collide import judge
 from clamp3d.collide.answer import Distance
+from clamp3d.collide.batch import in_frame_of_first
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check import check, check_full
 from clamp3d.collide.distance import distance
@@ -282,8 +284,8 @@ def test_contained_is_what_stands_out_by_no_more_than_the_contact(large, small, 
     T = np.array([rotation(rng.normal(size=3), rng.choice([0.0, 0.5, 2.0])) for _ in range(60)])
     T[:, :3, 3] = rng.normal(size=(60, 3)) * (5.0, 5.0, 3.0)
     a, b = (cache.model(faceted_shape(x, 0.02) if facets else x) for x in (large, small))
-    found = contained(a, b, T, Thresholds())
-    assert np.array_equal(found, contained(b, a, inverse(T), Thresholds()))
+    found = contained(a, b, in_frame_of_first(T), Thresholds())
+    assert np.array_equal(found, contained(b, a, in_frame_of_first(inverse(T)), Thresholds()))
     corners = mesh(small, 0.001).vertices
     out = np.array([body(large).field(to_target(P, corners)).max() for P in T])
     assert found[out <= 0.0].all()
@@ -297,10 +299,39 @@ def test_contained_along_the_diagonal_and_within_the_contact():
     way = np.array([20.0, 24.0, 16.0])
     T = rotation(np.cross([0.0, 0.0, 1.0], way), math.acos(16.0 / np.linalg.norm(way)))
     rod = shapes.cylinder(0.5, 28.0)
-    assert contained(cache.model(box), cache.model(rod), T[None], Thresholds()).all()
+    assert contained(cache.model(box), cache.model(rod), in_frame_of_first(T[None]), Thresholds()).all()
     places = np.array([translation(x, 0.0, 0.0) for x in (0.0, 0.008, -0.008, 0.012, -0.1)])
-    found = contained(cache.model(box), cache.model(shapes.box((20.0, 24.0, 16.0), name="same")), places, Thresholds())
+    same = cache.model(shapes.box((20.0, 24.0, 16.0), name="same"))
+    found = contained(cache.model(box), same, in_frame_of_first(places), Thresholds())
     assert found.tolist() == [True, True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("length", "asked"),
+    [(80.0, False), (40.0, True)],
+    ids=["longer than the block's diagonal, and of less volume", "shorter than the block"],
+)
+def test_containment_is_asked_where_sizes_leave_it_open(length, asked, monkeypatch):
+    """Of the clash of a wire in its groove: neither part fits in the other's box if the wire is long."""
+    seen = []
+    monkeypatch.setattr(judge, "within", lambda *pair: seen.append(pair) or False)
+    monkeypatch.setattr(judge, "_fits", lambda inner, outer, T: seen.append(inner.name) or np.ones(len(T), dtype=bool))
+    block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 20.0)
+    scene = Scene().add("block", block).add("wire", shapes.cylinder(6.5, length))
+    sweep = check_poses(scene, "wire", np.array([translation(0.0, y, 0.0) for y in (-0.6, -5.0, 0.0)]))
+    assert sweep.worst.tolist() == ["clash", "clash", "clear"]
+    assert [name for name in seen if isinstance(name, str)] == (["cylinder"] if asked else [])
+
+
+@pytest.mark.parametrize("allowance", [None, 0.0, 0.3])
+def test_what_an_upper_bound_alone_says_is_a_clash(allowance):
+    """Whatever the lower bound; a little above, the lower one decides."""
+    thresholds = Thresholds(clearance=0.5)
+    limit = thresholds.clash(allowance)
+    for upper in (limit - 1e-12, limit - 1e-6, limit - 1.0):
+        for lower in (-math.inf, upper - 3.0, upper - 1e-7, upper):
+            assert thresholds.verdict(Distance(lower, upper), allowance) is Verdict.CLASH
+    assert thresholds.verdict(Distance(limit + 2e-6, limit + 2e-6), allowance) is not Verdict.CLASH
 
 
 @pytest.mark.parametrize(

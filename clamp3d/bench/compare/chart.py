@@ -44,24 +44,25 @@ class _Look(NamedTuple):
 
 _LOOKS: dict[str, _Look] = {
     "cas": _Look("#D55E00", "*", "clamp3d (CAS): exact arc", 0, (-8.0, 20.0), "right"),
-    "chords": _Look("#3A9BD0", "v", "chords in the section\n(parallel axes only)", 0, (0.0, -22.0), "right"),
-    "wedges": _Look("#0072B2", "s", "wedges (FCL)", 0, (-44.0, -22.0), "center"),
+    "chords": _Look("#3A9BD0", "v", "chords, for\nparallel axes", 0, (-2.0, -34.0), "right"),
+    "wedges": _Look("#0072B2", "s", "wedges (FCL)", 0, (0.0, -36.0), "center"),
     "hulls": _Look("#CC79A7", "D", "CoACD hulls (FCL)", -1, (14.0, 0.0), "left"),
-    "mesh": _Look("#009E73", "o", "mesh (FCL)", 0, (14.0, -22.0), "center"),
-    "coal-cylinder": _Look("#000000", "P", "coal, cylinder", -1, (10.0, 20.0), "left"),
-    "coal-capsule": _Look("#000000", "P", "coal, capsule", -1, (-26.0, 10.0), "right"),
+    "mesh": _Look("#009E73", "o", "mesh (FCL)", 0, (24.0, -24.0), "center"),
+    "coal-cylinder": _Look("#000000", "P", "coal, cylinder", -1, (4.0, 12.0), "left"),
+    "coal-capsule": _Look("#000000", "P", "coal, capsule", -1, (-20.0, 14.0), "right"),
+    "coal-axis": _Look("#000000", "P", "coal, axis", 0, (-6.0, -12.0), "right"),
     "coal-sector": _Look("#000000", "P", "coal, asked for one\nsector by hand", 0, (-12.0, -16.0), "right", True),
     "mujoco-cylinder": _Look("#8A6D00", "X"),
-    "mujoco-capsule": _Look("#8A6D00", "X", "MuJoCo, capsule", -1, (-4.0, 26.0), "right"),
-    "mujoco-sector": _Look("#8A6D00", "X", "MuJoCo, one sector", 0, (10.0, -16.0), "left", True),
-    "fcl": _Look("#0072B2", "d", "FCL, plain", -1, (-14.0, 0.0), "right"),
-    "fcl-scaled": _Look("#0072B2", "d"),
-    "fcl-sector": _Look("#0072B2", "d", "FCL, one sector", 0, (10.0, 0.0), "left", True),
-    "trimesh": _Look("#5B7F95", "<", "trimesh", 0, (4.0, -40.0), "center"),
-    "manifold3d": _Look("#7A5195", ">", "manifold3d", 0, (4.0, 24.0), "left"),
-    "open-cascade": _Look("#7F2704", "h", "Open CASCADE,\nsolids", 0, (0.0, 26.0), "center"),
-    "open-cascade-axis": _Look("#7F2704", "h", "axis and solid", 0, (0.0, -24.0), "center"),
-    "open-cascade-face": _Look("#7F2704", "h", "axis and groove\nface, by hand", 0, (0.0, 26.0), "center", True),
+    "mujoco-capsule": _Look("#8A6D00", "X", "MuJoCo, capsule", -1, (-24.0, 28.0), "right"),
+    "mujoco-sector": _Look("#8A6D00", "X", "MuJoCo, one sector", 0, (-12.0, -36.0), "right", True),
+    "fcl": _Look("#0072B2", "d", "FCL, cylinder", -1, (-14.0, 0.0), "right"),
+    "fcl-axis": _Look("#0072B2", "d", "FCL, axis", 0, (10.0, 0.0), "left"),
+    "fcl-sector": _Look("#0072B2", "d", "FCL, one sector", 0, (-16.0, -52.0), "right", True),
+    "trimesh": _Look("#5B7F95", "<", "trimesh, axis", 0, (9.0, -11.0), "left"),
+    "manifold3d": _Look("#7A5195", ">", "manifold3d, axis", 0, (2.0, -16.0), "left"),
+    "open-cascade": _Look("#7F2704", "h", "Open CASCADE,\ncylinder", 0, (0.0, 26.0), "center"),
+    "open-cascade-axis": _Look("#7F2704", "h", "axis", 0, (0.0, -24.0), "center"),
+    "open-cascade-face": _Look("#7F2704", "h", "axis and arcs of\ngroove, by hand", 0, (8.0, 24.0), "left", True),
 }
 
 _QUIET = "#6B7480"
@@ -221,7 +222,8 @@ def _note(found: Comparison, command: str) -> str:
     text = (
         "Errors of the signed distance: 120 poses with up to 1 mm of clearance and 60 overlaps of up to 0.3 mm (where "
         "a method has a depth), parallel and tilted by up to 1.7 degrees, against distances found at 50 digits. Hollow "
-        "marks: which piece can be nearest was chosen by hand. Grey dashes: Pareto front without clamp3d. "
+        "marks but the star: which piece can be nearest was chosen by hand. Axis: the wire's axis less its radius. "
+        "Grey line: Pareto front, nothing is both left of it and below it; dashes: the same without clamp3d. "
         "Set-up: meshing, decomposing, building trees, with libraries already loaded; below 1 ms drawn at 1 ms; "
         f"CoACD by the clock. {found.machine}. Made by: {command}"
     )

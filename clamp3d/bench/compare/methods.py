@@ -183,6 +183,8 @@ ANGLES_DEG = (1.0, 5.0, 20.0)
 """Unit angles of the pieces, degrees."""
 SECTOR_ANGLES_DEG = (0.1, 1.0, 5.0)
 """Of pieces that are looked up: their number costs nothing."""
+AXIS_ANGLES_DEG = (0.01, 0.1, *ANGLES_DEG)
+"""Of a surface that is asked for an axis: the number of its triangles costs little."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,9 @@
 
 Every series answers for the same bodies and poses. What a series may know is in its name: ``cylinder`` and ``capsule``
 are the wire as the library's own flat-ended or rounded shape (the same surface next to the groove, whose ends the wire
-passes); ``sector`` looks up by hand which pieces of the arc can be nearest and asks only for these, which no library
-does by itself. The block is made of convex pieces where a library wants them: `pieces`.
+passes); ``axis`` asks its axis, less the radius, against the block's surface, as trimesh and manifold3d do too;
+``sector`` and ``face`` look up by hand what of the groove can be nearest and ask only for that, which no library does
+by itself. All are given as much of the block as the wire can come near, in the shapes that suit them: `pieces`.
 """
 
 from __future__ import annotations

@@ -1,69 +1,82 @@
-"""python-fcl 0.7: convex pieces under its dynamic AABB tree in millimetres, as its README does; or those of a sector.
+"""python-fcl 0.7: boxes under its dynamic AABB tree, as in its README; the surface as ``BVHModel``, or two of a sector.
 
-Its GJK stops at an absolute 1e-6; ``fcl-scaled`` gives it lengths in units of 2^-14 mm, which makes that finer. Signed
-distances are asked of a sector alone: the tree's callback ends at the first overlap.
+In millimetres. The tree asks GJK, which stops at an absolute 1e-6 and now and then a whole millimetre off; its callback
+ends at the first overlap, so it has no depth. ``fcl-axis`` and ``fcl-sector`` ask two meshes, triangles beside
+triangles, which have no tolerance.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from clamp3d.bench.compare.methods import SECTOR_ANGLES_DEG, Prepared, Series, ready
-from clamp3d.bench.compare.peers.pieces import TRIANGLES, boxes, prisms, sectors
+from clamp3d.bench.compare.methods import AXIS_ANGLES_DEG, SECTOR_ANGLES_DEG, Prepared, Series, ready
+from clamp3d.bench.compare.peers.pieces import AXIS, boxes, sectors, surface
 from clamp3d.bench.compare.scene import WIRE
 from clamp3d.core.pose import Array
 
-_FLAT = np.insert(TRIANGLES, 0, 3, axis=1).ravel()
 
-
-def _prisms(unit_angle: float, unit: float) -> list[Any]:
+def _tree(unit_angle: float) -> Prepared:
     import fcl
 
-    return [
-        fcl.CollisionObject(fcl.Convex(unit * V, len(TRIANGLES), _FLAT), fcl.Transform()) for V in prisms(unit_angle)
-    ]
-
-
-def _tree(unit_angle: float, unit: float) -> Prepared:
-    import fcl
-
-    keep = _prisms(unit_angle, unit)
-    keep += [fcl.CollisionObject(fcl.Box(*(unit * size)), fcl.Transform(unit * centre)) for size, centre in boxes()]
+    keep = [fcl.CollisionObject(fcl.Box(*size), fcl.Transform(T[:3, :3], T[:3, 3])) for size, T in boxes(unit_angle)]
     manager = fcl.DynamicAABBTreeCollisionManager()
     manager.registerObjects(keep)
     manager.setup()
-    wire = fcl.CollisionObject(fcl.Cylinder(unit * WIRE.radius, unit * WIRE.length), fcl.Transform())
+    wire = fcl.CollisionObject(fcl.Cylinder(WIRE.radius, WIRE.length), fcl.Transform())
 
     def one(T: Array) -> float:
-        wire.setTransform(fcl.Transform(T[:3, :3], unit * T[:3, 3]))
+        wire.setTransform(fcl.Transform(T[:3, :3], T[:3, 3]))
         told = fcl.DistanceData()
         manager.distance(wire, told, fcl.defaultDistanceCallback)
-        return float(told.result.min_distance) / unit
+        return float(told.result.min_distance)
 
     one.keep = keep  # type: ignore[attr-defined]
     return ready(one, len(keep), depth=False)
 
 
+def _mesh(V: Array, F: Array) -> Any:
+    import fcl
+
+    made = fcl.BVHModel()
+    made.beginModel(len(V), len(F))
+    made.addSubModel(V, F)
+    made.endModel()
+    return fcl.CollisionObject(made, fcl.Transform())
+
+
+def _axis(unit_angle: float) -> Prepared:
+    import fcl
+
+    V, F = surface(unit_angle)
+    part, axis, request = _mesh(V, F), _mesh(*AXIS), fcl.DistanceRequest()
+
+    def one(T: Array) -> float:
+        axis.setTransform(fcl.Transform(T[:3, :3], T[:3, 3]))
+        return float(fcl.distance(part, axis, request, fcl.DistanceResult())) - WIRE.radius
+
+    return ready(one, len(F), depth=True)
+
+
 def _sector(unit_angle: float) -> Prepared:
     import fcl
 
-    keep = _prisms(unit_angle, 1.0)
-    wire = fcl.CollisionObject(fcl.Capsule(WIRE.radius, WIRE.length), fcl.Transform())
-    find, request = sectors(len(keep)), fcl.DistanceRequest(enable_signed_distance=True)
+    V, F = surface(unit_angle)
+    chords = [_mesh(V[k : k + 4], F[:2]) for k in range(2, len(V) - 4, 2)]
+    axis, find, request = _mesh(*AXIS), sectors(len(chords)), fcl.DistanceRequest()
 
     def one(T: Array) -> float:
-        wire.setTransform(fcl.Transform(T[:3, :3], T[:3, 3]))
+        axis.setTransform(fcl.Transform(T[:3, :3], T[:3, 3]))
         i, j = find(T)
-        d = fcl.distance(keep[i], wire, request, fcl.DistanceResult())
-        return float(d if i == j else min(d, fcl.distance(keep[j], wire, request, fcl.DistanceResult())))
+        d = fcl.distance(chords[i], axis, request, fcl.DistanceResult())
+        if j != i:
+            d = min(d, fcl.distance(chords[j], axis, request, fcl.DistanceResult()))
+        return float(d) - WIRE.radius
 
-    return ready(one, len(keep), depth=True)
+    return ready(one, len(chords), depth=True)
 
 
 SERIES = {
-    "fcl": Series(lambda angle: _tree(angle, 1.0), "python-fcl", ("fcl",)),
-    "fcl-scaled": Series(lambda angle: _tree(angle, 16384.0), "python-fcl", ("fcl",)),
+    "fcl": Series(_tree, "python-fcl", ("fcl",)),
+    "fcl-axis": Series(_axis, "python-fcl", ("fcl",), AXIS_ANGLES_DEG),
     "fcl-sector": Series(_sector, "python-fcl", ("fcl",), SECTOR_ANGLES_DEG),
 }

@@ -1,7 +1,8 @@
-"""MuJoCo 4: convex geoms of one body, as it advises for other shapes; lengths in metres, no farther than 2 mm asked.
+"""MuJoCo 4: box geoms of one body, convex as it advises for other shapes; in metres, no farther than 2 mm asked.
 
-Whole part: a distance sensor between two bodies (native convex collision), many poses at once by `mujoco.rollout`,
-which runs in C++ with a thread for each `MjData`. A sector: `mj_geomDistance` of two geoms.
+Whole part: a distance sensor between two bodies (native convex collision), its wire placed where kinematics would put
+it; many poses at once by `mujoco.rollout`, which runs in C++ with a thread for each `MjData`. A sector:
+`mj_geomDistance` of two geoms. Contacts with a margin (`mj_collision`) take longer, and miss hits of a cylinder.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.bench.compare.methods import SECTOR_ANGLES_DEG, Prepared, Series, ready
-from clamp3d.bench.compare.peers.pieces import boxes, prisms, sectors
+from clamp3d.bench.compare.peers.pieces import boxes, sectors
 from clamp3d.bench.compare.scene import WIRE
 from clamp3d.core.pose import Array
 
@@ -22,23 +23,25 @@ _FARTHEST = 2.0  # mm
 
 
 def _model(unit_angle: float, shape: str) -> tuple[Any, int]:
-    """The compiled model, and how many of its geoms are prisms; then come the boxes, then the wire."""
+    """The compiled model, and how many of its geoms are the block's; then comes the wire."""
     mujoco: Any = importlib.import_module("mujoco")
 
     def numbers(x: Array) -> str:
-        return " ".join(repr(float(v)) for v in (x * _MM).ravel())
+        return " ".join(repr(float(v)) for v in x.ravel())
 
     passive = 'contype="0" conaffinity="0"'  # asked by the sensor alone, not by a simulation's collision detection
-    solids = prisms(unit_angle)
-    assets = [f'<mesh name="p{i}" inertia="convex" vertex="{numbers(V)}"/>' for i, V in enumerate(solids)]
-    geoms = [f'<geom type="mesh" mesh="p{i}" {passive}/>' for i in range(len(solids))]
-    geoms += [f'<geom type="box" size="{numbers(0.5 * s)}" pos="{numbers(c)}" {passive}/>' for s, c in boxes()]
+    pieces = boxes(unit_angle)
+    geoms = [
+        f'<geom type="box" size="{numbers(0.5 * _MM * size)}" pos="{numbers(_MM * T[:3, 3])}" '
+        f'xyaxes="{numbers(T[:3, :2].T)}" {passive}/>'
+        for size, T in pieces
+    ]
     wire = f'<geom type="{shape}" size="{WIRE.radius * _MM} {WIRE.length / 2 * _MM}" {passive}/>'
     return mujoco.MjModel.from_xml_string(
-        f'<mujoco><asset>{"".join(assets)}</asset><worldbody><body name="part">{"".join(geoms)}</body>'
+        f'<mujoco><worldbody><body name="part">{"".join(geoms)}</body>'
         f'<body name="wire" mocap="true">{wire}</body></worldbody>'
         f'<sensor><distance body1="part" body2="wire" cutoff="{_FARTHEST * _MM}"/></sensor></mujoco>'
-    ), len(solids)
+    ), len(pieces)
 
 
 def _whole(unit_angle: float, shape: str) -> Prepared:
@@ -46,17 +49,18 @@ def _whole(unit_angle: float, shape: str) -> Prepared:
 
     mujoco: Any = importlib.import_module("mujoco")
     rollout: Any = importlib.import_module("mujoco.rollout")
-    model, count = _model(unit_angle, shape)
+    model, wire = _model(unit_angle, shape)
     data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    at, turn, told = data.geom_xpos[wire], data.geom_xmat[wire], data.sensordata
     spec = int(mujoco.mjtState.mjSTATE_MOCAP_POS) | int(mujoco.mjtState.mjSTATE_MOCAP_QUAT)
     size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)
 
     def one(T: Array) -> float:
-        data.mocap_pos[0] = T[:3, 3] * _MM
-        mujoco.mju_mat2Quat(data.mocap_quat[0], T[:3, :3].ravel())
-        mujoco.mj_kinematics(model, data)
+        at[:] = T[:3, 3] * _MM
+        turn[:] = T[:3, :3].ravel()
         mujoco.mj_sensorPos(model, data)
-        return float(data.sensordata[0]) / _MM
+        return float(told[0]) / _MM
 
     def batch(poses: Array, threads: int) -> Array:
         turn = Rotation.from_matrix(poses[:, :3, :3]).as_quat()[:, [3, 0, 1, 2]]
@@ -70,7 +74,7 @@ def _whole(unit_angle: float, shape: str) -> Prepared:
     return Prepared(
         one,
         lambda poses: batch(poses, 1),
-        count + 2,
+        wire,
         batched=True,
         threaded=lambda poses: batch(poses, os.cpu_count() or 1),
     )
@@ -78,21 +82,21 @@ def _whole(unit_angle: float, shape: str) -> Prepared:
 
 def _sector(unit_angle: float) -> Prepared:
     mujoco: Any = importlib.import_module("mujoco")
-    model, count = _model(unit_angle, "capsule")
-    data, find, wire = mujoco.MjData(model), sectors(count), count + 2
+    model, wire = _model(unit_angle, "capsule")
+    data, find = mujoco.MjData(model), sectors(wire - 2)
     mujoco.mj_kinematics(model, data)
-    at, turn = data.geom_xpos, data.geom_xmat
+    at, turn = data.geom_xpos[wire], data.geom_xmat[wire]
 
     def one(T: Array) -> float:
-        at[wire] = T[:3, 3] * _MM
-        turn[wire] = T[:3, :3].ravel()
+        at[:] = T[:3, 3] * _MM
+        turn[:] = T[:3, :3].ravel()
         i, j = find(T)
         d = mujoco.mj_geomDistance(model, data, i, wire, _FARTHEST * _MM, None)
         if j != i:
             d = min(d, mujoco.mj_geomDistance(model, data, j, wire, _FARTHEST * _MM, None))
         return float(d) / _MM
 
-    return ready(one, count, depth=True)
+    return ready(one, wire - 2, depth=True)
 
 
 SERIES = {
