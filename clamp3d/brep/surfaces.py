@@ -39,7 +39,8 @@ class Faces:
     deviation : ndarray (n,)
         The file's surface is this near the canonical one (a recognised B-spline), or the triangles (kind "other").
     error : ndarray (m,)
-        Largest distance between each triangle and the piece of its face that it stands for.
+        Largest distance of each triangle from its face. Each point of the face is that near to one of them: on cones,
+        balls and tori not always to the one in whose parameters it lies.
     corners : ndarray (m, 3, 3)
         Corners of the triangles, outward; on the surface to within the face's deviation.
     uv : ndarray (m, 3, 2)

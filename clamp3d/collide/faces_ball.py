@@ -110,7 +110,7 @@ def clear_around(solid, row, bit, slack, at, x, y, z, needed, most, whole, stack
     f = row % len(solid[13])
     t = slack[row] + solid[13][f]
     limit = min(needed + 2.0 * (at + t), most)
-    clear = nearest_marked(solid, row, row, 0, bit, -1.0, slack, x, y, z, limit, whole, stack)
+    clear, _ = nearest_marked(solid, (row,), 0, 0, bit, -1.0, slack, x, y, z, limit, whole, stack)
     if clear > at + t and is_open(solid, f, t, stack[:0], slack[:0], clear, x, y, z, whole[1, 0], stack):
         return clear
     return -1.0

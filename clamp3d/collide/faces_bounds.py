@@ -211,14 +211,14 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                 xs, ys, zs = x + step * q[0], y + step * q[1], z + step * q[2]
                 # Where a piece of one looks over the other, what lies above both is outside.
                 for one, other in ((f, o), (o, f)):
-                    at = nearest_marked(
-                        solid, other, other, root[one], 1, 1.0, slack, xs, ys, zs, np.inf, whole, stack
+                    at, _ = nearest_marked(
+                        solid, (other,), 0, root[one], 1, 1.0, slack, xs, ys, zs, np.inf, whole, stack
                     )  # fmt: skip
                     if at == np.inf:
                         continue
                     t, over_other = slack[one] + deviation[one], slack[other] + deviation[other]
                     limit = 2.0 * at + 8.0 * (t + over_other) + max(least, 0.0) + rho
-                    clear = nearest_marked(solid, f, o, 0, 1, -1.0, slack, xs, ys, zs, limit, whole, stack)
+                    clear, _ = nearest_marked(solid, (f, o), 0, 0, 1, -1.0, slack, xs, ys, zs, limit, whole, stack)
                     near[0], whole[1, 1, 0] = other, over_other
                     if clear > at + t and is_open(
                         solid, one, t, near[:1], whole[1, 1, :1], clear, xs, ys, zs, whole[1, 0], stack

@@ -23,13 +23,12 @@ from clamp3d.collide.faces_math import (
     bend_over,
     height_at,
     least_height,
-    point_triangle,
     raise_by,
     spans,
     to_frame,
 )
 from clamp3d.collide.faces_open import is_open
-from clamp3d.collide.faces_tree import _mark, _state, box_distance, put_children
+from clamp3d.collide.faces_tree import nearest_marked
 from clamp3d.core.jit import formula
 
 MOST_TRIED = 16
@@ -165,44 +164,6 @@ def point_over(point, solid, count, chosen, raised):
 
 
 @formula
-def _reaching(solid, chosen, first, count, rows, slack, x, y, z, cut, whole, stack):
-    """Lower bound of a point's distance, at most ``cut``, from pieces that reach above all of several faces.
-
-    Those chosen from ``first`` on to ``count``; ``rows`` as in `hollow`. And the nearest such triangle, -1 if there is
-    none.
-    """
-    P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, _, _ = solid
-    stack[0], top = 0, 1
-    low, found = cut, -1
-    while top > 0:
-        top -= 1
-        i = stack[top]
-        if box_distance(box, i, x, y, z, x, y, z) - box[i, 6] >= low:
-            continue
-        mark = 1
-        for m in range(first, count):
-            mark = mark & _state(solid, rows + chosen[m], slack, i)
-        if mark == 0:
-            continue
-        if link[i, 1] < 0:
-            top = put_children(box, link, i, x, y, z, x, y, z, stack, top)
-            continue
-        for j in range(link[i, 0], link[i, 0] + link[i, 1]):
-            t = order[j]
-            d, _, _ = point_triangle(x, y, z, P[t])
-            if d - err[t] >= low:
-                continue
-            mark = 1
-            for m in range(first, count):
-                if mark:
-                    row = rows + chosen[m]
-                    mark = mark & _mark(solid, row, slack, _state(solid, row, slack, i), t, whole)
-            if mark:
-                low, found = d - err[t], t
-    return low, found
-
-
-@formula
 def hollow(solid, chosen, first, rows, slack, point, least, x, y, z, rho, raised, high, whole, stack):
     """How many faces, of which the first is chosen, have in a ball about x, y, z the solid below at least one of them.
 
@@ -225,11 +186,12 @@ def hollow(solid, chosen, first, rows, slack, point, least, x, y, z, rho, raised
             return 0, 0.0
         # First what is near the point, which tells which corner it is in; then what else is in the ball.
         limit = 1.1 * rho + 2.0 * max(0.0, -way) + 4.0 * t
-        _, found = _reaching(
-            solid, chosen, first, count, rows, slack, point[0], point[1], point[2], rho + limit, whole, stack
-        )
+        corner = chosen[first:count]
+        _, found = nearest_marked(
+            solid, corner, rows, 0, 1, -1.0, slack, point[0], point[1], point[2], rho + limit, whole, stack
+        )  # fmt: skip
         if found < 0 or not goes_with(kind, frame, sense, chosen, first, count, face[found]):
-            clear, found = _reaching(solid, chosen, first, count, rows, slack, x, y, z, limit, whole, stack)
+            clear, found = nearest_marked(solid, corner, rows, 0, 1, -1.0, slack, x, y, z, limit, whole, stack)
             if found < 0:
                 break
         if not goes_with(kind, frame, sense, chosen, first, count, face[found]):

@@ -324,45 +324,56 @@ def _mark(solid, row, slack, state, t, whole):
 
 
 @formula
-def nearest_marked(solid, row, other, root, bit, side, slack, x, y, z, cut, whole, stack):
-    """Bound of a point's distance, at most ``cut``, from marked pieces below the node ``root``.
+def nearest_marked(solid, rows, shift, root, bit, side, slack, x, y, z, cut, whole, stack):
+    """Bound of a point's distance, at most ``cut``, from marked pieces below the node ``root``; which is nearest.
 
-    Of those that have the ``bit`` in both rows of marks. ``side`` -1 for a lower bound, 1 for an upper one. Marks are
-    found out where the search comes to, and kept.
+    Of those that have the ``bit`` in all rows of marks ``shift`` + ``rows`` (k,); -1 if there is none. ``side`` -1 for
+    a lower bound, 1 for an upper one. Marks are found out where the search comes to, and kept.
     """
     P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, marks, nodes = solid
     stack[0], top = root, 1
-    low = cut
+    low, found = cut, -1
     while top > 0:
         top -= 1
         i = stack[top]
         if box_distance(box, i, x, y, z, x, y, z) + min(side, 0.0) * box[i, 6] >= low:
             continue
-        one = _state(solid, row, slack, i)
-        two = one if other == row else _state(solid, other, slack, i)
-        if one & two & bit == 0:
+        mark = bit
+        for m in range(len(rows)):
+            mark &= _state(solid, shift + rows[m], slack, i)
+        if mark == 0:
             continue
         if link[i, 1] < 0:
             top = put_children(box, link, i, x, y, z, x, y, z, stack, top)
             continue
-        left, first, second = 0, 0, 0
-        for j in range(link[i, 0], link[i, 0] + link[i, 1]):
+        first, end = link[i, 0], link[i, 0] + link[i, 1]
+        for j in range(first, end):
             t = order[j]
-            a, b = marks[row, t], marks[other, t]
-            if a == NEW or b == NEW:
-                d, _, _ = point_triangle(x, y, z, P[t])
-                if d + side * err[t] >= low:
-                    left += 1
-                    continue
-                a = _mark(solid, row, slack, one, t, whole)
-                b = a if other == row else _mark(solid, other, slack, two, t, whole)
-            first, second = first | a, second | b
-            if a & b & bit != 0:
-                d, _, _ = point_triangle(x, y, z, P[t])
-                low = min(low, d + side * err[t])
-        if left == 0:
-            if one == OPEN:
-                nodes[row, i] = first
-            if other != row and two == OPEN:
-                nodes[other, i] = second
-    return low
+            mark, known = bit, True
+            for m in range(len(rows)):
+                one = marks[shift + rows[m], t]
+                if one == NEW:
+                    known = False
+                else:
+                    mark &= one
+            if mark == 0:
+                continue
+            d, _, _ = point_triangle(x, y, z, P[t])
+            if d + side * err[t] >= low:
+                continue
+            if not known:
+                for m in range(len(rows)):
+                    if mark:
+                        row = shift + rows[m]
+                        mark &= _mark(solid, row, slack, nodes[row, i], t, whole)
+            if mark:
+                low, found = d + side * err[t], t
+        for m in range(len(rows)):
+            row = shift + rows[m]
+            if nodes[row, i] == OPEN:
+                together = 0
+                for j in range(first, end):
+                    one = marks[row, order[j]]
+                    together |= OPEN if one == NEW else one
+                nodes[row, i] = together
+    return low, found

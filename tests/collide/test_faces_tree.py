@@ -120,7 +120,11 @@ def test_what_is_nearest():
                 least = (d + side * err)[mine & ((f < 0) | (face == f))].min(initial=7.0)
                 there = 0 if f < 0 else root[f]
                 asked = there, bit, side, np.zeros(2), *x, 7.0, whole, stack
-                assert faces_tree.nearest_marked(solid, 0, 1, *asked) == pytest.approx(least, abs=1e-7)
+                told, t = faces_tree.nearest_marked(solid, (0, 1), 0, *asked)
+                assert told == pytest.approx(least, abs=1e-7)
+                assert (t < 0) == (told == 7.0)
+                assert t < 0 or (mine[t] and (d + side * err)[t] == pytest.approx(told, abs=1e-7))
+                assert faces_tree.nearest_marked(solid, np.array([1, 0]) - 5, 5, *asked) == (told, t)
 
 
 @pytest.mark.parametrize("k", range(len(SOLIDS)))
@@ -170,6 +174,6 @@ def test_marks_tell_which_pieces_reach_above_and_below_a_face(k):
             off = trimesh.triangles.closest_point(P[of], np.tile(x, (of.sum(), 1))) - x
             least = (np.linalg.norm(off, axis=1) - err[of]).min(initial=9.0)
             asked = 0, bit, -1.0, slack, *x, 9.0, whole, stack
-            assert faces_tree.nearest_marked(solid, i, i, *asked) == pytest.approx(least, abs=1e-7)
+            assert faces_tree.nearest_marked(solid, (i,), 0, *asked)[0] == pytest.approx(least, abs=1e-7)
         for n in np.flatnonzero((nodes[i] != faces_tree.NEW) & (nodes[i] != faces_tree.OPEN)):
             assert nodes[i, n] == np.bitwise_or.reduce(mark[below(link, order, n)])
