@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.brep.solid import BrepSolid
-from clamp3d.brep.surfaces import OTHER, PLANE, Faces, height
+from clamp3d.brep.surfaces import CONE, OTHER, PLANE, SPHERE, TORUS, Faces, bends, height
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.faces_search import FEW, Descent, Search
 from clamp3d.collide.verdict import RESOLUTION
@@ -44,14 +44,28 @@ class FaceModel:
         return np.ascontiguousarray(self.faces.frame.reshape(-1, 12))
 
     @cached_property
-    def errors(self) -> Array:
-        """Error (m,) of each triangle, mm."""
-        return self.faces.error
+    def spread(self) -> Array:
+        """So far (m,) mm are each triangle and the piece of its face that has its parameters from each other at most.
+
+        Of a cone, ball or torus that is more than the distance of the triangle from the face: the piece bulges beyond
+        the triangle's sides along the surface, where the triangle beside it is nearer.
+        """
+        from clamp3d.collide.faces_tree import bulges
+
+        f, found = self.faces, self.faces.error.copy()
+        there = np.empty(len(found))
+        bulges(f.kind, f.size, f.uv, f.face, there)
+        start = np.searchsorted(f.face, np.arange(len(f.kind) + 1))
+        for i in np.flatnonzero((f.kind == CONE) | (f.kind == SPHERE) | (f.kind == TORUS)):
+            rows = slice(start[i], start[i + 1])
+            size = (float(f.size[i, 0]), float(f.size[i, 1]))
+            found[rows] += np.maximum(there[rows] - bends(int(f.kind[i]), size, f.uv[rows], f.corners[rows]), 0.0)
+        return found
 
     @cached_property
     def bounds(self) -> Array:
         """Lower and upper corner (2, 3) of a box that holds the solid, mm."""
-        c, e = self.faces.corners, self.errors[:, None]
+        c, e = self.faces.corners, self.faces.error[:, None]
         return np.array([(c.min(axis=1) - e).min(axis=0), (c.max(axis=1) + e).max(axis=0)])
 
     @cached_property
@@ -114,12 +128,13 @@ class FaceModel:
         middle = 0.5 * (f.corners.min(axis=1) + f.corners.max(axis=1))
         first = np.minimum(start[:-1], m - 1)
         centre = 0.5 * (np.minimum.reduceat(middle, first) + np.maximum.reduceat(middle, first))
-        used = tree(f.corners, self.errors, start, middle, centre, np.arange(n), box, link, order, root)
+        used = tree(f.corners, self.spread, start, middle, centre, np.arange(n), box, link, order, root)
         box, link = box[:used].copy(), link[:used].copy()
         return (
-            f.corners, self.errors, f.face, box, link, order, root, f.uv, np.ascontiguousarray(f.sag.max(axis=1)),
+            f.corners, f.error, f.face, box, link, order, root, f.uv, np.ascontiguousarray(f.sag.max(axis=1)),
             f.kind, f.size, self.frames, f.sense, f.deviation, self.groups, self.neighbours,
             np.full((2 * n, m), NEW, dtype=np.int8), np.full((2 * n, used), NEW, dtype=np.int8),
+            self.spread,
         )  # fmt: skip
 
     @cached_property

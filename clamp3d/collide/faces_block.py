@@ -104,7 +104,7 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
     nearest_ones, chosen, raised, _, stack, whole = scratch
     chosen, raised = chosen[MOST_TRIED:], raised[MOST_TRIED:]
     over = (nearest_ones, chosen, raised, scratch[3], stack, whole)
-    P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, beside, _, _ = solid
+    P, err, _, box, link, order, root, _, _, kind, size, frame, sense, deviation, _, beside, _, _, _ = solid
     slack, _, goal, tol = limits
     wanted = enough(high, limits)
     x, y, z = whole[2, 0, 0], whole[2, 0, 1], whole[2, 0, 2]

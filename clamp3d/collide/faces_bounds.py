@@ -59,7 +59,7 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
     slack, contact, goal, tol = limits
     near, chosen, heights, over, stack, whole = scratch
     work, p, q = whole[0], whole[2, 0], whole[2, 1]
-    P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, _, beside, _, _ = solid
+    P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, _, beside, _, _, _ = solid
     du, v0, v1, u, v = spans(uv)
     e = bend(akind[g], asize[g, 0], asize[g, 1], du, v1 - v0, v0, v1)
     rim = max(sag[0], sag[1], sag[2]) + adeviation[g]

@@ -119,7 +119,7 @@ def _highest(count, solid, chosen, raised):
 
     Behind that is a ball's radius for each, 0 for a face that goes with the one before it.
     """
-    _, _, _, _, _, _, _, _, _, kind, _, frame, sense, _, _, _, _, _ = solid
+    _, _, _, _, _, _, _, _, _, kind, _, frame, sense, _, _, _, _, _, _ = solid
     heights, clear, high, first = raised[CAPACITY : 2 * CAPACITY], raised[2 * CAPACITY :], -np.inf, 0
     for last in range(1, count + 1):
         if last == count or clear[last] > 0.0:
@@ -134,7 +134,7 @@ def _highest(count, solid, chosen, raised):
 def piece_over(V, uv, g, rim, own, solid, count, scratch):
     """Lower bound, as `least_height`, of the highest that a piece of face g is over any of the first faces chosen."""
     akind, asize, aframe, _ = own
-    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
+    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _, _ = solid
     _, chosen, raised, _, _, whole = scratch
     du, v0, v1, _, _ = spans(uv)
     for m in range(count):
@@ -155,7 +155,7 @@ def piece_over(V, uv, g, rim, own, solid, count, scratch):
 @formula
 def point_over(point, solid, count, chosen, raised):
     """How high a point (3) is over the highest of the first faces chosen, as they are raised."""
-    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _ = solid
+    _, _, _, _, _, _, _, _, _, kind, size, frame, sense, _, _, _, _, _, _ = solid
     for m in range(count):
         f = chosen[m]
         h = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], point[0], point[1], point[2])
@@ -171,7 +171,7 @@ def hollow(solid, chosen, first, rows, slack, point, least, x, y, z, rho, raised
     0 for these by the faces' slack, or the number of faces for rounding alone. Returns also the ball's radius: ``rho``
     and more, for the way out of a ``point`` (3). Not wanted if that is not above all by more than ``least``.
     """
-    _, _, face, _, _, _, _, _, _, kind, size, frame, sense, deviation, _, _, _, _ = solid
+    _, _, face, _, _, _, _, _, _, kind, size, frame, sense, deviation, _, _, _, _, _ = solid
     count = first + 1
     while True:
         t = 0.0

@@ -57,7 +57,7 @@ def _descend(
     pieces, uvs, faces, sags, bounds, first, bbox, blink, border, broot, T,
     akind, asize, aframe, adeviation,
     P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
-    marks, nodes, slack, contact, clearance, tol, most, looks, other, over, whole, space, state, out,
+    marks, nodes, spread, slack, contact, clearance, tol, most, looks, other, over, whole, space, state, out,
 ):  # fmt: skip
     # At most ``most`` pieces are added in all, and few more than ``looks`` looked at.
     # ``state``: how many pieces there are, how many items wait, and whether the search has begun: it can be taken up
@@ -65,7 +65,7 @@ def _descend(
     own = (akind, asize, aframe, adeviation)
     solid = (
         P, err, face, box, link, order, root, buv, bsag, kind, size, frame, sense, deviation, group, neighbours,
-        marks, nodes,
+        marks, nodes, spread,
     )  # fmt: skip
     inner, near, chosen = space[:DEEP], space[DEEP : DEEP + NEAR], space[DEEP + NEAR : SPACE]
     # What waits, that with the least bound first: pieces, and after their numbers the nodes of their tree.
@@ -183,7 +183,7 @@ def _descend(
 
 _SOLID = (
     "f8[:,:,::1],f8[::1],i8[::1],f8[:,::1],i8[:,::1],i8[::1],i8[::1],f8[:,:,::1],f8[::1],"
-    "i8[::1],f8[:,::1],f8[:,::1],f8[::1],f8[::1],i8[::1],i8[:,::1],i1[:,::1],i1[:,::1]"
+    "i8[::1],f8[:,::1],f8[:,::1],f8[::1],f8[::1],i8[::1],i8[:,::1],i1[:,::1],i1[:,::1],f8[::1]"
 )
 descend = entry(
     _descend,

@@ -65,7 +65,7 @@ def is_open(solid, f, t, others, least, reach, x, y, z, q, stack):
     above all the faces ``others`` (k,) but f. Tried are, of the triangles nearest first, where they are nearest and on
     the way from there to their middles.
     """
-    P, err, face, box, link, order, root, uv, sag, kind, size, frame, sense, deviation, group, _, _, _ = solid
+    P, err, face, box, link, order, root, uv, sag, kind, size, frame, sense, deviation, group, _, _, _, _ = solid
     tree = P, err, face, box, link, order
     half, tried = len(stack) // 2, 0
     stack[0], top = root[f], 1

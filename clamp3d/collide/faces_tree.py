@@ -1,6 +1,6 @@
 """Compiled bounding volume tree over a solid's triangles, and what is asked of it.
 
-Each triangle stands for a piece of a trimmed face that is within the triangle's error of it.
+Each triangle stands for the piece of a trimmed face that has its parameters, and is within its error of it.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -15,6 +15,7 @@ from clamp3d.collide.faces_math import (
     OTHER,
     TORUS,
     band_over,
+    bend,
     bend_over,
     cut,
     height,
@@ -114,6 +115,17 @@ tree = entry(
     _build,
     "i8(f8[:,:,::1],f8[::1],i8[::1],f8[:,::1],f8[:,::1],i8[::1],f8[:,::1],i8[:,::1],i8[::1],i8[::1])",
 )
+
+
+def _bulges(kind, size, uv, face, out):
+    """Into ``out`` (m,) how far each triangle and its piece of a whole surface are from each other at most."""
+    for t in range(len(face)):
+        g = face[t]
+        du, v0, v1, _, _ = spans(uv[t])
+        out[t] = bend(kind[g], size[g, 0], size[g, 1], du, v1 - v0, v0, v1)
+
+
+bulges = entry(_bulges, "void(i8[::1],f8[:,::1],f8[:,:,::1],i8[::1],f8[::1])")
 
 
 @formula
@@ -277,7 +289,7 @@ def _reaches(V, uv, g, rim, kind, size, frame, f, sense, slack, left, pieces, uv
 @formula
 def _state(solid, row, slack, i):
     """What marks the triangles of a tree node can have in a row, all of them together; `OPEN` where it is not known."""
-    _, _, _, box, link, _, _, _, _, kind, size, frame, sense, _, _, _, _, nodes = solid
+    _, _, _, box, link, _, _, _, _, kind, size, frame, sense, _, _, _, _, nodes, _ = solid
     known = nodes[row]
     if known[i] == NEW:
         f = row % len(kind)
@@ -303,7 +315,7 @@ def _mark(solid, row, slack, state, t, whole):
 
     1 for a piece that reaches above it by the row's slack, 2 for one that reaches below, both for one that does either.
     """
-    P, _, face, _, _, _, _, uv, sag, kind, size, frame, sense, deviation, group, _, marks, _ = solid
+    P, _, face, _, _, _, _, uv, sag, kind, size, frame, sense, deviation, group, _, marks, _, _ = solid
     known = marks[row]
     if known[t] == NEW:
         f, g = row % len(kind), face[t]
@@ -330,7 +342,7 @@ def nearest_marked(solid, rows, shift, root, bit, side, slack, x, y, z, cut, who
     Of those that have the ``bit`` in all rows of marks ``shift`` + ``rows`` (k,); -1 if there is none. ``side`` -1 for
     a lower bound, 1 for an upper one. Marks are found out where the search comes to, and kept.
     """
-    P, err, _, box, link, order, _, _, _, _, _, _, _, _, _, _, marks, nodes = solid
+    P, _, _, box, link, order, _, _, _, _, _, _, _, _, _, _, marks, nodes, spread = solid
     stack[0], top = root, 1
     low, found = cut, -1
     while top > 0:
@@ -359,7 +371,7 @@ def nearest_marked(solid, rows, shift, root, bit, side, slack, x, y, z, cut, who
             if mark == 0:
                 continue
             d, _, _ = point_triangle(x, y, z, P[t])
-            if d + side * err[t] >= low:
+            if d + side * spread[t] >= low:
                 continue
             if not known:
                 for m in range(len(rows)):
@@ -367,7 +379,7 @@ def nearest_marked(solid, rows, shift, root, bit, side, slack, x, y, z, cut, who
                         row = shift + rows[m]
                         mark &= _mark(solid, row, slack, nodes[row, i], t, whole)
             if mark:
-                low, found = d + side * err[t], t
+                low, found = d + side * spread[t], t
         for m in range(len(rows)):
             row = shift + rows[m]
             if nodes[row, i] == OPEN:

@@ -15,7 +15,7 @@ from assemblies import ball, box, cone, cut, fuse, moved, ring, rod, shift, soli
 from test_faces_math import GRID
 
 from clamp3d.brep.solid import BrepSolid
-from clamp3d.brep.surfaces import CONE, TORUS, height, points_at
+from clamp3d.brep.surfaces import CONE, SPHERE, TORUS, height, points_at
 from clamp3d.collide import faces_tree
 from clamp3d.collide.faces import FaceModel
 from clamp3d.core import jit
@@ -114,7 +114,7 @@ def test_what_is_nearest():
             )
             rows, whole = np.stack([marks, rest]), np.empty((9, 3, 3))
             above = np.stack([nodes, others])
-            solid = P, err, face, box, link, order, root, *[None] * 9, rows, above
+            solid = P, err, face, box, link, order, root, *[None] * 9, rows, above, err
             for bit, side, f in ((1, -1.0, -1), (2, -1.0, -1), (1, 1.0, 0), (2, 1.0, 0)):
                 mine = (marks & rest & bit) != 0
                 least = (d + side * err)[mine & ((f < 0) | (face == f))].min(initial=7.0)
@@ -146,11 +146,26 @@ def test_triangles_keep_the_distance_from_faces_that_is_said(k):
 
 
 @pytest.mark.parametrize("k", range(len(SOLIDS)))
+def test_each_piece_is_near_the_triangle_that_has_its_parameters(k):
+    """Not only near to one of them: what is found of a piece, its mark say, is taken to be where its triangle is."""
+    model = FaceModel(BrepSolid.of(solid_of(SOLIDS[k]), "solid"))
+    f, beyond = model.faces, 0
+    for i, uv, V, spread, error in zip(f.face, f.uv, f.corners, model.spread, f.error, strict=True):
+        uv = np.where(np.isnan(uv), np.nanmean(uv, axis=0), uv)  # a pole has any u
+        on = points_at(int(f.kind[i]), f.frame[i], tuple(f.size[i]), GRID[::5] @ uv)
+        off = trimesh.triangles.closest_point(np.tile(V, (len(on), 1, 1)), on) - on
+        away = np.linalg.norm(off, axis=1).max()
+        assert away <= spread + 1e-9
+        beyond += away > error + 1e-9
+    assert (beyond > 0) == np.isin(f.kind, (CONE, SPHERE)).any()
+
+
+@pytest.mark.parametrize("k", range(len(SOLIDS)))
 def test_marks_tell_which_pieces_reach_above_and_below_a_face(k):
     """By points of each piece; a torus and the hollow of a cone may mark a little too much, none marks too little."""
     model = FaceModel(BrepSolid.of(solid_of(SOLIDS[k]), "solid"))
     solid, f, rng = model.arrays, model.faces, np.random.default_rng(k)
-    P, err, face, _, link, order, _, uv, sag, kind, size, _, sense, deviation, group, _, marks, nodes = solid
+    P, _, face, _, link, order, _, uv, sag, kind, size, _, sense, deviation, group, _, marks, nodes, spread = solid
     m, slack, whole = len(face), np.full(2 * len(kind), 0.01), np.empty((3 + 2 * faces_tree.PIECES, 3, 3))
     stack = np.empty(faces_tree.DEEP, dtype=np.int64)
     on = np.array(
@@ -172,7 +187,7 @@ def test_marks_tell_which_pieces_reach_above_and_below_a_face(k):
             x = rng.uniform(*model.bounds)
             of = (mark & bit) != 0
             off = trimesh.triangles.closest_point(P[of], np.tile(x, (of.sum(), 1))) - x
-            least = (np.linalg.norm(off, axis=1) - err[of]).min(initial=9.0)
+            least = (np.linalg.norm(off, axis=1) - spread[of]).min(initial=9.0)
             asked = 0, bit, -1.0, slack, *x, 9.0, whole, stack
             assert faces_tree.nearest_marked(solid, (i,), 0, *asked)[0] == pytest.approx(least, abs=1e-7)
         for n in np.flatnonzero((nodes[i] != faces_tree.NEW) & (nodes[i] != faces_tree.OPEN)):
