@@ -40,7 +40,7 @@ class Faces:
         The file's surface is this near the canonical one (a recognised B-spline), or the triangles (kind "other").
     error : ndarray (m,)
         Largest distance of each triangle from its face. Each point of the face is that near to one of them: on cones,
-        balls and tori not always to the one in whose parameters it lies.
+        balls and tori not always to the one that has its parameters.
     corners : ndarray (m, 3, 3)
         Corners of the triangles, outward; on the surface to within the face's deviation.
     uv : ndarray (m, 3, 2)

@@ -17,6 +17,9 @@ from clamp3d.bench.compare.methods import MANY, Method, Prepared, load, prepare
 from clamp3d.bench.compare.scene import BANDS, CLEAR, OVERLAP, Poses, coherent_poses, known_poses
 from clamp3d.core.pose import Array
 
+_ARC_PASSES = 9
+"""Passes of the arc whose median is what a call of it takes in a process."""
+
 
 @dataclass(frozen=True, slots=True)
 class Band:
@@ -35,10 +38,11 @@ class Measured:
 
     ``median_error`` and ``worst_error`` are of the distance of a wire that is clear, ``depth_error`` is the worst on
     overlaps up to 0.3 mm deep (None: no depth). ``load`` is the import of the libraries, ``setup`` what comes before
-    the first pose. ``one`` and ``many`` are CPU seconds per pose, medians of repeated passes over as many clear poses
-    as overlapping ones; ``coherent`` is the same on a slow motion, where a solver may start from its last answer;
-    ``threaded`` is by the clock, on all cores (None: the method has no threads). ``memory`` is what the process grew
-    by from set-up and queries, ``library_memory`` from the import (None where the system does not tell).
+    the first pose. ``one`` and ``many`` are CPU seconds per pose of repeated passes over as many clear poses as
+    overlapping ones; ``coherent`` is the same on a slow motion, where a solver may start from its last answer;
+    ``threaded`` is by the clock, on all cores (None: the method has no threads). As a machine's speed drifts, each is a
+    multiple of ``arc``, CPU seconds of a call of the arc, which is timed before every pass. ``memory`` is what the
+    process grew by from set-up and queries, ``library_memory`` from the import (None where the system does not tell).
     """
 
     method: str
@@ -56,6 +60,7 @@ class Measured:
     many: float
     coherent: float
     threaded: float | None
+    arc: float
     memory: float | None
     library_memory: float | None
 
@@ -84,22 +89,28 @@ def measure(
     if ready.parallel_only:
         poses = poses.select(poses.parallel)
     values = np.array([ready.one(T) for T in poses.T])
+    grown = resident()  # before the batch, whose poses and answers are the caller's, and before the arc beside it
     clear, overlap = poses.group == CLEAR, poses.group == OVERLAP
     error = np.abs(poses.error(values))
     half = np.flatnonzero(overlap)
     half = np.concatenate([half, np.flatnonzero(clear)[: len(half)]])
     timed = np.ascontiguousarray(poses.T[half])
-    one = repeated(lambda: [ready.one(T) for T in timed], budget) / len(timed)
+    beside = arc_beside(timed)
+    arc = statistics.median(seconds(beside) for _ in range(_ARC_PASSES)) / len(timed)
+
+    def per_pose(run: Callable[[], object], poses: Array, clock: Callable[[], float] = time.process_time) -> float:
+        return arc * repeated(run, beside, budget, clock=clock) * len(timed) / len(poses)
+
+    one = per_pose(lambda: [ready.one(T) for T in timed], timed)
     way = coherent_poses(len(timed), straight=ready.parallel_only)
-    coherent = repeated(lambda: [ready.one(T) for T in way], budget) / len(way)
+    coherent = per_pose(lambda: [ready.one(T) for T in way], way)
     if not np.allclose(ready.many(timed), values[half], rtol=0.0, atol=1e-12 + 0.5 * error.max()):
         raise AssertionError(f"{method.label}: one and many differ")
-    grown = resident()  # before the batch, whose poses and answers are the caller's
     times = min(MANY, max(len(timed), int(budget / max(one, 1e-9)))) // len(timed) if ready.batched else 1
     batch = np.tile(timed, (times, 1, 1))
-    many = repeated(lambda: ready.many(batch), budget) / len(batch)
+    many = per_pose(lambda: ready.many(batch), batch)
     run = ready.threaded
-    threaded = None if run is None else repeated(lambda: run(batch), budget, clock=time.perf_counter) / len(batch)
+    threaded = None if run is None else per_pose(lambda: run(batch), batch, time.perf_counter)
     return Measured(
         method=method.family,
         setting=method.setting,
@@ -116,6 +127,7 @@ def measure(
         many=many,
         coherent=coherent,
         threaded=threaded,
+        arc=arc,
         memory=None if grown is None or loaded is None else max(0.0, grown - loaded),
         library_memory=None if loaded is None or before is None else max(0.0, loaded - before),
     )
@@ -128,16 +140,40 @@ def verdicts(poses: Poses, values: Array, band: float) -> Band:
     return Band(band, int((~hit).sum()), int(hit.sum()), int((said & ~hit).sum()), int((hit & ~said).sum()))
 
 
+def arc_beside(poses: Array) -> Callable[[], object]:
+    """Calls of the arc for each of ``poses`` (n, 4, 4): what other times are told beside."""
+    arc = prepare(Method("cas")).one
+    arc(poses[0])
+    return lambda: [arc(T) for T in poses]
+
+
+def seconds(run: Callable[[], object], clock: Callable[[], float] = time.process_time) -> float:
+    """Time of ``run`` by ``clock``."""
+    start = clock()
+    run()
+    return clock() - start
+
+
 def repeated(
-    run: Callable[[], object], budget: float, most: int = 15, *, clock: Callable[[], float] = time.process_time
+    run: Callable[[], object],
+    beside: Callable[[], object],
+    budget: float,
+    most: int = 15,
+    *,
+    clock: Callable[[], float] = time.process_time,
 ) -> float:
-    """Median time of ``run`` in s by ``clock``: at least 3 runs, at most ``most``, until ``budget`` s are spent."""
-    times: list[float] = []
-    while len(times) < 3 or (len(times) < most and sum(times) < budget):
-        start = clock()
-        run()
-        times.append(clock() - start)
-    return statistics.median(times)
+    """How many times as long ``run`` takes as what is run before it: the median of at least 3 and at most ``most``.
+
+    Until ``budget`` s by ``clock`` are spent.
+    """
+    ratios: list[float] = []
+    spent = 0.0
+    while len(ratios) < 3 or (len(ratios) < most and spent < budget):
+        first = seconds(beside, clock)
+        own = seconds(run, clock)
+        ratios.append(own / first)
+        spent += own
+    return statistics.median(ratios)
 
 
 def resident() -> float | None:

@@ -49,7 +49,8 @@ def _row(method: str, one: float, worst: float, setting: float | None = None) ->
     bands = tuple(Band(b, 40, 40, 0, 0) for b in (0.02, 1e-4, 1e-6))
     label = Method(method, setting).label
     return Measured(
-        method, setting, label, 1, 420, worst / 2, worst, None, bands, 0.1, 0.01, one, one / 2, one, None, 1.0, 10.0
+        method, setting, label, 1, 420, worst / 2, worst, None, bands, 0.1, 0.01, one, one / 2, one, None, 5e-6,
+        1.0, 10.0,
     )  # fmt: skip
 
 
@@ -210,6 +211,7 @@ def test_pages_say_what_the_figures_say(tmp_path: Path) -> None:
     assert "0.0" in other.split("one call of the arc")[0]  # and it is slower than a piece chosen by hand
     finer = json.loads(json.dumps(data))
     row = next(row for row in data["peers"] if row["method"] == "coal-capsule")
+    finer["peers"] = [r for r in finer["peers"] if r["worst_error"] > 1e-7 or r["method"].startswith("open-cascade")]
     finer["peers"].append(row | {"method": "coal-axis", "worst_error": 4e-8, "depth_error": 5e-8, "one": 2e-5})
     assert "at least 20 us for 5e-08 mm (coal (axis))" in " ".join(claims(finer))
     page = tmp_path / "page.md"
@@ -359,7 +361,7 @@ def test_compare_asks_every_job_and_keeps_going(monkeypatch: pytest.MonkeyPatch)
     assert not any(kind == "peer" for kind, _ in asked)
 
 
-def test_times_are_the_least_of_rounds_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_times_are_told_beside_the_arc_in_rounds_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
 
     def answer(kind: str, method: str, *, time_limit: float) -> Any:
@@ -369,8 +371,10 @@ def test_times_are_the_least_of_rounds_in_turn(monkeypatch: pytest.MonkeyPatch) 
         if method == "chords:5.0" and asked.count(method) == 2:
             raise JobError("not finished in 90 s")
         m = Method.parse(method)
-        row = _row(m.family, (3.0, 1.0, 2.0)[asked.count(method) - 1], 1e-4, m.setting)
-        return dataclasses.replace(row, setup=60.0 if m.family == "hulls" else 0.1)
+        k = asked.count(method) - 1
+        speed = (1.0, 2.0, 4.0)[k]  # the machine is slower in each round: so is the arc
+        row = _row(m.family, speed * (3.0, 1.0, 2.0)[k], 1e-4, m.setting)
+        return dataclasses.replace(row, arc=speed * 5e-6, setup=60.0 if m.family == "hulls" else 0.1)
 
     monkeypatch.setattr(study, "run_job", answer)
     found = compare()
@@ -378,7 +382,7 @@ def test_times_are_the_least_of_rounds_in_turn(monkeypatch: pytest.MonkeyPatch) 
     assert {asked.count(m.key) for m in METHODS} == {1, 3}
     times = {row.label: row.one for row in found.measured}
     for m in METHODS:
-        expected = 3.0 if m.family == "hulls" else 2.0 if m.key == "chords:5.0" else 1.0
+        expected = 3.0 if m.family == "hulls" else 2.5 if m.key == "chords:5.0" else 2.0
         assert times[m.label] == pytest.approx(expected)
 
 
