@@ -36,7 +36,7 @@ MOST_TRIED = 16
 CAPACITY = 12
 """Faces at most that pieces are bounded over together."""
 TRIED = MOST_TRIED + 3 * CAPACITY
-"""Room for both: of the latter also what they are raised by, the heights over them and the radii of their balls."""
+"""Numbers that are kept for both: of the latter also what each is raised by, the height over it, its ball's radius."""
 MOST_AROUND = 4
 """Faces of a hollow corner at most."""
 _EXACT = 1e-6

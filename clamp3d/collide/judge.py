@@ -65,20 +65,20 @@ def contained(a: Model, b: Model, pairs: Pairs, thresholds: Thresholds) -> NDArr
         fits = _fits(inner, outer, places)
         rows, places = rows[fits], places[fits]
         if inner.faces is None or outer.faces is None:
-            open_ = ~_shows(inner, outer, places, thresholds.contact)
+            asked = ~_shows(inner, outer, places, thresholds.contact)
         else:
             faces = inner.faces, outer.faces
-            open_ = np.array([not stands_out(*faces, P, thresholds.contact) for P in places], dtype=bool)
-        a.counters.queries["containment"] += int(open_.sum())
-        found[rows[open_]] = [within(inner, outer, P, _ERROR, thresholds.contact) for P in places[open_]]
+            asked = np.array([not stands_out(*faces, P, thresholds.contact) for P in places], dtype=bool)
+        a.counters.queries["containment"] += int(asked.sum())
+        found[rows[asked]] = [within(inner, outer, P, _ERROR, thresholds.contact) for P in places[asked]]
     return found
 
 
 def _could_hold(inner: Model, outer: Model, contact: float) -> bool:
     """Whether the sizes of two parts leave open that one holds the other at some pose, as `within` takes it."""
     length, volume = inner.least_size
-    room = np.ptp(outer.bounds, axis=0) + 2.0 * (contact + 4.0 * _ERROR)
-    return bool(norm(room) >= length and room.prod() >= volume)
+    extent = np.ptp(outer.bounds, axis=0) + 2.0 * (contact + 4.0 * _ERROR)
+    return bool(norm(extent) >= length and extent.prod() >= volume)
 
 
 def _fits(inner: Model, outer: Model, T: Array) -> NDArray[np.bool_]:
