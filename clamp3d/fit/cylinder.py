@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from clamp3d.core.linear import atan2, cross, dot, eigh, lstsq, norm
 from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
+from clamp3d.fit.quantile import fisher
 
 _ROUNDS, _DIGITS = 60, 1e-13
 CONFIDENCE = 0.9973
@@ -195,7 +195,7 @@ def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> f
     )
     g = np.column_stack([np.ones_like(a), np.sin(a), -np.cos(a), z * np.sin(a), -z * np.cos(a)])
     worst = float(np.einsum("ij,jk,ik->i", g, C, g).max())
-    return float(np.sqrt(5.0 * special.fdtri(5, max(freedom, 1), CONFIDENCE) * worst))
+    return float(np.sqrt(5.0 * fisher(5, max(freedom, 1), 1.0 - CONFIDENCE) * worst))
 
 
 def patches_of(local: Array) -> list[NDArray[np.intp]]:

@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from clamp3d.core.linear import atan2, dot, lstsq
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
+from clamp3d.fit.quantile import student
 from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface, border, facet_span
 
 MIN_LINES = 4
@@ -115,7 +115,7 @@ def _tolerance(residual: Array) -> float:
     if n < 60:  # the median of few is too rough
         scatter = max(scatter, float(np.sqrt(np.mean(residual**2))))
     scatter *= np.sqrt(n / freedom)
-    return float(-scatter * special.stdtrit(min(freedom, 1000), 3.2e-5))
+    return float(scatter * student(min(freedom, 1000), 3.2e-5))
 
 
 def _support(surface: Surface, faces: IntArray, on: BoolArray) -> IntArray:

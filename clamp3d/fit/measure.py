@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import special
 
 from clamp3d.core.linear import atan2, cross, dot
 from clamp3d.core.mesh import IntArray
@@ -15,6 +14,7 @@ from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, patches_of, perpendicular, surface_error
 from clamp3d.fit.grow import Region
+from clamp3d.fit.quantile import student
 from clamp3d.fit.surface import BoolArray, Surface, angles, border, covered, turned
 
 FULL_TURN_GAP = np.radians(30.0)
@@ -142,7 +142,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         "covered_area": area,
         "coverage": min(1.0, area / (2.0 * half * axis.radius * length)),
         # Few points know their own scatter badly: three standard errors shall mean 99.73 % all the same.
-        "covariance": C * (float(special.stdtrit(freedom, 0.5 * (1.0 - CONFIDENCE))) / 3.0) ** 2,
+        "covariance": C * (student(freedom, 0.5 * (1.0 - CONFIDENCE)) / 3.0) ** 2,
         "covariance_error": surface_error(C, half, length, freedom),
         "form_error": _form_error(points, residual, rms) + 2.0 * surface.mesh.rounding,
         "chord_error": sagitta(axis.radius, region.span),
