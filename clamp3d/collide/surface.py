@@ -1,4 +1,4 @@
-"""A closed triangle mesh as the libraries want it: trees of FCL and libigl, a solid of manifold3d, each when needed.
+"""A closed triangle mesh as FCL, manifold3d and the compiled searches want it, each form when needed.
 
 Flat faces of a mesh are the part's own, round ones are off by their chords: every triangle has an error of its own.
 """
@@ -111,22 +111,33 @@ class Surface:
         return np.array(found)
 
     @cached_property
-    def _tree(self) -> tuple[Any, Array, NDArray[np.int64], NDArray[np.intp]]:
-        """Libigl's tree of the triangles that have an area, its arrays, and their rows in ``faces``."""
-        import igl
+    def _tree(self) -> tuple[NDArray[np.generic], ...]:
+        """Corners (m, 3, 3) of the triangles that have an area, their tree's arrays, and their rows in ``faces``."""
+        from clamp3d.collide.faces_tree import tree
 
-        V, F = np.ascontiguousarray(self.vertices, dtype=np.float64), np.ascontiguousarray(self.faces, dtype=np.int64)
-        a, b, c = (V[F[:, k]] for k in range(3))
-        rows = np.flatnonzero(np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0.0)
-        tree = igl.AABB()
-        tree.init(V, F[rows])
-        return tree, V, F[rows], rows
+        corners = self.vertices[self.faces]
+        twice_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        rows = np.flatnonzero(twice_area > 0.0)
+        corners = np.ascontiguousarray(corners[rows], dtype=np.float64)
+        m = len(rows)
+        box, link, order = np.empty((2 * m + 2, 7)), np.empty((2 * m + 2, 2), dtype=np.int64), np.arange(m)
+        middle = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
+        one = np.zeros(1, dtype=np.int64)
+        used = tree(
+            corners, np.zeros(m), np.array([0, m]), middle, np.zeros((1, 3)), one, box, link, order, np.empty_like(one)
+        )
+        return corners, box[:used].copy(), link[:used].copy(), order, rows
 
     def nearest(self, points: Array) -> tuple[Array, NDArray[np.intp], Array]:
         """Distance (k,) of points (k, 3) from the surface, the triangle (k,) that is nearest, and its point (k, 3)."""
-        tree, V, F, rows = self._tree
-        _, face, foot = tree.squared_distance(V, F, np.ascontiguousarray(points, dtype=np.float64))
-        return np.linalg.norm(foot - points, axis=1), rows[face], foot
+        from clamp3d.collide.faces_tree import DEEP
+        from clamp3d.collide.surface_kernel import nearest
+
+        *tree, rows = self._tree
+        away, face, foot = np.empty(len(points)), np.empty(len(points), dtype=np.int64), np.empty((len(points), 3))
+        stack = np.empty(DEEP, dtype=np.int64)
+        nearest(*tree, np.ascontiguousarray(points, dtype=np.float64), stack, away, face, foot)
+        return away, np.asarray(rows[face], dtype=np.intp), foot
 
     def distance(self, points: Array) -> Array:
         """Distance (k,) of points (k, 3) from the surface, never negative."""
