@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distances
 from clamp3d.collide.body import Bore, ClosedForm
-from clamp3d.collide.convex import MEMBER, Rod
+from clamp3d.collide.convex import Rod
+from clamp3d.collide.hull import MEMBER
 from clamp3d.collide.model import Model
 from clamp3d.core.pose import Array
 

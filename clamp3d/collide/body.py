@@ -15,7 +15,8 @@ from functools import cached_property
 import numpy as np
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.convex import MEMBER, Convex, Hull, Rod, convex_distance
+from clamp3d.collide.convex import Convex, Rod, convex_distance
+from clamp3d.collide.hull import MEMBER, Hull
 from clamp3d.collide.nearest import segment_pairs, to_faces
 from clamp3d.core.distance import SignedDistance, signed_distance
 from clamp3d.core.linear import cross, dot, norm, to_source, to_target

@@ -9,28 +9,21 @@ point inside both from below.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distance
+from clamp3d.collide.hull import FLAT, MEMBER, SMALL, Hull
 from clamp3d.collide.nearest import rim_minimum, segment_pairs, to_faces
-from clamp3d.collide.zonoid import Zonoid, box_of, zonoid_distance
+from clamp3d.collide.zonoid import Zonoid, zonoid_distance
 from clamp3d.core.linear import cross, dot, norm, to_source, to_target
 from clamp3d.core.pose import Array, inverse
-from clamp3d.core.triangles import closest_points
 
-MEMBER = 1e-9
-"""Relative to the size of the parts: a point this far outside still counts as on the surface."""
-_FLAT = 1e-8
-"""Sine of the angle below which a face or line counts as square to a direction."""
 _LEVEL = 1e-6
 """Below this sine it is not claimed that the nearest points are the only ones: rounding decides."""
-_SMALL = 40
-"""Hulls with more corners are searched only where FCL finds the nearest points."""
 _EPS = 2.0**-52
 
 
@@ -54,19 +47,19 @@ class Rod:
         """Points (k, 3) of what lies furthest along ``n`` (3,): a line on the side, the rim of an end, a point."""
         m = dot(n, self.T[:3, :3])
         across = float(np.hypot(m[0], m[1]))
-        if across < _FLAT:
+        if across < FLAT:
             turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
             rim = self.radius * np.column_stack([np.cos(turn), np.sin(turn)])
             flat = np.vstack([rim, 0.5 * rim, np.zeros((1, 2))])
             local = np.column_stack([flat, np.full(len(flat), np.copysign(0.5 * self.length, m[2]))])
-        elif abs(m[2]) < _FLAT:
+        elif abs(m[2]) < FLAT:
             z = np.linspace(-0.5, 0.5, 65) * self.length
             local = np.column_stack([np.outer(np.ones(65), self.radius / across * m[:2]), z])
         else:
             return self.support(n)[None]
         return np.asarray(to_target(self.T, local))
 
-    def flatness(self, n: Array, within: float = _FLAT) -> tuple[int, Array | None]:
+    def flatness(self, n: Array, within: float = FLAT) -> tuple[int, Array | None]:
         """Dimension of what lies furthest along ``n`` (3,), and its direction if it is a line."""
         m = dot(n, self.T[:3, :3])
         if float(np.hypot(m[0], m[1])) < within:
@@ -109,123 +102,7 @@ class Rod:
         return np.asarray(self.T[:3, 3] + np.outer([-0.5 * self.length, 0.5 * self.length], self.T[:3, 2]))
 
 
-@dataclass(frozen=True, eq=False)
-class Hull:
-    """A convex polyhedron: ``vertices`` (n, 3), ``planes`` (m, 4) with outward unit normals, normal . x + d <= 0."""
-
-    vertices: Array
-    planes: Array
-    faces: NDArray[np.int64] = field(repr=False)
-
-    @cached_property
-    def edges(self) -> NDArray[np.int64]:
-        """Corner numbers (k, 2) of the edges; those between two triangles of one flat face are left out."""
-        F, V = self.faces, self.vertices
-        normal = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-        both = np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        order = np.lexsort((both[:, 1], both[:, 0]))
-        pairs, owner = both[order].reshape(-1, 4)[:, :2], (order // 3).reshape(-1, 2)
-        bent = np.linalg.norm(np.cross(normal[owner[:, 0]], normal[owner[:, 1]]), axis=1) > 1e-10
-        return np.asarray(pairs[bent])
-
-    @cached_property
-    def sum(self) -> Zonoid | None:
-        """A box as a sum of segments; None for any other polyhedron."""
-        return box_of(self.vertices, self.edges)
-
-    def support(self, n: Array) -> Array:
-        """The vertex (3,) that lies furthest along ``n`` (3,)."""
-        return np.asarray(self.vertices[int(np.argmax(dot(self.vertices, n)))])
-
-    def _highest(self, n: Array, within: float = _FLAT) -> Array:
-        height = dot(self.vertices, n)
-        return np.asarray(self.vertices[height >= height.max() - within * (1.0 + float(np.ptp(height)))][:24])
-
-    def face(self, n: Array) -> Array:
-        """Points (k, 3) of what lies furthest along ``n`` (3,): corners, and the middles between each two of them."""
-        corners = self._highest(n)
-        i, j = np.triu_indices(len(corners))
-        return np.asarray(0.5 * (corners[i] + corners[j]))
-
-    def flatness(self, n: Array, within: float = _FLAT) -> tuple[int, Array | None]:
-        """Dimension of what lies furthest along ``n`` (3,), and its direction if it is a line."""
-        corners = self._highest(n, within)
-        if len(corners) == 2:
-            along = corners[1] - corners[0]
-            return 1, along / norm(along)
-        return (0, None) if len(corners) == 1 else (2, None)
-
-    def depth(self, points: Array) -> Array:
-        """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""
-        return np.asarray(-(dot(points, self.planes[:, :3].T) + self.planes[:, 3]).max(axis=1))
-
-    def normals(self, n: Array) -> list[Array]:
-        """The face normal nearest to ``n`` (3,)."""
-        return [np.asarray(self.planes[int(np.argmax(dot(self.planes[:, :3], n))), :3])]
-
-    def near(self, n: Array | None) -> tuple[Array, Array, Array]:
-        """Corners (k, 3), edges (k, 2, 3) and triangles (k, 3, 3), of a large hull only those that face ``n`` (3,)."""
-        V = self.vertices
-        if n is None or len(V) <= _SMALL:
-            return V, V[self.edges], V[self.faces]
-        height = dot(V, n)
-        high = height >= height.max() - 0.01 * float(np.ptp(height))
-        return V[high], V[self.edges[high[self.edges].any(axis=1)]], V[self.faces[high[self.faces].any(axis=1)]]
-
-    def closest(self, points: Array) -> Array:
-        """The points of the surface (k, 3) that are nearest to ``points`` (k, 3), which lie outside."""
-        k, m = len(points), len(self.faces)
-        pairs = np.tile(self.vertices[self.faces], (k, 1, 1)), np.repeat(points, m, axis=0)
-        feet = closest_points(*pairs).reshape(k, m, 3)
-        nearest = np.linalg.norm(feet - points[:, None], axis=2).argmin(axis=1)
-        return np.asarray(feet[np.arange(k), nearest])
-
-    def crossed_by(self, ends: Array) -> bool:
-        """Whether the segment between ``ends`` (2, 3) meets the polyhedron."""
-        h, k = dot(ends, self.planes[:, :3].T) + self.planes[:, 3]
-        if ((h > 0.0) & (k > 0.0)).any():
-            return False
-        enters, leaves = h > 0.0, k > 0.0
-        low = (h[enters] / (h - k)[enters]).max(initial=0.0)
-        return bool(low <= (h[leaves] / (h - k)[leaves]).min(initial=1.0))
-
-    def clipped(self, plane: Array) -> Hull | None:
-        """What of it lies in the half-space plane[:3] . x + plane[3] >= 0; None if it has no volume."""
-        V = self.vertices
-        height = dot(V, plane[:3]) + plane[3]
-        slack = MEMBER * (1.0 + float(np.abs(V).max()))
-        if height.min() >= -slack:
-            return self
-        if height.max() <= slack:
-            return None
-        a, b = self.edges.T
-        crossed = height[a] * height[b] < 0.0
-        a, b = a[crossed], b[crossed]
-        share = (height[a] / (height[a] - height[b]))[:, None]
-        return hull(np.vstack([V[height >= 0.0], V[a] + share * (V[b] - V[a])]))
-
-
 Convex: TypeAlias = Rod | Hull
-
-
-def hull(points: Array) -> Hull:
-    """Convex hull of points (n, 3). Raises ValueError if they lie in one plane."""
-    import manifold3d
-
-    solid = manifold3d.Manifold.hull_points(np.ascontiguousarray(points, dtype=np.float64))
-    made = solid.to_mesh64()
-    vertices, faces = np.array(made.vert_properties)[:, :3], np.array(made.tri_verts, dtype=np.int64)
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    area = np.linalg.norm(normal, axis=1)
-    if not len(faces) or not solid.volume() > 1e-14 * float(np.ptp(vertices, axis=0).max()) ** 3:
-        raise ValueError("the points lie in one plane")
-    kept = area > 1e-14 * area.max()
-    normal = normal[kept] / area[kept, None]
-    offset = -dot(vertices, normal.T).max(axis=0)  # no rounding of a triangle cuts into the hull
-    planes = sorted({tuple(plane) for plane in np.column_stack([normal, offset]).round(14).tolist()})
-    return Hull(vertices, np.array(planes), faces)
 
 
 def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, rims: bool = True) -> Distance:
@@ -266,7 +143,7 @@ def _unique(a: Convex, Ta: Array, b: Convex, Tb: Array, found: Distance) -> bool
     n = found.normal
     if n is None or found.lower < -1e-9:
         return None
-    flat, nearly = (_several(a, Ta, b, Tb, n, within) for within in (_FLAT, _LEVEL))
+    flat, nearly = (_several(a, Ta, b, Tb, n, within) for within in (FLAT, _LEVEL))
     return not flat if flat == nearly else None
 
 
@@ -286,7 +163,7 @@ def _placed(points: Array, T: Array) -> Array:
 
 def _hulls(a: Hull, Ta: Array, b: Hull, Tb: Array, n: Array | None) -> Distance:
     """Two polyhedra: corners against faces and edges against edges; of large ones what looks along ``n``."""
-    if n is None and max(len(a.vertices), len(b.vertices)) > _SMALL:
+    if n is None and max(len(a.vertices), len(b.vertices)) > SMALL:
         return Distance()
     Va, Ea, Fa = (_placed(x, Ta) for x in a.near(None if n is None else dot(n, Ta[:3, :3])))
     Vb, Eb, Fb = (_placed(x, Tb) for x in b.near(None if n is None else dot(-n, Tb[:3, :3])))
@@ -308,7 +185,7 @@ def _proven(a: Convex, Ta: Array, b: Convex, Tb: Array, p: Array, q: Array, d: f
 
 def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None, rims: bool) -> Distance:
     """A cylinder and a polyhedron: its axis against edges and faces, less the radius; then its rims."""
-    if n is None and len(b.vertices) > _SMALL:
+    if n is None and len(b.vertices) > SMALL:
         return Distance()
     _V, E, F = (_placed(x, Tb) for x in b.near(None if n is None else dot(-n, Tb[:3, :3])))
     ends = _placed(a.ends, Ta)
@@ -318,7 +195,7 @@ def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None, rims: bool
     m = (q - x) / d
     axis = dot(Ta[:3, :3], a.T[:3, 2])
     found = Distance()
-    if abs(float(dot(m, axis))) <= _FLAT:  # square to the axis: on the side
+    if abs(float(dot(m, axis))) <= FLAT:  # square to the axis: on the side
         p = x + a.radius * m
         low, normal = _slab(a, Ta, b, Tb, m)
         if d >= a.radius:
@@ -326,7 +203,7 @@ def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None, rims: bool
         else:
             found = _deepest(a, Ta, b, Tb, [q, p, 0.5 * (p + q)], low, 0.0)
             found = replace(found, normal=normal, point_a=p, point_b=q) if found.upper < np.inf else found
-    if rims and found.upper - found.lower > 1e-10 and len(b.vertices) <= _SMALL:
+    if rims and found.upper - found.lower > 1e-10 and len(b.vertices) <= SMALL:
         found = found.meet(_rims(a, Ta, b, Tb))
     return found
 

@@ -15,11 +15,12 @@ import numpy as np
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm
-from clamp3d.collide.convex import Convex, Hull, Rod
+from clamp3d.collide.convex import Convex, Rod
 from clamp3d.collide.depth_convex import Supports, convex_depth, supports
 from clamp3d.collide.depth_cover import Union, difference, nearest_behind
 from clamp3d.collide.depth_pieces import around_in_form, around_in_mesh
 from clamp3d.collide.drilled import drilled_depth, is_drilled
+from clamp3d.collide.hull import Hull
 from clamp3d.collide.model import Model
 from clamp3d.collide.refine import from_boxes, refine
 from clamp3d.collide.surface import Surface
@@ -105,8 +106,8 @@ class _Pair:
                 A, B = _around(x, p, half_extent), _around(y, to_source(self.T, p - t), half_extent)
                 if A is not None and B is not None:
                     try:
-                        return difference(A, _moved(B, self.T), t)
-                    except RuntimeError:  # Qhull's: too thin
+                        return difference(A, _moved(B, self.T))
+                    except ValueError:  # too thin
                         continue
         return None
 

@@ -14,7 +14,8 @@ from collections.abc import Callable
 import numpy as np
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.convex import Convex, Hull, Rod
+from clamp3d.collide.convex import Convex, Rod
+from clamp3d.collide.hull import Hull, hull
 from clamp3d.collide.zonoid import zonoid_distance
 from clamp3d.core.linear import dot, norm, to_target
 from clamp3d.core.pose import Array
@@ -25,6 +26,8 @@ _ROUNDS = 40
 """Times that the polytope inside is refined; each about quarters the gap at a round surface."""
 _ALL = 20000
 """Pairs of edge directions up to which every cross product is asked."""
+_LEVEL = 1e-8
+"""Relative to the size: corners whose heights differ by less are taken to lie equally far along a direction."""
 _SPHERE = np.array([v for v in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
 _SPHERE /= np.linalg.norm(_SPHERE, axis=1)[:, None]
 
@@ -80,12 +83,20 @@ def crossed(E: Array, F: Array) -> Array:
     return np.vstack([N, -N])
 
 
-def normals_of(a: Hull, Ta: Array, b: Hull, Tb: Array) -> Array | None:
-    """Directions (k, 3) among which are all face normals of the Minkowski difference; None if too many."""
-    (Na, Ea, _), (Nb, Eb, _) = _outline(a, Ta), _outline(b, Tb)
+def crossed_normals(a: Hull, Ta: Array, b: Hull, Tb: Array) -> Array | None:
+    """Normals (k, 3) of the faces of the Minkowski difference that edges of both span; None if too many to try.
+
+    Furthest along such a normal lie an edge of a, and of b the other way: two corners at least of each.
+    """
+    (_, Ea, Va), (_, Eb, Vb) = _outline(a, Ta), _outline(b, Tb)
     if len(Ea) * len(Eb) > _ALL:
         return None
-    return np.vstack([Na, -Nb, crossed(Ea, Eb)])
+    N = crossed(Ea, Eb)
+    for V, sign in ((Va, 1.0), (Vb, -1.0)):
+        height = sign * dot(N, V.T)
+        near = height >= height.max(axis=1, keepdims=True) - _LEVEL * float(np.ptp(V, axis=0).max())
+        N = N[near.sum(axis=1) > 1]
+    return N
 
 
 def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array, *, tolerance: float = 0.0) -> Distance:
@@ -148,8 +159,6 @@ def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[
 
     ``difference`` gives its support points; ``N`` (k, 3) are directions to start with, ``P`` (m, 3) points of it.
     """
-    from scipy.spatial import ConvexHull
-
     h = (N * difference(N)).sum(axis=1)
     k = int(np.argmin(h))
     upper, n = float(h[k]), N[k]
@@ -158,10 +167,10 @@ def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[
         if upper <= 0.0:
             return upper, upper, n
         try:
-            made = ConvexHull(P)
-        except RuntimeError:  # Qhull's: the points are too near to each other for it; the bounds so far hold
+            made = hull(P)
+        except ValueError:  # the points are too near to each other for it; the bounds so far hold
             break
-        planes = np.unique(made.equations, axis=0)
+        planes = made.planes
         lower = max(lower, -float(planes[:, 3].max()))
         if upper - lower <= tolerance:
             break
@@ -176,7 +185,7 @@ def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[
         if not fresh.any():
             lower = min(float((-planes[:, 3]).min()), upper)
             break
-        P = np.vstack([P[made.vertices], new[fresh]])
+        P = np.vstack([made.vertices, new[fresh]])
     return lower, upper, n
 
 

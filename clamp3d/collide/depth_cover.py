@@ -10,8 +10,8 @@ import itertools
 
 import numpy as np
 
-from clamp3d.collide.convex import Hull
-from clamp3d.collide.depth_convex import normals_of, supports
+from clamp3d.collide.depth_convex import crossed_normals, supports
+from clamp3d.collide.hull import Hull, hull
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
@@ -23,30 +23,23 @@ CELLS = 60_000
 """Cubes looked at before the search ends with the bound that it has."""
 
 
-def difference(a: Hull, b: Hull, inner: Array) -> Array:
-    """Planes (k, 4), n . t <= d, of translations of b at which it overlaps a, a convex set around ``inner`` (3,).
+def difference(a: Hull, b: Hull) -> Array:
+    """Planes (k, 4), n . t <= d, of a convex set of translations of b at which it overlaps a.
 
-    Exact for small polyhedra, else a polyhedron inside.
+    Exact for small polyhedra, else a polyhedron inside. Raises ValueError if they are too thin for one.
     """
-    from scipy.spatial import ConvexHull
-
     here = np.eye(4)
-    N = normals_of(a, here, b, here)
-    if N is None:
+    sa, sb = supports(a, here), supports(b, here)
+    crossed = crossed_normals(a, here, b, here)
+    if crossed is None:
         k = np.arange(_SPREAD) + 0.5
         up, turn = 1.0 - 2.0 * k / _SPREAD, np.pi * (1.0 + 5.0**0.5) * k
         N = np.column_stack([np.sqrt(1.0 - up * up) * np.cos(turn), np.sqrt(1.0 - up * up) * np.sin(turn), up])
         N = np.vstack([N, a.planes[:200, :3], -b.planes[:200, :3]])
-        sa, sb = supports(a, here), supports(b, here)
-        made = ConvexHull(sa(N) - sb(-N)).equations
+        made = hull(sa(N) - sb(-N)).planes
         return np.column_stack([made[:, :3], -made[:, 3]])
-    h = dot(N, a.vertices.T).max(axis=1) + (-dot(N, b.vertices.T)).max(axis=1)
-    over = h - dot(N, inner)
-    if not over.min() > 0.0:
-        return np.column_stack([N, h])
-    # The corners of the polar set are the planes that bound the set; the others touch an edge or a corner of it.
-    bounding = ConvexHull(N / over[:, None]).vertices
-    return np.column_stack([N[bounding], h[bounding]])
+    N = np.vstack([a.planes[:, :3], -b.planes[:, :3], crossed])
+    return np.column_stack([N, (N * (sa(N) - sb(-N))).sum(axis=1)])
 
 
 def nearest_behind(planes: Array, start: Array) -> Array:

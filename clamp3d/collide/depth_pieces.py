@@ -12,7 +12,8 @@ import math
 import numpy as np
 
 from clamp3d.collide.body import ClosedForm
-from clamp3d.collide.convex import Hull, Rod, hull
+from clamp3d.collide.convex import Rod
+from clamp3d.collide.hull import Hull, hull
 from clamp3d.collide.surface import Surface
 from clamp3d.core.linear import dot, norm, to_source
 from clamp3d.core.pose import Array
@@ -109,16 +110,24 @@ def closest_on_triangles(corners: Array, x: Array) -> Array:
 
 def _hull_of(planes: Array, x: Array) -> Hull | None:
     """The polyhedron of all points with n . y + d <= 0; None if ``x`` (3,) is not well inside."""
-    from scipy.spatial import HalfspaceIntersection, QhullError
-
     depth = -(dot(planes[:, :3], x) + planes[:, 3])
     if not depth.min() > LEAST * float(np.abs(planes[:, 3]).max() + np.abs(x).max()):
         return None
     try:
-        # About the point and in its scale, so that thin polyhedra keep their digits.
-        made = HalfspaceIntersection(np.column_stack([planes[:, :3], -depth]), np.zeros(3))
-        found = hull(made.intersections[np.isfinite(made.intersections).all(axis=1)])
-    except (QhullError, ValueError):
+        # About the point and in its scale, so that thin polyhedra keep their digits; then about their middle.
+        middle = _corners(planes[:, :3], depth).mean(axis=0)
+        made = hull(_corners(planes[:, :3], depth - dot(planes[:, :3], middle)) + middle)
+    except ValueError:
         return None
-    moved = np.column_stack([found.planes[:, :3], found.planes[:, 3] - dot(found.planes[:, :3], x)])
-    return Hull(found.vertices + x, moved, found.faces)
+    moved = np.column_stack([made.planes[:, :3], made.planes[:, 3] - dot(made.planes[:, :3], x)])
+    return Hull(made.vertices + x, moved, made.faces)
+
+
+def _corners(N: Array, depth: Array) -> Array:
+    """Corners (m, 3) of the polyhedron of points with N . y <= depth, all of ``depth`` (k,) being positive.
+
+    They are the planes of the polar set. As those lie as high as its highest points no corner is beyond any plane.
+    """
+    polar = hull(N / depth[:, None]).planes
+    polar = polar[polar[:, 3] < 0.0]
+    return np.asarray(polar[:, :3] / -polar[:, 3:])

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.collide.body import Bore, ClosedForm
-from clamp3d.collide.convex import Convex, Hull, Rod, hull
+from clamp3d.collide.convex import Convex, Rod
+from clamp3d.collide.hull import Hull, hull
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.linear import cross, dot, to_target
 from clamp3d.core.pose import Array

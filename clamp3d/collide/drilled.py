@@ -12,7 +12,8 @@ import numpy as np
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import Bore, ClosedForm, bore_rod
-from clamp3d.collide.convex import Hull, Rod
+from clamp3d.collide.convex import Rod
+from clamp3d.collide.hull import Hull
 from clamp3d.collide.zonoid import zonoid_distance
 from clamp3d.core.linear import cross, dot, norm
 from clamp3d.core.pose import Array, inverse

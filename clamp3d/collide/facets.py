@@ -13,7 +13,8 @@ import numpy as np
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import ClosedForm
-from clamp3d.collide.convex import Hull, Rod
+from clamp3d.collide.convex import Rod
+from clamp3d.collide.hull import Hull
 from clamp3d.collide.surface import Surface, fcl_tree
 from clamp3d.core.linear import dot, norm, to_target
 from clamp3d.core.pose import Array

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.collide.body import Bore, ClosedForm
-from clamp3d.collide.convex import Rod, hull
+from clamp3d.collide.convex import Rod
+from clamp3d.collide.hull import nearly_hull
 from clamp3d.collide.surface import Surface
 from clamp3d.core.linear import atan2, dot, to_source, to_target
 from clamp3d.core.pose import Array
@@ -41,10 +43,11 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[C
         reach = convex.radius / (1.0 - convex.chord_error / convex.radius) + convex.fit_error
         local[:, :2] *= (np.maximum(reach, out) / out)[:, None]
         points[own] = to_target(T, local)
-    used = [bore for feature in (*result.grooves, *result.holes) if (bore := _bore(feature, V, F)) is not None]
     error = max((fit_error(feature, round_) for feature in result.features), default=0.0)
     mesh_error = max((feature.error_bound for feature in result.features), default=0.0)
 
+    hollow = (*result.grooves, *result.holes)
+    used = [bore for feature in hollow if (bore := _bore(feature, hollow, V, F, error)) is not None]
     in_feature = np.zeros(len(F), dtype=bool)
     for feature in result.features:
         in_feature[feature.faces] = True
@@ -67,15 +70,34 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[C
     bores = tuple(used)
     rods, rest = _rods(result, V, F)
     made = [ClosedForm((rod,), bores, error=error) for rod in rods]
-    made += [ClosedForm((hull(points[index]),), bores, error=error, surface=depth) for index in rest]
+    for index in rest:
+        around, off = nearly_hull(points[index])
+        made.append(ClosedForm((around,), bores, error=error + off, surface=depth))
     return tuple(made)
 
 
-def _bore(feature: FittedSurface, V: Array, F: Faces) -> Bore | None:
-    """The groove or hole as a bore of the whole mesh; None if some of the mesh lies in its circle."""
+def _bore(feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: Faces, error: float) -> Bore | None:
+    """The groove or hole as a bore of the whole mesh; None if the mesh reaches into its circle by more than ``error``.
+
+    Its own triangles, and those of other ``hollow`` surfaces on the same cylinder, may lie in the circle by their
+    sagitta, and their neighbours as deep as the edges and corners that they share with them.
+    """
     T = feature.T_part_feature.copy()
     local = to_source(T, V)
-    if _nearest_to_axis(local[:, :2][F]) < feature.radius - feature.error_bound - 1e-9 * feature.radius:
+    own = np.zeros(len(F), dtype=bool)
+    for other in hollow:
+        own[other.faces] |= other is feature or _on_cylinder(local[np.unique(F[other.faces])], feature.radius, error)
+    least, edges = _nearest_to_axis(local[:, :2][F])
+    if least[own].min() < feature.radius - feature.error_bound - 1e-9 * feature.radius:
+        return None
+    corner = np.zeros(len(V), dtype=bool)
+    corner[F[own]] = True
+    limit = np.full(F.shape, feature.radius - error)
+    away = np.hypot(local[:, 0], local[:, 1])[F]
+    limit = np.where(corner[F], np.minimum(limit, away), limit)
+    keys = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=2), axis=2) @ np.array([len(V), 1])
+    limit = np.where(np.isin(keys, keys[own]), np.minimum(limit, edges), limit)
+    if (least < limit.min(axis=1) - 1e-9 * feature.radius)[~own].any():
         return None
     low, high, top = float(local[:, 2].min()), float(local[:, 2].max()), float(local[:, 1].max())
     T[:3, 3] += 0.5 * (low + high) * T[:3, 2]
@@ -88,16 +110,21 @@ def _bore(feature: FittedSurface, V: Array, F: Faces) -> Bore | None:
     return Bore(feature.radius, half, high - low, T)
 
 
-def _nearest_to_axis(flat: Array) -> float:
-    """Least distance of triangles (k, 3, 2) from the origin of their plane."""
+def _on_cylinder(points: Array, radius: float, error: float) -> bool:
+    """Whether points (k, 3) lie on the cylinder of this radius about z, within ``error``."""
+    return bool(np.abs(np.hypot(points[:, 0], points[:, 1]) - radius).max() <= error + 1e-9 * radius)
+
+
+def _nearest_to_axis(flat: Array) -> tuple[Array, Array]:
+    """Least distance (k,) of triangles (k, 3, 2), and of their edges (k, 3), from the origin of their plane."""
     a, b = flat, np.roll(flat, -1, axis=1)
     ab = b - a
     square = np.maximum(np.einsum("ijk,ijk->ij", ab, ab), 1e-300)
     t = np.clip(-np.einsum("ijk,ijk->ij", a, ab) / square, 0.0, 1.0)
-    edge = np.linalg.norm(a + t[..., None] * ab, axis=2).min()
+    edges = np.linalg.norm(a + t[..., None] * ab, axis=2)
     cross = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    around = ((cross > 0.0).all(axis=1) | (cross < 0.0).all(axis=1)).any()
-    return 0.0 if around else float(edge)
+    around = (cross > 0.0).all(axis=1) | (cross < 0.0).all(axis=1)
+    return np.where(around, 0.0, edges.min(axis=1)), edges
 
 
 def _rods(result: FitResult, V: Array, F: Faces) -> tuple[list[Rod], list[Faces]]:

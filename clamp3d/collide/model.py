@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.body import ClosedForm
-from clamp3d.collide.convex import Hull, hull
 from clamp3d.collide.drawn import bodies_of
 from clamp3d.collide.faces import FaceModel
+from clamp3d.collide.hull import Hull, hull, hull_error
 from clamp3d.collide.surface import Surface, at_edges
-from clamp3d.core.linear import atan2, dot
+from clamp3d.core.linear import atan2
 from clamp3d.core.mesh import edges_of
 from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import MeshShape, Shape, Solid
-from clamp3d.core.triangles import distinct
 
 if TYPE_CHECKING:
     from clamp3d.fit.fit import FitResult
@@ -32,6 +31,8 @@ Progress = Callable[[str, int, int], None]
 
 _LARGE = 2000
 """Triangles of a mesh beyond which its hull is no quicker to ask than the mesh itself."""
+_CONVEX = 1e-9
+"""Relative to its size: a mesh whose hull stands out of it by less is asked in its place."""
 Maker = Callable[[Solid, float], tuple[Array, NDArray[np.int64]] | None]
 
 FINEST = 0.001
@@ -93,12 +94,10 @@ class Model:
         raw = self.raw
         if len(raw.faces) > _LARGE:  # the mesh is quicker than a hull of so many faces
             return None
-        if not looks_convex(raw.vertices, raw.faces):
+        off = hull_error(raw.vertices, raw.faces)
+        if off > _CONVEX * raw.scale:
             return None
-        volume = float(raw.manifold.volume())
-        if abs(float(raw.manifold.hull().volume()) - volume) <= 1e-9 * volume:
-            return (ClosedForm((self._hull(self.shape.mesh.vertices),), error=raw.error),)
-        return None
+        return (ClosedForm((self._hull(raw.vertices),), error=raw.error + off),)
 
     @property
     def forms(self) -> tuple[ClosedForm, ...]:
@@ -213,16 +212,6 @@ class Model:
         self.counters.built["meshes"] += 1
         self.counters.built["triangles"] += len(made.faces)
         return made
-
-
-def looks_convex(vertices: Array, faces: NDArray[np.int64]) -> bool:
-    """Whether no vertex (n, 3) lies before one of a few triangles (m, 3): false proves that a mesh is not convex."""
-    # Rows far apart, in no step with the rings that a mesh may be made of.
-    corners = vertices[faces[distinct(np.arange(64) * 2654435761 % len(faces))]]
-    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    n /= np.maximum(np.linalg.norm(n, axis=1), 1e-300)[:, None]
-    height = dot(vertices, n.T).max(axis=0) - np.einsum("ij,ij->i", corners[:, 0], n)
-    return bool(height.max() <= 1e-6 * float(np.abs(vertices).max()))
 
 
 def _nowhere(points: Array) -> Array:

@@ -11,8 +11,9 @@ import math
 import numpy as np
 
 from clamp3d.collide.body import ClosedForm, bore_rod
-from clamp3d.collide.convex import Convex, Hull, Rod, convex_distance, hull
+from clamp3d.collide.convex import Convex, Rod, convex_distance
 from clamp3d.collide.facets import axis_gap, hull_gap
+from clamp3d.collide.hull import Hull, nearly_hull
 from clamp3d.collide.model import Model
 from clamp3d.core.linear import dot, to_target
 from clamp3d.core.pose import Array, inverse
@@ -80,7 +81,8 @@ def _swept_hull(piece: Convex, poses: tuple[Array, ...], angle: float) -> tuple[
     """Hull of a polyhedron at all three poses, in the standing part's frame, and how far arcs leave it."""
     assert isinstance(piece, Hull)
     ways = np.array([to_target(T, piece.vertices) for T in poses])
-    return hull((ways if angle else ways[::2]).reshape(-1, 3)), _sagitta(ways, angle)
+    around, off = nearly_hull((ways if angle else ways[::2]).reshape(-1, 3))
+    return around, off + _sagitta(ways, angle)
 
 
 def _swept_rod(rod: Rod, poses: tuple[Array, ...], angle: float) -> Rod:

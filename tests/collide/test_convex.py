@@ -10,8 +10,9 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from clamp3d.collide.convex import Hull, Rod, convex_distance, hull
+from clamp3d.collide.convex import Rod, convex_distance
 from clamp3d.collide.depth_convex import convex_depth
+from clamp3d.collide.hull import Hull, hull
 from clamp3d.core.linear import to_target
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.testing import directions

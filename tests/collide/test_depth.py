@@ -13,10 +13,11 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.check import check
-from clamp3d.collide.convex import Rod, hull
+from clamp3d.collide.convex import Rod
 from clamp3d.collide.depth_convex import convex_depth
 from clamp3d.collide.depth_cover import Union
 from clamp3d.collide.distance import distance
+from clamp3d.collide.hull import hull
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds, Verdict

@@ -12,11 +12,11 @@ from scipy.spatial import ConvexHull
 
 from clamp3d import shapes
 from clamp3d.collide import depth_cover, depth_pieces
-from clamp3d.collide.convex import hull
 from clamp3d.collide.depth_convex import crossed, directions, supports
 from clamp3d.collide.depth_cover import Union, difference, nearest_behind
 from clamp3d.collide.depth_pieces import around_in_form, around_in_mesh, closest_on_triangles, mesh_planes
 from clamp3d.collide.drilled import is_drilled
+from clamp3d.collide.hull import hull
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.surface import Surface
 from clamp3d.core.pose import rotation, translation
@@ -125,7 +125,7 @@ def test_the_set_of_translations_that_overlap(many, monkeypatch):
         a, b = hull(rng.normal(size=(count, 3)) * 2.0), hull(rng.normal(size=(count, 3)) + 0.3)
         truth = ConvexHull((a.vertices[:, None] - b.vertices[None]).reshape(-1, 3)).equations
         inner = a.vertices.mean(axis=0) - b.vertices.mean(axis=0)
-        planes = difference(a, b, inner)
+        planes = difference(a, b)
         for n in spread(60):
             reach = ((planes[:, 3] - planes[:, :3] @ inner) / np.maximum(planes[:, :3] @ n, 1e-300)).min(
                 where=planes[:, :3] @ n > 1e-12, initial=np.inf

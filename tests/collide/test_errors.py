@@ -12,8 +12,9 @@ import trimesh
 
 from clamp3d import distance
 from clamp3d.collide.body import ClosedForm, bodies_distance
-from clamp3d.collide.convex import Hull, Rod, hull
+from clamp3d.collide.convex import Rod
 from clamp3d.collide.facets import axis_gap, hull_gap, rod_distance
+from clamp3d.collide.hull import Hull, hull
 from clamp3d.collide.meshes import any_inside, gap, nearest_of, surface_distance
 from clamp3d.collide.surface import Surface
 from clamp3d.collide.swept import swept_lower

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from clamp3d.collide.convex import Rod, convex_distance, hull
+from clamp3d.collide.convex import Rod, convex_distance
 from clamp3d.collide.depth_convex import convex_depth
 from clamp3d.collide.distance import distance
+from clamp3d.collide.hull import hull
 from clamp3d.core import kernel_zonoid, shapes
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Cylinder

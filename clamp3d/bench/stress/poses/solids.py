@@ -23,8 +23,8 @@ from clamp3d.bench.stress.poses.cases import unit_rows
 from clamp3d.bench.stress.poses.flat import MAX_BOXES, NARROW, FlatFamily
 from clamp3d.bench.stress.poses.flat_truth import solid_truth
 from clamp3d.bench.stress.worker import Measured, Measures, Rows
-from clamp3d.collide.convex import MEMBER
 from clamp3d.collide.distance import distance
+from clamp3d.collide.hull import MEMBER
 from clamp3d.collide.model import ModelCache
 from clamp3d.core import shapes
 from clamp3d.core.pose import Array
