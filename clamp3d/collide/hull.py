@@ -153,22 +153,23 @@ def _hull(points: Array, vertices: Array, faces: NDArray[np.int64]) -> tuple[Hul
 
 
 def _reach(vertices: Array, faces: NDArray[np.int64], points: Array) -> float:
-    """How far (mm) points (k, 3) are at most from what is spanned by the vertices of a closed mesh about their middle.
+    """How far (mm) points (k, 3) are at most from what the vertices of a closed mesh span.
 
-    A point in the cone from the middle c to a triangle is c + s (x - c), where x is a point of the triangle: for s > 1
-    it is no further from x than that.
+    A point is a sum of the corners of the triangle that it lies behind, as seen from their middle. Weights below 0, and
+    what they add up to beyond 1, are cut: the rest is a point between the vertices, near to it.
     """
     middle = vertices.mean(axis=0)
     corners = vertices[faces] - middle
     across = np.cross(np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1))
-    size = np.einsum("ij,ij->i", corners[:, 0], across[:, 0])
-    across = across[size != 0.0] / size[size != 0.0, None, None]
+    volume = np.einsum("ij,ij->i", corners[:, 0], across[:, 0])
+    wide = np.abs(volume) > 1e-15 * float(np.abs(corners).max()) ** 3  # beside a sliver its neighbours do as well
+    corners, across = corners[wide], across[wide] / volume[wide, None, None]
     worst = 0.0
     for point in points - middle:
-        share = dot(across, point)
-        s = float(share.sum(axis=1).min(where=(share > -1e-9).all(axis=1), initial=np.inf))
-        worst = max(worst, norm(point) * max(0.0, 1.0 - 1.0 / s))
-    return worst * (1.0 + 1e-6)
+        weight = np.maximum(dot(across, point), 0.0)
+        weight /= np.maximum(weight.sum(axis=1), 1.0)[:, None]
+        worst = max(worst, float(np.linalg.norm(np.einsum("ij,ijk->ik", weight, corners) - point, axis=1).min()))
+    return worst
 
 
 def _by_manifold(points: Array) -> tuple[Array, NDArray[np.int64]]:
