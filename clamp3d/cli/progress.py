@@ -65,8 +65,8 @@ def bar(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
     if quiet or not sys.stderr.isatty():
         yield lambda stage, done, of: None
         return
-    from rich.console import Console
     from rich import progress
+    from rich.console import Console
 
     columns = (
         progress.TextColumn("{task.description}", markup=False),
