@@ -95,7 +95,7 @@ def _bore(feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: 
     limit = np.full(F.shape, feature.radius - error)
     away = np.hypot(local[:, 0], local[:, 1])[F]
     limit = np.where(corner[F], np.minimum(limit, away), limit)
-    keys = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=2), axis=2) @ np.array([len(V), 1])
+    keys = np.minimum(F, np.roll(F, -1, axis=1)) * len(V) + np.maximum(F, np.roll(F, -1, axis=1))
     limit = np.where(np.isin(keys, keys[own]), np.minimum(limit, edges), limit)
     if (least < limit.min(axis=1) - 1e-9 * feature.radius)[~own].any():
         return None
