@@ -114,7 +114,7 @@ def test_turns_that_are_carried_across_their_axis(seed):
     assert pair.lower(0.5, 0.5, distance(block, block, way.at(0.5, T)).lower, math.inf) <= least
 
 
-@settings(SLOW, max_examples=8)
+@settings(SLOW, max_examples=6)
 @given(st.sampled_from(DRAWN + FACETED), st.sampled_from(DRAWN), ways, poses(25.0))
 def test_least_distances_and_first_contacts(a, b, way, start):
     assert_motion(min_clearance(a, b, way, start), a, b, way, start, tolerance=1e-5, cells=1500, times=5)

@@ -7,7 +7,7 @@ import pytest
 import clamp3d
 from tests.fuzz import api_targets, runner
 
-COUNTS = {"clamp files": 50, "scene files": 50, "API calls": 800, "mesh files": 50, "command lines": 50}
+COUNTS = {"clamp files": 35, "scene files": 35, "API calls": 500, "mesh files": 35, "command lines": 35}
 
 
 @pytest.mark.parametrize("kind", COUNTS)
