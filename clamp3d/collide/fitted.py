@@ -99,7 +99,7 @@ def _bore(feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: 
     """The groove or hole as a bore of the whole mesh; None if the mesh reaches into its circle by more than ``error``.
 
     Its own triangles, and those of other ``hollow`` surfaces on the same cylinder, may lie in the circle by their
-    sagitta, their neighbours as deep as the edges and corners that they share with them, and flat ends as deep as both.
+    sagitta, their neighbours as deep as the edges that they share with them, and flat ends as deep as both.
     """
     T = feature.T_part_feature.copy()
     local = to_source(T, V)
@@ -109,11 +109,7 @@ def _bore(feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: 
     least, edges = _nearest_to_axis(local[:, :2][F])
     if least[own].min() < feature.radius - feature.error_bound - 1e-9 * feature.radius:
         return None
-    corner = np.zeros(len(V), dtype=bool)
-    corner[F[own]] = True
     limit = np.full(F.shape, feature.radius - error)
-    away = np.hypot(local[:, 0], local[:, 1])[F]
-    limit = np.where(corner[F], np.minimum(limit, away), limit)
     keys = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=2), axis=2) @ np.array([len(V), 1])
     limit = np.where(np.isin(keys, keys[own]), np.minimum(limit, edges), limit)
     limit = limit.min(axis=1)

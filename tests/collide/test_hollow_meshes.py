@@ -84,3 +84,14 @@ def test_what_facets_fill_beside_a_round_rim_is_air():
     depth = form.depth(np.array([(5.995, 0.0, 15.0), (6.001, 0.0, 15.0), (6.0, 0.0, 7.0), (-9.0, 8.0, 15.0)]))
     assert depth[0] < -1e-3
     assert depth[1:] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 10.0])
+def test_a_pin_in_a_hole_that_leaves_through_a_slanted_face(tilt):
+    """Facets beside the hole's mouth reach into its circle by the chords that they share with it."""
+    roof = manifold3d.Manifold.cube((60.0, 60.0, 20.0), True).rotate((0.0, tilt, 0.0)).translate((0.0, 0.0, 20.0))
+    hole = manifold3d.Manifold.cylinder(60.0, 6.0, 6.0, 48, True)
+    block = manifold3d.Manifold.cube((30.0, 30.0, 30.0), True) - roof - hole
+    found = distance(mesh_shape(block, "round"), shapes.cylinder(5.9, 60.0), translation(0.02, 0.0, 0.0))
+    assert found.lower - 1e-9 <= 0.08 <= found.upper + 1e-9
+    assert found.upper - found.lower <= 1e-6
