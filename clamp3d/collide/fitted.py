@@ -25,8 +25,8 @@ def fit_error(feature: FittedSurface, round_: bool) -> float:
     return feature.fit_error if round_ else feature.error_bound
 
 
-def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[ClosedForm, ...]:
-    """Bodies around the fitted mesh.
+def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool, stated: float = 0.0) -> tuple[ClosedForm, ...]:
+    """Bodies around the fitted mesh, whose true surface can be ``stated`` mm from its facets besides.
 
     A groove or hole counts where no part of the mesh lies in its circle, over the whole length of the mesh; else the
     mesh is asked. Where the mesh is nothing but a round bar (a wire, a shank, a step of a turned part) it becomes a
@@ -47,19 +47,39 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[C
     mesh_error = max((feature.error_bound for feature in result.features), default=0.0)
 
     hollow = (*result.grooves, *result.holes)
-    used = [bore for feature in hollow if (bore := _bore(feature, hollow, V, F, error)) is not None]
-    in_feature = np.zeros(len(F), dtype=bool)
-    for feature in result.features:
-        in_feature[feature.faces] = True
+    bores, through = [], np.zeros(len(F), dtype=bool)
+    for feature in hollow:
+        bore = _bore(feature, hollow, V, F, error)
+        if bore is not None:
+            bores.append(bore)
+            through[feature.faces] = True
+    owner = np.full(len(F), -1)
+    for k, feature in enumerate(result.features):
+        owner[feature.faces] = k
+    corners = V[F]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    slack = 1e-9 * model.scale
 
     def depth(x: Array) -> Array:
-        away, face, _ = model.nearest(x)
-        on = (away <= 1e-9 * model.scale) & ~in_feature[face]
-        for surface in result.features:  # a point on the fitted surface is on the part, within the error of the fit
+        away, face, foot = model.nearest(x)
+        on = (away <= slack) & (owner[face] < 0)
+        aside = np.linalg.norm(np.cross(x - foot, normal[face]), axis=1)
+        for k, surface in enumerate(result.features):
             local = to_source(surface.T_part_feature, x)
-            touch = np.abs(np.hypot(local[:, 0], local[:, 1]) - surface.radius) <= 1e-9 * model.scale
-            touch &= np.abs(local[:, 2]) <= 0.5 * surface.length + 1e-9 * model.scale
-            on |= touch & (np.abs(atan2(local[:, 0], -local[:, 1])) <= surface.half_angle + 1e-9)
+            out, z = np.hypot(local[:, 0], local[:, 1]) - surface.radius, np.abs(local[:, 2]) - 0.5 * surface.length
+            turned = np.abs(atan2(local[:, 0], -local[:, 1])) - surface.half_angle
+            # Over a facet of its own the fitted surface is the part's, within the error of the fit; elsewhere it may
+            # have a window.
+            over = (owner[face] == k) & (aside <= surface.fit_error + slack)
+            on |= over & (np.abs(out) <= slack) & (z <= slack) & (turned <= 1e-9)
+        for surface in hollow:  # facets beside a round edge fill what is between its chords and the arc
+            local = to_source(surface.T_part_feature, x)
+            cut = np.hypot(local[:, 0], local[:, 1]) < surface.radius - slack
+            # At its ends: faces that look out of it, not the floor or the step that it ends at.
+            leaves = dot(normal[face], surface.T_part_feature[:3, 2]) * np.sign(local[:, 2]) > 1e-6
+            cut &= np.abs(local[:, 2]) < 0.5 * surface.length + np.where(leaves, slack, -slack)
+            on &= ~(cut & (np.abs(atan2(local[:, 0], -local[:, 1])) < surface.half_angle))
         found = np.where(on, 0.0, -mesh_error - away)
         # Nearer to the facets than their own error a point proves nothing; further in it does.
         far = np.flatnonzero(~on & (away > mesh_error))
@@ -67,12 +87,11 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool) -> tuple[C
         found[within] = away[within] - mesh_error
         return found
 
-    bores = tuple(used)
-    rods, rest = _rods(result, V, F)
-    made = [ClosedForm((rod,), bores, error=error) for rod in rods]
+    rods, rest = _rods(result, V, F, through)
+    made = [ClosedForm((rod,), tuple(bores), error=error + stated) for rod in rods]
     for index in rest:
         around, off = nearly_hull(points[index])
-        made.append(ClosedForm((around,), bores, error=error + off, surface=depth))
+        made.append(ClosedForm((around,), tuple(bores), error=error + off + stated, surface=depth))
     return tuple(made)
 
 
@@ -80,7 +99,7 @@ def _bore(feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: 
     """The groove or hole as a bore of the whole mesh; None if the mesh reaches into its circle by more than ``error``.
 
     Its own triangles, and those of other ``hollow`` surfaces on the same cylinder, may lie in the circle by their
-    sagitta, and their neighbours as deep as the edges and corners that they share with them.
+    sagitta, their neighbours as deep as the edges that they share with them, and flat ends as deep as both.
     """
     T = feature.T_part_feature.copy()
     local = to_source(T, V)
@@ -90,14 +109,14 @@ def _bore(feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: 
     least, edges = _nearest_to_axis(local[:, :2][F])
     if least[own].min() < feature.radius - feature.error_bound - 1e-9 * feature.radius:
         return None
-    corner = np.zeros(len(V), dtype=bool)
-    corner[F[own]] = True
     limit = np.full(F.shape, feature.radius - error)
-    away = np.hypot(local[:, 0], local[:, 1])[F]
-    limit = np.where(corner[F], np.minimum(limit, away), limit)
     keys = np.minimum(F, np.roll(F, -1, axis=1)) * len(V) + np.maximum(F, np.roll(F, -1, axis=1))
     limit = np.where(np.isin(keys, keys[own]), np.minimum(limit, edges), limit)
-    if (least < limit.min(axis=1) - 1e-9 * feature.radius)[~own].any():
+    limit = limit.min(axis=1)
+    # Faces square to the axis fill what is between chords and arc; a shoulder among them ends in others that do not.
+    square = np.ptp(local[:, 2][F], axis=1) <= 1e-9 * feature.radius
+    limit[square] = np.minimum(limit[square], feature.radius - feature.error_bound)
+    if (least < limit - 1e-9 * feature.radius)[~own].any():
         return None
     low, high, top = float(local[:, 2].min()), float(local[:, 2].max()), float(local[:, 1].max())
     T[:3, 3] += 0.5 * (low + high) * T[:3, 2]
@@ -127,8 +146,11 @@ def _nearest_to_axis(flat: Array) -> tuple[Array, Array]:
     return np.where(around, 0.0, edges.min(axis=1)), edges
 
 
-def _rods(result: FitResult, V: Array, F: Faces) -> tuple[list[Rod], list[Faces]]:
-    """Stretches along the first full cylinder's axis where the mesh is a round bar, and the vertices of the others."""
+def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> tuple[list[Rod], list[Faces]]:
+    """Stretches along the first full cylinder's axis where the mesh is a round bar, and the vertices of the others.
+
+    ``through`` (m,): the triangles of holes and grooves that are bores of the whole mesh.
+    """
     full = [f for f in result.cylinders if f.full]
     everything = [np.unique(F)]
     if not full:
@@ -136,9 +158,6 @@ def _rods(result: FitResult, V: Array, F: Faces) -> tuple[list[Rod], list[Faces]
     T = full[0].T_part_feature
     local = to_source(T, V)
     z, out = local[:, 2], np.hypot(local[:, 0], local[:, 1])
-    holes = np.zeros(len(V), dtype=bool)
-    for hole in result.holes:
-        holes[F[hole.faces]] = True
     rods: list[Rod] = []
     taken: list[tuple[float, float]] = []
     for feature in full:
@@ -146,10 +165,10 @@ def _rods(result: FitResult, V: Array, F: Faces) -> tuple[list[Rod], list[Faces]
         low, high = float(z[own].min()), float(z[own].max())
         slack = feature.fit_error + 1e-9 * (high - low)
         coaxial = np.abs(out[own] - feature.radius).max() <= 10.0 * slack
-        # Between the ends there must be nothing but this surface, and holes in it.
+        # Between the ends there must be nothing but this surface, and the bores.
         between = (z[F].min(axis=1) < high - slack) & (z[F].max(axis=1) > low + slack)
         between[feature.faces] = False
-        if not coaxial or (between & ~holes[F].all(axis=1)).any() or any(low < b and a < high for a, b in taken):
+        if not coaxial or (between & ~through).any() or any(low < b and a < high for a, b in taken):
             continue
         place = feature.T_part_feature.copy()
         middle = (

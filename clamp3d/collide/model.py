@@ -90,7 +90,8 @@ class Model:
         if self._fit is not None and self._fit.features:
             from clamp3d.collide.fitted import bodies_of_fit
 
-            return bodies_of_fit(self._fit, self.raw, round_=self.shape.fit == "round")
+            round_ = self.shape.fit == "round"
+            return bodies_of_fit(self._fit, self.raw, round_=round_, stated=self.shape.error)
         raw = self.raw
         if len(raw.faces) > _LARGE:  # the mesh is quicker than a hull of so many faces
             return None

@@ -124,6 +124,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
 
     points = dot(surface.V[region.points] - T[:3, 3], R)
     residual = np.hypot(points[:, 0], points[:, 1]) - axis.radius
+    ridges = _off_ridges(surface, region) if region.strips else 0.0
     freedom = max(len(points) - 5, 1)
     rms = float(np.sqrt(dot(residual, residual) / freedom))
     noise = float(np.hypot(rms, surface.mesh.rounding))
@@ -144,7 +145,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         # Few points know their own scatter badly: three standard errors shall mean 99.73 % all the same.
         "covariance": C * (student(freedom, 0.5 * (1.0 - CONFIDENCE)) / 3.0) ** 2,
         "covariance_error": surface_error(C, half, length, freedom),
-        "form_error": _form_error(points, residual, rms) + 2.0 * surface.mesh.rounding,
+        "form_error": max(_form_error(points, residual, rms), ridges) + 2.0 * surface.mesh.rounding,
         "chord_error": sagitta(axis.radius, region.span),
         "arc_error": arc_error,
         "length_error": length_error,
@@ -175,6 +176,16 @@ def _inflation(surface: Surface, region: Region, residual: Array) -> float:
         return 1.0
     c = min(float(np.mean(residual[i[both]] * residual[j[both]])) / power, 0.95)
     return 1.0 if c < 3.0 / np.sqrt(both.sum()) else (1.0 + c) / (1.0 - c)
+
+
+def _off_ridges(surface: Surface, region: Region) -> float:
+    """How far (mm) the lines between the strips are at most off the surface: what lies on chords is within a strip.
+
+    An exact tessellation has no scatter that would average out, and the fit may have taken some lines for chords.
+    """
+    within = border(surface, region.faces)[2] & (surface.step > surface.floor)
+    ends = surface.V[np.unique(surface.edges[within])]
+    return float(np.abs(region.axis.residual(ends)).max(initial=0.0))
 
 
 def _form_error(points: Array, residual: Array, rms: float) -> float:

@@ -199,3 +199,15 @@ def test_v_and_trapezoid_grooves_are_not_arcs(flank_deg):
         assert not fitted(prism(outline, 30.0)).features
     mesh = prism(outline, 30.0).subdivide().subdivide().subdivide()
     assert not fitted(mesh, sigma=0.02).grooves
+
+
+@pytest.mark.parametrize("turn", [0.0, np.pi / 48.0, 0.3])
+def test_the_error_holds_for_the_lines_between_all_strips(turn):
+    """Corners in single precision that nobody says are: some lie on one circle to the last digit, most do not."""
+    angle = turn + np.arange(48) * (2.0 * np.pi / 48.0)
+    rod = prism(np.column_stack([10.0 * np.cos(angle), 10.0 * np.sin(angle)]), 20.0)
+    corners = rod.vertices.astype(np.float32).astype(np.float64)
+    for found in fit_mesh(make_mesh(corners, rod.faces)).cylinders:
+        local = (corners - found.T_part_feature[:3, 3]) @ found.T_part_feature[:3, :3]
+        assert np.abs(np.hypot(local[:, 0], local[:, 1]) - found.radius).max() <= found.fit_error
+        assert found.fit_error <= 1e-4
