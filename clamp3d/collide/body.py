@@ -127,7 +127,7 @@ def _convex(piece: Convex, other: Convex, a: ClosedForm, b: ClosedForm, here: Ar
     new = _with_witnesses(raw, a, b, T)
     expensive = a.surface is not None or b.surface is not None
     if new.upper - raw.lower > 1e-10 and raw.normal is not None and (raw.lower > -0.01 or not expensive):
-        return new.meet(_face_to_face(raw, piece, other, a, b, T))
+        return new.meet(face_to_face(raw, piece, other, a, b, T))
     return new
 
 
@@ -263,7 +263,7 @@ def _attested(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array,
     return replace(known, upper=known.upper + float(outside[k]), point_a=p[k], point_b=q[k])
 
 
-def _face_to_face(known: Distance, piece: Convex, other: Convex, a: ClosedForm, b: ClosedForm, T: Array) -> Distance:
+def face_to_face(known: Distance, piece: Convex, other: Convex, a: ClosedForm, b: ClosedForm, T: Array) -> Distance:
     """``known`` with points of the two faces that look at each other across its planes, where both bodies have them.
 
     A hole or the mouth of a groove may take the solver's own points away.

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.body import Bore, ClosedForm, bore_rod
+from clamp3d.collide.body import Bore, ClosedForm, bore_rod, face_to_face
 from clamp3d.collide.convex import Rod
-from clamp3d.collide.hull import Hull
+from clamp3d.collide.hull import MEMBER, Hull
 from clamp3d.collide.zonoid import zonoid_distance
 from clamp3d.core.linear import cross, dot, norm
 from clamp3d.core.pose import Array, inverse
@@ -81,6 +81,14 @@ def drilled_depth(a: ClosedForm, b: ClosedForm, T: Array) -> Distance | None:
     found = zonoid_distance(plate.sum, rod.sum.at(T)).labelled("depth", "convex")
     if found.lower >= 0.0:
         return replace(found, upper=np.inf)
+    p, n = found.point_a, found.normal
+    if p is not None and n is not None and a.depth(p[None])[0] < -MEMBER * (1.0 + float(np.abs(p).max())):
+        # On what fills a hole: beside it the faces meet as well.
+        out = T.copy()
+        out[:3, 3] -= found.lower * n
+        at = face_to_face(Distance(0.0, 0.0, normal=n), plate, rod, a, b, out)
+        q = None if at.point_b is None else at.point_b + found.lower * n
+        found = replace(found, point_a=at.point_a, point_b=q)
     for bore in a.bores:
         low, t = _into_hole(bore, rod, T, -found.lower)
         shortest = min(-found.upper, low)

@@ -12,7 +12,7 @@ from clamp3d.collide.distance import distance
 from clamp3d.core import shapes
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder
-from clamp3d.testing import directions
+from clamp3d.testing import assert_distance, directions
 
 PLATE = shapes.box((60.0, 50.0, 8.0), holes=[shapes.Hole(5.0, (4.0, 0.0)), shapes.Hole(3.0, (-15.0, 5.0))])
 WASHER = shapes.cylinder(12.0, 8.0, bore=5.0)
@@ -87,3 +87,14 @@ def test_a_hole_that_breaks_through_a_side_is_no_hole_of_a_plate():
     open_ = shapes.box((20.0, 30.0, 30.0), holes=[shapes.Hole(4.0, (9.0, 0.0))])
     found = distance(open_, Cylinder(3.0, 40.0), translation(7.0, 0.0, 0.0))
     assert found.lower <= -1.0 <= found.upper
+
+
+def test_the_points_of_a_pin_that_is_drawn_off_its_hole_are_on_the_plate():
+    """The middle of the pin's end is above the hole when it leaves the tube; the points are where the faces meet."""
+    tube, pin = shapes.cylinder(8.0, 12.0, bore=4.0), shapes.cylinder(5.0, 40.0)
+    T = translation(0.0, 0.4778, 0.3698) @ rotation((0.0, 1.0, 1.0), np.pi)
+    for a, b, place in ((tube, pin, T), (pin, tube, np.linalg.inv(T))):
+        found = distance(a, b, place)
+        assert found.lower == pytest.approx(0.3698 - 11.0, abs=1e-9)
+        assert found.point_a is not None
+        assert_distance(found, a, b, place)
