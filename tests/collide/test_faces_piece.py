@@ -11,14 +11,18 @@ from shapely import box as rectangle
 pytest.importorskip("OCP")
 sys.path.insert(0, str(Path(__file__).parents[1] / "brep"))
 
-from assemblies import box, fuse, moved, rod, solid_of
-from test_faces_inside import ROUND, TURNED, signed
+from assemblies import ball, box, cone, cut, fuse, moved, ring, rod, solid_of
+from test_faces_inside import ROUND, TURNED, _outside, signed
 from test_faces_math import GRID
 
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import OTHER
 from clamp3d.collide.faces import FaceModel
 from clamp3d.collide.faces_search import Descent
+
+
+def _ring(x, major, minor):
+    return np.hypot(np.hypot(x[:, 0], x[:, 1]) - major, x[:, 2]) - minor
 
 
 def asked(model, triangle, sag=(0.0, 0.0, 0.0), deviation=0.0):
@@ -31,7 +35,20 @@ def asked(model, triangle, sag=(0.0, 0.0, 0.0), deviation=0.0):
     return search.go(0, np.inf), float(search.out[0]), float(search.out[8])
 
 
-@pytest.mark.parametrize(("shape", "truth"), [x[1:] for x in ROUND], ids=[x[0] for x in ROUND])
+BLOCK = box((-4.6, -4.6, -4.6), (4.6, 4.6, 4.6))
+HELD = {"ball": ball(3.0), "rod": rod(2.0, -3.0, 3.0), "ring": ring(2.5, 1.5), "cone": cone(3.0, 1.0, -2.0, 2.0)}
+"""Of these there are closed forms, and so of a block that has one of them for a hollow."""
+
+
+def hollowed(truth):
+    return lambda x: np.maximum(_outside(np.abs(x) - 4.6), -truth(x))
+
+
+TRUTHS = {name: truth for name, _, truth in ROUND} | {"ring": lambda x: _ring(x, 2.5, 1.5)}
+SOLIDS = ROUND + [(f"without a {name}", cut(BLOCK, shape), hollowed(TRUTHS[name])) for name, shape in HELD.items()]
+
+
+@pytest.mark.parametrize(("shape", "truth"), [x[1:] for x in SOLIDS], ids=[x[0] for x in SOLIDS])
 @pytest.mark.parametrize("size", [0.0, 0.3, 4.0])
 def test_no_point_of_a_triangle_is_nearer_than_its_bound(shape, truth, size):
     """Nor any that is as far off it as its border or its face may be; and one of its points is as near as is said."""
@@ -56,8 +73,8 @@ def test_a_triangle_in_a_rod_that_is_all_but_covered_is_deeper_than_the_rod_says
     block = box((-20, -20, -20), (4.8, 20, 20))
     model = FaceModel(BrepSolid.of(solid_of(fuse(rod(5, -20, 20), block)), "solid"))
     section = Point(0.0, 0.0).buffer(5.0, quad_segs=4000).union(rectangle(-20, -20, 4.8, 20))
-    for xs in ((-1.0, -1.0, 4.4), (-1.0, -1.2, 4.2), (-0.6, -0.6, 4.6)):
-        triangle = [(xs[0], 0.3, 0.0), (xs[1], -0.3, 0.1), (xs[2], 0.0, -0.1)]
+    for *xs, y in ((-1.0, -1.0, 4.4, 0.3), (-1.0, -1.2, 4.2, 0.3), (-0.6, -0.6, 4.6, 0.3), (-0.25, -0.2, 0.6, 0.1)):
+        triangle = [(xs[0], y, 0.0), (xs[1], -y, 0.1), (xs[2], 0.0, -0.1)]
         low, high, _ = asked(model, triangle)
         s = [signed(Polygon(section.exterior), x) for x in (GRID[::7] @ np.array(triangle))[:, :2]]
         assert low <= min(s) + 1e-5
