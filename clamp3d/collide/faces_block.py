@@ -176,8 +176,6 @@ def block(pieces, uvs, sags, g, own, solid, limits, rows, known, high, scratch, 
         held = new
         for m in range(count):
             if clears[m] > 0.0:
-                alone = m + 1 == count or clears[m + 1] > 0.0
-                feet = alone and has_feet(kind[chosen[m]], sense[chosen[m]])
-                held = min(held, below(new, rho, clears[m], feet))
+                held = min(held, below(new, rho, clears[m], has_feet(kind[chosen[m]], sense[chosen[m]])))
         found, lowest = max(found, held), deep
     return max(known, found), lowest if count > 0 else np.inf

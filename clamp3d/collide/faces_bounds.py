@@ -140,7 +140,7 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                 if clear > 0.0:  # what is above the face by more than t is outside there
                     found = max(found, below(least, rho, clear, feet) - e)
                     if h > t:
-                        outside = max(outside, min(h - t, clear))
+                        outside = max(outside, h - t)  # the ball holds the face, so it is larger than that
             if wanted:
                 most = reach if sense[f] > 0.0 else np.inf
                 clear = clear_around(solid, row, 2, slack, at, x, y, z, deep, most, whole, stack)
@@ -155,7 +155,7 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                         P, err, face, box, link, order, kind, size, frame, deviation, whole[1], over,
                         max(deep + t, high), work, stack,
                     )  # fmt: skip
-                    depth = max(depth, min(deep, clear)) - rim
+                    depth = max(depth, deep) - rim  # as above, no more than the ball's radius
                     if -depth < out[0] and depth > 0.0:
                         out[0] = -depth
                         for k in range(3):
@@ -180,7 +180,7 @@ def piece(V, uv, g, sag, own, solid, limits, scratch, out):
                     for n in range(fits):
                         up[2 * CAPACITY + n] = 0.0
                     least = piece_over(V, uv, g, rim, own, solid, fits, (near, around, up, over, stack, whole))
-                    found = max(found, below(least, rho + e, clear, False))
+                    found = max(found, below(least, rho + e, clear, True))
     if found < -0.5 * contact and fits == 0:
         # In a hollow corner the solid lies below one of two surfaces. A way out of both is along both normals.
         for m in range(tried):

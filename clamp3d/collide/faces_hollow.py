@@ -169,7 +169,8 @@ def hollow(solid, chosen, first, rows, slack, point, least, x, y, z, rho, raised
 
     0 if none are found. They go into ``chosen`` from ``first`` on, how far they are raised into ``raised``. ``rows`` is
     0 for these by the faces' slack, or the number of faces for rounding alone. Returns also the ball's radius: ``rho``
-    and more, for the way out of a ``point`` (3). Not wanted if that is not above all by more than ``least``.
+    and more, for the way out of a ``point`` (3), and so that the ball holds what is within ``rho`` of its middle's foot
+    on what is above all. Not wanted if the point is not above all by more than ``least``.
     """
     _, _, face, _, _, _, _, _, _, kind, size, frame, sense, deviation, _, _, _, _, _ = solid
     count = first + 1
@@ -178,14 +179,18 @@ def hollow(solid, chosen, first, rows, slack, point, least, x, y, z, rho, raised
         for m in range(first, count):
             f = chosen[m]
             raised[m] = slack[rows + f] + deviation[f]
+            t = max(t, raised[m])
+            high[m] = sense[f] * height_at(kind[f], size[f, 0], size[f, 1], frame[f], x, y, z) - raised[m]
+        middle = above_all(high, first, count, chosen, kind, frame, sense)
+        for m in range(first, count):
+            f = chosen[m]
             h = height_at(kind[f], size[f, 0], size[f, 1], frame[f], point[0], point[1], point[2])
             high[m] = sense[f] * h - raised[m]
-            t = max(t, raised[m])
         way = above_all(high, first, count, chosen, kind, frame, sense)
-        if way <= least:
+        if way <= least or middle == -np.inf:
             return 0, 0.0
         # First what is near the point, which tells which corner it is in; then what else is in the ball.
-        limit = 1.1 * rho + 2.0 * max(0.0, -way) + 4.0 * t
+        limit = max(1.1 * rho + 2.0 * max(0.0, -way) + 4.0 * t, rho + max(0.0, -middle) + t)
         corner = chosen[first:count]
         _, found = nearest_marked(
             solid, corner, rows, 0, 1, -1.0, slack, point[0], point[1], point[2], rho + limit, whole, stack

@@ -1,6 +1,8 @@
 """Bounds of many pieces of a face at once against points of them, measured by Open CASCADE."""
 
+import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -157,3 +159,30 @@ def test_pieces_cut_on_coarse_borders_are_off_by_their_bulge(monkeypatch, k):
         found = faces_distance(a, b, np.eye(4), contact=1e-3, tol=tol)
         assert found.lower <= least
         assert found.upper >= least - 1e-3
+
+
+@pytest.mark.parametrize("wall", [False, True])
+def test_the_way_out_of_a_corner_ends_where_the_corner_is_seen_to_be_open(wall):
+    """A triangle, tip up, in the material below a pit, and deepest at both ends of its base.
+
+    Straight above these is more of the material: the pit is half as wide. Its cone is no face of a corner, and further
+    from the middle of the triangle's box, which is that of the base, than any point of the triangle is.
+    """
+    size, R = 8.0, np.eye(4)
+    R[:3, :3] = np.array([[1.0, 0.0, 1.0], [0.0, math.sqrt(2.0), 0.0], [-1.0, 0.0, 1.0]]) / math.sqrt(2.0)
+    high = size / math.sqrt(2.0)
+    shape = cut(box((-30, -30, -40), (30, 30, 30)), cone(0.5 * high, 0.46 * high, 0, 31))
+    if wall:
+        shape = fuse(shape, box((-29, -29, -1), (29, -0.5, 29)))
+    shape = solid_of(moved(shape, R))
+    other = cut(box((-size, 0, -size), (0, 0.1, 0)), moved(box((-20, -1, -20), (20, 1, -high)), R))
+    a = FaceModel(BrepSolid.of(shape, "a", chord=0.02))
+    b = FaceModel(BrepSolid.of(solid_of(other), "b", chord=0.02)).faces
+    least = signed([(-size, 0.0, 0.0), (-size, 0.1, 0.0)], shape)
+    assert least == pytest.approx(-math.hypot(high, 0.5 * high), abs=2e-3)
+    for k in range(3):
+        rows = {name: np.roll(getattr(b, name), k, axis=1).copy() for name in ("corners", "uv", "sag")}
+        for g, (bound, _) in enumerate(bounds(a, replace(b, **rows))):
+            corners = b.corners[b.face == g].reshape(-1, 3)
+            if (np.abs(corners - [-size, 0.0, 0.0]).max(axis=1) < 0.2).any():
+                assert bound <= least + 2e-3, (k, g, bound, least)
