@@ -91,8 +91,9 @@ class MeshShape:
 
     ``fit``: "bound" fits grooves, cylinders and holes and adds the error bound that assumes nothing between the
     vertices; "round" assumes round surfaces through the vertices (what a CAD export is) and adds the fit's error
-    alone; "off" takes the facets as the part. ``error`` mm: how far the true surface can be from the facets, as stated
-    by who made them. A mesh that is not closed is measured as a surface: what is inside of it is not known.
+    alone; "off" takes the facets as the part, and so do the others where no round surface is found. ``error`` mm: how
+    far the true surface can be from the facets, as stated by who made them. A mesh that is not closed is measured as
+    a surface: what is inside of it is not known.
     """
 
     mesh: Mesh
