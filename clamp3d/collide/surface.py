@@ -134,7 +134,10 @@ class Surface:
         from clamp3d.collide.surface_kernel import nearest
 
         *tree, rows = self._tree
-        away, face, foot = np.empty(len(points)), np.empty(len(points), dtype=np.int64), np.empty((len(points), 3))
+        n = len(points)
+        away, face, foot = np.full(n, np.inf), np.zeros(n, dtype=np.int64), np.zeros((n, 3))
+        if not len(rows):  # slivers alone, as a group of triangles with like errors can be: others have their points
+            return away, face, foot
         stack = np.empty(DEEP, dtype=np.int64)
         nearest(*tree, np.ascontiguousarray(points, dtype=np.float64), stack, away, face, foot)
         return away, np.asarray(rows[face], dtype=np.intp), foot

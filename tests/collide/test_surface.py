@@ -46,6 +46,11 @@ def test_nearest_point_of_a_mesh_is_exact(point):
     assert np.linalg.norm(foot - feet[face]) < 1e-9
 
 
+def test_a_group_of_slivers_has_no_nearest_point():
+    line = Surface(np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)]), np.array([(0, 1, 2)]))
+    assert line.distance(np.ones((2, 3))).tolist() == [np.inf, np.inf]
+
+
 GROOVED = shapes.groove_block(
     SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0, holes=[shapes.Hole(2.0, (13.0, -10.0))]
 )
