@@ -69,7 +69,7 @@ def around_in_mesh(mesh: Surface, x: Array, half_extent: float) -> Hull | None:
     """
     corners = mesh.vertices[mesh.faces]
     error = np.zeros(len(corners)) if mesh.face_error is None else mesh.face_error
-    N, d = mesh_planes(mesh)
+    N, d = mesh.planes
     planes = []
     if len(corners) > _LARGE:
         within = (corners.min(axis=1) - error[:, None] < x + half_extent).all(axis=1)
@@ -91,16 +91,6 @@ def around_in_mesh(mesh: Surface, x: Array, half_extent: float) -> Hull | None:
         beyond = dot(corners[left], n).min(axis=1) - error[left] >= offset - 1e-12 * mesh.scale
         left = left[~beyond & (left != k)]
     return _hull_of(np.array(planes), x)
-
-
-def mesh_planes(mesh: Surface) -> tuple[Array, Array]:
-    """Unit normals (m, 3) and offsets (m,) of a mesh's triangles; none for slivers."""
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    N = np.cross(b - a, c - a)
-    size = np.linalg.norm(N, axis=1)
-    N = N / np.maximum(size, 1e-300)[:, None]
-    d = np.einsum("ij,ij->i", N, a)
-    return N, np.where(size > 1e-14 * mesh.scale**2, d, -np.inf)
 
 
 def closest_on_triangles(corners: Array, x: Array) -> Array:

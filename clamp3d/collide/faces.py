@@ -120,20 +120,14 @@ class FaceModel:
     @cached_property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
         """What the compiled search reads of the solid that distances are measured from."""
-        from clamp3d.collide.faces_tree import NEW, tree
+        from clamp3d.collide.faces_tree import NEW, tree_of
 
         f, m, n = self.faces, len(self.faces.face), len(self.faces.kind)
-        box, link = np.empty((2 * m + 2 * n, 7)), np.empty((2 * m + 2 * n, 2), dtype=np.int64)
-        order, root, start = np.arange(m), np.empty(n, dtype=np.int64), np.searchsorted(f.face, np.arange(n + 1))
-        middle = 0.5 * (f.corners.min(axis=1) + f.corners.max(axis=1))
-        first = np.minimum(start[:-1], m - 1)
-        centre = 0.5 * (np.minimum.reduceat(middle, first) + np.maximum.reduceat(middle, first))
-        used = tree(f.corners, self.spread, start, middle, centre, np.arange(n), box, link, order, root)
-        box, link = box[:used].copy(), link[:used].copy()
+        box, link, order, root = tree_of(f.corners, self.spread, np.searchsorted(f.face, np.arange(n + 1)))
         return (
             f.corners, f.error, f.face, box, link, order, root, f.uv, np.ascontiguousarray(f.sag.max(axis=1)),
             f.kind, f.size, self.frames, f.sense, f.deviation, self.groups, self.neighbours,
-            np.full((2 * n, m), NEW, dtype=np.int8), np.full((2 * n, used), NEW, dtype=np.int8),
+            np.full((2 * n, m), NEW, dtype=np.int8), np.full((2 * n, len(box)), NEW, dtype=np.int8),
             self.spread,
         )  # fmt: skip
 

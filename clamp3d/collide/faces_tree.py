@@ -28,6 +28,8 @@ from clamp3d.collide.faces_math import (
     triangles,
 )
 from clamp3d.core.jit import entry, formula
+from clamp3d.core.mesh import IntArray
+from clamp3d.core.pose import Array
 
 LEAF = 4
 DEEP = 128
@@ -111,10 +113,25 @@ def _build(P, err, start, middle, centre, chosen, box, link, order, root):
     return used
 
 
-tree = entry(
+_tree = entry(
     _build,
     "i8(f8[:,:,::1],f8[::1],i8[::1],f8[:,::1],f8[:,::1],i8[::1],f8[:,::1],i8[:,::1],i8[::1],i8[::1])",
 )
+
+
+def tree_of(P: Array, err: Array, start: IntArray) -> tuple[Array, IntArray, IntArray, IntArray]:
+    """Boxes (n, 7) and links (n, 2) of the tree, the order (m,) of triangles P (m, 3, 3), and faces' nodes (f,).
+
+    ``err`` (m,) are their errors, ``start`` (f + 1,) the first triangle of each face.
+    """
+    m, n = len(P), len(start) - 1
+    box, link = np.empty((2 * m + 2 * n, 7)), np.empty((2 * m + 2 * n, 2), dtype=np.int64)
+    order, root = np.arange(m), np.empty(n, dtype=np.int64)
+    middle = 0.5 * (P.min(axis=1) + P.max(axis=1))
+    first = np.minimum(start[:-1], m - 1)
+    centre = 0.5 * (np.minimum.reduceat(middle, first) + np.maximum.reduceat(middle, first))
+    used = _tree(P, err, start, middle, centre, np.arange(n), box, link, order, root)
+    return box[:used].copy(), link[:used].copy(), order, root
 
 
 def _bulges(kind, size, uv, face, out):
@@ -183,10 +200,13 @@ def nearest(P, err, face, box, link, order, x, y, z, cut, near, stack):
 
 
 @formula
-def nearest_below(P, err, box, link, order, root, x, y, z, stack):
-    """Upper bound of a point's distance from the pieces below the node ``root``."""
+def nearest_triangle(P, err, box, link, order, root, x, y, z, stack):
+    """Least of distance and error of the triangles below the node ``root``, which it is, and its weights at the foot.
+
+    The weights are those of its second and third corner.
+    """
     stack[0], top = root, 1
-    low = np.inf
+    low, found, second, third = np.inf, 0, 0.0, 0.0
     while top > 0:
         top -= 1
         i = stack[top]
@@ -197,9 +217,16 @@ def nearest_below(P, err, box, link, order, root, x, y, z, stack):
             continue
         for j in range(link[i, 0], link[i, 0] + link[i, 1]):
             t = order[j]
-            d, _, _ = point_triangle(x, y, z, P[t])
-            low = min(low, d + err[t])
-    return low
+            d, v, w = point_triangle(x, y, z, P[t])
+            if d + err[t] < low:
+                low, found, second, third = d + err[t], t, v, w
+    return low, found, second, third
+
+
+@formula
+def nearest_below(P, err, box, link, order, root, x, y, z, stack):
+    """Upper bound of a point's distance from the pieces below the node ``root``."""
+    return nearest_triangle(P, err, box, link, order, root, x, y, z, stack)[0]
 
 
 @formula

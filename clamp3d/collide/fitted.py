@@ -56,9 +56,7 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool, stated: fl
     owner = np.full(len(F), -1)
     for k, feature in enumerate(result.features):
         owner[feature.faces] = k
-    corners = V[F]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    normal, _ = model.planes
     slack = 1e-9 * model.scale
 
     def depth(x: Array) -> Array:

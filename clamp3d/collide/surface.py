@@ -111,36 +111,41 @@ class Surface:
         return np.array(found)
 
     @cached_property
-    def _tree(self) -> tuple[NDArray[np.generic], ...]:
-        """Corners (m, 3, 3) of the triangles that have an area, their tree's arrays, and their rows in ``faces``."""
-        from clamp3d.collide.faces_tree import tree
+    def planes(self) -> tuple[Array, Array]:
+        """Unit normals (m, 3) of the triangles, and offsets (m,) of their planes, minus infinity of slivers."""
+        a, b, c = corners_of(self.vertices, self.faces)
+        N = np.cross(b - a, c - a)
+        size = np.linalg.norm(N, axis=1)
+        N = N / np.maximum(size, 1e-300)[:, None]
+        return N, np.where(size > 1e-14 * self.scale**2, np.einsum("ij,ij->i", N, a), -np.inf)
 
-        corners = self.vertices[self.faces]
-        twice_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        rows = np.flatnonzero(twice_area > 0.0)
-        corners = np.ascontiguousarray(corners[rows], dtype=np.float64)
-        m = len(rows)
-        box, link, order = np.empty((2 * m + 2, 7)), np.empty((2 * m + 2, 2), dtype=np.int64), np.arange(m)
-        middle = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
-        one = np.zeros(1, dtype=np.int64)
-        used = tree(
-            corners, np.zeros(m), np.array([0, m]), middle, np.zeros((1, 3)), one, box, link, order, np.empty_like(one)
-        )
-        return corners, box[:used].copy(), link[:used].copy(), order, rows
+    @cached_property
+    def _wide(self) -> NDArray[np.intp]:
+        """Rows (n,) of the triangles that have an area."""
+        return np.flatnonzero(self.planes[0].any(axis=1))
+
+    @cached_property
+    def _tree(self) -> tuple[NDArray[np.generic], ...]:
+        """Corners (n, 3, 3) of these triangles, no errors (n,), and their tree's arrays."""
+        from clamp3d.collide.faces_tree import tree_of
+
+        corners = np.ascontiguousarray(self.vertices[self.faces[self._wide]], dtype=np.float64)
+        exact = np.zeros(len(corners))
+        box, link, order, _ = tree_of(corners, exact, np.array([0, len(corners)]))
+        return corners, exact, box, link, order
 
     def nearest(self, points: Array) -> tuple[Array, NDArray[np.intp], Array]:
         """Distance (k,) of points (k, 3) from the surface, the triangle (k,) that is nearest, and its point (k, 3)."""
         from clamp3d.collide.faces_tree import DEEP
         from clamp3d.collide.surface_kernel import nearest
 
-        *tree, rows = self._tree
         n = len(points)
         away, face, foot = np.full(n, np.inf), np.zeros(n, dtype=np.int64), np.zeros((n, 3))
-        if not len(rows):  # slivers alone, as a group of triangles with like errors can be: others have their points
+        if not len(self._wide):  # of slivers alone, as a group of triangles with like errors may be
             return away, face, foot
         stack = np.empty(DEEP, dtype=np.int64)
-        nearest(*tree, np.ascontiguousarray(points, dtype=np.float64), stack, away, face, foot)
-        return away, np.asarray(rows[face], dtype=np.intp), foot
+        nearest(*self._tree, np.ascontiguousarray(points, dtype=np.float64), stack, away, face, foot)
+        return away, self._wide[face], foot
 
     def distance(self, points: Array) -> Array:
         """Distance (k,) of points (k, 3) from the surface, never negative."""

@@ -14,7 +14,7 @@ from clamp3d import shapes
 from clamp3d.collide import depth_cover, depth_pieces
 from clamp3d.collide.depth_convex import crossed, directions, supports
 from clamp3d.collide.depth_cover import Union, difference, nearest_behind
-from clamp3d.collide.depth_pieces import around_in_form, around_in_mesh, closest_on_triangles, mesh_planes
+from clamp3d.collide.depth_pieces import around_in_form, around_in_mesh, closest_on_triangles
 from clamp3d.collide.drilled import is_drilled
 from clamp3d.collide.hull import hull
 from clamp3d.collide.model import ModelCache
@@ -99,7 +99,7 @@ def test_planes_and_points_of_triangles():
     V = rng.normal(size=(12, 3))
     V[11] = 0.5 * (V[9] + V[10])  # a sliver
     mesh = Surface(V, np.arange(12).reshape(4, 3))
-    N, d = mesh_planes(mesh)
+    N, d = mesh.planes
     assert np.linalg.norm(N[:3], axis=1) == pytest.approx(1.0, abs=1e-12)
     for k in range(3):
         a, b, c = V[3 * k : 3 * k + 3]
