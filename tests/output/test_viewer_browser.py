@@ -81,7 +81,6 @@ def page(browser, run, tmp_path_factory):
         viewer.save_html(path)
     page = open_page(browser, path.as_uri(), offline=True)
     wait_for(page, "viewer.animator.duration > 0 && viewer.scene.getObjectByName('clamp3d') !== undefined")
-    page.evaluate("viewer.animator.pause()")
     yield page
     assert page.problems == []
 
@@ -96,6 +95,14 @@ def hinge(tmp_path_factory):
     path = tmp_path_factory.mktemp("hinge") / "check.html"
     path.write_text(check_to_html(result), encoding="utf-8")
     return path, result
+
+
+@pytest.fixture(scope="module")
+def hinge_page(browser, hinge):
+    page = open_page(browser, hinge[0].as_uri(), offline=True)
+    wait_for(page, "viewer.animator.duration > 0")
+    yield page
+    assert page.problems == []
 
 
 def open_page(browser, url, *, offline=False, **options):
@@ -298,10 +305,8 @@ def opacity(page, part, tree="cutaway"):
     )
 
 
-def test_findings_of_a_check_lead_to_their_places(browser, hinge):
-    path, result = hinge
-    page = open_page(browser, path.as_uri(), offline=True)
-    wait_for(page, "viewer.animator.duration > 0")
+def test_findings_of_a_check_lead_to_their_places(hinge_page, hinge):
+    page, (_, result) = hinge_page, hinge
     assert page.title().startswith(result.scene.name)
     assert re.match(r"\d+ clashes", page.inner_text("#headline"))
     findings = page.query_selector_all(".finding")
@@ -326,8 +331,6 @@ def test_findings_of_a_check_lead_to_their_places(browser, hinge):
     image = pixels(page)
     red = (image[..., 0] > 150) & (image[..., 1] < 110) & (image[..., 2] < 110)
     assert red[:, 370:].sum() > 200
-    assert page.problems == []
-    page.context.close()
 
 
 def test_parts_of_one_shape_share_their_geometry_and_each_is_seen_and_fades_alone(browser, tmp_path):
@@ -361,9 +364,8 @@ def test_parts_of_one_shape_share_their_geometry_and_each_is_seen_and_fades_alon
     assert not page.problems
 
 
-def test_play_halts_at_first_contact_and_goes_on_when_asked(browser, hinge):
-    page = open_page(browser, hinge[0].as_uri(), offline=True)
-    wait_for(page, "viewer.animator.duration > 0")
+def test_play_halts_at_first_contact_and_goes_on_when_asked(hinge_page):
+    page = hinge_page
     stops = page.evaluate("viewer.scene_tree.find(['clamp3d']).object.story.stops")
     contact = next(k for k, stop in enumerate(stops) if stop["halts"])
     page.evaluate(f"viewer.animator.seek({stops[contact]['arrive'] - 0.4})")
@@ -373,7 +375,7 @@ def test_play_halts_at_first_contact_and_goes_on_when_asked(browser, hinge):
     assert "first contact at t = " in page.inner_text("#label")
     page.click("#play")
     wait_for(page, f"viewer.animator.time > {stops[contact]['arrive'] + 0.3}")
-    page.context.close()
+    page.evaluate("viewer.animator.pause()")
 
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True, "device_scale_factor": 2}
@@ -397,16 +399,17 @@ def test_page_on_a_phone(browser, hinge):
     page.context.close()
 
 
-def test_page_in_dark_mode_is_dark_and_readable(browser, hinge):
-    page = open_page(browser, hinge[0].as_uri(), offline=True, color_scheme="dark")
-    wait_for(page, "viewer.animator.duration > 0")
+def test_page_in_dark_mode_is_dark_and_readable(hinge_page):
+    page = hinge_page
+    page.click("#home")
+    page.emulate_media(color_scheme="dark")
     page.wait_for_timeout(300)
     image = pixels(page)
     assert image[5, -5].max() < 70  # behind the parts
     assert image[-5, 5].max() < 70  # the panel
     for selector in ("h1", "#headline", ".finding b", ".small", "td", "h2"):
         assert contrast(page, selector) > 4.5, selector  # WCAG 2.2, level AA
-    page.context.close()
+    page.emulate_media(color_scheme="light")
 
 
 @pytest.mark.parametrize(("scheme", "dark"), [("dark", True), ("light", False)])
@@ -484,6 +487,7 @@ def test_live_page_follows_the_run(browser, run):
             T = pose_in_browser(page, ["whole", "P2 down splint"])
             np.testing.assert_allclose(T, waypoint.poses["P2"].T(), atol=2e-4)
         assert not page.is_visible("#timeline")
+        page.emulate_media(reduced_motion="no-preference")
         viewer.finish(run)
         wait_for(page, "viewer.animator.playing")
         go_to(page, len(run.path) - 1)
@@ -491,6 +495,7 @@ def test_live_page_follows_the_run(browser, run):
 
         late = open_page(browser, viewer.url)
         wait_for(late, "viewer.animator.duration > 0")
+        assert not late.evaluate("viewer.animator.playing")  # who wants less motion starts it by the button
         go_to(late, len(run.path) - 1)
         assert_drawn(late, run.poses)
         assert late.problems == []

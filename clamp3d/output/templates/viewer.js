@@ -146,7 +146,8 @@ function clamp3dViewer(messages) {
     const moves = story.done && animator.playing && story.stops[stop + 1] ? 2 : 1;
     if (!touched && stop >= 0 && framed !== stop + " " + moves) home(soft());
   }
-  const soft = () => (matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : 700);
+  const calm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const soft = () => (calm() ? 0 : 700);
 
   function pick(element, names, low, high) {
     for (const e of document.querySelectorAll(".finding.now, .rows tr.now")) e.classList.remove("now");
@@ -219,6 +220,11 @@ function clamp3dViewer(messages) {
     for (const e of document.querySelectorAll(".stop")) e.hidden = Number(e.dataset.stop) !== i;
     [...$("marks").children].forEach((a, k) => a.classList.toggle("now", k === i));
   }
+  // An attribute, or the text, where it is another: what is written is laid out and painted again, in each frame.
+  function write(element, name, value) {
+    if (!name && element.textContent !== value) element.textContent = value;
+    else if (name && element.getAttribute(name) !== value) element.setAttribute(name, value);
+  }
   function refresh() {
     if (!story || !story.done || $("timeline").hidden) return;
     const t = animator.time;
@@ -228,13 +234,13 @@ function clamp3dViewer(messages) {
       before = t;
     }
     const i = current(t), s = story.stops[i], next = story.stops[i + 1];
-    $("time").max = end();
+    write($("time"), "max", String(end()));
     if (document.activeElement !== $("time") || animator.playing) $("time").value = t;
-    $("play").firstElementChild.firstElementChild.setAttribute("d", animator.playing ? "M3 2h4v12H3zM9 2h4v12H9z" : "M3 1l11 7-11 7z");
+    write($("play").firstElementChild.firstElementChild, "d", animator.playing ? "M3 2h4v12H3zM9 2h4v12H9z" : "M3 1l11 7-11 7z");
     const moving = next && t > s.leave + 1e-6;
     const at = moving ? next : s;
-    $("label").textContent = (story.stops.indexOf(at) + 1) + "/" + story.stops.length + "  " + (moving ? "moving to: " : "") + at.label;
-    $("step").textContent = at.label.startsWith(at.step) ? "" : "step " + at.step;
+    write($("label"), "", (story.stops.indexOf(at) + 1) + "/" + story.stops.length + "  " + (moving ? "moving to: " : "") + at.label);
+    write($("step"), "", at.label.startsWith(at.step) ? "" : "step " + at.step);
     if (i !== stop) showStop(i);
     follow();
   }
@@ -284,6 +290,7 @@ function clamp3dViewer(messages) {
     if (command.type === "set_geometry") geometries[command.path] = { data: command.geometry };
     else if (command.type === "set_object") setObject(command);
     else handle(command);
+    if (command.type === "set_animation" && calm()) animator.pause();  // it waits for the button (WCAG 2.2.2)
     if (command.type === "set_property" && command.property === "story" && command.path === "/clamp3d") tell(command.value);
     else if (command.type === "set_property" && command.property === "visible") {
       // A switch that the user has set outlasts what the program sends.
