@@ -37,25 +37,38 @@ class _Formula:
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         self._function, self._options = function, options
 
-    @cached_property
-    def _compiled(self) -> Any:
+    def _compile(self, **options: Any) -> Any:
         import numba
 
-        return numba.njit(**_OPTIONS, **self._options)(self._function)
+        return numba.njit(**_OPTIONS, **self._options, **options)(self._function)
+
+    @cached_property
+    def _compiled(self) -> Any:
+        """As other formulas call it: without the functions that numba makes for calls from Python and from C."""
+        import numba
+
+        compiled = self._compile(no_cpython_wrapper=True, no_cfunc_wrapper=True)
+        if "forceinline" not in self._options:  # numba would compile it anew for each constant that it is called with
+            template = compiled.get_call_template
+            compiled.get_call_template = lambda given, named: template(tuple(map(numba.types.unliteral, given)), named)
+        return compiled
+
+    @cached_property
+    def _called(self) -> Any:
+        return self._compile()
 
     @property
     def _numba_type_(self) -> Any:
         return self._compiled._numba_type_
 
     def __call__(self, *arguments: Any) -> Any:
-        return self._compiled(*arguments)
+        return self._called(*arguments)
 
 
 class _Prefetch(_Formula):
     """One instruction that neither Python nor numba has a word for."""
 
-    @cached_property
-    def _compiled(self) -> Any:
+    def _compile(self, **options: Any) -> Any:
         import numba
         from llvmlite import ir
         from numba import types
@@ -75,7 +88,8 @@ class _Prefetch(_Formula):
 
             return types.void(array, offset), build
 
-        return numba.njit(**_OPTIONS, **self._options)(lambda array, offset: instruction(array, offset))  # type: ignore[call-arg]
+        fetch = partial(numba.njit, **_OPTIONS, **self._options, **options)
+        return fetch(lambda array, offset: instruction(array, offset))  # type: ignore[call-arg]
 
 
 def formula(function: Callable[..., Any]) -> Any:
@@ -84,7 +98,7 @@ def formula(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """The same for a small formula: built into each caller, which drops what it does not use."""
+    """The same for a small formula: built into each caller, for its constants, without what it does not use."""
     return _Formula(function, forceinline=True)
 
 
@@ -199,7 +213,7 @@ def _keep(path: Path, code: bytes) -> None:
 def _say(once: bool) -> None:
     """One line on stderr when compiling begins."""
     when = "once for this machine" if once else "in every run: no cache folder can be written, CLAMP3D_CACHE names one"
-    print(f"clamp3d: compiling the contact kernel, {when} (a few seconds) ...", file=sys.stderr, flush=True)
+    print(f"clamp3d: compiling the contact kernel, {when} (up to a minute) ...", file=sys.stderr, flush=True)
 
 
 def _can_keep(folder: Path) -> bool:
@@ -292,7 +306,7 @@ def _machine_code(function: Callable[..., Any], returned: str, arguments: list[s
         "i8": pointer(types.int64, ir.IntType(64)),
         "i1": pointer(types.int8, ir.IntType(8)),
     }
-    exec(text, known | {"function": numba.njit(**_OPTIONS)(function)}, known)
+    exec(text, known | {"function": _Formula(function)._compiled}, known)
     plain = ", ".join("i8" if "[" in kind else kind for kind in arguments)
     made = numba.cfunc(f"{returned}({plain})", **_OPTIONS)(known["call"])
     module = llvm.parse_assembly(made.inspect_llvm())
