@@ -21,6 +21,7 @@ from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core.linear import dot, to_target
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array, inverse
+from clamp3d.core.shells import joined
 
 ACCURACY = 1e-4
 """A least distance on a way is found to within this (mm), or to what the models give."""
@@ -112,9 +113,8 @@ class MovingPair:
         moving, still = (v[s.faces] for v, s in zip(placed, (mine, other), strict=True))
         errors = [np.zeros(len(s.faces)) if s.face_error is None else s.face_error for s in (mine, other)]
         ours, theirs = can_meet(self.motion, (moving, errors[0]), (still, errors[1]), limit)
-        shells = [still[rows].reshape(-1, 3) for rows in other.shells]
-        boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in shells])
-        return _Near(limit, moving[ours], errors[0][ours], Standing(still[theirs], errors[1][theirs], boxes))
+        piece = joined(other.faces[theirs], len(other.vertices))[other.faces[theirs, 0]]
+        return _Near(limit, moving[ours], errors[0][ours], Standing(still[theirs], errors[1][theirs], piece))
 
 
 def box_corners(model: Model, T: Array) -> Array:

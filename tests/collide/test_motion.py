@@ -205,3 +205,19 @@ def test_first_contact_of_meshes_does_not_depend_on_what_slides_close_by(kind, g
     assert hit.touches
     assert 0.0 <= (truth - hit.t) * length <= 2e-4
     assert hit.evaluations < 1000
+
+
+def test_a_fin_is_met_though_its_foot_is_nearer_the_axis_than_a_plate_that_screws_past():
+    """The post itself is never reached: the fin's sides alone are inside the hull of what the plate's face sweeps."""
+    import manifold3d
+
+    root = np.array([(0.0, -0.5, -0.5), (0.0, 0.5, -0.5), (0.0, 0.5, 0.5), (0.0, -0.5, 0.5), (20.5, 0.0, 0.0)])
+    fin = manifold3d.Manifold.hull_points(root + (0.0, 0.0, 30.0))
+    made = (manifold3d.Manifold.cylinder(600.0, 17.0, 17.0, 96, True) + fin).to_mesh64()
+    post = MeshShape(make_mesh(made.vert_properties, made.tri_verts), "off")
+    plate = joined(((20, -100, -0.5), (60, 100, 0.5)))
+    motion = Motion.screw((0.0, 0.0, 1.0), 0.15, travel=100.0, parts=("plate",))
+    scene = Scene(Scene().add("post", post).add("plate", plate).parts, motions=(motion,))
+    row = check(scene, depths=False).motions[0]
+    assert row.verdict is Verdict.CLASH
+    assert 0.29 < row.contact_at < 0.3
