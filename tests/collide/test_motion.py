@@ -212,7 +212,7 @@ def test_a_fin_is_met_though_its_foot_is_nearer_the_axis_than_a_plate_that_screw
     import manifold3d
 
     root = np.array([(0.0, -0.5, -0.5), (0.0, 0.5, -0.5), (0.0, 0.5, 0.5), (0.0, -0.5, 0.5), (20.5, 0.0, 0.0)])
-    fin = manifold3d.Manifold.hull_points(root + (0.0, 0.0, 30.0))
+    fin = manifold3d.Manifold.hull_points(root).translate((0.0, 0.0, 30.0))
     made = (manifold3d.Manifold.cylinder(600.0, 17.0, 17.0, 96, True) + fin).to_mesh64()
     post = MeshShape(make_mesh(made.vert_properties, made.tri_verts), "off")
     plate = joined(((20, -100, -0.5), (60, 100, 0.5)))
