@@ -26,6 +26,8 @@ from clamp3d.core.shells import joined
 ACCURACY = 1e-4
 """A least distance on a way is found to within this (mm), or to what the models give."""
 MAX_STEPS = 2000
+SPARE_STEPS = 200
+"""Steps for a nearer time among those that can not be nearer than the nearest time found, by its lower bound."""
 MAX_UNINFORMATIVE = 12
 """Answers in a row that told nothing, after which a method is not asked again."""
 SHELL_ERROR = 0.064
@@ -151,12 +153,20 @@ def least_distance(pair: MovingPair, thresholds: Thresholds, allowance: float | 
     for t, half in ((0.0, 0.0), (1.0, 0.0), (0.5, 0.5)):
         heapq.heappush(heap, (*look(t, half, -np.inf), t, half))
     floor = np.inf  # of stretches that were given up
+    spare, nearest = SPARE_STEPS, best.upper
     for _ in range(MAX_STEPS):
         lower, here, t, half = heap[0]
         width = best.upper - min(floor, lower)
         limit = max(2.0 * ACCURACY, 0.02 * abs(best.upper), 2.0 * (best.upper - best.lower))
+        if best.upper < 0.0:  # depths take the longest
+            limit = max(limit, 0.1 * thresholds.contact)
         verdict = thresholds.verdict(Distance(min(floor, lower), best.upper), allowance)
         if clash(best) or (width <= limit and verdict is not Verdict.UNCERTAIN) or width <= 2.0 * ACCURACY:
+            break
+        # What the models leave open at the nearest time they mostly do at all: its lower bound will hardly rise.
+        settled = best.upper == nearest and width <= best.upper - best.lower + 2.0 * ACCURACY
+        spare, nearest = spare - 1 if settled else SPARE_STEPS, best.upper
+        if not spare:
             break
         heapq.heappop(heap)
         if half * pair.speed <= 0.5 * ACCURACY or here <= lower + ACCURACY:  # the models have no more to say

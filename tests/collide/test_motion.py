@@ -221,3 +221,18 @@ def test_a_fin_is_met_though_its_foot_is_nearer_the_axis_than_a_plate_that_screw
     row = check(scene, depths=False).motions[0]
     assert row.verdict is Verdict.CLASH
     assert 0.29 < row.contact_at < 0.3
+
+
+def test_what_the_models_leave_open_at_the_nearest_time_is_not_searched_for_elsewhere():
+    """0.01 mm apart at the start, known to 0.05: no more steps tell whether they touch."""
+    mesh = trimesh.creation.icosphere(2, 10.0)
+    ball = MeshShape(make_mesh(mesh.vertices, mesh.faces), "off", error=0.05)
+    motion = Motion.screw((0.3, 0.1, 1.0), 1.6, point=(0.0, 60.0, 0.0), parts=("ball",))
+    start = translation(-mesh.bounds[0, 0] + 3.01, 0.0, 0.0)
+    scene = Scene().add("tube", shapes.box((6.0, 20.0, 30.0))).add("ball", ball, start)
+    result = check(Scene(scene.parts, motions=(motion,)), depths=False)
+    row = result.motions[0]
+    assert row.verdict is Verdict.UNCERTAIN
+    assert row.distance.lower == pytest.approx(-0.04, abs=3e-4)
+    assert row.distance.upper == pytest.approx(0.06, abs=3e-4)
+    assert sum(result.work.queries.values()) < 1200
