@@ -11,7 +11,7 @@ import trimesh
 
 from clamp3d.collide.check import check
 from clamp3d.collide.model import ModelCache
-from clamp3d.collide.motions import first_contact
+from clamp3d.collide.motions import first_contact, min_clearance
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
@@ -21,6 +21,7 @@ from clamp3d.core.motion import Motion
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.core.shapes import MeshShape
+from clamp3d.errors import InputError
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
@@ -84,6 +85,38 @@ def test_screw_to_a_pose_arrives_there():
         np.testing.assert_allclose(motion.at(1.0) @ start, goal, atol=1e-9)
         half = motion.at(0.5)
         np.testing.assert_allclose(half @ half, motion.at(1.0), atol=1e-9)  # one and the same screw
+
+
+@pytest.mark.parametrize("angle", [1e-13, 2e-12, 1e-10, 1e-8, 1e-6])
+@pytest.mark.parametrize("far", [0.0, 1e4, 1e8])
+def test_a_part_that_hardly_turns_arrives_too(angle, far):
+    """A turn that is rounding, as of poses with twelve digits: its axis is 1e13 mm away, the goal 50 mm."""
+    rng = np.random.default_rng(1)
+    start = rotation(rng.normal(size=3), 1.0)
+    start[:3, 3] = far * rng.normal(size=3)
+    goal = rotation(rng.normal(size=3), angle) @ start
+    goal[:3, 3] = start[:3, 3] + 30.0 * rng.normal(size=3)
+    motion = Motion.to_pose(goal, parts="a").resolved(start)
+    np.testing.assert_allclose(motion.at(1.0, start), goal, rtol=4e-16, atol=1e-11)
+    middle = 0.5 * (start[:3, 3] + goal[:3, 3])
+    np.testing.assert_allclose(motion.at(0.5, start)[:3, 3], middle, rtol=4e-16, atol=max(1e-11, 50.0 * angle))
+
+
+def test_a_turn_about_an_axis_far_away_costs_a_groove_no_accuracy():
+    groove, wire, start = SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), translation(-1.0, -1.0, 0.0)
+    goals = [rotation((0.1, 0.2, 1.0), angle) for angle in (0.0, 1e-10)]
+    for goal in goals:
+        goal[:3, 3] = 3.0, 0.5, 0.0
+    straight, turned = (min_clearance(groove, wire, Motion.to_pose(goal), start) for goal in goals)
+    assert turned.resolution == pytest.approx(straight.resolution)
+    assert turned.distance.upper == pytest.approx(straight.distance.upper, abs=1e-8)
+
+
+def test_a_depth_is_no_margin_of_bodies_whose_depth_is_not_measured_on_the_way():
+    """Boxes of 10 and 4 mm are 6.9 mm deep in each other soon before they are concentric."""
+    a, b = shapes.box((10, 10, 10)), shapes.box((4, 4, 4))
+    with pytest.raises(InputError, match="margin must be >= 0"):
+        first_contact(a, b, Motion.translate((-20, 0, 0)), translation(20.0, 0.0, 0.0), margin=-6.9)
 
 
 def test_motions_follow_one_another():
