@@ -164,7 +164,7 @@ def least_distance(pair: MovingPair, thresholds: Thresholds, allowance: float | 
         if clash(best) or (width <= limit and verdict is not Verdict.UNCERTAIN) or width <= 2.0 * ACCURACY:
             break
         # What the models leave open at the nearest time they mostly do at all: its lower bound will hardly rise.
-        settled = best.upper == nearest and width <= best.upper - best.lower + 2.0 * ACCURACY
+        settled = best.upper == nearest and width <= 1.1 * (best.upper - best.lower) + 2.0 * ACCURACY
         spare, nearest = spare - 1 if settled else SPARE_STEPS, best.upper
         if not spare:
             break
