@@ -26,8 +26,8 @@ from clamp3d.core.shells import joined
 ACCURACY = 1e-4
 """A least distance on a way is found to within this (mm), or to what the models give."""
 MAX_STEPS = 2000
-SPARE_STEPS = 200
-"""Steps for a nearer time among those that can not be nearer than the nearest time found, by its lower bound."""
+SPARE_STEPS = 100
+"""Steps for a nearer time where what the models leave open at the times looked at leaves the verdict open."""
 MAX_UNINFORMATIVE = 12
 """Answers in a row that told nothing, after which a method is not asked again."""
 SHELL_ERROR = 0.064
@@ -131,19 +131,20 @@ def least_distance(pair: MovingPair, thresholds: Thresholds, allowance: float | 
 
     Branch and bound over t: a stretch is done when nothing in it can come below the best distance found.
     """
-    best, at = Distance(), 0.0
+    best, at, reached = Distance(), 0.0, np.inf
 
     def clash(known: Distance) -> bool:
         return thresholds.verdict(known, allowance) is Verdict.CLASH
 
     def look(t: float, half: float, above: float) -> tuple[float, float]:
-        nonlocal best, at
+        nonlocal best, at, reached
 
         def enough(known: Distance) -> bool:
             sharp = known.upper - known.lower <= max(ACCURACY, 0.02 * abs(known.lower))
             return sharp or known.lower - pair.speed * half >= best.upper - ACCURACY or clash(known)
 
         found = pair.ask(t, enough, thresholds)
+        reached = min(reached, found.lower)
         if found.upper < best.upper:
             best, at = found, t
         lower = pair.lower(t, half, found.lower, best.upper - ACCURACY) if half else found.lower
@@ -163,8 +164,10 @@ def least_distance(pair: MovingPair, thresholds: Thresholds, allowance: float | 
         verdict = thresholds.verdict(Distance(min(floor, lower), best.upper), allowance)
         if clash(best) or (width <= limit and verdict is not Verdict.UNCERTAIN) or width <= 2.0 * ACCURACY:
             break
-        # What the models leave open at the nearest time they mostly do at all: its lower bound will hardly rise.
-        settled = best.upper == nearest and width <= 1.1 * (best.upper - best.lower) + 2.0 * ACCURACY
+        # No lower bound rises above what the models say at the times looked at: where that leaves the verdict open,
+        # only a nearer time can decide.
+        open_ = thresholds.verdict(Distance(min(reached, best.upper), best.upper), allowance) is Verdict.UNCERTAIN
+        settled = open_ and best.upper == nearest and width <= 1.5 * (best.upper - reached) + 2.0 * ACCURACY
         spare, nearest = spare - 1 if settled else SPARE_STEPS, best.upper
         if not spare:
             break

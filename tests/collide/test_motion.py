@@ -22,6 +22,8 @@ from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.core.shapes import MeshShape
 from clamp3d.errors import InputError
+from clamp3d.output.scene_report import check_to_text
+from clamp3d.output.wording import finding_text
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
@@ -269,3 +271,15 @@ def test_what_the_models_leave_open_at_the_nearest_time_is_not_searched_for_else
     assert row.distance.lower == pytest.approx(-0.04, abs=3e-4)
     assert row.distance.upper == pytest.approx(0.06, abs=3e-4)
     assert sum(result.work.queries.values()) < 1200
+
+
+def test_a_first_contact_is_not_told_later_than_it_is():
+    """Within 0.01 mm after 0.12347 of the way."""
+    way = Motion.translate((-10.0, 0.0, 0.0), parts=("b",))
+    box = shapes.box((10.0, 10.0, 10.0))
+    scene = Scene().add("a", box).add("b", box, translation(11.2447, 0.0, 0.0))
+    result = check(Scene(scene.parts, motions=(way,)))
+    assert result.motions[0].contact_at == pytest.approx(0.12347, abs=2e-5)
+    assert "first contact at t = 0.1234," in finding_text(result.motions[0], {"a": "a", "b": "b"})
+    row = next(line for line in check_to_text(result).splitlines() if line.startswith("  translation"))
+    assert " 0.1234 " in row
