@@ -294,15 +294,42 @@ def _by_gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
 
 
 def _touching(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
-    """Lower bound from all faces of both pieces."""
-    best, normal = -np.inf, None
-    for piece, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
+    """Lower bound from all faces of both pieces, and what of the other piece looks at each."""
+    Ra, Rb = Ta[:3, :3], Tb[:3, :3]
+    offset = Tb[:3, 3] - Ta[:3, 3]
+    trials = []
+    for piece, R, other, S, sign in ((a, Ra, b, Rb, 1.0), (b, Rb, a, Ra, -1.0)):
         axes = piece.T[:3, 2] * np.array([[1.0], [-1.0]]) if isinstance(piece, Rod) else piece.planes[:200, :3]
-        for n in dot(sign * axes, T[:3, :3].T):
-            gap, m = _slab(a, Ta, b, Tb, n)
-            if gap > best:
-                best, normal = gap, m
-    return Distance(best, normal=normal, method="convex")
+        n = dot(sign * axes, R.T)
+        trials.append(n)
+        for m in _normals(other, dot(-sign * n, S)):
+            opposite = dot(-sign * m, S.T)
+            trials.append(opposite[np.einsum("ij,ij->i", opposite, n) > 0.5])
+    m = np.vstack(trials)
+    gap = dot(m, offset) - _heights(b, dot(-m, Rb)) - _heights(a, dot(m, Ra))
+    gap -= 4.0 * _EPS * (float(np.abs(offset).sum()) + np.abs(gap))
+    k = int(np.argmax(gap))
+    return Distance(float(gap[k]), normal=m[k], method="convex")
+
+
+def _normals(piece: Convex, n: Array) -> list[Array]:
+    """What ``normals`` of a piece gives for each of some directions (k, 3): arrays (k, 3)."""
+    if isinstance(piece, Hull):
+        return [np.asarray(piece.planes[np.argmax(dot(n, piece.planes[:, :3].T), axis=1), :3])]
+    axis = piece.T[:3, 2]
+    along = dot(n, axis)[:, None]
+    across = n - along * axis
+    size = np.linalg.norm(across, axis=1)[:, None]
+    return [np.copysign(1.0, along) * axis, np.where(size > 1e-9, across / np.maximum(size, 1e-9), 0.0)]
+
+
+def _heights(piece: Convex, n: Array) -> Array:
+    """How far (k,) a piece reaches along directions (k, 3)."""
+    if isinstance(piece, Hull):
+        return np.asarray(dot(n, piece.vertices.T).max(axis=1))
+    m = dot(n, piece.T[:3, :3])
+    across = piece.radius * np.hypot(m[:, 0], m[:, 1])
+    return np.asarray(dot(n, piece.T[:3, 3]) + across + 0.5 * piece.length * np.abs(m[:, 2]))
 
 
 def _depth(piece: Convex, T: Array, x: Array) -> float:

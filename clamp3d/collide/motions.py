@@ -20,6 +20,7 @@ from clamp3d.core.motion_search import Search
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc, place
 from clamp3d.core.shapes import AnyShape, as_shape
+from clamp3d.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +80,7 @@ def first_contact(
     T_a_b : array_like (4, 4), optional
         Pose of b at t = 0.
     margin : float
-        Distance in mm that counts as contact.
+        Distance in mm that counts as contact; below 0, a depth, for a groove and a cylinder alone.
     resolution : float, optional
         For groove and cylinder: depth in mm that may be missed, 1e-12 of the largest size by default (1e-9 where a
         flat end decides).
@@ -105,6 +106,8 @@ def first_contact(
     pair = _searched(a, b, motion, T_a_b, resolution)
     if isinstance(pair, Search):
         return _from_kernel(pair, *pair.first_contact(margin))
+    if margin < 0.0:
+        raise InputError(f"margin must be >= 0 but for a groove and a cylinder, got {margin:g}")
     thresholds = Thresholds(max(margin, 1e-6))
     least, t = least_distance(pair, thresholds, None)
     touches = least.upper <= margin + RESOLUTION

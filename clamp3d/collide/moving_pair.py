@@ -21,10 +21,13 @@ from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core.linear import dot, to_target
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array, inverse
+from clamp3d.core.shells import joined
 
 ACCURACY = 1e-4
 """A least distance on a way is found to within this (mm), or to what the models give."""
 MAX_STEPS = 2000
+SPARE_STEPS = 100
+"""Steps for a nearer time where what the models leave open at the times looked at leaves the verdict open."""
 MAX_UNINFORMATIVE = 12
 """Answers in a row that told nothing, after which a method is not asked again."""
 SHELL_ERROR = 0.064
@@ -112,9 +115,8 @@ class MovingPair:
         moving, still = (v[s.faces] for v, s in zip(placed, (mine, other), strict=True))
         errors = [np.zeros(len(s.faces)) if s.face_error is None else s.face_error for s in (mine, other)]
         ours, theirs = can_meet(self.motion, (moving, errors[0]), (still, errors[1]), limit)
-        shells = [still[rows].reshape(-1, 3) for rows in other.shells]
-        boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in shells])
-        return _Near(limit, moving[ours], errors[0][ours], Standing(still[theirs], errors[1][theirs], boxes))
+        piece = joined(other.faces[theirs], len(other.vertices))[other.faces[theirs, 0]]
+        return _Near(limit, moving[ours], errors[0][ours], Standing(still[theirs], errors[1][theirs], piece))
 
 
 def box_corners(model: Model, T: Array) -> Array:
@@ -129,19 +131,20 @@ def least_distance(pair: MovingPair, thresholds: Thresholds, allowance: float | 
 
     Branch and bound over t: a stretch is done when nothing in it can come below the best distance found.
     """
-    best, at = Distance(), 0.0
+    best, at, reached = Distance(), 0.0, np.inf
 
     def clash(known: Distance) -> bool:
         return thresholds.verdict(known, allowance) is Verdict.CLASH
 
     def look(t: float, half: float, above: float) -> tuple[float, float]:
-        nonlocal best, at
+        nonlocal best, at, reached
 
         def enough(known: Distance) -> bool:
             sharp = known.upper - known.lower <= max(ACCURACY, 0.02 * abs(known.lower))
             return sharp or known.lower - pair.speed * half >= best.upper - ACCURACY or clash(known)
 
         found = pair.ask(t, enough, thresholds)
+        reached = min(reached, found.lower)
         if found.upper < best.upper:
             best, at = found, t
         lower = pair.lower(t, half, found.lower, best.upper - ACCURACY) if half else found.lower
@@ -151,12 +154,22 @@ def least_distance(pair: MovingPair, thresholds: Thresholds, allowance: float | 
     for t, half in ((0.0, 0.0), (1.0, 0.0), (0.5, 0.5)):
         heapq.heappush(heap, (*look(t, half, -np.inf), t, half))
     floor = np.inf  # of stretches that were given up
+    spare, nearest = SPARE_STEPS, best.upper
     for _ in range(MAX_STEPS):
         lower, here, t, half = heap[0]
         width = best.upper - min(floor, lower)
         limit = max(2.0 * ACCURACY, 0.02 * abs(best.upper), 2.0 * (best.upper - best.lower))
+        if best.upper < 0.0:  # depths take the longest
+            limit = max(limit, 0.1 * thresholds.contact)
         verdict = thresholds.verdict(Distance(min(floor, lower), best.upper), allowance)
         if clash(best) or (width <= limit and verdict is not Verdict.UNCERTAIN) or width <= 2.0 * ACCURACY:
+            break
+        # No lower bound rises above what the models say at the times looked at: where that leaves the verdict open,
+        # only a nearer time can decide.
+        open_ = thresholds.verdict(Distance(min(reached, best.upper), best.upper), allowance) is Verdict.UNCERTAIN
+        settled = open_ and best.upper == nearest and width <= 1.5 * (best.upper - reached) + 2.0 * ACCURACY
+        spare, nearest = spare - 1 if settled else SPARE_STEPS, best.upper
+        if not spare:
             break
         heapq.heappop(heap)
         if half * pair.speed <= 0.5 * ACCURACY or here <= lower + ACCURACY:  # the models have no more to say

@@ -28,12 +28,21 @@ _ALL = np.array(list(itertools.combinations(range(6), 3)), dtype=np.int64)
 
 
 class Standing:
-    """Triangles (n, 3, 3) of a part that stands still, each with its error (n,) mm, and the boxes of its shells."""
+    """Triangles (n, 3, 3) of a part that stands still, each with its error (n,) mm.
 
-    def __init__(self, triangles: Array, errors: Array, shells: Array) -> None:
+    ``piece`` (n,) numbers the connected surfaces that they make among themselves: of a shell of which some triangles
+    are left out there may be several.
+    """
+
+    def __init__(self, triangles: Array, errors: Array, piece: NDArray[np.int64]) -> None:
         from rtree import index
 
-        self.triangles, self.errors, self.shells = triangles, errors, shells
+        self.triangles, self.errors = triangles, errors
+        _, first, self.piece = np.unique(piece, return_index=True, return_inverse=True)
+        self.points = triangles[first, 0]
+        self.boxes = np.full((len(first), 2, 3), np.inf) * np.array([[1.0], [-1.0]])
+        np.minimum.at(self.boxes[:, 0], self.piece, triangles.min(axis=1))
+        np.maximum.at(self.boxes[:, 1], self.piece, triangles.max(axis=1))
         low, high = triangles.min(axis=1) - errors[:, None], triangles.max(axis=1) + errors[:, None]
         rows = np.arange(len(triangles))
         self._tree = index.Index((rows, low, high), properties=index.Property(dimension=3)) if len(rows) else None
@@ -86,14 +95,12 @@ def swept_gap(
     rows, other = standing.near(low - reach, high + reach)
     if not len(rows):
         return most
-    # A shell that no triangle of a hull's surface meets may still be inside the hull.
-    held = (low[rows, None] <= standing.shells[:, 0]) & (standing.shells[:, 1] <= high[rows, None])
-    if held.all(axis=2).any():
-        return -np.inf
     shape, gap, errors = _ALL if motion.angle else _PRISM, most, off_chord
     if len(rows) > _MOST:  # where they are at the middle, and as far as they travel from there
         errors = off_chord + 0.5 * span * (norm(motion.travel) + abs(motion.angle) * out)
         shape, hulls = _ONE, at(0.5 * (stretch[0] + stretch[1]))
+    elif _holds(hulls[rows], standing, np.unique(standing.piece[other])):
+        return -np.inf
     still = [(_tree(standing.triangles[other[k]], _ONE), error) for k, error in _levels(standing.errors[other])]
     for k, error in _levels(errors[rows]):
         moving = _tree(hulls[rows[k]], shape)
@@ -103,6 +110,26 @@ def swept_gap(
                 return -np.inf
             gap = min(gap, d - error - off)
     return gap
+
+
+def _holds(hulls: Array, standing: Standing, pieces: NDArray[np.intp]) -> bool:
+    """Whether one of the ``pieces`` may be inside the hull of some row of ``hulls`` (m, 6, 3), whose sides it misses.
+
+    It is as a whole where one of its points is. The planes that separate a point from a hull are those of its sides.
+    """
+    low, high = hulls.min(axis=1), hulls.max(axis=1)
+    for k in pieces:
+        box, point = standing.boxes[k], standing.points[k]
+        around = hulls[((low <= box[0]) & (box[1] <= high)).all(axis=1)] - point
+        if not len(around):
+            continue
+        a, b, c = (around[:, _ALL[:, i]] for i in range(3))
+        height = dot(np.cross(b - a, c - a), np.swapaxes(around, 1, 2))
+        slack = 1e-14 * np.abs(around).max(axis=(1, 2), initial=0.0) ** 3
+        beyond = (height > slack[:, None, None]).all(axis=2) | (height < -slack[:, None, None]).all(axis=2)
+        if not beyond.any(axis=1).all():
+            return True
+    return False
 
 
 def _levels(errors: Array) -> list[tuple[NDArray[np.intp], float]]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.checks import array, items, number, text
-from clamp3d.core.linear import cross, dot, lstsq, norm
-from clamp3d.core.pose import Array, check_pose, inverse, rotation, unit
+from clamp3d.core.linear import cross, dot, norm
+from clamp3d.core.pose import Array, check_pose, rotation, unit
 from clamp3d.errors import InputError
 
 FARTHEST = 1e9
@@ -91,14 +92,16 @@ class Motion:
             return self
         from scipy.spatial.transform import Rotation
 
-        M = dot(self.to, inverse(start))
-        turn = Rotation.from_matrix(M[:3, :3]).as_rotvec()
-        angle, t = norm(turn), M[:3, 3]
+        way = self.to[:3, 3] - start[:3, 3]
+        turn = Rotation.from_matrix(dot(self.to[:3, :3], start[:3, :3].T)).as_rotvec()
+        angle = norm(turn)
         if angle < 1e-12:
-            return replace(self, travel=t, to=None)
+            return replace(self, travel=way, to=None)
         u = turn / angle
-        along = float(dot(t, u)) * u
-        point = lstsq(np.eye(3) - M[:3, :3], t - along, 1e-12)[0]
+        along = float(dot(way, u)) * u
+        across = way - along
+        # The middle of the chord, and from there as far as it is wide for the angle: exact however far the axis is.
+        point = start[:3, 3] + 0.5 * (across + cross(u, across) / math.tan(0.5 * angle))
         return replace(self, axis=u, point=point, angle=angle, travel=along, to=None)
 
     def at(self, t: float, start: Array | None = None) -> Array:
@@ -110,12 +113,13 @@ class Motion:
         if not abs(t) <= _LATEST:
             raise InputError(f"t must be from 0 to 1 (or at most {_LATEST:g} times as far), got {t}")
         T = np.eye(4) if start is None else array("start", start, (4, 4)).copy()
-        # The turn minus one: what does not move is not rounded.
-        turn = np.eye(3)
         if self.angle:
-            turn = rotation(self.axis, t * self.angle)[:3, :3]
-        T[:3, 3] += dot(turn - np.eye(3), T[:3, 3] - self.point) + t * self.travel
-        T[:3, :3] = dot(turn, T[:3, :3])
+            # The turn minus one, by its sine and versine: what hardly turns is hardly rounded, however far the axis is.
+            square = cross(self.axis, T[:3, 3] - self.point)
+            half = math.sin(0.5 * t * self.angle)
+            T[:3, 3] += math.sin(t * self.angle) * square + 2.0 * half * half * cross(self.axis, square)
+            T[:3, :3] = dot(rotation(self.axis, t * self.angle)[:3, :3], T[:3, :3])
+        T[:3, 3] += t * self.travel
         return T
 
     def from_axis(self, points: Array) -> Array:

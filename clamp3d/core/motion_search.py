@@ -54,7 +54,9 @@ class Search:
         offset, motion = self.start[:3, 3], self.motion
         lengths = np.abs(offset).max() + np.abs(motion.travel).max() + along
         if motion.angle != 0.0:
-            lengths += 2.0 * np.abs(offset - motion.point).max() + np.abs(motion.point).max()
+            # A small turn about a far axis takes no more of the rounding of that distance than of the distance itself.
+            turned = min(1.0, abs(motion.angle))
+            lengths += turned * (2.0 * np.abs(offset - motion.point).max() + np.abs(motion.point).max())
         return _ROUNDING * float(lengths) * (1.0 + abs(motion.angle))
 
     def pose(self, t: float) -> Array:

@@ -14,6 +14,7 @@ from clamp3d.output.wording import (
     counted,
     distance_text,
     finding_text,
+    first_text,
     headline,
     meaning,
     titles,
@@ -80,7 +81,7 @@ def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
                 r.verdict.value,
                 distance_text(r.distance),
                 "" if r.t is None else f"{r.t:.4f}",
-                "" if r.contact_at is None else f"{r.contact_at:.4f}",
+                "" if r.contact_at is None else first_text(r.contact_at),
                 r.distance.method,
             )
             for r in result.motions

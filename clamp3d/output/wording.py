@@ -151,12 +151,21 @@ def circumstances(row: PairResult) -> str:
     """Where a finding is: when in a motion, and where in space parts overlap; or why there is no verdict."""
     said = []
     if row.motion is not None:
-        first = "" if row.contact_at is None else f"first contact at t = {row.contact_at:.4f}, "
+        first = "" if row.contact_at is None else f"first contact at t = {first_text(row.contact_at)}, "
         kind = "deepest found" if row.verdict in BAD else "nearest"
         said.append(f"in motion {row.motion!r}" + ("" if row.t is None else f": {first}{kind} at t = {row.t:.4f}"))
     if row.where is not None:
         said.append(where_text(row.where))
     return "; ".join([*said, row.reason] if row.reason else said)
+
+
+def first_text(t: float) -> str:
+    """The time of a first contact, never late.
+
+    >>> first_text(0.12349), first_text(0.9), first_text(1.0)
+    ('0.1234', '0.9000', '1.0000')
+    """
+    return f"{Decimal(repr(float(t))).quantize(Decimal('0.0001'), rounding=ROUND_FLOOR):f}"
 
 
 def finding_text(row: PairResult, names: dict[str, str]) -> str:

@@ -10,6 +10,7 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
+from clamp3d.collide import convex
 from clamp3d.collide.convex import Rod, convex_distance
 from clamp3d.collide.depth_convex import convex_depth
 from clamp3d.collide.hull import Hull, hull
@@ -238,3 +239,25 @@ def test_the_depth_of_parallel_cylinders_is_known_to_rounding():
         depth = (Fraction(length) + Fraction(other)) / 2 - Fraction(off)
         assert found.lower <= -depth <= found.upper
         assert found.upper - found.lower < 2e-12
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_all_faces_prove_is_the_best_that_any_of_them_does(seed):
+    """The planes of every face and axis, and of what looks at each on the other side, one by one."""
+    rng = np.random.default_rng(seed)
+
+    def piece():
+        if rng.random() < 0.4:
+            return Rod(*rng.uniform(0.1, 5.0, 2), rotation(rng.normal(size=3), 1.0) @ translation(*rng.normal(size=3)))
+        return hull(rng.normal(size=(rng.choice([8, 60]), 3)) * rng.uniform(1.0, 5.0, 3))
+
+    a, b = piece(), piece()
+    Ta, Tb = (translation(*far) @ rotation(rng.normal(size=3), 2.0) for far in (np.zeros(3), 6.0 * rng.normal(size=3)))
+    found = convex._touching(a, Ta, b, Tb)
+    best = -np.inf
+    for one, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
+        axes = one.planes[:, :3] if isinstance(one, Hull) else one.T[:3, 2] * np.array([[1.0], [-1.0]])
+        best = max([best, *(convex._slab(a, Ta, b, Tb, sign * T[:3, :3] @ n)[0] for n in axes)])
+    assert found.lower == pytest.approx(best, abs=1e-12)
+    points = [corners(one, T, sides=720, scale=1.0) @ found.normal for one, T in ((a, Ta), (b, Tb))]
+    assert points[1].min() - points[0].max() == pytest.approx(found.lower, abs=1e-4)

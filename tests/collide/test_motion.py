@@ -11,7 +11,7 @@ import trimesh
 
 from clamp3d.collide.check import check
 from clamp3d.collide.model import ModelCache
-from clamp3d.collide.motions import first_contact
+from clamp3d.collide.motions import first_contact, min_clearance
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
@@ -21,6 +21,9 @@ from clamp3d.core.motion import Motion
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.core.shapes import MeshShape
+from clamp3d.errors import InputError
+from clamp3d.output.scene_report import check_to_text
+from clamp3d.output.wording import finding_text
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
@@ -84,6 +87,38 @@ def test_screw_to_a_pose_arrives_there():
         np.testing.assert_allclose(motion.at(1.0) @ start, goal, atol=1e-9)
         half = motion.at(0.5)
         np.testing.assert_allclose(half @ half, motion.at(1.0), atol=1e-9)  # one and the same screw
+
+
+@pytest.mark.parametrize("angle", [1e-13, 2e-12, 1e-10, 1e-8, 1e-6])
+@pytest.mark.parametrize("far", [0.0, 1e4, 1e8])
+def test_a_part_that_hardly_turns_arrives_too(angle, far):
+    """A turn that is rounding, as of poses with twelve digits: its axis is 1e13 mm away, the goal 50 mm."""
+    rng = np.random.default_rng(1)
+    start = rotation(rng.normal(size=3), 1.0)
+    start[:3, 3] = far * rng.normal(size=3)
+    goal = rotation(rng.normal(size=3), angle) @ start
+    goal[:3, 3] = start[:3, 3] + 30.0 * rng.normal(size=3)
+    motion = Motion.to_pose(goal, parts="a").resolved(start)
+    np.testing.assert_allclose(motion.at(1.0, start), goal, rtol=4e-16, atol=1e-11)
+    middle = 0.5 * (start[:3, 3] + goal[:3, 3])
+    np.testing.assert_allclose(motion.at(0.5, start)[:3, 3], middle, rtol=4e-16, atol=max(1e-11, 50.0 * angle))
+
+
+def test_a_turn_about_an_axis_far_away_costs_a_groove_no_accuracy():
+    groove, wire, start = SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), translation(-1.0, -1.0, 0.0)
+    goals = [rotation((0.1, 0.2, 1.0), angle) for angle in (0.0, 1e-10)]
+    for goal in goals:
+        goal[:3, 3] = 3.0, 0.5, 0.0
+    straight, turned = (min_clearance(groove, wire, Motion.to_pose(goal), start) for goal in goals)
+    assert turned.resolution == pytest.approx(straight.resolution)
+    assert turned.distance.upper == pytest.approx(straight.distance.upper, abs=1e-8)
+
+
+def test_a_depth_is_no_margin_of_bodies_whose_depth_is_not_measured_on_the_way():
+    """Boxes of 10 and 4 mm are 6.9 mm deep in each other soon before they are concentric."""
+    a, b = shapes.box((10, 10, 10)), shapes.box((4, 4, 4))
+    with pytest.raises(InputError, match="margin must be >= 0"):
+        first_contact(a, b, Motion.translate((-20, 0, 0)), translation(20.0, 0.0, 0.0), margin=-6.9)
 
 
 def test_motions_follow_one_another():
@@ -205,3 +240,46 @@ def test_first_contact_of_meshes_does_not_depend_on_what_slides_close_by(kind, g
     assert hit.touches
     assert 0.0 <= (truth - hit.t) * length <= 2e-4
     assert hit.evaluations < 1000
+
+
+def test_a_fin_is_met_though_its_foot_is_nearer_the_axis_than_a_plate_that_screws_past():
+    """The post itself is never reached: the fin's sides alone are inside the hull of what the plate's face sweeps."""
+    import manifold3d
+
+    root = np.array([(0.0, -0.5, -0.5), (0.0, 0.5, -0.5), (0.0, 0.5, 0.5), (0.0, -0.5, 0.5), (20.5, 0.0, 0.0)])
+    fin = manifold3d.Manifold.hull_points(root).translate((0.0, 0.0, 30.0))
+    made = (manifold3d.Manifold.cylinder(600.0, 17.0, 17.0, 96, True) + fin).to_mesh64()
+    post = MeshShape(make_mesh(made.vert_properties, made.tri_verts), "off")
+    plate = joined(((20, -100, -0.5), (60, 100, 0.5)))
+    motion = Motion.screw((0.0, 0.0, 1.0), 0.15, travel=100.0, parts=("plate",))
+    scene = Scene(Scene().add("post", post).add("plate", plate).parts, motions=(motion,))
+    row = check(scene, depths=False).motions[0]
+    assert row.verdict is Verdict.CLASH
+    assert 0.29 < row.contact_at < 0.3
+
+
+def test_what_the_models_leave_open_at_the_nearest_time_is_not_searched_for_elsewhere():
+    """0.01 mm apart at the start, known to 0.05: no more steps tell whether they touch."""
+    mesh = trimesh.creation.icosphere(2, 10.0)
+    ball = MeshShape(make_mesh(mesh.vertices, mesh.faces), "off", error=0.05)
+    motion = Motion.screw((0.3, 0.1, 1.0), 1.6, point=(0.0, 60.0, 0.0), parts=("ball",))
+    start = translation(-mesh.bounds[0, 0] + 3.01, 0.0, 0.0)
+    scene = Scene().add("tube", shapes.box((6.0, 20.0, 30.0))).add("ball", ball, start)
+    result = check(Scene(scene.parts, motions=(motion,)), depths=False)
+    row = result.motions[0]
+    assert row.verdict is Verdict.UNCERTAIN
+    assert row.distance.lower == pytest.approx(-0.04, abs=3e-4)
+    assert row.distance.upper == pytest.approx(0.06, abs=3e-4)
+    assert sum(result.work.queries.values()) < 1200
+
+
+def test_a_first_contact_is_not_told_later_than_it_is():
+    """Within 0.01 mm after 0.12347 of the way."""
+    way = Motion.translate((-10.0, 0.0, 0.0), parts=("b",))
+    box = shapes.box((10.0, 10.0, 10.0))
+    scene = Scene().add("a", box).add("b", box, translation(11.2447, 0.0, 0.0))
+    result = check(Scene(scene.parts, motions=(way,)))
+    assert result.motions[0].contact_at == pytest.approx(0.12347, abs=2e-5)
+    assert "first contact at t = 0.1234," in finding_text(result.motions[0], {"a": "a", "b": "b"})
+    row = next(line for line in check_to_text(result).splitlines() if line.startswith("  translation"))
+    assert " 0.1234 " in row

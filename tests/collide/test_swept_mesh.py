@@ -21,9 +21,12 @@ seeds = st.integers(0, 10**6)
 
 
 def standing(triangles, errors, *, wide=False):
-    """Triangles that are a shell each; ``wide``: parts of shells so large that nothing can hold them."""
-    boxes = np.stack([triangles.min(axis=1), triangles.max(axis=1)], axis=1)
-    return Standing(triangles, errors, boxes + 1e3 * np.array([[-1.0], [1.0]]) if wide else boxes)
+    """Triangles that are a piece each; ``wide``: one piece with a triangle that no others come near."""
+    n = len(triangles)
+    if not wide:
+        return Standing(triangles, errors, np.arange(n))
+    far = 1e6 + np.eye(3)
+    return Standing(np.concatenate([triangles, far[None]]), np.append(errors, 0.0), np.zeros(n + 1, dtype=np.int64))
 
 
 def some_triangles(rng, most, spread):
@@ -132,12 +135,12 @@ def test_what_the_side_of_a_turning_triangle_passes_is_met(seed, angle):
 def test_a_bead_that_a_face_passes_over_is_met(monkeypatch):
     """No triangle of the swept hull's surface comes near it: it is inside, whatever else stands elsewhere."""
     bead = trimesh.creation.box(bounds=[(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)])
-    inside = Standing(bead.triangles, np.zeros(12), bead.bounds[None])
+    inside = Standing(bead.triangles, np.zeros(12), np.zeros(12, dtype=np.int64))
     far = np.array([[50.0, 50.0, 50.0], [51.0, 51.0, 51.0]])
     two = Standing(
         np.vstack([bead.triangles, trimesh.creation.box(bounds=far).triangles]),
         np.zeros(24),
-        np.stack([bead.bounds, far]),
+        np.repeat([7, 4], 12),
     )
     face, way = np.array([[(-9.0, -9.0, 5.0), (9.0, -9.0, 5.0), (0.0, 9.0, 5.0)]]), Motion.translate((0.0, 0.0, -10.0))
     beside = face + np.array([0.0, 25.0, 0.0])
@@ -151,3 +154,13 @@ def test_a_bead_that_a_face_passes_over_is_met(monkeypatch):
     assert swept_gap(inside, face, np.zeros(1), way, (0.0, 0.4), 9.0) == pytest.approx(0.9, abs=1e-9)
     turn = Motion.screw((1.0, 0.0, 0.0), 0.1)
     assert swept_gap(inside, face, np.zeros(1), turn, (0.0, 1.0), 9.0) <= 4.9
+
+
+def test_a_piece_beside_a_slanted_way_is_not_held():
+    """The box around what a face sweeps holds the bead, the hull of it does not: 1 mm is left, however long the way."""
+    bead = trimesh.creation.box(bounds=[(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)])
+    still = Standing(bead.triangles, np.zeros(12), np.zeros(12, dtype=np.int64))
+    face = np.array([[(-20.0, -21.0, -9.0), (20.0, 19.0, -9.0), (0.0, -1.0, 9.0)]])
+    way = Motion.translate((20.0, 20.0, 0.0))
+    left = 0.5 * math.sqrt(2.0) - 0.1 * math.sqrt(2.0)
+    assert swept_gap(still, face, np.zeros(1), way, (0.0, 1.0), 9.0) == pytest.approx(left, abs=1e-9)
