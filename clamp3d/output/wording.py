@@ -49,10 +49,19 @@ def distance_text(distance: Distance, *, digits: int = 6) -> str:
 
 def _rounded(value: float, rounding: str) -> str:
     """Four significant digits, six decimals at most, rounded to the safe side."""
-    exact = Decimal(repr(float(value)))  # the digits that name the float: its last bit is no digit of a length
+    exact = _decimal(value)
     digits = min(6, max(0, 3 - exact.adjusted())) if exact else 0
-    text = f"{exact.quantize(Decimal(1).scaleb(-digits), rounding=rounding):f}"
+    text = f"{_to_digits(exact, digits, rounding):f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def _decimal(value: float) -> Decimal:
+    """The digits that name the float: its last bit is no digit of a length."""
+    return Decimal(repr(float(value)))
+
+
+def _to_digits(exact: Decimal, digits: int, rounding: str) -> Decimal:
+    return exact.quantize(Decimal(1).scaleb(-digits), rounding=rounding)
 
 
 def part_title(part: Part) -> str:
@@ -165,7 +174,7 @@ def first_text(t: float) -> str:
     >>> first_text(0.12349), first_text(0.9), first_text(1.0)
     ('0.1234', '0.9000', '1.0000')
     """
-    return f"{Decimal(repr(float(t))).quantize(Decimal('0.0001'), rounding=ROUND_FLOOR):f}"
+    return f"{_to_digits(_decimal(t), 4, ROUND_FLOOR):f}"
 
 
 def finding_text(row: PairResult, names: dict[str, str]) -> str:
@@ -198,8 +207,8 @@ def where_text(where: Overlap) -> str:
 
 def _tenths(value: float, rounding: str) -> str:
     """A coordinate in tenths of a millimetre, rounded outward but for the rounding of floats."""
-    near = round(value, 6) + 0.0
-    text = f"{Decimal(repr(near)).quantize(Decimal('0.1'), rounding=rounding) + 0:f}"
+    near = _decimal(round(value, 6) + 0.0)
+    text = f"{_to_digits(near, 1, rounding) + 0:f}"
     return text.removesuffix(".0")
 
 
