@@ -36,12 +36,12 @@ class Rod:
     T: Array
 
     def support(self, n: Array) -> Array:
-        """The point (3,) that lies furthest along ``n`` (3,)."""
-        R, t = self.T[:3, :3], self.T[:3, 3]
-        m = dot(n, R)
-        across = float(np.hypot(m[0], m[1]))
-        scale = self.radius / across if across > 1e-12 else 0.0
-        return np.asarray(t + dot(R, np.array([scale * m[0], scale * m[1], np.copysign(0.5 * self.length, m[2])])))
+        """The points (k, 3) that lie furthest along ``n`` (k, 3)."""
+        m = dot(n, self.T[:3, :3])
+        across = np.hypot(m[:, 0], m[:, 1])
+        local = m * np.where(across > 1e-12, self.radius / np.maximum(across, 1e-12), 0.0)[:, None]
+        local[:, 2] = np.copysign(0.5 * self.length, m[:, 2])
+        return np.asarray(to_target(self.T, local))
 
     def face(self, n: Array) -> Array:
         """Points (k, 3) of what lies furthest along ``n`` (3,): a line on the side, the rim of an end, a point."""
@@ -56,7 +56,7 @@ class Rod:
             z = np.linspace(-0.5, 0.5, 65) * self.length
             local = np.column_stack([np.outer(np.ones(65), self.radius / across * m[:2]), z])
         else:
-            return self.support(n)[None]
+            return self.support(n[None])
         return np.asarray(to_target(self.T, local))
 
     def flatness(self, n: Array, within: float = FLAT) -> tuple[int, Array | None]:
@@ -73,14 +73,14 @@ class Rod:
             np.minimum(self.radius - np.hypot(local[:, 0], local[:, 1]), 0.5 * self.length - np.abs(local[:, 2]))
         )
 
-    def normals(self, n: Array) -> list[Array]:
-        """Directions near ``n`` (3,) in which the surface is flat or round: the axis, and across it."""
+    def normals(self, n: Array) -> Array:
+        """Directions near ``n`` (k, 3) in which the surface is flat or round (m, 3): the axis, and across it."""
         axis = self.T[:3, 2]
-        along = float(dot(n, axis))
+        along = dot(n, axis)[:, None]
         across = n - along * axis
-        size = norm(across)
-        found = [np.copysign(1.0, along) * axis]
-        return [*found, across / size] if size > 1e-9 else found
+        size = np.linalg.norm(across, axis=1)
+        aside = size > 1e-9
+        return np.vstack([np.copysign(1.0, along) * axis, across[aside] / size[aside, None]])
 
     def closest(self, points: Array) -> Array:
         """The points of the rod (k, 3) that are nearest to ``points`` (k, 3)."""
@@ -177,7 +177,7 @@ def _proven(a: Convex, Ta: Array, b: Convex, Tb: Array, p: Array, q: Array, d: f
     """Points ``p``, ``q`` of two pieces that are ``d`` mm apart, with what the slab between the pieces proves."""
     if not 0.0 < d < np.inf:
         return Distance()
-    low, normal = _slab(a, Ta, b, Tb, (q - p) / d)
+    low, normal = _slab(a, Ta, b, Tb, (q - p)[None] / d)
     if d - low > 1e-5 * (1.0 + d):  # they overlap, or another place is nearer
         return Distance(low, normal=normal)
     return Distance(low, d, p, q, normal, None, "features", "convex")
@@ -197,7 +197,7 @@ def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None, rims: bool
     found = Distance()
     if abs(float(dot(m, axis))) <= FLAT:  # square to the axis: on the side
         p = x + a.radius * m
-        low, normal = _slab(a, Ta, b, Tb, m)
+        low, normal = _slab(a, Ta, b, Tb, m[None])
         if d >= a.radius:
             found = Distance(low, d - a.radius, p, q, normal, None, "features", "convex")
         else:
@@ -267,7 +267,7 @@ def _by_gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
         size = norm(q - p)
         if 0.0 < size < np.inf:
             n = (q - p) / size
-            low, m = _slab(a, Ta, b, Tb, n)
+            low, m = _slab(a, Ta, b, Tb, n[None])
             outside = max(0.0, -_depth(a, Ta, p), -_depth(b, Tb, q))
             found = Distance(low, size + 2.0 * outside, p, q, m, None, "features", "convex (GJK)")
             if found.upper - found.lower > 1e-10 and (isinstance(a, Hull) or isinstance(b, Hull)):
@@ -284,7 +284,7 @@ def _by_gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
         size = norm(n)
         if not 0.0 < size < np.inf:
             continue
-        low, m = max((_slab(a, Ta, b, Tb, s * n / size) for s in (1.0, -1.0)), key=lambda found: found[0])
+        low, m = _slab(a, Ta, b, Tb, np.array([n, -n]) / size)
         reach = abs(float(contact.penetration_depth))
         trials = [at + s * reach * n / size for s in (0.0, -0.5, 0.5, -0.25, 0.25)]
         new = _deepest(a, Ta, b, Tb, trials, low, MEMBER * (1.0 + float(np.abs(at).max())))
@@ -295,58 +295,28 @@ def _by_gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
 
 def _touching(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
     """Lower bound from all faces of both pieces, and what of the other piece looks at each."""
-    Ra, Rb = Ta[:3, :3], Tb[:3, :3]
-    offset = Tb[:3, 3] - Ta[:3, 3]
     trials = []
-    for piece, R, other, S, sign in ((a, Ra, b, Rb, 1.0), (b, Rb, a, Ra, -1.0)):
+    for piece, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
         axes = piece.T[:3, 2] * np.array([[1.0], [-1.0]]) if isinstance(piece, Rod) else piece.planes[:200, :3]
-        n = dot(sign * axes, R.T)
-        trials.append(n)
-        for m in _normals(other, dot(-sign * n, S)):
-            opposite = dot(-sign * m, S.T)
-            trials.append(opposite[np.einsum("ij,ij->i", opposite, n) > 0.5])
-    m = np.vstack(trials)
-    gap = dot(m, offset) - _heights(b, dot(-m, Rb)) - _heights(a, dot(m, Ra))
-    gap -= 4.0 * _EPS * (float(np.abs(offset).sum()) + np.abs(gap))
-    k = int(np.argmax(gap))
-    return Distance(float(gap[k]), normal=m[k], method="convex")
-
-
-def _normals(piece: Convex, n: Array) -> list[Array]:
-    """What ``normals`` of a piece gives for each of some directions (k, 3): arrays (k, 3)."""
-    if isinstance(piece, Hull):
-        return [np.asarray(piece.planes[np.argmax(dot(n, piece.planes[:, :3].T), axis=1), :3])]
-    axis = piece.T[:3, 2]
-    along = dot(n, axis)[:, None]
-    across = n - along * axis
-    size = np.linalg.norm(across, axis=1)[:, None]
-    return [np.copysign(1.0, along) * axis, np.where(size > 1e-9, across / np.maximum(size, 1e-9), 0.0)]
-
-
-def _heights(piece: Convex, n: Array) -> Array:
-    """How far (k,) a piece reaches along directions (k, 3)."""
-    if isinstance(piece, Hull):
-        return np.asarray(dot(n, piece.vertices.T).max(axis=1))
-    m = dot(n, piece.T[:3, :3])
-    across = piece.radius * np.hypot(m[:, 0], m[:, 1])
-    return np.asarray(dot(n, piece.T[:3, 3]) + across + 0.5 * piece.length * np.abs(m[:, 2]))
+        trials.append(dot(sign * axes, T[:3, :3].T))
+    low, normal = _slab(a, Ta, b, Tb, np.vstack(trials))
+    return Distance(low, normal=normal, method="convex")
 
 
 def _depth(piece: Convex, T: Array, x: Array) -> float:
     return float(piece.depth(to_source(T, x)[None])[0])
 
 
-def _slab(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array) -> tuple[float, Array]:
-    """Largest signed gap between two planes square to a normal near ``n`` (a to b) that part the pieces; and it."""
+def _slab(a: Convex, Ta: Array, b: Convex, Tb: Array, near: Array) -> tuple[float, Array]:
+    """Largest signed gap between two planes that part the pieces, square to one of the normals ``near`` (k, 3) from a
+    to b or to what either piece has beside one; and that normal (3,).
+    """
     Ra, Rb = Ta[:3, :3], Tb[:3, :3]
     offset = Tb[:3, 3] - Ta[:3, 3]
-    best, normal = -np.inf, n
-    trials = [n, *(dot(Ra, m) for m in a.normals(dot(n, Ra))), *(-dot(Rb, m) for m in b.normals(dot(-n, Rb)))]
-    for m in trials:
-        if float(dot(m, n)) > 0.5:
-            ma, mb = dot(m, Ra), dot(m, Rb)
-            gap = float(dot(m, offset) + dot(mb, b.support(-mb)) - dot(ma, a.support(ma)))
-            gap -= 4.0 * _EPS * float(np.abs(offset).sum() + abs(gap))
-            if gap > best:
-                best, normal = gap, m
-    return best, normal
+    n = np.vstack([near, dot(a.normals(dot(near, Ra)), Ra.T), -dot(b.normals(-dot(near, Rb)), Rb.T)])
+    na, nb = dot(n, Ra), -dot(n, Rb)
+    reach = np.einsum("ij,ij->i", na, a.support(na)) + np.einsum("ij,ij->i", nb, b.support(nb))
+    gap = dot(n, offset) - reach
+    gap -= 4.0 * _EPS * (float(np.abs(offset).sum()) + np.abs(gap))
+    k = int(np.argmax(gap))
+    return float(gap[k]), n[k]

@@ -37,19 +37,8 @@ Supports = Callable[[Array], Array]
 
 def supports(piece: Convex, T: Array) -> Supports:
     """Support points of a piece placed by ``T`` (4, 4)."""
-    if isinstance(piece, Hull):
-        V = to_target(T, piece.vertices)
-        return lambda N: V[np.argmax(dot(N, V.T), axis=1)]
-    P = dot(T, piece.T)
-    R, t, r, half = P[:3, :3], P[:3, 3], piece.radius, 0.5 * piece.length
-
-    def rod(N: Array) -> Array:
-        m = dot(N, R)
-        across = np.hypot(m[:, 0], m[:, 1])
-        scale = np.where(across > 1e-12, r / np.maximum(across, 1e-300), 0.0)
-        return np.asarray(dot(np.column_stack([scale * m[:, 0], scale * m[:, 1], np.copysign(half, m[:, 2])]), R.T) + t)
-
-    return rod
+    R = T[:3, :3]
+    return lambda N: to_target(T, piece.support(dot(N, R)))
 
 
 def _outline(piece: Convex, T: Array) -> tuple[Array, Array, Array]:

@@ -103,8 +103,8 @@ def _less(body: ClosedForm, hole: Extrusion) -> list[ClosedForm] | None:
     if circle is not None:
         T = _pose(hole, circle.centre)
         z, middle = T[:3, 2], T[:3, 3]
-        low = max(float(dot(z, piece.support(-z) - middle)) for piece in body.outers)
-        high = min(float(dot(z, piece.support(z) - middle)) for piece in body.outers)
+        ends = [dot(piece.support(np.array([-z, z])) - middle, z) for piece in body.outers]
+        low, high = float(max(below for below, _ in ends)), float(min(above for _, above in ends))
         T[:3, 3] = middle + 0.5 * (low + high) * z
         return [replace(body, bores=(*body.bores, Bore(circle.radius, math.pi, max(high - low, 1e-6), T)))]
     if hole.profile.arcs:

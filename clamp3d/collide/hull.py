@@ -52,8 +52,8 @@ class Hull:
         return box_of(self.vertices, self.edges)
 
     def support(self, n: Array) -> Array:
-        """The vertex (3,) that lies furthest along ``n`` (3,)."""
-        return np.asarray(self.vertices[int(np.argmax(dot(self.vertices, n)))])
+        """The vertices (k, 3) that lie furthest along ``n`` (k, 3)."""
+        return np.asarray(self.vertices[np.argmax(dot(n, self.vertices.T), axis=1)])
 
     def _highest(self, n: Array, within: float = FLAT) -> Array:
         height = dot(self.vertices, n)
@@ -77,9 +77,9 @@ class Hull:
         """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""
         return np.asarray(-(dot(points, self.planes[:, :3].T) + self.planes[:, 3]).max(axis=1))
 
-    def normals(self, n: Array) -> list[Array]:
-        """The face normal nearest to ``n`` (3,)."""
-        return [np.asarray(self.planes[int(np.argmax(dot(self.planes[:, :3], n))), :3])]
+    def normals(self, n: Array) -> Array:
+        """The face normals (k, 3) nearest to ``n`` (k, 3)."""
+        return np.asarray(self.planes[np.argmax(dot(n, self.planes[:, :3].T), axis=1), :3])
 
     def near(self, n: Array | None) -> tuple[Array, Array, Array]:
         """Corners (k, 3), edges (k, 2, 3) and triangles (k, 3, 3), of a large hull only those that face ``n`` (3,)."""

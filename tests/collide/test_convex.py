@@ -93,19 +93,19 @@ def test_what_is_furthest_nearest_and_inside(piece):
     T, rng = (piece.T if isinstance(piece, Rod) else HERE), np.random.default_rng(0)
     points = corners(piece, HERE, 720) if isinstance(piece, Rod) else piece.vertices
     for n in [*directions(20), T[:3, 2], -T[:3, 2], T[:3, 0], -T[:3, 1]]:
-        top = (points @ n).max()
-        assert piece.support(n) @ n == pytest.approx(top, abs=1e-4)
-        assert piece.support(n) @ n >= top - 1e-12
+        top, furthest = (points @ n).max(), piece.support(n[None])
+        assert furthest @ n == pytest.approx([top], abs=1e-4)
+        assert furthest @ n >= top - 1e-12
         face = piece.face(n)
-        assert face @ n == pytest.approx(np.full(len(face), piece.support(n) @ n), abs=1e-7)
-        assert piece.depth(np.vstack([face, piece.support(n)[None]])).min() >= -1e-9
-        named = piece.normals(n)
+        assert face @ n == pytest.approx(np.full(len(face), (furthest @ n).item()), abs=1e-7)
+        assert piece.depth(np.vstack([face, furthest])).min() >= -1e-9
+        named = piece.normals(n[None])
         assert all(np.linalg.norm(m) == pytest.approx(1.0, abs=1e-12) for m in named)
         dimension, line = piece.flatness(n)
         assert np.linalg.matrix_rank(face - face[0], tol=1e-7) == dimension
         assert line is None if dimension != 1 else abs(line @ n) < 1e-9
     for flat in (T[:3, 2], -T[:3, 2]):
-        assert max(flat @ m for m in piece.normals(flat + 0.1 * T[:3, 0])) == pytest.approx(1.0, abs=1e-12)
+        assert max(piece.normals((flat + 0.1 * T[:3, 0])[None]) @ flat) == pytest.approx(1.0, abs=1e-12)
     x = to_target(T, 4.0 * rng.normal(size=(300, 3)))
     local = np.abs(to_target(inverse(T), x))
     if isinstance(piece, Rod):
@@ -257,7 +257,7 @@ def test_what_all_faces_prove_is_the_best_that_any_of_them_does(seed):
     best = -np.inf
     for one, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
         axes = one.planes[:, :3] if isinstance(one, Hull) else one.T[:3, 2] * np.array([[1.0], [-1.0]])
-        best = max([best, *(convex._slab(a, Ta, b, Tb, sign * T[:3, :3] @ n)[0] for n in axes)])
+        best = max([best, *(convex._slab(a, Ta, b, Tb, sign * (T[:3, :3] @ n)[None])[0] for n in axes)])
     assert found.lower == pytest.approx(best, abs=1e-12)
     points = [corners(one, T, sides=720, scale=1.0) @ found.normal for one, T in ((a, Ta), (b, Tb))]
     assert points[1].min() - points[0].max() == pytest.approx(found.lower, abs=1e-4)

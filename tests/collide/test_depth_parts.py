@@ -228,7 +228,7 @@ def test_support_points_are_furthest():
         assert body(shape).field((found - T[:3, 3]) @ T[:3, :3]).max() <= 1e-9
         best = (N * found).sum(axis=1)
         assert (best >= (N @ inside.T).max(axis=1)).all()
-        assert piece.support(N[0] @ T[:3, :3]) == pytest.approx((found[0] - T[:3, 3]) @ T[:3, :3], abs=1e-12)
+        assert piece.support(N @ T[:3, :3]) == pytest.approx((found - T[:3, 3]) @ T[:3, :3], abs=1e-12)
 
 
 def test_directions_and_their_crossings():
