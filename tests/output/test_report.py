@@ -34,7 +34,7 @@ from clamp3d.scenefile.file import load_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 LOOSE = {"line": "LGJ-10/2", "jumper": "LJ-150"}
-WIRES = [{}, {"line": "LJ-500", "jumper": "LJ-185"}, {"line": "LJ-300", "jumper": "LJ-95"}]
+WIRES = [{}, {"line": "LJ-500", "jumper": "LJ-185"}]
 
 
 @pytest.fixture(scope="module")

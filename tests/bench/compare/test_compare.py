@@ -251,7 +251,7 @@ def test_a_quick_search_is_timed_three_times() -> None:
 
 def test_exponents_of_table_5(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table_5, "_timed", lambda run: (run(), 1.0))  # what is counted is the same each time
-    sweeps = table_5.complexity(scale=0.3)
+    sweeps = table_5.complexity(scale=0.2)
     by = {(s.search, s.method, s.varied, s.fixed.split(",")[0]): s for s in sweeps}
     assert by["grid", "cas", "n", "a = 2"].exponents[:2] == pytest.approx((2.0, 2.0))
     assert by["grid", "cas", "n", "a = 3"].exponents[:2] == pytest.approx((3.0, 3.0))

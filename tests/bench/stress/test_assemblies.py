@@ -18,7 +18,7 @@ from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import Section
 
-CLAMPS = 8
+CLAMPS = 5
 
 
 @pytest.mark.parametrize("family", ASSEMBLIES)

@@ -16,8 +16,8 @@ from clamp3d.errors import InputError
 
 ANSWERED = ("mesh: soup", "mesh: turned")
 NEVER = ("mesh: open", "mesh: empty")
-CASES = {"mesh": 100, "fit": 30, "scene": 12}
-REFUSING = 150
+CASES = {"mesh": 60, "fit": 18, "scene": 8}
+REFUSING = 60
 
 
 def _ask(family: MeshFamily, name: str, n: int, seed: int = 7) -> Outcome:
