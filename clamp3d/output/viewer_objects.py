@@ -20,6 +20,8 @@ _CREASE = math.radians(25.0)
 """Faces that meet at less are shaded as one round surface; sharper edges are drawn as lines."""
 _FRONT = 10
 """Render order of what is drawn over the solids; labels come after it."""
+_SHADES = 32
+"""Colours of a label's picture: its two, and what is between them at their edges."""
 
 
 def command(path: str, what: g.Object) -> dict[str, Any]:
@@ -180,7 +182,8 @@ def _text_image(text: str, colour: str, ink: str) -> tuple[bytes, float]:
     draw.rounded_rectangle((1, 1, width - 2, height - 2), height // 2 - 2, fill=colour, outline=INK, width=2)
     draw.text((width / 2, height / 2), text, fill=ink, font=font, anchor="mm")
     out = io.BytesIO()
-    picture.save(out, format="PNG")
+    # A third of the bytes that a picture with all colours has: labels are most of a page of thousands of parts.
+    picture.quantize(_SHADES, Image.Quantize.FASTOCTREE).save(out, format="PNG")
     return out.getvalue(), width / height
 
 
