@@ -17,7 +17,7 @@ from pathlib import Path
 from clamp3d.cli import group
 
 for command in (
-    ["run", "--quiet"], ["tolerance", "--n", "4", "--quiet"], ["sweep", "--steps", "5"],
+    ["run", "--quiet"], ["tolerance", "--n", "2", "--quiet"], ["sweep", "--steps", "3"],
     ["check", "examples/v-block/scene.toml", "--quiet"], ["check", "examples/hinge/scene.toml", "--quiet"],
 ):
     with tempfile.TemporaryDirectory() as folder:

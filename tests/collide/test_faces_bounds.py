@@ -70,7 +70,7 @@ def on_edges(shape):
     points = []
     for edge in explore(shape, "EDGE"):
         curve = BRepAdaptor_Curve(edge)
-        steps = np.linspace(curve.FirstParameter(), curve.LastParameter(), 60)
+        steps = np.linspace(curve.FirstParameter(), curve.LastParameter(), 40)
         points += [curve.Value(float(t)).Coord() for t in steps]
     return points
 

@@ -179,8 +179,7 @@ def test_thresholds():
     assert t.verdict(Distance(-math.inf, -0.02)) is Verdict.CLASH
 
 
-@pytest.mark.parametrize("full", [False, True])
-@pytest.mark.parametrize("shift", [0.0, 1e-9])
+@pytest.mark.parametrize(("full", "shift"), [(False, 0.0), (False, 1e-9), (True, 1e-9)])
 @pytest.mark.parametrize(
     "make",
     [
