@@ -9,11 +9,17 @@ from numpy.typing import NDArray
 
 from clamp3d.brep.borders import spline_sags
 from clamp3d.brep.grid import divisions, gridded
+from clamp3d.brep.spans import Bends, Spans, crossed, spans_of
 from clamp3d.brep.surfaces import OTHER, PLANE, Size
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Array, IntArray
-from clamp3d.core.triangles import distinct
+from clamp3d.core.triangles import distinct, halved
 
+FREE = 0.02
+"""Largest chord error (mm) of free-form faces: their triangles stand for them to the end, others say where to look."""
+_FEW, _PLENTY, _MOST = 3, 24, 300
+"""Samples along a triangle's side: `_SAMPLES` are so few; a triangle is halved that takes more; the most there are."""
+_ROUNDS = 12
 _SAFETY = 2.0
 """Factor on the deviations of free-form faces, which are sampled, not computed."""
 
@@ -40,11 +46,15 @@ def facets(
         F = grid if (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() > 0.0 else grid[:, ::-1]
         uv = np.concatenate([uv, new])
         P = np.concatenate([P, np.reshape([surface.Value(u, v).Coord() for u, v in new.tolist()], (-1, 3))])
-    own = np.zeros(len(F))
     closed = kind != PLANE and made is None and (surface.IsUClosed() or surface.IsVClosed())
     if not closed and kind != OTHER:
-        return F, P, own
-    corners = _without_poles(uv, F, poles)
+        return F, P, np.zeros(len(F))
+    corners, off = _without_poles(uv, F, poles), None
+    if kind == OTHER:
+        off = _swept(surface, corners, P[F])
+        if off is None:
+            F, uv, P, corners, off = _resolved(surface, F, uv, P, border, poles, min(chord, FREE))
+    own = np.zeros(len(F))
     if closed:
         turns = np.array([
             surface.LastUParameter() - surface.FirstUParameter() if surface.IsUClosed() else np.inf,
@@ -52,10 +62,7 @@ def facets(
         ])  # fmt: skip
         # Two nodes a whole turn apart are at one place: a triangle of theirs can stand for all round it.
         own = np.where(_spread(corners, turns), norm(np.ptp(P, axis=0)), 0.0)
-    if kind != OTHER:
-        return F, P, own
-    off = _swept(surface, corners, P[F])
-    return F, P, np.maximum(own, _sampled(surface, F, corners, P) if off is None else off)
+    return F, P, own if off is None else np.maximum(own, off)
 
 
 def _swept(surface: Any, uv: Array, corners: Array) -> Array | None:
@@ -102,12 +109,84 @@ def _spread(uv: Array, turns: Array) -> NDArray[np.bool_]:
     return np.asarray((np.ptp(uv, axis=1) > 0.45 * turns).any(axis=1))
 
 
+def _resolved(
+    surface: Any, F: IntArray, uv: Array, P: Array, border: list[IntArray], poles: list[IntArray], wanted: float
+) -> tuple[IntArray, Array, Array, Array, Array]:
+    """Triangles halved where they stand for several polynomials of a surface and are off by more than is ``wanted``.
+
+    A mesher looks at few points and passes over what bulges between them. Sides at the border stay as they are. Returns
+    triangles, parameters and points, the parameters of the triangles' corners, and how far they can be off.
+    """
+    spans, bends = spans_of(surface), Bends.of(surface)
+    whole = np.concatenate([np.column_stack([nodes[:-1], nodes[1:]]) for nodes in border])
+    for last in (*[False] * _ROUNDS, True):
+        corners = _without_poles(uv, F, poles)
+        off = _deviations(surface, spans, bends, corners, P[F], wanted, _PLENTY)
+        ends = F[:, [1, 2, 0]]
+        across = _order(spans, np.stack([uv[F], uv[ends]], axis=2).reshape(-1, 2, 2)).reshape(-1, 3)
+        order = across.max(axis=1, keepdims=True)
+        keys = np.minimum(F, ends) * len(P) + np.maximum(F, ends)
+        cut = (off > wanted)[:, None] & (order > _FEW) & (across > 0.4 * order)
+        cut &= ~np.isin(keys, whole.min(axis=1) * len(P) + whole.max(axis=1))
+        for nodes in poles:
+            cut &= ~np.isin(F, nodes) & ~np.isin(ends, nodes)
+        if last or not cut.any():
+            break
+        sides = distinct(keys[cut])
+        middle = 0.5 * (uv[sides // len(P)] + uv[sides % len(P)])
+        at = np.minimum(np.searchsorted(sides, keys), len(sides) - 1)
+        F = halved(F, np.where(sides[at] == keys, len(P) + at, -1))
+        uv = np.concatenate([uv, middle])
+        P = np.concatenate([P, [surface.Value(u, v).Coord() for u, v in middle.tolist()]])
+    wide = np.flatnonzero(np.isinf(off))
+    off[wide] = _deviations(surface, spans, bends, corners[wide], P[F[wide]], wanted, _MOST)
+    return F, uv, P, corners, off
+
+
+def _order(spans: tuple[Spans, Spans], uv: Array) -> Array:
+    """Samples along a side (m,) that show all polynomials between parameters (m, k, 2)."""
+    return np.maximum(crossed(spans[0], uv[:, :, 0]), crossed(spans[1], uv[:, :, 1]))
+
+
 _SAMPLES = np.array([[1, 1, 1], [3, 3, 0], [0, 3, 3], [3, 0, 3], [4, 1, 1], [1, 4, 1], [1, 1, 4]], dtype=np.float64)
 _SAMPLES /= _SAMPLES.sum(axis=1, keepdims=True)
 
 
-def _sampled(surface: Any, F: IntArray, uv: Array, P: Array) -> Array:
-    """Twice the largest distance (m,) of points of triangles from the surface, found from the same parameters on."""
+def _lattice(order: int) -> Array:
+    """Weights (s, 3) of samples of a triangle, so many along a side."""
+    if order <= _FEW:
+        return _SAMPLES
+    i, j = np.divmod(np.arange((order + 1) ** 2), order + 1)
+    weights = np.column_stack([i, j, order - i - j])
+    return np.asarray(weights[(weights >= 0).all(axis=1) & (weights < order).all(axis=1)] / order)
+
+
+def _deviations(
+    surface: Any, spans: tuple[Spans, Spans], bends: Bends | None, uv: Array, corners: Array, wanted: float, most: int
+) -> Array:
+    """How far triangles (m, 3, 3) with parameters ``uv`` (m, 3, 2) can be from a surface.
+
+    Of one that stands for several polynomials what the ``bends`` say, where that is less than is ``wanted`` or it takes
+    more than `_PLENTY` samples to see them all; else samples, at ``most`` so many along a side.
+    """
+    order, found = _order(spans, uv), np.full(len(uv), np.inf)
+    if bends is not None:
+        wide = np.flatnonzero(order > _FEW)
+        found[wide] = bends.at(uv[wide])
+    count = np.where((found <= wanted) | (order > most), 0, np.ceil(order).clip(_FEW)).astype(np.int64)
+    if most > _PLENTY:
+        count = np.where(np.isinf(found), np.ceil(order).clip(_FEW, most), count).astype(np.int64)
+    for n in distinct(count[count > 0]):
+        rows = np.flatnonzero(count == n)
+        found[rows] = _sampled(surface, uv[rows], corners[rows], _lattice(int(n)))
+    return found
+
+
+def _sampled(surface: Any, uv: Array, corners: Array, weights: Array) -> Array:
+    """Twice the largest distance (m,) of points of triangles (m, 3, 3) from a surface, of those at ``weights`` (s, 3).
+
+    It is found from the same parameters on.
+    """
     from OCP.gp import gp_Pnt, gp_Vec
 
     point, along, across = gp_Pnt(), gp_Vec(), gp_Vec()
@@ -120,8 +199,8 @@ def _sampled(surface: Any, F: IntArray, uv: Array, P: Array) -> Array:
             made[k] = point.Coord(), along.Coord(), across.Coord()
         return made
 
-    where = np.einsum("sk,mkd->msd", _SAMPLES, uv).reshape(-1, 2)
-    flat = np.einsum("sk,mkd->msd", _SAMPLES, P[F]).reshape(-1, 3)
+    where = np.einsum("sk,mkd->msd", weights, uv).reshape(-1, 2)
+    flat = np.einsum("sk,mkd->msd", weights, corners).reshape(-1, 3)
     made = at(where)
     off = flat - made[:, 0]
     # The same parameters are not the nearest point's. Least squares; at a pole, where a tangent is 0, along the other.
@@ -132,4 +211,4 @@ def _sampled(surface: Any, F: IntArray, uv: Array, P: Array) -> Array:
     low, high = uv.min(axis=(0, 1)), uv.max(axis=(0, 1))
     nearer = at(np.clip(where + step, low, high))[:, 0]
     found = np.minimum(np.linalg.norm(off, axis=1), np.linalg.norm(flat - nearer, axis=1))
-    return np.asarray(_SAFETY * found.reshape(len(F), -1).max(axis=1))
+    return np.asarray(_SAFETY * found.reshape(len(corners), -1).max(axis=1))

@@ -44,7 +44,11 @@ def _node(item: Any) -> Node | None:
         return Node("part", np.eye(4), None, _nodes(item.vals()))
     label = str(getattr(item, "label", "") or "part")
     part = getattr(item, "part", None)
-    if hasattr(item, "wrapped"):
+    try:
+        is_shape = hasattr(item, "wrapped")
+    except AssertionError:  # build123d, of a shape that holds nothing
+        return None
+    if is_shape:
         children = tuple(getattr(item, "children", ()) or ())
         if children:  # build123d: the children are placed in their parent's frame, and its shape holds them
             return Node(label, matrix(item.wrapped.Location()), None, _nodes(children))

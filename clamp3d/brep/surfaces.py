@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.brep.spans import spans_of, stations
 from clamp3d.core.linear import atan2, crosses, dot, norm
 from clamp3d.core.pose import Array
 
@@ -18,6 +19,9 @@ KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
 PLANE, CYLINDER, CONE, SPHERE, TORUS, OTHER = range(6)
 RECOGNISED = 1e-3
 """Largest deviation (mm) of a free-form surface from the canonical one that it is taken for."""
+
+_SAFETY = 2.0
+"""Factor on that deviation where it is sampled, not computed."""
 
 Size = tuple[float, float]
 
@@ -173,6 +177,7 @@ def _recognised(face: Any) -> tuple[int, Array, Size, float]:
     from OCP.gp import gp_Cone, gp_Cylinder, gp_Pln, gp_Sphere
     from OCP.ShapeAnalysis import ShapeAnalysis_CanonicalRecognition
 
+    points = _stations(face)
     for number, name, empty in (
         (PLANE, "IsPlane", gp_Pln),
         (CYLINDER, "IsCylinder", gp_Cylinder),
@@ -180,9 +185,25 @@ def _recognised(face: Any) -> tuple[int, Array, Size, float]:
         (SPHERE, "IsSphere", gp_Sphere),
     ):
         asked, found = ShapeAnalysis_CanonicalRecognition(face), empty()
-        if getattr(asked, name)(RECOGNISED, found) and asked.GetGap() <= RECOGNISED:
-            return number, *_canonical(number, found), float(asked.GetGap())
+        if not getattr(asked, name)(RECOGNISED, found) or asked.GetGap() > RECOGNISED:
+            continue
+        frame, size = _canonical(number, found)
+        # Open CASCADE looks at few points, and passes over what bulges between them.
+        deviation = max(float(asked.GetGap()), _SAFETY * float(np.abs(height(number, frame, size, points)).max()))
+        if deviation <= RECOGNISED:
+            return number, frame, size, deviation
     return OTHER, np.vstack([np.zeros(3), np.eye(3)]), (0.0, 0.0), 0.0
+
+
+def _stations(face: Any) -> Array:
+    """Points (k, 3) of a face's surface that show all polynomials it is made of."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+
+    surface = BRepAdaptor_Surface(face)
+    along, across = spans_of(surface)
+    u = stations(along, surface.FirstUParameter(), surface.LastUParameter())
+    v = stations(across, surface.FirstVParameter(), surface.LastVParameter())
+    return np.array([surface.Value(a, b).Coord() for a in u.tolist() for b in v.tolist()])
 
 
 def _canonical(kind: int, found: Any) -> tuple[Array, Size]:

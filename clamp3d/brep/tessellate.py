@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.brep.borders import BORDER, Borders, Curve
-from clamp3d.brep.facets import facets
+from clamp3d.brep.facets import FREE, facets
 from clamp3d.brep.surfaces import (
     OTHER,
     PLANE,
@@ -36,8 +36,6 @@ from clamp3d.errors import Clamp3dError
 
 ANGLE = 0.35
 """Largest turn (rad) of a facet's neighbour, so that a small fillet gets facets enough to be seen as round."""
-FREE = 0.02
-"""Largest chord error (mm) of free-form faces: their triangles stand for them to the end, others say where to look."""
 _RETRIES = 4
 _BULGE = 10.0 * BORDER
 """Sag (mm) of a border that is not split, because its triangle is too slim, above which borders are meshed finer."""
@@ -92,7 +90,6 @@ def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
     """
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
-    from OCP.IMeshTools import IMeshTools_Parameters
 
     faces = list(explore(solid, "FACE"))
     surfaces = [surface_of(face) for face in faces]
@@ -101,10 +98,7 @@ def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
     allowed, finer = min(chord, FREE), 1.0
     for _ in range(_RETRIES):
         BRepTools.Clean_s(solid)
-        asked = IMeshTools_Parameters()
-        asked.Angle = asked.AngleInterior = angle
-        asked.DeflectionInterior = wanted * allowed / chord
-        asked.Deflection = min(BORDER, asked.DeflectionInterior)
+        asked = _finest(wanted * allowed / chord, angle)
         for face, is_free in zip(faces, free.tolist(), strict=True):
             if is_free:
                 BRepMesh_IncrementalMesh(face, asked)
@@ -114,7 +108,12 @@ def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
         if not inner:  # most faces need none, or are meshed in rows
             asked.InternalVerticesMode, asked.DeflectionInterior, asked.AngleInterior = False, 1e3, 3.0
         BRepMesh_IncrementalMesh(solid, asked)
-        made = _collected(faces, surfaces, wanted)
+        try:
+            made = _collected(faces, surfaces, wanted)
+        except _TornEdgeError:  # as the faces beside it were meshed one after the other
+            BRepTools.Clean_s(solid)
+            BRepMesh_IncrementalMesh(solid, _finest(wanted * allowed / chord, angle))
+            made = _collected(faces, surfaces, wanted)
         of_free = made.surfaces.error[free[made.surfaces.face]].max(initial=0.0)
         worst = max(of_free / allowed, 0.5 * float(made.errors.max()) / chord)
         bulge = made.surfaces.sag[~free[made.surfaces.face]].max(initial=0.0)
@@ -127,6 +126,21 @@ def tessellate(solid: Any, chord: float, angle: float = ANGLE) -> Tessellation:
         else:  # below a tenth of what is asked for it is the file's own tolerance that is in the way
             wanted, angle = max(0.7 * wanted / worst, 0.1 * chord), 0.7 * angle
     return made
+
+
+class _TornEdgeError(Clamp3dError):
+    """The mesher has split an edge in one way for one of its faces and in another for the other."""
+
+
+def _finest(deflection: float, angle: float) -> Any:
+    """What the mesher is asked for where a face is free-form: ``deflection`` mm, and finer borders."""
+    from OCP.IMeshTools import IMeshTools_Parameters
+
+    asked = IMeshTools_Parameters()
+    asked.Angle = asked.AngleInterior = angle
+    asked.DeflectionInterior = deflection
+    asked.Deflection = min(BORDER, deflection)
+    return asked
 
 
 def _is_trimmed(face: Any, kind: int) -> bool:
@@ -180,6 +194,8 @@ def _collected(faces: list[Any], surfaces: list[Surface], chord: float) -> Tesse
             if twin is None:
                 twin = edge, start + at, Curve(BRepAdaptor_Curve(edge))
                 twins.append(twin)
+            elif len(twin[1]) != len(at):
+                raise _TornEdgeError(f"Open CASCADE splits an edge of face {number + 1} differently for its two faces")
             else:
                 links.append(np.stack([twin[1], start + at]))
             edges.append(

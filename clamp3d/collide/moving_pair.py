@@ -28,6 +28,9 @@ ACCURACY = 1e-4
 MAX_STEPS = 2000
 SPARE_STEPS = 100
 """Steps for a nearer time where what the models leave open at the times looked at leaves the verdict open."""
+VAIN_STEPS = 24
+"""Steps, and two for each stretch that waits, which may tell no more than a tenth of what is open of a least distance,
+once the verdict is certain: what the models leave open over stretches no cut narrows."""
 MAX_UNINFORMATIVE = 12
 """Answers in a row that told nothing, after which a method is not asked again."""
 SHELL_ERROR = 0.064
@@ -155,6 +158,7 @@ def least_distance(pair: MovingPair, thresholds: Thresholds, allowance: float | 
         heapq.heappush(heap, (*look(t, half, -np.inf), t, half))
     floor = np.inf  # of stretches that were given up
     spare, nearest = SPARE_STEPS, best.upper
+    vain, widest, waiting = 0, np.inf, 0
     for _ in range(MAX_STEPS):
         lower, here, t, half = heap[0]
         width = best.upper - min(floor, lower)
@@ -163,6 +167,11 @@ def least_distance(pair: MovingPair, thresholds: Thresholds, allowance: float | 
             limit = max(limit, 0.1 * thresholds.contact)
         verdict = thresholds.verdict(Distance(min(floor, lower), best.upper), allowance)
         if clash(best) or (width <= limit and verdict is not Verdict.UNCERTAIN) or width <= 2.0 * ACCURACY:
+            break
+        vain += 1
+        if width <= 0.9 * widest:
+            vain, widest, waiting = 0, width, len(heap)
+        if vain >= max(VAIN_STEPS, 2 * waiting) and verdict is not Verdict.UNCERTAIN:
             break
         # No lower bound rises above what the models say at the times looked at: where that leaves the verdict open,
         # only a nearer time can decide.

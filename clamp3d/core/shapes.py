@@ -16,6 +16,7 @@ import numpy as np
 
 from clamp3d.checks import array, choice, instance, items, number, text
 from clamp3d.core.extrusion import Extrusion
+from clamp3d.core.linear import norm
 from clamp3d.core.mesh import Mesh
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc, place
@@ -117,6 +118,9 @@ def _drill(holes: Sequence[Hole], low: Array, high: Array) -> tuple[Extrusion, .
     made = []
     for hole in items("holes", holes, "holes"):
         instance("hole", hole, Hole)
+        across = [0, 2] if hole.axis == "y" else [0, 1]
+        if norm(np.maximum(high[across] - hole.at, hole.at - low[across])) <= hole.radius:
+            raise InputError(f"hole of radius {hole.radius:g} mm at {hole.at} leaves nothing of the part")
         if hole.axis == "z":
             made.append(Extrusion(Profile.circle(hole.radius, hole.at), "Z", float(low[2]), float(high[2])))
         else:  # outlines along Y are (u, v) = (x, -z)

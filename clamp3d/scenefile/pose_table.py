@@ -59,7 +59,9 @@ class Pose(Table):
             R = np.array(rows)[:3, :3]
             with np.errstate(over="ignore", invalid="ignore"):
                 off = float(np.abs(dot(R, R.T) - np.eye(3)).max())
-            if not off <= _SNAP or np.linalg.det(R) < 0.0:
+            if off <= _SNAP and np.linalg.det(R) < 0.0:
+                raise ValueError("matrix: must be rigid (a rotation and a translation): it reflects")
+            if not off <= _SNAP:
                 raise ValueError(f"matrix: must be rigid (a rotation and a translation): deviates by {off:.3g}")
         return self
 

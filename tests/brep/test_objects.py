@@ -36,6 +36,8 @@ def test_what_is_no_body_is_refused():
     for thing in (3, object(), [1, 2], None):
         with pytest.raises(InputError, match="source must be a path, a clamp's name, or an object of CadQuery"):
             load(thing)
+    with pytest.raises(InputError, match="source must be a path"):
+        load(pytest.importorskip("build123d").Compound())
     with pytest.raises(InputError, match="joints goes with a robot description"):
         load(trimesh.creation.box(), joints={"a": 1.0})
 

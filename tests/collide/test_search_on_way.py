@@ -199,3 +199,22 @@ def test_what_a_way_has_no_time_for_is_not_asked():
     model = SimpleNamespace(bounds=np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]))
     corners = box_corners(model, translation(10.0, 0.0, 0.0))
     assert sorted(map(tuple, corners)) == [(10.0 + x, y, z) for x in (0.0, 1.0) for y in (0.0, 2.0) for z in (0.0, 3.0)]
+
+
+def test_a_search_ends_where_stretches_tell_no_more_and_the_verdict_is_certain():
+    class Along:
+        """0.5 mm apart all the way, over any stretch known to 0.02 mm: a pin from CAD in its hole."""
+
+        speed, count = 20.0, 0
+
+        def ask(self, t, enough, thresholds):
+            self.count += 1
+            return Distance(0.4995, 0.5)
+
+        def lower(self, t, half, here, wanted):
+            return max(0.48, here - self.speed * half)
+
+    pair = Along()
+    found, _ = least_distance(pair, Thresholds(), None)
+    assert (found.lower, found.upper) == (0.48, 0.5)
+    assert pair.count < 100
