@@ -21,6 +21,8 @@ class Allowed:
     def __post_init__(self) -> None:
         text("allowed part", self.a)
         text("allowed part", self.b)
+        if self.a == self.b and not _is_pattern(self.a):
+            raise InputError(f"allowed must name two parts, got {self.a!r} twice")
         object.__setattr__(self, "overlap", number("allowed overlap", self.overlap, rule="be >= 0 mm"))
         if not self.overlap >= 0.0:
             raise InputError(f"allowed overlap must be >= 0 mm, got {self.overlap}")
@@ -28,6 +30,10 @@ class Allowed:
     def fits(self, a: str, b: str) -> bool:
         """Whether it speaks of these two, in either order."""
         return any(fnmatchcase(x, self.a) and fnmatchcase(y, self.b) for x, y in ((a, b), (b, a)))
+
+
+def _is_pattern(name: str) -> bool:
+    return any(c in name for c in "*?[")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +49,7 @@ class Allowances:
         exact: dict[tuple[str, str], float] = {}
         patterns = []
         for item in allowed:
-            if any(c in item.a + item.b for c in "*?["):
+            if _is_pattern(item.a + item.b):
                 patterns.append(item)
                 continue
             for pair in ((item.a, item.b), (item.b, item.a)):

@@ -166,6 +166,7 @@ def test_motions():
         (BOX + "holes = [{ radius = 30 }]\n", "parts.box: hole of radius 30 mm at (0.0, 0.0) leaves nothing"),
         (BOX + "pose = { translation = [nan, 0, 0] }\n", "parts.box.pose.translation.0: must be a finite number"),
         (BOX + '[[allowed]]\nparts = ["box", "bax"]\n', "allowed: unknown part 'bax'; available: box"),
+        (BOX + '[[allowed]]\nparts = ["box", "box"]\n', "allowed must name two parts, got 'box' twice"),
         (
             BOX + '[[motions]]\nparts = ["box"]\n',
             "motions.0.translate: give exactly one of translate, rotate, screw, to",
