@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.brep.surfaces import OTHER, PLANE, Size, from_sides, height, normals
+from clamp3d.brep.surfaces import OTHER, PLANE, SAFETY, Size, from_sides, height, normals
 from clamp3d.core.mesh import Array, IntArray
+from clamp3d.core.triangles import side_keys
 
 BORDER = 0.0003
 """Largest sag (mm) of a border that is not split: where two parts touch their borders decide."""
 _MOST = 64
-_SAFETY = 2.0
-"""Factor on deviations that are sampled, not computed: of edges that are no lines, circles or plain splines."""
 _ROUNDING = 1e-11
 """What is nearer (mm) than this is as good as there."""
 _SHARES = (0.25, 0.5, 0.75)
@@ -87,10 +86,9 @@ class Borders:
 
     def at_sides(self, F: IntArray, n: int) -> IntArray:
         """Row of the piece that each triangle's side is (m, 3), of triangles of ``n`` nodes; -1 for none."""
-        keys = self.nodes.min(axis=1) * n + self.nodes.max(axis=1)
+        keys = side_keys(self.nodes[:, 0], self.nodes[:, 1], n)
         order = np.lexsort((-self.sag, keys))  # of two with the same ends the larger sag
-        ends = F[:, [1, 2, 0]]
-        wanted = np.minimum(F, ends) * n + np.maximum(F, ends)
+        wanted = side_keys(F, F[:, [1, 2, 0]], n)
         row = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
         return np.asarray(np.where(keys[row] == wanted, row, -1))
 
@@ -164,7 +162,7 @@ def _sags(curve: Curve, t: Array, points: Array, kind: int, frame: Array, size: 
         return np.asarray(curve.adaptor.Ellipse().MajorRadius() * (1.0 - np.cos(turn)))
     if what == Kind.GeomAbs_Circle and _is_around(curve.adaptor.Circle(), frame):
         off = np.abs(height(kind, frame, size, points[:1]))
-        return np.where(np.repeat(off, len(turn)) > _ROUNDING, _SAFETY * off, 0.0)
+        return np.where(np.repeat(off, len(turn)) > _ROUNDING, SAFETY * off, 0.0)
     if what == Kind.GeomAbs_BSplineCurve and kind in (PLANE, OTHER):
         found = _stretches(curve.bends, np.minimum(t[:-1], t[1:]), np.maximum(t[:-1], t[1:]))
         if found is not None:
@@ -173,7 +171,7 @@ def _sags(curve: Curve, t: Array, points: Array, kind: int, frame: Array, size: 
     true = curve.at(at)
     start, end = (np.tile(x, (len(_SHARES), 1)) for x in (points[:-1], points[1:]))
     off = from_sides(kind, frame, size, start, end, true).reshape(len(_SHARES), -1).max(axis=0)
-    return np.where(off > _ROUNDING, _SAFETY * off, 0.0)
+    return np.where(off > _ROUNDING, SAFETY * off, 0.0)
 
 
 def _is_around(circle: Any, frame: Array) -> bool:

@@ -10,18 +10,16 @@ from numpy.typing import NDArray
 from clamp3d.brep.borders import spline_sags
 from clamp3d.brep.grid import divisions, gridded
 from clamp3d.brep.spans import Bends, Spans, crossed, spans_of
-from clamp3d.brep.surfaces import OTHER, PLANE, Size
+from clamp3d.brep.surfaces import OTHER, PLANE, SAFETY, Size
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Array, IntArray
-from clamp3d.core.triangles import distinct, halved
+from clamp3d.core.triangles import distinct, halved, side_keys
 
 FREE = 0.02
 """Largest chord error (mm) of free-form faces: their triangles stand for them to the end, others say where to look."""
 _FEW, _PLENTY, _MOST = 3, 24, 300
 """Samples along a triangle's side: `_SAMPLES` are so few; a triangle is halved that takes more; the most there are."""
 _ROUNDS = 12
-_SAFETY = 2.0
-"""Factor on the deviations of free-form faces, which are sampled, not computed."""
 
 
 def facets(
@@ -121,13 +119,13 @@ def _resolved(
     whole = np.concatenate([np.column_stack([nodes[:-1], nodes[1:]]) for nodes in border])
     for last in (*[False] * _ROUNDS, True):
         corners = _without_poles(uv, F, poles)
-        off = _deviations(surface, spans, bends, corners, P[F], wanted, _PLENTY)
+        off = _deviations(surface, spans, bends, corners, P[F], wanted)
         ends = F[:, [1, 2, 0]]
         across = _order(spans, np.stack([uv[F], uv[ends]], axis=2).reshape(-1, 2, 2)).reshape(-1, 3)
         order = across.max(axis=1, keepdims=True)
-        keys = np.minimum(F, ends) * len(P) + np.maximum(F, ends)
+        keys = side_keys(F, ends, len(P))
         cut = (off > wanted)[:, None] & (order > _FEW) & (across > 0.4 * order)
-        cut &= ~np.isin(keys, whole.min(axis=1) * len(P) + whole.max(axis=1))
+        cut &= ~np.isin(keys, side_keys(whole[:, 0], whole[:, 1], len(P)))
         for nodes in poles:
             cut &= ~np.isin(F, nodes) & ~np.isin(ends, nodes)
         if last or not cut.any():
@@ -139,7 +137,8 @@ def _resolved(
         uv = np.concatenate([uv, middle])
         P = np.concatenate([P, [surface.Value(u, v).Coord() for u, v in middle.tolist()]])
     wide = np.flatnonzero(np.isinf(off))
-    off[wide] = _deviations(surface, spans, bends, corners[wide], P[F[wide]], wanted, _MOST)
+    count = _order(spans, corners[wide]).clip(_FEW, _MOST)
+    off[wide] = _sampled(surface, corners[wide], P[F[wide]], count)
     return F, uv, P, corners, off
 
 
@@ -162,27 +161,32 @@ def _lattice(order: int) -> Array:
 
 
 def _deviations(
-    surface: Any, spans: tuple[Spans, Spans], bends: Bends | None, uv: Array, corners: Array, wanted: float, most: int
+    surface: Any, spans: tuple[Spans, Spans], bends: Bends | None, uv: Array, corners: Array, wanted: float
 ) -> Array:
     """How far triangles (m, 3, 3) with parameters ``uv`` (m, 3, 2) can be from a surface.
 
     Of one that stands for several polynomials what the ``bends`` say, where that is less than is ``wanted`` or it takes
-    more than `_PLENTY` samples to see them all; else samples, at ``most`` so many along a side.
+    more than `_PLENTY` samples to see them all; else samples. Infinite where neither tells.
     """
     order, found = _order(spans, uv), np.full(len(uv), np.inf)
     if bends is not None:
         wide = np.flatnonzero(order > _FEW)
         found[wide] = bends.at(uv[wide])
-    count = np.where((found <= wanted) | (order > most), 0, np.ceil(order).clip(_FEW)).astype(np.int64)
-    if most > _PLENTY:
-        count = np.where(np.isinf(found), np.ceil(order).clip(_FEW, most), count).astype(np.int64)
-    for n in distinct(count[count > 0]):
-        rows = np.flatnonzero(count == n)
-        found[rows] = _sampled(surface, uv[rows], corners[rows], _lattice(int(n)))
+    rows = np.flatnonzero((found > wanted) & (order <= _PLENTY))
+    found[rows] = _sampled(surface, uv[rows], corners[rows], order[rows].clip(_FEW))
     return found
 
 
-def _sampled(surface: Any, uv: Array, corners: Array, weights: Array) -> Array:
+def _sampled(surface: Any, uv: Array, corners: Array, order: Array) -> Array:
+    """How far samples of triangles (m, 3, 3), ``order`` (m,) of them along a side, can be from a surface."""
+    count, found = np.ceil(order).astype(np.int64), np.empty(len(uv))
+    for n in distinct(count):
+        rows = np.flatnonzero(count == n)
+        found[rows] = _sampled_at(surface, uv[rows], corners[rows], _lattice(int(n)))
+    return found
+
+
+def _sampled_at(surface: Any, uv: Array, corners: Array, weights: Array) -> Array:
     """Twice the largest distance (m,) of points of triangles (m, 3, 3) from a surface, of those at ``weights`` (s, 3).
 
     It is found from the same parameters on.
@@ -211,4 +215,4 @@ def _sampled(surface: Any, uv: Array, corners: Array, weights: Array) -> Array:
     low, high = uv.min(axis=(0, 1)), uv.max(axis=(0, 1))
     nearer = at(np.clip(where + step, low, high))[:, 0]
     found = np.minimum(np.linalg.norm(off, axis=1), np.linalg.norm(flat - nearer, axis=1))
-    return np.asarray(_SAFETY * found.reshape(len(corners), -1).max(axis=1))
+    return np.asarray(SAFETY * found.reshape(len(corners), -1).max(axis=1))

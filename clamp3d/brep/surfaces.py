@@ -20,8 +20,8 @@ PLANE, CYLINDER, CONE, SPHERE, TORUS, OTHER = range(6)
 RECOGNISED = 1e-3
 """Largest deviation (mm) of a free-form surface from the canonical one that it is taken for."""
 
-_SAFETY = 2.0
-"""Factor on that deviation where it is sampled, not computed."""
+SAFETY = 2.0
+"""Factor on deviations that are sampled, not computed."""
 
 Size = tuple[float, float]
 
@@ -177,7 +177,6 @@ def _recognised(face: Any) -> tuple[int, Array, Size, float]:
     from OCP.gp import gp_Cone, gp_Cylinder, gp_Pln, gp_Sphere
     from OCP.ShapeAnalysis import ShapeAnalysis_CanonicalRecognition
 
-    points = _stations(face)
     for number, name, empty in (
         (PLANE, "IsPlane", gp_Pln),
         (CYLINDER, "IsCylinder", gp_Cylinder),
@@ -189,7 +188,8 @@ def _recognised(face: Any) -> tuple[int, Array, Size, float]:
             continue
         frame, size = _canonical(number, found)
         # Open CASCADE looks at few points, and passes over what bulges between them.
-        deviation = max(float(asked.GetGap()), _SAFETY * float(np.abs(height(number, frame, size, points)).max()))
+        off = float(np.abs(height(number, frame, size, _stations(face))).max())
+        deviation = max(float(asked.GetGap()), SAFETY * off)
         if deviation <= RECOGNISED:
             return number, frame, size, deviation
     return OTHER, np.vstack([np.zeros(3), np.eye(3)]), (0.0, 0.0), 0.0

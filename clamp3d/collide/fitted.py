@@ -14,6 +14,7 @@ from clamp3d.collide.hull import nearly_hull
 from clamp3d.collide.surface import Surface
 from clamp3d.core.linear import atan2, dot, to_source, to_target
 from clamp3d.core.pose import Array
+from clamp3d.core.triangles import side_keys
 from clamp3d.fit.features import FittedSurface
 from clamp3d.fit.fit import FitResult
 
@@ -108,7 +109,7 @@ def _bore(feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: 
     if least[own].min() < feature.radius - feature.error_bound - 1e-9 * feature.radius:
         return None
     limit = np.full(F.shape, feature.radius - error)
-    keys = np.minimum(F, np.roll(F, -1, axis=1)) * len(V) + np.maximum(F, np.roll(F, -1, axis=1))
+    keys = side_keys(F, np.roll(F, -1, axis=1), len(V))
     limit = np.where(np.isin(keys, keys[own]), np.minimum(limit, edges), limit)
     limit = limit.min(axis=1)
     # Faces square to the axis fill what is between chords and arc; a shoulder among them ends in others that do not.

@@ -45,6 +45,15 @@ def closest_points(triangles: Array, points: Array) -> Array:
     return np.asarray(found)
 
 
+def side_keys(a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """Numbers that name the sides between nodes ``a`` and ``b`` of ``n``, whichever way they go.
+
+    >>> side_keys(np.array([0, 4]), np.array([4, 0]), 10).tolist()
+    [4, 4]
+    """
+    return np.asarray(np.minimum(a, b) * n + np.maximum(a, b))
+
+
 def halved(F: NDArray[np.int64], middle: NDArray[np.int64]) -> NDArray[np.int64]:
     """Triangles F (m, 3) cut at the nodes ``middle`` (m, 3) of the sides that start at each corner; -1 for none.
 
