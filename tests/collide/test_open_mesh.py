@@ -151,3 +151,14 @@ def test_an_open_mesh_says_how_open():
         "not closed: 3 edges with one triangle, 0 with more than two, 0 with both on one side: "
         "what is inside is not known",
     )
+
+
+def test_a_triangle_without_an_area_along_an_edge_opens_nothing():
+    V = np.vstack([BOX.vertices, 0.5 * (BOX.vertices[0] + BOX.vertices[1])])
+    a, b, middle = 0, 1, len(BOX.vertices)
+    mesh = make_mesh(V, np.vstack([BOX.faces, [[a, b, middle]]]))
+    assert mesh.watertight
+    assert mesh.notes == ("1 triangles without an area left out",)
+    assert len(mesh.vertices) == 8
+    both = np.vstack([BOX.faces[1:], [[a, b, middle]]])
+    assert not make_mesh(V, both).watertight
