@@ -16,7 +16,7 @@ from clamp3d.collide.reasons import failure, undecided
 from clamp3d.collide.refine import with_normal
 from clamp3d.collide.result import BAD, PairResult
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import Verdict
+from clamp3d.collide.verdict import RESOLUTION, Verdict
 from clamp3d.collide.where import locator
 from clamp3d.core.linear import to_target
 from clamp3d.core.motion import Motion
@@ -67,7 +67,8 @@ def _row(
     try:
         pair = moving_pair(models[i], models[j], motion, poses[i], poses[j])
         least, t = least_distance(pair, thresholds, allowance)
-        contact_at = first_time(pair, t, thresholds, thresholds.contact) if least.upper <= thresholds.contact else None
+        meets = least.upper <= thresholds.contact + RESOLUTION  # as the verdict counts it
+        contact_at = first_time(pair, t, thresholds, thresholds.contact) if meets else None
         verdict = thresholds.verdict(least, allowance)
         deep = with_normal(least)
         if verdict in BAD:
