@@ -124,7 +124,9 @@ def any_inside(outer: Surface, inner: Surface, T: Array) -> bool:
     """
     points = to_target(T, inner.shell_points)
     if not outer.rimless:
-        return bool(outer.contains(points.reshape(-1, 3)).any())
+        each = points.reshape(-1, 1, 3)
+        each = each[((each > outer.box[0]) & (each < outer.box[1])).all(axis=(1, 2))]
+        return any(outer.contains(point)[0] for point in each)  # one will do, and each takes a sum over all triangles
     boxed = ((points >= outer.box[0]) & (points <= outer.box[1])).all(axis=(1, 2))
     return bool(boxed.any()) and bool(outer.contains(points[boxed, 0]).any())
 
