@@ -29,7 +29,7 @@ def can_meet(
     boxes = []
     rounding = 0.0
     for triangles, errors in (moving, still):
-        low, high = _unchanged(motion, triangles)
+        low, high = unchanged(motion, triangles)
         rounding += 1e-12 * float(np.abs(triangles).max() + np.abs(motion.point).max())
         boxes.append(box(*(low - errors[:, None]).T, *(high + errors[:, None]).T))
     found = []
@@ -41,8 +41,12 @@ def can_meet(
     return found[0], found[1]
 
 
-def _unchanged(motion: Motion, triangles: Array) -> tuple[Array, Array]:
-    """Least and greatest values (m, 2) over each triangle of two coordinates that differ by no more than places do."""
+def unchanged(motion: Motion, triangles: Array) -> tuple[Array, Array]:
+    """Least and greatest values (m, 2) over each triangle of two coordinates that differ by no more than places do.
+
+    Across a straight way they are Cartesian; of a turn the height along its axis and the distance from it, of a screw
+    0 and that distance.
+    """
     if not motion.angle:
         across = dot(triangles, svd(motion.travel[None])[2][1:].T)
         return across.min(axis=1), across.max(axis=1)

@@ -5,23 +5,18 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.invariants import can_meet
-from clamp3d.collide.meshes import any_inside
-from clamp3d.collide.model import Model
+from clamp3d.collide.model import FINEST_CAD, Model
 from clamp3d.collide.refine import from_boxes, refine
-from clamp3d.collide.surface import Surface
 from clamp3d.collide.swept import swept_lower
-from clamp3d.collide.swept_mesh import Standing, swept_gap
+from clamp3d.collide.swept_pair import SweptPair
 from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core.linear import dot, to_target
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array, inverse
-from clamp3d.core.shells import joined
 
 ACCURACY = 1e-4
 """A least distance on a way is found to within this (mm), or to what the models give."""
@@ -33,20 +28,6 @@ VAIN_STEPS = 24
 once the verdict is certain: what the models leave open over stretches no cut narrows."""
 MAX_UNINFORMATIVE = 12
 """Answers in a row that told nothing, after which a method is not asked again."""
-SHELL_ERROR = 0.064
-"""Chord error (mm) of the meshes that a stretch of a motion is bounded with where closed forms say too little."""
-
-
-class _Near(NamedTuple):
-    """Triangles that may come within ``limit`` mm of the other mesh on the way; all others never do.
-
-    ``moving`` (m, 3, 3) in the world at t = 0, each with its error (m,) mm.
-    """
-
-    limit: float
-    moving: Array
-    errors: Array
-    still: Standing
 
 
 class MovingPair:
@@ -55,11 +36,21 @@ class MovingPair:
     def __init__(self, moving: Model, still: Model, motion: Motion, start: Array, T_still: Array) -> None:
         self.a, self.b = moving, still
         self.motion, self.start, self.T_still, self.back = motion, start, T_still, inverse(T_still)
-        self._near: _Near | None = None
+        self.meshes = SweptPair(moving, still, motion, start, T_still)
         self.counters = moving.counters
         self.speed = motion.speed(box_corners(moving, start))
         # How often in a row closed forms, and swept ones, had nothing to say: hulls in each other never have.
         self.n_uninformative = self.n_uninformative_swept = 0
+
+    @property
+    def meshed(self) -> bool:
+        """Whether a stretch has been bounded by meshes, and that asks for less than a distance at a time."""
+        return self.meshes.asked and not self.meshes.by_faces
+
+    @property
+    def left_open(self) -> float:
+        """How much (mm) of a least distance two meshes of CAD leave open at their finest."""
+        return 2.0 * FINEST_CAD if self.meshes.by_faces else 0.0
 
     def pose(self, t: float) -> Array:
         """The standing shape in the moving shape's frame."""
@@ -82,6 +73,8 @@ class MovingPair:
         plain = here - self.speed * half
         if plain >= wanted:
             return plain
+        if self.meshes.by_faces and here > 0.0:
+            return max(plain, self.by_meshes(t, half, min(wanted, here), apart=True))
         stretch = (self.pose(t - half), self.pose(t), self.pose(t + half))
         swept = plain
         if self.n_uninformative_swept < MAX_UNINFORMATIVE:
@@ -93,33 +86,9 @@ class MovingPair:
             return swept
         return max(swept, self.by_meshes(t, half, min(wanted, here)) if meshes is None else meshes)
 
-    @property
-    def meshed(self) -> bool:
-        """Whether a stretch has been bounded by meshes."""
-        return self._near is not None
-
-    def by_meshes(self, t: float, half: float, wanted: float) -> float:
-        """Lower bound from t - half to t + half, by those triangles that may come within ``wanted`` on the way."""
-        self.counters.queries["swept meshes"] += 1
-        mine, other = self.a.outer(SHELL_ERROR), self.b.outer(SHELL_ERROR)
-        limit = max(wanted - 0.25 * ACCURACY, 0.0)
-        if self._near is None or not limit <= self._near.limit <= 2.0 * limit:
-            self._near = self._meeting(mine, other, limit)
-        near = self._near
-        low = swept_gap(near.still, near.moving, near.errors, self.motion, (t - half, t + half), near.limit)
-        T = self.pose(t)
-        if low == -np.inf or any_inside(other, mine, inverse(T)) or any_inside(mine, other, T):
-            return -np.inf
-        return low - 1e-11 * (mine.scale + other.scale + float(np.abs(T[:3, 3]).max()))
-
-    def _meeting(self, mine: Surface, other: Surface, limit: float) -> _Near:
-        """The triangles of the two meshes that may come within ``limit`` mm of the other one on the way."""
-        placed = [to_target(T, s.vertices) for s, T in ((mine, self.start), (other, self.T_still))]
-        moving, still = (v[s.faces] for v, s in zip(placed, (mine, other), strict=True))
-        errors = [np.zeros(len(s.faces)) if s.face_error is None else s.face_error for s in (mine, other)]
-        ours, theirs = can_meet(self.motion, (moving, errors[0]), (still, errors[1]), limit)
-        piece = joined(other.faces[theirs], len(other.vertices))[other.faces[theirs, 0]]
-        return _Near(limit, moving[ours], errors[0][ours], Standing(still[theirs], errors[1][theirs], piece))
+    def by_meshes(self, t: float, half: float, wanted: float, apart: bool = False) -> float:
+        """The same by meshes alone, and no better than just below ``wanted``; ``apart``: at t they certainly are."""
+        return self.meshes.lower(t, half, wanted - 0.25 * ACCURACY, apart)
 
 
 def box_corners(model: Model, T: Array) -> Array:
@@ -162,7 +131,7 @@ def least_distance(pair: MovingPair, thresholds: Thresholds, allowance: float | 
     for _ in range(MAX_STEPS):
         lower, here, t, half = heap[0]
         width = best.upper - min(floor, lower)
-        limit = max(2.0 * ACCURACY, 0.02 * abs(best.upper), 2.0 * (best.upper - best.lower))
+        limit = max(2.0 * ACCURACY, pair.left_open, 0.02 * abs(best.upper), 2.0 * (best.upper - best.lower))
         if best.upper < 0.0:  # depths take the longest
             limit = max(limit, 0.1 * thresholds.contact)
         verdict = thresholds.verdict(Distance(min(floor, lower), best.upper), allowance)

@@ -56,7 +56,13 @@ class Standing:
 
 
 def swept_gap(
-    standing: Standing, triangles: Array, errors: Array, motion: Motion, stretch: tuple[float, float], most: float
+    standing: Standing,
+    triangles: Array,
+    errors: Array,
+    motion: Motion,
+    stretch: tuple[float, float],
+    most: float,
+    least: float = -np.inf,
 ) -> float:
     """Distance (mm) that moving triangles certainly keep from standing ones all through a stretch, up to ``most``.
 
@@ -72,6 +78,8 @@ def swept_gap(
         First and last time.
     most : float
         A distance (mm) that is enough.
+    least : float
+        A distance (mm) that they are known to keep.
 
     Returns
     -------
@@ -95,21 +103,23 @@ def swept_gap(
     rows, other = standing.near(low - reach, high + reach)
     if not len(rows):
         return most
+    if most - errors[rows].max() - standing.errors[other].max() <= least:  # hulls will say no more
+        return least
     shape, gap, errors = _ALL if motion.angle else _PRISM, most, off_chord
     if len(rows) > _MOST:  # where they are at the middle, and as far as they travel from there
         errors = off_chord + 0.5 * span * (norm(motion.travel) + abs(motion.angle) * out)
         shape, hulls = _ONE, at(0.5 * (stretch[0] + stretch[1]))
     elif _holds(hulls[rows], standing, np.unique(standing.piece[other])):
-        return -np.inf
+        return least
     still = [(_tree(standing.triangles[other[k]], _ONE), error) for k, error in _levels(standing.errors[other])]
     for k, error in _levels(errors[rows]):
         moving = _tree(hulls[rows[k]], shape)
         for fixed, off in still:
             d = float(fcl.distance(fixed, moving, fcl.DistanceRequest(), fcl.DistanceResult()))
             if d <= 0.0:
-                return -np.inf
+                return least
             gap = min(gap, d - error - off)
-    return gap
+    return max(gap, least)
 
 
 def _holds(hulls: Array, standing: Standing, pieces: NDArray[np.intp]) -> bool:

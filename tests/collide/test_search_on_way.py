@@ -36,7 +36,7 @@ class Cones:
         rng = np.random.default_rng(seed)
         self.speed, self.when = rng.uniform(0.5, 20.0), rng.uniform(0.0, 1.0, 6)
         self.low = rng.uniform(0.0, 0.3, 6) * self.speed
-        self.error, self.meshed, self.shift = error, meshed, 0.0
+        self.error, self.meshed, self.shift, self.left_open = error, meshed, 0.0, 0.0
         self.shift = above - self.least()
         self.asked: list[float] = []
         self.stretches: list[tuple[float, float]] = []
@@ -205,7 +205,7 @@ def test_a_search_ends_where_stretches_tell_no_more_and_the_verdict_is_certain()
     class Along:
         """0.5 mm apart all the way, over any stretch known to 0.02 mm: a pin from CAD in its hole."""
 
-        speed, count = 20.0, 0
+        speed, left_open, count = 20.0, 0.0, 0
 
         def ask(self, t, enough, thresholds):
             self.count += 1
