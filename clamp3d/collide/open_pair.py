@@ -63,9 +63,9 @@ class OpenPair(MovingPair):
         (one, long), (other, wide) = ((min(size), norm(size)) for size in map(_size, (self.a, self.b)))
         return float(min(one + wide, other + long))
 
-    def by_meshes(self, t: float, half: float, wanted: float) -> float:
+    def by_meshes(self, t: float, half: float, wanted: float, apart: bool = False) -> float:
         """As of closed ones; minus infinity also where one may be inside of the other at some time of the stretch."""
-        low = super().by_meshes(t, half, wanted)
+        low = super().by_meshes(t, half, wanted, apart)
         return -np.inf if low > 0.0 and self._may_hold(t, half) else low
 
     def _may_hold(self, t: float, half: float) -> bool:
