@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from clamp3d.brep.bodies import Reading
 from clamp3d.brep.placing import Placer
-from clamp3d.checks import readable_file
-from clamp3d.core.linear import dot
+from clamp3d.checks import readable_file, shown
+from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Array, IntArray
 from clamp3d.core.pose import turn_of
 from clamp3d.errors import InputError
@@ -202,7 +202,10 @@ def _transform(node: dict[str, Any]) -> Array:
         T[:] = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
         return T
     if "rotation" in node:
-        T[:3, :3] = turn_of(*np.array(node["rotation"], dtype=np.float64))
+        turn = np.array(node["rotation"], dtype=np.float64)
+        if turn.shape != (4,) or not abs(norm(turn) - 1.0) <= 1e-3:
+            raise InputError(f"the rotation of a node must be a quaternion of length 1, got {shown(turn)}")
+        T[:3, :3] = turn_of(*turn)
     T[:3, :3] *= np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64)
     T[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
     return T

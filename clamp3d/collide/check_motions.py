@@ -10,12 +10,13 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, near_between
 from clamp3d.collide.depth import is_quick, penetration
 from clamp3d.collide.model import Model, Progress
-from clamp3d.collide.moving_pair import MovingPair, box_corners, first_time, least_distance
+from clamp3d.collide.moving_pair import box_corners, first_time, least_distance
+from clamp3d.collide.open_pair import moving_pair
 from clamp3d.collide.reasons import failure, undecided
 from clamp3d.collide.refine import with_normal
 from clamp3d.collide.result import BAD, PairResult
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import Verdict
+from clamp3d.collide.verdict import RESOLUTION, Verdict
 from clamp3d.collide.where import locator
 from clamp3d.core.linear import to_target
 from clamp3d.core.motion import Motion
@@ -42,7 +43,7 @@ def check_motions(
     rows: list[PairResult] = []
     keep = None if asked is None else set(asked)
     for motion in scene.motions:
-        moving = [scene.index(name) for name in motion.parts]
+        moving = [scene.index(name) for name in dict.fromkeys(motion.parts)]  # one that is named twice moves once
         resolved = motion.resolved(poses[moving[0]])
         found = _near(scene, models, poses, boxes, moving, resolved)
         near = [p for p in found if keep is None or tuple(sorted(p)) in keep]
@@ -64,9 +65,10 @@ def _row(
     a, b = scene.parts[i].name, scene.parts[j].name
     thresholds, allowance = scene.thresholds, scene.allowance(a, b)
     try:
-        pair = MovingPair(models[i], models[j], motion, poses[i], poses[j])
+        pair = moving_pair(models[i], models[j], motion, poses[i], poses[j])
         least, t = least_distance(pair, thresholds, allowance)
-        contact_at = first_time(pair, t, thresholds, thresholds.contact) if least.upper <= thresholds.contact else None
+        meets = least.upper <= thresholds.contact + RESOLUTION  # as the verdict counts it
+        contact_at = first_time(pair, t, thresholds, thresholds.contact) if meets else None
         verdict = thresholds.verdict(least, allowance)
         deep = with_normal(least)
         if verdict in BAD:

@@ -120,8 +120,13 @@ def any_inside(outer: Surface, inner: Surface, T: Array) -> bool:
     """Whether a shell of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer``; no surfaces may meet.
 
     A shell with a vertex outside of the other's box is not inside; only for the others winding numbers are asked.
+    A surface with an edge may hold a part of a shell alone.
     """
     points = to_target(T, inner.shell_points)
+    if not outer.rimless:
+        each = points.reshape(-1, 1, 3)
+        each = each[((each > outer.box[0]) & (each < outer.box[1])).all(axis=(1, 2))]
+        return any(outer.contains(point)[0] for point in each)  # one will do, and each takes a sum over all triangles
     boxed = ((points >= outer.box[0]) & (points <= outer.box[1])).all(axis=(1, 2))
     return bool(boxed.any()) and bool(outer.contains(points[boxed, 0]).any())
 

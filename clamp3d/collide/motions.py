@@ -12,6 +12,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.body import kernel_distance
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.moving_pair import ACCURACY, MovingPair, first_time, least_distance
+from clamp3d.collide.open_pair import moving_pair
 from clamp3d.collide.refine import measured, with_normal
 from clamp3d.collide.verdict import RESOLUTION, Thresholds
 from clamp3d.core.distance import SignedDistance
@@ -150,7 +151,7 @@ def _searched(
     if isinstance(a, SweptArc) and isinstance(b, (Cylinder, Capsule)):
         return Search(a, b, motion, T, resolution)
     cache = ModelCache()
-    return MovingPair(cache.model(as_shape(b)), cache.model(as_shape(a)), motion, T, np.eye(4))
+    return moving_pair(cache.model(as_shape(b)), cache.model(as_shape(a)), motion, T, np.eye(4))
 
 
 def _from_kernel(search: Search, touches: bool | None, t: float, slack: float) -> MotionDistance:

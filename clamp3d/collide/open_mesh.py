@@ -17,7 +17,7 @@ from clamp3d.core.pose import Array, inverse
 
 _PAIRS = 4000
 """Pairs of crossing triangles that are looked at."""
-_ERROR = 0.016
+OPEN_ERROR = 0.016
 """Chord error (mm) of the meshes of a drawn part that an open mesh is measured against."""
 
 
@@ -27,9 +27,9 @@ def open_distance(a: Model, b: Model, T: Array) -> Distance:
     Without a crossing the surfaces are as far apart as said. If an open mesh seems to wind round the other part,
     nothing says that they are apart: ``lower`` is minus infinity.
     """
-    outer_a, outer_b = a.outer(_ERROR), b.outer(_ERROR)
+    outer_a, outer_b = a.outer(OPEN_ERROR), b.outer(OPEN_ERROR)
     lower = nearest_of(outer_a, outer_b, T)[0]
-    inner_a, inner_b = a.inner(_ERROR), b.inner(_ERROR)
+    inner_a, inner_b = a.inner(OPEN_ERROR), b.inner(OPEN_ERROR)
     if inner_a is None or inner_b is None:
         return Distance(lower if lower > 0.0 else -np.inf)
     rounding = rounding_of(inner_a, inner_b, T)

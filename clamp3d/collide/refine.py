@@ -107,6 +107,8 @@ def _faces(a: Model, b: Model, T: Array, found: Distance, thresholds: Thresholds
     one, other = a.faces, b.faces
     free = OTHER in one.faces.kind and OTHER in other.faces.kind
     for tol in (None, *_FACE_WIDTHS):
+        if tol is not None and found.upper - found.lower <= tol:  # so near the search for a verdict has come already
+            continue
         for flat in (False, True) if free and tol is None else (free,):
             if flat and tol is None:
                 one, other = flat_where_near(one, other, T, thresholds.reach)

@@ -1,4 +1,4 @@
-"""A closed triangle mesh as FCL, manifold3d and the compiled searches want it, each form when needed.
+"""A triangle mesh, mostly a closed one, as FCL, manifold3d and the compiled searches want it, each form when needed.
 
 Flat faces of a mesh are the part's own, round ones are off by their chords: every triangle has an error of its own.
 """
@@ -27,7 +27,7 @@ _SHARP = np.cos(np.radians(30.0))
 
 @dataclass(eq=False)
 class Surface:
-    """A closed mesh, ``vertices`` (n, 3) mm, ``faces`` (m, 3) wound outward.
+    """A mesh, ``vertices`` (n, 3) mm, ``faces`` (m, 3), wound outward where it is closed.
 
     ``face_error`` (m,) mm: every point of the true surface is within this of a triangle, and the other way round;
     None where the mesh is the part, or holds it, or is held by it. ``point_error`` (m,) mm: how far points of a
@@ -152,11 +152,39 @@ class Surface:
         return self.nearest(points)[0]
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
-        """Which of the points (k, 3), none of them on the surface, lie inside: winding numbers of those in the box."""
+        """Which of the points (k, 3), none of them on the surface, lie inside: winding numbers of those in the box.
+
+        Of a surface with an edge: which it hides from more than half of all directions, whichever side it shows them.
+        """
         found = ((points > self.box[0]) & (points < self.box[1])).all(axis=1)
-        if found.any():
+        if found.any() and self.rimless:
             found[found] = self.winding_numbers(points[found]) > 0.5
+        elif found.any():
+            corners = corners_of(self.vertices, self.faces)
+            found[found] = [abs(winding_number(corners, point)) > 0.5 for point in points[found]]
         return np.asarray(found)
+
+    @cached_property
+    def _ends(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """The edges of all triangles in order: those run along from their smaller end, and the others."""
+        ends = np.roll(self.faces, -1, axis=1)
+        key = np.minimum(self.faces, ends) * len(self.vertices) + np.maximum(self.faces, ends)
+        forward = ends > self.faces
+        return np.sort(key[forward]), np.sort(key[~forward])
+
+    @property
+    def rimless(self) -> bool:
+        """Whether each edge is run along as often one way as the other: else a line may miss it that starts inside."""
+        return np.array_equal(*self._ends)
+
+    @cached_property
+    def rim(self) -> tuple[Array, Array]:
+        """Starts (k, 3) of the edges that are not, and the ways (k, 3) to their ends, as often as left over."""
+        keys, number = np.unique(np.concatenate(self._ends), return_inverse=True)
+        one_way = np.bincount(number[: len(self._ends[0])], minlength=len(keys))
+        left = np.abs(2 * one_way - np.bincount(number, minlength=len(keys)))
+        low, high = np.divmod(np.repeat(keys, left), len(self.vertices))
+        return self.vertices[low], self.vertices[high] - self.vertices[low]
 
     def winding_numbers(self, points: Array) -> Array:
         """How often the surface winds round points (k, 3) that are not on it."""

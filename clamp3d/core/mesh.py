@@ -54,11 +54,7 @@ class Mesh:
     @property
     def slivers(self) -> NDArray[np.bool_]:
         """Triangles (m,) without a normal: no higher than the rounding of their corners."""
-        corners = self.vertices[self.faces]
-        sides = np.roll(corners, -1, axis=1) - corners
-        longest = np.linalg.norm(sides, axis=2).max(axis=1)
-        twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 2]), axis=1)
-        return np.asarray(twice_area <= 4.0 * self.rounding * longest)
+        return _slivers(self.vertices, self.faces, self.rounding)
 
 
 def make_mesh(
@@ -123,6 +119,13 @@ def make_mesh(
     used, index = np.unique(single, return_inverse=True)
     V, F = V[used], index.reshape(-1, 3).astype(np.int64)
     _, edge, uses = _edges(F)
+    if (uses % 2).any():
+        thin = _in_the_way(V, F, rounding)
+        if thin.any():
+            notes.append(f"{int(thin.sum())} triangles without an area left out")
+            used, index = np.unique(F[~thin], return_inverse=True)
+            V, F = V[used], index.reshape(-1, 3).astype(np.int64)
+            _, edge, uses = _edges(F)
     if _balance(F, edge)[uses == 2].any():
         import trimesh  # takes longer to load than most meshes to read
 
@@ -280,6 +283,31 @@ def _may_be_close(V: Array, tolerance: float) -> bool:
         if (np.linalg.norm(V[rows + k] - V[rows], axis=1) <= 2.0 * tolerance).any():
             return True
     return True
+
+
+def _slivers(V: Array, F: IntArray, rounding: float) -> NDArray[np.bool_]:
+    """Faces (m,) that are no higher than the ``rounding`` (mm) of their corners."""
+    corners = V[F]
+    sides = np.roll(corners, -1, axis=1) - corners
+    longest = np.linalg.norm(sides, axis=2).max(axis=1)
+    twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 2]), axis=1)
+    return np.asarray(twice_area <= 4.0 * rounding * longest)
+
+
+def _in_the_way(V: Array, F: IntArray, rounding: float) -> NDArray[np.bool_]:
+    """Slivers (m,) on edges of an odd number of faces, if without them there are no such edges; else none."""
+    thin = _slivers(V, F, rounding)
+    gone = np.zeros(len(F), dtype=bool)
+    while thin.any() and not gone.all():
+        rest = np.flatnonzero(~gone)
+        _, edge, uses = _edges(F[rest])
+        odd = (uses % 2 == 1)[edge].reshape(-1, 3).any(axis=1)
+        if not odd.any():
+            return gone
+        if not (odd & thin[rest]).any():
+            break
+        gone[rest[odd & thin[rest]]] = True
+    return np.zeros(len(F), dtype=bool)
 
 
 def _folded(F: IntArray) -> NDArray[np.bool_]:

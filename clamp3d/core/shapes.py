@@ -15,6 +15,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from clamp3d.checks import array, choice, instance, items, number, text
+from clamp3d.core.drilling import leaves_something
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.linear import norm
 from clamp3d.core.mesh import Mesh
@@ -116,9 +117,12 @@ AnyShape: TypeAlias = Shape | Cylinder | Capsule | SweptArc
 
 def _drill(holes: Sequence[Hole], low: Array, high: Array) -> tuple[Extrusion, ...]:
     made = []
+    circles: dict[str, list[tuple[float, float, float]]] = {}
     for hole in items("holes", holes, "holes"):
         instance("hole", hole, Hole)
         across = [0, 2] if hole.axis == "y" else [0, 1]
+        if norm(np.maximum(np.maximum(low[across] - hole.at, hole.at - high[across]), 0.0)) >= hole.radius:
+            raise InputError(f"hole of radius {hole.radius:g} mm at {hole.at} lies beside the part")
         if norm(np.maximum(high[across] - hole.at, hole.at - low[across])) <= hole.radius:
             raise InputError(f"hole of radius {hole.radius:g} mm at {hole.at} leaves nothing of the part")
         if hole.axis == "z":
@@ -126,6 +130,10 @@ def _drill(holes: Sequence[Hole], low: Array, high: Array) -> tuple[Extrusion, .
         else:  # outlines along Y are (u, v) = (x, -z)
             at = (hole.at[0], -hole.at[1])
             made.append(Extrusion(Profile.circle(hole.radius, at), "Y", float(low[1]), float(high[1])))
+        u, v = np.array(hole.at) - 0.5 * (low + high)[across]
+        circles.setdefault(hole.axis, []).append((hole.radius, float(u), float(v)))
+    if not leaves_something(0.5 * (high - low), circles):
+        raise InputError(f"{len(made)} holes together leave nothing of the part")
     return tuple(made)
 
 

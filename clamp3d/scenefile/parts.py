@@ -172,7 +172,7 @@ def _folder(folder: Path, reader: Reader) -> Parts:
 def read_poses(path: Path) -> list[tuple[str, Array]]:
     """Names and poses (4, 4) of a table with the columns of `COLUMNS`; a name may be there more than once."""
     from clamp3d.clamp.loader import read_text
-    from clamp3d.scenefile.pose_table import Pose
+    from clamp3d.scenefile.pose_table import UNIT_TOLERANCE, Pose
 
     rows = csv.reader(read_text(path).splitlines())
     found = []
@@ -187,7 +187,7 @@ def read_poses(path: Path) -> list[tuple[str, Array]]:
                 raise ValueError(f"{len(COLUMNS)} values are needed, got {len(row)}")
             x, y, z, *turn = (_number(column, cell) for column, cell in zip(COLUMNS[1:], row[1:], strict=True))
             size = norm(turn)
-            if not abs(size - 1.0) <= 1e-3:
+            if not abs(size - 1.0) <= UNIT_TOLERANCE:
                 raise ValueError(f"the quaternion must have length 1, got {size:.6g}")
             qx, qy, qz, qw = turn
             found.append((row[0].strip(), Pose(translation=(x, y, z), quaternion=(qx, qy, qz, qw)).T()))

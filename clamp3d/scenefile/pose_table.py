@@ -12,6 +12,8 @@ from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, nearest_rigid, rotation, turn_of
 
 _SNAP = 1e-4
+UNIT_TOLERANCE = 1e-3
+"""How far from 1 the length of a quaternion may be: three decimals are 9e-4 off at most."""
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Vector = tuple[Number, Number, Number]
 Angle = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False, strict=True)]
@@ -50,6 +52,8 @@ class Pose(Table):
             raise ValueError("axis: must not have length zero")
         if self.quaternion is not None and not any(self.quaternion):
             raise ValueError("quaternion: must not have length zero")
+        if self.quaternion is not None and not abs((size := math.hypot(*self.quaternion)) - 1.0) <= UNIT_TOLERANCE:
+            raise ValueError(f"quaternion: must have length 1, got {size:.6g}")
         if self.matrix is not None:
             if any(self.translation):
                 raise ValueError("matrix: holds the translation already")
@@ -85,8 +89,8 @@ class Pose(Table):
             )
         elif self.axis is not None and self.angle_deg is not None:
             R = rotation(self.axis, math.radians(self.angle_deg))[:3, :3]
-        elif self.quaternion is not None:  # its square neither overflows nor vanishes
-            R = turn_of(*(part / max(map(abs, self.quaternion)) for part in self.quaternion))
+        elif self.quaternion is not None:
+            R = turn_of(*self.quaternion)
         else:
             return T
         # Without the rounding of zeros and ones: quarter turns are exact.

@@ -160,6 +160,8 @@ def damage(what):
         made.node(name="bad", children=[2])
         made.node(children=[1])
         made.data["scenes"] = [{"nodes": [0, 1]}]
+    elif what == "turn":
+        made.node(name="bad", mesh=made.mesh(made.cube()), rotation=[0.0, 0.0, 0.0, 2.0])
     elif what == "beyond":
         made.node(name="bad", mesh=made.mesh(made.cube()))
         made.data["accessors"][-1]["count"] = 10**9
@@ -182,6 +184,7 @@ def damage(what):
         ("node", r"missing: node 9 \(not in the file\)"),
         ("extension", "needs EXT_meshopt_compression, which is not read"),
         ("circle", "in the tree twice"),
+        ("turn", "rotation of a node must be a quaternion of length 1, got"),
         ("beyond", "reach beyond their part|at most 2 GB"),
         ("zeros", "at most 2 GB are read"),
     ],

@@ -140,6 +140,22 @@ def test_motions_follow_one_another():
     assert result.motions[0].contact_at == pytest.approx((14.0 - 0.01) / 14.5, abs=1e-4)
 
 
+def test_a_part_that_a_motion_names_twice_moves_once():
+    box = shapes.box((10, 10, 10))
+    scene = Scene(clearance=6.0).add("still", box).add("moving", box, translation(13, 0, 0))
+    go = Motion.translate((1.0, 0.0, 0.0), parts=("moving", "moving"))
+    found = check(replace(scene, motions=(go, go))).motions
+    assert [row.distance.value for row in found] == pytest.approx([3.0, 4.0])
+
+
+@pytest.mark.parametrize("gap", [0.01, 0.0100001, 0.01 + 5e-7])
+def test_what_counts_as_contact_has_a_first_time(gap):
+    """A gap of the contact threshold to rounding is contact."""
+    box = shapes.box((10, 10, 10))
+    (row,) = move(box, box, translation(10.0 + gap, 0, 0), Motion.translate((0, 5, 0), parts="moving"), contact=0.01)
+    assert (row.verdict.value, row.contact_at) == ("contact", 0.0)
+
+
 def test_distance_along_a_way_is_bounded_for_polyhedra():
     # A box turning past another one: its corner comes nearest at 45 degrees.
     still, turning = shapes.box((10, 10, 10)), shapes.box((10, 10, 30))
