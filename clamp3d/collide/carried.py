@@ -7,10 +7,9 @@ curve, a line or a circle, and no triangles stand for it.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from clamp3d.brep.surfaces import CONE, CYLINDER, PLANE, SPHERE, TORUS, Faces
@@ -19,6 +18,9 @@ from clamp3d.collide.slopes import CANONICAL, Mask
 from clamp3d.core.linear import atan2, cross, crosses, dot, norm, to_target
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
+
+if TYPE_CHECKING:
+    from shapely import LineString
 
 _BESIDE = 1e-6
 """A face that leaves itself by less (mm) is carried along itself."""
@@ -144,14 +146,16 @@ def _curve(faces: Faces, k: int, T: Array, motion: Motion) -> tuple[Array, Array
     return (np.array([h, 0.0]), nothing, size) if kind == SPHERE else (np.array([h, size]), nothing, second)
 
 
-def _lines(at: Array, direction: Array, radius: float, low: Array, high: Array) -> list[shapely.LineString]:
+def _lines(at: Array, direction: Array, radius: float, low: Array, high: Array) -> list[LineString]:
     """What of a line or circle may be in some boxes (k, 2), and perhaps a little more, as polylines."""
+    from shapely import LineString
+
     corners = np.stack([np.column_stack([x, y]) for x in (low[:, 0], high[:, 0]) for y in (low[:, 1], high[:, 1])])
     corners -= at
     if not radius:
         reach = dot(corners, direction)
         ends = np.stack([reach.min(axis=0), reach.max(axis=0)], axis=1)
-        return [shapely.LineString(at + np.outer(end, direction)) for end in _merged(ends)]
+        return [LineString(at + np.outer(end, direction)) for end in _merged(ends)]
     # Seen from the centre a box that does not hold it is less than half a turn wide.
     middle = corners.mean(axis=0)
     side = atan2(middle[:, 0] * corners[..., 1] - middle[:, 1] * corners[..., 0], (middle * corners).sum(axis=2))
@@ -163,7 +167,7 @@ def _lines(at: Array, direction: Array, radius: float, low: Array, high: Array) 
     for start, stop in _merged(ends):
         count = int(np.ceil((stop - start) / np.sqrt(min(8.0 * _SAGITTA / radius, 1.0)))) + 1
         angle = np.linspace(start, stop, count + 1)
-        found.append(shapely.LineString(at + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)))
+        found.append(LineString(at + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)))
     return found
 
 
@@ -177,10 +181,12 @@ def _merged(ends: Array) -> Array:
 
 def pairs_of(moving: Curves, still: Curves, kept: Mask, motion: Motion, limit: float) -> Carried | None:
     """The pairs of faces ``kept`` (n, k) that come within ``limit`` mm; None where there are too many to measure."""
+    from shapely import distance
+
     if len(moving.lines) * len(still.lines) > _MOST:
         return None
     i, j = np.nonzero(kept[np.ix_(moving.face, still.face)])
-    apart = shapely.distance(moving.lines[i], still.lines[j]) - moving.error[i] - still.error[j]
+    apart = distance(moving.lines[i], still.lines[j]) - moving.error[i] - still.error[j]
     near = apart < limit
     i, j = i[near], j[near]
     travel = norm(motion.travel) if not motion.angle else float(dot(motion.travel, motion.axis))
@@ -194,20 +200,22 @@ def least(
 
     Triangles (m, 3, 3) in the world at t = 0, each with how far the true surface may be from it (m,) mm.
     """
+    from shapely import STRtree, box, distance
+
     found = limit
     shapes = []
     for lines, triangles, errors in (moving, still):
         low, high = unchanged(motion, triangles)
         rounding = 1e-12 * float(np.abs(triangles).max(initial=0.0) + np.abs(motion.point).max())
         reach = (errors + rounding)[:, None]
-        shapes.append((lines, shapely.box(*(low - reach).T, *(high + reach).T)))
+        shapes.append((lines, box(*(low - reach).T, *(high + reach).T)))
     (lines, boxes), (other_lines, other_boxes) = shapes
     for curved, flat in ((lines, other_boxes), (other_lines, boxes)):
         for line, error in zip(curved.lines, curved.error, strict=True):
             if len(flat):
-                found = min(found, float(shapely.distance(line, flat).min()) - error)
+                found = min(found, float(distance(line, flat).min()) - error)
     if len(boxes) and len(other_boxes) and found > 0.0:
-        _, apart = shapely.STRtree(boxes).query_nearest(
+        _, apart = STRtree(boxes).query_nearest(
             other_boxes, max_distance=found, return_distance=True, all_matches=False
         )
         found = min(found, float(apart.min(initial=np.inf)))
