@@ -23,7 +23,7 @@ from clamp3d.brep.placing import Placer
 from clamp3d.checks import readable_file, shown
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Array, IntArray
-from clamp3d.core.pose import turn_of
+from clamp3d.core.pose import UNIT_TOLERANCE, turn_of
 from clamp3d.errors import InputError
 
 _Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -203,7 +203,7 @@ def _transform(node: dict[str, Any]) -> Array:
         return T
     if "rotation" in node:
         turn = np.array(node["rotation"], dtype=np.float64)
-        if turn.shape != (4,) or not abs(norm(turn) - 1.0) <= 1e-3:
+        if turn.shape != (4,) or not abs(norm(turn) - 1.0) <= UNIT_TOLERANCE:
             raise InputError(f"the rotation of a node must be a quaternion of length 1, got {shown(turn)}")
         T[:3, :3] = turn_of(*turn)
     T[:3, :3] *= np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64)

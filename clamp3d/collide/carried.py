@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.brep.surfaces import CONE, CYLINDER, PLANE, SPHERE, TORUS, Faces
-from clamp3d.collide.invariants import unchanged
+from clamp3d.collide.invariants import boxes_of, rounding_of, unchanged
 from clamp3d.collide.slopes import CANONICAL, Mask
 from clamp3d.core.linear import atan2, cross, crosses, dot, norm, to_target
 from clamp3d.core.motion import Motion
@@ -64,7 +64,7 @@ class Carried(NamedTuple):
         return float(found.min(initial=most))
 
 
-def carried(faces: Faces, T: Array, motion: Motion) -> Array:
+def _leaves(faces: Faces, T: Array, motion: Motion) -> Array:
     """How far (n,) mm each face of a solid at ``T`` (4, 4) leaves itself in the motion; infinity: it does not stay."""
     u, z = axis_of(motion), dot(faces.frame[:, 3], T[:3, :3].T)
     origin = dot(faces.frame[:, 0], T[:3, :3].T) + T[:3, 3]
@@ -91,11 +91,12 @@ def axis_of(motion: Motion) -> Array:
     return motion.axis if motion.angle else motion.travel / norm(motion.travel)
 
 
-def curves(faces: Faces, T: Array, motion: Motion, off: Array) -> Curves:
-    """The faces of a solid at ``T`` (4, 4) that stay (``off`` is finite, as `carried` tells), as curves.
+def curves(faces: Faces, T: Array, motion: Motion) -> Curves:
+    """The faces of a solid at ``T`` (4, 4) that the motion carries along themselves, as curves.
 
     Their triangles, and how far these are from the surface and its border, tell from where to where.
     """
+    off = _leaves(faces, T, motion)
     rows = np.flatnonzero(np.isfinite(off)[faces.face])
     triangles = to_target(T, faces.corners[rows].reshape(-1, 3)).reshape(-1, 3, 3)
     reach = faces.error[rows] + faces.sag[rows].max(axis=1) + _BESIDE
@@ -117,8 +118,7 @@ def curves(faces: Faces, T: Array, motion: Motion, off: Array) -> Curves:
         found = _lines(*_curve(faces, int(of[k]), T, motion), boxes[:, :2], boxes[:, 2:])
         lines += found
         piece += [k] * len(found)
-    rounding = 1e-12 * float(np.abs(triangles).max(initial=0.0) + np.abs(motion.point).max())
-    error = off[of] + faces.deviation[of] + _SAGITTA + rounding
+    error = off[of] + faces.deviation[of] + _SAGITTA + rounding_of(motion, triangles)
     return Curves(np.array(lines, dtype=object), of[piece], error[piece], pieces[piece, 1:])
 
 
@@ -200,16 +200,10 @@ def least(
 
     Triangles (m, 3, 3) in the world at t = 0, each with how far the true surface may be from it (m,) mm.
     """
-    from shapely import STRtree, box, distance
+    from shapely import STRtree, distance
 
     found = limit
-    shapes = []
-    for lines, triangles, errors in (moving, still):
-        low, high = unchanged(motion, triangles)
-        rounding = 1e-12 * float(np.abs(triangles).max(initial=0.0) + np.abs(motion.point).max())
-        reach = (errors + rounding)[:, None]
-        shapes.append((lines, box(*(low - reach).T, *(high + reach).T)))
-    (lines, boxes), (other_lines, other_boxes) = shapes
+    (lines, boxes), (other_lines, other_boxes) = ((x[0], boxes_of(motion, *x[1:])) for x in (moving, still))
     for curved, flat in ((lines, other_boxes), (other_lines, boxes)):
         for line, error in zip(curved.lines, curved.error, strict=True):
             if len(flat):

@@ -24,21 +24,31 @@ def can_meet(
     The meshes are triangles, (m, 3, 3) and (n, 3, 3) in the world at t = 0, each with how far the true surface may be
     from it, (m,) and (n,) mm. All other triangles of either mesh stay at least ``limit`` from the whole other one.
     """
-    from shapely import STRtree, box
+    from shapely import STRtree
 
-    boxes = []
-    rounding = 0.0
-    for triangles, errors in (moving, still):
-        low, high = unchanged(motion, triangles)
-        rounding += 1e-12 * float(np.abs(triangles).max() + np.abs(motion.point).max())
-        boxes.append(box(*(low - errors[:, None]).T, *(high + errors[:, None]).T))
+    boxes = [boxes_of(motion, *moving), boxes_of(motion, *still)]
+    reach = max(limit, float(np.finfo(float).tiny))  # shapely takes no 0
     found = []
     for mine, other in (boxes, boxes[::-1]):
-        near, _ = STRtree(other).query_nearest(mine, max_distance=limit + rounding, all_matches=False)
+        near, _ = STRtree(other).query_nearest(mine, max_distance=reach, all_matches=False)
         mask = np.zeros(len(mine), dtype=bool)
         mask[near] = True
         found.append(mask)
     return found[0], found[1]
+
+
+def boxes_of(motion: Motion, triangles: Array, errors: Array) -> NDArray[np.object_]:
+    """Boxes (m,) that hold the true surface of triangles (m, 3, 3) in the coordinates that the motion leaves."""
+    from shapely import box
+
+    low, high = unchanged(motion, triangles)
+    reach = (errors + rounding_of(motion, triangles))[:, None]
+    return np.asarray(box(*(low - reach).T, *(high + reach).T))
+
+
+def rounding_of(motion: Motion, triangles: Array) -> float:
+    """How far (mm) rounding moves triangles (m, 3, 3) in these coordinates."""
+    return 1e-12 * float(np.abs(triangles).max(initial=0.0) + np.abs(motion.point).max())
 
 
 def unchanged(motion: Motion, triangles: Array) -> tuple[Array, Array]:

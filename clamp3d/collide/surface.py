@@ -16,6 +16,7 @@ from clamp3d.core.linear import dot
 from clamp3d.core.mesh import edges_of
 from clamp3d.core.pose import Array, rotation
 from clamp3d.core.shells import corners_of, shells, winding_number
+from clamp3d.core.triangles import side_keys
 
 _LEVELS = 4
 """Groups that the triangles with errors are put in at most, each four times finer than the one before."""
@@ -168,7 +169,7 @@ class Surface:
     def _ends(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """The edges of all triangles in order: those run along from their smaller end, and the others."""
         ends = np.roll(self.faces, -1, axis=1)
-        key = np.minimum(self.faces, ends) * len(self.vertices) + np.maximum(self.faces, ends)
+        key = side_keys(self.faces, ends, len(self.vertices))
         forward = ends > self.faces
         return np.sort(key[forward]), np.sort(key[~forward])
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.brep.solid import BrepSolid
-from clamp3d.brep.surfaces import Faces
-from clamp3d.collide.carried import Carried, Curves, axis_of, carried, curves, least, pairs_of
+from clamp3d.collide.carried import Carried, Curves, axis_of, curves, least, pairs_of
 from clamp3d.collide.invariants import can_meet
 from clamp3d.collide.meshes import any_inside
 from clamp3d.collide.model import FINEST_CAD, Model
@@ -78,9 +77,14 @@ class SweptPair:
     @cached_property
     def by_faces(self) -> bool:
         """Whether faces can be left out, and others be measured exactly, while the parts are apart."""
-        both = all(isinstance(x.shape, BrepSolid) and x.shape.mesh.watertight for x in (self.a, self.b))
-        still = not self.motion.angle and not self.motion.travel.any()
-        return both and self.motion.is_screw and not still
+        moves = bool(self.motion.angle) or bool(self.motion.travel.any())
+        return len(self._solids) == 2 and self.motion.is_screw and moves
+
+    @cached_property
+    def _solids(self) -> list[tuple[BrepSolid, Array]]:
+        """Those of the two that are closed solids from CAD, with their poses (4, 4) at t = 0."""
+        placed = ((self.a.shape, self.start), (self.b.shape, self.T_still))
+        return [(shape, T) for shape, T in placed if isinstance(shape, BrepSolid) and shape.mesh.watertight]
 
     def lower(self, t: float, half: float, wanted: float, apart: bool) -> float:
         """Distance (mm) that is kept from t - half to t + half, up to ``wanted``; minus infinity where they may meet.
@@ -137,21 +141,21 @@ class SweptPair:
         exact, pairs = self._carried(limit)
         kept = self._facing & ~pairs
         sides = []
-        for model, T in ((self.a, self.start), (self.b, self.T_still)):
-            assert isinstance(model.shape, BrepSolid)
-            faces = model.shape.tessellated(max(error, FINEST_CAD)).surfaces
+        for (solid, T), lines in zip(self._solids, self._curves, strict=True):
+            faces = solid.tessellated(max(error, FINEST_CAD)).surfaces
             points = faces.corners.reshape(-1, 3)
             _, corner = np.unique(points, axis=0, return_inverse=True)
             # A flat face has no error of its own, but a border that its triangles cut short.
             errors = faces.error + faces.sag.max(axis=1)
-            sides.append((faces.face, _Side(to_target(T, points).reshape(-1, 3, 3), errors, corner.reshape(-1, 3))))
+            side = _Side(to_target(T, points).reshape(-1, 3, 3), errors, corner.reshape(-1, 3))
+            sides.append((faces.face, ~np.isin(faces.face, lines.face), side, lines))
         groups = []
         for rows in _alike(kept):
             chosen, images = [], []
-            for (face, side), lines, mask in zip(
-                sides, self._curves, (rows, np.asarray(kept[rows].any(axis=0))), strict=True
+            for (face, leaves, side, lines), mask in zip(
+                sides, (rows, np.asarray(kept[rows].any(axis=0))), strict=True
             ):
-                flat = mask[face] & ~np.isin(face, lines.face)
+                flat = mask[face] & leaves
                 images.append((lines.of(mask), side.triangles[flat], side.errors[flat]))
                 chosen.append(side.of(mask[face]))
             known = least(self.motion, images[0], images[1], limit) if exact is not None else -np.inf
@@ -174,19 +178,13 @@ class SweptPair:
     @cached_property
     def _facing(self) -> Mask:
         """Pairs of faces that can hold the nearest points."""
-        u = axis_of(self.motion)
-        assert isinstance(self.a.shape, BrepSolid)
-        assert isinstance(self.b.shape, BrepSolid)
-        return facing(self.a.shape, self.b.shape, dot(u, self.start[:3, :3]), dot(u, self.T_still[:3, :3]))
+        u, ((moving, start), (still, T_still)) = axis_of(self.motion), self._solids
+        return facing(moving, still, dot(u, start[:3, :3]), dot(u, T_still[:3, :3]))
 
     @cached_property
-    def _curves(self) -> tuple[Curves, Curves]:
+    def _curves(self) -> list[Curves]:
         """The faces of each part that the motion carries along themselves."""
-        made = []
-        for model, T in ((self.a, self.start), (self.b, self.T_still)):
-            faces: Faces = model.shape.surfaces  # type: ignore[union-attr]
-            made.append(curves(faces, T, self.motion, carried(faces, T, self.motion)))
-        return made[0], made[1]
+        return [curves(solid.surfaces, T, self.motion) for solid, T in self._solids]
 
     def _carried(self, limit: float) -> tuple[Carried | None, Mask]:
         """The pairs of them that come within ``limit`` mm, and which pairs of faces those are of."""

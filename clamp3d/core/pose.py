@@ -24,7 +24,8 @@ RIGID_TOLERANCE = 1e-9
 """Largest entry of R R^T - 1 that still counts as a rotation (rounding of a product of many poses)."""
 REPAIR_TOLERANCE = 1e-4
 """Largest entry of R R^T - 1 that counts as rounding of the input: single precision has 1e-7, four decimals 3e-4."""
-
+UNIT_TOLERANCE = 1e-3
+"""How far from 1 the length of a quaternion that is given may be: three decimals are 9e-4 off at most."""
 _AS_IT_IS = 0.999 * RIGID_TOLERANCE  # what the kernel refuses by another rounding of the same sums is mended
 
 

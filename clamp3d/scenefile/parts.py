@@ -18,7 +18,7 @@ from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.allowed import Allowed
 from clamp3d.collide.scene import Part
 from clamp3d.core.linear import dot, norm
-from clamp3d.core.pose import Array
+from clamp3d.core.pose import UNIT_TOLERANCE, Array
 from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, MeshShape
 from clamp3d.errors import InputError
 
@@ -172,7 +172,7 @@ def _folder(folder: Path, reader: Reader) -> Parts:
 def read_poses(path: Path) -> list[tuple[str, Array]]:
     """Names and poses (4, 4) of a table with the columns of `COLUMNS`; a name may be there more than once."""
     from clamp3d.clamp.loader import read_text
-    from clamp3d.scenefile.pose_table import UNIT_TOLERANCE, Pose
+    from clamp3d.scenefile.pose_table import Pose
 
     rows = csv.reader(read_text(path).splitlines())
     found = []

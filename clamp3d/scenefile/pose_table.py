@@ -9,11 +9,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from clamp3d.core.linear import dot
-from clamp3d.core.pose import Array, nearest_rigid, rotation, turn_of
+from clamp3d.core.pose import UNIT_TOLERANCE, Array, nearest_rigid, rotation, turn_of
 
 _SNAP = 1e-4
-UNIT_TOLERANCE = 1e-3
-"""How far from 1 the length of a quaternion may be: three decimals are 9e-4 off at most."""
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Vector = tuple[Number, Number, Number]
 Angle = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False, strict=True)]

@@ -8,7 +8,7 @@ import pytest
 
 from clamp3d import min_clearance
 from clamp3d.brep.solid import BrepSolid
-from clamp3d.collide.carried import Carried, axis_of, carried, curves, pairs_of
+from clamp3d.collide.carried import Carried, axis_of, curves, pairs_of
 from clamp3d.collide.model import FINEST_CAD, ModelCache
 from clamp3d.collide.moving_pair import MovingPair, least_distance
 from clamp3d.collide.slopes import facing
@@ -133,7 +133,7 @@ def test_curves_are_as_far_apart_as_the_faces(case):
     moving, still = brep(part()), brep(hole())
     world = rotation((3, -1, 2), 0.8)
     motion = Motion(world[:3, :3] @ motion.axis, np.zeros(3), motion.angle, world[:3, :3] @ motion.travel)
-    made = [curves(s.surfaces, world, motion, carried(s.surfaces, world, motion)) for s in (moving, still)]
+    made = [curves(s.surfaces, world, motion) for s in (moving, still)]
     axis = axis_of(motion) @ world[:3, :3]
     found = pairs_of(*made, facing(moving, still, axis, axis), motion, known + 0.01)
     assert known - 1.5e-3 <= found.gap((0.0, 1.0), 1.0) <= known
