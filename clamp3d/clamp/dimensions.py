@@ -1,4 +1,4 @@
-"""Dimensions of a parallel groove clamp: frozen dataclasses, validated by pydantic.
+"""Dimensions of a parallel groove clamp: frozen dataclasses whose values are checked.
 
 Lengths in mm; angles in degrees where a name ends in ``_deg`` (this is what the user types), properties give radians.
 Section frame of the paper: x right, y down, so "depth" and "below" are along +y.
@@ -8,28 +8,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias, cast
 
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass
-from pydantic_core import PydanticCustomError
+from msgspec import Meta
 
 from clamp3d.clamp.conductors import conductor
-from clamp3d.core.validation import one_line_errors
+from clamp3d.core.validation import checked
 from clamp3d.errors import InputError
 
 SMALLEST = 1e-6
 """Least length in mm: ratios of lengths stay within what a picture, a file and a turn of a nut can hold."""
 
 
-def _not_tiny(value: float) -> float:
-    if value < SMALLEST:
-        raise PydanticCustomError("length", "Input should be at least {least} mm", {"least": f"{SMALLEST:g}"})
-    return value
-
-
-Length = Annotated[float, Field(gt=0.0, lt=1e5, allow_inf_nan=False, strict=True), AfterValidator(_not_tiny)]
-Offset = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False, strict=True)]
+Length = Annotated[float, Meta(ge=SMALLEST, lt=1e5)]
+Offset = Annotated[float, Meta(gt=-1e5, lt=1e5)]
 ClampPart = Literal["P1", "P2", "P3", "P4", "P5", "P6", "P7"]
 """Names of a clamp's parts, as files may give them."""
 PartName: TypeAlias = str
@@ -46,23 +39,19 @@ TITLES: dict[PartName, str] = {
     "P7": "jumper",
 }
 
-_FROZEN = ConfigDict(extra="forbid")
 
-
-@one_line_errors
-@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+@checked
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Wire:
     """A conductor, by catalogue name or by ``diameter``; exactly one of the two. Raises InputError if it is unknown."""
 
     conductor: str | None = None
     diameter: Length | None = None
 
-    @model_validator(mode="after")
-    def _one_of_two(self) -> Wire:
+    def __post_init__(self) -> None:
         one = (self.conductor is None) != (self.diameter is None)
         _rule(one, "conductor or diameter: give one of them, not both")
         check_conductor(self.conductor)
-        return self
 
     @property
     def radius(self) -> float:
@@ -75,8 +64,8 @@ class Wire:
         return self.conductor or f"diameter {self.diameter:g} mm"
 
 
-@one_line_errors
-@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+@checked
+@dataclass(frozen=True, slots=True, kw_only=True)
 class GrooveDimensions:
     """A groove's arc: its centre lies ``offset`` beside the bolt axis and ``centre_depth`` below the part's origin."""
 
@@ -85,8 +74,8 @@ class GrooveDimensions:
     centre_depth: Offset
 
 
-@one_line_errors
-@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+@checked
+@dataclass(frozen=True, slots=True, kw_only=True)
 class UpSplint:
     """P1: a plate with its two grooves underneath. Origin: its top left corner."""
 
@@ -101,18 +90,16 @@ class UpSplint:
         """Half angle of a groove's arc in rad: it ends on the inner face."""
         return math.acos((groove.centre_depth - self.thickness) / groove.radius)
 
-    @model_validator(mode="after")
-    def _grooves_fit(self) -> UpSplint:
+    def __post_init__(self) -> None:
         for key in ("line_groove", "jumper_groove"):
             groove: GrooveDimensions = getattr(self, key)
             _check_groove(key, groove, groove.centre_depth - self.thickness, self.width / 2, self.hole_diameter / 2)
             left = groove.centre_depth - groove.radius
             _rule(left > 0.0, f"{key}: the arc cuts the top face: centre_depth - radius must be > 0 mm, got {left:.4g}")
-        return self
 
 
-@one_line_errors
-@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+@checked
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DownSplint:
     """P2: grooves on top, a round back that tilts in the saddle. Origin: centre of the round back."""
 
@@ -120,10 +107,10 @@ class DownSplint:
     length: Length
     face_depth: Length
     back_radius: Length
-    back_half_angle_deg: Annotated[float, Field(gt=0.0, lt=90.0, strict=True)]
+    back_half_angle_deg: Annotated[float, Meta(gt=0.0, lt=90.0)]
     slot_width: Length
     slot_length: Length
-    max_tilt_deg: Annotated[float, Field(gt=0.0, lt=45.0, strict=True)] | None = None
+    max_tilt_deg: Annotated[float, Meta(gt=0.0, lt=45.0)] | None = None
     line_groove: GrooveDimensions
     jumper_groove: GrooveDimensions
 
@@ -141,8 +128,7 @@ class DownSplint:
         """Half angle of a groove's arc in rad: it ends on the inner face."""
         return math.acos((self.face_depth - groove.centre_depth) / groove.radius)
 
-    @model_validator(mode="after")
-    def _grooves_fit(self) -> DownSplint:
+    def __post_init__(self) -> None:
         _rule(
             self.face_depth < self.underside_depth,
             f"face_depth must be above the flat underside (back_radius cos back_half_angle = "
@@ -160,11 +146,10 @@ class DownSplint:
                 f"{key}: the arc cuts the underside: centre_depth + radius must be < "
                 f"{self.underside_depth:.4g} mm, got {groove.centre_depth + groove.radius:.4g}",
             )
-        return self
 
 
-@one_line_errors
-@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+@checked
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Saddle:
     """P3: saddle washer under the round back. Origin: centre of its concave arc."""
 
@@ -179,16 +164,14 @@ class Saddle:
         """Half angle of the concave arc in rad."""
         return math.asin(self.width / 2 / self.radius)
 
-    @model_validator(mode="after")
-    def _is_saddle(self) -> Saddle:
+    def __post_init__(self) -> None:
         _rule(self.width < 2 * self.radius, f"width must be < 2 radius = {2 * self.radius:g} mm, got {self.width:g}")
         hole = self.hole_diameter
         _rule(hole < self.width, f"hole_diameter must be < width = {self.width:g} mm, got {hole:g}")
-        return self
 
 
-@one_line_errors
-@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+@checked
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Bolt:
     """P4: hexagon bolt, head below the saddle. Origin: its free (upper) end."""
 
@@ -208,8 +191,8 @@ class Bolt:
         return 2.0 * math.pi * travel / self.pitch
 
 
-@one_line_errors
-@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+@checked
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Nut:
     """P5: hexagon nut and washers together, on the up splint. Origin: its free (upper) face."""
 
@@ -217,8 +200,8 @@ class Nut:
     height: Length
 
 
-@one_line_errors
-@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+@checked
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Joints:
     """Whether parts use their sideways play: the bolt in the up splint's ``hole``, the down splint's round back in the
     ``saddle``, the saddle ``washer`` on the bolt. The paper holds the down splint on the bolt's axis: none of it."""
@@ -228,8 +211,8 @@ class Joints:
     washer: bool = False
 
 
-@one_line_errors
-@dataclass(frozen=True, slots=True, config=_FROZEN, kw_only=True)
+@checked
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Clamp:
     """A parallel groove clamp with its two wires, connection matrix and assembly sequence."""
 
@@ -299,8 +282,7 @@ class Clamp:
         first, second = sorted((a, b))
         return rows.get(first, {}).get(second, 0)
 
-    @model_validator(mode="after")
-    def _parts_fit_each_other(self) -> Clamp:
+    def __post_init__(self) -> None:
         r, down = self.bolt.diameter / 2, self.down_splint
         for key, wire in (("line", self.line), ("jumper", self.jumper)):
             _rule(
@@ -339,7 +321,6 @@ class Clamp:
         for a, row in self.connections.items():
             for b in row:
                 _rule(a < b, f"connections.{a}.{b}: the matrix is given above its diagonal, write it as {b}.{a}")
-        return self
 
 
 def check_conductor(name: str | None) -> None:
@@ -352,7 +333,7 @@ def check_conductor(name: str | None) -> None:
 
 
 def _rule(holds: bool, message: str) -> None:
-    """Raise ValueError, which pydantic reports with the place in the file, unless a rule holds."""
+    """Raise ValueError, which is reported with the place in the file, unless a rule holds."""
     if not holds:
         raise ValueError(message)
 

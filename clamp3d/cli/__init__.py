@@ -95,7 +95,6 @@ def main() -> None:
     end_on_signals()
     own_process()
     gc.set_threshold(100_000)  # a command is short, and what its libraries load is no garbage: 4 % of a run
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # none has a part in this: to look for them is 2 %
     try:
         _check_environment()
         with warnings.catch_warnings():

@@ -1,80 +1,132 @@
-"""What pydantic finds wrong, as one line: origin, key, value and rule."""
+"""Values from files and from Python as dataclasses and tables, by msgspec; what is wrong as one line."""
 
 from __future__ import annotations
 
 import functools
+import math
+import re
 import typing
-from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 
-from pydantic import TypeAdapter, ValidationError
+import msgspec
+import numpy as np
 
 from clamp3d import checks
 from clamp3d.errors import InputError
 
-_UNKNOWN_KEY = {"unexpected_keyword_argument", "extra_forbidden"}
-
 T = typing.TypeVar("T")
 
+_WORDS = {">": "greater than", ">=": "at least", "<": "less than", "<=": "at most"}
+_KINDS = {
+    "float": "a valid number",
+    "int": "a whole number",
+    "str": "a text",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "a table",
+}
 
-def one_line_errors(kind: type[T]) -> type[T]:
-    """A pydantic dataclass that raises InputError with one line when it is made of wrong values."""
-    make = kind.__init__
 
-    @functools.wraps(make)
-    def init(self: T, *args: typing.Any, **values: typing.Any) -> None:
-        try:
-            make(self, *args, **values)
-        except ValidationError as failure:
-            raise _one_line(failure, kind, kind.__name__, {}) from None
+def checked(kind: type[T]) -> type[T]:
+    """A dataclass with keywords alone that raises InputError with one line when it is made of wrong values."""
+
+    @functools.wraps(kind.__init__)
+    def init(self: T, **values: typing.Any) -> None:
+        plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in values.items()}
+        made = validate(kind, plain, kind.__name__)
+        for field in fields(kind):  # type: ignore[arg-type]
+            object.__setattr__(self, field.name, getattr(made, field.name))
 
     kind.__init__ = init  # type: ignore[assignment, method-assign]
     return kind
 
 
-def validate(kind: typing.Any, data: typing.Any, origin: str, tags: Mapping[str, type] | None = None) -> typing.Any:
-    """``data`` as ``kind`` (a pydantic model or dataclass), else InputError: one line with origin, key, value and rule.
+def validate(kind: typing.Any, data: typing.Any, origin: str, key: str = "") -> typing.Any:
+    """``data`` as ``kind`` (a dataclass or a msgspec.Struct); ``key`` is where it stands in ``origin``.
 
-    ``tags`` maps the tags of a discriminated union, which are no keys of the file, to its members.
+    Raises InputError: one line with origin, key, value and rule.
     """
+    if is_dataclass(kind) and isinstance(data, dict):
+        hints = typing.get_type_hints(kind, include_extras=True)
+        for name in data:
+            if name not in hints:  # which msgspec lets pass
+                raise InputError(f"{origin}: {_unknown(_joined(key, name), name, list(hints))}")
+        data = {name: validate(hints[name], value, origin, _joined(key, name)) for name, value in data.items()}
     try:
-        return TypeAdapter(kind).validate_python(data)
-    except ValidationError as failure:
-        raise _one_line(failure, kind, origin, tags or {}) from None
+        return msgspec.convert(data, kind)
+    except msgspec.ValidationError as failure:
+        raise InputError(f"{origin}: {_told(failure, kind, data, key)}") from None
 
 
-def _one_line(failure: ValidationError, kind: typing.Any, origin: str, tags: Mapping[str, type]) -> InputError:
-    """The error that says what pydantic found."""
-    # A misspelt key is both unknown and missing; the first says what to mend.
-    error = min(failure.errors(include_url=False), key=lambda e: e["type"] not in _UNKNOWN_KEY)
-    others = failure.error_count() - 1
-    key = checks.short(".".join(str(part) for part in error["loc"] if part != "[key]" and part not in tags), 100)
-    rule = error["msg"].replace("Input should", "must").removeprefix("Value error, ")
-    if error["type"] == "value_error":  # from our own validators, which begin with the key
-        line = f"{origin}: {key}.{rule}" if key else f"{origin}: {rule}"
-    elif error["type"] == "missing":
-        line = f"{origin}: {key} is missing"
-    elif error["type"] in _UNKNOWN_KEY:
-        import difflib
-
-        near = difflib.get_close_matches(str(error["loc"][-1]), _keys_at(kind, error["loc"][:-1], tags), n=1)
-        line = f"{origin}: {key} is not a known key" + (f"; did you mean {near[0]}?" if near else "")
-    elif isinstance(error["input"], (str, int, float, bool)):
-        line = f"{origin}: {key}: {rule}, got {checks.shown(error['input'])}"
-    else:
-        line = f"{origin}: {key}: {rule}"
-    return InputError(line + (f" (and {others} more)" if others else ""))
+def _told(failure: msgspec.ValidationError, kind: typing.Any, data: typing.Any, key: str) -> str:
+    """Key, value and rule of what msgspec found in ``data``, which is no ``kind``."""
+    message, _, path = str(failure).partition(" - at `")
+    for name, number in re.findall(r"\.(\w+)|\[(\d+|\.\.\.)\]", path):
+        key, kind, data = _below(key, kind, data, name or number)
+    if failure.__cause__ is not None:  # one of our own rules, which begin with the key
+        return _joined(checks.short(key, 100), str(failure.__cause__))
+    kind = _bare(kind)
+    if path.startswith("key` in `"):
+        kind = typing.get_args(kind)[0]
+        data = next(name for name in data if not _is(name, kind))
+        key = _joined(key, data)
+    named = re.search(r"(missing required|unknown) field `(.*)`", message)
+    if named is not None:
+        where = _joined(key, named[2])
+        return f"{where} is missing" if named[1] != "unknown" else _unknown(where, named[2], kind.__struct_fields__)
+    return f"{checks.short(key, 100)}: must be {_rule(message, kind, data)}, got {checks.shown(data)}"
 
 
-def _keys_at(kind: typing.Any, loc: tuple[int | str, ...], tags: Mapping[str, type]) -> list[str]:
-    """Names of the fields that a table of the file may hold."""
-    for part in loc:
-        if part in tags:
-            kind = tags[str(part)]
-        elif dict in (kind, typing.get_origin(kind)) or isinstance(part, int):
-            kind = next(iter(reversed(typing.get_args(kind))), None)
-        else:
-            kind = typing.get_type_hints(kind).get(str(part)) if hasattr(kind, "__annotations__") else None
-        options = [a for a in typing.get_args(kind) if a is not type(None)]
-        if type(None) in typing.get_args(kind) and len(options) == 1:
-            kind = options[0]
-    return list(getattr(kind, "__pydantic_fields__", {}))
+def _rule(message: str, kind: typing.Any, data: typing.Any) -> str:
+    """What ``data`` must be to be a ``kind``, of which msgspec's ``message`` says something."""
+    if typing.get_origin(kind) is typing.Literal:
+        *most, last = map(repr, typing.get_args(kind))
+        return f"{', '.join(most)} or {last}" if most else last
+    if length := re.fullmatch(r"Expected `array` (of length \d+), got \d+", message):
+        return length[1]
+    bound = re.fullmatch(r"Expected `(\w+)` (?:of length )?([<>]=?) (.*)", message)
+    if bound is not None and not (isinstance(data, float) and not math.isfinite(data)):
+        return f"{'of length ' * (bound[1] == 'array')}{_WORDS[bound[2]]} {float(bound[3]):g}"
+    expected = re.match(r"Expected `(.*?)`, got", message)
+    words = [_KINDS[word] for word in expected[1].split(" | ") if word in _KINDS] if expected else []
+    return " or ".join(words) or "a finite number"
+
+
+def _below(key: str, kind: typing.Any, data: typing.Any, step: str) -> tuple[str, typing.Any, typing.Any]:
+    """Key, kind and value of what stands in a table or list under ``step``; `...` for the first value that is wrong."""
+    kind = _bare(kind)
+    inner = typing.get_args(kind)
+    if step == "...":
+        step = next(name for name, value in data.items() if not _is(value, inner[1]))
+        return _joined(key, step), inner[1], data[step]
+    if isinstance(data, (list, tuple)):
+        number = int(step)
+        return _joined(key, step), inner[min(number, len(inner) - 1)], data[number]
+    value = data[step] if isinstance(data, dict) else getattr(data, step)
+    return _joined(key, step), typing.get_type_hints(kind, include_extras=True)[step], value
+
+
+def _bare(kind: typing.Any) -> typing.Any:
+    """A type without its bounds, and without None beside it."""
+    while typing.get_origin(kind) is typing.Annotated or type(None) in typing.get_args(kind):
+        kind = typing.get_args(kind)[0]
+    return kind
+
+
+def _is(value: typing.Any, kind: typing.Any) -> bool:
+    try:
+        msgspec.convert(value, kind)
+    except msgspec.ValidationError:
+        return False
+    return True
+
+
+def _joined(key: str, name: str) -> str:
+    return f"{key}.{name}" if key and name else f"{key}{name}"
+
+
+def _unknown(where: str, name: str, known: typing.Sequence[str]) -> str:
+    import difflib
+
+    near = difflib.get_close_matches(name, known, n=1)
+    return f"{checks.short(where, 100)} is not a known key" + (f"; did you mean {near[0]}?" if near else "")

@@ -9,6 +9,8 @@ import os
 from dataclasses import fields
 from pathlib import Path
 
+import msgspec
+
 from clamp3d import checks
 from clamp3d.brep.mesh_file import FORMATS
 from clamp3d.clamp.dimensions import Clamp
@@ -20,7 +22,8 @@ from clamp3d.core.linear import dot
 from clamp3d.core.validation import validate
 from clamp3d.errors import Clamp3dError, InputError, escaped
 from clamp3d.scenefile.parts import Parts, refuse_wires
-from clamp3d.scenefile.tables import TAGS, ClampTable, FileTable, MeshTable, SceneTable, clamp_source
+from clamp3d.scenefile.pose_table import Pose
+from clamp3d.scenefile.tables import ClampTable, FileTable, MeshTable, SceneTable, clamp_source, part_table
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -47,12 +50,13 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
     >>> scene.parts[0].T_world[:3, 3].tolist()
     [0.0, 0.0, 5.0]
     """
-    table: SceneTable = validate(SceneTable, parse_toml(text, origin), origin, TAGS)
+    table: SceneTable = validate(SceneTable, parse_toml(text, origin), origin)
+    tables = {key: part_table(data, origin, f"parts.{key}") for key, data in table.parts.items()}
     parts: list[Part] = []
     allowed: list[Allowed] = []
     notes: list[str] = []
     files: dict[tuple[object, ...], shapes.AnyShape] = {}
-    read: dict[str, Parts] = {}
+    read: dict[bytes, Parts] = {}
     where = ""
 
     def take(found: Parts, of: str) -> None:
@@ -67,10 +71,10 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
         where = "include"
         for file in [table.include] if isinstance(table.include, str) else table.include:
             take(FileTable(file=file).read(folder), file)
-        for part_name, part in table.parts.items():
+        for part_name, part in tables.items():
             where = f"parts.{part_name}"
             if isinstance(part, FileTable):
-                same = part.model_dump_json(exclude={"pose"})
+                same = msgspec.json.encode(msgspec.structs.replace(part, pose=Pose()))
                 if same not in read:  # nor are files of several bodies read twice
                     read[same] = part.read(folder)
                 take(read[same].prefixed(part_name, part.pose.T()), part_name)
@@ -122,7 +126,7 @@ def _is_clamp(path: Path) -> bool:
         if named_toml:
             raise
         raise InputError(f"{checks.short(path)}: unknown kind of file; {_choices()}") from None
-    of_clamp, of_scene = {f.name for f in fields(Clamp)}, {*SceneTable.model_fields}
+    of_clamp, of_scene = {f.name for f in fields(Clamp)}, {*SceneTable.__struct_fields__}
     as_clamp, as_scene = len(given & of_clamp - of_scene), len(given & of_scene - of_clamp)
     if not as_clamp and not as_scene:
         raise InputError(

@@ -102,7 +102,7 @@ def load(
     if has_bodies(path) and not (os.path.isdir(path) and _is_builtin(str(path))):
         refuse_wires(path, "a file of bodies", wires)
         return _scene(read_parts(path, reader), path.resolve().name if os.path.isdir(path) else path.stem)
-    from clamp3d.scenefile.file import load_described  # pydantic takes longer to load than a small STEP file
+    from clamp3d.scenefile.file import load_described
 
     reader.refuse(checks.short(path), "unit", "fit", "chord", "joints", "poses", "partial")
     return load_described(path, wires)

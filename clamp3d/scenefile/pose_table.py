@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from msgspec import Meta, Struct
 
 from clamp3d.core.linear import dot
 from clamp3d.core.pose import UNIT_TOLERANCE, Array, nearest_rigid, rotation, turn_of
 
 _SNAP = 1e-4
-Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Number = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 Vector = tuple[Number, Number, Number]
-Angle = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False, strict=True)]
+Angle = Annotated[float, Meta(gt=-1e5, lt=1e5)]
 
 
-class Table(BaseModel):
+class Table(Struct, forbid_unknown_fields=True):
     """A table of a scene file: a key that is not known is an error."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Pose(Table):
@@ -37,8 +36,7 @@ class Pose(Table):
     quaternion: tuple[Number, Number, Number, Number] | None = None
     matrix: list[tuple[Number, Number, Number, Number]] | None = None
 
-    @model_validator(mode="after")
-    def _one_turn(self) -> Pose:
+    def __post_init__(self) -> None:
         turns = [k for k in ("rpy_deg", "axis", "quaternion", "matrix") if getattr(self, k) is not None]
         if len(turns) > 1:
             raise ValueError(
@@ -65,7 +63,6 @@ class Pose(Table):
                 raise ValueError("matrix: must be rigid (a rotation and a translation): it reflects")
             if not off <= _SNAP:
                 raise ValueError(f"matrix: must be rigid (a rotation and a translation): deviates by {off:.3g}")
-        return self
 
     def T(self) -> Array:
         """The pose (4, 4). A typed matrix is brought to the nearest rotation: its printed digits are not exact."""

@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, model_validator
+from msgspec import Meta, field
 
+from clamp3d import checks
 from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import ClampPart, Length, Offset, check_conductor
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.core import shapes
 from clamp3d.core.motion import Motion
 from clamp3d.core.primitives import SweptArc
+from clamp3d.core.validation import validate
 from clamp3d.errors import InputError
 from clamp3d.scenefile.parts import Parts, Reader, names_like, read_parts
 from clamp3d.scenefile.pose_table import Angle, Number, Pose, Table, Vector
@@ -29,10 +31,8 @@ class HoleTable(Table):
     at: tuple[Number, Number] = (0.0, 0.0)
     axis: Literal["y", "z"] = "z"
 
-    @model_validator(mode="after")
-    def _one(self) -> HoleTable:
+    def __post_init__(self) -> None:
         _one_of(self, "radius", "diameter")
-        return self
 
     def hole(self) -> shapes.Hole:
         """The hole as a shape's argument."""
@@ -44,14 +44,16 @@ class GrooveTable(Table):
 
     x: Offset
     radius: Length
-    half_angle_deg: Annotated[float, Field(gt=0.0, lt=180.0, strict=True)]
+    half_angle_deg: Annotated[float, Meta(gt=0.0, lt=180.0)]
 
 
-class _Placed(Table):
-    pose: Pose = Field(default_factory=Pose)
+class PartTable(Table):
+    """What all parts have."""
+
+    pose: Pose = field(default_factory=Pose)
 
 
-class CylinderTable(_Placed):
+class CylinderTable(PartTable, kw_only=True):
     """``shape = "cylinder"``: axis on z, centred; the diameter may be a conductor's."""
 
     shape: Literal["cylinder"]
@@ -61,11 +63,9 @@ class CylinderTable(_Placed):
     conductor: str | None = None
     bore_diameter: Length | None = None
 
-    @model_validator(mode="after")
-    def _one(self) -> CylinderTable:
+    def __post_init__(self) -> None:
         _one_of(self, "radius", "diameter", "conductor")
         check_conductor(self.conductor)
-        return self
 
     def make(self, folder: Path) -> shapes.AnyShape:
         """The shape."""
@@ -73,29 +73,29 @@ class CylinderTable(_Placed):
         return shapes.cylinder(_half(self.radius, diameter), self.length, bore=(self.bore_diameter or 0.0) / 2)
 
 
-class BoxTable(_Placed):
+class BoxTable(PartTable, kw_only=True):
     """``shape = "box"``: centred, with round holes."""
 
     shape: Literal["box"]
     size: tuple[Length, Length, Length]
-    holes: list[HoleTable] = Field(default_factory=list)
+    holes: list[HoleTable] = field(default_factory=list)
 
     def make(self, folder: Path) -> shapes.AnyShape:
         """The shape."""
         return shapes.box(self.size, holes=[h.hole() for h in self.holes])
 
 
-class GrooveBlockTable(_Placed):
+class GrooveBlockTable(PartTable, kw_only=True):
     """``shape = "groove-block"``: in the groove's frame, arc about the origin, axis on z, mouth to +y."""
 
     shape: Literal["groove-block"]
     radius: Length
-    half_angle_deg: Annotated[float, Field(gt=0.0, lt=180.0, strict=True)]
+    half_angle_deg: Annotated[float, Meta(gt=0.0, lt=180.0)]
     length: Length
     width: Length
     height: Length
-    grooves: list[GrooveTable] = Field(default_factory=list)
-    holes: list[HoleTable] = Field(default_factory=list)
+    grooves: list[GrooveTable] = field(default_factory=list)
+    holes: list[HoleTable] = field(default_factory=list)
 
     def make(self, folder: Path) -> shapes.AnyShape:
         """The shape."""
@@ -105,7 +105,7 @@ class GrooveBlockTable(_Placed):
         return shapes.groove_block(groove, self.width, self.height, others=others, holes=holes)
 
 
-class ClampPartTable(_Placed):
+class ClampPartTable(PartTable, kw_only=True):
     """``shape = "clamp-part"``: one of the seven parts of a clamp, in its own frame."""
 
     shape: Literal["clamp-part"]
@@ -121,14 +121,14 @@ class ClampPartTable(_Placed):
         return parts(load_clamp(clamp_source(self.clamp, folder), line=self.line, jumper=self.jumper))[self.part]
 
 
-class MeshTable(_Placed):
+class MeshTable(PartTable, kw_only=True):
     """``shape = "mesh"``: a file of one body beside the scene, as a mesh; see `MeshShape` for ``fit``."""
 
     shape: Literal["mesh"]
     file: str
     unit: Literal["mm", "cm", "m", "in"] | None = None
     fit: shapes.Fit = "off"
-    chord: Annotated[float, Field(ge=0.0, lt=1e5, strict=True)] = 0.0
+    chord: Annotated[float, Meta(ge=0.0, lt=1e5)] = 0.0
 
     def make(self, folder: Path) -> shapes.AnyShape:
         """The shape."""
@@ -145,14 +145,14 @@ class MeshTable(_Placed):
         return shapes.MeshShape(body.shape.mesh, self.fit, self.file, self.chord)
 
 
-class FileTable(_Placed):
+class FileTable(PartTable, kw_only=True):
     """A ``file`` and no ``shape``: all bodies of it, as `clamp3d.load` reads them, moved by ``pose``."""
 
     file: str
     unit: Literal["mm", "cm", "m", "in"] | None = None
     fit: shapes.Fit | None = None
-    chord: Annotated[float, Field(ge=0.0, lt=1e5, strict=True)] | None = None
-    joints: dict[str, Number] = Field(default_factory=dict)
+    chord: Annotated[float, Meta(ge=0.0, lt=1e5)] | None = None
+    joints: dict[str, Number] = field(default_factory=dict)
     poses: str | None = None
     partial: bool = False
 
@@ -163,40 +163,30 @@ class FileTable(_Placed):
         return read_parts(folder / self.file, Reader(poses=poses, **{key: getattr(self, key) for key in keys}))
 
 
-TAGS: dict[str, type[Table]] = {
-    "shape cylinder": CylinderTable,
-    "shape box": BoxTable,
-    "shape groove-block": GrooveBlockTable,
-    "shape clamp-part": ClampPartTable,
-    "shape mesh": MeshTable,
-    "shape file": FileTable,
+ShapeTable: TypeAlias = CylinderTable | BoxTable | GrooveBlockTable | ClampPartTable | MeshTable
+SHAPES: dict[str, type[ShapeTable]] = {
+    "cylinder": CylinderTable,
+    "box": BoxTable,
+    "groove-block": GrooveBlockTable,
+    "clamp-part": ClampPartTable,
+    "mesh": MeshTable,
 }
 
 
-def _tag(data: Any) -> str | None:
-    kind = data.get("shape", "file" if "file" in data else None) if isinstance(data, dict) else None
-    tag = f"shape {kind}"
-    return tag if tag in TAGS else None
+def part_table(data: Any, origin: str, key: str) -> ShapeTable | FileTable:
+    """The table of a part, by its ``shape`` or as a file. Raises InputError."""
+    shape = data.get("shape") if isinstance(data, dict) else None
+    kind: type[ShapeTable | FileTable] | None = SHAPES.get(shape) if isinstance(shape, str) else None
+    if isinstance(data, dict) and "file" in data and "shape" not in data:
+        kind = FileTable
+    if kind is None:
+        choices = ", ".join(f'"{name}"' for name in SHAPES)
+        raise InputError(f"{origin}: {checks.short(key, 100)}: must have shape = one of {choices}, or a file")
+    made: ShapeTable | FileTable = validate(kind, data, origin, key)
+    return made
 
 
-PartTable = Annotated[
-    Annotated[CylinderTable, Tag("shape cylinder")]
-    | Annotated[BoxTable, Tag("shape box")]
-    | Annotated[GrooveBlockTable, Tag("shape groove-block")]
-    | Annotated[ClampPartTable, Tag("shape clamp-part")]
-    | Annotated[MeshTable, Tag("shape mesh")]
-    | Annotated[FileTable, Tag("shape file")],
-    Discriminator(
-        _tag,
-        custom_error_type="shape",
-        custom_error_message="must have shape = one of "
-        + ", ".join(f'"{tag[6:]}"' for tag in TAGS if tag != "shape file")
-        + ", or a file",
-    ),
-]
-
-
-class ClampTable(_Placed):
+class ClampTable(PartTable, kw_only=True):
     """``[clamp]``: the parts P1 to P7 of a clamp as `clamp3d run` leaves them; their connections are allowed."""
 
     name: str = "reference"
@@ -208,7 +198,7 @@ class AllowedTable(Table):
     """``[[allowed]]``: two part names, or patterns, that may touch, and overlap by ``overlap`` mm."""
 
     parts: tuple[str, str]
-    overlap: Annotated[float, Field(ge=0.0, strict=True)] = 0.0
+    overlap: Annotated[float, Meta(ge=0.0)] = 0.0
 
 
 class TurnTable(Table):
@@ -220,31 +210,27 @@ class TurnTable(Table):
     travel: Number | None = None
     pitch: Number | None = None
 
-    @model_validator(mode="after")
-    def _is_turn(self) -> TurnTable:
+    def __post_init__(self) -> None:
         if not any(self.axis):
             raise ValueError("axis: must not have length zero")
         if self.travel is not None and self.pitch is not None:
             raise ValueError("pitch: give travel or pitch, not both")
-        return self
 
 
 class MotionTable(Table):
     """``[[motions]]``, one after another: ``parts`` move together by ``translate``, ``rotate``, ``screw`` or ``to``."""
 
-    parts: Annotated[list[str], Field(min_length=1)]
+    parts: Annotated[list[str], Meta(min_length=1)]
     name: str | None = None
     translate: Vector | None = None
     rotate: TurnTable | None = None
     screw: TurnTable | None = None
     to: Pose | None = None
 
-    @model_validator(mode="after")
-    def _one(self) -> MotionTable:
+    def __post_init__(self) -> None:
         _one_of(self, "translate", "rotate", "screw", "to")
         if self.rotate is not None and (self.rotate.travel is not None or self.rotate.pitch is not None):
             raise ValueError("rotate: a rotation has no travel or pitch; call it screw")
-        return self
 
     def motion(self, number: int, names: Iterable[str] = ()) -> Motion:
         """The motion of the ``names`` that its parts are patterns of; without a name it is called by its number."""
@@ -265,13 +251,13 @@ class SceneTable(Table):
     """The whole file."""
 
     unit: Literal["mm"] = "mm"
-    contact: Annotated[float, Field(gt=0.0, lt=1e3, strict=True)] = 0.01
-    clearance: Annotated[float, Field(ge=0.0, lt=1e5, strict=True)] = 0.0
+    contact: Annotated[float, Meta(gt=0.0, lt=1e3)] = 0.01
+    clearance: Annotated[float, Meta(ge=0.0, lt=1e5)] = 0.0
     clamp: ClampTable | None = None
-    include: str | list[str] = Field(default_factory=list)
-    parts: dict[str, PartTable] = Field(default_factory=dict)
-    allowed: list[AllowedTable] = Field(default_factory=list)
-    motions: list[MotionTable] = Field(default_factory=list)
+    include: str | list[str] = field(default_factory=list)
+    parts: dict[str, Any] = field(default_factory=dict)  # each a `PartTable` of its own shape
+    allowed: list[AllowedTable] = field(default_factory=list)
+    motions: list[MotionTable] = field(default_factory=list)
 
 
 def clamp_source(name: str, folder: Path) -> str:

@@ -14,7 +14,7 @@ from clamp3d.errors import InputError
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda c: Wire(diameter=-3.0), "Wire: diameter: must be greater than 0, got -3.0"),
+        (lambda c: Wire(diameter=-3.0), "Wire: diameter: must be at least 1e-06, got -3.0"),
         (lambda c: Wire(diamter=3.0), "Wire: diamter is not a known key; did you mean diameter?"),
         (lambda c: replace(c.bolt, pitch=math.nan), "Bolt: pitch: must be a finite number, got nan"),
         (

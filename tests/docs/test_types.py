@@ -63,7 +63,7 @@ def test_mypy_sees_what_a_user_gets(tmp_path):
 
 
 def test_the_import_costs_next_to_nothing():
-    heavy = {"numpy", "numba", "scipy", "trimesh", "fcl", "click", "matplotlib", "pydantic", "rich"}
+    heavy = {"numpy", "numba", "scipy", "trimesh", "fcl", "click", "matplotlib", "msgspec", "rich"}
     code = f"import sys, clamp3d; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
