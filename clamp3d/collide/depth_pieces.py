@@ -17,7 +17,7 @@ from clamp3d.collide.hull import Hull, hull
 from clamp3d.collide.surface import Surface
 from clamp3d.core.linear import dot, norm, to_source
 from clamp3d.core.pose import Array
-from clamp3d.core.triangles import closest_points
+from clamp3d.core.triangles import closest_points, distinct
 
 _AROUND = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
 _CLOSE = np.array([-0.05, -2e-3, -1e-4, -5e-6, 0.0, 5e-6, 1e-4, 2e-3, 0.05])
@@ -51,7 +51,7 @@ def _prism(rod: Rod, x: Array) -> Array:
     """Planes (k, 4) of a prism in a cylinder, with edges all around and many near ``x`` (3,)."""
     local = to_source(rod.T, x)
     own = math.atan2(local[1], local[0])
-    angle = np.unique(np.concatenate([(own + _AROUND) % (2.0 * np.pi), (own + _CLOSE) % (2.0 * np.pi)]))
+    angle = distinct(np.concatenate([(own + _AROUND) % (2.0 * np.pi), (own + _CLOSE) % (2.0 * np.pi)]))
     gap = np.diff(np.append(angle, angle[0] + 2.0 * np.pi))
     angle, gap = angle[gap > 1e-9], gap[gap > 1e-9]
     middle = angle + 0.5 * gap

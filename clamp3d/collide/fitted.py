@@ -14,7 +14,7 @@ from clamp3d.collide.hull import nearly_hull
 from clamp3d.collide.surface import Surface
 from clamp3d.core.linear import atan2, dot, to_source, to_target
 from clamp3d.core.pose import Array
-from clamp3d.core.triangles import side_keys
+from clamp3d.core.triangles import distinct, side_keys
 from clamp3d.fit.features import FittedSurface
 from clamp3d.fit.fit import FitResult
 
@@ -37,7 +37,7 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool, stated: fl
     points = V.copy()
     for convex in result.cylinders:
         # Facets are inscribed: their tangents in place of their chords enclose the round surface.
-        own = np.unique(F[convex.faces])
+        own = distinct(F[convex.faces])
         T = convex.T_part_feature
         local = to_source(T, V[own])
         out = np.hypot(local[:, 0], local[:, 1])
@@ -104,13 +104,16 @@ def _bore(feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: 
     local = to_source(T, V)
     own = np.zeros(len(F), dtype=bool)
     for other in hollow:
-        own[other.faces] |= other is feature or _on_cylinder(local[np.unique(F[other.faces])], feature.radius, error)
+        own[other.faces] |= other is feature or _on_cylinder(local[distinct(F[other.faces])], feature.radius, error)
     least, edges = _nearest_to_axis(local[:, :2][F])
     if least[own].min() < feature.radius - feature.error_bound - 1e-9 * feature.radius:
         return None
     limit = np.full(F.shape, feature.radius - error)
-    keys = side_keys(F, np.roll(F, -1, axis=1), len(V))
-    limit = np.where(np.isin(keys, keys[own]), np.minimum(limit, edges), limit)
+    sides, number = np.unique(side_keys(F, np.roll(F, -1, axis=1), len(V)), return_inverse=True)
+    number = number.reshape(F.shape)
+    shared = np.zeros(len(sides), dtype=bool)
+    shared[number[own]] = True
+    limit = np.where(shared[number], np.minimum(limit, edges), limit)
     limit = limit.min(axis=1)
     # Faces square to the axis fill what is between chords and arc; a shoulder among them ends in others that do not.
     square = np.ptp(local[:, 2][F], axis=1) <= 1e-9 * feature.radius
@@ -151,7 +154,7 @@ def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> 
     ``through`` (m,): the triangles of holes and grooves that are bores of the whole mesh.
     """
     full = [f for f in result.cylinders if f.full]
-    everything = [np.unique(F)]
+    everything = [distinct(F)]
     if not full:
         return [], everything
     T = full[0].T_part_feature
@@ -160,7 +163,7 @@ def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> 
     rods: list[Rod] = []
     taken: list[tuple[float, float]] = []
     for feature in full:
-        own = np.unique(F[feature.faces])
+        own = distinct(F[feature.faces])
         low, high = float(z[own].min()), float(z[own].max())
         slack = feature.fit_error + 1e-9 * (high - low)
         coaxial = np.abs(out[own] - feature.radius).max() <= 10.0 * slack
@@ -181,7 +184,7 @@ def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> 
     for low, high in zip(edges[0::2], edges[1::2], strict=True):
         slack = 1e-6 * (1.0 + float(np.ptp(z)))
         inside = (z[F].min(axis=1) >= low - slack) & (z[F].max(axis=1) <= high + slack)
-        index = np.unique(F[inside])
+        index = distinct(F[inside])
         if len(index) and np.ptp(z[index]) > slack:  # a flat face between two stretches is the end of either
             rest.append(index)
     return (rods, rest) if rods else ([], everything)

@@ -20,6 +20,7 @@ from clamp3d.collide.overlap import common, deepest, deepest_at_most
 from clamp3d.collide.surface import Surface
 from clamp3d.core.linear import dot, norm, to_source, to_target
 from clamp3d.core.pose import Array, inverse
+from clamp3d.core.triangles import distinct
 
 _HALVINGS = 16
 """Ninths of a way that the surface of a body is looked for in, one after another: then it is known to rounding."""
@@ -154,7 +155,7 @@ def _vertex_depth(a: Surface, b: Surface, T: Array, meeting: tuple[Rows, Rows], 
     found = Distance()
     for outer, inner, place, rows in ((a, b, T, meeting[1]), (b, a, inverse(T), meeting[0])):
         spread = inner.vertices[:: max(1, len(inner.vertices) // _SPREAD)]
-        points = to_target(place, np.vstack([inner.vertices[np.unique(inner.faces[rows])], spread]))
+        points = to_target(place, np.vstack([inner.vertices[distinct(inner.faces[rows])], spread]))
         points = points[((points >= outer.box[0]) & (points <= outer.box[1])).all(axis=1)]
         if len(points):
             depth = outer.certain_depth(points) - a.error - b.error - rounding

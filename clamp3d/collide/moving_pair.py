@@ -81,10 +81,14 @@ class MovingPair:
             self.counters.queries["swept"] += 1
             angle = self.motion.angle * half
             swept = max(plain, swept_lower(self.a, self.b, *stretch, angle=angle, screw=self.motion.is_screw))
-            self.n_uninformative_swept = 0 if swept > plain else self.n_uninformative_swept + 1
         if swept >= min(wanted, here) - ACCURACY:
+            self.n_uninformative_swept = 0
             return swept
-        return max(swept, self.by_meshes(t, half, min(wanted, here)) if meshes is None else meshes)
+        if meshes is None:
+            meshes = self.by_meshes(t, half, min(wanted, here))
+        told = swept > max(plain, meshes, -np.inf if wanted < 0.0 else 0.0)
+        self.n_uninformative_swept = 0 if told else self.n_uninformative_swept + 1
+        return max(swept, meshes)
 
     def by_meshes(self, t: float, half: float, wanted: float, apart: bool = False) -> float:
         """The same by meshes alone, and no better than just below ``wanted``; ``apart``: at t they certainly are."""

@@ -16,7 +16,7 @@ from clamp3d.core.linear import dot
 from clamp3d.core.mesh import edges_of
 from clamp3d.core.pose import Array, rotation
 from clamp3d.core.shells import corners_of, shells, winding_number
-from clamp3d.core.triangles import side_keys
+from clamp3d.core.triangles import distinct, side_keys
 
 _LEVELS = 4
 """Groups that the triangles with errors are put in at most, each four times finer than the one before."""
@@ -107,7 +107,7 @@ class Surface:
         """Six vertices (k, 6, 3) of each connected surface: those furthest out along the axes."""
         found = []
         for rows in self.shells:
-            own = self.vertices[np.unique(self.faces[rows])]
+            own = self.vertices[distinct(self.faces[rows])]
             found.append(own[np.concatenate([own.argmin(axis=0), own.argmax(axis=0)])])
         return np.array(found)
 

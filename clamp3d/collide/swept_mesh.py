@@ -7,6 +7,7 @@ one that slides along a face keeps its distance however long the stretch. Arcs l
 from __future__ import annotations
 
 import itertools
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,12 @@ from clamp3d.collide.surface import fcl_tree
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
+from clamp3d.core.triangles import distinct
 
 _MOST = 3000
 """Swept triangles whose hulls are measured at once."""
+_AT_ONCE = 10_000
+"""Pairs of boxes that are asked one by one: to load and fill a tree takes longer."""
 _PRISM = np.array(
     [(0, 1, 2), (3, 4, 5), (0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (2, 0, 3), (2, 3, 5)], dtype=np.int64
 )
@@ -35,24 +39,28 @@ class Standing:
     """
 
     def __init__(self, triangles: Array, errors: Array, piece: NDArray[np.int64]) -> None:
-        from rtree import index
-
         self.triangles, self.errors = triangles, errors
         _, first, self.piece = np.unique(piece, return_index=True, return_inverse=True)
         self.points = triangles[first, 0]
         self.boxes = np.full((len(first), 2, 3), np.inf) * np.array([[1.0], [-1.0]])
         np.minimum.at(self.boxes[:, 0], self.piece, triangles.min(axis=1))
         np.maximum.at(self.boxes[:, 1], self.piece, triangles.max(axis=1))
-        low, high = triangles.min(axis=1) - errors[:, None], triangles.max(axis=1) + errors[:, None]
-        rows = np.arange(len(triangles))
-        self._tree = index.Index((rows, low, high), properties=index.Property(dimension=3)) if len(rows) else None
+        self._low, self._high = triangles.min(axis=1) - errors[:, None], triangles.max(axis=1) + errors[:, None]
+
+    @cached_property
+    def _tree(self) -> Any:
+        from rtree import index
+
+        rows = np.arange(len(self.triangles))
+        return index.Index((rows, self._low, self._high), properties=index.Property(dimension=3))
 
     def near(self, low: Array, high: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Which boxes ``low``, ``high`` (m, 3) meet one of a triangle, and which triangles those are."""
-        if self._tree is None or not len(low):
-            return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
-        found, count = self._tree.intersection_v(low, high)  # type: ignore[no-untyped-call]
-        return np.flatnonzero(count), np.unique(np.asarray(found, dtype=np.intp))
+        if len(low) * len(self.triangles) <= _AT_ONCE:
+            meet = ((low[:, None] <= self._high) & (self._low <= high[:, None])).all(axis=2)
+            return np.flatnonzero(meet.any(axis=1)), np.flatnonzero(meet.any(axis=0))
+        found, count = self._tree.intersection_v(low, high)
+        return np.flatnonzero(count), distinct(np.asarray(found, dtype=np.intp))
 
 
 def swept_gap(
@@ -109,7 +117,7 @@ def swept_gap(
     if len(rows) > _MOST:  # where they are at the middle, and as far as they travel from there
         errors = off_chord + 0.5 * span * (norm(motion.travel) + abs(motion.angle) * out)
         shape, hulls = _ONE, at(0.5 * (stretch[0] + stretch[1]))
-    elif _holds(hulls[rows], standing, np.unique(standing.piece[other])):
+    elif _holds(hulls[rows], standing, distinct(standing.piece[other])):
         return least
     still = [(_tree(standing.triangles[other[k]], _ONE), error) for k, error in _levels(standing.errors[other])]
     for k, error in _levels(errors[rows]):
@@ -145,7 +153,7 @@ def _holds(hulls: Array, standing: Standing, pieces: NDArray[np.intp]) -> bool:
 def _levels(errors: Array) -> list[tuple[NDArray[np.intp], float]]:
     """Rows of errors (m,) of one order of magnitude, and the largest of each."""
     level = np.ceil(np.log2(np.maximum(errors, 1e-300)) / 2.0)
-    return [(rows, float(errors[rows].max())) for k in np.unique(level) if len(rows := np.flatnonzero(level == k))]
+    return [(rows, float(errors[rows].max())) for k in distinct(level) if len(rows := np.flatnonzero(level == k))]
 
 
 def _tree(points: Array, shape: NDArray[np.int64]) -> Any:

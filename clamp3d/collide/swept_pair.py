@@ -19,6 +19,7 @@ from clamp3d.core.linear import dot, to_target
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.shells import joined
+from clamp3d.core.triangles import distinct
 
 _ERRORS = (0.064, 0.016, 0.004)
 """Chord errors (mm) of the meshes: the first that is at most an eighth of the distance that is wanted, so that most is
@@ -192,7 +193,7 @@ class SweptPair:
         found = pairs_of(moving, still, facing, self.motion, limit)
         pairs = np.zeros_like(facing)
         if found is not None:
-            pairs[np.ix_(np.unique(moving.face), np.unique(still.face))] = True
+            pairs[np.ix_(distinct(moving.face), distinct(still.face))] = True
         return found, pairs
 
 

@@ -13,6 +13,7 @@ from clamp3d.brep.solid import BrepSolid
 from clamp3d.brep.surfaces import CYLINDER, KINDS, PLANE, parameters, unwrapped
 from clamp3d.core.linear import atan2, cross, dot, norm, to_source, to_target
 from clamp3d.core.mesh import Array, IntArray, Mesh
+from clamp3d.core.triangles import distinct
 from clamp3d.fit.surface import covered
 
 _SAME = 1e-6
@@ -87,7 +88,7 @@ def _measured(body: Body, shape: BrepSolid, group: IntArray) -> tuple[float, dic
     area = 0.5 * radius * float(np.abs(a * d - b * c).sum())
     arc_error, length_error = _strays(shape.mesh.faces[rows], shape.mesh.vertices, T, half, high - low)
     off = float(faces.deviation[group].max())
-    points = np.unique(shape.mesh.faces[rows])
+    points = distinct(shape.mesh.faces[rows])
     return float(faces.sense[group[0]]), {
         "radius": radius,
         "half_angle": half,

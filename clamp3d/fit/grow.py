@@ -11,8 +11,9 @@ from clamp3d.core.linear import atan2, dot, lstsq
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
+from clamp3d.core.triangles import distinct
 from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
-from clamp3d.fit.quantile import student
+from clamp3d.fit.quantile import quantile, student
 from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface, border, facet_span
 
 MIN_LINES = 4
@@ -68,7 +69,7 @@ def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float
         depth = sagitta(axis.radius, span)
         tolerance = max(tolerance, share * depth)
         near = (off <= tolerance) & (off >= -1.02 * depth - tolerance)
-        slack = math.acos(float(np.quantile(np.clip(sign * surface.lean(axis, faces), -1.0, 1.0), 0.1)))
+        slack = math.acos(quantile(np.clip(sign * surface.lean(axis, faces), -1.0, 1.0), 0.1))
         limit = np.cos(min(max(0.6 * span, 2.5 * slack, 0.02), 0.7))
         mask: BoolArray = search.free & np.asarray(near[F].all(axis=1))
         index = np.flatnonzero(mask)
@@ -92,7 +93,7 @@ def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float
         span = float(search.span(axis, faces).max())
         if settled:
             break
-    corners = np.unique(F[faces])
+    corners = distinct(F[faces])
     if len(points) < len(corners) <= min(60, 1.25 * len(points)):
         # Scatter can look like points on chords: if all points make one consistent surface, none was.
         whole = fit_axis(V[corners], axis)
@@ -111,7 +112,7 @@ def _tolerance(residual: Array) -> float:
     """
     n = len(residual)
     freedom = max(n - 5, 1)
-    scatter = 1.4826 * float(np.median(np.abs(residual)))
+    scatter = 1.4826 * quantile(np.abs(residual), 0.5)
     if n < 60:  # the median of few is too rough
         scatter = max(scatter, float(np.sqrt(np.mean(residual**2))))
     scatter *= np.sqrt(n / freedom)
@@ -144,9 +145,9 @@ def accept(search: Search, region: Region) -> bool:
     # Every trapezoid with equal flanks lies on a circle: with three facets ask for three equal ones.
     if lines == MIN_LINES and (spans.max() > 1.02 * spans.min() or spans.max() > np.radians(30.0)):
         return False
-    if sagitta(axis.radius, arc) < 6.0 * noise or arc < 2.0 * float(np.median(spans)):
+    if sagitta(axis.radius, arc) < 6.0 * noise or arc < 2.0 * quantile(spans, 0.5):
         return False
-    length = float(np.ptp(dot(V[np.unique(search.surface.F[region.faces])], axis.direction)))
+    length = float(np.ptp(dot(V[distinct(search.surface.F[region.faces])], axis.direction)))
     if _runs_on(search.surface, region, length) or _bent(p, axis.residual(V[region.points]), axis.radius):
         return False
     return len(region.points) >= 8 and length > 0.0
@@ -179,4 +180,4 @@ def _runs_on(surface: Surface, region: Region, length: float) -> bool:
     smooth = surface.bend[crossing] < 1.5 * region.span
     band = np.ptp(dot(surface.V[surface.F[outside]], region.axis.direction), axis=1)
     both = [across & (z > 0.0), across & (z < 0.0)]
-    return all(bool(e.any() and smooth[e].mean() > 0.7 and np.median(band[e]) > 0.3 * length) for e in both)
+    return all(bool(e.any() and smooth[e].mean() > 0.7 and quantile(band[e], 0.5) > 0.3 * length) for e in both)

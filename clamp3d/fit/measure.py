@@ -12,9 +12,10 @@ from clamp3d.core.linear import atan2, cross, dot
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
+from clamp3d.core.triangles import distinct, side_keys
 from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, patches_of, perpendicular, surface_error
 from clamp3d.fit.grow import Region
-from clamp3d.fit.quantile import student
+from clamp3d.fit.quantile import quantile, student
 from clamp3d.fit.surface import BoolArray, Surface, angles, border, covered, turned
 
 FULL_TURN_GAP = np.radians(30.0)
@@ -57,9 +58,9 @@ class _Border:
                 return None
             v, w = values[side], self.length[side]
             at = _quantile(v, w, 0.5)
-            crease = np.median(self.bend[side]) > 2.0 * self.inner_bend
+            crease = quantile(self.bend[side], 0.5) > 2.0 * self.inner_bend
             dense = step < 0.1 * extent
-            if (crease and np.median(self.growth[side]) > 4.0) or step >= 0.5 * extent:
+            if (crease and quantile(self.growth[side], 0.5) > 4.0) or step >= 0.5 * extent:
                 uncertainty = 0.0
             else:
                 uncertainty = 0.5 * step if dense else step
@@ -81,9 +82,9 @@ def _border(surface: Surface, faces: IntArray) -> _Border:
     ends = surface.V[np.concatenate([surface.edges[crossing], rim])]
     beyond = np.full(len(rim), np.inf)
     bend = np.concatenate([surface.bend[crossing], beyond])
-    growth = np.concatenate([surface.areas[outside] / np.median(surface.areas[faces]), beyond])
+    growth = np.concatenate([surface.areas[outside] / quantile(surface.areas[faces], 0.5), beyond])
     bends = surface.bend[within & (surface.bend > 1e-4)]
-    inner = float(np.median(bends)) if len(bends) else 0.0
+    inner = quantile(bends, 0.5) if len(bends) else 0.0
     return _Border(ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), bend, growth, inner)
 
 
@@ -97,7 +98,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     deepest = np.cos(middle) * u + np.sin(middle) * w
     R = np.stack([cross(-deepest, d), -deepest, d], axis=1)
 
-    corners = dot(surface.V[np.unique(surface.F[region.faces])] - axis.point, R)
+    corners = dot(surface.V[distinct(surface.F[region.faces])] - axis.point, R)
     z0, z1 = float(corners[:, 2].min()), float(corners[:, 2].max())
     rim = _border(surface, region.faces)
     local = dot(rim.edges - axis.point, R)
@@ -107,7 +108,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     v, t = (2.0 * z - z0 - z1) / (z1 - z0), angle / half
     length_error = arc_error = 0.0
     rounds = [~along & (k * v > 0.8) & (np.abs(t) < 0.85) for k in (-1, 1)]
-    step = 0.0 if region.strips else float(np.median(np.ptp(dot(surface.V[surface.F[region.faces]], d), axis=1)))
+    step = 0.0 if region.strips else quantile(np.ptp(dot(surface.V[surface.F[region.faces]], d), axis=1), 0.5)
     if ends := rim.ends(z, rounds, step, z1 - z0):
         z0, z1, length_error = ends
     lips = [along & (k * t > 0.8) & (np.abs(v) < 0.85) for k in (-1, 1)]
@@ -157,7 +158,7 @@ def _facet(surface: Surface, axis: Axis, faces: IntArray) -> float:
     """Median angle (rad) that a triangle covers."""
     u = axis.radial(surface.V[surface.F[faces].reshape(-1)])[0].reshape(-1, 3, 3)
     chord = np.linalg.norm(u - u[:, [1, 2, 0]], axis=2).max(axis=1)
-    return 2.0 * math.asin(min(0.5 * float(np.median(chord)), 1.0))
+    return 2.0 * math.asin(min(0.5 * quantile(chord, 0.5), 1.0))
 
 
 def _inflation(surface: Surface, region: Region, residual: Array) -> float:
@@ -169,7 +170,8 @@ def _inflation(surface: Surface, region: Region, residual: Array) -> float:
     number = np.full(len(surface.V), -1)
     number[region.points] = np.arange(len(region.points))
     F = surface.F[region.faces]
-    i, j = number[np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)].T
+    sides = distinct(side_keys(F, np.roll(F, -1, axis=1), len(surface.V)))
+    i, j = (number[ends] for ends in np.divmod(sides, len(surface.V)))
     both = (i >= 0) & (j >= 0)
     power = float(dot(residual, residual)) / len(residual)
     if both.sum() < 30 or power <= 0.0:
@@ -184,7 +186,7 @@ def _off_ridges(surface: Surface, region: Region) -> float:
     An exact tessellation has no scatter that would average out, and the fit may have taken some lines for chords.
     """
     within = border(surface, region.faces)[2] & (surface.step > surface.floor)
-    ends = surface.V[np.unique(surface.edges[within])]
+    ends = surface.V[distinct(surface.edges[within])]
     return float(np.abs(region.axis.residual(ends)).max(initial=0.0))
 
 

@@ -11,8 +11,10 @@ from clamp3d.core.linear import cross, dot, eigh, norm, svd
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
+from clamp3d.core.triangles import distinct
 from clamp3d.fit.cylinder import Axis, axis_along, fit_axis, perpendicular
 from clamp3d.fit.grow import Region, Search, accept, grow
+from clamp3d.fit.quantile import quantile
 from clamp3d.fit.surface import BoolArray, Surface
 
 if TYPE_CHECKING:
@@ -80,11 +82,11 @@ def _from_patches(search: Search, same: list[IntArray], limit: float, seeds: Boo
             start, sign, scatter = guess
             if scatter > limit:  # an edge is in it: so it is in every larger patch
                 break
-            points = surface.V[np.unique(surface.F[patch])]
+            points = surface.V[distinct(surface.F[patch])]
             axis = fit_axis(points, start, robust_scale=max(scatter, search.floor))
             if axis is None:
                 continue
-            noise = 1.4826 * float(np.median(np.abs(axis.residual(points))))
+            noise = 1.4826 * quantile(np.abs(axis.residual(points)), 0.5)
             tolerance = max(search.floor, 4.0 * noise)
             if noise > 1.6 * scatter + search.floor or tolerance > 0.1 * axis.radius:
                 continue
@@ -111,8 +113,8 @@ def _noise(surface: Surface, tree: cKDTree, sample: IntArray) -> float:
             scatters.append(scatter[2])
     if len(scatters) < 20:
         return np.inf
-    side = float(np.sqrt(np.median(surface.areas[sample])))
-    return float(np.median(scatters)) + 0.003 * side
+    side = float(np.sqrt(quantile(surface.areas[sample], 0.5)))
+    return quantile(np.array(scatters), 0.5) + 0.003 * side
 
 
 def _quadric_fit(surface: Surface, patch: IntArray) -> tuple[Array, Array, float, float, Array] | None:
@@ -123,7 +125,7 @@ def _quadric_fit(surface: Surface, patch: IntArray) -> tuple[Array, Array, float
     """
     normal = dot(surface.areas[patch], surface.normals[patch])
     length = norm(normal)
-    points = surface.V[np.unique(surface.F[patch])]
+    points = surface.V[distinct(surface.F[patch])]
     if length <= 0.0 or len(points) < 9:
         return None
     normal = normal / length
@@ -167,7 +169,7 @@ def _from_normals(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] 
     """Cylinder whose axis is the direction that the patch's normals avoid most, and the scatter about it."""
     N = surface.normals[patch]
     d = eigh(dot((N * surface.areas[patch][:, None]).T, N))[1][:, 0]
-    points = surface.V[np.unique(surface.F[patch])]
+    points = surface.V[distinct(surface.F[patch])]
     axis = axis_along(d, points)
     if axis is None:
         return None

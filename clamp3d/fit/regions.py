@@ -19,10 +19,12 @@ import numpy as np
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.profile import sagitta
+from clamp3d.core.triangles import distinct
 from clamp3d.fit.cylinder import Axis, axis_along, fit_axis, perpendicular
 from clamp3d.fit.grow import Region, Search, accept, grow
 from clamp3d.fit.measure import arc
 from clamp3d.fit.patches import patches
+from clamp3d.fit.quantile import quantile
 from clamp3d.fit.surface import MAX_FACET, Surface
 
 
@@ -72,16 +74,16 @@ def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regio
         # Lines along the axis: the corners of the strips; what else they have (a split strip) lies on chords.
         own = np.concatenate([lines[a], lines[b]])
         own = own[np.abs(dot(vector[own], d)) > 0.9999]
-        corners = np.unique(ends[own])
+        corners = distinct(ends[own])
         axis = axis_along(d, V[corners])
         # Slack for the axis: a direction from one edge is only as good as its ends.
         loose = 3.0 * floor
         if axis is None or axis.radius > 20.0 * surface.extent or np.abs(axis.residual(V[corners])).max() > loose:
             continue
         # Two strips always lie on a circle: a third one must agree before the expensive growing starts.
-        beyond = np.setdiff1d(cell[own], (a, b))
+        beyond = _others(cell[own], np.array([a, b]))
         third = np.concatenate([lines[c] for c in beyond]) if len(beyond) else np.empty(0, dtype=np.int64)
-        far = ends[np.setdiff1d(third[np.abs(dot(vector[third], d)) > 0.9999], own)]
+        far = ends[_others(third[np.abs(dot(vector[third], d)) > 0.9999], own)]
         if not (np.abs(axis.residual(V[far.reshape(-1)])).reshape(-1, 2) <= 4.0 * loose).all(axis=1).any():
             continue
         seed = np.concatenate([members[a], members[b]])
@@ -92,7 +94,13 @@ def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regio
         if accept(search, region):
             yield region
         else:  # its other strips would only grow the same again
-            fails[np.unique(cells[region.faces])] += 3
+            fails[distinct(cells[region.faces])] += 3
+
+
+def _others(values: IntArray, known: IntArray) -> IntArray:
+    """What is in ``values`` (n,) and not ``known`` (k,), once each and sorted."""
+    found = distinct(values)
+    return found[~np.isin(found, known)]
 
 
 def _groups(values: IntArray, label: IntArray) -> dict[int, IntArray]:
@@ -127,11 +135,11 @@ def _joined(surface: Surface, a: Region, b: Region) -> Region | None:
     gap, _, shorter = _along(surface, large, a.faces, b.faces)
     if -gap > 0.5 * shorter:  # side by side
         tolerance = max(tolerance, 0.3 * sagitta(large.radius, span))
-    points = np.union1d(a.points, b.points)
+    points = distinct(np.concatenate([a.points, b.points]))
     axis = fit_axis(V[points], large)
     if axis is None:
         return None
-    if any(np.quantile(np.abs(axis.residual(V[region.points])), 0.9) > tolerance for region in (a, b)):
+    if any(quantile(np.abs(axis.residual(V[region.points])), 0.9) > tolerance for region in (a, b)):
         return None
     # Far apart along the axis they are two features: one groove would claim material where there is none.
     gap, length, shorter = _along(surface, axis, a.faces, b.faces)
@@ -149,7 +157,7 @@ def _along(surface: Surface, axis: Axis, a: IntArray, b: IntArray) -> tuple[floa
 
     All in mm.
     """
-    spans = [dot(surface.V[np.unique(surface.F[f])] - axis.point, axis.direction) for f in (a, b)]
+    spans = [dot(surface.V[distinct(surface.F[f])] - axis.point, axis.direction) for f in (a, b)]
     (low_a, high_a), (low_b, high_b) = ((float(z.min()), float(z.max())) for z in spans)
     length = max(high_a, high_b) - min(low_a, low_b)
     return max(low_a - high_b, low_b - high_a), length, min(high_a - low_a, high_b - low_b)

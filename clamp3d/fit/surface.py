@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from clamp3d.core.linear import atan2, crosses, dot
 from clamp3d.core.mesh import Array, IntArray, Mesh, edges_of
 from clamp3d.core.shells import joined
+from clamp3d.core.triangles import distinct
 from clamp3d.fit.cylinder import Axis, perpendicular
 
 BoolArray = NDArray[np.bool_]
@@ -45,7 +46,7 @@ class Surface:
             np.abs(np.einsum("ij,ij->i", self.V[opposite[:, 0]] - on_edge, n2)),
         )
         self.valence = np.bincount(self.F.reshape(-1), minlength=len(self.V))
-        self.extent = float(np.ptp(self.V[np.unique(self.F)], axis=0).max())
+        self.extent = float(np.ptp(self.V[distinct(self.F)], axis=0).max())
         self.floor = max(4.0 * mesh.rounding, 1e-9 * self.extent)
 
     def lean(self, axis: Axis, faces: IntArray) -> Array:

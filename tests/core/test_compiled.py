@@ -1,12 +1,14 @@
 """The compiled kernel's start: cached on disk, announced when it is cold, and never an error without a cache."""
 
 import ctypes
+import importlib.util
 import os
 import shutil
 import stat
 import subprocess
 import sys
 import time
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -179,3 +181,13 @@ def test_import_is_light():
         "print(sorted({'numba', 'scipy', 'trimesh', 'fcl'} & set(sys.modules)))"
     )
     assert run(code, PACKAGE.parent)[0] == ["[]"]
+
+
+def test_the_version_of_numba_is_that_of_its_folder(tmp_path):
+    """Read without importlib.metadata, which is asked where the folders do not tell it."""
+    installed = metadata.version("numba")
+    assert jit._numba(Path(importlib.util.find_spec("numba").origin).parents[1]) == installed
+    (tmp_path / "numba-1.2.3.dist-info").mkdir()
+    assert jit._numba(tmp_path) == "1.2.3"
+    (tmp_path / "numba-1.2.4.dist-info").mkdir()
+    assert jit._numba(tmp_path) == jit._numba(tmp_path / "none") == installed

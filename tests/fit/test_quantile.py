@@ -1,13 +1,21 @@
-"""Quantiles against SciPy's."""
+"""Quantiles against NumPy's and SciPy's."""
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import special
 
-from clamp3d.fit.quantile import fisher, student
+from clamp3d.fit.quantile import fisher, quantile, student
 
 FREEDOM = st.one_of(st.integers(1, 60), st.integers(1, 1_000_000))
+
+
+@given(st.lists(st.floats(-1e6, 1e6) | st.just(np.inf), min_size=1, max_size=30), st.sampled_from([0.1, 0.5, 0.9]))
+def test_samples(values, share):
+    with np.errstate(invalid="ignore"):  # NumPy's way between two infinities
+        expected = np.quantile(values, share)
+    assert np.isnan(expected) or quantile(np.array(values), share) == pytest.approx(expected, rel=1e-12, abs=1e-9)
 
 
 @settings(deadline=None)
