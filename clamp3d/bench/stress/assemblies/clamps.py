@@ -194,7 +194,16 @@ def _sizes(rng: np.random.Generator) -> Clamp:
     return scaled(random_clamp(rng), float(10.0 ** rng.uniform(-3.0, 2.0)))
 
 
-_NO_LENGTHS = {"back_half_angle_deg", "max_tilt_deg", "connections", "name", "description", "unit", "sequence"}
+_NO_LENGTHS = {
+    "back_half_angle_deg",
+    "max_tilt_deg",
+    "joints",
+    "connections",
+    "name",
+    "description",
+    "unit",
+    "sequence",
+}
 
 
 def scaled(clamp: Clamp, factor: float) -> Clamp:
