@@ -46,16 +46,22 @@ def validate(kind: typing.Any, data: typing.Any, origin: str, key: str = "") -> 
 
     Raises InputError: one line with origin, key, value and rule.
     """
-    if is_dataclass(kind) and isinstance(data, dict):
-        hints = typing.get_type_hints(kind, include_extras=True)
-        for name in data:
+    if isinstance(data, dict) and isinstance(kind, type) and is_dataclass(kind):
+        hints, data = _hints(kind), dict(data)
+        for name, value in data.items():
             if name not in hints:  # which msgspec lets pass
                 raise InputError(f"{origin}: {_unknown(_joined(key, name), name, list(hints))}")
-        data = {name: validate(hints[name], value, origin, _joined(key, name)) for name, value in data.items()}
+            if isinstance(value, dict):
+                data[name] = validate(_bare(hints[name]), value, origin, _joined(key, name))
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as failure:
         raise InputError(f"{origin}: {_told(failure, kind, data, key)}") from None
+
+
+@functools.cache
+def _hints(kind: typing.Any) -> dict[str, typing.Any]:
+    return typing.get_type_hints(kind, include_extras=True)
 
 
 def _told(failure: msgspec.ValidationError, kind: typing.Any, data: typing.Any, key: str) -> str:
@@ -103,7 +109,7 @@ def _below(key: str, kind: typing.Any, data: typing.Any, step: str) -> tuple[str
         number = int(step)
         return _joined(key, step), inner[min(number, len(inner) - 1)], data[number]
     value = data[step] if isinstance(data, dict) else getattr(data, step)
-    return _joined(key, step), typing.get_type_hints(kind, include_extras=True)[step], value
+    return _joined(key, step), _hints(kind)[step], value
 
 
 def _bare(kind: typing.Any) -> typing.Any:
