@@ -34,6 +34,8 @@ REFERENCE = resources.files("clamp3d.clamp").joinpath("data/reference.toml").rea
         ('conductor = "LJ-630"', 'conductor = "LJ-631"', "line.conductor: unknown conductor 'LJ-631'; nearest: LJ-630"),
         ('conductor = "LJ-630"', "", "line.conductor or diameter: give one of them"),
         ("P4 = 2, P5", "P4 = 4, P5", "connections.P1.P4: must be 0, 1, 2 or 3, got 4"),
+        ("P5 = 2, P6", "P5 = 9, P6", "connections.P1.P5: must be 0, 1, 2 or 3, got 9"),
+        ("P4 = { P5 = 1 }", "P4 = { P5 = -1 }", "connections.P4.P5: must be 0, 1, 2 or 3, got -1"),
         ("P4 = 2, P5", "P9 = 2, P5", "connections.P1.P9: must be 'P1', 'P2'"),
         ("P4 = { P5 = 1 }", "P5 = { P4 = 1 }", "connections.P5.P4: the matrix is given above its diagonal"),
         ("[nut]", "[nut", "not valid TOML"),

@@ -221,6 +221,22 @@ def test_open_and_unreadable_meshes(tmp_path):
         load_scene(Path(tmp_path / "missing.toml"))
 
 
+def test_a_file_is_read_once_for_each_way_to_read_it(tmp_path, monkeypatch):
+    import trimesh
+
+    from clamp3d.scenefile import tables
+
+    trimesh.creation.box((10, 10, 10)).export(tmp_path / "cube.stl")
+    asked = []
+    read = tables.read_parts
+    monkeypatch.setattr(tables, "read_parts", lambda path, reader: asked.append(reader.unit) or read(path, reader))
+    table = '[parts.{}]\nfile = "cube.stl"\nunit = "{}"\npose = {{ translation = [{}, 0, 0] }}\n'
+    text = "".join(table.format(*row) for row in (("a", "mm", 0), ("b", "mm", 20), ("c", "cm", 300), ("d", "mm", 40)))
+    scene = parse_scene(text, folder=tmp_path)
+    assert asked == ["mm", "cm"]
+    assert [part.T_world[0, 3] for part in scene.parts] == [0.0, 20.0, 300.0, 40.0]
+
+
 @pytest.mark.parametrize("size", [1e-300, 1.0, 1e308])
 def test_a_turn_does_not_depend_on_how_long_its_axis_is(size):
     turn = f"axis = [0, 0, {size}], angle_deg = 90"
