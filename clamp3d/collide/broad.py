@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,8 @@ from clamp3d.core.pose import Array
 
 FEW = 32
 """So few boxes are compared with all others, without a tree."""
+_AT_ONCE = 10_000
+"""So few pairs of boxes as well: to load and fill a tree takes longer."""
 
 FIRST = np.zeros(1, dtype=np.int64)
 """Which box all of many poses have."""
@@ -76,15 +80,30 @@ def near_between(boxes: Boxes, others: Boxes, reach: float) -> NDArray[np.int64]
     grown = 0.5 * reach * (1.0 + 1e-9)
     low, high = boxes.centre - (boxes.reach + grown), boxes.centre + (boxes.reach + grown)
     lows, highs = others.centre - (others.reach + grown), others.centre + (others.reach + grown)
-    if min(len(low), len(lows)) <= FEW:
-        return np.argwhere(((low[:, None] <= highs) & (lows <= high[:, None])).all(axis=2))
-    from rtree import index
-
-    tree = index.Index((np.arange(len(lows)), lows, highs), properties=index.Property(dimension=3))
-    second, count = tree.intersection_v(low, high)  # type: ignore[no-untyped-call]
-    first = np.repeat(np.arange(len(low)), count.astype(np.int64))
-    second = np.asarray(second, dtype=np.int64)
+    first, second = BoxTree(lows, highs).meeting(low, high)
     return np.column_stack([first, second])[np.lexsort((second, first))]
+
+
+class BoxTree:
+    """Boxes along the world's axes, from ``low`` to ``high`` (n, 3), of which those are asked that meet others."""
+
+    def __init__(self, low: Array, high: Array) -> None:
+        self.low, self.high = low, high
+
+    def meeting(self, low: Array, high: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Which boxes of ``low``, ``high`` (m, 3) meet which of these, as pairs in two arrays (k,)."""
+        if min(len(low), len(self.low)) <= FEW or len(low) * len(self.low) <= _AT_ONCE:
+            first, second = np.nonzero(((low[:, None] <= self.high) & (self.low <= high[:, None])).all(axis=2))
+            return first, second
+        found, count = self._tree.intersection_v(low, high)
+        return np.repeat(np.arange(len(low)), count.astype(np.int64)), np.asarray(found, dtype=np.int64)
+
+    @cached_property
+    def _tree(self) -> Any:
+        from rtree import index
+
+        rows = np.arange(len(self.low))
+        return index.Index((rows, self.low, self.high), properties=index.Property(dimension=3))
 
 
 def box_gaps(boxes: Boxes, pairs: NDArray[np.int64]) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.batch import Pairs, bounds_by_kernel, relative
-from clamp3d.collide.broad import FEW, FIRST, Boxes, box_gaps, box_sizes, world_boxes
+from clamp3d.collide.broad import FEW, FIRST, Boxes, BoxTree, box_gaps, box_sizes, world_boxes
 from clamp3d.collide.judge import contained, judge
 from clamp3d.collide.model import Model, ModelCache
 from clamp3d.collide.scene import Scene
@@ -224,7 +224,7 @@ def _meeting(T: Array, bounds: Array, still: Array, reach: float) -> tuple[int, 
     below, above, sizes = still[:3] - reach, still[3:] + reach, box_sizes(bounds[None])
     moving, others = np.empty((6, min(_BLOCK, len(T)))), np.empty(still.shape[1], dtype=np.int64)
     pairs, count = np.empty((2, len(T)), dtype=np.int64), 0
-    tree: Any = None
+    tree = BoxTree(below.T, above.T)
     for start in range(0, len(T), _BLOCK):
         some = T[start : start + _BLOCK]
         bad = boxes(some, sizes, FIRST, FARTHEST, moving)
@@ -233,16 +233,12 @@ def _meeting(T: Array, bounds: Array, still: Array, reach: float) -> tuple[int, 
         near, n = others[: around(moving, len(some), below, above, others)], len(some)
         most = n * len(near)
         if len(near) > FEW:
-            from rtree import index
-
-            if tree is None:
-                tree = index.Index((np.arange(len(others)), below.T, above.T), properties=index.Property(dimension=3))
-            column, each = tree.intersection_v(moving[:3, :n].T, moving[3:, :n].T)
+            row, column = tree.meeting(moving[:3, :n].T, moving[3:, :n].T)
             most = len(column)
         if count + most > pairs.shape[1]:
             pairs = np.concatenate([pairs[:, :count], np.empty((2, count + most), dtype=np.int64)], axis=1)
         if len(near) > FEW:
-            pairs[0, count : count + most] = np.repeat(np.arange(start, start + n), np.asarray(each, dtype=np.int64))
+            pairs[0, count : count + most] = start + row
             pairs[1, count : count + most] = column
             count += most
         else:

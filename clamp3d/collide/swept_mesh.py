@@ -7,12 +7,12 @@ one that slides along a face keeps its distance however long the stretch. Arcs l
 from __future__ import annotations
 
 import itertools
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.collide.broad import BoxTree
 from clamp3d.collide.surface import fcl_tree
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.motion import Motion
@@ -21,8 +21,6 @@ from clamp3d.core.triangles import distinct
 
 _MOST = 3000
 """Swept triangles whose hulls are measured at once."""
-_AT_ONCE = 10_000
-"""Pairs of boxes that are asked one by one: to load and fill a tree takes longer."""
 _PRISM = np.array(
     [(0, 1, 2), (3, 4, 5), (0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (2, 0, 3), (2, 3, 5)], dtype=np.int64
 )
@@ -45,22 +43,12 @@ class Standing:
         self.boxes = np.full((len(first), 2, 3), np.inf) * np.array([[1.0], [-1.0]])
         np.minimum.at(self.boxes[:, 0], self.piece, triangles.min(axis=1))
         np.maximum.at(self.boxes[:, 1], self.piece, triangles.max(axis=1))
-        self._low, self._high = triangles.min(axis=1) - errors[:, None], triangles.max(axis=1) + errors[:, None]
-
-    @cached_property
-    def _tree(self) -> Any:
-        from rtree import index
-
-        rows = np.arange(len(self.triangles))
-        return index.Index((rows, self._low, self._high), properties=index.Property(dimension=3))
+        self._tree = BoxTree(triangles.min(axis=1) - errors[:, None], triangles.max(axis=1) + errors[:, None])
 
     def near(self, low: Array, high: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Which boxes ``low``, ``high`` (m, 3) meet one of a triangle, and which triangles those are."""
-        if len(low) * len(self.triangles) <= _AT_ONCE:
-            meet = ((low[:, None] <= self._high) & (self._low <= high[:, None])).all(axis=2)
-            return np.flatnonzero(meet.any(axis=1)), np.flatnonzero(meet.any(axis=0))
-        found, count = self._tree.intersection_v(low, high)
-        return np.flatnonzero(count), distinct(np.asarray(found, dtype=np.intp))
+        rows, triangles = self._tree.meeting(low, high)
+        return distinct(rows), distinct(triangles)
 
 
 def swept_gap(
