@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import statistics
 import sys
 import time
 from collections.abc import Callable
@@ -17,8 +16,12 @@ from clamp3d.bench.compare.methods import MANY, Method, Prepared, load, prepare
 from clamp3d.bench.compare.scene import BANDS, CLEAR, OVERLAP, Poses, coherent_poses, known_poses
 from clamp3d.core.pose import Array
 
-_ARC_PASSES = 9
-"""Passes of the arc whose median is what a call of it takes in a process."""
+_PASSES = 3
+"""Times that everything is asked at least."""
+_PART = 1e-3
+"""Seconds of a stretch that is timed by itself: now and then one runs undisturbed also where a core is shared."""
+_BATCH = 0.05
+"""Seconds of a batch: long beside the start of threads."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +41,10 @@ class Measured:
 
     ``median_error`` and ``worst_error`` are of the distance of a wire that is clear, ``depth_error`` is the worst on
     overlaps up to 0.3 mm deep (None: no depth). ``load`` is the import of the libraries, ``setup`` what comes before
-    the first pose. ``one`` and ``many`` are CPU seconds per pose of repeated passes over as many clear poses as
-    overlapping ones; ``coherent`` is the same on a slow motion, where a solver may start from its last answer;
-    ``threaded`` is by the clock, on all cores (None: the method has no threads). As a machine's speed drifts, each is a
-    multiple of ``arc``, CPU seconds of a call of the arc, which is timed before every pass. ``memory`` is what the
+    the first pose. ``one`` and ``many`` are CPU seconds per pose over as many clear poses as overlapping ones;
+    ``coherent`` is the same on a slow motion, where a solver may start from its last answer; ``threaded`` is by the
+    clock, on all cores (None: the method has no threads). Each is the least of repeated passes (`least`): what the
+    method takes where nothing else slows the machine. ``memory`` is what the
     process grew by from set-up and queries, ``library_memory`` from the import (None where the system does not tell).
     """
 
@@ -60,7 +63,6 @@ class Measured:
     many: float
     coherent: float
     threaded: float | None
-    arc: float
     memory: float | None
     library_memory: float | None
 
@@ -75,7 +77,7 @@ def measure(
     *,
     load: Callable[[Method], None] = load,
     prepare: Callable[[Method], Prepared] = prepare,
-    budget: float = 0.6,
+    budget: float = 0.3,
 ) -> Measured:
     """Measure one method in this process; ``budget`` is about how many seconds the timing of each kind may take."""
     poses = known_poses()
@@ -95,22 +97,18 @@ def measure(
     half = np.flatnonzero(overlap)
     half = np.concatenate([half, np.flatnonzero(clear)[: len(half)]])
     timed = np.ascontiguousarray(poses.T[half])
-    beside = arc_beside(timed)
-    arc = statistics.median(seconds(beside) for _ in range(_ARC_PASSES)) / len(timed)
 
-    def per_pose(run: Callable[[], object], poses: Array, clock: Callable[[], float] = time.process_time) -> float:
-        return arc * repeated(run, beside, budget, clock=clock) * len(timed) / len(poses)
+    def pose_by_pose(poses: Array) -> float:
+        return least(lambda part: [ready.one(T) for T in part], poses, budget)
 
-    one = per_pose(lambda: [ready.one(T) for T in timed], timed)
-    way = coherent_poses(len(timed), straight=ready.parallel_only)
-    coherent = per_pose(lambda: [ready.one(T) for T in way], way)
+    one, coherent = pose_by_pose(timed), pose_by_pose(coherent_poses(len(timed), straight=ready.parallel_only))
     if not np.allclose(ready.many(timed), values[half], rtol=0.0, atol=1e-12 + 0.5 * error.max()):
         raise AssertionError(f"{method.label}: one and many differ")
-    times = min(MANY, max(len(timed), int(budget / max(one, 1e-9)))) // len(timed) if ready.batched else 1
+    times = max(1, min(MANY // len(timed), int(_BATCH / (_seconds(ready.many, timed, time.perf_counter) + 1e-9))))
     batch = np.tile(timed, (times, 1, 1))
-    many = per_pose(lambda: ready.many(batch), batch)
+    many = least(ready.many, batch, budget, whole=True)
     run = ready.threaded
-    threaded = None if run is None else per_pose(lambda: run(batch), batch, time.perf_counter)
+    threaded = None if run is None else least(run, batch, budget, whole=True, clock=time.perf_counter)
     return Measured(
         method=method.family,
         setting=method.setting,
@@ -127,7 +125,6 @@ def measure(
         many=many,
         coherent=coherent,
         threaded=threaded,
-        arc=arc,
         memory=None if grown is None or loaded is None else max(0.0, grown - loaded),
         library_memory=None if loaded is None or before is None else max(0.0, loaded - before),
     )
@@ -140,40 +137,35 @@ def verdicts(poses: Poses, values: Array, band: float) -> Band:
     return Band(band, int((~hit).sum()), int(hit.sum()), int((said & ~hit).sum()), int((hit & ~said).sum()))
 
 
-def arc_beside(poses: Array) -> Callable[[], object]:
-    """Calls of the arc for each of ``poses`` (n, 4, 4): what other times are told beside."""
-    arc = prepare(Method("cas")).one
-    arc(poses[0])
-    return lambda: [arc(T) for T in poses]
-
-
-def seconds(run: Callable[[], object], clock: Callable[[], float] = time.process_time) -> float:
-    """Time of ``run`` by ``clock``."""
-    start = clock()
-    run()
-    return clock() - start
-
-
-def repeated(
-    run: Callable[[], object],
-    beside: Callable[[], object],
+def least(
+    run: Callable[[Array], object],
+    poses: Array,
     budget: float,
-    most: int = 15,
     *,
+    whole: bool = False,
     clock: Callable[[], float] = time.process_time,
 ) -> float:
-    """How many times as long ``run`` takes as what is run before it: the median of at least 3 and at most ``most``.
+    """Least time per pose by ``clock`` in which ``run`` answers ``poses`` (n, 4, 4).
 
-    Until ``budget`` s by ``clock`` are spent.
+    They are gone through in parts of about a millisecond (``whole``: as they are), again and again for ``budget`` s;
+    the least times of the parts are added up. Other work on the machine can only make a part slower, and Python more
+    than compiled loops, so neither mean nor median of a pass can be had again.
     """
-    ratios: list[float] = []
-    spent = 0.0
-    while len(ratios) < 3 or (len(ratios) < most and spent < budget):
-        first = seconds(beside, clock)
-        own = seconds(run, clock)
-        ratios.append(own / first)
-        spent += own
-    return statistics.median(ratios)
+    times: list[list[float]] = []
+    parts = [poses]
+    if not whole:
+        count = max(1, int(_PART / (_seconds(run, poses[:1], clock) + 1e-9)))
+        parts = [poses[i : i + count] for i in range(0, len(poses), count)]
+    end = time.perf_counter() + budget
+    while len(times) < _PASSES or time.perf_counter() < end:
+        times.append([_seconds(run, part, clock) for part in parts])
+    return float(np.min(times, axis=0).sum()) / len(poses)
+
+
+def _seconds(run: Callable[[Array], object], poses: Array, clock: Callable[[], float]) -> float:
+    start = clock()
+    run(poses)
+    return clock() - start
 
 
 def resident() -> float | None:

@@ -62,15 +62,13 @@ class Prepared:
     """A method ready to measure poses of the wire in the groove's frame.
 
     ``one`` takes a pose (4, 4), ``many`` takes poses (n, 4, 4). ``pieces`` counts the convex pieces, triangles or
-    chords. ``batched``: ``many`` is more than a loop, ``threaded`` the same on all cores. ``depth``: a negative value
-    measures the overlap.
+    chords. ``threaded`` is ``many`` on all cores. ``depth``: a negative value measures the overlap.
     ``elsewhere`` are seconds of the set-up that other processes took (CoACD, also when its answer was cached).
     """
 
     one: Callable[[Array], float]
     many: Callable[[Array], Array]
     pieces: int
-    batched: bool = False
     depth: bool = True
     parallel_only: bool = False
     elsewhere: float = 0.0
@@ -141,7 +139,6 @@ def _cas() -> Prepared:
         lambda T: signed_distance(GROOVE, WIRE, T).distance,
         lambda poses: signed_distances(GROOVE, WIRE, poses, workers=1),
         1,
-        batched=True,
         threaded=lambda poses: signed_distances(GROOVE, WIRE, poses),
     )
 

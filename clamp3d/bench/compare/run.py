@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -19,8 +18,8 @@ from clamp3d.errors import Clamp3dError
 
 CONTACT_LIMIT = 90.0
 """Seconds that one method may take on the poses, its set-up included."""
-ROUNDS = 3
-"""Processes of each method on the poses, in turn with the others: a machine's speed drifts within minutes."""
+ROUNDS = 5
+"""Processes of each method on the poses, in turn with the others: a machine may be slow for minutes."""
 SLOW_SETUP = 3.0
 """CPU seconds of set-up from which a method is measured in one process only."""
 ASSEMBLY_LIMIT = 150.0
@@ -82,8 +81,8 @@ def compare(
 ) -> Comparison:
     """Measure all methods, one process after the other; ``progress`` is told jobs done, jobs in all and what is next.
 
-    Times on the poses are medians of `ROUNDS` processes each, beside the arc in the same process, and told for one
-    speed of the machine; in all some minutes. A method that fails or does not end in time becomes a row that says so.
+    Times on the poses are the least of `ROUNDS` processes each; in all some minutes. A method that fails or does not
+    end in time becomes a row that says so.
     """
     start = time.monotonic()
     peer_methods = PEER_METHODS if peers else ()
@@ -115,8 +114,7 @@ def compare(
                 rows.append(job(kind, method, CONTACT_LIMIT, f"{method.label} on known poses"))
             else:
                 done += 1
-    arc = min((row.arc for rows in rounds for row in rows if isinstance(row, Measured)), default=0.0)
-    known = [typical(rows, arc) for rows in rounds]
+    known = [quickest(rows) for rows in rounds]
     both = [job("assembly", m, ASSEMBLY_LIMIT, f"assembly by {m.label}") for m in ASSEMBLIES]
     pairs = [found if isinstance(found, tuple) else (found, found) for found in both]
     image = job("image", Method("image"), ASSEMBLY_LIMIT, "measuring in a picture")
@@ -134,29 +132,15 @@ def compare(
     )
 
 
-def typical(rows: Sequence[Measured | NotMeasured], arc: float) -> Measured | NotMeasured:
-    """The first row with the median of every time of those that have figures, were a call of the arc to take ``arc`` s.
-
-    Of load and set-up, for which the arc is not asked beside them, the least.
-    """
+def quickest(rows: Sequence[Measured | NotMeasured]) -> Measured | NotMeasured:
+    """The first row with the least of every time of those that have figures."""
     first, *_ = rows
     if not isinstance(first, Measured):
         return first
     some = [row for row in rows if isinstance(row, Measured)]
-
-    def told(name: str) -> float:
-        return arc * float(statistics.median(getattr(row, name) / row.arc for row in some))
-
-    return replace(
-        first,
-        one=told("one"),
-        many=told("many"),
-        coherent=told("coherent"),
-        threaded=None if first.threaded is None else told("threaded"),
-        arc=arc,
-        load=min(row.load for row in some),
-        setup=min(row.setup for row in some),
-    )
+    told = {name: min(getattr(row, name) for row in some) for name in ("load", "setup", "one", "many", "coherent")}
+    threaded = [row.threaded for row in some if row.threaded is not None]
+    return replace(first, **told, threaded=min(threaded, default=None))
 
 
 def exact_distance(found: Comparison) -> float:

@@ -27,7 +27,7 @@ from clamp3d.bench.compare import run as study
 from clamp3d.bench.compare.assemblies import Assembled, Imaged, assembled, imaged
 from clamp3d.bench.compare.chart import save_comparison
 from clamp3d.bench.compare.jobs import JobError, run_job
-from clamp3d.bench.compare.measure import Band, Measured, measure, verdicts
+from clamp3d.bench.compare.measure import Band, Measured, least, measure, verdicts
 from clamp3d.bench.compare.methods import METHODS, Method, prepare
 from clamp3d.bench.compare.peers import PEER_METHODS, SERIES, load_peer, missing_peers, prepare_peer
 from clamp3d.bench.compare.peers.pieces import sectors
@@ -40,6 +40,7 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.cli.compare import command
+from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
 
 QUICK = 0.01
@@ -49,7 +50,7 @@ def _row(method: str, one: float, worst: float, setting: float | None = None) ->
     bands = tuple(Band(b, 40, 40, 0, 0) for b in (0.02, 1e-4, 1e-6))
     label = Method(method, setting).label
     return Measured(
-        method, setting, label, 1, 420, worst / 2, worst, None, bands, 0.1, 0.01, one, one / 2, one, None, 5e-6,
+        method, setting, label, 1, 420, worst / 2, worst, None, bands, 0.1, 0.01, one, one / 2, one, None,
         1.0, 10.0,
     )  # fmt: skip
 
@@ -361,29 +362,53 @@ def test_compare_asks_every_job_and_keeps_going(monkeypatch: pytest.MonkeyPatch)
     assert not any(kind == "peer" for kind, _ in asked)
 
 
-def test_times_are_told_beside_the_arc_in_rounds_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_least_of_rounds_in_turn_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
 
     def answer(kind: str, method: str, *, time_limit: float) -> Any:
         if kind != "contact":
             return NotMeasured(method, None, method, "not asked here")
         asked.append(method)
-        if method == "chords:5.0" and asked.count(method) == 2:
+        k = asked.count(method) - 1
+        if method == "chords:5.0" and k == 3:
             raise JobError("not finished in 90 s")
         m = Method.parse(method)
-        k = asked.count(method) - 1
-        speed = (1.0, 2.0, 4.0)[k]  # the machine is slower in each round: so is the arc
-        row = _row(m.family, speed * (3.0, 1.0, 2.0)[k], 1e-4, m.setting)
-        return dataclasses.replace(row, arc=speed * 5e-6, setup=60.0 if m.family == "hulls" else 0.1)
+        row = _row(m.family, (3.0, 2.0, 4.0, 1.0, 5.0)[k], 1e-4, m.setting)
+        return dataclasses.replace(
+            row,
+            setup=60.0 if m.family == "hulls" else 0.1 + 0.1 * k,
+            many=7.0 - k,
+            threaded=9.0 - k if m.family == "cas" else None,
+        )
 
     monkeypatch.setattr(study, "run_job", answer)
     found = compare()
     assert asked[: len(METHODS)] == [m.key for m in METHODS]  # in turn, not one after the other
-    assert {asked.count(m.key) for m in METHODS} == {1, 3}
-    times = {row.label: row.one for row in found.measured}
+    assert {asked.count(m.key) for m in METHODS} == {1, 5}
+    rows = {row.label: row for row in found.measured}
     for m in METHODS:
-        expected = 3.0 if m.family == "hulls" else 2.5 if m.key == "chords:5.0" else 2.0
-        assert times[m.label] == pytest.approx(expected)
+        row = rows[m.label]
+        assert row.one == (3.0 if m.family == "hulls" else 2.0 if m.key == "chords:5.0" else 1.0)
+        assert row.many == (7.0 if m.family == "hulls" else 3.0)
+        assert row.setup == (60.0 if m.family == "hulls" else 0.1)
+        assert row.threaded == (5.0 if m.family == "cas" else None)
+
+
+def test_the_least_time_is_found_part_by_part() -> None:
+    """A machine that is slow for a while: no whole pass is undisturbed, every part is once."""
+    now, calls = 0.0, 0
+
+    def run(part: Array) -> None:
+        nonlocal now, calls
+        calls += 1
+        disturbed = calls % 3 != 0  # of the ten parts of a pass, others each time
+        now += len(part) * 1e-4 * (2.0 if disturbed else 1.0)
+
+    poses = np.tile(np.eye(4), (100, 1, 1))
+    assert least(run, poses, 0.01, clock=lambda: now) == pytest.approx(1e-4)
+    now, calls = 0.0, 0
+    assert least(run, poses, 0.0, whole=True, clock=lambda: now) == pytest.approx(1e-4)
+    assert calls == 3
 
 
 def test_command_refuses_before_it_measures(tmp_path: Path) -> None:

@@ -75,7 +75,6 @@ def _whole(unit_angle: float, shape: str) -> Prepared:
         one,
         lambda poses: batch(poses, 1),
         wire,
-        batched=True,
         threaded=lambda poses: batch(poses, os.cpu_count() or 1),
     )
 
