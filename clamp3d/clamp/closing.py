@@ -10,17 +10,19 @@ over h are the contact forces in parts of the bolt force.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.clamp.curvature import lagrangian_hessian
 from clamp3d.clamp.matrix import Pair
-from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, U, V, W
-from clamp3d.core.linear import dot, eigh, svd
-from clamp3d.core.nonnegative import nnls
+from clamp3d.clamp.section import SIZE, SPLINTS, WIRES, D, Gaps, S, Section, U, W
+from clamp3d.core.linear import dot, eigh
 from clamp3d.core.pose import Array
 from clamp3d.core.roots import root
 from clamp3d.errors import SolverError
@@ -48,6 +50,8 @@ _FULL = 1e-9
 """Clearance in parts of the groove's radius below which a wire fills it: there is no round to roll in."""
 _SHORTEST = 1e-9
 """Shortest stride, in parts of the half width."""
+_GROOVES = {(splint, wire): 2 * i + k for i, wire in enumerate(WIRES) for k, splint in enumerate(SPLINTS)}
+"""Their numbers in `kernel_closing.bends`."""
 
 
 def open_start(section: Section, *, open_by: float = 0.0, open_tilt: float = 0.0) -> Array:
@@ -86,7 +90,7 @@ def descend(
     ``at_rest`` over the bolt's speed. Raises SolverError if that takes more than ``most`` steps.
     """
     longest = stride * section.lever
-    motion = _Motion(section, goal, list(section.free if free is None else free), longest)
+    motion = _Motion(section, goal, np.array(section.free if free is None else free), longest)
     gaps, h = section.gaps(q), longest
     loaded: set[Pair] = set()
     for _ in range(most or _STEPS):
@@ -116,13 +120,13 @@ def descend(
     )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Motion:
     """The motion that lowers ``goal`` by the coordinates ``moving``, in steps of about ``longest`` mm."""
 
     section: Section
     goal: Array
-    moving: list[int]
+    moving: NDArray[np.intp]
     longest: float
 
     def step(self, q: Array, gaps: Gaps, h: float, without: Pair | None = None) -> tuple[Array, Gaps, Array] | None:
@@ -130,20 +134,21 @@ class _Motion:
 
         The gaps of the pair ``without`` do not count, but for the saddle's arc: it carries from the outset.
         """
-        longest, moving = self.longest, self.moving
+        longest, moving, n = self.longest, self.moving, len(self.moving)
         target = q - h * self.goal
-        at, force = q, np.zeros(len(gaps.value))
-        ignored = np.array([without is not None and pair == without for pair in gaps.pair[:-1]] + [False])
+        at, force = np.ascontiguousarray(q), np.zeros(len(gaps.value))
+        apart = np.zeros(len(force), np.int64)
+        if without is not None:
+            apart[:-1] = [pair == without for pair in gaps.pair[:-1]]
         for k in range(_ROUNDS):
             if h <= _SLOW * longest or k == 1:
                 bend = self._bend(at, gaps, force, exact=h > _SLOW * longest)
             elif k == 0:
-                bend = np.zeros((len(moving), len(moving)))
-            hessian = np.eye(len(moving)) + h * bend
-            near = np.flatnonzero(~ignored & (gaps.value <= 2.0 * longest + np.abs(gaps.gradient[:, D]) * h))
-            move, pushed = _project((at - target)[moving], hessian, gaps.gradient[near][:, moving], gaps.value[near], h)
-            if move is None:
+                bend = np.zeros((n, n))
+            found = self._move(at, target, bend, gaps, apart, h)
+            if found is None:
                 return None
+            move, force = found
             new = at.copy()
             new[moving] += move
             if np.abs(new - q).max() > 3.0 * max(longest, h):
@@ -151,14 +156,27 @@ class _Motion:
             gaps, at = self.section.gaps(new), new
             if len(gaps.value) != len(force):
                 return None
-            force = np.zeros(len(force))
-            force[near] = pushed / h
-            least = float(gaps.value[~ignored].min())
+            least = float(gaps.value.min() if without is None else gaps.value[apart == 0].min())
             if (np.abs(move).max() <= _SETTLED * longest and least >= -_OVERLAP * longest) or (
-                not pushed.any() and least >= 0.0
+                not force.any() and least >= 0.0
             ):
                 return at, gaps, force
         return None
+
+    def _move(
+        self, at: Array, target: Array, bend: Array, gaps: Gaps, apart: NDArray[np.int64], h: float
+    ) -> tuple[Array, Array] | None:
+        """Move (n,) of a round and forces (k,) of the gaps; None where they cannot open. See `kernel_closing`."""
+        from clamp3d.clamp.kernel_closing import move  # compiled on first use
+
+        k, n = len(gaps.value), len(self.moving)
+        x, force, square = np.empty(n), np.empty(k), np.empty((2, n, n))
+        work = square[0], np.empty((k, n)), square[1], np.empty((n + 1, k)), np.empty((n + 1, k + 1))
+        given = at, target, self.moving, bend, h, 2.0 * self.longest, gaps.value, gaps.gradient, apart
+        found = move(*given, x, force, *work, np.empty((7, n + k + 1)))
+        if found < 0:
+            raise SolverError(f"a step of the closing path does not end: {k} gaps, {n} coordinates")
+        return (x, force) if found else None
 
     def meeting(self, q: Array, gaps: Gaps, h: float, pair: Pair, new: Array) -> Array:
         """The state in a step of ``h`` from q to ``new`` at which ``pair`` meets: the step without it, cut short."""
@@ -180,46 +198,25 @@ class _Motion:
         (force over radius difference), on a long one all there is, by differences."""
         section, moving = self.section, self.moving
         if exact:
-            size, axes = eigh(lagrangian_hessian(section, q, gaps, force)[np.ix_(moving, moving)])
+            size, axes = eigh(lagrangian_hessian(section, q, gaps, force)[moving[:, None], moving])
             return np.asarray(dot(axes * np.maximum(size, 0.0), axes.T))
+        from clamp3d.clamp.kernel_closing import bends  # compiled on first use
+
         found = np.zeros((SIZE, SIZE))
         found[W, W] = max(0.0, section.lift(float(q[W]))[2]) * force[-1] * gaps.normal[-1, 1]
         angle = float(q[S]) / section.lever
-        c, s = math.cos(angle), math.sin(angle)
-        for k in np.flatnonzero(force):
-            (splint, wire), row = gaps.pair[k], gaps.gradient[k]
-            if gaps.feature[k] != "arc" or wire not in WIRES:
-                continue
-            pair, i = section.pairs[splint, wire], 2 * WIRES.index(wire)
-            along = np.zeros(SIZE)
-            tx, ty = -row[i + 1], row[i]
-            along[i], along[i + 1] = tx, ty
-            if splint == "P2":
-                u, v = float(pair.T_a_groove[0, 3]), -float(pair.T_a_groove[2, 3])
-                ox, oy = u * c + v * s, v * c - u * s
-                along[D], along[U], along[S] = -ty, ty, (ty * ox - tx * oy) / section.lever
-                along[B] = along[V] = along[W] = -tx
+        named = zip(gaps.pair, gaps.feature, strict=True)
+        groove = [_GROOVES.get(pair, -1) if name == "arc" else -1 for pair, name in named]
+        turned = math.cos(angle), math.sin(angle), section.lever
+        bends(gaps.gradient, force, np.array(groove), self._rounds, *turned, np.empty(SIZE), found)
+        return found[moving[:, None], moving]
+
+    @cached_property
+    def _rounds(self) -> Array:
+        """Difference of the radii and centre in the splint's axes (4, 3) of each groove and its wire, mm."""
+        found = []
+        for wire, splint in itertools.product(WIRES, SPLINTS):
+            pair = self.section.pairs[splint, wire]
             slack = max(abs(pair.groove.radius - pair.cylinder.radius), _FULL * pair.groove.radius)
-            found += force[k] / slack * np.outer(along, along)
-        return found[np.ix_(moving, moving)]
-
-
-def _project(offset: Array, hessian: Array, A: Array, value: Array, scale: float) -> tuple[Array | None, Array]:
-    """Least x . H x / 2 + offset . x with A x >= -value, and the multipliers; None where A x cannot be.
-
-    A least-distance problem, solved by non-negative least squares [Lawson & Hanson, Solving Least Squares Problems,
-    1974, chapter 23].
-    """
-    _, sizes, axes = svd(hessian)
-    back = axes / np.sqrt(sizes)[:, None]
-    z0 = dot(back, offset)
-    if not len(A):
-        return dot(-z0, back), np.zeros(0)
-    G = dot(A, back.T)
-    lower = (dot(G, z0) - value) / scale
-    u = nnls(np.vstack([G.T, lower]), np.append(np.zeros(len(offset)), 1.0))
-    rest = 1.0 - float(dot(lower, u))
-    if not rest > 1e-12:
-        return None, u
-    multipliers = u / rest * scale
-    return dot(dot(multipliers, G) - z0, back), multipliers
+            found.append((slack, pair.T_a_groove[0, 3], -pair.T_a_groove[2, 3]))
+        return np.array(found)

@@ -15,12 +15,21 @@ from clamp3d.core.kernel_pieces import enter, side_pieces
 # Columns of a state that the rows depend on, as in `section`.
 _D, _S, _B, _V, _W, _U = 4, 5, 6, 7, 8, 9
 
+EDGE = -1.0
+"""In place of a feature's code: a splint's outer edge."""
+_FAR = 1e3
+"""Gap in mm of a piece that another one stands for."""
 
-def _straight(R, half_angle, H, r, l, cx, cy, mouth, u, v, work, out):  # type: ignore[no-untyped-def] # noqa: E741
+
+@formula
+def _groove(groove, u, v, work, out):  # type: ignore[no-untyped-def]
     """Arc and faces of a groove for a wire along it at (u, v): gap, point, normal and feature's code, out (3, 6).
 
-    The groove's centre is at (cx, cy), its mouth looks down (``mouth`` 1) or up (-1); ``work`` is (3, 14).
+    ``groove`` (8,) is its radius, half angle and half length, the wire's radius and half length, the groove's centre
+    and where its mouth looks, down (1) or up (-1); ``work`` is (3, 14).
     """
+    R, half_angle, H, r, l = groove[0], groove[1], groove[2], groove[3], groove[4]  # noqa: E741
+    cx, cy, mouth = groove[5], groove[6], groove[7]
     s = R * math.sin(half_angle)
     h = -R * math.cos(half_angle)
     x = u - cx
@@ -37,6 +46,57 @@ def _straight(R, half_angle, H, r, l, cx, cy, mouth, u, v, work, out):  # type: 
         out[k, 3] = row[4]
         out[k, 4] = mouth * row[5]
         out[k, 5] = row[7]
+
+
+@formula
+def _end(face, r, u, v, out):  # type: ignore[no-untyped-def]
+    """A splint's faces end at its outer edge: beside it (wire of radius r) that is the nearest piece in ``out`` (k, 6).
+
+    ``face`` (4,): x of the edge, on which side the outside is (-1, 1), the face's height, and where it looks (1: down).
+    Pieces that are nearer than the edge stand `_FAR` away: the groove's material has no end.
+    """
+    edge, side, height, looks = face[0], face[1], face[2], face[3]
+    beyond = side * (u - edge)
+    if beyond <= 0.0:
+        return
+    above = max(looks * (v - height), 0.0)
+    away = math.hypot(beyond, above)
+    gap = away - r
+    nearest = 0
+    for k in range(out.shape[0]):
+        if out[k, 0] < out[nearest, 0]:
+            nearest = k
+    for k in range(out.shape[0]):
+        if out[k, 0] < gap:
+            out[k, 0] = _FAR
+    row = out[nearest]
+    row[0] = gap
+    row[1] = edge
+    row[2] = height if above > 0.0 else v
+    row[3] = side * beyond / away
+    row[4] = looks * above / away
+    row[5] = EDGE
+
+
+def _straight(groove, face, u, v, work, out):  # type: ignore[no-untyped-def]
+    """`_groove` and `_end`."""
+    _groove(groove, u, v, work, out)
+    _end(face, groove[3], u, v, out)
+
+
+def _pushes(groove, face, places, force, work, out, pushes):  # type: ignore[no-untyped-def]
+    """Normals of the pieces, each times its ``force`` (3,), of a wire at each of ``places`` (n, 2), into (n, 2)."""
+    for k in range(places.shape[0]):
+        u, v = places[k, 0], places[k, 1]
+        _groove(groove, u, v, work, out)
+        _end(face, groove[3], u, v, out)
+        for i in range(2):
+            pushes[k, i] = force[0] * out[0, 3 + i] + force[1] * out[1, 3 + i] + force[2] * out[2, 3 + i]
+
+
+def _ended(face, r, u, v, out):  # type: ignore[no-untyped-def]
+    """`_end`."""
+    _end(face, r, u, v, out)
 
 
 @formula
@@ -59,13 +119,15 @@ def _put(k, gap, x, y, nx, ny, value, place):  # type: ignore[no-untyped-def]
     place[k, 3] = ny
 
 
-def _wire(q, down, i, bolt_x, shank, r, lever, up, below, value, gradient, place):  # type: ignore[no-untyped-def]
+@formula
+def _rows(q, down, i, p, r, up, below, value, gradient, place):  # type: ignore[no-untyped-def]
     """Gaps of the wire at columns i, i + 1 of q to both splints, whose pieces are ``up`` and ``below``, and the bolt.
 
     Pieces (k, 6): gap, point and normal in the splint's own axes. Into value (k,), gradient (k, 10; zeros), and point
-    and normal, place (k, 4).
+    and normal, place (k, 4). ``p`` as of `_stops`.
     """
     px, py, c, s, slope = down[0], down[1], down[2], down[3], down[4]
+    bolt_x, shank, lever = p[0], p[1], p[2]
     n = 0
     for j in range(up.shape[0]):
         nx, ny = up[j, 3], up[j, 4]
@@ -90,19 +152,39 @@ def _wire(q, down, i, bolt_x, shank, r, lever, up, below, value, gradient, place
     _put(n, side * (q[i] - axis) - shank - r, axis + side * shank, q[i + 1], side, 0.0, value, place)
 
 
-def _stops(q, down, p, hole, washer, walls, value, gradient, place):  # type: ignore[no-untyped-def]
-    """Gaps of the inner faces, then what ends the down splint's tilt and slide, and carries it; as `_wire` writes them.
+def _wire(q, down, i, p, r, up, below, value, gradient, place):  # type: ignore[no-untyped-def]
+    """`_rows`."""
+    _rows(q, down, i, p, r, up, below, value, gradient, place)
 
-    Its underside on the saddle's edges, its slot (``walls`` of its ends count) on the shank (Table 2 of the paper), the
-    play of hole and washer where there is any, and its round back in the saddle's arc. The splints' faces are straight:
-    their gap is least at an end of their overlap.
+
+def _wires(q, down, first, last, p, grooves, faces, work, pieces, value, gradient, place):  # type: ignore[no-untyped-def]
+    """`_rows` of the wires ``first`` to ``last`` - 1, seven each, with the ``pieces`` (2, 2, 3, 6) of arc and faces.
+
+    ``p`` as of `_stops`, ``grooves`` (2, 2, 8) and ``faces`` (2, 2, 4) as of `_groove` and `_end`, by wire and splint.
     """
-    px, py, c, s, slope, bend = down[0], down[1], down[2], down[3], down[4], down[5]
-    bolt_x, shank, lever, up_half, thickness, face, slot, slot_bottom = p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7]
-    under, saddle_half, edge_below, back, play, washer_play = p[8], p[9], p[10], p[11], p[12], p[13]
+    px, py, c, s = down[0], down[1], down[2], down[3]
     n = 0
-    for k in range(2):
-        side = 2.0 * k - 1.0
+    for k in range(first, last):
+        x, y = q[2 * k], q[2 * k + 1]
+        dx, dy = x - px, y - py
+        r = grooves[k, 0, 3]
+        for splint in range(2):
+            u, v = (x, y) if splint == 0 else (dx * c - dy * s, dx * s + dy * c)
+            _groove(grooves[k, splint], u, v, work, pieces[k, splint])
+            _end(faces[k, splint], r, u, v, pieces[k, splint])
+        up, below = pieces[k, 0], pieces[k, 1]
+        rows = value[n : n + 7], gradient[n : n + 7], place[n : n + 7]
+        _rows(q, down, 2 * k, p, r, up, below, rows[0], rows[1], rows[2])
+        n += 7
+
+
+@formula
+def _faces(down, p, value, gradient, place):  # type: ignore[no-untyped-def]
+    """The first two rows: gaps of the splints' inner faces, which are straight, so least at an end of their overlap."""
+    px, py, c, s, slope = down[0], down[1], down[2], down[3], down[4]
+    bolt_x, lever, up_half, thickness, face = p[0], p[2], p[3], p[4], p[5]
+    for n in range(2):
+        side = 2.0 * n - 1.0
         u = side * lever
         corner, edge = px + u * c + face * s, bolt_x + side * up_half
         if side * (corner - edge) <= 0.0:  # P2's corner under P1's face
@@ -112,7 +194,27 @@ def _stops(q, down, p, hole, washer, walls, value, gradient, place):  # type: ig
             x, y = edge - px, thickness - py
             _move(gradient[n], s, c, y * s - x * c, slope, lever)
             _put(n, face - (x * s + y * c), edge, thickness, s, c, value, place)
-        n += 1
+
+
+def _face_gaps(tilts, down, p, value, gradient, place, out):  # type: ignore[no-untyped-def]
+    """Least gap of the inner faces at each tilt (n,) into ``out`` (n,); ``down`` without it; workspace of two rows."""
+    for k in range(tilts.shape[0]):
+        down[2], down[3] = math.cos(tilts[k]), math.sin(tilts[k])
+        _faces(down, p, value, gradient, place)
+        out[k] = min(value[0], value[1])
+
+
+def _stops(q, down, p, hole, washer, walls, value, gradient, place):  # type: ignore[no-untyped-def]
+    """Gaps of the inner faces, then what ends the down splint's tilt and slide, and carries it; as `_rows` writes them.
+
+    Its underside on the saddle's edges, its slot (``walls`` of its ends count) on the shank (Table 2 of the paper), the
+    play of hole and washer where there is any, and its round back in the saddle's arc.
+    """
+    px, py, c, s, slope, bend = down[0], down[1], down[2], down[3], down[4], down[5]
+    bolt_x, shank, lever, thickness, face, slot, slot_bottom = p[0], p[1], p[2], p[4], p[5], p[6], p[7]
+    under, saddle_half, edge_below, back, play, washer_play = p[8], p[9], p[10], p[11], p[12], p[13]
+    _faces(down, p, value, gradient, place)
+    n = 2
     b, v, u = q[_B], q[_V], q[_U]
     axis = bolt_x + b
     for k in range(2):
@@ -147,6 +249,13 @@ def _stops(q, down, p, hole, washer, walls, value, gradient, place):  # type: ig
     _put(n, u * upright, px + back * nx, py + back * upright, nx, upright, value, place)
 
 
-straight = entry(_straight, "void(f8,f8,f8,f8,f8,f8,f8,f8,f8,f8,f8[:,::1],f8[:,::1])")
-wire = entry(_wire, "void(f8[::1],f8[::1],i8,f8,f8,f8,f8,f8[:,::1],f8[:,::1],f8[::1],f8[:,::1],f8[:,::1])")
+straight = entry(_straight, "void(f8[::1],f8[::1],f8,f8,f8[:,::1],f8[:,::1])")
+ended = entry(_ended, "void(f8[::1],f8,f8,f8,f8[:,::1])")
+wire = entry(_wire, "void(f8[::1],f8[::1],i8,f8[::1],f8,f8[:,::1],f8[:,::1],f8[::1],f8[:,::1],f8[:,::1])")
+wires = entry(
+    _wires,
+    "void(f8[::1],f8[::1],i8,i8,f8[::1],f8[:,:,::1],f8[:,:,::1],f8[:,::1],f8[:,:,:,::1],f8[::1],f8[:,::1],f8[:,::1])",
+)
+pushes = entry(_pushes, "void(f8[::1],f8[::1],f8[:,::1],f8[::1],f8[:,::1],f8[:,::1],f8[:,::1])")
+face_gaps = entry(_face_gaps, "void(f8[::1],f8[::1],f8[::1],f8[::1],f8[:,::1],f8[:,::1],f8[::1])")
 stops = entry(_stops, "void(f8[::1],f8[::1],f8[::1],b1,b1,i8,f8[::1],f8[:,::1],f8[:,::1])")

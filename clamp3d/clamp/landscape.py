@@ -33,7 +33,7 @@ def initial_guesses(section: Section) -> list[Array]:
     limit, lever = section.clamp.tilt_stops["the slot"], section.lever
     tilts = np.linspace(-limit, limit, _TILTS)
     lifted = section.lifted(tilts)
-    faces = np.array([_faces(section, tilt) for tilt in tilts])
+    faces = -section.face_gaps(tilts)  # least d at which they do not overlap
     wires = [_Minima(section, i, tilts) for i in range(len(WIRES))]
     found: list[Array] = []
 
@@ -71,7 +71,7 @@ class _Minima:
     """
 
     def __init__(self, section: Section, i: int, tilts: Array) -> None:
-        from clamp3d.clamp.kernel_landscape import downhill  # compiled on first use
+        from clamp3d.clamp import kernel_landscape  # compiled on first use
 
         wire, bolt = WIRES[i], section.bolt_x
         up, down = section.pairs["P1", wire], section.pairs["P2", wire]
@@ -84,12 +84,10 @@ class _Minima:
         u = np.linspace((low - bolt - aside) / c, (high - bolt + aside) / c, _POSITIONS)
         v = _curve(section, down, u, face - 1.01 * r, 1.0)
         self.under = np.empty((len(tilts), _POSITIONS))
-        for k, tilt in enumerate(tilts):
-            c, s = math.cos(tilt), math.sin(tilt)
-            self.under[k] = np.interp(self.x, np.maximum.accumulate(bolt + u * c + v * s), v * c - u * s)
+        kernel_landscape.under(u, v, tilts, bolt, self.x, np.empty((2, _POSITIONS)), self.under)
         least = np.round((self.over - self.under) / (_LEVEL * r)) * (_LEVEL * r)
         step = np.empty(least.shape, dtype=np.int64)
-        downhill(least, np.empty(_POSITIONS), step)
+        kernel_landscape.downhill(least, np.empty(_POSITIONS), step)
         row, self.position = np.nonzero(step == 0)
         key = row * _POSITIONS + self.position
         self.least = least[row, self.position]
@@ -119,13 +117,6 @@ def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: flo
         if not len(moving):
             break
     return -T[:, 2, 3]
-
-
-def _faces(section: Section, tilt: float) -> float:
-    """Least d at which the inner faces do not overlap."""
-    q = np.zeros(SIZE)
-    q[S] = section.lever * tilt
-    return -section.face_gap(q)
 
 
 def _open(section: Section, q: Array) -> Array | None:

@@ -9,9 +9,10 @@ how high the round back stands over the saddle's arc, 0 unless the saddle's edge
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -44,8 +45,8 @@ SEAT = "arc"
 
 _SPARE, _SPARE_OF_LEVER = 10.0, 0.2
 """How much wider than the wires need a clamp stands open, mm, and at most how much of its half width."""
-_FAR = 1e3
-"""Gap in mm of a piece that another one stands for."""
+_NEAR = 0.1 * LARGEST
+"""States with coordinates below are asked at once; further off the model tells what is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +70,17 @@ _RIGHT_DOWN = np.array([1.0, -1.0])
 _Named = tuple[Pair, str]
 _FACES: tuple[_Named, _Named] = ((("P1", "P2"), "left edge"), (("P1", "P2"), "right edge"))
 """The gaps between the inner faces."""
-_FEATURES = {float(feature.value): str(feature) for feature in Feature}
+_FEATURES = {-1.0: EDGE} | {float(feature.value): str(feature) for feature in Feature}
 """Names of what the kernel says is nearest."""
+
+
+@cache
+def _pairs(wires: tuple[PartName, ...], counts: tuple[tuple[int, int], ...]) -> tuple[Pair, ...]:
+    """Of the gaps of ``wires``, each with ``counts`` of pieces of the up and the down splint, and the shank."""
+    found: list[Pair] = []
+    for wire, (up, below) in zip(wires, counts, strict=True):
+        found += [("P1", wire)] * up + [("P2", wire)] * below + [("P4", wire)]
+    return tuple(found)
 
 
 @dataclass
@@ -237,42 +247,57 @@ class Section:
         """The least gap between the inner faces (convex object collision, type 2 of the paper); mm."""
         return float(self._gaps(q, (), stops=True).value[: len(_FACES)].min())
 
+    def face_gaps(self, tilts: Array) -> Array:
+        """`face_gap` (n,) at tilts (n,) in rad, d and all shifts 0; mm."""
+        from clamp3d.clamp.kernel_section import face_gaps  # compiled on first use
+
+        found = np.empty(len(tilts))
+        down, work = self._down(np.zeros(SIZE)), (np.empty(2), np.zeros((2, SIZE)), np.empty((2, 4)))
+        face_gaps(np.ascontiguousarray(tilts), down, self._sizes, *work, found)
+        return found
+
     def _gaps(self, q: Array, wires: tuple[PartName, ...], *, stops: bool) -> Gaps:
-        from clamp3d.clamp import kernel_section  # compiled on first use
+        from clamp3d.clamp import kernel_section as kernel  # compiled on first use
 
         q = np.ascontiguousarray(q)
         down = self._down(q)
-        px, py, c, s, *_ = down.tolist()
-        pieces: list[tuple[int, Array, Array]] = []
-        pairs: tuple[Pair, ...] = ()
+        at_once = type(self.model) is Cas and float(np.abs(q).max()) < _NEAR
+        asked = [] if at_once else [self._both_pieces(q, down, wire) for wire in wires]
+        counts = [(3, 3)] * len(wires) if at_once else [(len(up), len(below)) for up, below, _ in asked]
+        pairs = _pairs(wires, tuple(counts)) + (self._stops[0] if stops else ())
+        value, gradient, place = np.empty(len(pairs)), np.zeros((len(pairs), SIZE)), np.empty((len(pairs), 4))
         features: tuple[str, ...] = ()
-        for wire in wires:
-            i = 2 * WIRES.index(wire)
-            x, y = q[i : i + 2].tolist()
-            dx, dy = x - px, y - py
-            up, named = self._pieces("P1", wire, x, y)
-            below, named_below = self._pieces("P2", wire, dx * c - dy * s, dx * s + dy * c, c, s)
-            pieces.append((i, up, below))
-            pairs += (("P1", wire),) * len(up) + (("P2", wire),) * len(below) + (("P4", wire),)
-            features += (*named, *named_below, "shank")
-        if stops:
-            stop_pairs, stop_features = self._stops
-            pairs, features = pairs + stop_pairs, features + stop_features
-        k = len(pairs)
-        value, gradient, place = np.empty(k), np.zeros((k, SIZE)), np.empty((k, 4))
-        at = 0
-        for i, up, below in pieces:
-            rows = slice(at, at := at + len(up) + len(below) + 1)
-            r = self.pairs["P1", WIRES[i // 2]].cylinder.radius
-            bolt = self.bolt_x, 0.5 * self.clamp.bolt.diameter
-            kernel_section.wire(q, down, i, *bolt, r, self.lever, up, below, value[rows], gradient[rows], place[rows])
+        at, shapes = 0, (self._sizes, self._grooves, self._faces)
+        if at_once:
+            self.queries.contact += 2 * len(wires)
+            first, pieces = WIRES.index(wires[0]) if wires else 0, np.empty((2, 2, 3, 6))
+            last, work = first + len(wires), np.empty((3, 14))
+            kernel.wires(q, down, first, last, *shapes, work, pieces, value, gradient, place)
+            for codes in pieces[first:last, :, :, 5].reshape(-1, 6).tolist():
+                features += (*[_FEATURES[code] for code in codes], "shank")
+                at += 7
+        for wire, (up, below, named) in zip(wires, asked, strict=False):
+            rows = slice(at, at := at + len(named))
+            given = q, down, 2 * WIRES.index(wire), self._sizes, self.pairs["P1", wire].cylinder.radius, up, below
+            kernel.wire(*given, value[rows], gradient[rows], place[rows])
+            features += named
         if stops:
             joints = self.clamp.joints
             walls = 2 if joints.washer or joints.saddle else 1  # centred, the slot's lower ends meet the shank first
-            kernel_section.stops(
-                q, down, self._sizes, joints.hole, joints.washer, walls, value[at:], gradient[at:], place[at:]
-            )
+            plays = joints.hole, joints.washer, walls
+            kernel.stops(q, down, self._sizes, *plays, value[at:], gradient[at:], place[at:])
+            features += self._stops[1]
         return Gaps(value, gradient, pairs, features, place[:, :2], place[:, 2:])
+
+    def _both_pieces(self, q: Array, down: Array, wire: PartName) -> tuple[Array, Array, tuple[str, ...]]:
+        """`_pieces` of both splints for a wire at a state, and what they and the shank are."""
+        i = 2 * WIRES.index(wire)
+        px, py, c, s, *_ = down.tolist()
+        x, y = q[i : i + 2].tolist()
+        dx, dy = x - px, y - py
+        up, named = self._pieces("P1", wire, x, y)
+        below, named_below = self._pieces("P2", wire, dx * c - dy * s, dx * s + dy * c, c, s)
+        return up, below, (*named, *named_below, "shank")
 
     @cached_property
     def _stops(self) -> tuple[tuple[Pair, ...], tuple[str, ...]]:
@@ -307,10 +332,9 @@ class Section:
         turn = np.array([[c, -s], [s, c]])
         u, v = dot(turn, q[i : i + 2] - (px, py)).tolist()
 
-        def push(u: float, v: float) -> Array:
-            return np.asarray(dot(force, self._pieces(splint, wire, u, v, c, s)[0][:, 3:5]))
-
-        turning = np.column_stack([push(u + h, v) - push(u - h, v), push(u, v + h) - push(u, v - h)]) / (2.0 * h)
+        places = [(u + h, v), (u - h, v), (u, v + h), (u, v - h), *[(u, v)] * (splint == "P2")]
+        right, left, under, over, *here = self._pushes(splint, wire, np.array(places), force, c, s)
+        turning = np.column_stack([right - left, under - over]) / (2.0 * h)
         by_q, found = np.zeros((2, SIZE)), np.zeros((SIZE, SIZE))
         by_q[:, i : i + 2] = turn
         if splint == "P2":
@@ -318,23 +342,42 @@ class Section:
             by_q[:, [D, U]] = np.column_stack([-turn[:, 1], turn[:, 1]])
             by_q[:, W] += slope * turn[:, 1]
             by_q[:, S] = np.array((-v, u)) / self.lever
-            along, deep = push(u, v)
+            along, deep = here[0].tolist()
             found[S] = (deep * by_q[0] - along * by_q[1]) / self.lever
             found += found.T
             found[S, S] *= 0.5
             found[W, W] += bend * (along * turn[0, 1] + deep * turn[1, 1])
         return dot(dot(by_q.T, turning), by_q) + found
 
-    @cached_property
-    def _grooves(self) -> dict[Pair, tuple[float, ...]]:
-        """Of each groove radius, half angle, half length, wire and its half length, centre and sense of the mouth."""
-        found: dict[Pair, tuple[float, ...]] = {}
-        for (splint, wire), pair in self.pairs.items():
-            groove, r, T = pair.groove, pair.cylinder.radius, pair.T_a_groove
-            sizes = groove.radius, groove.half_angle, 0.5 * groove.length, r, 0.5 * pair.cylinder.length
-            mouth = 1.0 if splint == "P1" else -1.0
-            found[splint, wire] = (*sizes, float(T[0, 3]), -float(T[2, 3]), mouth)
+    def _pushes(self, splint: PartName, wire: PartName, places: Array, force: Array, c: float, s: float) -> Array:
+        """``force`` (k,) times the normals of `_pieces` of a wire at each of ``places`` (n, 2)."""
+        if type(self.model) is not Cas or float(np.abs(places).max()) >= _NEAR:
+            return np.array([dot(force, self._pieces(splint, wire, u, v, c, s)[0][:, 3:5]) for u, v in places.tolist()])
+        from clamp3d.clamp.kernel_section import pushes  # compiled on first use
+
+        self.queries.contact += len(places)
+        groove = WIRES.index(wire), SPLINTS.index(splint)
+        work, found = (np.empty((3, 14)), np.empty((3, 6))), np.empty(places.shape)
+        pushes(self._grooves[groove], self._faces[groove], places, force, *work, found)
         return found
+
+    @cached_property
+    def _grooves(self) -> Array:
+        """Dimensions (2, 2, 8) in mm of each wire's groove in each splint, as the kernel takes them."""
+        found = np.empty((2, 2, 8))
+        for (i, wire), (k, splint) in itertools.product(enumerate(WIRES), enumerate(SPLINTS)):
+            pair = self.pairs[splint, wire]
+            groove, r, T = pair.groove, pair.cylinder.radius, pair.T_a_groove
+            found[i, k, :5] = groove.radius, groove.half_angle, 0.5 * groove.length, r, 0.5 * pair.cylinder.length
+            found[i, k, 5:] = T[0, 3], -T[2, 3], 1.0 if splint == "P1" else -1.0
+        return found
+
+    @cached_property
+    def _faces(self) -> Array:
+        """Where each splint's face ends on each wire's side (2, 2, 4), in mm, as the kernel takes it."""
+        up, face = self.clamp.up_splint, self.clamp.down_splint.face_depth
+        sides = ((-1.0, 0.0, -self.lever), (1.0, up.width, self.lever))
+        return np.array([((a, side, up.thickness, 1.0), (b, side, face, -1.0)) for side, a, b in sides])
 
     def _pieces(
         self, splint: PartName, wire: PartName, u: float, v: float, c: float = 1.0, s: float = 0.0
@@ -344,37 +387,22 @@ class Section:
         Gap, point and normal of each (k, 6; the last column is not used), and what it is. The faces end at the splint's
         outer edge: the groove's material has no end.
         """
-        pair = self.pairs[splint, wire]
-        self.queries.contact += 1
-        feature: tuple[str, ...]
-        if type(self.model) is Cas and abs(u) + abs(v) < LARGEST:
-            from clamp3d.clamp.kernel_section import straight  # compiled on first use
+        from clamp3d.clamp import kernel_section as kernel  # compiled on first use
 
-            rows, work = np.empty((3, 6)), np.empty((3, 14))
-            straight(*self._grooves[splint, wire], u, v, work, rows)
-            feature = tuple([_FEATURES[code] for code in rows[:, 5].tolist()])
-        else:
-            T = np.array([c, 0.0, s, u, 0.0, 1.0, 0.0, 0.0, -s, 0.0, c, -v, 0.0, 0.0, 0.0, 1.0]).reshape(4, 4)
-            found = self.model.pieces(pair, T)
-            feature, flat = found.feature, (found.point[:, ::2] * _RIGHT_DOWN, found.normal[:, ::2] * _RIGHT_DOWN)
-            rows = np.column_stack([found.distance, *flat, np.zeros(len(feature))])
-        half, face, out = (
-            (self.bolt_x, self.clamp.up_splint.thickness, 1.0)
-            if splint == "P1"
-            else (self.lever, self.clamp.down_splint.face_depth, -1.0)
+        pair, i, k = self.pairs[splint, wire], WIRES.index(wire), SPLINTS.index(splint)
+        self.queries.contact += 1
+        if type(self.model) is Cas and abs(u) + abs(v) < LARGEST:
+            rows = np.empty((3, 6))
+            kernel.straight(self._grooves[i, k], self._faces[i, k], u, v, np.empty((3, 14)), rows)
+            return rows, tuple([_FEATURES[code] for code in rows[:, 5].tolist()])
+        T = np.array([c, 0.0, s, u, 0.0, 1.0, 0.0, 0.0, -s, 0.0, c, -v, 0.0, 0.0, 0.0, 1.0]).reshape(4, 4)
+        found = self.model.pieces(pair, T)
+        flat = found.point[:, ::2] * _RIGHT_DOWN, found.normal[:, ::2] * _RIGHT_DOWN
+        rows = np.column_stack([found.distance, *flat, np.zeros(len(found.feature))])
+        kernel.ended(self._faces[i, k], pair.cylinder.radius, u, v, rows)
+        return rows, tuple(
+            EDGE if code else name for code, name in zip(rows[:, 5].tolist(), found.feature, strict=True)
         )
-        middle = self.bolt_x if splint == "P1" else 0.0
-        side = -1.0 if wire == "P6" else 1.0
-        beyond = side * (u - middle) - half
-        if beyond <= 0.0:
-            return rows, feature
-        above = max(out * (v - face), 0.0)
-        away = math.hypot(beyond, above)
-        gap = away - pair.cylinder.radius
-        k = int(np.argmin(rows[:, 0]))
-        rows[rows[:, 0] < gap, 0] = _FAR
-        rows[k, :5] = gap, middle + side * half, face if above else v, side * beyond / away, out * above / away
-        return rows, tuple(EDGE if i == k else name for i, name in enumerate(feature))
 
     @cached_property
     def _edge_below(self) -> float:

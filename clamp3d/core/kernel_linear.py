@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.core.jit import entry
+from clamp3d.core.jit import entry, formula
 
 _SWEEPS = 60
 _EPS = 2.0**-52
@@ -20,7 +20,8 @@ def _product(a, b, out):  # type: ignore[no-untyped-def]
                 out[i, j] += a[i, k] * b[k, j]
 
 
-def _columns(A, V):  # type: ignore[no-untyped-def]
+@formula
+def rotated(A, V):  # type: ignore[no-untyped-def]
     """Turn the columns of A, which are the *rows* of the array ``A``, until all are square to each other.
 
     One-sided Jacobi [M. R. Hestenes, Inversion of matrices by biorthogonalization, J. SIAM 6 (1958) 51-90]. The rows
@@ -63,6 +64,11 @@ def _columns(A, V):  # type: ignore[no-untyped-def]
         if done:
             return sweep
     return -1
+
+
+def _columns(A, V):  # type: ignore[no-untyped-def]
+    """`rotated`."""
+    return rotated(A, V)
 
 
 product = entry(_product, "void(f8[:,::1],f8[:,::1],f8[:,::1])")

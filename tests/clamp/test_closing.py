@@ -67,7 +67,7 @@ def test_short_and_long_steps_know_the_curvature_of_the_loaded_gaps(wires: dict[
     bend = (pulls[0] - pulls[1]) / (2.0 * h)
     assert set(np.array(final.gaps.feature)[force > 0.0]) == {"arc"}
     for moving in (list(range(SIZE)), [0, 1, D, S]):
-        motion, own = closing._Motion(section, closing.CLOSING, moving, 0.1), np.ix_(moving, moving)
+        motion, own = closing._Motion(section, closing.CLOSING, np.array(moving), 0.1), np.ix_(moving, moving)
         assert motion._bend(q, final.gaps, force, exact=True) == pytest.approx(bend[own], abs=1e-6)
         found, spot = motion._bend(q, final.gaps, force, exact=False), moving.index(S)
         found[spot, spot] = bend[S, S]

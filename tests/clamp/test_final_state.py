@@ -143,16 +143,25 @@ def test_curvatures_agree_with_differences_of_gradients(clamp):
         assert np.allclose(section.wire_curvature(q, *pair, force, h), numeric, atol=1e-8)
 
 
-@pytest.mark.parametrize("beyond", [-0.5, 0.5, 3.0])
-def test_a_face_ends_at_the_splints_outer_edge(clamp, beyond):
+@pytest.mark.parametrize("splint", ["P1", "P2"])
+@pytest.mark.parametrize("above", [16.0, 7.0, 0.0, -5.0])
+@pytest.mark.parametrize("beyond", [-0.5, 0.5, 3.0, 25.0])
+def test_a_face_ends_at_the_splints_outer_edge(clamp, beyond, above, splint):
+    """And with it the material: a wire beside the splint is as far from it as from the edge, or from the side face."""
     section = Section(clamp, Cas())
-    edge, face = 2.0 * section.bolt_x, clamp.up_splint.thickness
-    q = section.open_state(60.0, 0.0)
-    q[2:4] = edge + beyond, face + 7.0
-    gaps = section.gaps(q)
-    least = min(value for value, pair in zip(gaps.value, gaps.pair, strict=True) if pair == ("P1", "P7"))
-    radius = section.pairs["P1", "P7"].cylinder.radius
-    assert least == pytest.approx(math.hypot(max(beyond, 0.0), 7.0) - radius, abs=1e-9)
+    for wire, side in (("P6", -1.0), ("P7", 1.0)):
+        q = section.open_state(60.0, 0.0)
+        down = section.down_splint(q)
+        edge, face, looks = section.bolt_x + side * section.bolt_x, clamp.up_splint.thickness, 1.0
+        if splint == "P2":
+            edge, face, looks = down.x + side * section.lever, down.y + clamp.down_splint.face_depth, -1.0
+        i = 2 * int(wire == "P7")
+        q[i : i + 2] = edge + side * beyond, face + looks * above
+        gaps = section.gaps(q)
+        least = min(value for value, pair in zip(gaps.value, gaps.pair, strict=True) if pair == (splint, wire))
+        radius = section.pairs[splint, wire].cylinder.radius
+        expected = math.hypot(beyond, max(above, 0.0)) if beyond > 0.0 else above
+        assert least == pytest.approx(expected - radius, abs=1e-9)
 
 
 def test_pairs_of_conductors_end_in_a_stated_result():
