@@ -136,7 +136,7 @@ class _Motion:
         """
         longest, moving, n = self.longest, self.moving, len(self.moving)
         target = q - h * self.goal
-        at, force = np.ascontiguousarray(q), np.zeros(len(gaps.value))
+        at, force = np.ascontiguousarray(q, np.float64), np.zeros(len(gaps.value))
         apart = np.zeros(len(force), np.int64)
         if without is not None:
             apart[:-1] = [pair == without for pair in gaps.pair[:-1]]

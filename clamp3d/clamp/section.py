@@ -253,13 +253,13 @@ class Section:
 
         found = np.empty(len(tilts))
         down, work = self._down(np.zeros(SIZE)), (np.empty(2), np.zeros((2, SIZE)), np.empty((2, 4)))
-        face_gaps(np.ascontiguousarray(tilts), down, self._sizes, *work, found)
+        face_gaps(np.ascontiguousarray(tilts, np.float64), down, self._sizes, *work, found)
         return found
 
     def _gaps(self, q: Array, wires: tuple[PartName, ...], *, stops: bool) -> Gaps:
         from clamp3d.clamp import kernel_section as kernel  # compiled on first use
 
-        q = np.ascontiguousarray(q)
+        q = np.ascontiguousarray(q, np.float64)
         down = self._down(q)
         at_once = type(self.model) is Cas and float(np.abs(q).max()) < _NEAR
         asked = [] if at_once else [self._both_pieces(q, down, wire) for wire in wires]
@@ -398,7 +398,7 @@ class Section:
         T = np.array([c, 0.0, s, u, 0.0, 1.0, 0.0, 0.0, -s, 0.0, c, -v, 0.0, 0.0, 0.0, 1.0]).reshape(4, 4)
         found = self.model.pieces(pair, T)
         flat = found.point[:, ::2] * _RIGHT_DOWN, found.normal[:, ::2] * _RIGHT_DOWN
-        rows = np.column_stack([found.distance, *flat, np.zeros(len(found.feature))])
+        rows = np.ascontiguousarray(np.column_stack([found.distance, *flat, np.zeros(len(found.feature))]), np.float64)
         kernel.ended(self._faces[i, k], pair.cylinder.radius, u, v, rows)
         return rows, tuple(
             EDGE if code else name for code, name in zip(rows[:, 5].tolist(), found.feature, strict=True)

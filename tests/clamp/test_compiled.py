@@ -14,11 +14,20 @@ from clamp3d.clamp.closing import CLOSING, _Motion
 from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.kernel_landscape import under
 from clamp3d.clamp.section import EDGE, SIZE, SPLINTS, WIRES, Gaps, S, Section
+from clamp3d.core.contact_model import Pieces
+from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array
 
 
 class OneByOne(Cas):
-    """The same closed forms, asked in three dimensions and one groove after the other, as any other model is."""
+    """The same closed forms, asked in three dimensions and one groove after the other, as any other model is.
+
+    Its arrays are in Fortran's order, which a model of somebody else's may have, and compiled loops can't read.
+    """
+
+    def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
+        found = super().pieces(pair, T_a_b)
+        return replace(found, point=np.asfortranarray(found.point), normal=np.asfortranarray(found.normal))
 
 
 def _states(section: Section, rng: np.random.Generator, count: int) -> list[Array]:
