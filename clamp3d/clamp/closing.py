@@ -90,7 +90,7 @@ def descend(
     ``at_rest`` over the bolt's speed. Raises SolverError if that takes more than ``most`` steps.
     """
     longest = stride * section.lever
-    motion = _Motion(section, goal, np.array(section.free if free is None else free), longest)
+    motion = _Motion(section, goal, np.array(section.free if free is None else free, np.int64), longest)
     gaps, h = section.gaps(q), longest
     loaded: set[Pair] = set()
     for _ in range(most or _STEPS):
@@ -126,7 +126,7 @@ class _Motion:
 
     section: Section
     goal: Array
-    moving: NDArray[np.intp]
+    moving: NDArray[np.int64]
     longest: float
 
     def step(self, q: Array, gaps: Gaps, h: float, without: Pair | None = None) -> tuple[Array, Gaps, Array] | None:
@@ -208,7 +208,7 @@ class _Motion:
         named = zip(gaps.pair, gaps.feature, strict=True)
         groove = [_GROOVES.get(pair, -1) if name == "arc" else -1 for pair, name in named]
         turned = math.cos(angle), math.sin(angle), section.lever
-        bends(gaps.gradient, force, np.array(groove), self._rounds, *turned, np.empty(SIZE), found)
+        bends(gaps.gradient, force, np.array(groove, np.int64), self._rounds, *turned, np.empty(SIZE), found)
         return found[moving[:, None], moving]
 
     @cached_property

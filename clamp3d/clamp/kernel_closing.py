@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import math
 
+from clamp3d.clamp.section import SIZE, B, D, S, U, V, W
 from clamp3d.core.jit import entry, formula
 from clamp3d.core.kernel_linear import rotated
 from clamp3d.core.kernel_nonnegative import nonnegative
 
 _NONE = 1e-12
 """What is left of a distance of 1 where there is no x."""
-_D, _S, _B, _V, _W, _U = 4, 5, 6, 7, 8, 9
-"""Columns of a state, as in `section`."""
 
 
 @formula
 def _project(H, A, k, scale, x, back, M, Q, work):  # type: ignore[no-untyped-def]
-    """Least y . H y / 2 + x . y with A y >= -value: y into x (n,), multipliers. 1, 0 where A y cannot be, -1 in no end.
+    """Least y . H y / 2 + x . y with A y >= -value: y into x (n,), and the multipliers.
 
     A least-distance problem, solved by non-negative least squares [Lawson & Hanson, Solving Least Squares Problems,
-    1974, chapter 23]. H (n, n) is symmetric and positive and is lost; of A (m, n) the first k rows count. Rows of
-    ``work`` (7, n + m + 1): the values, the multipliers, then workspace, as are ``back`` (n, n), ``M`` (n + 1, m) and
-    ``Q`` (n + 1, m + 1).
+    1974, chapter 23]. Returns 1, 0 where no y is so, and -1 where an iteration does not end. H (n, n) is symmetric and
+    positive and is lost; of A (m, n) the first k rows count. Rows of ``work`` (7, n + m + 1): the values, the
+    multipliers, then workspace, as are ``back`` (n, n), ``M`` (n + 1, m) and ``Q`` (n + 1, m + 1).
     """
     n = A.shape[1]
     value, u, z, b = work[0], work[1], work[2], work[3]
@@ -80,7 +79,7 @@ def _move(at, target, moving, bend, h, reach, value, gradient, apart, x, force, 
     m = 0
     for g in range(value.shape[0]):
         force[g] = -1.0
-        if apart[g] == 0 and value[g] <= reach + abs(gradient[g, _D]) * h:
+        if apart[g] == 0 and value[g] <= reach + abs(gradient[g, D]) * h:
             for i in range(n):
                 A[m, i] = gradient[g, moving[i]]
             work[0, m] = value[g]
@@ -109,12 +108,12 @@ def _bends(gradient, force, groove, sizes, c, s, lever, along, bend):  # type: i
         along[i] = tx
         along[i + 1] = ty
         if which % 2 == 1:
-            along[_D] = -ty
-            along[_U] = ty
-            along[_S] = (ty * (u * c + v * s) - tx * (v * c - u * s)) / lever
-            along[_B] = along[_V] = along[_W] = -tx
-        for a in range(10):
-            for b in range(10):
+            along[D] = -ty
+            along[U] = ty
+            along[S] = (ty * (u * c + v * s) - tx * (v * c - u * s)) / lever
+            along[B] = along[V] = along[W] = -tx
+        for a in range(SIZE):
+            for b in range(SIZE):
                 bend[a, b] += force[k] / slack * along[a] * along[b]
 
 

@@ -8,15 +8,11 @@ from __future__ import annotations
 
 import math
 
+from clamp3d.clamp.section import EDGE_CODE, B, D, S, U, V, W
 from clamp3d.core.jit import entry, formula
 from clamp3d.core.kernel_features import clip
 from clamp3d.core.kernel_pieces import enter, side_pieces
 
-# Columns of a state that the rows depend on, as in `section`.
-_D, _S, _B, _V, _W, _U = 4, 5, 6, 7, 8, 9
-
-EDGE = -1.0
-"""In place of a feature's code: a splint's outer edge."""
 _FAR = 1e3
 """Gap in mm of a piece that another one stands for."""
 
@@ -75,7 +71,7 @@ def _end(face, r, u, v, out):  # type: ignore[no-untyped-def]
     row[2] = height if above > 0.0 else v
     row[3] = side * beyond / away
     row[4] = looks * above / away
-    row[5] = EDGE
+    row[5] = EDGE_CODE
 
 
 def _straight(groove, face, u, v, work, out):  # type: ignore[no-untyped-def]
@@ -102,12 +98,12 @@ def _ended(face, r, u, v, out):  # type: ignore[no-untyped-def]
 @formula
 def _move(row, bx, by, turn, slope, lever):  # type: ignore[no-untyped-def]
     """Add to a row what it changes by with the down splint's x, y and angle, which the state moves."""
-    row[_D] += by
-    row[_S] += turn / lever
-    row[_B] += bx
-    row[_V] += bx
-    row[_W] += bx - slope * by
-    row[_U] -= by
+    row[D] += by
+    row[S] += turn / lever
+    row[B] += bx
+    row[V] += bx
+    row[W] += bx - slope * by
+    row[U] -= by
 
 
 @formula
@@ -146,9 +142,9 @@ def _rows(q, down, i, p, r, up, below, value, gradient, place):  # type: ignore[
         n += 1
     # The shank stands between the wires: each keeps to its side.
     side = -1.0 if i == 0 else 1.0
-    axis = bolt_x + q[_B]
+    axis = bolt_x + q[B]
     gradient[n, i] = side
-    gradient[n, _B] = -side
+    gradient[n, B] = -side
     _put(n, side * (q[i] - axis) - shank - r, axis + side * shank, q[i + 1], side, 0.0, value, place)
 
 
@@ -215,37 +211,37 @@ def _stops(q, down, p, hole, washer, walls, value, gradient, place):  # type: ig
     under, saddle_half, edge_below, back, play, washer_play = p[8], p[9], p[10], p[11], p[12], p[13]
     _faces(down, p, value, gradient, place)
     n = 2
-    b, v, u = q[_B], q[_V], q[_U]
+    b, v, u = q[B], q[V], q[U]
     axis = bolt_x + b
     for k in range(2):
         side = 2.0 * k - 1.0
         # The centre of the saddle's arc stands back_clearance above the state's d.
-        edge, edge_y = axis + v + side * saddle_half, q[_D] + edge_below
+        edge, edge_y = axis + v + side * saddle_half, q[D] + edge_below
         x, y = edge - px, edge_y - py
-        gradient[n, _D] = c
-        gradient[n, _B] = gradient[n, _V] = s
+        gradient[n, D] = c
+        gradient[n, B] = gradient[n, V] = s
         _move(gradient[n], -s, -c, x * c - y * s, slope, lever)
         _put(n, x * s + y * c - under, edge, edge_y, s, c, value, place)
         n += 1
         for end in range(walls):  # the lower end, then the upper one
             deep = slot_bottom if end == 0 else face
             x, y = px + side * slot * c + deep * s, py - side * slot * s + deep * c
-            gradient[n, _B] = -side
+            gradient[n, B] = -side
             _move(gradient[n], side, 0.0, side * (y - py), slope, lever)
             _put(n, side * (x - axis) - shank, x, y, -side, 0.0, value, place)
             n += 1
         if hole:
-            gradient[n, _B] = -side
+            gradient[n, B] = -side
             _put(n, play - side * b, axis + side * shank, 0.5 * thickness, -side, 0.0, value, place)
             n += 1
         if washer:
-            gradient[n, _V] = -side
-            _put(n, washer_play - side * v, axis - side * shank, q[_D] + back, side, 0.0, value, place)
+            gradient[n, V] = -side
+            _put(n, washer_play - side * v, axis - side * shank, q[D] + back, side, 0.0, value, place)
             n += 1
     upright = 1.0 / math.sqrt(1.0 + slope * slope)  # the height over the arc, square to it
     nx = slope * upright
-    gradient[n, _W] = -u * slope * bend * upright**3
-    gradient[n, _U] = upright
+    gradient[n, W] = -u * slope * bend * upright**3
+    gradient[n, U] = upright
     _put(n, u * upright, px + back * nx, py + back * upright, nx, upright, value, place)
 
 

@@ -38,6 +38,8 @@ SIZE = 10
 
 EDGE = "outer edge"
 """Feature of a splint's gap to a wire that has left its face sideways."""
+EDGE_CODE = -1.0
+"""Its number in compiled loops, where others have those of `Feature`."""
 EDGES = "saddle's edge"
 """Feature of the gap between the down splint's underside and the saddle."""
 SEAT = "arc"
@@ -70,7 +72,7 @@ _RIGHT_DOWN = np.array([1.0, -1.0])
 _Named = tuple[Pair, str]
 _FACES: tuple[_Named, _Named] = ((("P1", "P2"), "left edge"), (("P1", "P2"), "right edge"))
 """The gaps between the inner faces."""
-_FEATURES = {-1.0: EDGE} | {float(feature.value): str(feature) for feature in Feature}
+_FEATURES = {EDGE_CODE: EDGE} | {float(feature.value): str(feature) for feature in Feature}
 """Names of what the kernel says is nearest."""
 
 
