@@ -10,7 +10,6 @@ over h are the contact forces in parts of the bolt force.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -51,7 +50,7 @@ _FULL = 1e-9
 _SHORTEST = 1e-9
 """Shortest stride, in parts of the half width."""
 _GROOVES = {(splint, wire): 2 * i + k for i, wire in enumerate(WIRES) for k, splint in enumerate(SPLINTS)}
-"""Their numbers in `kernel_closing.bends`."""
+"""Their numbers in `Section.grooves`, all in one."""
 
 
 def open_start(section: Section, *, open_by: float = 0.0, open_tilt: float = 0.0) -> Array:
@@ -214,9 +213,6 @@ class _Motion:
     @cached_property
     def _rounds(self) -> Array:
         """Difference of the radii and centre in the splint's axes (4, 3) of each groove and its wire, mm."""
-        found = []
-        for wire, splint in itertools.product(WIRES, SPLINTS):
-            pair = self.section.pairs[splint, wire]
-            slack = max(abs(pair.groove.radius - pair.cylinder.radius), _FULL * pair.groove.radius)
-            found.append((slack, pair.T_a_groove[0, 3], -pair.T_a_groove[2, 3]))
-        return np.array(found)
+        grooves = self.section.grooves.reshape(4, -1)
+        R, r = grooves[:, 0], grooves[:, 3]
+        return np.column_stack([np.maximum(np.abs(R - r), _FULL * R), grooves[:, 5:7]])

@@ -74,12 +74,6 @@ def _end(face, r, u, v, out):  # type: ignore[no-untyped-def]
     row[5] = EDGE_CODE
 
 
-def _straight(groove, face, u, v, work, out):  # type: ignore[no-untyped-def]
-    """`_groove` and `_end`."""
-    _groove(groove, u, v, work, out)
-    _end(face, groove[3], u, v, out)
-
-
 def _pushes(groove, face, places, force, work, out, pushes):  # type: ignore[no-untyped-def]
     """Normals of the pieces, each times its ``force`` (3,), of a wire at each of ``places`` (n, 2), into (n, 2)."""
     for k in range(places.shape[0]):
@@ -245,8 +239,7 @@ def _stops(q, down, p, hole, washer, walls, value, gradient, place):  # type: ig
     _put(n, u * upright, px + back * nx, py + back * upright, nx, upright, value, place)
 
 
-straight = entry(_straight, "void(f8[::1],f8[::1],f8,f8,f8[:,::1],f8[:,::1])")
-ended = entry(_ended, "void(f8[::1],f8,f8,f8,f8[:,::1])")
+end = entry(_ended, "void(f8[::1],f8,f8,f8,f8[:,::1])")
 wire = entry(_wire, "void(f8[::1],f8[::1],i8,f8[::1],f8,f8[:,::1],f8[:,::1],f8[::1],f8[:,::1],f8[:,::1])")
 wires = entry(
     _wires,

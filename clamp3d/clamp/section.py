@@ -269,20 +269,22 @@ class Section:
         pairs = _pairs(wires, tuple(counts)) + (self._stops[0] if stops else ())
         value, gradient, place = np.empty(len(pairs)), np.zeros((len(pairs), SIZE)), np.empty((len(pairs), 4))
         features: tuple[str, ...] = ()
-        at, shapes = 0, (self._sizes, self._grooves, self._faces)
+        at = 0
         if at_once:
             self.queries.contact += 2 * len(wires)
             first, pieces = WIRES.index(wires[0]) if wires else 0, np.empty((2, 2, 3, 6))
             last, work = first + len(wires), np.empty((3, 14))
+            shapes = self._sizes, self.grooves, self._faces
             kernel.wires(q, down, first, last, *shapes, work, pieces, value, gradient, place)
             for codes in pieces[first:last, :, :, 5].reshape(-1, 6).tolist():
                 features += (*[_FEATURES[code] for code in codes], "shank")
                 at += 7
-        for wire, (up, below, named) in zip(wires, asked, strict=False):
-            rows = slice(at, at := at + len(named))
-            given = q, down, 2 * WIRES.index(wire), self._sizes, self.pairs["P1", wire].cylinder.radius, up, below
-            kernel.wire(*given, value[rows], gradient[rows], place[rows])
-            features += named
+        else:
+            for wire, (up, below, named) in zip(wires, asked, strict=True):
+                rows = slice(at, at := at + len(named))
+                given = q, down, 2 * WIRES.index(wire), self._sizes, self.pairs["P1", wire].cylinder.radius, up, below
+                kernel.wire(*given, value[rows], gradient[rows], place[rows])
+                features += named
         if stops:
             joints = self.clamp.joints
             walls = 2 if joints.washer or joints.saddle else 1  # centred, the slot's lower ends meet the shank first
@@ -360,11 +362,11 @@ class Section:
         self.queries.contact += len(places)
         groove = WIRES.index(wire), SPLINTS.index(splint)
         work, found = (np.empty((3, 14)), np.empty((3, 6))), np.empty(places.shape)
-        pushes(self._grooves[groove], self._faces[groove], places, force, *work, found)
+        pushes(self.grooves[groove], self._faces[groove], places, force, *work, found)
         return found
 
     @cached_property
-    def _grooves(self) -> Array:
+    def grooves(self) -> Array:
         """Dimensions (2, 2, 8) in mm of each wire's groove in each splint, as the kernel takes them."""
         found = np.empty((2, 2, 8))
         for (i, wire), (k, splint) in itertools.product(enumerate(WIRES), enumerate(SPLINTS)):
@@ -389,19 +391,15 @@ class Section:
         Gap, point and normal of each (k, 6; the last column is not used), and what it is. The faces end at the splint's
         outer edge: the groove's material has no end.
         """
-        from clamp3d.clamp import kernel_section as kernel  # compiled on first use
+        from clamp3d.clamp.kernel_section import end  # compiled on first use
 
-        pair, i, k = self.pairs[splint, wire], WIRES.index(wire), SPLINTS.index(splint)
+        pair, face = self.pairs[splint, wire], self._faces[WIRES.index(wire), SPLINTS.index(splint)]
         self.queries.contact += 1
-        if type(self.model) is Cas and abs(u) + abs(v) < LARGEST:
-            rows = np.empty((3, 6))
-            kernel.straight(self._grooves[i, k], self._faces[i, k], u, v, np.empty((3, 14)), rows)
-            return rows, tuple([_FEATURES[code] for code in rows[:, 5].tolist()])
         T = np.array([c, 0.0, s, u, 0.0, 1.0, 0.0, 0.0, -s, 0.0, c, -v, 0.0, 0.0, 0.0, 1.0]).reshape(4, 4)
         found = self.model.pieces(pair, T)
         flat = found.point[:, ::2] * _RIGHT_DOWN, found.normal[:, ::2] * _RIGHT_DOWN
         rows = np.ascontiguousarray(np.column_stack([found.distance, *flat, np.zeros(len(found.feature))]), np.float64)
-        kernel.ended(self._faces[i, k], pair.cylinder.radius, u, v, rows)
+        end(face, pair.cylinder.radius, u, v, rows)
         return rows, tuple(
             EDGE if code else name for code, name in zip(rows[:, 5].tolist(), found.feature, strict=True)
         )
