@@ -65,7 +65,7 @@ def read_apart(path: Path) -> Reading:
         raise InputError(f"{path}: not read in {seconds:.0f} s; {LIMITS}=4 allows four times as much")
     if any(word in line for line in said for word in ("bad_alloc", "MemoryError")):
         raise _too_large(path, memory)
-    raise InputError(f"{path}: the file is damaged: its reader ended with {_ending(code)}")
+    raise InputError(f"{path}: the reader ended with {_ending(code)}: the file is damaged, or uses what the reader does not support")
 
 
 def _installed(library: str) -> bool:

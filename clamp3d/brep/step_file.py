@@ -99,8 +99,12 @@ def _name(label: Any) -> str:
     """A label's name; none where Open CASCADE has put the label's own address, as in ``=>[0:1:1:2]``."""
     from OCP.TDataStd import TDataStd_Name
 
-    found = TDataStd_Name()
-    name = str(found.Get().ToExtString()).strip() if label.FindAttribute(TDataStd_Name.GetID_s(), found) else ""
+    key = TDataStd_Name.GetID_s()
+    if not label.IsAttribute(key):  # FindAttribute ends the process on a label without one (a coloured face)
+        return ""
+    attribute = TDataStd_Name()
+    label.FindAttribute(key, attribute)
+    name = str(attribute.Get().ToExtString()).strip()
     return "" if name.startswith("=>[") else name
 
 

@@ -217,3 +217,24 @@ for _ in range(3):
 def test_a_forked_process_meshes_too():
     """Open CASCADE's parallel mesher would wait for threads that only the parent has."""
     subprocess.run([sys.executable, "-c", FORKED], check=True, timeout=120)
+
+
+def test_coloured_and_layered_faces_are_read(tmp_path):
+    """Colours and layers put labels without a name below a part."""
+    from OCP.Quantity import Quantity_Color, Quantity_NameOfColor
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
+
+    tree = Tree()
+    box = BRepPrimAPI_MakeBox(10.0, 10.0, 10.0).Shape()
+    label = tree.product("box", box)
+    face = tree.tool.AddSubShape(label, TopExp_Explorer(box, TopAbs_ShapeEnum.TopAbs_FACE).Current())
+    red = Quantity_Color(Quantity_NameOfColor.Quantity_NOC_RED)
+    XCAFDoc_DocumentTool.ColorTool_s(tree.document.Main()).SetColor(face, red, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
+    XCAFDoc_DocumentTool.LayerTool_s(tree.document.Main()).SetLayer(label, TCollection_ExtendedString("outer"))
+    scene = load(tree.write(tmp_path / "coloured.step"))
+    assert [part.name for part in scene.parts] == ["box"]
+    mesh = scene.parts[0].shape.mesh
+    assert volume(mesh.vertices, mesh.faces) == pytest.approx(1000.0)
