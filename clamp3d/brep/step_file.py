@@ -13,8 +13,8 @@ import numpy as np
 
 from clamp3d.brep.bodies import Reading
 from clamp3d.brep.cad import Key, Node, bodies_of, matrix
+from clamp3d.brep.open_cascade import require_open_cascade
 from clamp3d.brep.part21 import Announced, announced
-from clamp3d.brep.solid import require_open_cascade
 from clamp3d.errors import InputError
 
 _OTHERS = {

@@ -16,7 +16,6 @@ import numpy as np
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.convex import Convex, Rod
 from clamp3d.collide.hull import Hull, hull
-from clamp3d.collide.zonoid import zonoid_distance
 from clamp3d.core.linear import dot, norm, to_target
 from clamp3d.core.pose import Array
 
@@ -72,22 +71,6 @@ def crossed(E: Array, F: Array) -> Array:
     return np.vstack([N, -N])
 
 
-def crossed_normals(a: Hull, Ta: Array, b: Hull, Tb: Array) -> Array | None:
-    """Normals (k, 3) of the faces of the Minkowski difference that edges of both span; None if too many to try.
-
-    Furthest along such a normal lie an edge of a, and of b the other way: two corners at least of each.
-    """
-    (_, Ea, Va), (_, Eb, Vb) = _outline(a, Ta), _outline(b, Tb)
-    if len(Ea) * len(Eb) > _ALL:
-        return None
-    N = crossed(Ea, Eb)
-    for V, sign in ((Va, 1.0), (Vb, -1.0)):
-        height = sign * dot(N, V.T)
-        near = height >= height.max(axis=1, keepdims=True) - _LEVEL * float(np.ptp(V, axis=0).max())
-        N = N[near.sum(axis=1) > 1]
-    return N
-
-
 def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array, *, tolerance: float = 0.0) -> Distance:
     """Penetration depth of two convex pieces as a signed distance; zero or more for pieces that do not overlap.
 
@@ -103,8 +86,6 @@ def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array, *, tolerance: float
     Distance
         With ``normal``, along which b moves out, and points of the two surfaces that meet then.
     """
-    if a.sum is not None and b.sum is not None:
-        return zonoid_distance(a.sum.at(Ta), b.sum.at(Tb)).labelled("depth", "convex")
     sa, sb = supports(a, Ta), supports(b, Tb)
 
     def difference(N: Array) -> Array:

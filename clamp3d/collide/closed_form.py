@@ -100,7 +100,7 @@ def bodies_distance(a: ClosedForm, b: ClosedForm, T: Array, enough: Callable[[Di
         if kind == "convex":
             for piece in a.outers:
                 for other in b.outers:
-                    for rims in (True,) if piece.sum is not None and other.sum is not None else (False, True):
+                    for rims in (False, True):
                         new = _convex(piece, other, a, b, here, T, rims)
                         found = found.meet(new)
                         if enough(found.widened(error)):
