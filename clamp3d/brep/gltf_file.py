@@ -196,10 +196,9 @@ def _simplify(path: Path, tree: dict[str, Any], used: set[int], placer: Placer) 
 
 def _arrays(pieces: list[trimesh.Trimesh], divisors: list[float]) -> tuple[Array, IntArray]:
     """Vertices (n, 3) and faces (m, 3) of the primitives of a mesh together."""
-    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
     for piece in pieces:
         if piece.faces.max() >= len(piece.vertices):
             raise InputError(f"face index {piece.faces.max()} is out of range for {len(piece.vertices)} vertices")
     vertices = [np.asarray(piece.vertices) / divisor for piece, divisor in zip(pieces, divisors, strict=True)]
-    faces = [np.asarray(piece.faces) + start for piece, start in zip(pieces, starts, strict=False)]
-    return np.concatenate(vertices), np.concatenate(faces)
+    V, F = trimesh.util.append_faces(vertices, [piece.faces for piece in pieces])
+    return np.asarray(V, dtype=np.float64), np.asarray(F, dtype=np.int64)

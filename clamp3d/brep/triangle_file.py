@@ -52,8 +52,8 @@ def _arrays(path: Path) -> tuple[Array, IntArray]:
         raise InputError(f"{path}: no triangles in the file")
     if read < announced:
         raise InputError(f"{path}: the file is damaged: it announces {announced} triangles or faces, {read} were read")
-    whole = trimesh.util.concatenate([trimesh.Trimesh(m.vertices, m.faces, process=False) for m in meshes])
-    return np.asarray(whole.vertices, dtype=np.float64), np.asarray(whole.faces, dtype=np.int64)
+    vertices, faces = trimesh.util.append_faces([mesh.vertices for mesh in meshes], [mesh.faces for mesh in meshes])
+    return np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
 
 
 def _announced_stl(path: Path, raw: bytes) -> int:

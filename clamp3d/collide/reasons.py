@@ -25,7 +25,7 @@ def undecided(models: dict[str, Model], found: Distance, thresholds: Thresholds,
         elif isinstance(shape, MeshShape):
             error = f"(its round faces are off by up to {model.raw.error:.2g} mm)"
             if model.raw.error > 0.0:
-                round_ = f"fit = 'round' for {name}, or " if shape.fit == "bound" else ""
+                round_ = f"fit = 'round' for {name}, or " if shape.fit == "off" else ""
                 advice.append(f"{round_}a finer mesh of {name} {error}")
         elif model.refines:
             advice.append(f"meshes of {name} finer than {FINEST:g} mm")
