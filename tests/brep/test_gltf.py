@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from clamp3d import InputError, load
-from clamp3d.brep.gltf_file import read_gltf
+from clamp3d.brep.mesh_file import load_bodies
 
 CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -63,7 +63,7 @@ class Gltf:
 def only(tmp_path, *primitives_of):
     made = Gltf()
     made.node(mesh=made.mesh(*(make(made) for make in primitives_of)))
-    (body,) = read_gltf(made.write(tmp_path / "a.glb"), 1.0).bodies
+    (body,) = load_bodies(made.write(tmp_path / "a.glb")).bodies
     return trimesh.Trimesh(body.shape.mesh.vertices, body.shape.mesh.faces)
 
 
