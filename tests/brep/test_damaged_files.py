@@ -178,7 +178,7 @@ def test_a_gltf_reads_nothing_outside_of_its_folder(tmp_path, monkeypatch):
     folder.mkdir()
     for uri in ("../secret.bin", str(tmp_path / "secret.bin"), "%2e%2e/secret.bin", "http://127.0.0.1:9/x.bin"):
         path = outside_gltf(folder, uri)
-        with pytest.raises(InputError, match="outside of its folder|No such file") as caught:
+        with pytest.raises(InputError, match=r"outside of its folder|No such file") as caught:
             load(path)
         assert "secretsecret" not in str(caught.value)
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
@@ -213,10 +213,10 @@ MORE = '<parent link="tip"/><child link="end"/>'
         ('<link name="tip">', "<link>", "link 2 has no name"),
         ("sphere radius", "ball radius", "a shape of link 'tip' must be one of box, cylinder, mesh, sphere, got ball"),
         ('<box size="0.1 0.1 0.02"/>', "", "a shape of link 'base' must be .*, got none"),
-        ('<box size="0.1 0.1 0.02"/>', '<mesh filename="no.stl"/>', r"2 of 3 shapes read; missing: base \(.*no such file"),
+        ('<box size="0.1 0.1 0.02"/>', '<mesh filename="no.stl"/>', r"missing: base \(.*no such file"),
         ('<box size="0.1 0.1 0.02"/>', '<mesh filename="../../no.stl"/>', "outside of the robot's folder"),
         ('radius="0.012"', 'radius="big"', "not a readable URDF file"),
-        ('radius="0.012"', 'radius="-1"', r"1 of 3 shapes read|2 of 3 shapes read; missing: tip \(radius of a sphere must be"),
+        ('radius="0.012"', 'radius="-1"', r"missing: tip \(radius of a sphere must be"),
         ("robot", "robots", "it holds <robots>, not <robot>"),
     ],
 )  # fmt: skip
