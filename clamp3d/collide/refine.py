@@ -14,10 +14,11 @@ import numpy as np
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.closed_form import ClosedForm, bodies_distance
+from clamp3d.collide.facets import rod_of, rods_distance
 from clamp3d.collide.mesh_distance import meshes_distance
 from clamp3d.collide.model import Model
 from clamp3d.collide.open_mesh import open_distance
-from clamp3d.core.pose import Array
+from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import SolverError
 
 ACCURACY = 1e-7
@@ -57,6 +58,8 @@ def _levels(a: Model, b: Model, T: Array, forms: bool) -> Iterator[Callable[[Eno
     both_exact = a.exact is not None and b.exact is not None
     if forms and not both_exact and a.simple and b.simple:
         yield lambda enough: _by_closed_forms(a, b, T, enough)
+    if forms and not both_exact:
+        yield from (lambda _, ask=ask: ask() for ask in _cylinders_on_facets(a, b, T))  # type: ignore[misc]
     for chord in _chords(a, b):
         queries["meshes"] += 1
         said = f", chord error {chord:.2g} mm" if a.refines or b.refines else ""
@@ -68,6 +71,22 @@ def _levels(a: Model, b: Model, T: Array, forms: bool) -> Iterator[Callable[[Eno
 
         queries["exact"] += 1
         yield lambda _: exact_distance(a, b, T)
+
+
+def _cylinders_on_facets(a: Model, b: Model, T: Array) -> Iterator[Callable[[], Distance]]:
+    """Questions about exact cylinders of one part against the facets of the other, where that is a mesh."""
+    for mesh, round_, pose, swapped in ((a, b, T, False), (b, a, inverse(T), True)):
+        bodies = round_.bodies
+        if mesh.drawn or not mesh.chords or not bodies or any(rod_of(body) is None for body in bodies):
+            continue
+
+        def ask(mesh: Model = mesh, pose: Array = pose, swapped: bool = swapped) -> Distance:
+            mesh.counters.queries["facets"] += 1
+            distance = rods_distance(mesh.outer(mesh.chords[-1]), bodies, pose)
+            distance = distance.moved(T).swapped() if swapped else distance
+            return distance.labelled("facets", "cylinder on facets (FCL)")
+
+        yield ask
 
 
 def _chords(a: Model, b: Model) -> list[float]:
