@@ -33,7 +33,7 @@ def read_urdf(path: str, joints: dict[str, float]) -> dict[str, Any]:
     -------
     dict
         ``shapes``: a dict for each, with its ``link``, ``kind``, place ``T`` (4, 4), and ``size`` of a box, ``radius``
-        and ``length`` of a cylinder, ``mesh`` and ``error`` of a sphere, ``file`` and ``scale`` of a mesh file.
+        and ``length`` of a cylinder, ``mesh`` and ``error`` of a sphere, ``file`` and ``scale`` of a mesh file, or a ``reason``.
         ``joined``: the pairs of links that a joint connects. ``notes``: what was assumed.
 
     Raises InputError for a file that is no whole URDF, unknown joints and values out of their limits.
@@ -154,7 +154,10 @@ def _shape(geometry: Any) -> dict[str, Any]:
         radius, length = geometry.cylinder.radius, geometry.cylinder.length
         return {"kind": "cylinder", "radius": 1000.0 * radius, "length": 1000.0 * length}
     if geometry.sphere is not None:
-        mesh, error = _ball(1000.0 * geometry.sphere.radius)
+        try:
+            mesh, error = _ball(1000.0 * geometry.sphere.radius)
+        except InputError as problem:
+            return {"kind": "unreadable", "reason": str(problem)}
         return {"kind": "sphere", "mesh": mesh, "error": error}
     scale = 1.0 if geometry.mesh.scale is None else geometry.mesh.scale
     scales = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import signal
 import sys
 from collections.abc import Collection
@@ -96,7 +97,9 @@ def tolerate_closed_pipes() -> None:
     """Let ``clamp3d ... | head`` keep the exit code of its verdict. Streams that a test put in place stay."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is not None and stream is getattr(sys, f"__{name}__"):
+        if stream is None:  # closed by the caller: libraries ask it whether it is a terminal
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+        elif stream is getattr(sys, f"__{name}__"):
             raw = io.BufferedWriter(_Tolerant(stream.fileno(), "wb", closefd=False))
             wrapped = io.TextIOWrapper(
                 raw, stream.encoding, "backslashreplace", line_buffering=stream.line_buffering or name == "stderr"

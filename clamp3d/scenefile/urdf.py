@@ -74,6 +74,8 @@ def _shape(
         return shapes.box(item["size"])
     if item["kind"] == "cylinder":
         return shapes.cylinder(item["radius"], item["length"])
+    if item["kind"] == "unreadable":
+        raise InputError(item["reason"])
     if item["kind"] == "sphere":
         return shapes.MeshShape(Mesh(**item["mesh"]), "off", "sphere", item["error"])
     key = f"{item['file']} {item['scale']}"
