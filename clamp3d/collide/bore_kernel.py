@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.collide.poses_kernel import AHEAD, depth_behind, depth_in_round, frame, relative, turned_back
-from clamp3d.core.jit import entry, inlined, prefetch
+from clamp3d.collide.poses_kernel import depth_behind, depth_in_round, frame, relative, turned_back
+from clamp3d.core.jit import entry, inlined
 from clamp3d.core.kernel_batch import (
     AT_ONCE,
     BOUND,
@@ -78,9 +78,6 @@ def poses(w, count, start, A, column, T, row):
     """The poses of a block, and no distance yet."""
     for i in range(count):
         k = start + i
-        ahead = 128 * row[min(k + AHEAD, row.shape[0] - 1)]
-        prefetch(T, ahead)
-        prefetch(T, ahead + 64)
         a, b, c, d, e, f, g, h, m, x, y, z = relative(A, column[k], T, row[k])
         put(w, FIRST, i, a, b, c)
         put(w, SECOND, i, d, e, f)

@@ -5,11 +5,8 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.core.jit import entry, inlined, prefetch
+from clamp3d.core.jit import entry, inlined
 from clamp3d.core.kernel_pose import rigid
-
-AHEAD = 32
-"""Poses between the one that is looked at and the one that is fetched."""
 
 
 @inlined
@@ -58,8 +55,6 @@ def _boxes(T, sizes, which, far, out):
     all. No pose may lie further than ``far`` off; if that is infinite all poses are taken as they are.
     """
     for k in range(T.shape[0]):
-        prefetch(T, 128 * (k + AHEAD))
-        prefetch(T, 128 * (k + AHEAD) + 64)
         if far < math.inf and not (
             rigid(T, k) and abs(T[k, 0, 3]) <= far and abs(T[k, 1, 3]) <= far and abs(T[k, 2, 3]) <= far
         ):
