@@ -17,7 +17,7 @@ from clamp3d.collide.refine import measured, with_normal
 from clamp3d.collide.verdict import RESOLUTION, Thresholds
 from clamp3d.core.distance import SignedDistance
 from clamp3d.core.motion import Motion, scene_pose
-from clamp3d.core.motion_search import Search
+from clamp3d.core.groove_motion import Search
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc, place
 from clamp3d.core.shapes import AnyShape, as_shape
