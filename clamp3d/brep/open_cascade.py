@@ -375,7 +375,7 @@ def common(a: bytes, b: bytes, T: Array, share: float) -> tuple[float, float, Ar
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
 
     made = BRepAlgoAPI_Common(from_bytes(a), moved(from_bytes(b), T))
-    if not made.IsDone() or made.HasErrors():
+    if not made.IsDone():
         raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
     shape = made.Shape()
     if next(explore(shape, "SOLID"), None) is None:

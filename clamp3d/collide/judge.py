@@ -1,4 +1,4 @@
-"""The verdict of one pair: equal parts in one place, the distance refined until it is certain, a part inside another."""
+"""The verdict of one pair: its distance refined until it is certain, equal parts in one place, one part in another."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from clamp3d.brep import cad_process
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.depth import depth_of_pieces
 from clamp3d.collide.mesh_distance import within
@@ -41,8 +42,8 @@ def judge(
         if exact is not None:
             distance = replace(exact, level="features")
             verdict = thresholds.verdict(distance, allowance)
-    if verdict is Verdict.CLASH and is_contained(a, b, T, thresholds.contact):
-        verdict = Verdict.CONTAINED
+    if verdict is Verdict.CLASH:
+        verdict = kind_of_overlap(a, b, T, thresholds.contact)
     return verdict, distance
 
 
@@ -56,18 +57,30 @@ def is_duplicate(a: Model, b: Model, T: Array, contact: float) -> bool:
     return bool(np.linalg.norm(shift, axis=1).max() <= contact)
 
 
-def is_contained(a: Model, b: Model, T: Array, contact: float) -> bool:
-    """Whether one of two overlapping parts lies wholly in the other, within ``contact`` mm."""
-    if not (a.closed and b.closed and a.chords and b.chords):
+def kind_of_overlap(a: Model, b: Model, T: Array, contact: float) -> Verdict:
+    """Clash, contained, or duplicate where each of two parts lies in the other, all within ``contact`` mm."""
+    inside = [_holds(b, a, T, contact), _holds(a, b, inverse(T), contact)]
+    if all(inside):
+        return Verdict.DUPLICATE
+    return Verdict.CONTAINED if any(inside) else Verdict.CLASH
+
+
+def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
+    """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer``, within ``contact`` mm."""
+    if not (inner.closed and outer.closed and inner.chords and outer.chords):
         return False
-    for inner, outer, pose in ((b, a, T), (a, b, inverse(T))):
-        if not _boxes_allow(inner, outer, pose, contact):
-            continue
-        a.counters.queries["containment"] += 1
-        small, large = inner.outer(inner.chords[-1]), outer.inner(outer.chords[-1])
-        if large is not None and within(small, large, pose, contact + small.error + large.error + _chord(inner, outer)):
-            return True
-    return False
+    if not _boxes_allow(inner, outer, T, contact):
+        return False
+    inner.counters.queries["containment"] += 1
+    small, large = inner.outer(inner.chords[-1]), outer.inner(outer.chords[-1])
+    slack = small.error + _chord(inner, outer)
+    if large is None or not within(small, large, T, contact + slack + large.error):
+        return False
+    if slack + large.error <= contact or inner.exact is None or outer.exact is None:
+        return True
+    # The meshes are coarser than the threshold: what is shared must be all of the inner one but a skin.
+    shared = cad_process.common(outer.exact.brep, inner.exact.brep, T, 1.0)
+    return shared.volume >= inner.exact.volume - contact * shared.area
 
 
 def _chord(*models: Model) -> float:

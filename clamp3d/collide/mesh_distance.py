@@ -7,6 +7,7 @@ but for an error of each triangle.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,24 +18,27 @@ from clamp3d.collide.overlap import common, deepest, thickness
 from clamp3d.collide.surface import Surface
 from clamp3d.core.pose import Array, inverse
 
+Enough = Callable[[Distance], bool]
+
 _MOST_POINTS = 400
 """Vertices of a mesh, spread over it, that are tried as points inside another one."""
 _HALVINGS = 30
 """Halvings of the way between two nearest points in which the true surface is looked for: then it is found to rounding."""
 
 
-def meshes_distance(a: Model, b: Model, T: Array, error: float) -> Distance:
+def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough) -> Distance:
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame, from meshes of chord error ``error`` mm.
 
-    In an overlap the bounds are those of the interference: the greatest depth of a point of one body in the other.
+    In an overlap the bounds are those of the interference: the greatest depth of a point of one body in the other. It
+    is bounded from above only where that can be ``enough``.
     """
     if not (a.between or b.between):
-        return surface_distance(a.outer(error), b.outer(error), T)
-    outer = surface_distance(a.outer(error), b.outer(error), T)
+        return surface_distance(a.outer(error), b.outer(error), T, enough)
+    outer = surface_distance(a.outer(error), b.outer(error), T, enough)
     inner_a, inner_b = a.inner(error), b.inner(error)
     if inner_a is None or inner_b is None:
         return Distance(outer.lower)
-    inner = surface_distance(inner_a, inner_b, T)
+    inner = surface_distance(inner_a, inner_b, T, _nothing)
     p, q = inner.point_a, inner.point_b
     if inner.lower > 0.0 and p is not None and q is not None:
         p = _towards(a, np.eye(4), p, q)
@@ -60,22 +64,22 @@ def _towards(model: Model, T: Array, inside: Array, outside: Array) -> Array:
     return np.asarray(inside + low * (outside - inside))
 
 
-def surface_distance(a: Surface, b: Surface, T: Array) -> Distance:
+def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough) -> Distance:
     """Signed distance of two meshes, ``b`` at ``T`` (4, 4) in a's frame; answers as `meshes_distance`."""
     rounding = rounding_of(a, b, T)
     if surfaces_meet(a, b, T):
-        return _overlap(a, b, T, rounding)
+        return _overlap(a, b, T, rounding, enough)
     lower, upper, p, q = nearest_points(a, b, T)
     if upper <= rounding:
-        return _overlap(a, b, T, rounding)
+        return _overlap(a, b, T, rounding, enough)
     if one_inside(a, b, T) or one_inside(b, a, inverse(T)):
-        return _overlap(a, b, T, rounding)
+        return _overlap(a, b, T, rounding, enough)
     local = (q - T[:3, 3]) @ T[:3, :3]
     off = float(a.error_at(p[None])[0] + b.error_at(local[None])[0])
     return Distance(lower - rounding, upper + off + rounding, p, q)
 
 
-def _overlap(a: Surface, b: Surface, T: Array, rounding: float) -> Distance:
+def _overlap(a: Surface, b: Surface, T: Array, rounding: float, enough: Enough) -> Distance:
     """Bounds of the interference of two meshes of which one meets the other or lies inside it."""
     off = a.error + b.error + rounding
     vertex = _deepest_vertex(a, b, T)
@@ -88,8 +92,19 @@ def _overlap(a: Surface, b: Surface, T: Array, rounding: float) -> Distance:
     upper = rounding - depth
     if vertex is not None and vertex.upper < upper:
         upper, point = vertex.upper, vertex.point_a
-    bound = thickness(a, b, T, shared, depth)
-    return Distance(-bound - off, max(upper, -bound - off), point, point)
+
+    def of_thickness(bound: float) -> Distance:
+        return Distance(-bound - off, max(upper, -bound - off), point, point)
+
+    unbounded = Distance(-np.inf, upper, point, point)
+    if enough(unbounded) or not enough(of_thickness(max(0.0, -upper))):
+        return unbounded
+    return of_thickness(thickness(a, b, T, shared, lambda bound: enough(of_thickness(bound))))
+
+
+def _nothing(_: Distance) -> bool:
+    """Nothing is enough, and no upper bound of an overlap is asked for: the inner meshes attest depths alone."""
+    return False
 
 
 def _deepest_vertex(a: Surface, b: Surface, T: Array) -> Distance | None:

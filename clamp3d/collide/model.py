@@ -30,6 +30,8 @@ Progress = Callable[[str, int, int], None]
 
 _LARGE = 2000
 """Triangles of a mesh beyond which its hull is no quicker to ask than the mesh itself."""
+_MOST_COARSE = 3000
+"""Triangles of the coarse mesh of a solid from CAD beyond which the fine one costs more than asking Open CASCADE."""
 _CONVEX = 1e-9
 """Relative to its size: a mesh whose hull stands out of it by less is asked in its place."""
 Maker = Callable[[Solid, float], tuple[Array, NDArray[np.int64]] | None]
@@ -37,8 +39,12 @@ Maker = Callable[[Solid, float], tuple[Array, NDArray[np.int64]] | None]
 DRAWN_CHORDS = (0.5, 0.06, 0.008, 0.001)
 """Chord errors (mm) that drawn solids are meshed with; a pair still open at the last is uncertain."""
 
-CAD_CHORDS = (0.1, 0.01)
-"""Chord errors (mm) that solids from CAD are meshed with; what these leave open is asked of Open CASCADE."""
+CAD_CHORDS = (0.1, 0.0025)
+"""Chord errors (mm) that solids from CAD are meshed with; what these leave open is asked of Open CASCADE.
+
+Of two equal cylinders, one in the other, facets overlap by a chord error, and each adds its own: three fine ones are less
+than the usual threshold of contact, 0.01 mm.
+"""
 
 
 @dataclass
@@ -145,7 +151,7 @@ class Model:
     def chords(self) -> tuple[float, ...]:
         """Chord errors (mm) of the meshes that are worth a question, from coarse to fine; one for given triangles."""
         if isinstance(self.shape, BrepSolid):
-            return CAD_CHORDS if self._meshes_close else ()
+            return self._cad_chords
         arcs = isinstance(self.shape, Solid) and any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes))
         return DRAWN_CHORDS if arcs else DRAWN_CHORDS[:1]
 
@@ -155,13 +161,16 @@ class Model:
         return len(self.chords) > 1
 
     @cached_property
-    def _meshes_close(self) -> bool:
-        """Whether Open CASCADE's triangles of a solid from CAD close; else only its exact faces say anything."""
+    def _cad_chords(self) -> tuple[float, ...]:
+        """The chord errors for a solid from CAD; none if Open CASCADE's triangles do not close: then it is asked."""
         assert isinstance(self.shape, BrepSolid)
         try:
-            return is_closed(self.shape.tessellated(CAD_CHORDS[0]).faces)
+            faces = self.shape.tessellated(CAD_CHORDS[0]).faces
         except Clamp3dError:
-            return False
+            return ()
+        if not is_closed(faces):
+            return ()
+        return CAD_CHORDS if len(faces) <= _MOST_COARSE else CAD_CHORDS[:1]
 
     @property
     def closed(self) -> bool:

@@ -7,23 +7,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clamp3d.checks import instance, positive
+from clamp3d.checks import instance
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.closed_form import kernel_distance
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.moving_pair import ACCURACY, MovingPair
 from clamp3d.collide.refine import measured, with_normal
 from clamp3d.collide.verdict import RESOLUTION
-from clamp3d.core.distance import SignedDistance, signed_distance
+from clamp3d.core.distance import SignedDistance
+from clamp3d.core.groove_motion import Search
 from clamp3d.core.motion import Motion, scene_pose
-from clamp3d.core.motion_search import Outcome, first_time, least
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc, place
 from clamp3d.core.shapes import AnyShape, as_shape
 from clamp3d.errors import InputError
-
-_RELATIVE = 1e-9
-"""Accuracy of a search for a groove and a cylinder, relative to their largest size."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,9 +100,9 @@ def first_contact(
     (True, 0.5375, 'groove kernel')
     """
     margin = place("margin", margin)
-    kernel = _kernel_pair(a, b, motion, T_a_b, resolution)
-    if kernel is not None:
-        return kernel.first_contact(margin)
+    search = _kernel_search(a, b, motion, T_a_b, resolution)
+    if search is not None:
+        return _from_kernel(search, *search.first_contact(margin))
     if margin < 0.0:
         raise InputError(f"margin must be >= 0 but for a groove and a cylinder, got {margin:g}")
     pair = _moving_pair(a, b, motion, T_a_b)
@@ -134,9 +131,9 @@ def min_clearance(
     >>> round(least.distance.value, 12), least.t
     (0.085786437627, 0.0)
     """
-    kernel = _kernel_pair(a, b, motion, T_a_b, resolution)
-    if kernel is not None:
-        return kernel.least()
+    search = _kernel_search(a, b, motion, T_a_b, resolution)
+    if search is not None:
+        return _from_kernel(search, None, *search.least())
     pair = _moving_pair(a, b, motion, T_a_b)
     least, t = pair.least_distance()
     return _answer(pair, least.upper <= RESOLUTION, t, least)
@@ -155,60 +152,24 @@ def _moving_pair(a: AnyShape, b: AnyShape, motion: Motion, T_a_b: ArrayLike | No
     return MovingPair(cache.model(as_shape(b)), cache.model(as_shape(a)), screw, T, np.eye(4))
 
 
-def _kernel_pair(
+def _kernel_search(
     a: AnyShape, b: AnyShape, motion: Motion, T_a_b: ArrayLike | None, resolution: float | None
-) -> _KernelPair | None:
-    """A groove and a cylinder, which the kernel measures; None for other bodies."""
+) -> Search | None:
+    """The kernel's search for a groove and a cylinder; None for other bodies."""
     screw, T = _start(motion, T_a_b)
-    if not (isinstance(a, SweptArc) and isinstance(b, (Cylinder, Capsule))):
-        return None
-    size = max(a.radius, a.length, b.radius, b.length)
-    accuracy = _RELATIVE * size if resolution is None else positive("resolution", resolution)
-    return _KernelPair(a, b, screw, T, accuracy)
+    if isinstance(a, SweptArc) and isinstance(b, (Cylinder, Capsule)):
+        return Search(a, b, screw, T, resolution)
+    return None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _KernelPair:
-    """A groove that stands and a cylinder that moves, ``T`` (4, 4) being its pose at the start."""
-
-    groove: SweptArc
-    cylinder: Cylinder | Capsule
-    motion: Motion
-    T: Array
-    accuracy: float
-
-    def _at(self, t: float) -> SignedDistance:
-        return signed_distance(self.groove, self.cylinder, self.motion.at(t, self.T))
-
-    def _bounds(self, t: float) -> tuple[float, float]:
-        contact = self._at(t)
-        return contact.distance - contact.error_bound, contact.distance + contact.error_bound
-
-    @property
-    def _speed(self) -> float:
-        r, half = self.cylinder.radius, 0.5 * self.cylinder.length
-        half += r if isinstance(self.cylinder, Capsule) else 0.0
-        corners = np.array([(x, y, z) for x in (-r, r) for y in (-r, r) for z in (-half, half)])
-        return self.motion.speed(corners @ self.T[:3, :3].T + self.T[:3, 3])
-
-    def first_contact(self, margin: float) -> MotionDistance:
-        """The first time at which they come within ``margin`` mm; else the least distance."""
-        answer = first_time(self._bounds, self._speed, margin, accuracy=self.accuracy)
-        if answer.outcome is Outcome.CLEAR:
-            return replace(self.least(), touches=False)
-        return self._answer(True, answer.t, self.accuracy, answer.evaluations)
-
-    def least(self) -> MotionDistance:
-        """The least distance on the whole way."""
-        answer = least(self._bounds, self._speed, accuracy=self.accuracy)
-        return self._answer(answer.upper <= 0.0, answer.t, max(0.0, answer.upper - answer.lower), answer.evaluations)
-
-    def _answer(self, touches: bool, t: float, width: float, evaluations: int) -> MotionDistance:
-        contact = self._at(t)
-        distance = kernel_distance(contact)
-        distance = replace(distance, lower=distance.lower - width)
-        pose = self.motion.at(t, self.T)
-        return MotionDistance(touches, t, _overlap(distance), pose, width, evaluations, contact)
+def _from_kernel(search: Search, touches: bool | None, t: float, slack: float) -> MotionDistance:
+    """The answer at time ``t``; ``touches`` None: as the distance there says."""
+    contact = search.at(t)
+    distance = kernel_distance(contact)
+    if touches is None:
+        touches = distance.upper <= 0.0
+        distance = replace(distance, lower=distance.lower - slack)
+    return MotionDistance(touches, t, _overlap(distance), search.pose(t), slack, search.evaluations, contact)
 
 
 def _answer(pair: MovingPair, touches: bool, t: float, distance: Distance) -> MotionDistance:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,8 +20,6 @@ _CORNERS = 400
 """Corners of an overlap that are measured."""
 _TRIANGLES = 20_000
 """Triangles of an overlap, cut in four again and again, whose thickness is bounded at most: a tenth of a second."""
-_CLOSE = 1.02
-"""Ratio of the bound of the thickness to the depth that a point has, at which the bound is close enough."""
 
 
 @dataclass(eq=False)
@@ -89,43 +88,41 @@ def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Ar
     points = np.vstack([shared.vertices[:: max(1, len(shared.vertices) // _CORNERS)], shared.inner_points()])
     back = inverse(T)
     local = points @ back[:3, :3].T + back[:3, 3]
-    away_a, face_a, _ = a.nearest(points)
-    away_b, face_b, _ = b.nearest(local)
-    off = a.error + b.error
-    depth = np.maximum(away_a, away_b) - off
+    depth = np.maximum(a.distance(points), b.distance(local)) - a.error - b.error
     k = int(np.argmax(depth))
     return float(depth[k]), points[k]
 
 
-def thickness(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> float:
-    """Upper bound (mm) of how deep any point of one mesh's surface lies in the other; ``depth`` is one that a point has.
+def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Callable[[float], bool]) -> float:
+    """Upper bound (mm) of how deep any point of one mesh's surface lies in the other, sharpened until ``is_enough``.
 
-    Lemma: the distance from a fixed triangle is convex, so over a triangle of the common part it is largest at a corner,
-    and the distance from the whole surface is no larger than that from any one of its triangles. Infinite where one
+    Lemma: the distance from a fixed triangle is convex, so over a triangle of the common part it is largest at a
+    corner, and the distance from the whole surface is no larger than that from any one of its triangles. Infinite where one
     body may be swallowed whole, since the surfaces then say nothing of its middle.
     """
     if 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
         return np.inf
     back = inverse(T)
     pieces = shared.vertices[shared.faces]
-    bound = 0.0
+    settled = 0.0
     budget = _TRIANGLES
     while len(pieces):
         budget -= len(pieces)
         local = pieces @ back[:3, :3].T + back[:3, 3]
         each = np.maximum(_from_one_triangle(a, pieces), _from_one_triangle(b, local))
-        open_ = each > max(_CLOSE * depth, 1e-9 * a.scale)
-        bound = max(bound, float(each[~open_].max(initial=0.0)))
+        largest = max(settled, float(each.max(initial=0.0)))
+        if is_enough(largest):
+            return largest
+        open_ = each > 0.5 * largest
+        settled = max(settled, float(each[~open_].max(initial=0.0)))
         if 4 * int(open_.sum()) > budget:
-            return max(bound, float(each.max(initial=0.0)))
+            return largest
         pieces = _quartered(pieces[open_])
-        if len(pieces) and float(np.ptp(pieces, axis=1).max()) < 1e-7 * a.scale:
-            return max(bound, float(each.max(initial=0.0)))
-    return bound
+    return settled
 
 
 def _from_one_triangle(surface: Surface, pieces: Array) -> Array:
-    """Largest distance (m,) of the corners of triangles (m, 3, 3) from the one of ``surface`` nearest to their middle."""
+    """Largest distance (m,) of the corners of triangles (m, 3, 3) from the triangle nearest to their middle."""
     _, face, _ = surface.nearest(pieces.mean(axis=1))
     chosen = np.repeat(surface.vertices[surface.faces[face]], 3, axis=0)
     corners = pieces.reshape(-1, 3)

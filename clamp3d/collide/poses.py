@@ -14,7 +14,7 @@ from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.batch import bounds_at_poses
 from clamp3d.collide.broad import Boxes, box_gaps, near_between
-from clamp3d.collide.judge import is_contained, judge
+from clamp3d.collide.judge import judge, kind_of_overlap
 from clamp3d.collide.model import Model, ModelCache
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import RESOLUTION, VERDICTS, Thresholds, Verdict
@@ -25,9 +25,7 @@ _BLOCK = 8192
 """Poses that are compared with all others together: what their boxes take is then a few megabytes."""
 
 _NAMES = np.array([verdict.value for verdict in VERDICTS])
-_CONTAINED, _CLASH, _UNCERTAIN, _CLEAR = map(
-    VERDICTS.index, (Verdict.CONTAINED, Verdict.CLASH, Verdict.UNCERTAIN, Verdict.CLEAR)
-)
+_CLASH, _UNCERTAIN, _CLEAR = map(VERDICTS.index, (Verdict.CLASH, Verdict.UNCERTAIN, Verdict.CLEAR))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,7 +169,7 @@ def _judged(
         a.counters.queries["boxes"] += len(left)
     for k, m in enumerate(left.tolist()):
         if holds[m]:
-            rank[m] = _CONTAINED if is_contained(a, b, T[m], thresholds.contact) else _CLASH
+            rank[m] = VERDICTS.index(kind_of_overlap(a, b, T[m], thresholds.contact))
             continue
         if gaps[k] >= thresholds.reach + RESOLUTION:
             least[m], rank[m] = gaps[k], _CLEAR

@@ -8,16 +8,18 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.closed_form import ClosedForm, bodies_distance
+from clamp3d.collide.facets import rod_of, rods_distance
 from clamp3d.collide.mesh_distance import meshes_distance
 from clamp3d.collide.model import Model
 from clamp3d.collide.open_mesh import open_distance
-from clamp3d.core.pose import Array
+from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import SolverError
 
 ACCURACY = 1e-7
@@ -41,10 +43,15 @@ def refine(a: Model, b: Model, T: Array, start: Distance, enough: Enough, *, for
     if enough(distance):
         return distance
     for level in _levels(a, b, T, forms):
-        distance = _agreed(distance, level(lambda x, known=distance: enough(known.meet(x))))  # type: ignore[misc]
+        distance = _agreed(distance, level(partial(_enough_with, distance, enough)))
         if enough(distance):
             break
     return distance
+
+
+def _enough_with(distance: Distance, enough: Enough, new: Distance) -> bool:
+    """Whether a new answer is enough together with the one so far."""
+    return enough(distance.meet(new))
 
 
 def _levels(a: Model, b: Model, T: Array, forms: bool) -> Iterator[Callable[[Enough], Distance]]:
@@ -57,17 +64,40 @@ def _levels(a: Model, b: Model, T: Array, forms: bool) -> Iterator[Callable[[Eno
     both_exact = a.exact is not None and b.exact is not None
     if forms and not both_exact and a.simple and b.simple:
         yield lambda enough: _by_closed_forms(a, b, T, enough)
+    if forms and not both_exact:
+        yield from _cylinders_on_facets(a, b, T)
     for chord in _chords(a, b):
         queries["meshes"] += 1
         said = f", chord error {chord:.2g} mm" if a.refines or b.refines else ""
-        yield lambda _, chord=chord, said=said: meshes_distance(a, b, T, chord).labelled(  # type: ignore[misc]
-            "meshes", f"meshes (FCL){said}"
-        )
+        yield partial(_by_meshes, a, b, T, chord, f"meshes (FCL){said}")
     if both_exact:
         from clamp3d.collide.exact import exact_distance
 
         queries["exact"] += 1
         yield lambda _: exact_distance(a, b, T)
+
+
+def _cylinders_on_facets(a: Model, b: Model, T: Array) -> Iterator[Callable[[Enough], Distance]]:
+    """Levels for exact cylinders of one part against the facets of the other, where that is a mesh."""
+    if _is_round(b) and not a.drawn and a.chords:
+        yield lambda _: _on_facets(a, b, T)
+    if _is_round(a) and not b.drawn and b.chords:
+        yield lambda _: _on_facets(b, a, inverse(T)).moved(T).swapped()
+
+
+def _is_round(model: Model) -> bool:
+    """Whether a cylinder holds each piece of a body."""
+    return bool(model.bodies) and all(rod_of(body) is not None for body in model.bodies or ())
+
+
+def _on_facets(mesh: Model, round_: Model, T: Array) -> Distance:
+    mesh.counters.queries["facets"] += 1
+    distance = rods_distance(mesh.outer(mesh.chords[-1]), round_.bodies or (), T)
+    return distance.labelled("facets", "cylinder on facets (FCL)")
+
+
+def _by_meshes(a: Model, b: Model, T: Array, chord: float, method: str, enough: Enough) -> Distance:
+    return meshes_distance(a, b, T, chord, enough).labelled("meshes", method)
 
 
 def _chords(a: Model, b: Model) -> list[float]:

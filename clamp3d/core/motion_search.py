@@ -62,7 +62,8 @@ def bound_by_speed(at_start: float, at_stop: float, way: float) -> float:
     """Lower bound of a distance between two times, ``at_start`` and ``at_stop`` mm at these.
 
     Lemma: a distance changes no faster than the fastest point of the moving body moves. On a way of ``way`` mm it is at
-    least ``at_start - x`` and ``at_stop - (way - x)`` after x mm, and the larger of the two is no less than their mean.
+    least ``at_start - x`` and ``at_stop - (way - x)`` after x mm, and the larger of the two is no less than their mean
+    (but for the rounding of these numbers).
 
     >>> bound_by_speed(3.0, 2.0, 4.0)
     0.5
@@ -98,34 +99,25 @@ def least(
     >>> least(lambda t: (abs(t - 0.3),) * 2, 1.0, accuracy=1e-9)
     Least(t=0.3, lower=0.0, upper=0.0, evaluations=3)
     """
-    ends = distance(0.0), distance(1.0)
-    t, upper = min(((t, ends[t][1]) for t in (0, 1)), key=lambda end: end[1])
+    start, stop = distance(0.0), distance(1.0)
+    t, upper = (0.0, start[1]) if start[1] <= stop[1] else (1.0, stop[1])
     evaluations = 2
-    lower = min(ends[0][0], ends[1][0])  # of all times that are no longer searched
-    heap = [_between(0.0, 1.0, ends[0][0], ends[1][0], speed, -math.inf)]
-    while heap and evaluations < most:
+    between = _Bounds(speed, bound)
+    heap = [between(_Stretch(-math.inf, 0.0, 1.0, start[0], stop[0]), upper - accuracy)]
+    lower = math.inf  # of all stretches that no time parts
+    while heap and heap[0].lower < upper - accuracy and evaluations < most:
         stretch = heapq.heappop(heap)
-        if bound is not None and stretch.lower < upper - accuracy:
-            known = max(stretch.lower, bound(stretch.start, stretch.stop))
-            if heap and known > heap[0].lower:  # no longer the one that decides
-                heapq.heappush(heap, stretch._replace(lower=known))
-                continue
-            stretch = stretch._replace(lower=known)
-        if stretch.lower >= upper - accuracy:
-            heapq.heappush(heap, stretch)
-            break
         middle = _meeting(stretch, speed)
-        if not stretch.start < middle < stretch.stop:  # no time between the two
+        if not stretch.start < middle < stretch.stop:
             lower = min(lower, stretch.lower)
             continue
         here = distance(middle)
         evaluations += 1
         if here[1] < upper:
             t, upper = middle, here[1]
-        lower = min(lower, here[0])
-        heapq.heappush(heap, _between(stretch.start, middle, stretch.at_start, here[0], speed, stretch.lower))
-        heapq.heappush(heap, _between(middle, stretch.stop, here[0], stretch.at_stop, speed, stretch.lower))
-    return Least(float(t), min([lower, upper, *(stretch.lower for stretch in heap[:1])]), upper, evaluations)
+        for half in _halves(stretch, middle, here[0]):
+            heapq.heappush(heap, between(half, upper - accuracy))
+    return Least(t, min([lower, upper, *(stretch.lower for stretch in heap[:1])]), upper, evaluations)
 
 
 def first_time(
@@ -145,36 +137,47 @@ def first_time(
 
     Examples
     --------
-    >>> first_time(lambda t: (1.0 - t,) * 2, 1.0, 0.25).t
+    >>> round(first_time(lambda t: (1.0 - t,) * 2, 1.0, 0.25).t, 5)
     0.75
     """
     at_start, upper = distance(0.0)
     if at_start <= level:
         return FirstTime(Outcome.REACHED if upper <= level else Outcome.UNDECIDED, 0.0, 1)
-    todo = [_between(0.0, 1.0, at_start, distance(1.0)[0], speed, -math.inf)]
+    between = _Bounds(speed, bound)
+    todo = [_Stretch(-math.inf, 0.0, 1.0, at_start, distance(1.0)[0])]
     evaluations = 2
     while todo:
-        stretch = todo.pop()
-        way = (stretch.stop - stretch.start) * speed
-        if stretch.lower > level or (bound is not None and bound(stretch.start, stretch.stop) > level):
+        stretch = between(todo.pop(), level)
+        if stretch.lower > level:
             continue
         middle = 0.5 * (stretch.start + stretch.stop)
-        if way <= accuracy or not stretch.start < middle < stretch.stop:
+        if (stretch.stop - stretch.start) * speed <= accuracy or not stretch.start < middle < stretch.stop:
             return FirstTime(Outcome.REACHED, stretch.start, evaluations)
         if evaluations >= most:
             return FirstTime(Outcome.UNDECIDED, stretch.start, evaluations)
         here, _ = distance(middle)
         evaluations += 1
-        if here > level:  # else the first time is in the first half
-            todo.append(_between(middle, stretch.stop, here, stretch.at_stop, speed, stretch.lower))
-        todo.append(_between(stretch.start, middle, stretch.at_start, here, speed, stretch.lower))
+        todo += reversed(_halves(stretch, middle, here))
     return FirstTime(Outcome.CLEAR, 1.0, evaluations)
 
 
-def _between(start: float, stop: float, at_start: float, at_stop: float, speed: float, known: float) -> _Stretch:
-    """The stretch between two times, with the best bound that is known of it."""
-    lower = max(known, bound_by_speed(at_start, at_stop, speed * (stop - start)))
-    return _Stretch(min(lower, at_start, at_stop), start, stop, at_start, at_stop)
+class _Bounds:
+    """What bounds the distance on a stretch: the speed, and where that is not enough the caller's own bound."""
+
+    def __init__(self, speed: float, bound: BoundBetween | None) -> None:
+        self.speed, self.bound = speed, bound
+
+    def __call__(self, stretch: _Stretch, enough: float) -> _Stretch:
+        way = self.speed * (stretch.stop - stretch.start)
+        lower = max(stretch.lower, bound_by_speed(stretch.at_start, stretch.at_stop, way))
+        if lower < enough and self.bound is not None:
+            lower = max(lower, self.bound(stretch.start, stretch.stop))
+        return stretch._replace(lower=lower)
+
+
+def _halves(stretch: _Stretch, middle: float, here: float) -> tuple[_Stretch, _Stretch]:
+    """Both parts of a stretch, with what is known of the whole; ``here``: lower bound at the time between them."""
+    return stretch._replace(stop=middle, at_stop=here), stretch._replace(start=middle, at_start=here)
 
 
 def _meeting(stretch: _Stretch, speed: float) -> float:
