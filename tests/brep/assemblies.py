@@ -129,7 +129,7 @@ def taper():
     """A taper pin in a hub, a ball in its socket, a rubber ring in its groove: cones, spheres, tori."""
     plate = cut(box((-14, -14, -10), (14, 14, 10)), cone(2.0, 2.5, -10.0, 10.0))
     pin = cone(2.0, 2.5, -10.0, 10.0)
-    stud = fuse(rod(3.0, 10, 20, (9, 9)), ball(5.0, (9, 9, 25)))
+    stud = fuse(rod(3.0, 10, 21, (9, 9)), ball(5.0, (9, 9, 25)))
     socket = cut(box((0, 0, 25), (18, 18, 33)), ball(5.0, (9, 9, 25)))
     groove = moved(cut(rod(9.0, -4, 4), ring(9.0, 1.5)), shift(-30, 0, 0))
     return {"plate": plate, "pin": pin, "stud": stud, "socket": socket, "groove": groove,
