@@ -37,7 +37,6 @@ from numpy.typing import ArrayLike
 from clamp3d.baselines import cache as disk
 from clamp3d.checks import choice, whole
 from clamp3d.core.child import run_child
-from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
@@ -182,7 +181,7 @@ def _outside(points: Array, hulls: tuple[Mesh, ...]) -> Array:
     best = np.full(len(points), np.inf)
     for hull in hulls:
         planes = ConvexHull(hull.vertices).equations
-        best = np.minimum(best, (dot(points, planes[:, :3].T) + planes[:, 3]).max(axis=1))
+        best = np.minimum(best, ((points @ planes[:, :3].T) + planes[:, 3]).max(axis=1))
     return best
 
 

@@ -25,7 +25,6 @@ import fcl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder
@@ -80,7 +79,7 @@ def convex(vertices: ArrayLike, faces: ArrayLike, name: str = "convex shape") ->
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
     real = length > 0.0
-    height = (dot(V, normals[real].T) - np.einsum("ij,ij->i", corners[real, 0], normals[real])) / length[real]
+    height = ((V @ normals[real].T) - np.einsum("ij,ij->i", corners[real, 0], normals[real])) / length[real]
     if height.max() > _CONVEX * np.ptp(V, axis=0).max():
         raise InputError(f"{name} must be convex: a vertex stands {height.max():.3g} mm outside one of its faces")
     return _shape("convex", solid, fcl.Convex(V * UNIT, len(F), encoded(F)))
@@ -188,7 +187,7 @@ def measure(shape: Shape, wire: Wire) -> Measurement:
 
 def contained(shape: Shape, wire: Wire) -> bool:
     """Whether a wire that does not cross a mesh's surface lies inside it (its middle has winding number 1)."""
-    if shape.kind != "mesh" or wire.cylinder.length > norm(shape.bounds[1] - shape.bounds[0]):
+    if shape.kind != "mesh" or wire.cylinder.length > np.linalg.norm(shape.bounds[1] - shape.bounds[0]):
         return False
     middle = wire.T[:3, 3]
     if (middle < shape.bounds[0]).any() or (middle > shape.bounds[1]).any():
@@ -234,20 +233,20 @@ def _inside_out(found: Measurement, depth: float) -> Measurement:
 def _normal(d: float, on_a: Array, on_b: Array, wire: Wire) -> Array:
     """Unit normal from a to b. On the cylinder's side and ends it is the surface's own, turned inward."""
     across, height = _from_axis(on_b, wire)
-    radius = norm(across)
+    radius = np.linalg.norm(across)
     on_side, on_end = _places(radius, height, wire)
     if on_end and not on_side:
         return np.asarray(-np.copysign(1.0, height) * wire.T[:3, 2])
     if on_side and not (on_end and d > _WITNESS):
         return np.asarray(-across / radius)
     between = on_b - on_a
-    return np.asarray(between / norm(between))
+    return np.asarray(between / np.linalg.norm(between))
 
 
 def _rim(point: Array, wire: Wire) -> bool:
     """Whether a point of the cylinder lies on the edge of an end."""
     across, height = _from_axis(point, wire)
-    return all(_places(norm(across), height, wire))
+    return all(_places(np.linalg.norm(across), height, wire))
 
 
 def _places(radius: float, height: float, wire: Wire) -> tuple[bool, bool]:
@@ -260,7 +259,7 @@ def _from_axis(point: Array, wire: Wire) -> tuple[Array, float]:
     """Vector from the cylinder's axis to a point, and the point's height along the axis."""
     axis = wire.T[:3, 2]
     from_middle = point - wire.T[:3, 3]
-    height = float(dot(from_middle, axis))
+    height = float(from_middle @ axis)
     return from_middle - height * axis, height
 
 

@@ -11,7 +11,6 @@ from clamp3d.baselines.fcl_shapes import Shape, Wire, bvh, distance, facets, mea
 from clamp3d.baselines.model import Pieces, pose_of, poses_of
 from clamp3d.checks import instance
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, check_pose_array
 from clamp3d.core.primitives import Cylinder
 from clamp3d.core.shapes import Solid
@@ -112,12 +111,12 @@ class PolytopeModel:
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every piece of part a; see `ContactModel`."""
         T_a_b = pose_of(pair, T_a_b)
-        return self._pieces_of[pair.a].pieces(self._wire(pair.cylinder), dot(T_a_b, pair.T_b_cylinder))
+        return self._pieces_of[pair.a].pieces(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
         T_a_b = poses_of(pair, T_a_b)
-        return self.parts[pair.a].distances(self._wire(pair.cylinder), dot(T_a_b, pair.T_b_cylinder))
+        return self.parts[pair.a].distances(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)
 
     def _wire(self, cylinder: Cylinder) -> Wire:
         """FCL's cylinder of this size, made once."""
