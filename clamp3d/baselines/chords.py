@@ -47,9 +47,7 @@ class Chords:
         distance, foot, normal = _signed(centre, starts, ends)
         R, p = pair.T_a_groove[:3, :3], pair.T_a_groove[:3, 3]
         point = (np.column_stack([foot, np.full(len(foot), T[2, 3])]) @ R.T) + p
-        return Pieces(
-            distance - pair.cylinder.radius, point, np.column_stack([normal, 0.0 * distance]) @ R.T, features
-        )
+        return Pieces(distance - pair.cylinder.radius, point, np.column_stack([normal, 0.0 * distance]) @ R.T, features)
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""

@@ -48,13 +48,9 @@ class Polytopes:
     def pieces(self, wire: Wire, T_a_wire: Array) -> Pieces:
         """One gap per polytope, with the wire at a pose (4, 4) in the part's frame."""
         wire.place(check_pose_array(T_a_wire[None])[0])
-        found = [measure(shape, wire) for shape in self.shapes]
-        return Pieces(
-            np.array([m.distance for m in found]),
-            np.array([m.point_a for m in found]),
-            np.array([m.normal for m in found]),
-            self.names,
-        )
+        measured = [measure(shape, wire) for shape in self.shapes]
+        columns = (np.array([getattr(m, name) for m in measured]) for name in ("distance", "point", "normal"))
+        return Pieces(*columns, self.names)
 
     def distances(self, wire: Wire, T_a_wire: Array) -> Array:
         """Least signed distance (n,) at poses (n, 4, 4), the polytopes taken by the distance of their boxes.
@@ -137,10 +133,9 @@ def part_mesh(part: PartOrMesh, mesh_error: float) -> TriangleMesh:
 class Meshes(PolytopeModel):
     """The parts' meshes as they are, measured by FCL; any pose.
 
-    The groove is too tight by the mesh's chord error. A mesh is a surface: depth comes from a thinner core of the wire
-    and ends where that crosses the surface too; beyond, the number is the deepest triangle's own way out and only its
-    sign means something. A wire inside the wall is found by the winding number (see `fcl_shapes.measure`), but not by
-    ``pieces``, the gaps to every flat face.
+    The groove is too tight by the mesh's chord error. A mesh is a surface: depth comes from thinner cores of the wire
+    and ends where the thinnest crosses the surface too. A wire inside the wall is seen (`fcl_shapes.measure`), but not
+    by ``pieces``, the gaps to every flat face.
 
     Parameters
     ----------
@@ -151,7 +146,7 @@ class Meshes(PolytopeModel):
     """
 
     name = "mesh"
-    limits = ("surface only", "no depth beyond 0.4 of the wire's radius", "groove too tight by the mesh's chord error")
+    limits = ("surface only", "no depth beyond 0.9 of the wire's radius", "groove too tight by the mesh's chord error")
 
     def __init__(self, parts: Mapping[str, PartOrMesh], mesh_error: float = 0.05) -> None:
         instance("parts", parts, Mapping)

@@ -30,7 +30,11 @@ class Surface:
         self.V, self.F = mesh.vertices, mesh.faces[self.rows]
         known = trimesh.Trimesh(self.V, self.F, process=False, validate=False)
         self.normals, self.areas, self.centres = known.face_normals, known.area_faces, known.triangles_center
-        self.edges, self.pairs, opposite = known.face_adjacency_edges, known.face_adjacency, known.face_adjacency_unshared
+        self.edges, self.pairs, opposite = (
+            known.face_adjacency_edges,
+            known.face_adjacency,
+            known.face_adjacency_unshared,
+        )
         alone = trimesh.grouping.group_rows(known.edges_sorted, require_count=1)
         self.rim, self.rim_faces = known.edges[alone], known.edges_face[alone]
         n1, n2 = self.normals[self.pairs[:, 0]], self.normals[self.pairs[:, 1]]

@@ -90,6 +90,8 @@ def _sdf(cases: Motions, i: int, instant: Array, place: Array) -> NDArray[Any]:
     centre, way = cases.start[i, :3, 3], cases.start[i, :3, 2] / np.linalg.norm(cases.start[i, :3, 2])
     points = centre + place[:, None] * way
     if cases.angle[i]:
-        points = cases.point[i] + turned(points - cases.point[i], np.asarray(one.unit_axis()[0], float), instant * cases.angle[i])
+        points = cases.point[i] + turned(
+            points - cases.point[i], np.asarray(one.unit_axis()[0], float), instant * cases.angle[i]
+        )
     x, y, z = (points + instant[:, None] * np.asarray(one.vector()[0], float)).T
     return point_sdf(x, y, z, R, R * np.sin(a), -R * np.cos(a), H)
