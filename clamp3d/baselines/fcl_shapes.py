@@ -10,7 +10,7 @@ What python-fcl 0.7.0 does, measured on wedges of a groove of radius 12 against 
   can run without end beside them. It is not asked for. Where two shapes overlap, a cylinder thinner and shorter by
   ``c`` all round is measured instead, 40 % and then 90 % of the radius: if that is apart by d and the nearest point is
   on its side or end, the depth is c - d exactly, for a cylinder's support in such a direction is its core's and c more.
-  At a rim the depth is understated, as of a cylinder whose rims are rounded by c. Deeper than that it is only known to
+  At a rim the depth is understated, as of a cylinder whose rims are rounded by c (no less than 1e-9 mm). Deeper than that it is only known to
   be at least c.
 - The normal from two witness points is worthless where they nearly meet. It is taken from the cylinder's own surface.
 - NaN, scaled poses, empty meshes and open "convex" shapes pass without a word or end the interpreter: refused here.
@@ -18,6 +18,7 @@ What python-fcl 0.7.0 does, measured on wedges of a groove of radius 12 against 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -38,6 +39,7 @@ MIN_SIZE, MAX_SIZE = 0.1, 1e4
 """Extents in mm between which the accuracy stated above was measured; others are refused."""
 
 _EROSIONS = (0.4, 0.9)  # of the radius or half length
+_SHALLOWEST = 1e-9  # mm: what overlaps by a rim alone is this deep at least
 _RIM = 1e-6  # of the cylinder's size: a witness point this near the rim lies on it
 _WITNESS = 1e-3  # mm apart from which the witness points give a direction at a rim
 _CONVEX = 1e-9  # of the size
@@ -169,7 +171,7 @@ def measure(shape: Shape, wire: Wire) -> Measurement:
             continue
         if contained(shape, each):
             return Measurement(-d - 2.0 * wire.cylinder.radius, nearest.point, -nearest.normal)
-        return Measurement(d, nearest.point, nearest.normal)
+        return Measurement(min(d, -_SHALLOWEST) if each.erosion else d, nearest.point, nearest.normal)
     return Measurement(-wire.cores[-1].erosion, nearest.point, nearest.normal)
 
 
@@ -180,7 +182,12 @@ def contained(shape: Shape, wire: Wire) -> bool:
     middle = wire.T[:3, 3]
     if (middle < shape.bounds[0]).any() or (middle > shape.bounds[1]).any():
         return False
-    return bool(trimesh.Trimesh(shape.solid.vertices, shape.solid.faces, process=False).contains(middle[None])[0])
+    corners = shape.solid.vertices[shape.solid.faces] - middle
+    a, b, c = np.moveaxis(corners, 1, 0)
+    la, lb, lc = np.linalg.norm(corners, axis=2).T
+    below = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
+    angle = 2.0 * np.arctan2(np.linalg.det(corners), below)  # solid angle of each triangle (Van Oosterom, Strackee)
+    return bool(angle.sum() > 2.0 * math.pi)
 
 
 def _nearest(shape: Shape, wire: Wire) -> Measurement:
