@@ -14,14 +14,13 @@ from clamp3d.checks import choice, function, number, text
 from clamp3d.clamp.closing import HELD, open_start
 from clamp3d.clamp.contact import Contact, seats
 from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
-from clamp3d.clamp.equilibria import describe, equilibria, same, start_tilts
+from clamp3d.clamp.equilibria import describe, equilibria, same
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.follow import Closing, follow
 from clamp3d.clamp.forces import contact_forces
 from clamp3d.clamp.loader import WireSize, load_clamp
 from clamp3d.clamp.matrix import PAIRS, Difference, contact_type
 from clamp3d.clamp.meetings import meetings
-from clamp3d.clamp.out_of_plane import out_of_plane
 from clamp3d.clamp.result import Assembly, Equilibrium, Event, Solver, Start, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import B, D, S, Section, W
@@ -86,8 +85,7 @@ def assemble(
     open_by, open_tilt : float
         How much further than needed the clamp stands open before it comes in; mm and rad.
     others : bool
-        Also find the other states that closing can end in, how far the start may tilt before one of them is reached,
-        and the distance with the joints' play (exact solver only).
+        Also find the other states that closing can end in, and the distance with the joints' play (exact solver only).
     on_waypoint : callable, optional
         Called with every `Waypoint` as it is reached.
     progress : callable, optional
@@ -185,16 +183,15 @@ def assemble(
         optimality=proof[1],
         work=Work(len(PARTS), len(PAIRS), queries, motion_steps, model.meshes_built),
         start=Start(float(start[D]), open_tilt, (float(start[0]), float(start[1])), (float(start[2]), float(start[3]))),
-        **(_solved(section, final, others, open_by, open_tilt) if isinstance(final, FinalState) else {}),
+        **(_solved(section, final, others) if isinstance(final, FinalState) else {}),
     )
 
 
-def _solved(section: Section, final: FinalState, others: bool, open_by: float, open_tilt: float) -> dict[str, Any]:
-    """What only an exact answer has: forces, second order in space and, if asked, what else closing could end in."""
-    found: dict[str, Any] = {"forces": contact_forces(section, final), "out_of_plane": out_of_plane(section, final)}
+def _solved(section: Section, final: FinalState, others: bool) -> dict[str, Any]:
+    """What only an exact answer has: forces and, if asked, what else closing could end in."""
+    found: dict[str, Any] = {"forces": contact_forces(section, final)}
     if others:
         found["others"] = _others(section, final)
-        found["start_tilts"] = start_tilts(section, final, open_by=open_by, open_tilt=open_tilt)
         found["with_play"] = _with_play(section, final)
     return found
 
@@ -242,7 +239,6 @@ def _others(section: Section, final: FinalState) -> tuple[Equilibrium, ...]:
             status=final_status(section, state),
             detail=describe(state, section.escaped(state.q)),
             is_equilibrium=not section.escaped(state.q),
-            out_of_plane=out_of_plane(section, state),
         )
         for state in equilibria(section)
         if not same(state, final)

@@ -13,7 +13,6 @@ from clamp3d.clamp.contact import Contact, Seat, measure_contacts, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.forces import Force
 from clamp3d.clamp.matrix import Difference, Pair, differences, plain
-from clamp3d.clamp.out_of_plane import OutOfPlane
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array, SectionPose
@@ -103,8 +102,6 @@ class Equilibrium:
         What holds the state where that is not the grooves' arcs.
     is_equilibrium : bool
         If it is not one, a wire slips out of its groove there.
-    out_of_plane : OutOfPlane or None
-        As of `Assembly`.
     """
 
     distance: float
@@ -113,7 +110,6 @@ class Equilibrium:
     status: str
     detail: str
     is_equilibrium: bool
-    out_of_plane: OutOfPlane | None = None
 
     def __str__(self) -> str:
         where = f"{self.distance:.3f} mm, tilt {math.degrees(self.tilt):z.2f} deg"
@@ -124,8 +120,7 @@ class Equilibrium:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         data = plain(self, distance="distance_mm", closing="closing_mm", tilt="tilt_deg", is_equilibrium="rests")
-        space = self.out_of_plane
-        return data | {"tilt_deg": math.degrees(self.tilt), "out_of_plane": space and space.to_dict()}
+        return data | {"tilt_deg": math.degrees(self.tilt)}
 
 
 Severity = Literal["error", "warning", "note"]
@@ -188,12 +183,8 @@ class Assembly:
         Where closing began.
     forces : tuple of Force
         The contact forces per newton of bolt force (exact solver).
-    out_of_plane : OutOfPlane or None
-        Whether it is an equilibrium in space too; None where nothing is known of it.
     others : tuple of Equilibrium or None
         The other states that closing can end in, the one closed furthest first; None if they were not looked for.
-    start_tilts : (float, float) or None
-        Tilts of the open down splint, rad, between which closing ends in this state; None if they were not looked for.
     with_play : dict or None
         Distance in mm with the joints' play (None: not clamped), by the joints that have it; None if not looked for.
     """
@@ -218,8 +209,6 @@ class Assembly:
     work: Work
     start: Start
     forces: tuple[Force, ...] = ()
-    out_of_plane: OutOfPlane | None = None
-    start_tilts: tuple[float, float] | None = None
     with_play: dict[str, float | None] | None = None
     others: tuple[Equilibrium, ...] | None = None
 
@@ -274,8 +263,6 @@ class Assembly:
         for d in self.matrix_differences:
             if d.declared != 0:
                 found.append(Finding("warning" if d.declared == 3 or d.measured else "note", str(d), d.a, d.b))
-        if self.out_of_plane is not None and self.out_of_plane.stable is False:
-            found.append(Finding("warning", f"out of the plane {self.out_of_plane}, and the clamp closes further"))
         found += [Finding("note", str(e)) for e in self.others or ()]
         return tuple(sorted(found, key=lambda finding: get_args(Severity).index(finding.severity)))
 
@@ -329,10 +316,8 @@ class Assembly:
             "matrix_differences": [d.to_dict() for d in self.matrix_differences],
             "findings": [plain(finding) for finding in self.findings],
             "residuals": {"largest_violated_gap_mm": self.violation, "optimality_mm": self.optimality},
-            "out_of_plane": None if self.out_of_plane is None else self.out_of_plane.to_dict(),
             "other_ends": None if self.others is None else [e.to_dict() for e in self.others],
             "start": self.start.to_dict(),
-            "start_tilts_deg": None if self.start_tilts is None else [math.degrees(t) for t in self.start_tilts],
             "forces": [f.to_dict() for f in self.forces],
             "with_play_mm": self.with_play,
             "work": plain(self.work),

@@ -21,7 +21,6 @@ from clamp3d.clamp.dimensions import Clamp, Wire
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.section import SIZE, Section
 from clamp3d.clamp.status import CLAMPED, final_status
-from clamp3d.core.linear import dot, lstsq
 from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
 
@@ -140,7 +139,7 @@ def _derivatives(section: Section, final: FinalState) -> Array:
     def conditions(at: Section, x: Array) -> Array:
         """Gradient of the Lagrangian (n, up to a constant), active gaps (k), and the splint distance."""
         gaps = at.gaps(x)
-        gradient = dot(-final.multipliers[active], gaps.gradient[active][:, free])
+        gradient = -final.multipliers[active] @ gaps.gradient[active][:, free]
         return np.array([*gradient, *gaps.value[active], at.splint_distance(x)])
 
     def changed(name: str, by: float) -> Section:
@@ -153,7 +152,7 @@ def _derivatives(section: Section, final: FinalState) -> Array:
     by_q, by_p = by_q / (2.0 * h), by_p / (2.0 * h)
     A, k = final.gaps.gradient[active][:, free], len(active)
     kkt = np.block([[by_q[: len(free)], -A.T], [A, np.zeros((k, k))]])
-    adjoint, rank = lstsq(kkt.T, np.append(by_q[-1], np.zeros(k)), _WELL_POSED)
+    adjoint, _, rank, _ = np.linalg.lstsq(kkt.T, np.append(by_q[-1], np.zeros(k)), _WELL_POSED)
     if rank < len(kkt):
         raise SolverError("no sensitivity: the final state is not isolated, its KKT matrix is singular")
-    return np.asarray(by_p[-1] - dot(adjoint, by_p[:-1]))
+    return np.asarray(by_p[-1] - adjoint @ by_p[:-1])

@@ -25,7 +25,6 @@ def command(
     ),
     processes: int = option("Processes.", type=click.IntRange(1, 1024), default=1),
     scheduler: str | None = option("Spread over this Dask cluster (extra 'cluster').", metavar="ADDRESS"),
-    resume: Path | None = option("Keep finished work here; go on from it if it exists."),
     json_file: Path | None = JSON,
     plot_file: Path | None = option("Draw the histogram (.png, .svg, .pdf).", "--plot", type=PICTURE),
     quiet: bool = QUIET,
@@ -56,7 +55,6 @@ def command(
             distribution="normal" if distribution == "normal" else "uniform",
             processes=processes,
             scheduler=scheduler,
-            resume=resume,
             progress=lambda done, of: report("clamps", done, of),
         )
     show(tolerance_to_text(result, rows, note))

@@ -49,9 +49,6 @@ def _lines(assembly: Assembly) -> Iterator[str]:
             for f in assembly.forces
             if f.feature == HELD
         )
-    if assembly.start_tilts:
-        low, high = (f"{math.degrees(t):z.1f}" for t in assembly.start_tilts)
-        yield f"closing from a start tilted by {low} or {high} deg ends here too"
     yield from map(str, assembly.others or ())
     yield ""
     yield "final state (mm; x right, y down from the power line's centre, angle counter-clockwise)"
@@ -109,8 +106,7 @@ def _lines(assembly: Assembly) -> Iterator[str]:
             yield from (f"  {row}" for row in rows)
     yield ""
     if assembly.violation is not None:
-        space = f"; out of the plane {assembly.out_of_plane}" if assembly.out_of_plane else ""
-        yield f"proof: largest violated gap {assembly.violation:.1e} mm, optimality {assembly.optimality:.1e} mm{space}"
+        yield f"proof: largest violated gap {assembly.violation:.1e} mm, optimality {assembly.optimality:.1e} mm"
     yield (
         f"work: {work.parts} parts, {work.pairs} pairs, {work.contact_queries} contact queries, "
         f"{work.motion_steps} motion steps, {work.meshes_built} meshes built"
