@@ -166,12 +166,13 @@ class _Motion:
     ) -> tuple[Array, Array] | None:
         """Move (n,) of a round and forces (k,) of the gaps; None where they cannot open.
 
-        Gaps that are ``apart`` do not count, nor those further than two strides and what a step of h closes.
+        Gaps that are ``apart`` do not count, nor those that no coordinate changes, nor those further than two strides
+        and what a step of h closes.
         """
-        near = ~apart & (gaps.value <= 2.0 * self.longest + np.abs(gaps.gradient[:, D]) * h)
         moving, forces = self.moving, np.zeros(len(gaps.value))
-        H = np.eye(len(moving)) + h * bend
-        least = _least_move(H, (at - target)[moving], gaps.gradient[np.ix_(near, moving)], gaps.value[near], h)
+        A, H = gaps.gradient[:, moving], np.eye(len(moving)) + h * bend
+        near = ~apart & A.any(axis=1) & (gaps.value <= 2.0 * self.longest + np.abs(gaps.gradient[:, D]) * h)
+        least = _least_move(H, (at - target)[moving], A[near], gaps.value[near], h)
         if least is None:
             return None
         move, multipliers = least
