@@ -9,11 +9,12 @@ from typing import Any, Literal, get_args
 from clamp3d import __version__
 from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import instance
-from clamp3d.clamp.contact import Contact, Seat, measure_contacts, overlap
+from clamp3d.clamp.contact import Contact, measure_contacts, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.forces import Force
 from clamp3d.clamp.matrix import Difference, Pair, differences, plain
 from clamp3d.clamp.scene import clamp_scene
+from clamp3d.clamp.status import ClosingStatus, Seat
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array, SectionPose
 from clamp3d.errors import need
@@ -123,6 +124,15 @@ class Equilibrium:
         return data | {"tilt_deg": math.degrees(self.tilt)}
 
 
+@dataclass(frozen=True, slots=True)
+class Play:
+    """Where the clamp closes to when ``joints`` have play: the distance in mm if it holds then, and its status."""
+
+    joints: tuple[str, ...]
+    status: str
+    distance: float | None
+
+
 Severity = Literal["error", "warning", "note"]
 
 
@@ -151,8 +161,8 @@ class Assembly:
         How its grooves were measured.
     solver : str
         How the closed position was found: "exact", "stepped" or "bisection".
-    status : str
-        "clamped", or "not clamped: ..." with the reason.
+    closing_status : ClosingStatus
+        Whether it holds both wires, and where they lie in its grooves.
     distance : float
         Height between the splints' inner edges on the line side, along the bolt (Table 4); mm.
     closing : float
@@ -165,8 +175,6 @@ class Assembly:
         Each part in the section frame, in the final state.
     contacts : tuple of Contact
         How all 21 pairs of parts stand in the final state, in the order of the connection matrix.
-    seats : tuple of Seat
-        Whether each wire lies in each of its grooves.
     events : tuple of Event
         The contacts that ended or changed a motion, in order.
     path : tuple of Waypoint
@@ -185,21 +193,20 @@ class Assembly:
         The contact forces per newton of bolt force (exact solver).
     others : tuple of Equilibrium or None
         The other states that closing can end in, the one closed furthest first; None if they were not looked for.
-    with_play : dict or None
-        Distance in mm with the joints' play (None: not clamped), by the joints that have it; None if not looked for.
+    with_play : tuple of Play or None
+        What the joints' play changes; None if not looked for.
     """
 
     clamp: Clamp
     model: ContactModel
     solver: Solver
-    status: str
+    closing_status: ClosingStatus
     distance: float
     closing: float
     tilt: float
     turns: float
     poses: dict[PartName, SectionPose]
     contacts: tuple[Contact, ...]
-    seats: tuple[Seat, ...]
     events: tuple[Event, ...]
     path: tuple[Waypoint, ...]
     undeclared: tuple[Difference, ...]
@@ -209,7 +216,7 @@ class Assembly:
     work: Work
     start: Start
     forces: tuple[Force, ...] = ()
-    with_play: dict[str, float | None] | None = None
+    with_play: tuple[Play, ...] | None = None
     others: tuple[Equilibrium, ...] | None = None
 
     @property
@@ -223,9 +230,24 @@ class Assembly:
         return self.model.limits
 
     @property
+    def status(self) -> str:
+        """ "clamped", "clamped, but P6 on a lip of ...", or "not clamped: ..." with the reason."""
+        return self.closing_status.text
+
+    @property
     def clamped(self) -> bool:
-        """Whether the splints hold both wires."""
-        return self.status == "clamped"
+        """Whether the grooves of both splints hold both wires."""
+        return self.closing_status.clamped
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing is wrong: no finding is an error. Else every command ends with exit code 1."""
+        return not any(finding.severity == "error" for finding in self.findings)
+
+    @property
+    def seats(self) -> tuple[Seat, ...]:
+        """Where each wire lies in each of its grooves."""
+        return self.closing_status.seats
 
     @property
     def scene(self) -> Scene:
@@ -260,6 +282,7 @@ class Assembly:
         found = [] if self.clamped else [Finding("error", self.status, *((why.a, why.b) if why else ()))]
         found += [Finding("error", text, c.a, c.b) for text, c in overlaps.items() if c is not why]
         found += [Finding("error", str(d), d.a, d.b) for d in self.undeclared]
+        found += [Finding("warning", text) for text in self.closing_status.warnings]
         for d in self.matrix_differences:
             if d.declared != 0:
                 found.append(Finding("warning" if d.declared == 3 or d.measured else "note", str(d), d.a, d.b))
@@ -319,7 +342,9 @@ class Assembly:
             "other_ends": None if self.others is None else [e.to_dict() for e in self.others],
             "start": self.start.to_dict(),
             "forces": [f.to_dict() for f in self.forces],
-            "with_play_mm": self.with_play,
+            "with_play_mm": None
+            if self.with_play is None
+            else {", ".join(p.joints): p.distance for p in self.with_play},
             "work": plain(self.work),
         }
 

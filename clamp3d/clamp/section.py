@@ -413,9 +413,7 @@ class Section:
             curvature[W, W] += down.bend * (along * turn[0, 1] + deep * turn[1, 1])
         return np.asarray(by_q.T @ turning @ by_q + curvature)
 
-    def _pieces(
-        self, splint: PartName, wire: PartName, u: float, v: float, c: float = 1.0, s: float = 0.0
-    ) -> _Pieces:
+    def _pieces(self, splint: PartName, wire: PartName, u: float, v: float, c: float = 1.0, s: float = 0.0) -> _Pieces:
         """The model's pieces for a wire at (u, v) in the splint's own axes (right, down), which is turned by (c, s)."""
         self.queries.contact += 1
         T = np.array([[c, 0.0, s, u], [0.0, 1.0, 0.0, 0.0], [-s, 0.0, c, -v], [0.0, 0.0, 0.0, 1.0]])

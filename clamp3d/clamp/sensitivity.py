@@ -20,9 +20,9 @@ from clamp3d.checks import choice
 from clamp3d.clamp.dimensions import Clamp, Wire
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.section import SIZE, Section
-from clamp3d.clamp.status import CLAMPED, final_status
+from clamp3d.clamp.status import closing_status
 from clamp3d.core.pose import Array
-from clamp3d.errors import SolverError
+from clamp3d.errors import NotClampedError, SolverError
 
 _GROOVES = ("line_groove", "jumper_groove")
 DIMENSIONS: tuple[str, ...] = (
@@ -99,9 +99,10 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
 
     Raises
     ------
+    NotClampedError
+        If the clamp does not hold both wires.
     SolverError
-        If the final state cannot be proven, does not hold both wires, or is not an isolated one (the derivative then
-        does not exist).
+        If the final state cannot be proven, or is not an isolated one (the derivative then does not exist).
 
     Examples
     --------
@@ -111,9 +112,9 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
     """
     section = Section(clamp, Cas())
     final = solve_final_state(section)
-    status = final_status(section, final)
-    if status != CLAMPED:
-        raise SolverError(f"no sensitivity: {status}")
+    status = closing_status(section, final)
+    if not status.clamped:
+        raise NotClampedError(f"no sensitivity: {status}")
     derivative = _derivatives(section, final)
     rows = [
         Sensitivity(n, dimension(clamp, n), float(v))

@@ -27,7 +27,7 @@ from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
-from clamp3d.clamp.status import CLAMPED, final_status
+from clamp3d.clamp.status import closing_status
 from clamp3d.core.child import end_with_parent
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError, need, without_numbers
@@ -42,6 +42,8 @@ CHUNK = 50
 """Samples that are solved and sent together: about a second of work."""
 # ISO 2768-1:1989, table 1, class m: (nominal sizes up to, permissible deviation either way), mm.
 _MEDIUM = ((6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8), (2000.0, 1.2), (math.inf, 2.0))
+UNPROVEN = "not proven"
+"""How the status of a sample begins whose answer could not be proven."""
 _PATIENCE = 15.0
 """Seconds without an answer after which the workers are counted: a cluster's may be starting anew."""
 _SIGMAS = 3.0
@@ -89,6 +91,8 @@ class MonteCarlo:
         What was sampled.
     nominal : float or None
         The nominal clamp's distance in mm; None if it does not clamp.
+    nominal_status : str
+        "clamped", or why not.
     distance : ndarray (n,)
         Mm; NaN where the clamp does not hold both wires.
     status : tuple of str
@@ -97,6 +101,7 @@ class MonteCarlo:
 
     spec: Spec
     nominal: float | None
+    nominal_status: str
     distance: Array
     status: tuple[str, ...]
 
@@ -106,9 +111,14 @@ class MonteCarlo:
         return np.asarray(self.distance[~np.isnan(self.distance)])
 
     def reasons(self) -> dict[str, int]:
-        """How many samples do not clamp, by their reason, most frequent first."""
-        count = Counter(status for status in self.status if status != CLAMPED)
+        """How many samples have no distance, by their reason, most frequent first."""
+        count = Counter(s for s, d in zip(self.status, self.distance.tolist(), strict=True) if math.isnan(d))
         return dict(sorted(count.items(), key=lambda item: (-item[1], item[0])))
+
+    @property
+    def unproven(self) -> int:
+        """How many samples have an answer that could not be proven: whether they clamp is not known."""
+        return sum(status.startswith(UNPROVEN) for status in self.status)
 
     def percentiles(self, at: tuple[float, ...]) -> tuple[float, ...]:
         """Percentiles of the clamped distances in mm; empty where none clamps."""
@@ -180,7 +190,9 @@ def monte_carlo(
     instance("clamp", clamp, Clamp)
     n, processes = whole("n", n, least=1), whole("processes", processes, least=1)
     function("progress", progress)
-    spec, nominal = _spec(clamp, whole("seed", seed, least=0), tolerance, wire_tolerance_percent, distribution)
+    spec, nominal, nominal_status = _spec(
+        clamp, whole("seed", seed, least=0), tolerance, wire_tolerance_percent, distribution
+    )
     chunks: dict[int, list[Sample]] = {}
     tell = progress or (lambda done, of: None)
     tell(0, n)
@@ -189,7 +201,7 @@ def monte_carlo(
         tell(sum(map(len, chunks.values())), n)
     samples = [sample for k in sorted(chunks) for sample in chunks[k]]
     distance = np.array([math.nan if d is None else d for d, _ in samples])
-    return MonteCarlo(spec, nominal, distance, tuple(status for _, status in samples))
+    return MonteCarlo(spec, nominal, nominal_status, distance, tuple(status for _, status in samples))
 
 
 def sample_dimensions(spec: Spec, index: int) -> dict[str, float]:
@@ -206,7 +218,7 @@ def sample_dimensions(spec: Spec, index: int) -> dict[str, float]:
 
 def _spec(
     clamp: Clamp, seed: int, tolerance: float | None, percent: float, distribution: Distribution
-) -> tuple[Spec, float | None]:
+) -> tuple[Spec, float | None, str]:
     if tolerance is not None and not 0.0 <= (tolerance := number("tolerance", tolerance)) < 1e5:
         raise InputError(f"tolerance must be >= 0 and < 100000 mm, got {tolerance:g}")
     if not 0.0 <= (percent := number("wire tolerance", percent)) <= 100.0 * _TOP:
@@ -220,10 +232,7 @@ def _spec(
         return general_tolerance(size) if tolerance is None else tolerance
 
     spec = Spec(clamp, seed, distribution, tuple(of(name) for name in DIMENSIONS))
-    try:
-        return spec, _closed(clamp)[0]
-    except SolverError:
-        return spec, None
+    return spec, *_closed(clamp)
 
 
 def _chunk(task: _Task) -> tuple[int, list[Sample]]:
@@ -236,16 +245,17 @@ def _sample(spec: Spec, index: int) -> Sample:
     except InputError as error:
         return None, f"not a clamp: {without_numbers(str(error))}"
     try:
-        return _closed(clamp)
+        distance, status = _closed(clamp)
+        return distance, without_numbers(status)
     except SolverError as error:
-        return None, f"not solved: {without_numbers(str(error))}"
+        return None, f"{UNPROVEN}: {without_numbers(str(error))}"
 
 
 def _closed(clamp: Clamp) -> Sample:
     section = Section(clamp, Cas())
     final = solve_final_state(section)
-    status = final_status(section, final)
-    return (section.splint_distance(final.q) if status == CLAMPED else None), without_numbers(status)
+    status = closing_status(section, final)
+    return (section.splint_distance(final.q) if status.clamped else None), status.text
 
 
 def _solve(tasks: list[_Task], processes: int, scheduler: str | None) -> Iterator[tuple[int, list[Sample]]]:
