@@ -166,7 +166,8 @@ def _relation(clamp: Clamp, poses: Poses, a: _Side, b: _Side, gap: float) -> tup
         return 1, SCREW_JOINT
     for arc, back in ((a, b), (b, a)):
         for concave, convex in itertools.product(arc.named("arc", "lip"), back.named("round face")):
-            return (3 if gap <= TOUCHING else 0), _arc_relation(arc, concave, back, convex, gap)
+            if gap <= TOUCHING or clamp.connection(a.solid.name, b.solid.name) == 3:
+                return (3 if gap <= TOUCHING else 0), _arc_relation(arc, concave, back, convex, gap)
     if gap > TOUCHING:
         return 0, NONE
     if gap < -TOUCHING:

@@ -34,8 +34,14 @@ DIMENSIONS: tuple[str, ...] = (
     "down_splint.width",
     "down_splint.face_depth",
     *(f"down_splint.{g}.{key}" for g in _GROOVES for key in ("radius", "offset", "centre_depth")),
+    "up_splint.hole_diameter",
+    "bolt.diameter",
+    "saddle.hole_diameter",
+    "saddle.radius",
+    "down_splint.back_radius",
 )
-"""Dimensions that place the splints and wires in the section, by their names in clamp files; all in mm."""
+"""Dimensions that place splints and wires in the section, and then those that limit play, by their names in clamp
+files; all in mm."""
 
 _WELL_POSED = 1e-10
 _NONE = 1e-8
@@ -71,6 +77,8 @@ def dimension(clamp: Clamp, name: str) -> float:
 def with_dimensions(clamp: Clamp, values: Mapping[str, float]) -> Clamp:
     """The clamp with some of `DIMENSIONS` changed to ``values`` in mm.
 
+    The tilt that its file names goes: it is that of the nominal clamp, and the bodies say where the tilt ends.
+
     Raises InputError for an unknown name and for dimensions that are no clamp, with the rule that they break.
 
     >>> from clamp3d.clamp.loader import load_clamp
@@ -88,6 +96,7 @@ def with_dimensions(clamp: Clamp, values: Mapping[str, float]) -> Clamp:
     for wire in ("line", "jumper"):
         if wire in tree:
             tree[wire]["conductor"] = None
+    tree.setdefault("down_splint", {})["max_tilt_deg"] = None
     changed: Clamp = _replaced(clamp, tree)
     return changed
 

@@ -227,7 +227,7 @@ def _spec(
 
     def of(name: str) -> float:
         size = dimension(clamp, name)
-        if name.endswith(".diameter"):
+        if name in ("line.diameter", "jumper.diameter"):
             return size * percent / 100.0
         return general_tolerance(size) if tolerance is None else tolerance
 
