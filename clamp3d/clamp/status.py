@@ -28,6 +28,8 @@ from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import SectionPose, inverse
 
 CLAMPED = "clamped"
+_KEPT_APART: frozenset[Pair] = frozenset((("P1", "P4"), ("P3", "P4"), ("P4", "P5")))
+"""The bolt stands in the middle of these parts' holes, which are wider, but for what play the section counts."""
 SeatFeature = Literal["arc", "lip", "flat face", "edge"]
 _DETAILS: dict[SeatFeature, str] = {
     "arc": "seated in the groove",
@@ -213,12 +215,12 @@ def _overlap(section: Section, final: FinalState | SteppedState, poses: dict[Par
     k = int(gaps.value.argmin())
     if gaps.value[k] < -TOUCHING:
         return f"{gaps.pair[k][0]} overlaps {gaps.pair[k][1]} by {-gaps.value[k]:.4g} mm"
-    near = _other_pairs(section.clamp, poses, set(gaps.pair))
+    near = _near_pairs(section.clamp, poses, _KEPT_APART | set(gaps.pair))
     contacts = measure_contacts(section.clamp, poses, section.model, pairs=near) if near else ()
     return overlap(min(contacts, key=lambda c: c.gap)) if contacts else ""
 
 
-def _other_pairs(clamp: Clamp, poses: dict[PartName, SectionPose], known: set[Pair]) -> list[Pair]:
+def _near_pairs(clamp: Clamp, poses: dict[PartName, SectionPose], known: frozenset[Pair]) -> list[Pair]:
     """Pairs of parts, but for ``known`` ones, whose boxes overlap."""
     boxes = {}
     for name, solid in parts(clamp).items():
@@ -226,7 +228,7 @@ def _other_pairs(clamp: Clamp, poses: dict[PartName, SectionPose], known: set[Pa
         high = np.array([max(body.support(R[k]) for body in solid.bodies) for k in range(3)]) + p
         low = np.array([-max(body.support(-R[k]) for body in solid.bodies) for k in range(3)]) + p
         boxes[name] = low, high
-    rest = [pair for pair in PAIRS if pair not in known and pair != ("P4", "P5")]
+    rest = [pair for pair in PAIRS if pair not in known]
     return [
         (a, b)
         for a, b in rest
