@@ -25,8 +25,8 @@ from clamp3d.errors import NotClampedError, SolverError, without_numbers
 
 COMMANDS = ("run", "check", "tolerance --n 1", "sweep", "report -o", "export -o", "view --html")
 COUNT = int(os.environ.get("CLAMP3D_RANDOM_CLAMPS", "12"))
-TOUCH = 1e-5
-"""Mm to which chords of 1e-6 mm and the section agree that a wire touches."""
+TOUCH = 1e-6
+"""Gap in mm up to which a wire touches; chords of an arc are nearer than it is, by as much."""
 
 
 def nearest_feature(run: Assembly, splint: str, wire: str) -> tuple[str, float]:
@@ -70,7 +70,8 @@ def test_a_random_clamp_has_one_status_and_the_seats_that_its_outlines_show(k: i
         return
     for seat in run.seats:
         name, gap = nearest_feature(run, seat.splint, seat.wire)
-        assert seat.touches == (gap <= TOUCH)
+        assert seat.touches or gap > 0.0
+        assert not seat.touches or gap <= TOUCH
         if seat.touches:
             assert seat.feature == name
             (contact,) = (c for c in run.contacts if (c.a, c.b) == (seat.splint, seat.wire))
