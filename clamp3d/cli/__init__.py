@@ -22,7 +22,7 @@ import click
 import clamp3d
 from clamp3d.cli.terminal import ExitCode, end_on_signals, show, tolerate_closed_pipes
 from clamp3d.core.child import own_process
-from clamp3d.errors import EXTRAS, Clamp3dError, SequenceError, SolverError, missing, one_line
+from clamp3d.errors import EXTRAS, Clamp3dError, NotClampedError, SequenceError, SolverError, missing, one_line
 
 # Name -> (module, one line for the list of commands). A command's module is loaded when it is called.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -112,7 +112,7 @@ def main() -> None:
             traceback.print_exc()
         if isinstance(error, ModuleNotFoundError) and (library := str(error.name).partition(".")[0]) in EXTRAS:
             error = missing(library, "this")
-        if isinstance(error, SequenceError):
+        if isinstance(error, (NotClampedError, SequenceError)):
             status = _fail(str(error), ExitCode.FINDING)
         elif isinstance(error, SolverError):
             status = _fail(str(error), ExitCode.FAILED)

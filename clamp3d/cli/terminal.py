@@ -53,13 +53,13 @@ def finish(*, finding: bool, failed: bool = False, undecided: bool = False, empt
         raise InputError("there is no pair of parts to judge")
 
 
-def finish_checked(verdicts: Collection[str], *, empty: bool = False) -> None:
-    """End a command by the verdicts of a scene; see `finish`."""
+def finish_checked(verdicts: Collection[str], *, finding: bool = False, empty: bool = False) -> None:
+    """End a command by the verdicts of a scene, and by what else was a finding; see `finish`."""
     from clamp3d.collide.result import BAD
     from clamp3d.collide.verdict import Verdict
 
     finish(
-        finding=any(verdict in verdicts for verdict in BAD),
+        finding=finding or any(verdict in verdicts for verdict in BAD),
         failed=Verdict.FAILED in verdicts,
         undecided=Verdict.UNCERTAIN in verdicts,
         empty=empty,

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.forces import HELD
 from clamp3d.clamp.matrix import millimetres
-from clamp3d.clamp.result import Assembly
+from clamp3d.clamp.result import Assembly, Play
 from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.output.tables import text_table
 
@@ -25,9 +25,9 @@ _PLAY = {
 }
 
 
-def _play(item: tuple[str, float | None]) -> str:
-    joints, distance = item
-    return f"{'not clamped' if distance is None else f'{distance:.3f} mm'} ({_PLAY[joints.split(', ')[-1]]})"
+def _play(play: Play) -> str:
+    said = play.status.partition(":")[0] if play.distance is None else f"{play.distance:.3f} mm"
+    return f"{said} ({_PLAY[play.joints[-1]]})"
 
 
 def _lines(assembly: Assembly) -> Iterator[str]:
@@ -40,7 +40,7 @@ def _lines(assembly: Assembly) -> Iterator[str]:
         f"tilt {math.degrees(assembly.tilt):.2f} deg, nut turned {assembly.turns:.2f} times from open"
     )
     if assembly.with_play:
-        yield "with play: " + ", ".join(map(_play, assembly.with_play.items()))
+        yield "with play: " + ", ".join(map(_play, assembly.with_play))
     if assembly.forces:
         pushes = ", ".join(f"{f.a}-{f.b} {f.force:.3f}" for f in assembly.forces if f.feature != HELD)
         yield f"contact forces per newton of bolt force: {pushes}"
@@ -49,9 +49,6 @@ def _lines(assembly: Assembly) -> Iterator[str]:
             for f in assembly.forces
             if f.feature == HELD
         )
-    if assembly.start_tilts:
-        low, high = (f"{math.degrees(t):z.1f}" for t in assembly.start_tilts)
-        yield f"closing from a start tilted by {low} or {high} deg ends here too"
     yield from map(str, assembly.others or ())
     yield ""
     yield "final state (mm; x right, y down from the power line's centre, angle counter-clockwise)"
@@ -109,8 +106,7 @@ def _lines(assembly: Assembly) -> Iterator[str]:
             yield from (f"  {row}" for row in rows)
     yield ""
     if assembly.violation is not None:
-        space = f"; out of the plane {assembly.out_of_plane}" if assembly.out_of_plane else ""
-        yield f"proof: largest violated gap {assembly.violation:.1e} mm, optimality {assembly.optimality:.1e} mm{space}"
+        yield f"proof: largest violated gap {assembly.violation:.1e} mm, optimality {assembly.optimality:.1e} mm"
     yield (
         f"work: {work.parts} parts, {work.pairs} pairs, {work.contact_queries} contact queries, "
         f"{work.motion_steps} motion steps, {work.meshes_built} meshes built"
