@@ -8,7 +8,6 @@ import click
 
 from clamp3d.cli.options import JSON, UNITS, argument, declared, option
 from clamp3d.cli.progress import bar
-from clamp3d.cli.results import write_result
 from clamp3d.cli.terminal import show
 
 
@@ -27,7 +26,7 @@ def command(
     A mesh without any is said to have none, with exit code 0.
     """
     from clamp3d.fit.fit import fit_file
-    from clamp3d.output.files import write_text
+    from clamp3d.output.files import write_json, write_text
     from clamp3d.output.fit_report import fit_to_html, fit_to_text
 
     with bar(quiet) as report:
@@ -37,6 +36,6 @@ def command(
             show(f"note: {note}", err=True)
     show(fit_to_text(result))
     if json_file is not None:
-        write_result(json_file, result.to_dict())
+        write_json(json_file, result.to_dict())
     if html_file is not None:
         write_text(html_file, fit_to_html(result))

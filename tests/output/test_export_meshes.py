@@ -61,7 +61,7 @@ def read_stl(path: Path) -> np.ndarray:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
     solid = length > 1e-6
-    np.testing.assert_allclose(rows["v"][solid, 0], normals[solid] / length[solid, None], atol=1e-6)
+    np.testing.assert_allclose(rows["v"][solid, 0], normals[solid] / length[solid, None], atol=1e-5)
     return corners
 
 
