@@ -67,9 +67,7 @@ def command(
     except SequenceError as error:
         show(f"not assembled: {error}")
         if json_file is not None:
-            write_json(
-                json_file, {"status": f"not assembled: {error}", "blocks": [b.to_dict() for b in error.blocks]}
-            )
+            write_json(json_file, {"status": f"not assembled: {error}", "blocks": [b.to_dict() for b in error.blocks]})
         if viewed:
             from clamp3d.cli.viewing import view_blocked
 

@@ -267,7 +267,9 @@ def groups_csv(groups: Sequence[Group], comparison: Comparison) -> str:
     """One line for each pair of each group, with a header; lengths in mm."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["id", "status", "group", "a", "b", "verdict", "motion", "t", "at_least_mm", "at_most_mm", "method"])
+    writer.writerow(
+        ["id", "status", "group", "a", "b", "verdict", "motion", "t", "at_least_mm", "at_most_mm", "method"]
+    )
     for group in groups:
         for row in group.rows:
             d = row.distance

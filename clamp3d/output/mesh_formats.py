@@ -38,7 +38,9 @@ def stl(items: Sequence[PosedMesh], title: str, unit: str) -> bytes:
 
     _check_rounding("stl", items, unit)
     header = f"clamp3d {title}; unit {unit}; Z up".encode("ascii", "replace")[:80].ljust(80, b" ")
-    return header + bytes(export_stl(_joined(items, unit)))[80:]
+    mesh = _joined(items, unit)
+    mesh.vertices = mesh.vertices.astype(np.float32)  # the normals in the file are those of its own corners
+    return header + bytes(export_stl(mesh))[80:]
 
 
 def ply(items: Sequence[PosedMesh], title: str, unit: str) -> bytes:

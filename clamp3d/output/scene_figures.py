@@ -19,7 +19,7 @@ from clamp3d.output.figures import blank
 from clamp3d.output.palette import INK, VERDICT_COLOURS
 from clamp3d.output.placed import PosedMesh, place, posed
 from clamp3d.output.view3d import Camera, draw_solids
-from clamp3d.output.viewer_cut import overlap
+from clamp3d.output.common import overlap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -111,7 +111,9 @@ def _solids(scene: Scene, names: Sequence[str]) -> dict[str, PosedMesh]:
 
 
 def _place(row: PairResult) -> Array | None:
-    """The middle between the two witness points."""
+    """A point inside the overlap where one is known, else the middle between the two witness points."""
+    if row.where is not None and row.where.point is not None:
+        return row.where.point
     p, q = row.distance.point_a, row.distance.point_b
     return None if p is None or q is None else 0.5 * (p + q)
 
@@ -152,4 +154,12 @@ def _legend(ax: Axes, solids: dict[str, PosedMesh]) -> None:
 
     if len(solids) <= 12:
         handles = [Patch(fc=solid.colour, ec=INK, lw=0.5, label=name) for name, solid in solids.items()]
-        ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=4, frameon=False, fontsize=8)
+        ax.legend(
+            handles=handles,
+            loc="upper left",
+            bbox_to_anchor=(0.0, 0.0),
+            ncols=4,
+            frameon=False,
+            fontsize=8,
+            labelcolor=INK,
+        )

@@ -5,6 +5,8 @@ Needs the extra ``step`` (cadquery-ocp-novtk); imported when a file is written.
 
 from __future__ import annotations
 
+import itertools
+import re
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
@@ -56,7 +58,7 @@ def step(placed: Sequence[PlacedPart], title: str, unit: str) -> bytes:
             content = path.read_bytes()
     finally:
         Interface_Static.SetCVal_s("write.step.unit", before)
-    return content
+    return _canonical(content)
 
 
 def solid(part: Solid) -> Any:
@@ -160,6 +162,35 @@ def location(T: Array) -> Any:
     transform = gp_Trsf()
     transform.SetValues(*T[:3].flatten().tolist())
     return TopLoc_Location(transform)
+
+
+def _canonical(content: bytes) -> bytes:
+    """The same file, the same bytes each time.
+
+    Open CASCADE numbers the instances of an assembly for as long as the process lives, and lists the colours in the
+    order of their addresses: instances are numbered from 1 here, colours follow the order of their solids.
+    """
+    count = itertools.count(1)
+    content = re.sub(
+        rb"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\d+',(.*?)\);",
+        lambda m: b"NEXT_ASSEMBLY_USAGE_OCCURRENCE('%d',%s);" % (next(count), re.sub(rb"\n *", b"", m[1])),
+        content,
+        flags=re.DOTALL,
+    )
+    colour = rb"^#\d+ = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION"
+    first = re.search(colour, content, re.MULTILINE)
+    if first is None:
+        return content
+    end = content.index(b"ENDSEC;", first.start())
+    blocks = [
+        block for block in re.split(rb"(?=%s)" % colour, content[first.start() : end], flags=re.MULTILINE) if block
+    ]
+    blocks.sort(key=lambda block: int(re.search(rb"STYLED_ITEM\('[^']*',\([^)]*\),#(\d+)\)", block)[1]))  # type: ignore[index]
+    tail = b"".join(blocks)
+    old = [int(number) for number in re.findall(rb"^#(\d+) = ", tail, re.MULTILINE)]
+    new = {before: min(old) + i for i, before in enumerate(old)}
+    tail = re.sub(rb"#(\d+)", lambda m: b"#%d" % new.get(int(m[1]), int(m[1])), tail)
+    return content[: first.start()] + tail + content[end:]
 
 
 def _header(writer: Any, title: str, stamp: str) -> None:

@@ -19,14 +19,14 @@ from meshcat.geometry import Object
 from numpy.typing import ArrayLike
 
 from clamp3d.clamp.forces import Force
-from clamp3d.collide.distance import Distance
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.result import BAD
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.pose import Array
 from clamp3d.output import viewer_objects as draw
 from clamp3d.output.palette import FORCE, INK, VERDICT_COLOURS, darker
 from clamp3d.output.placed import place, posed
-from clamp3d.output.viewer_cut import cut_open, overlap
+from clamp3d.output.common import cut_open, overlap
 from clamp3d.output.viewer_timeline import FIRST, Row, Stop, Timeline
 from clamp3d.output.wording import part_title
 
