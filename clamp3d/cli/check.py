@@ -7,14 +7,24 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import INPUT_FILE, JSON, QUIET, Source, argument, declared, group, option
+from clamp3d.cli.options import (
+    INPUT_FILE,
+    JSON,
+    QUIET,
+    Source,
+    argument,
+    complete_inputs,
+    declared,
+    group,
+    option,
+)
 from clamp3d.cli.progress import bar
 from clamp3d.cli.terminal import finish_checked, show
 
 
 @declared("check")
 def command(
-    source: Source = group(Source, source=argument(metavar="INPUT", required=True)),
+    source: Source = group(Source, source=argument(metavar="INPUT", required=True, shell_complete=complete_inputs)),
     pairs: str | None = option("Only these pairs, for instance P1:P6,P2:P7.", metavar="A:B,..."),
     clearance: float | None = option("Gap that parts must keep; replaces the file's.", metavar="MM"),
     distances: bool = option("Measure every pair, not only as finely as its verdict needs."),
@@ -69,7 +79,7 @@ def command(
 
 @declared("accept")
 def accept_command(
-    source: str = argument(metavar="INPUT"),
+    source: str = argument(metavar="INPUT", shell_complete=complete_inputs),
     identifiers: tuple[str, ...] = argument(metavar="ID...", nargs=-1, required=True),
     why: str = option("The reason.", required=True, metavar="TEXT"),
     who: str = option("Who accepts it.  [default: the login name]", default="", show_default=False, metavar="NAME"),

@@ -21,9 +21,9 @@ def command(
     html_file: Path | None = option("Write a page: the mesh, its features, their errors.", "--html"),
     quiet: bool = option("No progress and no notes.", "--quiet", "-q"),
 ) -> None:
-    """Find round grooves, cylinders and holes in MESH (STL, OBJ, PLY, GLB, 3MF, STEP) and say how well they are known.
+    """Find round grooves, cylinders and holes in MESH (STL, OBJ, PLY, GLB, 3MF, STEP) each with its error bound.
 
-    A mesh without any is said to have none, with exit code 0.
+    A mesh without any is no error: exit code 0.
     """
     from clamp3d.fit.fit import fit_file
     from clamp3d.output.files import write_json, write_text

@@ -61,8 +61,8 @@ def command(
 
             result = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=view, done=done)
         else:
-            with narrator(quiet) as tell:
-                result = assemble(loaded, model, on_waypoint=tell.waypoint, progress=tell.position, **settings)
+            with narrator(quiet) as narrate:
+                result = assemble(loaded, model, on_waypoint=narrate.waypoint, progress=narrate.position, **settings)
             done(result)
     except SequenceError as error:
         show(f"not assembled: {error}")

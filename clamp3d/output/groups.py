@@ -217,7 +217,7 @@ def accept(path: Path, identifiers: Sequence[str], *, why: str, who: str = "") -
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Groups beside those of an earlier check: the ``status`` of each by its identifier, and those that are ``gone``."""
+    """Groups beside those of an earlier check: the ``status`` of each by its identifier, and which are ``gone``."""
 
     status: Mapping[str, Status]
     gone: tuple[dict[str, Any], ...] = ()

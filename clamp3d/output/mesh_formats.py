@@ -64,9 +64,10 @@ def obj(items: Sequence[PosedMesh], title: str, unit: str, mtl_name: str) -> tup
     scene = trimesh.Scene()
     for item in items:
         name = item.label.replace(" ", "_")
-        material = trimesh.visual.material.SimpleMaterial(name=name, diffuse=rgb(item.colour))
+        visual: Any = trimesh.visual
+        material = visual.material.SimpleMaterial(name=name, diffuse=rgb(item.colour))
         mesh = _mesh(item, unit)
-        mesh.visual = trimesh.visual.TextureVisuals(material=material)
+        mesh.visual = visual.TextureVisuals(material=material)
         scene.add_geometry(mesh, geom_name=name, node_name=name)
     text, materials = trimesh.exchange.obj.export_obj(  # type: ignore[no-untyped-call]
         scene,
@@ -158,7 +159,8 @@ def three_mf(items: Sequence[PosedMesh], title: str, unit: str, mesh_error: floa
 
 
 def _in_six_digits(item: PosedMesh, unit: str) -> tuple[Array, Array]:
-    """Vertices (n, 3) and pose (4, 4) in a unit: lib3mf writes six digits of a pose, the rest goes into the vertices."""
+    """Vertices (n, 3) and pose (4, 4) in a unit: lib3mf writes six digits of a pose, the rest is put
+    into the vertices."""
     T = item.T.copy()
     T[:3, 3] /= MILLIMETRES[unit]
     written = np.vectorize(lambda value: float(f"{value:.6g}"))(T)
@@ -186,9 +188,9 @@ def _mesh(item: PosedMesh, unit: str) -> trimesh.Trimesh:
     """A part's mesh in the world in a file's unit, without negative zeros, in its colour."""
     import trimesh
 
-    mesh = trimesh.Trimesh(item.world / MILLIMETRES[unit] + 0.0, item.mesh.faces, process=False)
-    mesh.visual.vertex_colors = [*rgb(item.colour), 255]
-    return mesh
+    vertices = item.world / MILLIMETRES[unit] + 0.0
+    colours = np.tile(np.array([*rgb(item.colour), 255], dtype=np.uint8), (len(vertices), 1))
+    return trimesh.Trimesh(vertices, item.mesh.faces, vertex_colors=colours, process=False)
 
 
 def _joined(items: Sequence[PosedMesh], unit: str) -> trimesh.Trimesh:

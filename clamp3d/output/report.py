@@ -15,8 +15,8 @@ from clamp3d.checks import path as checked_path
 from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.result import Assembly
-from clamp3d.collide.check import check
 from clamp3d.collide.answer import Distance
+from clamp3d.collide.check import check
 from clamp3d.collide.result import BAD, PairResult
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds, Verdict

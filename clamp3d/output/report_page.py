@@ -44,7 +44,7 @@ MATRIX = 30
 
 
 def write_report(report: Report, folder: Path, *, progress: Callable[[str], None] = lambda step: None) -> list[Path]:
-    """Write report.html, report.json and pairs.csv into ``folder``, all or none; ``progress`` is called with each picture.
+    """Write report.html, report.json and pairs.csv into ``folder``, all or none; ``progress`` gets each picture.
 
     Raises InputError if the folder cannot be written to.
     """
@@ -138,7 +138,7 @@ def report_html(report: Report, *, progress: Callable[[str], None] = lambda step
         made=f"{now():%Y-%m-%d %H:%M} UTC",
         versions=_versions(),
         gap=distance_text,
-        bound=lambda value: f"{value:.1e}" if math.isfinite(value) else "not known",
+        bound=lambda value: f"{value:.1e}" if math.isfinite(value) else "unknown",
         vector=lambda v: "" if v is None else ", ".join(f"{x:z.3f}" if abs(x) >= 5e-4 else "0" for x in v),
         degrees=math.degrees,
         pictures=_pictures(report, progress),

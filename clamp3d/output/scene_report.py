@@ -83,7 +83,7 @@ def comparison_text(comparison: Comparison) -> list[str]:
         return [f"  {counted(n_accepted, 'group of findings', 'groups of findings')} accepted"] if n_accepted else []
     summary = f"  since the baseline: {status.count('new')} new, {status.count('changed')} changed"
     summary += f", {len(comparison.gone)} gone, {status.count('same')} unchanged, {n_accepted} accepted"
-    gone = (f"  {old['id']}  gone: {old['a']} and {old['b']}, {old['verdict']}" for old in comparison.gone)
+    gone = (f"  gone: {old['a']} and {old['b']}, {old['verdict']}; id {old['id']}" for old in comparison.gone)
     return [summary, *gone]
 
 
@@ -103,11 +103,11 @@ def _findings(result: CheckResult, comparison: Comparison | None, accepted: Mapp
     names = titles(result.scene)
 
     def line(group: Group) -> str:
-        status = "" if comparison is None else comparison.status[group.id]
+        status: str = "" if comparison is None else comparison.status[group.id]
         if status == "accepted" and (entry := accepted.get(group.id)):
             status = f"accepted by {entry.who} on {entry.when} ({entry.why})"
         shown = comparison is not None and (comparison.has_baseline or status.startswith("accepted"))
-        return f"  {group.id}  {f'{status}: ' if shown else ''}{group_text(group, names)}"
+        return f"  {f'{status}: ' if shown else ''}{group_text(group, names)}; id {group.id}"
 
     groups = grouped(result)
     return [line(g) for g in groups if g.verdict is not Verdict.CONTACT or g.motion is not None]

@@ -62,7 +62,7 @@ class CommandLog:
 class PageServer:
     """Serves what ``page()`` returns at ``url``, in a thread, until it is closed.
 
-    A request under a foreign name is refused: a page elsewhere whose name is made to point here may not read along.
+    A request under a foreign name is refused: a page elsewhere whose name is pointed here may not read along.
     Raises InputError if a ``port`` that was named, or every port from 7000 on, is taken, or ``host`` is not ours.
     """
 

@@ -130,7 +130,7 @@ class Viewer:
             anchors=None if self._clamp is None else self._clamp.anchors,
             overlays=overlays,
         )
-        self._tell("waiting for the first state", state="waiting")
+        self._set_story("waiting for the first state", state="waiting")
         if url is None and serve:
             self._server = PageServer(self.html, host=host, port=port)
 
@@ -153,13 +153,13 @@ class Viewer:
         self._waypoints.append(waypoint)
         self._drawing.show(self._clamp.stop(waypoint))
         self._drawing.dimension(len(self._waypoints) - 1, "splints", *self._clamp.opening(waypoint))
-        self._tell(f"{waypoint.step}: {waypoint.label}", state="running")
+        self._set_story(f"{waypoint.step}: {waypoint.label}", state="running")
 
     def finish(self, result: Assembly | CheckResult) -> None:
         """Show the result, and play the whole time line once."""
         shown = self._finish_assembly(result) if isinstance(result, Assembly) else self._finish_check(result)
         self._drawing.play()
-        self._tell(**shown, done=True)
+        self._set_story(**shown, done=True)
 
     def html(self) -> str:
         """The scene with its animation as one HTML page that needs neither server nor network."""
@@ -205,7 +205,7 @@ class Viewer:
         worst = {finding.severity for finding in run.findings}
         state = "found" if "error" in worst else "note" if "warning" in worst else "clean"
         findings = [self._assembly_finding(k, finding) for k, finding in enumerate(run.findings)]
-        return {"said": run.status, "state": state, "assembly": run, "forces": forces, "findings": findings}
+        return {"text": run.status, "state": state, "assembly": run, "forces": forces, "findings": findings}
 
     def _finish_check(self, result: CheckResult) -> dict[str, Any]:
         """What the page says of a checked scene."""
@@ -213,7 +213,7 @@ class Viewer:
         for stop in scene_stops(result, self._rows):
             self._drawing.show(stop)
         return {
-            "said": headline(result),
+            "text": headline(result),
             "state": severity(result),
             "findings": self._scene_findings(result),
             "pairs": worst_first(result.pairs)[:_LISTED],
@@ -258,14 +258,14 @@ class Viewer:
         margin = 0.1 * self._drawing.size
         return {"stop": stop, "low": (box[0] - margin).tolist(), "high": (box[1] + margin).tolist()}
 
-    def _tell(self, said: str, *, state: str, done: bool = False, **more: Any) -> None:
+    def _set_story(self, text: str, *, state: str, done: bool = False, **more: Any) -> None:
         """Set what the page beside the picture shows; meshcat's own page takes no notice of it."""
         scene, drawing, clamp = self._scene, self._drawing, self._clamp
         accuracy = self._accuracy()
         drawing.caption(accuracy)
         self._story = {
             "title": scene.name if clamp is None else clamp.title,
-            "headline": said,
+            "headline": text,
             "done": done,
             "stops": [_stop_data(stop, *drawing.extent([stop.poses])) for stop in drawing.timeline.stops],
             "findings": more.get("findings", []),

@@ -211,7 +211,7 @@ def _motion_stops(
     contacts, before = first_contacts(rows), 0.0
     for k, (t, touching) in enumerate(contacts.items()):
         poses = at(t)
-        # The engine knows the moment; the distance right there may be known to its contact threshold only.
+        # The moment is certain; the distance right there may be certain to the contact threshold only.
         touching_now = measure(result.scene.moved(poses), [(row.a, row.b) for row in touching])
         now = tuple(replace(row, verdict="contact", what=FIRST) for row in touching_now)
         label = f"{motion.name}: {'first' if k == 0 else 'next'} contact at t = {first_text(t)}"

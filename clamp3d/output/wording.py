@@ -40,7 +40,7 @@ def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
             return f"{kind} {floor} to {_rounded(most, ROUND_CEILING)} mm"
     if math.isfinite(upper) and math.isfinite(lower):
         return f"gap or overlap at most {_rounded(max(upper, -lower), ROUND_CEILING)} mm"
-    return f"gap at most {_rounded(upper, ROUND_CEILING)} mm" if math.isfinite(upper) else "not known"
+    return f"gap at most {_rounded(upper, ROUND_CEILING)} mm" if math.isfinite(upper) else "unknown"
 
 
 def distance_text(distance: Distance, *, digits: int = 6) -> str:
@@ -184,7 +184,7 @@ def circumstances(row: PairResult) -> str:
     details = []
     if row.motion is not None:
         first = "" if row.contact_at is None else f"first contact at t = {first_text(row.contact_at)}, "
-        kind = "deepest found" if row.verdict in BAD else "nearest"
+        kind = "deepest" if row.verdict in BAD else "nearest"
         details.append(f"in motion {row.motion!r}" + ("" if row.t is None else f": {first}{kind} at t = {row.t:.4f}"))
     if row.where is not None:
         details.append(where_text(row.where))
