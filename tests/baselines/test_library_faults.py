@@ -449,7 +449,7 @@ def _turned(children: dict[str, Child]) -> list[list[list[list[float]]]]:
 # --- meshcat ----------------------------------------------------------------------------------------------------------
 
 
-@mended("meshcat", "a viewer cannot be closed", "output.viewer_server's own server")
+@mended("meshcat", "a viewer cannot be closed", "the standard library's server in output.serving")
 def test_bare_meshcat_closes(children: dict[str, Child]) -> None:
     assert children["meshcat"].said[2] is True
 
