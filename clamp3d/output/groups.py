@@ -1,7 +1,7 @@
 """Findings with one cause as one group, with an identifier that stays, and how they differ from an earlier check.
 
-Parts of one shape whose names differ in their number only are a family: twelve rollers that overlap one race by the
-same amount are one group. Text, JSON, page, report and CSV list these groups.
+Parts whose names differ in their number only are a family: twelve rollers that overlap one race by about the same
+are one group. Text, JSON, page, report and CSV list these groups.
 """
 
 from __future__ import annotations
@@ -24,13 +24,14 @@ from typing import Any, Literal
 from clamp3d.collide.result import BAD, CheckResult, PairResult
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Verdict
+from clamp3d.core.shapes import Shape
 from clamp3d.errors import InputError
 from clamp3d.output.files import write_text
 
 Status = Literal["new", "changed", "same", "accepted"]
 
-_SAME, _SAME_SHARE = 0.01, 0.1
-"""Distances of one group differ by at most so many mm, or by this share."""
+_JUMP, _JUMP_SHARE = 0.01, 0.2
+"""A distance that differs from the next by more mm than this, and by more than this share, has a cause of its own."""
 _CHANGED, _CHANGED_SHARE = 1e-3, 1e-3
 """A distance has changed since the last check if it differs by more mm than this, or by more than this share."""
 
@@ -102,50 +103,42 @@ def grouped(result: CheckResult) -> tuple[Group, ...]:
     >>> [(group.a, group.b, len(group.rows)) for group in grouped(check(scene))]
     [('rail', 'nut-3', 1), ('rail', 'nut', 3)]
     """
-    clashing = {(row.a, row.b) for row in result.pairs if row.verdict in BAD}
+    clashing = {frozenset((row.a, row.b)) for row in result.pairs if row.verdict in BAD}
     family = families(result.scene)
-    causes: dict[tuple[str, ...], list[_Cluster]] = {}
-    for row in result.findings:
-        if row.motion is not None and (row.a, row.b) in clashing:
-            continue
-        key = (row.motion or "", *sorted((family[row.a], family[row.b])))
-        clusters = causes.setdefault(key, [])
-        own = next((cluster for cluster in clusters if cluster.takes(row)), None)
-        if own is None:
-            clusters.append(own := _Cluster([], -math.inf, math.inf))
-        own.add(row)
-    groups = [group for key, clusters in causes.items() for group in _identified(key, clusters, family)]
+    causes: dict[tuple[str, ...], list[PairResult]] = {}
+    for row in sorted(result.findings, key=lambda row: row.distance.upper):
+        if row.motion is None or frozenset((row.a, row.b)) not in clashing:
+            key = (row.motion or "", *sorted((family[row.a], family[row.b])))
+            causes.setdefault(key, []).append(row)
+    groups = [group for key, rows in causes.items() for group in _identified(key, _alike(rows), family)]
     order = {verdict: k for k, verdict in enumerate(Verdict)}
     order[Verdict.CONTAINED] = order[Verdict.CLASH]
     return tuple(sorted(groups, key=lambda group: (order[group.verdict], len(group.rows), group.upper)))
 
 
-@dataclass(slots=True)
-class _Cluster:
-    """Rows whose distances can be one and the same: what lies between ``lower`` and ``upper`` fits all of them."""
-
-    rows: list[PairResult]
-    lower: float
-    upper: float
-
-    def takes(self, row: PairResult) -> bool:
-        """Whether a row has the same verdict, and a distance that can be the same."""
-        slack = max(_SAME, _SAME_SHARE * abs(self.upper))
-        overlap = row.distance.lower <= self.upper + slack and self.lower - slack <= row.distance.upper
-        return overlap and row.verdict is self.rows[0].verdict
-
-    def add(self, row: PairResult) -> None:
-        """Add a row."""
-        self.rows.append(row)
-        self.lower, self.upper = max(self.lower, row.distance.lower), min(self.upper, row.distance.upper)
+def _alike(rows: Sequence[PairResult]) -> list[list[PairResult]]:
+    """Rows of one cause, in the order of their distances, by verdicts, and apart where the distance jumps."""
+    alike: list[list[PairResult]] = []
+    latest: dict[Verdict, list[PairResult]] = {}
+    for row in rows:
+        own = latest.get(row.verdict)
+        if own is None or _jumps(own[-1].distance.upper, row.distance.lower):
+            own = latest[row.verdict] = []
+            alike.append(own)
+        own.append(row)
+    return alike
 
 
-def _identified(key: tuple[str, ...], clusters: list[_Cluster], family: Mapping[str, str]) -> Iterable[Group]:
+def _jumps(last: float, next_at_least: float) -> bool:
+    return next_at_least > last + max(_JUMP, _JUMP_SHARE * abs(last))
+
+
+def _identified(key: tuple[str, ...], clusters: list[list[PairResult]], family: Mapping[str, str]) -> Iterable[Group]:
     """The groups of one cause: the largest is named by the families, those that differ from it by their parts."""
-    names = [sorted(f"{row.a}:{row.b}" for row in cluster.rows) for cluster in clusters]
-    first = min(range(len(clusters)), key=lambda k: (-len(clusters[k].rows), names[k]))
+    names = [sorted(f"{row.a}:{row.b}" for row in cluster) for cluster in clusters]
+    first = min(range(len(clusters)), key=lambda k: (-len(clusters[k]), names[k]))
     for k, cluster in enumerate(clusters):
-        row, rows = cluster.rows[0], tuple(cluster.rows)
+        row, rows = cluster[0], tuple(cluster)
         a, b = (family[row.a], family[row.b]) if len(rows) > 1 else (row.a, row.b)
         text = "\n".join(key if k == first else (*key, *names[k]))
         identifier = hashlib.blake2s(text.encode(), digest_size=4).hexdigest()
@@ -154,16 +147,23 @@ def _identified(key: tuple[str, ...], clusters: list[_Cluster], family: Mapping[
 
 
 def families(scene: Scene) -> dict[str, str]:
-    """The family of each part: its name without the number where parts of one shape differ in that only.
+    """The family of each part: its name without the number, if another part differs from it in the number only.
+
+    A number without a separator before it counts for parts of one shape only.
 
     >>> from clamp3d.core import shapes
-    >>> ball = shapes.cylinder(2.0, 4.0)
-    >>> list(families(Scene().add("ball", ball).add("ball_2", ball).add("pin_1", ball)).values())
-    ['ball', 'ball', 'pin_1']
+    >>> ball, pin = shapes.cylinder(2.0, 4.0), shapes.cylinder(1.0, 4.0)
+    >>> scene = Scene().add("ball", ball).add("ball_2", pin).add("P1", ball).add("P2", ball).add("P3", pin)
+    >>> list(families(scene).values())
+    ['ball', 'ball', 'P', 'P', 'P3']
     """
-    stems = {part.name: re.sub(r"[\W_]*\d+$", "", part.name) or part.name for part in scene.parts}
-    count = Counter((part.shape, stems[part.name]) for part in scene.parts)
-    return {p.name: stems[p.name] if count[p.shape, stems[p.name]] > 1 else p.name for p in scene.parts}
+    kinds: dict[str, tuple[str, Shape | None]] = {}
+    for part in scene.parts:
+        numbered = re.fullmatch(r"(.*?[^\W_])([\W_]*)\d+", part.name)
+        stem, separator = numbered.groups() if numbered else (part.name, "-")
+        kinds[part.name] = (stem, None if separator else part.shape)
+    count = Counter(kinds.values())
+    return {name: kind[0] if count[kind] > 1 else name for name, kind in kinds.items()}
 
 
 @dataclass(frozen=True, slots=True)
