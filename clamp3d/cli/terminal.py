@@ -71,7 +71,7 @@ STDOUT_TAKEN = "clamp3d.stdout"
 
 
 def end_on_signals() -> None:
-    """Let a process that is asked to end (SIGTERM, SIGHUP) remove its temporary files and its workers before."""
+    """Let a process that is ended by a signal (SIGTERM, SIGHUP) remove its temporary files and its workers before."""
 
     def end(number: int, frame: object) -> NoReturn:
         signal.signal(number, signal.SIG_DFL)  # the second one ends it at once
