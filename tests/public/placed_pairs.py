@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 from OCP.Bnd import Bnd_Box
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_Copy,
@@ -24,6 +24,7 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_Transform,
 )
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+from OCP.BRepGProp import BRepGProp
 from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeBox,
     BRepPrimAPI_MakeCone,
@@ -35,6 +36,7 @@ from OCP.BRepPrimAPI import (
 )
 from OCP.Geom import Geom_BezierCurve
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.GProp import GProp_GProps
 from OCP.Interface import Interface_Static
 from OCP.Message import Message
 from OCP.STEPCAFControl import STEPCAFControl_Writer
@@ -165,6 +167,13 @@ def bottom_of(shape):
     bounds = Bnd_Box()
     BRepBndLib.AddOptimal_s(shape, bounds, False, False)
     return bounds.CornerMin().Z()
+
+
+def common_volume(a, b):
+    """The volume that two shapes share, mm^3."""
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(BRepAlgoAPI_Common(a, b).Shape(), properties)
+    return properties.Mass()
 
 
 def drilled(rng, low, high, radius):
