@@ -18,6 +18,7 @@ import click
 
 import clamp3d
 from clamp3d.cli.terminal import ExitCode, end_on_signals, show, tolerate_closed_pipes
+from clamp3d.core.child import own_process
 from clamp3d.errors import EXTRAS, Clamp3dError, NotClampedError, SequenceError, SolverError, missing, one_line
 
 # Name -> (module and function, one line for the list of commands). A module is loaded when its command is called.
