@@ -53,13 +53,13 @@ def finish(*, finding: bool, failed: bool = False, undecided: bool = False, empt
         raise InputError("there is no pair of parts to judge")
 
 
-def finish_checked(verdicts: Collection[str], *, empty: bool = False) -> None:
-    """End a command by the verdicts of a scene; see `finish`."""
+def finish_checked(verdicts: Collection[str], *, finding: bool = False, empty: bool = False) -> None:
+    """End a command by the verdicts of a scene, and by what else was a finding; see `finish`."""
     from clamp3d.collide.result import BAD
     from clamp3d.collide.verdict import Verdict
 
     finish(
-        finding=any(verdict in verdicts for verdict in BAD),
+        finding=finding or any(verdict in verdicts for verdict in BAD),
         failed=Verdict.FAILED in verdicts,
         undecided=Verdict.UNCERTAIN in verdicts,
         empty=empty,
@@ -71,7 +71,7 @@ STDOUT_TAKEN = "clamp3d.stdout"
 
 
 def end_on_signals() -> None:
-    """Let a process that is asked to end (SIGTERM, SIGHUP) remove its temporary files and its workers before."""
+    """Let a process that is ended by a signal (SIGTERM, SIGHUP) remove its temporary files and its workers before."""
 
     def end(number: int, frame: object) -> NoReturn:
         signal.signal(number, signal.SIG_DFL)  # the second one ends it at once

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.brep.solid import BrepSolid
+from clamp3d.brep.solid import CHORD, BrepSolid
 from clamp3d.collide.closed_form import ClosedForm
 from clamp3d.collide.drawn import bodies_of
 from clamp3d.collide.hull import Hull, hull, hull_error
@@ -85,7 +85,7 @@ class Model:
             return bodies_of(self.shape)
         if not self.closed or not self.chords:
             return None
-        mesh = self.outer(self.chords[0])
+        mesh = self._cad_mesh(CHORD) if self.exact is not None else self.raw
         if self._fit is not None and self._fit.features:
             from clamp3d.collide.fitted import bodies_of_fit
 
@@ -108,7 +108,7 @@ class Model:
         if isinstance(self.shape, BrepSolid):
             from clamp3d.fit.fit import fit_solid
 
-            return fit_solid(self.shape, CAD_CHORDS[0])
+            return fit_solid(self.shape)
         if not isinstance(self.shape, MeshShape) or self.shape.fit == "off" or not self.closed:
             return None
         from clamp3d.fit.fit import fit_mesh
@@ -217,13 +217,16 @@ class Model:
         error = max(error, self.chords[-1])
         if error not in kept:
             if isinstance(self.shape, BrepSolid):
-                made = self.shape.tessellated(error)
-                errors = at_edges(made.vertices, made.faces, made.errors)
-                kept[error] = self._counted(Surface(made.vertices, made.faces, errors))
+                kept[error] = self._cad_mesh(error)
             else:
                 mesh = make(self.shape, error)
                 kept[error] = None if mesh is None else self._counted(Surface(*mesh))
         return kept[error]
+
+    def _cad_mesh(self, chord: float) -> Surface:
+        assert isinstance(self.shape, BrepSolid)
+        mesh = self.shape.tessellated(chord)
+        return self._counted(Surface(mesh.vertices, mesh.faces, at_edges(mesh.vertices, mesh.faces, mesh.errors)))
 
     def _counted(self, surface: Surface) -> Surface:
         self.counters.built["meshes"] += 1
