@@ -91,14 +91,14 @@ FARTHEST_OFF = 1e5
 class MeshShape:
     """A mesh, and what to make of its round surfaces.
 
-    ``fit``: "round" fits grooves, cylinders and holes through the vertices (what a CAD export is) and adds the fit's
-    error; "off" takes the facets as the part, and so does "round" where no round surface is found. ``error`` mm: how
-    far the true surface can be from the facets, as stated by who made them. A mesh that is not closed is measured as
-    a surface: what is inside of it is not known.
+    ``fit``: "off" takes the facets as the part; "round" takes grooves, cylinders and holes as round surfaces through
+    the vertices (what a CAD export is) and adds the fit's error, and takes the facets where it finds none. ``error``
+    mm: how far the true surface can be from the facets, as stated by who made them. A mesh that is not closed is
+    measured as a surface: what is inside of it is not known.
     """
 
     mesh: Mesh
-    fit: Fit = "round"
+    fit: Fit = "off"
     name: str = field(default="mesh")
     error: float = 0.0
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from clamp3d.brep.bodies import Body, Reading
+from clamp3d.brep.open_cascade import CYLINDER, KINDS, PLANE
 from clamp3d.brep.solid import BrepSolid
-from clamp3d.brep.surfaces import CYLINDER, KINDS, PLANE
 from clamp3d.core.mesh import Array, IntArray, Mesh
 from clamp3d.fit.cylinder import Axis, perpendicular
 from clamp3d.fit.surface import covered

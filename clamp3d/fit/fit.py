@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from clamp3d import checks
+from clamp3d.brep.bodies import Body, Reading
 from clamp3d.brep.mesh_file import load_bodies, load_mesh
+from clamp3d.brep.solid import BrepSolid
 from clamp3d.checks import function, instance
 from clamp3d.core.mesh import Array, Mesh
 from clamp3d.fit.cad import cad_features
@@ -104,6 +106,12 @@ def fit_file(
         mesh, surfaces, notes = cad_features(load_bodies(file, unit=unit), file.name)
         return _result(mesh, surfaces, mesh.vertices[mesh.faces], notes)
     return fit_mesh(load_mesh(path, unit=unit), progress=progress)
+
+
+def fit_solid(solid: BrepSolid) -> FitResult:
+    """The cylindrical faces of a solid from CAD, with its own mesh."""
+    mesh, features, notes = cad_features(Reading((Body(solid.name, solid, np.eye(4)),)), solid.name)
+    return _result(mesh, features, mesh.vertices[mesh.faces], notes)
 
 
 def fit_mesh(mesh: Mesh, *, progress: Callable[[str, float], None] | None = None) -> FitResult:
