@@ -30,7 +30,7 @@ from step_scenes import Tree, location
 
 from clamp3d.brep.cad import Key, matrix
 from clamp3d.brep.solid import BrepSolid, require_open_cascade
-from clamp3d.brep.tessellate import explore
+from clamp3d.brep.open_cascade import explore
 
 
 def moved(shape, T):
