@@ -261,37 +261,6 @@ def test_findings_of_a_check_lead_to_their_places(hinge_page, hinge):
     assert red[:, 370:].sum() > 200
 
 
-def test_parts_of_one_shape_share_their_geometry_and_each_is_seen_and_fades_alone(browser, tmp_path):
-    scene = Scene()
-    places = [(0, 0, 0), (9, 0, 0), (40, 0, 0), (80, 0, 0)]
-    for k, at in enumerate(places):
-        scene = scene.add(f"p{k}", shapes.box((10, 10, 10)), translation(*at))
-    view(scene, serve=False).save_html(tmp_path / "boxes.html")
-    page = open_page(browser, (tmp_path / "boxes.html").as_uri(), offline=True)
-    wait_for(page, "document.querySelector('.finding')")
-    geometries = page.evaluate(
-        """kind => ["p0", "p1", "p2", "p3"].map(
-            (name) => viewer.scene_tree.find(["clamp3d", "whole", name, kind, "<object>"]).object.geometry.id)""",
-        "solid",
-    )
-    assert len(set(geometries)) == 1
-    page.locator("#switch-cutaway").uncheck()
-    page.locator("#switch-labels").uncheck()
-    page.wait_for_timeout(200)
-    ground, image = pixels(page)[690, 1190], pixels(page)
-    for column, row in on_screen(page, [(x, -5.0, 3.0) for x, _, _ in places[2:]]):
-        assert np.abs(image[round(row), round(column)] - ground).max() > 30
-    page.locator(".finding").first.click()
-    page.wait_for_timeout(200)
-    faint = page.evaluate(
-        """() => ["p0", "p1", "p2", "p3"].map(
-            (n) => viewer.scene_tree.find(["clamp3d", "whole", n, "solid", "<object>"]).object.material.opacity)"""
-    )
-    assert faint[:2] == [1, 1]
-    assert max(faint[2:]) < 0.2
-    assert not page.problems
-
-
 def test_play_halts_at_first_contact_and_goes_on_when_asked(hinge_page):
     page = hinge_page
     stops = page.evaluate("viewer.scene_tree.find(['clamp3d']).object.story.stops")
