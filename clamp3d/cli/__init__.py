@@ -19,7 +19,7 @@ import click
 import clamp3d
 from clamp3d.cli.terminal import ExitCode, end_on_signals, show, tolerate_closed_pipes
 from clamp3d.core.child import own_process
-from clamp3d.errors import EXTRAS, Clamp3dError, SequenceError, SolverError, missing, one_line
+from clamp3d.errors import EXTRAS, Clamp3dError, NotClampedError, SequenceError, SolverError, missing, one_line
 
 # Name -> (module and function, one line for the list of commands). A module is loaded when its command is called.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -121,8 +121,10 @@ def _explained(error: Exception) -> tuple[str, ExitCode]:
         return error.format_message().replace("\n", " ") + hint, ExitCode.BAD_INPUT
     if isinstance(error, ModuleNotFoundError) and (library := str(error.name).partition(".")[0]) in EXTRAS:
         error = missing(library, "this")
-    if isinstance(error, (SequenceError, SolverError)):
-        return str(error), ExitCode.FINDING if isinstance(error, SequenceError) else ExitCode.FAILED
+    if isinstance(error, (NotClampedError, SequenceError)):
+        return str(error), ExitCode.FINDING
+    if isinstance(error, SolverError):
+        return str(error), ExitCode.FAILED
     if isinstance(error, OSError) and error.filename is not None:
         return f"{short(error.filename)}: {error.strerror}", ExitCode.BAD_INPUT
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EFBIG):

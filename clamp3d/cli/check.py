@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -21,6 +22,9 @@ from clamp3d.cli.options import (
 )
 from clamp3d.cli.progress import bar
 from clamp3d.cli.terminal import finish_checked, show
+
+if TYPE_CHECKING:
+    from clamp3d.clamp.result import Assembly
 
 BCF = Output((".bcfzip", ".bcf"))
 
@@ -47,7 +51,8 @@ def command(
     INPUT is a scene file, a file or folder with the parts (STEP, GLB, 3MF, URDF, STL, OBJ, PLY, OFF), or a clamp (a
     built-in name or a TOML file), which is assembled first and measured in all its pairs. Findings with one cause are
     one line; those that `clamp3d accept` has written to INPUT.accepted.toml are not counted. Exit code 1 if parts
-    clash, else 4 if a pair failed, else 3 if one is undecided, and 2 if there are no two parts.
+    clash or the clamp does not close as it should, else 4 if a pair failed, else 3 if one is undecided, and 2 if there
+    are no two parts.
     """
     from clamp3d.collide.check import check
     from clamp3d.collide.scene import Scene
@@ -57,23 +62,28 @@ def command(
 
     chosen_pairs = _pairs(pairs) if pairs is not None else None
     loaded = source.load()
+    run: Assembly | None = None
     if isinstance(loaded, Scene):
-        scene, is_clamp = loaded, False
+        scene = loaded
     else:
         from clamp3d.clamp.assemble import assemble  # takes long to import, and most scenes need none of it
 
-        scene, is_clamp = assemble(loaded).scene, True
+        run = assemble(loaded)
+        scene = run.scene
     if clearance is not None:
         scene = replace(scene, clearance=clearance)
     accepted = read_accepted(accepted_file(source.source))
     compare((), baseline, accepted)  # a file that cannot be read is reported before the work
     with bar(quiet) as report:
-        result = check(scene, pairs=chosen_pairs, distances=distances or is_clamp, progress=report)
+        result = check(scene, pairs=chosen_pairs, distances=distances or run is not None, progress=report)
     groups = grouped(result)
     comparison = compare(groups, baseline, accepted)
+    if run is not None:
+        show("\n".join([run.status, *(f.text for f in run.findings if f.severity == "error" and f.text != run.status)]))
     show(check_to_text(result, comparison, accepted))
     if json_file is not None:
-        write_json(json_file, check_to_dict(result, comparison))
+        status = {} if run is None else {"status": run.status}
+        write_json(json_file, check_to_dict(result, comparison) | status)
     if csv_file is not None:
         write_text(csv_file, groups_csv(groups, comparison))
     if bcf_file is not None:
@@ -82,7 +92,8 @@ def command(
         write_bcf(result, bcf_file)
     if html_file is not None:
         write_text(html_file, check_to_html(result))
-    finish_checked({group.verdict for group in comparison.open(groups)}, empty=not result.work.pairs)
+    verdicts = {group.verdict for group in comparison.open(groups)}
+    finish_checked(verdicts, finding=run is not None and not run.passed, empty=not result.work.pairs)
 
 
 @declared("accept")

@@ -170,8 +170,8 @@ class Source(ClampSource):
     source: str = argument(metavar="[INPUT]", default="reference", required=False, shell_complete=complete_inputs)
     input_unit: str | None = option("Unit of a mesh file.  [default: mm; m for glTF]", type=click.Choice(UNITS))
     fit: str | None = option(
-        "Round surfaces of a mesh file: off: its facets are the part; bound, round: fitted.  [default: off]",
-        type=click.Choice(["off", "bound", "round"]),
+        "Round surfaces of a mesh file: off: its facets are the part; round: fitted.  [default: off]",
+        type=click.Choice(["off", "round"]),
     )
     chord: float | None = option("How far a mesh file's true surface can be from its facets.", metavar="MM")
     joints: str | None = option("Joint values of a URDF: rad, or mm for those that slide.", metavar="NAME=VALUE,...")

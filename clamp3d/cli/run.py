@@ -72,4 +72,4 @@ def command(
             from clamp3d.cli.viewing import view_blocked
 
             view_blocked(error, viewing, quiet=quiet, serve=view)
-    finish(finding=result is None or not result.clamped or bool(result.undeclared))
+    finish(finding=result is None or not result.passed)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.forces import HELD
-from clamp3d.clamp.result import Assembly
+from clamp3d.clamp.result import Assembly, Play
 from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.output.tables import text_table
 from clamp3d.output.wording import distance_text
@@ -36,7 +36,7 @@ def _summary(assembly: Assembly) -> Iterator[str]:
         f"tilt {math.degrees(assembly.tilt):.2f} deg, nut turned {assembly.turns:.2f} times from open"
     )
     if assembly.with_play:
-        yield "with play: " + ", ".join(map(_play, assembly.with_play.items()))
+        yield "with play: " + ", ".join(map(_play, assembly.with_play))
     if assembly.forces:
         pushes = ", ".join(f"{f.a}-{f.b} {f.force:.3f}" for f in assembly.forces if f.feature != HELD)
         yield f"contact forces per newton of bolt force: {pushes}"
@@ -48,9 +48,9 @@ def _summary(assembly: Assembly) -> Iterator[str]:
     yield from map(str, assembly.others or ())
 
 
-def _play(item: tuple[str, float | None]) -> str:
-    joints, distance = item
-    return f"{'not clamped' if distance is None else f'{distance:.3f} mm'} ({_PLAY[joints.split(', ')[-1]]})"
+def _play(play: Play) -> str:
+    said = play.status.partition(":")[0] if play.distance is None else f"{play.distance:.3f} mm"
+    return f"{said} ({_PLAY[play.joints[-1]]})"
 
 
 def _tables(assembly: Assembly) -> Iterator[str]:
