@@ -85,6 +85,7 @@ def meaning(verdict: str, scene: Scene) -> str:
     """What a verdict means in this scene."""
     contact, clearance = scene.thresholds.contact, scene.thresholds.clearance
     return {
+        "duplicate": "the same part twice in one place",
         "contained": "one part lies inside the other",
         "clash": f"parts overlap by more than {contact:g} mm",
         "failed": "could not be computed",
@@ -169,6 +170,7 @@ def group_sentence(group: Group, names: Mapping[str, str]) -> str:
 
 def _sentence(a: str, b: str, verdict: Verdict, gap: str, often: str = "") -> str:
     phrases = {
+        Verdict.DUPLICATE: f"{a} and {b} are the same part twice in one place{often}",
         Verdict.CONTAINED: f"{a} and {b}: one lies inside the other{often}, {gap}",
         Verdict.CLASH: f"{a} and {b} clash{often}: {gap}",
         Verdict.FAILED: f"{a} and {b}: failed{often}, no answer",
