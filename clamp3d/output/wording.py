@@ -129,7 +129,7 @@ def headline(result: CheckResult) -> str:
     if not phrases:
         return f"Clean: {checked} checked, nothing clashes"
     decided = not count[Verdict.FAILED] and not count[Verdict.UNCERTAIN]
-    opening = "" if clashes else "No clash: " if decided else "Undecided: "
+    opening = "No clash: " if decided and not clashes else ""
     return f"{opening}{'; '.join(phrases)} ({checked} checked)"
 
 
