@@ -196,8 +196,8 @@ def test_the_nut_comes_down_on_the_bolts_end_and_blocks_the_splint_below_it():
     place = open_place()
     (block,) = [b for b in Ways(load_clamp()).blocks([("P1", "P5")], place) if b.origin == "from above"]
     assert block.way == pytest.approx(SPARE + 26.4 + 27.726, abs=1e-9)
-    assert block.travel == pytest.approx(SPARE, abs=2e-4)
-    assert block.point[2] == pytest.approx(place["P5"][2, 3], abs=2e-4)
+    assert block.travel == pytest.approx(SPARE, abs=2e-3)
+    assert block.point[2] == pytest.approx(place["P5"][2, 3], abs=2e-3)
 
 
 def test_a_report_of_any_sequence_counts_the_nuts_turns_from_the_open_clamp():
