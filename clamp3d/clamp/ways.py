@@ -43,6 +43,8 @@ _ENDLESS = 20.0
 """How many times as long as drawn a wire is taken to be."""
 _BENDS = (0.5, 0.25, 0.75)
 """Where a way out bends, in parts of how far the parts can go before they meet something."""
+_LOOKS = (0.5, 0.25, 0.125, 0.0625, 0.03125)
+"""Where a way is looked at before it is proven: most ways that are blocked show it."""
 _SHORTEST = 0.5
 """Shortest leg of a way with a bend, mm."""
 _LOOK = 0.01
@@ -219,6 +221,10 @@ class Ways:
 
     def _clash(self, pair: Pair, place: Poses, start: Array, by: Array) -> PairResult | None:
         """The row of a pair that overlaps on its way, or may do so."""
+        for t in _LOOKS:
+            there = check(self._scene([pair], place, start + t * by), pairs=[pair], depths=False, cache=self.cache)
+            if not there.clean:
+                return replace(there.rows[0], t=t)
         scene = self._scene([pair], place, start, by)
         rows = check(scene, pairs=[pair], depths=False, cache=self.cache).rows
         return next((row for row in rows if row.verdict in NOT_CLEAN), None)

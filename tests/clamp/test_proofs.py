@@ -12,12 +12,11 @@ from clamp3d.clamp.equilibria import equilibria, same
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.meetings import meetings
-from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Waypoint
-from clamp3d.clamp.section import WIRES, D, Section
+from clamp3d.clamp.section import D, Section
 from clamp3d.core.pose import SectionPose
 from clamp3d.errors import SolverError
-from clamp3d.testing import assert_returns, body
+from clamp3d.testing import assert_returns
 
 
 @pytest.fixture(scope="module")
@@ -68,23 +67,6 @@ def test_equilibria_solved_again_from_their_neighbours_return(section):
             if section.gaps(start).value.min() >= 0.0:
                 starts.append(start)
         assert_returns(lambda q: solve_final_state(section, q).q, state.q, starts, 1e-6)
-
-
-def test_a_wire_settles_between_the_bottoms_of_its_two_grooves(section):
-    """At its limits the wire's centre lies on the grooves' surfaces, by the parts' own outlines."""
-    q = solve_final_state(section).q
-    splints = {name: body(parts(section.clamp)[name]) for name in ("P1", "P2")}
-    for wire in WIRES:
-        (left, right), (top, bottom) = section.wire_limits(q, wire)
-        up, down = (section.pairs[name, wire] for name in ("P1", "P2"))
-        assert 0.5 * (left + right) == pytest.approx(up.T_a_groove[0, 3], abs=1e-9)
-        at = np.array([[up.T_a_groove[0, 3], 0.0, -top]])
-        assert splints["P1"].field(at)[0] == pytest.approx(0.0, abs=1e-9)
-        # The lowest place is no further below the down splint's groove than that is deep.
-        T = section.down_splint(q).T()
-        centre = T[:3, :3] @ down.T_a_groove[:3, 3] + T[:3, 3]
-        x = np.array([[centre[0], 0.0, -bottom]])
-        assert abs(splints["P2"].at(T).field(x)[0]) <= down.groove.radius * (1.0 - np.cos(section.down_splint(q).angle))
 
 
 def test_a_splint_that_turns_past_a_wire_meets_it_between_two_waypoints():
