@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import signal
 import sys
 from collections.abc import Collection
@@ -70,7 +71,7 @@ STDOUT_TAKEN = "clamp3d.stdout"
 
 
 def end_on_signals() -> None:
-    """Let a process that is asked to end (SIGTERM, SIGHUP) remove its temporary files and its workers before."""
+    """Let a process that is ended by a signal (SIGTERM, SIGHUP) remove its temporary files and its workers before."""
 
     def end(number: int, frame: object) -> NoReturn:
         signal.signal(number, signal.SIG_DFL)  # the second one ends it at once
@@ -96,7 +97,9 @@ def tolerate_closed_pipes() -> None:
     """Let ``clamp3d ... | head`` keep the exit code of its verdict. Streams that a test put in place stay."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is not None and stream is getattr(sys, f"__{name}__"):
+        if stream is None:  # closed by the caller: libraries ask it whether it is a terminal
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+        elif stream is getattr(sys, f"__{name}__"):
             raw = io.BufferedWriter(_Tolerant(stream.fileno(), "wb", closefd=False))
             wrapped = io.TextIOWrapper(
                 raw, stream.encoding, "backslashreplace", line_buffering=stream.line_buffering or name == "stderr"

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.forces import HELD
 from clamp3d.clamp.matrix import millimetres
 from clamp3d.clamp.result import Assembly, Play
 from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.output.tables import text_table
-
-
-def run_to_text(assembly: Assembly) -> str:
-    """The assembly as lines for a terminal, numbers to the paper's printed digits."""
-    return "\n".join(_lines(assembly))
-
 
 _PLAY = {
     "hole": "bolt in the up splint's hole",
@@ -25,13 +20,14 @@ _PLAY = {
 }
 
 
-def _play(play: Play) -> str:
-    said = play.status.partition(":")[0] if play.distance is None else f"{play.distance:.3f} mm"
-    return f"{said} ({_PLAY[play.joints[-1]]})"
+def run_to_text(assembly: Assembly) -> str:
+    """The assembly as lines for a terminal, numbers to the paper's printed digits."""
+    blocks = ["\n".join(_summary(assembly)), *_tables(assembly), "\n".join(_footer(assembly))]
+    return "\n\n".join(blocks)
 
 
-def _lines(assembly: Assembly) -> Iterator[str]:
-    clamp, work = assembly.clamp, assembly.work
+def _summary(assembly: Assembly) -> Iterator[str]:
+    clamp = assembly.clamp
     line, jumper = (f"{wire.label} ({2 * wire.radius:g} mm)" for wire in (clamp.line, clamp.jumper))
     limits = f" ({'; '.join(assembly.limits)})" if assembly.limits else ""
     yield f"clamp {clamp.name}: line {line}, jumper {jumper}; method {assembly.method}, {assembly.solver}{limits}"
@@ -50,61 +46,51 @@ def _lines(assembly: Assembly) -> Iterator[str]:
             if f.feature == HELD
         )
     yield from map(str, assembly.others or ())
-    yield ""
-    yield "final state (mm; x right, y down from the power line's centre, angle counter-clockwise)"
-    yield text_table(
-        ("part", "x", "y", "angle_deg"),
-        [
-            (f"{name} {TITLES[name]}", f"{p.x:z.3f}", f"{p.y:z.3f}", f"{math.degrees(p.angle):z.2f}")
-            for name, p in assembly.poses.items()
-        ],
-        indent=2,
-    )
-    yield ""
-    yield "contacts (gap in mm; x, y of the point)"
-    yield text_table(
-        ("pair", "type", "relation", "gap", "x", "y", "on"),
-        [
-            (
-                f"{c.a}-{c.b}",
-                c.type,
-                c.relation,
-                millimetres(c.gap),
-                *(("", "") if c.point is None else (f"{c.point[0]:z.3f}", f"{-c.point[2]:z.3f}")),
-                c.feature,
-            )
-            for c in assembly.contacts
-            if c.declared or c.type
-        ],
-        indent=2,
-    )
-    yield ""
-    yield "grooves"
-    yield text_table(
-        ("pair", "seated", ""),
-        [(f"{s.splint}-{s.wire}", "yes" if s.seated else "no", s.detail) for s in assembly.seats],
-        indent=2,
-    )
+
+
+def _play(play: Play) -> str:
+    said = play.status.partition(":")[0] if play.distance is None else f"{play.distance:.3f} mm"
+    return f"{said} ({_PLAY[play.joints[-1]]})"
+
+
+def _tables(assembly: Assembly) -> Iterator[str]:
+    """The tables of a run, each under its title."""
+    clamp = assembly.clamp
+    poses = [
+        (f"{name} {TITLES[name]}", f"{p.x:z.3f}", f"{p.y:z.3f}", f"{math.degrees(p.angle):z.2f}")
+        for name, p in assembly.poses.items()
+    ]
+    heading = "final state (mm; x right, y down from the power line's centre, angle counter-clockwise)"
+    yield _titled(heading, ("part", "x", "y", "angle_deg"), poses)
+    contacts = [_contact(contact) for contact in assembly.contacts if contact.declared or contact.type]
+    columns = ("pair", "type", "relation", "gap", "x", "y", "on")
+    yield _titled("contacts (gap in mm; x, y of the point)", columns, contacts)
+    seats = [(f"{s.splint}-{s.wire}", "yes" if s.seated else "no", s.detail) for s in assembly.seats]
+    yield _titled("grooves", ("pair", "seated", ""), seats)
     if not as_published(parse_sequence(clamp.sequence)):
-        yield ""
-        yield f"sequence {clamp.sequence}"
-        yield text_table(("step", "reached"), [(w.step, w.label) for w in assembly.path], indent=2)
-    yield ""
-    yield "events (mm travelled in the step)"
-    yield text_table(
-        ("step", "pair", "relation", "after"),
-        [(e.step, f"{e.a}-{e.b}", e.relation, f"{e.travel:.3f}") for e in assembly.events],
-        indent=2,
-    )
-    for title, rows in (
+        yield _titled(f"sequence {clamp.sequence}", ("step", "reached"), [(w.step, w.label) for w in assembly.path])
+    events = [(e.step, f"{e.a}-{e.b}", e.relation, f"{e.travel:.3f}") for e in assembly.events]
+    yield _titled("events (mm travelled in the step)", ("step", "pair", "relation", "after"), events)
+    for title, differences in (
         ("met although the connection matrix says otherwise", assembly.undeclared),
         ("measured contacts that differ from the connection matrix", assembly.matrix_differences),
     ):
-        if rows:
-            yield ""
-            yield title
-            yield from (f"  {row}" for row in rows)
-    yield ""
+        if differences:
+            yield "\n".join([title, *(f"  {difference}" for difference in differences)])
+
+
+def _titled(title: str, head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    return f"{title}\n{text_table(head, rows, indent=2)}"
+
+
+def _contact(contact: Contact) -> tuple[object, ...]:
+    place = ("", "") if contact.point is None else (f"{contact.point[0]:z.3f}", f"{-contact.point[2]:z.3f}")
+    pair = f"{contact.a}-{contact.b}"
+    return (pair, contact.type, contact.relation, millimetres(contact.gap), *place, contact.feature)
+
+
+def _footer(assembly: Assembly) -> Iterator[str]:
+    work = assembly.work
     if assembly.violation is not None:
         yield f"proof: largest violated gap {assembly.violation:.1e} mm, optimality {assembly.optimality:.1e} mm"
     yield (
