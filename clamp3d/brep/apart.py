@@ -50,7 +50,6 @@ def read_apart(path: Path) -> Reading:
     factor = _factor()
     seconds = factor * (_SECONDS + _PER_MEGABYTE * size / 1e6)
     memory = factor * (_MEMORY + _PER_BYTE * size)
-    import clamp3d.core.kernel_linear  # noqa: F401  both processes need it: once, before one is a copy of the other
 
     with tempfile.TemporaryDirectory(prefix="clamp3d-") as folder:
         out = Path(folder) / "bodies"
