@@ -9,7 +9,6 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta, Struct
 
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import UNIT_TOLERANCE, Array, nearest_rigid, rotation, turn_of
 
 _SNAP = 1e-4
@@ -58,7 +57,7 @@ class Pose(Table):
                 raise ValueError("matrix: must have 3 rows of 4 numbers, or a fourth row 0, 0, 0, 1")
             R = np.array(rows)[:3, :3]
             with np.errstate(over="ignore", invalid="ignore"):
-                off = float(np.abs(dot(R, R.T) - np.eye(3)).max())
+                off = float(np.abs(R @ R.T - np.eye(3)).max())
             if off <= _SNAP and np.linalg.det(R) < 0.0:
                 raise ValueError("matrix: must be rigid (a rotation and a translation): it reflects")
             if not off <= _SNAP:
@@ -74,14 +73,8 @@ class Pose(Table):
             # Exact input stays exact: a product of factors is not.
             return T if np.abs(nearest - T).max() < 1e-14 else nearest
         if self.rpy_deg is not None:
-            (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in map(math.radians, self.rpy_deg))
-            R = np.array(
-                [
-                    [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-                    [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-                    [-sp, cp * sr, cp * cr],
-                ]
-            )
+            roll, pitch, yaw = map(math.radians, self.rpy_deg)
+            R = (rotation([0, 0, 1], yaw) @ rotation([0, 1, 0], pitch) @ rotation([1, 0, 0], roll))[:3, :3]
         elif self.axis is not None and self.angle_deg is not None:
             R = rotation(self.axis, math.radians(self.angle_deg))[:3, :3]
         elif self.quaternion is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Iterable
 from pathlib import Path
@@ -134,12 +135,10 @@ class MeshTable(PartTable, kw_only=True):
         """The shape."""
         from clamp3d.brep.mesh_file import load_bodies
 
-        found = load_bodies(folder / self.file, unit=self.unit)
-        if len(found.bodies) != 1:
-            raise InputError(
-                f"{self.file} holds {len(found.bodies)} bodies: leave out shape, and it gives as many parts"
-            )
-        (body,) = found.bodies
+        bodies = load_bodies(folder / self.file, unit=self.unit).bodies
+        if len(bodies) != 1:
+            raise InputError(f"{self.file} holds {len(bodies)} bodies: leave out shape, and it gives as many parts")
+        (body,) = bodies
         if not np.array_equal(body.T, np.eye(4)):
             raise InputError(f"{self.file} places its body itself: leave out shape, and it is placed so")
         return shapes.MeshShape(body.shape.mesh, self.fit, self.file, self.chord)
@@ -181,9 +180,14 @@ def part_table(data: Any, origin: str, key: str) -> ShapeTable | FileTable:
         kind = FileTable
     if kind is None:
         choices = ", ".join(f'"{name}"' for name in SHAPES)
-        raise InputError(f"{origin}: {checks.short(key, 100)}: must have shape = one of {choices}, or a file")
-    made: ShapeTable | FileTable = validate(kind, data, origin, key)
-    return made
+        near = difflib.get_close_matches(shape, SHAPES, n=1) if isinstance(shape, str) else []
+        raise InputError(
+            f"{origin}: {checks.short(key, 100)}: must have shape = one of {choices}, or a file"
+            + (f", got {checks.shown(shape)}" if shape is not None else "")
+            + (f"; did you mean {near[0]}?" if near else "")
+        )
+    table: ShapeTable | FileTable = validate(kind, data, origin, key)
+    return table
 
 
 class ClampTable(PartTable, kw_only=True):
@@ -266,9 +270,9 @@ def clamp_source(name: str, folder: Path) -> str:
 
 
 def _one_of(table: Any, *keys: str) -> None:
-    given = [key for key in keys if getattr(table, key) is not None]
-    if len(given) != 1:
-        raise ValueError(f"{(given or keys)[0]}: give exactly one of {', '.join(keys)}")
+    present = [key for key in keys if getattr(table, key) is not None]
+    if len(present) != 1:
+        raise ValueError(f"{(present or keys)[0]}: give exactly one of {', '.join(keys)}")
 
 
 def _half(radius: float | None, diameter: float | None) -> float:

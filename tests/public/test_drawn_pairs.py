@@ -1,0 +1,176 @@
+"""Signed distances of drawn bodies against formulas, and against Open CASCADE at random poses."""
+
+import math
+
+import numpy as np
+import pytest
+
+from clamp3d import Scene, check, check_poses, distance, distances
+from clamp3d.kernel import rotation, translation
+from clamp3d.shapes import Hole, SweptArc, box, cylinder, groove_block
+
+HALF = math.radians(60.0)
+BLOCK = groove_block(SweptArc(7.0, HALF, 50.0), 40.0, 20.0)  # its face is at y = -3.5
+TUBE, PIN = cylinder(9.0, 40.0, bore=5.1), cylinder(5.0, 60.0)
+PLATE = box((40.0, 30.0, 6.0), holes=[Hole(4.0, (3.0, 2.0))])
+WIRE = cylinder(6.935, 80.0)
+TILT = math.radians(0.1)
+SQRT2 = math.sqrt(2.0)
+QUARTER = rotation((1.0, 0.0, 0.0), math.pi / 2)
+
+APART = {
+    "faces of boxes": (box((10, 10, 10)), box((4, 6, 8)), translation(1, 1, 9.25), 0.25),
+    "edges of boxes": (box((10, 10, 10)), box((4, 4, 4)), translation(10, 11, 0), 5.0),
+    "corners of boxes": (box((10, 10, 10)), box((4, 4, 4)), translation(8, 9, 9), 3.0),
+    "an edge over a face": (
+        box((20, 20, 2)), box((4, 4, 9)), translation(0, 0, 1.5 + 6.5 / SQRT2) @ rotation((0, 1, 0), math.pi / 4), 0.5
+    ),
+    "parallel cylinders": (cylinder(5, 40), cylinder(3, 20), translation(6, 8, 5), 2.0),
+    "crossed cylinders": (cylinder(5, 40), cylinder(3, 40), translation(8.001, 0, 0) @ QUARTER, 0.001),
+    "cylinders end to end": (cylinder(5, 40), cylinder(3, 20), translation(1, 1, 30.4), 0.4),
+    "rims of cylinders": (cylinder(5, 40), cylinder(3, 20), translation(11, 0, 34), 5.0),
+    "a cylinder on a box": (box((20, 20, 10)), cylinder(3, 15), translation(0, 0, 8.0625) @ QUARTER, 0.0625),
+    "a pin in a tube": (TUBE, PIN, translation(0, 0, 3), 0.1),
+    "a pin off the middle of a tube": (TUBE, PIN, translation(0.03, 0.04, 3), 0.05),
+    "a pin in a hole": (PLATE, cylinder(3.75, 20), translation(3, 2, 1), 0.25),
+    "a wire in its groove": (BLOCK, WIRE, np.eye(4), 0.065),
+    "a wire low in its groove": (BLOCK, WIRE, translation(0, -0.0649, 0), 1e-4),
+    "a wire askew in its groove": (
+        BLOCK, WIRE, rotation((1, 0, 0), TILT), math.cos(TILT) * (7 - 25 * math.tan(TILT)) - 6.935,
+    ),
+    "a square bar in a groove": (BLOCK, box((8, 8, 60)), np.eye(4), 7 - 4 * SQRT2),
+    "a box over a groove": (BLOCK, box((30, 10, 10)), translation(0, 2.25, 0), 0.75),
+}  # fmt: skip
+OVERLAPPING = {
+    "boxes by 0.01 um": (box((10, 10, 10)), box((4, 6, 8)), translation(1, 1, 9 - 1e-5), 1e-5),
+    "boxes by 1 um": (box((10, 10, 10)), box((4, 6, 8)), translation(1, 1, 8.999), 1e-3),
+    "boxes by 2 mm": (box((10, 10, 10)), box((4, 6, 8)), translation(1, 1, 7), 2.0),
+    "a box in a box": (box((10, 10, 10)), box((2, 3, 4)), np.eye(4), 6.0),
+    "equal boxes": (box((10, 12, 14)), box((10, 12, 14)), np.eye(4), 10.0),
+    "parallel cylinders": (cylinder(5, 40), cylinder(3, 20), translation(4.8, 6.4 - 0.126125, 5), None),
+    "crossed cylinders": (cylinder(5, 40), cylinder(3, 40), translation(7.9899, 0, 0) @ QUARTER, 0.0101),
+    "a cylinder in a cylinder": (cylinder(5, 40), cylinder(2, 10), np.eye(4), 7.0),
+    "cylinders end to end": (cylinder(5, 40), cylinder(3, 20), translation(1, 1, 29.5), 0.5),
+    "a cylinder in a box": (box((20, 20, 10)), cylinder(3, 15), translation(0, 0, 7.5) @ QUARTER, 0.5),
+    "a wire in a groove's bottom": (BLOCK, WIRE, translation(0, -0.565, 0), 0.5),
+    "a box in a groove block": (BLOCK, box((30, 10, 10)), translation(0, 1.499, 0), 1e-3),
+    "a cylinder in a tube's wall": (cylinder(30, 40, bore=10), cylinder(2, 60), translation(0, 20, 0), 12.0),
+}
+LOOSE = {"a cylinder in a tube's wall"}
+"""Overlaps of bodies with a bore, whose depth is not known sharply."""
+
+
+def exactly(truth, found, sharp=1e-6):
+    assert found.lower - 1e-9 <= truth <= found.upper + 1e-9
+    assert found.upper - found.lower < sharp
+
+
+@pytest.mark.parametrize("case", APART)
+def test_distances_of_bodies_apart(case):
+    a, b, T, truth = APART[case]
+    found = distance(a, b, T)
+    exactly(truth, found)
+    assert np.linalg.norm(found.point_b - found.point_a) == pytest.approx(truth, abs=1e-6)
+    np.testing.assert_allclose(found.point_b - found.point_a, truth * found.normal, atol=1e-6)
+    back = distance(b, a, np.linalg.inv(T))
+    exactly(truth, back)
+
+
+@pytest.mark.parametrize("case", OVERLAPPING)
+def test_depths_of_bodies_that_overlap(case):
+    a, b, T, truth = OVERLAPPING[case]
+    found = distance(a, b, T)
+    truth = 8.0 - float(np.hypot(T[0, 3], T[1, 3])) if truth is None else truth
+    assert found.lower - 1e-9 <= -truth <= found.upper + 1e-9
+    assert found.upper < 0.0
+    if case not in LOOSE:
+        assert found.upper - found.lower < max(0.01, 0.05 * truth)
+    if found.normal is not None and math.isfinite(found.lower):
+        way = translation(*(-(found.lower - 1e-6) * found.normal))
+        assert distance(a, b, way @ T).lower >= -1e-6
+
+
+@pytest.mark.parametrize("case", ["a pin in a tube", "a wire in its groove", "crossed cylinders", "faces of boxes"])
+def test_many_poses_are_measured_as_each_of_them(case):
+    a, b, T, _ = APART[case]
+    rng = np.random.default_rng(0)
+    poses = np.array([translation(*rng.uniform(-0.05, 0.05, 3)) @ T for _ in range(12)])
+    batch = distances(a, b, poses)
+    for k, pose in enumerate(poses):
+        one = distance(a, b, pose)
+        assert batch.lower[k] <= one.upper + 1e-9
+        assert one.lower <= batch.upper[k] + 1e-9
+        assert (batch.upper[k] < 0.0) == (one.upper < 0.0)
+
+
+def test_verdicts_at_many_poses():
+    ways = np.array([0.0, 0.04, 0.0549, 0.0551, 0.0749, 0.0751, 0.2])  # 0.065 mm of clearance, contact within 0.01
+    scene = Scene(clearance=0.02).add("block", BLOCK).add("wire", WIRE)
+    found = check_poses(scene, "wire", np.array([translation(0, -way, 0) for way in ways]))
+    wanted = ["clear", "clear", "clearance", "contact", "contact", "clash", "clash"]
+    assert found.verdict[:, 0].tolist() == wanted
+    for way, verdict in zip(ways, wanted, strict=True):
+        row = check(scene.moved({"wire": translation(0, -way, 0)})).pairs
+        assert (row[0].verdict.value if row else "clear") == verdict
+
+
+def test_a_wire_at_the_edge_of_contact_is_decided():
+    for depth, wanted in ((0.0101, "clash"), (0.0099, "contact")):
+        for turn in (np.eye(4), QUARTER):
+            scene = Scene().add("a", cylinder(5, 40)).add("b", cylinder(3, 40), translation(8 - depth, 0, 0) @ turn)
+            assert check(scene).verdict("a", "b").value == wanted
+
+
+# --- Open CASCADE -----------------------------------------------------------------------------------------------------
+
+
+def as_cad(name):
+    """The bodies below, made by Open CASCADE."""
+    from tests.public.placed_pairs import block, cut, rod
+
+    return {
+        "box": lambda: block((-5, -4, -3), (5, 4, 3)),
+        "cylinder": lambda: rod(4.0, -8, 8),
+        "tube": lambda: cut(rod(6.0, -7, 7), rod(4.0, -9, 9)),
+        "plate": lambda: cut(block((-12, -9, -2), (12, 9, 2)), rod(3.0, -3, 3, 4.0, 2.0)),
+        "groove": lambda: cut(block((-15, -13.5, -12), (15, -3.5, 12)), rod(7.0, -13, 13)),
+    }[name]()
+
+
+BODIES = {
+    "box": box((10, 8, 6)),
+    "cylinder": cylinder(4.0, 16.0),
+    "tube": cylinder(6.0, 14.0, bore=4.0),
+    "plate": box((24, 18, 4), holes=[Hole(3.0, (4.0, 2.0))]),
+    "groove": groove_block(SweptArc(7.0, HALF, 24.0), 30.0, 10.0),
+}
+PAIRS = ["box-cylinder", "cylinder-cylinder", "tube-box", "tube-cylinder", "plate-cylinder", "groove-cylinder",
+         "groove-box", "groove-plate"]  # fmt: skip
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_random_poses_as_open_cascade_measures_them(pair):
+    pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
+    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+
+    from tests.public.placed_pairs import common_volume, moved, random_pose
+
+    one, two = pair.split("-")
+    rng = np.random.default_rng(len(pair))
+    seen = set()
+    for k in range(10):
+        T = random_pose(rng, 6.0 if k % 2 else 14.0)
+        a, b = as_cad(one), moved(as_cad(two), T)
+        truth, found = BRepExtrema_DistShapeShape(a, b).Value(), distance(BODIES[one], BODIES[two], T)
+        seen.add(truth > 0.0)
+        if truth > 0.0:
+            exactly(truth, found, 2e-6)
+        elif common_volume(a, b) > 1e-6:
+            assert found.upper < 0.0
+            for way in rng.normal(size=(4, 3)):  # no shorter translation parts them
+                near = moved(b, translation(*(0.99 * -found.upper * way / np.linalg.norm(way))))
+                assert BRepExtrema_DistShapeShape(a, near).Value() < 1e-9
+            if found.normal is not None and math.isfinite(found.lower):
+                free = moved(b, translation(*(-found.lower * found.normal)))
+                assert common_volume(a, free) < 1e-4
+    assert seen == {True, False}
