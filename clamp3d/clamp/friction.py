@@ -1,13 +1,14 @@
 """The friction band: between which splint distances a clamp stays where it is, if its wires rub in their grooves.
 
 Without friction the clamp ends in one state. With friction it stays in every state in which forces within the friction
-cones of its closed contacts balance every part. The band is of states with all four contacts of wire and groove closed,
-both wires in the arcs, the down splint held on the bolt's axis, and friction in the grooves alone. A wire is then pushed
-at two points only, so both forces lie on the line through them, which leaves either normal by the same angle ``a``: its
-centre and those of its two arcs are ``separation`` apart by ``s^2 = p^2 + q^2 + 2 p q cos 2a``, with the radius
-differences p and q. The state has an equilibrium if no ``a`` exceeds the friction angle ``atan(friction)``, for the two
-forces of the wires always balance the bolt's force and the tilt (friction in the saddle changes nothing). So each tilt
-has one interval of distances.
+cones of its closed contacts balance every part. The band is of the states with all four contacts of wire and groove
+closed, both wires in the arcs, the down splint held on the bolt's axis, and friction in the grooves alone.
+
+A wire is then pushed at two points only, so both forces lie on the line through them, which leaves either normal by the
+same angle a. The centres of its two arcs are s apart, ``s^2 = p^2 + q^2 + 2 p q cos 2a``, with p and q by which the arcs'
+radii exceed the wire's. The state has an equilibrium if neither wire's a exceeds the friction angle ``atan(friction)``:
+the sizes of the two wires' forces then balance the bolt's force and the tilt, whatever the saddle's friction adds. So at
+each tilt equilibrium exists in one interval of distances.
 
 The ends of the band are found in this closed form and proven apart from it, by the section's own contacts: forces that
 balance at the end, and a little beyond it, for states at many tilts, a Farkas certificate each that no forces do
@@ -254,7 +255,9 @@ class FrictionBand:
             low, high = max(i - 1, 0), min(i + 1, len(tilt) - 1)
             tilt = np.append(np.linspace(tilt[low], tilt[high], 2 * _TILTS), best[2])
             tilt.sort()
-            share = np.unique(np.append(np.linspace(share[max(j - 1, 0)], share[min(j + 1, len(share) - 1)], _SHARES), (0, 1)))
+            share = np.unique(
+                np.append(np.linspace(share[max(j - 1, 0)], share[min(j + 1, len(share) - 1)], _SHARES), (0, 1))
+            )
         if not math.isfinite(best[0]):
             raise SolverError(f"friction band: no state with friction {friction:g} was found")
         return sense * best[0], best[1], best[2]

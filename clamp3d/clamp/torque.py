@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
 
 THREAD_FRICTION = (0.10, 0.14, 0.20)
-"""Friction of thread and nut face: spans class B and most of class C (0.08 to 0.16, 0.14 to 0.24) of VDI 2230, table A5.
-"""
+"""Friction of thread and nut face. Chosen from classes B and C of VDI 2230, table A5 (0.08 to 0.16, 0.14 to 0.24)."""
 GROOVE_FRICTION = (0.10, 0.20)
 """Friction of a wire in its grooves. Chosen: aluminium strands on a cast clamp, oxide and grease unknown."""
 PITCH_TERM = 0.16
@@ -182,7 +181,7 @@ def tighten(
     >>> f"{tight.preload.low / 1e3:.1f} to {tight.preload.high / 1e3:.1f} kN"
     '15.6 to 28.9 kN'
     """
-    torque = _positive("torque", torque, "Nm")
+    torque = check_torque(torque)
     thread, groove = (coefficients(n, v) for n, v in (("friction", friction), ("groove friction", groove_friction)))
     if not (assembly.clamped and assembly.forces):
         raise InputError(f"torque: needs a clamp that the exact solver has closed, got {assembly.status!r}")
@@ -201,7 +200,7 @@ def tighten(
 def coefficients(name: str, values: Sequence[float]) -> tuple[float, ...]:
     """Friction coefficients, from the least to the greatest. Raises InputError unless each is > 0 and at most 1."""
     checked = tuple(sorted(number(name, value) for value in values))
-    if not checked or not (0.0 < checked[0] and checked[-1] <= 1.0):
+    if not checked or not (checked[0] > 0.0 and checked[-1] <= 1.0):
         raise InputError(f"{name} must be > 0 and at most 1, got {', '.join(f'{v:g}' for v in checked) or 'nothing'}")
     return checked
 
@@ -260,13 +259,13 @@ def _sources(clamp: Clamp, thread: Sequence[float], groove: Sequence[float]) -> 
     )
 
 
-def _positive(name: str, value: float, unit: str) -> float:
-    value = number(name, value)
-    if not 0.0 < value <= 1e6:
-        raise InputError(f"{name} must be > 0 and at most 1e6 {unit}, got {value:g}")
-    return value
+def check_torque(torque: float) -> float:
+    """A torque in Nm. Raises InputError unless it is > 0 and at most 1e6."""
+    torque = number("torque", torque)
+    if not 0.0 < torque <= 1e6:
+        raise InputError(f"torque must be > 0 and at most 1e6 Nm, got {torque:g}")
+    return torque
 
 
 def _ends(span: Range) -> list[float]:
     return [span.low, span.high]
-
