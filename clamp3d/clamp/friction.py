@@ -4,11 +4,13 @@ Without friction the clamp ends in one state. With friction it stays in every st
 cones of its closed contacts balance every part. The band is of the states with all four contacts of wire and groove
 closed, both wires in the arcs, the down splint held on the bolt's axis, and friction in the grooves alone.
 
+A wire that has jammed on a lip is not looked at: it can hold the clamp further open.
+
 A wire is then pushed at two points only, so both forces lie on the line through them, which leaves either normal by the
-same angle a. The centres of its two arcs are s apart, ``s^2 = p^2 + q^2 + 2 p q cos 2a``, with p and q by which the arcs'
-radii exceed the wire's. The state has an equilibrium if neither wire's a exceeds the friction angle ``atan(friction)``:
-the sizes of the two wires' forces then balance the bolt's force and the tilt, whatever the saddle's friction adds. So at
-each tilt equilibrium exists in one interval of distances.
+same angle a. The centres of its two arcs are s apart, ``s^2 = p^2 + q^2 + 2 p q cos 2a``, with p and q by which the
+radii of the arcs exceed the wire's. The state has an equilibrium if neither wire's a exceeds the friction angle
+``atan(friction)``: the sizes of the two wires' forces then balance the bolt's force and the tilt. So at each tilt
+equilibrium exists in one interval of distances.
 
 The ends of the band are found in this closed form and proven apart from it, by the section's own contacts: forces that
 balance at the end, and a little beyond it, for states at many tilts, a Farkas certificate each that no forces do
@@ -249,15 +251,14 @@ class FrictionBand:
         for _ in range(_ROUNDS):
             d, valid = self._states(tilt, share, friction)
             score = np.where(valid, sense * self._splint_distance(d, tilt[:, None]), np.inf)
-            i, j = np.unravel_index(int(score.argmin()), score.shape)
+            i, j = divmod(int(score.argmin()), len(share))
             if score[i, j] < best[0]:
                 best = float(score[i, j]), float(d[i, j]), float(tilt[i])
             low, high = max(i - 1, 0), min(i + 1, len(tilt) - 1)
             tilt = np.append(np.linspace(tilt[low], tilt[high], 2 * _TILTS), best[2])
             tilt.sort()
-            share = np.unique(
-                np.append(np.linspace(share[max(j - 1, 0)], share[min(j + 1, len(share) - 1)], _SHARES), (0, 1))
-            )
+            near = np.linspace(share[max(j - 1, 0)], share[min(j + 1, len(share) - 1)], _SHARES)
+            share = np.unique(np.concatenate([near, [0.0, 1.0]]))
         if not math.isfinite(best[0]):
             raise SolverError(f"friction band: no state with friction {friction:g} was found")
         return sense * best[0], best[1], best[2]

@@ -5,22 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from clamp3d.cli.options import number
 
 if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
 
 
-class Listed(click.ParamType):
+def numbers(text: str) -> tuple[float, ...]:
     """Numbers with commas between them, as the type of an option."""
-
-    name = "numbers"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
-        """The numbers; a tuple is returned as it is."""
-        return value if isinstance(value, tuple) else tuple(number(text) for text in str(value).split(","))
+    return tuple(number(part) for part in text.split(","))
 
 
 @dataclass(frozen=True, slots=True)

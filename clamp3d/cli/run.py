@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from clamp3d.cli.mechanics import Asked, Listed
+from clamp3d.cli.mechanics import Asked, numbers
 from clamp3d.cli.options import CLAMP, JSON, METHOD, QUIET, VIEWING, ClampSource, Method, Viewing, declared, option
 from clamp3d.cli.progress import narrator
 from clamp3d.cli.terminal import finish, show
@@ -30,13 +30,13 @@ def command(
         "Also tell what this torque at the nut does: preload, force in each contact, when a wire slips.", metavar="NM"
     ),
     friction: tuple[float, ...] | None = option(
-        "Friction of thread and nut face, with --torque.  [default: 0.1,0.14,0.2]", type=Listed(), metavar="MU,..."
+        "Friction of thread and nut face, with --torque.  [default: 0.1,0.14,0.2]", type=numbers, metavar="MU,..."
     ),
     measured: float | None = option("Also tell whether friction explains this distance of the splints.", metavar="MM"),
     groove_friction: tuple[float, ...] | None = option(
         "Friction of the wires in their grooves, with --torque and --measured; alone it tells between which distances "
         "the clamp stays.  [default: 0.1,0.2]",
-        type=Listed(),
+        type=numbers,
         metavar="MU,...",
     ),
     json_file: Path | None = JSON,

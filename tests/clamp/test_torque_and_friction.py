@@ -129,7 +129,8 @@ def test_work_of_forces_is_that_of_the_gaps():
         assert work[7:] == pytest.approx(0.0, abs=1e-9)  # of a round wire
         i, tangent = ("P6", "P7").index(gaps.pair[k][1]), np.array([-gaps.normal[k, 1], gaps.normal[k, 0]])
         work = unit_work(section, q, gaps, k, tangent)
-        assert abs(work[7 + i]) == pytest.approx(1.0, abs=1e-6)
+        radius = section.pairs[gaps.pair[k]].cylinder.radius  # the force acts on the splint's surface
+        assert abs(work[7 + i]) == pytest.approx(1.0 + gaps.value[k] / radius, abs=1e-6)
         if gaps.pair[k][0] == "P2":
             pose, h = section.down_splint(q), 1e-6
             c, s = math.cos(angle), math.sin(angle)
@@ -197,7 +198,13 @@ def close_wires(section, q, touching):
                 found.append(at[2 * i : 2 * i + 2])
         places.append(found)
     states = [np.concatenate([a, b, q[4:]]) for a, b in itertools.product(*places)]
-    return [state for state in states if section.gaps(state).value.min() > -1e-7]
+    return [state for state in states if in_arcs(section.gaps(state), touching)]
+
+
+def in_arcs(gaps, touching):
+    rows = zip(gaps.pair, gaps.feature, gaps.value, strict=True)
+    on = {pair: feature for pair, feature, gap in rows if pair in touching and abs(gap) < 1e-7}
+    return gaps.value.min() > -1e-7 and list(on.values()) == ["arc"] * 4
 
 
 def test_symmetric_clamp_in_closed_form():
