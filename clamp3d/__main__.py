@@ -1,6 +1,6 @@
 """``python -m clamp3d``."""
 
-from clamp3d.cli import program
+from clamp3d.cli import main
 
 if __name__ == "__main__":
-    program()
+    main()

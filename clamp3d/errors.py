@@ -39,6 +39,10 @@ class InputError(Clamp3dError, ValueError):
     """A value from outside breaks a rule. The message names the value and the rule (exit code 2)."""
 
 
+class NotClampedError(InputError):
+    """A clamp does not hold both wires, which the question takes for granted (exit code 1). The message says why."""
+
+
 class SolverError(Clamp3dError):
     """A solver could not prove its answer. The message says which condition does not hold."""
 

@@ -34,7 +34,7 @@ BOXES = {
     "verdict": ("engine", 790, 440, 180, 100, "Distance, verdict", ("collide/answer.py", "collide/verdict.py")),
     "text": ("out", 30, 620, 210, 90, "text, JSON, table", ("output/scene_report.py", "output/run_report.py")),
     "report": ("out", 273, 620, 210, 90, "report()", ("output/report.py", "output/report_page.py")),
-    "view": ("out", 516, 620, 210, 90, "view()", ("output/viewer.py", "output/viewer_page.py")),
+    "view": ("out", 516, 620, 210, 90, "view()", ("output/viewer.py", "output/viewer_scene.py")),
     "export": ("out", 760, 620, 210, 90, "export()", ("output/export.py", "output/step.py")),
 }
 # Points of each arrow, and a label with its place

@@ -9,7 +9,6 @@ import numpy as np
 
 from clamp3d.baselines.model import Pieces, check_unit_angle, pose_of, poses_of
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, check_pose, check_pose_array, inverse
 from clamp3d.core.primitives import SweptArc
 from clamp3d.core.profile import chord_count, sagitta
@@ -42,20 +41,18 @@ class Chords:
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every chord and to the two faces; see `ContactModel`."""
         T_a_b = check_pose(pose_of(pair, T_a_b), "T_a_b")
-        T = dot(dot(inverse(pair.T_a_groove), T_a_b), pair.T_b_cylinder)
+        T = (inverse(pair.T_a_groove) @ T_a_b) @ pair.T_b_cylinder
         centre = _section_point(T[None])[0]
         starts, ends, features = _polyline(pair.groove, self.unit_angle)
         distance, foot, normal = _signed(centre, starts, ends)
         R, p = pair.T_a_groove[:3, :3], pair.T_a_groove[:3, 3]
-        point = dot(np.column_stack([foot, np.full(len(foot), T[2, 3])]), R.T) + p
-        return Pieces(
-            distance - pair.cylinder.radius, point, dot(np.column_stack([normal, 0.0 * distance]), R.T), features
-        )
+        point = (np.column_stack([foot, np.full(len(foot), T[2, 3])]) @ R.T) + p
+        return Pieces(distance - pair.cylinder.radius, point, np.column_stack([normal, 0.0 * distance]) @ R.T, features)
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
         poses = check_pose_array(poses_of(pair, T_a_b), "T_a_b")
-        T = dot(dot(inverse(pair.T_a_groove), poses), pair.T_b_cylinder)
+        T = (inverse(pair.T_a_groove) @ poses) @ pair.T_b_cylinder
         starts, ends, _ = _polyline(pair.groove, self.unit_angle)
         signed = [_signed(centre, starts, ends)[0].min() for centre in _section_point(T)]
         return np.array(signed) - pair.cylinder.radius

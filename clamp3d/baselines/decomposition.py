@@ -25,7 +25,7 @@ import hashlib
 import json
 import math
 import tempfile
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
@@ -37,7 +37,6 @@ from numpy.typing import ArrayLike
 from clamp3d.baselines import cache as disk
 from clamp3d.checks import choice, whole
 from clamp3d.core.child import run_child
-from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
@@ -182,7 +181,7 @@ def _outside(points: Array, hulls: tuple[Mesh, ...]) -> Array:
     best = np.full(len(points), np.inf)
     for hull in hulls:
         planes = ConvexHull(hull.vertices).equations
-        best = np.minimum(best, (dot(points, planes[:, :3].T) + planes[:, 3]).max(axis=1))
+        best = np.minimum(best, ((points @ planes[:, :3].T) + planes[:, 3]).max(axis=1))
     return best
 
 
@@ -196,26 +195,18 @@ def _run(
 ) -> tuple[tuple[Mesh, ...], float]:
     """Hulls and seconds of a run; its file is kept in the cache under ``key``, if there is one."""
     from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
     shown = console.is_terminal if progress is None else progress
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with (
         tempfile.TemporaryDirectory(prefix="clamp3d-") as folder,
-        Progress(*columns, console=console, transient=True, disable=not shown) as bar,
+        console.status(f"CoACD {name}") if shown else nullcontext(),
     ):
         source, target = Path(folder) / "in.npz", Path(folder) / "out.npz"
         arguments = np.array(json.dumps(asdict(parameters)))
         np.savez(source, vertices=solid.vertices, faces=solid.faces, arguments=arguments)
-        task = bar.add_task(f"CoACD {name}", total=None)
-        code, said = run_child(
-            "clamp3d.baselines.coacd_worker",
-            str(source),
-            str(target),
-            time_limit=time_limit,
-            watch=lambda log: bar.update(task, description=f"CoACD {name}: {_stage(log)}"),
-        )
+        worker = "clamp3d.baselines.coacd_worker"
+        code, said = run_child(worker, str(source), str(target), time_limit=time_limit)
         if code is None:
             raise SolverError(
                 f"CoACD did not finish {name} in {time_limit:g} s at threshold {parameters.threshold:g}; "
@@ -230,13 +221,3 @@ def _run(
         if key is not None:
             disk.keep(key, target)
         return found
-
-
-def _stage(log: list[str]) -> str:
-    """What CoACD is at, from its log: 'iter 3 ---- waiting pool: 8' is its third round with 8 pieces to cut."""
-    for line in reversed(log):
-        if "Merge" in line:
-            return "merging hulls"
-        if "iter" in line and "waiting pool:" in line:
-            return f"round {line.split('iter')[1].split()[0]}, {line.rsplit(':', 1)[1].strip()} pieces to cut"
-    return "starting"

@@ -8,29 +8,28 @@ What python-fcl 0.7.0 does, measured on wedges of a groove of radius 12 against 
   the median and 1.5e-6 as the worst of 600 000 near contact, and up to 4e-6 of the distance apart (1.8e-5 at 5 mm).
 - Signed distance (EPA) ends the interpreter on 1 to 3 % of the poses where a parallel wire just touches a face, and
   can run without end beside them. It is not asked for. Where two shapes overlap, a cylinder thinner and shorter by
-  ``c`` all round is measured instead: if that is apart by d and the nearest point is on its side or end, the depth is
-  c - d exactly, for a cylinder's support in such a direction is its core's and c more. Only at a rim, or deeper than
-  40 % of the radius, FCL's contact depth is taken, which is never less than the true one but up to 4 times as much.
-- For a mesh the signed distance is the depth of *some* triangle that is crossed; the deepest is taken here.
+  ``c`` all round is measured instead, 40 % and then 90 % of the radius: if that is apart by d and the nearest point is
+  on its side or end, the depth is c - d exactly, for a cylinder's support in such a direction is its core's and c more.
+  At a rim the depth is understated, as of a cylinder whose rims are rounded by c (no less than 1e-9 mm). Deeper than that it is only known to
+  be at least c.
 - The normal from two witness points is worthless where they nearly meet. It is taken from the cylinder's own surface.
 - NaN, scaled poses, empty meshes and open "convex" shapes pass without a word or end the interpreter: refused here.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import fcl
 import numpy as np
+import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.collide.surface import fcl_tree
-from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder
-from clamp3d.core.shells import corners_of, winding_number
 from clamp3d.errors import InputError
 
 UNIT = 16384.0
@@ -39,7 +38,8 @@ UNIT = 16384.0
 MIN_SIZE, MAX_SIZE = 0.1, 1e4
 """Extents in mm between which the accuracy stated above was measured; others are refused."""
 
-_EROSION = 0.4  # of the radius or half length
+_EROSIONS = (0.4, 0.9)  # of the radius or half length
+_SHALLOWEST = 1e-9  # mm: what overlaps by a rim alone is this deep at least
 _RIM = 1e-6  # of the cylinder's size: a witness point this near the rim lies on it
 _WITNESS = 1e-3  # mm apart from which the witness points give a direction at a rim
 _CONVEX = 1e-9  # of the size
@@ -50,17 +50,14 @@ Kind = Literal["convex", "mesh", "surface"]
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """Signed distance in mm (positive apart) of solid a and cylinder b; ``point_b = point_a + distance * normal``.
+    """Signed distance in mm (positive apart) of solid a and cylinder b; b's point is ``point + distance * normal``.
 
-    Points (3,) in mm and the unit normal from a to b (3,), all in the frame of a. ``face`` is the triangle of a mesh
-    that is nearest (deepest), -1 for a convex shape.
+    Point (3,) of a in mm and the unit normal from a to b (3,), both in the frame of a.
     """
 
     distance: float
-    point_a: Array
-    point_b: Array
+    point: Array
     normal: Array
-    face: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +78,7 @@ def convex(vertices: ArrayLike, faces: ArrayLike, name: str = "convex shape") ->
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
     real = length > 0.0
-    height = (dot(V, normals[real].T) - np.einsum("ij,ij->i", corners[real, 0], normals[real])) / length[real]
+    height = ((V @ normals[real].T) - np.einsum("ij,ij->i", corners[real, 0], normals[real])) / length[real]
     if height.max() > _CONVEX * np.ptp(V, axis=0).max():
         raise InputError(f"{name} must be convex: a vertex stands {height.max():.3g} mm outside one of its faces")
     return _shape("convex", solid, fcl.Convex(V * UNIT, len(F), encoded(F)))
@@ -97,10 +94,17 @@ def bvh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Shape:
     return _tree("mesh", _solid(vertices, faces, name))
 
 
+def tree(vertices: NDArray[Any], faces: NDArray[Any]) -> Any:
+    """A triangle mesh as `fcl.BVHModel`, as it is."""
+    model = fcl.BVHModel()
+    model.beginModel(len(vertices), len(faces))
+    model.addSubModel(vertices, faces)
+    model.endModel()
+    return model
+
+
 def facets(mesh: Shape) -> list[Shape]:
     """Each flat face of a mesh as an open surface of its own: it has no inside, and nothing is contained in it."""
-    import trimesh
-
     V, F = mesh.solid.vertices, mesh.solid.faces
     flat = [np.asarray(group, dtype=np.int64) for group in trimesh.Trimesh(V, F, process=False).facets]
     alone = np.setdiff1d(np.arange(len(F)), np.concatenate([*flat, np.empty(0, dtype=np.int64)]))
@@ -114,18 +118,19 @@ def facets(mesh: Shape) -> list[Shape]:
 class Wire:
     """A cylinder to be placed and measured again and again (`fcl.Cylinder`); axis on z, centred.
 
-    ``core`` is the same cylinder ``erosion`` mm smaller all round, None if this is a core.
+    ``cores`` are the same cylinder, each ``erosion`` mm smaller all round; a core has none.
     """
 
-    def __init__(self, cylinder: Cylinder, *, is_core: bool = False) -> None:
-        self.erosion = 0.0
-        self.core: Wire | None = None
-        if not is_core:
+    def __init__(self, cylinder: Cylinder, erosion: float = 0.0) -> None:
+        self.cylinder = Cylinder(cylinder.radius - erosion, cylinder.length - 2.0 * erosion)
+        self.erosion = erosion
+        self.cores: tuple[Wire, ...] = ()
+        if not erosion:
             _check_size("cylinder radius", cylinder.radius)
             _check_size("cylinder length", cylinder.length)
-            self.erosion = e = _EROSION * min(cylinder.radius, cylinder.length / 2)
-            self.core = Wire(Cylinder(cylinder.radius - e, cylinder.length - 2.0 * e), is_core=True)
-        self.cylinder = cylinder
+            thick = min(cylinder.radius, cylinder.length / 2)
+            self.cores = tuple(Wire(cylinder, share * thick) for share in _EROSIONS)
+        cylinder = self.cylinder
         self.T = np.eye(4)
         shape = fcl.Cylinder(cylinder.radius * UNIT, cylinder.length * UNIT)
         self.collision_object = fcl.CollisionObject(shape, transform(self.T))
@@ -152,40 +157,37 @@ def distance(shape: Shape, wire: Wire) -> float:
 
 
 def measure(shape: Shape, wire: Wire) -> Measurement:
-    """Distance, witness points and normal of a shape and a wire that was placed in the shape's frame.
+    """Distance, point and normal of a shape and a wire that was placed in the shape's frame.
 
-    Exact (see the module) apart, and overlapping up to 0.4 of the wire's radius; beyond, and where a rim dips in, the
-    depth is an upper bound. A mesh has no inside for FCL: a wire (or its core) inside the wall without crossing the
-    surface is contained, and the depth is its way out through the nearest place. The normal of a contact on a rim
-    closer than 1e-3 mm is that of the round side.
+    Exact (see the module) apart, and overlapping up to 0.9 of the wire's radius. A mesh has no inside for FCL: a wire
+    (or its core) inside the wall without crossing the surface is contained, and the depth is its way out through the
+    nearest place. The normal of a contact on a rim closer than 1e-3 mm is that of the round side.
     """
-    found = _nearest(shape, wire)
-    d = found.distance
-    if d > 0.0:
-        return _inside_out(found, d + 2.0 * wire.cylinder.radius) if contained(shape, wire) else found
-    core = wire.core
-    assert core is not None
-    core.place(wire.T)
-    inner = _nearest(shape, core)
-    if inner.distance <= 0.0:
-        return _deepest(shape, wire)
-    d = inner.distance - wire.erosion
-    if contained(shape, core):
-        return _inside_out(inner, d + 2.0 * wire.cylinder.radius)
-    if _rim(inner.point_b, core):
-        return _deepest(shape, wire)
-    n = inner.normal
-    return Measurement(d, inner.point_a, inner.point_a + d * n, n, inner.face)
+    for each in (wire, *wire.cores):
+        each.place(wire.T)
+        nearest = _nearest(shape, each)
+        d = nearest.distance - each.erosion
+        if nearest.distance <= 0.0:
+            continue
+        if contained(shape, each):
+            return Measurement(-d - 2.0 * wire.cylinder.radius, nearest.point, -nearest.normal)
+        return Measurement(min(d, -_SHALLOWEST) if each.erosion else d, nearest.point, nearest.normal)
+    return Measurement(-wire.cores[-1].erosion, nearest.point, nearest.normal)
 
 
 def contained(shape: Shape, wire: Wire) -> bool:
-    """Whether a wire that does not cross a mesh's surface lies inside it (its middle has winding number 1)."""
-    if shape.kind != "mesh" or wire.cylinder.length > norm(shape.bounds[1] - shape.bounds[0]):
+    """Whether a wire that does not cross a mesh's surface lies inside it (its middle does)."""
+    if shape.kind != "mesh" or wire.cylinder.length > np.linalg.norm(shape.bounds[1] - shape.bounds[0]):
         return False
     middle = wire.T[:3, 3]
     if (middle < shape.bounds[0]).any() or (middle > shape.bounds[1]).any():
         return False
-    return winding_number(corners_of(shape.solid.vertices, shape.solid.faces), middle) > 0.5
+    corners = shape.solid.vertices[shape.solid.faces] - middle
+    a, b, c = np.moveaxis(corners, 1, 0)
+    la, lb, lc = np.linalg.norm(corners, axis=2).T
+    below = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
+    angle = 2.0 * np.arctan2(np.linalg.det(corners), below)  # solid angle of each triangle (Van Oosterom, Strackee)
+    return bool(angle.sum() > 2.0 * math.pi)
 
 
 def _nearest(shape: Shape, wire: Wire) -> Measurement:
@@ -194,66 +196,23 @@ def _nearest(shape: Shape, wire: Wire) -> Measurement:
     fcl.distance(shape.collision_object, wire.collision_object, fcl.DistanceRequest(True), result)
     d = float(result.min_distance) / UNIT
     on_a, on_b = (np.asarray(point) / UNIT for point in result.nearest_points)
-    face = -1 if shape.kind == "convex" else int(result.b1)
-    if d <= 0.0:
-        return Measurement(d, on_a, on_b, wire.T[:3, 0], face)
-    normal = _normal(d, on_a, on_b, wire)
-    return Measurement(d, on_b - d * normal, on_b, normal, face)
-
-
-def _deepest(shape: Shape, wire: Wire) -> Measurement:
-    """The deepest of FCL's contacts: one for a convex shape, one for each triangle crossed for a mesh."""
-    request = fcl.CollisionRequest(num_max_contacts=len(shape.solid.faces), enable_contact=True)
-    result = fcl.CollisionResult()
-    fcl.collide(shape.collision_object, wire.collision_object, request, result)
-    if not result.contacts:  # distance() and collide() disagree only where the two touch
-        found = _nearest(shape, wire)
-        return Measurement(0.0, found.point_a, found.point_a, found.normal, found.face)
-    contact = max(result.contacts, key=lambda c: c.penetration_depth)
-    depth = abs(float(contact.penetration_depth)) / UNIT
-    normal = np.asarray(contact.normal, dtype=np.float64)
-    middle = np.asarray(contact.pos) / UNIT
-    face = -1 if shape.kind == "convex" else int(contact.b1)
-    return Measurement(-depth, middle + 0.5 * depth * normal, middle - 0.5 * depth * normal, normal, face)
-
-
-def _inside_out(found: Measurement, depth: float) -> Measurement:
-    """The way out of a contained wire through the nearest place of the surface."""
-    normal = -found.normal
-    return Measurement(-depth, found.point_a, found.point_a - depth * normal, normal, found.face)
+    normal = _normal(d, on_a, on_b, wire) if d > 0.0 else wire.T[:3, 0]
+    return Measurement(d, on_b - d * normal, normal)
 
 
 def _normal(d: float, on_a: Array, on_b: Array, wire: Wire) -> Array:
     """Unit normal from a to b. On the cylinder's side and ends it is the surface's own, turned inward."""
-    across, height = _from_axis(on_b, wire)
-    radius = norm(across)
-    on_side, on_end = _places(radius, height, wire)
+    height = float((on_b - wire.T[:3, 3]) @ wire.T[:3, 2])
+    across = on_b - wire.T[:3, 3] - height * wire.T[:3, 2]
+    radius = float(np.linalg.norm(across))
+    on_side = radius >= wire.cylinder.radius * (1.0 - _RIM)
+    on_end = abs(height) >= 0.5 * wire.cylinder.length * (1.0 - _RIM)
     if on_end and not on_side:
         return np.asarray(-np.copysign(1.0, height) * wire.T[:3, 2])
     if on_side and not (on_end and d > _WITNESS):
         return np.asarray(-across / radius)
     between = on_b - on_a
-    return np.asarray(between / norm(between))
-
-
-def _rim(point: Array, wire: Wire) -> bool:
-    """Whether a point of the cylinder lies on the edge of an end."""
-    across, height = _from_axis(point, wire)
-    return all(_places(norm(across), height, wire))
-
-
-def _places(radius: float, height: float, wire: Wire) -> tuple[bool, bool]:
-    """Whether a point of the cylinder lies on its side, and on an end."""
-    on_side = radius >= wire.cylinder.radius * (1.0 - _RIM)
-    return on_side, abs(height) >= 0.5 * wire.cylinder.length * (1.0 - _RIM)
-
-
-def _from_axis(point: Array, wire: Wire) -> tuple[Array, float]:
-    """Vector from the cylinder's axis to a point, and the point's height along the axis."""
-    axis = wire.T[:3, 2]
-    from_middle = point - wire.T[:3, 3]
-    height = float(dot(from_middle, axis))
-    return from_middle - height * axis, height
+    return np.asarray(between / np.linalg.norm(between))
 
 
 def _shape(kind: Kind, solid: Mesh, geometry: Any) -> Shape:
@@ -262,7 +221,7 @@ def _shape(kind: Kind, solid: Mesh, geometry: Any) -> Shape:
 
 
 def _tree(kind: Kind, solid: Mesh) -> Shape:
-    return _shape(kind, solid, fcl_tree(solid.vertices * UNIT, solid.faces))
+    return _shape(kind, solid, tree(solid.vertices * UNIT, solid.faces))
 
 
 def _solid(vertices: ArrayLike, faces: ArrayLike, name: str) -> Mesh:

@@ -11,7 +11,6 @@ from clamp3d.baselines.fcl_shapes import Shape, Wire, bvh, distance, facets, mea
 from clamp3d.baselines.model import Pieces, pose_of, poses_of
 from clamp3d.checks import instance
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, check_pose_array
 from clamp3d.core.primitives import Cylinder
 from clamp3d.core.shapes import Solid
@@ -49,13 +48,9 @@ class Polytopes:
     def pieces(self, wire: Wire, T_a_wire: Array) -> Pieces:
         """One gap per polytope, with the wire at a pose (4, 4) in the part's frame."""
         wire.place(check_pose_array(T_a_wire[None])[0])
-        found = [measure(shape, wire) for shape in self.shapes]
-        return Pieces(
-            np.array([m.distance for m in found]),
-            np.array([m.point_a for m in found]),
-            np.array([m.normal for m in found]),
-            self.names,
-        )
+        measured = [measure(shape, wire) for shape in self.shapes]
+        columns = (np.array([getattr(m, name) for m in measured]) for name in ("distance", "point", "normal"))
+        return Pieces(*columns, self.names)
 
     def distances(self, wire: Wire, T_a_wire: Array) -> Array:
         """Least signed distance (n,) at poses (n, 4, 4), the polytopes taken by the distance of their boxes.
@@ -112,12 +107,12 @@ class PolytopeModel:
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every piece of part a; see `ContactModel`."""
         T_a_b = pose_of(pair, T_a_b)
-        return self._pieces_of[pair.a].pieces(self._wire(pair.cylinder), dot(T_a_b, pair.T_b_cylinder))
+        return self._pieces_of[pair.a].pieces(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
         T_a_b = poses_of(pair, T_a_b)
-        return self.parts[pair.a].distances(self._wire(pair.cylinder), dot(T_a_b, pair.T_b_cylinder))
+        return self.parts[pair.a].distances(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)
 
     def _wire(self, cylinder: Cylinder) -> Wire:
         """FCL's cylinder of this size, made once."""
@@ -138,10 +133,9 @@ def part_mesh(part: PartOrMesh, mesh_error: float) -> TriangleMesh:
 class Meshes(PolytopeModel):
     """The parts' meshes as they are, measured by FCL; any pose.
 
-    The groove is too tight by the mesh's chord error. A mesh is a surface: depth comes from a thinner core of the wire
-    and ends where that crosses the surface too; beyond, the number is the deepest triangle's own way out and only its
-    sign means something. A wire inside the wall is found by the winding number (see `fcl_shapes.measure`), but not by
-    ``pieces``, the gaps to every flat face.
+    The groove is too tight by the mesh's chord error. A mesh is a surface: depth comes from thinner cores of the wire
+    and ends where the thinnest crosses the surface too. A wire inside the wall is seen (`fcl_shapes.measure`), but not
+    by ``pieces``, the gaps to every flat face.
 
     Parameters
     ----------
@@ -152,7 +146,7 @@ class Meshes(PolytopeModel):
     """
 
     name = "mesh"
-    limits = ("surface only", "no depth beyond 0.4 of the wire's radius", "groove too tight by the mesh's chord error")
+    limits = ("surface only", "no depth beyond 0.9 of the wire's radius", "groove too tight by the mesh's chord error")
 
     def __init__(self, parts: Mapping[str, PartOrMesh], mesh_error: float = 0.05) -> None:
         instance("parts", parts, Mapping)

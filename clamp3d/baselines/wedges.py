@@ -16,7 +16,6 @@ from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.model import check_unit_angle
 from clamp3d.baselines.polytopes import PerPart, PolytopeModel, Polytopes
 from clamp3d.checks import instance
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc, Segment, chord_count
 from clamp3d.core.shapes import Solid
@@ -42,7 +41,7 @@ class Wedge:
     def area(self) -> float:
         """Area of the polygon in mm^2."""
         x, y = (self.polygon - self.polygon[0]).T
-        return 0.5 * float(dot(x, np.roll(y, -1)) - dot(y, np.roll(x, -1)))
+        return 0.5 * float((x @ np.roll(y, -1)) - (y @ np.roll(x, -1)))
 
 
 class Wedges(PolytopeModel):
@@ -115,7 +114,7 @@ def wedge_solids(part: Solid, unit_angle: float) -> list[tuple[str, Array, NDArr
     """
     body = part.bodies[0]
     prisms = [(w.name, *prism(w.polygon, body.start, body.end)) for w in part_wedges(part, unit_angle)]
-    return [(name, dot(vertices, body.frame.T), faces) for name, vertices, faces in prisms]
+    return [(name, vertices @ body.frame.T, faces) for name, vertices, faces in prisms]
 
 
 def _sectors(cell: shapely.Polygon, arc: Arc, unit_angle: float) -> list[Wedge]:

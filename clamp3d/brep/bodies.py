@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import itertools
-import json
-import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.checks import short
-from clamp3d.core.mesh import Array, Mesh
+from clamp3d.core.mesh import Array, Mesh, make_mesh
 from clamp3d.core.shapes import MeshShape
 from clamp3d.errors import InputError
 
@@ -75,6 +72,48 @@ class Reading:
             raise InputError(f"{short(path)}: only {count} (--partial goes on with those)")
         return Reading(self.bodies, self.missing, (count, *self.notes))
 
+    def merged(self, name: str) -> Mesh:
+        """All bodies, each at its place, as one mesh in mm."""
+        if len(self.bodies) == 1 and np.array_equal(self.bodies[0].T, np.eye(4)):
+            return self.bodies[0].shape.mesh
+        meshes = [body.shape.mesh for body in self.bodies]
+        starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+        placed = [body.shape.mesh.vertices @ body.T[:3, :3].T + body.T[:3, 3] for body in self.bodies]
+        faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+        mesh = make_mesh(np.concatenate(placed), np.concatenate(faces), name=name)
+        return replace(mesh, notes=(*self.notes, *mesh.notes))
+
+    def to_plain(self) -> dict[str, Any]:
+        """All of it as dicts, lists and arrays, for another process; each shape once."""
+        shapes = {id(body.shape): body.shape for body in self.bodies}
+        numbers = {key: k for k, key in enumerate(shapes)}
+        return {
+            "shapes": [_plain(shape) for shape in shapes.values()],
+            "bodies": [(body.name, numbers[id(body.shape)], body.T) for body in self.bodies],
+            "missing": self.missing,
+            "notes": self.notes,
+        }
+
+    @classmethod
+    def from_plain(cls, plain: dict[str, Any]) -> Reading:
+        """From what `to_plain` gave."""
+        shapes = [_shape(**shape) for shape in plain["shapes"]]
+        bodies = [Body(name, shapes[k], T) for name, k, T in plain["bodies"]]
+        return cls(tuple(bodies), tuple(plain["missing"]), tuple(plain["notes"]))
+
+
+def _plain(shape: MeshShape) -> dict[str, Any]:
+    if isinstance(shape, BrepSolid):
+        return {"name": shape.name, "exact": shape.to_arrays()}
+    return {"name": shape.name, "mesh": shape.mesh}
+
+
+def _shape(name: str, exact: dict[str, Any] | None = None, mesh: dict[str, Any] | None = None) -> MeshShape:
+    if exact is not None:
+        return BrepSolid.from_arrays(name, exact)
+    assert mesh is not None
+    return MeshShape(Mesh(**mesh | {"notes": tuple(mesh["notes"])}), "off", name)
+
 
 def part_name(name: str) -> str:
     """A name as a part may have it: what separates names and what patterns are made of becomes a dash.
@@ -95,69 +134,11 @@ def unique_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
     bare = [part_name(name) for name in names]
     often = Counter(bare)
     used = set(taken) | {name for name in bare if often[name] == 1}
-    found = []
+    unique = []
     counters = {name: itertools.count(1) for name in often}
     for name in bare:
         if often[name] > 1 or name in taken:
-            name = next(made for k in counters[name] if (made := f"{name}_{k}") not in used)
+            name = next(numbered for k in counters[name] if (numbered := f"{name}_{k}") not in used)
             used.add(name)
-        found.append(name)
-    return found
-
-
-def save(reading: Reading, path: Path) -> None:
-    """Write a reading to a file of arrays, for the process that asked for it."""
-    arrays: dict[str, NDArray[Any]] = {}
-    numbers: dict[int, int] = {}
-    shapes = []
-    for shape in (body.shape for body in reading.bodies):
-        if id(shape) in numbers:
-            continue
-        k = numbers[id(shape)] = len(numbers)
-        own = shape.to_arrays() if isinstance(shape, BrepSolid) else _arrays(shape.mesh)
-        arrays |= {f"{k} {key}": value for key, value in own.items()}
-        shapes.append({"name": shape.name, "exact": isinstance(shape, BrepSolid), "notes": shape.mesh.notes})
-    meta = {
-        "shapes": shapes,
-        "bodies": [(body.name, numbers[id(body.shape)]) for body in reading.bodies],
-        "missing": reading.missing,
-        "notes": reading.notes,
-    }
-    arrays["T"] = np.array([body.T for body in reading.bodies]).reshape(-1, 4, 4)
-    meta["arrays"] = [(key, value.dtype.str, value.shape) for key, value in arrays.items()]
-    with path.open("wb") as out:
-        out.write(json.dumps(meta).encode() + b"\n")
-        for value in arrays.values():
-            out.write(np.ascontiguousarray(value).tobytes())
-
-
-def restore(path: Path) -> Reading:
-    """A reading that `save` wrote."""
-    arrays: dict[str, NDArray[Any]] = {}
-    with path.open("rb") as file:
-        meta = json.loads(file.readline())
-        for key, kind, shape in meta["arrays"]:
-            arrays[key] = np.fromfile(file, np.dtype(kind), math.prod(shape)).reshape(shape)
-    places = arrays.pop("T")
-    own: list[dict[str, NDArray[Any]]] = [{} for _ in meta["shapes"]]
-    for key, value in arrays.items():
-        number, _, name = key.partition(" ")
-        own[int(number)][name] = value
-    shapes = [_shape(made, given) for made, given in zip(meta["shapes"], own, strict=True)]
-    bodies = [Body(name, shapes[k], T) for (name, k), T in zip(meta["bodies"], places, strict=True)]
-    return Reading(tuple(bodies), tuple(meta["missing"]), tuple(meta["notes"]))
-
-
-def _arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
-    state = np.array([mesh.watertight, mesh.rounding])
-    return {"vertices": mesh.vertices, "faces": mesh.faces, "state": state}
-
-
-def _shape(made: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> MeshShape:
-    if made["exact"]:
-        return BrepSolid.from_arrays(made["name"], arrays)
-    watertight, rounding = arrays["state"]
-    mesh = Mesh(
-        made["name"], arrays["vertices"], arrays["faces"], bool(watertight), float(rounding), tuple(made["notes"])
-    )
-    return MeshShape(mesh, "off", made["name"])
+        unique.append(name)
+    return unique

@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 
 from clamp3d.brep.bodies import MOST_BODIES, Body, Reading
-from clamp3d.brep.solid import CHORD, BrepSolid
-from clamp3d.brep.tessellate import explore
-from clamp3d.core.linear import dot
+from clamp3d.brep.open_cascade import explore, volume_of
+from clamp3d.brep.solid import BrepSolid
 from clamp3d.core.mesh import Array
-from clamp3d.core.shells import volume
 from clamp3d.errors import Clamp3dError, InputError
 
 _DEEPEST = 200
@@ -56,10 +54,10 @@ def matrix(location: Any) -> Array:
     return T
 
 
-def bodies_of(roots: Iterable[Node], chord: float = CHORD) -> tuple[Reading, int]:
+def bodies_of(roots: Iterable[Node]) -> tuple[Reading, int]:
     """All solids below ``roots`` with names and places, equal ones sharing a shape; and how many different ones.
 
-    What is no closed solid is among the reading's missing. Raises InputError for too many bodies, or too deep a tree.
+    What is no solid is among the reading's missing. Raises InputError for too many bodies, or too deep a tree.
     """
     bodies: list[Body] = []
     missing: list[str] = []
@@ -71,8 +69,8 @@ def bodies_of(roots: Iterable[Node], chord: float = CHORD) -> tuple[Reading, int
             key = Key(solid)
             name = node.named.get(key) or node.name
             if key not in shapes:
-                shapes[key] = _made(key.shape, name, chord)
-            place = dot(T, matrix(solid.Location()))
+                shapes[key] = _made(key.shape, name)
+            place = T @ matrix(solid.Location())
             made = shapes[key]
             if isinstance(made, str):
                 missing.append(f"{name} ({made})")
@@ -102,7 +100,7 @@ def _leaves(roots: Iterable[Node]) -> Iterator[tuple[Node, Array]]:
         if node is None:
             stack.pop()
             continue
-        T = dot(above, node.T)
+        T = above @ node.T
         if node.shape is not None:
             yield node, T
         if len(stack) > _DEEPEST:
@@ -110,18 +108,12 @@ def _leaves(roots: Iterable[Node]) -> Iterator[tuple[Node, Array]]:
         stack.append((iter(node.below), T))
 
 
-def _made(solid: Any, name: str, chord: float) -> BrepSolid | str:
+def _made(solid: Any, name: str) -> BrepSolid | str:
     """The solid as a shape, or why it cannot be one."""
     try:
-        made = BrepSolid.of(solid, name, chord=chord)
-        if not made.mesh.watertight:
-            return "its faces do not close"
-        size = volume(made.mesh.vertices, made.mesh.faces)
-        if size < 0.0:
-            made = BrepSolid.of(solid.Reversed(), name, chord=chord)
-            size = volume(made.mesh.vertices, made.mesh.faces)
-        if not size > 0.0:
+        size = volume_of(solid)
+        if not abs(size) > 0.0:
             return "encloses no volume"
+        return BrepSolid.of(solid if size > 0.0 else solid.Reversed(), name)
     except Clamp3dError as error:
         return str(error)
-    return made

@@ -7,7 +7,6 @@ from collections.abc import Callable, Hashable
 import numpy as np
 
 from clamp3d.brep.bodies import MOST_BODIES, Body, Reading
-from clamp3d.core.linear import dot, svd
 from clamp3d.core.mesh import Array, IntArray, make_mesh
 from clamp3d.core.shapes import MeshShape
 from clamp3d.errors import InputError
@@ -37,22 +36,22 @@ class Placer:
         pose, form = rigid_part(T)
         own = (key, form.round(12).tobytes())
         if own not in self._shapes:
-            self._shapes[own] = self._made(name, arrays, form)
+            self._shapes[own] = self._shape(name, arrays, form)
         shape = self._shapes[own]
         if isinstance(shape, str):
             self.missing.append(f"{name} ({shape})")
             return
         place = np.eye(4)
-        place[:3, :3] = dot(dot(self.R, pose[:3, :3]), self.R.T)
-        place[:3, 3] = dot(self.scale * self.R, pose[:3, 3])
+        place[:3, :3] = self.R @ pose[:3, :3] @ self.R.T
+        place[:3, 3] = self.scale * self.R @ pose[:3, 3]
         self.bodies.append(Body(name, shape, place))
 
-    def _made(self, name: str, arrays: Callable[[], tuple[Array, IntArray]], form: Array) -> MeshShape | str:
+    def _shape(self, name: str, arrays: Callable[[], tuple[Array, IntArray]], form: Array) -> MeshShape | str:
         try:
             V, F = arrays()
             if np.linalg.det(form) < 0.0:
                 F = F[:, ::-1]
-            mesh = make_mesh(dot(V, dot(self.R, form).T), F, name=name, scale=self.scale, float32=True)
+            mesh = make_mesh(V @ (self.R @ form).T, F, name=name, scale=self.scale, float32=True)
             shape = MeshShape(mesh, "off", name)
         except InputError as error:
             return str(error).removeprefix(f"{name}: ")
@@ -68,8 +67,8 @@ def rigid_part(T: Array) -> tuple[Array, Array]:
     """A placement (4, 4) as a rigid pose after a scale, shear or reflection (3, 3): the identity where it is rigid."""
     R = T[:3, :3]
     pose = T.copy()
-    if np.abs(dot(R, R.T) - np.eye(3)).max() <= 1e-5 and np.linalg.det(R) > 0.0:
+    if np.abs(R @ R.T - np.eye(3)).max() <= 1e-5 and np.linalg.det(R) > 0.0:
         return pose, np.eye(3)
-    left, _, right = svd(R)
-    pose[:3, :3] = turn = dot(left.T * (1.0, 1.0, np.sign(np.linalg.det(R))), right)
-    return pose, dot(turn.T, R)
+    left, _, right = np.linalg.svd(R)
+    pose[:3, :3] = turn = left * (1.0, 1.0, np.sign(np.linalg.det(R))) @ right
+    return pose, turn.T @ R

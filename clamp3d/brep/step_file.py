@@ -1,6 +1,6 @@
 """STEP files as placed solids: the product tree with names, placements and shared instances (Open CASCADE's XDE).
 
-This runs in a process of its own (`clamp3d.brep.apart`): a damaged file can end it. Needs the extra ``step``.
+This runs in a process of its own (`clamp3d.brep.worker`): a damaged file can end it. Needs the extra ``step``.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 
 from clamp3d.brep.bodies import Reading
 from clamp3d.brep.cad import Key, Node, bodies_of, matrix
+from clamp3d.brep.open_cascade import require_open_cascade
 from clamp3d.brep.part21 import Announced, announced
-from clamp3d.brep.solid import require_open_cascade
 from clamp3d.errors import InputError
 
 _OTHERS = {
@@ -30,7 +30,7 @@ _OTHERS = {
 _PLACE = "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"
 
 
-def read_step(path: Path) -> Reading:
+def read_step(path: Path, _: str | None = None) -> Reading:
     """The solids of a STEP file, in the order of its tree, in mm.
 
     Raises InputError if its text is damaged or Open CASCADE cannot read it.

@@ -1,7 +1,7 @@
-"""3MF files as placed meshes: what the build lists, its objects and their components (lib3mf).
+"""3MF files as placed meshes: what the build lists, its objects and their components, by lib3mf.
 
-This runs in a process of its own (`clamp3d.brep.apart`): an archive of a kilobyte can name itself into millions of
-components.
+An archive of a kilobyte can unpack to gigabytes, or name itself into millions of components, so both are counted
+before. This runs in the process for foreign files.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ import zipfile
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
+from xml.parsers import expat
 
+import lib3mf
 import numpy as np
 
 from clamp3d.brep.bodies import MOST_BODIES, Reading
 from clamp3d.brep.placing import Placer
-from clamp3d.core.linear import dot
 from clamp3d.core.mesh import Array
 from clamp3d.errors import InputError
 
@@ -29,19 +30,13 @@ _RATIO, _UNPACKED = 200, 2**28
 """An archive that unpacks to more than this many times its size, and to more than so many bytes, is refused."""
 
 
-def read_3mf(path: Path) -> Reading:
+def read_3mf(path: Path, _: str | None) -> Reading:
     """The meshes of a 3MF file, each instance a body, in mm. Raises InputError if lib3mf cannot read it."""
-    import lib3mf
-
     try:
         with zipfile.ZipFile(path) as archive:
-            unpacked = sum(entry.file_size for entry in archive.infolist())
-    except (zipfile.BadZipFile, NotImplementedError) as error:
+            _check_size(archive, path)
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, expat.ExpatError) as error:
         raise InputError(f"{path}: not a readable 3MF file ({error})") from None
-    if unpacked > max(_UNPACKED, _RATIO * path.stat().st_size):
-        raise InputError(
-            f"{path}: unpacks to {unpacked / 1e6:.0f} MB, {unpacked / path.stat().st_size:.0f} times its size"
-        )
     try:
         model = lib3mf.get_wrapper().CreateModel()
         reader = model.QueryReader("3mf")
@@ -50,16 +45,10 @@ def read_3mf(path: Path) -> Reading:
         warnings = {reader.GetWarning(k)[1] for k in range(reader.GetWarningCount())}
         if any("unit" in text.lower() for text in warnings):
             raise InputError(f"{path}: unit must be one of micron, millimeter, centimeter, meter, inch, foot")
-        scale = _UNITS[model.GetUnit().name]
-        placer = Placer(scale)
-        items: list[Any] = []
-        known: dict[int, int] = {}
-        listed = model.GetBuildItems()
-        while listed.MoveNext():
-            items.append(listed.GetCurrent())
-        if sum(_count(item.GetObjectResource(), known, 0) for item in items) > MOST_BODIES:
-            raise InputError(f"{path}: more than {MOST_BODIES} bodies")
-        for item in items:
+        placer = Placer(_UNITS[model.GetUnit().name])
+        items = model.GetBuildItems()
+        while items.MoveNext():
+            item = items.GetCurrent()
             T = _matrix(item.GetObjectTransform()) if item.HasObjectTransform() else np.eye(4)
             for obj, place in _meshes(item.GetObjectResource(), T):
                 placer.place(obj.GetName() or path.stem, obj.GetResourceID(), partial(_arrays, obj), place)
@@ -69,15 +58,47 @@ def read_3mf(path: Path) -> Reading:
     return placer.reading()
 
 
-def _count(obj: Any, known: dict[int, int], depth: int) -> int:
-    """How many meshes an object is made of, at least 1; ``known`` keeps the answers, since components can double."""
-    if depth > _DEEPEST:
-        raise InputError(f"components more than {_DEEPEST} levels deep")
-    number = obj.GetResourceID()
-    if number not in known:
-        below = [] if obj.IsMeshObject() else [obj.GetComponent(k) for k in range(obj.GetComponentCount())]
-        known[number] = max(1, sum(_count(part.GetObjectResource(), known, depth + 1) for part in below))
-    return known[number]
+def _check_size(archive: zipfile.ZipFile, path: Path) -> None:
+    """Raise InputError for an archive that unpacks to very much, or places too many bodies."""
+    packed, unpacked = path.stat().st_size, sum(entry.file_size for entry in archive.infolist())
+    if unpacked > max(_UNPACKED, _RATIO * packed):
+        raise InputError(f"{path}: unpacks to {unpacked / 1e6:.0f} MB, {unpacked / packed:.0f} times its size")
+    below: dict[str, list[str]] = {}
+    for name in archive.namelist():
+        if name.lower().endswith(".model"):
+            with archive.open(name) as file:
+                below |= _components(file, f"/{name}")
+    counts: dict[str, int] = {}
+
+    def count(item: str, depth: int) -> int:
+        if depth > _DEEPEST:
+            raise InputError(f"{path}: components more than {_DEEPEST} levels deep")
+        if item not in counts:
+            counts[item] = max(1, sum(count(part, depth + 1) for part in below.get(item, ())))
+        return counts[item]
+
+    if sum(count(item, 0) for key in below if key.endswith("#build") for item in below[key]) > MOST_BODIES:
+        raise InputError(f"{path}: more than {MOST_BODIES} bodies")
+
+
+def _components(file: IO[bytes], name: str) -> dict[str, list[str]]:
+    """What each object of a model file is made of, by file and number ("/3D/a.model#7"); its build is "...#build"."""
+    below: dict[str, list[str]] = {}
+    current: list[str] = []
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal current
+        kind = tag.rpartition(":")[2]
+        if kind in ("object", "build"):
+            current = below.setdefault(f"{name}#{attributes.get('id', kind)}", [])
+        elif kind in ("component", "item"):
+            other = next((value for key, value in attributes.items() if key.endswith(":path")), name)
+            current.append(f"{other}#{attributes.get('objectid', '')}")
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = start
+    parser.ParseFile(file)
+    return below
 
 
 def _meshes(obj: Any, T: Array) -> Iterator[tuple[Any, Array]]:
@@ -88,7 +109,7 @@ def _meshes(obj: Any, T: Array) -> Iterator[tuple[Any, Array]]:
     for k in range(obj.GetComponentCount()):
         part = obj.GetComponent(k)
         own = _matrix(part.GetTransform()) if part.HasTransform() else np.eye(4)
-        yield from _meshes(part.GetObjectResource(), dot(T, own))
+        yield from _meshes(part.GetObjectResource(), T @ own)
 
 
 def _matrix(transform: Any) -> Array:

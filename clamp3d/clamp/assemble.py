@@ -4,38 +4,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import choice, function, number, text
 from clamp3d.clamp.closing import HELD, open_start
-from clamp3d.clamp.contact import Contact, seats
+from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
-from clamp3d.clamp.equilibria import describe, equilibria, same, start_tilts
+from clamp3d.clamp.equilibria import describe, equilibria, same
 from clamp3d.clamp.final_state import FinalState, solve_final_state
-from clamp3d.clamp.follow import Closing, follow
+from clamp3d.clamp.follow import follow
 from clamp3d.clamp.forces import contact_forces
 from clamp3d.clamp.loader import WireSize, load_clamp
-from clamp3d.clamp.matrix import PAIRS, Difference, contact_type
+from clamp3d.clamp.matrix import PAIRS, Difference
 from clamp3d.clamp.meetings import meetings
-from clamp3d.clamp.out_of_plane import out_of_plane
-from clamp3d.clamp.result import Assembly, Equilibrium, Event, Solver, Start, Waypoint, Work
+from clamp3d.clamp.places import section_poses
+from clamp3d.clamp.result import Assembly, Equilibrium, Event, Play, Solver, Start, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import B, D, S, Section, W
-from clamp3d.clamp.sequence import as_published, parse_sequence
-from clamp3d.clamp.status import CLAMPED, final_status
+from clamp3d.clamp.sequence import Step, as_published, parse_sequence
+from clamp3d.clamp.status import closing_status
 from clamp3d.clamp.stepped import SteppedState, solve_bisection, solve_stepped
 from clamp3d.clamp.steps import (
+    Closing,
     Log,
     Meetings,
     approach_line,
     close_splints,
     first_touch,
     insert_jumper,
-    section_poses,
     tighten_nut,
 )
 from clamp3d.errors import InputError, SolverError
@@ -51,21 +51,57 @@ _WIDEST = 1000.0
 """The most that a clamp is opened further than it needs, mm: descents are short."""
 
 
+class Options(TypedDict, total=False):
+    """Keywords of `assemble`, all of them optional."""
+
+    sequence: str | None
+    solver: Solver
+    step: float
+    tilt_step: float
+    open_by: float
+    open_tilt: float
+    others: bool
+    on_waypoint: Callable[[Waypoint], None] | None
+    progress: Callable[[int, float], None] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Settings:
+    """`Options` with their defaults. Raises InputError for a value that breaks its rule."""
+
+    sequence: str | None = None
+    solver: Solver = "exact"
+    step: float = STEP
+    tilt_step: float = TILT_STEP
+    open_by: float = 0.0
+    open_tilt: float = 0.0
+    others: bool = False
+    on_waypoint: Callable[[Waypoint], None] | None = None
+    progress: Callable[[int, float], None] | None = None
+
+    def __post_init__(self) -> None:
+        choice("solver", self.solver, ("exact", "stepped", "bisection"))
+        for name in ("step", "tilt_step", "open_by", "open_tilt"):
+            title = "tilt step" if name == "tilt_step" else name
+            object.__setattr__(self, name, number(title, getattr(self, name)))
+        if not 0.0 <= self.open_by <= _WIDEST:
+            raise InputError(f"open_by must be between 0 and {_WIDEST:g} mm, got {self.open_by:g}")
+        function("on_waypoint", self.on_waypoint)
+        function("progress", self.progress)
+
+    @property
+    def resolution(self) -> float:
+        """Gaps in mm up to which the solver cannot close further."""
+        return {"exact": CONTACT, "stepped": self.step, "bisection": 10.0 * RESOLUTION}[self.solver]
+
+
 def assemble(
     clamp: Clamp | str | Path = "reference",
     model: ContactModel | None = None,
     *,
     line: WireSize | None = None,
     jumper: WireSize | None = None,
-    sequence: str | None = None,
-    solver: Solver = "exact",
-    step: float = STEP,
-    tilt_step: float = TILT_STEP,
-    open_by: float = 0.0,
-    open_tilt: float = 0.0,
-    others: bool = False,
-    on_waypoint: Callable[[Waypoint], None] | None = None,
-    progress: Callable[[int, float], None] | None = None,
+    **options: Unpack[Options],
 ) -> Assembly:
     """Assemble a clamp with its wires and measure where every part ends up.
 
@@ -86,8 +122,7 @@ def assemble(
     open_by, open_tilt : float
         How much further than needed the clamp stands open before it comes in; mm and rad.
     others : bool
-        Also find the other states that closing can end in, how far the start may tilt before one of them is reached,
-        and the distance with the joints' play (exact solver only).
+        Also find the other states that closing can end in, and the distance with the joints' play (exact solver only).
     on_waypoint : callable, optional
         Called with every `Waypoint` as it is reached.
     progress : callable, optional
@@ -112,109 +147,104 @@ def assemble(
     >>> assembly.status, round(assembly.distance, 3)
     ('clamped', 31.53)
     """
-    clamp = load_clamp(clamp, line=line, jumper=jumper)
-    if sequence is not None:
-        clamp = replace(clamp, sequence=text("sequence", sequence))
-    model = Cas() if model is None else model
-    choice("solver", solver, ("exact", "stepped", "bisection"))
+    clamp, model, settings = load_clamp(clamp, line=line, jumper=jumper), model or Cas(), _Settings(**options)
+    if settings.sequence is not None:
+        clamp = replace(clamp, sequence=text("sequence", settings.sequence))
     check_model(model)
-    step, tilt_step = number("step", step), number("tilt step", tilt_step)
-    open_by, open_tilt = number("open_by", open_by), number("open_tilt", open_tilt)
-    if not 0.0 <= open_by <= _WIDEST:
-        raise InputError(f"open_by must be between 0 and {_WIDEST:g} mm, got {open_by:g}")
-    function("on_waypoint", on_waypoint)
-    function("progress", progress)
-    steps = parse_sequence(clamp.sequence)
-    names, published = [step.name for step in steps], as_published(steps)
-    section = Section(clamp, model)
-    log = Log(section, on_waypoint)
-    opened = section.open_state(section.open_distance() + open_by, open_tilt)
-    start = open_start(section, open_by=open_by, open_tilt=open_tilt)
-    if published:
-        approach_line(section, opened, start, names[0], log)
-        insert_jumper(section, opened, start, names[1], log)
-    final: FinalState | SteppedState
-    met: Meetings = []
-    if solver == "exact":
-        final = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
-        held = final.held
-        met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
-    else:
-        if solver == "stepped":
-            final = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
-        else:
-            final = solve_bisection(section, resolution=RESOLUTION, step=step, tilt_step=tilt_step, progress=progress)
-        held = final.q
-        met = first_touch(section, start, float(start[D] - held[D]))
-    by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
-    taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
-    if published:
-        close_splints(section, start, held, by_hand, names[2], log)
-        travel = tighten_nut(section, start, held, final.q, taken, names[3], log)
-    else:
-        travel = follow(section, steps, Closing(start, held, final.q, by_hand, taken), log)
+    steps, section = parse_sequence(clamp.sequence), Section(clamp, model)
+    log = Log(section, settings.on_waypoint)
+    closing, final = _close(section, settings)
+    travel = _play(section, steps, closing, settings, log)
     poses = section_poses(section, final.q)
     contacts = log.contacts(poses)
-    resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
-    found = {(e.a, e.b) for e in log.events}
-    closes = next(step.name for step in steps if step.kind != "bring")
-    for c in contacts:  # what touches in the end though no force says when
-        if c.gap <= resolution and (c.declared or c.type) not in (0, 1) and (c.a, c.b) not in found:
-            log.events.append(Event(closes, c.a, c.b, c.relation, c.point, float(start[D] - held[D])))
-    log.events.sort(key=lambda e: (names.index(e.step), e.travel))
+    _add_silent_contacts(log, steps, closing, contacts, settings.resolution)
     queries = section.queries.contact  # what the assembly itself asked, without the other equilibria
-    proof = (final.violation, final.optimality) if isinstance(final, FinalState) else (None, None)
-    motion_steps = final.motion_steps if isinstance(final, SteppedState) else 0
+    q, proven = closing.start, final if isinstance(final, FinalState) else None
     return Assembly(
         clamp=clamp,
         model=model,
-        solver=solver,
-        status=final_status(section, final, resolution, contacts),
+        solver=settings.solver,
+        closing_status=closing_status(section, final, settings.resolution),
         distance=section.splint_distance(final.q),
         closing=float(final.q[D]),
         tilt=float(final.q[S]) / section.lever,
         turns=clamp.bolt.turn(travel) / (2.0 * math.pi),
         poses=poses,
         contacts=contacts,
-        seats=seats(contacts, resolution),
         events=tuple(log.events),
         path=tuple(log.path),
         undeclared=_undeclared(clamp, contacts, log),
-        resolution=resolution,
-        violation=proof[0],
-        optimality=proof[1],
-        work=Work(len(PARTS), len(PAIRS), queries, motion_steps, model.meshes_built),
-        start=Start(float(start[D]), open_tilt, (float(start[0]), float(start[1])), (float(start[2]), float(start[3]))),
-        **(_solved(section, final, others, open_by, open_tilt) if isinstance(final, FinalState) else {}),
+        resolution=settings.resolution,
+        violation=proven.violation if proven else None,
+        optimality=proven.optimality if proven else None,
+        work=Work(len(PARTS), len(PAIRS), queries, getattr(final, "motion_steps", 0), model.meshes_built),
+        start=Start(float(q[D]), settings.open_tilt, (float(q[0]), float(q[1])), (float(q[2]), float(q[3]))),
+        forces=contact_forces(section, proven) if proven else (),
+        others=_others(section, proven) if proven and settings.others else None,
+        with_play=_with_play(section, proven) if proven and settings.others else None,
     )
 
 
-def _solved(section: Section, final: FinalState, others: bool, open_by: float, open_tilt: float) -> dict[str, Any]:
-    """What only an exact answer has: forces, second order in space and, if asked, what else closing could end in."""
-    found: dict[str, Any] = {"forces": contact_forces(section, final), "out_of_plane": out_of_plane(section, final)}
-    if others:
-        found["others"] = _others(section, final)
-        found["start_tilts"] = start_tilts(section, final, open_by=open_by, open_tilt=open_tilt)
-        found["with_play"] = _with_play(section, final)
-    return found
+def _close(section: Section, settings: _Settings) -> tuple[Closing, FinalState | SteppedState]:
+    """Close the clamp: the states on the way, and the last one."""
+    start = open_start(section, open_by=settings.open_by, open_tilt=settings.open_tilt)
+    met: Meetings = []
+    final: FinalState | SteppedState
+    if settings.solver == "exact":
+        final = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
+        held, met = final.held, [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
+    else:
+        moves: Any = {"step": settings.step, "tilt_step": settings.tilt_step, "progress": settings.progress}
+        if settings.solver == "stepped":
+            final = solve_stepped(section, **moves)
+        else:
+            final = solve_bisection(section, resolution=RESOLUTION, **moves)
+        held = final.q
+        met = first_touch(section, start, float(start[D] - held[D]))
+    by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
+    taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
+    return Closing(start, held, final.q, by_hand, taken), final
 
 
-def _with_play(section: Section, final: FinalState) -> dict[str, float | None] | None:
-    """Distances that the clamp closes to from its final state when its joints have play, one after the other."""
+def _play(section: Section, steps: tuple[Step, ...], closing: Closing, settings: _Settings, log: Log) -> float:
+    """Play the steps of the sequence; returns the way that the nut has gone when it is tight, mm."""
+    if not as_published(steps):
+        return follow(section, steps, closing, log)
+    line, jumper, close, tighten = (step.name for step in steps)
+    opened = section.open_state(section.open_distance() + settings.open_by, settings.open_tilt)
+    approach_line(section, opened, closing.start, line, log)
+    insert_jumper(section, opened, closing.start, jumper, log)
+    close_splints(section, closing.start, closing.held, closing.by_hand, close, log)
+    return tighten_nut(section, closing, tighten, log)
+
+
+def _add_silent_contacts(
+    log: Log, steps: tuple[Step, ...], closing: Closing, contacts: Sequence[Contact], resolution: float
+) -> None:
+    """Add to the events what touches in the end though no force says when, and put them in order."""
+    names, logged = [step.name for step in steps], {(e.a, e.b) for e in log.events}
+    closes = next(step.name for step in steps if step.kind != "bring")
+    for c in contacts:
+        if c.gap <= resolution and (c.declared or c.type) not in (0, 1) and (c.a, c.b) not in logged:
+            log.events.append(Event(closes, c.a, c.b, c.relation, c.point, float(closing.start[D] - closing.held[D])))
+    log.events.sort(key=lambda e: (names.index(e.step), e.travel))
+
+
+def _with_play(section: Section, final: FinalState) -> tuple[Play, ...]:
+    """What the clamp closes to from its final state when its joints have play, one after the other."""
     if section.free != HELD:
-        return None
-    found: dict[str, float | None] = {}
+        return ()
+    ends = []
     for joints in (("hole",), ("hole", "saddle"), ("hole", "saddle", "washer")):
-        clamp = replace(section.clamp, joints=Joints(**dict.fromkeys(joints, True)))
-        free = Section(clamp, section.model)
+        free = Section(replace(section.clamp, joints=Joints(**dict.fromkeys(joints, True))), section.model)
         try:
             end = solve_final_state(free, final.q)
-        except SolverError:
-            found[", ".join(joints)] = None
+        except SolverError as error:
+            ends.append(Play(joints, f"not proven: {error}", None))
             continue
-        clamped = final_status(free, end) == CLAMPED
-        found[", ".join(joints)] = free.splint_distance(end.q) if clamped else None
-    return found
+        status = closing_status(free, end)
+        ends.append(Play(joints, status.text, free.splint_distance(end.q) if status.clamped else None))
+    return tuple(ends)
 
 
 def _undeclared(clamp: Clamp, contacts: Sequence[Contact], log: Log) -> tuple[Difference, ...]:
@@ -227,8 +257,8 @@ def _undeclared(clamp: Clamp, contacts: Sequence[Contact], log: Log) -> tuple[Di
         if c.declared == 0 and c.type
     }
     waiting = [pair for pair in PAIRS if clamp.connection(*pair) == 0 and pair not in touching]
-    met = meetings(clamp, log.path, waiting, log.cache)
-    on_the_way = (Difference(*pair, 0, contact_type(pair), None, None, where) for pair, where in met.items())
+    met = meetings(clamp, log.path, waiting)
+    on_the_way = (Difference(*pair, 0, 2, None, None, where) for pair, where in met.items())
     return (*touching.values(), *on_the_way)
 
 
@@ -239,10 +269,9 @@ def _others(section: Section, final: FinalState) -> tuple[Equilibrium, ...]:
             distance=section.splint_distance(state.q),
             closing=float(state.q[D]),
             tilt=float(state.q[S]) / section.lever,
-            status=final_status(section, state),
+            status=closing_status(section, state).text,
             detail=describe(state, section.escaped(state.q)),
             is_equilibrium=not section.escaped(state.q),
-            out_of_plane=out_of_plane(section, state),
         )
         for state in equilibria(section)
         if not same(state, final)

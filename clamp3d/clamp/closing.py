@@ -13,17 +13,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq, nnls
 
 from clamp3d.clamp.curvature import lagrangian_hessian
+from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
-from clamp3d.clamp.section import SIZE, SPLINTS, WIRES, D, Gaps, S, Section, U, W
-from clamp3d.core.linear import dot, eigh
+from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, U, V, W
 from clamp3d.core.pose import Array
-from clamp3d.core.roots import root
 from clamp3d.errors import SolverError
 
 STRIDE = 0.01
@@ -49,8 +48,8 @@ _FULL = 1e-9
 """Clearance in parts of the groove's radius below which a wire fills it: there is no round to roll in."""
 _SHORTEST = 1e-9
 """Shortest stride, in parts of the half width."""
-_GROOVES = {(splint, wire): 2 * i + k for i, wire in enumerate(WIRES) for k, splint in enumerate(SPLINTS)}
-"""Their numbers in `Section.grooves`, all in one."""
+_NONE = 1e-12
+"""What is left of a distance of 1 where there is no step."""
 
 
 def open_start(section: Section, *, open_by: float = 0.0, open_tilt: float = 0.0) -> Array:
@@ -111,7 +110,7 @@ def descend(
             return q
         h = min(longest / speed, 4.0 * h)
         if not force.any():  # nothing is pushed: no gap closes faster than the motion goes
-            closing = dot(gaps.gradient, goal) > 0.0
+            closing = gaps.gradient @ goal > 0.0
             h = max(h, float(gaps.value[closing].min(initial=math.inf))) if closing.any() else h
     raise SolverError(
         f"closing takes more than {most or _STEPS} steps of {longest:.3g} mm: the down splint's width "
@@ -135,8 +134,8 @@ class _Motion:
         """
         longest, moving, n = self.longest, self.moving, len(self.moving)
         target = q - h * self.goal
-        at, force = np.ascontiguousarray(q, np.float64), np.zeros(len(gaps.value))
-        apart = np.zeros(len(force), np.int64)
+        at, force = q, np.zeros(len(gaps.value))
+        apart = np.zeros(len(force), np.bool_)
         if without is not None:
             apart[:-1] = [pair == without for pair in gaps.pair[:-1]]
         for k in range(_ROUNDS):
@@ -155,7 +154,7 @@ class _Motion:
             gaps, at = self.section.gaps(new), new
             if len(gaps.value) != len(force):
                 return None
-            least = float(gaps.value.min() if without is None else gaps.value[apart == 0].min())
+            least = float(gaps.value.min() if without is None else gaps.value[~apart].min())
             if (np.abs(move).max() <= _SETTLED * longest and least >= -_OVERLAP * longest) or (
                 not force.any() and least >= 0.0
             ):
@@ -163,19 +162,22 @@ class _Motion:
         return None
 
     def _move(
-        self, at: Array, target: Array, bend: Array, gaps: Gaps, apart: NDArray[np.int64], h: float
+        self, at: Array, target: Array, bend: Array, gaps: Gaps, apart: NDArray[np.bool_], h: float
     ) -> tuple[Array, Array] | None:
-        """Move (n,) of a round and forces (k,) of the gaps; None where they cannot open. See `kernel_closing`."""
-        from clamp3d.clamp.kernel_closing import move  # compiled on first use
+        """Move (n,) of a round and forces (k,) of the gaps; None where they cannot open.
 
-        k, n = len(gaps.value), len(self.moving)
-        x, force, square = np.empty(n), np.empty(k), np.empty((2, n, n))
-        work = square[0], np.empty((k, n)), square[1], np.empty((n + 1, k)), np.empty((n + 1, k + 1))
-        given = at, target, self.moving, bend, h, 2.0 * self.longest, gaps.value, gaps.gradient, apart
-        found = move(*given, x, force, *work, np.empty((7, n + k + 1)))
-        if found < 0:
-            raise SolverError(f"a step of the closing path does not end: {k} gaps, {n} coordinates")
-        return (x, force) if found else None
+        Gaps that are ``apart`` do not count, nor those that no coordinate changes, nor those further than two strides
+        and what a step of h closes.
+        """
+        moving, forces = self.moving, np.zeros(len(gaps.value))
+        A, H = gaps.gradient[:, moving], np.eye(len(moving)) + h * bend
+        near = ~apart & A.any(axis=1) & (gaps.value <= 2.0 * self.longest + np.abs(gaps.gradient[:, D]) * h)
+        least = _least_move(H, (at - target)[moving], A[near], gaps.value[near], h)
+        if least is None:
+            return None
+        move, multipliers = least
+        forces[near] = multipliers / h
+        return move, forces
 
     def meeting(self, q: Array, gaps: Gaps, h: float, pair: Pair, new: Array) -> Array:
         """The state in a step of ``h`` from q to ``new`` at which ``pair`` meets: the step without it, cut short."""
@@ -183,36 +185,60 @@ class _Motion:
 
         def gap(part: float) -> float:
             if part not in states:
-                found = self.step(q, gaps, part * h, without=pair)
-                states[part] = new if found is None else found[0]
+                step = self.step(q, gaps, part * h, without=pair)
+                states[part] = new if step is None else step[0]
             at = self.section.gaps(states[part])
             return float(min(v for v, p in zip(at.value[:-1], at.pair[:-1], strict=True) if p == pair))
 
         if gap(0.0) <= 0.0:
             return q
-        return states[root(gap, 0.0, 1.0, xtol=1e-9)] if gap(1.0) < 0.0 else new
+        return states[float(brentq(gap, 0.0, 1.0, xtol=1e-9))] if gap(1.0) < 0.0 else new
 
     def _bend(self, q: Array, gaps: Gaps, force: Array, *, exact: bool) -> Array:
         """Curvature of the loaded gaps: on a short step what keeps a wire, or the round back, in the round of its arc
         (force over radius difference), on a long one all there is, by differences."""
         section, moving = self.section, self.moving
         if exact:
-            size, axes = eigh(lagrangian_hessian(section, q, gaps, force)[moving[:, None], moving])
-            return np.asarray(dot(axes * np.maximum(size, 0.0), axes.T))
-        from clamp3d.clamp.kernel_closing import bends  # compiled on first use
+            size, axes = np.linalg.eigh(lagrangian_hessian(section, q, gaps, force)[np.ix_(moving, moving)])
+            return np.asarray(axes * np.maximum(size, 0.0) @ axes.T)
+        bend = np.zeros((SIZE, SIZE))
+        bend[W, W] = max(0.0, section.lift(float(q[W]))[2]) * force[-1] * gaps.normal[-1, 1]
+        for k in np.flatnonzero(force):
+            (splint, wire), feature = gaps.pair[k], gaps.feature[k]
+            if feature == "arc" and wire in WIRES:
+                along, slack = self._along(q, gaps.gradient[k], splint, wire)
+                bend += force[k] / slack * np.outer(along, along)
+        return bend[np.ix_(moving, moving)]
 
-        found = np.zeros((SIZE, SIZE))
-        found[W, W] = max(0.0, section.lift(float(q[W]))[2]) * force[-1] * gaps.normal[-1, 1]
-        angle = float(q[S]) / section.lever
-        named = zip(gaps.pair, gaps.feature, strict=True)
-        groove = [_GROOVES.get(pair, -1) if name == "arc" else -1 for pair, name in named]
-        turned = math.cos(angle), math.sin(angle), section.lever
-        bends(gaps.gradient, force, np.array(groove, np.int64), self._rounds, *turned, np.empty(SIZE), found)
-        return found[moving[:, None], moving]
+    def _along(self, q: Array, gradient: Array, splint: PartName, wire: PartName) -> tuple[Array, float]:
+        """How the wire moves along its groove's arc by the state (10,), and the difference of the radii, mm."""
+        pair, i, angle = self.section.pairs[splint, wire], 2 * WIRES.index(wire), float(q[S]) / self.section.lever
+        tx, ty, along = -gradient[i + 1], gradient[i], np.zeros(SIZE)
+        along[i], along[i + 1] = tx, ty
+        if splint == "P2":
+            c, s, u, v = math.cos(angle), math.sin(angle), pair.T_a_groove[0, 3], -pair.T_a_groove[2, 3]
+            along[D], along[U] = -ty, ty
+            along[S] = (ty * (u * c + v * s) - tx * (v * c - u * s)) / self.section.lever
+            along[B] = along[V] = along[W] = -tx
+        return along, max(abs(pair.groove.radius - pair.cylinder.radius), _FULL * pair.groove.radius)
 
-    @cached_property
-    def _rounds(self) -> Array:
-        """Difference of the radii and centre in the splint's axes (4, 3) of each groove and its wire, mm."""
-        grooves = self.section.grooves.reshape(4, -1)
-        R, r = grooves[:, 0], grooves[:, 3]
-        return np.column_stack([np.maximum(np.abs(R - r), _FULL * R), grooves[:, 5:7]])
+
+def _least_move(H: Array, x: Array, A: Array, value: Array, scale: float) -> tuple[Array, Array] | None:
+    """The y with the least y . H y / 2 + x . y and A y >= -value, with the multipliers; None where no y is so.
+
+    A least-distance problem, solved by non-negative least squares [Lawson & Hanson, Solving Least Squares Problems,
+    1974, chapter 23]; ``scale`` is about the length of y.
+    """
+    L = np.linalg.cholesky(H)
+    turned = np.linalg.solve(L, np.column_stack([x, A.T]))
+    z, G = turned[:, 0], turned[:, 1:]
+    M = np.vstack([G, (z @ G - value) / scale])
+    try:
+        u = nnls(M, np.append(np.zeros(len(x)), 1.0))[0] if len(value) else np.zeros(0)
+    except RuntimeError:
+        raise SolverError(f"a step of the closing path does not end: {len(value)} gaps, {len(x)} coordinates") from None
+    rest = 1.0 - float(M[-1] @ u)
+    if not rest > _NONE:
+        return None
+    u *= scale / rest
+    return np.linalg.solve(L.T, G @ u - z), u

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,17 +12,17 @@ import numpy as np
 
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.dimensions import Clamp, ConnectionType, PartName
-from clamp3d.clamp.features import groove_pairs
-from clamp3d.clamp.matrix import ARC_PAIRS, PAIRS, SCREW, Pair, contact_type, plain
+from clamp3d.clamp.matrix import PAIRS, Pair, plain
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.scene import CONTACT, clamp_scene
-from clamp3d.clamp.section import SPLINTS, WIRES
-from clamp3d.collide.distance import Distance, measure
+from clamp3d.clamp.scene import clamp_scene
+from clamp3d.clamp.section import SPLINTS
+from clamp3d.clamp.surfaces import SURFACES, TOUCHING, Surface, surfaces_at
+from clamp3d.collide.answer import Distance
+from clamp3d.collide.distance import measure
 from clamp3d.collide.model import ModelCache
 from clamp3d.core.arc_circle import classify_arc_circle
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, SectionPose, inverse
-from clamp3d.core.profile import Arc, Edge
+from clamp3d.core.profile import Arc
 from clamp3d.core.rectangle import Rectangle, hole_bolt
 from clamp3d.core.shapes import Solid
 
@@ -33,10 +33,10 @@ _MODEL = 0.1
 NONE = "none"
 """Relation of parts that do not touch and for which the paper has no word."""
 
-_SEATS: tuple[Pair, ...] = (("P1", "P5"), ("P3", "P4"))
-"""Pairs whose flat faces meet: the nut on the up splint, the saddle on the bolt's head."""
-_HOLES: tuple[Pair, ...] = (("P1", "P4"), ("P2", "P4"))
-"""Pairs of Table 2: the bolt in the hole of each splint."""
+SCREW_JOINT = "screw joint"
+"""Relation of a bolt and its nut."""
+_PARALLEL = 1e-8
+"""Turn of two flat faces in rad up to which they meet as faces."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,17 +91,6 @@ class Contact:
         return data | {"point": distance["point_a"]} | distance
 
 
-@dataclass(frozen=True, slots=True)
-class Seat:
-    """A wire in a groove: ``seated`` if it touches the groove's arc; ``gap`` in mm; ``detail`` in words."""
-
-    splint: PartName
-    wire: PartName
-    seated: bool
-    gap: float
-    detail: str
-
-
 def measure_contacts(
     clamp: Clamp,
     poses: Poses,
@@ -132,71 +121,103 @@ def measure_contacts(
     [(2, 'seat')]
     """
     scene = clamp_scene(clamp, {part: pose.T() for part, pose in poses.items()})
-    solids = parts(clamp)
-    found = []
+    solids, contacts = parts(clamp), []
     for (a, b), d in measure(scene, pairs, model=model, cache=cache).items():
-        relation = _relation(clamp, poses, (a, b), d)
-        kind: ConnectionType = contact_type((a, b)) if d.value <= CONTACT and relation != NONE else 0
-        names = [
-            surface_name(
-                solids[part],
-                dot(inverse(poses[part].T()), np.array([*point, 1.0])),
-                CONTACT if d.estimate is None else _MODEL,
-            )
-            for part, point in ((a, d.point_a), (b, d.point_b))
-            if point is not None
-        ]
-        feature = "thread" if (a, b) == SCREW else min(names, key=_SURFACES.index, default="inside")
-        found.append(Contact(a, b, clamp.connection(a, b), kind, relation, d, feature))
-    return tuple(found)
+        tolerance = TOUCHING if d.estimate is None else _MODEL
+        first = _Side.at(solids[a], poses[a].T(), d.point_a, tolerance)
+        second = _Side.at(solids[b], poses[b].T(), d.point_b, tolerance)
+        kind, relation = _relation(clamp, poses, first, second, d.value)
+        names = [surface.name for surface in (*first.surfaces, *second.surfaces)]
+        feature = "thread" if relation == SCREW_JOINT else min(names, key=SURFACES.index, default="inside")
+        contacts.append(Contact(a, b, clamp.connection(a, b), kind, relation, d, feature))
+    return tuple(contacts)
 
 
 def overlap(contact: Contact) -> str:
-    """'P4 overlaps P6 by 1.2 mm' where two parts certainly overlap by more than `CONTACT`, else nothing."""
-    if not contact.gap < -CONTACT:
+    """'P4 overlaps P6 by 1.2 mm' where two parts certainly overlap by more than `TOUCHING`, else nothing."""
+    if not contact.gap < -TOUCHING:
         return ""
-    at_least = "" if contact.distance.uncertainty <= CONTACT else "at least "
+    at_least = "" if contact.distance.uncertainty <= TOUCHING else "at least "
     return f"{contact.a} overlaps {contact.b} by {at_least}{-contact.gap:.4g} mm"
 
 
-def seats(contacts: Iterable[Contact], tolerance: float) -> tuple[Seat, ...]:
-    """Whether each wire lies in each of its two grooves; a gap up to ``tolerance`` mm touches."""
-    by_pair = {(c.a, c.b): c for c in contacts}
-    found = []
-    for splint, wire in itertools.product(SPLINTS, WIRES):
-        contact = by_pair[splint, wire]
-        touching = contact.gap <= tolerance
-        seated = touching and contact.feature == "arc"
-        detail = "seated in the groove" if seated else f"rests on the {contact.feature}" if touching else "loose"
-        found.append(Seat(splint, wire, seated, contact.gap, detail))
-    return tuple(found)
+@dataclass(frozen=True, slots=True)
+class _Side:
+    """One of two parts that are measured: its solid, its pose (4, 4) in the world, and its nearest surfaces."""
+
+    solid: Solid
+    T: Array
+    surfaces: tuple[Surface, ...]
+
+    @classmethod
+    def at(cls, solid: Solid, T: Array, point: Array | None, tolerance: float) -> _Side:
+        """With the surfaces at a point (3,) of the world."""
+        local = None if point is None else inverse(T) @ np.array([*point, 1.0])
+        return cls(solid, T, () if local is None else surfaces_at(solid, local, tolerance))
+
+    def named(self, *names: str) -> Iterator[Surface]:
+        """Its surfaces of these names."""
+        return (surface for surface in self.surfaces if surface.name in names)
 
 
-def _relation(clamp: Clamp, poses: Poses, pair: Pair, d: Distance) -> str:
-    """What the paper calls it, or the plainest word where it has none."""
-    gap = d.value
-    if pair in ARC_PAIRS:
-        return _arc_relation(clamp, poses, pair, gap)
-    if pair == SCREW:
-        return "screw joint" if poses["P4"].y < poses["P5"].y + clamp.nut.height else NONE
-    if gap > CONTACT:
+def _relation(clamp: Clamp, poses: Poses, a: _Side, b: _Side, gap: float) -> tuple[ConnectionType, str]:
+    """Type of the connection by what touches, and what the paper calls it, or the plainest word where it has none."""
+    if _threaded(a, b) or _threaded(b, a):
+        return 1, SCREW_JOINT
+    for arc, back in ((a, b), (b, a)):
+        for concave, convex in itertools.product(arc.named("arc", "lip"), back.named("round face")):
+            if gap <= TOUCHING or clamp.connection(a.solid.name, b.solid.name) == 3:
+                return (3 if gap <= TOUCHING else 0), _arc_relation(arc, concave, back, convex, gap)
+    if gap > TOUCHING:
+        return 0, NONE
+    if gap < -TOUCHING:
+        return 2, "overlap"
+    if any(_face_each_other(a, x, b, y) for x, y in itertools.product(a.surfaces, b.surfaces)):
+        return 2, "seat"
+    if a.solid.name in SPLINTS and any(a.named("hole")) and any(b.named("round face")):
+        words = _hole_relation(clamp, poses, a.solid.name)
+        return 2, "contact" if words == NONE else words
+    return 2, "contact"
+
+
+def _arc_relation(arc: _Side, concave: Surface, back: _Side, convex: Surface, gap: float) -> str:
+    """Column of Table 3 for a concave arc and a round face along it."""
+    groove, circle = concave.edge, convex.edge
+    if not (isinstance(groove, Arc) and isinstance(circle, Arc)):
         return NONE
-    if gap < -CONTACT:
-        return "overlap"
-    if pair in _SEATS or (pair == ("P1", "P2") and poses["P1"].angle == poses["P2"].angle):
-        return "seat"
-    words = _hole_relation(clamp, poses, pair[0]) if pair in _HOLES else NONE
-    return "contact" if words == NONE else words
+    centre = convex.extrusion.frame @ np.array([*circle.centre, 0.0])
+    T = inverse(arc.T) @ back.T
+    a, b, _ = (T[:3, :3] @ centre + T[:3, 3]) @ concave.extrusion.frame
+    x, y = float(a) - groove.centre[0], float(b) - groove.centre[1]
+    deepest = 0.5 * (groove.start_angle + groove.end_angle)
+    c, s = -math.sin(deepest), math.cos(deepest)  # turned until the deepest point is at -y
+    half = 0.5 * abs(groove.sweep)
+    x, y = c * x + s * y, c * y - s * x
+    return classify_arc_circle(gap, groove.radius, half, circle.radius, x, y, tolerance=TOUCHING).value
 
 
-def _arc_relation(clamp: Clamp, poses: Poses, pair: Pair, gap: float) -> str:
-    """Column of Table 3 for a cylinder and the arc that it lies in."""
-    arcs = groove_pairs(clamp)
-    arc = arcs[pair] if pair in arcs else arcs[pair[1], pair[0]]
-    T = dot(dot(inverse(dot(poses[arc.a].T(), arc.T_a_groove)), poses[arc.b].T()), arc.T_b_cylinder)
-    groove, radius = arc.groove, arc.cylinder.radius
-    x, y = float(T[0, 3]), float(T[1, 3])
-    return classify_arc_circle(gap, groove.radius, groove.half_angle, radius, x, y, tolerance=CONTACT).value
+def _face_each_other(a: _Side, x: Surface, b: _Side, y: Surface) -> bool:
+    """Whether two surfaces are flat and their normals opposite, to what a part's size makes of `TOUCHING`."""
+    if x.normal is None or y.normal is None:
+        return False
+    return bool(np.linalg.norm(a.T[:3, :3] @ x.normal + b.T[:3, :3] @ y.normal) <= _PARALLEL)
+
+
+def _threaded(bolt: _Side, nut: _Side) -> bool:
+    """Whether a round bar of one part stands in a round hole of the other that it fills: threads are not drawn."""
+    T = inverse(nut.T) @ bolt.T
+    for bar, hole in itertools.product(bolt.solid.bodies, nut.solid.holes):
+        circle, bore = bar.profile.edges[0], hole.profile.edges[0]
+        if not (isinstance(circle, Arc) and isinstance(bore, Arc)) or bar.axis != hole.axis:
+            continue
+        frame = hole.frame
+        ends = [frame.T @ (T[:3, :3] @ frame @ np.array([*circle.centre, z]) + T[:3, 3]) for z in (bar.start, bar.end)]
+        filled = abs(circle.radius - bore.radius) <= TOUCHING
+        coaxial = all(math.dist(end[:2], bore.centre) <= TOUCHING for end in ends)
+        low, high = sorted(float(end[2]) for end in ends)
+        if filled and coaxial and low < hole.end and high > hole.start:
+            return True
+    return False
 
 
 def _hole_relation(clamp: Clamp, poses: Poses, splint: PartName) -> str:
@@ -212,52 +233,4 @@ def _hole_relation(clamp: Clamp, poses: Poses, splint: PartName) -> str:
         bottom = math.sqrt(down.back_radius**2 - half_width**2)
     centre = poses[splint].point(middle, 0.5 * (top + bottom))
     hole = Rectangle(*centre, half_width, 0.5 * (bottom - top), poses[splint].angle)
-    return hole_bolt(hole, bolt, tolerance=CONTACT).relation.value
-
-
-_SURFACES = ("lip", "arc", "hole", "flat face", "round face", "end face")
-"""Names of surfaces; of two that touch the one that comes first names the contact."""
-
-
-def surface_name(solid: Solid, point: Array, tolerance: float = CONTACT) -> str:
-    """The surface of a solid that a point (3,) in its own frame is nearest to; a lip is where a concave arc ends.
-
-    Of surfaces that are as near to within ``tolerance`` mm the first of `_SURFACES` counts.
-
-    >>> from clamp3d.core.shapes import cylinder
-    >>> surface_name(cylinder(5.0, 20.0), np.array([5.0, 0.0, 3.0]))
-    'round face'
-    """
-    near: list[tuple[float, str]] = []
-    for extrusion in (*solid.bodies, *solid.holes):
-        hole = extrusion in solid.holes
-        a, b, along = (float(v) for v in dot(np.asarray(point)[:3], extrusion.frame))
-        for edge in extrusion.profile.edges:
-            near.append((_edge_distance(edge, a, b), "hole" if hole else _edge_name(edge, a, b)))
-        if not hole:
-            end = min(abs(along - extrusion.start), abs(along - extrusion.end))
-            near.append((end, "end face" if extrusion.axis == "Y" else "flat face"))
-    least = min(distance for distance, _ in near)
-    return min((name for distance, name in near if distance <= least + tolerance), key=_SURFACES.index)
-
-
-def _edge_distance(edge: Edge, a: float, b: float) -> float:
-    """How far a point (a, b) is from an edge of an outline, mm."""
-    if isinstance(edge, Arc):
-        da, db = a - edge.centre[0], b - edge.centre[1]
-        low, high = sorted((edge.start_angle, edge.end_angle))
-        if (math.atan2(db, da) - low) % (2.0 * math.pi) <= high - low:
-            return abs(math.hypot(da, db) - edge.radius)
-        return min(math.dist((a, b), edge.start), math.dist((a, b), edge.end))
-    (a0, b0), (a1, b1) = edge.start, edge.end
-    t = ((a - a0) * (a1 - a0) + (b - b0) * (b1 - b0)) / ((a1 - a0) ** 2 + (b1 - b0) ** 2)
-    t = min(max(t, 0.0), 1.0)
-    return math.dist((a, b), (a0 + t * (a1 - a0), b0 + t * (b1 - b0)))
-
-
-def _edge_name(edge: Edge, a: float, b: float) -> str:
-    if not isinstance(edge, Arc):
-        return "flat face"
-    if edge.sweep > 0.0:
-        return "round face"
-    return "lip" if min(math.dist((a, b), edge.start), math.dist((a, b), edge.end)) <= CONTACT else "arc"
+    return hole_bolt(hole, bolt, tolerance=TOUCHING).relation.value

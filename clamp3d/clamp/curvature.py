@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.clamp.section import SIZE, SPLINTS, WIRES, Gaps, Section
-from clamp3d.core.linear import dot, eigh, svd
 from clamp3d.core.pose import Array
 
 LEVEL = 1e-6
@@ -32,13 +31,13 @@ def least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array, 
     free = touched(section, gaps, strong)
     if not len(free):
         return np.inf
-    _, sizes, rows = svd(A[:, free])
+    _, sizes, rows = np.linalg.svd(A[:, free])
     tangent = rows[int((sizes > 1e-9).sum()) :]
     if not len(tangent):
         return np.inf
     hessian = lagrangian_hessian(section, q, gaps, multipliers)[np.ix_(free, free)]
-    reduced = dot(dot(tangent, hessian), tangent.T)
-    least = float(eigh(reduced)[0][0])
+    reduced = tangent @ hessian @ tangent.T
+    least = float(np.linalg.eigvalsh(reduced)[0])
     weak = np.flatnonzero((np.abs(gaps.value) <= tolerance) & (multipliers == 0.0))
     if least >= -LEVEL or not len(weak):
         return least
@@ -51,7 +50,7 @@ def least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array, 
     else:
         motions = np.random.default_rng(0).normal(size=(20_000, m))
         motions /= np.linalg.norm(motions, axis=1)[:, None]
-    opens = dot(dot(gaps.gradient[np.ix_(weak, free)], tangent.T), motions.T)
+    opens = gaps.gradient[np.ix_(weak, free)] @ tangent.T @ motions.T
     motions = motions[(opens >= -1e-7).all(axis=0)]
     return float(np.einsum("ni,ij,nj->n", motions, reduced, motions).min(initial=np.inf))
 
@@ -79,7 +78,7 @@ def lagrangian_hessian(section: Section, q: Array, gaps: Gaps, force: Array) -> 
     for j in touched(section, gaps, rows):
         e = np.zeros(SIZE)
         e[j] = h
-        H[j] -= dot(force[rows], section.gaps(q + e).gradient[rows] - section.gaps(q - e).gradient[rows]) / (2.0 * h)
+        H[j] -= force[rows] @ (section.gaps(q + e).gradient[rows] - section.gaps(q - e).gradient[rows]) / (2.0 * h)
     return 0.5 * (H + H.T)
 
 

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from clamp3d.checks import instance
-from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.dimensions import TITLES, PartName
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.landscape import initial_guesses
 from clamp3d.clamp.section import EDGE, SIZE, WIRES, D, Section
 from clamp3d.clamp.status import stop_words
-from clamp3d.errors import InputError, SolverError
+from clamp3d.errors import SolverError
 
 OFF_ARC = ("face ", "flat", "lip", "end", "corner", EDGE)
 """How the names of features begin that are not of a groove's arc."""
-_TILT = math.radians(0.1)
-"""How closely the tilts of the start are told."""
 SAME = 1e-6
 """States whose distance, tilt and held wires agree to this many mm are one."""
 _STRIDE = 0.004
@@ -72,29 +67,6 @@ def equilibria(section: Section) -> tuple[FinalState, ...]:
             raise SolverError(f"no equilibrium could be proven; the last start says: {last}")
         found.append(solve_final_state(section))
     return tuple(sorted(found, key=lambda state: float(state.q[D])))
-
-
-def start_tilts(section: Section, final: FinalState, *, open_by: float, open_tilt: float) -> tuple[float, float]:
-    """Tilts (rad) of the open clamp between which closing ends in ``final``, which it does from ``open_tilt``.
-
-    Either way the furthest tilt is tried first; where that ends elsewhere the boundary is halved down to 0.1 degrees. A
-    start in between that ends elsewhere all the same is not seen.
-    """
-
-    def reaches(tilt: float) -> bool:
-        try:
-            return same(solve_final_state(section, open_start(section, open_by=open_by, open_tilt=tilt)), final)
-        except (SolverError, InputError):
-            return False
-
-    ends = []
-    for limit in (-section.clamp.tilt_stop, section.clamp.tilt_stop):
-        inside, outside = (limit, limit) if reaches(limit) else (open_tilt, limit)
-        while abs(outside - inside) > _TILT:
-            middle = 0.5 * (inside + outside)
-            inside, outside = (middle, outside) if reaches(middle) else (inside, middle)
-        ends.append(inside)
-    return ends[0], ends[1]
 
 
 def same(a: FinalState, b: FinalState) -> bool:

@@ -12,14 +12,13 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import nnls
 
 from clamp3d.clamp.closing import CLOSING, HELD, STILL, STRIDE, OnContact, descend, open_start
 from clamp3d.clamp.curvature import LEVEL, lagrangian_hessian, least_curvature, rounding_of_normals, touched
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section, U
-from clamp3d.core.linear import dot, lstsq
-from clamp3d.core.nonnegative import nnls
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
 
@@ -167,10 +166,10 @@ def _certify(section: Section, q: Array, start: Array, held: Array, active: floa
         q = _settle_loose(section, q, wire)
     if loose:
         gaps = section.gaps(q)
-    unbalanced = (CLOSING - dot(multipliers, gaps.gradient))[list(section.free)]
+    unbalanced = (CLOSING - multipliers @ gaps.gradient)[list(section.free)]
     residual = max(0.0, float(np.abs(unbalanced).max()) - rounding_of_normals(section, q))
     violation = max(0.0, -float(gaps.value.min()))
-    complementarity = float(dot(multipliers, np.abs(gaps.value)))  # by this much the distance is off
+    complementarity = float(multipliers @ np.abs(gaps.value))  # by this much the distance is off
     curvature = least_curvature(section, q, gaps, multipliers, TOLERANCE)
     optimality = max(optimality, residual, complementarity)
     if section.free == HELD:  # nothing moves while the nut turns
@@ -223,7 +222,7 @@ def _settle_loose(section: Section, q: Array, wire: PartName) -> Array:
             return fallen
         near = gaps.value < depth
         fallen = fallen.copy()
-        fallen[[x, y]] -= lstsq(gaps.gradient[near][:, [x, y]], gaps.value[near])[0]
+        fallen[[x, y]] -= np.linalg.lstsq(gaps.gradient[near][:, [x, y]], gaps.value[near])[0]
     return fallen if depth <= TOLERANCE else q
 
 
@@ -244,7 +243,7 @@ def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
             in_set[i if gaps.value[i] >= gaps.value[j] else j] = False
     multipliers = np.zeros(len(gaps.value))
     if in_set.any():
-        multipliers[in_set] = nnls(gaps.gradient[in_set][:, free].T, CLOSING[free])
+        multipliers[in_set] = nnls(gaps.gradient[in_set][:, free].T, CLOSING[free])[0]
     multipliers[multipliers < _NO_MULTIPLIER] = 0.0
     return multipliers
 
@@ -267,9 +266,9 @@ def _polish(section: Section, q: Array, active: float, least: float) -> tuple[Ar
         A = gaps.gradient[rows]
         k, n = len(rows), len(free)
         kkt = np.block([[hessian[np.ix_(free, free)], -A[:, free].T], [A[:, free], np.zeros((k, k))]])
-        rhs = -np.concatenate([(CLOSING - dot(multipliers[rows], A))[free], gaps.value[rows]])
+        rhs = -np.concatenate([(CLOSING - multipliers[rows] @ A)[free], gaps.value[rows]])
         move = np.zeros(SIZE)
-        move[free] = lstsq(kkt, rhs, 1e-12)[0][:n]
+        move[free] = np.linalg.lstsq(kkt, rhs, 1e-12)[0][:n]
         new = float(np.abs(move).max())
         if not new < step:
             break

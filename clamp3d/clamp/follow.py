@@ -3,33 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
 from clamp3d.clamp.dimensions import PARTS, PartName
-from clamp3d.clamp.matrix import PAIRS, SCREW, Pair
+from clamp3d.clamp.matrix import PAIRS, Pair
+from clamp3d.clamp.places import saddle_rise, section_poses
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import D, Section
 from clamp3d.clamp.sequence import Step
-from clamp3d.clamp.steps import Log, Meetings, close_splints, saddle_rise, section_poses, tighten_nut
+from clamp3d.clamp.steps import Closing, Log, close_splints, tighten_nut
 from clamp3d.clamp.ways import DIRECTIONS, SPARE, Leg, Ways, way_out
 from clamp3d.core.pose import Array
 from clamp3d.errors import SequenceError, SolverError
 
+SCREW: Pair = ("P4", "P5")
 Offsets = dict[PartName, Array]
 _ROUNDS = 1000
-
-
-@dataclass(frozen=True)
-class Closing:
-    """What the solver found: states at the start, closed by hand and at the end, and the contacts on the way."""
-
-    start: Array
-    held: Array
-    end: Array
-    by_hand: Meetings
-    taken: Meetings
 
 
 def follow(section: Section, steps: Sequence[Step], closing: Closing, log: Log) -> float:
@@ -48,13 +39,13 @@ def follow(section: Section, steps: Sequence[Step], closing: Closing, log: Log) 
             met = [(pair, q) for pair, q in closing.by_hand if not any(log.aside[name].any() for name in pair)]
             close_splints(section, closing.start, closing.held, met, step.name, log)
             continue
-        held, taken = closing.held, closing.taken
+        drawn = closing
         if "P2" in step.parts:  # the saddle goes with it
-            for pair, q in [*closing.by_hand, *taken]:
+            for pair, q in [*closing.by_hand, *closing.taken]:
                 log.reach(step.name, f"down splint touches {pair[1]}", section_poses(section, q))
                 log.touch(q, step.name, pair, saddle_rise(section, q, float(closing.start[D])))
-            held, taken = closing.end, []
-        travel = tighten_nut(section, closing.start, held, closing.end, taken, step.name, log)
+            drawn = replace(closing, held=closing.end, taken=[])
+        travel = tighten_nut(section, drawn, step.name, log)
     return travel
 
 

@@ -33,7 +33,7 @@ def initial_guesses(section: Section) -> list[Array]:
     limit, lever = section.clamp.tilt_stops["the slot"], section.lever
     tilts = np.linspace(-limit, limit, _TILTS)
     lifted = section.lifted(tilts)
-    faces = -section.face_gaps(tilts)  # least d at which they do not overlap
+    faces = np.array([-section.face_gap(_tilted(section, tilt)) for tilt in tilts])  # least d without an overlap
     wires = [_Minima(section, i, tilts) for i in range(len(WIRES))]
     found: list[Array] = []
 
@@ -71,8 +71,6 @@ class _Minima:
     """
 
     def __init__(self, section: Section, i: int, tilts: Array) -> None:
-        from clamp3d.clamp import kernel_landscape  # compiled on first use
-
         wire, bolt = WIRES[i], section.bolt_x
         up, down = section.pairs["P1", wire], section.pairs["P2", wire]
         r, (low, high) = up.cylinder.radius, section.reach(wire)
@@ -83,11 +81,9 @@ class _Minima:
         aside, c = deep * math.sin(tilts[-1]), math.cos(tilts[-1])
         u = np.linspace((low - bolt - aside) / c, (high - bolt + aside) / c, _POSITIONS)
         v = _curve(section, down, u, face - 1.01 * r, 1.0)
-        self.under = np.empty((len(tilts), _POSITIONS))
-        kernel_landscape.under(u, v, tilts, bolt, self.x, np.empty((2, _POSITIONS)), self.under)
+        self.under = np.array([_turned(u, v, tilt, bolt, self.x) for tilt in tilts])
         least = np.round((self.over - self.under) / (_LEVEL * r)) * (_LEVEL * r)
-        step = np.empty(least.shape, dtype=np.int64)
-        kernel_landscape.downhill(least, np.empty(_POSITIONS), step)
+        step = downhill(least)
         row, self.position = np.nonzero(step == 0)
         key = row * _POSITIONS + self.position
         self.least = least[row, self.position]
@@ -117,6 +113,41 @@ def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: flo
         if not len(moving):
             break
     return -T[:, 2, 3]
+
+
+def _turned(u: Array, v: Array, tilt: float, bolt: float, x: Array) -> Array:
+    """Depth (m,) at places x (m,) of a curve (u, v), n points by rising u, turned by a tilt about ``bolt``.
+
+    Linear between the points; of what the turned curve has over itself the first counts, and its ends beyond them.
+    """
+    c, s = math.cos(tilt), math.sin(tilt)
+    along = np.maximum.accumulate(bolt + u * c + v * s)
+    return np.interp(x, along, v * c - u * s)
+
+
+def downhill(height: Array) -> NDArray[np.int64]:
+    """Whether each sample of ``height`` (t, n) slides left (-1), right (1) or nowhere (0), along its row.
+
+    What counts is the next other height on either side, the lower one first, and none beyond the ends: a slight slope
+    is a stair. Of a level stretch between higher ones the first sample stands for all.
+    """
+    t, n = height.shape
+    number, changes = np.arange(n), height[:, 1:] != height[:, :-1]
+    first = np.ones((t, 1), np.bool_)
+    starts = np.maximum.accumulate(np.where(np.hstack([first, changes]), number, 0), axis=1)
+    ends = np.minimum.accumulate(np.where(np.hstack([changes, first]), number, n)[:, ::-1], axis=1)[:, ::-1]
+    fenced = np.pad(height, ((0, 0), (1, 1)), constant_values=np.inf)
+    left = np.take_along_axis(fenced, starts, axis=1)  # of the sample before the stretch: fenced is one ahead
+    right = np.take_along_axis(fenced, ends + 2, axis=1)
+    slides_left = (left < height) | (starts < number)
+    return np.where((right < height) & (right <= left), 1, np.where(slides_left, -1, 0))
+
+
+def _tilted(section: Section, tilt: float) -> Array:
+    """The state (10,) with a tilt alone."""
+    q = np.zeros(SIZE)
+    q[S] = section.lever * tilt
+    return q
 
 
 def _open(section: Section, q: Array) -> Array | None:

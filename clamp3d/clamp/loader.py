@@ -60,7 +60,10 @@ def load_clamp(
         clamp, origin = source, source.name
     else:
         text, origin = _read(checks.path("clamp", source))
-        clamp = validate(Clamp, parse_toml(text, origin), origin)
+        data = parse_toml(text, origin)
+        if "parts" in data or "include" in data:
+            raise InputError(f"{origin}: is a scene, not a clamp: give it to check, view, report or export")
+        clamp = validate(Clamp, data, origin)
     wires = {key: wire(given, key) for key, given in (("line", line), ("jumper", jumper)) if given is not None}
     if wires:
         clamp = validate(Clamp, {f.name: getattr(clamp, f.name) for f in fields(clamp)} | wires, origin)

@@ -28,20 +28,6 @@ Pair = tuple[PartName, PartName]
 PAIRS: tuple[Pair, ...] = tuple(itertools.combinations(PARTS, 2))
 """All pairs of parts, in the order of the matrix."""
 
-ARC_PAIRS: tuple[Pair, ...] = (("P1", "P6"), ("P1", "P7"), ("P2", "P3"), ("P2", "P6"), ("P2", "P7"))
-"""The pairs in which a cylinder lies in a concave arc (Fig. 5)."""
-
-SCREW: Pair = ("P4", "P5")
-
-
-def contact_type(pair: Pair) -> ConnectionType:
-    """Type of a contact of two parts, by their shapes.
-
-    >>> contact_type(("P1", "P6")), contact_type(("P4", "P5")), contact_type(("P1", "P2"))
-    (3, 1, 2)
-    """
-    return 3 if pair in ARC_PAIRS else 1 if pair == SCREW else 2
-
 
 def millimetres(gap: float) -> str:
     """A gap in mm for people: three digits, more where it is smaller than they show, and 0 for rounding.

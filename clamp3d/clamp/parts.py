@@ -44,8 +44,8 @@ def parts(clamp: Clamp) -> dict[PartName, Solid]:
         "P3": _saddle(clamp.saddle),
         "P4": _bolt(clamp.bolt),
         "P5": _nut(clamp.nut, clamp.bolt.diameter),
-        "P6": _wire("P6", clamp.line.radius, clamp.wire_length),
-        "P7": _wire("P7", clamp.jumper.radius, clamp.wire_length),
+        "P6": wire_solid("P6", clamp.line.radius, clamp.wire_length),
+        "P7": wire_solid("P7", clamp.jumper.radius, clamp.wire_length),
     }
 
 
@@ -131,7 +131,8 @@ def _nut(d: Nut, bolt_diameter: float) -> Solid:
 
 
 @_kept
-def _wire(name: PartName, radius: float, length: float) -> Solid:
+def wire_solid(name: PartName, radius: float, length: float) -> Solid:
+    """A wire of ``length`` mm."""
     body = _along_wires(Profile.circle(radius), length)
     return Solid(name, (body,), title=TITLES[name], volume=body.volume, not_modelled="strands")
 

@@ -26,9 +26,8 @@ from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.core.distance import Feature, signed_distances
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, inverse
-from clamp3d.errors import InputError
+from clamp3d.errors import InputError, NotClampedError
 
 Freedom = Literal["offset", "height", "yaw", "pitch"]
 FREEDOMS: tuple[Freedom, ...] = ("offset", "height", "yaw", "pitch")
@@ -150,7 +149,9 @@ def placement(
     Raises
     ------
     InputError
-        For bad values, or a clamp that does not close on its wires at all.
+        For bad values.
+    NotClampedError
+        For a clamp that does not close on its wires at all.
 
     Examples
     --------
@@ -175,13 +176,13 @@ class Placement:
         self.clamp, self.wire, self.seat_tolerance = final.clamp, wire, seat_tolerance
         if not final.clamped:
             wires = f"{self.clamp.line.label} and {self.clamp.jumper.label}"
-            raise InputError(f"clamp {self.clamp.name} with {wires}: {final.status}")
+            raise NotClampedError(f"clamp {self.clamp.name} with {wires}: {final.status}")
         self._nominal = final.T_world(wire)
         pairs = groove_pairs(self.clamp)
         self._splints: list[tuple[GroovePair, Array, Array]] = []
         for splint, up in (("P1", 1.0), ("P2", -1.0)):
             pair = pairs[splint, wire]
-            world = dot(final.T_world(splint), pair.T_a_groove)
+            world = final.T_world(splint) @ pair.T_a_groove
             self._splints.append((pair, inverse(world), np.array([0.0, 0.0, up])))
 
     def poses(self, misplacement: Array) -> Array:
@@ -191,7 +192,7 @@ class Placement:
             raise InputError(f"misplacements must be up to {_FARTHEST:g} mm, got {np.abs(m[:, :2]).max():g}")
         T = np.tile(self._nominal, (len(m), 1, 1))
         # Rz(yaw) Rx(pitch), about the wire's middle.
-        T[:, :3, :3] = dot(Rotation.from_euler("ZX", m[:, 2:]).as_matrix(), self._nominal[:3, :3])
+        T[:, :3, :3] = Rotation.from_euler("ZX", m[:, 2:]).as_matrix() @ self._nominal[:3, :3]
         T[:, (0, 2), 3] += m[:, :2]
         return T
 
@@ -202,7 +203,7 @@ class Placement:
         features = np.empty((len(poses), 2), dtype=np.int8)
         beside = np.zeros(len(poses), dtype=bool)
         for k, (pair, T_groove_world, away) in enumerate(self._splints):
-            travel, features[:, k], flat = _approach(pair, T_groove_world, dot(poses, pair.T_b_cylinder), away)
+            travel, features[:, k], flat = _approach(pair, T_groove_world, poses @ pair.T_b_cylinder, away)
             opening += travel
             beside |= flat & ~np.isin(features[:, k], _IN_GROOVE)
         in_groove = np.isin(features, _IN_GROOVE).all(axis=1)
@@ -297,8 +298,8 @@ def _approach(
     # Far enough for the thickest wire in the steepest pose; from there every step is safe.
     far = 4.0 * (groove.radius + cylinder.radius) + cylinder.length + float(np.abs(poses[:, :3, 3]).max(initial=0.0))
     travel = np.full(len(poses), far)
-    local = np.ascontiguousarray(dot(T_groove_world, poses))
-    step = dot(T_groove_world[:3, :3], away)
+    local = np.ascontiguousarray(T_groove_world @ poses)
+    step = T_groove_world[:3, :3] @ away
     home = local[:, :3, 3].copy()
     active = np.arange(len(poses))
     for _ in range(_ITERATIONS):

@@ -9,12 +9,12 @@ from typing import Any, Literal, get_args
 from clamp3d import __version__
 from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import instance
-from clamp3d.clamp.contact import Contact, Seat, measure_contacts, overlap
+from clamp3d.clamp.contact import Contact, measure_contacts, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.forces import Force
 from clamp3d.clamp.matrix import Difference, Pair, differences, plain
-from clamp3d.clamp.out_of_plane import OutOfPlane
 from clamp3d.clamp.scene import clamp_scene
+from clamp3d.clamp.status import ClosingStatus, Seat
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array, SectionPose
 from clamp3d.errors import need
@@ -103,8 +103,6 @@ class Equilibrium:
         What holds the state where that is not the grooves' arcs.
     is_equilibrium : bool
         If it is not one, a wire slips out of its groove there.
-    out_of_plane : OutOfPlane or None
-        As of `Assembly`.
     """
 
     distance: float
@@ -113,7 +111,6 @@ class Equilibrium:
     status: str
     detail: str
     is_equilibrium: bool
-    out_of_plane: OutOfPlane | None = None
 
     def __str__(self) -> str:
         where = f"{self.distance:.3f} mm, tilt {math.degrees(self.tilt):z.2f} deg"
@@ -124,8 +121,16 @@ class Equilibrium:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         data = plain(self, distance="distance_mm", closing="closing_mm", tilt="tilt_deg", is_equilibrium="rests")
-        space = self.out_of_plane
-        return data | {"tilt_deg": math.degrees(self.tilt), "out_of_plane": space and space.to_dict()}
+        return data | {"tilt_deg": math.degrees(self.tilt)}
+
+
+@dataclass(frozen=True, slots=True)
+class Play:
+    """Where the clamp closes to when ``joints`` have play: the distance in mm if it holds then, and its status."""
+
+    joints: tuple[str, ...]
+    status: str
+    distance: float | None
 
 
 Severity = Literal["error", "warning", "note"]
@@ -156,8 +161,8 @@ class Assembly:
         How its grooves were measured.
     solver : str
         How the closed position was found: "exact", "stepped" or "bisection".
-    status : str
-        "clamped", or "not clamped: ..." with the reason.
+    closing_status : ClosingStatus
+        Whether it holds both wires, and where they lie in its grooves.
     distance : float
         Height between the splints' inner edges on the line side, along the bolt (Table 4); mm.
     closing : float
@@ -170,8 +175,6 @@ class Assembly:
         Each part in the section frame, in the final state.
     contacts : tuple of Contact
         How all 21 pairs of parts stand in the final state, in the order of the connection matrix.
-    seats : tuple of Seat
-        Whether each wire lies in each of its grooves.
     events : tuple of Event
         The contacts that ended or changed a motion, in order.
     path : tuple of Waypoint
@@ -188,27 +191,22 @@ class Assembly:
         Where closing began.
     forces : tuple of Force
         The contact forces per newton of bolt force (exact solver).
-    out_of_plane : OutOfPlane or None
-        Whether it is an equilibrium in space too; None where nothing is known of it.
     others : tuple of Equilibrium or None
         The other states that closing can end in, the one closed furthest first; None if they were not looked for.
-    start_tilts : (float, float) or None
-        Tilts of the open down splint, rad, between which closing ends in this state; None if they were not looked for.
-    with_play : dict or None
-        Distance in mm with the joints' play (None: not clamped), by the joints that have it; None if not looked for.
+    with_play : tuple of Play or None
+        What the joints' play changes; None if not looked for.
     """
 
     clamp: Clamp
     model: ContactModel
     solver: Solver
-    status: str
+    closing_status: ClosingStatus
     distance: float
     closing: float
     tilt: float
     turns: float
     poses: dict[PartName, SectionPose]
     contacts: tuple[Contact, ...]
-    seats: tuple[Seat, ...]
     events: tuple[Event, ...]
     path: tuple[Waypoint, ...]
     undeclared: tuple[Difference, ...]
@@ -218,9 +216,7 @@ class Assembly:
     work: Work
     start: Start
     forces: tuple[Force, ...] = ()
-    out_of_plane: OutOfPlane | None = None
-    start_tilts: tuple[float, float] | None = None
-    with_play: dict[str, float | None] | None = None
+    with_play: tuple[Play, ...] | None = None
     others: tuple[Equilibrium, ...] | None = None
 
     @property
@@ -234,9 +230,24 @@ class Assembly:
         return self.model.limits
 
     @property
+    def status(self) -> str:
+        """ "clamped", "clamped, but P6 on a lip of ...", or "not clamped: ..." with the reason."""
+        return self.closing_status.text
+
+    @property
     def clamped(self) -> bool:
-        """Whether the splints hold both wires."""
-        return self.status == "clamped"
+        """Whether the grooves of both splints hold both wires."""
+        return self.closing_status.clamped
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing is wrong: no finding is an error. Else every command ends with exit code 1."""
+        return not any(finding.severity == "error" for finding in self.findings)
+
+    @property
+    def seats(self) -> tuple[Seat, ...]:
+        """Where each wire lies in each of its grooves."""
+        return self.closing_status.seats
 
     @property
     def scene(self) -> Scene:
@@ -271,11 +282,10 @@ class Assembly:
         found = [] if self.clamped else [Finding("error", self.status, *((why.a, why.b) if why else ()))]
         found += [Finding("error", text, c.a, c.b) for text, c in overlaps.items() if c is not why]
         found += [Finding("error", str(d), d.a, d.b) for d in self.undeclared]
+        found += [Finding("warning", text) for text in self.closing_status.warnings]
         for d in self.matrix_differences:
             if d.declared != 0:
                 found.append(Finding("warning" if d.declared == 3 or d.measured else "note", str(d), d.a, d.b))
-        if self.out_of_plane is not None and self.out_of_plane.stable is False:
-            found.append(Finding("warning", f"out of the plane {self.out_of_plane}, and the clamp closes further"))
         found += [Finding("note", str(e)) for e in self.others or ()]
         return tuple(sorted(found, key=lambda finding: get_args(Severity).index(finding.severity)))
 
@@ -329,12 +339,12 @@ class Assembly:
             "matrix_differences": [d.to_dict() for d in self.matrix_differences],
             "findings": [plain(finding) for finding in self.findings],
             "residuals": {"largest_violated_gap_mm": self.violation, "optimality_mm": self.optimality},
-            "out_of_plane": None if self.out_of_plane is None else self.out_of_plane.to_dict(),
             "other_ends": None if self.others is None else [e.to_dict() for e in self.others],
             "start": self.start.to_dict(),
-            "start_tilts_deg": None if self.start_tilts is None else [math.degrees(t) for t in self.start_tilts],
             "forces": [f.to_dict() for f in self.forces],
-            "with_play_mm": self.with_play,
+            "with_play_mm": None
+            if self.with_play is None
+            else {", ".join(p.joints): p.distance for p in self.with_play},
             "work": plain(self.work),
         }
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.parts import parts
+from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.collide.allowed import Allowed
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.pose import Array
 
-CONTACT = 1e-6
-"""Gap or overlap in mm up to which two parts of a clamp touch."""
+CONTACT = TOUCHING
 
 
 def clamp_scene(clamp: Clamp, poses: Mapping[str, Array], *, clearance: float = 0.0, contact: float = CONTACT) -> Scene:

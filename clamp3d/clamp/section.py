@@ -9,24 +9,20 @@ how high the round back stands over the saddle's arc, 0 unless the saddle's edge
 
 from __future__ import annotations
 
-import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
-from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import Pair
-from clamp3d.core.distance import Feature
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, SectionPose
-from clamp3d.core.primitives import LARGEST
 
 SPLINTS: tuple[PartName, PartName] = ("P1", "P2")
 WIRES: tuple[PartName, PartName] = ("P6", "P7")
@@ -38,8 +34,6 @@ SIZE = 10
 
 EDGE = "outer edge"
 """Feature of a splint's gap to a wire that has left its face sideways."""
-EDGE_CODE = -1.0
-"""Its number in compiled loops, where others have those of `Feature`."""
 EDGES = "saddle's edge"
 """Feature of the gap between the down splint's underside and the saddle."""
 SEAT = "arc"
@@ -47,8 +41,6 @@ SEAT = "arc"
 
 _SPARE, _SPARE_OF_LEVER = 10.0, 0.2
 """How much wider than the wires need a clamp stands open, mm, and at most how much of its half width."""
-_NEAR = 0.1 * LARGEST
-"""States with coordinates below are asked at once; further off the model tells what is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,20 +61,84 @@ class Gaps:
 
 _RIGHT_DOWN = np.array([1.0, -1.0])
 """Times a part's X and Z: its section coordinates."""
-_Named = tuple[Pair, str]
-_FACES: tuple[_Named, _Named] = ((("P1", "P2"), "left edge"), (("P1", "P2"), "right edge"))
-"""The gaps between the inner faces."""
-_FEATURES = {EDGE_CODE: EDGE} | {float(feature.value): str(feature) for feature in Feature}
-"""Names of what the kernel says is nearest."""
+_FAR = 1e3
+"""Gap in mm of a piece that another one stands for."""
+Point = Sequence[float]
+"""Right and down in a section, mm."""
 
 
-@cache
-def _pairs(wires: tuple[PartName, ...], counts: tuple[tuple[int, int], ...]) -> tuple[Pair, ...]:
-    """Of the gaps of ``wires``, each with ``counts`` of pieces of the up and the down splint, and the shank."""
-    found: list[Pair] = []
-    for wire, (up, below) in zip(wires, counts, strict=True):
-        found += [("P1", wire)] * up + [("P2", wire)] * below + [("P4", wire)]
-    return tuple(found)
+@dataclass(slots=True)
+class _Gap:
+    """One of `Gaps`; ``gradient`` has the length 10."""
+
+    pair: Pair
+    feature: str
+    value: float
+    gradient: list[float]
+    point: Point
+    normal: Point
+
+
+@dataclass(slots=True)
+class _Pieces:
+    """Pieces of a contact model in a splint's own axes (right, down): gaps in mm, points, normals and names."""
+
+    value: list[float]
+    point: list[Point]
+    normal: list[Point]
+    feature: list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class _Down:
+    """Where P2 stands, seen from P1: place in mm, cosine and sine of its angle, derivatives of its lift by w."""
+
+    x: float
+    y: float
+    cos: float
+    sin: float
+    slope: float
+    bend: float
+    lever: float
+
+    def seen(self, x: float, y: float) -> tuple[float, float]:
+        """A point of P1's axes in P2's."""
+        dx, dy = x - self.x, y - self.y
+        return dx * self.cos - dy * self.sin, dx * self.sin + dy * self.cos
+
+    def turned(self, u: float, v: float) -> tuple[float, float]:
+        """A direction of P2's axes in P1's."""
+        return u * self.cos + v * self.sin, v * self.cos - u * self.sin
+
+    def point(self, u: float, v: float) -> tuple[float, float]:
+        """A point of P2's axes in P1's."""
+        x, y = self.turned(u, v)
+        return x + self.x, y + self.y
+
+    def gradient(self, by_x: float, by_y: float, by_angle: float) -> list[float]:
+        """Derivatives by the state of what changes so with P2's place and angle."""
+        by_w = by_x - self.slope * by_y
+        return [0.0, 0.0, 0.0, 0.0, by_y, by_angle / self.lever, by_x, by_x, by_w, -by_y]
+
+
+_AT_REST = _Down(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def _at_wire(i: int, nx: float, ny: float, gradient: list[float]) -> list[float]:
+    """A gradient, with what the place of the wire at the coordinates i, i + 1 changes."""
+    gradient[i], gradient[i + 1] = nx, ny
+    return gradient
+
+
+def _collect(rows: list[_Gap]) -> Gaps:
+    return Gaps(
+        np.array([row.value for row in rows]),
+        np.array([row.gradient for row in rows]),
+        tuple(row.pair for row in rows),
+        tuple(row.feature for row in rows),
+        np.array([row.point for row in rows]),
+        np.array([row.normal for row in rows]),
+    )
 
 
 @dataclass
@@ -153,15 +209,15 @@ class Section:
 
     def down_splint(self, q: Array) -> SectionPose:
         """P2 seen from P1."""
-        x, y, *_ = self._down(q).tolist()
-        return SectionPose(x, y, float(q[S]) / self.lever)
+        down = self._down(q)
+        return SectionPose(down.x, down.y, float(q[S]) / self.lever)
 
-    def _down(self, q: Array) -> Array:
-        """x, y, cosine and sine of P2 seen from P1, and the derivatives of its lift by w."""
+    def _down(self, q: Array) -> _Down:
         _, _, _, _, d, scaled, b, v, w, u = q.tolist()
         lift, slope, bend = self.lift(w)
         angle = scaled / self.lever
-        return np.array((self.bolt_x + b + v + w, d - lift - u, math.cos(angle), math.sin(angle), slope, bend))
+        x, y = self.bolt_x + b + v + w, d - lift - u
+        return _Down(x, y, math.cos(angle), math.sin(angle), slope, bend, self.lever)
 
     @property
     def least_slack(self) -> float:
@@ -239,91 +295,94 @@ class Section:
 
     def wire_gaps(self, q: Array, wire: PartName) -> Gaps:
         """Gaps of one wire to both splints, every piece of the contact model, and to the bolt."""
-        return self._gaps(q, (wire,), stops=False)
+        return _collect(self._wire(q, self._down(q), wire))
 
     def gaps(self, q: Array) -> Gaps:
         """All gaps at a state: both wires, faces, stops."""
-        return self._gaps(q, WIRES, stops=True)
+        down = self._down(q)
+        return _collect([*self._wire(q, down, "P6"), *self._wire(q, down, "P7"), *self._stops(q, down)])
 
     def face_gap(self, q: Array) -> float:
         """The least gap between the inner faces (convex object collision, type 2 of the paper); mm."""
-        return float(self._gaps(q, (), stops=True).value[: len(_FACES)].min())
+        return min(row.value for row in self._faces(self._down(q)))
 
-    def face_gaps(self, tilts: Array) -> Array:
-        """`face_gap` (n,) at tilts (n,) in rad, d and all shifts 0; mm."""
-        from clamp3d.clamp.kernel_section import face_gaps  # compiled on first use
-
-        found = np.empty(len(tilts))
-        down, work = self._down(np.zeros(SIZE)), (np.empty(2), np.zeros((2, SIZE)), np.empty((2, 4)))
-        face_gaps(np.ascontiguousarray(tilts, np.float64), down, self._sizes, *work, found)
-        return found
-
-    def _gaps(self, q: Array, wires: tuple[PartName, ...], *, stops: bool) -> Gaps:
-        from clamp3d.clamp import kernel_section as kernel  # compiled on first use
-
-        q = np.ascontiguousarray(q, np.float64)
-        down = self._down(q)
-        at_once = type(self.model) is Cas and float(np.abs(q).max()) < _NEAR
-        asked = [] if at_once else [self._both_pieces(q, down, wire) for wire in wires]
-        counts = [(3, 3)] * len(wires) if at_once else [(len(up), len(below)) for up, below, _ in asked]
-        pairs = _pairs(wires, tuple(counts)) + (self._stops[0] if stops else ())
-        value, gradient, place = np.empty(len(pairs)), np.zeros((len(pairs), SIZE)), np.empty((len(pairs), 4))
-        features: tuple[str, ...] = ()
-        at = 0
-        if at_once:
-            self.queries.contact += 2 * len(wires)
-            first, pieces = WIRES.index(wires[0]) if wires else 0, np.empty((2, 2, 3, 6))
-            last, work = first + len(wires), np.empty((3, 14))
-            shapes = self._sizes, self.grooves, self._faces
-            kernel.wires(q, down, first, last, *shapes, work, pieces, value, gradient, place)
-            for codes in pieces[first:last, :, :, 5].reshape(-1, 6).tolist():
-                features += (*[_FEATURES[code] for code in codes], "shank")
-                at += 7
-        else:
-            for wire, (up, below, named) in zip(wires, asked, strict=True):
-                rows = slice(at, at := at + len(named))
-                given = q, down, 2 * WIRES.index(wire), self._sizes, self.pairs["P1", wire].cylinder.radius, up, below
-                kernel.wire(*given, value[rows], gradient[rows], place[rows])
-                features += named
-        if stops:
-            joints = self.clamp.joints
-            walls = 2 if joints.washer or joints.saddle else 1  # centred, the slot's lower ends meet the shank first
-            plays = joints.hole, joints.washer, walls
-            kernel.stops(q, down, self._sizes, *plays, value[at:], gradient[at:], place[at:])
-            features += self._stops[1]
-        return Gaps(value, gradient, pairs, features, place[:, :2], place[:, 2:])
-
-    def _both_pieces(self, q: Array, down: Array, wire: PartName) -> tuple[Array, Array, tuple[str, ...]]:
-        """`_pieces` of both splints for a wire at a state, and what they and the shank are."""
-        i = 2 * WIRES.index(wire)
-        px, py, c, s, *_ = down.tolist()
+    def _wire(self, q: Array, down: _Down, wire: PartName) -> list[_Gap]:
+        """Gaps of a wire to both splints and to the shank, which stands between the wires: each keeps to its side."""
+        i, rows = 2 * WIRES.index(wire), []
         x, y = q[i : i + 2].tolist()
-        dx, dy = x - px, y - py
-        up, named = self._pieces("P1", wire, x, y)
-        below, named_below = self._pieces("P2", wire, dx * c - dy * s, dx * s + dy * c, c, s)
-        return up, below, (*named, *named_below, "shank")
+        up = self._pieces("P1", wire, x, y)
+        for gap, point, (nx, ny), feature in zip(up.value, up.point, up.normal, up.feature, strict=True):
+            rows.append(_Gap(("P1", wire), feature, gap, _at_wire(i, nx, ny, [0.0] * SIZE), point, (nx, ny)))
+        below = self._pieces("P2", wire, *down.seen(x, y), down.cos, down.sin)
+        for gap, (pu, pv), (nu, nv), feature in zip(below.value, below.point, below.normal, below.feature, strict=True):
+            nx, ny = down.turned(nu, nv)
+            gradient = _at_wire(i, nx, ny, down.gradient(-nx, -ny, nv * pu - nu * pv))
+            rows.append(_Gap(("P2", wire), feature, gap, gradient, down.point(pu, pv), (nx, ny)))
+        side, axis, shank = (-1.0 if wire == "P6" else 1.0), self.bolt_x + float(q[B]), 0.5 * self.clamp.bolt.diameter
+        gap, gradient = side * (x - axis) - shank - self.pairs["P1", wire].cylinder.radius, [0.0] * SIZE
+        gradient[i], gradient[B] = side, -side
+        return [*rows, _Gap(("P4", wire), "shank", gap, gradient, (axis + side * shank, y), (side, 0.0))]
 
-    @cached_property
-    def _stops(self) -> tuple[tuple[Pair, ...], tuple[str, ...]]:
-        """Pairs and features of the gaps that are no wire's."""
-        joints = self.clamp.joints
-        slot: _Named = (("P2", "P4"), "slot")
-        side: list[_Named] = [(("P2", "P3"), EDGES), *[slot] * (2 if joints.washer or joints.saddle else 1)]
-        side += [(("P1", "P4"), "hole")] * joints.hole + [(("P3", "P4"), "hole")] * joints.washer
-        pairs, features = zip(*_FACES, *side, *side, (("P2", "P3"), SEAT), strict=True)
-        return pairs, features
+    def _faces(self, down: _Down) -> list[_Gap]:
+        """Gaps of the splints' inner faces, which are straight, so least at an end of their overlap."""
+        up, face, rows = self.clamp.up_splint, self.clamp.down_splint.face_depth, []
+        c, s = down.cos, down.sin
+        for side, feature in ((-1.0, "left edge"), (1.0, "right edge")):
+            (corner, corner_y), edge = down.point(side * self.lever, face), self.bolt_x + side * 0.5 * up.width
+            if side * (corner - edge) <= 0.0:  # P2's corner under P1's face
+                gradient = down.gradient(0.0, 1.0, down.x - corner)
+                gap, point, normal = corner_y - up.thickness, (corner, up.thickness), (0.0, 1.0)
+            else:  # P1's edge over P2's face
+                x, y = edge - down.x, up.thickness - down.y
+                gradient = down.gradient(s, c, y * s - x * c)
+                gap, point, normal = face - (x * s + y * c), (edge, up.thickness), (s, c)
+            rows.append(_Gap(("P1", "P2"), feature, gap, gradient, point, normal))
+        return rows
 
-    @cached_property
-    def _sizes(self) -> Array:
-        """Dimensions in mm as the kernel of the stops takes them."""
-        up, down, saddle, bolt = self.clamp.up_splint, self.clamp.down_splint, self.clamp.saddle, self.clamp.bolt
-        return np.array(
-            (
-                *(self.bolt_x, 0.5 * bolt.diameter, self.lever, 0.5 * up.width, up.thickness, down.face_depth),
-                *(0.5 * down.slot_width, down.slot_bottom, down.underside_depth),
-                *(0.5 * saddle.width, self._edge_below, down.back_radius, *self.play),
-            )
-        )
+    def _stops(self, q: Array, down: _Down) -> list[_Gap]:
+        """Gaps of the inner faces, then what ends the down splint's tilt and slide, and carries it (Table 2 of the
+        paper): its underside on the saddle's edges, its slot on the shank, the play of hole and washer where there is
+        any, and its round back in the saddle's arc."""
+        rows, joints, splint = self._faces(down), self.clamp.joints, self.clamp.down_splint
+        # Centred, the slot's lower ends meet the shank first.
+        depths = (splint.slot_bottom, splint.face_depth) if joints.washer or joints.saddle else (splint.slot_bottom,)
+        axis, shank, (play, washer_play) = self.bolt_x + float(q[B]), 0.5 * self.clamp.bolt.diameter, self.play
+        for side in (-1.0, 1.0):
+            rows.append(self._saddle_edge(q, down, side))
+            for depth in depths:
+                x, y = down.point(side * 0.5 * splint.slot_width, depth)
+                gradient = down.gradient(side, 0.0, side * (y - down.y))
+                gradient[B] = 0.0  # bolt and splint shift together
+                rows.append(_Gap(("P2", "P4"), "slot", side * (x - axis) - shank, gradient, (x, y), (-side, 0.0)))
+            if joints.hole:
+                gradient, point = [0.0] * SIZE, (axis + side * shank, 0.5 * self.clamp.up_splint.thickness)
+                gradient[B] = -side
+                rows.append(_Gap(("P1", "P4"), "hole", play - side * float(q[B]), gradient, point, (-side, 0.0)))
+            if joints.washer:
+                gradient, point = [0.0] * SIZE, (axis - side * shank, float(q[D]) + splint.back_radius)
+                gradient[V] = -side
+                rows.append(_Gap(("P3", "P4"), "hole", washer_play - side * float(q[V]), gradient, point, (side, 0.0)))
+        return [*rows, self._seat(q, down)]
+
+    def _saddle_edge(self, q: Array, down: _Down, side: float) -> _Gap:
+        """The down splint's underside on an edge of the saddle, whose arc's centre is back_clearance above q's d."""
+        edge = self.bolt_x + float(q[B] + q[V]) + side * 0.5 * self.clamp.saddle.width
+        edge_y = float(q[D]) + self._edge_below
+        x, y, c, s = edge - down.x, edge_y - down.y, down.cos, down.sin
+        gradient = down.gradient(-s, -c, x * c - y * s)
+        gradient[D] += c
+        gradient[B] += s
+        gradient[V] += s
+        gap = x * s + y * c - self.clamp.down_splint.underside_depth
+        return _Gap(("P2", "P3"), EDGES, gap, gradient, (edge, edge_y), (s, c))
+
+    def _seat(self, q: Array, down: _Down) -> _Gap:
+        """The round back's height over the saddle's arc, square to it."""
+        u, upright, gradient = float(q[U]), 1.0 / math.hypot(1.0, down.slope), [0.0] * SIZE
+        gradient[W], gradient[U] = -u * down.slope * down.bend * upright**3, upright
+        normal, back = (down.slope * upright, upright), self.clamp.down_splint.back_radius
+        point = (down.x + back * normal[0], down.y + back * normal[1])
+        return _Gap(("P2", "P3"), SEAT, u * upright, gradient, point, normal)
 
     def wire_curvature(self, q: Array, splint: PartName, wire: PartName, force: Array, h: float) -> Array:
         """Second derivatives (10, 10) by q of ``force`` (k,) times a wire's gaps to a splint.
@@ -331,78 +390,59 @@ class Section:
         The normals turn with the wire's place (u, v) in the splint's own axes: differences over ``h`` mm. How u and v
         follow from q is written out.
         """
-        i = 2 * WIRES.index(wire)
-        px, py, c, s, slope, bend = self._down(q).tolist() if splint == "P2" else (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-        turn = np.array([[c, -s], [s, c]])
-        u, v = dot(turn, q[i : i + 2] - (px, py)).tolist()
+        i, down = 2 * WIRES.index(wire), self._down(q) if splint == "P2" else _AT_REST
+        turn = np.array([[down.cos, -down.sin], [down.sin, down.cos]])
+        u, v = down.seen(float(q[i]), float(q[i + 1]))
 
-        places = [(u + h, v), (u - h, v), (u, v + h), (u, v - h), *[(u, v)] * (splint == "P2")]
-        right, left, under, over, *here = self._pushes(splint, wire, np.array(places), force, c, s)
+        def push(u: float, v: float) -> Array:
+            return np.asarray(force @ np.array(self._pieces(splint, wire, u, v, down.cos, down.sin).normal))
+
+        right, left, under, over = (push(u + du, v + dv) for du, dv in ((h, 0.0), (-h, 0.0), (0.0, h), (0.0, -h)))
         turning = np.column_stack([right - left, under - over]) / (2.0 * h)
-        by_q, found = np.zeros((2, SIZE)), np.zeros((SIZE, SIZE))
+        by_q, curvature = np.zeros((2, SIZE)), np.zeros((SIZE, SIZE))
         by_q[:, i : i + 2] = turn
         if splint == "P2":
             by_q[:, B : W + 1] = -turn[:, :1]
             by_q[:, [D, U]] = np.column_stack([-turn[:, 1], turn[:, 1]])
-            by_q[:, W] += slope * turn[:, 1]
+            by_q[:, W] += down.slope * turn[:, 1]
             by_q[:, S] = np.array((-v, u)) / self.lever
-            along, deep = here[0].tolist()
-            found[S] = (deep * by_q[0] - along * by_q[1]) / self.lever
-            found += found.T
-            found[S, S] *= 0.5
-            found[W, W] += bend * (along * turn[0, 1] + deep * turn[1, 1])
-        return dot(dot(by_q.T, turning), by_q) + found
+            along, deep = push(u, v).tolist()
+            curvature[S] = (deep * by_q[0] - along * by_q[1]) / self.lever
+            curvature += curvature.T
+            curvature[S, S] *= 0.5
+            curvature[W, W] += down.bend * (along * turn[0, 1] + deep * turn[1, 1])
+        return np.asarray(by_q.T @ turning @ by_q + curvature)
 
-    def _pushes(self, splint: PartName, wire: PartName, places: Array, force: Array, c: float, s: float) -> Array:
-        """``force`` (k,) times the normals of `_pieces` of a wire at each of ``places`` (n, 2)."""
-        if type(self.model) is not Cas or float(np.abs(places).max()) >= _NEAR:
-            return np.array([dot(force, self._pieces(splint, wire, u, v, c, s)[0][:, 3:5]) for u, v in places.tolist()])
-        from clamp3d.clamp.kernel_section import pushes  # compiled on first use
-
-        self.queries.contact += len(places)
-        groove = WIRES.index(wire), SPLINTS.index(splint)
-        work, found = (np.empty((3, 14)), np.empty((3, 6))), np.empty(places.shape)
-        pushes(self.grooves[groove], self._faces[groove], places, force, *work, found)
-        return found
-
-    @cached_property
-    def grooves(self) -> Array:
-        """Dimensions (2, 2, 8) in mm of each wire's groove in each splint, as the kernel takes them."""
-        found = np.empty((2, 2, 8))
-        for (i, wire), (k, splint) in itertools.product(enumerate(WIRES), enumerate(SPLINTS)):
-            pair = self.pairs[splint, wire]
-            groove, r, T = pair.groove, pair.cylinder.radius, pair.T_a_groove
-            found[i, k, :5] = groove.radius, groove.half_angle, 0.5 * groove.length, r, 0.5 * pair.cylinder.length
-            found[i, k, 5:] = T[0, 3], -T[2, 3], 1.0 if splint == "P1" else -1.0
-        return found
-
-    @cached_property
-    def _faces(self) -> Array:
-        """Where each splint's face ends on each wire's side (2, 2, 4), in mm, as the kernel takes it."""
-        up, face = self.clamp.up_splint, self.clamp.down_splint.face_depth
-        sides = ((-1.0, 0.0, -self.lever), (1.0, up.width, self.lever))
-        return np.array([((a, side, up.thickness, 1.0), (b, side, face, -1.0)) for side, a, b in sides])
-
-    def _pieces(
-        self, splint: PartName, wire: PartName, u: float, v: float, c: float = 1.0, s: float = 0.0
-    ) -> tuple[Array, tuple[str, ...]]:
-        """The model's pieces for a wire at (u, v) in the splint's own axes (right, down), which is turned by (c, s).
-
-        Gap, point and normal of each (k, 6; the last column is not used), and what it is. The faces end at the splint's
-        outer edge: the groove's material has no end.
-        """
-        from clamp3d.clamp.kernel_section import end  # compiled on first use
-
-        pair, face = self.pairs[splint, wire], self._faces[WIRES.index(wire), SPLINTS.index(splint)]
+    def _pieces(self, splint: PartName, wire: PartName, u: float, v: float, c: float = 1.0, s: float = 0.0) -> _Pieces:
+        """The model's pieces for a wire at (u, v) in the splint's own axes (right, down), which is turned by (c, s)."""
         self.queries.contact += 1
-        T = np.array([c, 0.0, s, u, 0.0, 1.0, 0.0, 0.0, -s, 0.0, c, -v, 0.0, 0.0, 0.0, 1.0]).reshape(4, 4)
-        found = self.model.pieces(pair, T)
-        flat = found.point[:, ::2] * _RIGHT_DOWN, found.normal[:, ::2] * _RIGHT_DOWN
-        rows = np.ascontiguousarray(np.column_stack([found.distance, *flat, np.zeros(len(found.feature))]), np.float64)
-        end(face, pair.cylinder.radius, u, v, rows)
-        return rows, tuple(
-            EDGE if code else name for code, name in zip(rows[:, 5].tolist(), found.feature, strict=True)
-        )
+        T = np.array([[c, 0.0, s, u], [0.0, 1.0, 0.0, 0.0], [-s, 0.0, c, -v], [0.0, 0.0, 0.0, 1.0]])
+        pieces = self.model.pieces(self.pairs[splint, wire], T)
+        points, normals = ((array[:, ::2] * _RIGHT_DOWN).tolist() for array in (pieces.point, pieces.normal))
+        rows = _Pieces(pieces.distance.tolist(), points, normals, list(pieces.feature))
+        self._end_face(rows, splint, wire, u, v)
+        return rows
+
+    def _end_face(self, rows: _Pieces, splint: PartName, wire: PartName, u: float, v: float) -> None:
+        """A splint's faces end at its outer edge: beside it that is the nearest piece in ``rows``.
+
+        Pieces that are nearer than the edge stand `_FAR` away: the groove's material has no end.
+        """
+        side = -1.0 if wire == "P6" else 1.0
+        if splint == "P1":
+            edge, height, looks = self.bolt_x + side * self.bolt_x, self.clamp.up_splint.thickness, 1.0
+        else:
+            edge, height, looks = side * self.lever, self.clamp.down_splint.face_depth, -1.0
+        beyond = side * (u - edge)
+        if beyond <= 0.0:
+            return
+        above = max(looks * (v - height), 0.0)
+        away = math.hypot(beyond, above)
+        gap, nearest = away - self.pairs[splint, wire].cylinder.radius, rows.value.index(min(rows.value))
+        rows.value = [_FAR if value < gap else value for value in rows.value]
+        rows.value[nearest], rows.feature[nearest] = gap, EDGE
+        rows.point[nearest] = (edge, height if above > 0.0 else v)
+        rows.normal[nearest] = (side * beyond / away, looks * above / away)
 
     @cached_property
     def _edge_below(self) -> float:

@@ -20,10 +20,9 @@ from clamp3d.checks import choice
 from clamp3d.clamp.dimensions import Clamp, Wire
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.section import SIZE, Section
-from clamp3d.clamp.status import CLAMPED, final_status
-from clamp3d.core.linear import dot, lstsq
+from clamp3d.clamp.status import closing_status
 from clamp3d.core.pose import Array
-from clamp3d.errors import SolverError
+from clamp3d.errors import NotClampedError, SolverError
 
 _GROOVES = ("line_groove", "jumper_groove")
 DIMENSIONS: tuple[str, ...] = (
@@ -35,8 +34,14 @@ DIMENSIONS: tuple[str, ...] = (
     "down_splint.width",
     "down_splint.face_depth",
     *(f"down_splint.{g}.{key}" for g in _GROOVES for key in ("radius", "offset", "centre_depth")),
+    "up_splint.hole_diameter",
+    "bolt.diameter",
+    "saddle.hole_diameter",
+    "saddle.radius",
+    "down_splint.back_radius",
 )
-"""Dimensions that place the splints and wires in the section, by their names in clamp files; all in mm."""
+"""Dimensions that place splints and wires in the section, and then those that limit play, by their names in clamp
+files; all in mm."""
 
 _WELL_POSED = 1e-10
 _NONE = 1e-8
@@ -72,6 +77,8 @@ def dimension(clamp: Clamp, name: str) -> float:
 def with_dimensions(clamp: Clamp, values: Mapping[str, float]) -> Clamp:
     """The clamp with some of `DIMENSIONS` changed to ``values`` in mm.
 
+    The tilt that its file names goes: it is that of the nominal clamp, and the bodies say where the tilt ends.
+
     Raises InputError for an unknown name and for dimensions that are no clamp, with the rule that they break.
 
     >>> from clamp3d.clamp.loader import load_clamp
@@ -89,6 +96,7 @@ def with_dimensions(clamp: Clamp, values: Mapping[str, float]) -> Clamp:
     for wire in ("line", "jumper"):
         if wire in tree:
             tree[wire]["conductor"] = None
+    tree.setdefault("down_splint", {})["max_tilt_deg"] = None
     changed: Clamp = _replaced(clamp, tree)
     return changed
 
@@ -100,9 +108,10 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
 
     Raises
     ------
+    NotClampedError
+        If the clamp does not hold both wires.
     SolverError
-        If the final state cannot be proven, does not hold both wires, or is not an isolated one (the derivative then
-        does not exist).
+        If the final state cannot be proven, or is not an isolated one (the derivative then does not exist).
 
     Examples
     --------
@@ -112,9 +121,9 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
     """
     section = Section(clamp, Cas())
     final = solve_final_state(section)
-    status = final_status(section, final)
-    if status != CLAMPED:
-        raise SolverError(f"no sensitivity: {status}")
+    status = closing_status(section, final)
+    if not status.clamped:
+        raise NotClampedError(f"no sensitivity: {status}")
     derivative = _derivatives(section, final)
     rows = [
         Sensitivity(n, dimension(clamp, n), float(v))
@@ -140,7 +149,7 @@ def _derivatives(section: Section, final: FinalState) -> Array:
     def conditions(at: Section, x: Array) -> Array:
         """Gradient of the Lagrangian (n, up to a constant), active gaps (k), and the splint distance."""
         gaps = at.gaps(x)
-        gradient = dot(-final.multipliers[active], gaps.gradient[active][:, free])
+        gradient = -final.multipliers[active] @ gaps.gradient[active][:, free]
         return np.array([*gradient, *gaps.value[active], at.splint_distance(x)])
 
     def changed(name: str, by: float) -> Section:
@@ -153,7 +162,7 @@ def _derivatives(section: Section, final: FinalState) -> Array:
     by_q, by_p = by_q / (2.0 * h), by_p / (2.0 * h)
     A, k = final.gaps.gradient[active][:, free], len(active)
     kkt = np.block([[by_q[: len(free)], -A.T], [A, np.zeros((k, k))]])
-    adjoint, rank = lstsq(kkt.T, np.append(by_q[-1], np.zeros(k)), _WELL_POSED)
+    adjoint, _, rank, _ = np.linalg.lstsq(kkt.T, np.append(by_q[-1], np.zeros(k)), _WELL_POSED)
     if rank < len(kkt):
         raise SolverError("no sensitivity: the final state is not isolated, its KKT matrix is singular")
-    return np.asarray(by_p[-1] - dot(adjoint, by_p[:-1]))
+    return np.asarray(by_p[-1] - adjoint @ by_p[:-1])

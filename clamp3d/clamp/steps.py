@@ -11,19 +11,30 @@ import numpy as np
 from clamp3d.clamp.contact import Contact, measure_contacts
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import PAIRS, Pair
+from clamp3d.clamp.places import Poses, saddle_rise, section_poses
 from clamp3d.clamp.result import Event, Waypoint
-from clamp3d.clamp.section import SIZE, WIRES, B, D, S, Section, U, V, W
+from clamp3d.clamp.section import SIZE, WIRES, D, Section
 from clamp3d.collide.model import ModelCache
 from clamp3d.core.pose import Array, SectionPose
 from clamp3d.errors import SolverError
 
-Poses = dict[PartName, SectionPose]
 Meetings = list[tuple[Pair, Array]]
 """Pairs of parts, each with the state (10,) in which they meet."""
 _SPARE = 20.0
 """Free way in mm between a wire and the open clamp before it comes in."""
 _TOUCH = 1e-10
 _MAX_ADVANCES = 100_000
+
+
+@dataclass(frozen=True)
+class Closing:
+    """What the solver found: states at the start, closed by hand and at the end, and the contacts on the way."""
+
+    start: Array
+    held: Array
+    end: Array
+    by_hand: Meetings
+    taken: Meetings
 
 
 @dataclass
@@ -114,17 +125,17 @@ def close_splints(section: Section, start: Array, end: Array, met: Meetings, ste
     log.reach(step, "splints closed", section_poses(section, end, saddle_d=d))
 
 
-def tighten_nut(section: Section, start: Array, held: Array, end: Array, met: Meetings, step: str, log: Log) -> float:
+def tighten_nut(section: Section, closing: Closing, step: str, log: Log) -> float:
     """The nut draws the saddle up to the round back, and on from ``held`` to ``end`` if the joints have play.
 
     Returns the way that the nut has gone when it is tight, mm.
     """
-    clamp, d = section.clamp, float(start[D])
+    clamp, d, held, end = section.clamp, float(closing.start[D]), closing.held, closing.end
     travel = saddle_rise(section, held, d)
     if not np.array_equal(held, end):
         log.reach(step, "saddle meets the down splint", section_poses(section, held))
         log.touch(held, step, ("P2", "P3"), travel)
-        for pair, q in met:
+        for pair, q in closing.taken:
             log.touch(q, step, pair, travel + float(held[D] - q[D]))
         travel = saddle_rise(section, end, d)
     log.reach(step, "nut tightened", section_poses(section, end))
@@ -167,42 +178,3 @@ def _rise(section: Section, q: Array, wire: PartName, limit: float) -> float:
 
 def _unit(i: int) -> Array:
     return np.asarray(np.eye(SIZE)[i])
-
-
-def section_poses(section: Section, q: Array, saddle_d: float | None = None) -> Poses:
-    """Section poses of all parts with the line at rest; ``saddle_d`` is where the saddle stands if not under P2."""
-    clamp = section.clamp
-    x, y = -float(q[0]), -float(q[1])
-    down = section.down_splint(q)
-    saddle_y = y + (down.y - _saddle_lift(section, q) if saddle_d is None else saddle_d - clamp.back_clearance)
-    bolt_y = saddle_y + clamp.saddle.radius + clamp.saddle.apex_thickness - clamp.bolt.shank_length
-    bolt_x = x + section.bolt_x + float(q[B])
-    return {
-        "P1": SectionPose(x, y),
-        "P2": SectionPose(x + down.x, y + down.y, down.angle),
-        "P3": SectionPose(bolt_x + float(q[V]), saddle_y),
-        "P4": SectionPose(bolt_x, bolt_y),
-        "P5": SectionPose(bolt_x, y - clamp.nut.height),
-        "P6": SectionPose(0.0, 0.0),
-        "P7": SectionPose(x + float(q[2]), y + float(q[3])),
-    }
-
-
-def saddle_rise(section: Section, q: Array, saddle_d: float) -> float:
-    """How far the saddle rises from where it stood with ``saddle_d`` until it meets the round back at ``q``; mm."""
-    opened = section.down_splint(q).y - saddle_d + section.clamp.back_clearance
-    return _saddle_lift(section, q, opened) - opened
-
-
-def _saddle_lift(section: Section, q: Array, lift: float = 0.0) -> float:
-    """How far above P2's origin the saddle's arc centre, rising from ``lift``, ends: where it meets the round back, or
-    u below that; mm."""
-    pair, aside = section.pairs["P3", "P2"], float(q[W])
-    for _ in range(100):
-        section.queries.contact += 1
-        back = SectionPose(aside, lift, float(q[S]) / section.lever)
-        gap = float(section.model.pieces(pair, back.T()).distance.min())
-        if abs(gap) <= 1e-12 * section.clamp.saddle.radius:
-            break
-        lift += gap
-    return lift - float(q[U])

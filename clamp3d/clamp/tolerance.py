@@ -14,10 +14,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, nullcontext
-from dataclasses import asdict, dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -26,10 +25,9 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.checks import choice, function, instance, number, whole
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.final_state import solve_final_state
-from clamp3d.clamp.journal import Journal
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
-from clamp3d.clamp.status import CLAMPED, final_status
+from clamp3d.clamp.status import closing_status
 from clamp3d.core.child import end_with_parent
 from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError, need, without_numbers
@@ -41,9 +39,11 @@ Sample = tuple[float | None, str]
 WIRE_TOLERANCE_PERCENT = 1.0
 """Chosen: conductors are within 1 % of their nominal diameter."""
 CHUNK = 50
-"""Samples that are solved, sent and kept together: about a second of work."""
+"""Samples that are solved and sent together: about a second of work."""
 # ISO 2768-1:1989, table 1, class m: (nominal sizes up to, permissible deviation either way), mm.
 _MEDIUM = ((6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8), (2000.0, 1.2), (math.inf, 2.0))
+UNPROVEN = "not proven"
+"""How the status of a sample begins whose answer could not be proven."""
 _PATIENCE = 15.0
 """Seconds without an answer after which the workers are counted: a cluster's may be starting anew."""
 _SIGMAS = 3.0
@@ -72,8 +72,13 @@ class Spec:
     tolerance: tuple[float, ...]
 
 
-_Task = tuple[Spec, int, int, int]
-"""What is sampled, the number of the chunk, its first sample and how many it has."""
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """The samples from ``first`` to ``end`` - 1."""
+
+    spec: Spec
+    first: int
+    end: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +91,8 @@ class MonteCarlo:
         What was sampled.
     nominal : float or None
         The nominal clamp's distance in mm; None if it does not clamp.
+    nominal_status : str
+        "clamped", or why not.
     distance : ndarray (n,)
         Mm; NaN where the clamp does not hold both wires.
     status : tuple of str
@@ -94,6 +101,7 @@ class MonteCarlo:
 
     spec: Spec
     nominal: float | None
+    nominal_status: str
     distance: Array
     status: tuple[str, ...]
 
@@ -103,9 +111,14 @@ class MonteCarlo:
         return np.asarray(self.distance[~np.isnan(self.distance)])
 
     def reasons(self) -> dict[str, int]:
-        """How many samples do not clamp, by their reason, most frequent first."""
-        count = Counter(status for status in self.status if status != CLAMPED)
+        """How many samples have no distance, by their reason, most frequent first."""
+        count = Counter(s for s, d in zip(self.status, self.distance.tolist(), strict=True) if math.isnan(d))
         return dict(sorted(count.items(), key=lambda item: (-item[1], item[0])))
+
+    @property
+    def unproven(self) -> int:
+        """How many samples have an answer that could not be proven: whether they clamp is not known."""
+        return sum(status.startswith(UNPROVEN) for status in self.status)
 
     def percentiles(self, at: tuple[float, ...]) -> tuple[float, ...]:
         """Percentiles of the clamped distances in mm; empty where none clamps."""
@@ -131,7 +144,6 @@ def monte_carlo(
     distribution: Distribution = "uniform",
     processes: int = 1,
     scheduler: str | None = None,
-    resume: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> MonteCarlo:
     """Assemble clamps whose dimensions and wires scatter independently about their nominal sizes.
@@ -152,8 +164,6 @@ def monte_carlo(
         How many share the work.
     scheduler : str, optional
         Address of a Dask cluster that shares the work.
-    resume : Path, optional
-        File that keeps what is finished; a run with the same settings (n may differ) goes on from it.
     progress : callable, optional
         Called with the samples done and ``n``.
 
@@ -180,24 +190,18 @@ def monte_carlo(
     instance("clamp", clamp, Clamp)
     n, processes = whole("n", n, least=1), whole("processes", processes, least=1)
     function("progress", progress)
-    spec, nominal = _spec(clamp, whole("seed", seed, least=0), tolerance, wire_tolerance_percent, distribution)
-    header = {"monte_carlo": 1, **asdict(spec), "chunk": CHUNK}
-    sizes = {k: min(CHUNK, n - k * CHUNK) for k in range(math.ceil(n / CHUNK))}
-    with nullcontext() if resume is None else Journal(resume, header) as journal:
-        kept = {} if journal is None else journal.pieces
-        waiting = [(spec, k, k * CHUNK, size) for k, size in sizes.items() if len(kept.get(k, ())) < size]
-        done = n - sum(size for *_, size in waiting)
-        tell = progress or (lambda done, of: None)
-        tell(done, n)
-        for k, found in _solve(waiting, processes, scheduler):
-            kept[k] = found
-            if journal is not None:
-                journal.add([k, found])
-            done += len(found)
-            tell(done, n)
-    samples = [sample for k, size in sizes.items() for sample in kept[k][:size]]
+    spec, nominal, nominal_status = _spec(
+        clamp, whole("seed", seed, least=0), tolerance, wire_tolerance_percent, distribution
+    )
+    chunks: dict[int, list[Sample]] = {}
+    tell = progress or (lambda done, of: None)
+    tell(0, n)
+    for k, chunk in _solve([_Task(spec, k, min(k + CHUNK, n)) for k in range(0, n, CHUNK)], processes, scheduler):
+        chunks[k] = chunk
+        tell(sum(map(len, chunks.values())), n)
+    samples = [sample for k in sorted(chunks) for sample in chunks[k]]
     distance = np.array([math.nan if d is None else d for d, _ in samples])
-    return MonteCarlo(spec, nominal, distance, tuple(status for _, status in samples))
+    return MonteCarlo(spec, nominal, nominal_status, distance, tuple(status for _, status in samples))
 
 
 def sample_dimensions(spec: Spec, index: int) -> dict[str, float]:
@@ -214,7 +218,7 @@ def sample_dimensions(spec: Spec, index: int) -> dict[str, float]:
 
 def _spec(
     clamp: Clamp, seed: int, tolerance: float | None, percent: float, distribution: Distribution
-) -> tuple[Spec, float | None]:
+) -> tuple[Spec, float | None, str]:
     if tolerance is not None and not 0.0 <= (tolerance := number("tolerance", tolerance)) < 1e5:
         raise InputError(f"tolerance must be >= 0 and < 100000 mm, got {tolerance:g}")
     if not 0.0 <= (percent := number("wire tolerance", percent)) <= 100.0 * _TOP:
@@ -223,20 +227,16 @@ def _spec(
 
     def of(name: str) -> float:
         size = dimension(clamp, name)
-        if name.endswith(".diameter"):
+        if name in ("line.diameter", "jumper.diameter"):
             return size * percent / 100.0
         return general_tolerance(size) if tolerance is None else tolerance
 
     spec = Spec(clamp, seed, distribution, tuple(of(name) for name in DIMENSIONS))
-    try:
-        return spec, _closed(clamp)[0]
-    except SolverError:
-        return spec, None
+    return spec, *_closed(clamp)
 
 
 def _chunk(task: _Task) -> tuple[int, list[Sample]]:
-    spec, k, first, size = task
-    return k, [_sample(spec, index) for index in range(first, first + size)]
+    return task.first, [_sample(task.spec, index) for index in range(task.first, task.end)]
 
 
 def _sample(spec: Spec, index: int) -> Sample:
@@ -245,16 +245,17 @@ def _sample(spec: Spec, index: int) -> Sample:
     except InputError as error:
         return None, f"not a clamp: {without_numbers(str(error))}"
     try:
-        return _closed(clamp)
+        distance, status = _closed(clamp)
+        return distance, without_numbers(status)
     except SolverError as error:
-        return None, f"not solved: {without_numbers(str(error))}"
+        return None, f"{UNPROVEN}: {without_numbers(str(error))}"
 
 
 def _closed(clamp: Clamp) -> Sample:
     section = Section(clamp, Cas())
     final = solve_final_state(section)
-    status = final_status(section, final)
-    return (section.splint_distance(final.q) if status == CLAMPED else None), without_numbers(status)
+    status = closing_status(section, final)
+    return (section.splint_distance(final.q) if status.clamped else None), status.text
 
 
 def _solve(tasks: list[_Task], processes: int, scheduler: str | None) -> Iterator[tuple[int, list[Sample]]]:
@@ -271,7 +272,7 @@ def _solve(tasks: list[_Task], processes: int, scheduler: str | None) -> Iterato
             while waiting:
                 done, waiting = wait(waiting, timeout=_PATIENCE, return_when=FIRST_COMPLETED)
                 if not done and not workers():
-                    raise SolverError("no workers are left; finished samples are kept by a resume file only")
+                    raise SolverError("no workers are left")
                 yield from (future.result() for future in done)
         finally:
             for future in futures:
@@ -284,7 +285,7 @@ def _processes(count: int) -> Iterator[tuple[Executor, Callable[[], int]]]:
         try:
             yield pool, lambda: count  # the pool itself tells of one that died
         except BrokenProcessPool:
-            raise SolverError("a worker process died; finished samples are kept by a resume file only") from None
+            raise SolverError("a worker process died") from None
 
 
 def _worker() -> None:

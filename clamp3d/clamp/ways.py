@@ -1,11 +1,13 @@
-"""The way by which parts come to their place, found by taking them out: straight, or with one bend.
+"""Ways by which parts come to their place, straight or with one bend, asked of `check` as motions of the clamp's scene.
 
-What comes out on a way comes in on it (assembly by disassembly). A way counts as free only if the continuous test of
-the bodies proves that no overlap on it is deeper than that test resolves (1e-4 mm); touching is free.
+They are found by taking parts out: what comes out on a way comes in on it. A group moves as one. A way ends where the
+group's box is apart from the boxes of all that stands there; wires go on far beyond what is drawn of them, so no way
+leads over a wire's end. It counts as free only where `check` proves that nothing overlaps by more than `RESOLUTION`.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -13,21 +15,21 @@ import numpy as np
 
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.matrix import Pair, plain
-from clamp3d.clamp.parts import parts
-from clamp3d.clamp.scene import CONTACT, clamp_scene
+from clamp3d.clamp.parts import parts, wire_solid
 from clamp3d.clamp.section import WIRES
-from clamp3d.collide.distance import Distance
+from clamp3d.collide.allowed import Allowed
+from clamp3d.collide.check import check
 from clamp3d.collide.model import ModelCache
-from clamp3d.collide.moving_pair import ACCURACY, MovingPair, box_corners, first_time
-from clamp3d.collide.refine import measured
-from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import Thresholds
-from clamp3d.core.linear import dot
+from clamp3d.collide.result import NOT_CLEAN, PairResult
+from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array
+from clamp3d.core.shapes import Solid
 
 SPARE = 20.0
 """Free way in mm between a part that waits and what is in its way."""
+RESOLUTION = 1e-4
+"""Overlap in mm up to which parts on their way touch."""
 DIRECTIONS: dict[str, tuple[float, float, float]] = {
     "from above": (0.0, 0.0, 1.0),
     "from below": (0.0, 0.0, -1.0),
@@ -37,17 +39,19 @@ DIRECTIONS: dict[str, tuple[float, float, float]] = {
     "from the front": (0.0, -1.0, 0.0),
 }
 """Where a part can come from, as unit vectors of the world: along the bolt, across the wires, along them."""
+_ENDLESS = 20.0
+"""How many times as long as drawn a wire is taken to be."""
 _BENDS = (0.5, 0.25, 0.75)
 """Where a way out bends, in parts of how far the parts can go before they meet something."""
-_LOOKS = (0.5, 0.25, 0.125, 0.0625, 0.03125)
-"""Where a way is looked at before it is proven: most ways that are blocked show it."""
 _SHORTEST = 0.5
 """Shortest leg of a way with a bend, mm."""
-_THRESHOLDS = Thresholds(CONTACT)
+_LOOK = 0.01
+"""So far behind the first contact, in mm, parts are looked at first."""
 
 Leg = tuple[str, float]
 """Where the parts come from (`DIRECTIONS`), and how far, mm; a way out is its legs from the place."""
 Poses = Mapping[PartName, Array]
+Box = tuple[Array, Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,168 +93,171 @@ class Block:
 
 @dataclass
 class Ways:
-    """Searches ways of a clamp's parts; ``cache`` keeps their models."""
+    """Searches ways of a clamp's parts; ``cache`` keeps their models.
+
+    In every method the first parts of ``pairs`` move, the second ones stand, and ``place`` holds their world poses.
+    """
 
     clamp: Clamp
     cache: ModelCache = field(default_factory=ModelCache)
 
     def __post_init__(self) -> None:
-        self.models = {name: self.cache.model(solid) for name, solid in parts(self.clamp).items()}
+        clamp, length = self.clamp, _ENDLESS * self.clamp.wire_length
+        self.drawn = parts(clamp)
+        endless = {n: wire_solid(n, w.radius, length) for n, w in zip(WIRES, (clamp.line, clamp.jumper), strict=True)}
+        self.solids: dict[PartName, Solid] = self.drawn | endless
+        self._farthest = 0.5 * length - clamp.wire_length
 
     def find(self, pairs: Sequence[Pair], place: Poses) -> tuple[Leg, ...]:
-        """The first free way out of ``place`` (world poses) for the first parts of ``pairs``; the second ones stand.
-
-        Empty if nothing is free; `blocks` says why.
-        """
-        todo = list(pairs)  # what blocked one way is asked first about the next
-        ways = list(self._outward(pairs, place, np.zeros(3)))
-        for origin, length in ways:
-            if self._free(todo, place, np.zeros(3), origin, length):
+        """The first free way out; empty if nothing is free, and `blocks` says why."""
+        todo, here = list(pairs), np.zeros(3)  # what blocked one way is asked first about the next
+        exits = list(self._exits(pairs, place, here))
+        for origin, length in exits:
+            if self._is_free(todo, place, here, out(origin, length)):
                 return ((origin, length + SPARE),)
-        for origin, length in ways:
-            if not self._free(todo, place, np.zeros(3), origin, min(length, _SHORTEST / _BENDS[1])):
-                continue
-            free = length * self._first(todo, place, np.zeros(3), _out(origin, length))[0]
-            for part in _BENDS:
-                corner = _out(origin, part * free)
-                for then, more in self._outward(pairs, place, corner):
-                    if dot(_out(then), _out(origin)) == 0.0 and self._free(todo, place, corner, then, more):
-                        return ((origin, part * free), (then, more + SPARE))
-        return self._slide(pairs, place)
-
-    def _slide(self, pairs: Sequence[Pair], place: Poses) -> tuple[Leg, ...]:
-        """The first free way out along the wires, past all that is no wire, and then across them; empty if none is.
-
-        Where a part leaves a wire nothing else is beside it, and the wire is as it is at the place: it has no end.
-        """
-        wires, here = [pair for pair in pairs if pair[1] in WIRES], np.zeros(3)
-        others = [pair for pair in pairs if pair not in wires]
-        if not wires or any(a in WIRES for a, _ in pairs):
-            return ()
-        for then, more in self._outward(wires, place, here):
-            if DIRECTIONS[then][1] or not self._free(wires, place, here, then, more):
-                continue
-            for origin, length in self._outward(others, place, here):
-                if DIRECTIONS[origin][1] and self._free(others, place, here, origin, length):
-                    return ((origin, length + SPARE), (then, more + SPARE))
-            break
+        for origin in DIRECTIONS:
+            for first in self._bends(todo, place, origin):
+                corner = out(origin, first)
+                for then, length in self._exits(pairs, place, corner):
+                    square = float(out(then) @ out(origin)) == 0.0
+                    if square and self._is_free(todo, place, corner, out(then, length)):
+                        return ((origin, first), (then, length + SPARE))
         return ()
 
     def blocks(self, pairs: Sequence[Pair], place: Poses) -> tuple[Block, ...]:
         """What each straight way in meets first, the way that leads nearest to the place first."""
-        ways = self._outward(pairs, place, np.zeros(3))
-        found = [self.block(pairs, place, origin, length + SPARE) for origin, length in ways]
-        return tuple(sorted(filter(None, found), key=lambda block: block.way - block.travel))
+        exits = self._exits(pairs, place, np.zeros(3))
+        met = [self.block(pairs, place, origin, length + SPARE) for origin, length in exits]
+        return tuple(sorted(filter(None, met), key=lambda block: block.way - block.travel))
 
     def block(self, pairs: Sequence[Pair], place: Poses, origin: str, length: float) -> Block | None:
         """What meets first on the straight way of ``length`` mm to ``place``; None if it is free."""
-        start = _out(origin, length)
-        t, pair = self._first(pairs, place, start, -start)
+        start = out(origin, length)
+        share, pair = self._first(pairs, place, start, -start)
         if pair is None:
             return None
-        moving = self._moving(pair, place, start, -start)
-        met = moving.ask(t, measured, _THRESHOLDS).moved(moving.motion.at(t, moving.start))
-        return Block(origin, *pair, met.point_b, t * length, length)
+        met = self._scene([pair], place, (1.0 - share) * start)
+        row = next(iter(check(met, pairs=[pair], distances=True, depths=False, cache=self.cache).pairs))
+        point = row.distance.point_b if row.a == pair[0] else row.distance.point_a
+        return Block(origin, *pair, point, share * length, length)
 
     def scene(self, pairs: Sequence[Pair], place: Poses, block: Block) -> Scene:
-        """The parts of ``pairs`` with the motion that ``block`` blocks, up to the place."""
-        moving, start = {a for a, _ in pairs}, np.eye(4)
-        start[:3, 3] = _out(block.origin, block.way)
-        whole = clamp_scene(self.clamp, {name: dot(start, T) if name in moving else T for name, T in place.items()})
-        shown = {name for pair in pairs for name in pair}
-        motion = Motion.translate(-start[:3, 3], parts=tuple(sorted(moving)), name=f"{block.a} {block.origin}")
+        """The parts of ``pairs`` as drawn, with the motion that ``block`` blocks, up to the place."""
+        start = out(block.origin, block.way)
         return replace(
-            whole,
-            parts=tuple(part for part in whole.parts if part.name in shown),
-            allowed=tuple(pair for pair in whole.allowed if {pair.a, pair.b} <= shown),
-            motions=(motion,),
+            self._scene(pairs, place, start, -start, solids=self.drawn, name=f"{block.a} {block.origin}"),
             name=f"{self.clamp.name} clamp: the step that is blocked",
         )
 
-    def _first(self, pairs: Sequence[Pair], place: Poses, start: Array, by: Array) -> tuple[float, Pair | None]:
-        """Up to which part of their way ``by`` (3,) the first parts, ``start`` off their place, overlap nothing."""
-        t, met = 1.0, None
-        for pair in pairs:
-            if t * float(np.abs(by).max()) <= ACCURACY:  # nothing is told apart on so short a way
-                break
-            if self._apart(pair, place, start, t * by):
-                continue
-            part = first_time(self._moving(pair, place, start, t * by), 1.0, _THRESHOLDS, -ACCURACY)
-            if part < 1.0:
-                t, met = part * t, pair
-        return t, met
+    def box(self, part: PartName, place: Poses) -> Box:
+        """Corners of the box around a part as it is drawn."""
+        return _box(self.drawn[part], place[part])
 
-    def _free(self, pairs: list[Pair], place: Poses, start: Array, origin: str, length: float) -> bool:
-        """Whether nothing overlaps on a way out; what does is put first."""
-        by = _out(origin, length)
+    def _exits(self, pairs: Sequence[Pair], place: Poses, start: Array) -> Iterator[Leg]:
+        """Directions that lead out, each with how far until the moving parts' common box leaves that of the others."""
+        for origin in DIRECTIONS:
+            length = self._length(pairs, place, start, origin)
+            if length <= self._farthest:
+                yield origin, length
+
+    def _length(self, pairs: Sequence[Pair], place: Poses, start: Array, origin: str) -> float:
+        """How far the moving parts, ``start`` off their place, go until their common box is past all others."""
+        u = out(origin)
+        k = int(np.argmax(np.abs(u)))
+        across, length = [i for i in range(3) if i != k], 0.0
+        if not pairs:
+            return 0.0
+        moving = [_box(self.solids[a], place[a]) for a in {a for a, _ in pairs}]
+        low, high = (
+            np.min([box[0] for box in moving], axis=0) + start,
+            np.max([box[1] for box in moving], axis=0) + start,
+        )
+        for name in {b for _, b in pairs}:
+            still_low, still_high = _box(self.solids[name], place[name])
+            if all(low[i] < still_high[i] and high[i] > still_low[i] for i in across):
+                length = max(length, float(still_high[k] - low[k] if u[k] > 0.0 else high[k] - still_low[k]))
+        return length
+
+    def _bends(self, pairs: list[Pair], place: Poses, origin: str) -> Iterator[float]:
+        """How far a first leg may go: past all that is no wire, along the wires; else a part of the free way."""
+        here, standing = np.zeros(3), [pair for pair in pairs if pair[1] not in WIRES]
+        if DIRECTIONS[origin][1]:
+            length = self._length(standing, place, here, origin) + SPARE
+            if length <= self._farthest and self._is_free(pairs, place, here, out(origin, length)):
+                yield length
+            return
+        reach = min(self._length(pairs, place, here, origin), self._farthest)
+        if reach <= 0.0 or not self._is_free(pairs, place, here, out(origin, min(reach, _SHORTEST / _BENDS[1]))):
+            return
+        free = reach * self._first(pairs, place, here, out(origin, reach))[0]
+        yield from (part * free for part in _BENDS)
+
+    def _is_free(self, pairs: list[Pair], place: Poses, start: Array, by: Array) -> bool:
+        """Whether nothing overlaps on a way; what does is put first."""
         for pair in pairs:
-            if self._apart(pair, place, start, by):
-                continue
-            moving = self._moving(pair, place, start, by)
-            if (
-                any(moving.ask(t, _known, _THRESHOLDS).upper < -ACCURACY for t in _LOOKS)
-                or first_time(moving, 1.0, _THRESHOLDS, -ACCURACY) < 1.0
-            ):
+            if self._clash(pair, place, start, by) is not None:
                 pairs.remove(pair)
                 pairs.insert(0, pair)
                 return False
         return True
 
-    def _apart(self, pair: Pair, place: Poses, start: Array, by: Array) -> bool:
-        """Whether the boxes of a pair stay apart on a way."""
-        (low, high), (still_low, still_high) = self.box(pair[0], place), self.box(pair[1], place)
-        low, high = low + start + np.minimum(by, 0.0), high + start + np.maximum(by, 0.0)
-        return bool((low > still_high).any() or (high < still_low).any())
-
-    def _moving(self, pair: Pair, place: Poses, start: Array, by: Array) -> MovingPair:
-        a, b = pair
-        T = place[a].copy()
-        T[:3, 3] += start
-        return MovingPair(self.models[a], self.models[b], Motion.translate(by), T, place[b])
-
-    def box(self, part: PartName, place: Poses) -> tuple[Array, Array]:
-        """Corners of the box around a part."""
-        points = box_corners(self.models[part], place[part])
-        return points.min(axis=0), points.max(axis=0)
-
-    def _outward(self, pairs: Sequence[Pair], place: Poses, start: Array) -> Iterator[Leg]:
-        """Directions, each with how far the moving parts must go until their common box leaves that of the others.
-
-        A wire goes on beyond what is drawn of it: nothing that it crosses in the section leaves it lengthwise.
-        """
-        boxes = {name: np.array(self.box(name, place)) for pair in pairs for name in pair}
-        for name, _ in pairs:
-            boxes[name] = np.array(self.box(name, place)) + start
-        for origin, u in DIRECTIONS.items():
-            k = int(np.argmax(np.abs(u)))
-            across = [i for i in range(3) if i != k]
-
-            def beside(a: Array, b: Array, across: Sequence[int] = across) -> bool:
-                return any(a[0, i] >= b[1, i] or a[1, i] <= b[0, i] for i in across)
-
-            lengthwise = [(a, b) for a, b in pairs if k == 1 and {a, b} & set(WIRES)]
-            if any(not beside(boxes[a], boxes[b]) for a, b in lengthwise):
+    def _first(self, pairs: Sequence[Pair], place: Poses, start: Array, by: Array) -> tuple[float, Pair | None]:
+        """Up to which part of their way ``by`` (3,) the moving parts, ``start`` off their place, overlap nothing."""
+        share, first = 1.0, None
+        for pair in pairs:
+            row = self._clash(pair, place, start, share * by)
+            if row is None:
                 continue
-            counted = [pair for pair in pairs if pair not in lengthwise]
-            length = 0.0
-            if counted:
-                (low, high), (still_low, still_high) = (
-                    (np.min([boxes[n][0] for n in names], axis=0), np.max([boxes[n][1] for n in names], axis=0))
-                    for names in map(set, zip(*counted, strict=True))
-                )
-                length = float(still_high[k] - low[k] if u[k] > 0.0 else high[k] - still_low[k])
-            yield origin, max(length, 0.0)
+            # Before they touch they are apart, and at the time of their least distance they overlap.
+            length = float(np.abs(by).max())
+            low, high = share * (row.contact_at or 0.0), share * (1.0 if row.t is None else row.t)
+            middle = low + _LOOK / length
+            while (high - low) * length > RESOLUTION:
+                middle = middle if low < middle < high else 0.5 * (low + high)
+                apart = self._clash(pair, place, start, middle * by) is None
+                low, high = (middle, high) if apart else (low, middle)
+            share, first = low, pair
+        return share, first
+
+    def _clash(self, pair: Pair, place: Poses, start: Array, by: Array) -> PairResult | None:
+        """The row of a pair that overlaps on its way, or may do so."""
+        scene = self._scene([pair], place, start, by)
+        rows = check(scene, pairs=[pair], depths=False, cache=self.cache).rows
+        return next((row for row in rows if row.verdict in NOT_CLEAN), None)
+
+    def _scene(
+        self,
+        pairs: Sequence[Pair],
+        place: Poses,
+        start: Array,
+        by: Array | None = None,
+        *,
+        solids: Mapping[PartName, Solid] | None = None,
+        name: str = "way",
+    ) -> Scene:
+        """The parts of ``pairs``, those that move ``start`` off their place, with their motion ``by`` (3,)."""
+        moving, T = sorted({a for a, _ in pairs}), np.eye(4)
+        T[:3, 3] = start
+        shapes = solids or self.solids
+        shown = [n for n in shapes if n in {part for pair in pairs for part in pair}]
+        placed = tuple(Part(n, shapes[n], T @ place[n] if n in moving else place[n]) for n in shown)
+        motions = () if by is None else (Motion.translate(by, parts=tuple(moving), name=name),)
+        meant = tuple(Allowed(a, b) for a, b in itertools.combinations(shown, 2))
+        return Scene(placed, RESOLUTION, 0.0, meant, motions)
 
 
-def _known(found: Distance) -> bool:
-    """Whether bounds say on which side of an overlap a distance is."""
-    return found.upper < -ACCURACY or found.lower >= -ACCURACY
+def _box(solid: Solid, T: Array) -> Box:
+    """Corners of the box around a solid at a pose (4, 4)."""
+    high = np.array([max(body.support(row) for body in solid.bodies) for row in T[:3, :3]])
+    low = np.array([max(body.support(-row) for body in solid.bodies) for row in T[:3, :3]])
+    return T[:3, 3] - low, T[:3, 3] + high
 
 
-def _out(origin: str, length: float = 1.0) -> Array:
+def out(origin: str, length: float = 1.0) -> Array:
+    """The offset (3,) of parts that come from ``length`` mm away."""
     return length * np.array(DIRECTIONS[origin])
 
 
 def way_out(legs: Sequence[Leg]) -> list[Array]:
     """Where a way out leads: the offsets (3,) from the place after each of its legs."""
-    return list(np.cumsum([_out(*leg) for leg in legs], axis=0))
+    return list(np.cumsum([out(*leg) for leg in legs], axis=0))

@@ -6,13 +6,10 @@ certain), 4 failed inside (a fault of the program, or a solver that could not pr
 
 from __future__ import annotations
 
-import atexit
 import errno
-import gc
 import importlib
 import os
 import sys
-import threading
 import traceback
 import warnings
 from contextlib import suppress
@@ -22,24 +19,24 @@ import click
 import clamp3d
 from clamp3d.cli.terminal import ExitCode, end_on_signals, show, tolerate_closed_pipes
 from clamp3d.core.child import own_process
-from clamp3d.errors import EXTRAS, Clamp3dError, SequenceError, SolverError, missing, one_line
+from clamp3d.errors import EXTRAS, Clamp3dError, NotClampedError, SequenceError, SolverError, missing, one_line
 
-# Name -> (module, one line for the list of commands). A command's module is loaded when it is called.
+# Name -> (module and function, one line for the list of commands). A module is loaded when its command is called.
 COMMANDS: dict[str, tuple[str, str]] = {
-    "run": ("clamp3d.cli.run", "Assemble a clamp and print where every part ends up."),
-    "view": ("clamp3d.cli.view", "Show the assembly in a browser, or write it as one page."),
-    "report": ("clamp3d.cli.report", "Write a report for an assembly reviewer."),
-    "reproduce": ("clamp3d.cli.reproduce", "Print Tables 1-5 of the paper beside this program's values."),
-    "compare": ("clamp3d.cli.compare", "Measure every contact method: accuracy against speed."),
-    "stress": ("clamp3d.cli.stress", "Put families of hard cases to every contact method."),
-    "measure-image": ("clamp3d.cli.measure_image", "Measure a distance in a photograph by marked points."),
-    "fit": ("clamp3d.cli.fit", "Find round grooves, cylinders and holes in a mesh."),
-    "export": ("clamp3d.cli.export", "Write the parts as files for CAD review."),
-    "check": ("clamp3d.cli.check", "Check which parts of a scene clash, touch or keep their clearance."),
-    "sweep": ("clamp3d.cli.sweep", "Map how far a wire may be misplaced before a clamp no longer closes on it."),
-    "tolerance": ("clamp3d.cli.tolerance", "Sensitivity to each dimension, and a Monte Carlo over tolerances."),
-    "verify": ("clamp3d.cli.verify", "Compute a result again and compare every value."),
-    "conductors": ("clamp3d.cli.conductors", "List the conductor catalogue."),
+    "run": ("run.command", "Assemble a clamp and print where every part ends up."),
+    "view": ("view.command", "Show the assembly in a browser, or write it as one page."),
+    "report": ("report.command", "Write a report for an assembly reviewer."),
+    "reproduce": ("reproduce.command", "Print Tables 1-5 of the paper beside this program's values."),
+    "compare": ("compare.command", "Measure every contact method: accuracy against speed."),
+    "stress": ("stress.command", "Put families of hard cases to every contact method."),
+    "measure-image": ("measure_image.command", "Measure a distance in a photograph by marked points."),
+    "fit": ("fit.command", "Find round grooves, cylinders and holes in a mesh."),
+    "export": ("export.command", "Write the parts as files for CAD review."),
+    "check": ("check.command", "Check which parts of a scene clash, touch or keep their clearance."),
+    "accept": ("check.accept_command", "Accept findings of check, with a reason."),
+    "sweep": ("sweep.command", "Map how far a wire may be misplaced before a clamp no longer closes on it."),
+    "tolerance": ("tolerance.command", "Sensitivity to each dimension, and a Monte Carlo over tolerances."),
+    "conductors": ("conductors.command", "List the conductor catalogue."),
 }
 
 
@@ -51,17 +48,10 @@ class _LazyGroup(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
-            return None
-        command: click.Command = importlib.import_module(COMMANDS[cmd_name][0]).command
+            raise click.exceptions.NoSuchCommand(cmd_name, possibilities=COMMANDS, ctx=ctx)
+        module, _, function = COMMANDS[cmd_name][0].partition(".")
+        command: click.Command = getattr(importlib.import_module(f"clamp3d.cli.{module}"), function)
         return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        name = args[0]
-        if name not in COMMANDS and not name.startswith("-"):
-            raise click.UsageError(f"unknown command {name!r}; available: {', '.join(COMMANDS)}", ctx)
-        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -84,6 +74,9 @@ def group(context: click.Context) -> None:
     clamp3d run my-clamp.toml --json out.json
     clamp3d view                            watch it in a browser
     clamp3d check assembly.step             which parts clash, touch, keep their clearance
+
+    Tab completion of commands, options, files and wires: eval "$(_CLAMP3D_COMPLETE=bash_source clamp3d)", or
+    zsh_source, fish_source.
     """
     if context.invoked_subcommand is None:
         show(context.get_help())
@@ -94,38 +87,18 @@ def main() -> None:
     tolerate_closed_pipes()
     end_on_signals()
     own_process()
-    gc.set_threshold(100_000)  # a command is short, and what its libraries load is no garbage: 4 % of a run
     try:
         _check_environment()
         with warnings.catch_warnings():
             warnings.showwarning = lambda message, *_, **__: show(f"warning: {one_line(str(message))}", err=True)
             status = group.main(prog_name="clamp3d", standalone_mode=False)
-    except click.ClickException as error:
-        where = getattr(error, "ctx", None)
-        hint = f" (see {where.command_path} --help)" if where is not None else ""
-        status = _fail(error.format_message().replace("\n", " ") + hint, ExitCode.BAD_INPUT)
     except (KeyboardInterrupt, click.Abort):
         print("clamp3d: interrupted", file=sys.stderr)
         status = ExitCode.INTERRUPTED
     except Exception as error:
         if os.environ.get("CLAMP3D_DEBUG"):
             traceback.print_exc()
-        if isinstance(error, ModuleNotFoundError) and (library := str(error.name).partition(".")[0]) in EXTRAS:
-            error = missing(library, "this")
-        if isinstance(error, SequenceError):
-            status = _fail(str(error), ExitCode.FINDING)
-        elif isinstance(error, SolverError):
-            status = _fail(str(error), ExitCode.FAILED)
-        elif isinstance(error, OSError) and error.filename is not None:
-            from clamp3d.checks import short
-
-            status = _fail(f"{short(error.filename)}: {error.strerror}", ExitCode.BAD_INPUT)
-        elif isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EFBIG):
-            status = _fail(f"cannot write to stdout: {error.strerror}", ExitCode.BAD_INPUT)
-        elif isinstance(error, (Clamp3dError, OSError)):
-            status = _fail(str(error), ExitCode.BAD_INPUT)
-        else:
-            status = _fail(f"inside clamp3d: {_place(error)}; CLAMP3D_DEBUG=1 shows the traceback", ExitCode.FAILED)
+        status = _fail(*_explained(error))
     for stream in (sys.stdout, sys.stderr):
         try:
             if stream is not None:
@@ -138,18 +111,27 @@ def main() -> None:
     sys.exit(int(status) if isinstance(status, int) else 0)
 
 
-def program() -> None:
-    """The whole process: `main`, then its end. To free what the system takes back anyway is 6 % of a check."""
-    try:
-        main()
-    except SystemExit as told:
-        if threading.active_count() > 1 or not isinstance(told.code, int):
-            raise
-        atexit._run_exitfuncs()
-        for stream in (sys.stdout, sys.stderr):
-            with suppress(OSError, ValueError, AttributeError):
-                stream.flush()
-        os._exit(told.code)
+def _explained(error: Exception) -> tuple[str, ExitCode]:
+    """An error in one line, and its exit code."""
+    from clamp3d.checks import short
+
+    if isinstance(error, click.ClickException):
+        context = getattr(error, "ctx", None)
+        hint = f" (see {context.command_path} --help)" if context is not None else ""
+        return error.format_message().replace("\n", " ") + hint, ExitCode.BAD_INPUT
+    if isinstance(error, ModuleNotFoundError) and (library := str(error.name).partition(".")[0]) in EXTRAS:
+        error = missing(library, "this")
+    if isinstance(error, (NotClampedError, SequenceError)):
+        return str(error), ExitCode.FINDING
+    if isinstance(error, SolverError):
+        return str(error), ExitCode.FAILED
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{short(error.filename)}: {error.strerror}", ExitCode.BAD_INPUT
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EFBIG):
+        return f"cannot write to stdout: {error.strerror}", ExitCode.BAD_INPUT
+    if isinstance(error, (Clamp3dError, OSError)):
+        return str(error), ExitCode.BAD_INPUT
+    return f"inside clamp3d: {_place(error)}; CLAMP3D_DEBUG=1 shows the traceback", ExitCode.FAILED
 
 
 def _check_environment() -> None:
@@ -170,6 +152,6 @@ def _place(error: Exception) -> str:
 
 
 def _fail(message: str, code: ExitCode) -> ExitCode:
-    with suppress(OSError):  # a full disk: the code still tells
+    with suppress(OSError):  # a full disk: the exit code is still right
         print(f"clamp3d: error: {one_line(message)}", file=sys.stderr)
     return code

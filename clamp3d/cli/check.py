@@ -1,66 +1,116 @@
-"""``clamp3d check``."""
+"""``clamp3d check`` and ``clamp3d accept``."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from clamp3d.cli.options import JSON, QUIET, Source, argument, declared, group, option
+from clamp3d.cli.options import (
+    INPUT_FILE,
+    JSON,
+    QUIET,
+    Source,
+    argument,
+    complete_inputs,
+    declared,
+    group,
+    option,
+)
 from clamp3d.cli.progress import bar
-from clamp3d.cli.results import write_result
 from clamp3d.cli.terminal import finish_checked, show
+
+if TYPE_CHECKING:
+    from clamp3d.clamp.result import Assembly
 
 
 @declared("check")
 def command(
-    source: Source = group(Source, source=argument(metavar="INPUT", required=True)),
+    source: Source = group(Source, source=argument(metavar="INPUT", required=True, shell_complete=complete_inputs)),
     pairs: str | None = option("Only these pairs, for instance P1:P6,P2:P7.", metavar="A:B,..."),
     clearance: float | None = option("Gap that parts must keep; replaces the file's.", metavar="MM"),
     distances: bool = option("Measure every pair, not only as finely as its verdict needs."),
-    full: bool = option("Also ask every model at its finest for every pair, and compare (slow)."),
+    baseline: Path | None = option(
+        "Compare with this result of an earlier check --json; then only new findings count for the exit code.",
+        type=INPUT_FILE,
+        metavar="LAST.json",
+    ),
     json_file: Path | None = JSON,
+    csv_file: Path | None = option("Write the findings as CSV; - is stdout.", "--csv"),
     html_file: Path | None = option("Write a page in 3D; - is stdout.", "--html"),
     quiet: bool = QUIET,
 ) -> None:
     """Check which parts of INPUT clash, touch or keep their clearance, at rest and in motion.
 
     INPUT is a scene file, a file or folder with the parts (STEP, GLB, 3MF, URDF, STL, OBJ, PLY, OFF), or a clamp (a
-    built-in name or a TOML file), which is assembled first and measured in all its pairs. Exit code 1 if parts clash,
-    else 4 if a pair failed, else 3 if one is undecided, and 2 if there are no two parts.
+    built-in name or a TOML file), which is assembled first and measured in all its pairs. Findings with one cause are
+    one line; those that `clamp3d accept` has written to INPUT.accepted.toml are not counted. Exit code 1 if parts
+    clash or the clamp does not close as it should, else 4 if a pair failed, else 3 if one is undecided, and 2 if there
+    are no two parts.
     """
-    from clamp3d.collide.check import check, check_full
+    from clamp3d.collide.check import check
     from clamp3d.collide.scene import Scene
-    from clamp3d.output.files import write_text
+    from clamp3d.output.files import write_json, write_text
+    from clamp3d.output.groups import accepted_file, compare, grouped, groups_csv, read_accepted
     from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
 
-    asked = _pairs(pairs) if pairs is not None else None
+    chosen_pairs = _pairs(pairs) if pairs is not None else None
     loaded = source.load()
+    run: Assembly | None = None
     if isinstance(loaded, Scene):
-        scene, is_clamp = loaded, False
+        scene = loaded
     else:
         from clamp3d.clamp.assemble import assemble  # takes long to import, and most scenes need none of it
 
-        scene, is_clamp = assemble(loaded).scene, True
+        run = assemble(loaded)
+        scene = run.scene
     if clearance is not None:
         scene = replace(scene, clearance=clearance)
+    accepted = read_accepted(accepted_file(source.source))
+    compare((), baseline, accepted)  # a file that cannot be read is reported before the work
     with bar(quiet) as report:
-        result = check(scene, pairs=asked, distances=distances or is_clamp, progress=report)
-        complete = check_full(scene, result, progress=report) if full else None
-    show(check_to_text(result, complete))
+        result = check(scene, pairs=chosen_pairs, distances=distances or run is not None, progress=report)
+    groups = grouped(result)
+    comparison = compare(groups, baseline, accepted)
+    if run is not None:
+        show("\n".join([run.status, *(f.text for f in run.findings if f.severity == "error" and f.text != run.status)]))
+    show(check_to_text(result, comparison, accepted))
     if json_file is not None:
-        write_result(json_file, check_to_dict(result, complete))
+        status = {} if run is None else {"status": run.status}
+        write_json(json_file, check_to_dict(result, comparison) | status)
+    if csv_file is not None:
+        write_text(csv_file, groups_csv(groups, comparison))
     if html_file is not None:
-        write_text(html_file, check_to_html(result, complete))
-    finish_checked(result.counts, empty=not result.work.pairs)
+        write_text(html_file, check_to_html(result))
+    verdicts = {group.verdict for group in comparison.open(groups)}
+    finish_checked(verdicts, finding=run is not None and not run.passed, empty=not result.work.pairs)
+
+
+@declared("accept")
+def accept_command(
+    source: str = argument(metavar="INPUT", shell_complete=complete_inputs),
+    identifiers: tuple[str, ...] = argument(metavar="ID...", nargs=-1, required=True),
+    why: str = option("The reason.", required=True, metavar="TEXT"),
+    who: str = option("Who accepts it.  [default: the login name]", default="", show_default=False, metavar="NAME"),
+) -> None:
+    """Accept findings of INPUT by their identifiers, as `clamp3d check INPUT` prints them, with the reason.
+
+    They are written to INPUT.accepted.toml beside the file, and no longer count for the exit code of check.
+    """
+    from clamp3d.output.groups import accept, accepted_file
+
+    path = accepted_file(source)
+    entries = accept(path, identifiers, why=why, who=who)
+    show(f"{path}: {len(entries)} accepted" + (f", {n} before" if (n := len(set(identifiers)) - len(entries)) else ""))
 
 
 def _pairs(text: str) -> list[tuple[str, str]]:
-    found = []
+    pairs = []
     for item in text.split(","):
         names = [name.strip() for name in item.split(":")]
         if len(names) != 2 or not all(names):
             raise click.BadParameter(f"must read like P1:P6,P2:P7, got {item!r}", param_hint="--pairs")
-        found.append((names[0], names[1]))
-    return found
+        pairs.append((names[0], names[1]))
+    return pairs

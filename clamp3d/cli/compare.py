@@ -29,11 +29,11 @@ def command(
     from clamp3d.output.files import write_json
 
     with bar(quiet) as report:
-        found = compare(peers=peers, progress=lambda done, total, what: report(what, done, total))
-    show(comparison_to_text(found))
+        comparison = compare(peers=peers, progress=lambda done, total, what: report(what, done, total))
+    show(comparison_to_text(comparison))
     if json_file is not None:
-        write_json(json_file, comparison_to_dict(found))
+        write_json(json_file, comparison_to_dict(comparison))
     if plot_file is not None:
         save_comparison(
-            found, plot_file, "clamp3d compare" + (" --peers" if peers else "") + f" --plot {plot_file.name}"
+            comparison, plot_file, "clamp3d compare" + (" --peers" if peers else "") + f" --plot {plot_file.name}"
         )

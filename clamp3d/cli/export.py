@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import click
 
 from clamp3d.cli.options import SEQUENCE, SOURCE, UNITS, Source, declared, option
-from clamp3d.cli.terminal import show
+from clamp3d.cli.terminal import finish, show
 
 if TYPE_CHECKING:
-    from clamp3d.clamp.result import Assembly
     from clamp3d.collide.scene import Scene
     from clamp3d.output.export import Format, Layout
 
@@ -48,9 +47,11 @@ def command(
 
     INPUT is a clamp (a built-in name or a TOML file), a scene file, or a file with parts. Prints the paths of the
     files. World axes are Z up, a clamp's wires along Y; GLB is metres and Y up, as its specification demands. STEP
-    holds true arcs, not facets. Exit code 1, and no file, if a step of the sequence is blocked.
+    holds true arcs, not facets. Exit code 1 if the clamp that is placed does not close as it should, and without a file
+    if a step of the sequence is blocked.
     """
     from clamp3d.clamp.dimensions import Clamp
+    from clamp3d.clamp.result import Assembly
     from clamp3d.output.export import default_layout, destination, export
 
     chosen, file = destination(output, format)
@@ -71,3 +72,4 @@ def command(
     written = export(loaded, output, format=chosen, layout=layout, state=state, mesh_error=mesh_error, unit=unit)
     for path in (*written.files, written.manifest):
         show(str(path))
+    finish(finding=isinstance(loaded, Assembly) and not loaded.passed)

@@ -8,7 +8,6 @@ import click
 
 from clamp3d.cli.options import JSON, UNITS, argument, declared, option
 from clamp3d.cli.progress import bar
-from clamp3d.cli.results import write_result
 from clamp3d.cli.terminal import show
 
 
@@ -22,12 +21,12 @@ def command(
     html_file: Path | None = option("Write a page: the mesh, its features, their errors.", "--html"),
     quiet: bool = option("No progress and no notes.", "--quiet", "-q"),
 ) -> None:
-    """Find round grooves, cylinders and holes in MESH (STL, OBJ, PLY, GLB, 3MF, STEP) and say how well they are known.
+    """Find round grooves, cylinders and holes in MESH (STL, OBJ, PLY, GLB, 3MF, STEP) each with its error bound.
 
-    A mesh without any is said to have none, with exit code 0.
+    A mesh without any is no error: exit code 0.
     """
     from clamp3d.fit.fit import fit_file
-    from clamp3d.output.files import write_text
+    from clamp3d.output.files import write_json, write_text
     from clamp3d.output.fit_report import fit_to_html, fit_to_text
 
     with bar(quiet) as report:
@@ -37,6 +36,6 @@ def command(
             show(f"note: {note}", err=True)
     show(fit_to_text(result))
     if json_file is not None:
-        write_result(json_file, result.to_dict())
+        write_json(json_file, result.to_dict())
     if html_file is not None:
         write_text(html_file, fit_to_html(result))

@@ -27,7 +27,7 @@ def command(
     calliper_error: float = option("Standard deviation of a reading.", default=0.02, metavar="MM"),
     json_file: Path | None = JSON,
 ) -> None:
-    """Measure a distance in the photograph IMAGE by marked points and a length of known size.
+    """Measure a distance in the photograph IMAGE by marked points and a length that was measured.
 
     \b
     clamp3d measure-image clamp.jpg --points "31,458 58,584" --reference "31,458 579,458" --scale 137
@@ -46,7 +46,7 @@ def command(
     marks = check_marks(shown, marks) if snap is None else snap_marks(shown, marks, snap)
     if marking_error is None:
         marking_error = MARKING_ERROR if snap is None else 0.5
-    found = measure_image(
+    measured = measure_image(
         marks[:2],
         marks[2:],
         scale,
@@ -54,12 +54,14 @@ def command(
         marking_error=marking_error,
         calliper_error=calliper_error,
     )
-    show(f"distance     {found.distance:.3f} mm +- {found.uncertainty:.3f} mm ({kind}; one standard deviation)")
-    show(f"height       {found.height:.3f} mm, straight {found.straight:.3f} mm")
-    show(f"scale        {found.mm_per_px:.6f} mm/px, marks +- {marking_error:g} px, reading +- {calliper_error:g} mm")
+    show(f"distance     {measured.distance:.3f} mm +- {measured.uncertainty:.3f} mm ({kind}; one standard deviation)")
+    show(f"height       {measured.height:.3f} mm, straight {measured.straight:.3f} mm")
+    show(
+        f"scale        {measured.mm_per_px:.6f} mm/px, marks +- {marking_error:g} px, reading +- {calliper_error:g} mm"
+    )
     show(f"marks        {', '.join(f'({x:.2f}, {y:.2f})' for x, y in marks)}")
     if json_file is not None:
-        write_json(json_file, {"image": str(image), "kind": kind, "marks": marks.tolist(), **asdict(found)})
+        write_json(json_file, {"image": str(image), "kind": kind, "marks": marks.tolist(), **asdict(measured)})
 
 
 def _marks(option: str, text: str) -> list[tuple[float, float]]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from clamp3d.baselines import METHODS, contact_model
 from clamp3d.cli.terminal import STDOUT_TAKEN
@@ -33,16 +34,16 @@ def number(text: str | float) -> float:
             from fractions import Fraction
 
             text = float(Fraction(text))
-        found = math.nan if "_" in str(text) else float(text)  # 1_0 is no number outside of Python
+        value = math.nan if "_" in str(text) else float(text)  # 1_0 is no number outside of Python
     except (ValueError, ZeroDivisionError, OverflowError):
-        found = math.nan
-    if not math.isfinite(found):
+        value = math.nan
+    if not math.isfinite(value):
         raise click.BadParameter(f"must be a finite number or a fraction like 1/3, got {text!r}")
-    return found
+    return value
 
 
 class Output(click.Path):
-    """A file to write; ``-`` is stdout. That it can be written is found out before the work, not after."""
+    """A file to write; ``-`` is stdout. Whether it can be written is checked before the work."""
 
     def __init__(self, suffixes: tuple[str, ...] = ()) -> None:
         super().__init__(dir_okay=False, path_type=Path)
@@ -79,7 +80,7 @@ def option(text: str, *names: str, **settings: Any) -> Any:
     """An option with the help ``text``, as the default of the parameter that gets its value.
 
     Without ``names`` it is called as the parameter. ``settings`` are those of `click.Option`; of a parameter that is
-    annotated as a bool, a float or a Path the type need not be said. A default is shown.
+    annotated as a bool, a float or a Path the type follows from the annotation. A default is shown.
     """
 
     def make(name: str, annotation: str) -> click.Option:
@@ -128,6 +129,19 @@ def declared(name: str) -> Callable[[Callable[..., None]], click.Command]:
     return decorate
 
 
+def _wires(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Names of wires, for tab completion."""
+    from clamp3d.clamp.conductors import catalogue
+
+    return [name for name in catalogue() if name.lower().startswith(incomplete.lower())]
+
+
+def complete_inputs(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Files and the built-in clamp, for tab completion."""
+    built_in = [CompletionItem("reference")] if incomplete and "reference".startswith(incomplete) else []
+    return [*built_in, CompletionItem(incomplete, type="file")]
+
+
 QUIET = option("No progress.", "--quiet", "-q")
 JSON = option("Write the result as JSON; - is stdout.", "--json")
 
@@ -136,9 +150,11 @@ JSON = option("Write the result as JSON; - is stdout.", "--json")
 class ClampSource:
     """The clamp that a command is to work on."""
 
-    source: str = argument(metavar="[CLAMP]", default="reference", required=False)
-    line: str | None = option("Power line: catalogue name or diameter in mm.", metavar="CONDUCTOR")
-    jumper: str | None = option("Jumper: catalogue name or diameter in mm.", metavar="CONDUCTOR")
+    source: str = argument(metavar="[CLAMP]", default="reference", required=False, shell_complete=complete_inputs)
+    line: str | None = option(
+        "Power line: catalogue name or diameter in mm.", metavar="CONDUCTOR", shell_complete=_wires
+    )
+    jumper: str | None = option("Jumper: catalogue name or diameter in mm.", metavar="CONDUCTOR", shell_complete=_wires)
 
     def clamp(self) -> Clamp:
         """The clamp; anything else is an error."""
@@ -151,11 +167,11 @@ class ClampSource:
 class Source(ClampSource):
     """What a command is to work on: a clamp, a scene or a file with parts."""
 
-    source: str = argument(metavar="[INPUT]", default="reference", required=False)
+    source: str = argument(metavar="[INPUT]", default="reference", required=False, shell_complete=complete_inputs)
     input_unit: str | None = option("Unit of a mesh file.  [default: mm; m for glTF]", type=click.Choice(UNITS))
     fit: str | None = option(
-        "Round surfaces of a mesh file: off: its facets are the part; bound, round: fitted.  [default: off]",
-        type=click.Choice(["off", "bound", "round"]),
+        "Round surfaces of a mesh file: off: its facets are the part; round: fitted.  [default: off]",
+        type=click.Choice(["off", "round"]),
     )
     chord: float | None = option("How far a mesh file's true surface can be from its facets.", metavar="MM")
     joints: str | None = option("Joint values of a URDF: rad, or mm for those that slide.", metavar="NAME=VALUE,...")
@@ -182,13 +198,13 @@ class Source(ClampSource):
 
 
 def _joints(text: str | None) -> dict[str, float]:
-    found = {}
+    values = {}
     for item in text.split(",") if text else ():
         name, equals, value = item.partition("=")
         if not equals or not name.strip():
             raise click.BadParameter(f"must read like elbow=1.57,slide=20, got {item!r}", param_hint="--joints")
-        found[name.strip()] = number(value)
-    return found
+        values[name.strip()] = number(value)
+    return values
 
 
 SOURCE = group(Source)
@@ -203,7 +219,7 @@ SEQUENCE: Any = option(
 
 @dataclass(frozen=True)
 class Method:
-    """How grooves are measured, and how the final state is found."""
+    """How grooves are measured, and how the final state is computed."""
 
     method: str = option(
         "How grooves are measured: as arcs, as chords in the section, or by FCL on convex wedges, on CoACD "
@@ -215,8 +231,8 @@ class Method:
     threshold: float | None = option("Concavity that CoACD may leave: hulls.  [default: 2]", metavar="MM")
     mesh_error: float | None = option("Chord error of hulls and mesh.  [default: 0.05]", metavar="MM")
     solver: str | None = option(
-        "How the final state is found.  [default: exact for cas and chords, bisection for the others; stepped if a "
-        "step is given]",
+        "How the final state is computed.  [default: exact for cas and chords, bisection for the others; stepped with "
+        "--step]",
         type=click.Choice(["exact", "stepped", "bisection"]),
     )
     sequence: str | None = SEQUENCE
@@ -235,18 +251,18 @@ class Method:
             raise click.UsageError("--step and --tilt-step-deg go with --solver stepped, not exact")
         default = "stepped" if by_step else "exact" if self.method in ("cas", "chords") else "bisection"
         tilt_step = None if self.tilt_step_deg is None else math.radians(self.tilt_step_deg)
-        given = {"sequence": self.sequence, "step": self.step, "tilt_step": tilt_step}
-        return {"solver": self.solver or default} | {key: value for key, value in given.items() if value is not None}
+        chosen = {"sequence": self.sequence, "step": self.step, "tilt_step": tilt_step}
+        return {"solver": self.solver or default} | {key: value for key, value in chosen.items() if value is not None}
 
     def model(self, clamp: Clamp, *, quiet: bool = False) -> ContactModel:
         """The contact model. Raises click.UsageError for options that do not go together."""
         from clamp3d.clamp.parts import parts
 
         angle = None if self.unit_angle_deg is None else math.radians(self.unit_angle_deg)
-        given = {"unit_angle": angle, "threshold": self.threshold, "mesh_error": self.mesh_error}
-        for option, setting in zip(("--unit-angle-deg", "--threshold", "--mesh-error"), given, strict=True):
-            takers = [name for name, settings in METHODS.items() if setting in settings]
-            if given[setting] is not None and self.method not in takers:
+        settings = {"unit_angle": angle, "threshold": self.threshold, "mesh_error": self.mesh_error}
+        for option, setting in zip(("--unit-angle-deg", "--threshold", "--mesh-error"), settings, strict=True):
+            takers = [name for name, accepted in METHODS.items() if setting in accepted]
+            if settings[setting] is not None and self.method not in takers:
                 raise click.UsageError(f"{option} goes with --method {' or '.join(takers)}, not {self.method}")
         return contact_model(
             self.method,

@@ -1,11 +1,10 @@
-"""Progress on stderr: lines that stay, and one line that changes where stderr is a terminal."""
+"""Progress on stderr by rich: lines that stay, and one line that changes where stderr is a terminal."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from typing import TYPE_CHECKING
 
 from clamp3d.errors import escaped
@@ -17,15 +16,10 @@ if TYPE_CHECKING:
 
 
 class Narrator:
-    """Tells the user what goes on: lines by ``say``, and in ``status`` what changes; nothing where they are None."""
+    """Lines on stderr, and in ``status`` what changes: only where it is a terminal, and nothing if ``quiet``."""
 
-    def __init__(self, say: Callable[[str], object] | None, status: Status | None) -> None:
-        self._say, self._status = say, status
-
-    def line(self, text: str) -> None:
-        """A line that stays."""
-        if self._say is not None:
-            self._say(escaped(text))
+    def __init__(self, quiet: bool, status: Status | None) -> None:
+        self._quiet, self._status = quiet, status
 
     def status(self, text: str) -> None:
         """What is going on now; not shown where stderr is a file."""
@@ -35,8 +29,12 @@ class Narrator:
             self._status.update(Text(escaped(text)))
 
     def waypoint(self, waypoint: Waypoint) -> None:
-        """What a run has reached."""
-        self.line(f"{waypoint.step:14s} {waypoint.label}")
+        """A line that stays: what a run has reached."""
+        line = escaped(f"{waypoint.step:14s} {waypoint.label}")
+        if self._status is not None:
+            self._status.console.print(line, markup=False, highlight=False, soft_wrap=True)
+        elif not self._quiet:
+            print(line, file=sys.stderr)
 
     def position(self, tried: int, distance: float) -> None:
         """What a solver is trying."""
@@ -46,22 +44,18 @@ class Narrator:
 @contextmanager
 def narrator(quiet: bool) -> Iterator[Narrator]:
     """A `Narrator` on stderr for the time of the block."""
-    if quiet:
-        yield Narrator(None, None)
-        return
-    if not sys.stderr.isatty():
-        yield Narrator(partial(print, file=sys.stderr), None)
+    if quiet or not sys.stderr.isatty():
+        yield Narrator(quiet, None)
         return
     from rich.console import Console
 
-    console = Console(stderr=True)
-    with console.status("") as status:
-        yield Narrator(partial(console.print, markup=False, highlight=False, soft_wrap=True), status)
+    with Console(stderr=True).status("") as status:
+        yield Narrator(quiet, status)
 
 
 @contextmanager
 def bar(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
-    """A function ``report(stage, done, of)`` that moves a bar; it is silent if stderr is no terminal."""
+    """A function ``report(stage, done, of)`` that moves a bar with the time left; silent if stderr is no terminal."""
     if quiet or not sys.stderr.isatty():
         yield lambda stage, done, of: None
         return

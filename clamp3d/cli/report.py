@@ -39,21 +39,21 @@ def command(
     check_folder(output)
     Thresholds(CONTACT, clearance or 0.0)
     loaded = source.load()
-    with narrator(quiet) as tell:
+    with narrator(quiet) as narrate:
         if isinstance(loaded, Clamp):
             model = method.model(loaded, quiet=quiet)
             others = method.method == "cas" and settings["solver"] == "exact"
             subject = assemble(
-                loaded, model, others=others, on_waypoint=tell.waypoint, progress=tell.position, **settings
+                loaded, model, others=others, on_waypoint=narrate.waypoint, progress=narrate.position, **settings
             )
-            made = make_report(subject, clearance=clearance, progress=tell.status)
+            review = make_report(subject, clearance=clearance, progress=narrate.status)
         else:
             method.refuse()
-            made = make_report(loaded, clearance=clearance, progress=tell.status)
-        paths = write_report(made, output, progress=tell.status)
+            review = make_report(loaded, clearance=clearance, progress=narrate.status)
+        paths = write_report(review, output, progress=narrate.status)
     for path in paths:
         show(str(path))
-    if made.assembly is not None:
-        finish(finding=not made.passed)
+    if review.assembly is not None:
+        finish(finding=not review.passed)
     else:
-        finish_checked({row.result.verdict for row in (*made.rows, *made.motions)})
+        finish_checked({row.result.verdict for row in (*review.rows, *review.motions)})

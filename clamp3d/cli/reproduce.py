@@ -20,7 +20,7 @@ def command(
     from clamp3d.bench.reproduce_report import reproduction_to_dict, reproduction_to_text
     from clamp3d.output.files import write_json
 
-    found = reproduce(lambda message: None if quiet else click.echo(message, err=True))
+    tables = reproduce(lambda message: None if quiet else click.echo(message, err=True))
     if json_file is not None:
-        write_json(json_file, reproduction_to_dict(found))
-    show(reproduction_to_text(found))
+        write_json(json_file, reproduction_to_dict(tables))
+    show(reproduction_to_text(tables))

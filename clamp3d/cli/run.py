@@ -9,7 +9,6 @@ import click
 
 from clamp3d.cli.options import CLAMP, JSON, METHOD, QUIET, VIEWING, ClampSource, Method, Viewing, declared, option
 from clamp3d.cli.progress import narrator
-from clamp3d.cli.results import write_result
 from clamp3d.cli.terminal import finish, show
 from clamp3d.errors import SequenceError
 
@@ -34,7 +33,7 @@ def command(
     """Assemble CLAMP (a built-in name or a TOML file) with its wires, and print where every part ends up.
 
     Exit code 1 if the clamp does not close on both wires, parts meet that should not, or a step of the sequence is
-    blocked: then it is said by what, where and when, and the page shows it.
+    blocked: the message names what blocks it, where and when, and the page shows it.
     """
     settings = method.settings()
     if equilibria and settings["solver"] != "exact":
@@ -43,6 +42,7 @@ def command(
         equilibria if equilibria is not None else method.method == "cas" and settings["solver"] == "exact"
     )
     from clamp3d.clamp.assemble import assemble
+    from clamp3d.output.files import write_json
     from clamp3d.output.run_report import run_to_text
 
     loaded = source.clamp()
@@ -52,7 +52,7 @@ def command(
     def done(run: Assembly) -> None:
         show(run_to_text(run))
         if json_file is not None:
-            write_result(json_file, run.to_dict())
+            write_json(json_file, run.to_dict())
 
     viewed = view or viewing.html_file is not None or viewing.url is not None
     try:
@@ -61,17 +61,15 @@ def command(
 
             result = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=view, done=done)
         else:
-            with narrator(quiet) as tell:
-                result = assemble(loaded, model, on_waypoint=tell.waypoint, progress=tell.position, **settings)
+            with narrator(quiet) as narrate:
+                result = assemble(loaded, model, on_waypoint=narrate.waypoint, progress=narrate.position, **settings)
             done(result)
     except SequenceError as error:
         show(f"not assembled: {error}")
         if json_file is not None:
-            write_result(
-                json_file, {"status": f"not assembled: {error}", "blocks": [b.to_dict() for b in error.blocks]}
-            )
+            write_json(json_file, {"status": f"not assembled: {error}", "blocks": [b.to_dict() for b in error.blocks]})
         if viewed:
             from clamp3d.cli.viewing import view_blocked
 
             view_blocked(error, viewing, quiet=quiet, serve=view)
-    finish(finding=result is None or not result.clamped or bool(result.undeclared))
+    finish(finding=result is None or not result.passed)

@@ -35,7 +35,7 @@ def command(
     plot_file: Path | None = option("Draw the matrix (.png, .svg, .pdf).", "--plot", type=PICTURE),
     quiet: bool = QUIET,
 ) -> None:
-    """Put families of hard contact cases with known answers to every contact method, and count what goes wrong.
+    """Put families of hard contact cases with exact answers to every contact method, and count what goes wrong.
 
     Exit code 1 if the project's own method, cas, has a wrong verdict or an error beyond its bound.
     """

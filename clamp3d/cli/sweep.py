@@ -8,7 +8,6 @@ from pathlib import Path
 import click
 
 from clamp3d.cli.options import CLAMP, JSON, PICTURE, ClampSource, declared, option
-from clamp3d.cli.results import write_result
 from clamp3d.cli.terminal import show
 
 
@@ -36,10 +35,11 @@ def command(
     """
     from clamp3d.clamp.placement import FREEDOMS, SEAT_TOLERANCE, Freedom, Placement
     from clamp3d.errors import InputError
+    from clamp3d.output.files import write_json
     from clamp3d.output.placement_report import draw_map, grid, planes, sweep_to_dict, sweep_to_text
 
-    given = {"offset": offset, "height": height, "yaw": math.radians(yaw_deg), "pitch": math.radians(pitch_deg)}
-    ranges: dict[Freedom, float] = {f: value for f in FREEDOMS if (value := given[f])}
+    half_ranges = {"offset": offset, "height": height, "yaw": math.radians(yaw_deg), "pitch": math.radians(pitch_deg)}
+    ranges: dict[Freedom, float] = {f: value for f in FREEDOMS if (value := half_ranges[f])}
     if not ranges:
         raise InputError("nothing to vary: give --offset, --height, --yaw-deg or --pitch-deg")
     if map_file is not None and len(ranges) < 2:
@@ -51,10 +51,10 @@ def command(
     )
     tolerances = closing.tolerance(ranges, seed=seed)
     cloud = closing.cloud(ranges, count, seed=seed) if count is not None else None
-    wanted = planes(ranges) if map_file is not None or json_file is not None else []
-    grids = {(x, y): grid(closing, x, y, ranges, steps) for x, y in wanted}
+    mapped = planes(ranges) if map_file is not None or json_file is not None else []
+    grids = {(x, y): grid(closing, x, y, ranges, steps) for x, y in mapped}
     show(sweep_to_text(closing, tolerances, cloud))
     if json_file is not None:
-        write_result(json_file, sweep_to_dict(closing, tolerances, grids, cloud))
+        write_json(json_file, sweep_to_dict(closing, tolerances, grids, cloud))
     if map_file is not None:
         draw_map(map_file, closing, tolerances, grids, ranges)

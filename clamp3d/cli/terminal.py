@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import signal
 import sys
 from collections.abc import Collection
@@ -52,13 +53,13 @@ def finish(*, finding: bool, failed: bool = False, undecided: bool = False, empt
         raise InputError("there is no pair of parts to judge")
 
 
-def finish_checked(verdicts: Collection[str], *, empty: bool = False) -> None:
-    """End a command by the verdicts of a scene; see `finish`."""
+def finish_checked(verdicts: Collection[str], *, finding: bool = False, empty: bool = False) -> None:
+    """End a command by the verdicts of a scene, and by what else was a finding; see `finish`."""
     from clamp3d.collide.result import BAD
     from clamp3d.collide.verdict import Verdict
 
     finish(
-        finding=any(verdict in verdicts for verdict in BAD),
+        finding=finding or any(verdict in verdicts for verdict in BAD),
         failed=Verdict.FAILED in verdicts,
         undecided=Verdict.UNCERTAIN in verdicts,
         empty=empty,
@@ -70,7 +71,7 @@ STDOUT_TAKEN = "clamp3d.stdout"
 
 
 def end_on_signals() -> None:
-    """Let a process that is asked to end (SIGTERM, SIGHUP) remove its temporary files and its workers before."""
+    """Let a process that is ended by a signal (SIGTERM, SIGHUP) remove its temporary files and its workers before."""
 
     def end(number: int, frame: object) -> NoReturn:
         signal.signal(number, signal.SIG_DFL)  # the second one ends it at once
@@ -96,7 +97,9 @@ def tolerate_closed_pipes() -> None:
     """Let ``clamp3d ... | head`` keep the exit code of its verdict. Streams that a test put in place stay."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is not None and stream is getattr(sys, f"__{name}__"):
+        if stream is None:  # closed by the caller: libraries ask it whether it is a terminal
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+        elif stream is getattr(sys, f"__{name}__"):
             raw = io.BufferedWriter(_Tolerant(stream.fileno(), "wb", closefd=False))
             wrapped = io.TextIOWrapper(
                 raw, stream.encoding, "backslashreplace", line_buffering=stream.line_buffering or name == "stderr"

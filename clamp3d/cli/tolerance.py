@@ -7,8 +7,7 @@ from pathlib import Path
 import click
 
 from clamp3d.cli.options import CLAMP, JSON, PICTURE, QUIET, ClampSource, declared, option
-from clamp3d.cli.results import write_result
-from clamp3d.cli.terminal import show
+from clamp3d.cli.terminal import finish, show
 
 
 @declared("tolerance")
@@ -25,26 +24,27 @@ def command(
     ),
     processes: int = option("Processes.", type=click.IntRange(1, 1024), default=1),
     scheduler: str | None = option("Spread over this Dask cluster (extra 'cluster').", metavar="ADDRESS"),
-    resume: Path | None = option("Keep finished work here; go on from it if it exists."),
     json_file: Path | None = JSON,
     plot_file: Path | None = option("Draw the histogram (.png, .svg, .pdf).", "--plot", type=PICTURE),
     quiet: bool = QUIET,
 ) -> None:
     """How the splint distance of CLAMP depends on its dimensions, and how it scatters within their tolerances.
 
-    The same seed gives the same clamps and distances, however the work is spread.
+    The same seed gives the same clamps and distances, however the work is spread. Exit code 1 if CLAMP itself does not
+    close on both wires, 4 if an answer could not be proven.
     """
     from clamp3d.clamp.sensitivity import sensitivity
     from clamp3d.clamp.tolerance import monte_carlo
     from clamp3d.cli.progress import bar
-    from clamp3d.errors import SolverError
+    from clamp3d.errors import NotClampedError, SolverError
+    from clamp3d.output.files import write_json
     from clamp3d.output.tolerance_report import draw_histogram, tolerance_to_dict, tolerance_to_text
 
     loaded = source.clamp()
     note = ""
     try:
         rows = sensitivity(loaded)
-    except SolverError as error:
+    except (NotClampedError, SolverError) as error:
         rows, note = (), str(error)
     with bar(quiet) as report:
         result = monte_carlo(
@@ -56,11 +56,11 @@ def command(
             distribution="normal" if distribution == "normal" else "uniform",
             processes=processes,
             scheduler=scheduler,
-            resume=resume,
             progress=lambda done, of: report("clamps", done, of),
         )
     show(tolerance_to_text(result, rows, note))
     if json_file is not None:
-        write_result(json_file, tolerance_to_dict(result, rows))
+        write_json(json_file, tolerance_to_dict(result, rows))
     if plot_file is not None:
         draw_histogram(plot_file, result)
+    finish(finding=result.nominal is None, failed=bool(result.unproven))

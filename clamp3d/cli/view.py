@@ -35,7 +35,7 @@ def command(
             show(f"not assembled: {error}")
             view_blocked(error, viewing, quiet=quiet, serve=serve)
             finish(finding=True)
-        finish(finding=not run.clamped or bool(run.undeclared))
+        finish(finding=not run.passed)
     else:
         method.refuse()
         result = check_and_view(loaded, viewing, quiet=quiet, serve=serve)

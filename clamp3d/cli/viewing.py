@@ -40,7 +40,7 @@ def run_and_view(
 ) -> Assembly:
     """Assemble with a viewer that shows every waypoint; call ``done`` with the result before the page is waited on.
 
-    A sequence other than the paper's is assembled first: all its ways are found before anything moves, and if one is
+    A sequence other than the paper's is assembled first: all its ways are computed before anything moves, and if one is
     blocked there is another page to show. ``serve`` starts a server, unless ``--url`` names one. Raises
     click.UsageError for options that do not go together.
     """
@@ -48,17 +48,17 @@ def run_and_view(
     drawn = {"model": model, "clearance": viewing.clearance, "overlays": overlays}
 
     def assembled(*listeners: Callable[[Waypoint], None]) -> Assembly:
-        with narrator(quiet) as tell:
+        with narrator(quiet) as narrate:
 
             def listen(waypoint: Waypoint) -> None:
-                for listener in (*listeners, tell.waypoint):
+                for listener in (*listeners, narrate.waypoint):
                     listener(waypoint)
 
-            return assemble(clamp, model, on_waypoint=listen, progress=tell.position, **settings)
+            return assemble(clamp, model, on_waypoint=listen, progress=narrate.position, **settings)
 
-    known = None if as_published(parse_sequence(settings.get("sequence", clamp.sequence))) else assembled()
+    finished = None if as_published(parse_sequence(settings.get("sequence", clamp.sequence))) else assembled()
     with _viewer(clamp, viewing, serve, quiet, **drawn) as viewer:
-        run = known or assembled(viewer.show)
+        run = finished or assembled(viewer.show)
         viewer.finish(run)
         _save(viewer, viewing)
         done(run)
@@ -100,7 +100,7 @@ def _viewer(shown: Clamp | Scene, viewing: Viewing, serve: bool, quiet: bool, **
                 click.launch(viewer.url)
         yield viewer
         if serve:
-            with contextlib.suppress(KeyboardInterrupt):  # the usual way to end; what was found decides the exit code
+            with contextlib.suppress(KeyboardInterrupt):  # the usual way to end; the result decides the exit code
                 if viewing.timeout is None and not quiet:
                     click.echo("serving the page until Ctrl-C ...", err=True)
                 viewer.wait(viewing.timeout)

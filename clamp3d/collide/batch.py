@@ -1,120 +1,90 @@
-"""Many poses at once, where grooves or holes of one body and a cylinder of the other decide."""
+"""Many poses at once, where grooves or holes of one body and a cylinder of the other decide: the kernel's batch."""
 
 from __future__ import annotations
 
-from functools import reduce
-
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distances
-from clamp3d.collide.body import Bore, ClosedForm
+from clamp3d.collide.closed_form import Bore, ClosedForm
 from clamp3d.collide.convex import Rod
 from clamp3d.collide.hull import MEMBER
 from clamp3d.collide.model import Model
-from clamp3d.core.pose import Array
-
-_KNOWN = 1e-9
-
-Pairs = tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]
-"""Poses (i, 4, 4) of a first body and which of them (m,) is meant, then those of a second."""
+from clamp3d.core.distance import signed_distances
+from clamp3d.core.pose import Array, inverse
+from clamp3d.core.primitives import Cylinder
 
 
-def in_frame_of_first(T: Array) -> Pairs:
-    """The pairs of a second body at poses (n, 4, 4) in the first one's frame."""
-    return np.eye(4)[None], np.zeros(len(T), dtype=np.int64), T, np.arange(len(T))
-
-
-def relative(pairs: Pairs) -> Array:
-    """The second body's poses (m, 4, 4) in the first one's frame."""
-    from clamp3d.collide.poses_kernel import between
-
-    T = np.empty((len(pairs[1]), 4, 4))
-    between(*pairs, T)
-    return T
-
-
-def by_kernel(a: Model, b: Model, T: Array) -> Distances:
+def bounds_at_poses(a: Model, b: Model, T: Array) -> Distances:
     """What grooves and holes against cylinders say of the distances of ``b`` at ``T`` (n, 4, 4) in a's frame.
 
-    Where other faces may decide both bounds are infinite; of an overlap they are those of the interference. `exact`
-    tells the rows whose distance is known.
+    A bore's material holds the body and a cylinder holds the other, so the kernel's distance is a lower bound; where its
+    nearest points lie on the bodies it is the distance. Other bounds are infinite, and so are lower ones in an overlap.
     """
-    found = _by_kernel(a, b, in_frame_of_first(T), points=True)
-    return Distances(found[0], found[1], found[2:5].T, found[5:8].T, found[8:11].T, ("groove kernel",) * len(T))
+    n = len(T)
+    answer = Distances(np.full(n, -np.inf), np.full(n, np.inf), *np.full((3, n, 3), np.nan), ("groove kernel",) * n)
+    if a.bodies is None or b.bodies is None or len(a.bodies) != 1 or len(b.bodies) != 1:
+        return answer
+    (first,), (second,) = a.bodies, b.bodies
+    if any(form.error or form.surface is not None for form in (first, second)):
+        return answer
+    for bore, rod in _pairs(first, second):
+        answer = _nearer(answer, _bore_rod(bore, rod, first, second, T))
+    back = np.array([inverse(pose) for pose in T]) if _pairs(second, first) else T
+    for bore, rod in _pairs(second, first):
+        answer = _nearer(answer, _seen_from_first(_bore_rod(bore, rod, second, first, back), T))
+    return answer
 
 
-def bounds_by_kernel(a: Model, b: Model, pairs: Pairs, clash: float = -np.inf) -> tuple[Array, Array]:
-    """The bounds (m,) of `by_kernel` alone, for the poses of both bodies in the world.
-
-    What overlaps by more than ``-clash`` mm need have no lower bound.
-    """
-    found = _by_kernel(a, b, pairs, points=False, clash=clash)
-    return found[0], found[1]
-
-
-def exact(found: Distances) -> NDArray[np.bool_]:
-    """Rows (n,) whose distance is known; how deep an overlap is takes a search."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray((found.upper - found.lower <= _KNOWN) & (found.lower >= -_KNOWN))
-
-
-def _by_kernel(a: Model, b: Model, pairs: Pairs, points: bool, clash: float = -np.inf) -> Array:
-    """Bounds, and with ``points`` points and normals in a's frame, NaN where unknown: (2 or 11, m)."""
-    known = []
-    if a.bodies is not None and b.bodies is not None and len(a.bodies) == len(b.bodies) == 1:
-        (first,), (second,) = a.bodies, b.bodies
-        if not any(form.error or form.surface is not None for form in (first, second)):
-            known = [_bore_rod(bore, rod, first, second, pairs, points, clash) for bore, rod in _asked(first, second)]
-            for bore, rod in _asked(second, first):
-                known.append(_bore_rod(bore, rod, second, first, (*pairs[2:], *pairs[:2]), points, clash))
-                if points:
-                    _seen_from_first(known[-1], pairs)
-    if known:
-        return reduce(_better, known)
-    nothing = np.full((11 if points else 2, len(pairs[1])), np.nan)
-    nothing[0], nothing[1] = -np.inf, np.inf
-    return nothing
-
-
-def _asked(a: ClosedForm, b: ClosedForm) -> list[tuple[Bore, Rod]]:
+def _pairs(a: ClosedForm, b: ClosedForm) -> list[tuple[Bore, Rod]]:
     """Bores of ``a`` against cylinders among the pieces of ``b``."""
     return [(bore, rod) for bore in a.bores for rod in b.outers if isinstance(rod, Rod)]
 
 
-def _seen_from_first(found: Array, pairs: Pairs) -> None:
-    """Points and normals (11, m) in the second body's frame, from it to the first, in place the other way about."""
-    T = relative(pairs)
-    R, t = T[:, :3, :3], T[:, :3, 3].T
-    q, p, n = (np.einsum("nij,jn->in", R, found[k : k + 3]) for k in (2, 5, 8))
-    found[2:5], found[5:8], found[8:11] = p + t, q + t, -n
+def _bore_rod(bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, T: Array) -> Distances:
+    """The nearest of a bore's grooves at each pose, its upper bound kept where its points lie on both bodies."""
+    cylinder, best = Cylinder(rod.radius, rod.length), None
+    for groove, place in bore.covers():
+        R, t = place[:3, :3], place[:3, 3]
+        answer = signed_distances(groove, cylinder, inverse(place) @ T @ rod.T, full=True)
+        p, q = answer.point_on_groove @ R.T + t, answer.point_on_cylinder @ R.T + t
+        error = answer.error_bound
+        one = Distances(answer.distance - error, answer.distance + error, p, q, answer.normal @ R.T, ("",) * len(T))
+        best = one if best is None else _least(best, one)
+    assert best is not None
+    local = np.einsum("nji,nj->ni", T[:, :3, :3], best.point_b - T[:, :3, 3])
+    slack = MEMBER * (1.0 + np.abs(best.point_a).max(axis=1, initial=0.0))
+    on_both = (a.depth(best.point_a) >= -slack) & (b.depth(local) >= -slack)
+    apart = best.lower >= 0.0
+    lower = np.where(apart, best.lower, -np.inf)
+    upper = np.where(on_both & (apart | (best.upper < 0.0)), best.upper, np.inf)
+    return Distances(lower, upper, best.point_a, best.point_b, best.normal, best.method)
 
 
-def _better(x: Array, y: Array) -> Array:
-    """The bounds that either knows, with the points of the smaller upper one."""
-    found = np.where(x[1] <= y[1], x, y)
-    found[0] = np.maximum(x[0], y[0])
-    return found
+def _least(x: Distances, y: Distances) -> Distances:
+    """At each pose the smaller of two distances: a body is held by the union of the two materials."""
+    return _chosen(x, y, y.upper < x.upper)
 
 
-def _bore_rod(
-    bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, pairs: Pairs, points: bool, clash: float = -np.inf
-) -> Array:
-    from clamp3d.collide.bore_kernel import WORK, bore_rod
-
-    covers = bore.covers()
-    grooves = np.array([(groove.radius, groove.half_angle, 0.5 * groove.length, 0.0, 0.0) for groove, _ in covers])
-    P, found = np.array([place for _, place in covers]), np.empty((11 if points else 2, len(pairs[1])))
-    wire = rod.radius, 0.5 * rod.length, np.array([rod.T])
-    work = np.empty(WORK), np.empty((128, 5))
-    bore_rod(grooves, P, *wire, *pairs, *members(a), *members(b), MEMBER, _KNOWN, clash, *work, found)
-    return found
+def _nearer(x: Distances, y: Distances) -> Distances:
+    """Both bounds at once, with the points of the smaller upper one."""
+    met = _chosen(x, y, y.upper < x.upper)
+    return Distances(np.maximum(x.lower, y.lower), met.upper, met.point_a, met.point_b, met.normal, x.method)
 
 
-def members(form: ClosedForm) -> tuple[Array, Array, Array]:
-    """What `ClosedForm.depth` asks, as the kernel takes it: planes (k, 4), radii and half lengths (m, 2), poses."""
-    planes = [piece.planes for piece in form.outers if not isinstance(piece, Rod)]
-    rods = [piece for piece in form.outers if isinstance(piece, Rod)]
-    rounds = [(rod.radius, 0.5 * rod.length) for rod in rods] + [(bore.radius, -1.0) for bore in form.bores]
-    places = [rod.T for rod in rods] + [bore.T for bore in form.bores]
-    return np.vstack([np.empty((0, 4)), *planes]), np.array(rounds).reshape(-1, 2), np.array(places).reshape(-1, 4, 4)
+def _chosen(x: Distances, y: Distances, second: Array) -> Distances:
+    row = second[:, None]
+    return Distances(
+        np.where(second, y.lower, x.lower),
+        np.where(second, y.upper, x.upper),
+        np.where(row, y.point_a, x.point_a),
+        np.where(row, y.point_b, x.point_b),
+        np.where(row, y.normal, x.normal),
+        x.method,
+    )
+
+
+def _seen_from_first(d: Distances, T: Array) -> Distances:
+    """Distances whose points are in the second body's frame, from it to the first, the other way about."""
+    R, t = T[:, :3, :3], T[:, :3, 3]
+    q, p, n = (np.einsum("nij,nj->ni", R, x) for x in (d.point_a, d.point_b, d.normal))
+    return Distances(d.lower, d.upper, p + t, q + t, -n, d.method)

@@ -9,16 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 
 FEW = 32
 """So few boxes are compared with all others, without a tree."""
 _AT_ONCE = 10_000
 """So few pairs of boxes as well: to load and fill a tree takes longer."""
-
-FIRST = np.zeros(1, dtype=np.int64)
-"""Which box all of many poses have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,21 +48,10 @@ class Boxes:
         return np.asarray(np.einsum("nij,nj->ni", np.abs(self.R), self.half))
 
 
-def box_sizes(bounds: Array) -> Array:
-    """Centre and half sizes (m, 6) of boxes (m, 2, 3)."""
-    return np.hstack([0.5 * (bounds[:, 0] + bounds[:, 1]), 0.5 * (bounds[:, 1] - bounds[:, 0])])
-
-
-def world_boxes(bounds: Array, T: Array, which: NDArray[np.int64] = FIRST) -> Array:
-    """Lower and upper corners (6, n) along the world's axes of the boxes at poses (n, 4, 4).
-
-    ``bounds`` (m, 2, 3): boxes in their own frames; ``which`` (n,): those of the poses, the first of all by default.
-    """
-    from clamp3d.collide.poses_kernel import boxes
-
-    around = np.empty((6, len(T)))
-    boxes(T, box_sizes(bounds), which, np.inf, around)
-    return around
+def world_boxes(bounds: Array, T: Array) -> Array:
+    """Boxes (n, 2, 3) along the world's axes around boxes (n or 1, 2, 3) at poses (n, 4, 4)."""
+    boxes = Boxes.of(np.broadcast_to(bounds, (len(T), 2, 3)), T)
+    return np.stack([boxes.centre - boxes.reach, boxes.centre + boxes.reach], axis=1)
 
 
 def near_pairs(boxes: Boxes, reach: float) -> NDArray[np.int64]:
@@ -124,9 +109,7 @@ def box_gaps(boxes: Boxes, pairs: NDArray[np.int64]) -> Array:
     axes = np.concatenate([A, B, crossed], axis=1)
     size = np.linalg.norm(axes, axis=2)
     axes = axes / np.maximum(size, 1e-300)[..., None]
-    spread = [
-        (np.abs(dot(axes, np.swapaxes(X, 1, 2))) * boxes.half[k][:, None]).sum(axis=2) for X, k in ((A, i), (B, j))
-    ]
+    spread = [(np.abs(axes @ np.swapaxes(X, 1, 2)) * boxes.half[k][:, None]).sum(axis=2) for X, k in ((A, i), (B, j))]
     apart = np.abs(np.einsum("mkj,mj->mk", axes, d)) - spread[0] - spread[1]
     found = np.maximum(found, np.where(size > 1e-6, apart, -np.inf).max(axis=1))
     return np.asarray(found - 1e-12 * (1.0 + np.abs(d).max(axis=1)))

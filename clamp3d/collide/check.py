@@ -9,26 +9,26 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.checks import flag, function, instance
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check_motions import check_motions
-from clamp3d.collide.depth import is_quick, penetration
-from clamp3d.collide.faces_depth import faces_depth
+from clamp3d.collide.depth import penetration
 from clamp3d.collide.judge import judge
 from clamp3d.collide.model import Model, ModelCache, Progress
 from clamp3d.collide.reasons import failure, undecided
-from clamp3d.collide.refine import measured, with_normal
-from clamp3d.collide.repeats import Repeats
+from clamp3d.collide.refine import accuracy_for, measured, with_normal
 from clamp3d.collide.result import BAD, CheckResult, PairResult, Work
 from clamp3d.collide.scene import Scene, name_pairs
-from clamp3d.collide.touching import is_box, touching_boxes
 from clamp3d.collide.verdict import Verdict
-from clamp3d.collide.where import locator
-from clamp3d.core.linear import dot
+from clamp3d.collide.where import Locator
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import InputError, MissingLibraryError, SolverError
+
+_SAME = 9
+"""Digits (of mm, or of a rotation) to which relative poses agree that one measurement serves."""
 
 
 def check(
@@ -52,10 +52,9 @@ def check(
     full : bool
         Ask every pair at every level down to the finest meshes: slow, for comparison.
     distances : bool
-        Measure every pair to `clamp3d.collide.distance.ACCURACY`, not only until its verdict is certain.
+        Measure every pair to `clamp3d.collide.refine.ACCURACY`, not only until its verdict is certain.
     depths : bool
-        Measure the penetration depth of clashes, as `clamp3d.collide.distance.distance` does; without, "at least", as
-        between two solids from CAD that no short move parts: a pin in a hole that is too narrow.
+        Measure the penetration depth of clashes, as `clamp3d.collide.distance.distance` does; without, "at least".
     progress : callable, optional
         Is told (stage, done, of).
     cache : ModelCache, optional
@@ -94,36 +93,25 @@ def check(
     placed = scene.placed
     of_shape = [shop.model(shape) for shape in placed.shapes]
     models = [of_shape[k] for k in placed.which.tolist()]
-    n, T = len(models), placed.poses
-    boxes = Boxes.of(np.array([m.bounds for m in of_shape]).reshape(-1, 2, 3)[placed.which], T)
-    asked = None if pairs is None else _asked(scene, pairs)
-    every = n * (n - 1) // 2 if asked is None else len(asked)
-    if full or distances:
-        chosen = np.array(list(itertools.combinations(range(n), 2)) if asked is None else asked, dtype=np.int64)
-    else:
-        chosen = near_pairs(boxes, scene.thresholds.reach)
-        if asked is not None:
-            keep = set(asked)
-            chosen = np.array([p for p in chosen.tolist() if tuple(p) in keep], dtype=np.int64)
-    chosen = chosen.reshape(-1, 2)
+    n = len(models)
+    boxes = Boxes.of(np.array([m.bounds for m in of_shape]).reshape(-1, 2, 3)[placed.which], placed.poses)
+    named = None if pairs is None else _numbered(scene, pairs)
+    every = n * (n - 1) // 2 if named is None else len(named)
+    chosen = _candidates(boxes, scene.thresholds.reach, named, everything=full or distances)
     gaps = box_gaps(boxes, chosen)
     counters.queries["boxes"] += len(chosen)
     times.append(time.perf_counter())
-    rows, decided, repeats = [], Counter({"broad phase": every - len(chosen)}), Repeats(models)
-    box = {model: is_box(model) for model in set(models)}
-    known = {} if full else touching_boxes(boxes, np.array([box[m] for m in models], dtype=bool), chosen, gaps)
+    rows, decided = [], Counter({"broad phase": every - len(chosen)})
+    questions = _Questions(scene, models, full=full, distances=distances, depths=depths)
     for k, ((i, j), gap) in enumerate(zip(chosen.tolist(), gaps.tolist(), strict=True)):
         if progress is not None:
             progress("pairs", k, len(chosen))
-        row = _touching(scene, i, j, known[k]) if k in known else None
-        if row is None:
-            start = Distance(gap, level="boxes", method="bounding boxes")
-            row = _pair(scene, i, j, models, T, start, full, distances, depths, repeats)
+        row = questions.row(i, j, gap)
         if row.verdict not in (Verdict.FAILED, Verdict.UNCERTAIN):
             decided[row.distance.level] += 1
         rows.append(row)
     times.append(time.perf_counter())
-    moved = check_motions(scene, models, asked, progress, depths)
+    moved = check_motions(scene, models, named, progress)
     times.append(time.perf_counter())
     stages = ("broad phase", "pairs", "motions") if scene.motions else ("broad phase", "pairs")
     work = Work(
@@ -137,7 +125,7 @@ def check(
         seconds={name: round(end - start, 6) for name, start, end in zip(stages, times, times[1:], strict=False)},
         full=full,
     )
-    names = None if asked is None else tuple((scene.parts[i].name, scene.parts[j].name) for i, j in asked)
+    names = None if named is None else tuple((scene.parts[i].name, scene.parts[j].name) for i, j in named)
     return CheckResult(scene, tuple(rows), moved, names, work)
 
 
@@ -158,70 +146,75 @@ def check_full(scene: Scene, result: CheckResult, *, progress: Progress | None =
     return complete
 
 
-def _asked(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, int]]:
-    found = set()
+def _numbered(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, int]]:
+    """Pairs of names as sorted pairs of numbers, each once. Raises InputError for unknown names."""
+    numbers = set()
     for a, b in name_pairs("pairs", pairs):
         i, j = sorted((scene.index(a), scene.index(b)))
         if i == j:
             raise InputError(f"pair {a}:{b} must name two different parts")
-        found.add((i, j))
-    return sorted(found)
+        numbers.add((i, j))
+    return sorted(numbers)
 
 
-def _touching(scene: Scene, i: int, j: int, known: Distance) -> PairResult | None:
-    """The row of a pair that touches, if that decides it; ``known`` in the world."""
-    a, b = scene.parts[i].name, scene.parts[j].name
-    verdict = scene.thresholds.verdict(known, scene.allowance(a, b))
-    return None if verdict is Verdict.UNCERTAIN or verdict in BAD else PairResult(a, b, verdict, known)
+def _candidates(
+    boxes: Boxes, reach: float, named: list[tuple[int, int]] | None, *, everything: bool
+) -> NDArray[np.int64]:
+    """Pairs (m, 2) that may be within ``reach`` mm, of those ``named``; ``everything``: all of them."""
+    n = len(boxes.centre)
+    if everything:
+        rows = list(itertools.combinations(range(n), 2)) if named is None else named
+        return np.array(rows, dtype=np.int64).reshape(-1, 2)
+    near = near_pairs(boxes, reach)
+    if named is None:
+        return near
+    keep = set(named)
+    return np.array([pair for pair in near.tolist() if tuple(pair) in keep], dtype=np.int64).reshape(-1, 2)
 
 
-def _pair(
-    scene: Scene,
-    i: int,
-    j: int,
-    models: list[Model],
-    T: Array,
-    start: Distance,
-    full: bool,
-    distances: bool,
-    depths: bool,
-    repeats: Repeats,
-) -> PairResult:
-    a, b = scene.parts[i].name, scene.parts[j].name
-    allowance, thresholds = scene.allowance(a, b), scene.thresholds
-    x, y, T_ab = models[i], models[j], dot(inverse(T[i]), T[j])
+class _Questions:
+    """What is asked of each pair of a scene, and the answers that serve pairs of equal shapes in equal relative poses."""
 
-    def enough(known: Distance) -> bool:
-        return not full and (not distances or measured(known))
+    def __init__(self, scene: Scene, models: list[Model], *, full: bool, distances: bool, depths: bool) -> None:
+        self.scene, self.models = scene, models
+        self.full, self.distances, self.depths = full, distances, depths
+        self._answers: dict[tuple[object, ...], tuple[Verdict, Distance]] = {}
 
-    pair = x, y, T_ab
-    known = repeats.find(*pair)
-    if known is not None and thresholds.verdict(known[1], allowance) is known[0] and enough(known[1]):
-        return _row(scene, i, j, pair, T[i], *known)
-    try:
-        verdict, found = judge(*pair, start, thresholds, allowance, enough)
-        deep = with_normal(found)
+    def row(self, i: int, j: int, gap: float) -> PairResult:
+        """The row of parts ``i`` and ``j``, whose boxes keep ``gap`` mm."""
+        first, second = self.scene.parts[i], self.scene.parts[j]
+        a, b = self.models[i], self.models[j]
+        allowance = self.scene.allowance(first.name, second.name)
+        T = inverse(first.T_world) @ second.T_world
+        key = (a, b, allowance, tuple((T[:3] + 0.0).round(_SAME).ravel().tolist()))
+        if key not in self._answers:
+            start = Distance(gap, level="boxes", method="bounding boxes")
+            try:
+                self._answers[key] = self._measured(a, b, T, start, allowance)
+            except MissingLibraryError:
+                raise
+            except Exception as error:  # one pair that fails is a finding, not the end of all others
+                return PairResult(first.name, second.name, Verdict.FAILED, start, reason=failure(error))
+        verdict, distance = self._answers[key]
+        row = PairResult(first.name, second.name, verdict, distance.moved(first.T_world))
         if verdict in BAD:
-            deep = penetration(*pair, deep) if depths and is_quick(x, y) else deep.of_overlap()
-            if depths and not is_quick(x, y) and x.faces is not None and y.faces is not None:
-                deep = faces_depth(x.faces, y.faces, T_ab, deep)
-    except MissingLibraryError:
-        raise
-    except Exception as error:  # one pair that fails is a finding, not the end of all others
-        return PairResult(a, b, Verdict.FAILED, start, reason=failure(error))
-    repeats.keep(*pair, verdict, deep)
-    return _row(scene, i, j, pair, T[i], verdict, deep)
+            return replace(row, locator=Locator(a, b, first.T_world, T))
+        if verdict is Verdict.UNCERTAIN:
+            models = {first.name: a, second.name: b}
+            return replace(row, reason=undecided(models, distance, self.scene.thresholds, allowance))
+        return row
 
+    def _measured(
+        self, a: Model, b: Model, T: Array, start: Distance, allowance: float | None
+    ) -> tuple[Verdict, Distance]:
+        """Verdict and distance of ``b`` at ``T`` (4, 4) in a's frame."""
+        accuracy = accuracy_for(a, b)
 
-def _row(
-    scene: Scene, i: int, j: int, pair: tuple[Model, Model, Array], T: Array, verdict: Verdict, found: Distance
-) -> PairResult:
-    """The row of two parts, the first one placed by ``T`` (4, 4), from what is known in its frame."""
-    a, b = scene.parts[i].name, scene.parts[j].name
-    x, y, T_ab = pair
-    row = PairResult(a, b, verdict, found.moved(T))
-    if verdict in BAD:
-        return replace(row, locate=locator(x, y, T, T_ab))
-    if verdict is Verdict.UNCERTAIN:
-        return replace(row, reason=undecided({a: x, b: y}, found, scene.thresholds, scene.allowance(a, b)))
-    return row
+        def enough(distance: Distance) -> bool:
+            return not self.full and (not self.distances or measured(distance, accuracy))
+
+        verdict, distance = judge(a, b, T, start, self.scene.thresholds, allowance, enough)
+        distance = with_normal(distance)
+        if verdict in BAD:
+            distance = penetration(a, b, T, distance) if self.depths else distance.of_overlap()
+        return verdict, distance

@@ -18,7 +18,6 @@ import numpy as np
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.hull import FLAT, MEMBER, SMALL, Hull
 from clamp3d.collide.nearest import rim_minimum, segment_pairs, to_faces
-from clamp3d.collide.zonoid import Zonoid, zonoid_distance
 from clamp3d.core.linear import cross, dot, norm, to_source, to_target
 from clamp3d.core.pose import Array, inverse
 
@@ -91,12 +90,6 @@ class Rod:
         return np.asarray(to_target(self.T, local))
 
     @property
-    def sum(self) -> Zonoid:
-        """The same as a sum of segments and discs."""
-        z, t = self.T[:3, 2], self.T[:3, 3]
-        return Zonoid(t, 0.5 * self.length * z[None], np.array([[*z, self.radius]]))
-
-    @property
     def ends(self) -> Array:
         """Both ends (2, 3) of the axis."""
         return np.asarray(self.T[:3, 3] + np.outer([-0.5 * self.length, 0.5 * self.length], self.T[:3, 2]))
@@ -108,31 +101,21 @@ Convex: TypeAlias = Rod | Hull
 def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, rims: bool = True) -> Distance:
     """Signed distance of two convex pieces placed by ``Ta``, ``Tb`` (4, 4); points and normal in that frame.
 
-    Of boxes and cylinders exact. Of others closed forms first; what they leave open goes to FCL, whose answer is
-    polished. Without ``rims`` the rims of a cylinder beside a polyhedron, which take long, are left to FCL.
+    Closed forms first; what they leave open goes to FCL, whose answer is polished. Without ``rims`` the rims of a
+    cylinder, which take long, are left to FCL.
     """
-    if a.sum is not None and b.sum is not None:
-        found = _of_sums(a, Ta, b, Tb, zonoid_distance(a.sum.at(Ta), b.sum.at(Tb)))
-    else:
-        found = _closed_form(a, Ta, b, Tb, None, rims)
-        if found.upper - found.lower > 1e-10:
-            found = found.meet(_by_gjk(a, Ta, b, Tb))
+    found = _closed_form(a, Ta, b, Tb, None, rims)
+    if found.upper - found.lower > 1e-10:
+        found = found.meet(_by_gjk(a, Ta, b, Tb))
     return replace(found, unique=_unique(a, Ta, b, Tb, found))
-
-
-def _of_sums(a: Convex, Ta: Array, b: Convex, Tb: Array, known: Distance) -> Distance:
-    """Of an overlap, whose depth is known, the deepest point in both that is found."""
-    p, q = known.point_a, known.point_b
-    if known.upper >= 0.0 or p is None or q is None:
-        return known
-    found = _deepest(a, Ta, b, Tb, [p, q, 0.5 * (p + q)], known.lower, MEMBER * (1.0 + float(np.abs(p).max())))
-    return replace(found, normal=known.normal, point_a=p, point_b=q, method=known.method)
 
 
 def _closed_form(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array | None, rims: bool) -> Distance:
     """What corners, edges, faces, axes and rims say; of large hulls only those that face along ``n``."""
     if isinstance(a, Rod):
-        return _rod_hull(a, Ta, b, Tb, n, rims)  # type: ignore[arg-type]
+        if isinstance(b, Rod):
+            return _rods(a, Ta, b, Tb, rims)
+        return _rod_hull(a, Ta, b, Tb, n, rims)
     if isinstance(b, Rod):
         return _rod_hull(b, Tb, a, Ta, None if n is None else -n, rims).swapped()
     return _hulls(a, Ta, b, Tb, n)
@@ -205,6 +188,28 @@ def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None, rims: bool
             found = replace(found, normal=normal, point_a=p, point_b=q) if found.upper < np.inf else found
     if rims and found.upper - found.lower > 1e-10 and len(b.vertices) <= SMALL:
         found = found.meet(_rims(a, Ta, b, Tb))
+    return found
+
+
+def _rods(a: Rod, Ta: Array, b: Rod, Tb: Array, rims: bool) -> Distance:
+    """Two cylinders: axis against axis, ends against ends, rims against the other cylinder."""
+    found = Distance()
+    ends_a, ends_b = _placed(a.ends, Ta), _placed(b.ends, Tb)
+    d, x, y = segment_pairs(ends_a[None], ends_b[None])
+    n = (y - x) / max(d, 1e-300)
+    square = all(abs(float(dot(n, dot(T[:3, :3], rod.T[:3, 2])))) <= FLAT for rod, T in ((a, Ta), (b, Tb)))
+    if square and d > 1e-9 * (a.radius + b.radius):  # else the feet are on ends, not on the sides
+        p, q = x + a.radius * n, y - b.radius * n
+        if d > a.radius + b.radius:
+            found = _proven(a, Ta, b, Tb, p, q, norm(q - p))
+        else:
+            low, normal = _slab(a, Ta, b, Tb, n[None])
+            deepest = _deepest(a, Ta, b, Tb, [p, q, 0.5 * (p + q)], low, 0.0)
+            found = replace(deepest, normal=normal, point_a=p, point_b=q) if deepest.upper < np.inf else deepest
+    if found.upper - found.lower > 1e-10:
+        found = found.meet(_touching(a, Ta, b, Tb))
+    if rims and found.upper - found.lower > 1e-10:
+        found = found.meet(_rims(a, Ta, b, Tb)).meet(_rims(b, Tb, a, Ta).swapped())
     return found
 
 

@@ -10,15 +10,13 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import instance, positive
 from clamp3d.collide.answer import Distance, Distances
-from clamp3d.collide.batch import by_kernel, exact
-from clamp3d.collide.depth import is_exact, penetration, touches_hole
-from clamp3d.collide.model import ModelCache
+from clamp3d.collide.batch import bounds_at_poses
+from clamp3d.collide.depth import depth_of_pieces, penetration
+from clamp3d.collide.model import Model, ModelCache
 from clamp3d.collide.modelled import modelled
-from clamp3d.collide.refine import ACCURACY, from_boxes, measured, refine, with_normal
+from clamp3d.collide.refine import ACCURACY, accuracy_for, from_boxes, measured, refine, with_normal
 from clamp3d.collide.scene import Scene, name_pairs
-from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.contact_model import ContactModel
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array, check_pose, check_pose_array, inverse
 from clamp3d.core.primitives import SweptArc
 from clamp3d.core.shapes import AnyShape, Shape, as_shape, groove_block
@@ -44,9 +42,9 @@ def distance(
     T_a_b : array_like (4, 4), optional
         Pose of b in the frame of a; the same frame by default.
     accuracy : float
-        The distance is refined until its bounds are this close, mm, or until the models have no more to say. The
-        depth of an overlap is exact where one contact decides it and in closed form; else it is known to 5 % or
-        0.01 mm, whichever is more, unless the search for it becomes too long.
+        The distance is refined until its bounds are this close, mm (or 1e-10 of the size, if that is more), or until
+        the models have no more to say. The depth of an overlap is exact for two convex pieces; else it lies between
+        the depth that a point has and the length of a translation that was verified to separate the bodies.
     model : ContactModel, optional
         Answers in place of the exact engine where one body has a groove and the other a cylinder.
     cache : ModelCache, optional
@@ -72,7 +70,8 @@ def distance(
     """
     T = np.eye(4) if T_a_b is None else check_pose(T_a_b, "T_a_b")
     x, y = _bounded(a, b, T[None])
-    return _measured(_checked(cache, model), x, y, T, positive("accuracy", accuracy), model)
+    cache = _checked(cache, model)
+    return _measured(cache.model(x), cache.model(y), T, positive("accuracy", accuracy), model)
 
 
 def distances(
@@ -113,10 +112,10 @@ def distances(
     cache = _checked(cache, model)
     shapes = _bounded(a, b, T)
     x, y = (cache.model(shape) for shape in shapes)
-    known = by_kernel(x, y, T)
-    settled = exact(known) if model is None else np.zeros(len(T), dtype=bool)
-    rows = np.flatnonzero(~settled).tolist()
-    return known.with_rows(rows, [_measured(cache, *shapes, T[k], ACCURACY, model) for k in rows])
+    batch = bounds_at_poses(x, y, T)
+    is_exact = (batch.lower >= 0.0) & (batch.upper - batch.lower <= ACCURACY)
+    rows = np.flatnonzero(~is_exact if model is None else np.ones(len(T), dtype=bool)).tolist()
+    return batch.with_rows(rows, [_measured(x, y, T[k], ACCURACY, model) for k in rows])
 
 
 def _bounded(a: AnyShape, b: AnyShape, T: Array) -> tuple[Shape, Shape]:
@@ -158,15 +157,16 @@ def measure(
     instance("scene", scene, Scene)
     accuracy = positive("accuracy", accuracy)
     cache = _checked(cache, model)
-    asked = (
+    chosen = (
         itertools.combinations([part.name for part in scene.parts], 2) if pairs is None else name_pairs("pairs", pairs)
     )
-    found = {}
-    for a, b in asked:
+    answers = {}
+    for a, b in chosen:
         first, second = (scene.parts[scene.index(name)] for name in (a, b))
-        T = dot(inverse(first.T_world), second.T_world)
-        found[a, b] = _measured(cache, first.shape, second.shape, T, accuracy, model).moved(first.T_world)
-    return found
+        T = inverse(first.T_world) @ second.T_world
+        models = cache.model(first.shape), cache.model(second.shape)
+        answers[a, b] = _measured(*models, T, accuracy, model).moved(first.T_world)
+    return answers
 
 
 def _checked(cache: ModelCache | None, model: ContactModel | None) -> ModelCache:
@@ -179,14 +179,13 @@ def _checked(cache: ModelCache | None, model: ContactModel | None) -> ModelCache
     return cache
 
 
-def _measured(cache: ModelCache, a: Shape, b: Shape, T: Array, accuracy: float, model: ContactModel | None) -> Distance:
-    x, y = cache.model(a), cache.model(b)
-    exact = is_exact(x, y)  # then closed forms know the depth too
-
-    def enough(known: Distance) -> bool:
-        return measured(known, accuracy) or (exact and known.point_a is not None) or touches_hole(x, y, known)
-
-    found = with_normal(refine(x, y, T, Distance() if exact else from_boxes(x, y, T), Thresholds(), enough))
-    if model is not None and (asked := modelled(x, y, T, found, model)) is not found:
-        return asked
-    return penetration(x, y, T, found)
+def _measured(a: Model, b: Model, T: Array, accuracy: float, model: ContactModel | None) -> Distance:
+    """The distance of ``b`` at ``T`` (4, 4) in a's frame, with the depth in an overlap."""
+    exact_depth = depth_of_pieces(a, b, T)
+    if exact_depth is not None and exact_depth.upper < -ACCURACY:
+        return exact_depth
+    wide = accuracy_for(a, b, accuracy)
+    distance = with_normal(refine(a, b, T, from_boxes(a, b, T), lambda known: measured(known, wide)))
+    if model is not None and (by_model := modelled(a, b, T, distance, model)) is not distance:
+        return by_model
+    return penetration(a, b, T, distance) if distance.upper < 0.0 or distance.lower < -ACCURACY else distance

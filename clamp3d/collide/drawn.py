@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from clamp3d.collide.body import Bore, ClosedForm
+from clamp3d.collide.closed_form import Bore, ClosedForm
 from clamp3d.collide.convex import Convex, Rod
 from clamp3d.collide.hull import Hull, hull
 from clamp3d.core.extrusion import Extrusion

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.collide.body import Bore, ClosedForm
+from clamp3d.collide.closed_form import Bore, ClosedForm
 from clamp3d.collide.convex import Rod
 from clamp3d.collide.hull import nearly_hull
 from clamp3d.collide.surface import Surface
@@ -21,12 +21,7 @@ from clamp3d.fit.fit import FitResult
 Faces = NDArray[np.int64]
 
 
-def fit_error(feature: FittedSurface, round_: bool) -> float:
-    """Error (mm) of a fitted surface: with the vertices taken to lie on a round surface, or with nothing assumed."""
-    return feature.fit_error if round_ else feature.error_bound
-
-
-def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool, stated: float = 0.0) -> tuple[ClosedForm, ...]:
+def bodies_of_fit(result: FitResult, model: Surface, *, stated: float = 0.0) -> tuple[ClosedForm, ...]:
     """Bodies around the fitted mesh, whose true surface can be ``stated`` mm from its facets besides.
 
     A groove or hole counts where no part of the mesh lies in its circle, over the whole length of the mesh; else the
@@ -44,7 +39,7 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool, stated: fl
         reach = convex.radius / (1.0 - convex.chord_error / convex.radius) + convex.fit_error
         local[:, :2] *= (np.maximum(reach, out) / out)[:, None]
         points[own] = to_target(T, local)
-    error = max((fit_error(feature, round_) for feature in result.features), default=0.0)
+    error = max((feature.fit_error for feature in result.features), default=0.0)
     mesh_error = max((feature.error_bound for feature in result.features), default=0.0)
 
     hollow = (*result.grooves, *result.holes)
@@ -57,7 +52,7 @@ def bodies_of_fit(result: FitResult, model: Surface, *, round_: bool, stated: fl
     owner = np.full(len(F), -1)
     for k, feature in enumerate(result.features):
         owner[feature.faces] = k
-    normal, _ = model.planes
+    normal = model.normals
     slack = 1e-9 * model.scale
 
     def depth(x: Array) -> Array:

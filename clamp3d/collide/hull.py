@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.collide.zonoid import Zonoid, box_of
 from clamp3d.core.linear import dot, norm
 from clamp3d.core.pose import Array
 from clamp3d.core.triangles import closest_points, distinct
@@ -45,11 +44,6 @@ class Hull:
         pairs, owner = both[order].reshape(-1, 4)[:, :2], (order // 3).reshape(-1, 2)
         bent = np.linalg.norm(np.cross(normal[owner[:, 0]], normal[owner[:, 1]]), axis=1) > 1e-10
         return np.asarray(pairs[bent])
-
-    @cached_property
-    def sum(self) -> Zonoid | None:
-        """A box as a sum of segments; None for any other polyhedron."""
-        return box_of(self.vertices, self.edges)
 
     def support(self, n: Array) -> Array:
         """The vertices (k, 3) that lie furthest along ``n`` (k, 3)."""

@@ -1,26 +1,19 @@
-"""The verdict of one pair: its distance refined until one is certain, and whether one part lies wholly in the other."""
+"""The verdict of one pair: its distance refined until it is certain, equal parts in one place, one part in another."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clamp3d.brep import cad_process
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.batch import Pairs, in_frame_of_first, members, relative
-from clamp3d.collide.broad import world_boxes
-from clamp3d.collide.depth import is_quick, penetration
-from clamp3d.collide.faces import stands_out
-from clamp3d.collide.meshes import within
+from clamp3d.collide.depth import depth_of_pieces
+from clamp3d.collide.mesh_distance import within
 from clamp3d.collide.model import Model
-from clamp3d.collide.refine import Enough, refine, with_normal
+from clamp3d.collide.refine import Enough, refine
 from clamp3d.collide.verdict import Thresholds, Verdict
-from clamp3d.core.linear import norm
-from clamp3d.core.pose import Array
-
-_ERROR = 0.064
-"""Chord error (mm) of the meshes that containment is asked with."""
+from clamp3d.core.pose import Array, inverse
 
 
 def judge(
@@ -32,74 +25,74 @@ def judge(
     allowance: float | None,
     enough: Enough = lambda _: True,
 ) -> tuple[Verdict, Distance]:
-    """Verdict and distance of ``b`` at ``T`` (4, 4) in a's frame, from ``start`` on, until certain and ``enough``."""
+    """Verdict and distance of ``b`` at ``T`` (4, 4) in a's frame, from ``start`` on, until certain and ``enough``.
 
-    def certain(known: Distance) -> bool:
-        return enough(known) and thresholds.verdict(known, allowance) is not Verdict.UNCERTAIN
-
-    found = refine(a, b, T, start, thresholds, certain)
-    verdict = thresholds.verdict(found, allowance)
-    if verdict is Verdict.UNCERTAIN and found.upper < thresholds.reach and is_quick(a, b):
-        # Nothing lies deeper inside than the way out is long.
-        deep = penetration(a, b, T, with_normal(found))
-        found = replace(found, lower=max(found.lower, deep.lower))
-        verdict = thresholds.verdict(found, allowance)
-    if verdict is Verdict.CLASH and contained(a, b, in_frame_of_first(T[None]), thresholds).any():
-        verdict = Verdict.CONTAINED
-    return verdict, found
-
-
-def contained(a: Model, b: Model, pairs: Pairs, thresholds: Thresholds) -> NDArray[np.bool_]:
-    """Whether one of two overlapping parts lies wholly in the other, within the contact threshold; (m,).
-
-    ``pairs`` are the poses of both.
+    Of an overlap the distance bounds minus the interference, or minus the depth where two convex pieces tell it.
     """
-    found = np.zeros(len(pairs[1]), dtype=bool)
-    if not (a.closed and b.closed):
-        return found
-    for inner, outer, (A, column, T, row) in ((b, a, pairs), (a, b, (*pairs[2:], *pairs[:2]))):
-        if not _could_hold(inner, outer, thresholds.contact):
-            continue
-        rows = np.flatnonzero(~found)
-        places = relative((A, column[rows], T, row[rows]))
-        fits = _fits(inner, outer, places)
-        rows, places = rows[fits], places[fits]
-        if inner.faces is None or outer.faces is None:
-            asked = ~_shows(inner, outer, places, thresholds.contact)
-        else:
-            faces = inner.faces, outer.faces
-            asked = np.array([not stands_out(*faces, P, thresholds.contact) for P in places], dtype=bool)
-        a.counters.queries["containment"] += int(asked.sum())
-        found[rows[asked]] = [within(inner, outer, P, _ERROR, thresholds.contact) for P in places[asked]]
-    return found
+    if is_duplicate(a, b, T, thresholds.contact):
+        return Verdict.DUPLICATE, replace(start, lower=-np.inf, upper=-0.0, level="boxes", method="equal shapes")
+
+    def certain(distance: Distance) -> bool:
+        return enough(distance) and thresholds.verdict(distance, allowance) is not Verdict.UNCERTAIN
+
+    distance = refine(a, b, T, start, certain)
+    verdict = thresholds.verdict(distance, allowance)
+    if verdict is Verdict.UNCERTAIN and distance.upper < thresholds.reach:
+        exact = depth_of_pieces(a, b, T)
+        if exact is not None:
+            distance = replace(exact, level="features")
+            verdict = thresholds.verdict(distance, allowance)
+    if verdict is Verdict.CLASH:
+        verdict = kind_of_overlap(a, b, T, thresholds.contact)
+    return verdict, distance
 
 
-def _could_hold(inner: Model, outer: Model, contact: float) -> bool:
-    """Whether the sizes of two parts leave open that one holds the other at some pose, as `within` takes it."""
-    length, volume = inner.least_size
-    extent = np.ptp(outer.bounds, axis=0) + 2.0 * (contact + 4.0 * _ERROR)
-    return bool(norm(extent) >= length and extent.prod() >= volume)
+def is_duplicate(a: Model, b: Model, T: Array, contact: float) -> bool:
+    """Whether two parts have one shape and, within ``contact`` mm, one place; ``b`` at ``T`` (4, 4) in a's frame."""
+    if a.shape is not b.shape and a.shape != b.shape:
+        return False
+    low, high = a.bounds
+    corners = np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    shift = corners @ T[:3, :3].T + T[:3, 3] - corners
+    return bool(np.linalg.norm(shift, axis=1).max() <= contact)
 
 
-def _fits(inner: Model, outer: Model, T: Array) -> NDArray[np.bool_]:
-    """Whether the boxes of two parts leave open that one holds the other, (n,): cheap, without a mesh."""
+def kind_of_overlap(a: Model, b: Model, T: Array, contact: float) -> Verdict:
+    """Clash, contained, or duplicate where each of two parts lies in the other, all within ``contact`` mm."""
+    inside = [_holds(b, a, T, contact), _holds(a, b, inverse(T), contact)]
+    if all(inside):
+        return Verdict.DUPLICATE
+    return Verdict.CONTAINED if any(inside) else Verdict.CLASH
+
+
+def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
+    """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer``, within ``contact`` mm."""
+    if not (inner.closed and outer.closed and inner.chords and outer.chords):
+        return False
+    if not _boxes_allow(inner, outer, T, contact):
+        return False
+    inner.counters.queries["containment"] += 1
+    small, large = inner.outer(inner.chords[-1]), outer.inner(outer.chords[-1])
+    slack = small.error + _chord(inner, outer)
+    if large is None or not within(small, large, T, contact + slack + large.error):
+        return False
+    if slack + large.error <= contact or inner.exact is None or outer.exact is None:
+        return True
+    # The meshes are coarser than the threshold: what is shared must be all of the inner one but a skin.
+    shared = cad_process.common(outer.exact.brep, inner.exact.brep, T, 1.0)
+    return shared.volume >= inner.exact.volume - contact * shared.area
+
+
+def _chord(*models: Model) -> float:
+    """How far (mm) meshes around and inside of drawn solids are from the solids."""
+    return sum(model.chords[-1] for model in models if model.between)
+
+
+def _boxes_allow(inner: Model, outer: Model, T: Array, contact: float) -> bool:
+    """Whether the boxes of two parts leave open that one holds the other: cheap, without a mesh."""
     low, high = outer.bounds
-    around = world_boxes(inner.bounds[None], T)
-    centre, reach = 0.5 * (around[:3] + around[3:]), 0.25 * (around[3:] - around[:3])
-    # The box of the inner one touches the outer's on six sides: one outside by more than its own corners can be is
-    # enough to say no.
-    return np.asarray(((centre + reach >= low[:, None]) & (centre - reach <= high[:, None])).all(axis=0))
-
-
-def _shows(inner: Model, outer: Model, T: Array, contact: float) -> NDArray[np.bool_]:
-    """Whether one of a few vertices of a part is certainly out of the other by more than ``contact`` mm, (n,)."""
-    from clamp3d.collide.poses_kernel import stand_out
-
-    forms = outer.bodies
-    if forms is None or len(forms) > 1 or forms[0].surface is not None:
-        return np.zeros(len(T), dtype=bool)
-    small, found = inner.outer(_ERROR), np.empty(len(T), dtype=np.int64)
-    slack = contact + small.error + forms[0].error + (_ERROR if inner.refines else 0.0)
-    points = np.vstack([small.shell_points.reshape(-1, 3), small.vertices[:: max(1, len(small.vertices) // 16)]])
-    stand_out(T, points, *members(forms[0]), slack, found)
-    return np.asarray(found == 1)
+    middle, half = 0.5 * (inner.bounds[0] + inner.bounds[1]), 0.5 * (inner.bounds[1] - inner.bounds[0])
+    centre = T[:3, :3] @ middle + T[:3, 3]
+    # The part touches each side of its box: somewhere it reaches at least half as far as the box in each direction.
+    reach = 0.5 * np.abs(T[:3, :3]) @ half - contact
+    return bool(((centre + reach >= low) & (centre - reach <= high)).all())

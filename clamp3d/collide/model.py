@@ -6,22 +6,21 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.brep.solid import BrepSolid
-from clamp3d.collide.body import ClosedForm
+from clamp3d.brep.solid import CHORD, BrepSolid
+from clamp3d.collide.closed_form import ClosedForm
 from clamp3d.collide.drawn import bodies_of
-from clamp3d.collide.faces import FaceModel
 from clamp3d.collide.hull import Hull, hull, hull_error
 from clamp3d.collide.surface import Surface, at_edges
-from clamp3d.core.linear import atan2
-from clamp3d.core.mesh import edges_of
+from clamp3d.core.mesh import edges_of, is_closed
 from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import MeshShape, Shape, Solid
+from clamp3d.errors import Clamp3dError
 
 if TYPE_CHECKING:
     from clamp3d.fit.fit import FitResult
@@ -31,15 +30,21 @@ Progress = Callable[[str, int, int], None]
 
 _LARGE = 2000
 """Triangles of a mesh beyond which its hull is no quicker to ask than the mesh itself."""
+_MOST_COARSE = 3000
+"""Triangles of the coarse mesh of a solid from CAD beyond which the fine one costs more than asking Open CASCADE."""
 _CONVEX = 1e-9
 """Relative to its size: a mesh whose hull stands out of it by less is asked in its place."""
 Maker = Callable[[Solid, float], tuple[Array, NDArray[np.int64]] | None]
 
-FINEST = 0.001
-"""Smallest chord error (mm) that a mesh is made with; a pair still open then is uncertain."""
+DRAWN_CHORDS = (0.5, 0.06, 0.008, 0.001)
+"""Chord errors (mm) that drawn solids are meshed with; a pair still open at the last is uncertain."""
 
-FINEST_CAD = 0.004
-"""The same (mm) for solids from CAD, whose facets come from a slow mesher."""
+CAD_CHORDS = (0.1, 0.0025)
+"""Chord errors (mm) that solids from CAD are meshed with; what these leave open is asked of Open CASCADE.
+
+Of two equal cylinders, one in the other, facets overlap by a chord error, and each adds its own: three fine ones are less
+than the usual threshold of contact, 0.01 mm.
+"""
 
 
 @dataclass
@@ -67,38 +72,30 @@ class Model:
     @cached_property
     def bounds(self) -> Array:
         """Lower and upper corner (2, 3) of a box that holds the true part, mm."""
-        if isinstance(self.shape, Solid):
+        if isinstance(self.shape, (Solid, BrepSolid)):
             return self.shape.bounds
         V = self.shape.mesh.vertices
         reach = self.shape.error + (_bulge(self.shape) if self.shape.fit != "off" else 0.0)
         return np.array([V.min(axis=0) - reach, V.max(axis=0) + reach])
 
     @cached_property
-    def least_size(self) -> tuple[float, float]:
-        """Length (mm) and volume (mm^3) that the true part has at least, where they cost nothing; else 0."""
-        if not isinstance(self.shape, Solid) or self.shape.holes:
-            return 0.0, 0.0
-        return float(np.ptp(self.bounds, axis=0).max()), sum(body.volume for body in self.shape.bodies)
-
-    @cached_property
     def bodies(self) -> tuple[ClosedForm, ...] | None:
         """The shape in closed form; None if it has none."""
         if isinstance(self.shape, Solid):
             return bodies_of(self.shape)
-        if not self.closed:
+        if not self.closed or not self.chords:
             return None
+        mesh = self._cad_mesh(CHORD) if self.exact is not None else self.raw
         if self._fit is not None and self._fit.features:
             from clamp3d.collide.fitted import bodies_of_fit
 
-            round_ = self.shape.fit == "round"
-            return bodies_of_fit(self._fit, self.raw, round_=round_, stated=self.shape.error)
-        raw = self.raw
-        if len(raw.faces) > _LARGE:  # the mesh is quicker than a hull of so many faces
+            return bodies_of_fit(self._fit, mesh, stated=0.0 if self.exact else self.shape.error)
+        if len(mesh.faces) > _LARGE:  # the mesh is quicker than a hull of so many faces
             return None
-        off = hull_error(raw.vertices, raw.faces)
-        if off > _CONVEX * raw.scale:
+        off = hull_error(mesh.vertices, mesh.faces)
+        if off > _CONVEX * mesh.scale:
             return None
-        return (ClosedForm((self._hull(raw.vertices),), error=raw.error + off),)
+        return (ClosedForm((self._hull(mesh.vertices),), error=mesh.error + off),)
 
     @property
     def forms(self) -> tuple[ClosedForm, ...]:
@@ -107,7 +104,11 @@ class Model:
 
     @cached_property
     def _fit(self) -> FitResult | None:
-        """Round surfaces found in a mesh; None where none are looked for."""
+        """Round surfaces found in a mesh, or named by a CAD file; None where none are looked for."""
+        if isinstance(self.shape, BrepSolid):
+            from clamp3d.fit.fit import fit_solid
+
+            return fit_solid(self.shape)
         if not isinstance(self.shape, MeshShape) or self.shape.fit == "off" or not self.closed:
             return None
         from clamp3d.fit.fit import fit_mesh
@@ -118,23 +119,28 @@ class Model:
     @cached_property
     def simple(self) -> bool:
         """Whether closed forms, or a small hull in place of them, are quicker to ask than the mesh."""
-        small = isinstance(self.shape, Solid) or len(self.shape.mesh.faces) <= _LARGE
+        if isinstance(self.shape, Solid):
+            return True
+        small = bool(self.chords) and len(self.outer(self.chords[0]).faces) <= _LARGE
         return small or (self.bodies is not None and all(form.surface is None for form in self.bodies))
 
-    @property
-    def facets(self) -> Surface | None:
-        """The mesh of a mesh shape; None for a drawn solid."""
-        return self.raw if isinstance(self.shape, MeshShape) and self.closed else None
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.shape, Counters())
 
-    @cached_property
-    def faces(self) -> FaceModel | None:
-        """The faces of a solid from CAD; None for other shapes."""
-        return FaceModel(self.shape) if isinstance(self.shape, BrepSolid) else None
+    @property
+    def drawn(self) -> bool:
+        """Whether it is a drawn solid."""
+        return isinstance(self.shape, Solid)
+
+    @property
+    def exact(self) -> BrepSolid | None:
+        """The solid from CAD that Open CASCADE can be asked about; None for other shapes."""
+        return self.shape if isinstance(self.shape, BrepSolid) else None
 
     @cached_property
     def hull_body(self) -> ClosedForm:
         """Convex hull of a mesh that holds the part: for lower bounds alone."""
-        outer = self.outer(0.5)
+        outer = self.outer(DRAWN_CHORDS[0])
         return ClosedForm((self._hull(outer.vertices),), error=outer.error, surface=_nowhere)
 
     def _hull(self, points: Array) -> Hull:
@@ -142,16 +148,34 @@ class Model:
         return hull(points)
 
     @property
-    def refines(self) -> bool:
-        """Whether a smaller chord error gives a better mesh: true of drawn solids with arcs and of solids from CAD."""
+    def chords(self) -> tuple[float, ...]:
+        """Chord errors (mm) of the meshes that are worth a question, from coarse to fine; one for given triangles."""
         if isinstance(self.shape, BrepSolid):
-            return self.shape.error > 1e-6
-        return isinstance(self.shape, Solid) and any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes))
+            return self._cad_chords
+        arcs = isinstance(self.shape, Solid) and any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes))
+        return DRAWN_CHORDS if arcs else DRAWN_CHORDS[:1]
+
+    @property
+    def refines(self) -> bool:
+        """Whether a smaller chord error gives a better mesh."""
+        return len(self.chords) > 1
+
+    @cached_property
+    def _cad_chords(self) -> tuple[float, ...]:
+        """The chord errors for a solid from CAD; none if Open CASCADE's triangles do not close: then it is asked."""
+        assert isinstance(self.shape, BrepSolid)
+        try:
+            faces = self.shape.tessellated(CAD_CHORDS[0]).faces
+        except Clamp3dError:
+            return ()
+        if not is_closed(faces):
+            return ()
+        return CAD_CHORDS if len(faces) <= _MOST_COARSE else CAD_CHORDS[:1]
 
     @property
     def closed(self) -> bool:
         """Whether it is known what is inside: not of a mesh with open or crossed edges."""
-        return isinstance(self.shape, Solid) or self.shape.mesh.watertight
+        return isinstance(self.shape, (Solid, BrepSolid)) or self.shape.mesh.watertight
 
     @property
     def between(self) -> bool:
@@ -160,10 +184,8 @@ class Model:
 
     @cached_property
     def raw(self) -> Surface:
-        """The facets of a mesh shape; round faces are off by the error of the fit, all by what the shape states."""
-        assert isinstance(self.shape, MeshShape)
-        if isinstance(self.shape, BrepSolid):
-            return self._facets(self.shape)
+        """The facets of a mesh; round faces are off by the error of the fit, all by what the shape states."""
+        assert not isinstance(self.shape, (Solid, BrepSolid))
         V, F = self.shape.mesh.vertices, self.shape.mesh.faces
         error = np.full(len(F), self.shape.error) if self.shape.error else None
         if self._fit is not None and self._fit.features:
@@ -173,15 +195,7 @@ class Model:
                 error[feature.faces] = np.maximum(error[feature.faces], feature.error_bound + self.shape.error)
                 patch[feature.faces] = k + 1
             error = at_edges(V, F, error, patch)
-            off = error.copy()
-            for feature in self._fit.cylinders if self.shape.fit == "round" else ():
-                off[feature.faces] = feature.fit_error + self.shape.error
-            return self._counted(Surface(V, F, error, off))
         return self._counted(Surface(V, F, error))
-
-    def _facets(self, solid: BrepSolid) -> Surface:
-        V, F = solid.mesh.vertices, solid.mesh.faces
-        return self._counted(Surface(V, F, at_edges(V, F, solid.errors)))
 
     def outer(self, error: float) -> Surface:
         """Mesh of chord error ``error`` mm that holds a drawn solid; a mesh shape's own facets, whose errors it has."""
@@ -195,24 +209,29 @@ class Model:
 
     def _made(self, kept: dict[float, Surface | None], make: Maker, error: float) -> Surface | None:
         if isinstance(self.shape, BrepSolid):
-            finer = self.shape.tessellated(max(error, FINEST_CAD))
-            kept, error = self._inner, finer.error
-            if error not in kept:
-                kept[error] = self.raw if finer is self.shape else self._facets(finer)
-            return kept[error]
-        if isinstance(self.shape, MeshShape):
+            kept = self._inner
+        elif not isinstance(self.shape, Solid):
             return self.raw
-        if not self.refines:  # outlines without arcs are exact at any chord error: one mesh serves all
-            kept, error = self._inner, 0.5
+        elif not self.refines:  # outlines without arcs are exact at any chord error: one mesh serves all
+            kept, error = self._inner, DRAWN_CHORDS[0]
+        error = max(error, self.chords[-1])
         if error not in kept:
-            made = make(self.shape, error)
-            kept[error] = None if made is None else self._counted(Surface(*made))
+            if isinstance(self.shape, BrepSolid):
+                kept[error] = self._cad_mesh(error)
+            else:
+                mesh = make(self.shape, error)
+                kept[error] = None if mesh is None else self._counted(Surface(*mesh))
         return kept[error]
 
-    def _counted(self, made: Surface) -> Surface:
+    def _cad_mesh(self, chord: float) -> Surface:
+        assert isinstance(self.shape, BrepSolid)
+        mesh = self.shape.tessellated(chord)
+        return self._counted(Surface(mesh.vertices, mesh.faces, at_edges(mesh.vertices, mesh.faces, mesh.errors)))
+
+    def _counted(self, surface: Surface) -> Surface:
         self.counters.built["meshes"] += 1
-        self.counters.built["triangles"] += len(made.faces)
-        return made
+        self.counters.built["triangles"] += len(surface.faces)
+        return surface
 
 
 def _nowhere(points: Array) -> Array:
@@ -227,7 +246,7 @@ def _bulge(shape: MeshShape) -> float:
     normals = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])[pairs]
     twice_area = np.linalg.norm(normals, axis=2)
     across = np.linalg.norm(np.cross(normals[:, 0], normals[:, 1]), axis=1)
-    angles = atan2(across, np.einsum("ij,ij->i", normals[:, 0], normals[:, 1]))
+    angles = np.arctan2(across, np.einsum("ij,ij->i", normals[:, 0], normals[:, 1]))
     length = np.linalg.norm(V[edges[:, 1]] - V[edges[:, 0]], axis=1)
     wide = twice_area.max(axis=1) / np.maximum(length, 1e-300)
     smooth = (angles > 1e-6) & (angles < np.radians(65.0))

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.body import bore_rod
+from clamp3d.collide.closed_form import bore_rod
 from clamp3d.collide.convex import Rod
 from clamp3d.collide.model import Model
 from clamp3d.core.contact_model import ContactModel

@@ -9,15 +9,14 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import instance
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.body import kernel_distance
+from clamp3d.collide.closed_form import kernel_distance
 from clamp3d.collide.model import ModelCache
-from clamp3d.collide.moving_pair import ACCURACY, MovingPair, first_time, least_distance
-from clamp3d.collide.open_pair import moving_pair
+from clamp3d.collide.moving_pair import ACCURACY, MovingPair
 from clamp3d.collide.refine import measured, with_normal
-from clamp3d.collide.verdict import RESOLUTION, Thresholds
+from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.distance import SignedDistance
+from clamp3d.core.groove_motion import Search
 from clamp3d.core.motion import Motion, scene_pose
-from clamp3d.core.motion_search import Search
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc, place
 from clamp3d.core.shapes import AnyShape, as_shape
@@ -73,9 +72,9 @@ def first_contact(
     Parameters
     ----------
     a, b : Solid, MeshShape, Cylinder, Capsule or SweptArc
-        Two bodies. For a `SweptArc` and a `Cylinder` or `Capsule` the kernel's search is used, to rounding; where a
-        flat end decides, to 1e-9 of the largest size. Any other pair is at most 2e-4 mm further apart than ``margin``
-        at the answer; a larger ``distance`` there means that the search ended early, and only that all before is free.
+        Two bodies. A `SweptArc` and a `Cylinder` or `Capsule` are measured by the kernel, other pairs as `distance`
+        measures them, to 1e-6 mm. A larger ``distance`` at the answer than ``margin`` means that the search ended
+        early, and only that all before is free.
     motion : Motion
         Moves b.
     T_a_b : array_like (4, 4), optional
@@ -83,15 +82,12 @@ def first_contact(
     margin : float
         Distance in mm that counts as contact; below 0, a depth, for a groove and a cylinder alone.
     resolution : float, optional
-        For groove and cylinder: depth in mm that may be missed, 1e-12 of the largest size by default (1e-9 where a
-        flat end decides).
+        For groove and cylinder: accuracy of the search in mm, 1e-9 of the largest size by default.
 
     Raises
     ------
     InputError
         For anything that is no shape, motion, rigid pose or finite number.
-    SolverError
-        If the search takes too many steps, or the motion goes so far that rounding moves it by more than the bodies.
 
     Examples
     --------
@@ -104,18 +100,18 @@ def first_contact(
     (True, 0.5375, 'groove kernel')
     """
     margin = place("margin", margin)
-    pair = _searched(a, b, motion, T_a_b, resolution)
-    if isinstance(pair, Search):
-        return _from_kernel(pair, *pair.first_contact(margin))
+    search = _kernel_search(a, b, motion, T_a_b, resolution)
+    if search is not None:
+        return _from_kernel(search, *search.first_contact(margin))
     if margin < 0.0:
         raise InputError(f"margin must be >= 0 but for a groove and a cylinder, got {margin:g}")
-    thresholds = Thresholds(max(margin, 1e-6))
-    least, t = least_distance(pair, thresholds, None)
-    touches = least.upper <= margin + RESOLUTION
-    if touches:
-        t = first_time(pair, t, thresholds, margin)
-        least = pair.ask(t, measured, thresholds)
-    return _from_search(pair, touches, t, least)
+    pair = _moving_pair(a, b, motion, T_a_b)
+    t = pair.first_time(margin)
+    if t is None:
+        least, t = pair.least_distance()
+        return _answer(pair, False, t, least)
+    here = pair.at(t, measured)
+    return _answer(pair, True, t, here)
 
 
 def min_clearance(
@@ -135,42 +131,54 @@ def min_clearance(
     >>> round(least.distance.value, 12), least.t
     (0.085786437627, 0.0)
     """
-    pair = _searched(a, b, motion, T_a_b, resolution)
-    if isinstance(pair, Search):
-        return _from_kernel(pair, None, *pair.least())
-    least, t = least_distance(pair, Thresholds(1e-6), None)
-    return _from_search(pair, least.upper <= RESOLUTION, t, least)
+    search = _kernel_search(a, b, motion, T_a_b, resolution)
+    if search is not None:
+        return _from_kernel(search, None, *search.least())
+    pair = _moving_pair(a, b, motion, T_a_b)
+    least, t = pair.least_distance()
+    return _answer(pair, least.upper <= RESOLUTION, t, least)
 
 
-def _searched(
-    a: AnyShape, b: AnyShape, motion: Motion, T_a_b: ArrayLike | None, resolution: float | None
-) -> Search | MovingPair:
+def _start(motion: Motion, T_a_b: ArrayLike | None) -> tuple[Motion, Array]:
+    """The motion as a screw, and the pose at its start. Raises InputError for anything else."""
     instance("motion", motion, Motion)
     T = np.eye(4) if T_a_b is None else scene_pose(T_a_b, "T_a_b")
-    motion = motion.resolved(T)
-    if isinstance(a, SweptArc) and isinstance(b, (Cylinder, Capsule)):
-        return Search(a, b, motion, T, resolution)
+    return motion.resolved(T), T
+
+
+def _moving_pair(a: AnyShape, b: AnyShape, motion: Motion, T_a_b: ArrayLike | None) -> MovingPair:
+    screw, T = _start(motion, T_a_b)
     cache = ModelCache()
-    return moving_pair(cache.model(as_shape(b)), cache.model(as_shape(a)), motion, T, np.eye(4))
+    return MovingPair(cache.model(as_shape(b)), cache.model(as_shape(a)), screw, T, np.eye(4))
+
+
+def _kernel_search(
+    a: AnyShape, b: AnyShape, motion: Motion, T_a_b: ArrayLike | None, resolution: float | None
+) -> Search | None:
+    """The kernel's search for a groove and a cylinder; None for other bodies."""
+    screw, T = _start(motion, T_a_b)
+    if isinstance(a, SweptArc) and isinstance(b, (Cylinder, Capsule)):
+        return Search(a, b, screw, T, resolution)
+    return None
 
 
 def _from_kernel(search: Search, touches: bool | None, t: float, slack: float) -> MotionDistance:
+    """The answer at time ``t``; ``touches`` None: as the distance there says."""
     contact = search.at(t)
-    found = kernel_distance(contact)
+    distance = kernel_distance(contact)
     if touches is None:
-        touches = found.upper <= 0.0
-        found = replace(found, lower=found.lower - slack)
-    return MotionDistance(touches, t, _overlap(found), search.pose(t), slack, search.evaluations, contact)
+        touches = distance.upper <= 0.0
+        distance = replace(distance, lower=distance.lower - slack)
+    return MotionDistance(touches, t, _overlap(distance), search.pose(t), slack, search.evaluations, contact)
 
 
-def _from_search(pair: MovingPair, touches: bool, t: float, found: Distance) -> MotionDistance:
+def _answer(pair: MovingPair, touches: bool, t: float, distance: Distance) -> MotionDistance:
     pose = pair.motion.at(t, pair.start)
-    width = max(found.upper - found.lower, ACCURACY)
-    return MotionDistance(
-        touches, t, _overlap(with_normal(found.moved(pose).swapped())), pose, width, sum(pair.counters.queries.values())
-    )
+    width = max(distance.upper - distance.lower, ACCURACY)
+    distance = _overlap(with_normal(distance.moved(pose).swapped()))
+    return MotionDistance(touches, t, distance, pose, width, pair.evaluations)
 
 
-def _overlap(found: Distance) -> Distance:
+def _overlap(distance: Distance) -> Distance:
     """Of an overlap without what bounds its deepest point only: that bounds no depth, nor is its normal the way out."""
-    return replace(found.of_overlap(), normal=None) if found.upper < -RESOLUTION else found
+    return replace(distance.of_overlap(), normal=None) if distance.upper < -RESOLUTION else distance

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.meshes import any_inside, nearest_of, rounding_of
+from clamp3d.collide.mesh_distance import nearest_points, one_inside, rounding_of, surfaces_meet
 from clamp3d.collide.model import Model
 from clamp3d.collide.surface import Surface
 from clamp3d.core.linear import to_target
@@ -28,18 +28,19 @@ def open_distance(a: Model, b: Model, T: Array) -> Distance:
     nothing says that they are apart: ``lower`` is minus infinity.
     """
     outer_a, outer_b = a.outer(OPEN_ERROR), b.outer(OPEN_ERROR)
-    lower = nearest_of(outer_a, outer_b, T)[0]
+    lower = -np.inf if surfaces_meet(outer_a, outer_b, T) else nearest_points(outer_a, outer_b, T)[0]
     inner_a, inner_b = a.inner(OPEN_ERROR), b.inner(OPEN_ERROR)
     if inner_a is None or inner_b is None:
         return Distance(lower if lower > 0.0 else -np.inf)
     rounding = rounding_of(inner_a, inner_b, T)
     error = inner_a.error + inner_b.error
-    _, upper, p, q = nearest_of(inner_a, inner_b, T)
+    meet = surfaces_meet(inner_a, inner_b, T)
+    upper, p, q = (0.0, None, None) if meet else nearest_points(inner_a, inner_b, T)[1:]
     if upper <= rounding:
         depth, at = _crossing(inner_a, inner_b, T)
         return Distance(-np.inf, error + rounding - depth, at, at)
     for outer, inner, place, closed in ((inner_a, inner_b, T, a.closed), (inner_b, inner_a, inverse(T), b.closed)):
-        if any_inside(outer, inner, place):
+        if one_inside(outer, inner, place):
             # In a closed part the other's surface is an overlap; an open one may or may not hold the other part.
             return Distance(-np.inf, (error - upper if closed else upper + error) + rounding)
     return Distance(lower - rounding, upper + error + rounding, p, q)

@@ -12,18 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, instance, items
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.batch import Pairs, bounds_by_kernel, relative
-from clamp3d.collide.broad import FEW, FIRST, Boxes, BoxTree, box_gaps, box_sizes, world_boxes
-from clamp3d.collide.judge import contained, judge
+from clamp3d.collide.batch import bounds_at_poses
+from clamp3d.collide.broad import Boxes, box_gaps, near_between
+from clamp3d.collide.judge import judge, kind_of_overlap
 from clamp3d.collide.model import Model, ModelCache
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import VERDICTS, Thresholds, Verdict
-from clamp3d.core.motion import FARTHEST, scene_pose
-from clamp3d.core.pose import Array, check_pose_array
+from clamp3d.collide.verdict import RESOLUTION, VERDICTS, Thresholds, Verdict
+from clamp3d.core.pose import Array, check_pose_array, inverse
 from clamp3d.errors import InputError, MissingLibraryError
 
 _BLOCK = 8192
-"""Poses that are compared together with what comes near any of them."""
+"""Poses that are compared with all others together: what their boxes take is then a few megabytes."""
 
 _NAMES = np.array([verdict.value for verdict in VERDICTS])
 _CLASH, _UNCERTAIN, _CLEAR = map(VERDICTS.index, (Verdict.CLASH, Verdict.UNCERTAIN, Verdict.CLEAR))
@@ -130,117 +129,73 @@ def check_poses(
     instance("scene", scene, Scene)
     if cache is not None:
         instance("cache", cache, ModelCache)
-    shop = cache or ModelCache()
-    i = scene.index(part)
-    placed = scene.placed
-    if others is None:
-        names = placed.names[:i] + placed.names[i + 1 :]
-        rest = np.delete(np.arange(len(placed.names)), i)
-    else:
-        names = items("others", others, "part names")
-        rest = np.array([scene.index(name) for name in names], dtype=np.int64)
-    if i in rest:
+    cache = cache or ModelCache()
+    number = scene.index(part)
+    names = tuple(p.name for p in scene.parts if p.name != part)
+    names = names if others is None else items("others", others, "part names")
+    rest = [scene.index(name) for name in names]
+    if number in rest:
         raise InputError(f"others must not hold {part!r} itself")
-    which = placed.which[rest]
-    models = {k: shop.model(placed.shapes[k]) for k in np.flatnonzero(np.bincount(which)).tolist()}
-    bounds = np.zeros((len(placed.shapes), 2, 3))
-    for k, found in models.items():
-        bounds[k] = found.bounds
-    model, P = shop.model(scene.parts[i].shape), placed.poses[rest]
-    reach = scene.thresholds.reach + 1e-6
-    T, row, column = _near(poses, model.bounds, world_boxes(bounds, P, which), reach)
-    # Equal parts that may meet this one alike are measured together.
-    alike: dict[tuple[int, float | None], list[int]] = {}
-    for k in np.flatnonzero(np.bincount(column)).tolist():
-        allowance = scene.allowance(part, names[k])
-        alike.setdefault((id(models[int(which[k])]), allowance), []).append(k)
+    T = check_pose_array(array("poses", poses, (None, 4, 4), finite=False))
+    moving, standing = cache.model(scene.parts[number].shape), [cache.model(scene.parts[k].shape) for k in rest]
+    P = np.array([scene.parts[k].T_world for k in rest]).reshape(-1, 4, 4)
+    reach = scene.thresholds.reach + RESOLUTION
+    row, column = _near(T, moving, P, standing, reach)
     least, most, rank = np.empty(len(row)), np.empty(len(row)), np.empty(len(row), dtype=np.int8)
-    for (_, allowance), columns in alike.items():
-        some = slice(None) if len(alike) == 1 else np.flatnonzero(np.isin(column, columns))
-        other = models[int(which[columns[0]])]
-        judged = _judged(other, model, (P, column[some], T, row[some]), scene.thresholds, allowance)
-        if len(alike) == 1:
-            least, most, rank = judged
-        else:
-            least[some], most[some], rank[some] = judged
+    for k, (name, other) in enumerate(zip(names, standing, strict=True)):
+        own = np.flatnonzero(column == k)
+        if len(own):
+            relative = inverse(P[k]) @ T[row[own]]
+            judged = _judged(other, moving, relative, scene.thresholds, scene.allowance(part, name))
+            least[own], most[own], rank[own] = judged
     least[least < 0.0] = -np.inf  # how deep a point lies in the other bounds verdicts, not the way out
     return PoseVerdicts(part, names, len(T), reach, row, column, least, most, rank)
 
 
 def _judged(
-    a: Model, b: Model, pairs: Pairs, thresholds: Thresholds, allowance: float | None
+    a: Model, b: Model, T: Array, thresholds: Thresholds, allowance: float | None
 ) -> tuple[Array, Array, NDArray[np.int8]]:
-    """Bounds of the signed distances (m,) of two parts at pairs of poses, and the places of their verdicts."""
-    A, column, T, row = pairs
-    least, most = bounds_by_kernel(a, b, pairs, thresholds.clash(allowance))
+    """Bounds of the signed distances (m,) of ``b`` at ``T`` (m, 4, 4) in a's frame, and the places of their verdicts."""
+    batch = bounds_at_poses(a, b, T)
+    least, most = batch.lower.copy(), batch.upper.copy()
     rank = thresholds.verdicts(least, most, allowance)
-    clash = np.flatnonzero(rank == _CLASH)
-    inside = contained(a, b, (A, column[clash], T, row[clash]), thresholds)
-    rank[clash[inside]] = VERDICTS.index(Verdict.CONTAINED)
-    left = np.flatnonzero(rank == _UNCERTAIN)
-    places = relative((A, column[left], T, row[left]))
-    around = np.concatenate([np.repeat(b.bounds[None], len(left), axis=0), a.bounds[None]])
-    each = np.column_stack([np.full(len(left), len(left)), np.arange(len(left))])
-    least[left] = box_gaps(Boxes.of(around, np.concatenate([places, np.eye(4)[None]])), each)
-    a.counters.queries["boxes"] += len(left)
-    for m, T in zip(left.tolist(), places, strict=True):
-        if least[m] >= thresholds.reach + 1e-6:
-            rank[m] = _CLEAR
+    holds = rank == _CLASH  # a part may hold the other whole
+    left = np.flatnonzero((rank == _UNCERTAIN) | holds)
+    if len(left):
+        poses = np.concatenate([T[left], np.eye(4)[None]])
+        around = np.concatenate([np.repeat(b.bounds[None], len(left), axis=0), a.bounds[None]])
+        pairs = np.column_stack([np.full(len(left), len(left)), np.arange(len(left))])
+        gaps = box_gaps(Boxes.of(around, poses), pairs)
+        a.counters.queries["boxes"] += len(left)
+    for k, m in enumerate(left.tolist()):
+        if holds[m]:
+            rank[m] = VERDICTS.index(kind_of_overlap(a, b, T[m], thresholds.contact))
+            continue
+        if gaps[k] >= thresholds.reach + RESOLUTION:
+            least[m], rank[m] = gaps[k], _CLEAR
             continue
         try:
-            verdict, known = judge(a, b, T, Distance(float(least[m])), thresholds, allowance)
-            rank[m], least[m], most[m] = VERDICTS.index(verdict), known.lower, known.upper
+            verdict, distance = judge(a, b, T[m], Distance(float(gaps[k])), thresholds, allowance)
+            rank[m], least[m], most[m] = VERDICTS.index(verdict), distance.lower, distance.upper
         except MissingLibraryError:
             raise
         except Exception:  # one pose that fails is a finding, not the end of all others
-            rank[m], most[m] = VERDICTS.index(Verdict.FAILED), np.inf
+            rank[m], least[m], most[m] = VERDICTS.index(Verdict.FAILED), -np.inf, np.inf
     return least, most, rank
 
 
 def _near(
-    poses: ArrayLike, bounds: Array, still: Array, reach: float
-) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
-    """The poses (n, 4, 4), checked, and those poses and others (m,) whose boxes come within ``reach`` mm.
-
-    ``bounds`` (2, 3) is the box of the part in its own frame, ``still`` (6, k) are those of the others in the world.
-    """
-    T = np.require(array("poses", poses, (None, 4, 4), finite=False), np.float64, ["C", "A"])
-    bad, row, column = _meeting(T, bounds, still, reach)
-    if bad >= 0:
-        T = np.require(check_pose_array(T), np.float64, ["C"])
-        bad, row, column = _meeting(T, bounds, still, reach)
-        if bad >= 0:
-            scene_pose(T[bad], f"poses[{bad}]")
-    return T, row, column
-
-
-def _meeting(T: Array, bounds: Array, still: Array, reach: float) -> tuple[int, NDArray[np.int64], NDArray[np.int64]]:
-    """The first pose that is not rigid or too far off, or -1; and what comes near before, as `_near` has it.
-
-    A block of poses, which often follow each other, is compared with all others that come near the block.
-    """
-    from clamp3d.collide.poses_kernel import around, boxes, meet
-
-    below, above, sizes = still[:3] - reach, still[3:] + reach, box_sizes(bounds[None])
-    moving, others = np.empty((6, min(_BLOCK, len(T)))), np.empty(still.shape[1], dtype=np.int64)
-    pairs, count = np.empty((2, len(T)), dtype=np.int64), 0
-    tree = BoxTree(below.T, above.T)
+    T: Array, moving: Model, P: Array, standing: list[Model], reach: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Poses and others (m,) whose boxes come within ``reach`` mm of each other, ordered by pose."""
+    if not standing:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    still = Boxes.of(np.array([model.bounds for model in standing]), P)
+    rows, columns = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for start in range(0, len(T), _BLOCK):
         some = T[start : start + _BLOCK]
-        bad = boxes(some, sizes, FIRST, FARTHEST, moving)
-        if bad >= 0:
-            return start + bad, *pairs[:, :count]
-        near, n = others[: around(moving, len(some), below, above, others)], len(some)
-        most = n * len(near)
-        if len(near) > FEW:
-            row, column = tree.meeting(moving[:3, :n].T, moving[3:, :n].T)
-            most = len(column)
-        if count + most > pairs.shape[1]:
-            pairs = np.concatenate([pairs[:, :count], np.empty((2, count + most), dtype=np.int64)], axis=1)
-        if len(near) > FEW:
-            pairs[0, count : count + most] = start + row
-            pairs[1, count : count + most] = column
-            count += most
-        else:
-            count += meet(moving, n, below, above, near, start, pairs[0, count:], pairs[1, count:])
-    return -1, *pairs[:, :count]
+        boxes = Boxes.of(np.broadcast_to(moving.bounds, (len(some), 2, 3)), some)
+        pairs = near_between(boxes, still, reach)
+        rows.append(start + pairs[:, 0])
+        columns.append(pairs[:, 1])
+    return np.concatenate(rows), np.concatenate(columns)

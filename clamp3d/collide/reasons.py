@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.model import FINEST, Model
+from clamp3d.collide.model import Model
 from clamp3d.collide.verdict import Thresholds
-from clamp3d.core.shapes import MeshShape
 from clamp3d.errors import Clamp3dError, one_line
 
 
@@ -14,20 +13,14 @@ def failure(error: Exception) -> str:
     return str(error) if isinstance(error, Clamp3dError) else one_line(f"{type(error).__name__}: {error}")
 
 
-def undecided(models: dict[str, Model], found: Distance, thresholds: Thresholds, allowance: float | None) -> str:
+def undecided(models: dict[str, Model], distance: Distance, thresholds: Thresholds, allowance: float | None) -> str:
     """Why the distance of two parts, by name, gives no verdict, and what would decide it, in one line."""
-    marks = " and ".join(thresholds.between(found, allowance))
+    marks = " and ".join(thresholds.between(distance, allowance))
     advice = []
     for name, model in models.items():
-        shape = model.shape
         if not model.closed:
             advice.append(f"a closed mesh of {name}")
-        elif isinstance(shape, MeshShape):
-            error = f"(its round faces are off by up to {model.raw.error:.2g} mm)"
-            if model.raw.error > 0.0:
-                round_ = f"fit = 'round' for {name}, or " if shape.fit == "bound" else ""
-                advice.append(f"{round_}a finer mesh of {name} {error}")
-        elif model.refines:
-            advice.append(f"meshes of {name} finer than {FINEST:g} mm")
+        elif model.exact is None and not model.drawn and model.raw.error > 0.0:
+            advice.append(f"a finer mesh of {name} (its round faces are off by up to {model.raw.error:.2g} mm)")
     would = f"; what would decide: {' or '.join(advice)}" if advice else ""
     return (f"between the bounds: {marks}" if marks else "the bounds allow several verdicts") + would

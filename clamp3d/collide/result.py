@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,9 +14,9 @@ from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.errors import InputError, need
 
 if TYPE_CHECKING:
-    from clamp3d.collide.where import Overlap
+    from clamp3d.collide.where import Locator, Overlap
 
-BAD = (Verdict.CLASH, Verdict.CONTAINED)
+BAD = (Verdict.DUPLICATE, Verdict.CONTAINED, Verdict.CLASH)
 """Verdicts of parts that overlap."""
 NOT_CLEAN = (*BAD, Verdict.FAILED, Verdict.UNCERTAIN)
 """Verdicts that make a scene not clean."""
@@ -47,8 +47,8 @@ class PairResult:
         In a motion: normalised time of the least distance, and of the first contact.
     reason : str
         Why a verdict is uncertain and what would decide it, or why the pair failed; else empty.
-    locate : callable or None
-        Gives ``where``.
+    locator : Locator or None
+        Works ``where`` out.
     """
 
     a: str
@@ -59,12 +59,12 @@ class PairResult:
     t: float | None = None
     contact_at: float | None = None
     reason: str = ""
-    locate: Callable[[], Overlap | None] | None = field(default=None, repr=False)
+    locator: Locator | None = field(default=None, repr=False)
 
     @property
     def where(self) -> Overlap | None:
         """Where the parts of a clash overlap, in the world; None for another verdict. Worked out when first asked."""
-        return None if self.locate is None else self.locate()
+        return None if self.locator is None else self.locator.overlap
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: unknown bounds are None."""

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
-from itertools import islice
-from threading import Lock
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import instance, items, shown, text
 from clamp3d.collide.allowed import Allowances, Allowed
-from clamp3d.collide.links import Linked, as_tuple, linked
 from clamp3d.collide.verdict import Thresholds
 from clamp3d.core.motion import Motion, scene_pose
 from clamp3d.core.pose import Array
@@ -23,10 +21,6 @@ from clamp3d.errors import InputError
 
 _NAMED = 8
 """Parts that a scene names when it is printed."""
-_GROWN = {"parts": "_parts", "allowed": "_allowed"}
-"""Fields that are put together when they are first asked for, and what of."""
-_INDEX_LOCK = Lock()
-"""Held while names are added to an index, which scenes in several threads may share."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +69,7 @@ class Placed:
         return cls(tuple(part.name for part in parts), poses, tuple(place), which)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, repr=False)
 class Scene:
     """Parts in the world, what counts as contact and clearance, what may touch, and how parts move.
 
@@ -100,65 +94,55 @@ class Scene:
     motions: tuple[Motion, ...] = ()
     name: str = "scene"
     notes: tuple[str, ...] = ()
-    thresholds: Thresholds = field(init=False)
-    _parts: Linked[Part] = field(init=False, repr=False, compare=False)
-    _allowed: Linked[Allowed] = field(init=False, repr=False, compare=False)
-    _n: int = field(init=False, repr=False, compare=False)
-    """How many parts."""
-    _index: dict[str, int] = field(init=False, repr=False, compare=False)
-    """Positions by name, shared with the scenes that `add` made of this one: it may hold more names than are here."""
-    _allowances: Allowances | None = field(init=False, repr=False, compare=False, default=None)
-    """Sorted when they are first asked for: pairs may come one by one."""
-    _placed: Placed | None = field(init=False, repr=False, compare=False, default=None)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "thresholds", Thresholds(self.contact, self.clearance))
+        Thresholds(self.contact, self.clearance)
         text("name of a scene", self.name)
         kinds = {"parts": Part, "allowed": Allowed, "motions": Motion}
         for key, kind in kinds.items():
-            given = items(key, getattr(self, key), f"{kind.__name__}s")
-            for item in given:
+            values = items(key, getattr(self, key), f"{kind.__name__}s")
+            for item in values:
                 instance(f"each of {key}", item, kind)
-            object.__setattr__(self, key, given)
-        seen: dict[str, int] = {}
-        for part in self.parts:
-            if part.name in seen:
-                raise InputError(f"part {part.name!r} is there twice; names must differ")
-            seen[part.name] = len(seen)
-        object.__setattr__(self, "_index", seen)
-        object.__setattr__(self, "_n", len(seen))
-        for key, source in _GROWN.items():
-            object.__setattr__(self, source, getattr(self, key))
+            object.__setattr__(self, key, values)
+        if len(self._index) < len(self.parts):
+            seen: set[str] = set()
+            for part in self.parts:
+                if part.name in seen:
+                    raise InputError(f"part {part.name!r} is there twice; names must differ")
+                seen.add(part.name)
         for item in self.allowed:
             self._check_allowed(item)
         for motion in self.motions:
             if not motion.parts:
                 raise InputError(f"motion {motion.name!r} must name at least one part")
             for name in motion.parts:
-                if name not in seen:
-                    raise InputError(f"motion {motion.name!r}: {unknown_part(name, seen)}")
+                if name not in self._index:
+                    raise InputError(f"motion {motion.name!r}: {unknown_part(name, self._index)}")
 
-    if not TYPE_CHECKING:  # to which any name would pass for an attribute
+    @cached_property
+    def thresholds(self) -> Thresholds:
+        """What counts as contact and clearance."""
+        return Thresholds(self.contact, self.clearance)
 
-        def __getattr__(self, name: str) -> Any:
-            """Put together what was added since it was last asked for."""
-            if name not in _GROWN:
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
-            found = as_tuple(getattr(self, _GROWN[name]))
-            object.__setattr__(self, name, found)
-            object.__setattr__(self, _GROWN[name], found)
-            return found
+    @cached_property
+    def placed(self) -> Placed:
+        """Its parts as arrays."""
+        return Placed.of(self.parts)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        # Without the names of other scenes.
-        return type(self), tuple(getattr(self, key.name) for key in fields(self) if key.init)
+    @cached_property
+    def _index(self) -> dict[str, int]:
+        """Positions of the parts by name."""
+        return {part.name: k for k, part in enumerate(self.parts)}
 
-    def _changed(self, **values: object) -> Scene:
-        """The scene with other values in its fields, which are known to fit; its parts are not put together for it."""
+    @cached_property
+    def _allowances(self) -> Allowances:
+        return Allowances.of(self.allowed)
+
+    def _with(self, **values: object) -> Scene:
+        """The scene with other values in fields, which are known to fit: nothing is checked again."""
         scene = object.__new__(type(self))
         for key in self.__dataclass_fields__:
-            if key not in _GROWN:
-                object.__setattr__(scene, key, values[key] if key in values else getattr(self, key))
+            object.__setattr__(scene, key, values.get(key, getattr(self, key)))
         return scene
 
     def __repr__(self) -> str:
@@ -186,29 +170,27 @@ class Scene:
             part = Part(part, as_shape(shape), np.eye(4) if T_world is None else T_world)  # type: ignore[arg-type]
         elif shape is not None or T_world is not None:
             raise InputError("add() takes a Part alone, or a name with a shape and a pose")
-        if self._has(part.name):
+        if part.name in self._index:
             raise InputError(f"part {part.name!r} is there twice; names must differ")
-        n = self._n
-        with _INDEX_LOCK:
-            # Where another scene was made of this one before, the names behind its own are of that one.
-            index = self._index if len(self._index) == n else dict(islice(self._index.items(), n))
-            index[part.name] = n
-        return self._changed(_parts=linked(self._parts, (part,)), _n=n + 1, _index=index, _placed=None)
+        scene = self._with(parts=(*self.parts, part))
+        object.__setattr__(scene, "_index", {**self._index, part.name: len(self.parts)})
+        return scene
+
+    def with_motion(self, *motions: Motion) -> Scene:
+        """The scene with more motions, each after those before it. Raises InputError for parts that it has not."""
+        return replace(self, motions=(*self.motions, *items("motions", motions, "Motions")))
 
     def allow(self, *pairs: tuple[str, str], overlap: float = 0.0) -> Scene:
         """The scene with contact of these pairs allowed, and overlap up to ``overlap`` mm."""
-        made = tuple(Allowed(a, b, overlap) for a, b in name_pairs("pairs", pairs))
-        for item in made:
+        added = tuple(Allowed(a, b, overlap) for a, b in name_pairs("pairs", pairs))
+        for item in added:
             self._check_allowed(item)
-        return self._changed(_allowed=linked(self._allowed, made), _allowances=None)
+        return self._with(allowed=(*self.allowed, *added))
 
     def _check_allowed(self, item: Allowed) -> None:
         for name in (item.a, item.b):
-            if not self._has(name) and not any(fnmatchcase(part.name, name) for part in self.parts):
+            if name not in self._index and not any(fnmatchcase(part.name, name) for part in self.parts):
                 raise InputError(f"allowed: {unknown_part(name, (part.name for part in self.parts))}")
-
-    def _has(self, name: str) -> bool:
-        return self._index.get(name, self._n) < self._n
 
     def moved(self, poses: Mapping[str, ArrayLike]) -> Scene:
         """The scene with parts at other poses ``{name: T_world}``."""
@@ -223,23 +205,12 @@ class Scene:
 
     def index(self, name: str) -> int:
         """Position of a part in ``parts``. Raises InputError for an unknown name."""
-        if not self._has(text("part", name)):
-            raise InputError(unknown_part(name, (p.name for p in self.parts)))
+        if text("part", name) not in self._index:
+            raise InputError(unknown_part(name, self._index))
         return self._index[name]
-
-    @property
-    def placed(self) -> Placed:
-        """Its parts as arrays, made when they are first asked for."""
-        if self._placed is None:
-            object.__setattr__(self, "_placed", Placed.of(self.parts))
-            assert self._placed is not None
-        return self._placed
 
     def allowance(self, a: str, b: str) -> float | None:
         """Allowed overlap of a pair in mm; None if even contact is not meant."""
-        if self._allowances is None:
-            object.__setattr__(self, "_allowances", Allowances.of(self.allowed))
-            assert self._allowances is not None
         return self._allowances.overlap(a, b)
 
 

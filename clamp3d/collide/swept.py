@@ -10,9 +10,8 @@ import math
 
 import numpy as np
 
-from clamp3d.collide.body import ClosedForm, bore_rod
+from clamp3d.collide.closed_form import ClosedForm, bore_rod
 from clamp3d.collide.convex import Convex, Rod, convex_distance
-from clamp3d.collide.facets import axis_gap, hull_gap
 from clamp3d.collide.hull import Hull, nearly_hull
 from clamp3d.collide.model import Model
 from clamp3d.core.linear import dot, to_target
@@ -40,18 +39,6 @@ def swept_lower(
             if screw:
                 low = max(low, _bores(y, x, back, angle))
             best = min(best, low - x.error - y.error)
-    for still, moving, poses in ((a, b, there), (b, a, back))[: 1 + screw]:
-        if still.facets is not None and moving.bodies is not None:
-            lows = []
-            for body in moving.bodies:
-                rods = [piece for piece in body.outers if isinstance(piece, Rod)]
-                if rods:
-                    low = axis_gap(still.facets, _swept_rod(rods[0], poses, angle), poses[1])
-                else:
-                    around, sag = _swept_hull(body.outers[0], poses, angle)
-                    low = hull_gap(still.facets, around) - sag
-                lows.append(low - body.error)
-            best = max(best, min(lows))
     return float(best)
 
 

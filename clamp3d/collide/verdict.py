@@ -20,6 +20,7 @@ RESOLUTION = 1e-6
 class Verdict(StrEnum):
     """How a pair of parts stands, from worst to best."""
 
+    DUPLICATE = "duplicate"
     CONTAINED = "contained"
     CLASH = "clash"
     FAILED = "failed"
@@ -32,6 +33,7 @@ class Verdict(StrEnum):
 
 VERDICTS = tuple(Verdict)
 """Verdicts by number, as arrays keep them."""
+_PLACE = {verdict: place for place, verdict in enumerate(VERDICTS)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,24 +95,27 @@ class Thresholds:
         return Verdict.CLASH if distance.upper < limit else Verdict.UNCERTAIN
 
     def verdicts(self, lower: Array, upper: Array, allowance: float | None = None) -> NDArray[np.int8]:
-        """The places in VERDICTS of many distances by their bounds (n,), each as `verdict` gives it.
+        """The places in VERDICTS of many distances by their bounds (n,), each as `verdict` gives it."""
+        sharp = upper - lower <= 2.0 * RESOLUTION
+        middle = 0.5 * (lower + upper)
+        low, high = self._places(np.where(sharp, middle, lower)), self._places(np.where(sharp, middle, upper))
+        plain = np.where(low == high, low, _PLACE[Verdict.UNCERTAIN])
+        if allowance is None:
+            return np.asarray(plain, dtype=np.int8)
+        limit = -max(allowance, self.contact)
+        shallow = lower >= limit - RESOLUTION
+        allowed = np.where(upper < self.reach, _PLACE[Verdict.ALLOWED], _PLACE[Verdict.UNCERTAIN])
+        allowed = np.where(lower >= self.reach, _PLACE[Verdict.CLEAR], allowed)
+        deep = np.where(upper < limit, _PLACE[Verdict.CLASH], _PLACE[Verdict.UNCERTAIN])
+        meant = np.where(shallow, allowed, deep)
+        return np.asarray(np.where(plain == _PLACE[Verdict.CLEAR], plain, meant), dtype=np.int8)
 
-        It is asked once for all bounds that lie alike among the numbers at which a verdict can change.
-        """
-        from clamp3d.collide.poses_kernel import cells
-
-        limit = -max(allowance or 0.0, self.contact)
-        marks = [limit, limit - RESOLUTION, self.reach]
-        marks += [-self.contact - RESOLUTION, self.contact + RESOLUTION, self.clearance - RESOLUTION]
-        cell = np.empty(len(lower), dtype=np.int64)
-        lower, upper = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-        one = np.full((2 * len(marks) + 2) ** 3, -1)
-        cells(lower, upper, 2.0 * RESOLUTION, np.array(marks), one, cell)
-        found = np.empty(len(one), dtype=np.int8)
-        for kind in np.flatnonzero(one >= 0):
-            k = one[kind]
-            found[kind] = VERDICTS.index(self.verdict(Distance(float(lower[k]), float(upper[k])), allowance))
-        return np.asarray(found[cell])
+    def _places(self, distance: Array) -> NDArray[np.int64]:
+        """The places in VERDICTS of exact distances (n,)."""
+        cases = [distance < -self.contact - RESOLUTION, distance <= self.contact + RESOLUTION]
+        cases.append(distance < self.clearance - RESOLUTION)
+        names = (Verdict.CLASH, Verdict.CONTACT, Verdict.CLEARANCE)
+        return np.select(cases, [_PLACE[name] for name in names], _PLACE[Verdict.CLEAR])
 
     def _of(self, distance: float) -> Verdict:
         if distance < -self.contact - RESOLUTION:

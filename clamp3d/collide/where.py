@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cache, cached_property, partial
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from clamp3d.collide.model import Model
 from clamp3d.collide.overlap import Common, common, deepest
-from clamp3d.collide.surface import Surface
-from clamp3d.core.linear import to_target
 from clamp3d.core.pose import Array
+from clamp3d.errors import Clamp3dError
 
-_ERRORS = (0.064, 0.008, 0.001)
-"""Chord errors (mm) of the meshes that are tried, until the volume is known to `_SHARE`."""
 _SHARE = 0.005
+"""Relative width of the interval of the volume at which it is not refined further."""
+_EXACT = 1e-6
+"""Relative accuracy taken for a volume by Open CASCADE."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,20 +30,15 @@ class Overlap:
     box : ndarray (2, 3)
         Lower and upper corner of a box in the world that holds all of the overlap, mm.
     of_facets : bool
-        Whether volume, box and point are those of the given meshes, whose round faces are off by their chords.
-    find : callable
-        Finds ``point``; asked once, by those who want to know it.
+        Whether volume, box and point are those of given meshes, of which nobody says how far they are from the parts.
+    point : ndarray (3,) or None
+        A point of the world that lies in both parts; None where no mesh inside them overlaps.
     """
 
     volume: tuple[float, float]
     box: Array
     of_facets: bool = False
-    find: Callable[[], Array | None] = field(default=lambda: None, repr=False)
-
-    @cached_property
-    def point(self) -> Array | None:
-        """A point (3,) of the world that lies in both parts; None where no mesh inside them overlaps."""
-        return self.find()
+    point: Array | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -58,40 +52,77 @@ class Overlap:
         }
 
 
-def locator(a: Model, b: Model, T_a: Array, T_ab: Array) -> Callable[[], Overlap | None]:
-    """`locate` when asked, once: ``b`` at ``T_ab`` (4, 4) in a's frame, ``a`` at ``T_a`` in the world."""
-    return cache(lambda: locate(a, b, T_a, T_ab))
+@dataclass(eq=False)
+class Locator:
+    """Two overlapping parts, ``b`` at ``T_ab`` (4, 4) in a's frame, ``a`` at ``T_a`` in the world; asked when needed."""
 
+    a: Model
+    b: Model
+    T_a: Array
+    T_ab: Array
 
-def locate(a: Model, b: Model, T_a: Array, T_ab: Array) -> Overlap | None:
-    """Where two parts overlap; None if not even meshes around them do, or one has no inside that is known."""
-    found = None
-    if not (a.closed and b.closed):
-        return found
-    for error in _ERRORS:
-        outer_a, outer_b = a.outer(error), b.outer(error)
-        outer = common(outer_a, outer_b, T_ab)
+    @cached_property
+    def overlap(self) -> Overlap | None:
+        """Where they overlap; None if not even meshes around them do, or one has no inside that is known."""
+        if not (self.a.closed and self.b.closed):
+            return None
+        rough = self._by_meshes() if self.a.chords and self.b.chords else None
+        if rough is not None and (rough.volume[1] - rough.volume[0] <= _SHARE * rough.volume[1]):
+            return rough
+        return self._exact(rough) or rough
+
+    def _by_meshes(self) -> Overlap | None:
+        overlap = None
+        for chord in sorted({*self.a.chords, *self.b.chords}, reverse=True):
+            finer = self._at(chord)
+            if finer is None:
+                break
+            overlap = finer
+            if finer.volume[1] - finer.volume[0] <= _SHARE * finer.volume[1]:
+                break
+        return overlap
+
+    def _at(self, chord: float) -> Overlap | None:
+        """From meshes of one chord error (mm)."""
+        outer_a, outer_b = self.a.outer(chord), self.b.outer(chord)
+        outer = common(outer_a, outer_b, self.T_ab)
         if outer is None:
-            return found
-        inner_a, inner_b = a.inner(error), b.inner(error)
-        inner = None
+            return None
+        inner_a, inner_b = self.a.inner(chord), self.b.inner(chord)
+        inner: Common | None = None
         if inner_a is outer_a and inner_b is outer_b:
             inner = outer
         elif inner_a is not None and inner_b is not None:
-            inner = common(inner_a, inner_b, T_ab)
-        within = None if inner is None or inner_a is None or inner_b is None else (inner_a, inner_b, T_ab, inner)
-        world = to_target(T_a, outer.vertices)
-        rounding = 1e-11 * (outer_a.scale + outer_b.scale)
-        slack = rounding * float(outer.normals[1].sum())
-        low, high = 0.0 if inner is None else max(0.0, inner.volume - slack), outer.volume + slack
-        box = np.array([world.min(axis=0) - rounding, world.max(axis=0) + rounding])
-        find = partial(_point, T_a, within)
-        found = Overlap((low, high), box, outer_a.error + outer_b.error > 0.0, find)
-        if high - low <= _SHARE * high or not (a.refines or b.refines):
-            break
-    return found
+            inner = common(inner_a, inner_b, self.T_ab)
+        off = outer_a.error + outer_b.error
+        slack = (off + 1e-11 * (outer_a.scale + outer_b.scale)) * float(outer.areas[1].sum())
+        low = 0.0 if inner is None else max(0.0, inner.volume - slack)
+        point = None
+        if inner is not None and inner_a is not None and inner_b is not None:
+            point = self._in_world(deepest(inner_a, inner_b, self.T_ab, inner)[1])
+        corners = self._in_world(outer.vertices)
+        box = np.array([corners.min(axis=0) - off, corners.max(axis=0) + off])
+        given = any(model.exact is None and not model.between and not model.drawn for model in (self.a, self.b))
+        return Overlap((low, outer.volume + slack), box, given and off == 0.0, point)
 
+    def _exact(self, rough: Overlap | None) -> Overlap | None:
+        """From Open CASCADE, for two solids from CAD; None for others, and where it fails."""
+        if self.a.exact is None or self.b.exact is None:
+            return None
+        from clamp3d.brep.cad_process import common as exact_common
 
-def _point(T: Array, within: tuple[Surface, Surface, Array, Common] | None) -> Array | None:
-    """The deepest point of what two meshes share, in the world; None if they share nothing."""
-    return None if within is None else to_target(T, deepest(*within)[1])
+        try:
+            shared = exact_common(self.a.exact.brep, self.b.exact.brep, self.T_ab, 0.1)
+        except Clamp3dError:
+            return None
+        if not shared.volume > 0.0:
+            return None
+        corners = self._in_world(
+            np.array([(x, y, z) for x in shared.box[:, 0] for y in shared.box[:, 1] for z in shared.box[:, 2]])
+        )
+        box = np.array([corners.min(axis=0), corners.max(axis=0)])
+        volume = (shared.volume * (1.0 - _EXACT), shared.volume * (1.0 + _EXACT))
+        return Overlap(volume, box if rough is None else rough.box, False, None if rough is None else rough.point)
+
+    def _in_world(self, points: Array) -> Array:
+        return np.asarray(points @ self.T_a[:3, :3].T + self.T_a[:3, 3])

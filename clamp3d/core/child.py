@@ -1,12 +1,16 @@
-"""Work in a Python process of its own, for libraries that end their process or cannot be stopped."""
+"""Work in a Python process of its own, for libraries that end their process, cannot be stopped or take all memory.
+
+The caller and the process exchange messages over pipes: MessagePack with arrays as raw bytes, nothing that could be
+executed. What a library prints is kept as the log of the process.
+"""
 
 from __future__ import annotations
 
-import faulthandler
 import importlib
 import os
-import select
+import queue
 import signal
+import struct
 import subprocess
 import sys
 import threading
@@ -14,10 +18,192 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any
+
+import msgspec
+import numpy as np
+
+from clamp3d import errors
+from clamp3d.errors import Clamp3dError
 
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
-"""To start NumPy's threads takes 0.04 s of CPU."""
-_owned = False
+"""Starting NumPy's threads takes 0.04 s of CPU."""
+_SIZE = struct.Struct(">Q")
+_LARGEST = 2**34
+"""Bytes of a message that are read at most."""
+_ARRAY = 1
+"""Number of MessagePack's extension type that holds an array."""
+_FORBIDDEN = ("socket.connect", "socket.getaddrinfo", "socket.bind", "subprocess.", "os.system", "os.exec", "os.fork")
+_OWN_ERRORS = ("InputError", "MissingLibraryError", "SolverError", "Clamp3dError")
+
+
+class WorkerEndedError(Clamp3dError):
+    """The process ended before it answered; ``ending`` says how ("SIGSEGV", "exit code 3"), ``code`` as Popen does."""
+
+    def __init__(self, code: int, log: list[str]) -> None:
+        self.code = code
+        self.ending = _ending(code)
+        last = f": {log[-1]}" if log and code >= 0 else ""
+        super().__init__(f"the process ended with {self.ending}{last}")
+
+
+class WorkerTimeoutError(Clamp3dError):
+    """The process gave no answer in time and was ended."""
+
+
+class Worker:
+    """A Python process that calls functions on request, one at a time, until it is closed.
+
+    It is started by the first call, and again by the next call after it ended or was stopped. It ends with its
+    caller, however that ends. Modules of the current folder are not imported in it (Python's ``-P``).
+
+    Parameters
+    ----------
+    *functions : str
+        The functions that it may call, each as ``"package.module:function"``. Arguments and results are what
+        MessagePack holds (None, bool, int, float, str, bytes, list, dict) and arrays; a dataclass and a tuple arrive
+        as a dict and a list.
+    confined : bool
+        Whether connections to other machines and further processes are refused in it.
+
+    Examples
+    --------
+    >>> with Worker("math:hypot") as worker:
+    ...     worker.call("math:hypot", 3.0, 4.0, time_limit=60.0)
+    5.0
+    """
+
+    def __init__(self, *functions: str, confined: bool = False) -> None:
+        self._functions = functions
+        self._confined = confined
+        self._process: subprocess.Popen[bytes] | None = None
+        self._lock = threading.Lock()
+        self._lines: deque[str] = deque(maxlen=50)
+        self._threads: list[threading.Thread] = []
+
+    def __enter__(self) -> Worker:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def log(self) -> list[str]:
+        """The last lines that the process printed."""
+        return [line for line in list(self._lines) if line]
+
+    def call(
+        self,
+        function: str,
+        *arguments: Any,
+        time_limit: float,
+        memory: float | None = None,
+        watch: Callable[[list[str]], None] = lambda log: None,
+    ) -> Any:
+        """The result of ``function(*arguments)`` in the process.
+
+        Parameters
+        ----------
+        function : str
+            One of the functions that the worker was made for.
+        *arguments
+            As described for the class.
+        time_limit : float
+            Seconds after which the process is ended.
+        memory : float, optional
+            Bytes that this call may take beyond what the process has, where the system can limit that.
+        watch : callable
+            Receives the last lines that the process printed, about ten times a second.
+
+        Raises
+        ------
+        InputError, MissingLibraryError, SolverError, Clamp3dError, OSError
+            As the function raised it, with its message.
+        MemoryError
+            If the call takes more than ``memory``.
+        WorkerTimeoutError, WorkerEndedError
+            If there is no answer within ``time_limit``, or the process ended by itself.
+        RuntimeError
+            For any other exception of the function; the message names its type and place.
+        """
+        if function not in self._functions:
+            raise ValueError(f"function must be one of {', '.join(self._functions)}, got {function!r}")
+        with self._lock:
+            try:
+                if self._process is None or self._process.poll() is not None:
+                    self._start()
+                request = {"function": function, "arguments": arguments, "memory": memory}
+                answer = self._exchange(_pack(request), time_limit, watch)
+            except BaseException:  # also for Ctrl-C: the process may still be at work
+                self.close()
+                raise
+        kind, message = answer["error"], answer["message"]
+        if kind is None:
+            return answer["result"]
+        if kind == "MemoryError":
+            raise MemoryError
+        raise OSError(message) if kind == "OSError" else getattr(errors, kind, RuntimeError)(message)
+
+    def close(self) -> None:
+        """End the process at once, if there is one."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        process.kill()
+        process.wait()
+        for thread in self._threads:
+            thread.join(timeout=5.0)
+        for pipe in (process.stdin, process.stdout, process.stderr):
+            with suppress(OSError):  # an unwritten rest of a request
+                if pipe is not None:
+                    pipe.close()
+
+    def _start(self) -> None:
+        self.close()
+        path = os.pathsep.join(folder for folder in sys.path if os.path.isabs(folder))
+        # A session of its own keeps Ctrl-C with the caller, who then ends the worker.
+        process = self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", "from clamp3d.core.child import serve; serve()", *self._functions],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=os.environ | {"PYTHONPATH": path} | _ONE_THREAD | {"CLAMP3D_CONFINED": str(int(self._confined))},
+            start_new_session=True,
+        )
+        self._lines = deque(maxlen=50)
+        self._answers: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._threads = [
+            threading.Thread(target=_forward, args=(process.stdout, self._answers), daemon=True),
+            threading.Thread(target=_keep_lines, args=(process.stderr, self._lines), daemon=True),
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def _exchange(self, request: bytes, time_limit: float, watch: Callable[[list[str]], None]) -> dict[str, Any]:
+        process = self._process
+        assert process is not None
+        assert process.stdin is not None
+        with suppress(BrokenPipeError):  # it has ended: said below
+            _send(process.stdin, request)
+        deadline = time.monotonic() + time_limit
+        while True:
+            try:
+                answer = self._answers.get(timeout=min(0.1, max(0.0, deadline - time.monotonic())))
+                break
+            except queue.Empty:
+                if time.monotonic() >= deadline:
+                    raise WorkerTimeoutError(f"no answer in {time_limit:g} s") from None
+                watch(self.log)
+        if answer is None:
+            code = process.wait()
+            self._threads[1].join(timeout=5.0)
+            if any(word in line for line in self.log for word in ("bad_alloc", "MemoryError")):
+                raise MemoryError
+            raise WorkerEndedError(code, self.log)
+        made: dict[str, Any] = _unpack(answer)
+        return made
 
 
 def run_child(
@@ -25,116 +211,148 @@ def run_child(
     *arguments: str,
     time_limit: float,
     watch: Callable[[list[str]], None] = lambda log: None,
-    copy: bool = False,
 ) -> tuple[int | None, list[str]]:
-    """Run ``python -m module arguments`` for at most ``time_limit`` s; nothing is left behind when it is interrupted.
+    """Call ``main(*arguments)`` of a module in a process of its own for at most ``time_limit`` s.
 
-    Returns its exit code (None: not done in time) and the last lines that it printed, which ``watch`` is told now and
-    then. The module's main function calls `end_with_caller`. It computes in one thread. With ``copy`` its function
-    ``main(*arguments)`` is called in a copy of this process, where `can_copy` allows it: nothing is imported twice.
+    Returns its exit code (None: not done in time) and the last lines that it printed, which ``watch`` receives about
+    ten times a second. An exception is exit code 1, and its message the last line.
     """
-    # A session of its own keeps Ctrl-C with the caller, who then ends the worker.
-    worker = (
-        Copy(module, arguments)
-        if copy and can_copy()
-        else subprocess.Popen(
-            [sys.executable, "-m", module, *arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)} | _ONE_THREAD,
-            start_new_session=True,
-        )
-    )
-    assert worker.stdin is not None
-    assert worker.stdout is not None
-    log: deque[str] = deque(maxlen=50)
-    reader = threading.Thread(target=log.extend, args=(worker.stdout,), daemon=True)
-    reader.start()
-    deadline = time.monotonic() + time_limit
-    code: int | None = None
+    with Worker(f"{module}:main") as worker:
+        try:
+            worker.call(f"{module}:main", *arguments, time_limit=time_limit, watch=watch)
+        except WorkerTimeoutError:
+            return None, worker.log
+        except WorkerEndedError as error:
+            return error.code, worker.log
+        except (Clamp3dError, OSError, RuntimeError, MemoryError) as error:
+            return 1, [*worker.log, str(error) or type(error).__name__]
+        return 0, worker.log
+
+
+def serve() -> None:
+    """Answer the requests of a `Worker` until it closes the pipe. The functions allowed are in ``sys.argv``."""
+    incoming, outgoing = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)  # what a library prints goes to the log
+    if os.environ["CLAMP3D_CONFINED"] == "1":
+        sys.addaudithook(_refuse)
+    requests: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+
+    def receive() -> None:
+        _forward(incoming, requests)
+        os._exit(1)  # the caller is gone, and a call may still be at work
+
+    threading.Thread(target=receive, daemon=True).start()
+    allowed = sys.argv[1:]
+    while True:
+        message = requests.get()
+        assert message is not None
+        request = _unpack(message)
+        assert request["function"] in allowed
+        _limit(request["memory"])
+        _send(outgoing, _answer(request["function"], request["arguments"]))
+
+
+def _answer(function: str, arguments: list[Any]) -> bytes:
+    kind, message, result = None, "", None
     try:
-        while code is None and time.monotonic() < deadline:
-            try:
-                code = worker.wait(timeout=min(0.1, max(0.0, deadline - time.monotonic())))
-            except subprocess.TimeoutExpired:
-                watch(list(log))
-    finally:
-        worker.kill()
-        worker.wait()
-        reader.join(timeout=5.0)
-        worker.stdin.close()
-        worker.stdout.close()
-    return code, [line.strip() for line in log if line.strip()]
+        module, _, name = function.partition(":")
+        result = getattr(importlib.import_module(module), name)(*arguments)
+        return _pack({"error": None, "message": "", "result": result})
+    except Clamp3dError as error:
+        kind = next(name for name in _OWN_ERRORS if isinstance(error, getattr(errors, name)))
+        message = str(error)
+    except MemoryError:
+        kind = "MemoryError"
+    except OSError as error:
+        kind, message = "OSError", f"{error.filename}: {error.strerror}" if error.filename else str(error)
+    except Exception as error:  # a fault of the function: the caller says so
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        kind = "RuntimeError"
+        message = f"{type(error).__name__}: {error} at {os.path.basename(frame.filename)}:{frame.lineno}"
+    return _pack({"error": kind, "message": message, "result": None})
+
+
+def _refuse(event: str, _: object) -> None:
+    """An audit hook that keeps a process to itself."""
+    if event.startswith(_FORBIDDEN):
+        raise PermissionError(f"{event} is not allowed while a file is read")
+
+
+def _limit(memory: float | None) -> None:
+    """Keep this process from taking ``memory`` bytes more, where the system can, and from leaving a core file."""
+    try:
+        import resource
+    except ImportError:  # Windows: the time limit alone
+        return
+    used = 0
+    with suppress(OSError):
+        used = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
+    most = resource.RLIM_INFINITY if memory is None else int(memory) + used
+    for kind, value in ((resource.RLIMIT_DATA, most), (resource.RLIMIT_CORE, 0)):
+        _, hard = resource.getrlimit(kind)
+        if hard != resource.RLIM_INFINITY:
+            value = hard if value == resource.RLIM_INFINITY else min(value, hard)
+        resource.setrlimit(kind, (value, hard))
+
+
+def _send(pipe: IO[bytes], message: bytes) -> None:
+    pipe.write(_SIZE.pack(len(message)))
+    pipe.write(message)
+    pipe.flush()
+
+
+def _forward(pipe: IO[bytes], messages: queue.SimpleQueue[bytes | None]) -> None:
+    """Put every whole message of a pipe into the queue, and None at its end."""
+    with suppress(OSError, ValueError):  # closed on this side
+        while len(head := pipe.read(_SIZE.size)) == _SIZE.size:
+            (size,) = _SIZE.unpack(head)
+            if size > _LARGEST or len(message := pipe.read(size)) < size:
+                break
+            messages.put(message)
+    messages.put(None)
+
+
+def _keep_lines(pipe: IO[bytes], lines: deque[str]) -> None:
+    with suppress(OSError, ValueError):
+        for line in pipe:
+            lines.append(line.decode(errors="replace").strip())
+
+
+def _pack(value: Any) -> bytes:
+    return msgspec.msgpack.encode(value, enc_hook=_plain)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        head = msgspec.msgpack.encode((value.dtype.str, value.shape))
+        return msgspec.msgpack.Ext(_ARRAY, _SIZE.pack(len(head)) + head + value.tobytes())
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{type(value).__name__} cannot be sent to another process")
+
+
+def _unpack(message: bytes) -> Any:
+    return msgspec.msgpack.decode(message, ext_hook=_array)
+
+
+def _array(_: int, data: memoryview) -> Any:
+    start = _SIZE.size + _SIZE.unpack_from(data)[0]
+    kind, shape = msgspec.msgpack.decode(data[_SIZE.size : start])
+    return np.frombuffer(data, np.dtype(kind), offset=start).reshape(shape).copy()  # a copy is aligned
+
+
+def _ending(code: int) -> str:
+    try:
+        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    except ValueError:
+        return f"signal {-code}"
 
 
 def own_process() -> None:
-    """Say that this process is the program's own from its first line on, as the command line's is."""
-    global _owned
-    _owned = True
+    """Compute in one thread: the command line calls this first of all."""
     for name, value in _ONE_THREAD.items():
         os.environ.setdefault(name, value)
-
-
-def can_copy() -> bool:
-    """Whether this process may be forked: on Linux, where it is our own and has one thread.
-
-    In a program of somebody else's a library can hold locks and devices (CUDA, ROS) that do not outlive a fork.
-    """
-    return _owned and sys.platform == "linux" and len(os.listdir("/proc/self/task")) == 1
-
-
-class Copy:
-    """A copy of this process that calls a module's main function; what is asked of a `subprocess.Popen`."""
-
-    def __init__(self, module: str, arguments: tuple[str, ...]) -> None:
-        (heard, tells), (hears, told) = os.pipe(), os.pipe()
-        self._pid = os.fork()
-        self._code: int | None = None
-        if self._pid == 0:
-            code = 1
-            try:
-                faulthandler.disable()  # its report would be the caller's
-                os.setsid()
-                for given, number in ((heard, 0), (told, 1), (told, 2)):
-                    os.dup2(given, number)
-                os.close(tells)
-                importlib.import_module(module).main(*arguments)
-                code = 0
-            except BaseException:  # whatever it is, the caller's own work must not go on here
-                os.write(2, traceback.format_exc().encode())
-            finally:
-                os._exit(code)
-        os.close(heard)
-        os.close(told)
-        self.stdin, self.stdout = os.fdopen(tells, "w"), os.fdopen(hears, errors="replace")
-        self._watched = os.pidfd_open(self._pid)
-
-    def wait(self, timeout: float | None = None) -> int:
-        """Its exit code, or minus the signal that ended it. Raises TimeoutExpired after ``timeout`` s."""
-        if self._code is None:
-            if not select.select([self._watched], [], [], timeout)[0]:
-                raise subprocess.TimeoutExpired("", timeout or 0.0)
-            self._code = os.waitstatus_to_exitcode(os.waitpid(self._pid, 0)[1])
-            os.close(self._watched)
-        return self._code
-
-    def kill(self) -> None:
-        """End it at once."""
-        if self._code is None:
-            os.kill(self._pid, signal.SIGKILL)
-
-
-def end_with_caller() -> None:
-    """End this process at once when its caller is gone, that is, when its stdin closes."""
-    _end_after(_drained)
-
-
-def _drained() -> None:
-    while os.read(0, 4096):  # sys.stdin has a lock that a waiting thread would keep at exit
-        pass
 
 
 def end_with_parent() -> None:
@@ -142,13 +360,11 @@ def end_with_parent() -> None:
     import multiprocessing
 
     parent = multiprocessing.parent_process()
-    if parent is not None:
-        _end_after(parent.join)
+    if parent is None:
+        return
 
-
-def _end_after(wait: Callable[[], object]) -> None:
     def end() -> None:
-        wait()
+        parent.join()
         os._exit(1)
 
     threading.Thread(target=end, daemon=True).start()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.core.jit import entry, formula, prefetch
+from clamp3d.core.jit import entry, formula
 from clamp3d.core.kernel_batch import (
     AT_ONCE,
     CX,
@@ -88,11 +88,7 @@ def _distances(T, R, half_angle, H, r, l, flat, pad, w, out):  # type: ignore[no
     for start in range(0, T.shape[0], AT_ONCE):
         count = min(AT_ONCE, T.shape[0] - start)
         parallel = 0
-        size = 8 * T.shape[1] * T.shape[2]
         for i in range(count):
-            ahead = (start + AT_ONCE + i) * size
-            prefetch(T, ahead)
-            prefetch(T, ahead + size // 2)
             if not rigid(T, start + i):
                 return start + i
             x, y, z, dx, dy, dz = place(T, start + i)

@@ -1,187 +1,187 @@
-"""Least distance and first contact of a moving cylinder and a groove, to rounding: the kernel's branch and bound."""
+"""Least distance and first contact along a motion, by branch and bound over the time: knows no geometry.
+
+A search asks for the distance of two bodies at single times, as an interval, and bounds it between two times from
+below. It halves the stretch of time that decides, until its bound does, or until it has asked as often as it may.
+"""
 
 from __future__ import annotations
 
-import numpy as np
+import heapq
+import math
+from collections.abc import Callable
+from enum import Enum
+from typing import NamedTuple
 
-from clamp3d.checks import positive
-from clamp3d.core.distance import SignedDistance, signed_distance
-from clamp3d.core.linear import cross, norm
-from clamp3d.core.motion import Motion
-from clamp3d.core.pose import Array
-from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
-from clamp3d.core.roots import root
-from clamp3d.errors import SolverError
+DistanceAt = Callable[[float], tuple[float, float]]
+"""Lower and upper bound (mm) of the distance at a time."""
+BoundBetween = Callable[[float, float], float]
+"""Lower bound (mm) of the distance between two times."""
 
-RESOLUTION = 1e-12
-"""Default resolution of a search, in parts of the largest length of the scene."""
-FLAT_RESOLUTION = 1e-9
-"""The same where a flat end decides: there the search knows only how fast the cylinder's points move."""
-_NEAR, _FEW = 1e-4, 400
-"""Times around the lowest, and cells, within which it is followed down to the rounding."""
-_ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
+ACCURACY = 1e-6
+"""Default accuracy of a search, mm."""
+MOST = 20_000
+"""Default number of times at which a search asks for the distance."""
 
 
-class Search:
-    """One groove, one cylinder and its motion from ``start`` (4, 4), ``T_groove_cylinder``; counts ``evaluations``.
+class Least(NamedTuple):
+    """The least distance: it is ``upper`` mm at time ``t`` (or less), and nowhere below ``lower`` mm."""
 
-    A flat-ended cylinder lies in its capsule: the capsule's answer is a bound, and the answer where both are equally
-    far. Only where a flat end decides the cylinder's own motion is searched.
+    t: float
+    lower: float
+    upper: float
+    evaluations: int
+
+
+class Outcome(Enum):
+    """How a search for the first time ended."""
+
+    CLEAR = "above the level all the way"
+    REACHED = "down to the level, or to within the accuracy of it"
+    UNDECIDED = "the search ended before it was known"
+
+
+class FirstTime(NamedTuple):
+    """The first time of a level: the distance is above it everywhere before ``t``, which is never late."""
+
+    outcome: Outcome
+    t: float
+    evaluations: int
+
+
+class _Stretch(NamedTuple):
+    """A stretch of time with lower bounds of the distance at both ends; the first in order is the lowest."""
+
+    lower: float
+    start: float
+    stop: float
+    at_start: float
+    at_stop: float
+
+
+def bound_by_speed(at_start: float, at_stop: float, way: float) -> float:
+    """Lower bound of a distance between two times, ``at_start`` and ``at_stop`` mm at these.
+
+    Lemma: a distance changes no faster than the fastest point of the moving body moves. On a way of ``way`` mm it is at
+    least ``at_start - x`` and ``at_stop - (way - x)`` after x mm, and the larger of the two is no less than their mean
+    (but for the rounding of these numbers).
+
+    >>> bound_by_speed(3.0, 2.0, 4.0)
+    0.5
     """
+    return 0.5 * (at_start + at_stop - way)
 
-    def __init__(
-        self, groove: SweptArc, cylinder: AnyCylinder, motion: Motion, start: Array, resolution: float | None
-    ) -> None:
-        self.groove, self.cylinder, self.motion, self.start = groove, cylinder, motion, start
-        size = max(groove.radius, groove.length, cylinder.radius, cylinder.length)
-        slack = RESOLUTION * size if resolution is None else positive("resolution", resolution)
-        # No search can tell apart what the rounding of the poses on the way cannot.
-        self.rounding = self._rounding(0.5 * cylinder.length)
-        if not self.rounding <= size:
-            raise SolverError(f"the motion's poses are rounded by {self.rounding:.3g} mm, more than its bodies' size")
-        self.slack = max(slack, self.rounding)
-        self.evaluations = 0
-        self._sizes = (groove.radius, groove.half_angle, 0.5 * groove.length, 0.5 * cylinder.length)
-        axis = start[:3, 2] / norm(start[:3, 2])
-        self._capsule: Search | None = None
-        if isinstance(cylinder, Cylinder):
-            self._capsule = Search(groove, Capsule(cylinder.radius, cylinder.length), motion, start, resolution)
-            self.flat_slack = max(self.slack, FLAT_RESOLUTION * size if resolution is None else 0.0)
-        self._numbers = np.concatenate([start[:3, 3], axis, motion.point, motion.axis, motion.travel, [motion.angle]])
 
-    def _rounding(self, along: float) -> float:
-        """Largest rounding in mm of a point of the axis at a pose of the motion."""
-        offset, motion = self.start[:3, 3], self.motion
-        lengths = np.abs(offset).max() + np.abs(motion.travel).max() + along
-        if motion.angle != 0.0:
-            # A small turn about a far axis takes no more of the rounding of that distance than of the distance itself.
-            turned = min(1.0, abs(motion.angle))
-            lengths += turned * (2.0 * np.abs(offset - motion.point).max() + np.abs(motion.point).max())
-        return _ROUNDING * float(lengths) * (1.0 + abs(motion.angle))
+def least(
+    distance: DistanceAt,
+    speed: float,
+    *,
+    bound: BoundBetween | None = None,
+    accuracy: float = ACCURACY,
+    most: int = MOST,
+) -> Least:
+    """Find the least distance between the times 0 and 1.
 
-    def pose(self, t: float) -> Array:
-        """``T_groove_cylinder`` (4, 4) at time ``t``."""
-        return self.motion.at(t, self.start)
+    Parameters
+    ----------
+    distance : callable
+        Lower and upper bound (mm) of the distance at a time.
+    speed : float
+        How fast it changes at most, mm per unit of time.
+    bound : callable, optional
+        Another lower bound (mm) between two times, asked for where the speed does not decide.
+    accuracy : float
+        How far the bounds of the answer may be apart, mm, besides those of ``distance``.
+    most : int
+        How often ``distance`` is asked; the bounds are further apart where that is not enough.
 
-    def at(self, t: float) -> SignedDistance:
-        """The kernel's answer at time ``t``."""
-        self.evaluations += 1
-        return signed_distance(self.groove, self.cylinder, self.pose(t))
+    Examples
+    --------
+    >>> least(lambda t: (abs(t - 0.3),) * 2, 1.0, accuracy=1e-9)
+    Least(t=0.3, lower=0.0, upper=0.0, evaluations=3)
+    """
+    start, stop = distance(0.0), distance(1.0)
+    t, upper = (0.0, start[1]) if start[1] <= stop[1] else (1.0, stop[1])
+    evaluations = 2
+    between = _Bounds(speed, bound)
+    heap = [between(_Stretch(-math.inf, 0.0, 1.0, start[0], stop[0]), upper - accuracy)]
+    lower = math.inf  # of all stretches that no time parts
+    while heap and heap[0].lower < upper - accuracy and evaluations < most:
+        stretch = heapq.heappop(heap)
+        middle = _meeting(stretch, speed)
+        if not stretch.start < middle < stretch.stop:
+            lower = min(lower, stretch.lower)
+            continue
+        here = distance(middle)
+        evaluations += 1
+        if here[1] < upper:
+            t, upper = middle, here[1]
+        for half in _halves(stretch, middle, here[0]):
+            heapq.heappush(heap, between(half, upper - accuracy))
+    return Least(t, min([lower, upper, *(stretch.lower for stretch in heap[:1])]), upper, evaluations)
 
-    def least(self) -> tuple[float, float]:
-        """Time of the least distance, and what any other time can be lower by, mm."""
-        if self._capsule is not None:
-            return self._flat_least(self._capsule)
-        from clamp3d.core import kernel_motion
 
-        out, heap = np.empty(4), np.empty((kernel_motion.CELLS, 5))
-        self.evaluations += kernel_motion.least(*self._sizes, self._numbers, 0.0, 1.0, self.slack, len(heap), heap, out)
-        best, t, _, bound = out.tolist()
-        # Down to the rounding where that is cheap: what only just touches is to be known as that.
-        low, high = max(0.0, t - _NEAR), min(1.0, t + _NEAR)
-        self.evaluations += kernel_motion.least(*self._sizes, self._numbers, low, high, self.rounding, _FEW, heap, out)
-        if out[0] <= best:
-            best, t = out[:2].tolist()
-        return t, max(best - bound, self.slack)
+def first_time(
+    distance: DistanceAt,
+    speed: float,
+    level: float,
+    *,
+    bound: BoundBetween | None = None,
+    accuracy: float = ACCURACY,
+    most: int = MOST,
+) -> FirstTime:
+    """Find the first time between 0 and 1 at which the distance is at most ``level`` mm.
 
-    def _flat_least(self, capsule: Search) -> tuple[float, float]:
-        t, slack = capsule.least()
-        self.evaluations += capsule.evaluations
-        here, held = self.at(t), capsule.at(t)
-        if here.distance - held.distance <= here.error_bound + held.error_bound:
-            return t, slack
-        best, found, low = self._flat_search(0.0, -np.inf)
-        return found, max(best - max(low, held.distance - slack), self.rounding)
+    The other parameters are those of `least`. The time is never late: a stretch is left behind only where its lower
+    bound is above the level. It is early where the distance stays within the accuracy of the level, or where the
+    bounds of ``distance`` are on both sides of it.
 
-    def _flat_search(self, begin: float, level: float) -> list[float]:
-        """What the compiled search fills in, from time ``begin`` on."""
-        from clamp3d.core import kernel_motion_flat
+    Examples
+    --------
+    >>> round(first_time(lambda t: (1.0 - t,) * 2, 1.0, 0.25).t, 5)
+    0.75
+    """
+    at_start, upper = distance(0.0)
+    if at_start <= level:
+        return FirstTime(Outcome.REACHED if upper <= level else Outcome.UNDECIDED, 0.0, 1)
+    between = _Bounds(speed, bound)
+    todo = [_Stretch(-math.inf, 0.0, 1.0, at_start, distance(1.0)[0])]
+    evaluations = 2
+    while todo:
+        stretch = between(todo.pop(), level)
+        if stretch.lower > level:
+            continue
+        middle = 0.5 * (stretch.start + stretch.stop)
+        if (stretch.stop - stretch.start) * speed <= accuracy or not stretch.start < middle < stretch.stop:
+            return FirstTime(Outcome.REACHED, stretch.start, evaluations)
+        if evaluations >= most:
+            return FirstTime(Outcome.UNDECIDED, stretch.start, evaluations)
+        here, _ = distance(middle)
+        evaluations += 1
+        todo += reversed(_halves(stretch, middle, here))
+    return FirstTime(Outcome.CLEAR, 1.0, evaluations)
 
-        R, half_angle, H, half = self._sizes
-        r = self.cylinder.radius
-        out, pad, heap = np.empty(3), np.empty((128, 5)), np.empty((kernel_motion_flat.MOST, 5))
-        arm = norm(cross(self.motion.axis, self.start[:3, 3] - self.motion.point))
-        speed = norm(self.motion.travel) + abs(self.motion.angle) * (arm + float(np.hypot(r, half)))
-        self.evaluations += kernel_motion_flat.search(
-            R,
-            half_angle,
-            H,
-            r,
-            half,
-            self._numbers,
-            speed * (1.0 + 1e-12),
-            begin,
-            1.0,
-            level,
-            self.flat_slack,
-            pad,
-            heap,
-            out,
-        )
-        return out.tolist()
 
-    def first_contact(self, margin: float) -> tuple[bool, float, float]:
-        """Whether the distance comes down to ``margin`` mm; first time of that, or of the least distance; slack, mm."""
-        start = self.at(0.0)
-        if start.distance <= margin + start.error_bound:
-            return True, 0.0, self.slack
-        t, slack = self.least()
-        least = self.at(t)
-        error = least.error_bound + self.rounding
-        if least.distance > margin + error:
-            return False, t, slack
-        # The lowest touches; what touches before it?
-        first = self._first(margin + min(error, max(least.distance - margin, 0.0)))
-        return True, self._crossing(t if first is None else first, margin, error), self.slack
+class _Bounds:
+    """What bounds the distance on a stretch: the speed, and where that is not enough the caller's own bound."""
 
-    def _first(self, level: float) -> float | None:
-        """First time at which the distance is at most ``level``, None if it never is."""
-        if self._capsule is not None:
-            return self._flat_first(self._capsule, level)
-        from clamp3d.core import kernel_motion
+    def __init__(self, speed: float, bound: BoundBetween | None) -> None:
+        self.speed, self.bound = speed, bound
 
-        out, heap = np.empty(2), np.empty((kernel_motion.CELLS, 5))
-        r = self.cylinder.radius
-        for _ in range(4):
-            self.evaluations += kernel_motion.first(*self._sizes, self._numbers, level + r, self.slack, heap, out)
-            hit, until = out.tolist()
-            if until >= min(hit, 1.0):
-                return hit if hit <= 1.0 else None
-            self.slack *= 100.0  # it slides along at the level: what is as good as on it is not to be told apart
-        raise SolverError(f"motion search did not end within {self.evaluations} cells; give a larger resolution")
+    def __call__(self, stretch: _Stretch, enough: float) -> _Stretch:
+        way = self.speed * (stretch.stop - stretch.start)
+        lower = max(stretch.lower, bound_by_speed(stretch.at_start, stretch.at_stop, way))
+        if lower < enough and self.bound is not None:
+            lower = max(lower, self.bound(stretch.start, stretch.stop))
+        return stretch._replace(lower=lower)
 
-    def _flat_first(self, capsule: Search, level: float) -> float | None:
-        held = capsule._first(level)
-        self.evaluations += capsule.evaluations
-        self.slack = max(self.slack, capsule.slack)
-        if held is None or self.at(held).distance <= level:
-            return held
-        for _ in range(4):
-            _, hit, until = self._flat_search(held, level)
-            if hit <= 1.0 or until >= 1.0:
-                self.slack = max(self.slack, self.flat_slack)
-                return hit if hit <= 1.0 else None
-            held = until
-            self.flat_slack *= 100.0
-        raise SolverError(f"motion search did not end within {self.evaluations} poses; give a larger resolution")
 
-    def _crossing(self, t: float, level: float, error: float) -> float:
-        """The root near ``t`` where the distance passes ``level``, or ``t`` where it only touches."""
+def _halves(stretch: _Stretch, middle: float, here: float) -> tuple[_Stretch, _Stretch]:
+    """Both parts of a stretch, with what is known of the whole; ``here``: lower bound at the time between them."""
+    return stretch._replace(stop=middle, at_stop=here), stretch._replace(start=middle, at_start=here)
 
-        def gap(s: float) -> float:
-            return self.at(s).distance - level
 
-        offset, u = self.start[:3, 3] - self.motion.point, self.motion.axis
-        reach = norm(cross(u, offset)) + 0.5 * self.cylinder.length
-        speed = max(abs(self.motion.angle) * reach + norm(self.motion.travel), 1e-300)
-        step = max(error / speed, 4e-16)
-        high = t
-        if gap(high) > 0.0:  # by rounding: just behind it
-            high = min(1.0, high + 8.0 * step)
-            if gap(high) > 0.0:
-                return t
-        low = high
-        while low > 0.0 and gap(low) <= 0.0:
-            low = max(0.0, high - step)
-            step *= 2.0
-        return root(gap, low, high, xtol=1e-16) if gap(low) > 0.0 > gap(high) else high
+def _meeting(stretch: _Stretch, speed: float) -> float:
+    """The time at which the two bounds by the speed meet: the lowest that the distance can be is there."""
+    middle = 0.5 * (stretch.start + stretch.stop)
+    meeting = middle + 0.5 * (stretch.at_start - stretch.at_stop) / speed if speed > 0.0 else middle
+    return meeting if stretch.start < meeting < stretch.stop else middle

@@ -25,8 +25,8 @@ from clamp3d.core.primitives import size as _size
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.errors import InputError
 
-Fit = Literal["bound", "round", "off"]
-FITS: tuple[Fit, ...] = ("bound", "round", "off")
+Fit = Literal["round", "off"]
+FITS: tuple[Fit, ...] = ("round", "off")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,15 +91,14 @@ FARTHEST_OFF = 1e5
 class MeshShape:
     """A mesh, and what to make of its round surfaces.
 
-    ``fit``: "bound" fits grooves, cylinders and holes and adds the error bound that assumes nothing between the
-    vertices; "round" assumes round surfaces through the vertices (what a CAD export is) and adds the fit's error
-    alone; "off" takes the facets as the part, and so do the others where no round surface is found. ``error`` mm: how
-    far the true surface can be from the facets, as stated by who made them. A mesh that is not closed is measured as
-    a surface: what is inside of it is not known.
+    ``fit``: "off" takes the facets as the part; "round" takes grooves, cylinders and holes as round surfaces through
+    the vertices (what a CAD export is) and adds the fit's error, and takes the facets where it finds none. ``error``
+    mm: how far the true surface can be from the facets, as stated by who made them. A mesh that is not closed is
+    measured as a surface: what is inside of it is not known.
     """
 
     mesh: Mesh
-    fit: Fit = "bound"
+    fit: Fit = "off"
     name: str = field(default="mesh")
     error: float = 0.0
 

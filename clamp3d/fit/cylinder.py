@@ -8,19 +8,16 @@ shallow arc, whose centre is hardly known, stays a well scaled problem, and a pl
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.special import fdtri
 
-from clamp3d.core.linear import atan2, cross, dot, eigh, lstsq, norm
 from clamp3d.core.pose import Array
-from clamp3d.errors import SolverError
-from clamp3d.fit.quantile import fisher
 
-_ROUNDS, _DIGITS = 60, 1e-13
+_DIGITS = 1e-15
 CONFIDENCE = 0.9973
 """Probability of the covariance part of every error bound: three standard deviations of a normal distribution."""
 
@@ -36,7 +33,7 @@ class Axis:
     def radial(self, points: Array) -> tuple[Array, Array]:
         """Unit vectors (n, 3) from the axis to ``points`` (n, 3), and distances (n,) from the axis in mm."""
         q = points - self.point
-        q = q - np.outer(dot(q, self.direction), self.direction)
+        q = q - np.outer(q @ self.direction, self.direction)
         r = np.sqrt(np.einsum("ij,ij->i", q, q))
         return q / np.maximum(r, 1e-300)[:, None], r
 
@@ -49,9 +46,9 @@ def perpendicular(direction: Array) -> tuple[Array, Array]:
     """Two unit vectors (3,) that make a right-handed frame with ``direction``."""
     helper = np.zeros(3)
     helper[int(np.argmin(np.abs(direction)))] = 1.0
-    u = cross(helper, direction)
-    u /= norm(u)
-    return u, cross(direction, u)
+    u = np.cross(helper, direction)
+    u /= np.linalg.norm(u)
+    return u, np.cross(direction, u)
 
 
 def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -> Axis | None:
@@ -71,13 +68,13 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
     centroid = points.mean(axis=0)
     w = start.direction
     inward = start.point - centroid
-    inward = inward - dot(inward, w) * w
+    inward = inward - (inward @ w) * w
     size = float(np.abs(points - centroid).max())
-    reach = norm(inward)
+    reach = np.linalg.norm(inward)
     # On a full turn the centroid lies on the axis and any direction serves.
     e = inward / reach if reach > 1e-6 * size else perpendicular(w)[0]
-    f = cross(w, e)
-    local = dot(points - centroid, np.stack([e, f, w], axis=1))
+    f = np.cross(w, e)
+    local = (points - centroid) @ np.stack([e, f, w], axis=1)
     scale = np.array([1.0, 1.0, 1.0 / size, 1.0 / size, 1.0 / size**2])
 
     def cylinder(x: Array) -> Axis:
@@ -92,7 +89,7 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
     def jacobian(x: Array) -> Array:
         axis = cylinder(x)
         u = axis.radial(local)[0]
-        tilt = -dot(local - axis.point, axis.direction) * axis.direction[2]
+        tilt = -((local - axis.point) @ axis.direction) * axis.direction[2]
         # The centre moves away as the radius grows: 1 + u.e is 1 - cos(angle from the arc's middle), tiny on an arc.
         bend = axis.radius * axis.radius * (np.sign(axis.radius) + u[:, 0])
         return np.asarray(np.column_stack([-u[:, :2], tilt[:, None] * u[:, :2], bend]) * scale)
@@ -100,50 +97,16 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
     first = np.array([reach - start.radius, 0.0, 0.0, 0.0, 1.0 / start.radius]) / scale
     try:
         if robust_scale is None:
-            x = _least_squares(residual, jacobian, first)
+            x = least_squares(residual, first, jacobian, x_scale="jac", xtol=_DIGITS, ftol=_DIGITS, gtol=_DIGITS).x
         else:
-            from scipy.optimize import least_squares
-
-            options: dict[str, Any] = {"loss": "cauchy", "f_scale": robust_scale, "max_nfev": 25}
-            x = least_squares(residual, first, jacobian, **options).x
-    except (ValueError, np.linalg.LinAlgError, SolverError):
+            x = least_squares(residual, first, jacobian, loss="cauchy", f_scale=robust_scale, max_nfev=25).x
+    except (ValueError, np.linalg.LinAlgError):
         return None
     if not np.isfinite(x).all() or x[4] * scale[4] * size < 1e-3:
         return None
     axis, to_world = cylinder(x), np.stack([e, f, w])
-    middle = axis.point - dot(axis.point, axis.direction) * axis.direction
-    return Axis(centroid + dot(middle, to_world), dot(axis.direction, to_world), float(axis.radius))
-
-
-def _least_squares(residual: Callable[[Array], Array], jacobian: Callable[[Array], Array], x: Array) -> Array:
-    """The unknowns (k,) near ``x`` with the least sum of squares of ``residual`` (n,), to rounding.
-
-    Levenberg and Marquardt's iteration, in units in which all columns of the Jacobian (n, k) have length 1. SciPy's
-    is the same one; to import it takes longer than to fit the round surfaces of a CAD part.
-    """
-    r = residual(x)
-    square, damping, size = float(dot(r, r)), 1e-6, np.zeros(len(x))
-    for _ in range(_ROUNDS):
-        J = jacobian(x)
-        size = np.maximum(size, np.maximum(np.sqrt(np.einsum("ij,ij->j", J, J)), 1e-300))
-        J = J / size
-        values, vectors = eigh(dot(J.T, J))
-        slope = dot(dot(r, J), vectors)
-        while True:
-            step = -dot(vectors, slope / (np.maximum(values, 0.0) + damping)) / size
-            tried = residual(x + step)
-            new = float(dot(tried, tried))
-            small = norm(size * step) <= _DIGITS * norm(size * x)
-            if new < square:
-                break
-            if small or damping > 1e6:
-                return x
-            damping = 10.0 * damping
-        gain = square - new
-        x, r, square, damping = x + step, tried, new, 0.1 * damping
-        if small or gain <= _DIGITS * new:
-            break
-    return x
+    middle = axis.point - (axis.point @ axis.direction) * axis.direction
+    return Axis(centroid + (middle @ to_world), axis.direction @ to_world, float(axis.radius))
 
 
 def circle(points: Array) -> tuple[Array, float] | None:
@@ -151,7 +114,7 @@ def circle(points: Array) -> tuple[Array, float] | None:
     m = points.mean(axis=0)
     p = points - m
     A = np.column_stack([2.0 * p, np.ones(len(p))])
-    sol, rank = lstsq(A, np.einsum("ij,ij->i", p, p), 1e-9)
+    sol, _, rank, _ = np.linalg.lstsq(A, (p * p).sum(axis=1), rcond=1e-9)
     if rank < 3:
         return None
     return m + sol[:2], float(np.sqrt(max(sol[2] + sol[0] ** 2 + sol[1] ** 2, 0.0)))
@@ -160,10 +123,10 @@ def circle(points: Array) -> tuple[Array, float] | None:
 def axis_along(direction: Array, points: Array) -> Axis | None:
     """Cylinder along a unit ``direction`` (3,) by the circle of ``points`` (n, 3) seen along it; None if on a line."""
     u, w = perpendicular(direction)
-    got = circle(np.column_stack([dot(points, u), dot(points, w)]))
-    if got is None:
+    fitted = circle(np.column_stack([points @ u, points @ w]))
+    if fitted is None:
         return None
-    centre, radius = got
+    centre, radius = fitted
     return Axis(centre[0] * u + centre[1] * w, direction, radius)
 
 
@@ -177,11 +140,11 @@ def covariance(local: Array, radius: float, noise: float) -> Array | None:
     z = local[:, 2:]
     size = float(np.abs(local).max())
     J = np.column_stack([np.ones(len(u)), u, z * u / size])
-    values, vectors = eigh(dot(J.T, J))
+    values, vectors = np.linalg.eigh(J.T @ J)
     if values[0] < 1e-10 * values[-1]:
         return None
     vectors[3:] /= size
-    return np.asarray(dot(vectors / values, vectors.T) * noise**2)
+    return np.asarray(((vectors / values) @ vectors.T) * noise**2)
 
 
 def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> float:
@@ -195,12 +158,12 @@ def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> f
     )
     g = np.column_stack([np.ones_like(a), np.sin(a), -np.cos(a), z * np.sin(a), -z * np.cos(a)])
     worst = float(np.einsum("ij,jk,ik->i", g, C, g).max())
-    return float(np.sqrt(5.0 * fisher(5, max(freedom, 1), 1.0 - CONFIDENCE) * worst))
+    return float(np.sqrt(5.0 / fdtri(max(freedom, 1), 5, 1.0 - CONFIDENCE) * worst))  # F is the inverse of 1 / F
 
 
 def patches_of(local: Array) -> list[NDArray[np.intp]]:
     """Points ``local`` (n, 3) of a cylinder's own frame in patches of 25 to 49, by halving along the longer side."""
-    angle = atan2(local[:, 0], -local[:, 1])
+    angle = np.arctan2(local[:, 0], -local[:, 1])
     flat = np.column_stack([angle * np.hypot(local[:, 0], local[:, 1]).mean(), local[:, 2]])
 
     def halved(index: NDArray[np.intp]) -> list[NDArray[np.intp]]:

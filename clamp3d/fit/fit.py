@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from clamp3d import checks
+from clamp3d.brep.bodies import Body, Reading
 from clamp3d.brep.mesh_file import load_bodies, load_mesh
+from clamp3d.brep.solid import BrepSolid
 from clamp3d.checks import function, instance
-from clamp3d.core.linear import to_source
 from clamp3d.core.mesh import Array, Mesh
 from clamp3d.fit.cad import cad_features
 from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
@@ -107,6 +108,12 @@ def fit_file(
     return fit_mesh(load_mesh(path, unit=unit), progress=progress)
 
 
+def fit_solid(solid: BrepSolid) -> FitResult:
+    """The cylindrical faces of a solid from CAD, with its own mesh."""
+    mesh, features, notes = cad_features(Reading((Body(solid.name, solid, np.eye(4)),)), solid.name)
+    return _result(mesh, features, mesh.vertices[mesh.faces], notes)
+
+
 def fit_mesh(mesh: Mesh, *, progress: Callable[[str, float], None] | None = None) -> FitResult:
     """Find the concave grooves, convex cylinders and holes of a mesh.
 
@@ -173,7 +180,7 @@ def _result(mesh: Mesh, found: list[tuple[float, dict[str, Any]]], corners: Arra
 def _open_ended(corners: Array, values: dict[str, Any]) -> bool:
     """True if nothing closes either end: from the middle, no face crosses the axis up to a radius past the ends."""
     T, reach = values["T_part_feature"], 0.5 * values["length"] + values["radius"]
-    x, y, z = np.moveaxis(to_source(T, corners), -1, 0)
+    x, y, z = np.moveaxis((corners - T[:3, 3]) @ T[:3, :3], -1, 0)
     # A face meets the axis if the origin lies in its projection along z: all three edge functions of one sign.
     e = np.roll(x, -1, axis=1) * np.roll(y, -2, axis=1) - np.roll(y, -1, axis=1) * np.roll(x, -2, axis=1)
     total = e.sum(axis=1)

@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
-from clamp3d.core.linear import atan2, dot, lstsq
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
-from clamp3d.core.triangles import distinct
 from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
-from clamp3d.fit.quantile import quantile, student
 from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface, border, facet_span
 
 MIN_LINES = 4
@@ -69,7 +67,7 @@ def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float
         depth = sagitta(axis.radius, span)
         tolerance = max(tolerance, share * depth)
         near = (off <= tolerance) & (off >= -1.02 * depth - tolerance)
-        slack = math.acos(quantile(np.clip(sign * surface.lean(axis, faces), -1.0, 1.0), 0.1))
+        slack = math.acos(np.quantile(np.clip(sign * surface.lean(axis, faces), -1.0, 1.0), 0.1))
         limit = np.cos(min(max(0.6 * span, 2.5 * slack, 0.02), 0.7))
         mask: BoolArray = search.free & np.asarray(near[F].all(axis=1))
         index = np.flatnonzero(mask)
@@ -93,7 +91,7 @@ def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float
         span = float(search.span(axis, faces).max())
         if settled:
             break
-    corners = distinct(F[faces])
+    corners = np.unique(F[faces])
     if len(points) < len(corners) <= min(60, 1.25 * len(points)):
         # Scatter can look like points on chords: if all points make one consistent surface, none was.
         whole = fit_axis(V[corners], axis)
@@ -112,11 +110,11 @@ def _tolerance(residual: Array) -> float:
     """
     n = len(residual)
     freedom = max(n - 5, 1)
-    scatter = 1.4826 * quantile(np.abs(residual), 0.5)
+    scatter = 1.4826 * np.median(np.abs(residual))
     if n < 60:  # the median of few is too rough
         scatter = max(scatter, float(np.sqrt(np.mean(residual**2))))
     scatter *= np.sqrt(n / freedom)
-    return float(scatter * student(min(freedom, 1000), 3.2e-5))
+    return float(-scatter * stdtrit(min(freedom, 1000), 3.2e-5))
 
 
 def _support(surface: Surface, faces: IntArray, on: BoolArray) -> IntArray:
@@ -133,8 +131,8 @@ def _support(surface: Surface, faces: IntArray, on: BoolArray) -> IntArray:
 def accept(search: Search, region: Region) -> bool:
     """True if the region is long, round and distinct enough to be a cylinder rather than an accident."""
     V, axis = search.surface.V, region.axis
-    p = dot(V[region.points] - axis.point, np.stack([*perpendicular(axis.direction), axis.direction], axis=1))
-    angle = np.sort(atan2(p[:, 1], p[:, 0]))
+    p = (V[region.points] - axis.point) @ np.stack([*perpendicular(axis.direction), axis.direction], axis=1)
+    angle = np.sort(np.arctan2(p[:, 1], p[:, 0]))
     gaps = np.diff(angle, append=angle[0] + 2.0 * np.pi)
     arc = 2.0 * np.pi - float(gaps.max())
     noise = max(region.tolerance / 4.0, 1e-12)
@@ -145,9 +143,9 @@ def accept(search: Search, region: Region) -> bool:
     # Every trapezoid with equal flanks lies on a circle: with three facets ask for three equal ones.
     if lines == MIN_LINES and (spans.max() > 1.02 * spans.min() or spans.max() > np.radians(30.0)):
         return False
-    if sagitta(axis.radius, arc) < 6.0 * noise or arc < 2.0 * quantile(spans, 0.5):
+    if sagitta(axis.radius, arc) < 6.0 * noise or arc < 2.0 * np.median(spans):
         return False
-    length = float(np.ptp(dot(V[distinct(search.surface.F[region.faces])], axis.direction)))
+    length = float(np.ptp((V[np.unique(search.surface.F[region.faces])]) @ axis.direction))
     if _runs_on(search.surface, region, length) or _bent(p, axis.residual(V[region.points]), axis.radius):
         return False
     return len(region.points) >= 8 and length > 0.0
@@ -159,25 +157,25 @@ def _bent(local: Array, residual: Array, radius: float) -> bool:
     Points ``local`` (n, 3) in the cylinder's own frame. Scatter leaves nothing for a smooth second-order correction to
     explain; another shape lets it explain more than half.
     """
-    power = float(dot(residual, residual))
+    power = float(residual @ residual)
     if np.sqrt(power / len(residual)) <= 0.01 * radius or len(residual) < 12:
         return False
     r = np.hypot(local[:, 0], local[:, 1])
     x, y, z = local[:, 0] / r, local[:, 1] / r, local[:, 2] - local[:, 2].mean()
     A = np.column_stack([np.ones_like(x), x, y, z, z * x, z * y, z * z, z * z * x, z * z * y, x * y, x * x])
-    left = residual - dot(A, lstsq(A, residual, 1e-9)[0])
-    return float(dot(left, left)) / power < 0.5 - 5.0 / len(residual)
+    left = residual - (A @ np.linalg.lstsq(A, residual, rcond=1e-9)[0])
+    return float(left @ left) / power < 0.5 - 5.0 / len(residual)
 
 
 def _runs_on(surface: Surface, region: Region, length: float) -> bool:
     """True if the surface goes on smoothly past both round ends with bands as long: a ring of a sphere or torus."""
     crossing, outside, _ = border(surface, region.faces)
     ends = surface.V[surface.edges[crossing]]
-    along = dot(ends, region.axis.direction)
+    along = ends @ region.axis.direction
     across = np.abs(along[:, 1] - along[:, 0]) < 0.5 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     z = along.mean(axis=1)
     z = z - 0.5 * (z.min() + z.max()) if len(z) else z
     smooth = surface.bend[crossing] < 1.5 * region.span
-    band = np.ptp(dot(surface.V[surface.F[outside]], region.axis.direction), axis=1)
+    band = np.ptp((surface.V[surface.F[outside]]) @ region.axis.direction, axis=1)
     both = [across & (z > 0.0), across & (z < 0.0)]
-    return all(bool(e.any() and smooth[e].mean() > 0.7 and quantile(band[e], 0.5) > 0.3 * length) for e in both)
+    return all(bool(e.any() and smooth[e].mean() > 0.7 and np.median(band[e]) > 0.3 * length) for e in both)

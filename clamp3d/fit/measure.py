@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtrit
 
-from clamp3d.core.linear import atan2, cross, dot
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
-from clamp3d.core.triangles import distinct, side_keys
 from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, patches_of, perpendicular, surface_error
 from clamp3d.fit.grow import Region
-from clamp3d.fit.quantile import quantile, student
 from clamp3d.fit.surface import BoolArray, Surface, angles, border, covered, turned
 
 FULL_TURN_GAP = np.radians(30.0)
@@ -58,9 +56,9 @@ class _Border:
                 return None
             v, w = values[side], self.length[side]
             at = _quantile(v, w, 0.5)
-            crease = quantile(self.bend[side], 0.5) > 2.0 * self.inner_bend
+            crease = np.median(self.bend[side]) > 2.0 * self.inner_bend
             dense = step < 0.1 * extent
-            if (crease and quantile(self.growth[side], 0.5) > 4.0) or step >= 0.5 * extent:
+            if (crease and np.median(self.growth[side]) > 4.0) or step >= 0.5 * extent:
                 uncertainty = 0.0
             else:
                 uncertainty = 0.5 * step if dense else step
@@ -82,9 +80,9 @@ def _border(surface: Surface, faces: IntArray) -> _Border:
     ends = surface.V[np.concatenate([surface.edges[crossing], rim])]
     beyond = np.full(len(rim), np.inf)
     bend = np.concatenate([surface.bend[crossing], beyond])
-    growth = np.concatenate([surface.areas[outside] / quantile(surface.areas[faces], 0.5), beyond])
+    growth = np.concatenate([surface.areas[outside] / np.median(surface.areas[faces]), beyond])
     bends = surface.bend[within & (surface.bend > 1e-4)]
-    inner = quantile(bends, 0.5) if len(bends) else 0.0
+    inner = np.median(bends) if len(bends) else 0.0
     return _Border(ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), bend, growth, inner)
 
 
@@ -96,19 +94,19 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     u, w = perpendicular(d)
     middle, half = arc(surface, axis, u, w, region.faces)
     deepest = np.cos(middle) * u + np.sin(middle) * w
-    R = np.stack([cross(-deepest, d), -deepest, d], axis=1)
+    R = np.stack([np.cross(-deepest, d), -deepest, d], axis=1)
 
-    corners = dot(surface.V[distinct(surface.F[region.faces])] - axis.point, R)
+    corners = (surface.V[np.unique(surface.F[region.faces])] - axis.point) @ R
     z0, z1 = float(corners[:, 2].min()), float(corners[:, 2].max())
     rim = _border(surface, region.faces)
-    local = dot(rim.edges - axis.point, R)
+    local = (rim.edges - axis.point) @ R
     along = np.abs(local[:, 1, 2] - local[:, 0, 2]) > 0.5 * rim.length
-    z, angle = local[:, :, 2].mean(axis=1), atan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
+    z, angle = local[:, :, 2].mean(axis=1), np.arctan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
     # Off the corners, where the two kinds of border mix.
     v, t = (2.0 * z - z0 - z1) / (z1 - z0), angle / half
     length_error = arc_error = 0.0
     rounds = [~along & (k * v > 0.8) & (np.abs(t) < 0.85) for k in (-1, 1)]
-    step = 0.0 if region.strips else quantile(np.ptp(dot(surface.V[surface.F[region.faces]], d), axis=1), 0.5)
+    step = 0.0 if region.strips else np.median(np.ptp((surface.V[surface.F[region.faces]]) @ d, axis=1))
     if ends := rim.ends(z, rounds, step, z1 - z0):
         z0, z1, length_error = ends
     lips = [along & (k * t > 0.8) & (np.abs(v) < 0.85) for k in (-1, 1)]
@@ -117,17 +115,17 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         a, b, arc_error = ends
         half = 0.5 * (b - a)
         c, s = np.cos(0.5 * (a + b)), np.sin(0.5 * (a + b))
-        R = dot(R, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+        R = R @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     length = z1 - z0
     T = np.eye(4)
     T[:3, :3] = R
     T[:3, 3] = axis.point + 0.5 * (z0 + z1) * d
 
-    points = dot(surface.V[region.points] - T[:3, 3], R)
+    points = (surface.V[region.points] - T[:3, 3]) @ R
     residual = np.hypot(points[:, 0], points[:, 1]) - axis.radius
     ridges = _off_ridges(surface, region) if region.strips else 0.0
     freedom = max(len(points) - 5, 1)
-    rms = float(np.sqrt(dot(residual, residual) / freedom))
+    rms = float(np.sqrt((residual @ residual) / freedom))
     noise = float(np.hypot(rms, surface.mesh.rounding))
     C = covariance(points, axis.radius, noise * _inflation(surface, region, residual))
     if C is None or length <= 0.0 or half <= 0.0:
@@ -144,7 +142,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         "covered_area": area,
         "coverage": min(1.0, area / (2.0 * half * axis.radius * length)),
         # Few points know their own scatter badly: three standard errors shall mean 99.73 % all the same.
-        "covariance": C * (student(freedom, 0.5 * (1.0 - CONFIDENCE)) / 3.0) ** 2,
+        "covariance": C * (stdtrit(freedom, 0.5 * (1.0 - CONFIDENCE)) / 3.0) ** 2,
         "covariance_error": surface_error(C, half, length, freedom),
         "form_error": max(_form_error(points, residual, rms), ridges) + 2.0 * surface.mesh.rounding,
         "chord_error": sagitta(axis.radius, region.span),
@@ -158,7 +156,7 @@ def _facet(surface: Surface, axis: Axis, faces: IntArray) -> float:
     """Median angle (rad) that a triangle covers."""
     u = axis.radial(surface.V[surface.F[faces].reshape(-1)])[0].reshape(-1, 3, 3)
     chord = np.linalg.norm(u - u[:, [1, 2, 0]], axis=2).max(axis=1)
-    return 2.0 * math.asin(min(0.5 * quantile(chord, 0.5), 1.0))
+    return 2.0 * math.asin(min(0.5 * np.median(chord), 1.0))
 
 
 def _inflation(surface: Surface, region: Region, residual: Array) -> float:
@@ -170,10 +168,9 @@ def _inflation(surface: Surface, region: Region, residual: Array) -> float:
     number = np.full(len(surface.V), -1)
     number[region.points] = np.arange(len(region.points))
     F = surface.F[region.faces]
-    sides = distinct(side_keys(F, np.roll(F, -1, axis=1), len(surface.V)))
-    i, j = (number[ends] for ends in np.divmod(sides, len(surface.V)))
+    i, j = number[np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)].T
     both = (i >= 0) & (j >= 0)
-    power = float(dot(residual, residual)) / len(residual)
+    power = float(residual @ residual) / len(residual)
     if both.sum() < 30 or power <= 0.0:
         return 1.0
     c = min(float(np.mean(residual[i[both]] * residual[j[both]])) / power, 0.95)
@@ -186,7 +183,7 @@ def _off_ridges(surface: Surface, region: Region) -> float:
     An exact tessellation has no scatter that would average out, and the fit may have taken some lines for chords.
     """
     within = border(surface, region.faces)[2] & (surface.step > surface.floor)
-    ends = surface.V[distinct(surface.edges[within])]
+    ends = surface.V[np.unique(surface.edges[within])]
     return float(np.abs(region.axis.residual(ends)).max(initial=0.0))
 
 

@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from clamp3d.core.linear import cross, dot, eigh, norm, svd
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import sagitta
-from clamp3d.core.triangles import distinct
 from clamp3d.fit.cylinder import Axis, axis_along, fit_axis, perpendicular
 from clamp3d.fit.grow import Region, Search, accept, grow
-from clamp3d.fit.quantile import quantile
 from clamp3d.fit.surface import BoolArray, Surface
-
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
 
 _PATCH_SIZES = (24, 96, 384, 1536)
 _GATES = tuple(np.radians(a) for a in (12.0, 25.0, 46.0))
@@ -37,8 +31,6 @@ def patches(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regi
     widest = gates[-1]
     if not (todo & (np.bincount(widest[free], minlength=len(todo))[widest] >= _LEAST)).any():
         return
-    from scipy.spatial import cKDTree
-
     tree = cKDTree(surface.centres)
     rng = np.random.default_rng(0)
     order = rng.permutation(np.flatnonzero(todo))
@@ -55,7 +47,7 @@ def patches(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regi
                 break
             tell("patches", 0.5 * (stage + n / len(order)))
             nearest = _nearest(surface, tree, start, _PATCH_SIZES[-1])
-            facing = nearest[free[nearest] & (dot(surface.normals[nearest], surface.normals[start]) > 0.5)]
+            facing = nearest[free[nearest] & ((surface.normals[nearest] @ surface.normals[start]) > 0.5)]
             same = [facing[label[facing] == label[start]] for label in gates]
             region = _from_patches(search, same, factor * noise, seeds)
             if region is None:
@@ -82,11 +74,11 @@ def _from_patches(search: Search, same: list[IntArray], limit: float, seeds: Boo
             start, sign, scatter = guess
             if scatter > limit:  # an edge is in it: so it is in every larger patch
                 break
-            points = surface.V[distinct(surface.F[patch])]
+            points = surface.V[np.unique(surface.F[patch])]
             axis = fit_axis(points, start, robust_scale=max(scatter, search.floor))
             if axis is None:
                 continue
-            noise = 1.4826 * quantile(np.abs(axis.residual(points)), 0.5)
+            noise = 1.4826 * np.median(np.abs(axis.residual(points)))
             tolerance = max(search.floor, 4.0 * noise)
             if noise > 1.6 * scatter + search.floor or tolerance > 0.1 * axis.radius:
                 continue
@@ -108,13 +100,13 @@ def _noise(surface: Surface, tree: cKDTree, sample: IntArray) -> float:
     scatters = []
     for start in sample:
         patch = _nearest(surface, tree, start, _PATCH_SIZES[0])
-        scatter = _quadric_fit(surface, patch[dot(surface.normals[patch], surface.normals[start]) > 0.5])
+        scatter = _quadric_fit(surface, patch[(surface.normals[patch] @ surface.normals[start]) > 0.5])
         if scatter is not None:
             scatters.append(scatter[2])
     if len(scatters) < 20:
         return np.inf
-    side = float(np.sqrt(quantile(surface.areas[sample], 0.5)))
-    return quantile(np.array(scatters), 0.5) + 0.003 * side
+    side = float(np.sqrt(np.median(surface.areas[sample])))
+    return np.median(np.array(scatters)) + 0.003 * side
 
 
 def _quadric_fit(surface: Surface, patch: IntArray) -> tuple[Array, Array, float, float, Array] | None:
@@ -123,34 +115,34 @@ def _quadric_fit(surface: Surface, patch: IntArray) -> tuple[Array, Array, float
     Returns coefficients (6,) and covariance (6, 6) in units of the size, scatter (mm), size (mm) and frame (4, 3): the
     rows u, w, normal and the middle. None if fewer than 9 vertices or all on two lines.
     """
-    normal = dot(surface.areas[patch], surface.normals[patch])
-    length = norm(normal)
-    points = surface.V[distinct(surface.F[patch])]
+    normal = surface.areas[patch] @ surface.normals[patch]
+    length = np.linalg.norm(normal)
+    points = surface.V[np.unique(surface.F[patch])]
     if length <= 0.0 or len(points) < 9:
         return None
     normal = normal / length
     u, w = perpendicular(normal)
     m = points.mean(axis=0)
-    x, y, z = dot(points - m, u), dot(points - m, w), dot(points - m, normal)
+    x, y, z = (points - m) @ u, (points - m) @ w, (points - m) @ normal
     s = max(float(np.abs(x).max()), float(np.abs(y).max()))
     x, y = x / s, y / s
     A = np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y])
-    left, sizes, right = svd(A)
+    left, sizes, right = np.linalg.svd(A, full_matrices=False)
     if sizes[-1] <= 0.01 * sizes[0]:
         return None
-    sol = dot(dot(left, z) / sizes, right)
-    res = z - dot(A, sol)
-    scatter = float(np.sqrt(dot(res, res) / (len(points) - 6)))
-    return sol, dot(right.T / sizes**2, right) * scatter**2, scatter, s, np.stack([u, w, normal, m])
+    sol = ((z @ left) / sizes) @ right
+    res = z - (A @ sol)
+    scatter = float(np.sqrt((res @ res) / (len(points) - 6)))
+    return sol, ((right.T / sizes**2) @ right) * scatter**2, scatter, s, np.stack([u, w, normal, m])
 
 
 def _quadric(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | None:
     """Cylinder from the principal curvatures of a patch, and the scatter about the quadric; None if it looks flat."""
-    got = _quadric_fit(surface, patch)
-    if got is None:  # long strips: all points in two rings leave the curvature along the axis open
+    quadric = _quadric_fit(surface, patch)
+    if quadric is None:  # long strips: all points in two rings leave the curvature along the axis open
         return _from_normals(surface, patch)
-    sol, C, scatter, s, (u, w, normal, m) = got
-    values, vectors = eigh(np.array([[2.0 * sol[3], sol[4]], [sol[4], 2.0 * sol[5]]]) / s**2)
+    sol, C, scatter, s, (u, w, normal, m) = quadric
+    values, vectors = np.linalg.eigh(np.array([[2.0 * sol[3], sol[4]], [sol[4], 2.0 * sol[5]]]) / s**2)
     big = int(np.argmax(np.abs(values)))
     uncertainty = 2.0 * float(np.sqrt(C[3:, 3:].diagonal().max())) / s**2
     if abs(values[big]) < 6.0 * uncertainty or abs(values[big]) * surface.extent < 0.05:
@@ -168,16 +160,16 @@ def _quadric(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | Non
 def _from_normals(surface: Surface, patch: IntArray) -> tuple[Axis, int, float] | None:
     """Cylinder whose axis is the direction that the patch's normals avoid most, and the scatter about it."""
     N = surface.normals[patch]
-    d = eigh(dot((N * surface.areas[patch][:, None]).T, N))[1][:, 0]
-    points = surface.V[distinct(surface.F[patch])]
+    d = np.linalg.eigh(((N * surface.areas[patch][:, None]).T) @ N)[1][:, 0]
+    points = surface.V[np.unique(surface.F[patch])]
     axis = axis_along(d, points)
     if axis is None:
         return None
-    sign = 1 if dot(surface.lean(axis, patch), surface.areas[patch]) > 0.0 else -1
+    sign = 1 if (surface.lean(axis, patch) @ surface.areas[patch]) > 0.0 else -1
     scatter = float(np.sqrt(np.mean(axis.residual(points) ** 2)))
     # Along the arc at the middle of the points; round a full turn any direction serves.
-    across = cross(d, points.mean(axis=0) - axis.point)
-    size = norm(across)
+    across = np.cross(d, points.mean(axis=0) - axis.point)
+    size = np.linalg.norm(across)
     across = across / size if size > 0.0 else perpendicular(d)[0]
-    reach = min(float(np.ptp(dot(points, across))) / axis.radius, np.pi)
+    reach = min(float(np.ptp(points @ across)) / axis.radius, np.pi)
     return None if sagitta(axis.radius, reach) < 6.0 * scatter else (axis, sign, scatter)

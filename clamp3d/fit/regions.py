@@ -16,15 +16,12 @@ from itertools import combinations
 
 import numpy as np
 
-from clamp3d.core.linear import dot, norm
 from clamp3d.core.mesh import IntArray
 from clamp3d.core.profile import sagitta
-from clamp3d.core.triangles import distinct
 from clamp3d.fit.cylinder import Axis, axis_along, fit_axis, perpendicular
 from clamp3d.fit.grow import Region, Search, accept, grow
 from clamp3d.fit.measure import arc
 from clamp3d.fit.patches import patches
-from clamp3d.fit.quantile import quantile
 from clamp3d.fit.surface import MAX_FACET, Surface
 
 
@@ -70,11 +67,11 @@ def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regio
             continue
         fails[[a, b]] += 1
         d = V[surface.edges[k, 1]] - V[surface.edges[k, 0]]
-        d /= norm(d)
+        d /= np.linalg.norm(d)
         # Lines along the axis: the corners of the strips; what else they have (a split strip) lies on chords.
         own = np.concatenate([lines[a], lines[b]])
-        own = own[np.abs(dot(vector[own], d)) > 0.9999]
-        corners = distinct(ends[own])
+        own = own[np.abs(vector[own] @ d) > 0.9999]
+        corners = np.unique(ends[own])
         axis = axis_along(d, V[corners])
         # Slack for the axis: a direction from one edge is only as good as its ends.
         loose = 3.0 * floor
@@ -83,7 +80,7 @@ def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regio
         # Two strips always lie on a circle: a third one must agree before the expensive growing starts.
         beyond = _others(cell[own], np.array([a, b]))
         third = np.concatenate([lines[c] for c in beyond]) if len(beyond) else np.empty(0, dtype=np.int64)
-        far = ends[_others(third[np.abs(dot(vector[third], d)) > 0.9999], own)]
+        far = ends[_others(third[np.abs(vector[third] @ d) > 0.9999], own)]
         if not (np.abs(axis.residual(V[far.reshape(-1)])).reshape(-1, 2) <= 4.0 * loose).all(axis=1).any():
             continue
         seed = np.concatenate([members[a], members[b]])
@@ -94,12 +91,12 @@ def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regio
         if accept(search, region):
             yield region
         else:  # its other strips would only grow the same again
-            fails[distinct(cells[region.faces])] += 3
+            fails[np.unique(cells[region.faces])] += 3
 
 
 def _others(values: IntArray, known: IntArray) -> IntArray:
     """What is in ``values`` (n,) and not ``known`` (k,), once each and sorted."""
-    found = distinct(values)
+    found = np.unique(values)
     return found[~np.isin(found, known)]
 
 
@@ -127,7 +124,7 @@ def join(surface: Surface, regions: list[Region]) -> list[Region]:
 def _joined(surface: Surface, a: Region, b: Region) -> Region | None:
     if a.sign != b.sign or abs(a.axis.radius - b.axis.radius) > 0.2 * a.axis.radius:
         return None
-    if abs(dot(a.axis.direction, b.axis.direction)) < 0.97:
+    if abs(a.axis.direction @ b.axis.direction) < 0.97:
         return None
     V, span = surface.V, max(a.span, b.span)
     large = (a if len(a.points) >= len(b.points) else b).axis
@@ -135,11 +132,11 @@ def _joined(surface: Surface, a: Region, b: Region) -> Region | None:
     gap, _, shorter = _along(surface, large, a.faces, b.faces)
     if -gap > 0.5 * shorter:  # side by side
         tolerance = max(tolerance, 0.3 * sagitta(large.radius, span))
-    points = distinct(np.concatenate([a.points, b.points]))
+    points = np.unique(np.concatenate([a.points, b.points]))
     axis = fit_axis(V[points], large)
     if axis is None:
         return None
-    if any(quantile(np.abs(axis.residual(V[region.points])), 0.9) > tolerance for region in (a, b)):
+    if any(np.quantile(np.abs(axis.residual(V[region.points])), 0.9) > tolerance for region in (a, b)):
         return None
     # Far apart along the axis they are two features: one groove would claim material where there is none.
     gap, length, shorter = _along(surface, axis, a.faces, b.faces)
@@ -157,7 +154,7 @@ def _along(surface: Surface, axis: Axis, a: IntArray, b: IntArray) -> tuple[floa
 
     All in mm.
     """
-    spans = [dot(surface.V[distinct(surface.F[f])] - axis.point, axis.direction) for f in (a, b)]
+    spans = [((surface.V[np.unique(surface.F[f])] - axis.point) @ axis.direction) for f in (a, b)]
     (low_a, high_a), (low_b, high_b) = ((float(z.min()), float(z.max())) for z in spans)
     length = max(high_a, high_b) - min(low_a, low_b)
     return max(low_a - high_b, low_b - high_a), length, min(high_a - low_a, high_b - low_b)

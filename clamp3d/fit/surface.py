@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from clamp3d.core.linear import atan2, crosses, dot
-from clamp3d.core.mesh import Array, IntArray, Mesh, edges_of
-from clamp3d.core.shells import joined
-from clamp3d.core.triangles import distinct
+from clamp3d.core.mesh import Array, IntArray, Mesh
 from clamp3d.fit.cylinder import Axis, perpendicular
 
 BoolArray = NDArray[np.bool_]
@@ -28,17 +28,17 @@ class Surface:
         # The normals of slivers are rounding.
         self.rows = np.flatnonzero(~mesh.slivers)
         self.V, self.F = mesh.vertices, mesh.faces[self.rows]
-        corners = self.V[self.F]
-        normals = crosses(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1])
-        twice = np.sqrt((normals * normals).sum(axis=1))
-        self.normals = normals * (1.0 / np.maximum(twice, 1e-300))[:, None]
-        self.areas = 0.5 * twice
-        self.centres = corners.mean(axis=1)
-        self.edges, self.pairs, opposite = edges_of(self.F, 2)
-        self.rim, rim_faces, _ = edges_of(self.F, 1)
-        self.rim_faces = rim_faces[:, 0]
+        known = trimesh.Trimesh(self.V, self.F, process=False, validate=False)
+        self.normals, self.areas, self.centres = known.face_normals, known.area_faces, known.triangles_center
+        self.edges, self.pairs, opposite = (
+            known.face_adjacency_edges,
+            known.face_adjacency,
+            known.face_adjacency_unshared,
+        )
+        alone = trimesh.grouping.group_rows(known.edges_sorted, require_count=1)
+        self.rim, self.rim_faces = known.edges[alone], known.edges_face[alone]
         n1, n2 = self.normals[self.pairs[:, 0]], self.normals[self.pairs[:, 1]]
-        self.bend = atan2(np.linalg.norm(crosses(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
+        self.bend = np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
         # Off-plane distance of each far corner: unlike an angle it does not blow up on slivers.
         on_edge = self.V[self.edges[:, 0]]
         self.step = np.maximum(
@@ -46,7 +46,7 @@ class Surface:
             np.abs(np.einsum("ij,ij->i", self.V[opposite[:, 0]] - on_edge, n2)),
         )
         self.valence = np.bincount(self.F.reshape(-1), minlength=len(self.V))
-        self.extent = float(np.ptp(self.V[distinct(self.F)], axis=0).max())
+        self.extent = float(np.ptp(self.V[np.unique(self.F)], axis=0).max())
         self.floor = max(4.0 * mesh.rounding, 1e-9 * self.extent)
 
     def lean(self, axis: Axis, faces: IntArray) -> Array:
@@ -54,8 +54,10 @@ class Surface:
         return np.asarray(np.einsum("ij,ij->i", self.normals[faces], axis.radial(self.centres[faces])[0]))
 
     def labels(self, keep: BoolArray) -> IntArray:
-        """Component (m,) of each face, called by its first one, when only the neighbour pairs ``keep`` (p,) connect."""
-        return joined(self.pairs[keep], len(self.F))
+        """Number of the component (m,) of each face, when only the neighbour pairs ``keep`` (p,) connect."""
+        i, j = self.pairs[keep].T
+        n = len(self.F)
+        return np.asarray(connected_components(coo_array((np.ones(len(i), bool), (i, j)), (n, n)), directed=False)[1])
 
     def cells(self, tolerance: float) -> IntArray:
         """Label (m,) of the planar cell of each face; neighbours within ``tolerance`` of one plane share a cell."""
@@ -73,7 +75,7 @@ def border(surface: Surface, faces: IntArray) -> tuple[BoolArray, IntArray, Bool
 def angles(surface: Surface, axis: Axis, faces: IntArray, u: Array, w: Array) -> Array:
     """Angles (k, 3) of the corners of ``faces`` (k,) about the axis, rad from u towards w."""
     p = surface.V[surface.F[faces]] - axis.point
-    return np.asarray(atan2(dot(p, w), dot(p, u)))
+    return np.asarray(np.arctan2(p @ w, p @ u))
 
 
 def turned(angle: Array, base: Array) -> Array:
@@ -100,8 +102,7 @@ def facet_span(surface: Surface, axis: Axis, faces: IntArray, cells: IntArray) -
     angle = angles(surface, axis, faces, *perpendicular(axis.direction))
     names, first, cell = np.unique(cells[faces], return_index=True, return_inverse=True)
     about = turned(angle, angle[first, :1][cell])
-    # Cell by cell: the largest and the least angle of each.
-    order = np.argsort(cell, kind="stable")
-    start = np.searchsorted(cell[order], np.arange(len(names)))
-    largest = np.maximum.reduceat(about.max(axis=1)[order], start)
-    return np.asarray(largest - np.minimum.reduceat(about.min(axis=1)[order], start))
+    largest, least = np.full(len(names), -np.inf), np.full(len(names), np.inf)
+    np.maximum.at(largest, cell, about.max(axis=1))
+    np.minimum.at(least, cell, about.min(axis=1))
+    return largest - least

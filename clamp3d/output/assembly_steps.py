@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from clamp3d.clamp.contact import Seat, measure_contacts, seats
+from clamp3d.clamp.contact import measure_contacts
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import CONTACT
+from clamp3d.clamp.status import Seat, seats
 from clamp3d.core.pose import SectionPose
 from clamp3d.output.section import edge_openings
 
@@ -71,7 +72,6 @@ def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
     clamp, start, last = assembly.clamp, *_last_step(assembly)
     # A solver that tries positions leaves small gaps; what it counted as seated is seated here.
     tolerance = max([CONTACT, *(s.gap for s in assembly.seats if s.seated)])
-    pairs: list[tuple[PartName, PartName]] = [("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7")]
     rows = []
     for waypoint in assembly.path:
         poses = waypoint.poses
@@ -86,7 +86,7 @@ def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
                 turns=round((_screwed(poses) - _screwed(start)) / clamp.bolt.pitch, 9) + 0.0
                 if waypoint in last
                 else 0.0,
-                seats=seats(measure_contacts(clamp, poses, assembly.model, pairs=pairs), tolerance),
+                seats=seats(clamp, poses, assembly.model, tolerance),
                 outside=tuple(w for w in _WIRES if not left < poses[w].x < left + clamp.up_splint.width),
             )
         )

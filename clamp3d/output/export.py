@@ -177,7 +177,7 @@ def _rounded(T: Array) -> Array:
 
 
 def _stems(placed: Sequence[PlacedPart]) -> list[str]:
-    """File names of the parts, told apart by a number where two would be the same."""
+    """File names of the parts, with a number where two would be the same."""
     out: list[str] = []
     for item in placed:
         stem = name = file_stem(item.label)

@@ -103,7 +103,7 @@ def write_json(path: Path, data: Any) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Raise InputError if ``folder`` neither exists nor can be made, before long work is done for it."""
+    """Raise InputError if ``folder`` neither exists nor can be created, to be called before long work."""
     there = folder.absolute()
     while not os.path.lexists(there):
         there = there.parent
@@ -116,7 +116,7 @@ def check_folder(folder: Path) -> None:
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> list[Path]:
-    """Write ``files`` (name to content) into ``folder``, made if need be; none is replaced before all are on the disk.
+    """Write ``files`` (name to content) into ``folder``, created if need be; all or none of them.
 
     Raises InputError if the folder cannot be written to.
     """

@@ -1,4 +1,4 @@
-"""What ``fit`` found, as text and as one self-contained page."""
+"""The result of ``fit`` as text and as one self-contained page."""
 
 from __future__ import annotations
 
@@ -102,8 +102,8 @@ def fit_to_html(result: FitResult) -> str:
 
 
 def _count(result: FitResult) -> str:
-    found = {"groove": result.grooves, "cylinder": result.cylinders, "hole": result.holes}
-    return ", ".join(counted(len(features), kind) if features else f"no {kind}" for kind, features in found.items())
+    families = {"groove": result.grooves, "cylinder": result.cylinders, "hole": result.holes}
+    return ", ".join(counted(len(features), kind) if features else f"no {kind}" for kind, features in families.items())
 
 
 def _arc(f: FittedSurface) -> str:

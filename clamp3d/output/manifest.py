@@ -1,4 +1,4 @@
-"""The manifest beside exported files: what was asked for, what each file holds, and how to check it."""
+"""The manifest beside exported files: the settings, what each file holds, and how to check it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def manifest(
 
     Volumes are mm^3, poses mm; ``bounds`` are in the unit and axes of the files. Of a drawn solid whose volume has no
     closed form ``volume_mm3`` is null and ``volume_bounds_mm3`` says between what it lies; of a mesh only the mesh's
-    own is known. Holds no date: same input, same bytes.
+    own is given. Holds no date: same input, same bytes.
     """
     libraries = ["manifold3d", "trimesh", "numpy"] if meshed else ["cadquery-ocp-novtk", "numpy"]
     if settings["format"] == "3mf":
@@ -71,9 +71,9 @@ def _part(item: PlacedPart, meshed: PosedMesh | None, settings: Mapping[str, Any
         if drawn:
             # How far the mesh's volume can lie from the true one, either way.
             low, high = volume_bounds(dataclasses.replace(drawn, volume=0.0), local.metadata["mesh_error"])
-            known = (volume + low, volume + high) if volume is not None else (local.volume - high, local.volume - low)
+            between = (volume + low, volume + high) if volume is not None else (local.volume - high, local.volume - low)
             key = "volume_bounds_mm3" if volume is None else "mesh_volume_bounds_mm3"
-            entry[key] = [round(float(bound), 6) for bound in known]
+            entry[key] = [round(float(bound), 6) for bound in between]
         entry["triangles"] = len(local.faces)
     else:
         assert isinstance(shape, (Solid, BrepSolid))  # a mesh has triangles
@@ -93,8 +93,8 @@ def versions(libraries: Iterable[str]) -> dict[str, str]:
     >>> list(versions(["numpy", "no-such-library"]))
     ['numpy']
     """
-    found = {}
+    installed = {}
     for name in libraries:
         with suppress(metadata.PackageNotFoundError):
-            found[name] = metadata.version(name)
-    return found
+            installed[name] = metadata.version(name)
+    return installed

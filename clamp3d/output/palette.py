@@ -1,6 +1,6 @@
 """Colours that mean the same in every picture, page and file.
 
-Parts: from the light scheme of Paul Tol's "Colour schemes" (SRON/EPS/TN/09-002), told apart by colour-blind readers and
+Parts: from the light scheme of Paul Tol's "Colour schemes" (SRON/EPS/TN/09-002), distinct for colour-blind readers and
 none of them a verdict's; bolt and nut are greys. Each part also carries its name, so no picture speaks by colour alone.
 """
 

@@ -59,18 +59,16 @@ class PlacedPart:
 
 
 def posed(parts: Iterable[PlacedPart], mesh_error: float) -> list[PosedMesh]:
-    """The triangles of parts, made once for all parts of a shape.
+    """The triangles of parts; parts of one shape share them.
 
     Arcs are within ``mesh_error`` mm, the facets of a mesh or of a solid from CAD are as they are. ``metadata`` of a
-    mesh holds ``mesh_error`` and ``chord_error``: what was asked for and what it is, mm.
+    mesh holds ``mesh_error`` and ``chord_error``: the largest error allowed and the largest there is, mm.
     """
-    made: dict[Shape, trimesh.Trimesh] = {}
-    found = []
-    for part in parts:
-        if part.shape not in made:
-            made[part.shape] = _triangles(part.shape, mesh_error)
-        found.append(PosedMesh(made[part.shape], part.T, part.colour, part.label))
-    return found
+    meshes: dict[Shape, trimesh.Trimesh] = {}
+    for part in (parts := list(parts)):
+        if part.shape not in meshes:
+            meshes[part.shape] = _triangles(part.shape, mesh_error)
+    return [PosedMesh(meshes[part.shape], part.T, part.colour, part.label) for part in parts]
 
 
 def _triangles(shape: Shape, mesh_error: float) -> trimesh.Trimesh:
@@ -87,19 +85,17 @@ def place(source: Clamp | Scene, names: Iterable[str] | None = None) -> tuple[Pl
 
     Raises InputError for an unknown part or none at all.
     """
-    given: list[tuple[str, Shape, Array | None]]
+    shapes: dict[str, tuple[Shape, Array | None]]
     if isinstance(source, Clamp):
-        given = [(name, solid, None) for name, solid in parts(source).items()]
+        shapes = {name: (solid, None) for name, solid in parts(source).items()}
     else:
-        given = [(part.name, part.shape, part.T_world) for part in source.parts]
-    colours = part_colours([name for name, _, _ in given])
-    found = [PlacedPart(name, shape, T, colours[name]) for name, shape, T in given]
-    known = [part.name for part in found]
-    given_names = known if names is None else items("names", names, "part names")
-    chosen = dict.fromkeys(text("each of names", name) for name in given_names)
+        shapes = {part.name: (part.shape, part.T_world) for part in source.parts}
+    available = list(shapes)
+    chosen = dict.fromkeys(available if names is None else items("names", names, "part names"))
     for name in chosen:
-        if name not in colours:
-            raise InputError(unknown_part(name, known))
+        if text("each of names", name) not in shapes:
+            raise InputError(unknown_part(name, available))
     if not chosen:
-        raise InputError(f"names must name at least one part, available: {', '.join(known) or 'none'}")
-    return tuple(part for part in found if part.name in chosen)
+        raise InputError(f"names must name at least one part, available: {', '.join(available) or 'none'}")
+    colours = part_colours(available)
+    return tuple(PlacedPart(name, *shapes[name], colours[name]) for name in available if name in chosen)

@@ -18,7 +18,7 @@ from clamp3d.output.palette import INK
 
 ANGLES: tuple[Freedom, ...] = ("yaw", "pitch")
 
-# Okabe and Ito's colours (Color Universal Design, 2008), told apart by colour-blind readers, light to dark.
+# Okabe and Ito's colours (Color Universal Design, 2008), distinct for colour-blind readers, light to dark.
 COLOURS = {Outcome.CLOSES: "#009E73", Outcome.TOUCHES_WRONGLY: "#E69F00", Outcome.CANNOT_SEAT: "#4A4F55"}
 _TITLES = {"offset": "offset (mm)", "height": "height (mm)", "yaw": "yaw (deg)", "pitch": "pitch (deg)"}
 

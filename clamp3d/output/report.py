@@ -1,6 +1,6 @@
 """A report for a reviewer, of a checked scene or of an assembled clamp: report.html, report.json and pairs.csv.
 
-What was found is gathered here, all distances and verdicts from the engine; `report_page` writes it down.
+The findings are gathered here, all distances and verdicts from the engine; `report_page` writes them down.
 """
 
 from __future__ import annotations
@@ -15,25 +15,26 @@ from clamp3d.checks import path as checked_path
 from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.result import Assembly
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.check import check
-from clamp3d.collide.distance import Distance
 from clamp3d.collide.result import BAD, PairResult
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.output.assembly_steps import StepRow, TighteningRow, step_rows, tightening_rows
+from clamp3d.output.groups import Group, grouped
 from clamp3d.output.pages import render
-from clamp3d.output.wording import distance_text, finding_text, headline, sentence, titles
+from clamp3d.output.wording import distance_text, group_text, headline, sentence, titles
 
 Severity = Literal["error", "warning", "note", "ok"]
 
 CLEARANCE = 5.0
-"""Gap in mm up to which two parts of a clamp are told to be near, if none is chosen."""
+"""Gap in mm below which two parts of a clamp are listed as near, if none is chosen."""
 LISTED = 400
 """With more rows than these the page leaves out those that are clear."""
 
 SEVERITIES: dict[Severity, str] = {
-    "error": "must be mended",
-    "warning": "to be looked at: undecided within the error bound, or apart though declared to touch in an arc",
+    "error": "must be corrected",
+    "warning": "to be checked: undecided within the error bound, or apart though declared to touch in an arc",
     "note": "worth knowing",
     "ok": "as it should be",
 }
@@ -67,11 +68,12 @@ class PairRow:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a reviewer has to look at: ``text`` in words, and the pair that it is about, if it is about one."""
+    """What a reviewer has to look at: ``text`` in words, the pair that it is about, if any, and its group."""
 
     severity: Severity
     text: str
     row: PairRow | None = None
+    group: Group | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,9 +85,9 @@ class Report:
     scene : Scene
         Parts, thresholds and motions.
     headline : str
-        What was found, in one line.
+        The result in one line.
     passed : bool
-        Whether nothing must be mended.
+        Whether nothing must be corrected.
     findings : tuple of Finding
         The worst first.
     rows, motions : tuple of PairRow
@@ -95,7 +97,7 @@ class Report:
     modelled, not_modelled : tuple of str
         What the numbers stand on, and what they leave out.
     settings : dict
-        What was asked for, in words.
+        The settings, in words.
     assembly : Assembly or None
         The clamp and its way together, with ``steps`` and ``tightening``.
     """
@@ -135,7 +137,7 @@ def report(
     clearance : float, optional
         Gap in mm that parts must keep; by default the scene's own, 5 mm for a clamp.
     progress : callable, optional
-        Is told what is being done.
+        Called with what is being done.
 
     Returns
     -------
@@ -158,8 +160,8 @@ def report(
     from clamp3d.output.report_page import write_report
 
     folder = checked_path("folder", folder)
-    tell = progress or (lambda what: None)
-    return write_report(make_report(source, clearance=clearance, progress=tell), folder, progress=tell)
+    made = make_report(source, clearance=clearance, progress=progress)
+    return write_report(made, folder, progress=progress or (lambda step: None))
 
 
 def make_report(
@@ -171,8 +173,8 @@ def make_report(
     """What `report` writes down.
 
     >>> from clamp3d.clamp.assemble import assemble
-    >>> found = make_report(assemble())
-    >>> len(found.rows), found.passed
+    >>> clamp_report = make_report(assemble())
+    >>> len(clamp_report.rows), clamp_report.passed
     (21, True)
     """
     instance("source", source, Scene, Assembly)
@@ -185,8 +187,8 @@ def make_report(
 
 
 def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
-    tell = None if progress is None else lambda stage, done, of: progress(f"{stage}: {done} of {of}")
-    result = check(scene, progress=tell)
+    on_stage = None if progress is None else lambda stage, done, of: progress(f"{stage}: {done} of {of}")
+    result = check(scene, progress=on_stage)
     names = titles(scene)
 
     def row(pair: PairResult) -> PairRow:
@@ -194,8 +196,9 @@ def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
 
     rows = {id(pair): row(pair) for pair in result.rows}
     findings = []
-    for pair in result.findings:
-        findings.append(Finding(rows[id(pair)].severity, finding_text(pair, names), rows[id(pair)]))
+    for group in grouped(result):
+        worst = rows[id(group.worst)]
+        findings.append(Finding(worst.severity, group_text(group, names), worst, group))
     return Report(
         scene=scene,
         headline=headline(result),
@@ -217,10 +220,10 @@ def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
         Finding(f.severity, f.text, next((r for r in rows if (r.result.a, r.result.b) == (f.a, f.b)), None))
         for f in assembly.findings
     ]
-    told = {finding.row for finding in findings}
+    named = {finding.row for finding in findings}
     names = titles(scene)
     for row in sorted(rows, key=lambda row: row.distance.upper):
-        if row.severity != "ok" and row not in told:
+        if row.severity != "ok" and row not in named:
             text = f"{names[row.result.a]} and {names[row.result.b]} {row.remark}: {distance_text(row.distance)}"
             findings.append(Finding(row.severity, text if row.remark else sentence(row.result, names), row))
     findings.sort(key=lambda finding: list(SEVERITIES).index(finding.severity))
@@ -275,7 +278,7 @@ def _severity(verdict: Verdict) -> Severity:
 
 def _thresholds(scene: Scene) -> dict[str, str]:
     t = scene.thresholds
-    clearance = f"{t.clearance:g} mm" if t.clearance else "not asked for"
+    clearance = f"{t.clearance:g} mm" if t.clearance else "not set"
     return {"contact": f"gap or overlap up to {t.contact:g} mm", "clearance": clearance}
 
 

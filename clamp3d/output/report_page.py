@@ -18,8 +18,8 @@ from clamp3d.collide.verdict import Verdict
 from clamp3d.output.files import write_files
 from clamp3d.output.manifest import versions
 from clamp3d.output.pages import now, render
-from clamp3d.output.palette import VERDICT_COLOURS, part_colours
-from clamp3d.output.report import LISTED, SEVERITIES, PairRow, Report
+from clamp3d.output.palette import DIMENSION, INK, VERDICT_COLOURS, part_colours
+from clamp3d.output.report import LISTED, SEVERITIES, Finding, PairRow, Report
 from clamp3d.output.wording import distance_text, meaning, titles
 
 if TYPE_CHECKING:
@@ -29,12 +29,22 @@ LIBRARIES = ("numpy", "scipy", "numba", "matplotlib")
 FILES = ("report.html", "report.json", "pairs.csv")
 PICTURES = 24
 """Findings of a scene that get a picture, the worst ones."""
+_DARK = (
+    "@media (prefers-color-scheme: dark) {"
+    + "".join(
+        f'[style*="{kind}: {light}"] {{ {kind}: {dark} !important }}'
+        for kind in ("fill", "stroke")
+        for light, dark in ((INK.lower(), "#dfe4ea"), (DIMENSION.lower(), "#ff9fcb"), ("#ffffff", "#1d2329"))
+    )
+    + "}"
+)
+"""Colours of a picture on a dark page: what is drawn in ink becomes light, what is white dark."""
 MATRIX = 30
 """Parts that the page's matrix shows at most."""
 
 
-def write_report(report: Report, folder: Path, *, progress: Callable[[str], None] = lambda what: None) -> list[Path]:
-    """Write report.html, report.json and pairs.csv into ``folder``, all or none; ``progress`` hears of each picture.
+def write_report(report: Report, folder: Path, *, progress: Callable[[str], None] = lambda step: None) -> list[Path]:
+    """Write report.html, report.json and pairs.csv into ``folder``, all or none; ``progress`` gets each picture.
 
     Raises InputError if the folder cannot be written to.
     """
@@ -77,7 +87,7 @@ def report_to_dict(report: Report) -> dict[str, Any]:
         "settings": report.settings,
         "headline": report.headline,
         "passed": report.passed,
-        "findings": [{"severity": f.severity, "text": f.text} for f in report.findings],
+        "findings": [_finding_to_dict(finding) for finding in report.findings],
         "pairs": [_pair_to_dict(row) for row in report.rows],
         "motions": [_pair_to_dict(row) for row in report.motions],
         "modelled": list(report.modelled),
@@ -113,7 +123,7 @@ def _cells(data: dict[str, Any]) -> Iterator[tuple[str, Any]]:
             yield key, "" if value is None else value
 
 
-def report_html(report: Report, *, progress: Callable[[str], None] = lambda what: None) -> str:
+def report_html(report: Report, *, progress: Callable[[str], None] = lambda step: None) -> str:
     """The report as one HTML page with its pictures inside."""
     cells = {(row.result.a, row.result.b): row for row in report.rows}
     names = [part.name for part in report.scene.parts]
@@ -128,7 +138,7 @@ def report_html(report: Report, *, progress: Callable[[str], None] = lambda what
         made=f"{now():%Y-%m-%d %H:%M} UTC",
         versions=_versions(),
         gap=distance_text,
-        bound=lambda value: f"{value:.1e}" if math.isfinite(value) else "not known",
+        bound=lambda value: f"{value:.1e}" if math.isfinite(value) else "unknown",
         vector=lambda v: "" if v is None else ", ".join(f"{x:z.3f}" if abs(x) >= 5e-4 else "0" for x in v),
         degrees=math.degrees,
         pictures=_pictures(report, progress),
@@ -164,10 +174,10 @@ def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list
             if row.contact is not None and (row.contact.type or row.contact.declared) > 1:
                 jobs.append(("pairs", row.name, partial(contact_figure, assembly, row.contact), row))
     elif scene.parts:
-        found = [finding.row for finding in report.findings if finding.row is not None]
-        marks = [(number, row.result) for number, row in enumerate(found, 1)]
+        rows = [finding.row for finding in report.findings if finding.row is not None]
+        marks = [(number, row.result) for number, row in enumerate(rows, 1)]
         jobs.append(("overview", "the scene", partial(scene_figure, scene, marks[:PICTURES]), None))
-        jobs += [("pairs", row.name, partial(finding_figure, scene, row.result), row) for row in found[:PICTURES]]
+        jobs += [("pairs", row.name, partial(finding_figure, scene, row.result), row) for row in rows[:PICTURES]]
     out: dict[str, list[tuple[str, PairRow | None]]] = {"overview": [], "steps": [], "pairs": []}
     for kind, name, draw, pair in jobs:
         progress(f"picture of {name}")
@@ -178,7 +188,13 @@ def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list
 def _data_address(figure: Figure) -> str:
     from clamp3d.output.figures import svg
 
-    return "data:image/svg+xml;base64," + base64.b64encode(svg(figure)).decode("ascii")
+    picture = svg(figure).replace(b"</style>", f"{_DARK}</style>".encode(), 1)
+    return "data:image/svg+xml;base64," + base64.b64encode(picture).decode("ascii")
+
+
+def _finding_to_dict(finding: Finding) -> dict[str, Any]:
+    group = {} if finding.group is None else {"id": finding.group.id, "count": len(finding.group.rows)}
+    return {"severity": finding.severity, "text": finding.text} | group
 
 
 def _pair_to_dict(row: PairRow) -> dict[str, Any]:

@@ -15,11 +15,11 @@ from clamp3d.core.pose import Array
 from clamp3d.core.profile import MIN_MESH_ERROR
 from clamp3d.core.shapes import Solid
 from clamp3d.errors import Clamp3dError
+from clamp3d.output.common import overlap
 from clamp3d.output.figures import blank
 from clamp3d.output.palette import INK, VERDICT_COLOURS
 from clamp3d.output.placed import PosedMesh, place, posed
 from clamp3d.output.view3d import Camera, draw_solids
-from clamp3d.output.viewer_cut import overlap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,15 +103,17 @@ def _at(scene: Scene, row: PairResult) -> Scene:
 
 
 def _solids(scene: Scene, names: Sequence[str]) -> dict[str, PosedMesh]:
-    found = {}
+    solids = {}
     for item in place(scene, names):
         extent = float(np.ptp(item.shape.bounds, axis=0).max()) if isinstance(item.shape, Solid) else 0.0
-        (found[item.name],) = posed([item], max(MIN_MESH_ERROR, _MESH_ERROR * extent))
-    return found
+        (solids[item.name],) = posed([item], max(MIN_MESH_ERROR, _MESH_ERROR * extent))
+    return solids
 
 
 def _place(row: PairResult) -> Array | None:
-    """The middle between the two witness points."""
+    """A point inside the overlap where one is known, else the middle between the two witness points."""
+    if row.where is not None and row.where.point is not None:
+        return row.where.point
     p, q = row.distance.point_a, row.distance.point_b
     return None if p is None or q is None else 0.5 * (p + q)
 
@@ -119,10 +121,10 @@ def _place(row: PairResult) -> Array | None:
 def _common(a: PosedMesh, b: PosedMesh) -> PosedMesh | None:
     """What two overlapping parts have in common; None where their facets do not meet or cannot be cut."""
     try:
-        found = overlap(a.mesh, a.T, b.mesh, b.T)
+        shared = overlap(a.mesh, a.T, b.mesh, b.T)
     except (Clamp3dError, RuntimeError, ValueError):
         return None
-    return None if found is None else PosedMesh(found, a.T, VERDICT_COLOURS["clash"])
+    return None if shared is None else PosedMesh(shared, a.T, VERDICT_COLOURS["clash"])
 
 
 def _hidden(camera: Camera, solids: Sequence[PosedMesh], place: Array) -> int:
@@ -152,4 +154,12 @@ def _legend(ax: Axes, solids: dict[str, PosedMesh]) -> None:
 
     if len(solids) <= 12:
         handles = [Patch(fc=solid.colour, ec=INK, lw=0.5, label=name) for name, solid in solids.items()]
-        ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=4, frameon=False, fontsize=8)
+        ax.legend(
+            handles=handles,
+            loc="upper left",
+            bbox_to_anchor=(0.0, 0.0),
+            ncols=4,
+            frameon=False,
+            fontsize=8,
+            labelcolor=INK,
+        )

@@ -1,7 +1,8 @@
-"""A checked scene as text, as JSON data and as one page in 3D: all three say what `CheckResult.findings` says."""
+"""A checked scene as text, as JSON data and as one page in 3D: all three list the groups of its findings."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import combinations
 from typing import Any
@@ -9,12 +10,13 @@ from typing import Any
 from clamp3d import __version__
 from clamp3d.collide.result import CheckResult, Work
 from clamp3d.collide.verdict import Verdict
+from clamp3d.output.groups import Accepted, Comparison, Group, grouped
 from clamp3d.output.tables import text_table
 from clamp3d.output.wording import (
     counted,
     distance_text,
-    finding_text,
     first_text,
+    group_text,
     headline,
     meaning,
     titles,
@@ -23,8 +25,8 @@ from clamp3d.output.wording import (
 
 _MATRIX = 14
 """More parts than this and the matrix no longer fits a terminal."""
-_ROWS = 60
-_NOTES = 12
+_LISTED, _PAIRS, _NOTES = 60, 30, 12
+"""Groups, pairs and notes that the text lists at most."""
 _MARK = {
     Verdict.CLEAR: ".",
     Verdict.CLEARANCE: "g",
@@ -37,57 +39,100 @@ _MARK = {
 }
 
 
-def check_to_dict(result: CheckResult, full: CheckResult | None = None) -> dict[str, Any]:
+def check_to_dict(result: CheckResult, comparison: Comparison | None = None) -> dict[str, Any]:
     """The result as JSON data; lengths in mm. Pairs that are not listed are clear."""
-    data = {"clamp3d": __version__, "headline": headline(result)} | result.to_dict() | {"work": asdict(result.work)}
-    if full is not None:
-        data["full"] = {"pairs": [row.to_dict() for row in full.pairs], "work": asdict(full.work)}
-    return data
+    groups = [group.to_dict() for group in grouped(result)]
+    if comparison is not None:
+        groups = [group | {"status": comparison.status[group["id"]]} for group in groups]
+    data = {"clamp3d": __version__, "headline": headline(result), "groups": groups}
+    if comparison is not None and comparison.has_baseline:
+        data["gone"] = list(comparison.gone)
+    return data | result.to_dict() | {"work": asdict(result.work)}
 
 
-def check_to_text(result: CheckResult, full: CheckResult | None = None) -> str:
-    """The result as lines for a terminal: the headline, the findings, the matrix, all pairs."""
-    t, n, names = result.thresholds, len(result.scene.parts), titles(result.scene)
-    clearance = f"clearance {t.clearance:g} mm" if t.clearance else "no clearance asked for"
-    moving = f" at rest and {len(result.motions)} in motion" if result.motions else ""
-    counts = ", ".join(f"{count} {name}" for name, count in result.counts.items()) or "no pairs"
-    lines = [
-        f"{result.scene.name}: {headline(result)}",
-        f"{counted(n, 'part')}, {counted(result.work.pairs, 'pair')}{moving}: {counts}; "
-        f"contact up to {t.contact:g} mm, {clearance}",
-    ]
-    lines += [f"  note: {note}" for note in result.scene.notes[:_NOTES]]
-    if len(result.scene.notes) > _NOTES:
-        lines.append(f"  ... and {len(result.scene.notes) - _NOTES} more notes (--json lists all)")
-    # What merely touches at rest stands in the table of pairs.
-    told = [row for row in result.findings if row.verdict is not Verdict.CONTACT or row.motion is not None]
-    lines += [f"  {finding_text(row, names)}" for row in told[:_ROWS]]
-    if len(told) > _ROWS:
-        lines.append(f"  ... and {len(told) - _ROWS} more (--json or --html lists all)")
+def check_to_text(
+    result: CheckResult, comparison: Comparison | None = None, accepted: Mapping[str, Accepted] | None = None
+) -> str:
+    """The result as lines for a terminal: the headline, the groups of findings, the matrix, the pairs, the motions."""
+    n = len(result.scene.parts)
+    lines = [f"{result.scene.name}: {headline(result)}", _counts(result)]
+    lines += _cut([f"  note: {note}" for note in result.scene.notes], _NOTES, "more notes (--json lists all)")
+    if comparison is not None:
+        lines += comparison_text(comparison)
+    lines += _cut(_findings(result, comparison, accepted or {}), _LISTED, "more (--json or --html lists all)")
     if 2 <= n <= _MATRIX and result.asked is None:
         lines += ["", *_matrix(result)]
-    pairs = worst_first(result.pairs)[: _ROWS // 2]
-    if pairs:
-        table = [(f"{r.a} - {r.b}", r.verdict.value, distance_text(r.distance), r.distance.method) for r in pairs]
-        lines += ["", text_table(("pair", "verdict", "distance", "by"), table, indent=2)]
-    if len(result.pairs) > len(pairs):
-        lines.append(f"  ... and {len(result.pairs) - len(pairs)} more (--json or --html lists all)")
-    if result.motions:
-        head = ("motion", "pair", "verdict", "least distance", "at t", "first contact at t", "by")
-        moved = [
-            (
-                str(r.motion),
-                f"{r.a} - {r.b}",
-                r.verdict.value,
-                distance_text(r.distance),
-                "" if r.t is None else f"{r.t:.4f}",
-                "" if r.contact_at is None else first_text(r.contact_at),
-                r.distance.method,
-            )
-            for r in result.motions
+    if result.pairs:
+        rows = [
+            (f"{row.a} - {row.b}", row.verdict.value, distance_text(row.distance), row.distance.method)
+            for row in worst_first(result.pairs)
         ]
-        lines += ["", text_table(head, moved, indent=2)]
-    return "\n".join([*lines, "", *work_text(result.work, full)])
+        lines += ["", text_table(("pair", "verdict", "distance", "by"), rows[:_PAIRS], indent=2)]
+        if len(rows) > _PAIRS:
+            lines.append(f"  ... and {len(rows) - _PAIRS} more (--json or --html lists all)")
+    if result.motions:
+        lines += ["", _motions(result)]
+    return "\n".join([*lines, "", *work_text(result.work)])
+
+
+def comparison_text(comparison: Comparison) -> list[str]:
+    """How the findings differ from the baseline's, in lines."""
+    status = list(comparison.status.values())
+    n_accepted = status.count("accepted")
+    if not comparison.has_baseline:
+        return [f"  {counted(n_accepted, 'group of findings', 'groups of findings')} accepted"] if n_accepted else []
+    summary = f"  since the baseline: {status.count('new')} new, {status.count('changed')} changed"
+    summary += f", {len(comparison.gone)} gone, {status.count('same')} unchanged, {n_accepted} accepted"
+    gone = (f"  gone: {old['a']} and {old['b']}, {old['verdict']}; id {old['id']}" for old in comparison.gone)
+    return [summary, *gone]
+
+
+def _counts(result: CheckResult) -> str:
+    t = result.thresholds
+    clearance = f"clearance {t.clearance:g} mm" if t.clearance else "no clearance set"
+    moving = f" at rest and {len(result.motions)} in motion" if result.motions else ""
+    counts = ", ".join(f"{count} {name}" for name, count in result.counts.items()) or "no pairs"
+    return (
+        f"{counted(len(result.scene.parts), 'part')}, {counted(result.work.pairs, 'pair')}{moving}: {counts}; "
+        f"contact up to {t.contact:g} mm, {clearance}"
+    )
+
+
+def _findings(result: CheckResult, comparison: Comparison | None, accepted: Mapping[str, Accepted]) -> list[str]:
+    """A line for each group; what merely touches at rest is in the table of pairs."""
+    names = titles(result.scene)
+
+    def line(group: Group) -> str:
+        status: str = "" if comparison is None else comparison.status[group.id]
+        if status == "accepted" and (entry := accepted.get(group.id)):
+            status = f"accepted by {entry.who} on {entry.when} ({entry.why})"
+        shown = comparison is not None and (comparison.has_baseline or status.startswith("accepted"))
+        return f"  {f'{status}: ' if shown else ''}{group_text(group, names)}; id {group.id}"
+
+    groups = grouped(result)
+    return [line(g) for g in groups if g.verdict is not Verdict.CONTACT or g.motion is not None]
+
+
+def _cut(lines: Sequence[str], most: int, rest: str) -> list[str]:
+    """The first lines, and how many more there are."""
+    return [*lines[:most], *([f"  ... and {len(lines) - most} {rest}"] if len(lines) > most else [])]
+
+
+def _motions(result: CheckResult) -> str:
+    head = ("motion", "pair", "verdict", "least distance", "at t", "first contact at t", "by")
+    rows = [
+        (
+            str(row.motion),
+            f"{row.a} - {row.b}",
+            row.verdict.value,
+            distance_text(row.distance),
+            "" if row.t is None else f"{row.t:.4f}",
+            "" if row.contact_at is None else first_text(row.contact_at),
+            row.distance.method,
+        )
+        for row in result.motions
+    ]
+    return text_table(head, rows, indent=2)
 
 
 def _matrix(result: CheckResult) -> list[str]:
@@ -99,28 +144,20 @@ def _matrix(result: CheckResult) -> list[str]:
     return [text_table(("", *names), table, indent=2), f"  {legend}"]
 
 
-def work_text(work: Work, full: CheckResult | None = None) -> list[str]:
+def work_text(work: Work) -> list[str]:
     """What the answer took, in lines."""
     decided = ", ".join(f"{count} by {level}" for level, count in work.decided.items())
     queries = ", ".join(f"{count} {level}" for level, count in work.queries.items() if count)
-    lines = [
+    return [
         f"decided: {decided or 'nothing'}",
         f"built: {work.meshes} meshes ({work.triangles} triangles), {work.hulls} hulls, {work.fits} fits "
-        f"for {work.shapes} shapes; asked: {queries or 'nothing'}; {sum(work.seconds.values()):.2f} s",
+        f"for {work.shapes} shapes; queries: {queries or 'none'}; {sum(work.seconds.values()):.2f} s",
     ]
-    if full is not None:
-        total = full.work
-        lines.append(
-            f"full model: {total.meshes} meshes, {total.triangles} triangles, {total.hulls} hulls, "
-            f"{sum(total.queries.values())} queries, {sum(total.seconds.values()):.2f} s; agrees in all "
-            f"{total.pairs} verdicts"
-        )
-    return lines
 
 
-def check_to_html(result: CheckResult, full: CheckResult | None = None) -> str:
+def check_to_html(result: CheckResult) -> str:
     """The result as one page in 3D that needs no other file and no network."""
     from clamp3d.output.viewer import view
 
-    with view(result, serve=False, notes=[*result.scene.notes, *work_text(result.work, full)]) as viewer:
+    with view(result, serve=False, notes=[*result.scene.notes, *work_text(result.work)]) as viewer:
         return viewer.html()

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from clamp3d.brep.open_cascade import explore
 from clamp3d.brep.solid import BrepSolid, require_open_cascade
-from clamp3d.brep.tessellate import explore
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc

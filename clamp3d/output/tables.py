@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
+from clamp3d.errors import escaped
+
 _NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?( %)?|-|")
 
 
@@ -32,22 +34,18 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, indent:
     P1      1.5
     P12   12.25
     """
-    cells = [["-" if cell is None else str(cell) for cell in row] for row in rows]
-    cells = [row + [""] * (len(head) - len(row)) for row in cells]
-    lines = [""] * (1 + len(cells))
-    for title, *column in zip(head, *cells, strict=True):
-        numbers = all(_NUMBER.fullmatch(cell) for cell in column)
-        width = max(_width(cell) for cell in (title, *column))
-        for k, cell in enumerate((title, *column)):
-            blanks = " " * (width - _width(cell))
-            lines[k] += (blanks + cell if numbers else cell + blanks) + "  "
-    return "\n".join((" " * indent + line).rstrip() for line in lines)
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
 
-
-def _width(cell: str) -> int:
-    """Columns of a terminal that a text takes."""
-    if cell.isascii() and cell.isprintable():
-        return len(cell)
-    from rich.cells import cell_len
-
-    return cell_len(cell)
+    cells = [["-" if cell is None else escaped(str(cell)) for cell in row] for row in rows]
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_edge=False)
+    for k, title in enumerate(head):
+        numeric = all(_NUMBER.fullmatch(row[k]) for row in cells if k < len(row))
+        table.add_column(Text(title), justify="right" if numeric else "left", no_wrap=True)
+    for row in cells:
+        table.add_row(*map(Text, row))
+    console = Console(width=100_000, color_system=None, legacy_windows=False)
+    with console.capture() as captured:
+        console.print(table)
+    return "\n".join((" " * indent + line).rstrip() for line in captured.get().splitlines())

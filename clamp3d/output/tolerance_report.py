@@ -34,8 +34,8 @@ def _lines(result: MonteCarlo, rows: tuple[Sensitivity, ...], note: str) -> Iter
     tolerance = dict(zip(DIMENSIONS, result.spec.tolerance, strict=True))
     variance = shares(result, rows)
     total = sum(variance.values())
-    n, m = len(result.status), len(result.clamped)
-    nominal = "does not clamp" if result.nominal is None else f"{result.nominal:.4f} mm"
+    n, m, unproven = len(result.status), len(result.clamped), result.unproven
+    nominal = result.nominal_status if result.nominal is None else f"{result.nominal:.4f} mm"
     yield f"clamp {result.spec.clamp.name}: splint distance {nominal}"
     yield (
         note
@@ -60,7 +60,9 @@ def _lines(result: MonteCarlo, rows: tuple[Sensitivity, ...], note: str) -> Iter
         yield spread + (f" (linear: {math.sqrt(total):.4f} mm)" if rows else "")
         values = zip(PERCENTILES, result.percentiles(PERCENTILES), strict=True)
         yield text_table(("percentile", "mm"), [(f"{p:.1f} %", f"{v:.4f}") for p, v in values], indent=2)
-    yield f"not clamped: {n - m} of {n} ({100 * (n - m) / n:.2f} %)"
+    yield f"not clamped: {n - m - unproven} of {n} ({100 * (n - m - unproven) / n:.2f} %)"
+    if unproven:
+        yield f"not proven: {unproven} of {n}"
     yield from (f"  {count:6d}  {reason}" for reason, count in result.reasons().items())
 
 
@@ -74,6 +76,7 @@ def tolerance_to_dict(result: MonteCarlo, rows: tuple[Sensitivity, ...]) -> dict
         "distribution": result.spec.distribution,
         "tolerances_mm": dict(zip(DIMENSIONS, result.spec.tolerance, strict=True)),
         "nominal_mm": result.nominal,
+        "status": result.nominal_status,
         "sensitivities": [asdict(row) for row in rows],
         "percentiles_mm": dict(zip(map(str, PERCENTILES), result.percentiles(PERCENTILES), strict=False)),
         "not_clamped": result.reasons(),

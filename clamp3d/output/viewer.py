@@ -8,12 +8,16 @@
 
 from __future__ import annotations
 
+import base64
+import itertools
+import math
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from clamp3d import __version__
 from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import flag, instance, text
 from clamp3d.clamp.dimensions import Clamp
@@ -22,19 +26,22 @@ from clamp3d.clamp.result import Assembly, Finding, Waypoint
 from clamp3d.collide.check import check
 from clamp3d.collide.distance import measure
 from clamp3d.collide.model import ModelCache
-from clamp3d.collide.result import CheckResult
+from clamp3d.collide.result import CheckResult, PairResult
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array
 from clamp3d.core.shapes import MeshShape
 from clamp3d.errors import InputError
 from clamp3d.output.files import write_text
+from clamp3d.output.groups import grouped
+from clamp3d.output.pages import render
 from clamp3d.output.palette import FORCE, VERDICT_COLOURS
-from clamp3d.output.viewer_page import live_page, panel, whole_page
+from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
 from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
-from clamp3d.output.viewer_server import CommandLog, LocalServer, RemoteServer
 from clamp3d.output.viewer_timeline import FIRST, UNCUT, ClampStory, Row, Stop, scene_stops
 from clamp3d.output.wording import (
     circumstances,
+    distance_text,
+    group_sentence,
     headline,
     meaning,
     sentence,
@@ -61,7 +68,7 @@ class Viewer:
     Parameters
     ----------
     shown : Clamp, Scene, Assembly or CheckResult
-        What to draw. `view` also tells what was found.
+        What to draw. `view` also shows the result.
     model : ContactModel, optional
         How grooves are measured; by default exactly.
     mesh_error : float
@@ -76,7 +83,7 @@ class Viewer:
         Serve the page on this machine (``host``, ``port``: the first free one from 7000); else it is only kept for
         `save_html`. No browser is opened, and none is waited for.
     url : str, optional
-        A running meshcat server in place of our own: its zmq_url.
+        A running meshcat server to show the scene on: its zmq_url.
 
     Raises
     ------
@@ -110,38 +117,32 @@ class Viewer:
         self._scene = self._clamp.scene if self._clamp is not None else _scene(shown, clearance)
         self._cache, self._log = ModelCache(), CommandLog()
         self._waypoints: list[Waypoint] = []
-        self._server: LocalServer | RemoteServer | None = None
         self._story: dict[str, Any] = {}
         self._panel = ""
-        try:
-            if url is not None:
-                self._server = RemoteServer(text("url", url))
-            self._drawing = SceneDrawing(
-                self._scene,
-                self._send,
-                mesh_error=mesh_error,
-                cut_y=0.0 if self._clamp is not None else _cut(self._scene),
-                uncut=UNCUT if self._clamp is not None else (),
-                anchors=None if self._clamp is None else self._clamp.anchors,
-                overlays=overlays,
-            )
-            self._tell("waiting for the first state", state="waiting")
-            if url is None and serve:
-                self._server = LocalServer(
-                    lambda: live_page(self._story["title"], self._panel), self._log, host=host, port=port
-                )
-        except BaseException:
-            self.close()
-            raise
+        self._meshcat = None if url is None else MeshcatServer(text("url", url))
+        self._server: PageServer | None = None
+        self._drawing = SceneDrawing(
+            self._scene,
+            self._send,
+            mesh_error=mesh_error,
+            cut_y=0.0 if self._clamp is not None else _cut(self._scene),
+            uncut=UNCUT if self._clamp is not None else (),
+            anchors=None if self._clamp is None else self._clamp.anchors,
+            overlays=overlays,
+        )
+        self._set_story("waiting for the first state", state="waiting")
+        if url is None and serve:
+            self._server = PageServer(self.html, host=host, port=port)
 
     @property
     def url(self) -> str | None:
         """Where to look with a browser; None if nothing is served."""
-        return None if self._server is None else self._server.url
+        server = self._meshcat or self._server
+        return None if server is None else server.url
 
     @property
     def story(self) -> dict[str, Any]:
-        """What the page tells, as data: stops with their rows (distances in mm), findings, parts."""
+        """What the page shows, as data: stops with their rows (distances in mm), findings, parts."""
         return self._story
 
     def show(self, waypoint: Waypoint) -> None:
@@ -152,32 +153,24 @@ class Viewer:
         self._waypoints.append(waypoint)
         self._drawing.show(self._clamp.stop(waypoint))
         self._drawing.dimension(len(self._waypoints) - 1, "splints", *self._clamp.opening(waypoint))
-        self._tell(f"{waypoint.step}: {waypoint.label}", state="running")
+        self._set_story(f"{waypoint.step}: {waypoint.label}", state="running")
 
     def finish(self, result: Assembly | CheckResult) -> None:
-        """Tell the result, and play the whole time line once."""
-        told: dict[str, Any]
-        if isinstance(result, Assembly):
-            for waypoint in result.path[len(self._waypoints) :]:
-                self.show(waypoint)
-            forces = [force for force in result.forces if force.feature != HELD]
-            self._drawing.forces(len(self._waypoints) - 1, forces)
-            worst = {finding.severity for finding in result.findings}
-            state = "found" if "error" in worst else "note" if "warning" in worst else "clean"
-            told = {"said": result.status, "state": state, "assembly": result, "forces": forces}
-            told["findings"] = [self._assembly_finding(finding) for finding in result.findings]
-        else:
-            instance("result", result, CheckResult)
-            for stop in scene_stops(result, self._measured):
-                self._drawing.show(stop)
-            told = {"said": headline(result), "state": severity(result), "findings": self._scene_findings(result)}
-            told |= {"pairs": worst_first(result.pairs)[:_LISTED], "motions": worst_first(result.motions)[:_LISTED]}
+        """Show the result, and play the whole time line once."""
+        shown = self._finish_assembly(result) if isinstance(result, Assembly) else self._finish_check(result)
         self._drawing.play()
-        self._tell(**told, done=True)
+        self._set_story(**shown, done=True)
 
     def html(self) -> str:
-        """The scene with its animation as one HTML page that needs nothing else."""
-        return whole_page(self._story["title"], self._panel, self._log.messages())
+        """The scene with its animation as one HTML page that needs neither server nor network."""
+        return render(
+            "viewer.html",
+            title=self._story["title"],
+            panel=self._panel,
+            done=self._story["done"],
+            messages=[base64.b64encode(message).decode("ascii") for message in self._log.messages()],
+            **_meshcat_script(),
+        )
 
     def save_html(self, path: str | Path) -> None:
         """Write `html` to a file. Raises InputError if it cannot be written."""
@@ -188,7 +181,7 @@ class Viewer:
         threading.Event().wait(timeout)
 
     def close(self) -> None:
-        """End our own server; a foreign one keeps the scene. A second call does nothing."""
+        """Stop serving the page; a meshcat server keeps the scene. A second call does nothing."""
         if self._server is not None:
             self._server.close()
 
@@ -198,56 +191,84 @@ class Viewer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _measured(self, scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[Row]:
-        """Pairs of a scene as rows, by the engine that every command asks."""
+    def _send(self, command: Command) -> None:
+        self._log.add(command)
+        if self._meshcat is not None:
+            self._meshcat.send(command)
+
+    def _finish_assembly(self, run: Assembly) -> dict[str, Any]:
+        """What the page says of an assembly."""
+        for waypoint in run.path[len(self._waypoints) :]:
+            self.show(waypoint)
+        forces = [force for force in run.forces if force.feature != HELD]
+        self._drawing.forces(len(self._waypoints) - 1, forces)
+        worst = {finding.severity for finding in run.findings}
+        state = "found" if "error" in worst else "note" if "warning" in worst else "clean"
+        findings = [self._assembly_finding(k, finding) for k, finding in enumerate(run.findings)]
+        return {"text": run.status, "state": state, "assembly": run, "forces": forces, "findings": findings}
+
+    def _finish_check(self, result: CheckResult) -> dict[str, Any]:
+        """What the page says of a checked scene."""
+        instance("result", result, CheckResult)
+        for stop in scene_stops(result, self._rows):
+            self._drawing.show(stop)
+        return {
+            "text": headline(result),
+            "state": severity(result),
+            "findings": self._scene_findings(result),
+            "pairs": worst_first(result.pairs)[:_LISTED],
+            "motions": worst_first(result.motions)[:_LISTED],
+        }
+
+    def _rows(self, scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[Row]:
+        """Pairs of a scene as rows, by the engine that every command uses."""
         return [Row.of(scene, *pair, d) for pair, d in measure(scene, pairs, cache=self._cache).items()]
 
-    def _assembly_finding(self, finding: Finding) -> dict[str, Any]:
+    def _assembly_finding(self, index: int, finding: Finding) -> dict[str, Any]:
         """A finding with the place to look at: where the pair that it names is at the end, else the whole clamp."""
         number = len(self._waypoints) - 1
-        stop, verdict = self._drawing.timeline.stops[number], _SEVERITY[finding.severity]
+        stop = self._drawing.timeline.stops[number]
         row = next((row for row in stop.rows if (row.a, row.b) == (finding.a, finding.b)), None)
-        place = self._drawing.extent([stop.poses]) if row is None else focus(row.distance)
-        return self._finding(finding.a or "", finding.b or "", verdict, finding.text, "", number, place)
+        data = {"a": finding.a or "", "b": finding.b or "", "verdict": _SEVERITY[finding.severity]}
+        data |= {"group": str(index), "title": finding.text, "text": finding.text, "detail": ""}
+        return data | self._place(number, self._drawing.extent([stop.poses]) if row is None else focus(row.distance))
 
     def _scene_findings(self, result: CheckResult) -> list[dict[str, Any]]:
-        """The findings of a check, each with the stop and the place to look at: a motion's at its first contact."""
+        """The findings of a check by groups, each with the stop and the place to look at."""
         names, stops = titles(result.scene), self._drawing.timeline.stops
         meetings = {k: self._drawing.mark_meeting(k) for k, stop in enumerate(stops) if stop.halts}
-        found = []
-        for row in result.findings[:_LISTED]:
-            of_motion = [k for k, stop in enumerate(stops) if row.motion and stop.step == row.motion]
-            first = [k for k in of_motion if any((r.a, r.b, r.what) == (row.a, row.b, FIRST) for r in stops[k].rows)]
-            number = ([*first, *of_motion[-1:], 0])[0]
-            place = meetings.get(number) or focus(row.distance)
-            said = sentence(row, names), circumstances(row)
-            found.append(self._finding(row.a, row.b, row.verdict.value, *said, number, place))
-        return found
+        findings: list[dict[str, Any]] = []
+        for group in grouped(result):
+            for row in group.rows[: max(0, _LISTED - len(findings))]:
+                number = self._stop_of(row)
+                data = {"a": row.a, "b": row.b, "verdict": row.verdict.value, "group": group.id}
+                data |= {"title": group_sentence(group, names), "text": sentence(row, names)}
+                data["detail"] = circumstances(row)
+                findings.append(data | self._place(number, meetings.get(number) or focus(row.distance)))
+        return findings
 
-    def _finding(
-        self, a: str, b: str, verdict: str, said: str, where: str, stop: int, place: tuple[Array, Array]
-    ) -> dict[str, Any]:
+    def _stop_of(self, row: PairResult) -> int:
+        """The stop that shows a finding: of one in a motion its first contact, else the motion's end."""
+        stops = self._drawing.timeline.stops
+        of_motion = [k for k, stop in enumerate(stops) if row.motion and stop.step == row.motion]
+        first = [k for k in of_motion if any((r.a, r.b, r.what) == (row.a, row.b, FIRST) for r in stops[k].rows)]
+        return [*first, *of_motion[-1:], 0][0]
+
+    def _place(self, stop: int, box: tuple[Array, Array]) -> dict[str, Any]:
         margin = 0.1 * self._drawing.size
-        corners = {"low": (place[0] - margin).tolist(), "high": (place[1] + margin).tolist()}
-        return {"a": a, "b": b, "verdict": verdict, "text": said, "detail": where, "stop": stop, **corners}
+        return {"stop": stop, "low": (box[0] - margin).tolist(), "high": (box[1] + margin).tolist()}
 
-    def _tell(self, said: str, *, state: str, done: bool = False, **more: Any) -> None:
-        """What the page beside the picture shows; meshcat's own page takes no notice of it."""
+    def _set_story(self, text: str, *, state: str, done: bool = False, **more: Any) -> None:
+        """Set what the page beside the picture shows; meshcat's own page takes no notice of it."""
         scene, drawing, clamp = self._scene, self._drawing, self._clamp
-        measured = "exactly" if self._model is None or self._model.name == "cas" else f"by {self._model.name}"
-        accuracy = f"Drawn with facets within {self._mesh_error:g} mm; measured {measured}, not on the facets."
-        if any(isinstance(part.shape, MeshShape) for part in scene.parts):
-            accuracy = (
-                f"Files are drawn with their own facets, other parts within {self._mesh_error:g} mm of their faces."
-            )
-            accuracy += " How each distance was measured stands beside it."
+        accuracy = self._accuracy()
         drawing.caption(accuracy)
         self._story = {
             "title": scene.name if clamp is None else clamp.title,
-            "headline": said,
+            "headline": text,
             "done": done,
             "stops": [_stop_data(stop, *drawing.extent([stop.poses])) for stop in drawing.timeline.stops],
-            "findings": more.pop("findings", []),
+            "findings": more.get("findings", []),
             "forces": [force.to_dict() for force in more.get("forces", ())],
             "nodes": {part.name: drawing.paths(part.name) for part in scene.parts},
             "overlays": [{"name": name, "path": f"{ROOT}/overlay {name}"} for name in drawing.overlays],
@@ -256,30 +277,37 @@ class Viewer:
             "frame": drawing.frame() if drawing.timeline.stops else None,
         }
         used = {row["verdict"] for stop in self._story["stops"] for row in stop["rows"]}
-        self._panel = panel(
-            self._story
-            | {"assembly": None, "forces": (), "pairs": (), "motions": ()}
-            | {
-                "subtitle": "" if clamp is None else clamp.subtitle,
-                "scene": scene,
-                "state": state,
-                "accuracy": accuracy,
-                "notes": self._notes,
-                "parts": titles(scene),
-                "part_colours": drawing.colours,
-                "colours": VERDICT_COLOURS,
-                "force_colour": FORCE,
-                "force_length": drawing.force_length,
-                "meanings": {name: meaning(name, scene) for name in VERDICT_COLOURS if name in used},
-            }
-            | more
-        )
+        context = {
+            "subtitle": "" if clamp is None else clamp.subtitle,
+            "scene": scene,
+            "state": state,
+            "accuracy": accuracy,
+            "notes": self._notes,
+            "parts": titles(scene),
+            "part_colours": drawing.colours,
+            "colours": VERDICT_COLOURS,
+            "force_colour": FORCE,
+            "force_length": drawing.force_length,
+            "meanings": {name: meaning(name, scene) for name in VERDICT_COLOURS if name in used},
+            "version": __version__,
+            "gap": distance_text,
+            "degrees": math.degrees,
+        }
+        numbered = enumerate(self._story["findings"])
+        context["groups"] = [list(members) for _, members in itertools.groupby(numbered, lambda pair: pair[1]["group"])]
+        missing = {"assembly": None, "forces": (), "pairs": (), "motions": ()}
+        self._panel = render("viewer.panel.html", **(self._story | missing | context | more))
         drawing.property(ROOT, "story", self._story | {"panel": self._panel})
 
-    def _send(self, command: Command) -> None:
-        messages = self._log.add(command)
-        if self._server is not None:
-            self._server.send(command, messages)
+    def _accuracy(self) -> str:
+        """How exact the picture and its numbers are."""
+        if any(isinstance(part.shape, MeshShape) for part in self._scene.parts):
+            return (
+                f"Files are drawn with their own facets, other parts within {self._mesh_error:g} mm of their faces. "
+                "How each distance was measured stands beside it."
+            )
+        measured = "exactly" if self._model is None or self._model.name == "cas" else f"by {self._model.name}"
+        return f"Drawn with facets within {self._mesh_error:g} mm; measured {measured}, not on the facets."
 
 
 def view(shown: Scene | Assembly | CheckResult, *, serve: bool = True, **options: Any) -> Viewer:
@@ -344,3 +372,16 @@ def _stop_data(stop: Stop, low: Array, high: Array) -> dict[str, Any]:
     keys = ("arrive", "leave", "step", "label", "mark", "halts")
     rows = [row.data() for row in stop.rows[:_LISTED]]
     return {key: getattr(stop, key) for key in keys} | {"low": low.tolist(), "high": high.tolist(), "rows": rows}
+
+
+def _meshcat_script() -> dict[str, str]:
+    """Meshcat's viewer (with three.js) and its licence, for the page."""
+    import meshcat
+
+    folder = Path(meshcat.__file__).parent / "viewer" / "dist"
+    script = (folder / "main.min.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
+    notices = folder / "main.min.js.LICENSE.txt"
+    return {
+        "meshcat": script,
+        "licence": notices.read_text(encoding="utf-8").replace("--", "- -") if notices.exists() else "",
+    }

@@ -1,4 +1,4 @@
-"""Objects of the viewer, made with meshcat's own classes: shaded solids, edges, dots, arrows, lines and labels."""
+"""Objects of the viewer, by meshcat's own classes: shaded solids, edges, dots, arrows, lines and labels."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def command(path: str, what: g.Object) -> dict[str, Any]:
 
 
 class _Packed(g.Geometry):  # type: ignore[misc]
-    """A geometry for any number of objects: what is sent of it is made once."""
+    """A geometry for any number of objects: its data are computed once."""
 
     def __init__(self, geometry: g.Geometry) -> None:
         self.uuid, self._data = geometry.uuid, geometry.lower({})
@@ -136,8 +136,7 @@ def arrow(
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
     """Several meshes as one."""
 
-    made: trimesh.Trimesh = trimesh.util.concatenate(list(meshes))  # type: ignore[assignment]
-    return made
+    return trimesh.util.concatenate(list(meshes))  # type: ignore[return-value]
 
 
 def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str = INK) -> g.Object:

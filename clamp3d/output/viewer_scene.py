@@ -19,14 +19,14 @@ from meshcat.geometry import Object
 from numpy.typing import ArrayLike
 
 from clamp3d.clamp.forces import Force
-from clamp3d.collide.distance import Distance
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.result import BAD
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.core.pose import Array
 from clamp3d.output import viewer_objects as draw
+from clamp3d.output.common import cut_open, overlap
 from clamp3d.output.palette import FORCE, INK, VERDICT_COLOURS, darker
 from clamp3d.output.placed import place, posed
-from clamp3d.output.viewer_cut import cut_open, overlap
 from clamp3d.output.viewer_timeline import FIRST, Row, Stop, Timeline
 from clamp3d.output.wording import part_title
 
@@ -52,7 +52,7 @@ _OVERLAY_COLOURS = ("#4477AA", "#EE6677", "#228833", "#CCBB44", "#66CCEE", "#AA3
 
 
 class SceneDrawing:
-    """Sends a scene's parts to ``send`` at once, each stop of its time line when told, and the animation at the end.
+    """Sends a scene's parts to ``send`` at once, each stop of its time line by `show`, and the animation at the end.
 
     ``cut_y`` is the world's plane Y that parts are cut at where they stand (None: not), but not those of ``uncut``;
     ``anchors`` (3,) are where labels stand in the frames of their parts.
@@ -198,7 +198,7 @@ class SceneDrawing:
                 continue
             elif not row.touches:
                 self._gap(where, d.point_a, d.point_b, row.gap, row.colour)
-            elif d.upper <= d.lower + 0.01 * self.size:  # else it is only known that they touch, not where
+            elif d.upper <= d.lower + 0.01 * self.size:  # else they touch, but it is not certain where
                 self._dot(f"{where}/point", 0.5 * (d.point_a + d.point_b), row.colour)
                 if d.normal is not None and not row.what.startswith("screw"):
                     arrow = draw.arrow(d.point_a, d.normal, 0.06 * self.size, darker(row.colour, 0.55))

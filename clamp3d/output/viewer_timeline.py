@@ -16,24 +16,27 @@ from clamp3d.clamp.contact import NONE, measure_contacts
 from clamp3d.clamp.dimensions import TITLES, Clamp
 from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.scene import CONTACT, clamp_scene
-from clamp3d.collide.distance import Distance
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.result import BAD, CheckResult, PairResult
 from clamp3d.collide.scene import Scene
+from clamp3d.collide.verdict import Verdict
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array, rotation
 from clamp3d.output.palette import VERDICT_COLOURS
 from clamp3d.output.section import edge_openings, part_anchor
-from clamp3d.output.wording import distance_text
+from clamp3d.output.wording import distance_text, first_text, worst_first
 
 Poses = Mapping[str, Array]
-Measured = Callable[[Scene, Sequence[tuple[str, str]]], Iterable["Row"]]
+Measure = Callable[[Scene, Sequence[tuple[str, str]]], Iterable["Row"]]
 """Measures pairs of a scene, as `clamp3d.collide.distance.measure` does, with their verdicts."""
 
 FIRST = "first contact"
 _HOLD = 1.2  # s at each stop
 _FASTEST, _SLOWEST = 0.9, 4.0  # s between two stops
 _MOTION = 4.0  # s of a motion of a scene from t = 0 to 1
+_MEASURED = 12
+"""Moments of first contact that a motion stops at, and pairs that are measured at its end, at most."""
 _TURN = math.radians(3.0)
 """Largest turn between two keys: between them the viewer moves parts along chords."""
 UNCUT = ("P4", "P5")
@@ -87,9 +90,9 @@ class Row:
 
     def data(self) -> dict[str, Any]:
         """The row as JSON data."""
-        said = {"gap": self.gap, "near": self.near, "colour": self.colour}
+        shown = {"gap": self.gap, "near": self.near, "colour": self.colour}
         names = {"a": self.a, "b": self.b, "verdict": self.verdict, "what": self.what}
-        return names | self.distance.to_dict() | said
+        return names | self.distance.to_dict() | shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,21 +180,21 @@ class Timeline:
         return times, poses
 
 
-def scene_stops(result: CheckResult, measured: Measured) -> Iterator[Stop]:
+def scene_stops(result: CheckResult, measure: Measure) -> Iterator[Stop]:
     """A checked scene at rest, then its motions one after the other, with a stop where parts first touch."""
     motions = result.scene.motions
     poses: Poses = {part.name: part.T_world for part in result.scene.parts}
     marks = [motion.name for motion in motions] + [""]
     yield Stop("at rest", "at rest", poses, tuple(_row(result, row) for row in result.pairs), marks[0])
     for motion, mark in zip(motions, marks[1:], strict=True):
-        for stop in _motion_stops(result, motion, poses, measured, mark):
+        for stop in _motion_stops(result, motion, poses, measure, mark):
             yield stop
             last = stop.poses
         poses = last
 
 
 def _motion_stops(
-    result: CheckResult, motion: Motion, start: Poses, measured: Measured, next_mark: str
+    result: CheckResult, motion: Motion, start: Poses, measure: Measure, next_mark: str
 ) -> Iterator[Stop]:
     """The stops of a motion: where parts first touch, where they go on to, and the end."""
     going = motion.resolved(start[motion.parts[0]])
@@ -208,30 +211,30 @@ def _motion_stops(
     contacts, before = first_contacts(rows), 0.0
     for k, (t, touching) in enumerate(contacts.items()):
         poses = at(t)
-        # The engine knows the moment; the distance right there may be known to its contact threshold only.
-        found = measured(result.scene.moved(poses), [(row.a, row.b) for row in touching])
-        now = tuple(replace(row, verdict="contact", what=FIRST) for row in found)
-        label = f"{motion.name}: {'first' if k == 0 else 'next'} contact at t = {t:.4f}"
+        # The moment is certain; the distance right there may be certain to the contact threshold only.
+        touching_now = measure(result.scene.moved(poses), [(row.a, row.b) for row in touching])
+        now = tuple(replace(row, verdict="contact", what=FIRST) for row in touching_now)
+        label = f"{motion.name}: {'first' if k == 0 else 'next'} contact at t = {first_text(t)}"
         seconds = max(0.3, _MOTION * (t - before))
         yield Stop(motion.name, label, poses, now, "" if k else FIRST, k == 0, way(before, t), seconds)
         before = t
-    least = tuple(
-        replace(_row(result, row), what=f"least, at t = {row.t:.4f}", drawn=row.t == 1.0 and row.verdict in BAD)
-        for row in rows
-        if row.t is not None
-    )
+    # Parts whose least distance is at the end are as the check says; the others are measured where they stand now.
+    at_end = {(row.a, row.b): _row(result, row) for row in rows if row.t == 1.0}
+    elsewhere = [(row.a, row.b) for row in worst_first(rows) if (row.a, row.b) not in at_end][:_MEASURED]
+    poses = at(1.0)
+    ends = (*at_end.values(), *(measure(result.scene.moved(poses), elsewhere) if elsewhere else ()))
     end = f"{motion.name}: end" + (", through the contact" if contacts else "")
     seconds = max(0.3, _MOTION * (1.0 - before))
-    yield Stop(motion.name, end, at(1.0), least, next_mark, via=way(before, 1.0), seconds=seconds)
+    yield Stop(motion.name, end, poses, ends, next_mark, via=way(before, 1.0), seconds=seconds)
 
 
 def first_contacts(rows: Iterable[PairResult]) -> dict[float, list[PairResult]]:
     """The pairs that come to touch during a motion where they are not meant to, by the moment; the first dozen."""
-    found: dict[float, list[PairResult]] = {}
+    contacts: dict[float, list[PairResult]] = {}
     for row in rows:
-        if row.contact_at and row.verdict in ("contact", "clash", "contained"):
-            found.setdefault(row.contact_at, []).append(row)
-    return dict(sorted(found.items())[:12])
+        if row.contact_at and row.verdict in (Verdict.CONTACT, *BAD):
+            contacts.setdefault(row.contact_at, []).append(row)
+    return dict(sorted(contacts.items())[:_MEASURED])
 
 
 def _row(result: CheckResult, row: PairResult) -> Row:

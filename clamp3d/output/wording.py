@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from typing import TYPE_CHECKING
 
-from clamp3d.collide.distance import Distance
+from clamp3d.collide.answer import Distance
 from clamp3d.collide.result import BAD, CheckResult, PairResult
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.collide.verdict import Verdict
+from clamp3d.output.groups import Group, grouped
 
 if TYPE_CHECKING:
     from clamp3d.collide.where import Overlap
@@ -33,13 +34,13 @@ def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
                 return f"{'overlap' if high < 0.0 else 'gap'} {abs(high):.{places}f} mm"
     for kind, least, most in (("overlap", -upper, -lower), ("gap", lower, upper)):
         if least > 0.0:
-            said = _rounded(least, ROUND_FLOOR)
+            floor = _rounded(least, ROUND_FLOOR)
             if math.isinf(most):
-                return f"{kind} at least {said} mm"
-            return f"{kind} {said} to {_rounded(most, ROUND_CEILING)} mm"
+                return f"{kind} at least {floor} mm"
+            return f"{kind} {floor} to {_rounded(most, ROUND_CEILING)} mm"
     if math.isfinite(upper) and math.isfinite(lower):
         return f"gap or overlap at most {_rounded(max(upper, -lower), ROUND_CEILING)} mm"
-    return f"gap at most {_rounded(upper, ROUND_CEILING)} mm" if math.isfinite(upper) else "not known"
+    return f"gap at most {_rounded(upper, ROUND_CEILING)} mm" if math.isfinite(upper) else "unknown"
 
 
 def distance_text(distance: Distance, *, digits: int = 6) -> str:
@@ -105,33 +106,40 @@ def counted(number: int, one: str, many: str = "") -> str:
 
 
 def headline(result: CheckResult) -> str:
-    """The result in one line: what was found, or what is clean."""
-    found = result.findings
-    clashes = [row for row in found if row.verdict in BAD]
-    others = [
-        counted(n, words, plural)
-        for verdict, words, plural in (
-            ("failed", "pair failed", "pairs failed"),
-            ("uncertain", "pair undecided", "pairs undecided"),
-            ("clearance", "gap too small", "gaps too small"),
-            ("contact", "contact", "contacts"),
-        )
-        if (n := sum(row.verdict == verdict for row in found))
-    ]
-    if clashes:
-        lower, upper = (min(getattr(row.distance, end) for row in clashes) for end in ("lower", "upper"))
-        moving = sum(row.motion is not None for row in clashes)
-        where = "" if not moving else " in motion" if moving == len(clashes) else f" ({moving} in motion)"
-        said = f", deepest {gap_text(lower, upper).removeprefix('overlap ')}" if upper < 0.0 else ""
-        others.insert(0, counted(len(clashes), "clash", "clashes") + where + said)
+    """The result in one line. Without a clash it says "No clash" only where every pair was decided."""
+    groups = grouped(result)
+    rows = [row for group in groups for row in group.rows]
+    count = {verdict: sum(row.verdict is verdict for row in rows) for verdict in Verdict}
+    clashes = [row for row in rows if row.verdict in BAD]
+    phrases = [_clashes(clashes, sum(group.verdict in BAD for group in groups))] if clashes else []
+    for verdict, one, many in (
+        (Verdict.FAILED, "pair failed", "pairs failed"),
+        (Verdict.UNCERTAIN, "pair undecided", "pairs undecided"),
+        (Verdict.CLEARANCE, "gap too small", "gaps too small"),
+        (Verdict.CONTACT, "contact", "contacts"),
+    ):
+        if count[verdict]:
+            phrases.append(counted(count[verdict], one, many))
     checked = counted(result.work.pairs, "pair")
     if result.scene.motions:
         checked += f" and {counted(len(result.scene.motions), 'motion')}"
     if not result.work.pairs:
         return "Nothing checked: there are no two parts"
-    if not found:
+    if not phrases:
         return f"Clean: {checked} checked, nothing clashes"
-    return ("" if clashes else "No clash: ") + "; ".join(others) + f" ({checked} checked)"
+    decided = not count[Verdict.FAILED] and not count[Verdict.UNCERTAIN]
+    opening = "" if clashes else "No clash: " if decided else "Undecided: "
+    return f"{opening}{'; '.join(phrases)} ({checked} checked)"
+
+
+def _clashes(rows: Sequence[PairResult], n_groups: int) -> str:
+    """How many clashes there are, how many of them in motion, and how deep the deepest is."""
+    lower, upper = (min(getattr(row.distance, end) for row in rows) for end in ("lower", "upper"))
+    moving = sum(row.motion is not None for row in rows)
+    where = "" if not moving else " in motion" if moving == len(rows) else f" ({moving} in motion)"
+    causes = f" in {n_groups} groups" if 1 < n_groups < len(rows) else " of one kind" if n_groups < len(rows) else ""
+    depth = f", deepest {gap_text(lower, upper).removeprefix('overlap ')}" if upper < 0.0 else ""
+    return counted(len(rows), "clash", "clashes") + causes + where + depth
 
 
 def severity(result: CheckResult) -> str:
@@ -141,31 +149,46 @@ def severity(result: CheckResult) -> str:
     return "clean" if result.clean and not result.findings else "note"
 
 
-def sentence(row: PairResult, names: dict[str, str]) -> str:
+def sentence(row: PairResult, names: Mapping[str, str]) -> str:
     """A finding in words."""
-    a, b, d = names[row.a], names[row.b], row.distance
-    gap = distance_text(d)
-    said = {
-        "contained": f"{a} and {b}: one lies inside the other, {gap}",
-        "clash": f"{a} and {b} clash: {gap}",
-        "failed": f"{a} and {b}: failed, no answer",
-        "uncertain": f"{a} and {b}: undecided, {gap}",
-        "contact": f"{a} and {b} touch" + ("" if gap == "gap 0.000000 mm" else f": {gap}"),
-        "clearance": f"{a} and {b} are too close: {gap}",
+    return _sentence(names[row.a], names[row.b], row.verdict, distance_text(row.distance))
+
+
+def group_sentence(group: Group, names: Mapping[str, str]) -> str:
+    """A group of findings in words.
+
+    >>> from clamp3d.output.groups import Group
+    >>> rows = (PairResult("pin", "plate_1", Verdict.CLASH, Distance(-0.2, -0.2)),) * 3
+    >>> group_sentence(Group("", "pin", "plate", rows, -0.2, -0.2), {})
+    'pin and plate clash, 3 times: overlap 0.200000 mm'
+    """
+    if len(group.rows) == 1:
+        return sentence(group.worst, names)
+    return _sentence(group.a, group.b, group.verdict, gap_text(group.lower, group.upper), f", {len(group.rows)} times")
+
+
+def _sentence(a: str, b: str, verdict: Verdict, gap: str, often: str = "") -> str:
+    phrases = {
+        Verdict.CONTAINED: f"{a} and {b}: one lies inside the other{often}, {gap}",
+        Verdict.CLASH: f"{a} and {b} clash{often}: {gap}",
+        Verdict.FAILED: f"{a} and {b}: failed{often}, no answer",
+        Verdict.UNCERTAIN: f"{a} and {b}: undecided{often}, {gap}",
+        Verdict.CONTACT: f"{a} and {b} touch{often}" + ("" if gap == "gap 0.000000 mm" else f": {gap}"),
+        Verdict.CLEARANCE: f"{a} and {b} are too close{often}: {gap}",
     }
-    return said.get(row.verdict.value, f"{a} and {b}: {gap}")
+    return phrases.get(verdict, f"{a} and {b}{often}: {gap}")
 
 
 def circumstances(row: PairResult) -> str:
     """Where a finding is: when in a motion, and where in space parts overlap; or why there is no verdict."""
-    said = []
+    details = []
     if row.motion is not None:
         first = "" if row.contact_at is None else f"first contact at t = {first_text(row.contact_at)}, "
-        kind = "deepest found" if row.verdict in BAD else "nearest"
-        said.append(f"in motion {row.motion!r}" + ("" if row.t is None else f": {first}{kind} at t = {row.t:.4f}"))
+        kind = "deepest" if row.verdict in BAD else "nearest"
+        details.append(f"in motion {row.motion!r}" + ("" if row.t is None else f": {first}{kind} at t = {row.t:.4f}"))
     if row.where is not None:
-        said.append(where_text(row.where))
-    return "; ".join([*said, row.reason] if row.reason else said)
+        details.append(where_text(row.where))
+    return "; ".join([*details, row.reason] if row.reason else details)
 
 
 def first_text(t: float) -> str:
@@ -177,9 +200,17 @@ def first_text(t: float) -> str:
     return f"{_to_digits(_decimal(t), 4, ROUND_FLOOR):f}"
 
 
-def finding_text(row: PairResult, names: dict[str, str]) -> str:
+def finding_text(row: PairResult, names: Mapping[str, str]) -> str:
     """A finding in words, and where it is."""
     return "; ".join(filter(None, (sentence(row, names), circumstances(row))))
+
+
+def group_text(group: Group, names: Mapping[str, str]) -> str:
+    """A group of findings in words, and where it is; of several findings, where the worst one is."""
+    if len(group.rows) == 1:
+        return finding_text(group.worst, names)
+    worst = f"worst {group.worst.a} and {group.worst.b}"
+    return "; ".join(filter(None, (group_sentence(group, names), worst, circumstances(group.worst))))
 
 
 def where_text(where: Overlap) -> str:

@@ -12,13 +12,13 @@ from pathlib import Path
 import msgspec
 
 from clamp3d import checks
-from clamp3d.brep.mesh_file import FORMATS
+from clamp3d.brep.formats import FORMATS
+from clamp3d.brep.worker import reading_process
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.loader import builtin_clamps, load_clamp, parse_toml, read_text
 from clamp3d.collide.allowed import Allowed
 from clamp3d.collide.scene import Part, Scene
 from clamp3d.core import shapes
-from clamp3d.core.linear import dot
 from clamp3d.core.validation import validate
 from clamp3d.errors import Clamp3dError, InputError, escaped
 from clamp3d.scenefile.parts import Parts, refuse_wires
@@ -34,7 +34,8 @@ def load_scene(path: str | Path) -> Scene:
     path = checks.path("scene", path)
     text = read_text(path)
     name = escaped((path.resolve().parent.name if path.stem == "scene" else "") or path.stem)
-    return parse_scene(text, origin=str(path), folder=path.parent, name=name)
+    with reading_process():
+        return parse_scene(text, origin=str(path), folder=path.parent, name=name)
 
 
 def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name: str = "scene") -> Scene:
@@ -101,7 +102,7 @@ def _clamp_scene(table: ClampTable, folder: Path) -> Scene:
 
     scene = assemble(clamp_source(table.name, folder), line=table.line, jumper=table.jumper).scene
     T = table.pose.T()
-    return scene.moved({part.name: dot(T, part.T_world) for part in scene.parts})
+    return scene.moved({part.name: T @ part.T_world for part in scene.parts})
 
 
 def load_described(path: Path, wires: dict[str, str | float]) -> Clamp | Scene:

@@ -13,11 +13,11 @@ import numpy as np
 
 from clamp3d import checks
 from clamp3d.brep.bodies import Reading, part_name, unique_names
-from clamp3d.brep.mesh_file import FORMATS, load_bodies
+from clamp3d.brep.formats import FORMATS
+from clamp3d.brep.mesh_file import load_bodies
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.allowed import Allowed
 from clamp3d.collide.scene import Part
-from clamp3d.core.linear import dot, norm
 from clamp3d.core.pose import UNIT_TOLERANCE, Array
 from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, MeshShape
 from clamp3d.errors import InputError
@@ -87,7 +87,7 @@ class Parts:
     def prefixed(self, name: str, T: Array) -> Parts:
         """The same moved by ``T`` (4, 4) and called ``name``, or ``name/...`` if there are several."""
         names = {p.name: name if len(self.parts) == 1 else f"{name}/{p.name}" for p in self.parts}
-        parts = (Part(names[p.name], p.shape, dot(T, p.T_world)) for p in self.parts)
+        parts = (Part(names[p.name], p.shape, T @ p.T_world) for p in self.parts)
         allowed = (Allowed(names[x.a], names[x.b], x.overlap) for x in self.allowed)
         return Parts(tuple(parts), self.notes, tuple(allowed))
 
@@ -186,7 +186,7 @@ def read_poses(path: Path) -> list[tuple[str, Array]]:
             if len(row) != len(COLUMNS):
                 raise ValueError(f"{len(COLUMNS)} values are needed, got {len(row)}")
             x, y, z, *turn = (_number(column, cell) for column, cell in zip(COLUMNS[1:], row[1:], strict=True))
-            size = norm(turn)
+            size = math.hypot(*turn)
             if not abs(size - 1.0) <= UNIT_TOLERANCE:
                 raise ValueError(f"the quaternion must have length 1, got {size:.6g}")
             qx, qy, qz, qw = turn

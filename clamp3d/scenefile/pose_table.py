@@ -9,7 +9,6 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta, Struct
 
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import UNIT_TOLERANCE, Array, nearest_rigid, rotation, turn_of
 
 _SNAP = 1e-4
@@ -58,7 +57,7 @@ class Pose(Table):
                 raise ValueError("matrix: must have 3 rows of 4 numbers, or a fourth row 0, 0, 0, 1")
             R = np.array(rows)[:3, :3]
             with np.errstate(over="ignore", invalid="ignore"):
-                off = float(np.abs(dot(R, R.T) - np.eye(3)).max())
+                off = float(np.abs(R @ R.T - np.eye(3)).max())
             if off <= _SNAP and np.linalg.det(R) < 0.0:
                 raise ValueError("matrix: must be rigid (a rotation and a translation): it reflects")
             if not off <= _SNAP:

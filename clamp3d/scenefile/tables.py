@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Iterable
 from pathlib import Path
@@ -181,7 +182,12 @@ def part_table(data: Any, origin: str, key: str) -> ShapeTable | FileTable:
         kind = FileTable
     if kind is None:
         choices = ", ".join(f'"{name}"' for name in SHAPES)
-        raise InputError(f"{origin}: {checks.short(key, 100)}: must have shape = one of {choices}, or a file")
+        near = difflib.get_close_matches(shape, SHAPES, n=1) if isinstance(shape, str) else []
+        raise InputError(
+            f"{origin}: {checks.short(key, 100)}: must have shape = one of {choices}, or a file"
+            + (f", got {checks.shown(shape)}" if shape is not None else "")
+            + (f"; did you mean {near[0]}?" if near else "")
+        )
     made: ShapeTable | FileTable = validate(kind, data, origin, key)
     return made
 

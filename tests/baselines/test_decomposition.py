@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +11,9 @@ import pytest
 from intrusion import intrusion
 from scipy.spatial import ConvexHull
 
-from clamp3d.baselines import cache, decomposition
+from clamp3d.baselines import cache
 from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
 from clamp3d.bench.compare.scene import block_pair, grooved_block
-from clamp3d.core.mesh import Mesh
 from clamp3d.core.meshing import mesh
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError, SolverError
@@ -85,64 +83,11 @@ def test_hulls_are_cached_by_content(workers: list[subprocess.Popen[str]]) -> No
     assert _same(first, again)  # one seed, one answer
 
 
-@pytest.mark.parametrize("damage", [b"not a zip file", None])
-def test_damaged_cache_file_is_computed_anew(damage: bytes | None) -> None:
-    first = decompose(*SMALL, COARSE)
-    (file,) = cache.cache_dir().iterdir()
-    content = file.read_bytes()
-    file.write_bytes(content[: len(content) // 2] if damage is None else damage)
-    second = decompose(*SMALL, COARSE)
-    assert not second.cached
-    assert _same(first, second)
-    assert decompose(*SMALL, COARSE).cached
-    assert [f.suffix for f in cache.cache_dir().iterdir()] == [".npz"]
-
-
-def test_unwritable_cache_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    blocked = tmp_path / "file"
-    blocked.write_text("in the way")
-    monkeypatch.setenv("CLAMP3D_CACHE", str(blocked))
-    assert not decompose(*SMALL, COARSE).cached
-
-
 def test_time_limit_leaves_no_process(workers: list[subprocess.Popen[str]]) -> None:
     with pytest.raises(SolverError, match=r"did not finish P1 in 2 s at threshold 0\.05; raise time_limit or thresh"):
         decompose(*_extruded(28), DecompositionParameters(threshold=0.05), name="P1", time_limit=2.0)
     assert [worker.poll() is not None for worker in workers] == [True]
     assert not cache.cache_dir().exists()
-
-
-def test_interrupt_leaves_no_process(workers: list[subprocess.Popen[str]], monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(decomposition, "_stage", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        decompose(V, F, COARSE)
-    assert [worker.poll() is not None for worker in workers] == [True]
-
-
-def test_worker_ends_when_its_caller_is_gone(tmp_path: Path) -> None:
-    source, target = tmp_path / "in.npz", tmp_path / "out.npz"
-    vertices, faces = _extruded(28)
-    np.savez(source, vertices=vertices, faces=faces, arguments=np.array('{"threshold": 0.001}'))
-    worker = subprocess.Popen(
-        [sys.executable, "-m", "clamp3d.baselines.coacd_worker", str(source), str(target)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    )
-    assert worker.stdin is not None
-    assert worker.stdout is not None
-    with worker.stdout:
-        assert b"CoACD" in worker.stdout.readline()  # it runs
-        worker.stdin.close()
-        assert worker.wait(timeout=10.0) == 1
-
-
-def test_crash_of_coacd_is_an_error_not_an_end() -> None:
-    nan = Mesh("hull", np.full((8, 3), np.nan), F[:4] * 0, True)
-    with pytest.raises(SolverError, match="CoACD gave no hulls for mesh"):
-        decomposition._run(nan, COARSE, "mesh", 60.0, False, None)
 
 
 @pytest.mark.parametrize(
@@ -178,15 +123,6 @@ def test_bad_mesh_never_reaches_coacd(
 def test_parameters_are_checked(changes: dict[str, object], rule: str) -> None:
     with pytest.raises(InputError, match=rule):
         DecompositionParameters(**changes)  # type: ignore[arg-type]
-
-
-def test_real_metric_is_a_length_of_the_mesh() -> None:
-    # The same cut, asked for in mm and on CoACD's own scale: 1.6 t / extent.
-    normalised = decompose(V, F, DecompositionParameters(threshold=0.05, real_metric=False))
-    metric = decompose(V, F, DecompositionParameters(threshold=0.05 * 137.0 / 1.6))
-    assert _same(normalised, metric)
-    halved = decompose(0.5 * V, F, DecompositionParameters(threshold=0.05 * 137.0 / 1.6 / 2.0))
-    assert len(halved.hulls) == len(metric.hulls)
 
 
 def test_coverage_is_that_of_the_hulls() -> None:

@@ -15,12 +15,14 @@ from click.testing import CliRunner
 
 from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.contact import CONTACT, overlap, surface_name
+from clamp3d.clamp.contact import overlap
 from clamp3d.clamp.dimensions import Clamp, GrooveDimensions
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.matrix import PAIRS
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Assembly
+from clamp3d.clamp.scene import CONTACT
+from clamp3d.clamp.surfaces import surface_name
 from clamp3d.clamp.tolerance import monte_carlo
 from clamp3d.cli import group
 from clamp3d.collide.answer import Distance

@@ -15,7 +15,7 @@ from clamp3d.bench.stress.assemblies.envelope import Envelope
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.clamp.equilibria import describe, equilibria
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
-from clamp3d.clamp.kernel_landscape import downhill
+from clamp3d.clamp.landscape import downhill
 from clamp3d.clamp.section import Section
 from clamp3d.cli import group
 from clamp3d.errors import SolverError
@@ -122,8 +122,7 @@ def test_command_line_tells_them_unless_told_not_to(tmp_path):
 def test_samples_slide_to_the_lower_side_and_level_ones_to_their_first():
     """Against the words: the next other height on either side, the lower one first, level stretches as one."""
     rows = np.random.default_rng(0).integers(0, 4, size=(200, 12)).astype(float)
-    step = np.empty(rows.shape, dtype=np.int64)
-    downhill(rows, np.empty(12), step)
+    step = downhill(rows)
     for row, steps in zip(rows, step, strict=True):
         for i, here in enumerate(row):
             right = next((v for v in row[i + 1 :] if v != here), np.inf)

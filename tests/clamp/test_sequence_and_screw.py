@@ -9,7 +9,7 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.sensitivity import sensitivity
 from clamp3d.clamp.sequence import parse_sequence
-from clamp3d.errors import InputError, SolverError
+from clamp3d.errors import InputError, NotClampedError
 
 
 def test_the_papers_sequence():
@@ -114,5 +114,5 @@ def test_a_bolt_that_does_not_fill_the_nut_does_not_clamp(lacking):
 
 
 def test_a_bolt_that_is_too_short_has_no_tolerance():
-    with pytest.raises(SolverError, match=r"no sensitivity: not clamped: the bolt is 29\.99 mm too short"):
+    with pytest.raises(NotClampedError, match=r"no sensitivity: not clamped: the bolt is 29\.99 mm too short"):
         sensitivity(with_bolt(77.6))

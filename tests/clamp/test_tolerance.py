@@ -1,4 +1,3 @@
-import json
 import subprocess
 import sys
 
@@ -8,7 +7,6 @@ import pytest
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp import tolerance as montecarlo
 from clamp3d.clamp.final_state import solve_final_state
-from clamp3d.clamp.journal import Journal
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, sensitivity, with_dimensions
@@ -61,34 +59,6 @@ def test_samples_do_not_depend_on_where_they_run(monkeypatch):
     assert there.status == alone.status
 
 
-def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
-    monkeypatch.setattr(montecarlo, "CHUNK", 4)
-    clamp, file = load_clamp(), tmp_path / "work"
-    whole = monte_carlo(clamp, n=10)
-
-    def stop(done, of):
-        if done >= 8:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        monte_carlo(clamp, n=10, resume=file, progress=stop)
-    file.write_bytes(file.read_bytes() + b"[2,[[31.")  # torn by a crash
-    solved = []
-    sample = montecarlo._sample
-    monkeypatch.setattr(montecarlo, "_sample", lambda spec, index: (solved.append(index), sample(spec, index))[1])
-    again = monte_carlo(clamp, n=10, resume=file)
-    assert solved == [8, 9]
-    assert again.distance.tobytes() == whole.distance.tobytes()
-    assert len([json.loads(line) for line in file.read_text().splitlines()]) == 4
-    with pytest.raises(InputError, match="other seed"):
-        monte_carlo(clamp, n=10, seed=1, resume=file)
-    other = tmp_path / "notes.txt"
-    other.write_text("dear diary")
-    with pytest.raises(InputError, match="not a file of finished work"):
-        monte_carlo(clamp, n=10, resume=other)
-    assert other.read_text() == "dear diary"
-
-
 def test_small_tolerances_scatter_as_the_derivatives_say():
     clamp = load_clamp()
     result = monte_carlo(clamp, n=6, tolerance=1e-3, wire_tolerance_percent=0.0)
@@ -126,16 +96,6 @@ def test_an_address_without_a_scheduler_is_one_line():
     done = subprocess.run(line, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr == "clamp3d: error: no Dask scheduler at 'x': missing port number in address 'x'\n"
-
-
-def test_one_process_at_a_time_has_the_file(tmp_path):
-    file = tmp_path / "work"
-    with Journal(file, {"run": 1}) as first:
-        first.add([0, "a"])
-        with pytest.raises(InputError, match="another process is at work on it"):
-            Journal(file, {"run": 1})
-    with Journal(file, {"run": 1}) as second:
-        assert second.pieces == {0: "a"}
 
 
 def test_a_cluster_without_workers_is_said_to_have_none(monkeypatch):

@@ -63,7 +63,7 @@ def test_a_clamp_that_does_not_close_is_a_finding(main):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["rum"], "unknown command 'rum'; available: run, "),
+        (["rum"], "No such command 'rum'. Did you mean 'run'?"),
         (["run", "nothing"], "unknown clamp 'nothing'; built in: reference"),
         (["run", "--line", "LJ-631"], "unknown conductor 'LJ-631'"),
         (["run", "--jumper", "-4"], "jumper diameter must be > 0"),

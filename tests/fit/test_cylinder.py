@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
 
 from clamp3d.fit.cylinder import Axis, circle, covariance, fit_axis, surface_error
 
@@ -87,25 +86,3 @@ def test_standard_errors_of_a_shallow_arc_hold():
     assert np.all(np.abs(errors.std(axis=0) - 1.0) < 4 / np.sqrt(400))
     assert (np.abs(errors) > 3).mean() < 0.01
     assert worst < 1.0
-
-
-def _off(x, points):
-    return Axis(x[:3], x[3:6] / np.linalg.norm(x[3:6]), x[6]).residual(points)
-
-
-@pytest.mark.parametrize("noise", [0.0, 1e-7, 1e-4, 1e-2])
-def test_least_squares_are_those_of_minpack(noise):
-    rng = np.random.default_rng(7)
-    for _ in range(40):
-        n, half, length = int(rng.integers(8, 200)), rng.uniform(0.1, np.pi), 10.0 ** rng.uniform(-1.0, 1.0)
-        points = points_on(rng, n, 1.0, half, length) + rng.normal(0.0, 1.0, (n, 3)) * noise
-        R, shift = turned(rng), 100.0 * rng.normal(size=3)
-        d = np.array([*rng.normal(0.0, 0.02, 2), 1.0])
-        start = Axis(R @ rng.normal(0.0, 0.03, 3) + shift, R @ d / np.linalg.norm(d), rng.uniform(0.8, 1.25))
-        points = points @ R.T + shift
-
-        first = [*start.point, *start.direction, start.radius]
-        known = least_squares(_off, first, x_scale="jac", xtol=1e-15, args=(points,))
-        found = fit_axis(points, start)
-        square, least = float((found.residual(points) ** 2).sum()), 2.0 * known.cost
-        assert square <= least * (1.0 + 1e-9) + n * 1e-26 * 100.0**2

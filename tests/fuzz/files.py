@@ -252,7 +252,6 @@ def make_scene(draw: Draw, folder: Path) -> tuple[str, Callable[[], bool]]:
         args += ["--clearance", str(pick(draw, 0, 1, "0.5", "nan", -1, "inf", 1e308, 1e-300))]
     if chance(draw, 8):
         args += ["--pairs", pick(draw, "block:wire", "pin:plate", "pin:pin", "a:b", ":", "P1:P2,P1:P3", "tetra:pin,")]
-    args += ["--full"] * chance(draw, 30)
     same &= mesh is TETRA and not {"--clearance", "--pairs"} & {*args}
     old = some_old(draw, written)
 

@@ -32,8 +32,6 @@ PUBLISHED = {
 
 @pytest.fixture
 def clamp3d(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setitem(cli.COMMANDS, "export", ("clamp3d.cli.export", "Write the parts as files for CAD review."))
-
     def run(*arguments: object) -> int:
         monkeypatch.setattr(sys, "argv", ["clamp3d", *map(str, arguments)])
         with pytest.raises(SystemExit) as stop:

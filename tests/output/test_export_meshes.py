@@ -86,16 +86,17 @@ def test_stl_assembly_is_in_the_world(reference: Clamp, odd_poses: dict, odd_sce
     assert whole.body_count == 7
 
 
-def test_stl_that_would_lose_accuracy_is_refused(reference: Clamp, tmp_path: Path) -> None:
+@pytest.mark.parametrize("format", ["stl", "ply"])
+def test_a_format_that_would_lose_accuracy_is_refused(reference: Clamp, tmp_path: Path, format: str) -> None:
     far = np.eye(4)
     far[0, 3] = 1e6
     scene = clamp_scene(reference, dict.fromkeys(PARTS, far))
-    with pytest.raises(InputError, match=r"stl holds 32-bit numbers: the pose of P1 up splint would lose 0\.03"):
-        export(scene, tmp_path / "stl", format="stl")
-    assert not (tmp_path / "stl").exists()
+    with pytest.raises(InputError, match=rf"{format} holds 32-bit numbers: the pose of P1 up splint would lose 0\.03"):
+        export(scene, tmp_path / format, format=format)
+    assert not (tmp_path / format).exists()
     # The others hold the same place exactly.
-    for format, rounding in (("ply", 1e-9), ("obj", 1e-9), ("3mf", 1e-5)):
-        written = export(scene, tmp_path, format=format, mesh_error=MESH_ERROR, names=["P1"])
+    for other, rounding in (("obj", 1e-9), ("3mf", 1e-5)):
+        written = export(scene, tmp_path, format=other, mesh_error=MESH_ERROR, names=["P1"])
         solid = trimesh.load(written.files[0], process=False, force="mesh")
         np.testing.assert_allclose(solid.bounds - [1e6, 0, 0], parts(reference)["P1"].bounds, atol=rounding)
 
@@ -112,7 +113,7 @@ def test_ply(reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path
         for name in (n for n in PARTS if f"comment part {n} {TITLES[n]}\n" in header):
             mine = (colours == trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3]).all(axis=1)
             faces = loaded.faces[mine[loaded.faces].all(axis=1)]
-            check_solid(name, reference, loaded.vertices * 1000.0, faces, odd_poses[name], 1e-9)
+            check_solid(name, reference, loaded.vertices * 1000.0, faces, odd_poses[name], 1e-4)
             seen.append(name)
     assert seen == list(PARTS)
 

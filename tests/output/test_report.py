@@ -293,7 +293,7 @@ def test_a_clashing_scene_says_so_worst_first(clashing, tmp_path):
 def test_a_finding_is_drawn_at_its_moment(monkeypatch):
     """Motions follow each other: the hinge's leaf is where the first one left it when the second one clashes."""
     from clamp3d.output import scene_figures
-    from clamp3d.output.viewer_cut import overlap
+    from clamp3d.output.common import overlap
 
     found = make_report(load_scene(ROOT / "examples" / "hinge" / "scene.toml"))
     (finding,) = found.findings
@@ -327,7 +327,7 @@ def test_a_report_asks_as_much_as_check(monkeypatch):
 
 
 def test_scenes_without_findings_pairs_or_parts(tmp_path):
-    assert "Nothing to mend" in report(Scene().add("pin", shapes.cylinder(5.0, 40.0)), tmp_path)[0].read_text()
+    assert "No issues found." in report(Scene().add("pin", shapes.cylinder(5.0, 40.0)), tmp_path)[0].read_text()
     assert report(Scene(), tmp_path)[2].read_text().startswith("a,b,verdict,distance_mm")
     grid = Scene()
     for i in range(40):

@@ -22,6 +22,7 @@ from clamp3d.core.meshing import mesh
 from clamp3d.core.pose import translation
 from clamp3d.fit.fit import fit_mesh
 from clamp3d.output.fit_report import fit_to_html
+from clamp3d.output.groups import grouped
 from clamp3d.output.palette import PART_COLOURS
 from clamp3d.output.scene_report import check_to_html
 from clamp3d.output.viewer import Viewer, view
@@ -308,10 +309,11 @@ def opacity(page, part, tree="cutaway"):
 def test_findings_of_a_check_lead_to_their_places(hinge_page, hinge):
     page, (_, result) = hinge_page, hinge
     assert page.title().startswith(result.scene.name)
-    assert re.match(r"\d+ clashes", page.inner_text("#headline"))
+    assert re.match(r"\d+ clash", page.inner_text("#headline"))
+    rows = [row for group in grouped(result) for row in group.rows]
     findings = page.query_selector_all(".finding")
-    assert len(findings) == len(result.findings)
-    for k, row in enumerate(result.findings):
+    assert len(findings) == len(rows)
+    for k, row in enumerate(rows):
         findings[k].click()
         page.wait_for_timeout(100)
         label = page.inner_text("#label")
@@ -325,7 +327,7 @@ def test_findings_of_a_check_lead_to_their_places(hinge_page, hinge):
             ((x, y),) = on_screen(page, [point])
             assert 400 < x < 1200
             assert 0 < y < 620
-    at_rest = next(k for k, row in enumerate(result.findings) if row.motion is None)
+    at_rest = next(k for k, row in enumerate(rows) if row.motion is None)
     findings[at_rest].click()
     page.wait_for_timeout(100)
     image = pixels(page)
@@ -472,36 +474,24 @@ with sync_playwright() as playwright:
     assert "stage: False" in done.stdout
     assert ("cannot draw 3D" in done.stdout) == javascript
     assert ("Scripts are off" in done.stdout) != javascript
-    for row in result.findings:
-        assert f"{row.a} and {row.b}" in done.stdout
+    for group in grouped(result):
+        assert f"{group.a} and {group.b}" in done.stdout
 
 
-def test_live_page_follows_the_run(browser, run):
+def test_served_page_follows_the_run_until_it_is_done(browser, run):
     with Viewer(run.clamp, mesh_error=0.1) as viewer:
+        viewer.show(run.path[0])
         page = open_page(browser, viewer.url)
-        wait_for(page, "viewer.scene_tree.children.clamp3d && viewer.scene_tree.children.clamp3d.children.labels")
-        wait_for(page, "Object.keys(viewer.scene_tree.find(['clamp3d', 'whole']).children).length === 7")
-        for waypoint in run.path:
-            viewer.show(waypoint)
-            wait_for(page, f'document.getElementById("headline").textContent.includes("{waypoint.label}")')
-            T = pose_in_browser(page, ["whole", "P2 down splint"])
-            np.testing.assert_allclose(T, waypoint.poses["P2"].T(), atol=2e-4)
+        wait_for(page, f'document.getElementById("headline").textContent.includes("{run.path[0].label}")')
         assert not page.is_visible("#timeline")
         page.emulate_media(reduced_motion="no-preference")
         viewer.finish(run)
+        wait_for(page, 'document.getElementById("headline").textContent === "clamped"')  # it loads itself again
         wait_for(page, "viewer.animator.playing")
         go_to(page, len(run.path) - 1)
         assert_drawn(page, run.poses)
-
-        late = open_page(browser, viewer.url)
-        wait_for(late, "viewer.animator.duration > 0")
-        assert not late.evaluate("viewer.animator.playing")  # who wants less motion starts it by the button
-        go_to(late, len(run.path) - 1)
-        assert_drawn(late, run.poses)
-        assert late.problems == []
-        late.context.close()
-    # Open pages do not hold us up.
-    wait_for(page, 'document.getElementById("ended")')
+    page.wait_for_timeout(1500)
+    assert page.is_visible("#timeline")  # the page stays when nothing is served any more
     assert page.problems == []
     page.context.close()
 
@@ -559,3 +549,36 @@ def test_meshcat_server_that_was_there_before(browser, run):
     finally:
         server.kill()
         server.communicate()
+
+
+def test_a_part_can_be_named_isolated_ghosted_and_hidden(browser, tmp_path):
+    scene = Scene().add("left", shapes.box((10, 10, 10))).add("right", shapes.box((10, 10, 10)), translation(30, 0, 0))
+    view(scene, serve=False).save_html(tmp_path / "two.html")
+    page = open_page(browser, (tmp_path / "two.html").as_uri(), offline=True)
+    wait_for(page, "document.querySelector('.part')")
+    page.locator("#switch-cutaway").uncheck()
+    page.wait_for_timeout(200)
+    ((x, y),) = on_screen(page, [(30.0, -5.0, 0.0)])
+    page.mouse.click(x, y)
+    assert page.inner_text("#identity b") == "right"
+    page.click("#identity [data-do=isolate]")
+    assert (opacity(page, "left", "whole") < 0.2, opacity(page, "right", "whole")) == (True, 1.0)
+    page.click("#identity [data-do=ghost]")
+    assert opacity(page, "right", "whole") < 0.2
+    page.keyboard.press("Escape")
+    assert opacity(page, "left", "whole") == opacity(page, "right", "whole") == 1.0
+    page.click(".part[data-part=left]")
+    page.click("#identity [data-do=hide]")
+    assert not page.evaluate(
+        "viewer.scene_tree.find(['clamp3d', 'whole', 'left', 'solid', '<object>']).object.material.visible"
+    )
+    assert page.problems == []
+
+
+def test_the_address_can_name_a_finding(browser, hinge):
+    path, result = hinge
+    group = grouped(result)[-1]
+    page = open_page(browser, f"{path.as_uri()}#finding={group.id}", offline=True)
+    wait_for(page, "document.querySelector('.finding.now')")
+    assert page.evaluate("document.querySelector('.finding.now').dataset.id") == group.id
+    assert page.problems == []

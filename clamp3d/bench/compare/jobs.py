@@ -1,19 +1,18 @@
 """Each measurement in a process of its own: a crash, a hang or used memory of one method leaves the others alone.
 
-``python -m clamp3d.bench.compare.jobs KIND METHOD OUT.pickle`` is the process; `run_job` starts it and waits.
+`run_job` starts the process and waits for its answer.
 """
 
 from __future__ import annotations
 
 import pickle
 import signal
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any, Literal
 
 from clamp3d.bench.compare.methods import Method
-from clamp3d.core.child import end_with_caller, run_child
+from clamp3d.core.child import run_child
 from clamp3d.errors import Clamp3dError
 
 Kind = Literal["contact", "peer", "assembly", "image", "complexity"]
@@ -60,17 +59,10 @@ def _answer(kind: str, method: str) -> Any:
 
 def main(kind: str, method: str, target: str) -> None:
     """Do a job; write its answer, or why there is none."""
-    from clamp3d.bench.compare import jobs  # not __main__, so that the caller knows the classes
-
-    end_with_caller()
     try:
         answer = _answer(kind, method)
     except Clamp3dError as error:
-        answer = jobs.JobError(str(error))
+        answer = JobError(str(error))
     done = Path(target + ".part")
     done.write_bytes(pickle.dumps(answer))
     done.rename(target)  # whole or not at all
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

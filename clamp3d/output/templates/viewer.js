@@ -1,17 +1,16 @@
 "use strict";
 // Time line, camera and switches around meshcat's viewer. What they show comes as `story` of the node /clamp3d; what
 // the panel says is HTML in it.
-function clamp3dViewer(messages) {
+function clamp3dViewer(messages, done) {
   const $ = (id) => document.getElementById(id);
   const pane = $("meshcat-pane");
-  const live = !messages.length;
+  if (!done && location.protocol !== "file:") setTimeout(() => location.reload(), 1000);
   let viewer;
   try {
     viewer = new MeshCat.Viewer(pane);
   } catch (error) {
     // Without WebGL the panel is the page; what it says is in the HTML already.
     $("no3d").hidden = false;
-    if (live) setTimeout(() => location.reload(), 3000);
     return;
   }
   document.body.classList.remove("no3d");
@@ -67,21 +66,25 @@ function clamp3dViewer(messages) {
     addSwitch("scene tree", false, (on) => $("stage").classList.toggle("tree", on));
   }
 
-  // Parts that a finding speaks of stand out: the others are seen through.
-  function highlight(names) {
-    for (const [name, paths] of Object.entries(story.nodes)) {
-      const faint = names && !names.includes(name);
-      for (const path of paths.filter((p) => !p.startsWith("/clamp3d/labels"))) {
-        const n = node(path);
-        if (n) n.object.traverse((o) => {
-          if (!o.material) return;
-          if (!o.plain) o.plain = { opacity: o.material.opacity, transparent: o.material.transparent, depthWrite: o.material.depthWrite };
-          Object.assign(o.material, faint ? { opacity: 0.13 * o.plain.opacity, transparent: true, depthWrite: false } : o.plain);
-          o.material.needsUpdate = true;
-        });
-      }
-      show("/clamp3d/labels/" + name, !faint);
+  // Parts: shown as they are, faint (seen through) or hidden.
+  const own = {};  // what the user chose for a part: "ghost" or "hide"
+  function look(name, how) {
+    for (const path of story.nodes[name].filter((p) => !p.startsWith("/clamp3d/labels"))) {
+      const n = node(path);
+      if (n) n.object.traverse((o) => {
+        if (!o.material) return;
+        if (!o.plain) o.plain = { opacity: o.material.opacity, transparent: o.material.transparent, depthWrite: o.material.depthWrite, visible: true };
+        Object.assign(o.material, how ? { opacity: 0.13 * o.plain.opacity, transparent: true, depthWrite: false, visible: how !== "hide" } : o.plain);
+        o.material.needsUpdate = true;
+      });
     }
+    show("/clamp3d/labels/" + name, !how);
+  }
+
+  // Parts that a finding names stand out: the others are seen through.
+  function highlight(names) {
+    if (!names) for (const name of Object.keys(own)) delete own[name];
+    for (const name of Object.keys(story.nodes)) look(name, own[name] || (names && !names.includes(name) ? "ghost" : ""));
     for (const group of ["contacts", "gaps", "forces"]) {
       const n = node("/clamp3d/" + group);
       for (const marks of n ? Object.values(n.children) : []) {
@@ -95,11 +98,47 @@ function clamp3dViewer(messages) {
       }
     }
     show("/clamp3d/labels", Boolean(names) || switches.labels.on);
-    $("home").hidden = !names;
+    $("home").hidden = !names && !Object.keys(own).length;
     viewer.set_dirty();
   }
 
-  // Camera: fly so that a box (corners in mm of the scene) fills the picture, without turning unless told how.
+  // A click on a part, in the picture or in the list, names it and offers to isolate, ghost or hide it.
+  let identified = "";
+  function identify(name) {
+    identified = name;
+    for (const e of document.querySelectorAll(".part")) e.classList.toggle("now", e.dataset.part === name);
+    $("identity").hidden = !name;
+    $("identity").firstElementChild.textContent = name;
+  }
+  $("identity").addEventListener("click", (e) => {
+    const how = e.target.dataset.do;
+    if (!how) return;
+    touched = true;
+    if (how === "isolate") highlight([identified]);
+    else { own[identified] = how; look(identified, how); $("home").hidden = false; viewer.set_dirty(); }
+  });
+  function partAt(x, y) {
+    const box = viewer.renderer.domElement.getBoundingClientRect(), T = MeshCat.THREE, ray = new T.Raycaster();
+    ray.setFromCamera(new T.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height), viewer.camera);
+    let nearest = null;
+    for (const [name, paths] of Object.entries(story.nodes)) for (const path of paths.filter((p) => /^\/clamp3d\/(whole|cutaway)\//.test(p))) {
+      const n = node(path);
+      if (!n || own[name] === "hide" || !node(path.split("/").slice(0, 3).join("/")).object.visible) continue;
+      const meshes = [];
+      n.object.traverse((o) => { if (o.isMesh) meshes.push(o); });
+      const hit = ray.intersectObjects(meshes, false)[0];
+      if (hit && (!nearest || hit.distance < nearest.distance)) nearest = { name, distance: hit.distance };
+    }
+    return nearest ? nearest.name : "";
+  }
+  let pressed = null;
+  pane.addEventListener("pointerdown", (e) => { pressed = [e.clientX, e.clientY]; });
+  pane.addEventListener("pointerup", (e) => {
+    if (story && pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < 4) identify(partAt(e.clientX, e.clientY));
+    pressed = null;
+  });
+
+  // Camera: fly so that a box (corners in mm of the scene) fills the picture, without turning unless an eye is given.
   let flight = 0;
   function fly(low, high, eye, time) {
     const V = MeshCat.THREE.Vector3;
@@ -157,7 +196,14 @@ function clamp3dViewer(messages) {
     if (low) fly(low, high, null, soft());
     else { touched = false; home(soft()); }
   }
-  $("told").addEventListener("click", (e) => {
+  $("story").addEventListener("click", (e) => {
+    const part = e.target.closest(".part");
+    if (part) {
+      const shown = part.classList.contains("now");
+      identify(shown ? "" : part.dataset.part);
+      touched = true;
+      return highlight(shown ? null : [part.dataset.part]);
+    }
     const finding = e.target.closest(".finding"), row = e.target.closest(".rows tr[data-a]");
     const again = (finding || row) && (finding || row).classList.contains("now");
     if (again) pick(null);
@@ -165,6 +211,7 @@ function clamp3dViewer(messages) {
       const f = story.findings[Number(finding.dataset.k)];
       if (!$("timeline").hidden) go(f.stop);
       pick(finding, f.a ? [f.a, f.b] : null, f.low, f.high);
+      try { history.replaceState(null, "", "#finding=" + f.group); } catch (error) { /* not everywhere for a file */ }
       if (innerWidth <= 760) $("stage").scrollIntoView({ block: "start" });
     } else if (row) {
       const r = story.stops[Number(row.closest(".stop").dataset.stop)].rows.find((r) => r.a === row.dataset.a && r.b === row.dataset.b);
@@ -175,7 +222,8 @@ function clamp3dViewer(messages) {
       else pick(row, [r.a, r.b], story.frame.low, story.frame.high);
     }
   });
-  $("home").addEventListener("click", () => pick(null));
+  addEventListener("hashchange", openFinding);
+  $("home").addEventListener("click", () => { identify(""); pick(null); });
   pane.addEventListener("pointerdown", () => { touched = true; flight++; });
   pane.addEventListener("wheel", () => { touched = true; flight++; }, { passive: true });
 
@@ -251,16 +299,16 @@ function clamp3dViewer(messages) {
   $("back").addEventListener("click", () => { const i = current(animator.time); go(animator.time > story.stops[i].arrive + 0.05 ? i : i - 1); });
   $("forward").addEventListener("click", () => go(current(animator.time) + 1));
   document.addEventListener("keydown", (e) => {
-    if (e.key === "h" || e.key === "Escape") pick(null);
+    if (e.key === "h" || e.key === "Escape") { identify(""); pick(null); }
     if ($("timeline").hidden || e.target.tagName === "INPUT" && e.target.type !== "checkbox") return;
     if (e.key === "ArrowRight") $("forward").click();
     else if (e.key === "ArrowLeft") $("back").click();
     else if (e.key === " " && !["BUTTON", "INPUT", "SUMMARY"].includes(e.target.tagName)) { toggle(); e.preventDefault(); }
   });
 
-  function tell(told) {
-    story = told;
-    $("told").innerHTML = story.panel;
+  function showStory(data) {
+    story = data;
+    $("story").innerHTML = story.panel;
     document.title = story.title + " - clamp3d";
     addSwitches();
     $("timeline").hidden = !(story.done && story.stops.length > 1);
@@ -269,7 +317,13 @@ function clamp3dViewer(messages) {
     if (story.stops.length) showStop(story.done ? 0 : story.stops.length - 1);
     // The panel says it; the caption is for meshcat's own page.
     viewer.scene_tree.find(["clamp3d", "caption"]).set_property("visible", false);
-    if (!touched) setTimeout(() => { viewer.set_3d_pane_size(); if (!touched) home(0, true); }, 30);
+    if (!touched) setTimeout(() => { viewer.set_3d_pane_size(); if (!touched) home(0, true); openFinding(); }, 30);
+  }
+  // The address can name a finding: #finding=ID.
+  function openFinding() {
+    const id = new URLSearchParams(location.hash.slice(1)).get("finding");
+    const finding = id && [...document.querySelectorAll(".finding")].find((e) => e.dataset.id === id);
+    if (finding && !finding.classList.contains("now")) finding.click();
   }
 
   // Parts of one shape share its geometry: it comes once, by its uuid, and is made for the first object that has it.
@@ -291,23 +345,12 @@ function clamp3dViewer(messages) {
     else if (command.type === "set_object") setObject(command);
     else handle(command);
     if (command.type === "set_animation" && calm()) animator.pause();  // it waits for the button (WCAG 2.2.2)
-    if (command.type === "set_property" && command.property === "story" && command.path === "/clamp3d") tell(command.value);
+    if (command.type === "set_property" && command.property === "story" && command.path === "/clamp3d") showStory(command.value);
     else if (command.type === "set_property" && command.property === "visible") {
       // A switch that the user has set outlasts what the program sends.
       for (const s of Object.values(switches)) if (s.touched) s.apply();
     }
   };
 
-  if (live) {
-    viewer.connect("ws://" + location.host + "/scene");
-    viewer.connection.onclose = () => {
-      const note = document.createElement("p");
-      note.className = "small";
-      note.id = "ended";
-      note.textContent = "The program has ended; this picture stays.";
-      if ($("headline")) $("headline").after(note);
-    };
-  } else {
-    for (const m of messages) viewer.handle_command_bytearray(Uint8Array.from(atob(m), (c) => c.charCodeAt(0)));
-  }
+  for (const m of messages) viewer.handle_command_bytearray(Uint8Array.from(atob(m), (c) => c.charCodeAt(0)));
 }

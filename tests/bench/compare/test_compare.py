@@ -5,14 +5,11 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from claims import END, START, as_list, assembly_table, claims, update
 from click.testing import CliRunner
@@ -24,23 +21,21 @@ from clamp3d.baselines.chords import Chords
 from clamp3d.bench import complexity as table_5
 from clamp3d.bench.compare import peers as compare_peers
 from clamp3d.bench.compare import run as study
-from clamp3d.bench.compare.assemblies import Assembled, Imaged, assembled, imaged
+from clamp3d.bench.compare.assemblies import Assembled, Imaged
 from clamp3d.bench.compare.chart import save_comparison
 from clamp3d.bench.compare.jobs import JobError, run_job
-from clamp3d.bench.compare.measure import Band, Measured, least, measure, verdicts
-from clamp3d.bench.compare.methods import METHODS, Method, prepare
-from clamp3d.bench.compare.peers import PEER_METHODS, SERIES, load_peer, missing_peers, prepare_peer
-from clamp3d.bench.compare.peers.pieces import sectors
+from clamp3d.bench.compare.measure import Band, Measured, measure
+from clamp3d.bench.compare.methods import METHODS, Method
+from clamp3d.bench.compare.peers import SERIES, load_peer, missing_peers, prepare_peer
 from clamp3d.bench.compare.report import comparison_to_dict, comparison_to_text
 from clamp3d.bench.compare.run import LIBRARIES, Comparison, NotMeasured, compare, pareto
-from clamp3d.bench.compare.scene import GROOVE, chord_error, known_poses
+from clamp3d.bench.compare.scene import chord_error
 from clamp3d.bench.complexity import Sweep, fitted, grid_search
 from clamp3d.bench.machine import machine
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.cli.compare import command
-from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
 
 QUICK = 0.01
@@ -77,18 +72,6 @@ def test_faceted_methods_err_by_their_chords_and_only_to_the_safe_side(method: M
     assert found.poses == (210 if method.family == "chords" else 420)
 
 
-def test_verdicts_are_counted_apart() -> None:
-    poses = known_poses()
-    band = poses.group == "0.0001"
-    values = poses.distance.copy()
-    free, hit = np.flatnonzero(band & (values > 0.0)), np.flatnonzero(band & (values < 0.0))
-    values[free[:3]] *= -1.0
-    values[hit[:5]] *= -1.0
-    values[free[3]] = 0.0  # touching is a hit
-    assert verdicts(poses, values, 1e-4) == Band(1e-4, 40, 40, 4, 5)
-    assert verdicts(poses, values, 0.02) == Band(0.02, 40, 40, 0, 0)
-
-
 points = st.lists(
     st.tuples(st.sampled_from([1.0, 2.0, 3.0, 5.0]), st.sampled_from([1e-9, 1e-3, 0.1, 1.0])), max_size=12
 )
@@ -101,12 +84,6 @@ def test_front_is_what_nothing_beats(values: list[tuple[float, float]]) -> None:
     beaten = {p for p in values if any(q != p and q[0] <= p[0] and q[1] <= p[1] for q in values)}
     assert front == set(values) - beaten
     assert pareto([_row("chords", 1.0, 1.0)]) == []
-
-
-def test_methods_go_through_their_keys() -> None:
-    assert [Method.parse(m.key) for m in (*METHODS, *PEER_METHODS)] == [*METHODS, *PEER_METHODS]
-    with pytest.raises(InputError, match="unknown method 'fog'; available: cas, chords"):
-        prepare(Method("fog", 1.0))
 
 
 def test_a_job_answers_as_the_process_itself_would() -> None:
@@ -129,40 +106,6 @@ def test_a_job_that_fails_hangs_or_crashes_says_so(tmp_path: Path, monkeypatch: 
         run_job("peer", "coal-sector:1.0", time_limit=30.0)
 
 
-@pytest.mark.skipif(not hasattr(os, "killpg"), reason="POSIX")
-def test_interrupting_a_job_leaves_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    started = []
-    popen = subprocess.Popen
-
-    class Interrupted(popen):  # type: ignore[misc, valid-type]
-        def wait(self, timeout: float | None = None) -> int:
-            started.append(self)
-            if timeout is not None:
-                raise KeyboardInterrupt
-            return int(super().wait())
-
-    monkeypatch.setattr(subprocess, "Popen", Interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        run_job("contact", "wedges:1.0", time_limit=60.0)
-    assert started[0].returncode is not None
-
-
-def test_assemblies_are_table_4() -> None:
-    exact, stepped = assembled(Method("chords", 20.0))
-    assert (exact.solver, stepped.solver) == ("exact", "stepped")
-    assert exact.distance == pytest.approx(32.080, abs=2e-3)
-    assert stepped.distance == pytest.approx(32.196, abs=2e-3)
-    assert stepped.motion_steps > 100
-    assert exact.motion_steps == 0
-
-
-def test_image_measurement_is_a_row() -> None:
-    found = imaged()
-    assert 0.5 < found.median_by_hand < 2.0
-    assert found.automatic < 0.05
-    assert len(found.first_five) == 5
-
-
 EXACT = ("open-cascade", "open-cascade-axis", "open-cascade-face")
 SHALLOW = ("coal-cylinder", "coal-capsule", "fcl", EXACT[0])
 """Series without a depth."""
@@ -180,20 +123,6 @@ def test_every_series_measures_the_same_groove(family: str) -> None:
     elif family != "fcl":  # in millimetres, FCL's own tolerance now and then costs a whole millimetre
         assert 0.9 * 0.0114 < found.error < 1.002 * 0.01143  # facets of the groove; the wire has none
     assert found.bands[0].false_misses == 0
-
-
-def test_sectors_hold_the_nearest_piece() -> None:
-    poses = known_poses()
-    for count in (7, 28, 140):
-        find = sectors(count)
-        angles = -0.5 * math.pi - GROOVE.half_angle + (np.arange(count) + 0.5) * 2.0 * GROOVE.half_angle / count
-        for T in poses.T[::7]:
-            z = np.linspace(-0.5 * GROOVE.length, 0.5 * GROOVE.length, 201)
-            t = (z - T[2, 3]) / T[2, 2]
-            at = T[:2, 3, None] + T[:2, 2, None] * t  # the axis in the block
-            k = int(np.hypot(*at).argmax())  # nearest the arc where it is furthest from its centre
-            off = np.angle(np.exp(1j * (angles - math.atan2(at[1, k], at[0, k]))))
-            assert min(abs(off)[list(find(T))]) <= abs(off).min() + 1e-9
 
 
 def test_pages_say_what_the_figures_say(tmp_path: Path) -> None:
@@ -241,13 +170,6 @@ def test_grid_search_finds_the_final_state_and_counts_as_the_paper_does() -> Non
     found = grid_search(run, chords, n=7, parts=1, grooves=4)
     assert found.tests == 7 * chords.segments(wire_pairs(run.clamp))
     assert found.closing is None or found.closing > run.closing + 0.1
-
-
-def test_a_quick_search_is_timed_three_times() -> None:
-    asked: list[int] = []
-    counted, seconds = table_5._timed(lambda: (asked.append(1) or len(asked), 0))  # type: ignore[func-returns-value]
-    assert (counted, len(asked)) == ((3, 0), 3)
-    assert 0.0 <= seconds < 0.3
 
 
 def test_exponents_of_table_5(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -360,55 +282,6 @@ def test_compare_asks_every_job_and_keeps_going(monkeypatch: pytest.MonkeyPatch)
     asked.clear()
     compare()
     assert not any(kind == "peer" for kind, _ in asked)
-
-
-def test_the_least_of_rounds_in_turn_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[str] = []
-
-    def answer(kind: str, method: str, *, time_limit: float) -> Any:
-        if kind != "contact":
-            return NotMeasured(method, None, method, "not asked here")
-        asked.append(method)
-        k = asked.count(method) - 1
-        if method == "chords:5.0" and k == 3:
-            raise JobError("not finished in 90 s")
-        m = Method.parse(method)
-        row = _row(m.family, (3.0, 2.0, 4.0, 1.0, 5.0)[k], 1e-4, m.setting)
-        return dataclasses.replace(
-            row,
-            setup=60.0 if m.family == "hulls" else 0.1 + 0.1 * k,
-            many=7.0 - k,
-            threaded=9.0 - k if m.family == "cas" else None,
-        )
-
-    monkeypatch.setattr(study, "run_job", answer)
-    found = compare()
-    assert asked[: len(METHODS)] == [m.key for m in METHODS]  # in turn, not one after the other
-    assert {asked.count(m.key) for m in METHODS} == {1, 5}
-    rows = {row.label: row for row in found.measured}
-    for m in METHODS:
-        row = rows[m.label]
-        assert row.one == (3.0 if m.family == "hulls" else 2.0 if m.key == "chords:5.0" else 1.0)
-        assert row.many == (7.0 if m.family == "hulls" else 3.0)
-        assert row.setup == (60.0 if m.family == "hulls" else 0.1)
-        assert row.threaded == (5.0 if m.family == "cas" else None)
-
-
-def test_the_least_time_is_found_part_by_part() -> None:
-    """A machine that is slow for a while: no whole pass is undisturbed, every part is once."""
-    now, calls = 0.0, 0
-
-    def run(part: Array) -> None:
-        nonlocal now, calls
-        calls += 1
-        disturbed = calls % 3 != 0  # of the ten parts of a pass, others each time
-        now += len(part) * 1e-4 * (2.0 if disturbed else 1.0)
-
-    poses = np.tile(np.eye(4), (100, 1, 1))
-    assert least(run, poses, 0.01, clock=lambda: now) == pytest.approx(1e-4)
-    now, calls = 0.0, 0
-    assert least(run, poses, 0.0, whole=True, clock=lambda: now) == pytest.approx(1e-4)
-    assert calls == 3
 
 
 def test_command_refuses_before_it_measures(tmp_path: Path) -> None:

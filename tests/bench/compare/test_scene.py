@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import importlib.util
-import math
 from pathlib import Path
 
 import mpmath
 import numpy as np
-import pytest
 
-from clamp3d.bench.compare.scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, chord_error, in_part_frame, known_poses
+from clamp3d.bench.compare.scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, known_poses
 from clamp3d.core.pose import check_pose
 
 POSES = known_poses()
@@ -59,19 +57,3 @@ def test_tilted_distances_are_those_of_the_search() -> None:
         value = oracle.exact_distance(GROOVE.radius, GROOVE.half_angle, GROOVE.length, WIRE.radius, WIRE.length, c, d)
         known = mpmath.mpf(float(POSES.distance[i])) + mpmath.mpf(float(POSES.residual[i]))
         assert abs(mpmath.mpf(value) - known) < mpmath.mpf(10) ** -22
-
-
-def test_error_sees_below_the_rounding_of_the_distances() -> None:
-    off = POSES.error(POSES.distance)
-    assert np.abs(off).max() < 2.0**-53
-    assert (off == -POSES.residual).all()
-
-
-def test_part_frame_has_no_rounding() -> None:
-    moved = in_part_frame(POSES.T)
-    assert (np.sort(np.abs(moved[:, :3, 3]), axis=1) == np.sort(np.abs(POSES.T[:, :3, 3]), axis=1)).all()
-
-
-@pytest.mark.parametrize(("deg", "known"), [(1.0, 0.00046), (5.0, 0.0114), (10.0, 0.0457), (20.0, 0.182)])
-def test_chord_errors_are_the_known_ones(deg: float, known: float) -> None:
-    assert chord_error(math.radians(deg)) == pytest.approx(known, rel=0.01)

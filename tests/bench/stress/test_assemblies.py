@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 
 from clamp3d.baselines.cas import Cas
-from clamp3d.bench.stress.assemblies.clamps import MAKERS, clamp_of, open_start, random_clamp, scaled
+from clamp3d.bench.stress.assemblies.clamps import clamp_of, random_clamp, scaled
 from clamp3d.bench.stress.assemblies.envelope import Envelope
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES, EXACT
 from clamp3d.bench.stress.assemblies.minima import minima
 from clamp3d.bench.stress.run import run_family
-from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import Section
 
 CLAMPS = 5
@@ -64,18 +62,6 @@ def test_falls_is_the_way_down_to_the_closed_form(lift):
     assert envelope.overlap(q) == pytest.approx(lift, abs=1e-12)
 
 
-def test_falls_sees_a_wire_beside_the_deepest_line_and_a_tilt_that_is_off():
-    # The wire's centre runs on circles of R - r about both arc centres: at x beside them it needs that much more room.
-    clamp, x = symmetric(), 0.01
-    rise = 6.0 - math.sqrt(6.0**2 - x**2)
-    d, middle = straight_d(clamp), clamp.up_splint.width / 2
-    y = 0.5 * (clamp.up_splint.line_groove.centre_depth + d + clamp.down_splint.line_groove.centre_depth)
-    q = np.array([middle - 48.0 + x, y, middle + 48.0, y, d + 2.0 * rise, *[0.0] * 5])
-    assert Envelope(clamp).falls(q) == pytest.approx(2.0 * rise, abs=1e-9)
-    q[:6] = [middle - 48.0, y, middle + 48.0, y, d + 0.02, 0.01]
-    assert 0.015 < Envelope(clamp).falls(q) <= 0.02 + 1e-12  # tilts are sampled: never more than the truth
-
-
 def test_envelopes_of_a_wire_against_the_distance_to_the_groove():
     """A centre on the envelope touches, by the signed distance in 3D; one beyond it overlaps."""
     rng = np.random.default_rng(4)
@@ -93,20 +79,6 @@ def test_envelopes_of_a_wire_against_the_distance_to_the_groove():
                 assert least == pytest.approx(0.0, abs=1e-9)
 
 
-def test_least_distance_is_monotone_between_its_places():
-    rng = np.random.default_rng(5)
-    for _ in range(20):
-        clamp = random_clamp(rng)
-        tilt = np.array([rng.uniform(-0.2, 0.2)])
-        for wire in Envelope(clamp).wires:
-            places = wire.places(tilt)
-            ends = wire.least(places, tilt)[0]
-            x = np.sort(rng.uniform(places[0, 0], places[0, -1], (1, 2000)))
-            d, j = wire.least(x, tilt)[0], np.searchsorted(places[0], x[0])
-            assert (d >= np.minimum(ends[j - 1], ends[j]) - 1e-10).all()
-            assert (d <= np.maximum(ends[j - 1], ends[j]) + 1e-10).all()
-
-
 @pytest.mark.parametrize("factor", [1e-3, 1e-2, 1e2])
 def test_sizes_scale_every_distance(factor):
     clamp = random_clamp(np.random.default_rng(8))
@@ -115,16 +87,6 @@ def test_sizes_scale_every_distance(factor):
         assert same.d == pytest.approx(factor * one.d, abs=1e-9 * max(1.0, factor))
     closed = [solve_final_state(Section(c, Cas())).q[4:] for c in (clamp, other)]
     assert closed[1] == pytest.approx(factor * closed[0], abs=1e-8 * max(1.0, factor))
-
-
-def test_random_starts_lead_to_places_that_are_named():
-    rng = np.random.default_rng(6)
-    for _ in range(4):
-        section = Section(random_clamp(rng), Cas())
-        named = np.array([state.q[4] for state in equilibria(section)])
-        for _ in range(5):
-            reached = solve_final_state(section, open_start(rng, section)).q[4]
-            assert np.abs(named - reached).min() < 1e-6
 
 
 def test_a_method_that_is_wrong_is_found_wrong():
@@ -143,12 +105,3 @@ def test_a_case_runs_as_python_and_prints_its_truth(family):
     truths = [float(word.split()[0]) for word in text.splitlines()[-1].split("d = ")[1].split(",")]
     reached = float(done.stdout.splitlines()[0].split()[-2])
     assert min(abs(reached - truth) for truth in truths) < 1e-6
-
-
-def test_the_reference_clamp_has_one_equilibrium_besides_and_three_ways_to_slip():
-    truth = minima(Envelope(load_clamp()))
-    states = equilibria(Section(load_clamp(), Cas()))
-    firm = [m.d for m in truth if not m.slipped]
-    assert firm == pytest.approx([float(state.q[4]) for state in states], abs=1e-9)
-    assert len(truth) - len(firm) == 3  # line, jumper, both
-    assert len(MAKERS) == len(ASSEMBLIES)

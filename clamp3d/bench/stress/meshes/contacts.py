@@ -17,13 +17,13 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from clamp3d.baselines.fcl_shapes import tree
 from clamp3d.bench.stress.family import Family, Makers, Methods
 from clamp3d.bench.stress.meshes.family import METHODS, Answer, OneByOne
 from clamp3d.bench.stress.outcome import REFERENCE
 from clamp3d.bench.stress.worker import Rows
 from clamp3d.collide.distance import distance
 from clamp3d.collide.motions import first_contact
-from clamp3d.collide.surface import fcl_tree
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import Array, inverse, rotation, translation
@@ -199,7 +199,7 @@ def _fcl_alone(case: Contact) -> Answer:
     if case.way is not None:
         return Answer(math.nan, why="FCL alone: one pose at a time")
     bodies = [
-        fcl.CollisionObject(fcl_tree(mesh.vertices, mesh.faces), fcl.Transform(T[:3, :3], T[:3, 3]))
+        fcl.CollisionObject(tree(mesh.vertices, mesh.faces), fcl.Transform(T[:3, :3], T[:3, 3]))
         for mesh, T in ((case.a, np.eye(4)), (case.b, case.T))
     ]
     found = float(fcl.distance(*bodies, fcl.DistanceRequest(), fcl.DistanceResult()))

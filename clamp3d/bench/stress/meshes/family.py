@@ -18,7 +18,7 @@ import fcl
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.baselines.fcl_shapes import encoded
+from clamp3d.baselines.fcl_shapes import encoded, tree
 from clamp3d.bench.stress.family import Methods
 from clamp3d.bench.stress.meshes import faults
 from clamp3d.bench.stress.meshes.cases import Fault, MeshCase, MeshCases, make_cases
@@ -29,7 +29,6 @@ from clamp3d.bench.stress.poses.flat import MAX_BOXES, FlatFamily, interval
 from clamp3d.bench.stress.worker import Answers, Measured, Measures
 from clamp3d.collide.check import check
 from clamp3d.collide.scene import Scene
-from clamp3d.collide.surface import fcl_tree
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core.distance import signed_distances
 from clamp3d.core.groove_pair import GroovePair
@@ -123,7 +122,7 @@ def _scene(case: MeshCase) -> Answer:
 def _fcl_alone(case: MeshCase) -> Answer:
 
     with _silence():
-        model = fcl_tree(case.mesh.vertices, case.mesh.faces)
+        model = tree(case.mesh.vertices, case.mesh.faces)
         return Answer(_fcl_distance([fcl.CollisionObject(model, fcl.Transform())], case))
 
 

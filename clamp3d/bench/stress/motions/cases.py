@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -123,18 +122,8 @@ def turned(x: NDArray[Any], axis: NDArray[Any], angle: NDArray[Any]) -> NDArray[
 
 def poses(cases: Motions, i: int, instants: Array) -> Array:
     """Poses (m, 4, 4) of case i at some instants."""
-    s = instants[:, None]
-    T = np.repeat(cases.start[i][None], len(s), 0)
-    if cases.angle[i] == 0.0:
-        T[:, :3, 3] += s * cases.travel[i]
-        return T
-    axis = cases.axis[i] / math.sqrt(float(cases.axis[i] @ cases.axis[i]))
-    angle = instants * cases.angle[i]
-    arm = T[0, :3, 3] - cases.point[i]
-    T[:, :3, 3] += (turned(arm, axis, angle) - arm) + s * (cases.travel[i, 0] * axis)
-    for k in range(3):
-        T[:, :3, k] = turned(cases.start[i, :3, k], axis, angle)
-    return T
+    motion = cases.motion(i)
+    return np.array([motion.at(t, cases.start[i]) for t in instants.tolist()])
 
 
 def touching(

@@ -102,18 +102,12 @@ def _turning_screws(rng: np.random.Generator, n: int, turns: Array, pitch: Array
     return screws_through(cases, point, np.asarray(axis, float), turns, pitch * radius * turns, instant)
 
 
-@MAKERS.family("turning", _best)
-def _turning(rng: np.random.Generator, n: int) -> Motions:
-    """Circles about any axis that touch at one instant and curve away, on any feature."""
-    return _turning_screws(rng, n, 10.0 ** rng.uniform(-1.3, 0.8, n) * rng.choice([-1.0, 1.0], n), np.zeros(n))
-
-
 @MAKERS.family("screws", _best)
 def _screws(rng: np.random.Generator, n: int) -> Motions:
-    """Turn and advance together, up to six turns, near at one place; and screws of no plan at all."""
+    """Circles and turns with advance, up to six turns, near at one place; and screws of no plan at all."""
     part = n // 2
     turns = 10.0 ** rng.uniform(-1.0, np.log10(12.0 * np.pi), n) * rng.choice([-1.0, 1.0], n)
-    pitch = draw.powers(rng, n, -3, 0)
+    pitch = draw.powers(rng, n, -3, 0, 0.4)
     built = _turning_screws(rng, n, turns, pitch)
     size = built.shapes.size()[built.shape][:, None]
     centre, point = rng.uniform(-1.5, 1.5, (n, 3)) * size, rng.uniform(-1.0, 1.0, (n, 3)) * size
@@ -256,22 +250,3 @@ def _start(rng: np.random.Generator, n: int) -> Motions:
     turns = motions(shapes, shape, cases.T_world_wire, travel=0.0, angle=2.0 * np.pi * rng.integers(1, 4, n),
                     point=point, axis=np.asarray(square_to(rng, normal), float), gap=gap, instant=0.0)  # fmt: skip
     return _choose(rng.random(n) < 0.75, leaves, turns)
-
-
-@MAKERS.family("from far", _best)
-def _from_far(rng: np.random.Generator, n: int) -> Motions:
-    """Comes from 1e3 ... 1e6 mm away and stops at, or flies past, 1e-12 ... 1e-2 of the radius."""
-    shapes, shape = draw.shapes_for(rng, n)
-    gap = shapes.r[shape] * draw.powers(rng, n, -12, -2)
-    feature = rng.choice(draw.FEATURES, n)
-    cases, normal = touching(rng, shapes, shape, feature, gap)
-    lean = rng.uniform(0.0, 1.4, n)[:, None]
-    way = np.cos(lean) * normal + np.sin(lean) * square_to(rng, normal)
-    distance = 10.0 ** rng.uniform(3, 6, n)
-    arrives = rng.random(n) < 0.6
-    past = np.isin(feature, _CONVEX) & ~arrives
-    way = np.where(past[:, None], square_to(rng, normal), way)
-    instant = np.where(past, rng.uniform(0.1, 0.9, n), 1.0)
-    travel = np.asarray(-way * distance[:, None], np.float64)
-    start = moved(cases.T_world_wire, -instant.astype(Extended)[:, None] * travel)
-    return motions(shapes, shape, start, travel=travel, gap=gap, instant=instant)

@@ -10,7 +10,7 @@ from clamp3d.bench.stress.family import Family
 from clamp3d.bench.stress.motions.cases import Motions, poses
 from clamp3d.bench.stress.motions.families import MAKERS
 from clamp3d.bench.stress.motions.methods import METHODS, CasMethod
-from clamp3d.bench.stress.motions.truth import TRUTH_ERROR, Least, truth, truth_50_digits
+from clamp3d.bench.stress.motions.truth import TRUTH_ERROR, Least, truth
 from clamp3d.bench.stress.outcome import REFERENCE, Outcome
 from clamp3d.bench.stress.poses.cases import Cases
 from clamp3d.bench.stress.poses.truth import truth_50_digits as pose_truth
@@ -45,9 +45,9 @@ class MotionFamily(Family):
         return Truths(least, reference, answers)
 
     def difference(self, cases: Motions, truths: Truths, i: int) -> float:
-        """See `Family`."""
-        difference = float(truth_50_digits(cases, i, truths.least) - truths.least.distance[i])
-        return abs(difference) / float(cases.scene()[i])
+        """See `Family`: at 50 digits of the pose at the instant that was found."""
+        least = truths.least
+        return abs(_at(cases, i, float(least.instant[i])) - float(least.distance[i])) / float(cases.scene()[i])
 
     def ask(self, name: str, cases: Motions, truths: Truths, time_limit: float) -> Answers:
         """See `Family`; the reference has answered already, and its first contacts are judged too."""
@@ -63,10 +63,10 @@ class MotionFamily(Family):
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
         cases = self.cases(n, seed)
-        one = cases.take([i])
-        found = truth(one)
-        least = float(truth_50_digits(one, 0, found))
-        return f"{cases.snippet(i)}\n# truth: least {least!r} mm at instant {float(found.instant[0])!r}"
+        least = truth(cases.take([i]))
+        return (
+            f"{cases.snippet(i)}\n# truth: least {float(least.distance[0])!r} mm at instant {float(least.instant[0])!r}"
+        )
 
 
 def _at(cases: Motions, i: int, instant: float) -> float:
@@ -93,7 +93,7 @@ def check_first_contacts(cases: Motions, exact: Least, asked: CasMethod, answers
     }
     rows = np.flatnonzero(have & touches)
     if len(rows):
-        until = truth(cases.take(rows), until=instant[rows], hints=instant[rows, None], cells=300).distance
+        until = truth(cases.take(rows), until=instant[rows], hints=instant[rows, None]).distance
         moved = instant[rows] > 0.0
         late, early = np.zeros(len(cases), bool), np.zeros(len(cases), bool)
         late[rows] = moved & (until < -bound[rows])

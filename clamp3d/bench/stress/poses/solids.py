@@ -2,8 +2,7 @@
 
 Each case is a contact of two features, made from the bodies' definition, at a small gap or overlap. The truth is an
 interval of the signed distance: apart that of the branch and bound of `flat_truth`; in an overlap the depth is at least
-that of the deepest point inside, and at most what parts the bodies in any of many directions, or brings the cylinder
-into the hole.
+that of the deepest point inside, and at most what parts the bodies in any of many directions.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from clamp3d.bench.stress.poses.flat import MAX_BOXES, NARROW, FlatFamily
 from clamp3d.bench.stress.poses.flat_truth import solid_truth
 from clamp3d.bench.stress.worker import Measured, Measures, Rows
 from clamp3d.collide.distance import distance
-from clamp3d.collide.hull import MEMBER
 from clamp3d.collide.model import ModelCache
 from clamp3d.core import shapes
 from clamp3d.core.pose import Array
@@ -33,8 +31,8 @@ from clamp3d.core.shapes import Solid
 from clamp3d.testing import assert_distance, directions
 
 _WAYS = directions(200)
-_HALVINGS, _QUICK = 6, 500
-"""Translations into a hole that are tried, and boxes that each may take."""
+_ROUNDING = 1e-9
+"""What the engine's bounds may be wrong by, in parts of the bodies' size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +148,7 @@ class EngineMethod:
         low, high = found.T
         unsure = ~np.isfinite(low)
         low = np.where(unsure, high, low)
-        bound = 0.5 * np.maximum(high - low, 0.0) + MEMBER * cases.scene()
+        bound = 0.5 * np.maximum(high - low, 0.0) + _ROUNDING * cases.scene()
         return Measured(0.5 * (low + high), bound, unsure, "the depth is not bounded from above")
 
 
@@ -179,27 +177,7 @@ class SolidFamily(FlatFamily):
         along = ways @ d
         other = 0.5 * length * np.abs(along) + r * np.sqrt(np.maximum(1.0 - along * along, 0.0)) - ways @ c
         shortest = float((own + other).min())
-        if cases.hollow and R > 0.0:
-            shortest = min(shortest, self._into_hole(cases, i))
         return -shortest - rounding, high + rounding
-
-    def _into_hole(self, cases: Solids, i: int) -> float:
-        """Length of a translation straight towards the hole's axis after which the bodies are apart."""
-        T, scene = cases.T[i].copy(), float(cases.take([i]).scene()[0])
-        c, d = T[:3, 3].copy(), T[:3, 2]
-        way = np.array([*(c - c[2] / d[2] * d)[:2], 0.0]) if abs(d[2]) > 0.1 else np.zeros(3)
-        found, short, long = math.inf, 0.0, 1.0
-        for _ in range(_HALVINGS):  # all the way first
-            part = long if found == math.inf else 0.5 * (short + long)
-            T[:3, 3] = c - part * way
-            size = (float(cases.radius[i]), True, cases.half[i], float(cases.r[i]), float(cases.length[i]))
-            if solid_truth(*size, T, 1e-4 * scene, _QUICK)[0] > 0.0:
-                found, long = part * float(np.linalg.norm(way)), part
-            elif found == math.inf:
-                break
-            else:
-                short = part
-        return found
 
     def difference(self, cases: Solids, truths: Array, i: int) -> float:  # type: ignore[override]
         """See `Family`; and the answer's points, normal and depth hold before an oracle of its own."""

@@ -1,0 +1,81 @@
+"""Open CASCADE in a process of its own, which stays alive: a fault in it ends no more than the question.
+
+Each function here calls the one of the same name in `clamp3d.brep.open_cascade`.
+"""
+
+from __future__ import annotations
+
+import atexit
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from clamp3d.brep.open_cascade import Surfaces, Tessellation
+from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
+from clamp3d.core.pose import Array
+from clamp3d.errors import SolverError
+
+_MODULE = "clamp3d.brep.open_cascade"
+_NAMES = ("tessellate", "surfaces", "distance", "common", "depths", "bounds_at")
+_SECONDS = 120.0
+"""Time limit of one question; a few hundred milliseconds are usual."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommonPart:
+    """What two solids share: ``volume`` mm^3, ``area`` mm^2, ``box`` (2, 3), ``points`` (k, 3) of its border."""
+
+    volume: float
+    area: float
+    box: Array
+    points: Array
+
+
+@cache
+def process() -> Worker:
+    """The one process; it is started by the first question."""
+    worker = Worker(*(f"{_MODULE}:{name}" for name in _NAMES), confined=True)
+    atexit.register(worker.close)
+    return worker
+
+
+def _ask(name: str, *arguments: Any) -> Any:
+    try:
+        return process().call(f"{_MODULE}:{name}", *arguments, time_limit=_SECONDS)
+    except WorkerEndedError as error:
+        raise SolverError(f"Open CASCADE ended with {error.ending}") from None
+    except WorkerTimeoutError:
+        raise SolverError(f"Open CASCADE gave no answer in {_SECONDS:g} s") from None
+
+
+def tessellate(brep: bytes, chord: float) -> Tessellation:
+    """Triangles of a solid, each with its error."""
+    return Tessellation(**_ask("tessellate", brep, chord))
+
+
+def surfaces(brep: bytes) -> Surfaces:
+    """The surfaces of a solid's faces."""
+    return Surfaces(**_ask("surfaces", brep))
+
+
+def bounds_at(brep: bytes, T: Array) -> Array:
+    """Box (2, 3) of a solid placed by ``T`` (4, 4), mm."""
+    return np.asarray(_ask("bounds_at", brep, T))
+
+
+def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
+    """Distance (mm) of two solids and nearest points (3,); 0 where they touch or overlap."""
+    gap, p, q = _ask("distance", a, b, T)
+    return gap, p, q
+
+
+def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
+    """The common part of two solids, its border sampled at ``share`` of its smallest extent."""
+    return CommonPart(*_ask("common", a, b, T, share))
+
+
+def depths(brep: bytes, points: Array) -> Array:
+    """Distance (k,) mm of points (k, 3) from the surface of a solid."""
+    return np.asarray(_ask("depths", brep, points))

@@ -1,0 +1,280 @@
+"""Findings with one cause as one group, with an identifier that stays, and how they differ from an earlier check.
+
+Parts whose names differ in their number only are a family: twelve rollers that overlap one race by about the same
+are one group. Text, JSON, page, report and CSV list these groups.
+"""
+
+from __future__ import annotations
+
+import csv
+import getpass
+import hashlib
+import io
+import json
+import math
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any, Literal
+
+from clamp3d.collide.result import BAD, CheckResult, PairResult
+from clamp3d.collide.scene import Scene
+from clamp3d.collide.verdict import Verdict
+from clamp3d.core.shapes import Shape
+from clamp3d.errors import InputError
+from clamp3d.output.files import write_text
+
+Status = Literal["new", "changed", "same", "accepted"]
+
+_JUMP, _JUMP_SHARE = 0.01, 0.2
+"""A distance that differs from the next by more mm than this, and by more than this share, has a cause of its own."""
+_CHANGED, _CHANGED_SHARE = 1e-3, 1e-3
+"""A distance has changed since the last check if it differs by more mm than this, or by more than this share."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Group:
+    """Findings with one cause.
+
+    Attributes
+    ----------
+    id : str
+        Identifier from the names and the motion: the same when the file is read again, in whatever order.
+    a, b : str
+        The two families, or the names of the two parts.
+    rows : tuple of PairResult
+        The findings, the worst first; all with one verdict and in one motion, or at rest.
+    lower, upper : float
+        Every distance of the group lies between these, mm.
+    """
+
+    id: str
+    a: str
+    b: str
+    rows: tuple[PairResult, ...]
+    lower: float
+    upper: float
+
+    @property
+    def worst(self) -> PairResult:
+        """The finding to look at first."""
+        return self.rows[0]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict of all its findings."""
+        return self.rows[0].verdict
+
+    @property
+    def motion(self) -> str | None:
+        """The motion that they are in, None at rest."""
+        return self.rows[0].motion
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; lengths in mm, unknown bounds are None."""
+        return {
+            "id": self.id,
+            "a": self.a,
+            "b": self.b,
+            "verdict": self.verdict.value,
+            "motion": self.motion,
+            "count": len(self.rows),
+            "at_least_mm": self.lower if math.isfinite(self.lower) else None,
+            "at_most_mm": self.upper if math.isfinite(self.upper) else None,
+            "pairs": [[row.a, row.b] for row in self.rows],
+        }
+
+
+def grouped(result: CheckResult) -> tuple[Group, ...]:
+    """The findings of a check by their causes: the worst verdicts first, and of one verdict what is rarest.
+
+    A pair that clashes at rest is not listed again for the motions.
+
+    >>> from clamp3d.collide.check import check
+    >>> from clamp3d.core import shapes
+    >>> from clamp3d.core.pose import translation
+    >>> scene = Scene().add("rail", shapes.box((90.0, 10.0, 10.0)))
+    >>> for k, height in enumerate((9.0, 9.0, 9.0, 6.0)):
+    ...     scene = scene.add(f"nut-{k}", shapes.box((5.0, 5.0, 10.0)), translation(20.0 * k - 30.0, 0.0, height))
+    >>> [(group.a, group.b, len(group.rows)) for group in grouped(check(scene))]
+    [('rail', 'nut-3', 1), ('rail', 'nut', 3)]
+    """
+    clashing = {frozenset((row.a, row.b)) for row in result.pairs if row.verdict in BAD}
+    family = families(result.scene)
+    causes: dict[tuple[str, ...], list[PairResult]] = {}
+    for row in sorted(result.findings, key=lambda row: row.distance.upper):
+        if row.motion is None or frozenset((row.a, row.b)) not in clashing:
+            key = (row.motion or "", *sorted((family[row.a], family[row.b])))
+            causes.setdefault(key, []).append(row)
+    groups = [group for key, rows in causes.items() for group in _identified(key, _alike(rows), family)]
+    order = {verdict: k for k, verdict in enumerate(Verdict)}
+    order[Verdict.CONTAINED] = order[Verdict.CLASH]
+    return tuple(sorted(groups, key=lambda group: (order[group.verdict], len(group.rows), group.upper)))
+
+
+def _alike(rows: Sequence[PairResult]) -> list[list[PairResult]]:
+    """Rows of one cause, in the order of their distances, by verdicts, and apart where the distance jumps."""
+    alike: list[list[PairResult]] = []
+    latest: dict[Verdict, list[PairResult]] = {}
+    for row in rows:
+        own = latest.get(row.verdict)
+        if own is None or _jumps(own[-1].distance.upper, row.distance.lower):
+            own = latest[row.verdict] = []
+            alike.append(own)
+        own.append(row)
+    return alike
+
+
+def _jumps(last: float, next_at_least: float) -> bool:
+    return next_at_least > last + max(_JUMP, _JUMP_SHARE * abs(last))
+
+
+def _identified(key: tuple[str, ...], clusters: list[list[PairResult]], family: Mapping[str, str]) -> Iterable[Group]:
+    """The groups of one cause: the largest is named by the families, those that differ from it by their parts."""
+    names = [sorted(f"{row.a}:{row.b}" for row in cluster) for cluster in clusters]
+    first = min(range(len(clusters)), key=lambda k: (-len(clusters[k]), names[k]))
+    for k, cluster in enumerate(clusters):
+        row, rows = cluster[0], tuple(cluster)
+        a, b = (family[row.a], family[row.b]) if len(rows) > 1 else (row.a, row.b)
+        text = "\n".join(key if k == first else (*key, *names[k]))
+        identifier = hashlib.blake2s(text.encode(), digest_size=4).hexdigest()
+        lower, upper = min(row.distance.lower for row in rows), max(row.distance.upper for row in rows)
+        yield Group(identifier, a, b, rows, lower, upper)
+
+
+def families(scene: Scene) -> dict[str, str]:
+    """The family of each part: its name without the number, if another part differs from it in the number only.
+
+    A number without a separator before it counts for parts of one shape only.
+
+    >>> from clamp3d.core import shapes
+    >>> ball, pin = shapes.cylinder(2.0, 4.0), shapes.cylinder(1.0, 4.0)
+    >>> scene = Scene().add("ball", ball).add("ball_2", pin).add("P1", ball).add("P2", ball).add("P3", pin)
+    >>> list(families(scene).values())
+    ['ball', 'ball', 'P', 'P', 'P3']
+    """
+    kinds: dict[str, tuple[str, Shape | None]] = {}
+    for part in scene.parts:
+        numbered = re.fullmatch(r"(.*?[^\W_])([\W_]*)\d+", part.name)
+        stem, separator = numbered.groups() if numbered else (part.name, "-")
+        kinds[part.name] = (stem, None if separator else part.shape)
+    count = Counter(kinds.values())
+    return {name: kind[0] if count[kind] > 1 else name for name, kind in kinds.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Accepted:
+    """A finding that somebody has accepted: its identifier, by whom, on what day, and why."""
+
+    id: str
+    who: str = ""
+    when: str = ""
+    why: str = ""
+
+
+def accepted_file(source: str) -> Path:
+    """The file with the accepted findings of an input: beside a file or folder, else in the current folder.
+
+    >>> accepted_file("parts/hinge.step").as_posix()
+    'parts/hinge.accepted.toml'
+    """
+    path = Path(source) if Path(source).name else Path(source).resolve()
+    return path.with_name(f"{path.stem}.accepted.toml")
+
+
+def read_accepted(path: Path) -> dict[str, Accepted]:
+    """The accepted findings by their identifiers; none where there is no file. Raises InputError for a bad file."""
+    if not path.is_file():
+        return {}
+    try:
+        entries = tomllib.loads(path.read_text(encoding="utf-8")).get("accepted", [])
+        accepted = [Accepted(**{key: str(value) for key, value in entry.items()}) for entry in entries]
+    except (OSError, ValueError, AttributeError, TypeError) as error:
+        raise InputError(f"{path}: must hold [[accepted]] with id, who, when and why: {error}") from None
+    return {entry.id: entry for entry in accepted}
+
+
+def accept(path: Path, identifiers: Sequence[str], *, why: str, who: str = "") -> list[Accepted]:
+    """Add findings to the file of accepted ones, and return what was added. Raises InputError for a bad identifier."""
+    present = read_accepted(path)
+    for identifier in identifiers:
+        if not re.fullmatch(r"[0-9a-f]{8}", identifier):
+            raise InputError(f"id of a finding must be 8 digits 0-9a-f, as `check` prints it, got {identifier!r}")
+    new = [i for i in dict.fromkeys(identifiers) if i not in present]
+    entries = [Accepted(i, who or getpass.getuser(), date.today().isoformat(), why) for i in new]
+    text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    for entry in entries:
+        fields = (f"{key} = {json.dumps(getattr(entry, key))}\n" for key in ("id", "who", "when", "why"))
+        text += "[[accepted]]\n" + "".join(fields) + "\n"
+    if entries:
+        write_text(path, text)
+    return entries
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Groups beside those of an earlier check: the ``status`` of each by its identifier, and which are ``gone``."""
+
+    status: Mapping[str, Status]
+    gone: tuple[dict[str, Any], ...] = ()
+    has_baseline: bool = False
+
+    def open(self, groups: Iterable[Group]) -> list[Group]:
+        """The groups that count for the exit code: not accepted, and with a baseline the new ones only."""
+        counting = ("new",) if self.has_baseline else ("new", "changed", "same")
+        return [group for group in groups if self.status[group.id] in counting]
+
+
+def compare(groups: Sequence[Group], baseline: Path | None, accepted: Mapping[str, Accepted]) -> Comparison:
+    """Compare groups with those of a result that ``check --json`` wrote. Raises InputError if it holds none.
+
+    A group counts as new too where it was no clash in the earlier check and is one now.
+    """
+    before = {} if baseline is None else _read_groups(baseline)
+
+    def status(group: Group) -> Status:
+        if group.id in accepted:
+            return "accepted"
+        old = before.get(group.id)
+        if old is None or (group.verdict in BAD and old.get("verdict") not in BAD):
+            return "new"
+        least, most = old.get("at_least_mm"), old.get("at_most_mm")
+        slack = max(_CHANGED, _CHANGED_SHARE * abs(group.upper))
+        apart = (most is not None and group.lower > most + slack) or (least is not None and group.upper < least - slack)
+        alike = (old.get("verdict"), old.get("count")) == (group.verdict.value, len(group.rows))
+        return "changed" if apart or not alike else "same"
+
+    ids = {group.id for group in groups}
+    gone = tuple(old for identifier, old in before.items() if identifier not in ids)
+    return Comparison({group.id: status(group) for group in groups}, gone, baseline is not None)
+
+
+def _read_groups(path: Path) -> dict[str, dict[str, Any]]:
+    try:
+        groups = json.loads(path.read_text(encoding="utf-8"))["groups"]
+        return {group["id"]: group for group in groups}
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError):
+        raise InputError(f"{path}: not a result of `clamp3d check --json` with groups of findings") from None
+
+
+def groups_csv(groups: Sequence[Group], comparison: Comparison) -> str:
+    """One line for each pair of each group, with a header; lengths in mm."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(
+        ["id", "status", "group", "a", "b", "verdict", "motion", "t", "at_least_mm", "at_most_mm", "method"]
+    )
+    for group in groups:
+        for row in group.rows:
+            d = row.distance
+            bounds = ["" if math.isinf(value) else value for value in (d.lower, d.upper)]
+            place = [row.a, row.b, row.verdict.value, row.motion or "", "" if row.t is None else row.t]
+            family = f"{group.a} and {group.b}"
+            writer.writerow([group.id, comparison.status[group.id], family, *place, *bounds, d.method])
+    return out.getvalue()

@@ -1,0 +1,151 @@
+"""Groups of findings: one line for one cause, identifiers that stay, baselines and accepted findings."""
+
+import csv
+import io
+import json
+import random
+from dataclasses import replace
+
+import pytest
+
+from clamp3d.collide.check import check
+from clamp3d.collide.scene import Scene
+from clamp3d.core import shapes
+from clamp3d.core.motion import Motion
+from clamp3d.core.pose import translation
+from clamp3d.output.groups import compare, grouped
+from clamp3d.output.report import make_report
+from clamp3d.output.scene_report import check_to_dict, check_to_text
+from clamp3d.output.viewer import view
+from clamp3d.output.wording import headline
+
+BOX = '[parts.{name}]\nshape = "box"\nsize = [10, 10, 10]\npose = {{ translation = [{x}, 0, 0] }}\n'
+
+
+def rail(depths, names=None):
+    """A rail with nuts that stand ``depths`` mm deep in it."""
+    scene = Scene(name="rail").add("rail", shapes.box((200.0, 10.0, 10.0)))
+    for k, depth in enumerate(depths):
+        name = f"nut_{k}" if names is None else names[k]
+        scene = scene.add(name, shapes.box((5.0, 5.0, 10.0)), translation(10.0 * k - 80.0, 0.0, 10.0 - depth))
+    return scene
+
+
+def rows(scene):
+    return [(group.a, group.b, group.verdict.value, len(group.rows)) for group in grouped(check(scene))]
+
+
+def test_one_cause_is_one_group_and_a_single_fault_comes_first():
+    depths = [0.3] * 7 + [0.5] + [0.0] * 4
+    assert rows(rail(depths)) == [
+        ("rail", "nut_7", "clash", 1),
+        ("rail", "nut", "clash", 7),
+        ("rail", "nut", "contact", 4),
+    ]
+    assert headline(check(rail(depths))).startswith("8 clashes in 2 groups, deepest 0.5")
+
+
+def test_identifiers_do_not_depend_on_the_order_of_the_file():
+    names = [f"nut_{k}" for k in range(8)]
+    depths = dict(zip(names, [0.3] * 6 + [0.7, 1.0], strict=True))
+    ids = {(g.id, g.b) for g in grouped(check(rail(depths.values(), names)))}
+    assert len(ids) == 3
+    random.Random(3).shuffle(names)
+    assert {(g.id, g.b) for g in grouped(check(rail([depths[n] for n in names], names)))} == ids
+
+
+def test_a_clash_at_rest_is_not_listed_again_for_a_motion():
+    scene = Scene().add("a", shapes.box((10, 10, 10))).add("b", shapes.box((10, 10, 10)), translation(9.0, 0, 0))
+    motions = (Motion.translate((-1.0, 0, 0), parts="b", name="in"), Motion.translate((30.0, 0, 0), parts="b"))
+    result = check(replace(scene, motions=motions))
+    assert len(result.findings) > 1
+    (group,) = grouped(result)
+    assert (group.motion, len(group.rows)) == (None, 1)
+    assert headline(result).startswith("1 clash, deepest 1.000")
+
+
+def test_text_json_page_and_report_list_the_same_groups():
+    scene = rail([0.3, 0.3, 0.3, 0.9])
+    result = check(scene)
+    ids = [group.id for group in grouped(result)]
+    assert len(ids) == 2
+    text = check_to_text(result).splitlines()
+    assert [line.rpartition("id ")[2] for line in text if "; id " in line] == ids
+    assert [group["id"] for group in check_to_dict(result)["groups"]] == ids
+    assert [finding.group.id for finding in make_report(scene).findings] == ids
+    with view(result, serve=False) as viewer:
+        assert list(dict.fromkeys(finding["group"] for finding in viewer.story["findings"])) == ids
+        assert "rail and nut clash, 3 times: overlap 0.3" in viewer.html()
+
+
+@pytest.mark.parametrize("n_clashes", [0, 1])
+def test_undecided_pairs_are_never_called_clean_or_free_of_clashes(n_clashes):
+    result = check(rail([0.3] * n_clashes + [-3.0]))
+    open_row = replace(result.pairs[0] if result.pairs else check(rail([0.3])).pairs[0])
+    open_row = replace(open_row, verdict=type(open_row.verdict)("uncertain"), b="nut_0")
+    said = headline(replace(result, pairs=(*result.pairs[:n_clashes], open_row)))
+    assert "1 pair undecided" in said
+    assert "No clash" not in said
+    assert "Clean" not in said
+
+
+def test_what_is_new_changed_and_gone_since_a_baseline(tmp_path):
+    last = tmp_path / "last.json"
+    last.write_text(json.dumps(check_to_dict(check(rail([0.3, 0.3, 0.3, 0.9])))))
+    same = grouped(check(rail([0.3, 0.3, 0.3, 0.9])))
+    assert set(compare(same, last, {}).status.values()) == {"same"}
+    assert compare(same, last, {}).open(same) == []
+    deeper = grouped(check(rail([0.4, 0.4, 0.4, 0.0, 0.0])))
+    comparison = compare(deeper, last, {})
+    assert [comparison.status[group.id] for group in deeper] == ["changed", "new"]
+    assert [old["b"] for old in comparison.gone] == ["nut_3"]
+
+
+def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main):
+    monkeypatch.chdir(tmp_path)
+
+    def boxes(**places):
+        (tmp_path / "boxes.toml").write_text("".join(BOX.format(name=name, x=x) for name, x in places.items()))
+
+    boxes(a=0, b=9, c=30)
+    assert main("check", "boxes.toml", "--json", "last.json")[0] == 1
+    assert main("check", "boxes.toml", "--baseline", "last.json")[0] == 0
+    boxes(a=0, b=9, c=17)
+    code, out, _ = main("check", "boxes.toml", "--baseline", "last.json", "--csv", "new.csv")
+    assert code == 1
+    assert "since the baseline: 1 new, 0 changed, 0 gone, 1 unchanged, 0 accepted" in out
+    lines = list(csv.DictReader(io.StringIO((tmp_path / "new.csv").read_text())))
+    assert {(line["a"], line["b"], line["status"]) for line in lines} == {("a", "b", "same"), ("b", "c", "new")}
+    assert all(float(line["at_least_mm"]) <= float(line["at_most_mm"]) for line in lines if line["at_least_mm"])
+    ids = sorted(line["id"] for line in lines)
+    code, out, _ = main("accept", "boxes.toml", *ids, "--why", 'a "press" fit', "--who", "Ada")
+    assert (code, out) == (0, "boxes.accepted.toml: 2 accepted\n")
+    assert main("accept", "boxes.toml", ids[0], "--why", "again")[1] == "boxes.accepted.toml: 0 accepted, 1 before\n"
+    code, out, _ = main("check", "boxes.toml")
+    assert code == 0
+    assert out.count("accepted by Ada on 20") == 2
+    boxes(a=0, b=9, c=8)
+    assert main("check", "boxes.toml")[0] == 1  # a and c clash too now
+
+
+@pytest.mark.parametrize(
+    ("arguments", "files", "message"),
+    [
+        (("check", "boxes.toml", "--baseline", "none.json"), {}, "none.json: cannot be read: No such file"),
+        (
+            ("check", "boxes.toml", "--baseline", "old.json"),
+            {"old.json": "{}"},
+            "not a result of `clamp3d check --json`",
+        ),
+        (("check", "boxes.toml"), {"boxes.accepted.toml": "[[accepted]]\nwho = 3"}, "boxes.accepted.toml: must hold"),
+        (("accept", "boxes.toml", "xyz", "--why", "so"), {}, "id of a finding must be 8 digits 0-9a-f"),
+        (("accept", "boxes.toml", "00000000"), {}, "Missing option '--why'"),
+    ],
+)
+def test_bad_baselines_and_identifiers_are_one_line(arguments, files, message, tmp_path, monkeypatch, main):
+    monkeypatch.chdir(tmp_path)
+    for name, text in (files | {"boxes.toml": BOX.format(name="a", x=0) + BOX.format(name="b", x=9)}).items():
+        (tmp_path / name).write_text(text)
+    code, out, err = main(*arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
