@@ -208,7 +208,7 @@ def test_check_as_a_process(gap, code, verdict, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["rum"], "unknown command 'rum'"),
+        (["rum"], "command 'rum'"),
         (["check", "nowhere.step"], "nowhere.step"),
         (["check", "reference", "--pairs", "P1:P9"], "unknown part 'P9'; available: P1"),
         (["run", "--line", "LJ-631"], "unknown conductor 'LJ-631'"),
