@@ -44,7 +44,7 @@ def test_a_bare_groove_and_a_cylinder(groove, wire, T):
 FACETED = {
     (a.name, fit): (a, faceted_shape(a, 0.3 if fit == "off" else 0.05, fit))
     for a in DRAWN
-    for fit in ("off", "round", "bound")
+    for fit in ("off", "round")
     if fit == "off" or any(e.profile.arcs for e in (*a.bodies, *a.holes))
 }
 

@@ -127,6 +127,10 @@ def test_without_depths_an_overlap_is_at_least():
     assert check(scene).pairs[0].distance.depth == pytest.approx(3.0, abs=1e-9)
 
 
+def is_known(d):
+    return d.lower <= d.upper < 0.0 and d.upper - d.lower <= max(0.01, 0.1 * -d.lower)
+
+
 BODIES = {
     "box": shapes.box((12.0, 9.0, 7.0)),
     "rod": shapes.cylinder(4.0, 18.0),
