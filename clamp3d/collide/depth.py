@@ -90,7 +90,8 @@ def _way_out(a: Model, b: Model, T: Array, deep: float) -> tuple[float, Array | 
         return np.inf, None
     best, way = np.inf, None
     slack = 2.0 * (outer_a.error + outer_b.error + rounding_of(outer_a, outer_b, T))
-    for direction in shared.directions(_DIRECTIONS):
+    # Where two faces hold a body, as a V does, its way out is between their normals.
+    for direction in np.vstack([shared.directions(_DIRECTIONS), shared.mean_normal(outer_a)]):
         reach = float(np.ptp(shared.vertices @ direction)) + slack
         for sign in (1.0, -1.0):
             length = _shortest(outer_a, outer_b, T, sign * direction, min(deep, reach), min(reach, best))

