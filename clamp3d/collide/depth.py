@@ -96,7 +96,8 @@ def _way_out(a: Surface, b: Surface, T: Array, shared: Common, deep: float) -> t
     """Length (mm), infinite if unknown, and direction (3,) of a translation of ``b`` after which meshes are apart."""
     best, way = np.inf, None
     slack = 2.0 * (a.error + b.error + rounding_of(a, b, T))
-    candidates = np.vstack([_pressure(a, shared), shared.directions(_DIRECTIONS), np.eye(3), T[:3, :3].T])
+    # Where two faces hold a body, as a V does, its way out is between their normals.
+    candidates = np.vstack([shared.mean_normal(a), shared.directions(_DIRECTIONS), np.eye(3), T[:3, :3].T])
     for direction in candidates:
         reach = float(np.ptp(shared.vertices @ direction)) + slack
         for sign in (1.0, -1.0):
@@ -104,15 +105,6 @@ def _way_out(a: Surface, b: Surface, T: Array, shared: Common, deep: float) -> t
             if length < best:
                 best, way = length, sign * direction
     return best, way
-
-
-def _pressure(a: Surface, shared: Common) -> Array:
-    """The direction (1, 3) in which a pressure on the overlap would push ``a``; (0, 3) if it pushes nowhere."""
-    normal, area = shared.areas
-    on_a = a.distance(shared.vertices[shared.faces].mean(axis=1)) <= 1e-6 * a.scale
-    push = (normal[on_a] * area[on_a, None]).sum(axis=0)
-    size = float(np.linalg.norm(push))
-    return np.array([push / size]) if size > 1e-9 * float(area.sum()) else np.empty((0, 3))
 
 
 def _outer(model: Model) -> Surface:

@@ -67,6 +67,15 @@ class Common:
             weight[np.abs(normal @ n) > 1.0 - 1e-6] = 0.0
         return np.array(chosen).reshape(-1, 3)
 
+    def mean_normal(self, surface: Surface) -> Array:
+        """Unit vectors (0 or 1, 3): the mean outward normal of what of ``surface`` bounds the common part."""
+        normal, area = self.areas
+        middles = self.vertices[self.faces].mean(axis=1)
+        on_surface = surface.distance(middles) <= 1e-9 * surface.scale
+        mean = (normal * area[:, None])[on_surface].sum(axis=0)
+        size = float(np.linalg.norm(mean))
+        return np.asarray(mean[None] / size if size > 1e-3 * float(area.sum()) else np.empty((0, 3)))
+
 
 def common(a: Surface, b: Surface, T: Array) -> Common | None:
     """The common part of ``a`` and of ``b`` at ``T`` (4, 4) in a's frame; None if there is none."""
