@@ -3,21 +3,19 @@
 import math
 from dataclasses import replace
 
-import manifold3d
 import numpy as np
 import pytest
 
-from clamp3d import check, distance, first_contact, min_clearance, shapes
+from clamp3d import distance, first_contact, min_clearance, shapes
 from clamp3d.baselines.wedges import wedge_solids
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.collide.answer import Distance
-from clamp3d.core.meshing import chord_error, mesh
+from clamp3d.core.meshing import chord_error
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import inverse, rotation, translation
-from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
+from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.core.profile import sagitta
-from clamp3d.errors import InputError
 from clamp3d.fit.fit import fit_mesh
 from clamp3d.testing import (
     Body,
@@ -30,8 +28,6 @@ from clamp3d.testing import (
     body,
     common,
     convex_body,
-    directions,
-    pose_at,
     separation,
 )
 from tests.kinds import BLOCK, DRAWN, faceted_shape
@@ -71,17 +67,6 @@ def test_fields_are_nowhere_steeper_than_one():
         assert (np.abs(field(x + step) - field(x)) <= np.linalg.norm(step, axis=1) * (1.0 + 1e-9) + 1e-12).all()
 
 
-def test_boxes_of_bodies_hold_them():
-    rng = np.random.default_rng(2)
-    for shape in (*DRAWN, Cylinder(3.0, 8.0), Capsule(3.0, 8.0)):
-        T = rotation(rng.normal(size=3), 1.0) @ translation(1.0, 2.0, 3.0)
-        it = body(shape).at(T)
-        x = rng.uniform(-60.0, 60.0, (20_000, 3))
-        inside = it.field(x) < 0.0
-        assert (x[inside] >= it.box[0] - 1e-9).all()
-        assert (x[inside] <= it.box[1] + 1e-9).all()
-
-
 def test_separation_and_common_in_closed_form():
     for T, gap in ((translation(9.0, 0.0, 0.0), 2.0), (translation(8.0, 8.0, 8.0), 3.0 * math.sqrt(3.0) - 2.0)):
         found = separation(BOX, BALL, T)
@@ -94,34 +79,6 @@ def test_separation_and_common_in_closed_form():
     groove, wire = SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0)
     assert separation(groove, wire, translation(0.0, -1.0, 0.0)).upper == pytest.approx(0.5, abs=1e-9)
     assert common(groove, wire, translation(0.0, -2.0, 0.0)).upper < -0.2
-
-
-def test_separation_agrees_with_manifold():
-    rng = np.random.default_rng(3)
-    seen = 0
-    while seen < 10:
-        a, b = (DRAWN[k] for k in rng.integers(len(DRAWN), size=2))
-        T = rotation(rng.normal(size=3), rng.uniform(0.0, 6.0))
-        T[:3, 3] = rng.normal(size=3) * 22.0
-        error = 0.01
-        A, B = (
-            manifold3d.Manifold(manifold3d.Mesh64(np.array(m.vertices), np.array(m.faces, dtype=np.uint64)))
-            for m in (mesh(a, error), mesh(b, error))
-        )
-        gap = A.min_gap(B.transform(np.ascontiguousarray(T[:3])), 200.0)
-        found, slack = separation(a, b, T), 2.0 * (chord_error(a, error) + chord_error(b, error))
-        assert found.lower <= gap + slack
-        if gap > 0.0:
-            seen += 1
-            assert found.upper == pytest.approx(gap, abs=slack + 1e-6)
-
-
-def test_any_body_can_be_asked_and_what_is_none_is_refused():
-    hull = convex_body([[x, y, z] for x in (-5, 5) for y in (-5, 5) for z in (-5, 5)])
-    x = np.random.default_rng(4).uniform(-9, 9, (500, 3))
-    assert np.array_equal(hull.field(x) <= 0.0, body(BOX).field(x) <= 0.0)
-    with pytest.raises(InputError, match="Capsule, SweptArc or Body, got int"):
-        body(3)
 
 
 T_APART = rotation((1.0, 2.0, 3.0), 0.7)
@@ -168,17 +125,6 @@ def test_wrong_answers_in_an_overlap_are_seen(change, message):
         assert_distance(replace(DEEP, **change), BOX, BOX, T_DEEP)
 
 
-def test_poses_of_a_motion_are_those_of_its_twist():
-    rng = np.random.default_rng(5)
-    for _ in range(20):
-        start = rotation(rng.normal(size=3), rng.uniform(0, 3))
-        start[:3, 3] = rng.normal(size=3) * 20.0
-        screw = Motion.screw(rng.normal(size=3), rng.normal(), point=rng.normal(size=3), travel=rng.normal())
-        for t in (0.0, 0.3, 1.0):
-            np.testing.assert_allclose(pose_at(screw, t, start), screw.at(t, start), atol=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(directions(50), axis=1), 1.0, atol=1e-14)
-
-
 def test_wrong_motions_are_seen():
     pin, start, way = Cylinder(2.0, 6.0), translation(20.0, 0.0, 0.0), Motion.translate((-40.0, 8.0, 0.0))
     least, hit = min_clearance(BOX, pin, way, start), first_contact(BOX, pin, way, start)
@@ -214,10 +160,3 @@ def test_wrong_fits_pieces_and_equilibria_are_seen():
     assert_returns(np.round, np.zeros(2), [np.full(2, 0.1), np.full(2, -0.4)], 1e-9)
     with pytest.raises(AssertionError, match=r"it ends 1\.0 away"):
         assert_returns(np.round, np.zeros(2), [np.full(2, 0.6)], 1e-9)
-
-
-def test_the_verdicts_of_a_scene_can_be_asked_too():
-    from clamp3d import Scene
-
-    row = check(Scene(clearance=40.0).add("a", BLOCK).add("b", BOX, T_APART), distances=True).pairs[0]
-    assert_distance(row.distance, BLOCK, BOX, T_APART)

@@ -132,11 +132,11 @@ def decompose(
     mesh_hash = _sha256(solid.vertices.astype("<f8").tobytes(), solid.faces.astype("<i8").tobytes())
     settings = json.dumps({"format": _FORMAT, "coacd": version, **asdict(parameters)}, sort_keys=True)
     key = f"decomposition-{_sha256(mesh_hash.encode(), settings.encode())[:32]}"
-    found = _load(key) if cache else None
-    cached = found is not None
-    if found is None:
-        found = _run(solid, parameters, name, time_limit, progress, key if cache else None)
-    hulls, seconds = found
+    result = _load(key) if cache else None
+    cached = result is not None
+    if result is None:
+        result = _run(solid, parameters, name, time_limit, progress, key if cache else None)
+    hulls, seconds = result
     outside = _outside(solid.vertices, hulls)
     return Decomposition(
         hulls=hulls,
@@ -170,8 +170,8 @@ def _hulls(arrays: Any) -> tuple[Mesh, ...]:
     if count < 1:
         raise ValueError("no hulls")
     # CoACD 1.0.10 gives the same hulls in another order each time.
-    found = sorted(((arrays[f"v{i}"], arrays[f"f{i}"]) for i in range(count)), key=lambda hull: hull[0].tolist())
-    return tuple(closed_mesh(vertices, faces, f"hull {i}") for i, (vertices, faces) in enumerate(found))
+    result = sorted(((arrays[f"v{i}"], arrays[f"f{i}"]) for i in range(count)), key=lambda hull: hull[0].tolist())
+    return tuple(closed_mesh(vertices, faces, f"hull {i}") for i, (vertices, faces) in enumerate(result))
 
 
 def _outside(points: Array, hulls: tuple[Mesh, ...]) -> Array:
@@ -214,10 +214,10 @@ def _run(
             )
         try:
             with np.load(target, allow_pickle=False) as file:
-                found = _hulls(file), float(file["seconds"])
+                result = _hulls(file), float(file["seconds"])
         except (OSError, ValueError, KeyError) as error:
             why = (said or ["nothing"])[-1] if code else str(error)
             raise SolverError(f"CoACD gave no hulls for {name} (exit code {code}): {why}") from None
         if key is not None:
             disk.keep(key, target)
-        return found
+        return result

@@ -10,8 +10,8 @@ What python-fcl 0.7.0 does, measured on wedges of a groove of radius 12 against 
   can run without end beside them. It is not asked for. Where two shapes overlap, a cylinder thinner and shorter by
   ``c`` all round is measured instead, 40 % and then 90 % of the radius: if that is apart by d and the nearest point is
   on its side or end, the depth is c - d exactly, for a cylinder's support in such a direction is its core's and c more.
-  At a rim the depth is understated, as of a cylinder whose rims are rounded by c (no less than 1e-9 mm). Deeper than that it is only known to
-  be at least c.
+  At a rim the depth is understated, as of a cylinder whose rims are rounded by c (1e-12 mm at least).
+  Deeper than that it is only known to be at least c.
 - The normal from two witness points is worthless where they nearly meet. It is taken from the cylinder's own surface.
 - NaN, scaled poses, empty meshes and open "convex" shapes pass without a word or end the interpreter: refused here.
 """
@@ -39,7 +39,7 @@ MIN_SIZE, MAX_SIZE = 0.1, 1e4
 """Extents in mm between which the accuracy stated above was measured; others are refused."""
 
 _EROSIONS = (0.4, 0.9)  # of the radius or half length
-_SHALLOWEST = 1e-9  # mm: what overlaps by a rim alone is this deep at least
+_SHALLOWEST = 1e-12  # mm: what overlaps by a rim alone is this deep at least
 _RIM = 1e-6  # of the cylinder's size: a witness point this near the rim lies on it
 _WITNESS = 1e-3  # mm apart from which the witness points give a direction at a rim
 _CONVEX = 1e-9  # of the size

@@ -49,8 +49,10 @@ class Polytopes:
         """One gap per polytope, with the wire at a pose (4, 4) in the part's frame."""
         wire.place(check_pose_array(T_a_wire[None])[0])
         measured = [measure(shape, wire) for shape in self.shapes]
-        columns = (np.array([getattr(m, name) for m in measured]) for name in ("distance", "point", "normal"))
-        return Pieces(*columns, self.names)
+        distance, point, normal = (
+            np.array([getattr(m, key) for m in measured]) for key in ("distance", "point", "normal")
+        )
+        return Pieces(distance, point, normal, self.names)
 
     def distances(self, wire: Wire, T_a_wire: Array) -> Array:
         """Least signed distance (n,) at poses (n, 4, 4), the polytopes taken by the distance of their boxes.

@@ -16,16 +16,16 @@ from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
 
 
-def reproduction_to_dict(found: Reproduction) -> dict[str, Any]:
+def reproduction_to_dict(tables: Reproduction) -> dict[str, Any]:
     """The tables as JSON data; lengths in mm, angles in degrees."""
     return {
         "table1": [
             asdict(row) | {"distance": row.distance.to_dict(), "gap": row.distance.value, "difference": row.difference}
-            for row in found.table1
+            for row in tables.table1
         ],
-        "table2": [asdict(row) for row in found.table2],
-        "table3": [asdict(row) for row in found.table3],
-        "final_state": [_pose_to_dict(row) for row in found.final_state],
+        "table2": [asdict(row) for row in tables.table2],
+        "table3": [asdict(row) for row in tables.table3],
+        "final_state": [_pose_to_dict(row) for row in tables.final_state],
         "table4": [
             {
                 "method": row.method,
@@ -36,13 +36,13 @@ def reproduction_to_dict(found: Reproduction) -> dict[str, Any]:
                 "error_mm": row.error,
                 "published_error_mm": row.published_error,
             }
-            for row in found.table4
+            for row in tables.table4
         ],
         "measured_mm": published.ACTUAL_DISTANCE,
-        "image_trials_mm": list(found.image_trials),
-        "table5": [asdict(row) for row in found.table5],
-        "table5_orders": [asdict(row) | {"refuted": row.refuted} for row in found.orders],
-        "plateau": found.plateau,
+        "image_trials_mm": list(tables.image_trials),
+        "table5": [asdict(row) for row in tables.table5],
+        "table5_orders": [asdict(row) | {"refuted": row.refuted} for row in tables.orders],
+        "plateau": tables.plateau,
     }
 
 
@@ -59,9 +59,9 @@ def _pose_to_dict(row: PoseRow) -> dict[str, Any]:
     }
 
 
-def reproduction_to_text(found: Reproduction) -> str:
+def reproduction_to_text(tables: Reproduction) -> str:
     """The tables as lines for a terminal."""
-    connections = [row for row in found.table1 if row.published or row.declared or row.measured]
+    connections = [row for row in tables.table1 if row.published or row.declared or row.measured]
     return render(
         "reproduce.txt",
         "clamp3d.bench",
@@ -70,16 +70,16 @@ def reproduction_to_text(found: Reproduction) -> str:
             (f"{r.a}-{r.b}", r.published, r.declared, r.measured, _gap(r.distance), r.relation, r.difference or "same")
             for r in connections
         ],
-        others=len(found.table1) - len(connections),
-        holes=_relations(found.table2),
-        arcs=_relations(found.table3),
-        poses=[_pose(pose) for pose in found.final_state],
-        matrices=[line for pose in found.final_state for line in _matrices(pose)][:-1],
+        others=len(tables.table1) - len(connections),
+        holes=_relations(tables.table2),
+        arcs=_relations(tables.table3),
+        poses=[_pose(pose) for pose in tables.final_state],
+        matrices=[line for pose in tables.final_state for line in _matrices(pose)][:-1],
         actual=f"{published.ACTUAL_DISTANCE:.3f}",
-        distances=_distances(found),
-        plateau=found.plateau,
-        work=[_work(row) for row in found.table5],
-        orders=[_order(row) for row in found.orders],
+        distances=_distances(tables),
+        plateau=tables.plateau,
+        work=[_work(row) for row in tables.table5],
+        orders=[_order(row) for row in tables.orders],
     )
 
 
@@ -109,16 +109,16 @@ def _matrices(row: PoseRow) -> list[Sequence[object]]:
     ]
 
 
-def _distances(found: Reproduction) -> list[Sequence[object]]:
+def _distances(tables: Reproduction) -> list[Sequence[object]]:
     rows: list[Sequence[object]] = []
-    for d in found.table4:
+    for d in tables.table4:
         # The paper's figures are stepped; the exact rows show what they would be without the step.
         compared = d.solver == "stepped" or d.unit_angle_deg is None
         theirs = (d.published, d.published_error) if compared else (None, None)
         apart = None if theirs[0] is None else f"{d.distance - theirs[0]:+z.3f}"
         cells = [None if v is None else f"{v:.3f}" for v in (d.distance, theirs[0], d.error, theirs[1])]
         rows.append([d.method, _unit(d.unit_angle_deg), d.solver, *cells[:2], apart, *cells[2:]])
-    for number, (trial, theirs5) in enumerate(zip(found.image_trials, published.IMAGE_DISTANCES, strict=True), 1):
+    for number, (trial, theirs5) in enumerate(zip(tables.image_trials, published.IMAGE_DISTANCES, strict=True), 1):
         errors = [f"{abs(v - published.ACTUAL_DISTANCE):.3f}" for v in (trial, theirs5)]
         rows.append(["image", f"trial {number}", "", f"{trial:.3f}", f"{theirs5:.3f}", None, *errors])
     return rows

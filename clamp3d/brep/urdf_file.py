@@ -33,7 +33,8 @@ def read_urdf(path: str, joints: dict[str, float]) -> dict[str, Any]:
     -------
     dict
         ``shapes``: a dict for each, with its ``link``, ``kind``, place ``T`` (4, 4), and ``size`` of a box, ``radius``
-        and ``length`` of a cylinder, ``mesh`` and ``error`` of a sphere, ``file`` and ``scale`` of a mesh file, or a ``reason``.
+        and ``length`` of a cylinder, ``mesh`` and ``error`` of a sphere, ``file`` and ``scale`` of a mesh file, or the
+        ``reason`` why it cannot be read.
         ``joined``: the pairs of links that a joint connects. ``notes``: what was assumed.
 
     Raises InputError for a file that is no whole URDF, unknown joints and values out of their limits.

@@ -63,9 +63,8 @@ def read_in_process(function: str, path: Path, *arguments: Any) -> Any:
         except MemoryError:
             problem = f"takes more than {memory / 2**30:.1f} GB to read; {LIMITS}=4 allows four times as much"
         except WorkerEndedError as error:
-            problem = (
-                f"the reader ended with {error.ending}: the file is damaged, or uses what the reader does not support"
-            )
+            reason = error.last or "the file is damaged, or uses what the reader does not support"
+            problem = f"the reader ended with {error.ending}: {reason}"
         except Clamp3dError as error:
             raise type(error)(str(error).replace(absolute, str(path))) from None
         except OSError as error:

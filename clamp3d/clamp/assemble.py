@@ -151,6 +151,11 @@ def assemble(
     if settings.sequence is not None:
         clamp = replace(clamp, sequence=text("sequence", settings.sequence))
     check_model(model)
+    return _assembled(clamp, model, settings)
+
+
+def _assembled(clamp: Clamp, model: ContactModel, settings: _Settings) -> Assembly:
+    """Close the clamp, play its sequence, and measure the end."""
     steps, section = parse_sequence(clamp.sequence), Section(clamp, model)
     log = Log(section, settings.on_waypoint)
     closing, final = _close(section, settings)

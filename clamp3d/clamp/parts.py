@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
+from scipy.special import ellipe, ellipk
+
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import (
     TITLES,
@@ -154,23 +156,8 @@ def _disk_under_arch(a: float, radius: float) -> float:
     elliptic integrals of that parameter give as ((1 + m) E - (1 - m) K) / (3 m).
     """
     m = (a / radius) ** 2
-    K, E = _complete_elliptic(m)
+    K, E = float(ellipk(m)), float(ellipe(m))
     return 4.0 * a * a * radius * ((1.0 + m) * E - (1.0 - m) * K) / (3.0 * m)
-
-
-def _complete_elliptic(m: float) -> tuple[float, float]:
-    """Complete elliptic integrals K and E of parameter ``m``, by the arithmetic-geometric mean.
-
-    [Abramowitz & Stegun, Handbook of Mathematical Functions, 17.6]. SciPy's `special` takes longer to import.
-    """
-    a, b, c = 1.0, math.sqrt(1.0 - m), math.sqrt(m)
-    total, power = 0.5 * c * c, 0.5
-    for _ in range(8):  # each doubles the digits
-        a, b, c = 0.5 * (a + b), math.sqrt(a * b), 0.5 * (a - b)
-        power *= 2.0
-        total += power * c * c
-    K = math.pi / (2.0 * a)
-    return K, K * (1.0 - total)
 
 
 def _check_hole(key: str, size: float, length: float) -> None:

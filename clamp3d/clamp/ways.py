@@ -28,7 +28,7 @@ from clamp3d.core.shapes import Solid
 
 SPARE = 20.0
 """Free way in mm between a part that waits and what is in its way."""
-RESOLUTION = 1e-4
+RESOLUTION = 1e-3
 """Overlap in mm up to which parts on their way touch."""
 DIRECTIONS: dict[str, tuple[float, float, float]] = {
     "from above": (0.0, 0.0, 1.0),
@@ -43,6 +43,8 @@ _ENDLESS = 20.0
 """How many times as long as drawn a wire is taken to be."""
 _BENDS = (0.5, 0.25, 0.75)
 """Where a way out bends, in parts of how far the parts can go before they meet something."""
+_LOOKS = (0.5, 0.25, 0.125, 0.0625, 0.03125)
+"""Where a way is looked at before it is proven: most ways that are blocked show it."""
 _SHORTEST = 0.5
 """Shortest leg of a way with a bend, mm."""
 _LOOK = 0.01
@@ -160,21 +162,19 @@ class Ways:
             if length <= self._farthest:
                 yield origin, length
 
-    def _length(self, pairs: Sequence[Pair], place: Poses, start: Array, origin: str) -> float:
-        """How far the moving parts, ``start`` off their place, go until their common box is past all others."""
+    def _length(self, pairs: Sequence[Pair], place: Poses, start: Array, origin: str, *, beside: bool = False) -> float:
+        """How far the moving parts, ``start`` off their place, go until their common box is past all others.
+
+        Boxes that they pass beside do not count, unless ``beside``.
+        """
         u = out(origin)
         k = int(np.argmax(np.abs(u)))
         across, length = [i for i in range(3) if i != k], 0.0
-        if not pairs:
-            return 0.0
         moving = [_box(self.solids[a], place[a]) for a in {a for a, _ in pairs}]
-        low, high = (
-            np.min([box[0] for box in moving], axis=0) + start,
-            np.max([box[1] for box in moving], axis=0) + start,
-        )
         for name in {b for _, b in pairs}:
+            low, high = (pick([box[i] for box in moving], axis=0) + start for i, pick in enumerate((np.min, np.max)))
             still_low, still_high = _box(self.solids[name], place[name])
-            if all(low[i] < still_high[i] and high[i] > still_low[i] for i in across):
+            if beside or all(low[i] < still_high[i] and high[i] > still_low[i] for i in across):
                 length = max(length, float(still_high[k] - low[k] if u[k] > 0.0 else high[k] - still_low[k]))
         return length
 
@@ -182,7 +182,7 @@ class Ways:
         """How far a first leg may go: past all that is no wire, along the wires; else a part of the free way."""
         here, standing = np.zeros(3), [pair for pair in pairs if pair[1] not in WIRES]
         if DIRECTIONS[origin][1]:
-            length = self._length(standing, place, here, origin) + SPARE
+            length = self._length(standing, place, here, origin, beside=True) + SPARE
             if length <= self._farthest and self._is_free(pairs, place, here, out(origin, length)):
                 yield length
             return
@@ -221,6 +221,10 @@ class Ways:
 
     def _clash(self, pair: Pair, place: Poses, start: Array, by: Array) -> PairResult | None:
         """The row of a pair that overlaps on its way, or may do so."""
+        for t in _LOOKS:
+            there = check(self._scene([pair], place, start + t * by), pairs=[pair], depths=False, cache=self.cache)
+            if not there.clean:
+                return replace(there.rows[0], t=t)
         scene = self._scene([pair], place, start, by)
         rows = check(scene, pairs=[pair], depths=False, cache=self.cache).rows
         return next((row for row in rows if row.verdict in NOT_CLEAN), None)

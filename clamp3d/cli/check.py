@@ -12,6 +12,7 @@ from clamp3d.cli.options import (
     INPUT_FILE,
     JSON,
     QUIET,
+    Output,
     Source,
     argument,
     complete_inputs,
@@ -24,6 +25,8 @@ from clamp3d.cli.terminal import finish_checked, show
 
 if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
+
+BCF = Output((".bcfzip", ".bcf"))
 
 
 @declared("check")
@@ -39,6 +42,7 @@ def command(
     ),
     json_file: Path | None = JSON,
     csv_file: Path | None = option("Write the findings as CSV; - is stdout.", "--csv"),
+    bcf_file: Path | None = option("Write the findings as BCF 2.1 topics, for review tools.", "--bcf", type=BCF),
     html_file: Path | None = option("Write a page in 3D; - is stdout.", "--html"),
     quiet: bool = QUIET,
 ) -> None:
@@ -82,6 +86,10 @@ def command(
         write_json(json_file, check_to_dict(result, comparison) | status)
     if csv_file is not None:
         write_text(csv_file, groups_csv(groups, comparison))
+    if bcf_file is not None:
+        from clamp3d.output.bcf import write_bcf
+
+        write_bcf(result, bcf_file)
     if html_file is not None:
         write_text(html_file, check_to_html(result))
     verdicts = {group.verdict for group in comparison.open(groups)}

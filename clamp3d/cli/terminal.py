@@ -98,7 +98,7 @@ def tolerate_closed_pipes() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:  # closed by the caller: libraries ask it whether it is a terminal
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+            setattr(sys, name, io.TextIOWrapper(io.FileIO(os.devnull, "w"), encoding="utf-8"))
         elif stream is getattr(sys, f"__{name}__"):
             raw = io.BufferedWriter(_Tolerant(stream.fileno(), "wb", closefd=False))
             wrapped = io.TextIOWrapper(

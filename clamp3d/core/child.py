@@ -40,13 +40,16 @@ _OWN_ERRORS = ("InputError", "MissingLibraryError", "SolverError", "Clamp3dError
 
 
 class WorkerEndedError(Clamp3dError):
-    """The process ended before it answered; ``ending`` says how ("SIGSEGV", "exit code 3"), ``code`` as Popen does."""
+    """The process ended before it answered; ``ending`` says how ("SIGSEGV", "exit code 3").
+
+    ``code`` is the exit code as Popen gives it, ``last`` the last line that the process printed before it ended itself.
+    """
 
     def __init__(self, code: int, log: list[str]) -> None:
         self.code = code
         self.ending = _ending(code)
-        last = f": {log[-1]}" if log and code >= 0 else ""
-        super().__init__(f"the process ended with {self.ending}{last}")
+        self.last = log[-1] if log and code >= 0 else ""
+        super().__init__(f"the process ended with {self.ending}{': ' * bool(self.last)}{self.last}")
 
 
 class WorkerTimeoutError(Clamp3dError):
@@ -162,7 +165,9 @@ class Worker:
 
     def _start(self) -> None:
         self.close()
-        path = os.pathsep.join(folder for folder in sys.path if os.path.isabs(folder))
+        own = str(Path(__file__).parents[2])  # also where that is the current folder, which is "" on the path
+        folders = (own if os.path.abspath(folder) == own else folder for folder in sys.path)
+        path = os.pathsep.join(folder for folder in folders if os.path.isabs(folder))
         # A session of its own keeps Ctrl-C with the caller, who then ends the worker.
         process = self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", "from clamp3d.core.child import serve; serve()", *self._functions],

@@ -12,6 +12,8 @@ from clamp3d.core.pose import Array
 from clamp3d.core.primitives import LARGEST, AnyCylinder, Cylinder, SweptArc
 from clamp3d.errors import SolverError
 
+_MOST_IN_OVERLAP, _MOST_APART = 500, 5000
+"""Poses at which the least distance is asked for; of bodies that overlap on their way how deep decides nothing."""
 _ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
 
 
@@ -97,7 +99,10 @@ class Search:
 
     def least(self) -> tuple[float, float]:
         """Time of the least distance, and what any other time can be lower by, mm."""
-        answer = least(self.bounds, self.speed, bound=self.bound_by_longer_bodies, accuracy=self.slack)
+        for most in (_MOST_IN_OVERLAP, _MOST_APART):
+            answer = least(self.bounds, self.speed, bound=self.bound_by_longer_bodies, accuracy=self.slack, most=most)
+            if answer.upper <= 0.0 or answer.evaluations < most:
+                break
         return answer.t, max(answer.upper - answer.lower, self.slack)
 
     def first_contact(self, margin: float) -> tuple[bool, float, float]:
@@ -122,7 +127,9 @@ class Search:
         def gap(time: float) -> float:
             return self.at(time).distance - margin
 
-        later = min(1.0, t + 2.0 * self.slack / self.speed)
+        later, step = t, self.slack / self.speed
+        while later < 1.0 and 0.0 < gap(later) <= 2.0 * self.slack:
+            later, step = min(1.0, later + step), 2.0 * step
         return float(brentq(gap, t, later, xtol=1e-16)) if gap(t) > 0.0 > gap(later) else t
 
 

@@ -30,7 +30,7 @@ def inlined(function: _F) -> _F:
     return numba.njit(forceinline=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
 
 
-def entry(function: _F, signature: str = "") -> _F:
+def entry(function: _F) -> _F:
     """Decorator of a kernel that Python calls; where numba finds no folder for its cache, every run compiles it."""
     try:
         return numba.njit(cache=True, **_OPTIONS)(function)  # type: ignore[no-any-return]

@@ -124,5 +124,5 @@ def _records(T, R, half_angle, H, r, l, flat, pad, out):  # type: ignore[no-unty
     return -1
 
 
-distances = entry(_distances, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[::1],f8[::1])")
-records = entry(_records, "i8(f8[:,:,::1],f8,f8,f8,f8,f8,b1,f8[:,::1],f8[:,::1])")
+distances = entry(_distances)
+records = entry(_records)

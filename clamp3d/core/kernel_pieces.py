@@ -328,5 +328,5 @@ def _pieces(T, R, half_angle, H, r, l, out):  # type: ignore[no-untyped-def] # n
     return True
 
 
-pieces = entry(_pieces, "b1(f8[:,:,::1],f8,f8,f8,f8,f8,f8[:,::1])")
+pieces = entry(_pieces)
 """Compiled entry point: one pose (1, 4, 4) into (5, 14); False for a pose that is not rigid."""

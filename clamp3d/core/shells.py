@@ -62,11 +62,14 @@ def joined(groups: Faces, n: int) -> Faces:
     >>> joined(np.array([[3, 1], [4, 3], [0, 2]]), 5).tolist()
     [0, 1, 0, 1, 1]
     """
-    from clamp3d.core import kernel_joined
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
 
-    label = np.arange(n)
-    kernel_joined.join(np.ascontiguousarray(groups, np.int64), label)
-    return label
+    first, others = np.repeat(groups[:, 0], groups.shape[1] - 1), groups[:, 1:].ravel()
+    graph = coo_matrix((np.ones(len(others), bool), (first, others)), shape=(n, n))
+    _, group = connected_components(graph, directed=False)
+    _, least = np.unique(group, return_index=True)
+    return np.asarray(least[group])
 
 
 def shells(faces: Faces, vertices: int) -> list[NDArray[np.intp]]:

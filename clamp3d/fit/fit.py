@@ -103,8 +103,8 @@ def fit_file(
     """
     file = checks.path("path", path)
     if file.suffix.lower() in (".step", ".stp"):
-        mesh, found, notes = cad_features(load_bodies(file, unit=unit), file.name)
-        return _result(mesh, found, mesh.vertices[mesh.faces], notes)
+        mesh, surfaces, notes = cad_features(load_bodies(file, unit=unit), file.name)
+        return _result(mesh, surfaces, mesh.vertices[mesh.faces], notes)
     return fit_mesh(load_mesh(path, unit=unit), progress=progress)
 
 
@@ -140,24 +140,24 @@ def fit_mesh(mesh: Mesh, *, progress: Callable[[str, float], None] | None = None
     >>> from clamp3d.core.mesh import make_mesh
     >>> from clamp3d.core.meshing import mesh
     >>> wire = mesh(shapes.cylinder(6.5, 80.0))
-    >>> (found,) = fit_mesh(make_mesh(wire.vertices, wire.faces)).cylinders
-    >>> round(found.radius, 9), round(found.length, 9), found.full
+    >>> (fitted,) = fit_mesh(make_mesh(wire.vertices, wire.faces)).cylinders
+    >>> round(fitted.radius, 9), round(fitted.length, 9), fitted.full
     (6.5, 80.0, True)
     """
     instance("mesh", mesh, Mesh)
     function("progress", progress)
     surface = Surface(mesh)
     regions = join(surface, find_regions(surface, progress))
-    found = [(float(region.sign), measure(surface, region)) for region in regions]
-    return _result(mesh, [(k, v) for k, v in found if v is not None], surface.V[surface.F], list(mesh.notes))
+    surfaces = [(float(region.sign), measure(surface, region)) for region in regions]
+    return _result(mesh, [(k, v) for k, v in surfaces if v is not None], surface.V[surface.F], list(mesh.notes))
 
 
-def _result(mesh: Mesh, found: list[tuple[float, dict[str, Any]]], corners: Array, notes: list[str]) -> FitResult:
-    """The features whose sense and values were ``found``, named; ``corners`` (m, 3, 3) of all triangles."""
+def _result(mesh: Mesh, surfaces: list[tuple[float, dict[str, Any]]], corners: Array, notes: list[str]) -> FitResult:
+    """The features whose sense and values were ``surfaces``, named; ``corners`` (m, 3, 3) of all triangles."""
     grooves: list[GrooveFit] = []
     cylinders: list[CylinderFit] = []
     holes: list[HoleFit] = []
-    for sign, values in sorted(found, key=lambda x: -x[1]["covered_area"]):
+    for sign, values in sorted(surfaces, key=lambda x: -x[1]["covered_area"]):
         if sign > 0:
             cylinders.append(CylinderFit(name=f"C{len(cylinders) + 1}", **values))
         elif values["half_angle"] < np.pi:

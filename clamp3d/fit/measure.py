@@ -120,7 +120,17 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     T = np.eye(4)
     T[:3, :3] = R
     T[:3, 3] = axis.point + 0.5 * (z0 + z1) * d
+    if length <= 0.0 or half <= 0.0:
+        return None
+    errors = _errors(surface, region, axis, T, (half, length))
+    return None if errors is None else errors | {"arc_error": arc_error, "length_error": length_error}
 
+
+def _errors(
+    surface: Surface, region: Region, axis: Axis, T: Array, extent: tuple[float, float]
+) -> dict[str, Any] | None:
+    """Values of a `FittedSurface` with frame ``T`` (4, 4) and ``extent`` (half angle, length); None if it is open."""
+    (half, length), R = extent, T[:3, :3]
     points = (surface.V[region.points] - T[:3, 3]) @ R
     residual = np.hypot(points[:, 0], points[:, 1]) - axis.radius
     ridges = _off_ridges(surface, region) if region.strips else 0.0
@@ -128,7 +138,7 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     rms = float(np.sqrt((residual @ residual) / freedom))
     noise = float(np.hypot(rms, surface.mesh.rounding))
     C = covariance(points, axis.radius, noise * _inflation(surface, region, residual))
-    if C is None or length <= 0.0 or half <= 0.0:
+    if C is None:
         return None
     area = float(surface.areas[region.faces].sum())
     return {
@@ -146,8 +156,6 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
         "covariance_error": surface_error(C, half, length, freedom),
         "form_error": max(_form_error(points, residual, rms), ridges) + 2.0 * surface.mesh.rounding,
         "chord_error": sagitta(axis.radius, region.span),
-        "arc_error": arc_error,
-        "length_error": length_error,
         "faces": surface.rows[region.faces],
     }
 

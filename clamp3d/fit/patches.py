@@ -106,7 +106,7 @@ def _noise(surface: Surface, tree: cKDTree, sample: IntArray) -> float:
     if len(scatters) < 20:
         return np.inf
     side = float(np.sqrt(np.median(surface.areas[sample])))
-    return np.median(np.array(scatters)) + 0.003 * side
+    return float(np.median(scatters)) + 0.003 * side
 
 
 def _quadric_fit(surface: Surface, patch: IntArray) -> tuple[Array, Array, float, float, Array] | None:

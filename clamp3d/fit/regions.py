@@ -28,14 +28,14 @@ from clamp3d.fit.surface import MAX_FACET, Surface
 def find_regions(surface: Surface, progress: Callable[[str, float], None] | None = None) -> list[Region]:
     """All cylinders on the mesh, none overlapping; ``progress(stage, fraction)`` is called as it goes."""
     free = np.ones(len(surface.F), dtype=bool)
-    found: list[Region] = []
+    regions_so_far: list[Region] = []
     coarse = 40.0 * max(surface.mesh.rounding, surface.extent * 2.0**-24)
     for floor, seeds in ((surface.floor, strips), (coarse, strips), (surface.floor, patches)):
         search = Search(surface, free, surface.cells(floor), floor, seeds is strips)
         for region in seeds(search, progress or (lambda stage, fraction: None)):
             free[region.faces] = False
-            found.append(region)
-    return found
+            regions_so_far.append(region)
+    return regions_so_far
 
 
 def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Region]:
@@ -94,10 +94,10 @@ def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regio
             fails[np.unique(cells[region.faces])] += 3
 
 
-def _others(values: IntArray, known: IntArray) -> IntArray:
-    """What is in ``values`` (n,) and not ``known`` (k,), once each and sorted."""
-    found = np.unique(values)
-    return found[~np.isin(found, known)]
+def _others(values: IntArray, excluded: IntArray) -> IntArray:
+    """What is in ``values`` (n,) and not ``excluded`` (k,), once each and sorted."""
+    regions_so_far = np.unique(values)
+    return regions_so_far[~np.isin(regions_so_far, excluded)]
 
 
 def _groups(values: IntArray, label: IntArray) -> dict[int, IntArray]:

@@ -35,7 +35,8 @@ class Surface:
             known.face_adjacency,
             known.face_adjacency_unshared,
         )
-        alone = trimesh.grouping.group_rows(known.edges_sorted, require_count=1)
+        _, number, count = np.unique(known.edges_sorted, axis=0, return_inverse=True, return_counts=True)
+        alone = np.flatnonzero(count[number.ravel()] == 1)
         self.rim, self.rim_faces = known.edges[alone], known.edges_face[alone]
         n1, n2 = self.normals[self.pairs[:, 0]], self.normals[self.pairs[:, 1]]
         self.bend = np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
@@ -105,4 +106,4 @@ def facet_span(surface: Surface, axis: Axis, faces: IntArray, cells: IntArray) -
     largest, least = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     np.maximum.at(largest, cell, about.max(axis=1))
     np.minimum.at(least, cell, about.min(axis=1))
-    return largest - least
+    return np.asarray(largest - least)

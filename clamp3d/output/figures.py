@@ -64,8 +64,13 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
 
 def svg(figure: Figure) -> bytes:
     """The figure as an SVG file."""
+    return picture(figure, "svg")
+
+
+def picture(figure: Figure, format: str) -> bytes:
+    """The figure as a file of a format, for instance "png"."""
     out = io.BytesIO()
-    _draw(figure, out, "svg", "figure")
+    _draw(figure, out, format, "figure")
     return out.getvalue()
 
 

@@ -16,7 +16,6 @@ from typing import Any
 from clamp3d.checks import short
 from clamp3d.errors import InputError
 
-_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 STDOUT = Path("-")
 """As the path of a file to write: standard output."""
 
@@ -29,66 +28,47 @@ def whole_file(path: Path) -> Iterator[Path]:
     so is standard output for the path ``-``. Raises InputError if the folder does not exist or cannot be written to,
     or the disk is full.
     """
-    if path == STDOUT:
-        with tempfile.TemporaryDirectory() as folder:
-            temporary = Path(folder, "stdout")
-            yield temporary
-            sys.stdout.flush()
-            sys.stdout.buffer.write(temporary.read_bytes())
-            sys.stdout.buffer.flush()
-        return
-    with _beside(path) as (temporary, target):
+    target = Path(os.path.realpath(path))
+    special = path == STDOUT or (target.exists() and not target.is_file() and not target.is_dir())
+    with ExitStack() as stack:
         try:
+            if target.is_dir():
+                raise OSError(errno.EISDIR, "it is a folder")
+            folder = stack.enter_context(tempfile.TemporaryDirectory()) if special else target.parent
+            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=folder)
+            os.close(handle)
+            temporary = Path(name)
+            stack.callback(temporary.unlink, missing_ok=True)
             yield temporary
-        except OSError as error:
-            if error.errno not in _DISK:
-                raise
-            raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        try:
-            if _special(target):
+            if path == STDOUT:
+                sys.stdout.flush()
+                sys.stdout.buffer.write(temporary.read_bytes())
+                sys.stdout.buffer.flush()
+            elif special:
                 target.write_bytes(temporary.read_bytes())
             else:
+                umask = os.umask(0)
+                os.umask(umask)
+                temporary.chmod(0o666 & ~umask)
                 os.replace(temporary, target)
         except OSError as error:
+            if path == STDOUT or isinstance(error, BrokenPipeError):
+                raise
             raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
 
 
 def check_writable(path: Path) -> None:
-    """Raise InputError if a file ``path`` cannot be written: to ask before long work."""
-    if path != STDOUT:
-        with _beside(path):
-            pass
-
-
-@contextmanager
-def _beside(path: Path) -> Iterator[tuple[Path, Path]]:
-    """A temporary file for the time of the block, and the target of ``path`` whose place it may take."""
-    target = _target(path)
-    with ExitStack() as stack:
-        try:
-            folder = stack.enter_context(tempfile.TemporaryDirectory()) if _special(target) else target.parent
-            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=folder)
-        except OSError as error:
-            raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
-        os.close(handle)
-        temporary = Path(name)
-        stack.callback(temporary.unlink, missing_ok=True)
-        yield temporary, target
-
-
-def _target(path: Path) -> Path:
-    """The file that is written for ``path``: where a link leads."""
-    if os.path.isdir(path):
+    """Raise InputError if a file ``path`` cannot be written: to be called before long work."""
+    if path == STDOUT:
+        return
+    folder = Path(os.path.realpath(path)).parent
+    if path.is_dir():
         raise InputError(f"cannot write {short(path)}: it is a folder")
-    return Path(os.path.realpath(path))
-
-
-def _special(path: Path) -> bool:
-    """Whether it is there and neither a file nor a folder."""
-    return os.path.exists(path) and not os.path.isfile(path)
+    try:
+        if not path.exists() or path.is_file():
+            tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
 
 
 def write_text(path: Path, text: str) -> None:

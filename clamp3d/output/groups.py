@@ -112,7 +112,7 @@ def grouped(result: CheckResult) -> tuple[Group, ...]:
             causes.setdefault(key, []).append(row)
     groups = [group for key, rows in causes.items() for group in _identified(key, _alike(rows), family)]
     order = {verdict: k for k, verdict in enumerate(Verdict)}
-    order[Verdict.CONTAINED] = order[Verdict.CLASH]
+    order |= dict.fromkeys(BAD, 0)
     return tuple(sorted(groups, key=lambda group: (order[group.verdict], len(group.rows), group.upper)))
 
 

@@ -23,6 +23,7 @@ PART_COLOURS: dict[PartName, str] = {
 VERDICT_COLOURS: dict[str, str] = {
     "clash": "#D32F2F",
     "contained": "#D32F2F",
+    "duplicate": "#D32F2F",
     "contact": "#F2B705",
     "allowed": "#F2B705",
     "clearance": "#00A6C0",

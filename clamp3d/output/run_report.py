@@ -8,10 +8,10 @@ from collections.abc import Iterator, Sequence
 from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.forces import HELD
-from clamp3d.clamp.matrix import millimetres
 from clamp3d.clamp.result import Assembly, Play
 from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.output.tables import text_table
+from clamp3d.output.wording import distance_text
 
 _PLAY = {
     "hole": "bolt in the up splint's hole",
@@ -86,7 +86,8 @@ def _titled(title: str, head: Sequence[str], rows: Sequence[Sequence[object]]) -
 def _contact(contact: Contact) -> tuple[object, ...]:
     place = ("", "") if contact.point is None else (f"{contact.point[0]:z.3f}", f"{-contact.point[2]:z.3f}")
     pair = f"{contact.a}-{contact.b}"
-    return (pair, contact.type, contact.relation, millimetres(contact.gap), *place, contact.feature)
+    gap = distance_text(contact.distance, digits=3).removeprefix("gap ").removesuffix(" mm")
+    return (pair, contact.type, contact.relation, gap, *place, contact.feature)
 
 
 def _footer(assembly: Assembly) -> Iterator[str]:

@@ -63,7 +63,7 @@ def finding_figure(scene: Scene, row: PairResult) -> Figure:
     place = _place(row)
     if place is None and common is not None:
         place = common.T[:3, :3] @ common.mesh.center_mass + common.T[:3, 3]
-    camera = _CAMERAS[0] if place is None else min(_CAMERAS, key=lambda c: _hidden(c, solids, place))
+    camera = _best_camera(solids, place)
     outlines = np.vstack([camera.view(s)[:, :2] for s in solids])
     size = float(np.ptp(outlines, axis=0).max())
     windows = [(outlines.min(axis=0) - 0.01 * size, outlines.max(axis=0) + 0.01 * size)]
@@ -87,6 +87,21 @@ def finding_figure(scene: Scene, row: PairResult) -> Figure:
         axes[1].set_title("enlarged", fontsize=8, loc="left", color=INK)
     _legend(axes[0], shown)
     return figure
+
+
+def view_of(scene: Scene, row: PairResult) -> tuple[Array, Array, Array, float]:
+    """How `finding_figure` looks at a finding: the place, unit vectors to the viewer and up (3,), and a size in mm."""
+    solids = list(_solids(_at(scene, row), [row.a, row.b]).values())
+    corners = np.vstack([solid.world for solid in solids])
+    place = _place(row)
+    target = corners.mean(axis=0) if place is None else place
+    _, up, towards_viewer = _best_camera(solids, place).axes()
+    return target, towards_viewer, up, float(np.ptp(corners, axis=0).max())
+
+
+def _best_camera(solids: Sequence[PosedMesh], place: Array | None) -> Camera:
+    """The camera that the fewest faces hide the place from."""
+    return _CAMERAS[0] if place is None else min(_CAMERAS, key=lambda camera: _hidden(camera, solids, place))
 
 
 def _at(scene: Scene, row: PairResult) -> Scene:

@@ -33,6 +33,7 @@ _MARK = {
     Verdict.CONTACT: "t",
     Verdict.CLASH: "X",
     Verdict.CONTAINED: "C",
+    Verdict.DUPLICATE: "D",
     Verdict.ALLOWED: "a",
     Verdict.UNCERTAIN: "?",
     Verdict.FAILED: "!",

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -165,20 +166,9 @@ class MeshcatServer:
     def send(self, command: Command) -> None:
         """Pass a command on. Raises Clamp3dError if the server has gone."""
         try:
-            self._window.send(_Lowered(command))
+            self._window.send(SimpleNamespace(lower=lambda: command))
         except zmq.ZMQError:
             raise self._silent() from None
 
     def _silent(self) -> Clamp3dError:
         return Clamp3dError(f"no meshcat server answers at {self._zmq_url} (waited {_TIMEOUT:g} s)")
-
-
-class _Lowered:
-    """A command as meshcat's own classes hand it over."""
-
-    def __init__(self, command: Command) -> None:
-        self._command = command
-
-    def lower(self) -> Command:
-        """The command as data."""
-        return self._command

@@ -85,6 +85,7 @@ def meaning(verdict: str, scene: Scene) -> str:
     """What a verdict means in this scene."""
     contact, clearance = scene.thresholds.contact, scene.thresholds.clearance
     return {
+        "duplicate": "the same part twice in one place",
         "contained": "one part lies inside the other",
         "clash": f"parts overlap by more than {contact:g} mm",
         "failed": "could not be computed",
@@ -128,7 +129,7 @@ def headline(result: CheckResult) -> str:
     if not phrases:
         return f"Clean: {checked} checked, nothing clashes"
     decided = not count[Verdict.FAILED] and not count[Verdict.UNCERTAIN]
-    opening = "" if clashes else "No clash: " if decided else "Undecided: "
+    opening = "No clash: " if decided and not clashes else ""
     return f"{opening}{'; '.join(phrases)} ({checked} checked)"
 
 
@@ -169,6 +170,7 @@ def group_sentence(group: Group, names: Mapping[str, str]) -> str:
 
 def _sentence(a: str, b: str, verdict: Verdict, gap: str, often: str = "") -> str:
     phrases = {
+        Verdict.DUPLICATE: f"{a} and {b} are the same part twice in one place{often}",
         Verdict.CONTAINED: f"{a} and {b}: one lies inside the other{often}, {gap}",
         Verdict.CLASH: f"{a} and {b} clash{often}: {gap}",
         Verdict.FAILED: f"{a} and {b}: failed{often}, no answer",

@@ -60,10 +60,10 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
     read: dict[bytes, Parts] = {}
     where = ""
 
-    def take(found: Parts, of: str) -> None:
-        parts.extend(found.parts)
-        allowed.extend(found.allowed)
-        notes.extend(f"{of}: {note}" for note in found.notes)
+    def take(more: Parts, of: str) -> None:
+        parts.extend(more.parts)
+        allowed.extend(more.allowed)
+        notes.extend(f"{of}: {note}" for note in more.notes)
 
     try:
         if table.clamp is not None:

@@ -111,8 +111,8 @@ def load(
     return load_described(path, wires)
 
 
-def _scene(found: Parts, name: str) -> Scene:
-    return Scene(found.parts, allowed=found.allowed, name=part_name(name), notes=found.notes)
+def _scene(parts: Parts, name: str) -> Scene:
+    return Scene(parts.parts, allowed=parts.allowed, name=part_name(name), notes=parts.notes)
 
 
 def _is_builtin(name: str) -> bool:

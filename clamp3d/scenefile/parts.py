@@ -122,12 +122,12 @@ def to_parts(reading: Reading, reader: Reader) -> Parts:
     shapes: dict[int, MeshShape] = {}
     parts = []
     for name, body in zip(unique_names(body.name for body in reading.bodies), reading.bodies, strict=True):
-        shape = shapes.setdefault(id(body.shape), _taken(body.shape, reader))
+        shape = shapes.setdefault(id(body.shape), _fitted(body.shape, reader))
         parts.append(Part(name, shape, body.T))
     return Parts(tuple(parts), reading.notes)
 
 
-def _taken(shape: MeshShape, reader: Reader) -> MeshShape:
+def _fitted(shape: MeshShape, reader: Reader) -> MeshShape:
     """A mesh taken as the reader says; a solid from CAD needs no fit and knows its chord error."""
     if isinstance(shape, BrepSolid):
         reader.refuse("STEP, whose faces are exact", "fit", "chord")
@@ -143,18 +143,18 @@ def _folder(folder: Path, reader: Reader) -> Parts:
     if not files:
         raise InputError(f"{checks.short(folder)}: no geometry file in the folder; read are {', '.join(FORMATS)}")
     places = read_poses(reader.poses) if reader.poses is not None else [(f.stem, np.eye(4)) for f in files]
-    known: dict[str, Path] = {}
+    named: dict[str, Path] = {}
     for file in files:
-        if (other := known.setdefault(file.stem, file)) is not file:
+        if (other := named.setdefault(file.stem, file)) is not file:
             raise InputError(
                 f"{checks.short(folder)}: {other.name} and {file.name} would both be part {checks.shown(file.stem)}; "
                 "give one file, or a folder in which names differ by more than their endings"
             )
-    unknown = [name for name, _ in places if name not in known]
+    unknown = [name for name, _ in places if name not in named]
     if unknown:
-        listed = ", ".join(list(known)[:8]) + (", ..." if len(known) > 8 else "")
+        listed = ", ".join(list(named)[:8]) + (", ..." if len(named) > 8 else "")
         raise InputError(f"{reader.poses}: no file for {checks.shown(unknown[0])} in {folder}; there are {listed}")
-    left = sorted(known.keys() - {name for name, _ in places})
+    left = sorted(named.keys() - {name for name, _ in places})
     if left and not reader.partial:
         raise InputError(f"{reader.poses}: no pose for {', '.join(left[:4])} ({len(left)} of {len(files)} files)")
     notes = [f"{len(left)} of {len(files)} files have no pose and are left out"] if left else []
@@ -162,7 +162,7 @@ def _folder(folder: Path, reader: Reader) -> Parts:
     bodies: list[tuple[str, Part]] = []
     for name, T in places:
         if name not in read:
-            read[name] = read_parts(known[name], replace(reader, poses=None))
+            read[name] = read_parts(named[name], replace(reader, poses=None))
             notes += [f"{name}: {note}" for note in read[name].notes]
         bodies += [(p.name, p) for p in read[name].prefixed(part_name(name), T).parts]
     names = unique_names(name for name, _ in bodies)
@@ -175,7 +175,7 @@ def read_poses(path: Path) -> list[tuple[str, Array]]:
     from clamp3d.scenefile.pose_table import Pose
 
     rows = csv.reader(read_text(path).splitlines())
-    found = []
+    poses = []
     try:
         head = [cell.strip() for cell in next(rows, [])]
         if tuple(head) != COLUMNS:
@@ -190,34 +190,34 @@ def read_poses(path: Path) -> list[tuple[str, Array]]:
             if not abs(size - 1.0) <= UNIT_TOLERANCE:
                 raise ValueError(f"the quaternion must have length 1, got {size:.6g}")
             qx, qy, qz, qw = turn
-            found.append((row[0].strip(), Pose(translation=(x, y, z), quaternion=(qx, qy, qz, qw)).T()))
+            poses.append((row[0].strip(), Pose(translation=(x, y, z), quaternion=(qx, qy, qz, qw)).T()))
     except (ValueError, csv.Error) as error:
         if isinstance(error, InputError) and str(error).startswith(f"{path}: "):
             raise
         raise InputError(f"{path}: line {rows.line_num}: {error}") from None
-    if not found:
+    if not poses:
         raise InputError(f"{path}: no pose in the table")
-    return found
+    return poses
 
 
 def _number(column: str, cell: str) -> float:
     """The number in a cell; Python's underscores between digits are none of a table's."""
     try:
-        found = math.nan if "_" in cell else float(cell)
+        value = math.nan if "_" in cell else float(cell)
     except ValueError:
-        found = math.nan
-    if not math.isfinite(found):
+        value = math.nan
+    if not math.isfinite(value):
         raise ValueError(f"{column} must be a finite number, got {checks.shown(cell.strip())}")
-    return found
+    return value
 
 
 def names_like(patterns: Iterable[str], names: Iterable[str]) -> list[str]:
-    """Names that are in ``patterns``, or fit one of them; a pattern that fits none stays, to be told as unknown."""
+    """Names that are in ``patterns``, or fit one of them; a pattern that fits none stays, and is refused as unknown."""
     from fnmatch import fnmatchcase
 
-    known = dict.fromkeys(names)
-    found: dict[str, None] = {}
+    available = dict.fromkeys(names)
+    matching: dict[str, None] = {}
     for pattern in patterns:
-        fits = [pattern] if pattern in known else [name for name in known if fnmatchcase(name, pattern)]
-        found |= dict.fromkeys(fits or [pattern])
-    return list(found)
+        fits = [pattern] if pattern in available else [name for name in available if fnmatchcase(name, pattern)]
+        matching |= dict.fromkeys(fits or [pattern])
+    return list(matching)

@@ -73,14 +73,8 @@ class Pose(Table):
             # Exact input stays exact: a product of factors is not.
             return T if np.abs(nearest - T).max() < 1e-14 else nearest
         if self.rpy_deg is not None:
-            (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in map(math.radians, self.rpy_deg))
-            R = np.array(
-                [
-                    [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-                    [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-                    [-sp, cp * sr, cp * cr],
-                ]
-            )
+            roll, pitch, yaw = map(math.radians, self.rpy_deg)
+            R = (rotation([0, 0, 1], yaw) @ rotation([0, 1, 0], pitch) @ rotation([1, 0, 0], roll))[:3, :3]
         elif self.axis is not None and self.angle_deg is not None:
             R = rotation(self.axis, math.radians(self.angle_deg))[:3, :3]
         elif self.quaternion is not None:

@@ -135,12 +135,10 @@ class MeshTable(PartTable, kw_only=True):
         """The shape."""
         from clamp3d.brep.mesh_file import load_bodies
 
-        found = load_bodies(folder / self.file, unit=self.unit)
-        if len(found.bodies) != 1:
-            raise InputError(
-                f"{self.file} holds {len(found.bodies)} bodies: leave out shape, and it gives as many parts"
-            )
-        (body,) = found.bodies
+        bodies = load_bodies(folder / self.file, unit=self.unit).bodies
+        if len(bodies) != 1:
+            raise InputError(f"{self.file} holds {len(bodies)} bodies: leave out shape, and it gives as many parts")
+        (body,) = bodies
         if not np.array_equal(body.T, np.eye(4)):
             raise InputError(f"{self.file} places its body itself: leave out shape, and it is placed so")
         return shapes.MeshShape(body.shape.mesh, self.fit, self.file, self.chord)
@@ -188,8 +186,8 @@ def part_table(data: Any, origin: str, key: str) -> ShapeTable | FileTable:
             + (f", got {checks.shown(shape)}" if shape is not None else "")
             + (f"; did you mean {near[0]}?" if near else "")
         )
-    made: ShapeTable | FileTable = validate(kind, data, origin, key)
-    return made
+    table: ShapeTable | FileTable = validate(kind, data, origin, key)
+    return table
 
 
 class ClampTable(PartTable, kw_only=True):
@@ -272,9 +270,9 @@ def clamp_source(name: str, folder: Path) -> str:
 
 
 def _one_of(table: Any, *keys: str) -> None:
-    given = [key for key in keys if getattr(table, key) is not None]
-    if len(given) != 1:
-        raise ValueError(f"{(given or keys)[0]}: give exactly one of {', '.join(keys)}")
+    present = [key for key in keys if getattr(table, key) is not None]
+    if len(present) != 1:
+        raise ValueError(f"{(present or keys)[0]}: give exactly one of {', '.join(keys)}")
 
 
 def _half(radius: float | None, diameter: float | None) -> float:

@@ -28,7 +28,13 @@ def directions(count: int) -> Array:
 
 
 def assert_distance(
-    found: Distance, a: AnyBody, b: AnyBody, T_a_b: Array | None = None, *, tolerance: float = 1e-6, cells: int = 20_000
+    answer: Distance,
+    a: AnyBody,
+    b: AnyBody,
+    T_a_b: Array | None = None,
+    *,
+    tolerance: float = 1e-6,
+    cells: int = 20_000,
 ) -> None:
     """``lower <= true signed distance <= upper``, and the points and the normal are what they are said to be.
 
@@ -38,7 +44,7 @@ def assert_distance(
 
     Parameters
     ----------
-    found : Distance
+    answer : Distance
         The answer, points in the frame of a.
     a, b, T_a_b
         As for `common`.
@@ -48,32 +54,32 @@ def assert_distance(
         Work of one search.
     """
     x, y = body(a), body(b) if T_a_b is None else body(b).at(T_a_b)
-    assert found.lower <= found.upper + tolerance, f"bounds are crossed: {found.lower} > {found.upper}"
-    p, q, n = found.point_a, found.point_b, found.normal
-    if p is not None and q is not None and found.upper < math.inf:
+    assert answer.lower <= answer.upper + tolerance, f"bounds are crossed: {answer.lower} > {answer.upper}"
+    p, q, n = answer.point_a, answer.point_b, answer.normal
+    if p is not None and q is not None and answer.upper < math.inf:
         for name, it, point in (("a", x, p), ("b", y, q)):
             out = float(it.field(point[None])[0])
             assert out <= tolerance, f"point on {name} is {out:.3g} mm outside"
-        if found.upper >= 0.0:
-            assert np.linalg.norm(q - p) <= found.upper + tolerance, "the points are further apart than upper"
+        if answer.upper >= 0.0:
+            assert np.linalg.norm(q - p) <= answer.upper + tolerance, "the points are further apart than upper"
     shared = _shared(x, y, cells)
     truth = nearest(x, y, shared)
     if truth.upper > 0.0:
-        assert found.lower <= truth.upper + tolerance, f"lower {found.lower} > attained {truth.upper}"
+        assert answer.lower <= truth.upper + tolerance, f"lower {answer.lower} > attained {truth.upper}"
         # Zero is what the search begins with: it proves nothing of a shallow overlap.
-        assert truth.lower <= max(found.upper + tolerance, 0.0), f"upper {found.upper} < proven {truth.lower}"
+        assert truth.lower <= max(answer.upper + tolerance, 0.0), f"upper {answer.upper} < proven {truth.lower}"
     else:
         deep = _deepest(x, y, shared, cells)
-        assert found.lower <= 2.0 * deep + tolerance, f"lower {found.lower}, but they share a ball of {-deep} mm"
-    if found.upper < -tolerance:
+        assert answer.lower <= 2.0 * deep + tolerance, f"lower {answer.lower}, but they share a ball of {-deep} mm"
+    if answer.upper < -tolerance:
         ways = directions(_WAYS) if n is None else np.vstack([n, directions(_WAYS)])
         for way in ways:
-            kept = common(x, _moved(y, -0.999 * found.upper * way), cells=cells // 10)
-            assert kept.lower <= 0.0, f"parted by less than {-found.upper} mm along {way}"
-    if n is not None and math.isfinite(found.lower):
+            kept = common(x, _moved(y, -0.999 * answer.upper * way), cells=cells // 10)
+            assert kept.lower <= 0.0, f"parted by less than {-answer.upper} mm along {way}"
+    if n is not None and math.isfinite(answer.lower):
         assert abs(float(np.linalg.norm(n)) - 1.0) <= 1e-9, "the normal is no unit vector"
-        closed = common(x, _moved(y, -found.lower * n), cells=cells).upper
-        assert closed >= -0.5 * tolerance, f"moved by {-found.lower} along the normal they overlap by {-2.0 * closed}"
+        closed = common(x, _moved(y, -answer.lower * n), cells=cells).upper
+        assert closed >= -0.5 * tolerance, f"moved by {-answer.lower} along the normal they overlap by {-2.0 * closed}"
 
 
 def _shared(x: Body, y: Body, cells: int) -> Common:
@@ -81,9 +87,9 @@ def _shared(x: Body, y: Body, cells: int) -> Common:
     return common(x, y, accuracy=0.005, cells=cells)
 
 
-def _deepest(x: Body, y: Body, found: Common, cells: int) -> float:
+def _deepest(x: Body, y: Body, answer: Common, cells: int) -> float:
     """The least field found in both: where a search has not ended a coarser one, which comes further, looks again."""
-    return found.upper if found.ended else min(found.upper, common(x, y, cells=cells).upper)
+    return answer.upper if answer.ended else min(answer.upper, common(x, y, cells=cells).upper)
 
 
 def _moved(it: Body, by: Array) -> Body:
@@ -121,7 +127,7 @@ def assert_lower_on_way(
 
 
 def assert_motion(
-    found: MotionDistance,
+    answer: MotionDistance,
     a: AnyBody,
     b: AnyBody,
     motion: Motion,
@@ -136,7 +142,7 @@ def assert_motion(
 
     Parameters
     ----------
-    found : MotionDistance
+    answer : MotionDistance
         What `min_clearance` or, with ``first``, `first_contact` (margin 0) said.
     a, b, motion, T_a_b
         What it was asked: b moves from its pose ``T_a_b`` (4, 4) in the frame of a.
@@ -145,17 +151,17 @@ def assert_motion(
     tolerance, cells
         As for `assert_distance`.
     """
-    apart = np.abs(found.pose - pose_at(motion, found.t, T_a_b)).max()
-    assert apart <= 1e-9 * (1.0 + np.abs(found.pose).max()), f"the pose is not that of t = {found.t}"
-    until = found.t if first and found.touches else 1.0
+    apart = np.abs(answer.pose - pose_at(motion, answer.t, T_a_b)).max()
+    assert apart <= 1e-9 * (1.0 + np.abs(answer.pose).max()), f"the pose is not that of t = {answer.t}"
+    until = answer.t if first and answer.touches else 1.0
     poses = [pose_at(motion, t, T_a_b) for t in np.linspace(0.0, until, times) if t < until or until == 1.0]
-    if first and found.touches:
-        assert_lower_on_way(0.0, a, b, poses, tolerance=max(tolerance, found.resolution), cells=cells)
+    if first and answer.touches:
+        assert_lower_on_way(0.0, a, b, poses, tolerance=max(tolerance, answer.resolution), cells=cells)
     else:
-        assert not (found.touches and found.distance.lower > tolerance), f"touches at {found.distance.lower} mm"
-        assert found.touches or found.distance.upper > -tolerance, f"touches nowhere, at {found.distance.upper} mm"
-        assert_lower_on_way(found.distance.lower, a, b, poses, tolerance=tolerance, cells=cells)
-        assert_distance(replace(found.distance, lower=-math.inf), a, b, found.pose, tolerance=tolerance, cells=cells)
+        assert not (answer.touches and answer.distance.lower > tolerance), f"touches at {answer.distance.lower} mm"
+        assert answer.touches or answer.distance.upper > -tolerance, f"touches nowhere, at {answer.distance.upper} mm"
+        assert_lower_on_way(answer.distance.lower, a, b, poses, tolerance=tolerance, cells=cells)
+        assert_distance(replace(answer.distance, lower=-math.inf), a, b, answer.pose, tolerance=tolerance, cells=cells)
 
 
 def assert_fit(feature: FittedSurface, points: Array, *, assumed_round: bool = False) -> None:

@@ -92,11 +92,11 @@ def separation(
     return nearest(x, y, common(x, y, accuracy=0.5 * accuracy, cells=cells))
 
 
-def nearest(x: Body, y: Body, found: Common) -> Distance:
-    """`separation` from what `common` has ``found``."""
-    if found.upper <= 0.0:
-        return Distance(0.0, 0.0, found.points[0], found.points[0])
-    q = found.points
+def nearest(x: Body, y: Body, shared: Common) -> Distance:
+    """`separation` from what `common` gave as ``shared``."""
+    if shared.upper <= 0.0:
+        return Distance(0.0, 0.0, shared.points[0], shared.points[0])
+    q = shared.points
     for _ in range(_PROJECTIONS):
         p = _onto(x, q)
         q = _onto(y, p)
@@ -114,7 +114,7 @@ def nearest(x: Body, y: Body, found: Common) -> Distance:
         best = np.minimum(best, gaps)
     p, q, gaps = _projected(x, y, q)
     k = int(np.argmin(gaps))
-    return Distance(max(0.0, 2.0 * found.lower), float(gaps[k]), p[k], q[k], method="branch and bound")
+    return Distance(max(0.0, 2.0 * shared.lower), float(gaps[k]), p[k], q[k], method="branch and bound")
 
 
 def _projected(x: Body, y: Body, points: Array) -> tuple[Array, Array, Array]:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 from clamp3d import baselines
 from clamp3d.bench.compare.scene import block_pair, grooved_block
-from clamp3d.core.meshing import mesh
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
 
@@ -48,17 +45,3 @@ def test_what_is_wrong_is_said_in_one_line() -> None:
         baselines.contact_model("wedges")
     with pytest.raises(InputError, match="parts must be"):
         baselines.contact_model("mesh", [BLOCK])  # type: ignore[arg-type]
-
-
-def test_a_mesh_is_taken_as_it_is_and_a_solid_is_meshed_to_the_error() -> None:
-    for error in (0.01, 0.2):
-        own = baselines.Meshes({"P1": mesh(BLOCK, error)})
-        made = baselines.contact_model("mesh", {"P1": BLOCK}, mesh_error=error)
-        assert own.distances(PAIR, np.eye(4)[None]) == made.distances(PAIR, np.eye(4)[None])
-
-
-def test_names_are_loaded_lazily() -> None:
-    heavy = "{'fcl', 'trimesh', 'coacd', 'shapely'}"
-    code = f"import sys, clamp3d.baselines as b; b.Cas; assert not {heavy} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True)
-    assert {"Cas", "Chords", "Wedges", "Hulls", "Meshes", "contact_model"} <= set(dir(baselines))

@@ -65,13 +65,3 @@ def test_corners_of_triangles_are_merged_and_cavities_kept() -> None:
     assert {tuple(map(tuple, soup.vertices[face])) for face in soup.faces} == {tuple(map(tuple, V[f])) for f in F}
     hollow = closed_mesh(np.vstack([4.0 * V, V + 1.0]), np.vstack([F, F[:, ::-1] + 8]))
     assert len(hollow.faces) == 24
-
-
-def test_good_mesh_is_copied_and_locked() -> None:
-    source = V + 1e6
-    solid = closed_mesh(source, F.astype(np.int32))
-    source[0] = 0.0
-    assert solid.vertices[0, 0] == 1e6
-    assert solid.faces.dtype == np.int64
-    with pytest.raises(ValueError, match="read-only"):
-        solid.vertices[0] = 0.0

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.wedges import Wedge, Wedges, part_wedges, prism
-from clamp3d.bench.compare.scene import block_pair, grooved_block
+from clamp3d.bench.compare.scene import grooved_block
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.core.primitives import SweptArc
 from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
 
@@ -93,16 +93,6 @@ def test_clamp_parts_are_filled_once(name: str, unit_deg: float) -> None:
         corners = shape.solid.vertices[shape.solid.faces]
         volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
         assert volume == pytest.approx(60.0 * wedge.area, rel=1e-9)
-
-
-@pytest.mark.parametrize(("unit_deg", "published"), [(1, 0.00046), (5, 0.0114), (10, 0.0457), (20, 0.182)])
-def test_chord_error_of_the_140_degree_groove(unit_deg: int, published: float) -> None:
-    groove = SweptArc(12.0, math.radians(70.0), 60.0)
-    pair = block_pair(groove, Cylinder(10.5, 200.0))
-    model = Wedges({"P1": grooved_block(groove, width=137.0, depth=30.0)}, math.radians(unit_deg))
-    error = 1.5 - model.distances(pair, np.eye(4)[None])[0]
-    assert error == pytest.approx(published, rel=8e-3)
-    assert error == pytest.approx(24.0 * math.sin(math.radians(unit_deg) / 4) ** 2, abs=1e-7)
 
 
 def test_unit_angle_and_part_are_checked() -> None:

@@ -29,8 +29,8 @@ from OCP.TopLoc import TopLoc_Location
 from step_scenes import Tree, location
 
 from clamp3d.brep.cad import Key, matrix
+from clamp3d.brep.open_cascade import explore
 from clamp3d.brep.solid import BrepSolid, require_open_cascade
-from clamp3d.brep.tessellate import explore
 
 
 def moved(shape, T):
@@ -129,7 +129,7 @@ def taper():
     """A taper pin in a hub, a ball in its socket, a rubber ring in its groove: cones, spheres, tori."""
     plate = cut(box((-14, -14, -10), (14, 14, 10)), cone(2.0, 2.5, -10.0, 10.0))
     pin = cone(2.0, 2.5, -10.0, 10.0)
-    stud = fuse(rod(3.0, 10, 20, (9, 9)), ball(5.0, (9, 9, 25)))
+    stud = fuse(rod(3.0, 10, 21, (9, 9)), ball(5.0, (9, 9, 25)))
     socket = cut(box((0, 0, 25), (18, 18, 33)), ball(5.0, (9, 9, 25)))
     groove = moved(cut(rod(9.0, -4, 4), ring(9.0, 1.5)), shift(-30, 0, 0))
     return {"plate": plate, "pin": pin, "stud": stud, "socket": socket, "groove": groove,

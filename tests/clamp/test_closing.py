@@ -11,7 +11,6 @@ from outlines import Outlines
 from random_clamps import check_clamps, whole_clamp
 
 from clamp3d.baselines.cas import Cas
-from clamp3d.clamp import closing
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.equilibria import equilibria
@@ -20,14 +19,11 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import EDGES, SIZE, B, D, Gaps, S, Section, U
 
 
-def test_every_command_an_optimiser_a_grid_and_virtual_work_agree() -> None:
+def test_an_optimiser_a_grid_and_virtual_work_agree() -> None:
     """Four of the clamps that ``scripts/check-clamps`` takes hundreds of."""
     score = check_clamps(4, 1)
     assert score.findings == []
-    assert score.asked["run"] == score.asked["tolerance"] == score.asked["sweep"] == 4
-    assert score.asked["clamped"] > 0
-    assert score.asked["not clamped"] > 0
-    assert score.asked["optimiser without play"] == score.asked["optimiser with play"] == 2
+    assert score.asked["optimiser without play"] == score.asked["optimiser with play"] == 4
     assert score.asked["forces"] > 0
     assert score.asked["equilibria named"] == 1
 
@@ -55,23 +51,6 @@ def test_the_end_does_not_depend_on_the_length_of_a_step() -> None:
         section = Section(whole_clamp(rng), Cas())
         ends = [solve_final_state(section, stride=stride).q[D] for stride in (0.01, 0.004)]
         assert ends[0] == pytest.approx(ends[1], abs=1e-7)
-
-
-@pytest.mark.parametrize("wires", [{}, {"line": "LJ-500", "jumper": "LJ-400"}])
-def test_short_and_long_steps_know_the_curvature_of_the_loaded_gaps(wires: dict[str, str]) -> None:
-    """By differences of gradients; on short steps but for the part of a turn of the down splint on the spot."""
-    section, h = Section(load_clamp(**wires), Cas()), 1e-4
-    final = solve_final_state(section)
-    q, force = final.q, final.multipliers
-    pulls = np.array([[force @ section.gaps(q + e).gradient for e in sign * h * np.eye(SIZE)] for sign in (-1.0, 1.0)])
-    bend = (pulls[0] - pulls[1]) / (2.0 * h)
-    assert set(np.array(final.gaps.feature)[force > 0.0]) == {"arc"}
-    for moving in (list(range(SIZE)), [0, 1, D, S]):
-        motion, own = closing._Motion(section, closing.CLOSING, np.array(moving), 0.1), np.ix_(moving, moving)
-        assert motion._bend(q, final.gaps, force, exact=True) == pytest.approx(bend[own], abs=1e-6)
-        found, spot = motion._bend(q, final.gaps, force, exact=False), moving.index(S)
-        found[spot, spot] = bend[S, S]
-        assert found == pytest.approx(bend[own], abs=1e-6)
 
 
 def test_a_saddle_with_play_on_the_bolt_comes_to_rest() -> None:

@@ -12,11 +12,7 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.parts import parts
 from clamp3d.clamp.placement import FREEDOMS, Outcome, Placement
-from clamp3d.collide.check import check
-from clamp3d.collide.scene import Scene
-from clamp3d.core.pose import translation
 from clamp3d.errors import InputError
 
 
@@ -74,27 +70,6 @@ def test_limits_are_where_the_outcome_turns(closing):
     assert 0.2 < tolerances.together < 1.0
     wide = closing.limits("height", 25.0)
     assert (wide.low, wide.high, wide.low_open, wide.high_open) == (-25.0, 25.0, True, True)
-
-
-def test_touch_as_the_scene_check_sees_it(closing):
-    """The up splint, drawn back by the travel found, touches the misplaced wire and no more."""
-    run = assemble(closing.clamp, Cas())
-    shapes = parts(closing.clamp)
-    rng = np.random.default_rng(1)
-    for m in rng.uniform(-1, 1, (12, 4)) * [3.0, 2.0, 0.03, 0.02]:
-        pose = closing.poses(m[None])[0]
-        splints = {}
-        for k, (name, sign) in enumerate((("P1", 1.0), ("P2", -1.0))):
-            alone = Placement.__new__(Placement)
-            alone.__dict__.update(closing.__dict__)
-            alone._splints = [closing._splints[k], closing._splints[k]]
-            travel = 0.5 * alone.close(m[None]).opening[0]
-            splints[name] = translation(0, 0, sign * travel) @ run.T_world(name)
-        for name, T in splints.items():
-            scene = Scene(contact=1e-3).add(name, shapes[name], T).add("P6", shapes["P6"], pose)
-            row = check(scene).pairs[0]
-            assert row.verdict.value == "contact"
-            assert abs(row.distance.upper) < 1e-5
 
 
 def test_a_cloud_fills_the_ranges_and_nothing_else(closing):

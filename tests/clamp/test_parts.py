@@ -17,7 +17,7 @@ from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.core.meshing import chord_error, mesh, volume_bounds
+from clamp3d.core.meshing import mesh, volume_bounds
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.errors import InputError
 
@@ -163,24 +163,6 @@ def test_mesh_is_closed_and_within_its_computed_volume_error(name: str, mesh_err
         assert solid.volume == pytest.approx(extreme, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", PARTS)
-def test_stated_chord_error_is_the_one_measured_on_the_mesh(name: str) -> None:
-    """Middle of every short edge with both ends on a circle, against that circle."""
-    part, mesh_error = REFERENCE[name], 0.02
-    solid = mesh(part, mesh_error)
-    worst = 0.0
-    for shape in (*part.bodies, *part.holes):
-        local = (solid.vertices @ shape.frame)[solid.edges_unique][:, :, :2]
-        for arc in shape.profile.arcs:
-            ends = local - np.array(arc.centre)
-            on_arc = np.abs(np.linalg.norm(ends, axis=2) - arc.radius).max(axis=1) < 1e-9
-            short = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1) < 3.0 * math.sqrt(2 * arc.radius * mesh_error)
-            middle = np.linalg.norm(ends[on_arc & short].mean(axis=1), axis=1)
-            worst = max(worst, float((arc.radius - middle).max(initial=0.0)))
-    assert worst == pytest.approx(chord_error(part, mesh_error), rel=1e-6)
-    assert worst <= mesh_error
-
-
 @settings(deadline=None, max_examples=40)
 @given(radius=st.floats(5.0, 25.0), depth=st.floats(-0.9, 0.95), gap=st.floats(0.0, 30.0), error=st.floats(1e-3, 2.0))
 def test_other_grooves_major_arcs_too_give_closed_meshes(radius: float, depth: float, gap: float, error: float) -> None:
@@ -210,31 +192,3 @@ def test_bad_values_say_what_is_wrong() -> None:
         Profile((Arc((0, 0), 1, 0, math.pi),))
     with pytest.raises(InputError, match="counter-clockwise"):
         Profile.of((0.0, 0.0), (0.0, 1.0), (1.0, 0.0))
-
-
-def test_profile_of_a_circular_segment() -> None:
-    half = 0.4
-    cap = Profile.of(Arc((3.0, -2.0), 10.0, -half, half))
-    assert cap.area == pytest.approx(100 * (half - math.sin(half) * math.cos(half)), rel=1e-13)
-    (a0, b0), (a1, b1) = cap.bounds
-    rise = 10 * math.sin(half)
-    assert (a0, b0, a1, b1) == pytest.approx((3 + 10 * math.cos(half), -2 - rise, 13.0, -2 + rise))
-    lost, gained = cap.chord_areas(0.05)
-    x, y = cap.polygon(0.05).T
-    shoelace = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-    assert (cap.area - shoelace, gained) == pytest.approx((lost, 0.0))
-
-
-def test_bounds_of_a_turned_part_hold_its_mesh_to_the_chord_error() -> None:
-    generator = np.random.default_rng(3)
-    for name, part in REFERENCE.items():
-        solid = mesh(part, 1e-4)
-        for _ in range(10):
-            Q = np.linalg.qr(generator.normal(size=(3, 3)))[0]
-            T = np.eye(4)
-            T[:3, :3], T[:3, 3] = Q * np.linalg.det(Q), generator.normal(size=3) * 100
-            vertices = solid.vertices @ T[:3, :3].T + T[:3, 3]
-            low, high = part.bounds_at(T)
-            for slack in (vertices.min(axis=0) - low, high - vertices.max(axis=0)):
-                assert (slack > -1e-10).all(), name
-                assert (slack < 1e-4 + 1e-10).all(), name

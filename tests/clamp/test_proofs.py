@@ -12,13 +12,11 @@ from clamp3d.clamp.equilibria import equilibria, same
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.meetings import meetings
-from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Waypoint
-from clamp3d.clamp.section import WIRES, D, Section
-from clamp3d.collide.model import ModelCache
+from clamp3d.clamp.section import D, Section
 from clamp3d.core.pose import SectionPose
 from clamp3d.errors import SolverError
-from clamp3d.testing import assert_returns, body
+from clamp3d.testing import assert_returns
 
 
 @pytest.fixture(scope="module")
@@ -71,23 +69,6 @@ def test_equilibria_solved_again_from_their_neighbours_return(section):
         assert_returns(lambda q: solve_final_state(section, q).q, state.q, starts, 1e-6)
 
 
-def test_a_wire_settles_between_the_bottoms_of_its_two_grooves(section):
-    """At its limits the wire's centre lies on the grooves' surfaces, by the parts' own outlines."""
-    q = solve_final_state(section).q
-    splints = {name: body(parts(section.clamp)[name]) for name in ("P1", "P2")}
-    for wire in WIRES:
-        (left, right), (top, bottom) = section.wire_limits(q, wire)
-        up, down = (section.pairs[name, wire] for name in ("P1", "P2"))
-        assert 0.5 * (left + right) == pytest.approx(up.T_a_groove[0, 3], abs=1e-9)
-        at = np.array([[up.T_a_groove[0, 3], 0.0, -top]])
-        assert splints["P1"].field(at)[0] == pytest.approx(0.0, abs=1e-9)
-        # The lowest place is no further below the down splint's groove than that is deep.
-        T = section.down_splint(q).T()
-        centre = T[:3, :3] @ down.T_a_groove[:3, 3] + T[:3, 3]
-        x = np.array([[centre[0], 0.0, -bottom]])
-        assert abs(splints["P2"].at(T).field(x)[0]) <= down.groove.radius * (1.0 - np.cos(section.down_splint(q).angle))
-
-
 def test_a_splint_that_turns_past_a_wire_meets_it_between_two_waypoints():
     """At both waypoints they stand clear and no origin moves: only that the splint turns brings its end to the line."""
     clamp = load_clamp()
@@ -100,9 +81,9 @@ def test_a_splint_that_turns_past_a_wire_meets_it_between_two_waypoints():
 
     beside = (0.7 * reach, 0.0)
     turned = path(0.9, -0.9, beside)  # the splint lies along x when it is level
-    assert meetings(clamp, turned, [("P1", "P6")], ModelCache()) == {("P1", "P6"): "P1 (after)"}
+    assert meetings(clamp, turned, [("P1", "P6")]) == {("P1", "P6"): "P1 (after)"}
     for pairs in itertools.permutations([("P1", "P6"), ("P1", "P5"), ("P1", "P4")]):  # the others are far away
-        assert meetings(clamp, turned, pairs, ModelCache()) == {("P1", "P6"): "P1 (after)"}
+        assert meetings(clamp, turned, pairs) == {("P1", "P6"): "P1 (after)"}
     away = path(0.9, -0.9, (0.7 * reach, 4.0 * reach))
-    assert meetings(clamp, away, [("P1", "P6")], ModelCache()) == {}
-    assert meetings(clamp, path(0.9, 0.9, beside), [("P1", "P6")], ModelCache()) == {}
+    assert meetings(clamp, away, [("P1", "P6")]) == {}
+    assert meetings(clamp, path(0.9, 0.9, beside), [("P1", "P6")]) == {}

@@ -96,7 +96,7 @@ class TestExitCodes:
         tube.export(tmp_path / "tube.stl")
         scene = tmp_path / "fit.toml"
         scene.write_text(
-            'contact = 1e-3\n[parts.tube]\nshape = "mesh"\nfile = "tube.stl"\nfit = "bound"\n'
+            'contact = 1e-3\n[parts.tube]\nshape = "mesh"\nfile = "tube.stl"\nchord = 0.05\n'
             '[parts.pin]\nshape = "cylinder"\nradius = 4.99\nlength = 20\n'
         )
         code, out, _ = whole_main("check", scene, "--json", "-")

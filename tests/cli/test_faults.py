@@ -88,30 +88,6 @@ class TestEnvironment:
 
 
 @posix
-class TestFullDisk:
-    """A limit of the size of files stands for a disk that fills up while a file is written."""
-
-    @pytest.mark.parametrize(
-        "arguments",
-        [("run", "-q", "--json"), ("check", "-q", "scene-a.toml", "--html"), ("tolerance", "--n", "2", "--json")],
-    )
-    def test_the_verdict_is_printed_and_the_file_named(self, arguments, scene, tmp_path):
-        target = tmp_path / "target"
-        code = (
-            "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)); sys.dont_write_bytecode = 1;"
-            f"sys.argv = {['clamp3d', *arguments, str(target)]!r}; from clamp3d.cli import main; main()"
-        )
-        env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, timeout=120, check=False, cwd=tmp_path, env=env
-        )
-        assert done.returncode == 2
-        assert done.stderr.decode().splitlines()[-1] == f"clamp3d: error: cannot write {target}: File too large"
-        assert len(done.stdout) > 100
-        assert sorted(path.name for path in tmp_path.iterdir()) == [scene.name]
-
-
-@posix
 class TestEnd:
     def test_when_asked_to_end_nothing_is_left(self, tmp_path):
         """The decomposition of a splint takes tens of seconds in a process of its own, with files in a folder."""

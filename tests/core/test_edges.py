@@ -113,7 +113,7 @@ def test_a_minimum_at_the_end_of_a_line_takes_few_steps():
     """Also where the first of Newton's steps stays on the line: it was halved to its end in fifty more."""
     roots = []
     counting = SimpleNamespace(inf=math.inf, sqrt=lambda x: roots.append(x) or math.sqrt(x))
-    plain = on_line._function
+    plain = on_line.py_func
     counted = FunctionType(plain.__code__, {**plain.__globals__, "math": counting})
     for case in (
         (1.8488, 0.14405, 0.0, 4.42285, 2.83844, 1.0, 0.0, 0.0030433, 0.0108284, 0.99993674, -17.8467, -0.185005),

@@ -9,7 +9,6 @@ from click.testing import CliRunner
 from fit_shapes import RADIUS, splint
 
 from clamp3d.cli.fit import command
-from clamp3d.errors import InputError
 
 
 @pytest.fixture
@@ -40,16 +39,3 @@ def test_mesh_without_features_is_an_answer(tmp_path):
     assert out.exit_code == 0
     assert "no groove, no cylinder, no hole" in out.stdout
     assert "<tbody>" not in (tmp_path / "b.html").read_text()
-
-
-def test_names_are_escaped_in_the_page(tmp_path):
-    file = tmp_path / "a<b>&c.stl"
-    splint(0.3).export(file)
-    CliRunner().invoke(command, [str(file), "--html", str(tmp_path / "c.html"), "--quiet"])
-    assert "<b>&c" not in (tmp_path / "c.html").read_text()
-
-
-def test_bad_output_folder_loses_nothing(part, tmp_path):
-    out = CliRunner().invoke(command, [str(part), "--json", str(tmp_path / "no" / "a.json")])
-    assert isinstance(out.exception, InputError)
-    assert CliRunner().invoke(command, [str(part), "--unit", "foot"]).exit_code == 2

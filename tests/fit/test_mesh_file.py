@@ -1,8 +1,5 @@
 """Reading: units, axes, repairs, and one line for every kind of bad file."""
 
-import sys
-import zipfile
-
 import manifold3d
 import numpy as np
 import pytest
@@ -11,7 +8,7 @@ from fit_shapes import RADIUS, splint
 
 from clamp3d.brep.mesh_file import load_mesh
 from clamp3d.core.mesh import make_mesh
-from clamp3d.errors import InputError, MissingLibraryError
+from clamp3d.errors import InputError
 from clamp3d.fit.fit import fit_file, fit_mesh
 
 
@@ -39,29 +36,6 @@ def test_gltf_is_metres_and_y_up(part, tmp_path):
     assert np.allclose(mesh.vertices.max(axis=0), part.vertices.max(axis=0), atol=1e-4)
 
 
-@pytest.mark.parametrize(("unit", "size"), [("micron", 0.137), ("foot", 137 * 304.8), ("inch", 137 * 25.4)])
-def test_units_of_the_3mf_specification(part, tmp_path, unit, size):
-    part.export(tmp_path / "part.3mf")
-    with zipfile.ZipFile(tmp_path / "part.3mf") as made:
-        files = {name: made.read(name) for name in made.namelist()}
-    for written, expected in ((unit, size), ("cubit", None)):
-        with zipfile.ZipFile(tmp_path / "other.3mf", "w") as out:
-            for name, content in files.items():
-                out.writestr(name, content.replace(b'unit="millimeter"', f'unit="{written}"'.encode()))
-        if expected is None:
-            with pytest.raises(InputError, match=r"unit must be one of micron, .*"):
-                load_mesh(tmp_path / "other.3mf")
-        else:
-            assert np.isclose(np.ptp(load_mesh(tmp_path / "other.3mf").vertices[:, 0]), expected, rtol=1e-6)
-
-
-def test_unit_option(part, tmp_path):
-    part.export(tmp_path / "part.stl")
-    assert np.isclose(np.ptp(load_mesh(tmp_path / "part.stl", unit="in").vertices[:, 0]), 137 * 25.4, rtol=1e-6)
-    with pytest.raises(InputError, match="unit must be one of mm, cm, m, in, got 'foot'"):
-        load_mesh(tmp_path / "part.stl", unit="foot")
-
-
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
@@ -86,13 +60,6 @@ def test_bad_files_give_one_line(tmp_path, name, content, message):
     assert "\n" not in str(caught.value)
 
 
-def test_step_without_its_library_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "OCP", None)
-    (tmp_path / "part.step").write_text("ISO-10303-21;")
-    with pytest.raises(MissingLibraryError, match=r"pip install 'clamp3d\[step\]'"):
-        load_mesh(tmp_path / "part.step")
-
-
 def test_step_of_the_up_splint(tmp_path):
     pytest.importorskip("OCP")
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
@@ -115,25 +82,6 @@ def test_step_of_the_up_splint(tmp_path):
     (tmp_path / "bad.step").write_text("nothing")
     with pytest.raises(InputError, match="not a readable STEP file"):
         load_mesh(tmp_path / "bad.step")
-
-
-@pytest.mark.parametrize(
-    ("vertices", "faces", "message"),
-    [
-        (np.zeros((3, 2)), [[0, 1, 2]], r"shape \(n, 3\)"),
-        (np.eye(3), [[0, 1]], r"shape \(m, 3\)"),
-        (np.eye(3), [[0, 1, 3]], "face index 3 is out of range for 3 vertices"),
-        (np.eye(3), [[0, 1, -1]], "face index -1"),
-        (np.eye(3), [[0.0, 1.0, 2.0]], "integers"),
-        (np.full((3, 3), np.inf), [[0, 1, 2]], "not finite"),
-        (np.zeros((3, 3)), [[0, 1, 2]], "one point"),
-        (0.9e-9 * np.eye(3), [[0, 1, 2]], "extent must be >= 1e-09 mm, got 9e-10 mm"),
-        (np.diag([1.0, 0, 0]), [[0, 1, 2], [0, 0, 1]], "no triangle with an area"),
-    ],
-)
-def test_bad_arrays(vertices, faces, message):
-    with pytest.raises(InputError, match=message):
-        make_mesh(vertices, np.array(faces))
 
 
 def test_repairs_are_noted():
@@ -181,24 +129,3 @@ def test_watertight_is_true_of_what_is_returned(part, height, float32):
             area = trimesh.triangles.area(mesh.vertices[mesh.faces[feature.faces]]).sum()
             assert area == pytest.approx(feature.covered_area, rel=1e-9)
             assert not mesh.slivers[feature.faces].any()
-
-
-def test_open_meshes_say_so():
-    box = trimesh.creation.box([1.0, 1.0, 1.0])
-    mesh = make_mesh(box.vertices, box.faces[1:])
-    assert not mesh.watertight
-    assert status(mesh) != manifold3d.Error.NoError
-    V, F = with_slivers(box, [0], 0.0)
-    mesh = make_mesh(V, np.delete(F, 5, axis=0))  # of an open mesh slivers are dropped
-    assert not mesh.watertight
-    assert not mesh.slivers.any()
-    # A strip with half a turn has a rim, and no consistent winding.
-    n = 12
-    ring = np.arange(2 * n).reshape(n, 2)
-    ahead = np.concatenate([ring[1:], ring[:1, ::-1]])
-    a, b, c, d = ring[:, 0], ring[:, 1], ahead[:, 0], ahead[:, 1]
-    t = np.linspace(0.0, 2 * np.pi, n, endpoint=False)
-    side = np.array([-0.3, 0.3])
-    r = 2.0 + np.cos(t / 2)[:, None] * side
-    V = np.stack([r * np.cos(t)[:, None], r * np.sin(t)[:, None], np.sin(t / 2)[:, None] * side], axis=2)
-    assert not make_mesh(V.reshape(-1, 3), np.concatenate([np.c_[a, c, b], np.c_[b, c, d]])).watertight

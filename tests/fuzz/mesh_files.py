@@ -208,7 +208,7 @@ def _command(draw: Draw, folder: Path, name: str) -> tuple[list[str], list[Path]
     if way <= 6:
         option, file = ("--html", "f.html") if way == 6 else ("--json", "f.json")
         return ["fit", name, "--quiet", option, file, *unit], [folder / file]
-    fit, aside = pick(draw, "bound", "round", "off"), draw(st.floats(-8.0, 8.0))
+    fit, aside = pick(draw, "round", "off"), draw(st.floats(-8.0, 8.0))
     Path(folder, "scene.toml").write_text(
         f'[parts.part]\nshape = "mesh"\nfile = "{name}"\nfit = "{fit}"\n'
         '[parts.wire]\nshape = "cylinder"\nradius = 6.5\nlength = 50\n'

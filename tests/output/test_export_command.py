@@ -14,8 +14,6 @@ import trimesh
 
 from clamp3d import cli
 from clamp3d.clamp.dimensions import PARTS
-from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.parts import parts
 
 ROOT = Path(__file__).resolve().parents[2]
 # x, y, degrees of the published final state (section frame: y down), relative to the line.
@@ -58,20 +56,6 @@ def test_final_state_is_exported_where_it_is_published(clamp3d, tmp_path: Path, 
     assert scene.bounds[1][1] == pytest.approx(0.120184, abs=1e-6)
 
 
-def test_parts_keep_their_own_frames_unless_a_state_is_named(clamp3d, tmp_path: Path) -> None:
-    assert clamp3d("export", "--format", "stl", "--output", tmp_path / "own", "--mesh-error", "0.1", "-q") == 0
-    assert clamp3d("export", "--format", "stl", "--output", tmp_path / "open", "--state", "open", "-q") == 0
-    assert clamp3d("export", "--format", "stl", "--output", tmp_path / "step", "--state", "P7", "-q") == 0
-    assert clamp3d("export", "--format", "stl", "--output", tmp_path / "3", "--state", "3", "-q") == 0
-    own, opened, step, third = (trimesh.load(tmp_path / d / "P2-down-splint.stl") for d in ("own", "open", "step", "3"))
-    np.testing.assert_allclose(own.bounds, parts(load_clamp())["P2"].bounds, atol=1e-5)
-    assert opened.bounds[0][0] > step.bounds[0][0] + 50.0  # the open clamp stands beside the line
-    assert third.bounds[0][2] > step.bounds[0][2] + 20.0  # the third step closes the down splint
-    listing = json.loads((tmp_path / "own" / "manifest-stl.json").read_text())
-    assert listing["parts"]["P1"]["T_world_part"] is None
-    assert listing["mesh_error_mm"] == 0.1
-
-
 def test_scenes_and_meshes_are_exported_too(clamp3d, tmp_path: Path, capfd) -> None:
     hinge = ROOT / "examples" / "hinge"
     assert clamp3d("export", hinge / "scene.toml", "-o", tmp_path / "hinge.3mf") == 0
@@ -87,15 +71,6 @@ def test_scenes_and_meshes_are_exported_too(clamp3d, tmp_path: Path, capfd) -> N
     assert "state goes with an assembled clamp" in capfd.readouterr().err
     assert clamp3d("export", "-o", tmp_path / "final.step", "-q") == 0
     assert capfd.readouterr().out.split() == [str(tmp_path / f"final.step{s}") for s in ("", ".manifest.json")]
-
-
-def test_other_wires_and_units(clamp3d, tmp_path: Path) -> None:
-    arguments = ("--jumper", "21.6", "--line", "LJ-500", "--layout", "assembly", "--unit", "in", "-q")
-    assert clamp3d("export", "--format", "obj", "--output", tmp_path, *arguments) == 0
-    listing = json.loads((tmp_path / "manifest-obj.json").read_text())
-    low, high = np.array(listing["parts"]["P7"]["bounds"])
-    assert high[2] - low[2] == pytest.approx(21.6 / 25.4, abs=0.02 / 25.4)
-    assert listing["parameters"]["line"]["conductor"] == "LJ-500"
 
 
 @pytest.mark.parametrize(
@@ -135,16 +110,6 @@ def test_review_set_is_what_a_new_build_gives() -> None:
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     assert (done.stdout, done.returncode) == ("", 0), done.stderr
-
-
-def test_review_set_holds_the_seven_parts_and_stays_small() -> None:
-    folder = ROOT / "meshes"
-    assert sum(path.stat().st_size for path in folder.iterdir()) < 2_000_000
-    for name, path in zip(PARTS, sorted(folder.glob("P*.stl")), strict=True):
-        solid = trimesh.load(path)
-        assert path.name.startswith(name)
-        assert solid.is_watertight
-        np.testing.assert_allclose(solid.bounds, parts(load_clamp())[name].bounds, atol=1e-5)
 
 
 def test_an_order_of_assembly_is_exported_as_it_stands_after_a_step(clamp3d, tmp_path: Path, capfd) -> None:

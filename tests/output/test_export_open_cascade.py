@@ -14,11 +14,8 @@ import pytest
 import trimesh
 
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
-from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.parts import parts
 from clamp3d.collide.scene import Scene
-from clamp3d.core.meshing import volume_bounds
-from clamp3d.core.pose import inverse
 from clamp3d.errors import InputError
 from clamp3d.output.export import export
 from clamp3d.output.palette import PART_COLOURS
@@ -131,22 +128,6 @@ def bounds(shape: Any) -> np.ndarray:
     return np.array([[low.X(), low.Y(), low.Z()], [high.X(), high.Y(), high.Z()]])
 
 
-def triangles(shape: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and faces (m, 3) of a shape that has a triangulation instead of surfaces."""
-    from OCP.BRep import BRep_Tool
-    from OCP.TopLoc import TopLoc_Location
-
-    points, corners = [], []
-    for face in faces(shape):
-        place = TopLoc_Location()
-        mesh = BRep_Tool.Triangulation_s(face, place)
-        for i in range(1, mesh.NbNodes() + 1):
-            point = mesh.Node(i).Transformed(place.Transformation())
-            points.append([point.X(), point.Y(), point.Z()])
-        corners += [[mesh.Triangle(i).Value(k) - 1 for k in (1, 2, 3)] for i in range(1, mesh.NbTriangles() + 1)]
-    return np.array(points), np.array(corners)
-
-
 def _colour(document: Any, label: Any) -> list[int] | None:
     from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
     from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType
@@ -203,26 +184,6 @@ def test_step_keeps_cylinders_as_cylinders_and_planes_as_planes(reference: Clamp
     }
 
 
-def test_step_grooves_lie_where_the_contact_features_do(
-    reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path
-) -> None:
-    """Axis and radius of every groove as read in the world, against the feature that the contact model measures."""
-    written = export(odd_scene, tmp_path, format="step")
-    _, found = read_step(written.files[0])
-    for (a, _), pair in groove_pairs(reference).items():
-        product = found[PARTS.index(a)]
-        to_groove = inverse(odd_poses[a] @ pair.T_a_groove)
-        errors = []
-        for surface in surfaces(product.shape):
-            if type(surface).__name__ != "Geom_CylindricalSurface" or abs(surface.Radius() - pair.groove.radius) > 1e-9:
-                continue
-            axis = surface.Axis()
-            point = to_groove @ [*_xyz(axis.Location()), 1.0]
-            direction = to_groove[:3, :3] @ _xyz(axis.Direction())
-            errors.append(max(np.abs(point[:2]).max(), np.abs(direction[:2]).max()))
-        assert min(errors) < 1e-9
-
-
 def test_step_same_input_same_bytes_and_manifest(
     reference: Clamp,
     odd_poses: dict,
@@ -247,43 +208,3 @@ def test_step_same_input_same_bytes_and_manifest(
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "today")
     with pytest.raises(InputError, match="SOURCE_DATE_EPOCH must be whole seconds since 1970, got 'today'"):
         export(odd_scene, tmp_path, format="step")
-
-
-def test_glb_comes_back_in_millimetres_and_z_up(
-    reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path
-) -> None:
-    from OCP.Message import Message_ProgressRange
-    from OCP.RWGltf import RWGltf_CafReader
-    from OCP.TCollection import TCollection_AsciiString
-
-    coordinates = pytest.importorskip("OCP.RWMesh", reason="OCP 7 lacks it")
-    written = export(odd_scene, tmp_path, format="glb", mesh_error=0.02)
-    document = new_document()
-    reader = RWGltf_CafReader()
-    reader.SetDocument(document)
-    reader.SetSystemLengthUnit(0.001)
-    reader.SetSystemCoordinateSystem(coordinates.RWMesh_CoordinateSystem.RWMesh_CoordinateSystem_Zup)
-    assert reader.Perform(TCollection_AsciiString(str(written.files[0])), Message_ProgressRange())
-    root = reader.SingleShape()
-    while len(list(_children(root))) == 1:
-        (root,) = _children(root)
-    for name, shape in zip(PARTS, _children(root), strict=True):
-        part = parts(reference)[name]
-        solid = trimesh.Trimesh(*triangles(shape), process=False)
-        low, high = volume_bounds(part, 0.02)
-        slack = 1e-4 * solid.area  # 32-bit poses and coordinates
-        assert low - slack <= solid.volume <= high + slack
-        np.testing.assert_allclose(solid.bounds, part.bounds_at(odd_poses[name]), atol=0.02 + 1e-4)
-
-
-def _xyz(point: Any) -> list[float]:
-    return [point.X(), point.Y(), point.Z()]
-
-
-def _children(shape: Any) -> Iterator[Any]:
-    from OCP.TopoDS import TopoDS_Iterator
-
-    iterator = TopoDS_Iterator(shape)
-    while iterator.More():
-        yield iterator.Value()
-        iterator.Next()

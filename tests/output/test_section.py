@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from legends import table2_figure, table3_figure
+from legends import table2_figure
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Path4
 
@@ -18,12 +18,11 @@ from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Assembly
-from clamp3d.core.pose import SectionPose
 from clamp3d.errors import InputError
 from clamp3d.output.assembly_figures import exploded_figure, exploded_poses, steps_figure
 from clamp3d.output.figures import contact_figure, contacts_figure, save_figure, section_figure, states_figure
 from clamp3d.output.palette import PART_COLOURS, VERDICT_COLOURS
-from clamp3d.output.section import arc_path, draw_dimensions, draw_section, edge_openings
+from clamp3d.output.section import arc_path, draw_section, edge_openings
 
 
 @pytest.fixture(scope="module")
@@ -45,15 +44,6 @@ def test_curves_lie_on_their_arcs() -> None:
                     points = curve(np.linspace(0.0, 1.0, 21))
                     worst = min(np.abs(np.hypot(*(points - c).T) - r).max() / r for c, r in circles)
                     assert worst < 1e-8
-
-
-def test_outline_encloses_the_area_of_the_part() -> None:
-    for part in parts(load_clamp()).values():
-        profile = part.bodies[0].profile
-        points = np.vstack([curve(np.linspace(0.0, 1.0, 401)[:-1]) for curve, _ in arc_path(profile).iter_bezier()])
-        x, y = points.T
-        area = 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
-        assert area == pytest.approx(profile.area, rel=1e-6)
 
 
 def test_drawing_is_to_scale_and_where_the_parts_are(run: Assembly) -> None:
@@ -82,15 +72,6 @@ def test_dimensions_are_the_published_ones(run: Assembly) -> None:
     assert left - right == pytest.approx(137.0 * math.sin(math.radians(12.0)), abs=1e-3)
 
 
-def test_dimensions_follow_the_poses(run: Assembly) -> None:
-    ax = Figure().add_subplot()
-    down = SectionPose(45.172, -10.374)
-    draw_dimensions(ax, run.clamp, {**run.poses, "P2": down})
-    expected = down.y + run.clamp.down_splint.face_depth - run.poses["P1"].y - run.clamp.up_splint.thickness
-    shown = [t.get_text() for t in ax.texts if t.get_text()]
-    assert shown == [f"{expected:.3f}", f"{expected:.3f}", "parallel"]
-
-
 def test_figures_name_what_they_show(run: Assembly) -> None:
     assert set(PARTS) <= set(texts(states_figure(run)))
     enlarged = [t for t in texts(contacts_figure(run)) if "interior contact" in t]
@@ -116,18 +97,6 @@ def test_exploded_parts_keep_clear_of_each_other() -> None:
     )
     for below, above in itertools.pairwise(spans):
         assert below[1] < above[0]
-
-
-def test_legends_show_every_relation() -> None:
-    assert [ax.get_title() for ax in table2_figure().axes] == [
-        "none",
-        "one point",
-        "two points on one side",
-        "two points on different sides",
-        "overlap",
-    ]
-    row = ["inside", "outside", "intersect", "exterior contact", "interior contact"]
-    assert [ax.get_title() for ax in table3_figure().axes] == [*row, *row, "", "", "", *row[3:]]
 
 
 def test_colours_of_parts_and_verdicts_are_apart() -> None:

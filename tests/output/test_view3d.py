@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 
 import numpy as np
 import pytest
@@ -64,28 +63,3 @@ def test_an_edge_that_goes_behind_something_ends_there() -> None:
     level = [s for s in lines if abs(s[0, 1] - 1.0) < 0.05 and abs(s[1, 1] - 1.0) < 0.05]
     spans = sorted({(round(float(min(s[:, 0])), 0), round(float(max(s[:, 0])), 0)) for s in level})
     assert spans == [(-10.0, -1.0), (1.0, 10.0)]
-
-
-def test_round_surfaces_have_no_facet_lines() -> None:
-    """A cylinder seen from the side: two ends and two outlines."""
-    pin = PosedMesh(trimesh.creation.cylinder(radius=3.0, height=10.0, sections=64), np.eye(4), "#808080")
-    image, (lines,) = scene([pin])
-    upright = [s for s in lines if abs(s[0, 0] - s[1, 0]) < 0.05 and abs(s[0, 1] - s[1, 1]) > 5.0]
-    assert sorted(round(float(s[0, 0])) for s in upright) == [-3, 3]
-    covered = float((image[..., 3] > 0).sum()) / 100.0
-    assert covered == pytest.approx(60.0, rel=0.02)
-
-
-def test_foreshortening() -> None:
-    """Seen from 30 degrees above, a height of 10 shows as 10 cos 30."""
-    axes = Camera(azimuth=0.3, elevation=math.radians(30.0))
-    assert axes.project(np.array([[0.0, 0.0, 10.0]]))[0, 1] == pytest.approx(10.0 * math.cos(math.radians(30.0)))
-
-
-def test_a_body_a_thousand_times_as_large_is_the_same_picture() -> None:
-    pictures = []
-    for k in (1.0, 1024.0):
-        ax = Figure().add_subplot()
-        draw_solids(ax, [block((4 * k, 2 * k, 3 * k), (0, 0, 0), "#FF0000")], Camera(), pixels=200)
-        pictures.append(np.asarray(ax.images[0].get_array()))
-    assert pictures[0] == pytest.approx(pictures[1], abs=1e-9)

@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import random
 import re
 import signal
 import socket
@@ -17,10 +16,8 @@ import numpy as np
 import pytest
 import trimesh
 import umsgpack
-from meshcat.servers.tree import SceneTree, find_node, walk
 
 from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.conductors import catalogue
 from clamp3d.clamp.forces import HELD
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.collide.check import check
@@ -32,7 +29,7 @@ from clamp3d.core.motion import Motion
 from clamp3d.core.pose import translation
 from clamp3d.errors import Clamp3dError, InputError
 from clamp3d.output import placed, serving
-from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
+from clamp3d.output.serving import MeshcatServer, PageServer
 from clamp3d.output.viewer import Viewer, view
 
 BAD = ("clash", "contained")
@@ -87,18 +84,6 @@ def answers(port):
         return s.connect_ex(("127.0.0.1", port)) == 0
 
 
-def test_parts_are_there_before_the_run_and_each_waypoint_comes_when_it_is_reached(recorded):
-    viewer, assembly, before = recorded
-    early = {c["path"] for c in viewer.commands[:before] if c["type"] == "set_object"}
-    for name in assembly.poses:
-        assert any(path.startswith(f"/clamp3d/cutaway/{name} ") for path in early)
-    path = "/clamp3d/whole/P2 down splint"
-    sent = [c for c in viewer.commands if c["type"] == "set_transform" and c["path"] == path]
-    assert len(sent) == len(assembly.path) + 1  # and back to the start at the end
-    for command, waypoint in zip(sent, assembly.path, strict=False):
-        np.testing.assert_allclose(np.reshape(command["matrix"], (4, 4)).T, waypoint.T_world("P2"), atol=1e-12)
-
-
 def animation_of(viewer):
     commands = [c for c in viewer.commands if c["type"] == "set_animation"]
     return {a["path"]: a["clip"] for a in commands[-1]["animations"]}
@@ -107,21 +92,6 @@ def animation_of(viewer):
 def keys_of(clip, name):
     track = next(t for t in clip["tracks"] if t["name"] == name)
     return {key["time"]: key["value"] for key in track["keys"]}
-
-
-def test_a_meshcat_server_tells_the_animation_after_all_poses(recorded):
-    """A page that comes later would else be taken back to the start by poses that reach it while it plays."""
-    viewer, _, _ = recorded
-    tree = SceneTree()
-    for command in viewer.commands:
-        node = find_node(tree, [name for name in command["path"].split("/") if name])
-        if command["type"] == "set_animation":
-            node.animation = command
-        elif command["type"] == "set_transform":
-            node.transform = command
-    told = [kind for node in walk(tree) for kind in ("transform", "animation") if getattr(node, kind) is not None]
-    assert told.count("animation") == 1
-    assert told[-1] == "animation"
 
 
 def test_animation_reaches_every_waypoint_in_turn(recorded):
@@ -168,21 +138,6 @@ def test_every_value_at_every_waypoint_is_what_measure_says(recorded):
             assert row["at_least_mm"] == pytest.approx(d.lower, abs=1e-9)
 
 
-def test_no_clash_at_a_waypoint_of_random_wires_that_the_engine_does_not_find():
-    pairs = random.Random(11).sample(list(itertools.product(sorted(catalogue()), repeat=2)), 2)
-    for line, jumper in [*pairs, ("LJ-240", "LJ-240")]:
-        assembly = assemble("reference", line=line, jumper=jumper)
-        with view(assembly, serve=False, mesh_error=0.2) as viewer:
-            stops = viewer.story["stops"]
-        for stop, waypoint in zip(stops, assembly.path, strict=True):
-            rows = check(assembly.scene_at(waypoint)).pairs
-            overlapping = {frozenset((row.a, row.b)) for row in rows if row.verdict in BAD}
-            for row in stop["rows"]:
-                pair = frozenset((row["a"], row["b"]))
-                assert (row["verdict"] in BAD) == (pair in overlapping), (line, jumper, stop["label"], pair)
-                assert row["distance_mm"] > -1e-6 or pair in overlapping
-
-
 def dots_of(viewer):
     """Names of the pair and place of each dot at each stop."""
     for command in viewer.commands:
@@ -206,22 +161,6 @@ def test_every_dot_lies_on_both_bodies(recorded):
             inside = np.linalg.inv(assembly.path[number].T_world(name)) @ [*point, 1.0]
             away = trimesh.proximity.closest_point(meshes[name], inside[None, :3])[1][0]
             assert away < 0.005, (number, pair, name)
-
-
-def test_gaps_are_lines_between_the_witness_points_with_their_length(recorded):
-    viewer, assembly, _ = recorded
-    group = f"/clamp3d/gaps/{len(assembly.path)} nut tightened"
-    lines = {
-        c["path"].split("/")[-2]: line_of(c)
-        for c in viewer.commands
-        if c["path"].startswith(f"{group}/") and c["path"].endswith("/line")
-    }
-    rows = {f"{r['a']}-{r['b']}": r for r in viewer.story["stops"][-1]["rows"]}
-    assert np.linalg.norm(np.subtract(*lines.pop("splints")[:2])) == pytest.approx(assembly.distance, abs=1e-4)
-    assert {"P1-P4", "P2-P4", "P1-P2"} <= set(lines)
-    for pair, ends in lines.items():
-        np.testing.assert_allclose(ends[:2], [rows[pair]["point_a"], rows[pair]["point_b"]], atol=1e-4)
-        assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(rows[pair]["distance_mm"], abs=0.01)
 
 
 def line_of(command):
@@ -273,21 +212,6 @@ def test_scene_with_a_motion_stops_at_first_contact_and_marks_it():
     assert end["high"][2] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_motions_of_a_scene_follow_each_other_and_turns_stay_on_their_arc():
-    scene = Scene(name="two motions").add("arm", shapes.box((40.0, 4.0, 4.0)), translation(30.0, 0.0, 0.0))
-    scene = scene.add("far", shapes.cylinder(1.0, 4.0), translation(0.0, 500.0, 0.0))
-    turn = Motion.screw((0, 0, 1), np.pi / 2, parts="arm", name="turn")
-    lift = Motion.translate((0, 0, 10.0), parts="arm", name="lift")
-    viewer = Recorder(Scene(scene.parts, motions=(turn, lift), name="two motions"))
-    viewer.finish(check(Scene(scene.parts, motions=(turn, lift), name="two motions")))
-    clip = animation_of(viewer)["/clamp3d/whole/arm"]
-    position = keys_of(clip, ".position")
-    assert list(position.values())[-1] == pytest.approx([0.0, 30.0, 10.0], abs=1e-9)
-    for a, b in itertools.pairwise(position.values()):
-        middle = 0.5 * (np.array(a) + b)
-        assert np.hypot(*middle[:2]) == pytest.approx(30.0, abs=0.02)
-
-
 def test_clash_at_rest_is_marked_where_it_is():
     scene = Scene(name="clash").add("a", shapes.box((10.0, 10.0, 10.0)))
     scene = scene.add("b", shapes.box((10.0, 10.0, 10.0)), translation(9.0, 1.0, 2.0))
@@ -299,20 +223,6 @@ def test_clash_at_rest_is_marked_where_it_is():
     margin = 0.01 * 19.0
     np.testing.assert_allclose(box.min(axis=0), np.array([4.0, -4.0, -3.0]) - margin, atol=1e-5)
     np.testing.assert_allclose(box.max(axis=0), np.array([5.0, 5.0, 5.0]) + margin, atol=1e-5)
-
-
-def test_viewer_of_many_parts_measures_only_what_is_near(monkeypatch):
-    from clamp3d.output import viewer as module
-
-    asked = []
-    monkeypatch.setattr(module, "check", lambda scene, distances: asked.append(distances) or check(scene))
-    scene = Scene(name="row")
-    for k in range(45):
-        scene = scene.add(f"p{k}", shapes.box((1.0, 1.0, 1.0)), translation(2.0 * k, 0.0, 0.0))
-    with view(scene, serve=False) as viewer:
-        assert viewer.story["stops"][0]["rows"] == []
-        assert viewer.story["headline"] == "Clean: 990 pairs checked, nothing clashes"
-    assert asked == [False]
 
 
 def test_page_is_whole_and_can_be_read_without_script():
@@ -332,14 +242,6 @@ def test_names_from_a_file_cannot_become_markup():
     assert "<img" not in page
     assert "<b>a</b>" not in page
     assert page.count("</script>") == 2
-
-
-def test_log_keeps_what_a_late_page_needs_and_no_more():
-    log = CommandLog()
-    for x in range(100):
-        log.add({"type": "set_transform", "path": "/a/b", "matrix": [float(x)] * 16})
-    log.add({"type": "set_property", "path": "/a/b", "property": "visible", "value": True})
-    assert len(log.messages()) == 2
 
 
 def test_equal_parts_are_meshed_and_written_once(monkeypatch):
@@ -398,25 +300,11 @@ def test_port_that_is_taken_is_an_error_that_says_so():
         serve(port=first.port)
 
 
-def test_serves_this_machine_only_unless_asked():
-    with serve() as server:
-        others = {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {"127.0.0.1"}
-        for address in others:
-            with socket.socket() as s:
-                assert s.connect_ex((address, server.port)) != 0
-
-
 def test_other_files_are_not_served():
     with serve() as server:
         for path in ("main.js", "../other.html", "etc/passwd"):
             with pytest.raises(urllib.error.HTTPError, match="404"):
                 read(server.url + path)
-
-
-def test_bad_mesh_error_leaves_no_server():
-    with pytest.raises(InputError, match="mesh_error"):
-        Viewer(load_clamp(), mesh_error=-1.0)
-    assert not [t for t in threading.enumerate() if t.name == "clamp3d viewer"]
 
 
 def test_without_a_meshcat_server_there_is_an_error(monkeypatch):
@@ -432,18 +320,6 @@ def test_without_a_meshcat_server_there_is_an_error(monkeypatch):
 
 def command_line(*arguments):
     return [sys.executable, "-m", "clamp3d", *arguments]
-
-
-def test_page_is_one_file_that_names_no_other(tmp_path, main):
-    page = tmp_path / "run.html"
-    code, out, err = main("view", "--html", page, "--draw-error", "0.1", "-q")
-    assert code == 0, err
-    assert out.split() == [str(page)]
-    text = page.read_text()
-    ours = re.sub(r"<script>.*?</script>", "", text, count=1, flags=re.DOTALL)  # without meshcat itself
-    assert not re.search(r"""(src|href)=["'](?!data:)""", ours)
-    assert "within 0.1 mm" in ours
-    assert [p.name for p in tmp_path.iterdir()] == ["run.html"]
 
 
 def test_view_serves_until_interrupted_and_leaves_nothing():
@@ -515,19 +391,3 @@ def test_bad_options_are_one_line(arguments, message, tmp_path, monkeypatch, mai
     assert message in err
     assert len(err.strip().splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
-
-
-def test_lengths_of_many_marks_wait_until_one_is_picked():
-    def hidden(n):
-        scene = Scene().add("plate", shapes.box((40.0 * n, 10.0, 2.0)))
-        for k in range(n):
-            scene = scene.add(
-                f"pin_{k}", shapes.box((1.0, 1.0, 2.0)), translation(20.0 * k - 20.0 * n + 20.0, 0.0, 1.5)
-            )
-        viewer = Recorder(check(scene))
-        viewer.finish(check(scene))
-        return [c for c in viewer.commands if c["path"].endswith("/value") and c.get("property") == "visible"]
-
-    assert hidden(3) == []
-    assert len(hidden(13)) == 13
-    assert not any(command["value"] for command in hidden(13))

@@ -26,7 +26,6 @@ from clamp3d.output.groups import grouped
 from clamp3d.output.palette import PART_COLOURS
 from clamp3d.output.scene_report import check_to_html
 from clamp3d.output.viewer import Viewer, view
-from clamp3d.output.viewer_overlay import overlay
 
 playwright_api = pytest.importorskip(
     "playwright.sync_api", reason="browser tests need playwright: pip install 'clamp3d[dev]'"
@@ -187,11 +186,6 @@ def go_to(page, number):
     page.wait_for_timeout(100)
 
 
-def test_page_draws_every_part_where_the_run_ends(page, run):
-    go_to(page, len(run.path) - 1)
-    assert_drawn(page, run.poses)
-
-
 def test_page_steps_through_the_sequence(page, run):
     go_to(page, 0)
     for number, waypoint in enumerate(run.path):
@@ -216,74 +210,6 @@ def test_page_steps_through_the_sequence(page, run):
         page.wait_for_timeout(50)
     page.click("#back")
     assert run.path[-2].label in page.inner_text("#label")
-
-
-def test_parts_are_half_way_between_two_stops_at_half_time(page, run):
-    page.evaluate(
-        """() => {
-            const slider = document.getElementById("time"), times = viewer.animator.actions[0]._clip.tracks[0].times;
-            slider.value = (times[1] + times[2]) / 2;
-            slider.dispatchEvent(new Event("input"));
-        }"""
-    )
-    a, b = (w.poses["P1"].T()[:3, 3] for w in run.path[:2])
-    T = pose_in_browser(page, ["whole", "P1 up splint"])
-    np.testing.assert_allclose(T[:3, 3], (a + b) / 2, atol=0.1)  # the slider goes in thousandths of a second
-    assert "moving to" in page.inner_text("#label")
-    assert not any(
-        visible(page, "contacts", f"{i + 1} {w.label}") for i, w in enumerate(run.path)
-    )  # they would be stale
-
-
-def test_cutaway_and_labels_switch(page, run):
-    go_to(page, len(run.path) - 1)
-    with_labels = pixels(page)
-    page.click("#switch-labels")
-    without = pixels(page)
-    assert (np.abs(with_labels - without).sum(2) > 30).sum() > 1000
-    page.click("#switch-cutaway")
-    assert visible(page, "whole")
-    assert not visible(page, "cutaway")
-    whole = cut_colours(page, run.poses)
-    assert any(
-        np.abs(whole[name] - [int(PART_COLOURS[name][i : i + 2], 16) for i in (1, 3, 5)]).max() > 8 for name in whole
-    )
-    page.click("#switch-cutaway")
-    page.click("#switch-labels")
-    assert_drawn(page, run.poses)
-
-
-def test_arrows_of_forces_are_seen_at_the_end_and_switch(page, run):
-    go_to(page, 0)
-    page.wait_for_timeout(100)
-    before = violet(page)
-    go_to(page, len(run.path) - 1)
-    with_arrows = violet(page)
-    assert with_arrows > before + 100
-    page.click("#switch-forces")
-    assert not visible(page, "forces")
-    assert violet(page) < before + 10
-    page.click("#switch-forces")
-    assert violet(page) == pytest.approx(with_arrows, rel=0.2)
-
-
-def violet(page):
-    """Pixels with the hue of an arrow, lit or shaded: red and blue far above green, blue first."""
-    red, green, blue = pixels(page)[..., :3].astype(int).transpose(2, 0, 1)
-    return int(((red > 1.6 * green) & (blue > 1.15 * red) & (blue > 60)).sum())
-
-
-def test_page_plays_by_itself_and_states_its_mesh_error(page, run):
-    go_to(page, 0)
-    page.click("#play")
-    wait_for(page, "viewer.animator.time > 0.5")
-    page.click("#play")
-    assert not page.evaluate("viewer.animator.playing")
-    assert "within 0.01 mm" in page.inner_text("#accuracy")
-    assert f"{run.distance:.3f} mm" in page.inner_text(".facts")
-    go_to(page, len(run.path) - 1)
-    shown = page.query_selector_all(".stop:not([hidden]) .rows tr")
-    assert len(shown) == 21
 
 
 def test_row_of_a_pair_flies_to_it_and_fades_the_others(page, run):
@@ -333,37 +259,6 @@ def test_findings_of_a_check_lead_to_their_places(hinge_page, hinge):
     image = pixels(page)
     red = (image[..., 0] > 150) & (image[..., 1] < 110) & (image[..., 2] < 110)
     assert red[:, 370:].sum() > 200
-
-
-def test_parts_of_one_shape_share_their_geometry_and_each_is_seen_and_fades_alone(browser, tmp_path):
-    scene = Scene()
-    places = [(0, 0, 0), (9, 0, 0), (40, 0, 0), (80, 0, 0)]
-    for k, at in enumerate(places):
-        scene = scene.add(f"p{k}", shapes.box((10, 10, 10)), translation(*at))
-    view(scene, serve=False).save_html(tmp_path / "boxes.html")
-    page = open_page(browser, (tmp_path / "boxes.html").as_uri(), offline=True)
-    wait_for(page, "document.querySelector('.finding')")
-    geometries = page.evaluate(
-        """kind => ["p0", "p1", "p2", "p3"].map(
-            (name) => viewer.scene_tree.find(["clamp3d", "whole", name, kind, "<object>"]).object.geometry.id)""",
-        "solid",
-    )
-    assert len(set(geometries)) == 1
-    page.locator("#switch-cutaway").uncheck()
-    page.locator("#switch-labels").uncheck()
-    page.wait_for_timeout(200)
-    ground, image = pixels(page)[690, 1190], pixels(page)
-    for column, row in on_screen(page, [(x, -5.0, 3.0) for x, _, _ in places[2:]]):
-        assert np.abs(image[round(row), round(column)] - ground).max() > 30
-    page.locator(".finding").first.click()
-    page.wait_for_timeout(200)
-    faint = page.evaluate(
-        """() => ["p0", "p1", "p2", "p3"].map(
-            (n) => viewer.scene_tree.find(["clamp3d", "whole", n, "solid", "<object>"]).object.material.opacity)"""
-    )
-    assert faint[:2] == [1, 1]
-    assert max(faint[2:]) < 0.2
-    assert not page.problems
 
 
 def test_play_halts_at_first_contact_and_goes_on_when_asked(hinge_page):
@@ -492,24 +387,6 @@ def test_served_page_follows_the_run_until_it_is_done(browser, run):
         assert_drawn(page, run.poses)
     page.wait_for_timeout(1500)
     assert page.is_visible("#timeline")  # the page stays when nothing is served any more
-    assert page.problems == []
-    page.context.close()
-
-
-def test_overlay_of_wedges_moves_with_its_part(browser, run, tmp_path):
-    title, pieces = overlay(run.clamp, "wedges=20")
-    with view(run, mesh_error=0.1, serve=False, overlays={title: pieces}) as viewer:
-        viewer.save_html(tmp_path / "overlay.html")
-    page = open_page(browser, (tmp_path / "overlay.html").as_uri(), offline=True)
-    wait_for(page, "viewer.animator.duration > 0")
-    go_to(page, len(run.path) - 1)
-    assert not visible(page, f"overlay {title}")
-    before = pixels(page)
-    page.click("#switch-wedges-of-20-deg")
-    assert visible(page, f"overlay {title}")
-    assert (np.abs(pixels(page) - before).sum(2) > 30).sum() > 2000
-    T = pose_in_browser(page, [f"overlay {title}", "P2"])
-    np.testing.assert_allclose(T, run.poses["P2"].T(), atol=2e-4)
     assert page.problems == []
     page.context.close()
 

@@ -74,20 +74,20 @@ _SMALLEST = 1e-17
 """mm: errors below are drawn here."""
 
 
-def save_comparison(found: Comparison, path: str | Path, command: str) -> Path:
+def save_comparison(comparison: Comparison, path: str | Path, command: str) -> Path:
     """Write the chart to ``path``: .png, .svg, or .html (one page of its own with the chart and the tables).
 
     ``command`` is what made it, for the note under the chart. Raises InputError for another suffix.
     """
     path = Path(path)
-    figure = comparison_figure(found, command)
+    figure = comparison_figure(comparison, command)
     if path.suffix.lower() != ".html":
         return save_figure(figure, path, dpi=200)
-    write_text(path, _page(found, figure))
+    write_text(path, _page(comparison, figure))
     return path
 
 
-def comparison_figure(found: Comparison, command: str) -> Figure:
+def comparison_figure(comparison: Comparison, command: str) -> Figure:
     """The chart as a matplotlib figure; see the module."""
     from matplotlib.figure import Figure
 
@@ -95,7 +95,7 @@ def comparison_figure(found: Comparison, command: str) -> Figure:
     grid = {"width_ratios": (2.7, 1.0), "height_ratios": (3.1, 1.0)}
     axes = figure.subplots(2, 2, sharex="col", sharey="row", gridspec_kw=grid)
     figure.subplots_adjust(left=0.08, right=0.985, top=0.875, bottom=0.185, wspace=0.05, hspace=0.07)
-    rows = found.measured
+    rows = comparison.measured
     _frame(axes, rows)
     for time, _ in axes:
         _front(time, rows)
@@ -107,8 +107,8 @@ def comparison_figure(found: Comparison, command: str) -> Figure:
         _label(axes[0 if members[0].error > _BREAK else 1][0], members)
     _batch(axes[1][0], [row for row in rows if row.method == "cas"])
     _levels(axes[0][0])
-    if isinstance(found.image, Imaged):
-        _images(axes[0][0], found.image)
+    if isinstance(comparison.image, Imaged):
+        _images(axes[0][0], comparison.image)
     axes[1][0].set_xlabel("time per query, microseconds (CPU time of one call from Python)", **_TEXT)
     axes[1][1].set_xlabel("set-up, seconds", **_TEXT)
     figure.text(0.018, 0.53, "largest error of the distance, mm", rotation=90, va="center", **_TEXT)
@@ -119,7 +119,7 @@ def comparison_figure(found: Comparison, command: str) -> Figure:
         "140 degree groove of R 12 mm, wire of 10.5 mm."
     )
     figure.text(0.08, 0.912, subtitle, **_TEXT)
-    figure.text(0.08, 0.018, _note(found, command), fontsize=7.5, color="#4A525C", va="bottom", linespacing=1.45)
+    figure.text(0.08, 0.018, _note(comparison, command), fontsize=7.5, color="#4A525C", va="bottom", linespacing=1.45)
     return figure
 
 
@@ -204,8 +204,8 @@ def _front(ax: Axes, rows: Sequence[Measured]) -> None:
     front, bottom = pareto(rows), ax.get_ylim()[0]
     if front and front[0].error < bottom:
         words = "Pareto front: nothing is both\nleft of it and below it"
-        at = (front[0].one * 1e6, math.sqrt(bottom * 1e-3))
-        ax.annotate(words, at, (-7, 0), textcoords="offset points", ha="right", va="center", **_SMALL)
+        place = (front[0].one * 1e6, math.sqrt(bottom * 1e-3))
+        ax.annotate(words, place, (-7, 0), textcoords="offset points", ha="right", va="center", **_SMALL)
 
 
 def _images(ax: Axes, image: Imaged) -> None:
@@ -218,19 +218,21 @@ def _images(ax: Axes, image: Imaged) -> None:
         ax.text(0.008, value * 1.15, words, transform=ax.get_yaxis_transform(), va="bottom", zorder=1, **_SMALL)
 
 
-def _note(found: Comparison, command: str) -> str:
+def _note(comparison: Comparison, command: str) -> str:
     text = (
         "Errors of the signed distance: 120 poses with up to 1 mm of clearance and 60 overlaps of up to 0.3 mm (where "
         "a method has a depth), parallel and tilted by up to 1.7 degrees, against distances found at 50 digits. Hollow "
         "marks but the star: which piece can be nearest was chosen by hand. Axis: the wire's axis less its radius. "
         "Grey line: Pareto front, nothing is both left of it and below it; dashes: the same without clamp3d. "
         "Set-up: meshing, decomposing, building trees, with libraries already loaded; below 1 ms drawn at 1 ms; "
-        f"CoACD by the clock. {found.machine}. Made by: {command}"
+        f"CoACD by the clock. {comparison.machine}. Made by: {command}"
     )
     return "\n".join(textwrap.wrap(text, 178))
 
 
-def _page(found: Comparison, figure: Figure) -> str:
+def _page(comparison: Comparison, figure: Figure) -> str:
     """One HTML page without anything outside itself."""
     drawn = svg(figure).decode("utf-8")
-    return render("compare.html", "clamp3d.bench", svg=drawn[drawn.index("<svg") :], tables=comparison_to_text(found))
+    return render(
+        "compare.html", "clamp3d.bench", svg=drawn[drawn.index("<svg") :], tables=comparison_to_text(comparison)
+    )

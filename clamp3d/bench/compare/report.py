@@ -16,9 +16,9 @@ from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
 
 
-def comparison_to_dict(found: Comparison) -> dict[str, Any]:
+def comparison_to_dict(comparison: Comparison) -> dict[str, Any]:
     """Everything measured as JSON data: mm, seconds, MB; ``known`` are figures from elsewhere for the same groove."""
-    truth = exact_distance(found)
+    truth = exact_distance(comparison)
 
     def contact(row: Measured | NotMeasured) -> dict[str, Any]:
         known = KNOWN.get(Method(row.method, row.setting).key)
@@ -34,33 +34,35 @@ def comparison_to_dict(found: Comparison) -> dict[str, Any]:
         return data
 
     return {
-        "machine": asdict(found.machine),
-        "seconds": found.seconds,
-        "contact": [contact(row) for row in found.contact],
-        "peers": [contact(row) for row in found.peers],
-        "assembly": [assembly(row) for row in (*found.exact, *found.stepped)],
-        "image": asdict(found.image),
-        "complexity": asdict(found.complexity)
-        if isinstance(found.complexity, NotMeasured)
-        else [asdict(sweep) for sweep in found.complexity],
+        "machine": asdict(comparison.machine),
+        "seconds": comparison.seconds,
+        "contact": [contact(row) for row in comparison.contact],
+        "peers": [contact(row) for row in comparison.peers],
+        "assembly": [assembly(row) for row in (*comparison.exact, *comparison.stepped)],
+        "image": asdict(comparison.image),
+        "complexity": asdict(comparison.complexity)
+        if isinstance(comparison.complexity, NotMeasured)
+        else [asdict(sweep) for sweep in comparison.complexity],
     }
 
 
-def comparison_to_text(found: Comparison) -> str:
+def comparison_to_text(comparison: Comparison) -> str:
     """The tables as lines for a terminal."""
-    rows = (*found.contact, *found.peers)
+    rows = (*comparison.contact, *comparison.peers)
     return render(
         "compare.txt",
         "clamp3d.bench",
-        found=found,
+        comparison=comparison,
         table=text_table,
         contact=[_contact(row) for row in rows if isinstance(row, Measured)],
         missing_contact=[row for row in rows if isinstance(row, NotMeasured)],
-        assembly=_assembly(found),
-        missing_assembly=[row for row in (*found.exact, found.image) if isinstance(row, NotMeasured)],
+        assembly=_assembly(comparison),
+        missing_assembly=[row for row in (*comparison.exact, comparison.image) if isinstance(row, NotMeasured)],
         published=published.IMAGE_DISTANCES,
         five=lambda values: ", ".join(f"{value:.3f}" for value in values),
-        complexity=[] if isinstance(found.complexity, NotMeasured) else [_sweep(sweep) for sweep in found.complexity],
+        complexity=[]
+        if isinstance(comparison.complexity, NotMeasured)
+        else [_sweep(sweep) for sweep in comparison.complexity],
     )
 
 
@@ -76,10 +78,10 @@ def _contact(row: Measured) -> list[object]:
     return [row.label, row.pieces, *errors, *bands, *times, "-" if None in both else f"{sum(filter(None, both)):.0f}"]
 
 
-def _assembly(found: Comparison) -> list[list[object]]:
-    truth = exact_distance(found)
+def _assembly(comparison: Comparison) -> list[list[object]]:
+    truth = exact_distance(comparison)
     rows: list[list[object]] = []
-    for exact, stepped in zip(found.exact, found.stepped, strict=True):
+    for exact, stepped in zip(comparison.exact, comparison.stepped, strict=True):
         if isinstance(exact, Assembled) and isinstance(stepped, Assembled):
             theirs = _published(stepped)
             by_gradients = [_signed(exact.distance - truth), f"{exact.seconds:.3f}", exact.contact_queries]

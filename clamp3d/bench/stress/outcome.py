@@ -46,15 +46,25 @@ def examples(what: str, rows: ArrayLike, truth: ArrayLike, answer: ArrayLike = n
     return [Example(int(i), what, float(told[i]), float(said[i])) for i in rows]
 
 
-def wrong_examples(
-    false_hit: Mask, false_miss: Mask, beyond: Mask, error: Array, truth: ArrayLike, answer: Array
-) -> list[Example]:
-    """The worst of what is wrong of each kind, by masks (n,) and ``error`` (n,)."""
-    found = []
-    for what, mask in (("false hit", false_hit), ("false miss", false_miss), ("beyond bound", beyond)):
-        rows = np.flatnonzero(mask)
-        found += examples(what, rows[np.argsort(-error[rows], kind="stable")], truth, answer)
-    return found
+@dataclass(frozen=True, slots=True)
+class Wrong:
+    """Which answers (n,) are wrong, by kind: verdicts, and errors beyond the method's own bound."""
+
+    false_hit: Mask
+    false_miss: Mask
+    beyond: Mask
+
+    def examples(self, error: Array, truth: ArrayLike, answer: Array) -> list[Example]:
+        """The worst of each kind by ``error`` (n,)."""
+        worst = []
+        for what, mask in (
+            ("false hit", self.false_hit),
+            ("false miss", self.false_miss),
+            ("beyond bound", self.beyond),
+        ):
+            rows = np.flatnonzero(mask)
+            worst += examples(what, rows[np.argsort(-error[rows], kind="stable")], truth, answer)
+        return worst
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,12 +125,10 @@ def score(
     answers: Answers,
     error: Array,
     size: Array,
-    false_hit: Mask,
-    false_miss: Mask,
-    beyond: Mask,
-    found: list[Example],
+    wrong: Wrong,
+    worst: list[Example],
 ) -> Outcome:
-    """Add up masks (n,) of what is wrong, and ``error`` (n,) mm, NaN where it does not count."""
+    """Add up what is ``wrong``, and ``error`` (n,) mm, NaN where it does not count."""
     bounded = np.isfinite(error) & np.isfinite(answers.bound)
     with np.errstate(invalid="ignore", divide="ignore"):
         relative, ratio = error / size, np.where(bounded, error / answers.bound, np.nan)
@@ -131,9 +139,9 @@ def score(
         asked=int(answers.asked.sum()),
         answered=int(np.isfinite(answers.distance).sum()),
         refused=int(answers.refused.sum()),
-        false_hits=int(false_hit.sum()),
-        false_misses=int(false_miss.sum()),
-        beyond_bound=int(beyond.sum()) if bounded.any() else None,
+        false_hits=int(wrong.false_hit.sum()),
+        false_misses=int(wrong.false_miss.sum()),
+        beyond_bound=int(wrong.beyond.sum()) if bounded.any() else None,
         worst_error=_of(np.max, error),
         median_error=_of(np.median, error),
         worst_relative=_of(np.max, relative),
@@ -143,7 +151,7 @@ def score(
         timeouts=len(answers.timeouts),
         seconds=answers.seconds,
         notes=tuple(answers.notes),
-        examples=tuple(found),
+        examples=tuple(worst),
     )
 
 
@@ -170,14 +178,13 @@ def judge(
         band = answers.bound if name == REFERENCE else TOUCHING * size
     decided = have & (np.abs(np.asarray(exact, np.float64)) > band)
     hit, overlap = answers.distance < 0.0, np.asarray(exact < 0, bool)
-    false_hit, false_miss = decided & hit & ~overlap, decided & ~hit & overlap
     counts = have & (measures != "verdict") & (np.asarray(exact >= 0, bool) | (measures == "depth"))
-    beyond = counts & (error > answers.bound)
-    found = wrong_examples(false_hit, false_miss, beyond, error, exact, answers.distance)
-    found += examples("crash", answers.crashed, exact) + examples("no answer in time", answers.timeouts, exact)
-    found += examples("exception", np.flatnonzero(answers.failed), exact)
+    wrong = Wrong(decided & hit & ~overlap, decided & ~hit & overlap, counts & (error > answers.bound))
+    worst = wrong.examples(error, exact, answers.distance)
+    worst += examples("crash", answers.crashed, exact) + examples("no answer in time", answers.timeouts, exact)
+    worst += examples("exception", np.flatnonzero(answers.failed), exact)
     error = np.where(counts, error, np.nan)
-    return score(family, name, answers, error, size, false_hit, false_miss, beyond, found)
+    return score(family, name, answers, error, size, wrong, worst)
 
 
 def _of(what: Any, values: Array) -> float | None:

@@ -110,43 +110,43 @@ class _Reply:
     """What a method said to some rows: its answer, or why there is none."""
 
     rows: NDArray[np.intp]
-    found: Measured | None
+    measured: Measured | None
     why: str
     seconds: float
 
 
-def _measure(asked: Method, cases: Any, rows: NDArray[np.intp]) -> _Reply:
+def _measure(method: Method, cases: Any, rows: NDArray[np.intp]) -> _Reply:
     """Ask for some rows of one shape; a refusal in the package's own words begins with 'refused: '."""
-    found, why = None, ""
+    measured, why = None, ""
     start = time.perf_counter()
     try:
-        found = asked.measure(cases.take(rows))
+        measured = method.measure(cases.take(rows))
     except Clamp3dError as error:
         why = f"refused: {str(error).splitlines()[0]}"
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         why = f"{type(error).__name__}: {error} ({place.name})"
-    return _Reply(rows, found, why, time.perf_counter() - start)
+    return _Reply(rows, measured, why, time.perf_counter() - start)
 
 
-def _replies(asked: Method, cases: Any, rows: NDArray[np.intp]) -> list[_Reply]:
+def _replies(method: Method, cases: Any, rows: NDArray[np.intp]) -> list[_Reply]:
     """Ask for all rows at once, and one by one if that gives no answer."""
-    reply = _measure(asked, cases, rows)
-    if reply.found is not None or len(rows) == 1:
+    reply = _measure(method, cases, rows)
+    if reply.measured is not None or len(rows) == 1:
         return [reply]
-    return [_measure(asked, cases, rows[k : k + 1]) for k in range(len(rows))]
+    return [_measure(method, cases, rows[k : k + 1]) for k in range(len(rows))]
 
 
 def _record(answers: Answers, reply: _Reply) -> None:
-    rows, found = reply.rows, reply.found
+    rows, measured = reply.rows, reply.measured
     answers.asked[rows] = True
     answers.seconds += reply.seconds
-    if found is not None:
-        answers.distance[rows] = np.where(found.unfit, np.nan, found.distance)
-        answers.bound[rows] = found.bound
-        answers.refused[rows] = found.unfit
-        if np.any(found.unfit):
-            answers.note(f"refused: {found.why}")
+    if measured is not None:
+        answers.distance[rows] = np.where(measured.unfit, np.nan, measured.distance)
+        answers.bound[rows] = measured.bound
+        answers.refused[rows] = measured.unfit
+        if np.any(measured.unfit):
+            answers.note(f"refused: {measured.why}")
     else:
         refused = reply.why.startswith("refused: ")
         (answers.refused if refused else answers.failed)[rows] = True
@@ -160,17 +160,17 @@ def _groups(cases: Any) -> list[NDArray[np.intp]]:
     return np.split(order, cuts)
 
 
-def run_here(asked: Method, cases: Any, time_limit: float | None = None) -> Answers:
+def run_here(method: Method, cases: Any, time_limit: float | None = None) -> Answers:
     """Put ``cases`` to a method in this process; groups of one shape at a time, singly where a group has no answer."""
     answers = Answers.empty(len(cases))
     groups = _groups(cases)
     if groups:
-        _measure(asked, cases, groups[0][:1])  # compile and import before the clock runs
+        _measure(method, cases, groups[0][:1])  # compile and import before the clock runs
     start = time.monotonic()
     for rows in groups:
         if time_limit is not None and time.monotonic() - start > time_limit:
             break
-        for reply in _replies(asked, cases, rows):
+        for reply in _replies(method, cases, rows):
             _record(answers, reply)
     return answers
 
@@ -178,14 +178,14 @@ def run_here(asked: Method, cases: Any, time_limit: float | None = None) -> Answ
 def _serve(pipe: Connection, make: Callable[[], Method], cases: Any) -> None:
     """Child: answer the rows that are sent, until the parent closes the pipe or is gone."""
     end_with_parent()
-    asked = make()
+    method = make()
     for name in _IMPORTED:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
     pipe.send("ready")
     with contextlib.suppress(EOFError, BrokenPipeError, KeyboardInterrupt):  # the parent has no more questions
         while True:
-            pipe.send(_replies(asked, cases, pipe.recv()))
+            pipe.send(_replies(method, cases, pipe.recv()))
 
 
 class _Child:

@@ -58,7 +58,7 @@ function clamp3dViewer(messages, done) {
   }
   function addSwitches() {
     if (story.cut) addSwitch("cutaway", story.cut_open, (on) => { show("/clamp3d/cutaway", on); show("/clamp3d/whole", !on); });
-    addSwitch("labels", Object.keys(story.nodes).length <= 30, (on) => show("/clamp3d/labels", on));
+    addSwitch("labels", Object.keys(story.nodes).length <= 14, (on) => show("/clamp3d/labels", on));
     addSwitch("contacts", true, (on) => show("/clamp3d/contacts", on));
     addSwitch("gaps", true, (on) => show("/clamp3d/gaps", on));
     if (story.forces.length) addSwitch("forces", true, (on) => show("/clamp3d/forces", on));

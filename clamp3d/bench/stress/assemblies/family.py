@@ -20,7 +20,7 @@ from clamp3d.bench.stress.assemblies.clamps import MAKERS, Case, snippet
 from clamp3d.bench.stress.assemblies.envelope import Envelope
 from clamp3d.bench.stress.assemblies.minima import Minimum, minima
 from clamp3d.bench.stress.family import Family
-from clamp3d.bench.stress.outcome import REFERENCE, Outcome, examples, score
+from clamp3d.bench.stress.outcome import REFERENCE, Outcome, Wrong, examples, score
 from clamp3d.bench.stress.worker import Answers, Measured, Measures, Rows, run_here
 from clamp3d.clamp.assemble import STEP, TILT_STEP
 from clamp3d.clamp.dimensions import Clamp
@@ -172,11 +172,11 @@ class AssemblyFamily(Family):
             d[i] = rest.q[4]
             error[i], missed[i], near[i] = truths.error(i, rest), truths.missed(i, rest), truths.nearest(i, d[i])
         no_rest, miss = error > answers.bound, np.isfinite(missed)
-        found = examples("no equilibrium", np.flatnonzero(no_rest), near, d)
-        found += examples("equilibrium not named", np.flatnonzero(miss), missed, d)
-        found += examples("exception", np.flatnonzero(answers.failed), np.nan)
+        worst = examples("no equilibrium", np.flatnonzero(no_rest), near, d)
+        worst += examples("equilibrium not named", np.flatnonzero(miss), missed, d)
+        worst += examples("exception", np.flatnonzero(answers.failed), np.nan)
         size = np.array([case.clamp.down_splint.width for case in cases.cases])
-        return score(self.name, name, answers, error, size, no_rest, miss, no_rest, found)
+        return score(self.name, name, answers, error, size, Wrong(no_rest, miss, no_rest), worst)
 
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""

@@ -88,13 +88,13 @@ def good_mesh(groove: SweptArc, wire: Cylinder, T: Array) -> tuple[Array, NDArra
     """Closed mesh of a block with the groove, in the groove's frame, that reaches beyond the place of contact."""
     from clamp3d.core.meshing import mesh
 
-    found = signed_distances(groove, wire, T[None], full=True, workers=1)
-    points = np.concatenate([found.point_on_groove, found.point_on_cylinder])
+    exact = signed_distances(groove, wire, T[None], full=True, workers=1)
+    points = np.concatenate([exact.point_on_groove, exact.point_on_cylinder])
     # A part in metres is too small to be meshed: as if it were in larger units, by a power of two.
     unit = min(1.0, 2.0 ** np.floor(np.log2(groove.radius)))
     large = SweptArc(groove.radius / unit, groove.half_angle, groove.length / unit)
-    made = mesh(block(large, points / unit), MESH_ERROR * large.radius)
-    return np.array(made.vertices, dtype=np.float64) * unit, np.array(made.faces, dtype=np.int64)
+    candidates = mesh(block(large, points / unit), MESH_ERROR * large.radius)
+    return np.array(candidates.vertices, dtype=np.float64) * unit, np.array(candidates.faces, dtype=np.int64)
 
 
 def make_cases(family: str, seed: int, n: int, fault: Fault, unit: Callable[[np.random.Generator], float]) -> MeshCases:
@@ -106,10 +106,10 @@ def make_cases(family: str, seed: int, n: int, fault: Fault, unit: Callable[[np.
         m = max(32, n)
         anywhere, contained = _anywhere(rng, m), _contained(rng, m)
         for k in range(m):
-            made = contained if rng.random() < _CONTAINED else anywhere
-            groove, wire, T = made.shapes.groove(k), made.shapes.cylinder(k), made.T_world_wire[k]
-            found = signed_distances(groove, wire, T[None], full=True, workers=1)
-            distance, thick = float(found.distance[0]), min(wire.radius, 0.5 * wire.length)
+            candidates = contained if rng.random() < _CONTAINED else anywhere
+            groove, wire, T = candidates.shapes.groove(k), candidates.shapes.cylinder(k), candidates.T_world_wire[k]
+            exact = signed_distances(groove, wire, T[None], full=True, workers=1)
+            distance, thick = float(exact.distance[0]), min(wire.radius, 0.5 * wire.length)
             # Of a disc that is deeper inside than it is thick only a bound of the signed distance is known.
             unknown = wire.length <= 2.0 * wire.radius and distance < -0.99 * thick
             if unknown or abs(distance) < LEAST * groove.radius:

@@ -86,17 +86,17 @@ def _contact(
 
 
 def _box(low: tuple[float, ...], high: tuple[float, ...]) -> trimesh.Trimesh:
-    made: trimesh.Trimesh = trimesh.creation.box(bounds=[low, high])
-    return made
+    solid: trimesh.Trimesh = trimesh.creation.box(bounds=[low, high])
+    return solid
 
 
 def _prism(depth: float, *corners: tuple[float, float]) -> trimesh.Trimesh:
     """An outline in x and z, from y = -depth / 2 to depth / 2."""
     from shapely import Polygon
 
-    made: trimesh.Trimesh = trimesh.creation.extrude_polygon(Polygon(corners), depth)
-    made.apply_translation((0.0, 0.0, -0.5 * depth)).apply_transform(_UPRIGHT)
-    return made
+    solid: trimesh.Trimesh = trimesh.creation.extrude_polygon(Polygon(corners), depth)
+    solid.apply_translation((0.0, 0.0, -0.5 * depth)).apply_transform(_UPRIGHT)
+    return solid
 
 
 def _lowered(rng: np.random.Generator, body: trimesh.Trimesh) -> trimesh.Trimesh:
@@ -186,8 +186,8 @@ def _shape(mesh: trimesh.Trimesh) -> MeshShape:
 def _engine(case: Contact) -> Answer:
     a, b = _shape(case.a), _shape(case.b)
     if case.way is None:
-        found = distance(a, b, case.T)
-        return Answer(0.5 * (found.lower + found.upper), 0.5 * (found.upper - found.lower) + _ROUNDING)
+        measured = distance(a, b, case.T)
+        return Answer(0.5 * (measured.lower + measured.upper), 0.5 * (measured.upper - measured.lower) + _ROUNDING)
     hit = first_contact(a, b, Motion.translate(case.way), case.T)
     length = float(np.linalg.norm(case.way))
     return Answer(hit.t * length + 0.5 * _EARLY, 0.5 * _EARLY + _ROUNDING)
@@ -202,8 +202,8 @@ def _fcl_alone(case: Contact) -> Answer:
         fcl.CollisionObject(tree(mesh.vertices, mesh.faces), fcl.Transform(T[:3, :3], T[:3, 3]))
         for mesh, T in ((case.a, np.eye(4)), (case.b, case.T))
     ]
-    found = float(fcl.distance(*bodies, fcl.DistanceRequest(), fcl.DistanceResult()))
-    return Answer(found if found > 0.0 else -1.0)  # it says 0 where triangles cross
+    measured = float(fcl.distance(*bodies, fcl.DistanceRequest(), fcl.DistanceResult()))
+    return Answer(measured if measured > 0.0 else -1.0)  # it says 0 where triangles cross
 
 
 class ContactFamily(Family):
@@ -251,4 +251,4 @@ class ContactFamily(Family):
         return "\n".join(lines)
 
 
-CONTACTS = {name: ContactFamily(name, *made) for name, made in MAKERS.items()}
+CONTACTS = {name: ContactFamily(name, *solid) for name, solid in MAKERS.items()}

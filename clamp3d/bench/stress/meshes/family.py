@@ -59,12 +59,12 @@ class OneByOne:
 
     def measure(self, cases: Any) -> Measured:
         """See `Method`."""
-        found = [self.ask(cases[i]) for i in range(len(cases))]
+        exact = [self.ask(cases[i]) for i in range(len(cases))]
         return Measured(
-            np.array([answer.distance for answer in found]),
-            np.array([answer.bound for answer in found]),
-            np.array([bool(answer.why) for answer in found]),
-            next((answer.why for answer in found if answer.why), ""),
+            np.array([answer.distance for answer in exact]),
+            np.array([answer.bound for answer in exact]),
+            np.array([bool(answer.why) for answer in exact]),
+            next((answer.why for answer in exact if answer.why), ""),
         )
 
 
@@ -93,10 +93,10 @@ def _fit(case: MeshCase) -> Answer:
         return Answer(math.nan, why=f"fit: {result.notes[-1]}")
     groove = result.grooves[0]
     T = np.ascontiguousarray(inverse(groove.T_part_feature) @ case.T_mesh_wire)
-    found = signed_distances(groove.shape, case.wire, T[None], full=True, workers=1)
+    exact = signed_distances(groove.shape, case.wire, T[None], full=True, workers=1)
     ends = groove.radius * groove.arc_error + groove.length_error
-    bound = float(found.error_bound[0]) + groove.fit_error + ends + mesh.rounding
-    return Answer(float(found.distance[0]), bound)
+    bound = float(exact.error_bound[0]) + groove.fit_error + ends + mesh.rounding
+    return Answer(float(exact.distance[0]), bound)
 
 
 def _scene(case: MeshCase) -> Answer:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.bench.stress.family import Family, Makers, Methods
-from clamp3d.bench.stress.outcome import REFERENCE, Outcome, score, wrong_examples
+from clamp3d.bench.stress.outcome import REFERENCE, Outcome, Wrong, score
 from clamp3d.bench.stress.poses import draw, features
 from clamp3d.bench.stress.poses.cases import Cases, Extended, Shapes, unit_rows
 from clamp3d.bench.stress.poses.family import METHODS as POSE_METHODS
@@ -128,14 +128,13 @@ class FlatFamily(Family):
         size = cases.scene()
         d, bound = answers.distance, answers.bound
         error = np.maximum(np.maximum(low - d, d - high), 0.0)
-        false_hit, false_miss = (d < -bound) & (low >= 0.0), (d > bound) & (high < 0.0)
-        beyond = error > bound
-        found = wrong_examples(false_hit, false_miss, beyond, error, 0.5 * (low + high), d)
+        wrong = Wrong((d < -bound) & (low >= 0.0), (d > bound) & (high < 0.0), error > bound)
+        worst = wrong.examples(error, 0.5 * (low + high), d)
         known, signed = (high - low <= _KNOWN * size).mean(), ((low >= 0.0) | (high < 0.0)).mean()
         answers.note(
             f"the truth is known to {_KNOWN:g} of the scene in {known:.1%} of the cases, its sign in {signed:.1%}"
         )
-        return score(self.name, name, answers, error, size, false_hit, false_miss, beyond, found)
+        return score(self.name, name, answers, error, size, wrong, worst)
 
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""

@@ -1,0 +1,107 @@
+"""Groups of findings as BCF 2.1 (BIM Collaboration Format of buildingSMART): topics that other review tools open."""
+
+from __future__ import annotations
+
+import io
+import uuid
+import zipfile
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, tostring
+
+from clamp3d.collide.result import CheckResult
+from clamp3d.core.pose import Array
+from clamp3d.output.figures import picture
+from clamp3d.output.files import whole_file
+from clamp3d.output.groups import Group, grouped
+from clamp3d.output.pages import now
+from clamp3d.output.scene_figures import finding_figure, view_of
+from clamp3d.output.wording import group_sentence, group_text, titles
+
+_TOPICS = 200
+"""Groups that get a topic at most, the first ones: each has a picture, which takes half a second."""
+_METRES = 1e-3
+_SYSTEM = "clamp3d"
+
+
+def write_bcf(result: CheckResult, path: Path) -> None:
+    """Write a topic for each group of findings: text, viewpoint, picture, and the parts by their names.
+
+    Lengths are metres, as BCF demands. The identifier of a topic follows from that of its group, so that a review tool
+    recognises it in the next file. Raises InputError if the file cannot be written, MissingLibraryError without
+    matplotlib.
+    """
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as package:
+
+        def add(name: str, data: bytes) -> None:
+            entry = zipfile.ZipInfo(name, now().timetuple()[:6])
+            package.writestr(entry, data, zipfile.ZIP_DEFLATED)
+
+        version = Element("Version", VersionId="2.1")
+        SubElement(version, "DetailedVersion").text = "2.1"
+        add("bcf.version", _xml(version))
+        for index, group in enumerate(grouped(result)[:_TOPICS]):
+            guid = _guid(group, "topic")
+            add(f"{guid}/markup.bcf", _xml(_markup(result, group, index)))
+            add(f"{guid}/viewpoint.bcfv", _xml(_viewpoint(result, group)))
+            add(f"{guid}/snapshot.png", picture(finding_figure(result.scene, group.worst), "png"))
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content.getvalue())
+
+
+def _markup(result: CheckResult, group: Group, index: int) -> Element:
+    """The topic in words, and the names of its files."""
+    names = titles(result.scene)
+    markup = Element("Markup")
+    attributes = {"TopicType": group.verdict.value, "TopicStatus": "Open"}
+    topic = SubElement(markup, "Topic", {"Guid": _guid(group, "topic"), **attributes})
+    pairs = ", ".join(f"{row.a} and {row.b}" for row in group.rows)
+    fields = {
+        "Title": group_sentence(group, names),
+        "Index": str(index),
+        "Labels": group.id,
+        "CreationDate": f"{now():%Y-%m-%dT%H:%M:%SZ}",
+        "CreationAuthor": _SYSTEM,
+        "Description": f"{group_text(group, names)}\n{pairs}",
+    }
+    for key, text in fields.items():
+        SubElement(topic, key).text = "".join(c if c.isprintable() or c == "\n" else " " for c in text)
+    viewpoints = SubElement(markup, "Viewpoints", Guid=_guid(group, "viewpoint"))
+    SubElement(viewpoints, "Viewpoint").text = "viewpoint.bcfv"
+    SubElement(viewpoints, "Snapshot").text = "snapshot.png"
+    return markup
+
+
+def _viewpoint(result: CheckResult, group: Group) -> Element:
+    """The parts of the group selected, and a camera that looks at its worst finding."""
+    root = Element("VisualizationInfo", Guid=_guid(group, "viewpoint"))
+    components = SubElement(root, "Components")
+    selection = SubElement(components, "Selection")
+    for name in dict.fromkeys(name for row in group.rows for name in (row.a, row.b)):
+        component = SubElement(selection, "Component")
+        SubElement(component, "OriginatingSystem").text = _SYSTEM
+        SubElement(component, "AuthoringToolId").text = name
+    SubElement(components, "Visibility", DefaultVisibility="true")
+    target, towards_viewer, up, size = view_of(result.scene, group.worst)
+    camera = SubElement(root, "PerspectiveCamera")
+    _vector(camera, "CameraViewPoint", (target + 1.5 * size * towards_viewer) * _METRES)
+    _vector(camera, "CameraDirection", -towards_viewer)
+    _vector(camera, "CameraUpVector", up)
+    SubElement(camera, "FieldOfView").text = "45"
+    return root
+
+
+def _vector(parent: Element, name: str, value: Array) -> None:
+    element = SubElement(parent, name)
+    for axis, number in zip("XYZ", value.tolist(), strict=True):
+        SubElement(element, axis).text = repr(number)
+
+
+def _guid(group: Group, kind: str) -> str:
+    return str(uuid.uuid5(uuid.NAMESPACE_URL, f"clamp3d/{kind}/{group.id}"))
+
+
+def _xml(root: Element) -> bytes:
+    data: Any = tostring(root, encoding="utf-8", xml_declaration=True)
+    return bytes(data)

@@ -1,0 +1,31 @@
+"""Assemblies as engineers draw them, through a STEP file of products and instances, against Open CASCADE."""
+
+import pytest
+
+pytest.importorskip("bd_warehouse")
+
+from assemblies import ASSEMBLIES, judged, near, nudged, truth, write_step
+from bolted import plates
+
+from clamp3d import check, load
+
+
+# scripts/measure-step does the same for the larger ones, as drawn and moved in several ways.
+@pytest.mark.parametrize("name", [*ASSEMBLIES, "plates"])
+def test_verdicts_and_bounds_of_an_assembly_whose_parts_are_moved(name, tmp_path):
+    parts = nudged((ASSEMBLIES | {"plates": plates})[name](), 1)
+    scene = load(write_step(parts, tmp_path / f"{name}.step"))
+    assert len(scene.parts) == len(parts)
+    rows = {(row.a, row.b): row for row in check(scene).pairs}
+    solids, names, verdicts = list(parts.values()), [part.name for part in scene.parts], []
+    for i, j in near(solids):
+        row, distance = rows.get((names[i], names[j])), truth(solids[i], solids[j])
+        bounds = ("clear", 0.0, float("inf"))
+        if row is not None:
+            bounds = row.verdict.value, row.distance.lower, row.distance.upper
+        verdict, holds = judged(*bounds, distance)
+        assert holds, (names[i], names[j], row, distance)
+        verdicts.append(verdict)
+    assert verdicts
+    assert "wrong" not in verdicts
+    assert verdicts.count("uncertain") <= 0.02 * len(verdicts)
