@@ -97,8 +97,8 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Calla
     """Upper bound (mm) of how deep any point of one mesh's surface lies in the other, sharpened until ``is_enough``.
 
     Lemma: the distance from a fixed triangle is convex, so over a triangle of the common part it is largest at a
-    corner, and the distance from the whole surface is no larger than that from any one of its triangles. Infinite where one
-    body may be swallowed whole, since the surfaces then say nothing of its middle.
+    corner, and the distance from the whole surface is no larger than that from any one of its triangles. Infinite where
+    one body may be swallowed whole, since the surfaces then say nothing of its middle.
     """
     if 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
         return np.inf
