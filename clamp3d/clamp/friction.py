@@ -286,15 +286,15 @@ class FrictionBand:
                 best, unbalanced, forces = balance, left, multipliers
         if best is None or unbalanced > BALANCED:
             raise SolverError(f"friction band: end at {distance:.6g} mm not proven, {unbalanced:.3g} N/N are left over")
-        certificates = list(self._beyond(friction, distance - sense * MARGIN))
+        certificates = list(self._beyond(friction, distance - sense * MARGIN, tilt))
         weakest = min(certificates, key=lambda proof: proof.drive - proof.resistance, default=None)
         if weakest is not None and not weakest.drive > 1e-5 > 1e3 * weakest.resistance:
             raise SolverError(f"friction band: beyond its end at {distance:.6g} mm a state may be in equilibrium")
         return End(distance, tilt, best.world_forces(forces), unbalanced, len(certificates), weakest)
 
-    def _beyond(self, friction: float, distance: float) -> Iterator[NoEquilibrium]:
-        """A certificate for each state of a splint distance, all tilts, with all four contacts closed."""
-        first, stop = float(self.final.q[S]) / self.section.lever, self.section.clamp.tilt_stop
+    def _beyond(self, friction: float, distance: float, first: float) -> Iterator[NoEquilibrium]:
+        """A certificate for each state of a splint distance, tilts around ``first``, with all four contacts closed."""
+        stop = self.section.clamp.tilt_stop
         aside = np.geomspace(1e-6, 2.0 * stop, _TILTS_BEYOND // 2)
         for tilt in np.concatenate([first - aside, [first], first + aside]):
             d = distance - float(self._splint_distance(np.zeros(1), np.array([tilt]))[0])
