@@ -2,7 +2,6 @@
 
 import math
 
-import manifold3d
 import numpy as np
 import pytest
 import trimesh
@@ -158,7 +157,7 @@ def test_a_pin_in_a_hole_of_facets_is_measured_from_its_axis():
 @settings(QUICK, max_examples=12)
 @given(SOME, SOME, poses(9.0))
 def test_the_verified_translation_parts_the_bodies(i, j, T):
-    """By manifold3d: moved by the depth's upper bound the meshes share nothing; less than its lower one parts nothing."""
+    """By manifold3d: moved by the depth's upper bound the meshes share nothing; less than its lower one, they do."""
     a, b = FACETED[i], FACETED[j]
     found = distance(a, b, T)
     if found.upper > -1e-3:
