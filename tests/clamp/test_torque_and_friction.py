@@ -250,6 +250,7 @@ def test_certificates(finder):
 def test_least_friction_of_a_measured_distance(finder):
     friction = finder.friction_for(31.63)
     assert friction == pytest.approx(brentq(lambda mu: finder.ends(mu)[1] - 31.63, 0.05, 0.2), abs=2e-5)
+    assert finder.ends(finder.friction_for(31.45))[0] == pytest.approx(31.45, abs=1e-4)
     assert finder.friction_for(29.147) is None
     assert finder.friction_for(finder.distance) == 0.0
     text = measured_to_text(finder, [finder.band(0.1), finder.band(0.2)], 31.63)
