@@ -6,7 +6,6 @@ poses, then a motion through it whose clearance is least there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import Any
 
@@ -14,13 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.bench.stress.family import Makers
-from clamp3d.bench.stress.motions.cases import Motions, motions, moved, screws_through, square_to, touching, turned
+from clamp3d.bench.stress.motions.cases import Motions, motions, moved, screws_through, square_to, touching
 from clamp3d.bench.stress.poses import draw
 from clamp3d.bench.stress.poses.cases import Extended
-from clamp3d.bench.stress.poses.truth import point_sdf
 from clamp3d.core.pose import Array
-
-Make = Callable[[np.random.Generator, int], Motions]
 
 _CONVEX = ("lip", "end arc", "end edge", "corner")
 """Features that a wire passes on a tangent."""
@@ -29,38 +25,7 @@ _CONVEX = ("lip", "end arc", "end edge", "corner")
 MAKERS = Makers("motion: ")
 
 
-def _best(make: Make) -> Make:
-    """Of 3 n cases n, in their order: those that stand as they were built before those that do not, by and large."""
-
-    def chosen(rng: np.random.Generator, n: int) -> Motions:
-        cases = make(rng, 3 * n)
-        rank = np.where(_spoilt(cases), 1.0, 0.0) + rng.random(3 * n) * 1.2
-        rows = np.sort(np.argsort(rank, kind="stable")[:n])
-        return replace(cases.take(rows), number=np.arange(n))
-
-    return chosen
-
-
-def _spoilt(cases: Motions) -> NDArray[np.bool_]:
-    """Whether a rough look (n,) finds the wire deeper elsewhere on its way than it was built for."""
-    out = np.zeros(len(cases), bool)
-    s, k = cases.shapes, cases.shape
-    R, a, H, half = (v[k][:, None] for v in (s.R, s.half_angle, 0.5 * s.L, 0.5 * s.length))
-    axis, vector = np.asarray(cases.unit_axis(), float), np.asarray(cases.vector(), float)
-    c, d = cases.start[:, :3, 3], cases.start[:, :3, 2]
-    gap = np.where(np.isfinite(cases.gap), cases.gap, -np.inf)
-    t = np.linspace(-1.0, 1.0, 9) * half
-    for u in np.linspace(0.0, 1.0, 33):
-        angle = u * cases.angle
-        centre = cases.point + turned(c - cases.point, axis, angle) + u * vector
-        points = centre[:, None, :] + t[:, :, None] * turned(d, axis, angle)[:, None, :]
-        x, y, z = (points[..., k] for k in range(3))
-        low = np.maximum(point_sdf(x, y, z, R, R * np.sin(a), -R * np.cos(a), H), 0.0).min(1)
-        out |= low - s.r[k] < gap - 1e-9 * s.R[k]
-    return out
-
-
-@MAKERS.family("grazing", _best)
+@MAKERS.family("grazing")
 def _grazing(rng: np.random.Generator, n: int) -> Motions:
     """Straight past a lip, an edge or a corner on a tangent: clear or deep by 1e-12 ... 1e-2 of the radius."""
     shapes, shape = draw.shapes_for(rng, n)
@@ -102,7 +67,7 @@ def _turning_screws(rng: np.random.Generator, n: int, turns: Array, pitch: Array
     return screws_through(cases, point, np.asarray(axis, float), turns, pitch * radius * turns, instant)
 
 
-@MAKERS.family("screws", _best)
+@MAKERS.family("screws")
 def _screws(rng: np.random.Generator, n: int) -> Motions:
     """Circles and turns with advance, up to six turns, near at one place; and screws of no plan at all."""
     part = n // 2
@@ -232,7 +197,7 @@ def _level(rng: np.random.Generator, n: int) -> Motions:
     return _choose(kind < 0.6, slides, _choose(kind < 0.85, turns, spins))
 
 
-@MAKERS.family("start", _best)
+@MAKERS.family("start")
 def _start(rng: np.random.Generator, n: int) -> Motions:
     """Starts in contact or by 1e-12 ... 1e-2 of the radius off it, and leaves, slides or comes back."""
     shapes, shape = draw.shapes_for(rng, n)
