@@ -124,49 +124,6 @@ def _thin(rng: np.random.Generator, n: int) -> Motions:
     return motions(shapes, shape, start, travel=travel, gap=gap, instant=instant)
 
 
-@MAKERS.family("narrow mouth")
-def _narrow_mouth(rng: np.random.Generator, n: int) -> Motions:
-    """Arcs over 180 deg: entry through the mouth hits where it is narrower, sliding along is free."""
-    k = draw.count(n)
-    a = np.pi / 2 + rng.uniform(0.01, 1.4, k)
-    R = 10.0 ** rng.uniform(0, 2, k)
-    s = R * np.sin(a)
-    off = 10.0 ** rng.uniform(-10, -0.5, k) * rng.choice([-1.0, 1.0], k)
-    r = np.minimum(s * (1.0 + off), R * (1.0 - 10.0 ** rng.uniform(-4, -1, k)))
-    shapes = draw.shapes(rng, k, R=R, half_angle=a, r=r)
-    shape = draw.spread(n, k)
-    R, r, s, L, length = (v[shape] for v in (shapes.R, shapes.r, s, shapes.L, shapes.length))
-    h = -R * np.cos(shapes.half_angle[shape])
-    exact = np.asarray(R, Extended) * np.sin(np.asarray(shapes.half_angle, Extended)[shape]) - r
-    z = np.zeros(n)
-    # Straight down through the mouth, in the middle or a little beside it, level or a little tilted.
-    level = rng.random(n) < 0.6
-    beside = np.where(level, 0.0, R * draw.powers(rng, n, -9, -1, 0.3))
-    tilt = np.stack([np.where(level, 0.0, draw.powers(rng, n, -9, -1, 0.3)) for _ in range(2)] + [z + 1.0], 1)
-    top, bottom = h + r + R * rng.uniform(0.1, 3.0, n), rng.uniform(-0.3, 0.3, n) * (R - r)
-    down = motions(
-        shapes,
-        shape,
-        draw.poses_from_axes(rng, np.stack([beside, top, rng.uniform(-0.5, 0.5, n) * L], 1), tilt),
-        travel=np.stack([z, bottom - top, z], 1),
-        gap=np.where(level, np.asarray(exact, float), np.nan),
-        instant=(top - h) / (top - bottom),
-    )
-    # Along the groove from beyond its end, in line with it, on its axis or off it towards the deepest line.
-    far = 0.5 * (L + length) + r + R * rng.uniform(0.1, 3.0, n)
-    y = -(R - r) * np.where(rng.random(n) < 0.5, 0.0, 1.0 - 10.0 ** rng.uniform(-6, -0.1, n))
-    side = rng.choice([-1.0, 1.0], n)
-    slide = motions(
-        shapes,
-        shape,
-        draw.poses_from_axes(rng, np.stack([z, y, -side * far], 1), np.stack([z, z, z + 1.0], 1)),
-        travel=np.stack([z, z, 2.0 * side * far], 1),
-        gap=(R - r) + y,
-        instant=0.5,
-    )
-    return _choose(rng.random(n) < 0.6, down, slide)
-
-
 @MAKERS.family("level")
 def _level(rng: np.random.Generator, n: int) -> Motions:
     """Clearance that does not change: slides along the groove, a face or an edge, turns about its axis; rest."""
