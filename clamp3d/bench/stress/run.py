@@ -13,7 +13,7 @@ from clamp3d.bench.machine import Machine, machine
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.family import Family
 from clamp3d.bench.stress.meshes import MESHES
-from clamp3d.bench.stress.motions.family import MOTIONS
+from clamp3d.bench.stress.motions import MOTIONS
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.poses.family import POSES
 from clamp3d.bench.stress.poses.flat import FLATS
