@@ -1,10 +1,9 @@
 """Before any test: the contact kernel is compiled once, so that no test measures or prints its compilation."""
 
 import gc
-import importlib
 import os
+import re
 import sys
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -25,32 +24,42 @@ settings.register_profile("ci", derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 
-ROOT = Path(cli.__file__).parents[2]
-
-
-def compiled_on_import():
-    """The modules that compile when they are imported; the two that take longest are at the ends."""
-    found = [path for path in (ROOT / "clamp3d").rglob("*.py") if "= entry(" in path.read_text("utf-8")]
-    found.sort(key=lambda path: ("faces" not in path.name, path.name == "bore_kernel.py", path))
-    return [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in found]
+SKIPS = os.environ.get("CLAMP3D_SKIPS", "")
+"""A file with the reasons for which tests may be skipped, as .ci/run has it; any other skip is then a failure."""
 
 
 def pytest_sessionstart(session):
-    worker = getattr(session.config, "workerinput", None)
-    if worker is None and session.config.getoption("numprocesses", None):
+    if session.config.getoption("numprocesses", None) and not hasattr(session.config, "workerinput"):
         return  # the workers run the tests
-    if worker is not None:  # minutes where no cache has them: two take them from either end, what no other has begun
-        begun = Path(session.config.option.basetemp).parent
-        names = compiled_on_import()
-        for name in names if worker["workerid"] == "gw0" else reversed(names):
-            with suppress(FileExistsError):
-                (begun / name).touch(exist_ok=False)
-                importlib.import_module(name)
-        for name in names:
-            importlib.import_module(name)
     groove, wire = SweptArc(7.0, 1.0, 50.0), Cylinder(6.0, 80.0)
     signed_distance(groove, wire, translation(0.0, 3.0, 0.0))
     groove_pieces(groove, Capsule(6.0, 80.0), translation(0.0, 3.0, 0.0))
+
+
+def listed_reasons():
+    """Regular expressions, one for each line of the list that is neither empty nor a comment."""
+    lines = Path(SKIPS).read_text("utf-8").splitlines() if SKIPS else [".*"]
+    return [line for line in lines if line and not line.startswith("#")]
+
+
+def without_unlisted_skips(report):
+    """The report of a test or a module, failed if it was skipped for a reason that is not listed."""
+    if report.skipped and not hasattr(report, "wasxfail") and isinstance(report.longrepr, tuple):
+        path, line, said = report.longrepr
+        reason = said.removeprefix("Skipped: ")
+        if not any(re.fullmatch(listed, reason) for listed in listed_reasons()):
+            report.outcome, report.longrepr = "failed", f"{path}:{line}: skipped, and not listed in {SKIPS}: {reason}"
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport():
+    return without_unlisted_skips((yield))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report():
+    return without_unlisted_skips((yield))
 
 
 @pytest.hookimpl(wrapper=True)

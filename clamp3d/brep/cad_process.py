@@ -20,7 +20,9 @@ from clamp3d.errors import SolverError
 _MODULE = "clamp3d.brep.open_cascade"
 _NAMES = ("tessellate", "surfaces", "distance", "common", "depths", "bounds_at")
 _SECONDS = 120.0
-"""Time limit of one question; a few hundred milliseconds are usual."""
+"""Time limit of a question; a few hundred milliseconds are usual."""
+_COMMON_SECONDS = 15.0
+"""Time limit of a common part, which Open CASCADE does not always find between round faces that all but coincide."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,13 +43,13 @@ def process() -> Worker:
     return worker
 
 
-def _ask(name: str, *arguments: Any) -> Any:
+def _ask(name: str, *arguments: Any, seconds: float = _SECONDS) -> Any:
     try:
-        return process().call(f"{_MODULE}:{name}", *arguments, time_limit=_SECONDS)
+        return process().call(f"{_MODULE}:{name}", *arguments, time_limit=seconds)
     except WorkerEndedError as error:
         raise SolverError(f"Open CASCADE ended with {error.ending}") from None
     except WorkerTimeoutError:
-        raise SolverError(f"Open CASCADE gave no answer in {_SECONDS:g} s") from None
+        raise SolverError(f"Open CASCADE gave no answer in {seconds:g} s") from None
 
 
 def tessellate(brep: bytes, chord: float) -> Tessellation:
@@ -73,7 +75,7 @@ def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
 
 def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
     """The common part of two solids, its border sampled at ``share`` of its smallest extent."""
-    return CommonPart(*_ask("common", a, b, T, share))
+    return CommonPart(*_ask("common", a, b, T, share, seconds=_COMMON_SECONDS))
 
 
 def depths(brep: bytes, points: Array) -> Array:

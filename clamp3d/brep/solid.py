@@ -92,7 +92,7 @@ class BrepSolid(MeshShape):
         return self._tessellations[chord]
 
     @cached_property
-    def mesh(self) -> Mesh:  # type: ignore[override]  # a field of the frozen base class
+    def mesh(self) -> Mesh:
         """Its triangles at `CHORD`."""
         made = self.tessellated(CHORD)
         closed = is_closed(made.faces)
@@ -101,7 +101,7 @@ class BrepSolid(MeshShape):
         return Mesh(self.name, made.vertices, made.faces, closed, rounding, notes)
 
     @property
-    def error(self) -> float:  # type: ignore[override]  # a field of the frozen base class
+    def error(self) -> float:
         """How far ``mesh`` can be from the faces, mm."""
         return float(self.tessellated(CHORD).errors.max())
 

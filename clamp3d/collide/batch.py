@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.collide.answer import Distances
 from clamp3d.collide.closed_form import Bore, ClosedForm
@@ -17,11 +18,13 @@ from clamp3d.core.primitives import Cylinder
 def bounds_at_poses(a: Model, b: Model, T: Array) -> Distances:
     """What grooves and holes against cylinders say of the distances of ``b`` at ``T`` (n, 4, 4) in a's frame.
 
-    A bore's material holds the body and a cylinder holds the other, so the kernel's distance is a lower bound; where its
-    nearest points lie on the bodies it is the distance. Other bounds are infinite, and so are lower ones in an overlap.
+    A bore's material holds the body and a cylinder holds the other, so the kernel's distance is a lower bound; where
+    its nearest points lie on the bodies it is the distance. Other bounds are infinite, and so are
+    lower ones in an overlap.
     """
     n = len(T)
-    answer = Distances(np.full(n, -np.inf), np.full(n, np.inf), *np.full((3, n, 3), np.nan), ("groove kernel",) * n)
+    p, q, normal = np.full((3, n, 3), np.nan)
+    answer = Distances(np.full(n, -np.inf), np.full(n, np.inf), p, q, normal, ("groove kernel",) * n)
     if a.bodies is None or b.bodies is None or len(a.bodies) != 1 or len(b.bodies) != 1:
         return answer
     (first,), (second,) = a.bodies, b.bodies
@@ -53,10 +56,13 @@ def _bore_rod(bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, T: Array) -> D
     assert best is not None
     local = np.einsum("nji,nj->ni", T[:, :3, :3], best.point_b - T[:, :3, 3])
     slack = MEMBER * (1.0 + np.abs(best.point_a).max(axis=1, initial=0.0))
-    on_both = (a.depth(best.point_a) >= -slack) & (b.depth(local) >= -slack)
+    on_a, on_b = a.depth(best.point_a) >= -slack, b.depth(local) >= -slack
     apart = best.lower >= 0.0
     lower = np.where(apart, best.lower, -np.inf)
-    upper = np.where(on_both & (apart | (best.upper < 0.0)), best.upper, np.inf)
+    # In an overlap the cylinder's point must lie in the body too, and is no deeper than the body's other faces allow.
+    deep = a.depth(best.point_b) - 4.0 * slack
+    upper = np.where(apart & on_a & on_b, best.upper, np.inf)
+    upper = np.where((best.upper < 0.0) & on_b & (deep > 0.0), np.maximum(best.upper, -deep), upper)
     return Distances(lower, upper, best.point_a, best.point_b, best.normal, best.method)
 
 
@@ -71,7 +77,7 @@ def _nearer(x: Distances, y: Distances) -> Distances:
     return Distances(np.maximum(x.lower, y.lower), met.upper, met.point_a, met.point_b, met.normal, x.method)
 
 
-def _chosen(x: Distances, y: Distances, second: Array) -> Distances:
+def _chosen(x: Distances, y: Distances, second: NDArray[np.bool_]) -> Distances:
     row = second[:, None]
     return Distances(
         np.where(second, y.lower, x.lower),

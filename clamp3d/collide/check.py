@@ -173,7 +173,7 @@ def _candidates(
 
 
 class _Questions:
-    """What is asked of each pair of a scene, and the answers that serve pairs of equal shapes in equal relative poses."""
+    """What is asked of each pair of a scene; one answer serves pairs of equal shapes in equal relative poses."""
 
     def __init__(self, scene: Scene, models: list[Model], *, full: bool, distances: bool, depths: bool) -> None:
         self.scene, self.models = scene, models

@@ -15,29 +15,27 @@ from clamp3d.collide.convex import Convex
 from clamp3d.collide.convex_depth import convex_depth
 from clamp3d.collide.mesh_distance import are_apart, rounding_of
 from clamp3d.collide.model import Model
-from clamp3d.collide.overlap import common
+from clamp3d.collide.overlap import Common, common, deepest, thickness
 from clamp3d.collide.surface import Surface
 from clamp3d.core.pose import Array
 
 _DIRECTIONS = 4
 """Flat sides of the overlap along which the bodies are moved apart."""
-_HALVINGS = 6
-"""Times that the length of a translation is halved towards the depth that a point has: it is then known to 2 %."""
-_STRETCH = 4.0
-"""Factor by which a translation is made longer where the overlap's extent is not enough, once."""
-
-
-def is_convex_pair(a: Model, b: Model) -> bool:
-    """Whether both bodies are one convex piece each, whose depth is exact."""
-    return convex_piece(a) is not None and convex_piece(b) is not None
+_STEPS, _HALVINGS = 4, 5
+"""Lengths of a translation that are tried, and halvings of the step to the first that parts the bodies: then it is
+known to less than 1 % of the overlap's extent."""
+_EXACT = 1e-9
+"""Error (mm) of a closed form up to which it counts as exact: rounding of a CAD file's points."""
+_CLOSE = 1.05
+"""Ratio of the bounds of the interference at which they are close enough."""
 
 
 def convex_piece(model: Model) -> Convex | None:
     """The one convex piece that a body is made of; None if it is made of more, has holes, or is not exact."""
-    if model.exact is not None or not model.bodies or len(model.bodies) != 1:
+    if not model.bodies or len(model.bodies) != 1:
         return None
     (body,) = model.bodies
-    one = len(body.outers) == 1 and not body.bores and body.surface is None and body.error == 0.0
+    one = len(body.outers) == 1 and not body.bores and body.surface is None and body.error <= _EXACT
     return body.outers[0] if one else None
 
 
@@ -46,7 +44,7 @@ def depth_of_pieces(a: Model, b: Model, T: Array) -> Distance | None:
     x, y = convex_piece(a), convex_piece(b)
     if x is None or y is None:
         return None
-    distance = convex_depth(x, np.eye(4), y, T)
+    distance = convex_depth(x, np.eye(4), y, T).widened(2.0 * _EXACT if a.exact or b.exact else 0.0)
     return distance if distance.upper <= 0.0 else None
 
 
@@ -72,28 +70,38 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
     exact = depth_of_pieces(a, b, T)
     if exact is not None:
         return replace(exact, upper=max(exact.lower, min(exact.upper, distance.upper)), interference=interference)
-    deep = -distance.upper
-    length, direction = _way_out(a, b, T, max(deep, 0.0))
-    lower = -length if length < np.inf else -np.inf
-    return replace(
-        distance, lower=min(lower, distance.upper), normal=direction, level="depth", interference=interference
-    )
-
-
-def _way_out(a: Model, b: Model, T: Array, deep: float) -> tuple[float, Array | None]:
-    """Length (mm) and direction (3,) of a translation of ``b`` after which the outer meshes are apart."""
     if not (a.chords and b.chords):
-        return np.inf, None
+        return replace(distance, lower=-np.inf, interference=interference)
     outer_a, outer_b = _outer(a), _outer(b)
     shared = common(outer_a, outer_b, T)
     if shared is None:
-        return np.inf, None
+        return replace(distance, lower=-np.inf, interference=interference)
+    sharp = _interference(outer_a, outer_b, T, shared)
+    interference = (max(interference[0], sharp[0]), max(interference[0], min(interference[1], sharp[1])))
+    upper = min(distance.upper, -interference[0])
+    length, direction = _way_out(outer_a, outer_b, T, shared, interference[0])
+    lower = min(-length, upper)
+    return replace(distance, lower=lower, upper=upper, normal=direction, level="depth", interference=interference)
+
+
+def _interference(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, float]:
+    """Bounds (mm) of the greatest depth of a point of one body in the other, from meshes that are or hold them."""
+    exact = a.face_error is not None or b.face_error is not None
+    depth = max(0.0, deepest(a, b, T, shared)[0]) if exact else 0.0  # meshes around the bodies attest nothing
+    off = a.error + b.error + rounding_of(a, b, T)
+    return depth, thickness(a, b, T, shared, lambda bound: bound <= _CLOSE * (depth + off)) + off
+
+
+def _way_out(a: Surface, b: Surface, T: Array, shared: Common, deep: float) -> tuple[float, Array | None]:
+    """Length (mm), infinite if unknown, and direction (3,) of a translation of ``b`` after which meshes are apart."""
     best, way = np.inf, None
-    slack = 2.0 * (outer_a.error + outer_b.error + rounding_of(outer_a, outer_b, T))
-    for direction in shared.directions(_DIRECTIONS):
+    slack = 2.0 * (a.error + b.error + rounding_of(a, b, T))
+    # Where two faces hold a body, as a V does, its way out is between their normals.
+    candidates = np.vstack([shared.mean_normal(a), shared.directions(_DIRECTIONS), np.eye(3), T[:3, :3].T])
+    for direction in candidates:
         reach = float(np.ptp(shared.vertices @ direction)) + slack
         for sign in (1.0, -1.0):
-            length = _shortest(outer_a, outer_b, T, sign * direction, min(deep, reach), min(reach, best))
+            length = _shortest(a, b, T, sign * direction, min(deep, reach), min(reach, best))
             if length < best:
                 best, way = length, sign * direction
     return best, way
@@ -106,10 +114,11 @@ def _outer(model: Model) -> Surface:
 
 def _shortest(a: Surface, b: Surface, T: Array, direction: Array, low: float, high: float) -> float:
     """A length (mm) between ``low`` and ``high`` after which ``b`` is apart; infinite if that is not so at ``high``."""
-    for length in (high, _STRETCH * high):
+    for length in np.linspace(low, high, _STEPS + 1)[1:].tolist():
         if are_apart(a, b, _moved(T, length * direction)):
             high = length
             break
+        low = length
     else:
         return np.inf
     for _ in range(_HALVINGS):

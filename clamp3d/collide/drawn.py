@@ -85,7 +85,7 @@ def _pose(body: Extrusion, centre: tuple[float, float], middle: float = -math.pi
 
 def _prism(body: Extrusion, corners: Array) -> Array:
     ends = [np.column_stack([corners, np.full(len(corners), z)]) for z in (body.start, body.end)]
-    return dot(np.vstack(ends), body.frame.T)
+    return np.asarray(np.vstack(ends) @ body.frame.T)
 
 
 def _beyond_chord(body: Extrusion, arc: Arc) -> Hull:

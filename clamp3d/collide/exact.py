@@ -12,6 +12,7 @@ from clamp3d.brep.open_cascade import TOLERANCE
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.model import Model
 from clamp3d.core.pose import Array
+from clamp3d.errors import SolverError
 
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
 _TRIED = 12
@@ -32,7 +33,10 @@ def exact_distance(a: Model, b: Model, T: Array) -> Distance:
         normal = (q - p) / np.linalg.norm(q - p)
         return Distance(gap - TOLERANCE, gap + TOLERANCE, p, q, normal, None, "exact", METHOD)
     touching = Distance(-TOLERANCE, TOLERANCE, p, q, None, None, "exact", METHOD)
-    shared = cad_process.common(a.exact.brep, b.exact.brep, T, _SAMPLES)
+    try:
+        shared = cad_process.common(a.exact.brep, b.exact.brep, T, _SAMPLES)
+    except SolverError:  # it takes too long: they touch or overlap, and nobody says by how much
+        return Distance(-np.inf, TOLERANCE, p, q, None, None, "exact", f"{METHOD}, without a common part")
     if shared.volume <= TOLERANCE * max(1e-12, shared.area) or not len(shared.points):
         return touching
     depth, point = _deepest(a, b, T, shared.points)

@@ -12,7 +12,7 @@ from clamp3d.collide.depth import depth_of_pieces
 from clamp3d.collide.mesh_distance import within
 from clamp3d.collide.model import Model
 from clamp3d.collide.refine import Enough, refine
-from clamp3d.collide.verdict import Thresholds, Verdict
+from clamp3d.collide.verdict import RESOLUTION, Thresholds, Verdict
 from clamp3d.core.pose import Array, inverse
 
 
@@ -37,8 +37,9 @@ def judge(
 
     distance = refine(a, b, T, start, certain)
     verdict = thresholds.verdict(distance, allowance)
-    if verdict is Verdict.UNCERTAIN and distance.upper < thresholds.reach:
-        exact = depth_of_pieces(a, b, T)
+    shallow = verdict is Verdict.CONTACT and distance.upper < -RESOLUTION
+    if shallow or (verdict is Verdict.UNCERTAIN and distance.upper < thresholds.reach):
+        exact = depth_of_pieces(a, b, T)  # known, the depth decides; else the interference, which is no more
         if exact is not None:
             distance = replace(exact, level="features")
             verdict = thresholds.verdict(distance, allowance)

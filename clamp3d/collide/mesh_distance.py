@@ -23,7 +23,7 @@ Enough = Callable[[Distance], bool]
 _MOST_POINTS = 400
 """Vertices of a mesh, spread over it, that are tried as points inside another one."""
 _HALVINGS = 30
-"""Halvings of the way between two nearest points in which the true surface is looked for: then it is found to rounding."""
+"""Halvings of the way between two nearest points after which the true surface on it is known to rounding."""
 
 
 def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough) -> Distance:
@@ -88,7 +88,8 @@ def _overlap(a: Surface, b: Surface, T: Array, rounding: float, enough: Enough) 
     shared = common(a, b, T)
     if shared is None:
         return Distance(-off, off)
-    depth, point = deepest(a, b, T, shared)
+    depth, deepest_point = deepest(a, b, T, shared)
+    point: Array | None = deepest_point
     upper = rounding - depth
     if vertex is not None and vertex.upper < upper:
         upper, point = vertex.upper, vertex.point_a

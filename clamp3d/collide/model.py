@@ -42,8 +42,8 @@ DRAWN_CHORDS = (0.5, 0.06, 0.008, 0.001)
 CAD_CHORDS = (0.1, 0.0025)
 """Chord errors (mm) that solids from CAD are meshed with; what these leave open is asked of Open CASCADE.
 
-Of two equal cylinders, one in the other, facets overlap by a chord error, and each adds its own: three fine ones are less
-than the usual threshold of contact, 0.01 mm.
+Of two equal cylinders, one in the other, facets overlap by a chord error, and each adds its own: three fine ones are
+less than the usual threshold of contact, 0.01 mm.
 """
 
 

@@ -111,7 +111,7 @@ def first_contact(
         least, t = pair.least_distance()
         return _answer(pair, False, t, least)
     here = pair.at(t, measured)
-    return _answer(pair, True, t, here)
+    return _answer(pair, here.upper <= margin + RESOLUTION, t, here)
 
 
 def min_clearance(

@@ -1,4 +1,4 @@
-"""One body that moves against one that stands: its distance at a time, over a stretch, at least, and the first contact."""
+"""One body that moves against one that stands: distances at a time and over a stretch, and the first contact."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ ACCURACY = 1e-6
 """A first contact and a least distance are searched to within this (mm), or to what the models give."""
 CHECKED = 1e-4
 """The same for the least distance of a scene's motion, which has to give a verdict and a number to print."""
-MOST = 1500
-"""Times at which a pair is looked at most, in one search."""
+MOST = 5000
+"""Times at which a pair is looked at most, in one search: with meshes about a second."""
 _UNINFORMATIVE = 8
 """Swept bounds in a row that said no more than the speed, after which they are no longer asked for."""
 

@@ -155,7 +155,7 @@ def check_poses(
 def _judged(
     a: Model, b: Model, T: Array, thresholds: Thresholds, allowance: float | None
 ) -> tuple[Array, Array, NDArray[np.int8]]:
-    """Bounds of the signed distances (m,) of ``b`` at ``T`` (m, 4, 4) in a's frame, and the places of their verdicts."""
+    """Bounds of the signed distances (m,) of ``b`` at ``T`` (m, 4, 4) in a's frame, and their verdicts' places."""
     batch = bounds_at_poses(a, b, T)
     least, most = batch.lower.copy(), batch.upper.copy()
     rank = thresholds.verdicts(least, most, allowance)

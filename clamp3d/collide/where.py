@@ -54,7 +54,7 @@ class Overlap:
 
 @dataclass(eq=False)
 class Locator:
-    """Two overlapping parts, ``b`` at ``T_ab`` (4, 4) in a's frame, ``a`` at ``T_a`` in the world; asked when needed."""
+    """Two overlapping parts: ``b`` at ``T_ab`` (4, 4) in a's frame, ``a`` at ``T_a`` in the world."""
 
     a: Model
     b: Model

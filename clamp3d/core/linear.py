@@ -87,4 +87,4 @@ def lstsq(A: Array, b: Array, least: float = 1e-15) -> tuple[Array, int]:
     ([2.0, 0.0], 1)
     """
     x, _, rank, _ = np.linalg.lstsq(A, b, rcond=least)
-    return x, int(rank)
+    return np.asarray(x, dtype=np.float64), int(rank)

@@ -143,7 +143,7 @@ def assert_as_volumes_say(part, others):
 
 @pytest.mark.parametrize(
     ("part", "others", "free"),
-    [  # scripts/check-sequences asks all that permutations of the parts lead to
+    [  # all that permutations of the parts lead to
         ("P7", ("P1", "P3", "P4", "P6"), True),
         ("P4", ("P1", "P3", "P5", "P6"), True),
         ("P3", ("P1", "P5", "P7"), True),

@@ -56,8 +56,8 @@ OVERLAPPING = {
     "a box in a groove block": (BLOCK, box((30, 10, 10)), translation(0, 1.499, 0), 1e-3),
     "a cylinder in a tube's wall": (cylinder(30, 40, bore=10), cylinder(2, 60), translation(0, 20, 0), 12.0),
 }
-LOOSE = {"a cylinder in a tube's wall"}
-"""Overlaps of bodies with a bore, whose depth is not known sharply."""
+LOOSE = {"a cylinder in a tube's wall", "a wire in a groove's bottom"}
+"""Overlaps of bodies that are not convex, whose depth is an interval."""
 
 
 def exactly(truth, found, sharp=1e-6):

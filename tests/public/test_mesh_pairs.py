@@ -1,0 +1,135 @@
+"""Meshes made by trimesh against manifold3d, python-fcl and formulas within the stated facets."""
+
+import manifold3d
+import numpy as np
+import pytest
+import trimesh
+
+from clamp3d import Scene, check, distance, load
+from clamp3d.kernel import rotation, translation
+from clamp3d.shapes import MeshShape, box, cylinder, make_mesh
+
+SKEW = rotation((1.0, 2.0, 3.0), 0.7)
+MADE = {
+    "icosphere": trimesh.creation.icosphere(3, 10.0),
+    "cylinder": trimesh.creation.cylinder(6.0, 20.0, sections=48),
+    "box": trimesh.creation.box((12.0, 10.0, 8.0)),
+    "torus": trimesh.creation.torus(10.0, 3.0, 48, 24),
+}
+
+
+def as_shape(mesh):
+    return MeshShape(make_mesh(mesh.vertices, mesh.faces), "off")
+
+
+def manifold(mesh, T=None):
+    vertices = trimesh.transform_points(mesh.vertices, np.eye(4) if T is None else T)
+    raw = manifold3d.Mesh64(np.ascontiguousarray(vertices), np.ascontiguousarray(mesh.faces, dtype=np.uint64))
+    return manifold3d.Manifold(raw)
+
+
+def sagitta(mesh, radius):
+    """How far the facets of a ball of ``radius`` lie inside it, mm."""
+    return radius - np.abs((mesh.triangles[:, 0] * mesh.face_normals).sum(axis=1)).min()
+
+
+def placed(rng, reach):
+    T = rotation(rng.normal(size=3), rng.uniform(0, 3))
+    way = rng.normal(size=3)
+    T[:3, 3] = reach * way / np.linalg.norm(way)
+    return T
+
+
+@pytest.mark.parametrize("b", MADE)
+@pytest.mark.parametrize("a", MADE)
+def test_gaps_and_common_volumes_as_manifold_measures_them(a, b):
+    rng = np.random.default_rng(0)
+    for reach in (9.0, 14.0, 22.0):
+        T = placed(rng, reach)
+        one, two = manifold(MADE[a]), manifold(MADE[b], T)
+        scene = Scene(clearance=30.0).add("a", as_shape(MADE[a])).add("b", as_shape(MADE[b]), T)
+        volume, row = (one ^ two).volume(), check(scene).pairs[0]
+        if volume > 0.1:
+            assert row.verdict.value in ("clash", "contained")
+            low, high = row.where.volume
+            assert low * 0.999 - 1e-6 <= volume <= high * 1.001 + 1e-6
+        elif volume == 0.0:
+            found = distance(as_shape(MADE[a]), as_shape(MADE[b]), T)
+            gap = one.min_gap(two, 60.0)
+            assert found.lower - 1e-6 <= gap <= found.upper + 1e-6
+            assert found.upper - found.lower < 1e-4
+
+
+@pytest.mark.parametrize("gap", [3.0, 0.4, 0.05, -0.3, -2.0])
+def test_two_balls_are_as_far_apart_as_spheres_within_their_facets(gap):
+    r, s = 10.0, 4.0
+    one, two = trimesh.creation.icosphere(4, r), trimesh.creation.icosphere(3, s)
+    chords = sagitta(one, r) + sagitta(two, s)
+    T = placed(np.random.default_rng(1), r + s + gap)
+    found = distance(as_shape(one), as_shape(two), T)
+    assert found.lower <= gap + chords
+    assert found.upper >= gap
+    if gap > 0.0:
+        assert found.upper <= gap + chords + 1e-6
+        assert found.lower >= gap - 1e-4
+    elif gap < -chords:
+        assert found.upper < 0.0
+
+
+@pytest.mark.parametrize(
+    ("gap", "wanted"), [(0.02, "clear"), (0.009, "contact"), (0.0, "contact"), (-0.009, "contact"), (-0.02, "clash")]
+)
+@pytest.mark.parametrize("format", ["stl", "glb"])
+def test_boxes_in_files_face_to_face(gap, wanted, format, tmp_path):
+    scene = trimesh.Scene()
+    scene.add_geometry(MADE["box"], node_name="under", geom_name="under", transform=SKEW)
+    scene.add_geometry(MADE["box"], node_name="over", geom_name="over", transform=SKEW @ translation(1, 2, 8 + gap))
+    if format == "glb":
+        scene.apply_transform(rotation((1, 0, 0), -np.pi / 2)).export(tmp_path / "boxes.glb")
+        loaded = load(tmp_path / "boxes.glb", unit="mm")
+    else:
+        for name, mesh in zip(("under", "over"), scene.dump(), strict=True):
+            mesh.export(tmp_path / f"{name}.stl")
+        loaded = load(tmp_path)
+    assert {part.name for part in loaded.parts} == {"under", "over"}
+    result = check(loaded)
+    assert result.verdict("under", "over").value == wanted
+    assert result.clean == (wanted != "clash")
+
+
+@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("offset", [0.0, 0.005])
+def test_one_mesh_twice_is_an_overlap(name, offset):
+    shape = as_shape(MADE[name])
+    scene = Scene().add("a", shape, SKEW).add("b", shape, translation(offset, 0, 0) @ SKEW)
+    assert check(scene).verdict("a", "b").value in ("duplicate", "contained", "clash")
+
+
+@pytest.mark.parametrize("outer", ["icosphere", "box"])
+def test_what_is_inside_a_closed_mesh_is_contained(outer):
+    scene = Scene().add("outer", as_shape(MADE[outer])).add("inner", as_shape(trimesh.creation.box((2, 2, 2))), SKEW)
+    assert check(scene).verdict("outer", "inner").value in ("contained", "clash")
+
+
+def opened(mesh):
+    return MeshShape(make_mesh(mesh.vertices, np.delete(mesh.faces, 0, axis=0)), "off")
+
+
+@pytest.mark.parametrize("other", [box((4, 4, 4)), as_shape(trimesh.creation.box((4, 4, 4))), cylinder(2, 4)])
+def test_of_an_open_mesh_distances_are_certain_and_its_inside_is_not_known(other):
+    scene = Scene(clearance=2.0).add("open", opened(trimesh.creation.box((10, 10, 10))))
+    row = check(scene.add("b", other, translation(8, 0.5, 0.3)), distances=True).pairs[0]
+    assert row.verdict.value == "clearance"
+    assert row.distance.lower - 1e-9 <= 1.0 <= row.distance.upper + 1e-9
+    assert check(scene.add("b", other, translation(5, 0.5, 0.3))).pairs[0].verdict.value in ("clash", "uncertain")
+    assert check(scene.add("b", other)).pairs[0].verdict.value == "uncertain"
+
+
+def test_a_stated_chord_widens_the_bounds(tmp_path):
+    ball = trimesh.creation.icosphere(3, 10.0)
+    for name, x in (("a", 0.0), ("b", 20.3)):
+        ball.copy().apply_translation((x, 0, 0)).export(tmp_path / f"{name}.stl")
+    chord = sagitta(ball, 10.0)
+    row = check(load(tmp_path, chord=chord), distances=True).pairs[0]
+    assert row.distance.lower <= 0.3 <= row.distance.upper
+    assert row.distance.upper - row.distance.lower >= 2 * chord

@@ -1,0 +1,140 @@
+"""First contacts and least clearances on motions against formulas: drawn bodies, meshes, CAD."""
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+from clamp3d import Motion, Scene, check, first_contact, load, min_clearance
+from clamp3d.kernel import Cylinder, translation
+from clamp3d.shapes import MeshShape, SweptArc, box, cylinder, groove_block, make_mesh
+
+ACCURACY = 3e-4
+"""How far apart bodies may still be at a first contact, mm."""
+GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
+BLOCK, WIRE = groove_block(GROOVE, 40.0, 20.0), cylinder(6.935, 80.0)
+TUBE, PIN = cylinder(9.0, 40.0, bore=5.1), cylinder(5.0, 60.0)
+UPRIGHT = translation(20.0, 0.0, 0.0)
+TURN = Motion.screw((0, 0, 1), math.pi / 2)
+SCREW = Motion.screw((0, 0, 1), math.pi / 2, travel=6.0)
+WALL = box((60, 10, 100))
+
+
+def mesh_box(*size):
+    made = trimesh.creation.box(size)
+    return MeshShape(make_mesh(made.vertices, made.faces), "off")
+
+
+def down(way):
+    return Motion.translate((0.0, 0.0, -way))
+
+
+# a, b, motion, pose of b at the start, t of the first contact, speed there in mm
+CONTACTS = {
+    "box onto box": (box((20, 20, 4)), box((3, 3, 3)), down(20), translation(0, 0, 13.5), 0.5, 20.0),
+    "cylinder onto box": (box((20, 20, 4)), cylinder(2, 7), down(20), translation(1, 2, 10.5), 0.25, 20.0),
+    "pin through a thin plate": (box((90, 90, 1)), cylinder(2, 5), down(1000), translation(0, 0, 503), 0.5, 1000.0),
+    "wire into its groove": (
+        BLOCK, WIRE, Motion.translate((0, -40, 0)), translation(0, 29.935, 0), 0.75, 40.0,
+    ),
+    "bare wire and groove": (
+        GROOVE, Cylinder(6.935, 80.0), Motion.translate((0, -40, 0)), translation(0, 29.935, 0), 0.75, 40.0,
+    ),
+    "pin against a tube": (TUBE, PIN, Motion.translate((8, 0, 0)), np.eye(4), 0.0125, 8.0),
+    "turning rod against a wall": (
+        WALL, cylinder(2, 8), TURN, UPRIGHT, None, 20 * math.pi / 2,
+    ),
+    "screwing rod against a wall": (WALL, cylinder(2, 8), SCREW, UPRIGHT, None, 20 * math.pi / 2 + 6),
+    "mesh onto mesh": (mesh_box(20, 20, 4), mesh_box(3, 3, 3), down(20), translation(0, 0, 13.5), 0.5, 20.0),
+    "mesh onto box": (box((20, 20, 4)), mesh_box(3, 3, 3), down(20), translation(0, 0, 13.5), 0.5, 20.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CONTACTS)
+def test_the_first_contact_is_neither_late_nor_early(case):
+    a, b, motion, start, t, speed = CONTACTS[case]
+    if t is None:  # the wall's face at y = 15 meets a rod of radius 2 that is carried round at 20 mm from the axis
+        motion = Motion.screw((0, 0, 1), motion.angle, point=(0, -20, 0), travel=float(motion.travel[2]))
+        start = translation(0, -20, 0) @ start
+        t = math.asin((15.0 - 2.0) / 20.0) / (math.pi / 2)
+    found = first_contact(a, b, motion, start)
+    assert found.touches
+    assert found.t <= t + 1e-9
+    assert found.t >= t - 3 * ACCURACY / speed - 1e-9
+    assert found.distance.upper <= ACCURACY
+    np.testing.assert_allclose(found.pose, motion.at(found.t, start), atol=1e-9)
+
+
+CLEARANCES = {
+    "wire to the bottom": (BLOCK, WIRE, Motion.translate((0, -30, 0)), translation(0, 30, 0), 0.065),
+    "pin through a tube": (TUBE, PIN, Motion.translate((0, 0, -240)), translation(0, 0, 120), 0.1),
+    "pin beside the middle": (TUBE, PIN, down(240), translation(0.03, -0.04, 120), 0.05),
+    "turning pin in a tube": (TUBE, PIN, Motion.screw((0, 0, 1), 3.0, travel=4.0), translation(0.06, 0, 0), 0.04),
+    "box past a box": (
+        box((10, 10, 10)), box((4, 4, 4)), Motion.translate((40, 0, 0)), translation(-20, 7.25, 0), 0.25,
+    ),
+    "box past a corner": (
+        box((10, 10, 10)), box((4, 4, 4)), Motion.translate((0, 0, 40)), translation(10, 11, -20), 5.0,
+    ),
+    "crossed rods": (
+        cylinder(5, 40), cylinder(3, 40), Motion.translate((0, 50, 0)), translation(8.3, -25, 0), 0.3,
+    ),
+    "mesh past a mesh": (
+        mesh_box(10, 10, 10), mesh_box(4, 4, 4), Motion.translate((40, 0, 0)), translation(-20, 7.25, 0), 0.25,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CLEARANCES)
+def test_the_least_clearance_on_a_way(case):
+    a, b, motion, start, truth = CLEARANCES[case]
+    found = min_clearance(a, b, motion, start)
+    assert not found.touches
+    assert found.distance.lower - 1e-9 <= truth <= found.distance.upper + 1e-9
+    assert found.distance.upper - found.distance.lower < 0.005
+    assert found.distance.value == pytest.approx(truth, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("way", "wanted"), [(30.0, "clearance"), (30.0651, "contact"), (30.0749, "contact"), (30.0751, "clash")]
+)
+def test_verdicts_of_a_motion_in_a_scene(way, wanted):
+    scene = Scene(clearance=0.07, motions=()).add("block", BLOCK).add("wire", WIRE, translation(0, 30, 0))
+    moving = Scene(scene.parts, clearance=0.07, motions=(Motion.translate((0, -way, 0), parts="wire", name="in"),))
+    result = check(moving)
+    (row,) = result.motions
+    assert (row.motion, row.verdict.value) == ("in", wanted)
+    assert result.clean == (wanted != "clash")
+    if wanted == "clash":
+        assert row.contact_at == pytest.approx(30.055 / way, abs=1e-5)
+    else:
+        assert row.contact_at is None or wanted == "contact"
+
+
+@pytest.fixture(scope="module")
+def plate_and_pin(tmp_path_factory):
+    pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
+    from tests.public.placed_pairs import StepFile, block, cut, rod
+
+    file = StepFile()
+    file.put(file.product("plate", cut(block((-15, -15, -3), (15, 15, 3)), rod(4.1, -4, 4))), np.eye(4))
+    file.put(file.product("pin", rod(4.0, 0, 20)), translation(0, 0, 10))
+    return {part.name: part for part in load(file.write(tmp_path_factory.mktemp("cad") / "pin.step")).parts}
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.05])
+def test_a_pin_of_cad_passes_its_hole(plate_and_pin, aside):
+    plate, pin = plate_and_pin["plate"], plate_and_pin["pin"]
+    start = translation(aside, 0, 0) @ pin.T_world
+    found = min_clearance(plate.shape, pin.shape, down(20.0), start)
+    assert found.distance.lower - 1e-9 <= 0.1 - aside <= found.distance.upper + 1e-9
+    assert not found.touches
+
+
+@pytest.mark.parametrize(("aside", "t"), [(0.3, (10 - 3) / 20), (9.0, (10 - 3) / 20)])
+def test_a_pin_of_cad_beside_its_hole_meets_the_plate(plate_and_pin, aside, t):
+    plate, pin = plate_and_pin["plate"], plate_and_pin["pin"]
+    found = first_contact(plate.shape, pin.shape, down(20.0), translation(aside, 0, 0) @ pin.T_world)
+    assert found.touches
+    assert t - 0.001 <= found.t <= t + 1e-9
