@@ -15,7 +15,7 @@ from clamp3d.bench.compare.methods import Method
 from clamp3d.core.child import run_child
 from clamp3d.errors import Clamp3dError
 
-Kind = Literal["contact", "peer", "assembly", "image", "complexity"]
+Kind = Literal["contact", "peer", "assembly", "image"]
 
 
 class JobError(Exception):
@@ -48,10 +48,6 @@ def _answer(kind: str, method: str) -> Any:
         from clamp3d.bench.compare.peers import load_peer, prepare_peer
 
         return measure(Method.parse(method), load=load_peer, prepare=prepare_peer)
-    if kind == "complexity":
-        from clamp3d.bench.complexity import complexity
-
-        return complexity()
     from clamp3d.bench.compare import assemblies
 
     return assemblies.imaged() if kind == "image" else assemblies.assembled(Method.parse(method))

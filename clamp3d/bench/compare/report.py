@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -11,7 +10,6 @@ from clamp3d.bench.compare.assemblies import Assembled
 from clamp3d.bench.compare.measure import Measured
 from clamp3d.bench.compare.methods import Method
 from clamp3d.bench.compare.run import KNOWN, Comparison, NotMeasured, exact_distance
-from clamp3d.bench.complexity import Sweep
 from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
 
@@ -40,9 +38,6 @@ def comparison_to_dict(comparison: Comparison) -> dict[str, Any]:
         "peers": [contact(row) for row in comparison.peers],
         "assembly": [assembly(row) for row in (*comparison.exact, *comparison.stepped)],
         "image": asdict(comparison.image),
-        "complexity": asdict(comparison.complexity)
-        if isinstance(comparison.complexity, NotMeasured)
-        else [asdict(sweep) for sweep in comparison.complexity],
     }
 
 
@@ -60,9 +55,6 @@ def comparison_to_text(comparison: Comparison) -> str:
         missing_assembly=[row for row in (*comparison.exact, comparison.image) if isinstance(row, NotMeasured)],
         published=published.IMAGE_DISTANCES,
         five=lambda values: ", ".join(f"{value:.3f}" for value in values),
-        complexity=[]
-        if isinstance(comparison.complexity, NotMeasured)
-        else [_sweep(sweep) for sweep in comparison.complexity],
     )
 
 
@@ -90,18 +82,6 @@ def _assembly(comparison: Comparison) -> list[list[object]]:
             lengths = f"{exact.distance:.4f}", f"{stepped.distance:.3f}"
             rows.append([exact.label, lengths[0], *by_gradients, lengths[1], *by_steps, *rest])
     return rows
-
-
-def _sweep(s: Sweep) -> list[object]:
-    fits = [f"{round(e, 2) + 0.0:.2f}" if len(s.values) > 1 else "-" for e in s.exponents]
-    paper = "-" if s.published is None else ", ".join(f"{p:g}" for p in s.published)
-    spread = ", ".join(_span(counts) for counts in (s.positions, s.tests, s.seconds))
-    return [s.search, s.method, s.varied, s.fixed, *fits, paper, spread]
-
-
-def _span(values: Sequence[float]) -> str:
-    first, last = (f"{v:.3g}" if isinstance(v, float) else str(v) for v in (values[0], values[-1]))
-    return first if first == last else f"{first}..{last}"
 
 
 def _published(row: Assembled) -> float | None:

@@ -12,7 +12,6 @@ from clamp3d.bench.compare.jobs import JobError, Kind, run_job
 from clamp3d.bench.compare.measure import Measured
 from clamp3d.bench.compare.methods import CLAMP_THRESHOLD, METHODS, Method
 from clamp3d.bench.compare.peers import PEER_METHODS, missing_peers
-from clamp3d.bench.complexity import Sweep
 from clamp3d.bench.machine import Machine, machine
 from clamp3d.errors import Clamp3dError
 
@@ -67,7 +66,6 @@ class Comparison:
     exact: tuple[Assembled | NotMeasured, ...]
     stepped: tuple[Assembled | NotMeasured, ...]
     image: Imaged | NotMeasured
-    complexity: tuple[Sweep, ...] | NotMeasured
     seconds: float
 
     @property
@@ -91,7 +89,7 @@ def compare(
         *(("contact", method) for method in METHODS),
         *(("peer", method) for method in peer_methods),
     ]
-    total = 3 + ROUNDS * len(on_poses) + len(ASSEMBLIES)
+    total = 2 + ROUNDS * len(on_poses) + len(ASSEMBLIES)
     done = 0
 
     def job(kind: Kind, method: Method, limit: float, what: str) -> Any:
@@ -118,7 +116,6 @@ def compare(
     both = [job("assembly", m, ASSEMBLY_LIMIT, f"assembly by {m.label}") for m in ASSEMBLIES]
     pairs = [found if isinstance(found, tuple) else (found, found) for found in both]
     image = job("image", Method("image"), ASSEMBLY_LIMIT, "measuring in a picture")
-    sweeps = job("complexity", Method("complexity"), ASSEMBLY_LIMIT, "counting work for Table 5")
     progress(total, total, "done")
     return Comparison(
         machine((*LIBRARIES, *(PEER_LIBRARIES if peers else ()))),
@@ -127,7 +124,6 @@ def compare(
         tuple(exact for exact, _ in pairs),
         tuple(stepped for _, stepped in pairs),
         image,
-        sweeps,
         time.monotonic() - start,
     )
 

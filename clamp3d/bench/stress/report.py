@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES, COUNTS
 from clamp3d.bench.stress.outcome import REFERENCE, Outcome
-from clamp3d.bench.stress.run import FAMILIES, KINDS, METHODS, StressRun
+from clamp3d.bench.stress.run import FAMILIES, METHODS, StressRun
 from clamp3d.output.figures import save_figure
 from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
 
 _LEAST = 1e-4
-_CELL_WIDTH, _CELL_HEIGHT, _LABELS, _HEAD = 0.78, 0.23, 1.75, 0.78
+_CELL_WIDTH, _CELL_HEIGHT = 0.9, 0.23
 """Inches."""
-_TITLES = {
-    "pose": "single poses",
-    "flat": "flat ends",
-    "solid": "finite bodies",
-    "motion": "motions",
-    "mesh": "meshes",
-    "assembly": "whole clamps",
-}
 
 
 def _length(x: float | None) -> str:
@@ -131,67 +122,33 @@ def finding(o: Outcome, run: StressRun) -> str:
 def plot(run: StressRun, path: Path) -> None:
     """Write the picture (.svg, .png or .pdf by the name). Raises InputError for another ending."""
     from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
-    outcomes = {(o.family, o.method): o for o in run.outcomes}
-    shown = {kind: [f for f in families if any(f == row for row, _ in outcomes)] for kind, families in KINDS.items()}
-    kinds = [kind for kind, families in shown.items() if families]
-    columns = [kinds[:1], kinds[1:]] if len(kinds) > 1 else [kinds]
-    methods = {kind: [*dict.fromkeys(m for f, m in outcomes if f in shown[kind])] for kind in kinds}
-    wide = [max(len(methods[kind]) for kind in column) * _CELL_WIDTH + _LABELS for column in columns]
-    high = max(sum(len(shown[kind]) * _CELL_HEIGHT + _HEAD for kind in column) for column in columns)
-    width, height = max(9.6, sum(wide) + 0.6), high + 0.85
-    figure = Figure(figsize=(width, height), dpi=150)
-
-    def inches(left: float, bottom: float, across: float, up: float) -> Any:
-        return figure.add_axes((left / width, bottom / height, across / width, up / height))
-
-    mappable = ScalarMappable(LogNorm(_LEAST, 1.0), colormaps["YlOrRd"])
-    left = 0.0
-    for column, across in zip(columns, wide, strict=True):
-        top = height
-        for kind in column:
-            matrix = [[outcomes.get((family, method)) for method in methods[kind]] for family in shown[kind]]
-            down = len(matrix) * _CELL_HEIGHT
-            top -= _HEAD + down
-            axes = inches(left + _LABELS, top, len(methods[kind]) * _CELL_WIDTH, down)
-            _draw(axes, matrix, mappable)
-            axes.set_xticks(np.arange(len(methods[kind])) + 0.5, methods[kind], rotation=25, ha="left", fontsize=7.5)
-            names = [name.split(": ")[-1] for name in shown[kind]]
-            axes.set_yticks(np.arange(len(names)) + 0.5, names, fontsize=7.5)
-            place = {"xycoords": "axes fraction", "xytext": (-6, 8), "textcoords": "offset points"}
-            axes.annotate(_TITLES[kind], (0, 1), **place, ha="right", fontsize=9, weight="bold")
-        left += across
-    bar_width = min(3.0, 0.5 * width)
-    bar = figure.colorbar(mappable, cax=inches(0.15, 0.45, bar_width, 0.1), orientation="horizontal")
-    bar.ax.tick_params(labelsize=7)
-    bar.set_label("share that went wrong", fontsize=7.5)
-    legend = (
-        "0: nothing wrong. White: not for this method. Grey: every case refused in words, or no time left.\n"
-        f"†: the interpreter died. {run.n} cases a family (meshes and clamps a hundredth; other methods than cas\n"
-        f"as many as their time allows), seed {run.seed}."
-    )
-    figure.text((bar_width + 0.4) / width, 0.62 / height, legend, fontsize=7.5, va="top")
-    save_figure(figure, path)
-
-
-def _draw(axes: Any, matrix: list[list[Outcome | None]], mappable: Any) -> None:
-    for i, row in enumerate(matrix):
-        for j, outcome in enumerate(row):
-            if outcome is None:
-                continue
-            rate = outcome.failure_rate
-            face = "#e8e8e8" if rate is None else "#f4faf4" if rate == 0.0 else mappable.to_rgba(max(rate, _LEAST))
-            axes.broken_barh([(j, 1)], (i, 1), facecolor=face, edgecolor="white", linewidth=1.2)
-            style = {"color": "black" if rate is None or rate < 0.08 else "white", "fontsize": 7.5}
-            style["weight"] = "bold" if outcome.method == REFERENCE else "normal"
-            axes.text(j + 0.5, i + 0.53, _cell(outcome), ha="center", va="center", **style)
-    axes.set(xlim=(0, len(matrix[0])), ylim=(len(matrix), 0))
+    families, methods = (list(dict.fromkeys(getattr(o, key) for o in run.outcomes)) for key in ("family", "method"))
+    height = len(families) * _CELL_HEIGHT + 1.7
+    figure = Figure(figsize=(max(9.6, len(methods) * _CELL_WIDTH + 3.0), height), dpi=150)
+    axes = figure.add_axes((0.27, 0.9 / height, 0.71, 1.0 - 1.7 / height))
+    colours, norm = colormaps["YlOrRd"], LogNorm(_LEAST, 1.0)
+    for o in run.outcomes:
+        i, j, rate = families.index(o.family), methods.index(o.method), o.failure_rate
+        face = "#e8e8e8" if rate is None else "#f4faf4" if rate == 0.0 else colours(norm(max(rate, _LEAST)))
+        axes.broken_barh([(j, 1)], (i, 1), facecolor=face, edgecolor="white", linewidth=1.2)
+        colour, weight = "black" if (rate or 0.0) < 0.08 else "white", "bold" if o.method == REFERENCE else "normal"
+        axes.text(j + 0.5, i + 0.53, _cell(o), ha="center", va="center", fontsize=7.5, color=colour, weight=weight)
+    axes.set(xlim=(0, len(methods)), ylim=(len(families), 0))
+    axes.set_xticks(np.arange(len(methods)) + 0.5, methods, rotation=25, ha="left", fontsize=7.5)
+    axes.set_yticks(np.arange(len(families)) + 0.5, families, fontsize=7.5)
     axes.xaxis.tick_top()
     axes.tick_params(length=0, pad=2)
     axes.spines[:].set_visible(False)
+    legend = (
+        "Share that went wrong. 0: nothing. White: not for this method. Grey: every case refused in words, or no time\n"
+        f"left. †: the interpreter died. {run.n} cases a family (meshes a tenth, clamps a hundredth; others than cas\n"
+        f"as many as their time allows), seed {run.seed}."
+    )
+    figure.text(0.02, 0.7 / height, legend, fontsize=7.5, va="top")
+    save_figure(figure, path)
 
 
 def _cell(o: Outcome) -> str:

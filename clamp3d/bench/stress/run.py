@@ -12,9 +12,8 @@ from typing import Any
 from clamp3d.bench.machine import Machine, machine
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.family import Family
-from clamp3d.bench.stress.meshes.contacts import CONTACTS
-from clamp3d.bench.stress.meshes.family import MESHES
-from clamp3d.bench.stress.motions.family import MOTIONS
+from clamp3d.bench.stress.meshes import MESHES
+from clamp3d.bench.stress.motions import MOTIONS
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.poses.family import POSES
 from clamp3d.bench.stress.poses.flat import FLATS
@@ -29,7 +28,7 @@ KINDS: dict[str, Mapping[str, Family]] = {
     "flat": FLATS,
     "solid": SOLIDS,
     "motion": MOTIONS,
-    "mesh": {**MESHES, **CONTACTS},
+    "mesh": MESHES,
     "assembly": ASSEMBLIES,
 }
 """Kind -> its families by name."""
@@ -44,7 +43,7 @@ def expand(names: list[str]) -> list[str]:
     """Families by name; ``pose``, ``flat``, ``solid``, ``motion``, ``mesh`` and ``assembly`` stand for their kind.
 
     >>> expand(["ties", "mesh"])[:2]
-    ['ties', 'mesh: open']
+    ['ties', 'mesh: contact']
     """
     return [family for name in names for family in KINDS.get(name, [name])]
 

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import multiprocessing
-import signal
+import pickle
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from multiprocessing.connection import Connection
-from typing import Any, Literal, Protocol, Self, cast
+from typing import Any, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.core.child import end_with_parent
+from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.core.pose import Array
 from clamp3d.errors import Clamp3dError, without_numbers
 
@@ -175,58 +173,23 @@ def run_here(method: Method, cases: Any, time_limit: float | None = None) -> Ans
     return answers
 
 
-def _serve(pipe: Connection, make: Callable[[], Method], cases: Any) -> None:
-    """Child: answer the rows that are sent, until the parent closes the pipe or is gone."""
-    end_with_parent()
-    method = make()
+_PREPARE, _ANSWER = (f"{__name__}:{name}" for name in ("prepare", "answer"))
+_held: dict[str, tuple[Method, Any]] = {}
+"""In a child: the method that it is there for, and the cases."""
+
+
+def prepare(setup: bytes) -> None:
+    """Child: make the method, import what it may need, and keep the cases."""
+    make, cases = pickle.loads(setup)
+    _held["here"] = make(), cases
     for name in _IMPORTED:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
-    pipe.send("ready")
-    with contextlib.suppress(EOFError, BrokenPipeError, KeyboardInterrupt):  # the parent has no more questions
-        while True:
-            pipe.send(_replies(method, cases, pipe.recv()))
 
 
-class _Child:
-    """A process that answers rows of ``cases`` by the method that ``make`` returns."""
-
-    def __init__(self, make: Callable[[], Method], cases: Any) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._pipe, other = context.Pipe()
-        self._process = context.Process(target=_serve, args=(other, make, cases), daemon=True)
-        self._process.start()
-        other.close()
-
-    def receive(self, seconds: float) -> Any:
-        """What it sends. Raises TimeoutError, or EOFError when the interpreter has ended."""
-        try:
-            if not self._pipe.poll(seconds):
-                raise TimeoutError
-            return self._pipe.recv()
-        except ConnectionResetError:
-            raise EOFError from None
-
-    def ask(self, rows: NDArray[np.intp], seconds: float) -> list[_Reply]:
-        """Replies to some rows; raises as `receive` does."""
-        try:
-            self._pipe.send(rows)
-        except (BrokenPipeError, ConnectionResetError):
-            raise EOFError from None
-        return cast(list[_Reply], self.receive(seconds))
-
-    def end_code(self) -> str:
-        """How the process ended, in words."""
-        self._process.join(5.0)
-        code = self._process.exitcode
-        return signal.Signals(-code).name if code is not None and code < 0 else f"exit code {code}"
-
-    def end(self) -> None:
-        """End the process."""
-        self._pipe.close()
-        if self._process.is_alive():
-            self._process.kill()
-        self._process.join()
+def answer(rows: NDArray[np.intp]) -> bytes:
+    """Child: the method's replies to some rows."""
+    return pickle.dumps(_replies(*_held["here"], rows))
 
 
 def run_isolated(make: Callable[[], Method], cases: Any, *, time_limit: float, case_limit: float = 20.0) -> Answers:
@@ -238,29 +201,26 @@ def run_isolated(make: Callable[[], Method], cases: Any, *, time_limit: float, c
     answers = Answers.empty(len(cases))
     queue: list[NDArray[np.intp]] = _groups(cases)[::-1]
     end = time.monotonic() + time_limit
-    child: _Child | None = None
-    deaths = 0
-    try:
+    setup, is_ready, deaths = pickle.dumps((make, cases)), False, 0
+    with Worker(_PREPARE, _ANSWER) as worker:
         while queue and time.monotonic() < end and deaths < _MAX_DEATHS:
-            if child is None:
-                child = _Child(make, cases)
-                try:
-                    child.receive(_START_LIMIT)
-                except TimeoutError:
-                    answers.note(f"refused: the method did not start within {_START_LIMIT:g} s")
-                    break
-                except EOFError:
-                    answers.note(f"the interpreter ended with {child.end_code()} at start")
-                    break
+            try:
+                if not is_ready:
+                    worker.call(_PREPARE, setup, time_limit=_START_LIMIT)
+                    is_ready = True
+            except (Clamp3dError, RuntimeError) as error:
+                answers.note(f"the method did not start: {error}")
+                break
             rows = queue.pop()
             try:
-                for reply in child.ask(rows, case_limit):
+                for reply in pickle.loads(worker.call(_ANSWER, rows, time_limit=case_limit)):
                     _record(answers, reply)
                 continue
-            except TimeoutError:
+            except WorkerTimeoutError:
                 lost, why = answers.timeouts, f"no answer within {case_limit:g} s"
-            except EOFError:
-                lost, why = answers.crashed, f"the interpreter ended with {child.end_code()}"
+            except WorkerEndedError as error:
+                lost, why = answers.crashed, f"the interpreter ended with {error.ending}"
+            is_ready = False
             if len(rows) > 1:
                 queue += [np.array([row]) for row in rows[::-1]]
             else:
@@ -268,9 +228,4 @@ def run_isolated(make: Callable[[], Method], cases: Any, *, time_limit: float, c
                 answers.asked[rows] = True
                 lost.append(int(rows[0]))
                 answers.note(why)
-            child.end()
-            child = None
-    finally:
-        if child is not None:
-            child.end()
     return answers

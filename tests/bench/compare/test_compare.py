@@ -18,7 +18,6 @@ from hypothesis import strategies as st
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
-from clamp3d.bench import complexity as table_5
 from clamp3d.bench.compare import peers as compare_peers
 from clamp3d.bench.compare import run as study
 from clamp3d.bench.compare.assemblies import Assembled, Imaged
@@ -30,7 +29,7 @@ from clamp3d.bench.compare.peers import SERIES, load_peer, missing_peers, prepar
 from clamp3d.bench.compare.report import comparison_to_dict, comparison_to_text
 from clamp3d.bench.compare.run import LIBRARIES, Comparison, NotMeasured, compare, pareto
 from clamp3d.bench.compare.scene import chord_error
-from clamp3d.bench.complexity import Sweep, fitted, grid_search
+from clamp3d.bench.complexity import fitted, grid_search
 from clamp3d.bench.machine import machine
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.features import wire_pairs
@@ -169,20 +168,6 @@ def test_grid_search_finds_the_final_state_and_counts_as_the_paper_does() -> Non
     found = grid_search(run, chords, n=7, parts=1, grooves=4)
     assert found.tests == 7 * chords.segments(wire_pairs(run.clamp))
     assert found.closing is None or found.closing > run.closing + 0.1
-
-
-def test_exponents_of_table_5(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table_5, "_timed", lambda run: (run(), 1.0))  # what is counted is the same each time
-    sweeps = table_5.complexity(scale=0.2)
-    by = {(s.search, s.method, s.varied, s.fixed.split(",")[0]): s for s in sweeps}
-    assert by["grid", "cas", "n", "a = 2"].exponents[:2] == pytest.approx((2.0, 2.0))
-    assert by["grid", "cas", "n", "a = 3"].exponents[:2] == pytest.approx((3.0, 3.0))
-    stepped = by["stepped", "cas", "n", "a = 3"]
-    assert 0.5 < stepped.exponents[0] < 1.1  # one way, not n^3
-    exact = by["exact", "cas", "n", "no steps"]
-    assert exact.positions == (0,)
-    assert exact.tests[0] < min(stepped.tests)
-    assert all(len(s.values) == len(s.positions) == len(s.tests) == len(s.seconds) for s in sweeps)
     assert fitted([1, 2, 4, 8], [5, 10, 20, 40]) == pytest.approx(1.0)
 
 
@@ -200,9 +185,8 @@ def _comparison() -> Comparison:
     )
     rows = [Assembled("cas", None, "cas", s, "clamped", 31.53, 0.0, 0.05, 864, 0) for s in ("exact", "stepped")]  # type: ignore[arg-type]
     late = NotMeasured("hulls", 2.0, "hulls 2 mm", "not finished in 150 s")
-    sweep = Sweep("grid", "cas", "n", "a = 1", (1.0, 2.0), (1, 2), (4, 8), (0.1, 0.2), (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
     image = dataclasses.replace(IMAGE)
-    return Comparison(machine(LIBRARIES), contact, peers, (rows[0], late), (rows[1], late), image, (sweep,), 12.0)
+    return Comparison(machine(LIBRARIES), contact, peers, (rows[0], late), (rows[1], late), image, 12.0)
 
 
 IMAGE = Imaged(10, 4.5, 4.0, 1.08, 7.1, (31.9, 31.1, 31.2, 30.9, 32.1), 0.006, 0.2)
@@ -225,9 +209,7 @@ def test_tables_show_every_row_and_why_one_is_missing() -> None:
     assert wedge["known"] == {"error": 0.0114, "pieces": None}
     assert data["assembly"][0]["error"] == 0.0
     assert data["assembly"][1]["reason"] == "not finished in 150 s"
-    failed = dataclasses.replace(
-        found, image=NotMeasured("image", None, "image", "no"), complexity=NotMeasured("c", None, "c", "no")
-    )
+    failed = dataclasses.replace(found, image=NotMeasured("image", None, "image", "no"))
     assert "no" in comparison_to_text(failed)
     comparison_to_dict(failed)
 
@@ -263,9 +245,7 @@ def test_compare_asks_every_job_and_keeps_going(monkeypatch: pytest.MonkeyPatch)
         if kind == "assembly":
             both = _comparison()
             return both.exact[0], both.stepped[0]
-        if kind == "image":
-            return IMAGE
-        return ()
+        return IMAGE
 
     monkeypatch.setattr(study, "run_job", answer)
     monkeypatch.setattr(study, "missing_peers", lambda: {"coal-sector": "not installed: pip install coal"})

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from clamp3d.bench.stress.meshes.contacts import CONTACTS
+from clamp3d.bench.stress.meshes import MESHES
 from clamp3d.bench.stress.run import FAMILIES
 from clamp3d.bench.stress.worker import run_here
 
 
-@pytest.mark.parametrize(("name", "n"), [(name, 10 if name == "mesh: late contact" else 25) for name in CONTACTS])
+@pytest.mark.parametrize(("name", "n"), [(name, 10 if name == "mesh: late contact" else 25) for name in MESHES])
 def test_the_engine_is_never_wrong_and_the_truth_is_found_again_by_manifold(name, n):
     family = FAMILIES[name]
     cases = family.cases(n, 11)
@@ -27,7 +27,7 @@ def test_the_engine_is_never_wrong_and_the_truth_is_found_again_by_manifold(name
 def test_depths_are_the_least_that_separate():
     """A little less than the depth, along any way, leaves no plane between two convex bodies; the way up does."""
     rng = np.random.default_rng(0)
-    deep = [case for case in CONTACTS["mesh: contact"].cases(40, 3).pairs if case.truth < -1e-3]
+    deep = [case for case in MESHES["mesh: contact"].cases(40, 3).pairs if case.truth < -1e-3]
     assert len(deep) > 2
     for case in deep:
         assert apart(case, case.near[:3, 3])

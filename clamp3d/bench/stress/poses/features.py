@@ -146,21 +146,6 @@ def _narrow_mouth(rng: np.random.Generator, n: int) -> Cases:
     return draw.free(rng, shapes, shape, np.stack([x, y, 0 * x], 1), tilt)
 
 
-@MAKERS.family("half turn")
-def _half_turn(rng: np.random.Generator, n: int) -> Cases:
-    """Contacts and offsets at +-180 deg from the deepest line and at +-0, where atan2 jumps."""
-    k = draw.count(n)
-    shapes = draw.shapes(rng, k, half_angle=np.pi - 10.0 ** rng.uniform(-8, 0, k))
-    shape = draw.spread(n, k)
-    angle = rng.choice([-np.pi, np.pi, 0.0], n) + draw.powers(rng, n, -17, -2)
-    rho = shapes.R[shape] * rng.choice([1.0, 1.0, 0.5, 1e-9], n) - shapes.r[shape] * rng.choice([0.0, 1.0], n)
-    x, y = rho * np.sin(angle), -rho * np.cos(angle)
-    x = np.where(rng.random(n) < 0.3, rng.choice([0.0, -0.0, 5e-324, -5e-324], n), x)
-    y = np.where(rng.random(n) < 0.1, rng.choice([0.0, -0.0], n), y)
-    d = np.stack([draw.powers(rng, n, -15, -1, 0.6) for _ in range(2)] + [rng.choice([-1.0, 1.0], n)], 1)
-    return draw.free(rng, shapes, shape, np.stack([x, y, rng.choice([0.0, -0.0], n)], 1), d)
-
-
 @MAKERS.family("embedded")
 def _embedded(rng: np.random.Generator, n: int) -> Cases:
     """Wires wholly inside the material, or their axis inside it: contained is a hit."""
@@ -193,28 +178,6 @@ def _ties(rng: np.random.Generator, n: int) -> Cases:
     lean = rng.choice([0.0, 1e-9, 1e-3, 0.3, 1.5707963267948966], n) + draw.powers(rng, n, -16, -9)
     d = np.stack([np.sin(lean) * np.cos(angle), np.sin(lean) * np.sin(angle), np.cos(lean)], 1)
     return draw.free(rng, shapes, shape, np.stack([off(), y, z + off()], 1), d)
-
-
-@MAKERS.family("tilted in the groove")
-def _tilted(rng: np.random.Generator, n: int) -> Cases:
-    """Wire turned in the groove's bottom plane until its ends meet the walls.
-
-    Clearance R - (L/2 tan t + r / cos t) for half angles from 90 deg: the wire's side meets the end arcs.
-    """
-    k = draw.count(n)
-    R = 10.0 ** rng.uniform(0, 2, k)
-    given = {"L": R * rng.uniform(1, 10, k), "length": R * 40.0, "r": R * (1.0 - 10.0 ** rng.uniform(-4, -0.5, k))}
-    shapes = draw.shapes(rng, k, R=R, half_angle=rng.uniform(1.2, 2.6, k), **given)
-    shape = draw.spread(n, k)
-    Rn, rn, H = R[shape], shapes.r[shape], shapes.L[shape] / 2
-    angle = np.zeros(n)  # H sin t + r = R cos t, by a few Newton steps
-    for _ in range(30):
-        angle -= (H * np.sin(angle) + rn - Rn * np.cos(angle)) / (H * np.cos(angle) + Rn * np.sin(angle))
-    angle = angle * (1.0 + draw.powers(rng, n, -15, -1))
-    turn = rng.choice([0.0, 0.0, 0.5, 1.0], n) * rng.uniform(-np.pi, np.pi, n)
-    d = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)], 1)
-    centre = np.stack([Rn * draw.powers(rng, n, -12, -3, 0.6) for _ in range(3)], 1)
-    return draw.free(rng, shapes, shape, centre, d)
 
 
 @MAKERS.family("crossed")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -33,18 +32,6 @@ def _sizes(rng: np.random.Generator, n: int) -> Cases:
     return draw.touching(rng, n, shapes, (-15, -1))
 
 
-@MAKERS.family("metres")
-def _metres(rng: np.random.Generator, n: int) -> Cases:
-    """A clamp in metres in place of millimetres: R 5e-3 ... 5e-2, gaps of 1e-7 ... 1e-4."""
-    k = draw.count(n)
-    R = rng.uniform(5e-3, 5e-2, k)
-    given = {"r": R * rng.uniform(0.5, 0.99, k), "L": R * rng.uniform(1, 8, k), "length": R * rng.uniform(1, 20, k)}
-    shapes = draw.shapes(rng, k, R=R, **given)
-    shape, feature = draw.spread(n, k), rng.choice(draw.FEATURES, n)
-    gap = draw.powers(rng, n, -7, -4)
-    return draw.place(rng, shapes, shape, draw.contact_on(rng, shapes, shape, feature), gap)
-
-
 @MAKERS.family("mixed sizes")
 def _mixed_sizes(rng: np.random.Generator, n: int) -> Cases:
     """Wire and groove, or length and radius, different by 1e-6 ... 1e6."""
@@ -67,32 +54,6 @@ def _far(rng: np.random.Generator, n: int) -> Cases:
     world = draw.poses_from_axes(rng, away, rng.normal(size=(n, 3)))
     exact = np.asarray(world, Extended) @ np.asarray(near.T_world_wire, Extended)
     return replace(near, T_world_wire=np.asarray(exact, np.float64), gap=np.full(n, np.nan), T_world_groove=world)
-
-
-@MAKERS.family("far wire")
-def _far_wire(rng: np.random.Generator, n: int) -> Cases:
-    """A long wire whose middle is 1e3 ... 1e6 mm away and whose side still touches."""
-    k = draw.count(n)
-    shapes = draw.shapes(rng, k, length=10.0 ** rng.uniform(3, 6.3, k))
-    return draw.touching(rng, n, shapes, (-9, -1), tilt=(-6, 0.5, 0.1))
-
-
-@MAKERS.family("vanishing sizes")
-def _vanishing(rng: np.random.Generator, n: int) -> Cases:
-    """Groove length, wire length or wire radius down to 1e-12 of the rest."""
-    k = draw.count(n)
-    R = 10.0 ** rng.uniform(0, 2, k)
-    which = rng.integers(3, size=k)
-    tiny = R * 10.0 ** rng.uniform(-12, -3, k)
-    base = draw.shapes(rng, k, R=R)
-    shrunk: dict[str, Any] = {
-        name: np.where(which == i, tiny, getattr(base, name)) for i, name in enumerate(("L", "r", "length"))
-    }
-    shapes = replace(base, **shrunk)
-    shape, feature = draw.spread(n, k), rng.choice(draw.FEATURES, n)
-    gap = shapes.R[shape] * draw.powers(rng, n, -12, -1)
-    gap = np.where(gap < -0.5 * shapes.r[shape], -gap, gap)
-    return draw.place(rng, shapes, shape, draw.contact_on(rng, shapes, shape, feature), gap)
 
 
 @MAKERS.family("poses barely rigid")

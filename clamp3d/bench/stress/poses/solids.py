@@ -1,6 +1,6 @@
 """Families of a flat-ended cylinder against finite bodies: boxes, plates with a hole, other cylinders.
 
-Each case is a contact of two features, made from the bodies' definition, at a small gap or overlap. The truth is an
+Each case is a contact of two features at a small gap or overlap. The truth is an
 interval of the signed distance: apart that of the branch and bound of `flat_truth`; in an overlap the depth is at least
 that of the deepest point inside, and at most what parts the bodies in any of many directions.
 """
@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 from clamp3d.bench.stress.family import Methods
 from clamp3d.bench.stress.outcome import REFERENCE
 from clamp3d.bench.stress.poses import draw
-from clamp3d.bench.stress.poses.cases import unit_rows
 from clamp3d.bench.stress.poses.flat import MAX_BOXES, NARROW, FlatFamily
 from clamp3d.bench.stress.poses.flat_truth import solid_truth
 from clamp3d.bench.stress.worker import Measured, Measures, Rows
 from clamp3d.collide.distance import distance
 from clamp3d.collide.model import ModelCache
 from clamp3d.core import shapes
-from clamp3d.core.pose import Array
+from clamp3d.core.pose import Array, rotation
 from clamp3d.core.primitives import Cylinder
 from clamp3d.core.shapes import Solid
 from clamp3d.testing import assert_distance, directions
@@ -67,43 +66,23 @@ class Solids(Rows):
         return Cylinder(float(self.r[i]), float(self.length[i]))
 
 
-def _normals(rng: np.random.Generator, n: int) -> Array:
-    """Unit vectors (n, 3), a third along an axis, a third square to one: normals of faces, edges and corners."""
-    v = rng.normal(size=(n, 3))
-    kept, kind = np.argsort(rng.random((n, 3)), axis=1), rng.random(n)
-    v[kept == 0] = np.where(np.abs(v[kept == 0]) < 1e-3, 1.0, v[kept == 0])
-    v[(kept > 0) & (kind < 1 / 3)[:, None]] = 0.0
-    v[(kept == 2) & (kind < 2 / 3)[:, None]] = 0.0
-    return np.asarray(unit_rows(v), np.float64)
-
-
-def _on_block(rng: np.random.Generator, half: Array, normal: Array) -> Array:
-    """Points (n, 3) of blocks that are farthest along ``normal``."""
-    return np.where(normal == 0.0, half * rng.uniform(-1.0, 1.0, half.shape), half * np.sign(normal))
-
-
-def _on_cylinder(rng: np.random.Generator, r: Array, half: Array, normal: Array) -> Array:
-    """The same of cylinders."""
-    n = len(r)
-    across = np.hypot(normal[:, 0], normal[:, 1])
-    turn, part = rng.uniform(0.0, 2.0 * math.pi, n), np.sqrt(rng.random(n))
-    disc = (r * part)[:, None] * np.stack([np.cos(turn), np.sin(turn)], 1)
-    rim = r[:, None] * normal[:, :2] / np.where(across > 0.0, across, 1.0)[:, None]
-    z = np.where(normal[:, 2] == 0.0, half * rng.uniform(-1.0, 1.0, n), half * np.sign(normal[:, 2]))
-    return np.column_stack([np.where((across > 0.0)[:, None], rim, disc), z])
-
-
-def _frames(rng: np.random.Generator, normal: Array) -> Array:
-    """Rotations (n, 3, 3) whose first column is ``normal``, turned at random about it."""
-    u = np.asarray(unit_rows(np.cross(normal, rng.normal(size=normal.shape))), np.float64)
-    return np.stack([normal, u, np.cross(normal, u)], 2)
+def _turned(rng: np.random.Generator) -> Array:
+    """A pose (4, 4) turned at random: anyhow, about one axis of the body, or along its axes."""
+    T = rotation(rng.normal(size=3), rng.uniform(0.0, math.pi))
+    kind = rng.random()
+    if kind < 2 / 3:
+        T = rotation(np.eye(3)[rng.integers(3)], rng.uniform(0.0, math.pi) if kind < 1 / 3 else 0.0)
+        T = T @ rotation(np.eye(3)[rng.integers(3)], 0.5 * math.pi * int(rng.integers(4)))
+    return T
 
 
 def _cases(rng: np.random.Generator, n: int, kind: str) -> Solids:
+    """Cylinders anywhere about a body, moved along the normal that the engine tells until they are at a small gap.
+
+    The engine only chooses where a case is: its truth is found from the bodies as they stand then.
+    """
     k = draw.count(n)
-    shape = draw.spread(n, k)
-    half = 10.0 ** rng.uniform(0.0, 1.5, (k, 3))
-    radius = np.zeros(k)
+    half, radius = 10.0 ** rng.uniform(0.0, 1.5, (k, 3)), np.zeros(k)
     r, length = 10.0 ** rng.uniform(0.0, 1.3, k), 10.0 ** rng.uniform(0.0, 2.0, k)
     if kind == "cylinder":
         radius = half[:, 0].copy()
@@ -111,28 +90,19 @@ def _cases(rng: np.random.Generator, n: int, kind: str) -> Solids:
     if kind == "hole":
         radius = half[:, :2].min(1) * rng.uniform(0.2, 0.9, k)
         r = radius * np.where(rng.random(k) < 0.7, rng.uniform(0.3, 0.999, k), rng.uniform(1.0, 3.0, k))
-    half, radius, r, length = half[shape], radius[shape], r[shape], length[shape]
-    normal = _normals(rng, n)
-    q = _on_block(rng, half, normal) if kind != "cylinder" else _on_cylinder(rng, radius, half[:, 2], normal)
-    if kind == "hole":  # most touch the wall of the hole or its rims
-        wall = rng.random(n) < 0.8
-        turn = rng.uniform(0.0, 2.0 * math.pi, n)
-        out = np.stack([np.cos(turn), np.sin(turn), np.zeros(n)], 1)
-        up = np.where(rng.random(n) < 0.5, rng.uniform(0.0, math.pi / 2, n), 0.0)
-        end = rng.choice([-1.0, 1.0], n)
-        z = np.where(up > 0.0, end, rng.uniform(-1.0, 1.0, n)) * half[:, 2]
-        at_wall = radius[:, None] * out + z[:, None] * [0.0, 0.0, 1.0]
-        q = np.where(wall[:, None], at_wall, q)
-        inward = np.cos(up)[:, None] * -out + (end * np.sin(up))[:, None] * [0.0, 0.0, 1.0]
-        normal = np.where(wall[:, None], inward, normal)
-    own = _normals(rng, n)
-    p = _on_cylinder(rng, r, 0.5 * length, own)
-    turned = _frames(rng, -normal) @ np.swapaxes(_frames(rng, own), 1, 2)
-    gap = r * draw.powers(rng, n, -12, -1)
-    T = np.tile(np.eye(4), (n, 1, 1))
-    T[:, :3, :3] = turned
-    T[:, :3, 3] = q + gap[:, None] * normal - (turned @ p[:, :, None])[:, :, 0]
-    return Solids(kind != "cylinder", half, radius, r, length, T, shape)
+    shape = draw.spread(n, k)
+    T = np.array([_turned(rng) for _ in range(n)])
+    cases = Solids(kind != "cylinder", half[shape], radius[shape], r[shape], length[shape], T, shape)
+    # Most cylinders at a plate are put into its hole or across its rims.
+    about = np.where(rng.random(n) < 0.7, radius[shape], 0.0) if kind == "hole" else np.zeros(n)
+    reach = np.where(about[:, None] > 0.0, about[:, None] * [0.3, 0.3, 0.0] + cases.half * [0.0, 0.0, 1.0], cases.half)
+    T[:, :3, 3] = rng.uniform(-1.0, 1.0, (n, 3)) * (reach + np.where(about > 0.0, 0.0, r[shape])[:, None])
+    gap, cache = cases.r * draw.powers(rng, n, -12, -1), ModelCache()
+    for i in range(n):
+        near = distance(cases.body(i), cases.cylinder(i), T[i], cache=cache)
+        if near.normal is not None and math.isfinite(near.lower):
+            T[i, :3, 3] += (gap[i] - near.lower) * near.normal
+    return cases
 
 
 class EngineMethod:

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from clamp3d.baselines.fcl_shapes import tree
 from clamp3d.bench.stress.family import Family, Makers, Methods
-from clamp3d.bench.stress.meshes.family import METHODS, Answer, OneByOne
 from clamp3d.bench.stress.outcome import REFERENCE
-from clamp3d.bench.stress.worker import Rows
+from clamp3d.bench.stress.worker import Measured, Measures, Rows
 from clamp3d.collide.distance import distance
 from clamp3d.collide.motions import first_contact
 from clamp3d.core.mesh import make_mesh
@@ -36,6 +35,30 @@ _EARLY = 2e-4
 _OFF = 1e-6
 """A body that slides is further than this (mm) from the floor."""
 _UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Distance and its bound in mm, NaN where there is none; ``why`` it does not hold."""
+
+    distance: float
+    bound: float = math.nan
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class OneByOne:
+    """A method that answers one pair of meshes at a time."""
+
+    answer: Callable[[Contact], Answer]
+    measures: Measures = "clearance"
+
+    def measure(self, cases: Contacts) -> Measured:
+        """See `Method`."""
+        answers = [self.answer(cases[i]) for i in range(len(cases))]
+        distance, bound = np.array([(answer.distance, answer.bound) for answer in answers]).T
+        why = next((answer.why for answer in answers if answer.why), "")
+        return Measured(distance, bound, np.array([bool(answer.why) for answer in answers]), why)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,7 +234,7 @@ class ContactFamily(Family):
 
     methods: ClassVar[Methods] = {
         REFERENCE: ("the exact engine, with proven bounds", partial(OneByOne, _engine, "depth")),
-        "FCL alone": (METHODS["FCL alone"][0], partial(OneByOne, _fcl_alone)),
+        "FCL alone": ("python-fcl's triangle meshes as they are, in millimetres", partial(OneByOne, _fcl_alone)),
     }
     part = 0.1
     truth_error = 1e-10
@@ -251,4 +274,4 @@ class ContactFamily(Family):
         return "\n".join(lines)
 
 
-CONTACTS = {name: ContactFamily(name, *solid) for name, solid in MAKERS.items()}
+MESHES = {name: ContactFamily(name, *solid) for name, solid in MAKERS.items()}

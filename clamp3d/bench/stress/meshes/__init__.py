@@ -1,1 +1,0 @@
-"""Faulty meshes of a block with a groove, and good ones that are hard to read."""

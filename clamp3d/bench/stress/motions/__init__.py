@@ -1,1 +1,0 @@
-"""Families of hard motions: a wire that moves past a groove, and the least distance on its way."""
