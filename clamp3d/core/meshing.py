@@ -149,11 +149,12 @@ def _extrude(shape: Extrusion, mesh_error: float, side: Side, overlap: float = 0
         n = len(corners)
         caps = np.asarray(manifold3d.triangulate(rings))
         first = np.arange(n)
-        second = np.concatenate([np.roll(part, -1) for part in np.split(first, np.cumsum([len(r) for r in rings])[:-1])])
+        starts = np.cumsum([len(ring) for ring in rings])[:-1]
+        second = np.concatenate([np.roll(part, -1) for part in np.split(first, starts)])
         sides = [np.stack([first, second, second + n], axis=1), np.stack([first, second + n, first + n], axis=1)]
         points = np.concatenate([np.column_stack([corners, np.full(n, end)]) for end in ends])
         faces = np.concatenate([caps[:, ::-1], caps + n, *sides]).astype(np.uint64)
-        # Not by trimesh: it takes 0.4 s to import, merges vertices, and rounds them to single precision in its booleans.
+        # Not by trimesh: it takes 0.4 s to import, merges vertices, and its booleans round them to single precision.
         solid += manifold3d.Manifold(manifold3d.Mesh64(vert_properties=dot(points, shape.frame.T), tri_verts=faces))
     return solid
 
