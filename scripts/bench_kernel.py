@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 
 from clamp3d.bench.compare.peers.open_cascade import asked, axis, cylinder, together
-from clamp3d.brep.tessellate import explore
+from clamp3d.brep.open_cascade import explore
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.poses import check_poses
 from clamp3d.collide.scene import Part, Scene

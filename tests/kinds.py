@@ -19,11 +19,10 @@ TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
 """A pose that nothing is square to."""
 
 
-def box_mesh(size, error=None, point_error=None):
+def box_mesh(size, error=None):
     """The mesh of a box, with one error for all its triangles."""
     made = trimesh.creation.box(size)
-    errors = [None if e is None else np.full(12, e) for e in (error, point_error)]
-    return Surface(np.array(made.vertices), np.array(made.faces), *errors)
+    return Surface(np.array(made.vertices), np.array(made.faces), None if error is None else np.full(12, error))
 
 
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0, name="block")

@@ -308,7 +308,7 @@ def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntA
         at = uv[triangles]
         at = 0.5 * (at + np.roll(at, -1, axis=1))
         true = np.array([surface.Value(u, v).Coord() for u, v in at.reshape(-1, 2).tolist()]).reshape(-1, 3, 3)
-        return SAMPLED * np.linalg.norm(true - middles, axis=2).max(axis=1)
+        return np.asarray(SAMPLED * np.linalg.norm(true - middles, axis=2).max(axis=1))
     off = np.abs(height(kind, form.frame[k], form.size[k], middles.reshape(-1, 3))).reshape(-1, 3).max(axis=1)
     corner = float(np.abs(height(kind, form.frame[k], form.size[k], points)).max())
     return np.asarray(off + corner if kind == PLANE else SAMPLED * off + corner)

@@ -23,6 +23,7 @@ SMALLEST = 1e-6
 
 Length = Annotated[float, Meta(ge=SMALLEST, lt=1e5)]
 Offset = Annotated[float, Meta(gt=-1e5, lt=1e5)]
+Load = Annotated[float, Meta(gt=0.0, lt=1e9)]
 ClampPart = Literal["P1", "P2", "P3", "P4", "P5", "P6", "P7"]
 """Names of a clamp's parts, as files may give them."""
 PartName: TypeAlias = str
@@ -213,6 +214,17 @@ class Joints:
 
 @checked
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What a tightening is measured by, where it is given: the most ``bolt_force`` in N, the most ``line_load`` on a
+    wire in N/mm, and the ``wire_pull`` in N that each wire must hold lengthwise."""
+
+    bolt_force: Load | None = None
+    line_load: Load | None = None
+    wire_pull: Load | None = None
+
+
+@checked
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Clamp:
     """A parallel groove clamp with its two wires, connection matrix and assembly sequence."""
 
@@ -228,6 +240,7 @@ class Clamp:
     bolt: Bolt
     nut: Nut
     joints: Joints = Joints()
+    limits: Limits = Limits()
     connections: dict[ClampPart, dict[ClampPart, ConnectionType]]
 
     @property

@@ -61,16 +61,16 @@ def contact_forces(section: Section, final: FinalState) -> tuple[Force, ...]:
     found, total = [], 0.0
     for k in np.flatnonzero(final.multipliers):
         (a, b), push = gaps.pair[k], float(final.multipliers[k])
-        found.append(_force(q, a, b, gaps.feature[k], push * gaps.normal[k], gaps.point[k]))
+        found.append(world_force(q, a, b, gaps.feature[k], push * gaps.normal[k], gaps.point[k]))
         total += push * gaps.normal[k, 0] * ((b == "P2") - (a == "P2"))
     if not section.clamp.joints.saddle and abs(total) > 1e-9:
         down = section.down_splint(q)
-        found.append(_force(q, "P4", "P2", HELD, np.array([-total, 0.0]), (down.x, down.y)))
+        found.append(world_force(q, "P4", "P2", HELD, np.array([-total, 0.0]), (down.x, down.y)))
     return tuple(found)
 
 
-def _force(q: Array, a: PartName, b: PartName, feature: str, push: Array, at: Any) -> Force:
-    """``push`` and ``at`` are in P1's section frame, the world's origin is the line's centre."""
+def world_force(q: Array, a: PartName, b: PartName, feature: str, push: Array, at: Any) -> Force:
+    """A force from what the section knows: ``push`` (2,) and ``at`` (2,) in P1's section frame at the state ``q``."""
     size = float(np.hypot(*push))
     point = np.array([at[0] - q[0], 0.0, q[1] - at[1]])
     return Force(a, b, feature, size, point, np.array([push[0], 0.0, -push[1]]) / size)

@@ -56,10 +56,13 @@ def _bore_rod(bore: Bore, rod: Rod, a: ClosedForm, b: ClosedForm, T: Array) -> D
     assert best is not None
     local = np.einsum("nji,nj->ni", T[:, :3, :3], best.point_b - T[:, :3, 3])
     slack = MEMBER * (1.0 + np.abs(best.point_a).max(axis=1, initial=0.0))
-    on_both = (a.depth(best.point_a) >= -slack) & (b.depth(local) >= -slack)
+    on_a, on_b = a.depth(best.point_a) >= -slack, b.depth(local) >= -slack
     apart = best.lower >= 0.0
     lower = np.where(apart, best.lower, -np.inf)
-    upper = np.where(on_both & (apart | (best.upper < 0.0)), best.upper, np.inf)
+    # In an overlap the cylinder's point must lie in the body too, and is no deeper than the body's other faces allow.
+    deep = a.depth(best.point_b) - 4.0 * slack
+    upper = np.where(apart & on_a & on_b, best.upper, np.inf)
+    upper = np.where((best.upper < 0.0) & on_b & (deep > 0.0), np.maximum(best.upper, -deep), upper)
     return Distances(lower, upper, best.point_a, best.point_b, best.normal, best.method)
 
 

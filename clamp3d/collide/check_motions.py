@@ -60,7 +60,7 @@ def _row(scene: Scene, models: list[Model], poses: list[Array], motion: Motion, 
         pair = MovingPair(models[i], models[j], motion, poses[i], poses[j])
         least, t = pair.least_distance(thresholds, allowance)
         meets = least.upper <= thresholds.contact + RESOLUTION  # as the verdict counts it
-        contact_at = pair.first_time(thresholds.contact) if meets else None
+        contact_at = pair.first_time(thresholds.contact + RESOLUTION) if meets else None
     except MissingLibraryError:
         raise
     except Exception as error:  # one pair that fails is a finding, not the end of all others

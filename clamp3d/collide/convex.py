@@ -158,9 +158,10 @@ def _hulls(a: Hull, Ta: Array, b: Hull, Tb: Array, n: Array | None) -> Distance:
 
 def _proven(a: Convex, Ta: Array, b: Convex, Tb: Array, p: Array, q: Array, d: float) -> Distance:
     """Points ``p``, ``q`` of two pieces that are ``d`` mm apart, with what the slab between the pieces proves."""
-    if not 0.0 < d < np.inf:
+    size = norm(q - p)
+    if not 0.0 < d < np.inf or abs(size - d) > 1e-6 * d:  # so close that the points' difference is mostly rounding
         return Distance()
-    low, normal = _slab(a, Ta, b, Tb, (q - p)[None] / d)
+    low, normal = _slab(a, Ta, b, Tb, (q - p)[None] / size)
     if d - low > 1e-5 * (1.0 + d):  # they overlap, or another place is nearer
         return Distance(low, normal=normal)
     return Distance(low, d, p, q, normal, None, "features", "convex")

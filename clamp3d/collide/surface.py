@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.core.mesh import edges_of
+from clamp3d.core.mesh import edges_of, is_closed
 from clamp3d.core.pose import Array
 from clamp3d.core.shells import corners_of, shells
 
@@ -121,15 +121,43 @@ class Surface:
         return self.nearest(points)[0]
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
-        """Which of the points (k, 3), none of them on the surface, lie inside: winding numbers of those in the box."""
+        """Which of the points (k, 3), none of them on the surface, lie inside.
+
+        Nothing of the surface lies between a point and the triangle nearest to it, so where the nearest point is in the
+        middle of a triangle its normal says the side. For other points, and of open surfaces, winding numbers do.
+        """
+        inside = ((points > self.box[0]) & (points < self.box[1])).all(axis=1)
+        rows = np.flatnonzero(inside)
+        if not len(rows):
+            return np.asarray(inside)
+        near = np.ascontiguousarray(points[rows], dtype=np.float64)
+        behind, is_certain = self._behind_nearest(near)
+        if not is_certain.all():
+            behind[~is_certain] = self._winds_round(near[~is_certain])
+        inside[rows] = behind
+        return np.asarray(inside)
+
+    def _behind_nearest(self, points: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether points (k, 3) are behind the triangle nearest to them, and whether it is nearest in its middle."""
+        _, face, foot = self.nearest(points)
+        corners = self.vertices[self.faces[face]]
+        normal = self.normals[face]
+        sides = np.roll(corners, -1, axis=1) - corners
+        inward = np.cross(normal[:, None], sides)
+        margin = np.einsum("kij,kij->ki", foot[:, None] - corners, inward) / np.maximum((sides**2).sum(axis=2), 1e-300)
+        away = np.einsum("ki,ki->k", points - foot, normal)
+        is_certain = self._is_closed & (margin.min(axis=1) > _MIDDLE) & (np.abs(away) > 1e-9 * self.scale)
+        return away < 0.0, np.asarray(is_certain)
+
+    @cached_property
+    def _is_closed(self) -> bool:
+        return is_closed(self.faces)
+
+    def _winds_round(self, points: Array) -> NDArray[np.bool_]:
         import igl
 
-        inside = ((points > self.box[0]) & (points < self.box[1])).all(axis=1)
-        if inside.any():
-            near = np.ascontiguousarray(points[inside], dtype=np.float64)
-            winding = igl.winding_number if len(near) <= _FEW else igl.fast_winding_number
-            inside[inside] = np.abs(winding(self.vertices, self.faces, near)) > 0.5
-        return np.asarray(inside)
+        winding = igl.winding_number if len(points) <= _FEW else igl.fast_winding_number
+        return np.asarray(np.abs(winding(self.vertices, self.faces, np.ascontiguousarray(points))) > 0.5)
 
     def certain_depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside the true body at least; negative where that is not certain.
@@ -159,6 +187,8 @@ class Surface:
         return np.asarray(corner[self.faces].max(axis=1))
 
 
+_MIDDLE = 1e-4
+"""How far from a triangle's sides, relative to these, a nearest point counts as in its middle."""
 _FEW = 8
 """Points up to which the exact sum over all triangles is quicker than the tree of the fast winding number."""
 

@@ -97,7 +97,7 @@ class Thresholds:
     def verdicts(self, lower: Array, upper: Array, allowance: float | None = None) -> NDArray[np.int8]:
         """The places in VERDICTS of many distances by their bounds (n,), each as `verdict` gives it."""
         sharp = upper - lower <= 2.0 * RESOLUTION
-        middle = 0.5 * (lower + upper)
+        middle = np.where(sharp, upper, 0.0) + 0.5 * np.where(sharp, lower - upper, 0.0)
         low, high = self._places(np.where(sharp, middle, lower)), self._places(np.where(sharp, middle, upper))
         plain = np.where(low == high, low, _PLACE[Verdict.UNCERTAIN])
         if allowance is None:

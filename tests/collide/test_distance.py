@@ -10,10 +10,8 @@ from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.parts import parts
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.batch import by_kernel, exact
 from clamp3d.collide.check import check
 from clamp3d.collide.distance import distance, distances, measure
-from clamp3d.collide.model import ModelCache
 from clamp3d.collide.motions import first_contact, min_clearance
 from clamp3d.collide.result import CheckResult, PairResult
 from clamp3d.collide.scene import Part, Scene
@@ -28,7 +26,7 @@ from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.core.profile import Profile
 from clamp3d.errors import InputError
-from clamp3d.testing import body, common, separation
+from clamp3d.testing import common
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
@@ -243,28 +241,6 @@ def test_witnesses_lie_on_the_bodies_where_meshes_decide():
     assert np.hypot(*d.point_a[:2]) == pytest.approx(5.0, abs=1e-9)
     x, y, z = np.linalg.inv(T)[:3] @ [*d.point_b, 1.0]
     assert max(math.hypot(x, y) - 1.5, abs(z) - 0.25) <= 1e-9
-
-
-def test_many_poses_of_flat_ends_in_a_hole_are_measured_at_once():
-    """A disc on edge beside or in a hole touches with its rims, which the batch knows as the single call does."""
-    rng = np.random.default_rng(3)
-    plate, disc = shapes.box((40.0, 40.0, 10.0), holes=[shapes.Hole(8.0)]), shapes.cylinder(3.0, 4.0)
-    T = np.array(
-        [
-            translation(*rng.uniform(-2.0, 2.0, 3)) @ rotation(rng.normal(size=3), rng.uniform(0.0, 3.0))
-            for _ in range(12)
-        ]
-    )
-    found, cache = distances(plate, disc, T), ModelCache()
-    known = by_kernel(cache.model(plate), cache.model(disc), T)
-    settled = exact(known)
-    assert settled.sum() >= 11
-    for k in range(len(T)):
-        truth = separation(body(plate), body(disc).at(T[k]), cells=2000)
-        assert found.lower[k] <= truth.upper + 1e-9
-        assert found.upper[k] >= truth.lower - 1e-9
-        if settled[k]:
-            assert distance(plate, disc, T[k], cache=cache).value == pytest.approx(known.value[k], abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import pickle
-import sys
-import time
-from concurrent.futures import ThreadPoolExecutor
 from copy import copy, deepcopy
 from dataclasses import replace
-from threading import Barrier
 
 import numpy as np
 import pytest
@@ -85,57 +81,6 @@ def test_against_scenes_made_at_once(steps):
             grown.append((new, new.parts, allowed, clearance))
     for scene, parts, allowed, clearance in grown:
         agrees(scene, parts, allowed, clearance)
-
-
-def references(n: int) -> int:
-    """Places that refer to the parts of ``n`` scenes which each add one, to their names, and to what may touch."""
-    scenes = [Scene()]
-    for k in range(n):
-        scenes.append(scenes[-1].add("".join(("part", str(k))), BOX))
-    for k in range(n):
-        scenes.append(scenes[-1].allow((f"part{k}", f"part{(k + 1) % n}")))
-    last = scenes[-1]
-    return sum(map(sys.getrefcount, (*last.parts, *last.allowed, *(part.name for part in last.parts))))
-
-
-def test_nothing_is_copied_for_one_more():
-    assert references(400) <= 1.01 * 4 * references(100)
-
-
-def test_of_two_scenes_that_add_to_one_neither_keeps_the_others_parts():
-    base = Scene().add("a", BOX)
-    before = sys.getrefcount(BOX)
-    base.add("b", BOX)  # which nobody keeps
-    assert sys.getrefcount(BOX) == before
-
-
-class SlowIndex(dict):
-    """Names that tell late how many they are: what another thread does in between would go unseen."""
-
-    def __len__(self) -> int:
-        n = super().__len__()
-        time.sleep(1e-3)
-        return n
-
-
-def test_threads_may_add_to_one_scene():
-    """Each of them ends with what it added, whoever came first to the names that they share."""
-    n = 4
-    for _ in range(10):
-        base, start = Scene().add("base", BOX), Barrier(n)
-        object.__setattr__(base, "_index", SlowIndex(base._index))
-
-        def grow(who: int, base: Scene = base, start: Barrier = start) -> Scene:
-            start.wait()
-            scene = base.add(f"{who}-0", BOX)
-            return scene.add(f"{who}-1", BOX)
-
-        with ThreadPoolExecutor(n) as pool:
-            for who, scene in enumerate(pool.map(grow, range(n))):
-                names = ["base", f"{who}-0", f"{who}-1"]
-                assert [part.name for part in scene.parts] == names
-                assert [scene.index(name) for name in names] == [0, 1, 2]
-                assert len(scene._index) == 3
 
 
 def test_what_is_copied_or_pickled_cannot_be_written_to_either():

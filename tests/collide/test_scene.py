@@ -17,27 +17,21 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.collide import judge
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.batch import in_frame_of_first
 from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check import check, check_full
 from clamp3d.collide.distance import distance
-from clamp3d.collide.judge import contained
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.poses import check_poses
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import RESOLUTION, VERDICTS, Thresholds, Verdict
 from clamp3d.core import shapes
-from clamp3d.core.linear import to_target
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.meshing import mesh
 from clamp3d.core.motion import Motion
-from clamp3d.core.pose import inverse, rotation, translation
+from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
-from clamp3d.testing import body
-from tests.kinds import faceted_shape
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -273,54 +267,6 @@ def test_poses_inside_are_contained_as_a_check_says():
             one = check(scene.moved({part: T}))
             assert [one.verdict(part, name).value for name in sweep.others] == sweep.verdict[k].tolist()
         assert {"contained", "clash", "clear"} <= set(sweep.verdict.ravel())
-
-
-@pytest.mark.parametrize("facets", [False, True])
-@pytest.mark.parametrize("small", [shapes.box((9.0, 7.0, 5.0)), shapes.cylinder(3.0, 12.0)], ids=["box", "pin"])
-@pytest.mark.parametrize("large", [shapes.box((20.0, 24.0, 16.0)), shapes.cylinder(11.0, 18.0)], ids=["box", "rod"])
-def test_contained_is_what_stands_out_by_no_more_than_the_contact(large, small, facets):
-    """By the corners of a fine mesh of the one on the other's definition; in between is what their chords are off."""
-    rng, cache = np.random.default_rng(8), ModelCache()
-    T = np.array([rotation(rng.normal(size=3), rng.choice([0.0, 0.5, 2.0])) for _ in range(60)])
-    T[:, :3, 3] = rng.normal(size=(60, 3)) * (5.0, 5.0, 3.0)
-    a, b = (cache.model(faceted_shape(x, 0.02) if facets else x) for x in (large, small))
-    found = contained(a, b, in_frame_of_first(T), Thresholds())
-    assert np.array_equal(found, contained(b, a, in_frame_of_first(inverse(T)), Thresholds()))
-    corners = mesh(small, 0.001).vertices
-    out = np.array([body(large).field(to_target(P, corners)).max() for P in T])
-    assert found[out <= 0.0].all()
-    assert not found[out > 0.3].any()
-    assert 5 <= found.sum() <= 50
-
-
-def test_contained_along_the_diagonal_and_within_the_contact():
-    """A rod longer than the box's sides fits along its diagonal; a box as large fits, and 0.008 mm beside its place."""
-    cache, box = ModelCache(), shapes.box((20.0, 24.0, 16.0))
-    way = np.array([20.0, 24.0, 16.0])
-    T = rotation(np.cross([0.0, 0.0, 1.0], way), math.acos(16.0 / np.linalg.norm(way)))
-    rod = shapes.cylinder(0.5, 28.0)
-    assert contained(cache.model(box), cache.model(rod), in_frame_of_first(T[None]), Thresholds()).all()
-    places = np.array([translation(x, 0.0, 0.0) for x in (0.0, 0.008, -0.008, 0.012, -0.1)])
-    same = cache.model(shapes.box((20.0, 24.0, 16.0), name="same"))
-    found = contained(cache.model(box), same, in_frame_of_first(places), Thresholds())
-    assert found.tolist() == [True, True, True, False, False]
-
-
-@pytest.mark.parametrize(
-    ("length", "asked"),
-    [(80.0, False), (40.0, True)],
-    ids=["longer than the block's diagonal, and of less volume", "shorter than the block"],
-)
-def test_containment_is_asked_where_sizes_leave_it_open(length, asked, monkeypatch):
-    """Of the clash of a wire in its groove: neither part fits in the other's box if the wire is long."""
-    seen = []
-    monkeypatch.setattr(judge, "within", lambda *pair: seen.append(pair) or False)
-    monkeypatch.setattr(judge, "_fits", lambda inner, outer, T: seen.append(inner.name) or np.ones(len(T), dtype=bool))
-    block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 20.0)
-    scene = Scene().add("block", block).add("wire", shapes.cylinder(6.5, length))
-    sweep = check_poses(scene, "wire", np.array([translation(0.0, y, 0.0) for y in (-0.6, -5.0, 0.0)]))
-    assert sweep.worst.tolist() == ["clash", "clash", "clear"]
-    assert [name for name in seen if isinstance(name, str)] == (["cylinder"] if asked else [])
 
 
 @pytest.mark.parametrize("allowance", [None, 0.0, 0.3])

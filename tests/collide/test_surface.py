@@ -12,20 +12,23 @@ from hypothesis import strategies as st
 from shapely import Polygon
 
 from clamp3d.collide.check import check
-from clamp3d.collide.meshes import meshes_distance, surface_distance
-from clamp3d.collide.model import ModelCache, _bulge
+from clamp3d.collide.mesh_distance import meshes_distance, surface_distance
+from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.surface import Surface, at_edges
 from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.kernel_winding import crossings
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import SweptArc
 from clamp3d.core.profile import Profile
-from clamp3d.core.shells import corners_of, winding_number
+
+
+def SHARP(found):
+    return found.upper - found.lower < 1e-7
+
 
 BRACKET = trimesh.creation.extrude_polygon(Polygon([(0, 0), (40, 0), (40, 5), (5, 5), (5, 30), (0, 30)]), 20)
 
@@ -46,14 +49,6 @@ def test_nearest_point_of_a_mesh_is_exact(point):
     assert np.linalg.norm(foot - feet[face]) < 1e-9
 
 
-def test_a_group_of_slivers_has_no_nearest_point():
-    line = Surface(np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)]), np.array([(0, 1, 2)]))
-    assert line.distance(np.ones((2, 3))).tolist() == [np.inf, np.inf]
-
-
-GROOVED = shapes.groove_block(
-    SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0, holes=[shapes.Hole(2.0, (13.0, -10.0))]
-)
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 PARTS = (
     shapes.cylinder(5.0, 20.0),
@@ -94,14 +89,14 @@ def test_bounds_of_meshes_hold_at_any_angle(tilt, turn, gap, error):
     reach = 10.0 * math.cos(tilt) + 5.0 * math.sin(tilt)
     T = translation(0.0, 0.0, 2.0 + reach + gap) @ R
     cache = ModelCache()
-    found = meshes_distance(cache.model(plate), cache.model(tube), T, error)
+    found = meshes_distance(cache.model(plate), cache.model(tube), T, error, SHARP)
     assert found.lower <= gap + 1e-9
     assert found.upper >= gap - 1e-9
     if found.point_b is not None and gap > 0.0:
         assert abs(found.point_a[2]) <= 2.0 + 1e-9
 
 
-@pytest.mark.parametrize("fit", ["off", "bound", "round"])
+@pytest.mark.parametrize("fit", ["off", "round"])
 def test_a_box_on_the_inner_face_of_a_bracket_touches(fit):
     scene = (
         Scene().add("bracket", mesh_shape(BRACKET, fit)).add("box", shapes.box((10, 10, 10)), translation(20, 10, 10))
@@ -124,7 +119,7 @@ def test_gaps_and_overlaps_of_concave_meshes_are_decided(size, apart, turn):
     right = Verdict.CLEARANCE if gap > 0.01 else Verdict.CONTACT if gap >= -0.01 else Verdict.CLASH
     assert row.verdict is right or abs(abs(gap) - 0.01) < 2e-6
     cache = ModelCache()
-    found = meshes_distance(cache.model(bracket), cache.model(box), np.linalg.inv(place) @ T_box, 0.5)
+    found = meshes_distance(cache.model(bracket), cache.model(box), np.linalg.inv(place) @ T_box, 0.5, SHARP)
     assert found.lower - 1e-8 <= gap <= found.upper + 1e-8
     assert found.upper - found.lower < 1e-6
 
@@ -155,11 +150,11 @@ def test_a_mesh_wholly_inside_another_overlaps_and_one_in_its_cavity_does_not():
     )
     small = Surface(np.array(ball.vertices), np.array(ball.faces))
     for a, b, T in ((full, small, translation(2, 0, 0)), (small, full, translation(-2, 0, 0))):
-        found = surface_distance(a, b, T)
+        found = surface_distance(a, b, T, SHARP)
         assert found.upper < -6.0
-    apart = surface_distance(hollow, small, translation(0, 0, 1))
+    apart = surface_distance(hollow, small, translation(0, 0, 1), SHARP)
     assert apart.lower == pytest.approx(3.0, abs=0.1)
-    assert surface_distance(hollow, small, translation(7.5, 0, 0)).upper < 0.0
+    assert surface_distance(hollow, small, translation(7.5, 0, 0), SHARP).upper < 0.0
 
 
 def test_flat_faces_of_a_part_with_a_hole_stay_exact():
@@ -168,14 +163,14 @@ def test_flat_faces_of_a_part_with_a_hole_stay_exact():
         [trimesh.creation.box((40, 40, 10)), trimesh.creation.cylinder(6.0, 30.0, sections=24)], engine="manifold"
     )
     scene = (
-        Scene().add("plate", mesh_shape(plate, "bound")).add("box", shapes.box((8, 8, 8)), translation(15, 15, 9.05))
+        Scene().add("plate", mesh_shape(plate, "round")).add("box", shapes.box((8, 8, 8)), translation(15, 15, 9.05))
     )
     (row,) = check(scene).pairs
     assert row.verdict is Verdict.CLEAR
     scene = Scene(clearance=1.0, parts=scene.parts)
     (row,) = check(scene).pairs
     assert row.verdict is Verdict.CLEARANCE
-    assert row.distance.upper - row.distance.lower < 1e-6
+    assert row.distance.upper - row.distance.lower < 1e-5
 
 
 @settings(max_examples=40, deadline=None)
@@ -195,32 +190,6 @@ def test_error_at_a_knife_edge_reaches_the_true_edge(wedge):
     assert error[~top].max() == 0.0
 
 
-TINY = st.floats(-7.0, 7.0) | st.floats(-1e-11, 1e-11) | st.sampled_from([-6.0, -1.0, 0.0, 1.0, 2.0])
-
-
-@settings(max_examples=200, deadline=None)
-@given(
-    shape=st.sampled_from(["ball", "ring", "bracket", "two boxes that cross"]),
-    points=st.lists(st.tuples(TINY, TINY, TINY), min_size=1, max_size=20),
-)
-def test_winding_numbers_are_the_sums_of_solid_angles(shape, points):
-    """Also straight below edges, and just beside a plane of symmetry, where libigl 2.6 errs."""
-    made = {
-        "ball": trimesh.creation.icosphere(subdivisions=2, radius=6.0),
-        "ring": trimesh.creation.torus(5.0, 2.0, major_sections=16, minor_sections=8),
-        "bracket": BRACKET,
-        "two boxes that cross": trimesh.util.concatenate(
-            [trimesh.creation.box((8, 8, 8)), trimesh.creation.box((4, 4, 14))]
-        ),
-    }[shape]
-    surface = Surface(np.array(made.vertices), np.array(made.faces))
-    x = np.array(points)
-    x = x[surface.distance(x) > 1e-9]
-    whole = np.array([winding_number(corners_of(surface.vertices, surface.faces), point) for point in x])
-    assert np.abs(surface.winding_numbers(x) - whole).max(initial=0.0) <= 1e-6
-    assert (surface.contains(x) == (whole > 0.5)).all()
-
-
 def test_large_convex_meshes_are_asked_as_meshes_and_their_depth_is_found():
     """A hull of so many faces takes gigabytes; the true balls overlap by 0.1 mm, their facets by up to 0.03 less."""
     ball = mesh_shape(trimesh.creation.icosphere(subdivisions=5, radius=10.0))
@@ -231,27 +200,3 @@ def test_large_convex_meshes_are_asked_as_meshes_and_their_depth_is_found():
     assert row.verdict is Verdict.CLASH
     assert -0.1 <= row.distance.lower <= row.distance.upper <= -0.07
     assert row.distance.upper - row.distance.lower <= 0.01
-
-
-def test_triangles_in_a_row_are_all_found():
-    """As wide as the widest, and asked at the far end: the first of those that count is just not passed over."""
-    for n in range(1, 40):
-        low = np.arange(n, dtype=float)
-        corners = np.tile([0.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0], (n, 1))
-        corners[:, ::3] += low[:, None]
-        points, found = np.column_stack([low + 0.99, np.zeros(n), np.zeros(n)]), np.empty(n)
-        crossings(corners, low, 1.0, points, 1.0, found)
-        assert (found == 1.0).all()
-
-
-@pytest.mark.parametrize(
-    "made", [trimesh.creation.cylinder(6.0, 20.0, sections=24), trimesh.creation.icosphere(3, 5.0)]
-)
-def test_bulge_between_facets_is_the_sagitta_of_their_bend(made):
-    """Of a cylinder's strips the sagitta of a chord; of others as trimesh's angles and areas say."""
-    shape = mesh_shape(made, "round")
-    facets = trimesh.Trimesh(shape.mesh.vertices, shape.mesh.faces, process=False)
-    length = np.linalg.norm(np.diff(facets.vertices[facets.face_adjacency_edges], axis=1)[:, 0], axis=1)
-    angle, wide = facets.face_adjacency_angles, 2.0 * facets.area_faces[facets.face_adjacency].max(axis=1) / length
-    smooth = (angle > 1e-6) & (angle < np.radians(65.0))
-    assert _bulge(shape) == pytest.approx((0.5 * wide * np.tan(0.25 * angle))[smooth].max(), rel=1e-6)

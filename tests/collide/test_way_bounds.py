@@ -178,10 +178,3 @@ def test_a_thin_plate_is_met_wherever_on_the_way_it_stands(when, length, thick, 
     assert least.distance.lower <= gap + 1e-9
     assert least.distance.upper >= gap - 1e-9
     assert least.distance.upper <= 1.03 * gap + 1e-3
-
-
-def test_both_meshes_may_be_off_by_what_they_state():
-    box = faceted_shape(shapes.box((10.0, 10.0, 10.0)), 0.3).mesh
-    a, b = (CACHE.model(shapes.MeshShape(box, "off", name, error)) for name, error in (("a", 0.3), ("b", 0.4)))
-    pair = MovingPair(a, b, Motion.translate((0.0, 0.0, 0.0)), np.eye(4), translation(15.0, 0.0, 0.0))
-    assert pair.by_meshes(0.0, 0.0, 10.0) == pytest.approx(5.0 - 0.3 - 0.4, abs=1e-6)

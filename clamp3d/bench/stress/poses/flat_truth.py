@@ -29,7 +29,7 @@ class Wire(NamedTuple):
 
 
 class Material(NamedTuple):
-    """What of the box from ``low`` to ``high`` (x, y, z) is outside a circle of the radius if ``hollow``, else inside."""
+    """What of the box from ``low`` to ``high`` (x, y, z) is outside a circle if ``hollow``, else inside it."""
 
     radius: float
     hollow: bool

@@ -1,0 +1,385 @@
+"""The friction band: between which splint distances a clamp stays where it is, if its wires rub in their grooves.
+
+Without friction the clamp ends in one state. With friction it stays in every state in which forces within the friction
+cones of its closed contacts balance every part. The band is of the states with all four contacts of wire and groove
+closed, both wires in the arcs, the down splint held on the bolt's axis, and friction in the grooves alone.
+
+A wire that has jammed on a lip is not looked at: it can hold the clamp further open.
+
+A wire is then pushed at two points only, so both forces lie on the line through them, which leaves either normal by the
+same angle a. The centres of its two arcs are s apart, ``s^2 = p^2 + q^2 + 2 p q cos 2a``, with p and q by which the
+radii of the arcs exceed the wire's. The state has an equilibrium if neither wire's a exceeds the friction angle
+``atan(friction)``: the sizes of the two wires' forces then balance the bolt's force and the tilt. So at each tilt
+equilibrium exists in one interval of distances.
+
+The ends of the band are found in this closed form and proven apart from it, by the section's own contacts: forces that
+balance at the end, and a little beyond it, for states at many tilts, a Farkas certificate each that no forces do
+[G. Farkas, Theorie der einfachen Ungleichungen, J. reine angew. Math. 124 (1902) 1-27].
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import bisect, linprog, nnls
+
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp.closing import CLOSING, HELD
+from clamp3d.clamp.dimensions import Clamp, Joints, PartName
+from clamp3d.clamp.final_state import solve_final_state
+from clamp3d.clamp.forces import Force, world_force
+from clamp3d.clamp.matrix import plain
+from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section, U
+from clamp3d.clamp.status import closing_status
+from clamp3d.core.pose import Array
+from clamp3d.errors import InputError, SolverError
+
+MARGIN = 1e-3
+"""How far beyond an end of the band it is proven that nothing balances, mm: the last digit that is printed."""
+CLOSED = 1e-7
+"""Gaps up to this many mm carry force."""
+BALANCED = 1e-6
+"""Largest unbalanced force of a certificate in parts of the bolt force."""
+MOST_FRICTION = 1.0
+_TILTS, _SHARES, _ROUNDS = 300, 11, 7
+"""Samples of the search: tilts to either side, distances a tilt, and how often it is narrowed."""
+_TILTS_BEYOND = 201
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NoEquilibrium:
+    """Proof that a state has no equilibrium: a motion that the bolt drives and no force of a closed contact resists.
+
+    Attributes
+    ----------
+    motion : ndarray (9,)
+        Wire centres x6, y6, x7, y7 in mm, distance, scaled tilt and height over the saddle's arc in mm (see `section`),
+        turns of both wires over their radius in mm; each at most 1.
+    drive : float
+        Work of the bolt's unit force on it, > 0.
+    resistance : float
+        Largest work of a unit force along any edge of any friction cone against it: 0 but for rounding.
+    """
+
+    motion: Array
+    drive: float
+    resistance: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class End:
+    """An end of the friction band.
+
+    Attributes
+    ----------
+    distance : float
+        Height between the splints' inner edges on the line side, mm.
+    tilt : float
+        Of the down splint, rad.
+    forces : tuple of Force
+        Contact forces per newton of bolt force that balance every part.
+    unbalanced : float
+        What they leave, N per newton of bolt force.
+    states_beyond : int
+        How many states `MARGIN` beyond the end were tried.
+    weakest : NoEquilibrium or None
+        Their certificate with the least drive; None if no state beyond has all contacts closed.
+    """
+
+    distance: float
+    tilt: float
+    forces: tuple[Force, ...]
+    unbalanced: float
+    states_beyond: int
+    weakest: NoEquilibrium | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        data = plain(self, distance="distance_mm", tilt="tilt_deg")
+        weakest = None if self.weakest is None else plain(self.weakest)
+        return data | {
+            "tilt_deg": math.degrees(self.tilt),
+            "forces": [force.to_dict() for force in self.forces],
+            "weakest": weakest,
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Band:
+    """Between which splint distances equilibrium exists with ``friction`` in the grooves."""
+
+    friction: float
+    least: End
+    greatest: End
+
+    def __contains__(self, distance: float) -> bool:
+        return self.least.distance <= distance <= self.greatest.distance
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {"friction": self.friction, "least": self.least.to_dict(), "greatest": self.greatest.to_dict()}
+
+
+@dataclass(frozen=True, slots=True)
+class _Wire:
+    """A wire and its two arcs: centre of P1's arc from P1's corner (``up``), of P2's from P2's origin (``down``), half
+    angles of both, and what each arc's radius is larger than the wire's; mm and rad, x right and y down."""
+
+    up: tuple[float, float]
+    down: tuple[float, float]
+    half_angles: tuple[float, float]
+    slack: tuple[float, float]
+
+    def separation(self, friction: float) -> float:
+        """Distance of the two arc centres at which the wire's forces are on the edges of the friction cones; mm."""
+        p, q = self.slack
+        return math.sqrt(p * p + q * q + 2.0 * p * q * math.cos(2.0 * math.atan(friction)))
+
+    def offset(self, bolt_x: float, tilt: Array) -> tuple[Array, Array]:
+        """From P1's arc centre to P2's, mm, with P2's origin at P1's height."""
+        c, s, (u, v) = np.cos(tilt), np.sin(tilt), self.down
+        return bolt_x + u * c + v * s - self.up[0], v * c - u * s - self.up[1]
+
+    def distance(self, bolt_x: float, tilt: Array, friction: float) -> Array:
+        """How far P2's origin is below P1's, mm, at the separation of a friction; NaN where it cannot be."""
+        x, y = self.offset(bolt_x, tilt)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(-y - np.sqrt(self.separation(friction) ** 2 - x * x))
+
+    def places(self, bolt_x: float, d: Array, tilt: Array) -> tuple[tuple[Array, Array, NDArray[np.bool_]], ...]:
+        """Both places of the wire's centre with both contacts closed, mm, and whether both are on the arcs."""
+        (p, q), (x, y) = self.slack, self.offset(bolt_x, tilt)
+        y = y + d
+        apart = np.maximum(np.hypot(x, y), 1e-300)
+        along = (p * p - q * q + apart * apart) / (2.0 * apart)
+        aside = np.sqrt(np.maximum(p * p - along * along, 0.0))
+        return tuple(self._place(tilt, (x, y), along / apart, side * aside / apart) for side in (-1.0, 1.0))
+
+    def _place(
+        self, tilt: Array, between: tuple[Array, Array], along: Array, aside: Array
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        x, y = between
+        right, below = along * x - aside * y, along * y + aside * x
+        in_up = np.abs(np.arctan2(right, -below)) <= self.half_angles[0]
+        dx, dy, c, s = right - x, below - y, np.cos(tilt), np.sin(tilt)
+        in_down = np.abs(np.arctan2(dx * c - dy * s, dx * s + dy * c)) <= self.half_angles[1]
+        return self.up[0] + right, self.up[1] + below, in_up & in_down
+
+
+class FrictionBand:
+    """The friction bands of a clamp.
+
+    Raises InputError for a clamp that does not hold both wires in the arcs of all four grooves.
+
+    Examples
+    --------
+    >>> from clamp3d.clamp.loader import load_clamp
+    >>> bands = FrictionBand(load_clamp())
+    >>> f"{bands.ends(0.1)[0]:.3f} to {bands.ends(0.1)[1]:.3f} mm"
+    '31.496 to 31.620 mm'
+    """
+
+    def __init__(self, clamp: Clamp) -> None:
+        self.section = Section(replace(clamp, joints=Joints()), Cas())
+        self.final = solve_final_state(self.section)
+        status = closing_status(self.section, self.final)
+        if not (status.clamped and all(seat.seated for seat in status.seats)):
+            raise InputError(f"friction band: needs both wires in the arcs of all four grooves, got {status.text!r}")
+
+    @property
+    def distance(self) -> float:
+        """Splint distance without friction, mm."""
+        return self.section.splint_distance(self.final.q)
+
+    @cached_property
+    def _wires(self) -> tuple[_Wire, ...]:
+        return tuple(self._wire(wire) for wire in WIRES)
+
+    def _wire(self, wire: PartName) -> _Wire:
+        up, down = self.section.pairs["P1", wire], self.section.pairs["P2", wire]
+        (xu, yu), (xd, yd) = ((float(p.T_a_groove[0, 3]), -float(p.T_a_groove[2, 3])) for p in (up, down))
+        radius = up.cylinder.radius
+        slack = up.groove.radius - radius, down.groove.radius - radius
+        return _Wire((xu, yu), (xd, yd), (up.groove.half_angle, down.groove.half_angle), slack)
+
+    def ends(self, friction: float) -> tuple[float, float]:
+        """The least and the greatest splint distance at which equilibrium exists, mm, without certificates."""
+        least, greatest = (self._extreme(_friction(friction), sense) for sense in (1.0, -1.0))
+        return least[0], greatest[0]
+
+    def band(self, friction: float) -> Band:
+        """The band of a friction with certificates at both ends. Raises SolverError if they cannot be had."""
+        friction = _friction(friction)
+        least, greatest = (self._end(friction, sense) for sense in (1.0, -1.0))
+        return Band(friction, least, greatest)
+
+    def friction_for(self, distance: float) -> float | None:
+        """The least friction whose band holds a splint distance; None if none up to `MOST_FRICTION` does."""
+        below = distance < self.distance
+
+        def lacking(friction: float) -> float:
+            if friction == 0.0:
+                return -abs(distance - self.distance)
+            least, greatest = self.ends(friction)
+            return distance - least if below else greatest - distance
+
+        if distance == self.distance:
+            return 0.0
+        return float(bisect(lacking, 0.0, MOST_FRICTION, xtol=1e-5)) if lacking(MOST_FRICTION) >= 0.0 else None
+
+    def _splint_distance(self, d: Array, tilt: Array) -> Array:
+        clamp = self.section.clamp
+        edge = clamp.down_splint.face_depth * np.cos(tilt) + self.section.lever * np.sin(tilt)
+        return np.asarray(d + edge - clamp.up_splint.thickness)
+
+    def _extreme(self, friction: float, sense: float) -> tuple[float, float, float]:
+        """Least splint distance (greatest for ``sense`` -1) of all states in equilibrium, with its d and tilt.
+
+        Tilts crowd around that without friction, which every band holds: a narrow band is not stepped over.
+        """
+        first, stop = float(self.final.q[S]) / self.section.lever, self.section.clamp.tilt_stop
+        aside = np.geomspace(1e-9, 2.0 * stop, _TILTS)
+        tilt, share = np.sort(np.concatenate([first - aside, [first], first + aside])), np.linspace(0.0, 1.0, _SHARES)
+        best = (math.inf, math.nan, first)
+        for _ in range(_ROUNDS):
+            d, valid = self._states(tilt, share, friction)
+            score = np.where(valid, sense * self._splint_distance(d, tilt[:, None]), np.inf)
+            i, j = divmod(int(score.argmin()), len(share))
+            if score[i, j] < best[0]:
+                best = float(score[i, j]), float(d[i, j]), float(tilt[i])
+            low, high = max(i - 1, 0), min(i + 1, len(tilt) - 1)
+            tilt = np.append(np.linspace(tilt[low], tilt[high], 2 * _TILTS), best[2])
+            tilt.sort()
+            near = np.linspace(share[max(j - 1, 0)], share[min(j + 1, len(share) - 1)], _SHARES)
+            share = np.unique(np.concatenate([near, [0.0, 1.0]]))
+        if not math.isfinite(best[0]):
+            raise SolverError(f"friction band: no state with friction {friction:g} was found")
+        return sense * best[0], best[1], best[2]
+
+    def _states(self, tilt: Array, share: Array, friction: float) -> tuple[Array, NDArray[np.bool_]]:
+        """Distances d (n, m) at shares (m,) of each tilt's interval (n,), and whether all contacts are closed there."""
+        clamp, bolt_x = self.section.clamp, self.section.bolt_x
+        low = np.max([wire.distance(bolt_x, tilt, 0.0) for wire in self._wires], axis=0)
+        high = np.min([wire.distance(bolt_x, tilt, friction) for wire in self._wires], axis=0)
+        d, column = low[:, None] + share * (high - low)[:, None], tilt[:, None]
+        valid = (low <= high)[:, None] & (np.abs(column) <= clamp.tilt_stop)
+        half, up = min(self.section.lever, self.section.bolt_x), clamp.up_splint.thickness
+        valid = valid & (d + clamp.down_splint.face_depth * np.cos(column) - half * np.abs(np.sin(column)) >= up)
+        for wire in self._wires:
+            valid = valid & np.any([on_arcs for _, _, on_arcs in wire.places(bolt_x, d, column)], axis=0)
+        return d, valid
+
+    def _end(self, friction: float, sense: float) -> End:
+        distance, d, tilt = self._extreme(friction, sense)
+        best, unbalanced, forces = None, math.inf, np.zeros(0)
+        for q in self._closed_states(d, tilt):
+            balance = Balance(self.section, q, friction)
+            multipliers, left = balance.forces()
+            if left < unbalanced:
+                best, unbalanced, forces = balance, left, multipliers
+        if best is None or unbalanced > BALANCED:
+            raise SolverError(f"friction band: end at {distance:.6g} mm not proven, {unbalanced:.3g} N/N are left over")
+        certificates = list(self._beyond(friction, distance - sense * MARGIN))
+        weakest = min(certificates, key=lambda proof: proof.drive - proof.resistance, default=None)
+        if weakest is not None and not weakest.drive > 1e-5 > 1e3 * weakest.resistance:
+            raise SolverError(f"friction band: beyond its end at {distance:.6g} mm a state may be in equilibrium")
+        return End(distance, tilt, best.world_forces(forces), unbalanced, len(certificates), weakest)
+
+    def _beyond(self, friction: float, distance: float) -> Iterator[NoEquilibrium]:
+        """A certificate for each state of a splint distance, all tilts, with all four contacts closed."""
+        first, stop = float(self.final.q[S]) / self.section.lever, self.section.clamp.tilt_stop
+        aside = np.geomspace(1e-6, 2.0 * stop, _TILTS_BEYOND // 2)
+        for tilt in np.concatenate([first - aside, [first], first + aside]):
+            d = distance - float(self._splint_distance(np.zeros(1), np.array([tilt]))[0])
+            for q in self._closed_states(d, float(tilt)):
+                yield Balance(self.section, q, friction).refute()
+
+    def _closed_states(self, d: float, tilt: float) -> Iterator[Array]:
+        """States (10,) of the section at d and tilt in which both wires touch both their arcs and nothing overlaps."""
+        bolt_x = self.section.bolt_x
+        places = [wire.places(bolt_x, np.array([d]), np.array([tilt])) for wire in self._wires]
+        for (x6, y6, _), (x7, y7, _) in itertools.product(*places):
+            q = np.zeros(SIZE)
+            q[:4], q[D], q[S] = (x6[0], y6[0], x7[0], y7[0]), d, self.section.lever * tilt
+            gaps = self.section.gaps(q)
+            touching = {pair for pair, gap in zip(gaps.pair, gaps.value, strict=True) if abs(gap) <= CLOSED}
+            if gaps.value.min() >= -CLOSED and {(a, b) for a in ("P1", "P2") for b in WIRES} <= touching:
+                yield q
+
+
+class Balance:
+    """Which forces can act at a state of the section (joints without play), with friction between wires and splints.
+
+    ``A`` (m, 9) is the work of unit forces along the edges of the friction cones, for unit motions of the seven
+    coordinates that move and of the turns of both wires; ``gap`` (m,) is the gap that each belongs to.
+    """
+
+    def __init__(self, section: Section, q: Array, friction: float) -> None:
+        self.section, self.q, self.gaps = section, q, section.gaps(q)
+        rows, self.gap, self.push = [], [], []
+        for k in np.flatnonzero(np.abs(self.gaps.value) <= CLOSED):
+            normal = self.gaps.normal[k]
+            tangent = np.array([-normal[1], normal[0]]) * friction
+            on_wire = self.gaps.pair[k][1] in WIRES and self.gaps.pair[k][0] != "P4"
+            for push in (normal + tangent, normal - tangent) if on_wire else (normal,):
+                rows.append(unit_work(section, q, self.gaps, int(k), push) if on_wire else self._frictionless(int(k)))
+                self.gap.append(int(k))
+                self.push.append(push)
+        self.A = np.array(rows).reshape(-1, len(HELD) + len(WIRES))
+        self.load = np.append(CLOSING[list(HELD)], np.zeros(len(WIRES)))
+
+    def _frictionless(self, k: int) -> Array:
+        return np.append(self.gaps.gradient[k][list(HELD)], np.zeros(len(WIRES)))
+
+    def forces(self) -> tuple[Array, float]:
+        """Forces >= 0 (m,) along the cones' edges that balance the bolt's unit force best, and what they leave."""
+        forces, left = nnls(self.A.T, self.load)
+        return np.asarray(forces), float(left)
+
+    def refute(self) -> NoEquilibrium:
+        """The motion of at most 1 in each coordinate that the bolt drives most while no contact force resists it.
+
+        If any forces f >= 0 balanced the load, ``load = A.T f``, the drive ``load . y = f . A y`` would be <= 0.
+        """
+        found = linprog(-self.load, self.A, np.zeros(len(self.A)), bounds=(-1.0, 1.0), method="highs")
+        if found.x is None:
+            raise SolverError(f"friction band: no certificate at a state: {found.message}")
+        motion = np.asarray(found.x)
+        return NoEquilibrium(motion, float(self.load @ motion), max(0.0, float((self.A @ motion).max(initial=0.0))))
+
+    def world_forces(self, forces: Array) -> tuple[Force, ...]:
+        """The contact forces in the world, those of both edges of a cone together."""
+        result = []
+        for k in sorted(set(self.gap)):
+            edges = [f * push for f, push, gap in zip(forces, self.push, self.gap, strict=True) if gap == k]
+            total = np.sum(edges, axis=0)
+            if np.hypot(*total) > BALANCED:
+                result.append(world_force(self.q, *self.gaps.pair[k], self.gaps.feature[k], total, self.gaps.point[k]))
+        return tuple(result)
+
+
+def unit_work(section: Section, q: Array, gaps: Gaps, k: int, push: Array) -> Array:
+    """Work (9,) of ``push`` (2,) on the wire of gap k, and of its reaction on the splint, for unit motions."""
+    (splint, wire), work = gaps.pair[k], np.zeros(SIZE)
+    i, (x, y) = WIRES.index(wire), gaps.point[k]
+    work[2 * i : 2 * i + 2] = push
+    if splint == "P2":
+        origin = section.down_splint(q)
+        work[D], work[U] = -push[1], push[1]
+        work[S] = -(push[0] * (y - origin.y) - push[1] * (x - origin.x)) / section.lever
+    turns, radius = np.zeros(len(WIRES)), section.pairs["P1", wire].cylinder.radius
+    turns[i] = (push[0] * (y - q[2 * i + 1]) - push[1] * (x - q[2 * i])) / radius
+    return np.append(work[list(HELD)], turns)
+
+
+def _friction(friction: float) -> float:
+    if not 0.0 < friction <= MOST_FRICTION:
+        raise InputError(f"groove friction must be > 0 and at most {MOST_FRICTION:g}, got {friction:g}")
+    return float(friction)

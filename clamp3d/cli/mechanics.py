@@ -1,0 +1,72 @@
+"""What ``clamp3d run`` computes of torque and friction, only where it is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from clamp3d.cli.options import number
+
+if TYPE_CHECKING:
+    from clamp3d.clamp.result import Assembly
+
+
+def numbers(text: str) -> tuple[float, ...]:
+    """Numbers with commas between them, as the type of an option."""
+    return tuple(number(part) for part in text.split(","))
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Torque (Nm), friction of thread and nut face, measured splint distance (mm), friction of the grooves."""
+
+    torque: float | None
+    friction: tuple[float, ...] | None
+    measured: float | None
+    groove_friction: tuple[float, ...] | None
+
+    @property
+    def anything(self) -> bool:
+        """Whether anything is to be computed."""
+        return not (self.torque is None and self.measured is None and self.groove_friction is None)
+
+    def check(self) -> None:
+        """Raise InputError for a value that breaks its rule."""
+        from clamp3d.clamp.torque import check_torque, coefficients
+
+        if self.torque is not None:
+            check_torque(self.torque)
+        for name, values in (("friction", self.friction), ("groove friction", self.groove_friction)):
+            if values is not None:
+                coefficients(name, values)
+
+    def answer(self, run: Assembly) -> tuple[str, dict[str, Any]]:
+        """Text and data for JSON of an assembled clamp."""
+        from clamp3d.clamp.torque import GROOVE_FRICTION, THREAD_FRICTION, tighten
+        from clamp3d.output.forces_report import tightening_to_text
+
+        if not run.clamped:
+            return f"torque and friction: not computed, {run.status}", {}
+        texts, data = [], dict[str, Any]()
+        groove = self.groove_friction or GROOVE_FRICTION
+        if self.torque is not None:
+            tight = tighten(run, self.torque, friction=self.friction or THREAD_FRICTION, groove_friction=groove)
+            texts.append(tightening_to_text(tight))
+            data["torque"] = tight.to_dict()
+        if self.torque is None or self.measured is not None:
+            text, data["friction_band"] = self._band(run, groove)
+            texts.append(text)
+        return "\n" + "\n\n".join(texts), data
+
+    def _band(self, run: Assembly, groove: tuple[float, ...]) -> tuple[str, dict[str, Any]]:
+        from clamp3d.clamp.friction import FrictionBand
+        from clamp3d.clamp.torque import coefficients
+        from clamp3d.output.forces_report import bands_to_text, measured_to_text
+
+        finder = FrictionBand(run.clamp)
+        bands = [finder.band(mu) for mu in coefficients("groove friction", groove)]
+        text, data = bands_to_text(bands), {"bands": [band.to_dict() for band in bands]}
+        if self.measured is None:
+            return text, data
+        measured = {"distance_mm": self.measured, "least_friction": finder.friction_for(self.measured)}
+        return f"{text}\n{measured_to_text(finder, bands, self.measured)}", data | {"measured": measured}

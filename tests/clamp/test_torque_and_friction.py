@@ -1,0 +1,282 @@
+"""Torque and friction band against hand-calculated values, and methods that share nothing with the code."""
+
+import itertools
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, linprog
+
+from clamp3d import assemble, load_clamp
+from clamp3d.baselines.cas import Cas
+from clamp3d.clamp import loader
+from clamp3d.clamp.closing import HELD
+from clamp3d.clamp.dimensions import Limits
+from clamp3d.clamp.friction import MARGIN, Balance, FrictionBand, unit_work
+from clamp3d.clamp.section import SIZE, D, S, Section
+from clamp3d.clamp.torque import tighten, torque_per_newton
+from clamp3d.cli import group
+from clamp3d.errors import InputError
+from clamp3d.output.forces_report import friction_figure, measured_to_text
+
+REFERENCE = load_clamp()
+
+
+@pytest.fixture(scope="module")
+def run():
+    return assemble()
+
+
+@pytest.fixture(scope="module")
+def finder():
+    return FrictionBand(REFERENCE)
+
+
+@pytest.mark.parametrize(
+    ("friction", "lever"),
+    # by hand: 0.16 * 2.5 = 0.4; 0.58 * (20 - 0.649519 * 2.5) = 10.65820; (30 + 22) / 4 = 13
+    [(0.10, 2.765820), (0.14, 3.712148), (0.20, 5.131640)],
+)
+def test_torque_equation_by_hand(friction, lever):
+    assert torque_per_newton(REFERENCE, friction) == pytest.approx(lever, abs=1e-6)
+
+
+def test_torque_equation_with_other_dimensions():
+    # M16 x 2, hole 17.5, across flats 24, friction 0.12: 0.32 + 0.58 * 14.700962 * 0.12 + 10.375 * 0.12
+    bolt, nut = replace(REFERENCE.bolt, diameter=16.0, pitch=2.0), replace(REFERENCE.nut, across_flats=24.0)
+    clamp = replace(REFERENCE, bolt=bolt, nut=nut, up_splint=replace(REFERENCE.up_splint, hole_diameter=17.5))
+    assert torque_per_newton(clamp, 0.12) == pytest.approx(2.588187, abs=1e-6)
+
+
+def test_preload_of_80_newton_metres(run):
+    newtons = [newton for _, newton in tighten(run, 80.0).preloads]
+    assert newtons == pytest.approx([29e3, 22e3, 16e3], abs=0.5e3)
+
+
+def test_loads_and_slip_by_hand(run):
+    tight = tighten(run, 80.0, friction=(0.10, 0.20), groove_friction=(0.15, 0.30))
+    low, high = 80e3 / 5.131640, 80e3 / 2.765820
+    loads = {(load.force.a, load.force.b): load for load in tight.contacts}
+    for wire, share in (("P6", 0.541), ("P7", 0.462)):
+        newton = loads["P1", wire].newton
+        assert (newton.low, newton.high) == pytest.approx((share * low, share * high), rel=2e-3)
+        line_load = loads["P1", wire].line_load
+        assert (line_load.low, line_load.high) == pytest.approx((newton.low / 60.0, newton.high / 60.0))
+        pull = tight.slip[wire]  # both grooves rub
+        assert (pull.low, pull.high) == pytest.approx((0.15 * 2 * newton.low, 0.30 * 2 * newton.high))
+    assert loads["P2", "P3"].line_load is None
+
+
+def test_line_load_takes_each_splints_own_length(run):
+    longer = replace(run, clamp=replace(REFERENCE, down_splint=replace(REFERENCE.down_splint, length=90.0)))
+    loads = {load.force.a: load for load in tighten(longer, 80.0).contacts if load.force.b == "P6"}
+    assert loads["P1"].line_load.low == pytest.approx(1.5 * loads["P2"].line_load.low, rel=1e-9)
+
+
+def test_limits_are_reached_at_their_torque(run):
+    limits = Limits(bolt_force=50e3, line_load=200.0, wire_pull=2000.0)
+    limited = replace(run, clamp=replace(REFERENCE, limits=limits))
+    reached = {item.limit: item.torque for item in tighten(limited, 80.0).limits}
+    assert len(reached) == 1 + 4 + 2
+    assert reached["bolt force 50000 N"].low == pytest.approx(50 * 2.765820)
+    assert reached["bolt force 50000 N"].high == pytest.approx(50 * 5.131640)
+    torque = reached["line load 200 N/mm at P1-P6"]
+    for value, end in ((torque.low, "high"), (torque.high, "low")):  # at this torque the load's end is the limit
+        [load] = [c for c in tighten(limited, value).contacts if (c.force.a, c.force.b) == ("P1", "P6")]
+        assert getattr(load.line_load, end) == pytest.approx(200.0)
+    pull = reached["P7 holds a pull of 2000 N"]
+    assert tighten(limited, pull.high).slip["P7"].low == pytest.approx(2000.0)
+    assert tighten(limited, pull.low).slip["P7"].high == pytest.approx(2000.0)
+
+
+def test_limits_come_from_the_file(tmp_path):
+    reference = Path(loader.__file__).with_name("data") / "reference.toml"
+    text = "[limits]\nline_load = 200\n[connections]\n"
+    file = tmp_path / "clamp.toml"
+    data = reference.read_text()
+    file.write_text(data.replace("[connections]\n", text))
+    assert load_clamp(file).limits == Limits(line_load=200.0)
+    file.write_text(data.replace("[connections]\n", text.replace("200", "-1")))
+    with pytest.raises(InputError, match=r"limits\.line_load"):
+        load_clamp(file)
+
+
+@pytest.mark.parametrize(("torque", "friction"), [(0.0, (0.1,)), (math.nan, (0.1,)), (80.0, (0.0,)), (80.0, ())])
+def test_bad_values(run, torque, friction):
+    with pytest.raises(InputError):
+        tighten(run, torque, friction=friction)
+
+
+def test_every_coefficient_names_its_source(run):
+    sources = {c.name: c.source for c in tighten(run, 80.0).coefficients}
+    assert "VDI 2230" in sources["torque terms"]
+    assert sources["friction of wire and groove"].startswith("chosen")
+    given = {c.name: c.source for c in tighten(run, 80.0, groove_friction=(0.3,)).coefficients}
+    assert given["friction of wire and groove"].startswith("given")
+
+
+def test_work_of_forces_is_that_of_the_gaps():
+    """Along the normal it must be the gap's derivative; along the tangent, what the touching material moves."""
+    section, q = Section(REFERENCE, Cas()), np.zeros(SIZE)
+    q[:6] = FrictionBand(REFERENCE).final.q[:6] + np.array((0.3, -0.2, 0.1, 0.4, 0.5, -0.7))
+    gaps, angle = section.gaps(q), q[S] / section.lever
+    for k in [k for k, (a, b) in enumerate(gaps.pair) if b in ("P6", "P7") and a != "P4"]:
+        work = unit_work(section, q, gaps, k, gaps.normal[k])
+        assert work[:7] == pytest.approx(gaps.gradient[k][list(HELD)], abs=1e-9)
+        assert work[7:] == pytest.approx(0.0, abs=1e-9)  # of a round wire
+        i, tangent = ("P6", "P7").index(gaps.pair[k][1]), np.array([-gaps.normal[k, 1], gaps.normal[k, 0]])
+        work = unit_work(section, q, gaps, k, tangent)
+        radius = section.pairs[gaps.pair[k]].cylinder.radius  # the force acts on the splint's surface
+        assert abs(work[7 + i]) == pytest.approx(1.0 + gaps.value[k] / radius, abs=1e-6)
+        if gaps.pair[k][0] == "P2":
+            pose, h = section.down_splint(q), 1e-6
+            c, s = math.cos(angle), math.sin(angle)
+            x, y = gaps.point[k] - (pose.x, pose.y)
+            on_splint = x * c - y * s, x * s + y * c
+            moved = replace(pose, angle=angle + h).point(*on_splint)
+            assert work[5] == pytest.approx(-tangent @ (moved - gaps.point[k]) / h / section.lever, abs=1e-5)
+            assert work[4] == pytest.approx(-tangent[1])
+
+
+def has_equilibrium(q, section, friction, touching):
+    """Written out for this clamp: forces and moments of both wires and of the down splint, by linear programming."""
+    gaps, pose = section.gaps(q), section.down_splint(q)
+    columns = []
+    for k, pair in enumerate(gaps.pair):
+        if pair not in touching or abs(gaps.value[k]) > 1e-7:
+            continue
+        i, n = ("P6", "P7").index(pair[1]), gaps.normal[k]
+        for side in (-friction, friction):
+            f = n + side * np.array([-n[1], n[0]])
+            column = np.zeros(8)  # wire x, y, moment, twice; the splint's y and moment about its origin
+            x, y = gaps.point[k] - q[2 * i : 2 * i + 2]
+            column[3 * i : 3 * i + 3] = f[0], f[1], x * f[1] - y * f[0]
+            if pair[0] == "P2":
+                x, y = gaps.point[k] - (pose.x, pose.y)
+                column[6:] = -f[1], -(x * f[1] - y * f[0])
+            columns.append(column)
+    load = np.array([0, 0, 0, 0, 0, 0, 1.0, 0])  # the saddle pushes up (y down): its reaction is balanced
+    return linprog(np.zeros(len(columns)), A_eq=np.array(columns).T, b_eq=load, method="highs").status == 0
+
+
+def test_band_by_brute_force(finder):
+    """States solved from the section's gaps alone, at tilts and distances of a grid, each asked of a linear program."""
+    section, friction, spread = finder.section, 0.2, []
+    touching = set(itertools.product(("P1", "P2"), ("P6", "P7")))
+    start = finder.final.q
+    for tilt in np.radians(np.linspace(11.55, 12.25, 15)):
+        for distance in np.arange(31.34, 31.94, 0.04):
+            q = start.copy()
+            q[S] = section.lever * tilt
+            q[D] += distance - section.splint_distance(q)
+            if closed := close_wires(section, q, touching):
+                spread += [distance for state in closed if has_equilibrium(state, section, friction, touching)]
+    least, greatest = finder.ends(friction)
+    assert least <= min(spread) <= least + 0.05
+    assert greatest - 0.06 <= max(spread) <= greatest
+
+
+def close_wires(section, q, touching):
+    """The states with each wire moved until it touches both splints, from both sides; none where it cannot."""
+    places = []
+    for i, wire in enumerate(("P6", "P7")):
+        found = []
+        for aside in (-2.0, 2.0):
+            at = q.copy()
+            at[2 * i] += aside
+            for _ in range(30):
+                gaps = section.wire_gaps(at, wire)
+                rows = [
+                    min((k for k, p in enumerate(gaps.pair) if p == (a, wire)), key=lambda k: gaps.value[k])
+                    for a in ("P1", "P2")
+                ]
+                at[2 * i : 2 * i + 2] -= np.linalg.lstsq(gaps.gradient[rows][:, 2 * i : 2 * i + 2], gaps.value[rows])[0]
+            if abs(section.wire_gaps(at, wire).value[rows]).max() < 1e-8:
+                found.append(at[2 * i : 2 * i + 2])
+        places.append(found)
+    states = [np.concatenate([a, b, q[4:]]) for a, b in itertools.product(*places)]
+    return [state for state in states if in_arcs(section.gaps(state), touching)]
+
+
+def in_arcs(gaps, touching):
+    rows = zip(gaps.pair, gaps.feature, gaps.value, strict=True)
+    on = {pair: feature for pair, feature, gap in rows if pair in touching and abs(gap) < 1e-7}
+    return gaps.value.min() > -1e-7 and list(on.values()) == ["arc"] * 4
+
+
+def test_symmetric_clamp_in_closed_form():
+    """With both sides alike the greatest distance is at no tilt: both wires at the edge of their cones at once."""
+    up, down = REFERENCE.up_splint, REFERENCE.down_splint
+    groove, low = up.line_groove, down.line_groove
+    clamp = replace(
+        load_clamp(line=32.67, jumper=32.67),
+        up_splint=replace(up, jumper_groove=groove),
+        down_splint=replace(down, jumper_groove=low),
+    )
+    slack, friction = groove.radius - 16.335, 0.15
+    finder = FrictionBand(clamp)
+    d = groove.centre_depth - low.centre_depth - 2.0 * slack / math.hypot(1.0, friction)
+    assert abs(finder.final.q[S]) < 1e-6
+    assert finder.band(friction).greatest.distance >= d + down.face_depth - up.thickness - 1e-9
+    assert finder.distance == pytest.approx(
+        d + down.face_depth - up.thickness - 2 * slack * (1 - 1 / math.hypot(1, friction))
+    )
+
+
+@pytest.mark.parametrize(("friction", "least", "greatest"), [(0.10, 31.502, 31.595), (0.20, 31.397, 31.853)])
+def test_band_holds_a_coarse_estimate(finder, friction, least, greatest):
+    """Published beside the paper's figures: sampled, so inside; it misses the corners by up to 0.03 mm."""
+    own = finder.ends(friction)
+    assert least - 0.03 <= own[0] <= least + 1e-3
+    assert greatest <= own[1] <= greatest + 0.03
+
+
+def test_certificates(finder):
+    band = finder.band(0.1)
+    for end, beyond in ((band.least, -1.0), (band.greatest, 1.0)):
+        assert end.unbalanced < 1e-9
+        assert end.states_beyond > 30
+        assert end.weakest.drive > 1e-4
+        total = sum(f.force * f.direction[2] for f in end.forces if f.a == "P1")
+        assert total == pytest.approx(-1.0, abs=1e-6)  # the up splint takes the bolt's whole force
+        assert (end.distance + beyond * MARGIN) not in band
+    section, q = finder.section, finder.final.q
+    assert Balance(section, q, 0.1).refute().drive < 1e-7  # in equilibrium there is no such motion
+
+
+def test_least_friction_of_a_measured_distance(finder):
+    friction = finder.friction_for(31.63)
+    assert friction == pytest.approx(brentq(lambda mu: finder.ends(mu)[1] - 31.63, 0.05, 0.2), abs=2e-5)
+    assert finder.friction_for(29.147) is None
+    assert finder.friction_for(finder.distance) == 0.0
+    text = measured_to_text(finder, [finder.band(0.1), finder.band(0.2)], 31.63)
+    assert "at least 0.106; outside at friction 0.1, inside at friction 0.2" in text
+    assert len(text.splitlines()) == 1
+    assert "no friction up to 1" in measured_to_text(finder, [], 29.147)
+
+
+def test_figure_draws_band_and_marks(finder):
+    axes = friction_figure(finder, {"measured": (31.63,)}).axes[0]
+    assert [line.get_ydata()[-1] for line in axes.lines[:2]] == pytest.approx(finder.ends(0.3), abs=1e-6)
+
+
+def test_clamp_with_a_wire_outside_its_arcs_is_refused():
+    with pytest.raises(InputError, match="all four grooves"):
+        FrictionBand(load_clamp(line="LJ-16", jumper="LJ-16"))
+
+
+def test_command(tmp_path):
+    from click.testing import CliRunner
+
+    file = tmp_path / "run.json"
+    ran = CliRunner().invoke(group, ["run", "--quiet", "--torque", "80", "--measured", "31.63", "--json", str(file)])
+    assert ran.exit_code == 0
+    assert "28.9 kN at friction 0.10, 21.6 kN at friction 0.14, 15.6 kN at friction 0.20" in ran.stdout
+    data = json.loads(file.read_text())
+    assert data["torque"]["torque_nm"] == 80.0
+    assert data["friction_band"]["measured"]["least_friction"] == pytest.approx(0.1056, abs=1e-4)
+    plain = CliRunner().invoke(group, ["run", "--quiet", "--no-equilibria"])
+    assert "friction" not in plain.stdout
