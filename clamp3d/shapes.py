@@ -9,7 +9,7 @@ from clamp3d.brep.mesh_file import load_mesh
 from clamp3d.core.mesh import Mesh, make_mesh
 from clamp3d.core.meshing import mesh
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
-from clamp3d.core.shapes import Hole, MeshShape, Solid, box, cylinder, groove_block
+from clamp3d.core.shapes import Hole, MeshShape, Solid, box, cylinder, extrusion, groove_block, sphere
 
 __all__ = [
     "Capsule",
@@ -21,8 +21,10 @@ __all__ = [
     "SweptArc",
     "box",
     "cylinder",
+    "extrusion",
     "groove_block",
     "load_mesh",
     "make_mesh",
     "mesh",
+    "sphere",
 ]

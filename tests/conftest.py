@@ -1,6 +1,7 @@
 """Before any test: the contact kernel is compiled once, so that no test measures or prints its compilation."""
 
 import gc
+import hashlib
 import os
 import re
 import sys
@@ -16,6 +17,14 @@ from clamp3d.kernel import Capsule, Cylinder, SweptArc, groove_pieces, signed_di
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+# numba reads a kernel from its cache also where a formula in another file has changed: each state has its own cache.
+ROOT = Path(__file__).parents[1]
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    core = ROOT / "clamp3d" / "core"
+    files = [*sorted(core.glob("kernel*.py")), core / "jit.py", core / "pose.py", core / "primitives.py"]
+    state = hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
+    os.environ["NUMBA_CACHE_DIR"] = str(Path(os.environ.get("NUMBA_CACHE_DIR", ROOT / ".pytest_cache")) / state)
+
 # Drawings and sentences of the documentation are tested too.
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
@@ -28,9 +37,8 @@ SKIPS = os.environ.get("CLAMP3D_SKIPS", "")
 """A file with the reasons for which tests may be skipped, as .ci/run has it; any other skip is then a failure."""
 
 
-def pytest_sessionstart(session):
-    if session.config.getoption("numprocesses", None) and not hasattr(session.config, "workerinput"):
-        return  # the workers run the tests
+def pytest_sessionstart():
+    """Compile the kernel; of several processes the first does it, before it starts the others."""
     groove, wire = SweptArc(7.0, 1.0, 50.0), Cylinder(6.0, 80.0)
     signed_distance(groove, wire, translation(0.0, 3.0, 0.0))
     groove_pieces(groove, Capsule(6.0, 80.0), translation(0.0, 3.0, 0.0))

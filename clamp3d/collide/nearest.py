@@ -8,7 +8,6 @@ import numpy as np
 
 from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
-from clamp3d.core.roots import root
 
 Found = tuple[float, Array, Array]
 """A distance in mm and the two points (3,) that have it."""
@@ -80,6 +79,8 @@ def rim_minimum(closest: Callable[[Array], Array], T: Array, radius: float) -> t
     middle, step = float(turn[int(np.argmin(d))]), float(turn[1])
     low, high = middle - step, middle + step
     if slope(low) < 0.0 < slope(high):
-        middle = root(slope, low, high)
+        from scipy.optimize import brentq  # 0.2 s of CPU to import
+
+        middle = float(brentq(slope, low, high, xtol=1e-15))
     p = rim(np.array([middle]))
     return p[0], closest(p)[0]

@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.errors import SolverError
-
 Array = NDArray[np.float64]
 
 dot = np.matmul
 atan2 = np.arctan2
-crosses = np.cross
 
 
 def norm(x: ArrayLike) -> float:
@@ -52,39 +49,3 @@ def to_source(T: Array, points: Array) -> Array:
     [1.0, 2.0, 3.0]
     """
     return np.asarray((points - T[:3, 3]) @ T[:3, :3])
-
-
-def svd(A: ArrayLike) -> tuple[Array, Array, Array]:
-    """Singular values (n,) of A (m, n), largest first, with rows (n, m) and (n, n): ``A = (left.T * sizes) @ right``.
-
-    Unlike NumPy's, there are always n of them, also where A has fewer rows.
-
-    >>> left, sizes, right = svd([[3.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
-    >>> sizes.tolist(), abs(right[2]).tolist()
-    ([4.0, 3.0, 0.0], [0.0, 0.0, 1.0])
-    """
-    rows = np.asarray(A, np.float64)
-    if not np.isfinite(rows).all():
-        raise SolverError("no singular values: an entry is not finite")
-    m, n = rows.shape
-    left, sizes, right = np.linalg.svd(np.vstack([rows, np.zeros((max(0, n - m), n))]), full_matrices=False)
-    return left.T[:, :m], sizes, right
-
-
-def eigh(A: Array) -> tuple[Array, Array]:
-    """Eigenvalues (n,), smallest first, and eigenvectors (n, n) in columns of a symmetric matrix."""
-    values, vectors = np.linalg.eigh(A)
-    return values, vectors
-
-
-def lstsq(A: Array, b: Array, least: float = 1e-15) -> tuple[Array, int]:
-    """The shortest of the x with the least ``|A x - b|``, and the rank of A.
-
-    Singular values below ``least`` times the largest count as 0.
-
-    >>> x, rank = lstsq(np.array([[1.0, 0.0], [1.0, 0.0]]), np.array([1.0, 3.0]))
-    >>> x.round(12).tolist(), rank
-    ([2.0, 0.0], 1)
-    """
-    x, _, rank, _ = np.linalg.lstsq(A, b, rcond=least)
-    return np.asarray(x, dtype=np.float64), int(rank)

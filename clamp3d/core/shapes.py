@@ -13,12 +13,13 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clamp3d.checks import array, choice, instance, items, number, text
 from clamp3d.core.drilling import leaves_something
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.linear import norm
-from clamp3d.core.mesh import Mesh
+from clamp3d.core.mesh import Mesh, make_mesh
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc, place
 from clamp3d.core.primitives import size as _size
@@ -145,12 +146,135 @@ def cylinder(radius: float, length: float, *, bore: float = 0.0, name: str = "cy
     return Solid(name, (Extrusion(Profile.circle(radius), "Z", -half, half),), holes)
 
 
-def box(size: Sequence[float], *, holes: Sequence[Hole] = (), name: str = "box") -> Solid:
-    """Box of ``size`` (x, y, z) mm, centred, with round holes right through it."""
+def box(
+    size: float | Sequence[float],
+    y: float | None = None,
+    z: float | None = None,
+    *,
+    holes: Sequence[Hole] = (),
+    name: str = "box",
+) -> Solid:
+    """Box centred in the origin, with round holes right through it.
+
+    Parameters
+    ----------
+    size : float or sequence of 3 floats
+        Length in mm along x, with ``y`` and ``z`` beside it; or all three lengths.
+    y, z : float, optional
+        Lengths in mm along y and z, where ``size`` is one number.
+    holes : sequence of Hole
+        Holes along y or z.
+    name : str
+        Name for messages.
+
+    Returns
+    -------
+    Solid
+        The box.
+
+    Raises
+    ------
+    InputError
+        If a length is not > 0, a hole lies beside the box, or the holes leave nothing of it.
+
+    Examples
+    --------
+    >>> box(10, 20, 5) == box((10, 20, 5))
+    True
+    """
+    if y is not None or z is not None:
+        if y is None or z is None or np.ndim(size):
+            raise InputError("size of a box must be three numbers (x, y, z) in mm, or one sequence of them")
+        size = (number("size", size), number("size", y), number("size", z))
     x, y, z = (_size("size", value) for value in array("size", size, (3,)))
     corner = np.array([x, y, z]) / 2
     body = Extrusion(Profile.rectangle(x, y), "Z", -z / 2, z / 2)
     return Solid(name, (body,), _drill(holes, -corner, corner))
+
+
+def extrusion(outline: Profile | ArrayLike, height: float, *, name: str = "extrusion") -> Solid:
+    """Outline drawn along z, from ``-height / 2`` to ``height / 2``.
+
+    Parameters
+    ----------
+    outline : Profile or array_like of shape (n, 2)
+        Outline of segments and arcs, or the corners (x, y) of a polygon in mm, in either turn.
+    height : float
+        Length in mm along z.
+    name : str
+        Name for messages.
+
+    Returns
+    -------
+    Solid
+        The prism.
+
+    Raises
+    ------
+    InputError
+        If the height is not > 0, or the outline encloses no area or crosses itself.
+
+    Examples
+    --------
+    >>> extrusion([(0, 0), (4, 0), (0, 3)], 2.0).bounds.tolist()
+    [[0.0, 0.0, -1.0], [4.0, 3.0, 1.0]]
+    """
+    half = _size("height", height) / 2
+    if not isinstance(outline, Profile):
+        points = array("outline", outline, (None, 2))
+        corners = [(place("outline", a), place("outline", b)) for a, b in points]
+        x, y = (points - points.mean(axis=0)).T if len(points) else np.zeros((2, 0))
+        area = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+        if area == 0.0:
+            raise InputError("outline must enclose an area > 0 mm^2")
+        outline = Profile.of(*(corners if area > 0.0 else corners[::-1]))
+    return Solid(name, (Extrusion(outline, "Z", -half, half),))
+
+
+FINEST_SPHERE = 1e-5
+"""Least error of a sphere's facets relative to its radius: a third of a million of them."""
+
+
+def sphere(radius: float, *, mesh_error: float | None = None, name: str = "sphere") -> MeshShape:
+    """Sphere about the origin as a mesh whose ``error`` says how far its facets lie below the true surface.
+
+    Parameters
+    ----------
+    radius : float
+        Radius in mm.
+    mesh_error : float, optional
+        Largest distance in mm between a facet and the sphere; a thousandth of the radius if it is not stated.
+    name : str
+        Name for messages.
+
+    Returns
+    -------
+    MeshShape
+        The mesh, with its corners on the sphere; distances from it are intervals that hold for the sphere.
+
+    Raises
+    ------
+    InputError
+        If the radius is not > 0, or the error is less than a hundred thousandth of it.
+
+    Examples
+    --------
+    >>> sphere(10.0, mesh_error=0.1).error < 0.1
+    True
+    """
+    import trimesh
+
+    radius = _size("radius", radius)
+    limit = radius / 1000 if mesh_error is None else number("mesh_error", mesh_error)
+    if not limit >= FINEST_SPHERE * radius:
+        raise InputError(f"mesh_error of a sphere must be >= {FINEST_SPHERE * radius:g} mm, got {mesh_error}")
+    for subdivisions in range(9):
+        ball = trimesh.creation.icosphere(subdivisions=subdivisions)
+        gap = 1.0 - float((ball.triangles[:, 0] * ball.face_normals).sum(axis=1).min())
+        if gap * radius <= limit:
+            break
+    rounding = 1e-12 * radius
+    return MeshShape(make_mesh(radius * ball.vertices, ball.faces, name=name), name=name, error=gap * radius + rounding)
 
 
 def groove_block(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.core.linear import atan2, crosses
 from clamp3d.core.pose import Array
 from clamp3d.core.triangles import distinct
 
@@ -28,8 +27,8 @@ def volume(vertices: Array, faces: Faces) -> float:
     low, high = used.min(axis=0), used.max(axis=0)
     # The middle as origin: far from it the volumes cancel badly.
     a, b, c = np.moveaxis(vertices[faces] - 0.5 * (low + high), 1, 0)
-    found = float(np.einsum("ij,ij->i", a, crosses(b, c)).sum() / 6.0)
-    area = 0.5 * float(np.linalg.norm(crosses(b - a, c - a), axis=1).sum())
+    found = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
     return found if abs(found) > _FLAT * area * float((high - low).max()) else 0.0
 
 
@@ -53,7 +52,7 @@ def winding_number(corners: tuple[Array, Array, Array], point: Array) -> float:
         + a[:, 2] * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
     )
     ab, bc, ca = (np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a)))
-    return float(atan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2.0 * np.pi))
+    return float(np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2.0 * np.pi))
 
 
 def joined(groups: Faces, n: int) -> Faces:

@@ -52,29 +52,3 @@ def side_keys(a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> NDArray[np.
     [4, 4]
     """
     return np.asarray(np.minimum(a, b) * n + np.maximum(a, b))
-
-
-def halved(F: NDArray[np.int64], middle: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles F (m, 3) cut at the nodes ``middle`` (m, 3) of the sides that start at each corner; -1 for none.
-
-    >>> halved(np.array([[0, 1, 2]]), np.array([[3, -1, -1]])).tolist()
-    [[0, 3, 2], [3, 1, 2]]
-    """
-    count = (middle >= 0).sum(axis=1)
-    made = [F[count == 0]]
-    # Turned so that one cut side is the first, and of two the side that is whole the last.
-    first = np.where(count == 2, np.argmin(middle, axis=1) + 1, np.argmax(middle, axis=1))
-    turn = (first[:, None] + np.arange(3)) % 3
-    F, middle = np.take_along_axis(F, turn, axis=1), np.take_along_axis(middle, turn, axis=1)
-    nodes = np.concatenate([F, middle], axis=1)
-    for n, pieces in enumerate(_CUTS, start=1):
-        made.append(nodes[count == n][:, pieces].reshape(-1, 3))
-    return np.concatenate(made)
-
-
-_CUTS = (
-    [(0, 3, 2), (3, 1, 2)],
-    [(3, 1, 4), (0, 3, 4), (0, 4, 2)],
-    [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)],
-)
-"""Triangles with one, two and three sides cut: corners 0 to 2, and the middles 3 to 5 of the sides that they start."""

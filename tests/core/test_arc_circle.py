@@ -199,13 +199,6 @@ def test_contact_along_the_arc(half: float, r: float, share: float, exterior: bo
     assert got.points[0] == pytest.approx(p, abs=1e-7 if abs(share) == 1.0 else 1e-13 * R / (R - r))
 
 
-@settings(max_examples=200, deadline=None)
-@given(half=st.floats(0.01, 3.13), r=st.floats(0.05, 12.0), x=ANY, y=ANY)
-def test_mirror(half: float, r: float, x: float, y: float) -> None:
-    here, there = (arc_circle(R, half, r, side * x, y, tolerance=1e-9) for side in (1, -1))
-    assert (here.gap, here.relation) == (there.gap, there.relation)
-
-
 @pytest.mark.parametrize(("side", "feature"), [(-1.0, ArcFeature.M), (1.0, ArcFeature.N)])
 @pytest.mark.parametrize("half", [0.4, 1.0, 2.6])
 def test_a_contact_within_the_tolerance_of_an_end_is_at_the_end(half: float, side: float, feature: ArcFeature) -> None:

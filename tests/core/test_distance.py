@@ -4,12 +4,12 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clamp3d.core import kernel_distance
 from clamp3d.core.distance import Feature, signed_distance, signed_distances
-from clamp3d.core.pose import PoseWarning, rotation, translation
+from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.relation3d import relative_pose
 from clamp3d.errors import InputError
@@ -63,10 +63,11 @@ def test_oracle_is_what_its_script_makes():
         assert abs(mp.mpf(value) - mp.mpf(case.value)) < mp.mpf(10) ** -18 * case.size
 
 
-def test_batch_has_the_bits_of_single():
+@pytest.mark.parametrize("wire", [Capsule(10.5, 80.0), Cylinder(10.5, 80.0), Cylinder(10.5, 4.0)])
+def test_batch_has_the_bits_of_single(wire):
     rng = np.random.default_rng(0)
-    groove, wire = SweptArc(12.0, 1.2, 50.0), Capsule(10.5, 80.0)
-    poses = np.array([rotation(rng.normal(size=3), rng.choice([0.0, 1e-9, 0.1, 1.0])) for _ in range(20_000)])
+    groove = SweptArc(12.0, 1.2, 50.0)
+    poses = np.array([rotation(rng.normal(size=3), rng.choice([0.0, 1e-9, 0.1, 1.0])) for _ in range(8_000)])
     poses[:, :3, 3] = rng.normal(size=(len(poses), 3)) * 8.0
     full = signed_distances(groove, wire, poses, full=True)
     assert np.array_equal(full.distance, signed_distances(groove, wire, poses))
@@ -125,21 +126,6 @@ def test_position_and_axis_alone_have_the_bits_of_poses(wire):
             signed_distances(groove, wire, axes)
 
 
-@pytest.mark.parametrize("kind", [Capsule, Cylinder])
-def test_poses_of_single_precision_are_mended_and_it_is_said(kind):
-    rng = np.random.default_rng(2)
-    poses = np.array([rotation(rng.normal(size=3), rng.uniform(0.0, 3.0)) for _ in range(50)])
-    poses[:, :3, 3] = rng.normal(size=(len(poses), 3))
-    groove, wire = SweptArc(12.0, 1.2, 50.0), kind(3.0, 20.0)
-    exact = signed_distances(groove, wire, poses)
-    stretched = poses.copy()
-    stretched[:, :3, :3] *= 1.0 + 1e-8
-    for rough, error in ((poses.astype(np.float32), 1e-5), (stretched, 1e-12)):
-        with pytest.warns(PoseWarning, match=r"poses\[0\] has rounding errors"):
-            found = signed_distances(groove, wire, rough)
-        assert np.abs(found - exact).max() < error
-
-
 def test_witnesses_lie_on_both_surfaces_and_moving_by_the_distance_makes_them_touch():
     for case in CASES:
         a = signed_distance(case.groove, case.cylinder, case.pose)
@@ -190,9 +176,10 @@ def test_agrees_with_dense_search(scene):
 
 
 @settings(max_examples=150, deadline=None)
-@given(scenes)
-def test_mirror_images(scene):
+@given(scenes, st.sampled_from([Capsule, Cylinder]))
+def test_mirror_images(scene, kind):
     groove, wire, T = scene
+    wire = kind(wire.radius, wire.length)
     a = signed_distance(groove, wire, T)
     for axis in (0, 2):
         mirror = np.eye(4)
@@ -210,29 +197,6 @@ def test_moving_both_bodies_changes_nothing(scene, angle, far):
     B = A @ T  # rounds to about far * 1e-16
     b = signed_distance(groove, wire, relative_pose(A, B))
     assert abs(a.distance - b.distance) <= 1e-12 * max(1.0, far, 200.0)
-
-
-@settings(max_examples=150, deadline=None)
-@given(scenes, st.tuples(*[st.floats(-1.0, 1.0)] * 6))
-def test_gradient_against_differences(scene, direction):
-    groove, wire, T = scene
-    v = np.array(direction)
-    v[3:] /= 30.0
-    angle = float(np.linalg.norm(v[3:]))
-    step = 1e-5
-
-    def moved(s):
-        M = rotation(v[3:], s * angle) if angle > 1e-9 else np.eye(4)
-        M[:3, 3] = s * v[:3]
-        return signed_distance(groove, wire, M @ T).distance
-
-    a = signed_distance(groove, wire, T)
-    back, here, ahead = moved(-step), a.distance, moved(step)
-    right, left, rate = (ahead - here) / step, (here - back) / step, a.gradient @ v
-    assume(not a.axis_inside and a.distance + wire.radius > 1e-3)  # where the axis enters the material the rate jumps
-    # The distance is the least over the places: where two are equally near it falls to either side, at most at the rate
-    # of the one that is named on this side, at least on the other.
-    assert right - 2e-3 <= rate <= left + 2e-3
 
 
 def test_world_offsets_cost_nothing():
@@ -267,12 +231,6 @@ def test_no_wrong_sign_at_a_nanometre():
             assert signed_distance(groove, Capsule(10.5, 80.0), T).distance == pytest.approx(gap, abs=2e-14)
 
 
-@pytest.mark.parametrize(("offset", "gap"), [(0.05, 0.015), (0.065, 0.0), (0.0650001, -1e-7)])
-def test_tangency_of_nearly_equal_radii(offset, gap):
-    answer = signed_distance(SweptArc(7.0, math.pi / 2, 50.0), Capsule(6.935, 100.0), translation(0.0, -offset, 0.0))
-    assert answer.distance == pytest.approx(gap, abs=1e-15)
-
-
 def test_tilted_wire_touches_at_both_ends():
     # R - (L / 2 tan t + r / cos t) = 0
     groove, wire = SweptArc(7.0, math.pi / 2, 50.0), Capsule(6.935, 100.0)
@@ -283,16 +241,6 @@ def test_tilted_wire_touches_at_both_ends():
     t = 0.002
     wanted = (7.0 - 25.0 * math.tan(t)) * math.cos(t) - 6.935
     assert signed_distance(groove, wire, rotation((1, 0, 0), t)).distance == pytest.approx(wanted, abs=1e-14)
-
-
-def test_mouth_narrower_than_the_wire():
-    groove, wire = SweptArc(7.0, math.radians(100.0), 50.0), Capsule(6.935, 50.0)
-    assert signed_distance(groove, wire, np.eye(4)).distance == pytest.approx(0.065, abs=1e-15)
-    y = 7.0 * math.cos(math.radians(80.0))  # between the lips: half the mouth minus the wire
-    half_mouth = 7.0 * math.sin(math.radians(100.0))
-    at_mouth = signed_distance(groove, wire, translation(0.0, y, 0.0))
-    assert at_mouth.distance == pytest.approx(half_mouth - 6.935, abs=1e-14)
-    assert at_mouth.feature in (Feature.LIP_M, Feature.LIP_N)
 
 
 def test_tiny_and_huge_numbers():
@@ -337,15 +285,6 @@ def test_limits():
     # A groove of no length is a sheet.
     sheet = SweptArc(12.0, 1.0, 1e-12)
     assert signed_distance(sheet, Capsule(1.0, 4.0), translation(0.0, -20.0, 5.0)).distance == pytest.approx(2.0)
-
-
-def test_deeper_is_lower():
-    groove, wire = SweptArc(12.0, 1.0, 80.0), Capsule(5.0, 200.0)
-    answers = [signed_distance(groove, wire, translation(0.0, -y, 0.0)) for y in np.linspace(0.0, 40.0, 81)]
-    values = np.array([a.distance for a in answers])
-    assert (np.diff(values) < 0.0).all()
-    assert np.array_equal(values < -5.0, [a.axis_inside for a in answers])
-    assert np.allclose(np.diff(values), -0.5)  # and at the rate of the motion
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
 
-from clamp3d.baselines.chords import Chords
-from clamp3d.collide.poses import check_poses
-from clamp3d.collide.scene import Scene
-from clamp3d.core import shapes
 from clamp3d.core.distance import signed_distance, signed_distances
-from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pieces import groove_pieces
 from clamp3d.core.pose import (
     PoseWarning,
@@ -123,22 +118,6 @@ def test_what_is_worse_than_rounding_is_refused(bad, rule):
         check_pose_array(np.array([np.eye(4), bad, bad]))
     with pytest.raises(InputError, match=rule):
         signed_distance(GROOVE, WIRE, bad)
-
-
-def test_batches_of_other_layers_measure_the_mended_poses():
-    rough = np.tile(np.eye(4), (2, 1, 1))
-    rough[1, :3, :3] = rotation((0, 0, 1), 0.3)[:3, :3] * (1.0 + 4e-5)
-    mended = nearest_rigid(rough)
-    pair = GroovePair("a", "b", GROOVE, np.eye(4), WIRE, np.eye(4))
-    scene = Scene().add("box", shapes.box((4.0, 6.0, 8.0))).add("pin", shapes.cylinder(1.0, 30.0, name="pin"))
-    rough[:, 0, 3] = mended[:, 0, 3] = 20.0
-    for measured in (
-        lambda T: Chords(0.1).distances(pair, T),
-        lambda T: check_poses(scene, "pin", T).upper,
-    ):
-        with pytest.warns(PoseWarning):
-            found = measured(rough)
-        assert np.array_equal(found, measured(mended))
 
 
 @given(hnp.arrays(float, 4, elements=st.floats(-1.0, 1.0)).filter(lambda q: np.abs(q).max() > 0.1))

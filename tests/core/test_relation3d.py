@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from clamp3d.core.arc_circle import ArcRelation, arc_circle
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
-from clamp3d.core.relation3d import Relation3D, groove_relation, relative_pose
+from clamp3d.core.relation3d import Relation3D, groove_relation
 from clamp3d.errors import InputError
 from tests.core.test_distance import scenes
 
@@ -129,13 +129,3 @@ def test_a_flat_ended_cylinder_is_inside_if_it_reaches_the_block():
             said[relation] += 1
             assert relation is (Relation3D.OUTSIDE if apart > 1e-9 else Relation3D.INSIDE)
     assert min(said.values()) > 20
-
-
-def test_relative_pose():
-    A, B = rotation((1, 2, 3), 1.0), rotation((3, -1, 0), 0.4)
-    A[:3, 3], B[:3, 3] = (1e6, 2e6, -1e6), (1e6 + 1.0, 2e6, -1e6)
-    T = relative_pose(A, B)
-    assert np.allclose(A[:3, :3] @ T[:3, :3], B[:3, :3], atol=1e-15)
-    assert np.allclose(T[:3, 3], A[0, :3], atol=1e-15)
-    with pytest.raises(InputError, match="T_world_b must have shape"):
-        relative_pose(A, np.eye(3))
