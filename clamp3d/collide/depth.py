@@ -21,9 +21,10 @@ from clamp3d.core.pose import Array
 
 _DIRECTIONS = 4
 """Flat sides of the overlap along which the bodies are moved apart."""
-_STEPS, _HALVINGS = 4, 5
-"""Lengths of a translation that are tried, and halvings of the step to the first that parts the bodies: then it is
-known to less than 1 % of the overlap's extent."""
+_SHARES = np.array([0.25, 0.5, 0.75, 1.0, 2.0, 4.0])
+"""Lengths of a translation that are tried, in extents of the overlap: the way back into a hole is longer than one."""
+_HALVINGS = 5
+"""Halvings of the step to the first length that parts the bodies: then it is known to 1 % of the extent."""
 _EXACT = 1e-9
 """Error (mm) of a closed form up to which it counts as exact: rounding of a CAD file's points."""
 _CLOSE = 1.05
@@ -76,20 +77,20 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
     shared = common(outer_a, outer_b, T)
     if shared is None:
         return replace(distance, lower=-np.inf, interference=interference)
-    sharp = _interference(outer_a, outer_b, T, shared)
-    interference = (max(interference[0], sharp[0]), max(interference[0], min(interference[1], sharp[1])))
-    upper = min(distance.upper, -interference[0])
+    # Meshes around drawn bodies attest no depth.
+    attested = 0.0 if a.between or b.between else max(0.0, deepest(outer_a, outer_b, T, shared)[0])
+    bound = _most_interference(outer_a, outer_b, T, shared, attested)
+    interference = max(interference[0], attested), max(interference[0], attested, min(interference[1], bound))
+    upper = min(distance.upper, -interference[0]) if interference[0] > 0.0 else distance.upper
     length, direction = _way_out(outer_a, outer_b, T, shared, interference[0])
     lower = min(-length, upper)
     return replace(distance, lower=lower, upper=upper, normal=direction, level="depth", interference=interference)
 
 
-def _interference(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, float]:
-    """Bounds (mm) of the greatest depth of a point of one body in the other, from meshes that are or hold them."""
-    exact = a.face_error is not None or b.face_error is not None
-    depth = max(0.0, deepest(a, b, T, shared)[0]) if exact else 0.0  # meshes around the bodies attest nothing
+def _most_interference(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> float:
+    """Upper bound (mm) of the greatest depth of a point of one body in the other, from meshes that are or hold them."""
     off = a.error + b.error + rounding_of(a, b, T)
-    return depth, thickness(a, b, T, shared, lambda bound: bound <= _CLOSE * (depth + off)) + off
+    return thickness(a, b, T, shared, lambda bound: bound <= _CLOSE * (depth + off)) + off
 
 
 def _way_out(a: Surface, b: Surface, T: Array, shared: Common, deep: float) -> tuple[float, Array | None]:
@@ -114,7 +115,7 @@ def _outer(model: Model) -> Surface:
 
 def _shortest(a: Surface, b: Surface, T: Array, direction: Array, low: float, high: float) -> float:
     """A length (mm) between ``low`` and ``high`` after which ``b`` is apart; infinite if that is not so at ``high``."""
-    for length in np.linspace(low, high, _STEPS + 1)[1:].tolist():
+    for length in (low + _SHARES * (high - low)).tolist():
         if are_apart(a, b, _moved(T, length * direction)):
             high = length
             break

@@ -22,6 +22,8 @@ CHECKED = 1e-4
 """The same for the least distance of a scene's motion, which has to give a verdict and a number to print."""
 MOST = 5000
 """Times at which a pair is looked at most, in one search: with meshes about a second."""
+_OVERLAPS = 64
+"""Times at which a pair is looked at after it was seen to overlap, for a deeper one."""
 _UNINFORMATIVE = 8
 """Swept bounds in a row that said no more than the speed, after which they are no longer asked for."""
 
@@ -66,15 +68,18 @@ class MovingPair:
     ) -> tuple[Distance, float]:
         """Least distance on the way, and its time; with ``thresholds`` only until their verdict is certain."""
         accuracy = ACCURACY if thresholds is None else CHECKED
-        best, at = Distance(), 0.0
+        best, at, overlaps = Distance(), 0.0, 0
 
         def distance(t: float) -> tuple[float, float]:
-            nonlocal best, at
+            nonlocal best, at, overlaps
             here = self._sharp(t, best.upper, accuracy, thresholds)
             if here.upper < best.upper:
                 best, at = here, t
                 if thresholds is not None and thresholds.verdict(here, allowance) is Verdict.CLASH:
                     raise _CertainError
+            overlaps += best.upper < -ACCURACY
+            if overlaps > _OVERLAPS:  # how deep it is at its deepest no bound here tells
+                raise _CertainError
             return here.lower, here.upper
 
         try:
