@@ -23,6 +23,8 @@ from clamp3d.core.pose import Array, inverse
 
 _LEVEL = 1e-6
 """Below this sine it is not claimed that the nearest points are the only ones: rounding decides."""
+_TOUCHING = 1e-3
+"""Distances and depths (mm) below which FCL's normal may be mostly rounding, so that it is searched for."""
 _EPS = 2.0**-52
 
 
@@ -107,6 +109,10 @@ def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, rims: bool = 
     found = _closed_form(a, Ta, b, Tb, None, rims)
     if found.upper - found.lower > 1e-10:
         found = found.meet(_by_gjk(a, Ta, b, Tb))
+    if rims and found.upper - found.lower > 1e-9 and abs(found.upper) < _TOUCHING:
+        from clamp3d.collide.convex_depth import convex_depth  # which needs the pieces of this module
+
+        found = found.meet(Distance(convex_depth(a, Ta, b, Tb).lower))
     return replace(found, unique=_unique(a, Ta, b, Tb, found))
 
 

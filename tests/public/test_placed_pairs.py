@@ -9,9 +9,9 @@ pytest.importorskip("bd_warehouse", reason="bd_warehouse (extra dev) is not inst
 from clamp3d import check, load
 from tests.public.placed_pairs import FAMILIES, SOLIDS, PlacedPair, duplicate, judge, placed_pair, write_pairs
 
-GAPS = (0.0, 2e-4, 5e-3, 0.0103, 0.03, -2e-4, -5e-3, -0.0103, -0.03)
-NO_ANSWER = {"spline_in_bore", "spline"}
-"""Families and solids of which the engine takes a minute a pair."""
+GAPS = (2e-4, 0.0103, -5e-3, -0.03)  # scripts/check-placed asks for many more
+NO_ANSWER = {"spline_in_bore", "spline", "ball_in_socket", "tube_in_tube"}
+"""Families and solids of which Open CASCADE takes up to a minute a pair; scripts/check-placed has them too."""
 UNDECIDED = {
     "pin_in_hole", "tube_in_tube", "hexagon_in_bore", "spline_under_plate", "ring_in_groove", "ring_on_shaft",
     "ball_in_ring", "thread_in_tube", "taper_in_hub", "ball_in_socket", "ball_in_cone",

@@ -203,6 +203,7 @@ _NO_LENGTHS = {
     "description",
     "unit",
     "sequence",
+    "limits",
 }
 
 
