@@ -94,7 +94,9 @@ class MovingPair:
         def enough(distance: Distance) -> bool:
             if distance.upper - distance.lower <= 0.5 * accuracy or distance.lower >= best + self.speed:
                 return True
-            return thresholds is not None and thresholds.verdict(distance) is Verdict.CLASH
+            if thresholds is None:  # of an overlap nothing is searched that the distance at one time does not tell
+                return distance.upper < -ACCURACY
+            return thresholds.verdict(distance) is Verdict.CLASH
 
         if thresholds is not None:
             self.evaluations += 1

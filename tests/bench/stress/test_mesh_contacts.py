@@ -10,7 +10,6 @@ from clamp3d.bench.stress.meshes import MESHES
 from clamp3d.bench.stress.run import FAMILIES
 from clamp3d.bench.stress.worker import run_here
 
-
 LATE = "a gap that stays small all the way takes more looks than a search has: it ends early, and says so"
 CASES = [
     pytest.param(name, 10, marks=pytest.mark.xfail(reason=LATE, strict=True))
