@@ -96,8 +96,9 @@ def least(
 
     Examples
     --------
-    >>> least(lambda t: (abs(t - 0.3),) * 2, 1.0, accuracy=1e-9)
-    Least(t=0.3, lower=0.0, upper=0.0, evaluations=3)
+    >>> answer = least(lambda t: (abs(t - 0.25),) * 2, 1.0, accuracy=1e-9)
+    >>> answer.t, answer.lower, answer.upper
+    (0.25, 0.0, 0.0)
     """
     start, stop = distance(0.0), distance(1.0)
     t, upper = (0.0, start[1]) if start[1] <= stop[1] else (1.0, stop[1])
