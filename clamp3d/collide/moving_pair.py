@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.judge import judge
 from clamp3d.collide.model import Model
 from clamp3d.collide.refine import Enough, from_boxes, refine
 from clamp3d.collide.swept import swept_lower
@@ -50,7 +49,7 @@ class MovingPair:
         """Distance at time ``t``, refined until ``enough``."""
         self.evaluations += 1
         T = self.pose(t)
-        return refine(self.a, self.b, T, from_boxes(self.a, self.b, T), enough)
+        return refine(self.a, self.b, T, from_boxes(self.a, self.b, T), enough, cad_forms=True)
 
     def between(self, start: float, stop: float) -> float:
         """Lower bound (mm) of the distance between two times, from swept shapes; minus infinity if they say nothing."""
@@ -98,15 +97,6 @@ class MovingPair:
                 return distance.upper < -ACCURACY
             return thresholds.verdict(distance) is Verdict.CLASH
 
-        if thresholds is not None:
-            self.evaluations += 1
-            T = self.pose(t)
-            start = from_boxes(self.a, self.b, T)
-            return (
-                start
-                if start.lower >= best + self.speed
-                else judge(self.a, self.b, T, start, thresholds, None, enough)[1]
-            )
         return self.at(t, enough)
 
     def first_time(self, level: float) -> float | None:
