@@ -1,4 +1,4 @@
-"""What ``clamp3d run`` computes of torque and friction, only where it is asked for."""
+"""What ``clamp3d run`` computes of torque and friction, only on request."""
 
 from __future__ import annotations
 

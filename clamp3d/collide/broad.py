@@ -48,12 +48,6 @@ class Boxes:
         return np.asarray(np.einsum("nij,nj->ni", np.abs(self.R), self.half))
 
 
-def world_boxes(bounds: Array, T: Array) -> Array:
-    """Boxes (n, 2, 3) along the world's axes around boxes (n or 1, 2, 3) at poses (n, 4, 4)."""
-    boxes = Boxes.of(np.broadcast_to(bounds, (len(T), 2, 3)), T)
-    return np.stack([boxes.centre - boxes.reach, boxes.centre + boxes.reach], axis=1)
-
-
 def near_pairs(boxes: Boxes, reach: float) -> NDArray[np.int64]:
     """Pairs (m, 2), first < second, whose boxes along the world's axes come within ``reach`` mm; sorted."""
     pairs = near_between(boxes, boxes, reach)

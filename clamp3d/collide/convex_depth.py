@@ -25,8 +25,6 @@ _ROUNDS = 40
 """Times that the polytope inside is refined; each about quarters the gap at a round surface."""
 _ALL = 20000
 """Pairs of edge directions up to which every cross product is asked."""
-_LEVEL = 1e-8
-"""Relative to the size: corners whose heights differ by less are taken to lie equally far along a direction."""
 _SPHERE = np.array([v for v in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
 _SPHERE /= np.linalg.norm(_SPHERE, axis=1)[:, None]
 
