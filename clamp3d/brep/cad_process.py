@@ -21,18 +21,21 @@ _MODULE = "clamp3d.brep.open_cascade"
 _NAMES = ("tessellate", "surfaces", "distance", "common", "depths", "bounds_at")
 _SECONDS = 120.0
 """Time limit of a question; a few hundred milliseconds are usual."""
-_COMMON_SECONDS = 15.0
-"""Time limit of a common part, which Open CASCADE does not always find between round faces that all but coincide."""
+_COMMON_SECONDS = 5.0
+"""Time limit of a common part, which Open CASCADE does not always find between round faces that all but coincide.
+
+Where it does not end, finer meshes decide.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommonPart:
-    """What two solids share: ``volume`` mm^3, ``area`` mm^2, ``box`` (2, 3), ``points`` (k, 3) of its border."""
+    """What two solids share: ``volume`` mm^3, ``area`` mm^2, ``box`` (2, 3), ``triangles`` (k, 3, 3) of its border."""
 
     volume: float
     area: float
     box: Array
-    points: Array
+    triangles: Array
 
 
 @cache
@@ -74,7 +77,7 @@ def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
 
 
 def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
-    """The common part of two solids, its border sampled at ``share`` of its smallest extent."""
+    """The common part of two solids, its border in chords of ``share`` of its thickness."""
     return CommonPart(*_ask("common", a, b, T, share, seconds=_COMMON_SECONDS))
 
 

@@ -366,9 +366,9 @@ def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
 
 
 def common(a: bytes, b: bytes, T: Array, share: float) -> tuple[float, float, Array, Array]:
-    """The common part of ``a`` and of ``b`` at ``T`` (4, 4): volume (mm^3), area (mm^2), box (2, 3), border (k, 3).
+    """The common part of ``a`` and of ``b`` at ``T`` (4, 4): volume (mm^3), area (mm^2), box (2, 3), border (k, 3, 3).
 
-    The chords between the points of the border are ``share`` of the part's thickness, volume over area.
+    The chords of the border's triangles are ``share`` of the part's thickness, volume over area.
     Raises Clamp3dError if Open CASCADE cannot make it.
     """
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
@@ -379,14 +379,14 @@ def common(a: bytes, b: bytes, T: Array, share: float) -> tuple[float, float, Ar
         raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
     shape = made.Shape()
     if next(explore(shape, "SOLID"), None) is None:
-        return 0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3))
+        return 0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3, 3))
     volume, area = abs(volume_of(shape)), area_of(shape)
     BRepMesh_IncrementalMesh(shape, max(share * volume / max(area, 1e-300), TOLERANCE), False, ANGLE, False)
-    points = [np.empty((0, 3))]
+    border = [np.empty((0, 3, 3))]
     for k, face in enumerate(explore(shape, "FACE")):
         P, triangles, _ = _triangles_of(face, k)
-        points += [P, P[triangles].mean(axis=1)]
-    return volume, area, bounds_of(shape), np.vstack(points)
+        border.append(P[triangles])
+    return volume, area, bounds_of(shape), np.concatenate(border)
 
 
 def depths(brep: bytes, points: Array) -> Array:

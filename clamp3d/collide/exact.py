@@ -11,12 +11,17 @@ from clamp3d.brep import cad_process
 from clamp3d.brep.open_cascade import TOLERANCE
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.model import Model
+from clamp3d.collide.overlap import cut_until
 from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
 
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
-_TRIED = 12
-"""Points of the common part's border that look deepest from the meshes, whose depth is then measured exactly."""
+_TRIED = 60
+"""Points of the common part's border whose depth is measured exactly: as many of those that look deepest by the meshes,
+and of all that may be the deepest.
+"""
+_PIECES = 4000
+"""Triangles that the common part's border is cut into at most, to find these points."""
 _SAMPLES = 0.02
 """Chord of the common part's border relative to its smallest extent; between the samples the depth hardly changes."""
 
@@ -37,24 +42,30 @@ def exact_distance(a: Model, b: Model, T: Array) -> Distance:
         shared = cad_process.common(a.exact.brep, b.exact.brep, T, _SAMPLES)
     except SolverError:  # it takes too long: they touch or overlap, and nobody says by how much
         return Distance(-np.inf, TOLERANCE, p, q, None, None, "exact", f"{METHOD}, without a common part")
-    if shared.volume <= TOLERANCE * max(1e-12, shared.area) or not len(shared.points):
+    if shared.volume <= TOLERANCE * max(1e-12, shared.area) or not len(shared.triangles):
         return touching
-    depth, point = _deepest(a, b, T, shared.points)
+    depth, point = _deepest(a, b, T, shared.triangles)
     # The samples are a fraction of the overlap's thickness apart: no point between them is much deeper.
     upper_depth = depth * (1.0 + _SAMPLES) + TOLERANCE
     return Distance(-upper_depth, TOLERANCE - depth, point, point, None, None, "exact", METHOD)
 
 
-def _deepest(a: Model, b: Model, T: Array, points: Array) -> tuple[float, Array]:
-    """The largest depth (mm) of points (k, 3) of the common part in either solid, and the point (3,)."""
+def _deepest(a: Model, b: Model, T: Array, border: Array) -> tuple[float, Array]:
+    """The largest depth (mm) of points of the common part's border (k, 3, 3) in either solid, and the point (3,)."""
+    points = border.reshape(-1, 3)
+    looks, slack = np.zeros(len(points)), np.inf
+    if a.chords and b.chords:
+        x, y = a.outer(a.chords[-1]), b.outer(b.chords[-1])
+        pieces, _ = cut_until(x, y, T, border, lambda _: False, _PIECES)
+        points, slack = pieces.mean(axis=1), 2.0 * (x.error + y.error)
+        looks = np.maximum(x.distance(points), y.distance((points - T[:3, 3]) @ T[:3, :3]))
+    order = np.argsort(-looks, kind="stable")
+    order = order[looks[order] >= looks.max() - slack]
+    spread = order[np.linspace(0, len(order) - 1, min(len(order), _TRIED)).round().astype(int)]
+    points = points[np.concatenate([order[:_TRIED], spread])]
     local = (points - T[:3, 3]) @ T[:3, :3]
-    best, where = 0.0, points[0]
-    for model, own in ((a, points), (b, local)):
-        assert model.exact is not None
-        meshed = np.zeros(len(own)) if not model.chords else model.outer(model.chords[-1]).distance(own)
-        chosen = np.argsort(-meshed, kind="stable")[:_TRIED]
-        depths = cad_process.depths(model.exact.brep, own[chosen])
-        k = int(np.argmax(depths))
-        if depths[k] > best:
-            best, where = float(depths[k]), points[chosen[k]]
-    return best, where
+    assert a.exact is not None
+    assert b.exact is not None
+    depths = np.maximum(cad_process.depths(a.exact.brep, points), cad_process.depths(b.exact.brep, local))
+    k = int(np.argmax(depths))
+    return float(depths[k]), points[k]

@@ -46,6 +46,9 @@ Of two equal cylinders, one in the other, facets overlap by a chord error, and e
 less than the usual threshold of contact, 0.01 mm.
 """
 
+LAST_CHORDS = (CAD_CHORDS[-1], 0.0006)
+"""Chord errors (mm) of meshes, however large, for pairs of which Open CASCADE does not find the common part."""
+
 
 @dataclass
 class Counters:
@@ -154,6 +157,13 @@ class Model:
             return self._cad_chords
         arcs = isinstance(self.shape, Solid) and any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes))
         return DRAWN_CHORDS if arcs else DRAWN_CHORDS[:1]
+
+    def refine_to(self, chord: float) -> bool:
+        """Use meshes of chord error ``chord`` mm of a solid from CAD from now on; whether that is new."""
+        if not self.chords or self.chords[-1] <= chord:
+            return False
+        self._cad_chords = (*self.chords, chord)
+        return True
 
     @property
     def refines(self) -> bool:

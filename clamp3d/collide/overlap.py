@@ -18,8 +18,11 @@ _INNER = 40
 """Triangles of an overlap under which a point is tried."""
 _CORNERS = 400
 """Corners of an overlap that are measured."""
-_TRIANGLES = 60_000
-"""Triangles of an overlap, cut in four again and again, whose thickness is bounded at most: some tenths of a second."""
+_CUTS = 60_000
+"""Triangles that those of an overlap are cut into beyond their number, to bound its thickness: tenths of a second."""
+
+_HAIR = 1e-9
+"""Relative to the size: a piece that reaches over a border by less is not cut there."""
 
 
 @dataclass(eq=False)
@@ -111,25 +114,35 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Calla
     """
     if 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
         return np.inf
-    back = inverse(T)
-    pieces = shared.vertices[shared.faces]
-    each = _largest_distance(a, b, pieces, back)
-    budget = _TRIANGLES - len(pieces)
-    while not is_enough(float(each.max(initial=0.0))):
-        largest = each > 0.5 * each.max()
-        budget -= 4 * int(largest.sum())
-        if budget < 0 or not each.max() > 0.0:
-            break
-        cut = _quartered(pieces[largest])
-        pieces = np.concatenate([pieces[~largest], cut])
-        each = np.concatenate([each[~largest], _largest_distance(a, b, cut, back)])
+    _, each = cut_until(a, b, T, shared.vertices[shared.faces], is_enough)
     return float(each.max(initial=0.0))
 
 
-def _largest_distance(a: Surface, b: Surface, pieces: Array, back: Array) -> Array:
-    """Largest distance (m,) of triangles (m, 3, 3) from either surface at most; ``back`` (4, 4) takes them to b."""
-    local = pieces @ back[:3, :3].T + back[:3, 3]
-    return np.maximum(_from_one_triangle(a, pieces), _from_one_triangle(b, local))
+def cut_until(
+    a: Surface, b: Surface, T: Array, pieces: Array, is_enough: Callable[[float], bool], most: int = _CUTS
+) -> tuple[Array, Array]:
+    """Triangles (m, 3, 3), cut up, and how far (m,) each is from either surface at most.
+
+    The furthest ones are cut until the largest distance ``is_enough``, or there are ``most`` more.
+    """
+    back = inverse(T)
+    each = _distances(a, b, pieces, back)
+    while not is_enough(float(each.max(initial=0.0))):
+        largest = each.max(axis=1) > 0.5 * each.max()
+        most -= 2 * int(largest.sum())  # three or four in place of one
+        if most < 0 or not each.max() > 0.0:
+            break
+        from_a = largest & (each[:, 0] >= each[:, 1])
+        from_b = largest & ~from_a
+        cut = np.concatenate([_cut(a, np.eye(4), pieces[from_a]), _cut(b, back, pieces[from_b])])
+        pieces = np.concatenate([pieces[~largest], cut])
+        each = np.concatenate([each[~largest], _distances(a, b, cut, back)])
+    return pieces, np.asarray(each.max(axis=1))
+
+
+def _distances(a: Surface, b: Surface, pieces: Array, back: Array) -> Array:
+    """Largest distances (m, 2) of triangles (m, 3, 3) from two surfaces at most; ``back`` (4, 4) takes them to b."""
+    return np.stack([_from_one_triangle(a, pieces), _from_one_triangle(b, _placed(back, pieces))], axis=1)
 
 
 def _from_one_triangle(surface: Surface, pieces: Array) -> Array:
@@ -138,6 +151,41 @@ def _from_one_triangle(surface: Surface, pieces: Array) -> Array:
     chosen = np.repeat(surface.vertices[surface.faces[face]], 3, axis=0)
     corners = pieces.reshape(-1, 3)
     return np.asarray(np.linalg.norm(closest_points(chosen, corners) - corners, axis=1).reshape(-1, 3).max(axis=1))
+
+
+def _placed(T: Array, points: Array) -> Array:
+    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
+
+
+def _cut(surface: Surface, T: Array, pieces: Array) -> Array:
+    """Triangles (k, 3, 3) cut where they reach over a border of the surface's triangle nearest to their middle.
+
+    Each is cut along one border, upright; those that reach over none are cut in four. ``T`` (4, 4) takes them to the
+    surface's frame.
+    """
+    local = _placed(T, pieces)
+    _, face, _ = surface.nearest(local.mean(axis=1))
+    corners = surface.vertices[surface.faces[face]]
+    inward = np.cross(surface.normals[face][:, None], np.roll(corners, -1, axis=1) - corners)
+    inward /= np.maximum(np.linalg.norm(inward, axis=2), 1e-300)[:, :, None]
+    height = np.einsum("mbj,mbcj->mbc", inward, local[:, None] - corners[:, :, None])
+    reach = np.minimum(height.max(axis=2), -height.min(axis=2))
+    border = reach.argmax(axis=1)
+    rows = np.arange(len(pieces))
+    over = reach[rows, border] > _HAIR * surface.scale
+    return np.concatenate([_split(pieces[over], height[rows, border][over]), _quartered(pieces[~over])])
+
+
+def _split(pieces: Array, height: Array) -> Array:
+    """Triangles (3 m, 3, 3): each of (m, 3, 3) cut where the height (m, 3) of its corners changes sign."""
+    above = height > 0.0
+    lone = np.argmax(above == (above.sum(axis=1) == 1)[:, None], axis=1)  # the corner that is alone on its side
+    order = (lone[:, None] + np.arange(3)) % 3
+    rows = np.arange(len(pieces))[:, None]
+    (a, b, c), (h, i, j) = pieces[rows, order].transpose(1, 0, 2), height[rows, order].T
+    ab = a + (h / (h - i))[:, None] * (b - a)
+    ac = a + (h / (h - j))[:, None] * (c - a)
+    return np.concatenate([np.stack(corners, axis=1) for corners in ((a, ab, ac), (ab, b, c), (ab, c, ac))])
 
 
 def _quartered(pieces: Array) -> Array:

@@ -17,7 +17,7 @@ from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.closed_form import ClosedForm, bodies_distance
 from clamp3d.collide.facets import rod_of, rods_distance
 from clamp3d.collide.mesh_distance import meshes_distance
-from clamp3d.collide.model import Model
+from clamp3d.collide.model import LAST_CHORDS, Model
 from clamp3d.collide.open_mesh import open_distance
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import SolverError
@@ -69,14 +69,15 @@ def _levels(a: Model, b: Model, T: Array, cad_forms: bool) -> Iterator[Callable[
     if forms:
         yield from _cylinders_on_facets(a, b, T)
     for chord in _chords(a, b):
-        queries["meshes"] += 1
-        said = f", chord error {chord:.2g} mm" if a.refines or b.refines else ""
-        yield partial(_by_meshes, a, b, T, chord, f"meshes (FCL){said}")
+        yield partial(_by_meshes, a, b, T, chord)
     if both_exact:
         from clamp3d.collide.exact import exact_distance
 
         queries["exact"] += 1
         yield lambda _: exact_distance(a, b, T)
+        for chord in LAST_CHORDS:  # Open CASCADE did not find the common part
+            if a.refine_to(chord) | b.refine_to(chord):
+                yield partial(_by_meshes, a, b, T, chord)
 
 
 def _cylinders_on_facets(a: Model, b: Model, T: Array) -> Iterator[Callable[[Enough], Distance]]:
@@ -98,8 +99,10 @@ def _on_facets(mesh: Model, round_: Model, T: Array) -> Distance:
     return distance.labelled("facets", "cylinder on facets (FCL)")
 
 
-def _by_meshes(a: Model, b: Model, T: Array, chord: float, method: str, enough: Enough) -> Distance:
-    return meshes_distance(a, b, T, chord, enough).labelled("meshes", method)
+def _by_meshes(a: Model, b: Model, T: Array, chord: float, enough: Enough) -> Distance:
+    a.counters.queries["meshes"] += 1
+    chord_error = f", chord error {chord:.2g} mm" if a.refines or b.refines else ""
+    return meshes_distance(a, b, T, chord, enough).labelled("meshes", f"meshes (FCL){chord_error}")
 
 
 def _chords(a: Model, b: Model) -> list[float]:

@@ -156,8 +156,14 @@ class Surface:
     def _winds_round(self, points: Array) -> NDArray[np.bool_]:
         import igl
 
-        winding = igl.winding_number if len(points) <= _FEW else igl.fast_winding_number
-        return np.asarray(np.abs(winding(self.vertices, self.faces, np.ascontiguousarray(points))) > 0.5)
+        turns = np.empty(len(points))
+        exactly = self.distance(points) <= _SINGLE * self.scale
+        if np.count_nonzero(~exactly) <= _FEW:
+            exactly[:] = True
+        for rows, winding in ((exactly, igl.winding_number), (~exactly, igl.fast_winding_number)):
+            if rows.any():
+                turns[rows] = winding(self.vertices, self.faces, np.ascontiguousarray(points[rows]))
+        return np.asarray(np.abs(turns) > 0.5)
 
     def certain_depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside the true body at least; negative where that is not certain.
@@ -189,6 +195,8 @@ class Surface:
 
 _MIDDLE = 1e-4
 """How far from a triangle's sides, relative to these, a nearest point counts as in its middle."""
+_SINGLE = 1e-4
+"""Distance from the surface, relative to its size, up to which the fast winding number, in single floats, may err."""
 _FEW = 8
 """Points up to which the exact sum over all triangles is quicker than the tree of the fast winding number."""
 
