@@ -200,10 +200,10 @@ def signed_distance(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) ->
     if type(groove) is not SweptArc or not flat:
         check_shapes(groove, cylinder)
     T = as_pose(pose)
-    record, pad = np.empty((1, 19)), np.empty((128, 5))
+    record = np.empty((1, 19))
     run = (_kernel or kernel()).records
     half, along = 0.5 * groove.length, 0.5 * cylinder.length
-    if run(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, pad, record) >= 0:
+    if run(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, record) >= 0:
         return signed_distance(groove, cylinder, repaired(T, "pose"))
     out = record[0]
     values = out.tolist()
@@ -288,8 +288,7 @@ def signed_distances(
     threads = min(workers or os.cpu_count() or 1, max(1, n // 4096))
 
     def part(start: int, stop: int) -> int:
-        extra = () if full else (np.empty(kernel().WORK),)
-        bad = run(T[start:stop], *sizes, np.empty((128, 5)), *extra, out[start:stop])
+        bad = run(T[start:stop], *sizes, out[start:stop])
         return bad if bad < 0 else start + int(bad)
 
     if threads == 1:
