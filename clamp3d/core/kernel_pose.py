@@ -45,7 +45,7 @@ def rigid(T: Array, k: int) -> bool:
         return False
     offset = abs(T[k, 0, 3]) + abs(T[k, 1, 3]) + abs(T[k, 2, 3])
     last = abs(T[k, 3, 0]) + abs(T[k, 3, 1]) + abs(T[k, 3, 2]) + abs(T[k, 3, 3] - 1.0)
-    return offset < LARGEST and last == 0.0
+    return bool(offset < LARGEST and last == 0.0)
 
 
 @inlined

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from clamp3d.checks import instance
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Profile, Side, check_mesh_error
 from clamp3d.core.shapes import Solid
@@ -155,7 +154,7 @@ def _extrude(shape: Extrusion, mesh_error: float, side: Side, overlap: float = 0
         points = np.concatenate([np.column_stack([corners, np.full(n, end)]) for end in ends])
         faces = np.concatenate([caps[:, ::-1], caps + n, *sides]).astype(np.uint64)
         # Not by trimesh: it takes 0.4 s to import, merges vertices, and its booleans round them to single precision.
-        solid += manifold3d.Manifold(manifold3d.Mesh64(vert_properties=dot(points, shape.frame.T), tri_verts=faces))
+        solid += manifold3d.Manifold(manifold3d.Mesh64(vert_properties=points @ shape.frame.T, tri_verts=faces))
     return solid
 
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import positive
 from clamp3d.core.distance import Feature, SignedDistance, as_pose, signed_distance, signed_distances
-from clamp3d.core.linear import dot, norm
+from clamp3d.core.linear import norm
 from clamp3d.core.pose import Array, rotation
 from clamp3d.core.primitives import AnyCylinder, SweptArc, check_shapes
 
@@ -119,6 +119,6 @@ def _moved(T: Array, twist: Array) -> Array:
     """The pose after a small motion in the groove's frame."""
     angle = norm(twist[3:])
     M = rotation(twist[3:], angle) if angle > 0.0 else np.eye(4)
-    out = dot(M, T)
+    out = M @ T
     out[:3, 3] += twist[:3]
     return np.asarray(out)
