@@ -85,8 +85,8 @@ def generalised_gradient(
     >>> from clamp3d.core.pose import translation
     >>> from clamp3d.core.primitives import Cylinder
     >>> groove, wire = SweptArc(12.0, np.pi / 3, 50.0), Cylinder(14.0, 80.0)
-    >>> found = generalised_gradient(groove, wire, translation(0.0, 5.0, 0.0))  # over both lips
-    >>> found.unique, sorted({str(feature) for feature in found.features})
+    >>> answer = generalised_gradient(groove, wire, translation(0.0, 5.0, 0.0))  # over both lips
+    >>> answer.unique, sorted({str(feature) for feature in answer.features})
     (False, ['corner M', 'corner N', 'lip M', 'lip N'])
     """
     check_shapes(groove, cylinder)
@@ -94,8 +94,8 @@ def generalised_gradient(
     T = as_pose(pose)
     arm = max(groove.radius, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, *np.abs(T[:3, 3]).tolist())
     step = _TOLERANCE * arm if tolerance is None else positive("tolerance", tolerance)
-    around = np.array([_moved(T, v * [*[step] * 3, *[step / arm] * 3]) for v in _directions()])
-    near = signed_distances(groove, cylinder, around, full=True)
+    moved_poses = np.array([_moved(T, v * [*[step] * 3, *[step / arm] * 3]) for v in _directions()])
+    near = signed_distances(groove, cylinder, moved_poses, full=True)
     scale = np.array([1.0, 1.0, 1.0, *[arm] * 3])
     kept: list[int] = []
     for k, rate in enumerate(near.gradient / scale):
