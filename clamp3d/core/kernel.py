@@ -11,18 +11,16 @@ from clamp3d.core.kernel_flat import flat_nearest
 from clamp3d.core.kernel_pose import rigid, rod_at
 from clamp3d.core.pose import Array
 
-# Columns of a record.
-DISTANCE, POINT_ON_GROOVE, POINT_ON_CYLINDER, NORMAL, ERROR_BOUND, FEATURE, ALONG, GRADIENT, WIDTH = (
-    0,
-    1,
-    4,
-    7,
-    10,
-    11,
-    12,
-    13,
-    19,
-)
+# First columns of a record: vectors take three, the gradient six.
+DISTANCE = 0
+POINT_ON_GROOVE = 1
+POINT_ON_CYLINDER = 4
+NORMAL = 7
+ERROR_BOUND = 10
+FEATURE = 11
+ALONG = 12
+GRADIENT = 13
+WIDTH = 19
 
 
 @inlined
