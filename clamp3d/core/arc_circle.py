@@ -142,10 +142,10 @@ def classify_arc_circle(
     arc_radius, half_angle, circle_radius, x, y, tolerance = _checked(
         arc_radius, half_angle, circle_radius, x, y, tolerance
     )
-    known = real(gap)
-    if known is None or math.isnan(known):
+    checked_gap = real(gap)
+    if checked_gap is None or math.isnan(checked_gap):
         raise InputError(f"gap must be a number, got {shown(gap)}")
-    gap = known
+    gap = checked_gap
     if gap < -tolerance:
         return ArcRelation.INTERSECT
     chord_x, chord_y = arc_radius * math.sin(half_angle), -arc_radius * math.cos(half_angle)

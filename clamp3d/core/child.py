@@ -207,8 +207,8 @@ class Worker:
             if any(word in line for line in self.log for word in ("bad_alloc", "MemoryError")):
                 raise MemoryError
             raise WorkerEndedError(code, self.log)
-        made: dict[str, Any] = _unpack(answer)
-        return made
+        reply: dict[str, Any] = _unpack(answer)
+        return reply
 
 
 def run_child(

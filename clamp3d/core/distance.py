@@ -196,14 +196,14 @@ def signed_distance(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) ->
     >>> answer.distance, answer.feature.name
     (1.5, 'ARC')
     """
-    flat = type(cylinder) is Cylinder
-    if type(groove) is not SweptArc or not flat:
+    if type(groove) is not SweptArc or type(cylinder) is not Cylinder:
         check_shapes(groove, cylinder)
+    flat = type(cylinder) is Cylinder
     T = as_pose(pose)
-    record, pad = np.empty((1, 19)), np.empty((128, 5))
-    run = (_kernel or kernel()).records
+    run = _kernel or kernel()
+    record = np.empty((1, run.WIDTH))
     half, along = 0.5 * groove.length, 0.5 * cylinder.length
-    if run(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, pad, record) >= 0:
+    if run.records(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, record) >= 0:
         return signed_distance(groove, cylinder, repaired(T, "pose"))
     out = record[0]
     values = out.tolist()
@@ -280,39 +280,49 @@ def signed_distances(
     T = np.require(T, np.float64, ["C", "A", "W"])
     if workers is not None:
         workers = whole("workers", workers, least=1)
+    out = _measured(groove, cylinder, T, full, workers)
+    if not full:
+        return out
+    columns = kernel()
+    return SignedDistances(
+        out[:, columns.DISTANCE],
+        out[:, 1:4],
+        out[:, 4:7],
+        out[:, 7:10],
+        out[:, columns.FEATURE].astype(np.int8),
+        out[:, columns.ALONG],
+        out[:, columns.ERROR_BOUND],
+        out[:, columns.DISTANCE] < -_inner_size(cylinder),
+        out[:, columns.GRADIENT :],
+    )
+
+
+def _inner_size(cylinder: AnyCylinder) -> float:
+    """By how much the cylinder can shrink before nothing, or its axis alone, is left; mm."""
+    return min(cylinder.radius, 0.5 * cylinder.length) if isinstance(cylinder, Cylinder) else cylinder.radius
+
+
+def _measured(groove: SweptArc, cylinder: AnyCylinder, T: Array, full: bool, workers: int | None) -> Array:
+    """Distances (n,) or full records of the kernel for poses (n, 4, 4) or (n, 2, 3), shared by threads."""
     n = len(T)
-    out = np.empty((n, 19) if full else n)
-    flat = isinstance(cylinder, Cylinder)
     run = kernel().records if full else kernel().distances
+    out = np.empty((n, kernel().WIDTH) if full else n)
+    flat = isinstance(cylinder, Cylinder)
     sizes = (groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, flat)
     threads = min(workers or os.cpu_count() or 1, max(1, n // 4096))
 
-    def part(start: int, stop: int) -> int:
-        extra = () if full else (np.empty(kernel().WORK),)
-        bad = run(T[start:stop], *sizes, np.empty((128, 5)), *extra, out[start:stop])
-        return bad if bad < 0 else start + int(bad)
+    def part(start: int, stop: int) -> bool:
+        return int(run(T[start:stop], *sizes, out[start:stop])) < 0
 
     if threads == 1:
-        found = [part(0, n)]
+        is_done = part(0, n)
     else:
         from concurrent.futures import ThreadPoolExecutor
 
         cuts = [n * i // threads for i in range(threads + 1)]
         with ThreadPoolExecutor(threads) as pool:
-            found = list(pool.map(part, cuts[:-1], cuts[1:]))
-    if max(found) >= 0:
-        mended = _unit_axes(T) if axes else repaired(T, "poses")
-        return signed_distances(groove, cylinder, mended, full=full, workers=workers)  # type: ignore[call-overload, no-any-return]
-    if not full:
+            is_done = all(pool.map(part, cuts[:-1], cuts[1:]))
+    if is_done:
         return out
-    return SignedDistances(
-        out[:, 0],
-        out[:, 1:4],
-        out[:, 4:7],
-        out[:, 7:10],
-        out[:, 11].astype(np.int8),
-        out[:, 12],
-        out[:, 10],
-        out[:, 0] < -(min(cylinder.radius, 0.5 * cylinder.length) if flat else cylinder.radius),
-        out[:, 13:19],
-    )
+    mended = _unit_axes(T) if T.shape[1] == 2 else repaired(T, "poses")
+    return _measured(groove, cylinder, mended, full, workers)

@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Profile
 
@@ -71,5 +70,5 @@ class Extrusion:
         float
             Largest dot product of ``direction`` with a point of the body, in mm.
         """
-        da, db, along = (float(d) for d in dot(np.asarray(direction), _FRAMES[self.axis]))
+        da, db, along = (float(d) for d in np.asarray(direction) @ _FRAMES[self.axis])
         return self.profile.support(da, db) + max(along * self.start, along * self.end)

@@ -22,21 +22,24 @@ _OPTIONS: dict[str, Any] = {"fastmath": False, "error_model": "numpy", "nogil": 
 
 def formula(function: _F) -> _F:
     """Decorator of a formula that only kernels call: compiled into them."""
-    return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
+    compiled: _F = numba.njit(**_OPTIONS)(function)
+    return compiled
 
 
 def inlined(function: _F) -> _F:
     """The same for a small formula: built into each caller."""
-    return numba.njit(forceinline=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+    compiled: _F = numba.njit(forceinline=True, **_OPTIONS)(function)
+    return compiled
 
 
 def entry(function: _F) -> _F:
     """Decorator of a kernel that Python calls; where numba finds no folder for its cache, every run compiles it."""
     try:
-        return numba.njit(cache=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+        compiled: _F = numba.njit(cache=True, **_OPTIONS)(function)
     except RuntimeError:  # no folder can be written
         _Notice.when = " in every run: set NUMBA_CACHE_DIR to a folder that can be written"
-        return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
+        compiled = numba.njit(**_OPTIONS)(function)
+    return compiled
 
 
 class _Notice(event.Listener):
@@ -56,4 +59,4 @@ class _Notice(event.Listener):
         pass
 
 
-event.register("numba:compile", _Notice())  # type: ignore[no-untyped-call]
+event.register("numba:compile", _Notice())

@@ -1,120 +1,244 @@
 """Least signed distance of a flat-ended cylinder's points along an edge of a groove: a line, or an end arc.
 
-A cylinder with flat ends is convex, so its signed distance ``f(q) = phi(w - r, |t| - l)`` is a convex function of the
-point q: w is q's distance from the axis, t its place along it, phi the signed distance from a quadrant. Outside f is
-the distance, inside it is minus the depth. Along a line it has one minimum. Along an arc it may have several: stretches
-of the arc are halved until each is proven to hold nothing lower, or exactly one minimum.
+A cylinder with flat ends is convex, so its signed distance ``f(q) = phi(w - r, |t| - half)`` is a convex function of
+the point q: w is q's distance from the axis, t its place along it, phi the signed distance from a quadrant. Outside f
+is the distance, inside it is minus the depth. Along a line it has one minimum. Along an arc it may have several:
+stretches of the arc are halved until each is proven to hold nothing lower, or exactly one minimum.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from clamp3d.core.jit import formula, inlined
-from clamp3d.core.kernel_features import phi
+from clamp3d.core.kernel_features import Groove, Rod, phi
 
 STRETCHES = 400
 """Stretches of an arc that are looked at; then the search ends with a wider bound, which it tells."""
 
+# What `root` solves, with w and t as above, g = w - r, e = |t| - half:
+RIM, SIDE, END, RIDGE, MIDDLE = range(5)
+"""The least distance from the rim, from the axis, from the end's plane; where g = e; where t = 0."""
+
+
+class Line(NamedTuple):
+    """The edge ``k + p u``, lo <= p <= hi: k = (x, y, z) from the cylinder's middle, u = (ux, 0, uz) is x or z.
+
+    u is square to k.
+    """
+
+    x: float
+    y: float
+    z: float
+    ux: float
+    uz: float
+    lo: float
+    hi: float
+
+
+class EndArc(NamedTuple):
+    """An end arc in the plane z: its radius, and its centre from the axis' nearest point, which is at ``off`` on it."""
+
+    R: float
+    x: float
+    y: float
+    z: float
+    off: float
+
+
+class Course(NamedTuple):
+    """w and t at a point of an edge, with their first and second rates along it."""
+
+    w: float
+    t: float
+    w1: float
+    t1: float
+    w2: float
+    t2: float
+
+
+class Stretch(NamedTuple):
+    """What bounds f on a stretch of an arc about a point: ranges of g and e, and the largest rates of w.
+
+    ``by``, ``bend`` and ``third`` bound the first three derivatives of w by the angle, ``tilt`` all those of t.
+    """
+
+    half: float
+    g: float
+    e: float
+    g_low: float
+    e_low: float
+    g_high: float
+    e_high: float
+    by: float
+    bend: float
+    third: float
+    tilt: float
+
+
+class Place(NamedTuple):
+    """Least f on an edge, where it is, and a lower bound of f where the search ended early (else infinite)."""
+
+    f: float
+    p: float
+    left: float
+
 
 @inlined
-def from_axis(x, y, z, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Distance of a point, given from the middle of a unit axis, from that axis, and its place along it."""
-    t = x * dx + y * dy + z * dz
-    x -= t * dx
-    y -= t * dy
-    z -= t * dz
+def from_axis(rod: Rod, x: float, y: float, z: float) -> tuple[float, float]:
+    """Distance of a point, given from the cylinder's middle, from its axis, and its place along it."""
+    t = x * rod.dx + y * rod.dy + z * rod.dz
+    x -= t * rod.dx
+    y -= t * rod.dy
+    z -= t * rod.dz
     return math.sqrt(x * x + y * y + z * z), t
 
 
+@inlined
+def beside(rod: Rod, w: float, t: float) -> float:
+    """Signed distance f of a point from the cylinder by its distance from the axis and its place along it."""
+    return phi(w - rod.r, abs(t) - rod.half)
+
+
 @formula
-def on_line(r, l, kx, ky, kz, ux, uz, dx, dy, dz, lo, hi, limit):  # type: ignore[no-untyped-def] # noqa: E741
-    """Least f at ``k + s u``, lo <= s <= hi, and s; k is given from the cylinder's middle, u is x or z, square to k.
+def line_course(line: Line, rod: Rod, p: float) -> Course:
+    """w and t at a place of a line."""
+    x, y, z = line.x + p * line.ux, line.y, line.z + p * line.uz
+    t = x * rod.dx + y * rod.dy + z * rod.dz
+    vx, vy, vz = x - t * rod.dx, y - t * rod.dy, z - t * rod.dz
+    w = math.sqrt(vx * vx + vy * vy + vz * vz)
+    t1 = line.ux * rod.dx + line.uz * rod.dz
+    w1 = (line.ux * vx + line.uz * vz) / w if w > 0.0 else 0.0
+    across2 = rod.dy * rod.dy + (line.uz * rod.dx) ** 2 + (line.ux * rod.dz) ** 2
+    return Course(w, t, w1, t1, (across2 - w1 * w1) / w if w > 0.0 else 0.0, 0.0)
 
-    What cannot be below ``limit`` is not looked for: then the value is inf.
 
-    Between the point nearest to the axis and the one nearest to the middle plane w and |t| go opposite ways.
-    """
-    along = ux * dx + uz * dz
-    across2 = dy * dy + (uz * dx) ** 2 + (ux * dz) ** 2
-    t0 = kx * dx + ky * dy + kz * dz
-    k2 = kx * kx + ky * ky + kz * kz
-    a = math.inf
-    if across2 > 0.0:
-        a = min(max(along * t0 / across2, lo), hi)
-    b = min(max(-t0 / along, lo), hi) if along != 0.0 else a
-    if a == math.inf:
-        a = b
-    w, t = from_axis(kx + a * ux, ky, kz + a * uz, dx, dy, dz)
-    ga, ea = w - r, abs(t) - l
-    if ea <= min(ga, 0.0) or a == b:
-        return phi(ga, ea), a
-    w, t = from_axis(kx + b * ux, ky, kz + b * uz, dx, dy, dz)
-    gb, eb = w - r, abs(t) - l
-    if phi(ga, eb) > limit:
-        return math.inf, a
-    if gb <= min(eb, 0.0):
-        return eb, b
-    _, t = from_axis(kx + 0.5 * (a + b) * ux, ky, kz + 0.5 * (a + b) * uz, dx, dy, dz)
-    side = 1.0 if t >= 0.0 else -1.0
-    best, at = (phi(ga, ea), a) if phi(ga, ea) <= phi(gb, eb) else (phi(gb, eb), b)
-    for rim in range(2):  # where side and end are equally far, which is the least inside; then the rim from outside
-        if rim == 0 and not (ga <= ea and gb >= eb):
-            continue
-        p, q = a, b
-        tried = False
-        s = 0.5 * (a + b)
-        if rim == 1 and along != 0.0:  # just beyond the end, where it begins to pull against the side
-            near = (side * l * (1.0 + 1e-6) - t0) / along
-            s = near if min(a, b) < near < max(a, b) else s
-        for _ in range(60):
-            x = kx + s * ux
-            z = kz + s * uz
-            t = x * dx + ky * dy + z * dz
-            vx = x - t * dx
-            vy = ky - t * dy
-            vz = z - t * dz
-            w = math.sqrt(vx * vx + vy * vy + vz * vz)
-            g, e = w - r, side * t - l
-            rate = (ux * vx + uz * vz) / w if w > 0.0 else 0.0
-            if rim == 0:
-                f = g - e
-                slope = rate - side * along
-                rising = f > 0.0
-            else:
-                g, e = max(g, 0.0), max(e, 0.0)
-                f = g * rate + e * side * along
-                slope = (rate * rate if g > 0.0 else 0.0) + (along * along if e > 0.0 else 0.0)
-                slope += g * (across2 - rate * rate) / w if w > 0.0 else 0.0
-                rising = f * (b - a) > 0.0
-            if f == 0.0:
-                break
-            if rising:
-                q = s
-            else:
-                p = s
-            step = f / slope if slope != 0.0 else math.inf
-            if abs(step) <= 1e-16 * (abs(s) + math.sqrt(k2)):
-                break
-            new = s - step
-            if not min(p, q) < new < max(p, q):
-                # At an end of the line, often: it is tried, once.
-                new = (p if rising else q) if rim == 1 and not tried else 0.5 * (p + q)
-                tried = True
-            if new == s:
-                break
-            s = new
-        w, t = from_axis(kx + s * ux, ky, kz + s * uz, dx, dy, dz)
-        f = phi(w - r, abs(t) - l)
-        if f < best:
-            best, at = f, s
-        if rim == 0 and f <= 0.0:
-            break
-    return best, at
+@formula
+def arc_course(arc: EndArc, rod: Rod, angle: float) -> Course:
+    """w and t at an angle from the arc's deepest point; the rates of w are infinite on the axis."""
+    sine, cosine = arc.R * math.sin(angle), arc.R * math.cos(angle)
+    x, y = sine + arc.x, -cosine + arc.y
+    t = x * rod.dx + y * rod.dy + arc.z * rod.dz
+    vx, vy, vz = x - t * rod.dx, y - t * rod.dy, arc.z - t * rod.dz
+    w = math.sqrt(vx * vx + vy * vy + vz * vz)
+    t1 = cosine * rod.dx + sine * rod.dy
+    t2 = cosine * rod.dy - sine * rod.dx
+    if w == 0.0:
+        return Course(w, t + arc.off, math.inf, t1, math.inf, t2)
+    w1 = (vx * cosine + vy * sine) / w
+    w2 = (arc.R * arc.R - t1 * t1 + vy * cosine - vx * sine - w1 * w1) / w
+    return Course(w, t + arc.off, w1, t1, w2, t2)
 
 
 @inlined
-def fall(slope, bend, third, reach):  # type: ignore[no-untyped-def]
+def equation(kind: int, rod: Rod, course: Course, side: float) -> tuple[float, float]:
+    """Left side of what `root` solves and its slope; ``side`` is the sign of t."""
+    w1, w2, e1, e2 = course.w1, course.w2, side * course.t1, side * course.t2
+    g, e = course.w - rod.r, side * course.t - rod.half
+    if kind == RIM:
+        bend = (w1 * w1 + g * w2 if g > 0.0 else 0.0) + (e1 * e1 + e * e2 if e > 0.0 else 0.0)
+        return max(g, 0.0) * w1 + max(e, 0.0) * e1, bend
+    if kind == SIDE:
+        return w1, w2
+    if kind == END:
+        return e1, e2
+    if kind == RIDGE:
+        return g - e, w1 - e1
+    return course.t, course.t1
+
+
+@formula
+def root(
+    course_of: Callable[[Any, Rod, float], Course],
+    curve: Any,
+    rod: Rod,
+    kind: int,
+    lo: float,
+    hi: float,
+    start: float,
+    size: float,
+) -> float:
+    """Root of a monotone function on lo <= p <= hi, or the end beyond which it lies: Newton's steps, else halving.
+
+    ``size`` is that of the lengths (of a line) or angles that p is reckoned from.
+    """
+    p = start
+    side = 1.0 if course_of(curve, rod, p).t >= 0.0 else -1.0
+    for k in range(60):
+        value, slope = equation(kind, rod, course_of(curve, rod, p), side)
+        if value == 0.0:
+            break
+        if (value > 0.0) == (kind < RIDGE or slope > 0.0):
+            hi = p
+        else:
+            lo = p
+        if k == 0:  # the end that it leads to is tried first: often the root is beyond it
+            end = lo if hi == p else hi
+            if (equation(kind, rod, course_of(curve, rod, end), side)[0] > 0.0) == (value > 0.0):
+                return end
+        step = value / slope if slope != 0.0 else math.inf
+        if abs(step) <= 1e-16 * (abs(p) + size):
+            break
+        new = p - step
+        if not lo < new < hi:
+            new = 0.5 * (lo + hi)
+        if new == p:
+            break
+        p = new
+    return p
+
+
+@formula
+def on_line(rod: Rod, line: Line, limit: float) -> Place:
+    """Least f on a line. What cannot be below ``limit`` is not looked for: then the value is infinite.
+
+    Between the point nearest to the axis and the one nearest to the middle plane w and |t| go opposite ways.
+    """
+    along = line.ux * rod.dx + line.uz * rod.dz
+    across2 = rod.dy * rod.dy + (line.uz * rod.dx) ** 2 + (line.ux * rod.dz) ** 2
+    t0 = line.x * rod.dx + line.y * rod.dy + line.z * rod.dz
+    b = min(max(-t0 / along, line.lo), line.hi) if along != 0.0 else math.inf
+    a = min(max(along * t0 / across2, line.lo), line.hi) if across2 > 0.0 else b
+    b = a if along == 0.0 else b
+    at_a, at_b = line_course(line, rod, a), line_course(line, rod, b)
+    ga, ea = at_a.w - rod.r, abs(at_a.t) - rod.half
+    gb, eb = at_b.w - rod.r, abs(at_b.t) - rod.half
+    if ea <= min(ga, 0.0) or a == b:
+        return Place(phi(ga, ea), a, math.inf)
+    if phi(ga, eb) > limit:
+        return Place(math.inf, a, math.inf)
+    if gb <= min(eb, 0.0):
+        return Place(eb, b, math.inf)
+    best = Place(phi(ga, ea), a, math.inf) if phi(ga, ea) <= phi(gb, eb) else Place(phi(gb, eb), b, math.inf)
+    lo, hi, middle = min(a, b), max(a, b), 0.5 * (a + b)
+    size = math.sqrt(line.x * line.x + line.y * line.y + line.z * line.z)
+    if ga <= ea and gb >= eb:  # where side and end are equally far, which is the least inside
+        p = root(line_course, line, rod, RIDGE, lo, hi, middle, size)
+        best = better(best, line, rod, p)
+        if best.f <= 0.0:
+            return best
+    # The rim from outside: from just beyond the end on, where it begins to pull against the side.
+    side = 1.0 if line_course(line, rod, middle).t >= 0.0 else -1.0
+    near = (side * rod.half * (1.0 + 1e-6) - t0) / along if along != 0.0 else middle
+    start = near if lo < near < hi else middle
+    p = root(line_course, line, rod, RIM, lo, hi, start, size)
+    return better(best, line, rod, p)
+
+
+@inlined
+def better(best: Place, line: Line, rod: Rod, p: float) -> Place:
+    """The best so far, or a place of a line."""
+    course = line_course(line, rod, p)
+    f = beside(rod, course.w, course.t)
+    return Place(f, p, math.inf) if f < best.f else best
+
+
+@inlined
+def fall(slope: float, bend: float, third: float, reach: float) -> float:
     """By how much a function with this slope, second and largest third derivative falls within ``reach`` at most."""
     a = abs(slope)
     drop = third * reach * reach * reach / 6.0
@@ -123,208 +247,159 @@ def fall(slope, bend, third, reach):  # type: ignore[no-untyped-def]
     return drop + a * reach - 0.5 * bend * reach * reach
 
 
-@formula
-def arc_terms(phi_, R, kx, ky, kz, off, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """w, t and their first and second rates by the angle at a point of an end arc; the rates of w are inf on the axis.
+@inlined
+def stretch_about(arc: EndArc, rod: Rod, course: Course, half: float) -> Stretch:
+    """The ranges on a stretch of an arc that reaches ``half`` rad to both sides."""
+    tilt = arc.R * math.sqrt(rod.e2)
+    # Largest derivatives of w^2 by the angle; t is at most ``tilt`` from off.
+    slope = 2.0 * arc.R * math.sqrt(arc.x * arc.x + arc.y * arc.y)
+    first, second, third = slope + tilt * tilt, slope + 2.0 * tilt * tilt, slope + 4.0 * tilt * tilt
+    g, e = course.w - rod.r, abs(course.t) - rod.half
+    low = max(math.sqrt(max(course.w * course.w - first * half, 0.0)), course.w - arc.R * half)  # the least w
+    by = arc.R if low <= 0.0 else min(arc.R, 0.5 * first / low)
+    bend = (0.5 * second + by * by) / low if low > 0.0 else math.inf
+    third = (0.5 * third + 3.0 * by * bend) / low if low > 0.0 else math.inf
+    g_low, e_low = max(g - by * half, -rod.r), max(e - tilt * half, -rod.half)
+    return Stretch(half, g, e, g_low, e_low, g + by * half, e + tilt * half, by, bend, third, tilt)
 
-    k leads from the axis' point nearest to the arc's centre to that centre, ``off`` is that point's place on the axis.
+
+@inlined
+def bound_by_mixture(stretch: Stretch, course: Course, f: float) -> float:
+    """Lower bound of f on a stretch.
+
+    Lemma: f is at least g, at least e, and at least every mixture ``u g + v e`` with u^2 + v^2 = 1 (outside) or
+    u + v = 1, u and v not negative. Each of these is at least its Taylor polynomial less the largest remainder.
     """
-    sine = R * math.sin(phi_)
-    cosine = R * math.cos(phi_)
-    x = sine + kx
-    y = -cosine + ky
-    t = x * dx + y * dy + kz * dz
-    vx = x - t * dx
-    vy = y - t * dy
-    vz = kz - t * dz
-    w = math.sqrt(vx * vx + vy * vy + vz * vz)
-    t1 = cosine * dx + sine * dy
-    t2 = cosine * dy - sine * dx
-    if w == 0.0:
-        return w, t + off, math.inf, t1, math.inf, t2
-    w1 = (vx * cosine + vy * sine) / w
-    w2 = (R * R - t1 * t1 + vy * cosine - vx * sine - w1 * w1) / w
-    return w, t + off, w1, t1, w2, t2
+    s, side = stretch, 1.0 if course.t >= 0.0 else -1.0
+    w1, w2, e1, e2 = course.w1, course.w2, side * course.t1, side * course.t2
+    bound = max(s.g - fall(w1, w2, s.third, s.half), s.e - fall(e1, e2, s.tilt, s.half))
+    if f > 0.0:
+        u, v = max(s.g, 0.0) / f, max(s.e, 0.0) / f
+    elif (w1 > 0.0) != (e1 > 0.0):
+        u, v = e1 / (e1 - w1), w1 / (w1 - e1)
+    else:
+        u, v = (1.0, 0.0) if s.g > s.e else (0.0, 1.0)
+    drop = fall(u * w1 + v * e1, u * w2 + v * e2, u * s.third + v * s.tilt, s.half)
+    return max(bound, u * s.g + v * s.e - drop)
+
+
+@inlined
+def one_minimum(stretch: Stretch, course: Course, rim_third: float) -> tuple[int, float]:
+    """What to solve for the one minimum of a stretch (-1: not known), and the slope if f is monotone (else 0)."""
+    s, side = stretch, 1.0 if course.t >= 0.0 else -1.0
+    w1, w2, e1, e2 = course.w1, course.w2, side * course.t1, side * course.t2
+    is_split = abs(course.t) <= s.tilt * s.half  # the sign of t may change
+    if s.g_low > 0.0 and s.e_low > 0.0:  # all of it beyond the rim
+        slope = s.g * w1 + s.e * e1
+        bend = w1 * w1 + s.g * w2 + e1 * e1 + s.e * e2
+        if rim_third * s.half < bend:
+            return RIM, 0.0
+        return -1, slope if abs(slope) > (abs(bend) + 0.5 * rim_third * s.half) * s.half else 0.0
+    if s.e_high <= min(s.g_low, 0.0):  # all of it beside the side
+        if w2 > s.third * s.half:
+            return SIDE, 0.0
+        return -1, w1 if abs(w1) > s.bend * s.half else 0.0
+    if is_split:
+        return -1, 0.0
+    if s.g_high <= min(s.e_low, 0.0):  # all of it nearest to the end
+        if e2 > s.tilt * s.half:
+            return END, 0.0
+        return -1, e1 if abs(e1) > s.tilt * s.half else 0.0
+    if abs(w1) > s.bend * s.half and abs(e1) > s.tilt * s.half:
+        return (-1, w1) if (w1 > 0.0) == (e1 > 0.0) else (RIDGE, 0.0)
+    return -1, 0.0
+
+
+@inlined
+def lower(best: Place, arc: EndArc, rod: Rod, angle: float) -> Place:
+    """The best so far, or the point of an arc at an angle."""
+    course = arc_course(arc, rod, angle)
+    f = beside(rod, course.w, course.t)
+    return Place(f, angle, best.left) if f < best.f else best
+
+
+@inlined
+def end_arc_of(groove: Groove, rod: Rod, ez: float) -> EndArc:
+    """The arc of the end in the plane z = ez."""
+    off = (ez - rod.z) * rod.dz - rod.x * rod.dx - rod.y * rod.dy
+    return EndArc(groove.R, -rod.x - off * rod.dx, -rod.y - off * rod.dy, ez - rod.z - off * rod.dz, off)
 
 
 @formula
-def settle(kind, r, l, side, middle, half, R, kx, ky, kz, off, dx, dy, dz):  # type: ignore[no-untyped-def] # noqa: E741
-    """Root of a monotone function within ``middle`` +- ``half``, or the end of the stretch beyond which it lies.
-
-    Kind 0: rate of the squared distance from the rim; 1: of w; 2: of the end's distance; 3: side and end equally far;
-    4: t.
-    """
-    lo, hi = middle - half, middle + half
-    at = middle
-    for k in range(60):
-        w, t, w1, t1, w2, t2 = arc_terms(at, R, kx, ky, kz, off, dx, dy, dz)
-        g, e, e1, e2 = w - r, side * t - l, side * t1, side * t2
-        if kind == 0:
-            f = g * w1 + e * e1
-            slope = w1 * w1 + g * w2 + e1 * e1 + e * e2
-        elif kind == 1:
-            f, slope = w1, w2
-        elif kind == 2:
-            f, slope = e1, e2
-        elif kind == 3:
-            f, slope = g - e, w1 - e1
-        else:
-            f, slope = t, t1
-        if f == 0.0:
-            break
-        if (f > 0.0) == (kind < 3 or slope > 0.0):
-            hi = at
-        else:
-            lo = at
-        if k == 0:  # the end that it leads to is tried first: often the root is beyond it
-            end = lo if hi == at else hi
-            w, t, w1, t1, w2, t2 = arc_terms(end, R, kx, ky, kz, off, dx, dy, dz)
-            g, e, e1 = w - r, side * t - l, side * t1
-            there = (
-                g * w1 + e * e1 if kind == 0 else w1 if kind == 1 else e1 if kind == 2 else g - e if kind == 3 else t
-            )
-            if (there > 0.0) == (f > 0.0):
-                return end
-        step = f / slope if slope != 0.0 else math.inf
-        if abs(step) <= 2e-16:
-            break
-        new = at - step
-        if not lo < new < hi:
-            new = 0.5 * (lo + hi)
-        if new == at:
-            break
-        at = new
-    return at
+def settled(arc: EndArc, rod: Rod, middle: float, stretch: Stretch, best: Place, eps: float) -> tuple[Place, float]:
+    """The best so far or that of a stretch, and a lower bound of what may be lower in it (infinite if nothing is)."""
+    s = stretch
+    course = arc_course(arc, rod, middle)
+    f = phi(s.g, s.e)
+    bound = bound_by_mixture(s, course, f)
+    if bound >= best.f - eps:
+        return best, math.inf
+    lo, hi = middle - s.half, middle + s.half
+    if f < 0.0 and abs(course.t) <= s.tilt * s.half < abs(course.t1):
+        best = lower(best, arc, rod, root(arc_course, arc, rod, MIDDLE, lo, hi, middle, 1.0))
+    # Third derivative of half the squared distance from the rim; that of the cylinder's middle bounds it too.
+    rim_third = 3.0 * s.by * s.bend + s.g_high * s.third + 3.0 * s.tilt * s.tilt + s.e_high * s.tilt
+    from_middle = arc.R * math.sqrt(rod.x * rod.x + rod.y * rod.y)
+    rim_third = min(rim_third, from_middle + rod.r * s.third + rod.half * s.tilt)
+    limit = best.f - eps
+    if s.g_low > 0.0 and s.e_low > 0.0 and limit > 0.0:
+        side = 1.0 if course.t >= 0.0 else -1.0
+        w1, e1 = course.w1, side * course.t1
+        slope, bend = s.g * w1 + s.e * e1, w1 * w1 + s.g * course.w2 + e1 * e1 + s.e * side * course.t2
+        if 0.5 * (s.g * s.g + s.e * s.e) - fall(slope, bend, rim_third, s.half) >= 0.5 * limit * limit:
+            return best, math.inf
+    kind, slope = one_minimum(s, course, rim_third)
+    if slope != 0.0:
+        return lower(best, arc, rod, lo if slope > 0.0 else hi), math.inf
+    if kind < 0:
+        return best, bound
+    angle = root(arc_course, arc, rod, kind, lo, hi, middle, 1.0)
+    end = arc_course(arc, rod, angle)
+    if kind == RIDGE and beside(rod, end.w, end.t) > 0.0:
+        return best, bound
+    return lower(best, arc, rod, angle), math.inf
 
 
 @formula
-def on_arc(ez, R, half_angle, r, l, cx, cy, cz, dx, dy, dz, best, slack, eps, work, found):  # type: ignore[no-untyped-def] # noqa: E741
-    """Minima of f on the end arc z = ez that are below ``best + slack``: their number, and what may lie below.
-
-    Their angles from the deepest line go to the first column of ``found``, of the best alone if ``slack`` is 0.
-    """
-    off = (ez - cz) * dz - cx * dx - cy * dy
-    kx = -cx - off * dx
-    ky = -cy - off * dy
-    kz = ez - cz - off * dz
-    tilt2 = dx * dx + dy * dy
-    T = R * math.sqrt(tilt2)
-    # Largest derivatives of w^2 by the angle; t is at most T from off.
-    N = 2.0 * R * math.sqrt(kx * kx + ky * ky)
-    W1, W2, W3 = N + T * T, N + 2.0 * T * T, N + 4.0 * T * T
-    M = R * math.sqrt(cx * cx + cy * cy)  # the same of half the squared distance from the cylinder's middle
-    count = 0
-    left = math.inf
+def on_arc(groove: Groove, rod: Rod, ez: float, limit: float, eps: float) -> Place:
+    """Least f on the end arc z = ez, and its angle from the deepest point; infinite if none is below ``limit``."""
+    arc = end_arc_of(groove, rod, ez)
+    best = Place(limit, math.nan, math.inf)
+    stack = np.empty((64, 2))  # middles and halves of the stretches that are left
     cuts = 4
-    top = cuts
     for i in range(cuts):
-        work[i, 0] = half_angle * ((2.0 * i + 1.0) / cuts - 1.0)
-        work[i, 1] = half_angle / cuts
+        stack[i, 0] = groove.half_angle * ((2.0 * i + 1.0) / cuts - 1.0)
+        stack[i, 1] = groove.half_angle / cuts
+    top = cuts
     looked = 0
     while top > 0:
         top -= 1
-        at, half = work[top, 0], work[top, 1]
         looked += 1
-        w, t, w1, t1, w2, t2 = arc_terms(at, R, kx, ky, kz, off, dx, dy, dz)
-        side = 1.0 if t >= 0.0 else -1.0
-        g, e, e1, e2 = w - r, side * t - l, side * t1, side * t2
-        f = phi(g, e)
-        if f < best:
-            best = f
-            if slack == 0.0:
-                found[0, 0] = at
-                count = 1
-        limit = best + slack - eps
-        low = math.sqrt(max(w * w - W1 * half, 0.0))
-        low = max(low, w - R * half)
-        by = R if low <= 0.0 else min(R, 0.5 * W1 / low)
-        g_low = max(g - by * half, -r)
-        e_low = max(e - T * half, -l)
-        if phi(g_low, e_low) >= limit:
+        middle, half = stack[top, 0], stack[top, 1]
+        course = arc_course(arc, rod, middle)
+        f = beside(rod, course.w, course.t)
+        if f < best.f:
+            best = Place(f, middle, best.left)
+        stretch = stretch_about(arc, rod, course, half)
+        bound = max(f - groove.R * half, phi(stretch.g_low, stretch.e_low))
+        if phi(stretch.g_low, stretch.e_low) >= best.f - eps:
             continue
-        done = False
-        bound = max(f - R * half, phi(g_low, e_low))
-        if low > 0.0:
-            bend = (0.5 * W2 + by * by) / low
-            third = (0.5 * W3 + 3.0 * by * bend) / low
-            bound = max(bound, g - fall(w1, w2, third, half), e - fall(e1, e2, T, half))
-            if f > 0.0:
-                u, v = max(g, 0.0) / f, max(e, 0.0) / f
-            elif (w1 > 0.0) != (e1 > 0.0):
-                u, v = e1 / (e1 - w1), w1 / (w1 - e1)
-            else:
-                u, v = (1.0, 0.0) if g > e else (0.0, 1.0)
-            bound = max(bound, u * g + v * e - fall(u * w1 + v * e1, u * w2 + v * e2, u * third + v * T, half))
-            if bound >= limit:
+        if stretch.bend < math.inf:
+            if bound >= best.f - eps:
                 continue
-            g_high, e_high = g + by * half, e + T * half
-            split = abs(t) <= T * half  # the sign of t may change
-            if split and f < 0.0 and abs(t1) > T * half:
-                new = settle(4, r, l, side, at, half, R, kx, ky, kz, off, dx, dy, dz)
-                w, u, _, _, _, _ = arc_terms(new, R, kx, ky, kz, off, dx, dy, dz)
-                new_f = phi(w - r, abs(u) - l)
-                if new_f < best:
-                    best, limit = new_f, new_f + slack - eps
-                    if slack == 0.0:
-                        found[0, 0] = new
-                        count = 1
-            kind = -1
-            falling = 0.0  # slope, where it has one sign over the whole stretch
-            if g_low > 0.0 and e_low > 0.0:  # all of it beyond the rim
-                G1 = g * w1 + e * e1
-                G2 = w1 * w1 + g * w2 + e1 * e1 + e * e2
-                G3 = 3.0 * by * bend + g_high * third + 3.0 * T * T + e_high * T
-                G3 = min(G3, M + r * third + l * T)
-                if limit > 0.0 and 0.5 * (g * g + e * e) - fall(G1, G2, G3, half) >= 0.5 * limit * limit:
-                    continue
-                if G3 * half < G2:
-                    kind = 0
-                elif abs(G1) > (abs(G2) + 0.5 * G3 * half) * half:
-                    falling = G1
-            elif e_high <= min(g_low, 0.0):  # all of it beside the side
-                if w2 > third * half:
-                    kind = 1
-                elif abs(w1) > bend * half:
-                    falling = w1
-            elif g_high <= min(e_low, 0.0) and not split:
-                if e2 > T * half:
-                    kind = 2
-                elif abs(e1) > T * half:
-                    falling = e1
-            elif not split and abs(w1) > bend * half and abs(e1) > T * half:
-                if (w1 > 0.0) == (e1 > 0.0):
-                    falling = w1
-                else:
-                    kind = 3
-            if falling != 0.0:
-                at = at - half if falling > 0.0 else at + half
-                done = True
-            if kind >= 0:
-                new = settle(kind, r, l, side, at, half, R, kx, ky, kz, off, dx, dy, dz)
-                w, t, _, _, _, _ = arc_terms(new, R, kx, ky, kz, off, dx, dy, dz)
-                done = kind < 3 or phi(w - r, abs(t) - l) <= 0.0
-                if done:
-                    at = new
-        if done:
-            w, t, _, _, _, _ = arc_terms(at, R, kx, ky, kz, off, dx, dy, dz)
-            f = phi(w - r, abs(t) - l)
-            if slack > 0.0:
-                if f <= best + slack and count < len(found):
-                    found[count, 0] = at
-                    count += 1
-            elif f < best:
-                found[0, 0] = at
-                count = 1
-            best = min(best, f)
-            continue
+            best, mixed = settled(arc, rod, middle, stretch, best, eps)
+            if mixed == math.inf:
+                continue
+            bound = max(bound, mixed)
         if looked >= STRETCHES or half <= 1e-13:
-            left = min(left, bound)
+            best = Place(best.f, best.p, min(best.left, bound))
             continue
         half *= 0.5
         # The end that it falls to is looked at first.
-        down = g * w1 + e * e1 if f > 0.0 else (w1 if g > e else e1)
-        ahead = half if down > 0.0 else -half
-        work[top, 0], work[top, 1] = at + ahead, half
-        work[top + 1, 0], work[top + 1, 1] = at - ahead, half
+        e1 = course.t1 if course.t >= 0.0 else -course.t1
+        slope = stretch.g * course.w1 + stretch.e * e1 if f > 0.0 else (course.w1 if stretch.g > stretch.e else e1)
+        ahead = half if slope > 0.0 else -half
+        stack[top, 0], stack[top, 1] = middle + ahead, half
+        stack[top + 1, 0], stack[top + 1, 1] = middle - ahead, half
         top += 2
-    return count, left
+    return best if not math.isnan(best.p) else Place(math.inf, 0.0, best.left)

@@ -2,22 +2,25 @@
 
 Notation, in the groove's frame: material ``S = {y <= h, x^2 + y^2 >= R^2, |z| <= H}``, lips at ``(-s, h)`` (M) and
 ``(s, h)`` (N), where ``s = R sin(half_angle)`` and ``h = -R cos(half_angle)``; the axis is ``c + t d``, ``|d| = 1``,
-``|t| <= l``.
+``|t| <= half``.
 
 Which features can hold the least distance of the axis from S: at an inner ``t`` the distance is stationary. Over the
 inside of the arc surface it is ``R - rho(t)``, concave in t; over a flat or an end face it is linear. So neither has an
 inner minimum (only a constant stretch, which reaches an end of the axis or an edge). What remains: the ends of the axis
 against S, and the axis' inside against the edges (lips, end arcs, end edges) and the corners.
+
+All numbers in the structures are floats, codes of features too: so each structure is one type to the compiler.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from clamp3d.core.jit import formula, inlined
 
 # Codes of the features; Feature in distance.py gives them names.
-ARC, LIP_M, LIP_N, FLAT_M, FLAT_N, END_FACE, END_ARC, END_EDGE_M, END_EDGE_N, CORNER_M, CORNER_N = range(11)
+ARC, LIP_M, LIP_N, FLAT_M, FLAT_N, END_FACE, END_ARC, END_EDGE_M, END_EDGE_N, CORNER_M, CORNER_N = map(float, range(11))
 
 CONVERGED = 1e-7
 """Last relative step of a quadratic iteration: the error left is of the order of its square."""
@@ -26,8 +29,58 @@ TINY = 1e-150
 """Below this the square of a length underflows, and with it the direction of the vector."""
 
 
+class Groove(NamedTuple):
+    """A groove: radius and half angle of its arc, the lips' place (s, h), half its length H."""
+
+    R: float
+    half_angle: float
+    s: float
+    h: float
+    H: float
+
+
+class Rod(NamedTuple):
+    """A cylinder or capsule: its middle, unit axis d, ``e2 = dx^2 + dy^2``, radius, half the axis' length."""
+
+    x: float
+    y: float
+    z: float
+    dx: float
+    dy: float
+    dz: float
+    e2: float
+    r: float
+    half: float
+
+
+class Candidate(NamedTuple):
+    """A point of the groove that may be nearest: squared distance from the axis, place t there, feature, point."""
+
+    d2: float
+    t: float
+    feature: float
+    x: float
+    y: float
+    z: float
+
+
+class EndCircle(NamedTuple):
+    """The circle of an end arc, seen along the axis: an ellipse with the half axes R and R |dz|.
+
+    ``z`` is its plane, (ex, ey) the direction of its minor axis, (p, v) the axis in parts of R along the major and
+    the minor one, ``reach`` a lower bound on its distance from the axis.
+    """
+
+    z: float
+    ex: float
+    ey: float
+    p: float
+    v: float
+    reach: float
+
+
 @inlined
-def phi(g, e):  # type: ignore[no-untyped-def]
+def phi(g: float, e: float) -> float:
     """Signed distance from the quadrant g <= 0, e <= 0."""
     if g <= 0.0 and e <= 0.0:
         return max(g, e)
@@ -36,13 +89,26 @@ def phi(g, e):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def section(x, y, R, s, h):  # type: ignore[no-untyped-def]
+def in_mouth(groove: Groove, x: float, y: float) -> bool:
+    """Whether (x, y) on the arc's circle lies in the groove's mouth; of nearly full arcs the angle decides."""
+    return y > groove.h or (groove.h > 0.0 and abs(x) * -groove.h + y * groove.s > 0.0)
+
+
+@inlined
+def is_behind_arc(groove: Groove, x: float, y: float) -> bool:
+    """Whether (x, y), at most as high as the flats, is behind the arc; of nearly full arcs the angle decides."""
+    return x * x + y * y >= groove.R * groove.R and (groove.h < 0.0 or abs(x) * -groove.h + y * groove.s <= 0.0)
+
+
+@inlined
+def section(groove: Groove, x: float, y: float) -> tuple[float, float]:
     """Signed gap of (x, y) to the groove's section, negative inside the material, and the nearest feature.
 
     Inside, the gap is the smaller of the depths below the flat faces and behind the arc: the lips are never nearer, in
     minor and in major arcs. In the mouth of a major arc y <= h and rho >= R exclude each other but for the rounding
     of h; there the angle decides (nearly full circles, whose mouth is wide by the root of that rounding).
     """
+    R, s, h = groove.R, groove.s, groove.h
     ax = abs(x)
     rho = math.sqrt(x * x + y * y)
     within = ax * -h + y * s <= 0.0  # within the angle of the arc: rho R sin(phi - half_angle) <= 0
@@ -57,8 +123,9 @@ def section(x, y, R, s, h):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def section_foot(feature, x, y, R, s, h):  # type: ignore[no-untyped-def]
+def section_foot(groove: Groove, feature: float, x: float, y: float) -> tuple[float, float, float, float]:
     """Nearest point of a section feature to (x, y), and the unit normal that leads out of the material there."""
+    R, h = groove.R, groove.h
     if feature == ARC:
         rho = math.sqrt(x * x + y * y)
         if rho < TINY:
@@ -66,7 +133,7 @@ def section_foot(feature, x, y, R, s, h):  # type: ignore[no-untyped-def]
         return x / rho * R, y / rho * R, -x / rho, -y / rho
     if feature in (FLAT_M, FLAT_N):
         return x, h, 0.0, 1.0
-    sx = -s if feature == LIP_M else s
+    sx = -groove.s if feature == LIP_M else groove.s
     gap = math.sqrt((x - sx) * (x - sx) + (y - h) * (y - h))
     if gap < TINY:
         return sx, h, -sx / R, -h / R
@@ -74,7 +141,7 @@ def section_foot(feature, x, y, R, s, h):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def beyond_end(feature):  # type: ignore[no-untyped-def]
+def beyond_end(feature: float) -> float:
     """Feature of an end face that a section feature ends in."""
     if feature <= LIP_N:
         return END_ARC if feature < LIP_M else feature + (CORNER_M - LIP_M)
@@ -82,63 +149,75 @@ def beyond_end(feature):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def lip_line(sx, h, H, cx, cy, cz, dx, dy, dz, e2, l, best2):  # type: ignore[no-untyped-def] # noqa: E741
-    """Squared distance of the axis' inside from the inside of the lip at x = sx, t, z.
-
-    It is inf if they do not face or the distance of the lines is no less than the best so far.
-    """
-    wx = cx - sx
-    wy = cy - h
-    cross = wx * dy - wy * dx
-    over = 1.0 / e2
-    t = -(wx * dx + wy * dy) * over
-    z = cz + t * dz
-    faces = cross * cross < best2 * e2 and abs(t) <= l and abs(z) <= H
-    return cross * cross * over if faces else math.inf, t, z
+def on_axis_end(groove: Groove, rod: Rod, t: float, best: Candidate) -> Candidate:
+    """The best so far, or the point of S that is nearest to the axis' end at t."""
+    x, y, z = rod.x + t * rod.dx, rod.y + t * rod.dy, rod.z + t * rod.dz
+    end = abs(z) - groove.H
+    if end > 0.0 and end * end >= best.d2:
+        return best
+    gap, feature = section(groove, x, y)
+    d2 = gap * gap
+    # In the material by the rounding of z alone (an axis in the plane of an end face): it is on the face.
+    if gap <= 0.0 and (end > 0.0 or end * end < d2):
+        candidate = Candidate(end * end, t, END_FACE, x, y, math.copysign(groove.H, z))
+    else:
+        qx, qy, _, _ = section_foot(groove, feature, x, y)
+        if end > 0.0:
+            d2, z, feature = d2 + end * end, math.copysign(groove.H, z), beyond_end(feature)
+        candidate = Candidate(d2, t, feature, qx, qy, z)
+    return candidate if candidate.d2 < best.d2 else best
 
 
 @inlined
-def end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l, best2):  # type: ignore[no-untyped-def] # noqa: E741
-    """The same of the edges {y = h, z = ez, |x| >= s}: squared distance, t, x."""
-    wy = cy - h
-    wz = cz - ez
-    f2 = dy * dy + dz * dz
-    cross = wy * dz - wz * dy
+def on_lip(groove: Groove, rod: Rod, side: float, best: Candidate) -> Candidate:
+    """The best so far, or the inside of the lip on a side (-1: M, 1: N) that the axis' inside faces."""
+    sx = side * groove.s
+    wx, wy = rod.x - sx, rod.y - groove.h
+    cross = wx * rod.dy - wy * rod.dx
+    if cross * cross >= best.d2 * rod.e2:  # the distance of the lines
+        return best
+    over = 1.0 / rod.e2
+    t = -(wx * rod.dx + wy * rod.dy) * over
+    z = rod.z + t * rod.dz
+    if abs(t) > rod.half or abs(z) > groove.H:
+        return best
+    return Candidate(cross * cross * over, t, LIP_M if side < 0.0 else LIP_N, sx, groove.h, z)
+
+
+@inlined
+def on_end_edge(groove: Groove, rod: Rod, ez: float, best: Candidate) -> Candidate:
+    """The best so far, or a point of the edges {y = h, z = ez, |x| >= s} that the axis' inside faces."""
+    wy, wz = rod.y - groove.h, rod.z - ez
+    f2 = rod.dy * rod.dy + rod.dz * rod.dz
+    cross = wy * rod.dz - wz * rod.dy
+    if cross * cross >= best.d2 * f2:
+        return best
     over = 1.0 / max(f2, TINY)
-    t = -(wy * dy + wz * dz) * over
-    x = cx + t * dx
-    faces = cross * cross < best2 * f2 and abs(t) <= l and abs(x) >= s
-    return cross * cross * over if faces else math.inf, t, x
+    t = -(wy * rod.dy + wz * rod.dz) * over
+    x = rod.x + t * rod.dx
+    if abs(t) > rod.half or abs(x) < groove.s:
+        return best
+    return Candidate(cross * cross * over, t, END_EDGE_M if x < 0.0 else END_EDGE_N, x, groove.h, ez)
 
 
 @inlined
-def corner(kx, ky, kz, cx, cy, cz, dx, dy, dz, l):  # type: ignore[no-untyped-def] # noqa: E741
-    """Squared distance of the axis' inside from a corner (inf if its foot is not on the axis), t.
-
-    And whether it falls from there along the end arc, whose centre is on the groove's axis.
-    """
-    mx = kx - cx
-    my = ky - cy
-    mz = kz - cz
-    t = mx * dx + my * dy + mz * dz
-    mx -= t * dx
-    my -= t * dy
-    mz -= t * dz
-    d2 = mx * mx + my * my + mz * mz if abs(t) <= l else math.inf
-    return d2, t, abs(kx) * my - math.copysign(ky, kx * ky) * mx > 0.0
-
-
-@inlined
-def inverse_root(g, near):  # type: ignore[no-untyped-def]
-    """1 / sqrt(g), at g near 1 by its series, whose next term is below the rounding: without waiting for a root.
-
-    ``near``: whether g is known to be so near.
-    """
-    return 1.5 - 0.5 * g if near or abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
+def on_corner(groove: Groove, rod: Rod, side: float, ez: float, best: Candidate) -> tuple[Candidate, bool]:
+    """The best so far, or a corner that the axis' inside faces; whether the distance falls into the end arc there."""
+    kx, ky = side * groove.s, groove.h
+    mx, my, mz = kx - rod.x, ky - rod.y, ez - rod.z
+    t = mx * rod.dx + my * rod.dy + mz * rod.dz
+    mx -= t * rod.dx
+    my -= t * rod.dy
+    mz -= t * rod.dz
+    d2 = mx * mx + my * my + mz * mz
+    falls = abs(kx) * my - side * ky * mx > 0.0
+    if abs(t) <= rod.half and d2 < best.d2:
+        return Candidate(d2, t, CORNER_M if side < 0.0 else CORNER_N, kx, ky, ez), falls
+    return best, falls
 
 
 @inlined
-def nearer_start(k, a, q):  # type: ignore[no-untyped-def]
+def nearer_start(k: float, a: float, q: float) -> tuple[float, float]:
     """Lower bound of the root of ``nearer_root``, and its expansion in k to the second order, exact for small tilt."""
     n2 = a * a + q * q
     n = math.sqrt(n2)
@@ -149,22 +228,7 @@ def nearer_start(k, a, q):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def nearer_step(k, a, q, low, mu):  # type: ignore[no-untyped-def]
-    """Newton's step of ``nearer_root``, and whether it was the last that is needed."""
-    over = 1.0 / ((k + mu) * mu)
-    u = mu * over
-    v = (k + mu) * over
-    x2 = (a * u) * (a * u)
-    y2 = (q * v) * (q * v)
-    g = x2 + y2
-    step = (math.sqrt(g) - 1.0) * g / (x2 * u + y2 * v)
-    mu = max(low, mu + step)
-    # What is left is at most 3/8 k^2 step^2 / (mu^2 (k + mu)): without k the left side's root is linear.
-    return mu, abs(step) * min(k, mu) <= CONVERGED * mu * mu
-
-
-@formula
-def nearer_root(k, a, q):  # type: ignore[no-untyped-def]
+def nearer_root(k: float, a: float, q: float) -> float:
     """Root mu > 0 of (a / (k + mu))^2 + (q / mu)^2 = 1, for k, a >= 0 and q > 0 (or a > k).
 
     1 / norm of the left side is concave in mu (a power mean of linear functions): Newton's method on it is below the
@@ -172,14 +236,20 @@ def nearer_root(k, a, q):  # type: ignore[no-untyped-def]
     """
     low, mu = nearer_start(k, a, q)
     for _ in range(40):
-        mu, done = nearer_step(k, a, q, low, mu)
-        if done:
+        over = 1.0 / ((k + mu) * mu)
+        u, v = mu * over, (k + mu) * over
+        x2, y2 = (a * u) * (a * u), (q * v) * (q * v)
+        g = x2 + y2
+        step = (math.sqrt(g) - 1.0) * g / (x2 * u + y2 * v)
+        mu = max(low, mu + step)
+        # What is left is at most 3/8 k^2 step^2 / (mu^2 (k + mu)): without k the left side's root is linear.
+        if abs(step) * min(k, mu) <= CONVERGED * mu * mu:
             break
     return mu
 
 
 @formula
-def farther_root(k, a, q):  # type: ignore[no-untyped-def]
+def farther_root(k: float, a: float, q: float) -> float:
     """Smaller root 0 < nu < k of (a / (k - nu))^2 + (q / nu)^2 = 1, for q > 0; -1 if there is none.
 
     Concave like ``nearer_root``, but with a maximum: a slope that is not positive means that there is no root.
@@ -204,165 +274,160 @@ def farther_root(k, a, q):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def ellipse(R, cx, cy, dx, dy, e2):  # type: ignore[no-untyped-def]
-    """What both ends share in ``end_arc``: tilt direction and sine, the axis' place p on the major axis, along it."""
-    e = math.sqrt(e2)
+def end_circle(groove: Groove, rod: Rod, ez: float) -> EndCircle:
+    """The circle of the end arc in the plane z = ez, seen along the axis."""
+    R, e = groove.R, math.sqrt(rod.e2)
     over = 1.0 / e
-    ex = dx * over
-    ey = dy * over
-    return ex, ey, e, (cy * ex - cx * ey) * (1.0 / R), cx * ex + cy * ey
-
-
-@inlined
-def end_arc_reach(ez, R, cz, dz, e, p, along):  # type: ignore[no-untyped-def]
-    """The axis' place v along the minor axis of the ellipse of ``end_arc``, and a lower bound on its distance."""
-    v = (-dz * along - e * (ez - cz)) * (1.0 / R)
-    if dz > 0.0:
+    ex, ey = rod.dx * over, rod.dy * over
+    p = (rod.y * ex - rod.x * ey) * (1.0 / R)
+    v = (-rod.dz * (rod.x * ex + rod.y * ey) - e * (ez - rod.z)) * (1.0 / R)
+    if rod.dz > 0.0:
         v = -v
     # The ellipse lies outside (for a point inside it) or inside (outside) its scaled copy through the point.
-    return v, R * abs(abs(dz) - math.sqrt(dz * dz * p * p + v * v))
+    reach = R * abs(abs(rod.dz) - math.sqrt(rod.dz * rod.dz * p * p + v * v))
+    return EndCircle(ez, ex, ey, p, v, reach)
 
 
 @inlined
-def arc_point(C, S, near, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
-    """Squared distance of the axis' inside from a point of the end arc (inf if they do not face), qx, qy, t."""
-    n = inverse_root(C * C + S * S, near)
+def circle_point(groove: Groove, rod: Rod, circle: EndCircle, C: float, S: float) -> Candidate:
+    """A point of an end arc by its direction (C, S) on the ellipse; infinite if the axis' inside does not face it."""
+    g = C * C + S * S
+    # At g near 1 the root by its series, whose next term is below the rounding: without waiting for a root.
+    n = 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
     C *= n
     S *= n
-    qx = R * (S * ex - C * ey)
-    qy = R * (S * ey + C * ex)
-    t = (qx - cx) * dx + (qy - cy) * dy + (ez - cz) * dz
-    du = R * (C - p)
-    dv = R * (abs(dz) * S - v)
-    d2 = du * du + dv * dv
-    if qy > h or (h > 0.0 and abs(qx) * -h + qy * s > 0.0) or abs(t) > l:
-        d2 = math.inf  # in the mouth; nearly full arcs: by the angle
-    return d2, qx, qy, t
+    qx = groove.R * (S * circle.ex - C * circle.ey)
+    qy = groove.R * (S * circle.ey + C * circle.ex)
+    t = (qx - rod.x) * rod.dx + (qy - rod.y) * rod.dy + (circle.z - rod.z) * rod.dz
+    du = groove.R * (C - circle.p)
+    dv = groove.R * (abs(rod.dz) * S - circle.v)
+    is_faced = abs(t) <= rod.half and not in_mouth(groove, qx, qy)
+    return Candidate(du * du + dv * dv if is_faced else math.inf, t, END_ARC, qx, qy, circle.z)
 
 
 @formula
-def end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
-    """Squared distance of the axis' inside from the end arc in the plane z = ez (inf if they do not face), qx, qy, t.
+def farther_point(groove: Groove, rod: Rod, circle: EndCircle) -> Candidate:
+    """The local minimum of `on_end_arc` on the other side of the ellipse's major axis."""
+    k, q, a = rod.e2, abs(rod.dz) * circle.v, abs(circle.p)
+    nu = farther_root(k, a, abs(q))
+    if nu <= 0.0:
+        return Candidate(math.inf, 0.0, END_ARC, 0.0, 0.0, 0.0)
+    return circle_point(groove, rod, circle, circle.p / (k - nu), -q / nu)
 
-    Seen along the axis the circle is an ellipse with the half axes R and R |dz| and the axis is a point. The distance
-    of that point from the circle's point at angle phi is a trigonometric polynomial of degree two in phi, its
-    stationary points a quartic. With C, S the cosine and sine from the major axis, they are C = p / (k + mu),
+
+@formula
+def mirrored_points(groove: Groove, rod: Rod, circle: EndCircle) -> Candidate:
+    """The nearer of two mirrored minima: the axis is on the ellipse's major axis, within the evolute."""
+    C = circle.p / rod.e2
+    S = math.sqrt(max(0.0, 1.0 - C * C))
+    first = circle_point(groove, rod, circle, C, S)
+    second = circle_point(groove, rod, circle, C, -S)
+    return second if second.d2 < first.d2 else first
+
+
+@inlined
+def on_end_arc(groove: Groove, rod: Rod, circle: EndCircle, best: Candidate) -> Candidate:
+    """The best so far, or the point of an end arc that is nearest to the axis' inside.
+
+    The distance of the axis, a point, from the ellipse at angle phi is a trigonometric polynomial of degree two in phi,
+    its stationary points a quartic. With C, S the cosine and sine from the major axis, they are C = p / (k + mu),
     S = q / mu, C^2 + S^2 = 1 with k = dx^2 + dy^2. Only the root mu > 0 (the least distance) and the largest mu < 0
     (the local minimum on the other side of the major axis) are minima; solving for them this way loses no digits where
     the quartic's roots run together (axis through the arc's centre, small tilt).
     """
-    q = abs(dz) * v
-    a = abs(p)
+    if circle.reach * circle.reach >= best.d2:
+        return best
+    k, q, a = rod.e2, abs(rod.dz) * circle.v, abs(circle.p)
     if abs(q) > TINY or a > k:
         mu = nearer_root(k, a, abs(q))
         both = 1.0 / ((k + mu) * mu)
-        C, S = p * (mu * both), q * ((k + mu) * both)
-        first = arc_point(C, S, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
-        nu = farther_root(k, a, abs(q)) if first[0] == math.inf else -1.0
-        if nu <= 0.0:
-            return first
-        return arc_point(p / (k - nu), -q / nu, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
-    C = p / k  # the point is on the major axis, within the evolute: two mirrored minima
-    S = math.sqrt(max(0.0, 1.0 - C * C))
-    first = arc_point(C, S, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
-    second = arc_point(C, -S, False, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
-    return second if second[0] < first[0] else first
+        point = circle_point(groove, rod, circle, circle.p * (mu * both), q * ((k + mu) * both))
+        if point.d2 == math.inf and a + abs(q) < k:
+            point = farther_point(groove, rod, circle)
+    else:
+        point = mirrored_points(groove, rod, circle)
+    return point if point.d2 < best.d2 else best
 
 
 @inlined
-def end_arc_soon(ez, R, s, h, cx, cy, cz, dx, dy, dz, k, l, ex, ey, p, v):  # type: ignore[no-untyped-def] # noqa: E741
-    """What `end_arc` gives, by one step and without branches; and whether that is enough."""
-    q = abs(dz) * v
-    a = abs(p)
-    low, mu = nearer_start(k, a, abs(q))
-    mu, done = nearer_step(k, a, abs(q), low, mu)
-    both = 1.0 / ((k + mu) * mu)
-    C, S = p * (mu * both), q * ((k + mu) * both)
-    d2, qx, qy, t = arc_point(C, S, True, ez, R, s, h, cx, cy, cz, dx, dy, dz, l, ex, ey, p, v)
-    done = done and abs(C * C + S * S - 1.0) <= 1e-8
-    # The farther minimum needs a place within the evolute, where a + |q| < k.
-    return d2, qx, qy, t, done and abs(q) > TINY and (d2 < math.inf or a + abs(q) >= k)
-
-
-@inlined
-def clip(h, H, cy, cz, dy, dz, l):  # type: ignore[no-untyped-def] # noqa: E741
-    """Part lo <= t <= hi of the axis in the block {y <= h, |z| <= H}; lo > hi if there is none."""
-    over = 1.0 / (dz if abs(dz) > TINY else TINY)
-    down, up = (-H - cz) * over, (H - cz) * over
-    lo, hi = max(-l, min(down, up)), min(l, max(down, up))
-    at = (h - cy) / dy
-    hi = min(hi, at) if dy > 0.0 else hi
-    lo = max(lo, at) if dy < 0.0 else lo
-    none = (dy == 0.0 and cy > h) or (abs(dz) <= TINY and abs(cz) > H)
+def clip(groove: Groove, rod: Rod, half: float) -> tuple[float, float]:
+    """Part lo <= t <= hi of the axis, |t| <= half, in the block {y <= h, |z| <= H}; lo > hi if there is none."""
+    over = 1.0 / (rod.dz if abs(rod.dz) > TINY else TINY)
+    down, up = (-groove.H - rod.z) * over, (groove.H - rod.z) * over
+    lo, hi = max(-half, min(down, up)), min(half, max(down, up))
+    level = (groove.h - rod.y) / rod.dy
+    hi = min(hi, level) if rod.dy > 0.0 else hi
+    lo = max(lo, level) if rod.dy < 0.0 else lo
+    none = (rod.dy == 0.0 and rod.y > groove.h) or (abs(rod.dz) <= TINY and abs(rod.z) > groove.H)
     return lo, -math.inf if none else hi
 
 
 @formula
-def point_depth(x, y, z, R, h, H):  # type: ignore[no-untyped-def]
+def point_depth(groove: Groove, x: float, y: float, z: float) -> tuple[float, float]:
     """Distance of a point of S from the boundary of S (negative outside): min of three, and its feature."""
-    rho = math.sqrt(x * x + y * y)
-    depth = rho - R
-    feature = ARC
-    if h - y < depth:
-        depth = h - y
-        feature = FLAT_N if x >= 0.0 else FLAT_M
-    if H - abs(z) < depth:
-        depth = H - abs(z)
-        feature = END_FACE
+    depth, feature = math.sqrt(x * x + y * y) - groove.R, ARC
+    if groove.h - y < depth:
+        depth, feature = groove.h - y, FLAT_N if x >= 0.0 else FLAT_M
+    if groove.H - abs(z) < depth:
+        depth, feature = groove.H - abs(z), END_FACE
     return depth, feature
 
 
 @formula
-def deepest(R, h, H, cx, cy, cz, dx, dy, dz, lo, hi):  # type: ignore[no-untyped-def]
-    """Deepest point of the axis in S for lo <= t <= hi: depth, t.
+def depth_at(groove: Groove, rod: Rod, t: float) -> float:
+    """Depth of an axis point in S."""
+    return point_depth(groove, rod.x + t * rod.dx, rod.y + t * rod.dy, rod.z + t * rod.dz)[0]
+
+
+@formula
+def depth_below_plane(groove: Groove, rod: Rod, plane: int) -> tuple[float, float]:
+    """Depth of the axis' middle below the flats (0), the top (1) or the bottom (2), and its rate along the axis."""
+    if plane == 0:
+        return groove.h - rod.y, -rod.dy
+    if plane == 1:
+        return groove.H - rod.z, -rod.dz
+    return groove.H + rod.z, rod.dz
+
+
+@formula
+def arc_crossing(groove: Groove, rod: Rod, depth: float, rate: float, is_first: bool) -> float:
+    """One of the two places where the axis is as deep behind the arc, rho - R, as ``depth + rate t``; NaN if none."""
+    n = groove.R + depth  # (n + rate t)^2 = (cx + dx t)^2 + (cy + dy t)^2
+    A = rod.e2 - rate * rate
+    B = rod.x * rod.dx + rod.y * rod.dy - n * rate
+    C = rod.x * rod.x + rod.y * rod.y - n * n
+    square = B * B - A * C
+    if square < 0.0:
+        return math.nan
+    w = -B - math.copysign(math.sqrt(square), B)
+    t = w / A if is_first else C / w
+    for _ in range(2):  # the quadratic squares its terms: Newton's steps on the unsquared equation restore them
+        x, y = rod.x + t * rod.dx, rod.y + t * rod.dy
+        rho = math.sqrt(x * x + y * y)
+        slope = (x * rod.dx + y * rod.dy) / rho - rate
+        if rho > 0.0 and slope != 0.0:
+            t -= (rho - groove.R - (depth + rate * t)) / slope
+    return t
+
+
+@formula
+def deeper(groove: Groove, rod: Rod, lo: float, hi: float, t: float, best: float) -> float:
+    """The place t on the axis if it is one of lo <= t <= hi and deeper in S than ``best``, else that."""
+    return t if lo <= t <= hi and depth_at(groove, rod, t) > depth_at(groove, rod, best) else best
+
+
+@formula
+def deepest(groove: Groove, rod: Rod, lo: float, hi: float) -> float:
+    """Place lo <= t <= hi of the deepest axis point in S.
 
     The depth is the smallest of a convex function (rho - R) and three linear ones, so its maximum is at an end, where
     two linear ones cross, or where rho - R crosses a linear one (a quadratic).
     """
-    best = -math.inf
-    bt = lo
-    for i in range(11):
-        if i < 2:
-            t = lo if i == 0 else hi
-        elif i < 5:
-            # h - y = H - z, h - y = H + z, H - z = H + z
-            if i == 2:
-                t = (h - cy - H + cz) / (dy - dz)
-            elif i == 3:
-                t = (h - cy - H - cz) / (dy + dz)
-            else:
-                t = -cz / dz
-        else:
-            j = (i - 5) // 2
-            if j == 0:
-                g0 = h - cy
-                g1 = -dy
-            elif j == 1:
-                g0 = H - cz
-                g1 = -dz
-            else:
-                g0 = H + cz
-                g1 = dz
-            # (R + g0 + g1 t)^2 = (cx + dx t)^2 + (cy + dy t)^2
-            A = dx * dx + dy * dy - g1 * g1
-            B = cx * dx + cy * dy - (R + g0) * g1
-            C = cx * cx + cy * cy - (R + g0) * (R + g0)
-            disc = B * B - A * C
-            if disc < 0.0:
-                continue
-            w = -B - math.copysign(math.sqrt(disc), B)
-            t = w / A if i % 2 == 1 else C / w
-            for _ in range(2):  # the quadratic squares its terms: Newton's steps on the unsquared equation restore them
-                x = cx + t * dx
-                y = cy + t * dy
-                rho = math.sqrt(x * x + y * y)
-                slope = (x * dx + y * dy) / rho - g1
-                if rho > 0.0 and slope != 0.0:
-                    t -= (rho - R - (g0 + g1 * t)) / slope
-        if not (lo <= t <= hi):
-            continue
-        depth, _ = point_depth(cx + t * dx, cy + t * dy, cz + t * dz, R, h, H)
-        if depth > best:
-            best = depth
-            bt = t
-    return best, bt
+    best = deeper(groove, rod, lo, hi, hi, lo)
+    for plane in range(3):
+        depth, rate = depth_below_plane(groove, rod, plane)
+        other, other_rate = depth_below_plane(groove, rod, (plane + 1) % 3)
+        best = deeper(groove, rod, lo, hi, (depth - other) / (other_rate - rate), best)
+        for root in range(2):
+            best = deeper(groove, rod, lo, hi, arc_crossing(groove, rod, depth, rate, root == 0), best)
+    return best

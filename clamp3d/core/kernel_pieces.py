@@ -9,74 +9,85 @@ negative on the piece's side of the lip and goes over into the plain distance on
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from clamp3d.core.jit import entry, formula
+from clamp3d.core.jit import entry, formula, inlined
+from clamp3d.core.kernel import groove_of, put
 from clamp3d.core.kernel_distance import edge_normal, is_parallel
 from clamp3d.core.kernel_features import (
     ARC,
-    CORNER_M,
-    CORNER_N,
-    END_ARC,
-    END_EDGE_M,
-    END_EDGE_N,
     END_FACE,
     FLAT_M,
     FLAT_N,
     LIP_M,
     LIP_N,
     TINY,
+    Candidate,
+    Groove,
+    Rod,
     beyond_end,
     clip,
-    corner,
     deepest,
-    ellipse,
-    end_arc,
-    end_arc_reach,
-    end_edge,
-    lip_line,
+    end_circle,
+    on_corner,
+    on_end_arc,
+    on_end_edge,
+    on_lip,
     section,
     section_foot,
 )
-from clamp3d.core.kernel_pose import axis, rigid
+from clamp3d.core.kernel_pose import rigid, rod_at
+from clamp3d.core.pose import Array
 
-PIECES = 5
-COLUMNS = 14
-"""distance, point on groove (3), normal (3), feature, rate by the cylinder's twist (6)."""
+# Columns of an answer; the rows are arc surface, flat M, flat N, end -z, end +z.
+DISTANCE, POINT, NORMAL, FEATURE, RATE, WIDTH = 0, 1, 4, 7, 8, 14
+
+ARC_SURFACE, FACE_M, FACE_N = range(3)
+
+
+class Gap(NamedTuple):
+    """Signed gap of a piece: distance, point (x, y, z), normal, feature, rate g by a shift, the axis' point a."""
+
+    distance: float
+    x: float
+    y: float
+    z: float
+    nx: float
+    ny: float
+    nz: float
+    feature: float
+    gx: float
+    gy: float
+    gz: float
+    ax: float
+    ay: float
+    az: float
 
 
 @formula
-def arc_section(x, y, R, s, h):  # type: ignore[no-untyped-def]
-    """Distance of (x, y) from the section's arc alone, nearest point, feature."""
-    ax = abs(x)
-    rho = math.sqrt(x * x + y * y)
-    if ax * -h + y * s <= 0.0:
-        if rho < TINY:
-            return R, 0.0, -R, ARC
-        return abs(R - rho), x / rho * R, y / rho * R, ARC
-    gap = math.sqrt((ax - s) * (ax - s) + (y - h) * (y - h))
-    return gap, s if x >= 0.0 else -s, h, LIP_N if x >= 0.0 else LIP_M
-
-
-@formula
-def flat_section(side, x, y, s, h):  # type: ignore[no-untyped-def]
-    """Distance of (x, y) from the flat face at side (-1: M, +1: N) alone, nearest point, feature."""
-    if side * x >= s:
+def piece_section(groove: Groove, piece: int, x: float, y: float) -> tuple[float, float, float, float]:
+    """Distance of (x, y) from the section of a side piece alone, nearest point, feature."""
+    R, s, h = groove.R, groove.s, groove.h
+    side = 1.0 if piece == FACE_N or (piece == ARC_SURFACE and x >= 0.0) else -1.0
+    if piece == ARC_SURFACE:
+        if abs(x) * -h + y * s <= 0.0:
+            rho = math.sqrt(x * x + y * y)
+            return (abs(R - rho), x / rho * R, y / rho * R, ARC) if rho >= TINY else (R, 0.0, -R, ARC)
+    elif side * x >= s:
         return abs(y - h), x, h, FLAT_N if side > 0.0 else FLAT_M
-    gap = math.sqrt((side * x - s) * (side * x - s) + (y - h) * (y - h))
-    return gap, side * s, h, LIP_N if side > 0.0 else LIP_M
+    lip = LIP_N if side > 0.0 else LIP_M
+    return math.sqrt((side * x - s) * (side * x - s) + (y - h) * (y - h)), side * s, h, lip
 
 
 @formula
-def sign(piece, x, y, s, h, half_angle):  # type: ignore[no-untyped-def]
+def sign(groove: Groove, piece: int, x: float, y: float) -> tuple[float, float, float]:
     """Factor in [-1, 1] of a piece's distance for an axis at (x, y) inside the material, and its rates by x and y."""
-    side = 1.0 if piece == 2 or (piece == 0 and x >= 0.0) else -1.0
-    X = side * x - s
-    Y = h - y
+    side = 1.0 if piece == FACE_N or (piece == ARC_SURFACE and x >= 0.0) else -1.0
+    X, Y = side * x - groove.s, groove.h - y
     n2 = X * X + Y * Y
-    half = 0.5 * (math.pi - half_angle)  # half of the material's angle at the lip, from the flat face to the arc
-    angle = math.atan2(Y, X)
-    part = angle / half if piece == 0 else angle / half - 1.0
-    flip = 1.0 if piece == 0 else -1.0
+    half = 0.5 * (math.pi - groove.half_angle)  # half of the material's angle at the lip, from the flat face to the arc
+    part = math.atan2(Y, X) / half - (0.0 if piece == ARC_SURFACE else 1.0)
+    flip = 1.0 if piece == ARC_SURFACE else -1.0
     if part <= 0.0 or n2 == 0.0:
         return flip, 0.0, 0.0
     if part >= 1.0:
@@ -86,247 +97,188 @@ def sign(piece, x, y, s, h, half_angle):  # type: ignore[no-untyped-def]
 
 
 @formula
-def put(row, distance, r, qx, qy, qz, ax, ay, az, feature, R, h):  # type: ignore[no-untyped-def]
-    """Fill one piece that the axis is outside of: nearest points q on the piece, a on the axis."""
-    nx = ax - qx
-    ny = ay - qy
-    nz = az - qz
+def plain_gap(groove: Groove, rod: Rod, best: Candidate) -> Gap:
+    """Gap of a piece that the axis is outside of."""
+    R, feature = groove.R, best.feature
+    ax, ay, az = rod.x + best.t * rod.dx, rod.y + best.t * rod.dy, rod.z + best.t * rod.dz
+    nx, ny, nz = ax - best.x, ay - best.y, az - best.z
     n = math.sqrt(nx * nx + ny * ny + nz * nz)
     if n > 1e-13 * R:
-        nx /= n
-        ny /= n
-        nz /= n
+        nx, ny, nz = nx / n, ny / n, nz / n
     elif feature == ARC:
-        nx = -qx / R
-        ny = -qy / R
-        nz = 0.0
+        nx, ny, nz = -best.x / R, -best.y / R, 0.0
     elif feature in (FLAT_M, FLAT_N):
-        nx = nz = 0.0
-        ny = 1.0
+        nx, ny, nz = 0.0, 1.0, 0.0
     elif feature == END_FACE:
-        nx = ny = 0.0
-        nz = 1.0 if qz > 0.0 else -1.0
+        nx, ny, nz = 0.0, 0.0, 1.0 if best.z > 0.0 else -1.0
     else:
-        nx, ny, nz = edge_normal(feature, R, h, qx, qy, qz)
-    row[0] = distance - r
-    row[1] = qx
-    row[2] = qy
-    row[3] = qz
-    row[4] = nx
-    row[5] = ny
-    row[6] = nz
-    row[7] = feature
-    row[8] = nx
-    row[9] = ny
-    row[10] = nz
-    row[11] = ax
-    row[12] = ay
-    row[13] = az
+        nx, ny, nz = edge_normal(groove, feature, best.x, best.y, best.z)
+    distance = math.sqrt(best.d2) - rod.r
+    return Gap(distance, best.x, best.y, best.z, nx, ny, nz, feature, nx, ny, nz, ax, ay, az)
 
 
 @formula
-def side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[no-untyped-def] # noqa: E741
-    """Arc surface and flat faces without regard to sign: rows 0 to 2."""
-    e2 = dx * dx + dy * dy
-    straight = is_parallel(R, l, dx, dy)
-    for piece in range(3):
-        side = 1.0 if piece == 2 else -1.0
-        best = math.inf
-        bx = by = bz = bt = 0.0
-        feature = ARC
-        for i in range(3 if straight else 2):
-            if straight:  # one point in the middle of the stretch next to the groove, or the nearer end
-                lo = max(cz - l, -H)
-                hi = min(cz + l, H)
-                t = (0.5 * (lo + hi) - cz if lo <= hi else (-l if hi == H else l)) * dz
-            else:
-                t = -l if i == 0 else l
-            x = cx + t * dx
-            y = cy + t * dy
-            z = cz + t * dz
-            if piece == 0:
-                gap, qx, qy, f = arc_section(x, y, R, s, h)
-            else:
-                gap, qx, qy, f = flat_section(side, x, y, s, h)
-            if abs(z) > H:
-                end = abs(z) - H
-                z = H if z > 0.0 else -H
-                gap = math.sqrt(gap * gap + end * end)
-                f = beyond_end(f)
-            if gap < best:
-                best, bx, by, bz, bt, feature = gap, qx, qy, z, t, f
-            if straight:
-                break
-        if not straight:
-            best2 = best * best
-            if piece == 0:
-                # From behind, the surface is convex: the axis' approach to the groove's own axis.
-                t = -(cx * dx + cy * dy) / e2
-                x = cx + t * dx
-                y = cy + t * dy
-                z = cz + t * dz
-                rho = math.sqrt(x * x + y * y)
-                if abs(t) <= l and abs(z) <= H and rho > R and abs(x) * -h + y * s <= 0.0 and rho - R < best:
-                    best, bx, by, bz, bt, feature = rho - R, x / rho * R, y / rho * R, z, t, ARC
-                    best2 = best * best
-            for j in range(2):
-                sx = -s if j == 0 else s
-                if piece != 0 and piece != j + 1:
-                    continue
-                d2, t, z = lip_line(sx, h, H, cx, cy, cz, dx, dy, dz, e2, l, best2)
-                if d2 < best2:
-                    best2, bx, by, bz, bt, feature = d2, sx, h, z, t, LIP_M if j == 0 else LIP_N
-                for i in range(2):
-                    ez = -H if i == 0 else H
-                    d2, t, _ = corner(sx, h, ez, cx, cy, cz, dx, dy, dz, l)
-                    if d2 < best2:
-                        best2, bx, by, bz, bt, feature = d2, sx, h, ez, t, CORNER_M if j == 0 else CORNER_N
-            for i in range(2):
-                ez = -H if i == 0 else H
-                if piece == 0:
-                    ex, ey, e, p, along = ellipse(R, cx, cy, dx, dy, e2)
-                    v, _ = end_arc_reach(ez, R, cz, dz, e, p, along)
-                    d2, x, y, t = end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
-                    if d2 < best2:
-                        best2, bx, by, bz, bt, feature = d2, x, y, ez, t, END_ARC
-                else:
-                    d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l, best2)
-                    if d2 < best2 and side * x > 0.0:
-                        best2, bx, by, bz, bt, feature = d2, x, h, ez, t, END_EDGE_M if side < 0.0 else END_EDGE_N
-            if best2 < best * best:
-                best = math.sqrt(best2)
-        put(out[piece], best, r, bx, by, bz, cx + bt * dx, cy + bt * dy, cz + bt * dz, feature, R, h)
+def on_side_at(groove: Groove, rod: Rod, piece: int, t: float, best: Candidate) -> Candidate:
+    """The best so far, or the point of a side piece that is nearest to the axis point at t."""
+    z = rod.z + t * rod.dz
+    gap, x, y, feature = piece_section(groove, piece, rod.x + t * rod.dx, rod.y + t * rod.dy)
+    end = abs(z) - groove.H
+    d2 = gap * gap
+    if end > 0.0:
+        d2, z, feature = d2 + end * end, math.copysign(groove.H, z), beyond_end(feature)
+    return Candidate(d2, t, feature, x, y, z) if d2 < best.d2 else best
 
 
 @formula
-def end_piece(ez, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, row):  # type: ignore[no-untyped-def] # noqa: E741
-    """End face in the plane z = ez; an axis through it counts by its way out: sideways, or back along z."""
-    up = 1.0 if ez > 0.0 else -1.0
-    high = up * cz + l * abs(dz) - H  # how far the axis reaches in front of the face, and behind it
-    low = H - (up * cz - l * abs(dz))
-    if high > 0.0 and low > 0.0 and dz != 0.0:
-        t = (ez - cz) / dz
-        x = cx + t * dx
-        y = cy + t * dy
-        gap, f = section(x, y, R, s, h)
-        qx, qy, nx, ny = section_foot(f, x, y, R, s, h)
-        if gap < 0.0:
-            if min(high, low) < -gap:
-                end = l if up * dz * (1.0 if low < high else -1.0) < 0.0 else -l
-                put(row, 0.0, r, x, y, ez, x, y, ez, END_FACE, R, h)
-                row[0] = -min(high, low) - r
-                row[10] = up if low < high else -up
-                row[11] = cx + end * dx
-                row[12] = cy + end * dy
-                row[13] = cz + end * dz
-                return
-            put(row, 0.0, r, qx, qy, ez, x, y, ez, beyond_end(f), R, h)
-            row[0] = gap - r
-            row[4] = row[8] = nx
-            row[5] = row[9] = ny
-            row[6] = 0.0
-            row[10] = -(nx * dx + ny * dy) / dz  # the crossing point moves in the face's plane
-            return
-    best2 = math.inf
-    bx = by = bt = 0.0
-    feature = END_FACE
-    for i in range(2):
-        t = -l if i == 0 else l
-        x = cx + t * dx
-        y = cy + t * dy
-        gap, f = section(x, y, R, s, h)
-        qx, qy, _, _ = section_foot(f, x, y, R, s, h)
-        end = cz + t * dz - ez
-        if gap <= 0.0:
-            d2, qx, qy, f = end * end, x, y, END_FACE
+def on_back_of_arc(groove: Groove, rod: Rod, best: Candidate) -> Candidate:
+    """The best so far, or the arc from behind, where it is convex: the axis' approach to the groove's own axis."""
+    t = -(rod.x * rod.dx + rod.y * rod.dy) / rod.e2
+    x, y, z = rod.x + t * rod.dx, rod.y + t * rod.dy, rod.z + t * rod.dz
+    rho = math.sqrt(x * x + y * y)
+    gap = rho - groove.R
+    if abs(t) > rod.half or abs(z) > groove.H or gap <= 0.0 or gap * gap >= best.d2:
+        return best
+    if abs(x) * -groove.h + y * groove.s > 0.0:
+        return best
+    return Candidate(gap * gap, t, ARC, x / rho * groove.R, y / rho * groove.R, z)
+
+
+@formula
+def side_gap(groove: Groove, rod: Rod, piece: int) -> Gap:
+    """Gap of the arc surface or of a flat face without regard to sign."""
+    H, half = groove.H, rod.half
+    best = Candidate(math.inf, 0.0, ARC, 0.0, 0.0, 0.0)
+    if is_parallel(groove, rod, half):  # one point in the middle of the stretch next to the groove, or the nearer end
+        lo, hi = max(rod.z - half, -H), min(rod.z + half, H)
+        along = 0.5 * (lo + hi) - rod.z if lo <= hi else (-half if hi == H else half)
+        return plain_gap(groove, rod, on_side_at(groove, rod, piece, along * rod.dz, best))
+    best = on_side_at(groove, rod, piece, -half, best)
+    best = on_side_at(groove, rod, piece, half, best)
+    if piece == ARC_SURFACE:
+        best = on_back_of_arc(groove, rod, best)
+    for k in range(2):
+        side = -1.0 if k == 0 else 1.0
+        ez = side * H
+        if piece != (FACE_N if k == 0 else FACE_M):  # its own lip and corners
+            best = on_lip(groove, rod, side, best)
+            best, _ = on_corner(groove, rod, side, -H, best)
+            best, _ = on_corner(groove, rod, side, H, best)
+        if piece == ARC_SURFACE:
+            best = on_end_arc(groove, rod, end_circle(groove, rod, ez), best)
         else:
-            d2, f = gap * gap + end * end, beyond_end(f)
-        if d2 < best2:
-            best2, bx, by, bt, feature = d2, qx, qy, t, f
-    e2 = dx * dx + dy * dy
-    if is_parallel(R, l, dx, dy):
-        if high > 0.0 and low > 0.0:
-            t = (ez - cz) / dz
-            gap, f = section(cx, cy, R, s, h)
-            qx, qy, _, _ = section_foot(f, cx, cy, R, s, h)
-            best2, bx, by, bt, feature = gap * gap, qx, qy, t, beyond_end(f)
+            edge = on_end_edge(groove, rod, ez, best)
+            best = edge if edge.x * (1.0 if piece == FACE_N else -1.0) > 0.0 else best
+    return plain_gap(groove, rod, best)
+
+
+@formula
+def on_face_at(groove: Groove, rod: Rod, ez: float, t: float, best: Candidate) -> Candidate:
+    """The best so far, or the point of the end face z = ez that is nearest to the axis point at t."""
+    x, y, end = rod.x + t * rod.dx, rod.y + t * rod.dy, rod.z + t * rod.dz - ez
+    gap, feature = section(groove, x, y)
+    d2 = end * end
+    if gap <= 0.0:
+        feature = END_FACE
     else:
-        d2, t, x = end_edge(ez, s, h, cx, cy, cz, dx, dy, dz, l, best2)
-        if d2 < best2:
-            best2, bx, by, bt, feature = d2, x, h, t, END_EDGE_M if x < 0.0 else END_EDGE_N
-        for j in range(2):
-            sx = -s if j == 0 else s
-            d2, t, _ = corner(sx, h, ez, cx, cy, cz, dx, dy, dz, l)
-            if d2 < best2:
-                best2, bx, by, bt, feature = d2, sx, h, t, CORNER_M if j == 0 else CORNER_N
-        ex, ey, e, p, along = ellipse(R, cx, cy, dx, dy, e2)
-        v, _ = end_arc_reach(ez, R, cz, dz, e, p, along)
-        d2, x, y, t = end_arc(ez, R, s, h, cx, cy, cz, dx, dy, dz, e2, l, ex, ey, p, v)
-        if d2 < best2:
-            best2, bx, by, bt, feature = d2, x, y, t, END_ARC
-    put(row, math.sqrt(best2), r, bx, by, ez, cx + bt * dx, cy + bt * dy, cz + bt * dz, feature, R, h)
+        x, y, _, _ = section_foot(groove, feature, x, y)
+        d2, feature = d2 + gap * gap, beyond_end(feature)
+    return Candidate(d2, t, feature, x, y, ez) if d2 < best.d2 else best
 
 
 @formula
-def enter(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, lo, hi, out):  # type: ignore[no-untyped-def] # noqa: E741
-    """Sign the side pieces for an axis that is inside the material for lo <= t <= hi."""
-    depth, t = deepest(R, h, 2.0 * (H + abs(cz) + l), cx, cy, cz, dx, dy, dz, lo, hi)
-    if depth <= 0.0:
-        return
-    x = cx + t * dx
-    y = cy + t * dy
-    z = cz + t * dz
-    for piece in range(3):
-        row = out[piece]
-        if piece == 0:
-            gap, qx, qy, f = arc_section(x, y, R, s, h)
-        else:
-            gap, qx, qy, f = flat_section(1.0 if piece == 2 else -1.0, x, y, s, h)
-        factor, fx, fy = sign(piece, x, y, s, h, half_angle)
-        free = row[0] + r
-        if factor > 0.0:
-            row[0] = factor * free - r
-            row[8] = factor * row[8] + free * fx
-            row[9] = factor * row[9] + free * fy
-            row[10] *= factor
-            continue
-        put(row, gap, r, qx, qy, z, x, y, z, f, R, h)
-        row[0] = factor * gap - r
-        ux = row[4]
-        uy = row[5]
-        row[4] = -ux if x * x + y * y > R * R and gap > 1e-13 * R else ux
-        row[5] = -uy if x * x + y * y > R * R and gap > 1e-13 * R else uy
-        row[8] = -factor * row[4] + gap * fx
-        row[9] = -factor * row[5] + gap * fy
-        row[10] = 0.0
+def end_gap(groove: Groove, rod: Rod, up: float) -> Gap:
+    """Gap of the end face at the top (up = 1) or the bottom (-1)."""
+    ez = up * groove.H
+    reach = rod.half * abs(rod.dz)
+    front, back = up * rod.z + reach - groove.H, groove.H - up * rod.z + reach  # how far the axis is on either side
+    is_through = front > 0.0 and back > 0.0 and rod.dz != 0.0
+    t = (ez - rod.z) / rod.dz
+    if is_through and section(groove, rod.x + t * rod.dx, rod.y + t * rod.dy)[0] < 0.0:
+        return gap_through(groove, rod, up, front, back)
+    best = Candidate(math.inf, 0.0, END_FACE, 0.0, 0.0, ez)
+    best = on_face_at(groove, rod, ez, -rod.half, best)
+    best = on_face_at(groove, rod, ez, rod.half, best)
+    if is_parallel(groove, rod, rod.half):
+        if is_through:
+            best = on_face_at(groove, rod, ez, t, best)
+    else:
+        best = on_end_edge(groove, rod, ez, best)
+        best, _ = on_corner(groove, rod, -1.0, ez, best)
+        best, _ = on_corner(groove, rod, 1.0, ez, best)
+        best = on_end_arc(groove, rod, end_circle(groove, rod, ez), best)
+    return plain_gap(groove, rod, best)
 
 
 @formula
-def all_pieces(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, out):  # type: ignore[no-untyped-def] # noqa: E741
-    """All pieces into out (5, 14)."""
-    side_pieces(R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out)
-    lo, hi = clip(h, H, cy, cz, dy, dz, l)
-    if lo <= hi and abs(cz + 0.5 * (lo + hi) * dz) < H:  # an axis that only touches an end face is on it, not inside
-        enter(R, s, h, H, half_angle, r, l, cx, cy, cz, dx, dy, dz, lo, hi, out)
-    end_piece(-H, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out[3])
-    end_piece(H, R, s, h, H, r, l, cx, cy, cz, dx, dy, dz, out[4])
-    for i in range(PIECES):  # moment of the rate, in place of the axis point
-        row = out[i]
-        gx, gy, gz, x, y, z = row[8], row[9], row[10], row[11], row[12], row[13]
-        row[11] = y * gz - z * gy
-        row[12] = z * gx - x * gz
-        row[13] = x * gy - y * gx
+def gap_through(groove: Groove, rod: Rod, up: float, front: float, back: float) -> Gap:
+    """Gap of an end face that the axis goes through: by its way out, sideways or back along z."""
+    ez = up * groove.H
+    t = (ez - rod.z) / rod.dz
+    x, y = rod.x + t * rod.dx, rod.y + t * rod.dy
+    gap, feature = section(groove, x, y)
+    if min(front, back) < -gap:
+        way = up if back < front else -up
+        end = math.copysign(rod.half, -rod.dz * way)
+        ax, ay, az = rod.x + end * rod.dx, rod.y + end * rod.dy, rod.z + end * rod.dz
+        return Gap(-min(front, back) - rod.r, x, y, ez, 0.0, 0.0, up, END_FACE, 0.0, 0.0, way, ax, ay, az)
+    qx, qy, nx, ny = section_foot(groove, feature, x, y)
+    gz = -(nx * rod.dx + ny * rod.dy) / rod.dz  # the crossing point moves in the face's plane
+    return Gap(gap - rod.r, qx, qy, ez, nx, ny, 0.0, beyond_end(feature), nx, ny, gz, x, y, ez)
 
 
-def _pieces(T, R, half_angle, H, r, l, out):  # type: ignore[no-untyped-def] # noqa: E741
+@formula
+def gap_inside(groove: Groove, rod: Rod, piece: int, t: float, outer: Gap) -> Gap:
+    """Gap of a side piece, whose distance is that of ``outer``, for an axis that is deepest in the material at t."""
+    x, y, z = rod.x + t * rod.dx, rod.y + t * rod.dy, rod.z + t * rod.dz
+    factor, fx, fy = sign(groove, piece, x, y)
+    a = outer
+    if factor > 0.0:
+        free = a.distance + rod.r
+        gx, gy, gz = factor * a.gx + free * fx, factor * a.gy + free * fy, factor * a.gz
+        distance = factor * free - rod.r
+        return Gap(distance, a.x, a.y, a.z, a.nx, a.ny, a.nz, a.feature, gx, gy, gz, a.ax, a.ay, a.az)
+    gap, qx, qy, feature = piece_section(groove, piece, x, y)
+    a = plain_gap(groove, rod, Candidate(gap * gap, t, feature, qx, qy, z))
+    flip = -1.0 if x * x + y * y > groove.R * groove.R and gap > 1e-13 * groove.R else 1.0
+    nx, ny = flip * a.nx, flip * a.ny
+    gx, gy = -factor * nx + gap * fx, -factor * ny + gap * fy
+    return Gap(factor * gap - rod.r, qx, qy, z, nx, ny, a.nz, feature, gx, gy, 0.0, x, y, z)
+
+
+@formula
+def write(gap: Gap, row: Array) -> None:
+    """Write a gap into a row (WIDTH,)."""
+    row[DISTANCE], row[FEATURE] = gap.distance, gap.feature
+    put(row, POINT, gap.x, gap.y, gap.z)
+    put(row, NORMAL, gap.nx, gap.ny, gap.nz)
+    gx, gy, gz, x, y, z = gap.gx, gap.gy, gap.gz, gap.ax, gap.ay, gap.az
+    put(row, RATE, gx, gy, gz)
+    put(row, RATE + 3, y * gz - z * gy, z * gx - x * gz, x * gy - y * gx)
+
+
+@inlined
+def place_inside(groove: Groove, rod: Rod) -> float:
+    """Place of the axis' deepest point in the material, as if the groove were endless; NaN if it is in none."""
+    lo, hi = clip(groove, rod, rod.half)
+    # An axis that only touches an end face is on it, not inside.
+    if lo > hi or abs(rod.z + 0.5 * (lo + hi) * rod.dz) >= groove.H:
+        return math.nan
+    endless = Groove(groove.R, groove.half_angle, groove.s, groove.h, 2.0 * (groove.H + abs(rod.z) + rod.half))
+    t = deepest(endless, rod, lo, hi)
+    x, y = rod.x + t * rod.dx, rod.y + t * rod.dy
+    return t if min(math.sqrt(x * x + y * y) - groove.R, groove.h - y) > 0.0 else math.nan
+
+
+@entry
+def pieces(T: Array, R: float, half_angle: float, H: float, r: float, half: float, out: Array) -> bool:
+    """The five pieces at one pose (1, 4, 4) into ``out`` (5, WIDTH); False for a pose that is not rigid."""
     if not rigid(T, 0):
         return False
-    dx, dy, dz = axis(T, 0)
-    s = R * math.sin(half_angle)
-    h = -R * math.cos(half_angle)
-    all_pieces(R, s, h, H, half_angle, r, l, T[0, 0, 3], T[0, 1, 3], T[0, 2, 3], dx, dy, dz, out)
+    groove, rod = groove_of(R, half_angle, H), rod_at(T, 0, r, half)
+    t = place_inside(groove, rod)
+    for piece in range(3):
+        gap = side_gap(groove, rod, piece)
+        write(gap if math.isnan(t) else gap_inside(groove, rod, piece, t, gap), out[piece])
+    for k in range(2):
+        write(end_gap(groove, rod, 2.0 * k - 1.0), out[3 + k])
     return True
-
-
-pieces = entry(_pieces)
-"""Compiled entry point: one pose (1, 4, 4) into (5, 14); False for a pose that is not rigid."""

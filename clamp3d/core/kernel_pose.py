@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
-from clamp3d.core.jit import formula, inlined
-from clamp3d.core.pose import RIGID_TOLERANCE
+from clamp3d.core.jit import inlined
+from clamp3d.core.kernel_features import Rod
+from clamp3d.core.pose import RIGID_TOLERANCE, Array
 from clamp3d.core.primitives import LARGEST
 
 
 @inlined
-def place(T, k):  # type: ignore[no-untyped-def]
+def place(T: Array, k: int) -> tuple[float, float, float, float, float, float]:
     """Position and axis as given, of pose k of (n, 4, 4) or of (n, 2, 3), which is these two alone."""
     if T.shape[1] == 2:
         return T[k, 0, 0], T[k, 0, 1], T[k, 0, 2], T[k, 1, 0], T[k, 1, 1], T[k, 1, 2]
@@ -18,7 +19,7 @@ def place(T, k):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def rigid(T, k):  # type: ignore[no-untyped-def]
+def rigid(T: Array, k: int) -> bool:
     """Whether pose k of (n, 4, 4) is rigid by the rule of ``pose.check_pose``, and its offset below LARGEST.
 
     Of (n, 2, 3): whether the axis is of unit length to the same tolerance.
@@ -44,12 +45,14 @@ def rigid(T, k):  # type: ignore[no-untyped-def]
         return False
     offset = abs(T[k, 0, 3]) + abs(T[k, 1, 3]) + abs(T[k, 2, 3])
     last = abs(T[k, 3, 0]) + abs(T[k, 3, 1]) + abs(T[k, 3, 2]) + abs(T[k, 3, 3] - 1.0)
-    return offset < LARGEST and last == 0.0
+    return bool(offset < LARGEST and last == 0.0)
 
 
-@formula
-def axis(T, k):  # type: ignore[no-untyped-def]
-    """Unit direction of the z axis of pose k: as given, normalised."""
-    _, _, _, x, y, z = place(T, k)
-    n = math.sqrt(x * x + y * y + z * z)
-    return x / n, y / n, z / n
+@inlined
+def rod_at(T: Array, k: int, r: float, half: float) -> Rod:
+    """The cylinder of this radius and half length at the valid pose k: its axis as given, normalised."""
+    x, y, z, dx, dy, dz = place(T, k)
+    g = dx * dx + dy * dy + dz * dz
+    n = 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)  # by its series near 1: no root to wait for
+    dx, dy, dz = dx * n, dy * n, dz * n
+    return Rod(x, y, z, dx, dy, dz, dx * dx + dy * dy, r, half)

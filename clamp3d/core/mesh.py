@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d import checks
-from clamp3d.core.linear import dot
 from clamp3d.core.shells import inside_out, joined, volume
 from clamp3d.errors import InputError
 
@@ -100,58 +99,81 @@ def make_mesh(
     scale, float32 = checks.positive("scale", scale), checks.flag("float32", float32)
     float32 = float32 or getattr(vertices, "dtype", None) == np.float32
     V, F = _arrays(vertices, faces, name, scale)
+    rounding = float(np.abs(V).max()) * (2.0**-24 if float32 else 2.0**-50)
+    notes: list[str] = []
+    V, F = _merge(V, F, max(4.0 * rounding, 1e-9 * _extent(V, name)))
+    V, F = _cleaned(V, F, rounding, name, notes)
+    F = _one_winding(V, F, notes)
+    watertight, fault = _closure(V, F)
+    if fault:
+        notes.append(fault)
+    if watertight:
+        F = _outward(V, F, name, notes)
+    mesh = Mesh(name, V, F, watertight, rounding, tuple(notes))
+    slivers = mesh.slivers
+    if slivers.all():
+        raise InputError(f"{name}: no triangle with an area")
+    return mesh if watertight else replace(mesh, faces=F[~slivers])
 
-    notes = []
-    reach = float(np.abs(V).max())
+
+def _extent(V: Array, name: str) -> float:
+    """Largest extent in mm. Raises InputError if it is too small for a mesh."""
     extent = float(np.ptp(V, axis=0).max())
     if extent <= 0.0:
         raise InputError(f"{name}: all vertices lie in one point")
     if extent < SMALLEST:
         raise InputError(f"{name}: extent must be >= {SMALLEST:g} mm, got {extent:.3g} mm; is the unit right?")
-    rounding = reach * (2.0**-24 if float32 else 2.0**-50)
-    V, F = _merge(V, F, max(4.0 * rounding, 1e-9 * extent))
+    return extent
+
+
+def _used(V: Array, F: IntArray) -> tuple[Array, IntArray]:
+    """The vertices that faces use, and the faces by their new numbers."""
+    used, index = np.unique(F, return_inverse=True)
+    return V[used], index.reshape(-1, 3).astype(np.int64)
+
+
+def _cleaned(V: Array, F: IntArray, rounding: float, name: str, notes: list[str]) -> tuple[Array, IntArray]:
+    """The mesh without folded and doubled triangles, and without slivers that keep it open; ``notes`` say so."""
     F = F[~_folded(F)]
     single = _without_doubles(F)
     if len(single) < len(F):
         notes.append(f"{len(F) - len(single)} doubled triangles left out")
     if len(single) == 0:
         raise InputError(f"{name}: no triangle with an area")
-    used, index = np.unique(single, return_inverse=True)
-    V, F = V[used], index.reshape(-1, 3).astype(np.int64)
-    _, edge, uses = _edges(F)
-    if (uses % 2).any():
+    V, F = _used(V, single)
+    if (_edges(F)[2] % 2).any():
         thin = _in_the_way(V, F, rounding)
         if thin.any():
             notes.append(f"{int(thin.sum())} triangles without an area left out")
-            used, index = np.unique(F[~thin], return_inverse=True)
-            V, F = V[used], index.reshape(-1, 3).astype(np.int64)
-            _, edge, uses = _edges(F)
-    if _balance(F, edge)[uses == 2].any():
-        import trimesh  # takes longer to load than most meshes to read
+            V, F = _used(V, F[~thin])
+    return V, F
 
-        mesh = trimesh.Trimesh(V, F, process=False)
-        trimesh.repair.fix_winding(mesh)  # type: ignore[no-untyped-call]
-        turned = np.array(mesh.faces, dtype=np.int64)
-        notes.append(f"{int(np.any(turned != F, axis=1).sum())} triangles turned to one winding")
-        F = turned
-    watertight, fault = _closure(V, F)
-    if fault:
-        notes.append(fault)
-    if watertight:
-        enclosed = volume(V, F)
-        if enclosed < 0.0:
-            F = np.ascontiguousarray(F[:, ::-1])
-            notes.append("inside out: all triangles turned")
-        for rows in inside_out(V, F):
-            F[rows] = F[rows][:, ::-1]
-            notes.append(f"a body of {len(rows)} triangles inside out: turned")
-        if not volume(V, F) > 0.0:
-            raise InputError(f"{name}: the surface encloses no volume")
-    made = Mesh(name, V, F, watertight, rounding, tuple(notes))
-    slivers = made.slivers
-    if slivers.all():
-        raise InputError(f"{name}: no triangle with an area")
-    return made if watertight else replace(made, faces=F[~slivers])
+
+def _one_winding(V: Array, F: IntArray, notes: list[str]) -> IntArray:
+    """The faces with one winding on each connected surface; ``notes`` say how many were turned."""
+    _, edge, uses = _edges(F)
+    if not _balance(F, edge)[uses == 2].any():
+        return F
+    import trimesh  # takes longer to load than most meshes to read
+
+    mesh = trimesh.Trimesh(V, F, process=False)
+    trimesh.repair.fix_winding(mesh)
+    turned = np.array(mesh.faces, dtype=np.int64)
+    notes.append(f"{int(np.any(turned != F, axis=1).sum())} triangles turned to one winding")
+    return turned
+
+
+def _outward(V: Array, F: IntArray, name: str, notes: list[str]) -> IntArray:
+    """The faces of a closed mesh wound outward, body by body; ``notes`` say what was turned."""
+    if volume(V, F) < 0.0:
+        F = np.ascontiguousarray(F[:, ::-1])
+        notes.append("inside out: all triangles turned")
+    for rows in inside_out(V, F):
+        F[rows] = F[rows][:, ::-1]
+        notes.append(f"a body of {len(rows)} triangles inside out: turned")
+    if not volume(V, F) > 0.0:
+        raise InputError(f"{name}: the surface encloses no volume")
+    return F
 
 
 def closed_mesh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Mesh:
@@ -273,7 +295,7 @@ def _may_be_close(V: Array, tolerance: float) -> bool:
 
     Along any direction they are no further apart than they are; few other points lie between them there.
     """
-    along = dot(V - V[0], _ASLANT)
+    along = (V - V[0]) @ _ASLANT
     order = np.argsort(along, kind="stable")
     V, along = V[order], along[order]
     for k in range(1, _BETWEEN):
@@ -385,7 +407,7 @@ def edges_of(F: IntArray, uses: int) -> tuple[IntArray, IntArray, IntArray]:
     >>> [x.tolist() for x in edges_of(np.array([[0, 1, 2], [2, 1, 3]]), 2)]
     [[[1, 2]], [[0, 1]], [[0, 3]]]
     """
-    directed, edge, found = _edges(F)
+    directed, edge, counts = _edges(F)
     order = np.argsort(edge, kind="stable")
-    sides = order[found[edge[order]] == uses].reshape(-1, uses)
+    sides = order[counts[edge[order]] == uses].reshape(-1, uses)
     return np.sort(directed[sides[:, 0]], axis=1), sides // 3, F[sides // 3, (sides + 2) % 3]

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from clamp3d.checks import instance
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Profile, Side, check_mesh_error
 from clamp3d.core.shapes import Solid
@@ -80,15 +79,15 @@ def enclosed(part: Solid, mesh_error: float) -> tuple[Array, NDArray[np.int64]] 
 
 def enclosing(part: Solid, mesh_error: float) -> tuple[Array, NDArray[np.int64]]:
     """Vertices (n, 3) mm and faces (m, 3) of a closed mesh that the part lies wholly in."""
-    made = _one_sided(part, mesh_error, "outer")
-    if made is None:
+    solid = _one_sided(part, mesh_error, "outer")
+    if solid is None:
         raise Clamp3dError(f"mesh of {part.name} is empty: one of its sizes vanishes beside the others")
-    return made
+    return solid
 
 
 def _one_sided(part: Solid, mesh_error: float, side: Side) -> tuple[Array, NDArray[np.int64]] | None:
-    made = _solid(part, mesh_error, side)
-    return None if made.is_empty() else _arrays(made)
+    solid = _solid(part, mesh_error, side)
+    return None if solid.is_empty() else _arrays(solid)
 
 
 def _arrays(solid: Any) -> tuple[Array, NDArray[np.int64]]:
@@ -155,7 +154,7 @@ def _extrude(shape: Extrusion, mesh_error: float, side: Side, overlap: float = 0
         points = np.concatenate([np.column_stack([corners, np.full(n, end)]) for end in ends])
         faces = np.concatenate([caps[:, ::-1], caps + n, *sides]).astype(np.uint64)
         # Not by trimesh: it takes 0.4 s to import, merges vertices, and its booleans round them to single precision.
-        solid += manifold3d.Manifold(manifold3d.Mesh64(vert_properties=dot(points, shape.frame.T), tri_verts=faces))
+        solid += manifold3d.Manifold(manifold3d.Mesh64(vert_properties=points @ shape.frame.T, tri_verts=faces))
     return solid
 
 
@@ -174,6 +173,6 @@ def _polygons(profile: Profile, mesh_error: float, side: Side) -> list[Polygon]:
             lenses.append(Polygon([*chords, *reversed(arc.tangents(mesh_error, arc.start))]).buffer(0.0))
     chords = Polygon(profile.polygon(mesh_error))
     # Their union in the plane would have cracks along the chords: `_extrude` joins the prisms.
-    made = [chords, *lenses] if side == "outer" else [chords.difference(union_all(lenses))]
-    parts = [part for some in made for part in getattr(some, "geoms", [some])]
+    polygons = [chords, *lenses] if side == "outer" else [chords.difference(union_all(lenses))]
+    parts = [part for some in polygons for part in getattr(some, "geoms", [some])]
     return [part for part in parts if part.geom_type == "Polygon" and not part.is_empty]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.checks import array, items, number, text
-from clamp3d.core.linear import cross, dot, norm
+from clamp3d.core.linear import cross, norm
 from clamp3d.core.pose import Array, check_pose, rotation, unit
 from clamp3d.errors import InputError
 
@@ -93,12 +93,12 @@ class Motion:
         from scipy.spatial.transform import Rotation
 
         way = self.to[:3, 3] - start[:3, 3]
-        turn = Rotation.from_matrix(dot(self.to[:3, :3], start[:3, :3].T)).as_rotvec()
+        turn = Rotation.from_matrix(self.to[:3, :3] @ start[:3, :3].T).as_rotvec()
         angle = norm(turn)
         if angle < 1e-12:
             return replace(self, travel=way, to=None)
         u = turn / angle
-        along = float(dot(way, u)) * u
+        along = float(way @ u) * u
         across = way - along
         # The middle of the chord, and from there as far as it is wide for the angle: exact however far the axis is.
         point = start[:3, 3] + 0.5 * (across + cross(u, across) / math.tan(0.5 * angle))
@@ -118,14 +118,14 @@ class Motion:
             square = cross(self.axis, T[:3, 3] - self.point)
             half = math.sin(0.5 * t * self.angle)
             T[:3, 3] += math.sin(t * self.angle) * square + 2.0 * half * half * cross(self.axis, square)
-            T[:3, :3] = dot(rotation(self.axis, t * self.angle)[:3, :3], T[:3, :3])
+            T[:3, :3] = rotation(self.axis, t * self.angle)[:3, :3] @ T[:3, :3]
         T[:3, 3] += t * self.travel
         return T
 
     def from_axis(self, points: Array) -> Array:
         """Distances (...) in mm of points (..., 3) from the axis."""
         out = points - self.point
-        return np.asarray(np.linalg.norm(out - dot(out, self.axis)[..., None] * self.axis, axis=-1))
+        return np.asarray(np.linalg.norm(out - (out @ self.axis)[..., None] * self.axis, axis=-1))
 
     @property
     def is_screw(self) -> bool:

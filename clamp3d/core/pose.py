@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, number
-from clamp3d.core.linear import dot, norm
+from clamp3d.core.linear import norm
 from clamp3d.core.primitives import LARGEST
 from clamp3d.errors import InputError
 
@@ -75,7 +75,7 @@ def check_pose(pose: ArrayLike, name: str = "pose") -> Array:
         raise InputError(f"{name} must have an offset below {LARGEST:g} mm, got {T[:3, 3].tolist()}")
     R = T[:3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
-        deviation = float(np.abs(dot(R, R.T) - np.eye(3)).max())
+        deviation = float(np.abs(R @ R.T - np.eye(3)).max())
     if not deviation <= REPAIR_TOLERANCE:
         raise InputError(f"{name} must be rigid: its rotation part deviates from orthonormal by {deviation:.3g}")
     if np.linalg.det(R) < 0:
@@ -110,7 +110,7 @@ def check_pose_array(poses: ArrayLike, name: str = "poses") -> Array:
     T = array(name, poses, (None, 4, 4), finite=False)
     R = T[:, :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
-        deviation = np.abs(dot(R, np.swapaxes(R, 1, 2)) - np.eye(3)).max(axis=(1, 2))
+        deviation = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
         sound = np.isfinite(T).all(axis=(1, 2)) & (np.linalg.det(R) > 0.0) & (deviation <= REPAIR_TOLERANCE)
         sound &= (T[:, 3] == (0.0, 0.0, 0.0, 1.0)).all(axis=1) & (np.abs(T[:, :3, 3]).max(axis=1) < LARGEST)
     if not sound.all():
@@ -173,7 +173,7 @@ def inverse(T: Array) -> Array:
     out = np.zeros_like(T)
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
     out[..., :3, :3] = Rt
-    out[..., :3, 3] = -dot(Rt, T[..., :3, 3:])[..., 0]
+    out[..., :3, 3] = -(Rt @ T[..., :3, 3:])[..., 0]
     out[..., 3, 3] = 1.0
     return out
 

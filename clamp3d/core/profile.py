@@ -169,8 +169,8 @@ class Arc:
         """
         n = max(self.chord_count(mesh_error), 4 * math.ceil(abs(self.sweep) / (2.0 * math.pi)))
         step = self.sweep / n
-        around = Arc(self.centre, self.radius / math.cos(0.5 * step), self.start_angle, self.end_angle)
-        corners = [around.at(self.start_angle + (k + 0.5) * step) for k in range(n)]
+        outer_arc = Arc(self.centre, self.radius / math.cos(0.5 * step), self.start_angle, self.end_angle)
+        corners = [outer_arc.at(self.start_angle + (k + 0.5) * step) for k in range(n)]
         return corners if abs(self.sweep) > 2.0 * math.pi - 1e-9 else [start, *corners]
 
     def sagitta(self, chords: int) -> float:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from clamp3d.core.arc_circle import ArcRelation, check_tolerance
 from clamp3d.core.distance import Feature, SignedDistance, as_pose, signed_distance
-from clamp3d.core.linear import dot, norm
+from clamp3d.core.linear import norm
 from clamp3d.core.pose import Array, check_pose
 from clamp3d.core.primitives import AnyCylinder, Capsule, SweptArc, check_shapes
 
@@ -170,6 +170,6 @@ def relative_pose(T_world_a: ArrayLike, T_world_b: ArrayLike) -> Array:
     """
     A, B = check_pose(T_world_a, "T_world_a"), check_pose(T_world_b, "T_world_b")
     T = np.eye(4)
-    T[:3, :3] = dot(A[:3, :3].T, B[:3, :3])
-    T[:3, 3] = dot(A[:3, :3].T, B[:3, 3] - A[:3, 3])
+    T[:3, :3] = A[:3, :3].T @ B[:3, :3]
+    T[:3, 3] = A[:3, :3].T @ (B[:3, 3] - A[:3, 3])
     return T

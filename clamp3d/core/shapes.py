@@ -48,10 +48,10 @@ class Solid:
     def __post_init__(self) -> None:
         text("name of a solid", self.name)
         for key in ("bodies", "holes"):
-            made = items(f"{key} of solid {self.name}", getattr(self, key), "extrusions")
-            for item in made:
+            checked = items(f"{key} of solid {self.name}", getattr(self, key), "extrusions")
+            for item in checked:
                 instance(f"{key} of solid {self.name}", item, Extrusion)
-            object.__setattr__(self, key, made)
+            object.__setattr__(self, key, checked)
         if not self.bodies:
             raise InputError(f"bodies of solid {self.name} must be at least one extrusion")
 
@@ -116,7 +116,7 @@ AnyShape: TypeAlias = Shape | Cylinder | Capsule | SweptArc
 
 
 def _drill(holes: Sequence[Hole], low: Array, high: Array) -> tuple[Extrusion, ...]:
-    made = []
+    extrusions = []
     circles: dict[str, list[tuple[float, float, float]]] = {}
     for hole in items("holes", holes, "holes"):
         instance("hole", hole, Hole)
@@ -126,15 +126,15 @@ def _drill(holes: Sequence[Hole], low: Array, high: Array) -> tuple[Extrusion, .
         if norm(np.maximum(high[across] - hole.at, hole.at - low[across])) <= hole.radius:
             raise InputError(f"hole of radius {hole.radius:g} mm at {hole.at} leaves nothing of the part")
         if hole.axis == "z":
-            made.append(Extrusion(Profile.circle(hole.radius, hole.at), "Z", float(low[2]), float(high[2])))
+            extrusions.append(Extrusion(Profile.circle(hole.radius, hole.at), "Z", float(low[2]), float(high[2])))
         else:  # outlines along Y are (u, v) = (x, -z)
             at = (hole.at[0], -hole.at[1])
-            made.append(Extrusion(Profile.circle(hole.radius, at), "Y", float(low[1]), float(high[1])))
+            extrusions.append(Extrusion(Profile.circle(hole.radius, at), "Y", float(low[1]), float(high[1])))
         u, v = np.array(hole.at) - 0.5 * (low + high)[across]
         circles.setdefault(hole.axis, []).append((hole.radius, float(u), float(v)))
     if not leaves_something(0.5 * (high - low), circles):
-        raise InputError(f"{len(made)} holes together leave nothing of the part")
-    return tuple(made)
+        raise InputError(f"{len(extrusions)} holes together leave nothing of the part")
+    return tuple(extrusions)
 
 
 def cylinder(radius: float, length: float, *, bore: float = 0.0, name: str = "cylinder") -> Solid:

@@ -13,7 +13,7 @@ Faces = NDArray[np.int64]
 _FLAT = 1e-14
 """A volume below this part of area x extent is rounding."""
 
-_ASKED = 64
+_MOST_SAMPLES = 64
 
 
 def volume(vertices: Array, faces: Faces) -> float:
@@ -27,9 +27,9 @@ def volume(vertices: Array, faces: Faces) -> float:
     low, high = used.min(axis=0), used.max(axis=0)
     # The middle as origin: far from it the volumes cancel badly.
     a, b, c = np.moveaxis(vertices[faces] - 0.5 * (low + high), 1, 0)
-    found = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+    enclosed = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
     area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    return found if abs(found) > _FLAT * area * float((high - low).max()) else 0.0
+    return enclosed if abs(enclosed) > _FLAT * area * float((high - low).max()) else 0.0
 
 
 def corners_of(vertices: Array, faces: Faces) -> tuple[Array, Array, Array]:
@@ -85,15 +85,15 @@ def inside_out(vertices: Array, faces: Faces) -> list[NDArray[np.intp]]:
     it would not be seen in.
     """
     parts = shells(faces, len(vertices))
-    found = []
+    turned = []
     for rows in parts:
         if volume(vertices, faces[rows]) >= 0.0:
             continue
         rest = np.ones(len(faces), dtype=bool)
         rest[rows] = False
-        asked = distinct(faces[rows])
-        asked = asked[:: max(1, len(asked) // _ASKED)]
+        samples = distinct(faces[rows])
+        samples = samples[:: max(1, len(samples) // _MOST_SAMPLES)]
         outer = corners_of(vertices, faces[rest])
-        if not rest.any() or min(winding_number(outer, vertices[k]) for k in asked) < 0.9:
-            found.append(rows)
-    return found
+        if not rest.any() or min(winding_number(outer, vertices[k]) for k in samples) < 0.9:
+            turned.append(rows)
+    return turned

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import positive
 from clamp3d.core.distance import Feature, SignedDistance, as_pose, signed_distance, signed_distances
-from clamp3d.core.linear import dot, norm
+from clamp3d.core.linear import norm
 from clamp3d.core.pose import Array, rotation
 from clamp3d.core.primitives import AnyCylinder, SweptArc, check_shapes
 
@@ -85,8 +85,8 @@ def generalised_gradient(
     >>> from clamp3d.core.pose import translation
     >>> from clamp3d.core.primitives import Cylinder
     >>> groove, wire = SweptArc(12.0, np.pi / 3, 50.0), Cylinder(14.0, 80.0)
-    >>> found = generalised_gradient(groove, wire, translation(0.0, 5.0, 0.0))  # over both lips
-    >>> found.unique, sorted({str(feature) for feature in found.features})
+    >>> answer = generalised_gradient(groove, wire, translation(0.0, 5.0, 0.0))  # over both lips
+    >>> answer.unique, sorted({str(feature) for feature in answer.features})
     (False, ['corner M', 'corner N', 'lip M', 'lip N'])
     """
     check_shapes(groove, cylinder)
@@ -94,8 +94,8 @@ def generalised_gradient(
     T = as_pose(pose)
     arm = max(groove.radius, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, *np.abs(T[:3, 3]).tolist())
     step = _TOLERANCE * arm if tolerance is None else positive("tolerance", tolerance)
-    around = np.array([_moved(T, v * [*[step] * 3, *[step / arm] * 3]) for v in _directions()])
-    near = signed_distances(groove, cylinder, around, full=True)
+    moved_poses = np.array([_moved(T, v * [*[step] * 3, *[step / arm] * 3]) for v in _directions()])
+    near = signed_distances(groove, cylinder, moved_poses, full=True)
     scale = np.array([1.0, 1.0, 1.0, *[arm] * 3])
     kept: list[int] = []
     for k, rate in enumerate(near.gradient / scale):
@@ -119,6 +119,6 @@ def _moved(T: Array, twist: Array) -> Array:
     """The pose after a small motion in the groove's frame."""
     angle = norm(twist[3:])
     M = rotation(twist[3:], angle) if angle > 0.0 else np.eye(4)
-    out = dot(M, T)
+    out = M @ T
     out[:3, 3] += twist[:3]
     return np.asarray(out)

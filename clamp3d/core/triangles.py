@@ -16,8 +16,8 @@ def distinct(values: NDArray[Any]) -> NDArray[Any]:
     >>> distinct(np.array([[3, 1], [1, 2]])).tolist()
     [1, 2, 3]
     """
-    found = np.sort(values, axis=None)
-    return found[np.append(True, found[1:] != found[:-1])] if len(found) else found
+    ordered = np.sort(values, axis=None)
+    return ordered[np.append(True, ordered[1:] != ordered[:-1])] if len(ordered) else ordered
 
 
 def closest_points(triangles: Array, points: Array) -> Array:
@@ -34,15 +34,15 @@ def closest_points(triangles: Array, points: Array) -> Array:
     feet = starts + share[:, :, None] * sides
     away = ((feet - points[:, None]) ** 2).sum(axis=2)
     rows = np.arange(len(points))
-    found = feet[rows, away.argmin(axis=1)]
+    nearest = feet[rows, away.argmin(axis=1)]
     normal = np.cross(sides[:, 0], sides[:, 1])
     # Inside: left of all three sides, as seen from the tip of the normal.
     left = (np.cross(normal[:, None], sides) * to_point).sum(axis=2)
     inside = (left > 0.0).all(axis=1)
     n, p = normal[inside], points[inside]
     height = ((p - starts[inside, 0]) * n).sum(axis=1) / (n * n).sum(axis=1)
-    found[inside] = p - height[:, None] * n
-    return np.asarray(found)
+    nearest[inside] = p - height[:, None] * n
+    return np.asarray(nearest)
 
 
 def side_keys(a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> NDArray[np.int64]:

@@ -33,9 +33,9 @@ def checked(kind: type[T]) -> type[T]:
     @functools.wraps(kind.__init__)
     def init(self: T, **values: typing.Any) -> None:
         plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in values.items()}
-        made = validate(kind, plain, kind.__name__)
+        converted = validate(kind, plain, kind.__name__)
         for field in fields(kind):  # type: ignore[arg-type]
-            object.__setattr__(self, field.name, getattr(made, field.name))
+            object.__setattr__(self, field.name, getattr(converted, field.name))
 
     kind.__init__ = init  # type: ignore[assignment, method-assign]
     return kind
