@@ -11,17 +11,17 @@ from clamp3d.brep import cad_process
 from clamp3d.brep.open_cascade import TOLERANCE
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.model import Model
-from clamp3d.collide.overlap import cut_until
+from clamp3d.collide.overlap import cut_up
 from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
 
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
-_TRIED = 60
+_TRIED = 24
 """Points of the common part's border whose depth is measured exactly: as many of those that look deepest by the meshes,
 and of all that may be the deepest.
 """
 _PIECES = 4000
-"""Triangles that the common part's border is cut into at most, to find these points."""
+"""Triangles that those of the common part's border are cut into beyond their number, to find these points."""
 _SAMPLES = 0.02
 """Chord of the common part's border relative to its smallest extent; between the samples the depth hardly changes."""
 
@@ -56,9 +56,9 @@ def _deepest(a: Model, b: Model, T: Array, border: Array) -> tuple[float, Array]
     looks, slack = np.zeros(len(points)), np.inf
     if a.chords and b.chords:
         x, y = a.outer(a.chords[-1]), b.outer(b.chords[-1])
-        pieces, _ = cut_until(x, y, T, border, lambda _: False, _PIECES)
-        points, slack = pieces.mean(axis=1), 2.0 * (x.error + y.error)
-        looks = np.maximum(x.distance(points), y.distance((points - T[:3, 3]) @ T[:3, :3]))
+        *_, pieces = cut_up(x, y, T, border, _PIECES)
+        points, looks = pieces.triangles.mean(axis=1), pieces.middles
+        slack = 2.0 * (x.error + y.error)
     order = np.argsort(-looks, kind="stable")
     order = order[looks[order] >= looks.max() - slack]
     spread = order[np.linspace(0, len(order) - 1, min(len(order), _TRIED)).round().astype(int)]

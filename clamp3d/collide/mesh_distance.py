@@ -98,7 +98,8 @@ def _overlap(a: Surface, b: Surface, T: Array, rounding: float, enough: Enough) 
         return Distance(-bound - off, max(upper, -bound - off), point, point)
 
     unbounded = Distance(-np.inf, upper, point, point)
-    if enough(unbounded) or not enough(of_thickness(max(0.0, -upper))):
+    of_meshes = depth + a.error + b.error  # what was measured there: no bound of the meshes' overlap is less
+    if enough(unbounded) or not enough(of_thickness(max(0.0, -upper, of_meshes))):
         return unbounded
     return of_thickness(thickness(a, b, T, shared, lambda bound: enough(of_thickness(bound))))
 

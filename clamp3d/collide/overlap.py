@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -114,43 +114,61 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Calla
     """
     if 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
         return np.inf
-    _, each = cut_until(a, b, T, shared.vertices[shared.faces], is_enough)
-    return float(each.max(initial=0.0))
-
-
-def cut_until(
-    a: Surface, b: Surface, T: Array, pieces: Array, is_enough: Callable[[float], bool], most: int = _CUTS
-) -> tuple[Array, Array]:
-    """Triangles (m, 3, 3), cut up, and how far (m,) each is from either surface at most.
-
-    The furthest ones are cut until the largest distance ``is_enough``, or there are ``most`` more.
-    """
-    back = inverse(T)
-    each = _distances(a, b, pieces, back)
-    while not is_enough(float(each.max(initial=0.0))):
-        largest = each.max(axis=1) > 0.5 * each.max()
-        most -= 2 * int(largest.sum())  # three or four in place of one
-        if most < 0 or not each.max() > 0.0:
+    bound = np.inf
+    for pieces in cut_up(a, b, T, shared.vertices[shared.faces]):
+        bound = float(pieces.at_most.max(initial=0.0))
+        if is_enough(bound) or not is_enough(float(pieces.middles.max(initial=0.0))):
             break
-        from_a = largest & (each[:, 0] >= each[:, 1])
-        from_b = largest & ~from_a
-        cut = np.concatenate([_cut(a, np.eye(4), pieces[from_a]), _cut(b, back, pieces[from_b])])
-        pieces = np.concatenate([pieces[~largest], cut])
-        each = np.concatenate([each[~largest], _distances(a, b, cut, back)])
-    return pieces, np.asarray(each.max(axis=1))
+    return bound
 
 
-def _distances(a: Surface, b: Surface, pieces: Array, back: Array) -> Array:
-    """Largest distances (m, 2) of triangles (m, 3, 3) from two surfaces at most; ``back`` (4, 4) takes them to b."""
-    return np.stack([_from_one_triangle(a, pieces), _from_one_triangle(b, _placed(back, pieces))], axis=1)
+@dataclass(eq=False)
+class Pieces:
+    """Triangles (m, 3, 3): how far from either surface their middles (m,) are, and any point of them (m, 2) at most."""
+
+    triangles: Array
+    middles: Array
+    at_most: Array
+
+    @classmethod
+    def of(cls, a: Surface, b: Surface, triangles: Array, back: Array) -> Pieces:
+        """Measured from two surfaces; ``back`` (4, 4) takes them to the frame of ``b``."""
+        (near_a, most_a), (near_b, most_b) = _distances(a, triangles), _distances(b, _placed(back, triangles))
+        return cls(triangles, np.maximum(near_a, near_b), np.stack([most_a, most_b], axis=1))
+
+    def replaced(self, rows: NDArray[np.bool_], by: Pieces) -> Pieces:
+        """With others in place of some."""
+        return Pieces(
+            np.concatenate([self.triangles[~rows], by.triangles]),
+            np.concatenate([self.middles[~rows], by.middles]),
+            np.concatenate([self.at_most[~rows], by.at_most]),
+        )
 
 
-def _from_one_triangle(surface: Surface, pieces: Array) -> Array:
-    """Largest distance (m,) of the corners of triangles (m, 3, 3) from the triangle nearest to their middle."""
-    _, face, _ = surface.nearest(pieces.mean(axis=1))
+def cut_up(a: Surface, b: Surface, T: Array, triangles: Array, most: int = _CUTS) -> Iterator[Pieces]:
+    """Triangles (m, 3, 3), and what is left when the furthest are cut, again and again, until ``most`` are added."""
+    back = inverse(T)
+    pieces = Pieces.of(a, b, triangles, back)
+    yield pieces
+    while pieces.at_most.max(initial=0.0) > 0.0:
+        furthest = pieces.at_most.max(axis=1) > 0.5 * pieces.at_most.max()
+        most -= 2 * int(furthest.sum())  # three or four in place of one
+        if most < 0:
+            return
+        from_a = furthest & (pieces.at_most[:, 0] >= pieces.at_most[:, 1])
+        from_b = furthest & ~from_a
+        cut = [_cut(a, np.eye(4), pieces.triangles[from_a]), _cut(b, back, pieces.triangles[from_b])]
+        pieces = pieces.replaced(furthest, Pieces.of(a, b, np.concatenate(cut), back))
+        yield pieces
+
+
+def _distances(surface: Surface, triangles: Array) -> tuple[Array, Array]:
+    """Distance (m,) of the middles of triangles (m, 3, 3), and of any point of them from the nearest triangle there."""
+    distance, face, _ = surface.nearest(triangles.mean(axis=1))
     chosen = np.repeat(surface.vertices[surface.faces[face]], 3, axis=0)
-    corners = pieces.reshape(-1, 3)
-    return np.asarray(np.linalg.norm(closest_points(chosen, corners) - corners, axis=1).reshape(-1, 3).max(axis=1))
+    corners = triangles.reshape(-1, 3)
+    largest = np.linalg.norm(closest_points(chosen, corners) - corners, axis=1).reshape(-1, 3).max(axis=1)
+    return distance, np.asarray(largest)
 
 
 def _placed(T: Array, points: Array) -> Array:
