@@ -12,12 +12,8 @@ from tests.public.placed_pairs import FAMILIES, SOLIDS, PlacedPair, duplicate, j
 GAPS = (2e-4, 0.0103, -5e-3, -0.03)  # scripts/check-placed asks for many more
 NO_ANSWER = {"spline_in_bore", "spline", "ball_in_socket", "tube_in_tube"}
 """Families and solids of which Open CASCADE takes up to a minute a pair; scripts/check-placed has them too."""
-UNDECIDED = {
-    "pin_in_hole", "tube_in_tube", "hexagon_in_bore", "spline_under_plate", "ring_in_groove", "ring_on_shaft",
-    "ball_in_ring", "thread_in_tube", "taper_in_hub", "ball_in_socket", "ball_in_cone",
-    "pin_off_centre", "cones_side_by_side", "nut_on_plate", "contained",
-}  # fmt: skip
-"""Families of which the engine leaves some pairs undecided."""
+UNDECIDED = {"ring_in_groove", "taper_in_hub", "ring_on_shaft", "ball_in_ring"}
+"""Families of which some shallow overlaps stay open where Open CASCADE does not find the common part in its time."""
 
 
 def checked(pairs, folder):
@@ -67,7 +63,7 @@ def test_every_pair_is_decided(family, placed):
     assert counts[family]["uncertain"] == 0, [line for line in lines if family in line]
 
 
-@pytest.mark.parametrize("kind", [marked(kind, *SOLIDS, reason="duplicates are undecided") for kind in SOLIDS])
+@pytest.mark.parametrize("kind", [marked(kind, *NO_ANSWER, reason="slow") for kind in SOLIDS])
 def test_one_part_twice_is_an_overlap(kind, twice):
     counts, lines = twice
     assert counts[f"duplicate {kind}"]["right"] == 3, lines
