@@ -21,14 +21,26 @@ from clamp3d.fit.fit import FitResult
 Faces = NDArray[np.int64]
 
 
-def bodies_of_fit(result: FitResult, model: Surface, *, stated: float = 0.0) -> tuple[ClosedForm, ...]:
+def bodies_of_fit(
+    result: FitResult,
+    model: Surface,
+    *,
+    stated: float = 0.0,
+    chord: Array | None = None,
+    flat: NDArray[np.bool_] | None = None,
+) -> tuple[ClosedForm, ...]:
     """Bodies around the fitted mesh, whose true surface can be ``stated`` mm from its facets besides.
+
+    Of a solid from CAD the cylinders are exact, ``chord`` (m,) mm says how far its triangles are from the true faces,
+    and ``flat`` (m,) which of them are off by that along their borders only.
 
     A groove or hole counts where no part of the mesh lies in its circle, over the whole length of the mesh; else the
     mesh is asked. Where the mesh is nothing but a round bar (a wire, a shank, a step of a turned part) it becomes a
     cylinder with flat ends; the rest keeps its hull.
     """
     V, F = model.vertices, model.faces
+    chord = np.zeros(len(F)) if chord is None else chord
+    flat = np.zeros(len(F), dtype=bool) if flat is None else flat
     points = V.copy()
     for convex in result.cylinders:
         # Facets are inscribed: their tangents in place of their chords enclose the round surface.
@@ -36,16 +48,17 @@ def bodies_of_fit(result: FitResult, model: Surface, *, stated: float = 0.0) -> 
         T = convex.T_part_feature
         local = to_source(T, V[own])
         out = np.hypot(local[:, 0], local[:, 1])
-        reach = convex.radius / (1.0 - convex.chord_error / convex.radius) + convex.fit_error
+        sagitta = max(convex.chord_error, float(chord[convex.faces].max()))
+        reach = convex.radius / (1.0 - sagitta / convex.radius) + convex.fit_error
         local[:, :2] *= (np.maximum(reach, out) / out)[:, None]
         points[own] = to_target(T, local)
     error = max((feature.fit_error for feature in result.features), default=0.0)
-    mesh_error = max((feature.error_bound for feature in result.features), default=0.0)
+    mesh_error = max([float(chord.max()), *(feature.error_bound for feature in result.features)])
 
     hollow = (*result.grooves, *result.holes)
     bores, through = [], np.zeros(len(F), dtype=bool)
     for feature in hollow:
-        bore = _bore(feature, hollow, V, F, error)
+        bore = _bore(feature, hollow, V, F, error, feature.error_bound + float(chord[feature.faces].max()))
         if bore is not None:
             bores.append(bore)
             through[feature.faces] = True
@@ -54,10 +67,13 @@ def bodies_of_fit(result: FitResult, model: Surface, *, stated: float = 0.0) -> 
         owner[feature.faces] = k
     normal = model.normals
     slack = 1e-9 * model.scale
+    bulging = float(chord[(owner < 0) & ~flat].max(initial=0.0))
+    # Where all other faces are cylinders, what is said of those below corrects the borders of the flat ones.
+    is_exact = (chord <= slack) | (flat & (bulging == 0.0))
 
     def depth(x: Array) -> Array:
         away, face, foot = model.nearest(x)
-        on = (away <= slack) & (owner[face] < 0)
+        on = (away <= slack) & (owner[face] < 0) & is_exact[face]
         aside = np.linalg.norm(np.cross(x - foot, normal[face]), axis=1)
         for k, surface in enumerate(result.features):
             local = to_source(surface.T_part_feature, x)
@@ -85,13 +101,16 @@ def bodies_of_fit(result: FitResult, model: Surface, *, stated: float = 0.0) -> 
     made = [ClosedForm((rod,), tuple(bores), error=error + stated) for rod in rods]
     for index in rest:
         around, off = nearly_hull(points[index])
-        made.append(ClosedForm((around,), tuple(bores), error=error + off + stated, surface=depth))
+        made.append(ClosedForm((around,), tuple(bores), error=error + off + stated + bulging, surface=depth))
     return tuple(made)
 
 
-def _bore(feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: Faces, error: float) -> Bore | None:
+def _bore(
+    feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: Faces, error: float, sagitta: float
+) -> Bore | None:
     """The groove or hole as a bore of the whole mesh; None if the mesh reaches into its circle by more than ``error``.
 
+    ``sagitta`` (mm) is what chords of the feature may.
     Its own triangles, and those of other ``hollow`` surfaces on the same cylinder, may lie in the circle by their
     sagitta, their neighbours as deep as the edges that they share with them, and flat ends as deep as both.
     """
@@ -101,7 +120,7 @@ def _bore(feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: 
     for other in hollow:
         own[other.faces] |= other is feature or _on_cylinder(local[distinct(F[other.faces])], feature.radius, error)
     least, edges = _nearest_to_axis(local[:, :2][F])
-    if least[own].min() < feature.radius - feature.error_bound - 1e-9 * feature.radius:
+    if least[own].min() < feature.radius - sagitta - 1e-9 * feature.radius:
         return None
     limit = np.full(F.shape, feature.radius - error)
     sides, number = np.unique(side_keys(F, np.roll(F, -1, axis=1), len(V)), return_inverse=True)
@@ -112,7 +131,7 @@ def _bore(feature: FittedSurface, hollow: Sequence[FittedSurface], V: Array, F: 
     limit = limit.min(axis=1)
     # Faces square to the axis fill what is between chords and arc; a shoulder among them ends in others that do not.
     square = np.ptp(local[:, 2][F], axis=1) <= 1e-9 * feature.radius
-    limit[square] = np.minimum(limit[square], feature.radius - feature.error_bound)
+    limit[square] = np.minimum(limit[square], feature.radius - sagitta)
     if (least < limit - 1e-9 * feature.radius)[~own].any():
         return None
     low, high, top = float(local[:, 2].min()), float(local[:, 2].max()), float(local[:, 1].max())

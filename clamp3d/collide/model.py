@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.brep.open_cascade import PLANE
 from clamp3d.brep.solid import CHORD, BrepSolid
 from clamp3d.collide.closed_form import ClosedForm
 from clamp3d.collide.drawn import bodies_of
@@ -92,7 +93,11 @@ class Model:
         if self._fit is not None and self._fit.features:
             from clamp3d.collide.fitted import bodies_of_fit
 
-            return bodies_of_fit(self._fit, mesh, stated=0.0 if self.exact else self.shape.error)
+            if self.exact is not None:
+                made = self.exact.tessellated(CHORD)
+                flat = self.exact.surfaces.kind[made.face] == PLANE
+                return bodies_of_fit(self._fit, mesh, chord=made.errors, flat=flat)
+            return bodies_of_fit(self._fit, mesh, stated=self.shape.error)
         if len(mesh.faces) > _LARGE:  # the mesh is quicker than a hull of so many faces
             return None
         off = hull_error(mesh.vertices, mesh.faces)

@@ -9,6 +9,7 @@ import trimesh
 from clamp3d import Motion, Scene, check, first_contact, load, min_clearance
 from clamp3d.kernel import Cylinder, translation
 from clamp3d.shapes import MeshShape, SweptArc, box, cylinder, groove_block, make_mesh
+from tests.kinds import pose
 
 ACCURACY = 3e-4
 """How far apart bodies may still be at a first contact, mm."""
@@ -129,6 +130,21 @@ def test_a_pin_of_cad_passes_its_hole(plate_and_pin, aside):
     start = translation(aside, 0, 0) @ pin.T_world
     found = min_clearance(plate.shape, pin.shape, down(20.0), start)
     assert found.distance.lower - 1e-9 <= 0.1 - aside <= found.distance.upper + 1e-9
+    assert not found.touches
+
+
+def test_a_round_side_of_cad_leaves_a_plate(tmp_path):
+    """What stands out of the facets counts: the lowest line of the cylinder starts 0.05 mm above the plate."""
+    pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
+    from tests.public.placed_pairs import StepFile, block, rod
+
+    file = StepFile()
+    file.put(file.product("plate", block((-40, -40, -3), (40, 40, 0))), np.eye(4))
+    file.put(file.product("bar", rod(8.0, -6, 6)), np.eye(4))
+    parts = {part.name: part for part in load(file.write(tmp_path / "over.step")).parts}
+    start = pose((1.0, 0.0, 0.0), math.pi / 2, (-10.0, 0.0, 8.05))
+    found = min_clearance(parts["plate"].shape, parts["bar"].shape, Motion.translate((20, 0, 20)), start)
+    assert found.distance.lower - 1e-6 <= 0.05 <= found.distance.upper + 1e-6
     assert not found.touches
 
 
