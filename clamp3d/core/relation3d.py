@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from clamp3d.core.arc_circle import ArcRelation, check_tolerance
 from clamp3d.core.distance import Feature, SignedDistance, as_pose, signed_distance
-from clamp3d.core.linear import norm
-from clamp3d.core.pose import Array, check_pose
+from clamp3d.core.pose import Array, check_pose, norm
 from clamp3d.core.primitives import AnyCylinder, Capsule, SweptArc, check_shapes
 
 Relation3D: TypeAlias = ArcRelation
