@@ -93,10 +93,10 @@ def test_time_limit_leaves_no_process(workers: list[subprocess.Popen[str]]) -> N
     ("vertices", "faces", "rule"),
     [
         (np.full_like(V, np.nan), F, "finite"),
-        (V[:0], F[:0], "empty"),
+        (V[:0], F[:0], "must have shape"),
         (V, F + 1, "is out of range"),
         (V, F[1:], "watertight"),
-        (V, F[:, ::-1], "volume > 0"),
+        (V, F[:, ::-1], "inside out"),
     ],
 )
 def test_bad_mesh_never_reaches_coacd(
