@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -271,7 +272,7 @@ def _ends(F: IntArray) -> IntArray:
     return np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2)
 
 
-def _edges(F: IntArray) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+def _edges(F: IntArray) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[Any]]:
     """The number (3m,) of each side's edge; of each edge (k,) how many faces it has, and how their directions differ.
 
     That is how much more often they run along it from its smaller end than from the other.
@@ -279,7 +280,7 @@ def _edges(F: IntArray) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     ends = _ends(F)
     key = ends.max(axis=1) * (F.max() + 1) + ends.min(axis=1)  # one number for both ends: quick to sort
     _, edge, uses = np.unique(key, return_inverse=True, return_counts=True)
-    return edge, uses, np.bincount(edge, weights=np.sign(ends[:, 1] - ends[:, 0]).astype(np.float64))
+    return edge, uses, np.bincount(edge, weights=np.sign(ends[:, 1] - ends[:, 0]))
 
 
 def _without_doubles(F: IntArray) -> IntArray:
