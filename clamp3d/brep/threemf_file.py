@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import zipfile
+import zlib
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -35,7 +36,7 @@ def read_3mf(path: Path, _: str | None) -> Reading:
     try:
         with zipfile.ZipFile(path) as archive:
             _check_size(archive, path)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, expat.ExpatError) as error:
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, expat.ExpatError) as error:
         reason = getattr(error, "strerror", None) or str(error)  # a cut archive leads outside of the file: an OSError
         raise InputError(f"{path}: not a readable 3MF file ({reason})") from None
     try:

@@ -123,19 +123,6 @@ def as_pose(pose: ArrayLike) -> Array:
     return np.require(check_pose(pose), np.float64, ["C", "A", "W"])
 
 
-def repaired(T: Array, name: str) -> Array:
-    """The poses (n, 4, 4) or the pose (4, 4) that the kernel refused, without their rounding errors.
-
-    Raises InputError if one is not rigid, or its offset is too large; PoseWarning says what was mended.
-    """
-    T = check_pose(T, name) if T.ndim == 2 else check_pose_array(T, name)
-    far = np.flatnonzero(np.atleast_1d(np.abs(T[..., :3, 3]).sum(axis=-1)) >= LARGEST)
-    if len(far):
-        where, offset = (name, T[:3, 3]) if T.ndim == 2 else (f"{name}[{far[0]}]", T[far[0], :3, 3])
-        raise InputError(f"{where} must have an offset below {LARGEST:g} mm, got {offset.tolist()}")
-    return T
-
-
 def _unit_axes(T: Array) -> Array:
     """Positions and axes (n, 2, 3) that the kernel refused, with axes of length 1. Raises InputError for others."""
     longest = np.abs(T[:, 1]).max(axis=1, keepdims=True)
@@ -204,7 +191,7 @@ def signed_distance(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) ->
     record = np.empty((1, run.WIDTH))
     half, along = 0.5 * groove.length, 0.5 * cylinder.length
     if run.records(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, record) >= 0:
-        return signed_distance(groove, cylinder, repaired(T, "pose"))
+        return signed_distance(groove, cylinder, check_pose(T))
     out = record[0]
     values = out.tolist()
     distance = values[0]
@@ -324,5 +311,5 @@ def _measured(groove: SweptArc, cylinder: AnyCylinder, T: Array, full: bool, wor
             is_done = all(pool.map(part, cuts[:-1], cuts[1:]))
     if is_done:
         return out
-    mended = _unit_axes(T) if T.shape[1] == 2 else repaired(T, "poses")
+    mended = _unit_axes(T) if T.shape[1] == 2 else check_pose_array(T)
     return _measured(groove, cylinder, mended, full, workers)

@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from clamp3d.core.linear import norm
-from clamp3d.core.pose import Array
+from clamp3d.core.pose import Array, norm
 
 Circle = tuple[float, float, float]
 """Radius, and the centre along x and across, from the middle of the box."""

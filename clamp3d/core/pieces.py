@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.core.distance import as_pose, repaired
-from clamp3d.core.pose import Array
+from clamp3d.core.distance import as_pose
+from clamp3d.core.pose import Array, check_pose
 from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc, check_shapes
 
 
@@ -87,5 +87,5 @@ def groove_pieces(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) -> G
     if not pieces(
         T[None], groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, out
     ):
-        return groove_pieces(groove, cylinder, repaired(T, "pose"))
+        return groove_pieces(groove, cylinder, check_pose(T))
     return GroovePieces(out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7].astype(np.int8), out[:, 8:14])

@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike
 from clamp3d.checks import array, choice, instance, items, number, text
 from clamp3d.core.drilling import leaves_something
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.linear import norm
 from clamp3d.core.mesh import Mesh, make_mesh
-from clamp3d.core.pose import Array
+from clamp3d.core.pose import Array, norm
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc, place
 from clamp3d.core.primitives import size as _size
 from clamp3d.core.profile import Arc, Profile

@@ -117,10 +117,10 @@ def test_bad_shapes_are_refused() -> None:
     nan[3, 1], index[5, 2] = np.nan, 2**31 - 1
     for read in (bvh, convex, decompose):
         for vertices, faces, rule in (
-            (V[:0], F[:0], "must not be empty"),
-            (nan, F, r"vertices must be finite, got nan at \[3, 1\]"),
+            (V[:0], F[:0], "must have shape"),
+            (nan, F, "vertex 3 is not finite"),
             (V, index, "face index 2147483647 is out of range"),
-            (V, F[:, ::-1], "may be inside out"),
+            (V, F[:, ::-1], "inside out"),
             (V, F[1:], "watertight"),
         ):
             with pytest.raises(InputError, match=rule):
