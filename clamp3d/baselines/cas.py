@@ -34,6 +34,5 @@ class Cas:
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
-        T_a_b = poses_of(pair, T_a_b)
-        poses = np.ascontiguousarray((pair.T_groove_a @ T_a_b) @ pair.T_b_cylinder)
-        return signed_distances(pair.groove, pair.cylinder, poses)
+        poses = (pair.T_groove_a @ poses_of(pair, T_a_b)) @ pair.T_b_cylinder
+        return signed_distances(pair.groove, pair.cylinder, np.ascontiguousarray(poses))

@@ -18,11 +18,11 @@ What python-fcl 0.7.0 does, measured on wedges of a groove of radius 12 against 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import fcl
+import igl
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
@@ -81,12 +81,7 @@ def convex(vertices: ArrayLike, faces: ArrayLike, name: str = "convex shape") ->
     height = ((V @ normals[real].T) - np.einsum("ij,ij->i", corners[real, 0], normals[real])) / length[real]
     if height.max() > _CONVEX * np.ptp(V, axis=0).max():
         raise InputError(f"{name} must be convex: a vertex stands {height.max():.3g} mm outside one of its faces")
-    return _shape("convex", solid, fcl.Convex(V * UNIT, len(F), encoded(F)))
-
-
-def encoded(faces: NDArray[Any]) -> NDArray[Any]:
-    """Triangles (m, 3) as `fcl.Convex` takes them: each with its number of corners before it."""
-    return np.insert(faces, 0, 3, axis=1).ravel()
+    return _shape("convex", solid, fcl.Convex(V * UNIT, len(F), np.insert(F, 0, 3, axis=1).ravel()))
 
 
 def bvh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Shape:
@@ -182,12 +177,7 @@ def contained(shape: Shape, wire: Wire) -> bool:
     middle = wire.T[:3, 3]
     if (middle < shape.bounds[0]).any() or (middle > shape.bounds[1]).any():
         return False
-    corners = shape.solid.vertices[shape.solid.faces] - middle
-    a, b, c = np.moveaxis(corners, 1, 0)
-    la, lb, lc = np.linalg.norm(corners, axis=2).T
-    below = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
-    angle = 2.0 * np.arctan2(np.linalg.det(corners), below)  # solid angle of each triangle (Van Oosterom, Strackee)
-    return bool(angle.sum() > 2.0 * math.pi)
+    return bool(igl.winding_number(shape.solid.vertices, shape.solid.faces, middle[None])[0] > 0.5)
 
 
 def _nearest(shape: Shape, wire: Wire) -> Measurement:

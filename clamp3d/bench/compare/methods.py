@@ -167,7 +167,7 @@ def _piece_count(model: Any, groove: GroovePair) -> int:
     """Chords, wedges, hulls or triangles of the groove's part."""
     if model.name == "chords":
         return int(model.segments([groove]))
-    shapes = model.parts[groove.a].shapes
+    shapes = model.polytopes(groove.a).shapes
     return len(shapes[0].solid.faces) if model.name == "mesh" else len(shapes)
 
 
