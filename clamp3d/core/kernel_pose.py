@@ -6,16 +6,17 @@ import math
 
 from clamp3d.core.jit import inlined
 from clamp3d.core.kernel_features import Rod
+from clamp3d.core.kernel_vector import Vector, dot, times
 from clamp3d.core.pose import RIGID_TOLERANCE, Array
 from clamp3d.core.primitives import LARGEST
 
 
 @inlined
-def place(T: Array, k: int) -> tuple[float, float, float, float, float, float]:
+def place(T: Array, k: int) -> tuple[Vector, Vector]:
     """Position and axis as given, of pose k of (n, 4, 4) or of (n, 2, 3), which is these two alone."""
     if T.shape[1] == 2:
-        return T[k, 0, 0], T[k, 0, 1], T[k, 0, 2], T[k, 1, 0], T[k, 1, 1], T[k, 1, 2]
-    return T[k, 0, 3], T[k, 1, 3], T[k, 2, 3], T[k, 0, 2], T[k, 1, 2], T[k, 2, 2]
+        return Vector(T[k, 0, 0], T[k, 0, 1], T[k, 0, 2]), Vector(T[k, 1, 0], T[k, 1, 1], T[k, 1, 2])
+    return Vector(T[k, 0, 3], T[k, 1, 3], T[k, 2, 3]), Vector(T[k, 0, 2], T[k, 1, 2], T[k, 2, 2])
 
 
 @inlined
@@ -25,8 +26,8 @@ def rigid(T: Array, k: int) -> bool:
     Of (n, 2, 3): whether the axis is of unit length to the same tolerance.
     """
     if T.shape[1] == 2:
-        x, y, z, dx, dy, dz = place(T, k)
-        return abs(dx * dx + dy * dy + dz * dz - 1.0) <= RIGID_TOLERANCE and abs(x) + abs(y) + abs(z) < LARGEST
+        p, d = place(T, k)
+        return abs(dot(d, d) - 1.0) <= RIGID_TOLERANCE and abs(p.x) + abs(p.y) + abs(p.z) < LARGEST
     a, b, c = T[k, 0, 0], T[k, 0, 1], T[k, 0, 2]
     d, e, f = T[k, 1, 0], T[k, 1, 1], T[k, 1, 2]
     g, h, i = T[k, 2, 0], T[k, 2, 1], T[k, 2, 2]
@@ -51,8 +52,8 @@ def rigid(T: Array, k: int) -> bool:
 @inlined
 def rod_at(T: Array, k: int, r: float, half: float) -> Rod:
     """The cylinder of this radius and half length at the valid pose k: its axis as given, normalised."""
-    x, y, z, dx, dy, dz = place(T, k)
-    g = dx * dx + dy * dy + dz * dz
+    centre, axis = place(T, k)
+    g = dot(axis, axis)
     n = 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)  # by its series near 1: no root to wait for
-    dx, dy, dz = dx * n, dy * n, dz * n
-    return Rod(x, y, z, dx, dy, dz, dx * dx + dy * dy, r, half)
+    d = times(n, axis)
+    return Rod(centre, d, d.x * d.x + d.y * d.y, r, half)

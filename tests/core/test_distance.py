@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from clamp3d.core import kernel_distance, kernel_features
 from clamp3d.core.distance import Feature, signed_distance, signed_distances
+from clamp3d.core.kernel_vector import Vector
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.relation3d import relative_pose
@@ -376,8 +377,8 @@ def test_the_normal_of_an_edge_leads_straight_away_from_it(feature, half_angle):
     """For an axis through the edge itself: by the definition alone, a step along it is all of the distance."""
     s, h = 10.0 * math.sin(half_angle), -10.0 * math.cos(half_angle)
     point = np.array(EDGE_POINTS[feature](s, h))
-    groove = kernel_features.Groove(10.0, 1.0, 0.0, h, 0.0)
-    normal = kernel_distance.edge_normal(groove, float(feature), *map(float, point))
+    groove = kernel_features.groove_of(10.0, half_angle, 20.0)
+    normal = kernel_distance.edge_normal(groove, float(feature), Vector(*map(float, point)))
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-12)
     away = body(SweptArc(10.0, half_angle, 40.0)).field(point + np.outer([1e-3, 0.1], normal))
     assert away == pytest.approx([1e-3, 0.1], abs=1e-6)

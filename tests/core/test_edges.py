@@ -7,6 +7,7 @@ import pytest
 
 from clamp3d.core.kernel_edges import Line, fall, on_arc, on_line
 from clamp3d.core.kernel_features import Groove, Rod
+from clamp3d.core.kernel_vector import Vector
 from clamp3d.core.pose import rotation
 
 
@@ -45,7 +46,7 @@ def test_a_function_falls_by_no_more_than_its_derivatives_let_it():
 
 
 def _rod(r, half, c, d):
-    return Rod(*map(float, (*c, *d, d[0] ** 2 + d[1] ** 2, r, half)))
+    return Rod(Vector(*map(float, c)), Vector(*map(float, d)), float(d[0] ** 2 + d[1] ** 2), float(r), float(half))
 
 
 def test_an_end_arc_has_no_nearer_point():
@@ -86,7 +87,10 @@ def test_a_line_has_no_nearer_point():
         s = np.linspace(lo, hi, 4001)
         near = s[at(s).argmin()] + np.linspace(-1.0, 1.0, 2001) * (hi - lo) / 2000.0
         true = at(np.clip(near, lo, hi)).min()
-        rod, line = _rod(r, l, np.zeros(3), d), Line(*map(float, (*k, u[0], u[2], lo, hi)))
+        rod, line = (
+            _rod(r, l, np.zeros(3), d),
+            Line(Vector(*map(float, k)), Vector(*map(float, u)), float(lo), float(hi)),
+        )
         f, place, _ = on_line(rod, line, math.inf)
         assert lo <= place <= hi
         assert f == pytest.approx(at(place)[0], abs=1e-11)
