@@ -21,22 +21,20 @@ What its settings do, as measured with coacd 1.0.14:
 from __future__ import annotations
 
 import hashlib
-import json
 import math
-import tempfile
 from contextlib import nullcontext, suppress
 from dataclasses import asdict, dataclass
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.baselines import cache as disk
-from clamp3d.core.child import run_child
+from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.errors import InputError, SolverError
+
+_RUN = "clamp3d.baselines.coacd_worker:run"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,36 +84,31 @@ def decompose(
     solid = closed_mesh(vertices, faces, name)
     if not time_limit > 0.0:
         raise InputError(f"time_limit must be > 0 s, got {time_limit}")
-    arguments = json.dumps(asdict(parameters or DecompositionParameters()))
-    key = _cache_key(solid, arguments)
+    settings = asdict(parameters or DecompositionParameters())
+    key = _cache_key(solid, settings)
     if cache and (arrays := disk.load(key)) is not None:
         with suppress(KeyError, TypeError, ValueError):
             return Decomposition(_hulls(arrays), float(arrays["seconds"]), True)
-    with tempfile.TemporaryDirectory(prefix="clamp3d-") as folder, _status(name, progress):
-        source, target = Path(folder) / "in.npz", Path(folder) / "out.npz"
-        np.savez(source, vertices=solid.vertices, faces=solid.faces, arguments=np.array(arguments))
-        code, log = run_child("clamp3d.baselines.coacd_worker", str(source), str(target), time_limit=time_limit)
-        if code is None:
-            threshold = json.loads(arguments)["threshold"]
-            raise SolverError(
-                f"CoACD did not finish {name} in {time_limit:g} s at threshold {threshold:g}; "
-                "raise time_limit or threshold"
-            )
-        try:
-            with np.load(target, allow_pickle=False) as file:
-                result = Decomposition(_hulls(file), float(file["seconds"]), False)
-        except (OSError, ValueError, KeyError) as error:
-            why = (log or ["nothing"])[-1] if code else str(error)
-            raise SolverError(f"CoACD gave no hulls for {name} (exit code {code}): {why}") from None
-        if cache:
-            disk.keep(key, target)
+    try:
+        with Worker(_RUN) as worker, _status(name, progress):
+            arrays = worker.call(_RUN, solid.vertices, solid.faces, settings, time_limit=time_limit)
+        result = Decomposition(_hulls(arrays), float(arrays["seconds"]), False)
+    except WorkerTimeoutError:
+        raise SolverError(
+            f"CoACD did not finish {name} in {time_limit:g} s at threshold {settings['threshold']:g}; "
+            "raise time_limit or threshold"
+        ) from None
+    except (WorkerEndedError, RuntimeError, MemoryError, ValueError) as error:
+        raise SolverError(f"CoACD gave no hulls for {name}: {error or 'out of memory'}") from None
+    if cache:
+        disk.keep(key, arrays)
     return result
 
 
-def _cache_key(solid: Mesh, arguments: str) -> str:
+def _cache_key(solid: Mesh, settings: dict[str, Any]) -> str:
     """The file's name in the cache, from everything that the hulls depend on."""
     mesh = solid.vertices.astype("<f8").tobytes() + solid.faces.astype("<i8").tobytes()
-    about = f"{metadata.version('coacd')} {len(solid.vertices)} {arguments}".encode()
+    about = f"{metadata.version('coacd')} {len(solid.vertices)} {settings}".encode()
     return f"decomposition-{hashlib.sha256(about + mesh).hexdigest()[:32]}"
 
 

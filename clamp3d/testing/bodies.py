@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array
@@ -49,7 +49,7 @@ def body(shape: AnyBody) -> Body:
         return Body(_solid(shape), shape.bounds)
     if isinstance(shape, MeshShape):
         V = shape.mesh.vertices
-        return Body(_mesh(V[shape.mesh.faces]), np.array([V.min(axis=0), V.max(axis=0)]))
+        return Body(_mesh(V, shape.mesh.faces), np.array([V.min(axis=0), V.max(axis=0)]))
     if isinstance(shape, Cylinder):
         r, half = shape.radius, 0.5 * shape.length
         corner = np.array([r, r, half])
@@ -165,24 +165,9 @@ def _groove(groove: SweptArc) -> Field:
     return field
 
 
-def _mesh(triangles: Array) -> Field:
-    """Distance from triangles (m, 3, 3), negative where they wind round the point (solid angles)."""
-    sides = np.roll(triangles, -1, axis=1) - triangles
-    normal = np.cross(sides[:, 0], sides[:, 1])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    walls = np.cross(normal[:, None], sides)
+def _mesh(vertices: Array, faces: NDArray[np.int64]) -> Field:
+    """Distance from the triangles, negative where they wind round the point."""
+    import igl
 
-    def some(x: Array) -> Array:
-        r = x[:, None, None] - triangles
-        s = np.clip((r * sides).sum(-1) / np.maximum((sides * sides).sum(-1), 1e-300), 0.0, 1.0)
-        edge = np.linalg.norm(r - s[..., None] * sides, axis=-1).min(axis=2)
-        height = np.abs(np.einsum("nmj,mj->nm", r[:, :, 0], normal))
-        least = np.where(((r * walls).sum(-1) >= 0.0).all(axis=2), height, edge).min(axis=1)
-        a, b, c = (-r[:, :, k] for k in range(3))
-        la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
-        below = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
-        turns = np.arctan2((a * np.cross(b, c)).sum(-1), below).sum(axis=1) / (2.0 * math.pi)
-        return np.asarray(np.where(turns > 0.5, -least, least))
-
-    step = max(1, 200_000 // len(triangles))
-    return lambda x: np.concatenate([some(x[k : k + step]) for k in range(0, len(x), step)] or [np.empty(0)])
+    kind = igl.SIGNED_DISTANCE_TYPE_WINDING_NUMBER
+    return lambda x: np.asarray(igl.signed_distance(x, vertices, faces, sign_type=kind)[0])

@@ -62,7 +62,7 @@ class Prepared:
     """A method ready to measure poses of the wire in the groove's frame.
 
     ``one`` takes a pose (4, 4), ``many`` takes poses (n, 4, 4). ``pieces`` counts the convex pieces, triangles or
-    chords. ``threaded`` is ``many`` on all cores. ``depth``: a negative value measures the overlap.
+    chords. ``depth``: a negative value measures the overlap.
     ``elsewhere`` are seconds of the set-up that other processes took (CoACD, also when its answer was cached).
     """
 
@@ -72,7 +72,6 @@ class Prepared:
     depth: bool = True
     parallel_only: bool = False
     elsewhere: float = 0.0
-    threaded: Callable[[Array], Array] | None = None
 
 
 UNITS = {"chords": "deg", "wedges": "deg", "hulls": "", "mesh": "mm"}
@@ -139,7 +138,6 @@ def _cas() -> Prepared:
         lambda T: signed_distance(GROOVE, WIRE, T).distance,
         lambda poses: signed_distances(GROOVE, WIRE, poses, workers=1),
         1,
-        threaded=lambda poses: signed_distances(GROOVE, WIRE, poses),
     )
 
 

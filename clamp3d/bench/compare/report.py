@@ -8,22 +8,14 @@ from typing import Any
 from clamp3d.bench import published
 from clamp3d.bench.compare.assemblies import Assembled
 from clamp3d.bench.compare.measure import Measured
-from clamp3d.bench.compare.methods import Method
-from clamp3d.bench.compare.run import KNOWN, Comparison, NotMeasured, exact_distance
+from clamp3d.bench.compare.run import Comparison, NotMeasured, exact_distance
 from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
 
 
 def comparison_to_dict(comparison: Comparison) -> dict[str, Any]:
-    """Everything measured as JSON data: mm, seconds, MB; ``known`` are figures from elsewhere for the same groove."""
+    """Everything measured as JSON data: mm, seconds."""
     truth = exact_distance(comparison)
-
-    def contact(row: Measured | NotMeasured) -> dict[str, Any]:
-        known = KNOWN.get(Method(row.method, row.setting).key)
-        data = asdict(row)
-        if known is not None:
-            data["known"] = {"error": known[0], "pieces": known[1]}
-        return data
 
     def assembly(row: Assembled | NotMeasured) -> dict[str, Any]:
         data = asdict(row)
@@ -34,8 +26,8 @@ def comparison_to_dict(comparison: Comparison) -> dict[str, Any]:
     return {
         "machine": asdict(comparison.machine),
         "seconds": comparison.seconds,
-        "contact": [contact(row) for row in comparison.contact],
-        "peers": [contact(row) for row in comparison.peers],
+        "contact": [asdict(row) for row in comparison.contact],
+        "peers": [asdict(row) for row in comparison.peers],
         "assembly": [assembly(row) for row in (*comparison.exact, *comparison.stepped)],
         "image": asdict(comparison.image),
     }
@@ -59,15 +51,10 @@ def comparison_to_text(comparison: Comparison) -> str:
 
 
 def _contact(row: Measured) -> list[object]:
-    known = KNOWN.get(Method(row.method, row.setting).key)
     depth = "none" if row.depth_error is None else f"{row.depth_error:.2g}"
-    errors = [f"{row.median_error:.2g}", f"{row.worst_error:.2g}", depth, f"{known[0]:g}" if known else "-"]
     bands = [f"{b.false_hits}/{b.false_misses}" for b in row.bands]
-    threaded = "-" if row.threaded is None else f"{row.threaded * 1e6:.3g}"
-    times = [f"{t * 1e6:.3g}" for t in (row.one, row.coherent, row.many)]
-    times += [threaded, f"{row.setup:.2g}", f"{row.load:.2f}"]
-    both = (row.memory, row.library_memory)
-    return [row.label, row.pieces, *errors, *bands, *times, "-" if None in both else f"{sum(filter(None, both)):.0f}"]
+    times = [f"{row.one * 1e6:.3g}", f"{row.many * 1e6:.3g}", f"{row.setup:.2g}", f"{row.load:.2f}"]
+    return [row.label, row.pieces, f"{row.median_error:.2g}", f"{row.worst_error:.2g}", depth, *bands, *times]
 
 
 def _assembly(comparison: Comparison) -> list[list[object]]:

@@ -24,18 +24,6 @@ SLOW_SETUP = 3.0
 ASSEMBLY_LIMIT = 150.0
 """Seconds for one assembly; CoACD alone takes 60 of them on the reference clamp."""
 
-KNOWN: dict[str, tuple[float, int | None]] = {
-    **{
-        f"{family}:{angle}": (error, None)
-        for family in ("chords", "wedges")
-        for angle, error in ((1.0, 0.00046), (5.0, 0.0114), (10.0, 0.0457), (20.0, 0.182))
-    },
-    "hulls:0.05": (2.17, 2),
-    "hulls:0.02": (0.556, 4),
-    "hulls:0.01": (0.18, 79),
-}
-"""Known figures for this groove: error in mm, and for hulls their number."""
-
 ASSEMBLIES = (
     *(m for m in METHODS if m.family in ("cas", "chords", "wedges")),
     Method("hulls", CLAMP_THRESHOLD),
@@ -134,9 +122,8 @@ def quickest(rows: Sequence[Measured | NotMeasured]) -> Measured | NotMeasured:
     if not isinstance(first, Measured):
         return first
     some = [row for row in rows if isinstance(row, Measured)]
-    told = {name: min(getattr(row, name) for row in some) for name in ("load", "setup", "one", "many", "coherent")}
-    threaded = [row.threaded for row in some if row.threaded is not None]
-    return replace(first, **told, threaded=min(threaded, default=None))
+    times = {name: min(getattr(row, name) for row in some) for name in ("load", "setup", "one", "many")}
+    return replace(first, **times)
 
 
 def exact_distance(found: Comparison) -> float:

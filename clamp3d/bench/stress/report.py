@@ -144,7 +144,7 @@ def plot(run: StressRun, path: Path) -> None:
     axes.spines[:].set_visible(False)
     legend = (
         "Share that went wrong. 0: nothing. White: not for this method. Grey: every case refused in words, or no time\n"
-        f"left. †: the interpreter died. {run.n} cases a family (meshes a tenth, clamps a hundredth; others than cas\n"
+        f"left. †: the interpreter died. {run.n} cases a family (clamps a hundredth; others than cas\n"
         f"as many as their time allows), seed {run.seed}."
     )
     figure.text(0.02, 0.7 / height, legend, fontsize=7.5, va="top")

@@ -12,12 +12,10 @@ from typing import Any
 from clamp3d.bench.machine import Machine, machine
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.family import Family
-from clamp3d.bench.stress.meshes import MESHES
 from clamp3d.bench.stress.motions import MOTIONS
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.poses.family import POSES
 from clamp3d.bench.stress.poses.flat import FLATS
-from clamp3d.bench.stress.poses.solids import SOLIDS
 from clamp3d.core.child import end_with_parent
 from clamp3d.errors import InputError, SolverError
 
@@ -26,9 +24,7 @@ LIBRARIES = ("numpy", "numba", "scipy", "python-fcl", "coacd", "mpmath")
 KINDS: dict[str, Mapping[str, Family]] = {
     "pose": POSES,
     "flat": FLATS,
-    "solid": SOLIDS,
     "motion": MOTIONS,
-    "mesh": MESHES,
     "assembly": ASSEMBLIES,
 }
 """Kind -> its families by name."""
@@ -40,10 +36,10 @@ METHODS: dict[str, str] = {name: about for f in FAMILIES.values() for name, (abo
 
 
 def expand(names: list[str]) -> list[str]:
-    """Families by name; ``pose``, ``flat``, ``solid``, ``motion``, ``mesh`` and ``assembly`` stand for their kind.
+    """Families by name; ``pose``, ``flat``, ``motion`` and ``assembly`` stand for their kind.
 
-    >>> expand(["ties", "mesh"])[:2]
-    ['ties', 'mesh: contact']
+    >>> expand(["ties", "motion"])[:2]
+    ['ties', 'motion: grazing']
     """
     return [family for name in names for family in KINDS.get(name, [name])]
 

@@ -1,14 +1,13 @@
 """MuJoCo 4: box geoms of one body, convex as it advises for other shapes; in metres, no farther than 2 mm asked.
 
 Whole part: a distance sensor between two bodies (native convex collision), its wire placed where kinematics would put
-it; many poses at once by `mujoco.rollout`, which runs in C++ with a thread for each `MjData`. A sector:
+it; many poses at once by `mujoco.rollout`, which runs in C++. A sector:
 `mj_geomDistance` of two geoms. Contacts with a margin (`mj_collision`) take longer, and miss hits of a cylinder.
 """
 
 from __future__ import annotations
 
 import importlib
-import os
 from typing import Any
 
 import numpy as np
@@ -62,21 +61,15 @@ def _whole(unit_angle: float, shape: str) -> Prepared:
         mujoco.mj_sensorPos(model, data)
         return float(told[0]) / _MM
 
-    def batch(poses: Array, threads: int) -> Array:
+    def many(poses: Array) -> Array:
         turn = Rotation.from_matrix(poses[:, :3, :3]).as_quat()[:, [3, 0, 1, 2]]
         control = np.hstack([poses[:, :3, 3] * _MM, turn])[:, None]
-        with rollout.Rollout(nthread=threads if threads > 1 else 0) as pool:
-            states = [mujoco.MjData(model) for _ in range(threads)]
-            _, seen = pool.rollout(model, states, np.zeros((len(poses), size)), control, control_spec=spec)
+        with rollout.Rollout(nthread=0) as pool:
+            _, seen = pool.rollout(model, [data], np.zeros((len(poses), size)), control, control_spec=spec)
         return np.asarray(seen[:, 0, 0]) / _MM
 
     one(np.eye(4))
-    return Prepared(
-        one,
-        lambda poses: batch(poses, 1),
-        wire,
-        threaded=lambda poses: batch(poses, os.cpu_count() or 1),
-    )
+    return Prepared(one, many, wire)
 
 
 def _sector(unit_angle: float) -> Prepared:

@@ -29,10 +29,9 @@ class Wire(NamedTuple):
 
 
 class Material(NamedTuple):
-    """What of the box from ``low`` to ``high`` (x, y, z) is outside a circle if ``hollow``, else inside it."""
+    """What of the box from ``low`` to ``high`` (x, y, z) is outside the groove's circle."""
 
     radius: float
-    hollow: bool
     low: tuple[float, float, float]
     high: tuple[float, float, float]
 
@@ -64,7 +63,7 @@ def _own(x, y, z, wire):  # type: ignore[no-untyped-def]
 def _tangent(point, low, high, material, wire):  # type: ignore[no-untyped-def]
     """Least value over the material in a box of the plane that is tangent to f at a point, and the gradient there."""
     x, y, z = point
-    R, hollow = material.radius, material.hollow
+    R = material.radius
     f, (gx, gy, gz), error = _own(x, y, z, wire)
     mx, my, mz = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
     ax, ay, az = 0.5 * (high[0] - low[0]), 0.5 * (high[1] - low[1]), 0.5 * (high[2] - low[2])
@@ -77,8 +76,8 @@ def _tangent(point, low, high, material, wire):  # type: ignore[no-untyped-def]
     ex, ey = mx / rho, my / rho
     k = gx * ex + gy * ey
     across = abs(ey) * ax + abs(ex) * ay
-    chord = math.sqrt(max(R * R - across * across, 0.0)) if hollow else R
-    if (k > 0.0) == hollow and (not hollow or rho - math.sqrt(ax * ax + ay * ay) > -chord):  # on this side of the axis
+    chord = math.sqrt(max(R * R - across * across, 0.0))
+    if k > 0.0 and rho - math.sqrt(ax * ax + ay * ay) > -chord:  # on this side of the axis
         rest = abs(gx - k * ex) * ax + abs(gy - k * ey) * ay + abs(gz) * az
         least = max(least, at_middle + k * (chord - rho) - rest)
     return least, (gx, gy, gz)
@@ -97,18 +96,18 @@ def _within(point, low, high):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True)
 def _point(point, material):  # type: ignore[no-untyped-def]
     """A point of the material near another one, and whether there is one: on the right side of the arc, in the box."""
-    R, hollow, low, high = material
+    R, low, high = material
     x, y, z = _within(point, low, high)
     rho = math.sqrt(x * x + y * y)
-    if (rho < R) == hollow:
+    if rho < R:
         if rho == 0.0:
-            return (x, y, z), not hollow
+            return (x, y, z), False
         x, y = x * (R / rho), y * (R / rho)
         if y > high[1]:
             y = high[1]
             x = math.copysign(math.sqrt(max(R * R - y * y, 0.0)), x)
-    square, inside = x * x + y * y, low[0] <= x <= high[0] and low[1] <= y <= high[1]
-    return (x, y, z), inside and (square >= R * R * (1.0 - 1e-15) if hollow else square <= R * R * (1.0 + 1e-15))
+    inside = low[0] <= x <= high[0] and low[1] <= y <= high[1]
+    return (x, y, z), inside and x * x + y * y >= R * R * (1.0 - 1e-15)
 
 
 @numba.njit(cache=True)
@@ -130,9 +129,7 @@ def _halves(low, high):  # type: ignore[no-untyped-def]
 def _is_empty(low, high, material):  # type: ignore[no-untyped-def]
     """Whether a box holds nothing of the material."""
     R = material.radius
-    if material.hollow:
-        return max(low[0] ** 2, high[0] ** 2) + max(low[1] ** 2, high[1] ** 2) < R * R
-    return max(low[0], -high[0], 0.0) ** 2 + max(low[1], -high[1], 0.0) ** 2 > R * R * (1.0 + 1e-15)
+    return max(low[0] ** 2, high[0] ** 2) + max(low[1] ** 2, high[1] ** 2) < R * R
 
 
 @numba.njit(cache=True)
@@ -178,13 +175,6 @@ def _search(material, wire, start, tolerance, most):  # type: ignore[no-untyped-
     return best - tolerance, best
 
 
-def _wire(r: float, length: float, T: Array) -> Wire:
-    axis = T[:3, 2] / np.linalg.norm(T[:3, 2])
-    x, y, z = T[:3, 3].tolist()
-    u, v, w = axis.tolist()
-    return Wire((x, y, z), (u, v, w), float(r), 0.5 * float(length))
-
-
 def flat_truth(
     R: float, half_angle: float, L: float, r: float, length: float, T: Array, tolerance: float, most: int = 200_000
 ) -> tuple[float, float]:
@@ -193,24 +183,13 @@ def flat_truth(
     It is at most ``tolerance`` mm wide, or as wide as ``most`` boxes left it. No less than minus the smaller of radius
     and half length: what goes deeper is not the inset any more.
     """
-    wire, z = _wire(r, length, T), float(T[2, 3])
+    axis = T[:3, 2] / np.linalg.norm(T[:3, 2])
+    x, y, z = T[:3, 3].tolist()
+    u, v, w = axis.tolist()
+    wire = Wire((x, y, z), (u, v, w), float(r), 0.5 * float(length))
     s, h, H = R * math.sin(half_angle), -R * math.cos(half_angle), 0.5 * L
     lips = [(x, h, end) for x in (-s, s) for end in (-H, min(max(z, -H), H), H)]
     start = min(lips, key=lambda q: _own(q[0], q[1], q[2], wire)[0])
-    material = Material(float(R), True, (-math.inf, -math.inf, -H), (math.inf, h, H))
+    material = Material(float(R), (-math.inf, -math.inf, -H), (math.inf, h, H))
     low, high = _search(material, wire, start, tolerance, most)
-    return float(low), float(high)
-
-
-def solid_truth(
-    R: float, hollow: bool, half: Array, r: float, length: float, T: Array, tolerance: float, most: int = 200_000
-) -> tuple[float, float]:
-    """The same for a finite body in place of the groove: a box of half sizes (3,), and of it only one side of a circle.
-
-    A ``hollow`` one has a hole of radius R (or none: 0) along z, any other is the cylinder of radius R in the box.
-    """
-    x, y, z = half.tolist()
-    material = Material(float(R), bool(hollow), (-x, -y, -z), (x, y, z))
-    start = (x, y, z) if hollow else (0.0, 0.0, 0.0)
-    low, high = _search(material, _wire(r, length, T), start, tolerance, most)
     return float(low), float(high)
