@@ -153,7 +153,7 @@ def rim_point(rod: Rod, up: float, is_farthest: bool, inset: float) -> RimPoint:
 
 
 @formula
-def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Search) -> tuple[RimPoint, float]:
+def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool) -> tuple[RimPoint, float]:
     """The point of a rim that reaches behind the arc, shrunk until it just touches it, and by how much it is shrunk.
 
     Its rho is -1 if that is no candidate.
@@ -161,19 +161,9 @@ def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Sea
     inset, most = 0.0, min(rod.r, rod.half)
     none = RimPoint(-1.0, rod.centre, 0.0, 0.0)
     point = rim_point(rod, up, is_farthest, inset)
-    if search.limit < 0.0 and is_farthest:  # less than the best inset frees this rim, or it goes on
-        inset = -search.limit
-        if inset < most:
-            point = rim_point(rod, up, is_farthest, inset)
-        if inset == most or point.rho <= groove.R:
-            return none, inset
-    last = math.inf
     for _ in range(60):
         rate = point.by_radius + point.by_length
-        step = (point.rho - groove.R) / rate if rate > 0.0 else math.inf
-        # Convex, so Newton's steps stay on this side of the root: what passes the bound is no candidate.
-        if is_farthest and inset + step > 64.0 * search.eps - search.least:
-            return none, inset
+        step = (point.rho - groove.R) / rate if rate > 0.0 else math.inf  # Newton's: convex, so it stays on this side
         if not inset + step < most:  # it never does: of a disc, what is left last
             if rod.r <= rod.half:
                 return none, most
@@ -181,12 +171,8 @@ def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Sea
             return (point, most) if point.rho >= groove.R else (none, most)
         inset += step
         point = rim_point(rod, up, is_farthest, inset)
-        size = abs(step)
-        if point.rho <= 0.0 or abs(point.rho - groove.R) <= 2.0 * UNIT * groove.R:
+        if point.rho <= 0.0 or abs(point.rho - groove.R) <= 2.0 * UNIT * groove.R or abs(step) <= 1e-12 * groove.R:
             break
-        if size <= 1e-12 * groove.R or (size <= 1e-8 * groove.R and size > 0.7 * last):
-            break
-        last = size
     return point, inset
 
 
@@ -194,14 +180,11 @@ def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Sea
 def on_arc_surface(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Search) -> Search:
     """The search with the arc surface against a rim, from inside."""
     R = groove.R
-    end = features.axis_point(rod, up * rod.half)
-    if R - math.sqrt(end.x * end.x + end.y * end.y) - rod.r > search.limit + 4.0 * search.eps:
-        return search
     rim, inset = rim_point(rod, up, is_farthest, 0.0), 0.0
     if not (rim.rho > 0.0 and R - rim.rho <= search.limit):  # nor if a square has overflowed
         return search
     if rim.rho > R:
-        rim, inset = free_rim(groove, rod, up, is_farthest, search)
+        rim, inset = free_rim(groove, rod, up, is_farthest)
     if rim.rho <= 0.0 or abs(rim.point.z) > groove.H:
         return search
     scale = R / rim.rho if inset < min(rod.r, rod.half) else 1.0
@@ -266,10 +249,9 @@ def best_point(groove: Groove, rod: Rod, search: Search) -> Search:
     if search.f < math.inf and search.limit <= search.least:
         return search
     is_above = c.y + rod.half * abs(d.y) + rod.r * math.sqrt(d.x * d.x + d.z * d.z) >= h
-    if search.f == math.inf or is_above or h > 0.0:
-        along_z = Vector(0.0, 0.0, 1.0)
-        search = on_edge(rod, Vector(-s, h, 0.0), along_z, -H, H, features.LIP_M, search)
-        search = on_edge(rod, Vector(s, h, 0.0), along_z, -H, H, features.LIP_N, search)
+    along_z = Vector(0.0, 0.0, 1.0)
+    search = on_edge(rod, Vector(-s, h, 0.0), along_z, -H, H, features.LIP_M, search)
+    search = on_edge(rod, Vector(s, h, 0.0), along_z, -H, H, features.LIP_N, search)
     far = rod.half * abs(d.z) + rod.r * math.sqrt(rod.e2)
     for k in range(2):
         up = 1.0 if k == 0 else -1.0
