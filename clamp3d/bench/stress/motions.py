@@ -177,44 +177,6 @@ def _thin(rng: np.random.Generator, n: int) -> Motions:
     return through(cases, rng.uniform(0.05, 0.95, n), travel=way * fast[:, None])
 
 
-@MAKERS.family("level")
-def _level(rng: np.random.Generator, n: int) -> Motions:
-    """Clearance that does not change: slides along the groove, turns about its axis or the wire's own; rest."""
-    shapes, shape, feature = draw.setting(rng, n, draw.PARALLEL_FEATURES)
-    contact = draw.contact_on(rng, shapes, shape, feature)
-    contact.ends[:] = False
-    cases = draw.place(rng, shapes, shape, contact, shapes.r[shape] * draw.powers(rng, n, -9, -1), tilt=np.zeros(n))
-    length = shapes.R[shape] * 10.0 ** rng.uniform(-1, 1.5, n) * rng.choice([-1.0, 0.0, 1.0], n, p=[0.45, 0.1, 0.45])
-    own = (rng.random(n) < 0.2)[:, None]  # turns about its own axis: nothing moves
-    return through(
-        cases,
-        0.0,
-        travel=length,
-        angle=rng.choice([-1.0, 0.0, 1.0], n, p=[0.2, 0.6, 0.2]) * rng.uniform(0.01, 6.0, n),
-        point=np.where(own, cases.T_world_wire[:, :3, 3], 0.0),
-        axis=np.where(own, cases.T_world_wire[:, :3, 2], [0.0, 0.0, 1.0]),
-    )
-
-
-@MAKERS.family("start")
-def _start(rng: np.random.Generator, n: int) -> Motions:
-    """Starts in contact or by 1e-12 ... 1e-2 of the radius off it, and leaves, slides or comes back in full circles."""
-    gap = np.where(rng.random(n) < 0.2, -rng.uniform(0, 0.99, n), draw.powers(rng, n, -12, -2, 0.3))
-    cases, normal = _touching(rng, draw.shapes(rng, draw.count(n)), n, draw.FEATURES, gap)
-    turns = rng.random(n) < 0.25
-    away = np.where(rng.random(n) < 0.3, 0.0, rng.uniform(-0.2, 1.5, n))[:, None]
-    length = (cases.shapes.R[cases.shape] * 10.0 ** rng.uniform(-2, 1, n))[:, None]
-    straight = (np.cos(away) * _square_to(rng, normal) + np.sin(away) * normal) * length
-    return through(
-        cases,
-        0.0,
-        travel=np.where(turns[:, None], 0.0, straight),
-        angle=np.where(turns, 2.0 * np.pi * rng.integers(1, 4, n), 0.0),
-        point=cases.T_world_wire[:, :3, 3] + length * normal,
-        axis=_square_to(rng, normal),
-    )
-
-
 def least_distance(cases: Motions, i: int, end: float = 1.0, named: tuple[float, ...] = ()) -> tuple[float, float]:
     """Least signed distance (mm) of case i until the instant ``end``, and its instant; see the module."""
     k = int(cases.shape[i])

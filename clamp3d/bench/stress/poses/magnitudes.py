@@ -54,12 +54,3 @@ def _far(rng: np.random.Generator, n: int) -> Cases:
     world = draw.poses_from_axes(rng, away, rng.normal(size=(n, 3)))
     exact = np.asarray(world, Extended) @ np.asarray(near.T_world_wire, Extended)
     return replace(near, T_world_wire=np.asarray(exact, np.float64), gap=np.full(n, np.nan), T_world_groove=world)
-
-
-@MAKERS.family("poses barely rigid")
-def _barely_rigid(rng: np.random.Generator, n: int) -> Cases:
-    """Rotations off by up to 1e-9, as products of many poses are."""
-    cases = draw.touching(rng, n, draw.shapes(rng, draw.count(n)), (-15, -1))
-    T = cases.T_world_wire.copy()
-    T[:, :3, :3] += rng.uniform(-1.0, 1.0, (n, 3, 3)) * 10.0 ** rng.uniform(-16, -9.8, n)[:, None, None]
-    return replace(cases, T_world_wire=T, gap=np.full(n, np.nan))
