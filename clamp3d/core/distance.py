@@ -204,9 +204,9 @@ def signed_distance(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) ->
     half, along, flat = 0.5 * groove.length, 0.5 * cylinder.length, type(cylinder) is Cylinder
     if kernel().records(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, out) >= 0:
         return signed_distance(groove, cylinder, check_pose(T))
-    values: list[Any] = [*out.tolist()[0]]
+    values: list[Any] = [*out.tolist()[0], (groove, cylinder, T)]
     values[4] = _FEATURES[values[4]]
-    return SignedDistance(*values, asked=(groove, cylinder, T))
+    return SignedDistance(*values)
 
 
 @overload
