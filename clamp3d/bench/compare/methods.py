@@ -45,17 +45,6 @@ class Method:
             return self.family
         return f"{self.family} {self.setting:g} {UNITS.get(self.family, 'deg')}".rstrip()
 
-    @property
-    def key(self) -> str:
-        """The method as one word, 'wedges:5'."""
-        return self.family if self.setting is None else f"{self.family}:{self.setting!r}"
-
-    @classmethod
-    def parse(cls, key: str) -> Method:
-        """The method of a `key`."""
-        family, _, setting = key.partition(":")
-        return cls(family, float(setting) if setting else None)
-
 
 @dataclass(frozen=True, slots=True)
 class Prepared:

@@ -87,7 +87,7 @@ def compare(
         try:
             if method.family in absent:
                 raise JobError(absent[method.family])
-            return run_job(kind, method.key, time_limit=limit)
+            return run_job(kind, method, time_limit=limit)
         except JobError as error:
             return NotMeasured(method.family, method.setting, method.label, str(error))
 

@@ -109,7 +109,7 @@ def through(
     travel = np.asarray(travel, np.float64)
     travel = spread(travel, 3) if travel.ndim == 2 else spread(travel)[:, None] * axis
     instant, angle, point = spread(instant), spread(angle), spread(point, 3)
-    motions = Motions(cases.shapes, cases.shape, cases.T_world_wire, point, axis, angle, travel, instant, np.arange(n))
+    motions = Motions(cases.shapes, cases.shape, cases.T_groove_wire, point, axis, angle, travel, instant, np.arange(n))
     for i in range(n):
         motions.start[i] = motions.motion(i).at(-float(instant[i]), motions.start[i])
     return motions
@@ -153,7 +153,7 @@ def _screws(rng: np.random.Generator, n: int) -> Motions:
         rng.uniform(0.05, 0.95, n),
         travel=draw.powers(rng, n, -3, 0, 0.4) * radius * turns,
         angle=turns,
-        point=cases.T_world_wire[:, :3, 3] + radius[:, None] * normal,
+        point=cases.T_groove_wire[:, :3, 3] + radius[:, None] * normal,
         axis=_square_to(rng, normal),
     )
 

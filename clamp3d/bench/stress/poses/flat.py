@@ -79,7 +79,7 @@ def _discs(rng: np.random.Generator, n: int) -> Cases:
 def interval(cases: Cases, i: int, most: int = MAX_BOXES) -> tuple[float, float]:
     """The interval in mm that holds the signed distance of case i."""
     case = _alone(cases, i)
-    s, scene, T = case.shapes, float(case.scene()[0]), case.T_world_wire[0]
+    s, scene, T = case.shapes, float(case.scene()[0]), case.T_groove_wire[0]
     R, half_angle, L, r, length = (float(column[0]) for column in (s.R, s.half_angle, s.L, s.r, s.length))
     low, high = flat_truth(R, half_angle, L, r, length, T, NARROW * scene, most)
     rounding = 20.0 * NARROW * scene if high < -min(r, 0.5 * length) + _KNOWN * scene else 0.05 * NARROW * scene

@@ -8,7 +8,7 @@ import numpy as np
 
 from clamp3d.bench.stress.family import Makers
 from clamp3d.bench.stress.poses import draw
-from clamp3d.bench.stress.poses.cases import Cases, Extended
+from clamp3d.bench.stress.poses.cases import Cases
 
 MAKERS = Makers()
 
@@ -43,14 +43,3 @@ def _mixed_sizes(rng: np.random.Generator, n: int) -> Cases:
     gap = np.minimum(shapes.r, shapes.R)[shape] * draw.powers(rng, n, -12, 0)
     tilt = draw.powers(rng, n, -12, 0, 0.3)
     return draw.place(rng, shapes, shape, draw.contact_on(rng, shapes, shape, feature), gap, tilt=tilt)
-
-
-@MAKERS.family("far from the origin")
-def _far(rng: np.random.Generator, n: int) -> Cases:
-    """Both bodies turned and 1e3 ... 1e9 mm from the world's origin."""
-    near = draw.touching(rng, n, draw.shapes(rng, draw.count(n)), (-9, -1))
-    away = rng.normal(size=(n, 3))
-    away *= (10.0 ** rng.uniform(3, 9, n) / np.sqrt((away**2).sum(1)))[:, None]
-    world = draw.poses_from_axes(rng, away, rng.normal(size=(n, 3)))
-    exact = np.asarray(world, Extended) @ np.asarray(near.T_world_wire, Extended)
-    return replace(near, T_world_wire=np.asarray(exact, np.float64), gap=np.full(n, np.nan), T_world_groove=world)
