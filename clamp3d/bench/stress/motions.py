@@ -222,8 +222,8 @@ class CasMethod:
             first = first_contact(groove, wire, motion, start)
             distance[i] = least.distance.value
             # In an overlap the answer bounds the depth of the whole way from one side only: the search's own error.
-            known = [d.uncertainty for d in (least.distance, first.distance) if np.isfinite(d.uncertainty)]
-            bound[i] = max(known, default=0.0) + max(least.resolution, first.resolution)
+            uncertainties = [d.uncertainty for d in (least.distance, first.distance) if np.isfinite(d.uncertainty)]
+            bound[i] = max(uncertainties, default=0.0) + max(least.resolution, first.resolution)
             self.lowest[int(cases.number[i])] = least.t
             self.first[int(cases.number[i])] = (first.touches, first.t, first.distance.value)
         return Measured(distance, bound)
@@ -329,4 +329,4 @@ def check_first_contacts(cases: Motions, truths: Truths) -> None:
             answers.note(f"first_contact: {flaw}, case {i}")
 
 
-MOTIONS = {name: MotionFamily(name, *made) for name, made in MAKERS.items()}
+MOTIONS = {name: MotionFamily(name, *maker) for name, maker in MAKERS.items()}

@@ -41,10 +41,10 @@ def _fitting(make: Callable[[np.random.Generator], Clamp | Case | None]) -> Call
     """The generator, asked again where it gives None: grooves that do not fit into the splints."""
 
     def case(rng: np.random.Generator) -> Case:
-        found = None
-        while found is None:
-            found = make(rng)
-        return found if isinstance(found, Case) else Case(found)
+        drawn = None
+        while drawn is None:
+            drawn = make(rng)
+        return drawn if isinstance(drawn, Case) else Case(drawn)
 
     return case
 

@@ -176,7 +176,7 @@ class Truths(dict[int, tuple[Envelope, list[Minimum]]]):
 
     def nearest(self, i: int, d: float) -> float:
         """The distance of the equilibrium that is nearest to ``d``; NaN if there is none."""
-        return min((found.d for found in self[i][1]), key=lambda found: abs(found - d), default=float("nan"))
+        return min((rest.d for rest in self[i][1]), key=lambda other: abs(other - d), default=float("nan"))
 
     def error(self, i: int, rest: Rest) -> float:
         """How far an answer is from rest, mm."""
@@ -188,9 +188,9 @@ class Truths(dict[int, tuple[Envelope, list[Minimum]]]):
         """The lowest equilibrium that a solver that is to name all did not; NaN if there is none."""
         if rest.others is None:
             return float("nan")
-        (envelope, found), named = self[i], np.array([q[4] for q in rest.others])
-        far = (m.d for m in found if m.firm and not m.slipped and np.abs(named - m.d).min() > SAME * envelope.lever)
+        (envelope, rests), named = self[i], np.array([q[4] for q in rest.others])
+        far = (m.d for m in rests if m.firm and not m.slipped and np.abs(named - m.d).min() > SAME * envelope.lever)
         return next(far, float("nan"))
 
 
-ASSEMBLIES = {name: AssemblyFamily(name, *made) for name, made in MAKERS.items()}
+ASSEMBLIES = {name: AssemblyFamily(name, *maker) for name, maker in MAKERS.items()}

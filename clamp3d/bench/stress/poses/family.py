@@ -48,8 +48,8 @@ class CasMethod:
 
     def measure(self, cases: Cases) -> Measured:
         """See `Method`."""
-        found = _by_kernel(cases)
-        return Measured(found.distance, found.error_bound)
+        answers = _by_kernel(cases)
+        return Measured(answers.distance, answers.error_bound)
 
 
 class ChordsMethod:
@@ -173,4 +173,4 @@ class PoseFamily(Family):
         return f"{cases.snippet(i)}\n# truth: {float(truth_50_digits(cases, i))!r} mm"
 
 
-POSES = {name: PoseFamily(name, *made) for name, made in (features.MAKERS | magnitudes.MAKERS).items()}
+POSES = {name: PoseFamily(name, *maker) for name, maker in (features.MAKERS | magnitudes.MAKERS).items()}

@@ -44,10 +44,10 @@ def _parallel_tangency(rng: np.random.Generator, n: int) -> Cases:
 def _equal_radii(rng: np.random.Generator, n: int) -> Cases:
     """Wire radius = groove radius (1 +- 1e-3 ... 1e-15) and equal to the last bit, nearly coaxial."""
     k = draw.count(n)
-    given = asdict(draw.shapes(rng, k))
-    del given["flat"]
-    given["r"] = given["R"] * (1.0 + draw.powers(rng, k, -16, -3))
-    shapes, shape = draw.shapes(rng, k, **given), draw.spread(n, k)
+    columns = asdict(draw.shapes(rng, k))
+    del columns["flat"]
+    columns["r"] = columns["R"] * (1.0 + draw.powers(rng, k, -16, -3))
+    shapes, shape = draw.shapes(rng, k, **columns), draw.spread(n, k)
     R = shapes.R[shape]
     offset = R[:, None] * np.stack([draw.powers(rng, n, -16, -3) for _ in range(3)], 1)
     tilt = np.stack([draw.powers(rng, n, -16, -3, 0.5) for _ in range(2)] + [np.ones(n)], 1)

@@ -130,9 +130,9 @@ class FlatFamily(Family):
         error = np.maximum(np.maximum(low - d, d - high), 0.0)
         wrong = Wrong((d < -bound) & (low >= 0.0), (d > bound) & (high < 0.0), error > bound)
         worst = wrong.examples(error, 0.5 * (low + high), d)
-        known, signed = (high - low <= _KNOWN * size).mean(), ((low >= 0.0) | (high < 0.0)).mean()
+        narrow, signed = (high - low <= _KNOWN * size).mean(), ((low >= 0.0) | (high < 0.0)).mean()
         answers.note(
-            f"the truth is known to {_KNOWN:g} of the scene in {known:.1%} of the cases, its sign in {signed:.1%}"
+            f"the truth is known to {_KNOWN:g} of the scene in {narrow:.1%} of the cases, its sign in {signed:.1%}"
         )
         return score(self.name, name, answers, error, size, wrong, worst)
 

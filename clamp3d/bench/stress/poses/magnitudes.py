@@ -37,8 +37,8 @@ def _mixed_sizes(rng: np.random.Generator, n: int) -> Cases:
     """Wire and groove, or length and radius, different by 1e-6 ... 1e6."""
     k = draw.count(n)
     R = 10.0 ** rng.uniform(-3, 3, k)
-    given = {name: R * 10.0 ** rng.uniform(-6, 6, k) for name in ("r", "L", "length")}
-    shapes = draw.shapes(rng, k, R=R, **given)
+    columns = {name: R * 10.0 ** rng.uniform(-6, 6, k) for name in ("r", "L", "length")}
+    shapes = draw.shapes(rng, k, R=R, **columns)
     shape, feature = draw.spread(n, k), rng.choice(draw.FEATURES, n)
     gap = np.minimum(shapes.r, shapes.R)[shape] * draw.powers(rng, n, -12, 0)
     tilt = draw.powers(rng, n, -12, 0, 0.3)
