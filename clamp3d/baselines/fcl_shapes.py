@@ -25,8 +25,9 @@ import fcl
 import igl
 import numpy as np
 import trimesh
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from clamp3d.collide.surface import fcl_tree
 from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder
@@ -87,15 +88,6 @@ def convex(vertices: ArrayLike, faces: ArrayLike, name: str = "convex shape") ->
 def bvh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Shape:
     """A closed triangle mesh (`fcl.BVHModel`); InputError if it is empty, open or inside out."""
     return _tree("mesh", _solid(vertices, faces, name))
-
-
-def tree(vertices: NDArray[Any], faces: NDArray[Any]) -> Any:
-    """A triangle mesh as `fcl.BVHModel`, as it is."""
-    model = fcl.BVHModel()
-    model.beginModel(len(vertices), len(faces))
-    model.addSubModel(vertices, faces)
-    model.endModel()
-    return model
 
 
 def facets(mesh: Shape) -> list[Shape]:
@@ -211,7 +203,7 @@ def _shape(kind: Kind, solid: Mesh, geometry: Any) -> Shape:
 
 
 def _tree(kind: Kind, solid: Mesh) -> Shape:
-    return _shape(kind, solid, tree(solid.vertices * UNIT, solid.faces))
+    return _shape(kind, solid, fcl_tree(solid.vertices * UNIT, solid.faces))
 
 
 def _solid(vertices: ArrayLike, faces: ArrayLike, name: str) -> Mesh:

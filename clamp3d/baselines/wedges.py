@@ -99,8 +99,8 @@ def prism(polygon: Array, start: float, end: float) -> tuple[Array, NDArray[np.i
     """Vertices (2k, 3) and outward triangles (4k - 4, 3) of a polygon (k, 2) drawn from z = start to end."""
     from trimesh.creation import extrude_polygon
 
-    made = extrude_polygon(shapely.Polygon(polygon), end - start)
-    return made.vertices + np.array([0.0, 0.0, start]), np.asarray(made.faces, dtype=np.int64)
+    solid = extrude_polygon(shapely.Polygon(polygon), end - start)
+    return solid.vertices + np.array([0.0, 0.0, start]), np.asarray(solid.faces, dtype=np.int64)
 
 
 def wedge_solids(part: Solid, unit_angle: float) -> list[tuple[str, Array, NDArray[np.int64]]]:

@@ -47,7 +47,7 @@ def grid_search(run: Assembly, model: ContactModel, *, n: int, parts: int, groov
     # Jumper and line rest in the up splint when all is closed; they come up into it from below.
     lower = grid[:, 0] + 1e-6
     T_down = _stack(down.x - up.x, down.y - up.y + lower, down.angle)
-    found = np.ones(len(grid), dtype=bool)
+    free = np.ones(len(grid), dtype=bool)
     tests = 0
     keys = [("P1", "P6"), ("P2", "P6"), ("P1", "P7"), ("P2", "P7")][:grooves]
     for key in keys:
@@ -56,9 +56,9 @@ def grid_search(run: Assembly, model: ContactModel, *, n: int, parts: int, groov
         T_wire = _stack(wire.x - up.x, wire.y - up.y + 0.5e-6 + fall, 0.0)
         pair = section.pairs[key]
         poses = T_wire if key[0] == "P1" else np.asarray(inverse(T_down) @ T_wire)
-        found &= model.distances(pair, poses) >= -1e-9
+        free &= model.distances(pair, poses) >= -1e-9
         tests += len(grid) * _segments(model, pair.groove.half_angle)
-    closing = down.y - up.y + float(lower[found].min()) if found.any() else None
+    closing = down.y - up.y + float(lower[free].min()) if free.any() else None
     return Searched(closing, len(grid), tests)
 
 

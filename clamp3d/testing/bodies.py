@@ -95,8 +95,8 @@ def _outline(profile: Profile) -> Callable[[Array], Array]:
     su, sv, eu, ev = (np.array([(*edge.start, *edge.end) for edge in edges]).T)[..., None]
     lu, lv = eu - su, ev - sv
     square = (lu * lu + lv * lv)[:k]
-    given = [(*arc.centre, arc.radius, 0.5 * (arc.start_angle + arc.end_angle), arc.sweep) for arc in arcs]
-    mu, mv, radius, middle, sweep = np.array(given).reshape(-1, 5).T[..., None]
+    numbers = [(*arc.centre, arc.radius, 0.5 * (arc.start_angle + arc.end_angle), arc.sweep) for arc in arcs]
+    mu, mv, radius, middle, sweep = np.array(numbers).reshape(-1, 5).T[..., None]
     sign, whole = np.sign(sweep), np.abs(sweep) >= 2.0 * math.pi - 1e-9
     closed = np.concatenate([np.zeros((k, 1), bool), whole])
 
@@ -140,13 +140,13 @@ def _solid(solid: Solid) -> Field:
         return field
 
     fields = [one(extrusion) for extrusion in solid.bodies]
-    crossing = [(hole, f) for hole, f in holes if any(hole.axis != made.axis for made in solid.bodies)]
+    crossing = [(hole, f) for hole, f in holes if any(hole.axis != extrusion.axis for extrusion in solid.bodies)]
 
     def field(x: Array) -> Array:
-        found = np.min([f(x) for f in fields], axis=0)
+        value = np.min([f(x) for f in fields], axis=0)
         for hole, circle in crossing:
-            found = np.maximum(found, -circle((x @ hole.frame)[:, :2]))
-        return np.asarray(found)
+            value = np.maximum(value, -circle((x @ hole.frame)[:, :2]))
+        return np.asarray(value)
 
     return field
 

@@ -16,11 +16,11 @@ class JobError(Exception):
     """Why a job gave no answer, in one line."""
 
 
-def run_job(kind: Kind, method: str, *, time_limit: float) -> Any:
+def run_job(kind: Kind, method: Method, *, time_limit: float) -> Any:
     """The answer of a job. Raises JobError if it fails, crashes or is not done in ``time_limit`` s."""
     try:
         with Worker(_ANSWER) as worker:
-            return pickle.loads(worker.call(_ANSWER, kind, method, time_limit=time_limit))
+            return pickle.loads(worker.call(_ANSWER, kind, method.family, method.setting, time_limit=time_limit))
     except WorkerTimeoutError:
         raise JobError(f"not finished in {time_limit:g} s") from None
     except WorkerEndedError as error:
@@ -32,8 +32,9 @@ def run_job(kind: Kind, method: str, *, time_limit: float) -> Any:
 _ANSWER = f"{__name__}:answer"
 
 
-def answer(kind: str, method: str) -> bytes:
+def answer(kind: str, family: str, setting: float | None) -> bytes:
     """Do a job in this process."""
+    method = Method(family, setting)
     if kind == "image":
         from clamp3d.bench.compare.assemblies import imaged
 
@@ -41,10 +42,10 @@ def answer(kind: str, method: str) -> bytes:
     if kind == "assembly":
         from clamp3d.bench.compare.assemblies import assembled
 
-        return pickle.dumps(assembled(Method.parse(method)))
+        return pickle.dumps(assembled(method))
     from clamp3d.bench.compare.measure import measure
     from clamp3d.bench.compare.methods import load, prepare
     from clamp3d.bench.compare.peers import load_peer, prepare_peer
 
     how = {"load": load_peer, "prepare": prepare_peer} if kind == "peer" else {"load": load, "prepare": prepare}
-    return pickle.dumps(measure(Method.parse(method), **how))
+    return pickle.dumps(measure(method, **how))

@@ -45,17 +45,6 @@ class Method:
             return self.family
         return f"{self.family} {self.setting:g} {UNITS.get(self.family, 'deg')}".rstrip()
 
-    @property
-    def key(self) -> str:
-        """The method as one word, 'wedges:5'."""
-        return self.family if self.setting is None else f"{self.family}:{self.setting!r}"
-
-    @classmethod
-    def parse(cls, key: str) -> Method:
-        """The method of a `key`."""
-        family, _, setting = key.partition(":")
-        return cls(family, float(setting) if setting else None)
-
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
@@ -64,6 +53,7 @@ class Prepared:
     ``one`` takes a pose (4, 4), ``many`` takes poses (n, 4, 4). ``pieces`` counts the convex pieces, triangles or
     chords. ``depth``: a negative value measures the overlap.
     ``elsewhere`` are seconds of the set-up that other processes took (CoACD, also when its answer was cached).
+    ``keep`` are objects of a library whose bindings hold bare pointers to them.
     """
 
     one: Callable[[Array], float]
@@ -72,6 +62,7 @@ class Prepared:
     depth: bool = True
     parallel_only: bool = False
     elsewhere: float = 0.0
+    keep: object = None
 
 
 UNITS = {"chords": "deg", "wedges": "deg", "hulls": "", "mesh": "mm"}
@@ -171,7 +162,7 @@ def _piece_count(model: Any, groove: GroovePair) -> int:
 
 def coacd_seconds(model: Any) -> float:
     """Seconds that CoACD took in processes of its own, also when its answer was cached."""
-    return sum(made.seconds for made in model.decompositions.values()) if model.name == "hulls" else 0.0
+    return sum(each.seconds for each in model.decompositions.values()) if model.name == "hulls" else 0.0
 
 
 ANGLES_DEG = (1.0, 5.0, 20.0)
@@ -194,11 +185,11 @@ class Series:
     angles: tuple[float | None, ...] = ANGLES_DEG
 
 
-def ready(one: Callable[[Array], float], pieces: int, *, depth: bool) -> Prepared:
+def ready(one: Callable[[Array], float], pieces: int, *, depth: bool, keep: object = None) -> Prepared:
     """A method that is asked pose by pose; asked once here, for what it makes when it is first used."""
 
     def many(poses: Array) -> Array:
         return np.array([one(T) for T in poses])
 
     many(np.eye(4)[None])
-    return Prepared(one, many, pieces, depth=depth)
+    return Prepared(one, many, pieces, depth=depth, keep=keep)

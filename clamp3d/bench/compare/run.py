@@ -87,7 +87,7 @@ def compare(
         try:
             if method.family in absent:
                 raise JobError(absent[method.family])
-            return run_job(kind, method.key, time_limit=limit)
+            return run_job(kind, method, time_limit=limit)
         except JobError as error:
             return NotMeasured(method.family, method.setting, method.label, str(error))
 
@@ -100,15 +100,15 @@ def compare(
                 rows.append(job(kind, method, CONTACT_LIMIT, f"{method.label} on known poses"))
             else:
                 done += 1
-    known = [quickest(rows) for rows in rounds]
+    rows_on_poses = [quickest(rows) for rows in rounds]
     both = [job("assembly", m, ASSEMBLY_LIMIT, f"assembly by {m.label}") for m in ASSEMBLIES]
-    pairs = [found if isinstance(found, tuple) else (found, found) for found in both]
+    pairs = [answers if isinstance(answers, tuple) else (answers, answers) for answers in both]
     image = job("image", Method("image"), ASSEMBLY_LIMIT, "measuring in a picture")
     progress(total, total, "done")
     return Comparison(
         machine((*LIBRARIES, *(PEER_LIBRARIES if peers else ()))),
-        tuple(known[: len(METHODS)]),
-        tuple(known[len(METHODS) :]),
+        tuple(rows_on_poses[: len(METHODS)]),
+        tuple(rows_on_poses[len(METHODS) :]),
         tuple(exact for exact, _ in pairs),
         tuple(stepped for _, stepped in pairs),
         image,
@@ -126,9 +126,9 @@ def quickest(rows: Sequence[Measured | NotMeasured]) -> Measured | NotMeasured:
     return replace(first, **times)
 
 
-def exact_distance(found: Comparison) -> float:
+def exact_distance(comparison: Comparison) -> float:
     """The assembled clamp's splint distance in mm by the exact method. Raises Clamp3dError if that failed."""
-    for row in found.exact:
+    for row in comparison.exact:
         if isinstance(row, Assembled) and row.method == "cas":
             return row.distance
     raise Clamp3dError("the assembly by cas gave no distance to compare with")

@@ -145,8 +145,8 @@ def pair() -> GroovePair:
 
 def in_part_frame(T: Array) -> Array:
     """Poses ``T_a_b`` of `pair` for poses (n, 4, 4) of the wire in the groove's frame; no rounding: quarter turns."""
-    made = pair()
-    return np.asarray(made.T_a_groove @ T @ inverse(made.T_b_cylinder))
+    groove_and_wire = pair()
+    return np.asarray(groove_and_wire.T_a_groove @ T @ inverse(groove_and_wire.T_b_cylinder))
 
 
 def chord_error(unit_angle: float) -> float:

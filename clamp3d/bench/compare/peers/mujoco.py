@@ -51,15 +51,15 @@ def _whole(unit_angle: float, shape: str) -> Prepared:
     model, wire = _model(unit_angle, shape)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    at, turn, told = data.geom_xpos[wire], data.geom_xmat[wire], data.sensordata
+    position, turn, reading = data.geom_xpos[wire], data.geom_xmat[wire], data.sensordata
     spec = int(mujoco.mjtState.mjSTATE_MOCAP_POS) | int(mujoco.mjtState.mjSTATE_MOCAP_QUAT)
     size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)
 
     def one(T: Array) -> float:
-        at[:] = T[:3, 3] * _MM
+        position[:] = T[:3, 3] * _MM
         turn[:] = T[:3, :3].ravel()
         mujoco.mj_sensorPos(model, data)
-        return float(told[0]) / _MM
+        return float(reading[0]) / _MM
 
     def many(poses: Array) -> Array:
         turn = Rotation.from_matrix(poses[:, :3, :3]).as_quat()[:, [3, 0, 1, 2]]
@@ -77,10 +77,10 @@ def _sector(unit_angle: float) -> Prepared:
     model, wire = _model(unit_angle, "capsule")
     data, find = mujoco.MjData(model), sectors(wire - 2)
     mujoco.mj_kinematics(model, data)
-    at, turn = data.geom_xpos[wire], data.geom_xmat[wire]
+    position, turn = data.geom_xpos[wire], data.geom_xmat[wire]
 
     def one(T: Array) -> float:
-        at[:] = T[:3, 3] * _MM
+        position[:] = T[:3, 3] * _MM
         turn[:] = T[:3, :3].ravel()
         i, j = find(T)
         d = mujoco.mj_geomDistance(model, data, i, wire, _FARTHEST * _MM, None)
