@@ -277,18 +277,24 @@ def bound_by_mixture(stretch: Stretch, course: Course, f: float) -> float:
 
 
 @inlined
-def one_minimum(stretch: Stretch, course: Course, rim_third: float) -> int:
-    """What to solve for the one minimum of a stretch; -1 if it is not certain that there is one only."""
+def one_minimum(stretch: Stretch, course: Course, rim_third: float) -> tuple[int, float]:
+    """What to solve for the one minimum of a stretch (-1: not known), and the slope if f is monotone (else 0)."""
     s, side = stretch, 1.0 if course.t >= 0.0 else -1.0
     w1, w2, e1, e2 = course.w1, course.w2, side * course.t1, side * course.t2
     if s.g_low > 0.0 and s.e_low > 0.0:  # all of it beyond the rim
+        slope = s.g * w1 + s.e * e1
         bend = w1 * w1 + s.g * w2 + e1 * e1 + s.e * e2
-        return RIM if rim_third * s.half < bend else -1
+        if rim_third * s.half < bend:
+            return RIM, 0.0
+        return -1, slope if abs(slope) > (abs(bend) + 0.5 * rim_third * s.half) * s.half else 0.0
     if s.e_high <= min(s.g_low, 0.0):  # all of it beside the side
-        return SIDE if w2 > s.third * s.half else -1
+        if w2 > s.third * s.half:
+            return SIDE, 0.0
+        return -1, w1 if abs(w1) > s.bend * s.half else 0.0
     is_split = abs(course.t) <= s.tilt * s.half  # the sign of t may change
-    is_opposed = abs(w1) > s.bend * s.half and abs(e1) > s.tilt * s.half and (w1 > 0.0) != (e1 > 0.0)
-    return RIDGE if is_opposed and not is_split else -1
+    if not is_split and abs(w1) > s.bend * s.half and abs(e1) > s.tilt * s.half:
+        return (-1, w1) if (w1 > 0.0) == (e1 > 0.0) else (RIDGE, 0.0)
+    return -1, 0.0
 
 
 @inlined
@@ -316,7 +322,9 @@ def settled(
     rim_third = 3.0 * s.by * s.bend + s.g_high * s.third + 3.0 * s.tilt * s.tilt + s.e_high * s.tilt
     from_middle = arc.R * math.sqrt(rod.centre.x * rod.centre.x + rod.centre.y * rod.centre.y)
     rim_third = min(rim_third, from_middle + rod.r * s.third + rod.half * s.tilt)
-    kind = one_minimum(s, course, rim_third)
+    kind, slope = one_minimum(s, course, rim_third)
+    if slope != 0.0:
+        return improved(best, arc_course, arc, rod, lo if slope > 0.0 else hi), math.inf
     if kind < 0:
         return best, bound
     angle = root(arc_course, arc, rod, kind, lo, hi, middle, 1.0)
