@@ -5,34 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from clamp3d.core import kernel_features as features
 from clamp3d.core.jit import formula, inlined
-from clamp3d.core.kernel_features import (
-    ARC,
-    END_ARC,
-    END_EDGE_M,
-    END_EDGE_N,
-    END_FACE,
-    LIP_M,
-    LIP_N,
-    Candidate,
-    Groove,
-    Rod,
-    axis_point,
-    beyond_end,
-    clip,
-    deepest,
-    depth_of,
-    end_circle,
-    face_normal,
-    is_behind_arc,
-    on_axis_end,
-    on_corner,
-    on_end_arc,
-    on_end_edge,
-    on_lip,
-    section,
-    section_foot,
-)
+from clamp3d.core.kernel_features import Candidate, Groove, Rod
 from clamp3d.core.kernel_vector import Vector, dot, length, minus, over, plus
 
 UNIT = 2.0**-53
@@ -68,8 +43,8 @@ def parallel(groove: Groove, rod: Rod) -> Answer:
     """Axis along z: the plane problem of a point and the section, and the gap along z."""
     R, H, r, half = groove.R, groove.H, rod.r, rod.half
     x, y, z = rod.centre
-    gap, feature = section(groove, x, y)
-    qx, qy, nx, ny = section_foot(groove, feature, x, y)
+    gap, feature = features.section(groove, x, y)
+    qx, qy, nx, ny = features.section_foot(groove, feature, x, y)
     up = math.copysign(1.0, rod.axis.z)
     lo, hi = max(z - half, -H), min(z + half, H)
     bound = UNIT * (6.0 * (R + abs(x) + abs(y)) + r)
@@ -79,36 +54,36 @@ def parallel(groove: Groove, rod: Rod) -> Answer:
         if H - abs(inside) < -gap:
             side = -1.0 if inside < 0.0 else 1.0
             point, t = Vector(x, y, side * H), (inside - z) * up
-            return Answer(abs(inside) - H - r, point, Vector(0.0, 0.0, side), END_FACE, t, bound_along)
+            return Answer(abs(inside) - H - r, point, Vector(0.0, 0.0, side), features.END_FACE, t, bound_along)
         middle = 0.5 * (lo + hi)
         # R - r first: exact for nearly equal radii, and rho is what is left.
-        distance = (R - r) - math.sqrt(x * x + y * y) if feature == ARC else gap - r
+        distance = (R - r) - math.sqrt(x * x + y * y) if feature == features.ARC else gap - r
         return Answer(distance, Vector(qx, qy, middle), Vector(nx, ny, 0.0), feature, (middle - z) * up, bound)
     side = 1.0 if hi == H else -1.0
     t, end = -side * half * up, lo - hi
     if gap <= 0.0:
-        return Answer(end - r, Vector(x, y, side * H), Vector(0.0, 0.0, side), END_FACE, t, bound_along)
+        return Answer(end - r, Vector(x, y, side * H), Vector(0.0, 0.0, side), features.END_FACE, t, bound_along)
     distance = math.sqrt(gap * gap + end * end)
     normal = Vector(nx * (gap / distance), ny * (gap / distance), side * (end / distance))
-    return Answer(distance - r, Vector(qx, qy, side * H), normal, beyond_end(feature), t, bound_along)
+    return Answer(distance - r, Vector(qx, qy, side * H), normal, features.beyond_end(feature), t, bound_along)
 
 
 @formula
 def way_out(groove: Groove, p: Vector) -> Answer:
     """Minus the depth of a point of the material, its nearest point of the boundary, the normal there, the feature."""
-    depth, feature = depth_of(groove, p)
-    if feature == END_FACE:
+    depth, feature = features.depth_of(groove, p)
+    if feature == features.END_FACE:
         side = 1.0 if p.z >= 0.0 else -1.0
         return Answer(-depth, Vector(p.x, p.y, side * groove.H), Vector(0.0, 0.0, side), feature, 0.0, 0.0)
-    qx, qy, nx, ny = section_foot(groove, feature, p.x, p.y)
+    qx, qy, nx, ny = features.section_foot(groove, feature, p.x, p.y)
     return Answer(-depth, Vector(qx, qy, p.z), Vector(nx, ny, 0.0), feature, 0.0, 0.0)
 
 
 @formula
 def inside(groove: Groove, rod: Rod, lo: float, hi: float, bound: float) -> Answer:
     """Axis that is in S for lo <= t <= hi: minus the depth of its deepest point, minus r."""
-    t = deepest(groove, rod, lo, hi)
-    out = way_out(groove, axis_point(rod, t))
+    t = features.deepest(groove, rod, lo, hi)
+    out = way_out(groove, features.axis_point(rod, t))
     return Answer(out.distance - rod.r, out.point, out.normal, out.feature, t, bound)
 
 
@@ -126,7 +101,7 @@ def inside_rate(groove: Groove, rod: Rod, t: float) -> Vector:
     to a second face, towards which the axis leads the other way: the depth falls by that mixture of both normals that
     is square to the axis.
     """
-    x, y, z = axis_point(rod, t)
+    x, y, z = features.axis_point(rod, t)
     rho, up = math.sqrt(x * x + y * y), 1.0 if z >= 0.0 else -1.0
     depths = (rho - groove.R, groove.h - y, groove.H - abs(z), groove.H + abs(z))
     normals = (
@@ -159,12 +134,12 @@ def inside_rate(groove: Groove, rod: Rod, t: float) -> Vector:
 def edge_normal(groove: Groove, feature: float, q: Vector) -> Vector:
     """A unit normal in the middle of the normal cone of an edge, for an axis that passes through the edge itself."""
     x, y, z = -q.x / groove.R, -q.y / groove.R, 0.0
-    if feature in (LIP_M, LIP_N):
+    if feature in (features.LIP_M, features.LIP_N):
         y += 1.0
-    elif feature != END_ARC:
-        x = 0.0 if feature in (END_EDGE_M, END_EDGE_N) else x
+    elif feature != features.END_ARC:
+        x = 0.0 if feature in (features.END_EDGE_M, features.END_EDGE_N) else x
         y = 1.0
-    if feature not in (LIP_M, LIP_N):
+    if feature not in (features.LIP_M, features.LIP_N):
         z = 1.0 if q.z > 0.0 else -1.0
     return over(Vector(x, y, z), math.sqrt(x * x + y * y + z * z))
 
@@ -172,9 +147,9 @@ def edge_normal(groove: Groove, feature: float, q: Vector) -> Vector:
 @inlined
 def is_in_material(groove: Groove, rod: Rod, t: float, is_rising: bool) -> bool:
     """Whether a point of the axis in the block is in S; ``is_rising``: it may be where the axis passes y = h."""
-    p = axis_point(rod, t)
+    p = features.axis_point(rod, t)
     is_level = is_rising and abs(p.x) >= groove.s and t == (groove.h - rod.centre.y) / rod.axis.y
-    return is_behind_arc(groove, p.x, p.y) or is_level
+    return features.is_behind_arc(groove, p.x, p.y) or is_level
 
 
 @inlined
@@ -188,17 +163,17 @@ def outside(groove: Groove, rod: Rod) -> Candidate:
     # by less than rounding.
     top, bottom = z + half * abs(rod.axis.z) >= H, z - half * abs(rod.axis.z) <= -H
     is_through = top and bottom  # then its ends are far from S
-    best = Candidate(math.inf, 0.0, ARC, rod.centre)
+    best = Candidate(math.inf, 0.0, features.ARC, rod.centre)
     if not is_through:
-        best = on_axis_end(groove, rod, -half, best)
-        best = on_axis_end(groove, rod, half, best)
-    best = on_lip(groove, rod, -1.0, best)
-    best = on_lip(groove, rod, 1.0, best)
+        best = features.on_axis_end(groove, rod, -half, best)
+        best = features.on_axis_end(groove, rod, half, best)
+    best = features.on_lip(groove, rod, -1.0, best)
+    best = features.on_lip(groove, rod, 1.0, best)
     if top or bottom:
         best = at_ends(groove, rod, best, top, bottom)
     if is_through:
-        best = on_axis_end(groove, rod, -half, best)
-        best = on_axis_end(groove, rod, half, best)
+        best = features.on_axis_end(groove, rod, -half, best)
+        best = features.on_axis_end(groove, rod, half, best)
     return best
 
 
@@ -207,27 +182,27 @@ def at_ends(groove: Groove, rod: Rod, best: Candidate, top: bool, bottom: bool) 
     """The best so far, or a corner, an edge or an arc of the ends that the axis reaches."""
     H = groove.H
     is_above = rod.centre.y + rod.half * abs(rod.axis.y) >= groove.h
-    low, high = end_circle(groove, rod, -H), end_circle(groove, rod, H)
+    low, high = features.end_circle(groove, rod, -H), features.end_circle(groove, rod, H)
     is_low_asked = is_high_asked = False
     if bottom:
-        best, falls = on_corner(groove, rod, -1.0, -H, best)
-        best, falls_too = on_corner(groove, rod, 1.0, -H, best)
+        best, falls = features.on_corner(groove, rod, -1.0, -H, best)
+        best, falls_too = features.on_corner(groove, rod, 1.0, -H, best)
         is_low_asked = falls or falls_too or has_two_minima(rod, low.p, low.v)
         if is_above:
-            best = on_end_edge(groove, rod, -H, best)
+            best = features.on_end_edge(groove, rod, -H, best)
     if top:
-        best, falls = on_corner(groove, rod, -1.0, H, best)
-        best, falls_too = on_corner(groove, rod, 1.0, H, best)
+        best, falls = features.on_corner(groove, rod, -1.0, H, best)
+        best, falls_too = features.on_corner(groove, rod, 1.0, H, best)
         is_high_asked = falls or falls_too or has_two_minima(rod, high.p, high.v)
         if is_above:
-            best = on_end_edge(groove, rod, H, best)
+            best = features.on_end_edge(groove, rod, H, best)
     if is_low_asked and not (is_high_asked and high.reach < low.reach):
-        best = on_end_arc(groove, rod, low, best)
+        best = features.on_end_arc(groove, rod, low, best)
         is_low_asked = False
     if is_high_asked:
-        best = on_end_arc(groove, rod, high, best)
+        best = features.on_end_arc(groove, rod, high, best)
     if is_low_asked:
-        best = on_end_arc(groove, rod, low, best)
+        best = features.on_end_arc(groove, rod, low, best)
     return best
 
 
@@ -256,12 +231,12 @@ def rounding(groove: Groove, rod: Rod) -> float:
 def from_outside(groove: Groove, rod: Rod, best: Candidate) -> Answer:
     """The answer of the candidate that is nearest to an axis outside S."""
     bound = rounding(groove, rod)
-    distance, normal = math.sqrt(best.d2) - rod.r, face_normal(groove, best.feature, best.point)
-    if best.feature == ARC:
+    distance, normal = math.sqrt(best.d2) - rod.r, features.face_normal(groove, best.feature, best.point)
+    if best.feature == features.ARC:
         # R - r first: exact for nearly equal radii, and rho is what is left.
-        p = axis_point(rod, best.t)
+        p = features.axis_point(rod, best.t)
         distance = (groove.R - rod.r) - math.sqrt(p.x * p.x + p.y * p.y)
-    elif best.feature >= END_ARC or best.feature in (LIP_M, LIP_N):
+    elif best.feature >= features.END_ARC or best.feature in (features.LIP_M, features.LIP_N):
         normal = normal_of_edge(groove, rod, best, bound)
     return Answer(distance, best.point, normal, best.feature, best.t, bound)
 
@@ -269,7 +244,7 @@ def from_outside(groove: Groove, rod: Rod, best: Candidate) -> Answer:
 @inlined
 def normal_of_edge(groove: Groove, rod: Rod, best: Candidate, bound: float) -> Vector:
     """Unit normal from a nearest point on an edge to the axis."""
-    n = minus(axis_point(rod, best.t), best.point)
+    n = minus(features.axis_point(rod, best.t), best.point)
     if dot(n, n) <= bound * bound:
         n = edge_normal(groove, best.feature, best.point)
     # Inside the axis the normal is across it, at an end it points back from it: with the axis close to the edge itself
@@ -289,7 +264,7 @@ def nearest(groove: Groove, rod: Rod) -> Answer:
     if is_parallel(groove, rod, rod.half):
         return parallel(groove, rod)
     if rod.centre.y - rod.half * abs(rod.axis.y) <= groove.h:
-        lo, hi = clip(groove, rod, rod.half)
+        lo, hi = features.clip(groove, rod, rod.half)
         # rho is convex along the axis: if any point of the part in the block is behind the arc, an end of it is.
         if lo <= hi and (
             is_in_material(groove, rod, lo, rod.axis.y < 0.0) or is_in_material(groove, rod, hi, rod.axis.y > 0.0)

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from clamp3d.core import kernel_features as features
 from clamp3d.core.jit import formula, inlined
 from clamp3d.core.kernel_distance import (
     UNIT,
@@ -29,33 +30,7 @@ from clamp3d.core.kernel_distance import (
     way_out,
 )
 from clamp3d.core.kernel_edges import Line, cylinder_distance, from_axis, on_arc, on_line
-from clamp3d.core.kernel_features import (
-    ARC,
-    CORNER_M,
-    CORNER_N,
-    END_ARC,
-    END_EDGE_M,
-    END_EDGE_N,
-    END_FACE,
-    FLAT_M,
-    FLAT_N,
-    LIP_M,
-    LIP_N,
-    TINY,
-    Groove,
-    Rod,
-    axis_point,
-    beyond_end,
-    clip,
-    face_normal,
-    farther_root,
-    in_mouth,
-    is_behind_arc,
-    nearer_root,
-    phi,
-    section,
-    section_foot,
-)
+from clamp3d.core.kernel_features import Groove, Rod
 from clamp3d.core.kernel_vector import Vector, dot, length, minus, over, plus, times
 
 
@@ -125,7 +100,7 @@ def on_face(groove: Groove, rod: Rod, normal: Vector, level: float, search: Sear
     if (a < 0.0 and rod.r <= rod.half) or a - rod.half * abs(along) - rod.r * across >= search.limit:
         return search
     f, t, out = plane_point(rod, a, along, across)
-    q = axis_point(rod, -t)
+    q = features.axis_point(rod, -t)
     if across > 0.0:
         q = plus(plus(q, out * along / across, rod.axis), -out / across, normal)
     if f == math.inf:
@@ -133,10 +108,10 @@ def on_face(groove: Groove, rod: Rod, normal: Vector, level: float, search: Sear
     if normal.y > 0.0:
         if abs(q.z) > groove.H or abs(q.x) < groove.s:
             return search
-        return better(search, f, Vector(q.x, level, q.z), FLAT_N if q.x >= 0.0 else FLAT_M)
-    if section(groove, q.x, q.y)[0] > 0.0:
+        return better(search, f, Vector(q.x, level, q.z), features.FLAT_N if q.x >= 0.0 else features.FLAT_M)
+    if features.section(groove, q.x, q.y)[0] > 0.0:
         return search
-    return better(search, f, Vector(q.x, q.y, normal.z * level), END_FACE)
+    return better(search, f, Vector(q.x, q.y, normal.z * level), features.END_FACE)
 
 
 @formula
@@ -151,13 +126,13 @@ def rim_point(rod: Rod, up: float, is_farthest: bool, inset: float) -> RimPoint:
     d, e2, e = rod.axis, rod.e2, math.sqrt(rod.e2)
     ex, ey = d.x / e, d.y / e
     radius = rod.r - inset
-    middle = axis_point(rod, up * (rod.half - inset))
+    middle = features.axis_point(rod, up * (rod.half - inset))
     b = abs(d.z)
     p = (ex * middle.y - ey * middle.x) / radius
     v = (ex * middle.x + ey * middle.y) / radius
     q, a = abs(p), abs(b * v)
-    if q > TINY or a > e2:
-        k = nearer_root(e2, a, q) if is_farthest else -farther_root(e2, a, q)
+    if q > features.TINY or a > e2:
+        k = features.nearer_root(e2, a, q) if is_farthest else -features.farther_root(e2, a, q)
         if not is_farthest and k >= 0.0:
             return none
         C, S = p / k, b * v / (k + e2)
@@ -171,14 +146,14 @@ def rim_point(rod: Rod, up: float, is_farthest: bool, inset: float) -> RimPoint:
     out = Vector(-ey * C + ex * b * S, ex * C + ey * b * S, -e * math.copysign(1.0, d.z) * S)
     point = plus(middle, radius, out)
     rho = math.sqrt(point.x * point.x + point.y * point.y)
-    if rho < TINY:
+    if rho < features.TINY:
         return none
     by_radius = (point.x * out.x + point.y * out.y) / rho
     return RimPoint(rho, point, by_radius, up * (point.x * d.x + point.y * d.y) / rho)
 
 
 @formula
-def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Search) -> tuple[RimPoint, float]:
+def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool) -> tuple[RimPoint, float]:
     """The point of a rim that reaches behind the arc, shrunk until it just touches it, and by how much it is shrunk.
 
     Its rho is -1 if that is no candidate.
@@ -186,19 +161,9 @@ def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Sea
     inset, most = 0.0, min(rod.r, rod.half)
     none = RimPoint(-1.0, rod.centre, 0.0, 0.0)
     point = rim_point(rod, up, is_farthest, inset)
-    if search.limit < 0.0 and is_farthest:  # less than the best inset frees this rim, or it goes on
-        inset = -search.limit
-        if inset < most:
-            point = rim_point(rod, up, is_farthest, inset)
-        if inset == most or point.rho <= groove.R:
-            return none, inset
-    last = math.inf
     for _ in range(60):
         rate = point.by_radius + point.by_length
-        step = (point.rho - groove.R) / rate if rate > 0.0 else math.inf
-        # Convex, so Newton's steps stay on this side of the root: what passes the bound is no candidate.
-        if is_farthest and inset + step > 64.0 * search.eps - search.least:
-            return none, inset
+        step = (point.rho - groove.R) / rate if rate > 0.0 else math.inf  # Newton's: convex, so it stays on this side
         if not inset + step < most:  # it never does: of a disc, what is left last
             if rod.r <= rod.half:
                 return none, most
@@ -206,12 +171,8 @@ def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Sea
             return (point, most) if point.rho >= groove.R else (none, most)
         inset += step
         point = rim_point(rod, up, is_farthest, inset)
-        size = abs(step)
-        if point.rho <= 0.0 or abs(point.rho - groove.R) <= 2.0 * UNIT * groove.R:
+        if point.rho <= 0.0 or abs(point.rho - groove.R) <= 2.0 * UNIT * groove.R or abs(step) <= 1e-12 * groove.R:
             break
-        if size <= 1e-12 * groove.R or (size <= 1e-8 * groove.R and size > 0.7 * last):
-            break
-        last = size
     return point, inset
 
 
@@ -219,24 +180,21 @@ def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Sea
 def on_arc_surface(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Search) -> Search:
     """The search with the arc surface against a rim, from inside."""
     R = groove.R
-    end = axis_point(rod, up * rod.half)
-    if R - math.sqrt(end.x * end.x + end.y * end.y) - rod.r > search.limit + 4.0 * search.eps:
-        return search
     rim, inset = rim_point(rod, up, is_farthest, 0.0), 0.0
     if not (rim.rho > 0.0 and R - rim.rho <= search.limit):  # nor if a square has overflowed
         return search
     if rim.rho > R:
-        rim, inset = free_rim(groove, rod, up, is_farthest, search)
+        rim, inset = free_rim(groove, rod, up, is_farthest)
     if rim.rho <= 0.0 or abs(rim.point.z) > groove.H:
         return search
     scale = R / rim.rho if inset < min(rod.r, rod.half) else 1.0
     point = Vector(rim.point.x * scale, rim.point.y * scale, rim.point.z)
-    if in_mouth(groove, point.x, point.y):
+    if features.in_mouth(groove, point.x, point.y):
         return search
     f = R - rim.rho
     if inset > 0.0:
         f = point_distance(rod, point)
-    return better(search, f, point, ARC)
+    return better(search, f, point, features.ARC)
 
 
 @inlined
@@ -261,7 +219,7 @@ def on_edge(
         return search
     p = min(max(place.p + middle, lo), hi)
     if p in (lo, hi):
-        feature = CORNER_M if feature in (LIP_M, END_EDGE_M) else CORNER_N
+        feature = features.CORNER_M if feature in (features.LIP_M, features.END_EDGE_M) else features.CORNER_N
     return better(search, place.f, plus(origin, p, direction), feature)
 
 
@@ -271,7 +229,7 @@ def on_circle(groove: Groove, rod: Rod, ez: float, search: Search) -> Search:
     place = on_arc(groove, rod, ez, search.limit, search.eps)
     if place.f < math.inf:
         point = Vector(groove.R * math.sin(place.p), -groove.R * math.cos(place.p), ez)
-        search = better(search, point_distance(rod, point), point, END_ARC)
+        search = better(search, point_distance(rod, point), point, features.END_ARC)
     left = min(search.left, place.left)
     return Search(search.f, search.point, search.feature, search.limit, search.least, left, search.eps)
 
@@ -291,10 +249,9 @@ def best_point(groove: Groove, rod: Rod, search: Search) -> Search:
     if search.f < math.inf and search.limit <= search.least:
         return search
     is_above = c.y + rod.half * abs(d.y) + rod.r * math.sqrt(d.x * d.x + d.z * d.z) >= h
-    if search.f == math.inf or is_above or h > 0.0:
-        along_z = Vector(0.0, 0.0, 1.0)
-        search = on_edge(rod, Vector(-s, h, 0.0), along_z, -H, H, LIP_M, search)
-        search = on_edge(rod, Vector(s, h, 0.0), along_z, -H, H, LIP_N, search)
+    along_z = Vector(0.0, 0.0, 1.0)
+    search = on_edge(rod, Vector(-s, h, 0.0), along_z, -H, H, features.LIP_M, search)
+    search = on_edge(rod, Vector(s, h, 0.0), along_z, -H, H, features.LIP_N, search)
     far = rod.half * abs(d.z) + rod.r * math.sqrt(rod.e2)
     for k in range(2):
         up = 1.0 if k == 0 else -1.0
@@ -303,8 +260,8 @@ def best_point(groove: Groove, rod: Rod, search: Search) -> Search:
             continue
         if is_above:
             along_x = Vector(1.0, 0.0, 0.0)
-            search = on_edge(rod, Vector(0.0, h, up * H), along_x, -math.inf, -s, END_EDGE_M, search)
-            search = on_edge(rod, Vector(0.0, h, up * H), along_x, s, math.inf, END_EDGE_N, search)
+            search = on_edge(rod, Vector(0.0, h, up * H), along_x, -math.inf, -s, features.END_EDGE_M, search)
+            search = on_edge(rod, Vector(0.0, h, up * H), along_x, s, math.inf, features.END_EDGE_N, search)
         search = on_circle(groove, rod, up * H, search)
     return search
 
@@ -312,17 +269,17 @@ def best_point(groove: Groove, rod: Rod, search: Search) -> Search:
 @inlined
 def edge_direction(groove: Groove, best: Search) -> Vector:
     """Direction of the edge on which a point of the groove is; else zero."""
-    if best.feature == END_ARC:
+    if best.feature == features.END_ARC:
         return Vector(-best.point.y / groove.R, best.point.x / groove.R, 0.0)
-    if best.feature in (END_EDGE_M, END_EDGE_N):
+    if best.feature in (features.END_EDGE_M, features.END_EDGE_N):
         return Vector(1.0, 0.0, 0.0)
-    return Vector(0.0, 0.0, 1.0 if best.feature in (LIP_M, LIP_N) else 0.0)
+    return Vector(0.0, 0.0, 1.0 if best.feature in (features.LIP_M, features.LIP_N) else 0.0)
 
 
 @inlined
 def shares(groove: Groove, best: Search, side: Vector, end: Vector) -> tuple[float, float]:
     """Shares of side and end in a mixture along the face's normal, or square to the edge; 0 and 0 if there is none."""
-    m = face_normal(groove, best.feature, best.point)
+    m = features.face_normal(groove, best.feature, best.point)
     u, v = max(dot(side, m), 0.0), max(dot(end, m), 0.0)
     if u + v == 0.0:
         m = edge_direction(groove, best)
@@ -340,13 +297,13 @@ def witness(groove: Groove, rod: Rod, best: Search, bound: float) -> tuple[Vecto
     f, g, e = best.f, w - rod.r, abs(t) - rod.half
     to_end = times(-1.0 if t >= 0.0 else 1.0, rod.axis)  # from the point back to the end, and to the side
     to_side = to_end
-    if w > TINY:
+    if w > features.TINY:
         to_side = over(plus(point, -t, rod.axis), -w)
     else:
         g = -math.inf
     u, v = shares(groove, best, to_side, to_end)
     is_mixed = u + v > 0.0
-    on_face = best.feature in (ARC, FLAT_M, FLAT_N, END_FACE)
+    on_face = best.feature in (features.ARC, features.FLAT_M, features.FLAT_N, features.END_FACE)
     if f <= 0.0:
         if not (abs(g - e) <= 64.0 * bound and is_mixed):
             u, v = (1.0, 0.0) if g >= e else (0.0, 1.0)
@@ -367,7 +324,7 @@ def flat_parallel(groove: Groove, rod: Rod) -> Answer:
     """Axis along z: the plane problem of a disc and the section, and the gap along z."""
     x, y, z = rod.centre
     r, half, H = rod.r, rod.half, groove.H
-    gap, feature = section(groove, x, y)
+    gap, feature = features.section(groove, x, y)
     end = abs(z) - H
     bound = UNIT * (6.0 * (groove.R + abs(x) + abs(y)) + 4.0 * (H + abs(z) + half) + r)
     if gap < 0.0 and end <= max(half - r, 0.0):  # the groove goes on where nothing is left of the cylinder
@@ -376,10 +333,10 @@ def flat_parallel(groove: Groove, rod: Rod) -> Answer:
         out = way_out(groove, rod.centre)
         return Answer(out.distance - half, out.point, out.normal, out.feature, 0.0, bound)
     g, e = gap - r if gap > 0.0 else -r, max(end, 0.0) - half
-    if feature == ARC and gap > 0.0:
+    if feature == features.ARC and gap > 0.0:
         g = (groove.R - r) - math.sqrt(x * x + y * y)
-    f = phi(g, e)
-    qx, qy, nx, ny = section_foot(groove, feature, x, y)
+    f = features.phi(g, e)
+    qx, qy, nx, ny = features.section_foot(groove, feature, x, y)
     if gap <= 0.0:
         qx, qy = x, y
     above = 1.0 if z > 0.0 else -1.0
@@ -387,7 +344,7 @@ def flat_parallel(groove: Groove, rod: Rod) -> Answer:
     qz, normal = 0.5 * (lo + hi) if lo <= hi else above * H, Vector(nx, ny, 0.0)
     if g > 0.0 and e > 0.0:
         normal = Vector(nx * (g / f), ny * (g / f), above * (e / f))
-        feature = beyond_end(feature)
+        feature = features.beyond_end(feature)
     elif g >= e:
         if g < 0.0 and abs(qz - z) - half > g:  # the middle of the line of contact is nearer to an end
             qz = min(max(z, -H), H)
@@ -395,7 +352,7 @@ def flat_parallel(groove: Groove, rod: Rod) -> Answer:
         qz = min(max(z, -H), H)
         normal = Vector(0.0, 0.0, above)
         if end >= 0.0:
-            feature = END_FACE if gap <= 0.0 else beyond_end(feature)
+            feature = features.END_FACE if gap <= 0.0 else features.beyond_end(feature)
     return Answer(f, Vector(qx, qy, qz), normal, feature, (qz - z) * math.copysign(1.0, rod.axis.z), bound)
 
 
@@ -424,14 +381,14 @@ def after_nothing_left(groove: Groove, rod: Rod, capsule: Answer) -> tuple[bool,
     """Whether what is left last of the cylinder is in the material; then answer and rate."""
     bound = capsule.bound
     if rod.half < rod.r:
-        if section(groove, rod.centre.x, rod.centre.y)[0] > 0.0 or abs(rod.centre.z) > groove.H:
+        if features.section(groove, rod.centre.x, rod.centre.y)[0] > 0.0 or abs(rod.centre.z) > groove.H:
             return False, capsule, capsule.normal
         out = way_out(groove, rod.centre)
         return True, Answer(out.distance - rod.half, out.point, out.normal, out.feature, 0.0, bound), out.normal
     left = shrunk(rod)
-    lo, hi = clip(groove, rod, left.half)
-    low, high = axis_point(rod, lo), axis_point(rod, hi)
-    if lo > hi or not (is_behind_arc(groove, low.x, low.y) or is_behind_arc(groove, high.x, high.y)):
+    lo, hi = features.clip(groove, rod, left.half)
+    low, high = features.axis_point(rod, lo), features.axis_point(rod, hi)
+    if lo > hi or not (features.is_behind_arc(groove, low.x, low.y) or features.is_behind_arc(groove, high.x, high.y)):
         return False, capsule, capsule.normal
     answer = inside(groove, left, lo, hi, bound)
     return True, answer, inside_rate(groove, left, answer.t)

@@ -11,33 +11,10 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from clamp3d.core import kernel_features as features
 from clamp3d.core.jit import entry, formula, inlined
 from clamp3d.core.kernel_distance import edge_normal, is_parallel
-from clamp3d.core.kernel_features import (
-    ARC,
-    END_FACE,
-    FLAT_M,
-    FLAT_N,
-    LIP_M,
-    LIP_N,
-    TINY,
-    Candidate,
-    Groove,
-    Rod,
-    axis_point,
-    beyond_end,
-    clip,
-    deepest,
-    end_circle,
-    face_normal,
-    groove_of,
-    on_corner,
-    on_end_arc,
-    on_end_edge,
-    on_lip,
-    section,
-    section_foot,
-)
+from clamp3d.core.kernel_features import Candidate, Groove, Rod
 from clamp3d.core.kernel_pose import rigid, rod_at
 from clamp3d.core.kernel_vector import Vector, cross, length, minus, over, put
 from clamp3d.core.pose import Array
@@ -70,10 +47,14 @@ def piece_section(groove: Groove, piece: int, p: Vector) -> tuple[float, float, 
     if piece == ARC_SURFACE:
         if abs(p.x) * -h + p.y * s <= 0.0:
             rho = math.sqrt(p.x * p.x + p.y * p.y)
-            return (abs(R - rho), p.x / rho * R, p.y / rho * R, ARC) if rho >= TINY else (R, 0.0, -R, ARC)
+            return (
+                (abs(R - rho), p.x / rho * R, p.y / rho * R, features.ARC)
+                if rho >= features.TINY
+                else (R, 0.0, -R, features.ARC)
+            )
     elif side * p.x >= s:
-        return abs(p.y - h), p.x, h, FLAT_N if side > 0.0 else FLAT_M
-    lip = LIP_N if side > 0.0 else LIP_M
+        return abs(p.y - h), p.x, h, features.FLAT_N if side > 0.0 else features.FLAT_M
+    lip = features.LIP_N if side > 0.0 else features.LIP_M
     return math.sqrt((side * p.x - s) * (side * p.x - s) + (p.y - h) * (p.y - h)), side * s, h, lip
 
 
@@ -97,13 +78,13 @@ def sign(groove: Groove, piece: int, p: Vector) -> tuple[float, float, float]:
 @formula
 def plain_gap(groove: Groove, rod: Rod, best: Candidate) -> Gap:
     """Gap of a piece that the axis is outside of."""
-    p = axis_point(rod, best.t)
+    p = features.axis_point(rod, best.t)
     normal = minus(p, best.point)
     n = length(normal)
     if n > 1e-13 * groove.R:
         normal = over(normal, n)
-    elif best.feature in (ARC, FLAT_M, FLAT_N, END_FACE):
-        normal = face_normal(groove, best.feature, best.point)
+    elif best.feature in (features.ARC, features.FLAT_M, features.FLAT_N, features.END_FACE):
+        normal = features.face_normal(groove, best.feature, best.point)
     else:
         normal = edge_normal(groove, best.feature, best.point)
     return Gap(math.sqrt(best.d2) - rod.r, best.point, normal, best.feature, normal, p)
@@ -112,11 +93,11 @@ def plain_gap(groove: Groove, rod: Rod, best: Candidate) -> Gap:
 @formula
 def on_side_at(groove: Groove, rod: Rod, piece: int, t: float, best: Candidate) -> Candidate:
     """The best so far, or the point of a side piece that is nearest to the axis point at t."""
-    p = axis_point(rod, t)
+    p = features.axis_point(rod, t)
     gap, x, y, feature = piece_section(groove, piece, p)
     d2, z, end = gap * gap, p.z, abs(p.z) - groove.H
     if end > 0.0:
-        d2, z, feature = d2 + end * end, math.copysign(groove.H, z), beyond_end(feature)
+        d2, z, feature = d2 + end * end, math.copysign(groove.H, z), features.beyond_end(feature)
     return Candidate(d2, t, feature, Vector(x, y, z)) if d2 < best.d2 else best
 
 
@@ -124,21 +105,21 @@ def on_side_at(groove: Groove, rod: Rod, piece: int, t: float, best: Candidate) 
 def on_back_of_arc(groove: Groove, rod: Rod, best: Candidate) -> Candidate:
     """The best so far, or the arc from behind, where it is convex: the axis' approach to the groove's own axis."""
     t = -(rod.centre.x * rod.axis.x + rod.centre.y * rod.axis.y) / rod.e2
-    x, y, z = axis_point(rod, t)
+    x, y, z = features.axis_point(rod, t)
     rho = math.sqrt(x * x + y * y)
     gap = rho - groove.R
     if abs(t) > rod.half or abs(z) > groove.H or gap <= 0.0 or gap * gap >= best.d2:
         return best
     if abs(x) * -groove.h + y * groove.s > 0.0:
         return best
-    return Candidate(gap * gap, t, ARC, Vector(x / rho * groove.R, y / rho * groove.R, z))
+    return Candidate(gap * gap, t, features.ARC, Vector(x / rho * groove.R, y / rho * groove.R, z))
 
 
 @formula
 def side_gap(groove: Groove, rod: Rod, piece: int) -> Gap:
     """Gap of the arc surface or of a flat face without regard to sign."""
     H, half, z = groove.H, rod.half, rod.centre.z
-    best = Candidate(math.inf, 0.0, ARC, rod.centre)
+    best = Candidate(math.inf, 0.0, features.ARC, rod.centre)
     if is_parallel(groove, rod, half):  # one point in the middle of the stretch next to the groove, or the nearer end
         lo, hi = max(z - half, -H), min(z + half, H)
         along = 0.5 * (lo + hi) - z if lo <= hi else (-half if hi == H else half)
@@ -151,13 +132,13 @@ def side_gap(groove: Groove, rod: Rod, piece: int) -> Gap:
         side = -1.0 if k == 0 else 1.0
         ez = side * H
         if piece != (FACE_N if k == 0 else FACE_M):  # its own lip and corners
-            best = on_lip(groove, rod, side, best)
-            best, _ = on_corner(groove, rod, side, -H, best)
-            best, _ = on_corner(groove, rod, side, H, best)
+            best = features.on_lip(groove, rod, side, best)
+            best, _ = features.on_corner(groove, rod, side, -H, best)
+            best, _ = features.on_corner(groove, rod, side, H, best)
         if piece == ARC_SURFACE:
-            best = on_end_arc(groove, rod, end_circle(groove, rod, ez), best)
+            best = features.on_end_arc(groove, rod, features.end_circle(groove, rod, ez), best)
         else:
-            edge = on_end_edge(groove, rod, ez, best)
+            edge = features.on_end_edge(groove, rod, ez, best)
             best = edge if edge.point.x * side_of(piece, 0.0) > 0.0 else best
     return plain_gap(groove, rod, best)
 
@@ -165,14 +146,14 @@ def side_gap(groove: Groove, rod: Rod, piece: int) -> Gap:
 @formula
 def on_face_at(groove: Groove, rod: Rod, ez: float, t: float, best: Candidate) -> Candidate:
     """The best so far, or the point of the end face z = ez that is nearest to the axis point at t."""
-    x, y, z = axis_point(rod, t)
-    gap, feature = section(groove, x, y)
+    x, y, z = features.axis_point(rod, t)
+    gap, feature = features.section(groove, x, y)
     d2 = (z - ez) * (z - ez)
     if gap <= 0.0:
-        feature = END_FACE
+        feature = features.END_FACE
     else:
-        x, y, _, _ = section_foot(groove, feature, x, y)
-        d2, feature = d2 + gap * gap, beyond_end(feature)
+        x, y, _, _ = features.section_foot(groove, feature, x, y)
+        d2, feature = d2 + gap * gap, features.beyond_end(feature)
     return Candidate(d2, t, feature, Vector(x, y, ez)) if d2 < best.d2 else best
 
 
@@ -184,20 +165,20 @@ def end_gap(groove: Groove, rod: Rod, up: float) -> Gap:
     front, back = up * z + reach - groove.H, groove.H - up * z + reach  # how far the axis is on either side
     is_through = front > 0.0 and back > 0.0 and dz != 0.0
     t = (ez - z) / dz
-    p = axis_point(rod, t)
-    if is_through and section(groove, p.x, p.y)[0] < 0.0:
+    p = features.axis_point(rod, t)
+    if is_through and features.section(groove, p.x, p.y)[0] < 0.0:
         return gap_through(groove, rod, up, front, back)
-    best = Candidate(math.inf, 0.0, END_FACE, rod.centre)
+    best = Candidate(math.inf, 0.0, features.END_FACE, rod.centre)
     best = on_face_at(groove, rod, ez, -rod.half, best)
     best = on_face_at(groove, rod, ez, rod.half, best)
     if is_parallel(groove, rod, rod.half):
         if is_through:
             best = on_face_at(groove, rod, ez, t, best)
     else:
-        best = on_end_edge(groove, rod, ez, best)
-        best, _ = on_corner(groove, rod, -1.0, ez, best)
-        best, _ = on_corner(groove, rod, 1.0, ez, best)
-        best = on_end_arc(groove, rod, end_circle(groove, rod, ez), best)
+        best = features.on_end_edge(groove, rod, ez, best)
+        best, _ = features.on_corner(groove, rod, -1.0, ez, best)
+        best, _ = features.on_corner(groove, rod, 1.0, ez, best)
+        best = features.on_end_arc(groove, rod, features.end_circle(groove, rod, ez), best)
     return plain_gap(groove, rod, best)
 
 
@@ -205,23 +186,23 @@ def end_gap(groove: Groove, rod: Rod, up: float) -> Gap:
 def gap_through(groove: Groove, rod: Rod, up: float, front: float, back: float) -> Gap:
     """Gap of an end face that the axis goes through: by its way out, sideways or back along z."""
     ez, d = up * groove.H, rod.axis
-    x, y, _ = axis_point(rod, (ez - rod.centre.z) / d.z)
-    gap, feature = section(groove, x, y)
+    x, y, _ = features.axis_point(rod, (ez - rod.centre.z) / d.z)
+    gap, feature = features.section(groove, x, y)
     if min(front, back) < -gap:
         way = up if back < front else -up
-        end = axis_point(rod, math.copysign(rod.half, -d.z * way))
+        end = features.axis_point(rod, math.copysign(rod.half, -d.z * way))
         point, normal, rate = Vector(x, y, ez), Vector(0.0, 0.0, up), Vector(0.0, 0.0, way)
-        return Gap(-min(front, back) - rod.r, point, normal, END_FACE, rate, end)
-    qx, qy, nx, ny = section_foot(groove, feature, x, y)
+        return Gap(-min(front, back) - rod.r, point, normal, features.END_FACE, rate, end)
+    qx, qy, nx, ny = features.section_foot(groove, feature, x, y)
     rate = Vector(nx, ny, -(nx * d.x + ny * d.y) / d.z)  # the crossing point moves in the face's plane
     point, normal, crossing = Vector(qx, qy, ez), Vector(nx, ny, 0.0), Vector(x, y, ez)
-    return Gap(gap - rod.r, point, normal, beyond_end(feature), rate, crossing)
+    return Gap(gap - rod.r, point, normal, features.beyond_end(feature), rate, crossing)
 
 
 @formula
 def gap_inside(groove: Groove, rod: Rod, piece: int, t: float, outer: Gap) -> Gap:
     """Gap of a side piece, whose distance is that of ``outer``, for an axis that is deepest in the material at t."""
-    p = axis_point(rod, t)
+    p = features.axis_point(rod, t)
     factor, fx, fy = sign(groove, piece, p)
     if factor > 0.0:
         free, g = outer.distance + rod.r, outer.rate
@@ -238,13 +219,13 @@ def gap_inside(groove: Groove, rod: Rod, piece: int, t: float, outer: Gap) -> Ga
 @inlined
 def place_inside(groove: Groove, rod: Rod) -> float:
     """Place of the axis' deepest point in the material, as if the groove were endless; NaN if it is in none."""
-    lo, hi = clip(groove, rod, rod.half)
+    lo, hi = features.clip(groove, rod, rod.half)
     # An axis that only touches an end face is on it, not inside.
     if lo > hi or abs(rod.centre.z + 0.5 * (lo + hi) * rod.axis.z) >= groove.H:
         return math.nan
     endless = 2.0 * (groove.H + abs(rod.centre.z) + rod.half)
-    t = deepest(Groove(groove.R, groove.half_angle, groove.s, groove.h, endless), rod, lo, hi)
-    p = axis_point(rod, t)
+    t = features.deepest(Groove(groove.R, groove.half_angle, groove.s, groove.h, endless), rod, lo, hi)
+    p = features.axis_point(rod, t)
     return t if min(math.sqrt(p.x * p.x + p.y * p.y) - groove.R, groove.h - p.y) > 0.0 else math.nan
 
 
@@ -253,7 +234,7 @@ def pieces(T: Array, R: float, half_angle: float, H: float, r: float, half: floa
     """The five pieces at one pose (1, 4, 4) into records (5,); False for a pose that is not rigid."""
     if not rigid(T, 0):
         return False
-    groove, rod = groove_of(R, half_angle, H), rod_at(T, 0, r, half)
+    groove, rod = features.groove_of(R, half_angle, H), rod_at(T, 0, r, half)
     t = place_inside(groove, rod)
     for piece in range(5):
         if piece < 3:
