@@ -120,8 +120,6 @@ def any_pose(draw):
     T = draw(rigid())
     if pick(draw, True, True, False):
         return pick(draw, lambda T: T, np.asfortranarray, np.ndarray.tolist, lambda T: T.astype(">f8"))(T)
-    if pick(draw, True, False):
-        T[draw(st.integers(0, 3)), draw(st.integers(0, 3))] = draw(NUMBERS)
-        return T
+    T[draw(st.integers(0, 3)), draw(st.integers(0, 3))] += pick(draw, 0.0, draw(NUMBERS))
     factor = pick(draw, 2.0, -1.0, 1.001, 1.0 + 1e-7, 0.0, 1e-300, 1e200)
     return pick(draw, T * [[factor, 1, 1, 1]], T * factor, T + 1e-3j, T.astype(str), T[:3], T[None], T.astype(object))

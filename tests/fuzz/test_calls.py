@@ -39,18 +39,15 @@ TARGETS = [
     (kernel.signed_distance, {"groove": GROOVES, "cylinder": WIRES, "pose": any_pose()}),
     (kernel.signed_distances, {"groove": GROOVES, "cylinder": WIRES, "poses": POSES}),
     (kernel.relative_pose, {"T_world_a": any_pose(), "T_world_b": any_pose()}),
-    (kernel.SweptArc, {"radius": SIZES, "half_angle": st.floats(0.0, 3.2), "length": SIZES}),
     (clamp3d.first_contact, WAY),
     (clamp3d.min_clearance, WAY),
     (shapes.make_mesh, {"vertices": SIZES.map(lambda s: (s * np.array(FLAT)).tolist()), "faces": FACES}),
-    (shapes.box, {"size": THREE.map(lambda x: (np.abs(x) + 0.1).tolist())}),
     (shapes.groove_block, {"groove": GROOVES, "width": SIZES.map(lambda s: 9 * s), "height": SIZES}),
     (BLOCK_AND_WIRE.add, {"part": "a", "shape": BOX, "T_world": any_pose()}),
     (clamp3d.Motion.screw, {"parts": "wire", "axis": THREE, "angle": st.floats(-4.0, 4.0), "point": THREE}),
     (clamp3d.check, {"scene": rigid().map(lambda T: BLOCK_AND_WIRE.moved({"wire": T}))}),
     (clamp3d.check_poses, {"scene": BLOCK_AND_WIRE, "part": "wire", "poses": POSES}),
     (clamp3d.distance, {"a": BLOCK, "b": BOX, "T_a_b": rigid()}),
-    (clamp3d.load_clamp, {"source": "reference", "line": st.sampled_from([None, "LJ-500", "20"])}),
 ]
 """What is called, and its arguments or strategies for them; what has a default and is not named gets that."""
 

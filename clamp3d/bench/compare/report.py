@@ -19,16 +19,14 @@ def comparison_to_dict(comparison: Comparison) -> dict[str, Any]:
 
     def assembly(row: Assembled | NotMeasured) -> dict[str, Any]:
         data = asdict(row)
-        if isinstance(row, Assembled):
-            data |= {"error": row.distance - truth, "published": _published(row)}
-        return data
+        return data | ({"error": row.distance - truth} if isinstance(row, Assembled) else {})
 
     return {
         "machine": asdict(comparison.machine),
         "seconds": comparison.seconds,
         "contact": [asdict(row) for row in comparison.contact],
         "peers": [asdict(row) for row in comparison.peers],
-        "assembly": [assembly(row) for row in (*comparison.exact, *comparison.stepped)],
+        "assembly": [assembly(row) for row in comparison.assemblies],
         "image": asdict(comparison.image),
     }
 
@@ -44,7 +42,7 @@ def comparison_to_text(comparison: Comparison) -> str:
         contact=[_contact(row) for row in rows if isinstance(row, Measured)],
         missing_contact=[row for row in rows if isinstance(row, NotMeasured)],
         assembly=_assembly(comparison),
-        missing_assembly=[row for row in (*comparison.exact, comparison.image) if isinstance(row, NotMeasured)],
+        missing_assembly=[row for row in (*comparison.assemblies, comparison.image) if isinstance(row, NotMeasured)],
         published=published.IMAGE_DISTANCES,
         five=lambda values: ", ".join(f"{value:.3f}" for value in values),
     )
@@ -58,26 +56,16 @@ def _contact(row: Measured) -> list[object]:
 
 
 def _assembly(comparison: Comparison) -> list[list[object]]:
-    truth = exact_distance(comparison)
-    rows: list[list[object]] = []
-    for exact, stepped in zip(comparison.exact, comparison.stepped, strict=True):
-        if isinstance(exact, Assembled) and isinstance(stepped, Assembled):
-            theirs = _published(stepped)
-            by_gradients = [_signed(exact.distance - truth), f"{exact.seconds:.3f}", exact.contact_queries]
-            by_steps = [f"{theirs:.3f}" if theirs else "-", f"{stepped.seconds:.2f}", stepped.contact_queries]
-            rest = [f"{exact.setup:.2g}", "" if exact.status == "clamped" else exact.status]
-            lengths = f"{exact.distance:.4f}", f"{stepped.distance:.3f}"
-            rows.append([exact.label, lengths[0], *by_gradients, lengths[1], *by_steps, *rest])
-    return rows
-
-
-def _published(row: Assembled) -> float | None:
-    if row.method == "cas":
-        return published.CAS_DISTANCE
-    if row.method in ("chords", "wedges") and row.solver == "stepped":
-        return published.CHORD_DISTANCES.get(row.setting or 0.0)
-    return None
-
-
-def _signed(value: float) -> str:
-    return f"{value:+.2g}" if value else "0"
+    truth, rows = exact_distance(comparison), [row for row in comparison.assemblies if isinstance(row, Assembled)]
+    return [
+        [
+            row.label,
+            f"{row.distance:.4f}",
+            f"{row.distance - truth:+.2g}" if row.distance != truth else "0",
+            f"{row.seconds:.3f}",
+            row.contact_queries,
+            f"{row.setup:.2g}",
+            "" if row.status == "clamped" else row.status,
+        ]
+        for row in rows
+    ]

@@ -51,8 +51,7 @@ class Comparison:
     machine: Machine
     contact: tuple[Measured | NotMeasured, ...]
     peers: tuple[Measured | NotMeasured, ...]
-    exact: tuple[Assembled | NotMeasured, ...]
-    stepped: tuple[Assembled | NotMeasured, ...]
+    assemblies: tuple[Assembled | NotMeasured, ...]
     image: Imaged | NotMeasured
     seconds: float
 
@@ -101,16 +100,14 @@ def compare(
             else:
                 done += 1
     rows_on_poses = [quickest(rows) for rows in rounds]
-    both = [job("assembly", m, ASSEMBLY_LIMIT, f"assembly by {m.label}") for m in ASSEMBLIES]
-    pairs = [answers if isinstance(answers, tuple) else (answers, answers) for answers in both]
+    assemblies = tuple(job("assembly", m, ASSEMBLY_LIMIT, f"assembly by {m.label}") for m in ASSEMBLIES)
     image = job("image", Method("image"), ASSEMBLY_LIMIT, "measuring in a picture")
     progress(total, total, "done")
     return Comparison(
         machine((*LIBRARIES, *(PEER_LIBRARIES if peers else ()))),
         tuple(rows_on_poses[: len(METHODS)]),
         tuple(rows_on_poses[len(METHODS) :]),
-        tuple(exact for exact, _ in pairs),
-        tuple(stepped for _, stepped in pairs),
+        assemblies,
         image,
         time.monotonic() - start,
     )
@@ -128,7 +125,7 @@ def quickest(rows: Sequence[Measured | NotMeasured]) -> Measured | NotMeasured:
 
 def exact_distance(comparison: Comparison) -> float:
     """The assembled clamp's splint distance in mm by the exact method. Raises Clamp3dError if that failed."""
-    for row in comparison.exact:
+    for row in comparison.assemblies:
         if isinstance(row, Assembled) and row.method == "cas":
             return row.distance
     raise Clamp3dError("the assembly by cas gave no distance to compare with")

@@ -16,8 +16,6 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clamp3d.baselines.cas import Cas
-from clamp3d.baselines.chords import Chords
 from clamp3d.bench.compare import run as study
 from clamp3d.bench.compare.assemblies import Assembled, Imaged
 from clamp3d.bench.compare.chart import save_comparison
@@ -28,11 +26,7 @@ from clamp3d.bench.compare.peers import SERIES, load_peer, missing_peers, prepar
 from clamp3d.bench.compare.report import comparison_to_dict, comparison_to_text
 from clamp3d.bench.compare.run import LIBRARIES, Comparison, NotMeasured, compare, pareto
 from clamp3d.bench.compare.scene import chord_error
-from clamp3d.bench.complexity import fitted, grid_search
 from clamp3d.bench.machine import machine
-from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.features import wire_pairs
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.cli.compare import command
 from clamp3d.errors import InputError
 
@@ -137,21 +131,6 @@ def test_pages_say_what_the_figures_say(tmp_path: Path) -> None:
         update(root / "LICENSE", "")
 
 
-def test_grid_search_finds_the_final_state_and_counts_as_the_paper_does() -> None:
-    run = assemble(load_clamp(), Cas())
-    for parts in (1, 2, 3):
-        found = grid_search(run, Cas(), n=7, parts=parts, grooves=4)
-        assert found.positions == 7**parts
-        assert found.tests == 4 * 7**parts
-        # The grid has the exact place (with 1e-6 mm of room) and nothing below it.
-        assert found.closing == pytest.approx(run.closing, abs=2e-6)
-    chords = Chords(math.radians(20.0))
-    found = grid_search(run, chords, n=7, parts=1, grooves=4)
-    assert found.tests == 7 * chords.segments(wire_pairs(run.clamp))
-    assert found.closing is None or found.closing > run.closing + 0.1
-    assert fitted([1, 2, 4, 8], [5, 10, 20, 40]) == pytest.approx(1.0)
-
-
 def _comparison() -> Comparison:
     contact = (
         _row("cas", 2e-6, 3e-15),
@@ -164,10 +143,10 @@ def _comparison() -> Comparison:
         _row("coal-capsule", 2e-4, 5e-4, 1.0),
         NotMeasured("mujoco-capsule", 1.0, "mujoco-capsule 1 deg", "not installed: pip install mujoco"),
     )
-    rows = [Assembled("cas", None, "cas", s, "clamped", 31.53, 0.0, 0.05, 864, 0) for s in ("exact", "stepped")]  # type: ignore[arg-type]
+    exact = Assembled("cas", None, "cas", "exact", "clamped", 31.53, 0.0, 0.05, 864)
     late = NotMeasured("hulls", 2.0, "hulls 2 mm", "not finished in 150 s")
     image = dataclasses.replace(IMAGE)
-    return Comparison(machine(LIBRARIES), contact, peers, (rows[0], late), (rows[1], late), image, 12.0)
+    return Comparison(machine(LIBRARIES), contact, peers, (exact, late), image, 12.0)
 
 
 IMAGE = Imaged(10, 4.5, 4.0, 1.08, 7.1, (31.9, 31.1, 31.2, 30.9, 32.1), 0.006, 0.2)
@@ -217,8 +196,7 @@ def test_compare_asks_every_job_and_keeps_going(monkeypatch: pytest.MonkeyPatch)
         if kind in ("contact", "peer"):
             return _row(method.family, 1e-4, 0.1, method.setting)
         if kind == "assembly":
-            both = _comparison()
-            return both.exact[0], both.stepped[0]
+            return _comparison().assemblies[0]
         return IMAGE
 
     monkeypatch.setattr(study, "run_job", answer)
@@ -231,7 +209,7 @@ def test_compare_asks_every_job_and_keeps_going(monkeypatch: pytest.MonkeyPatch)
     assert not any(method == "coal-sector" for _, method in asked)
     assert steps[-1][0] == steps[-1][1]
     assert steps == sorted(steps)
-    assert len(found.exact) == len(found.stepped) == len(study.ASSEMBLIES)
+    assert len(found.assemblies) == len(study.ASSEMBLIES)
     asked.clear()
     compare()
     assert not any(kind == "peer" for kind, _ in asked)
