@@ -85,26 +85,6 @@ def test_capsule_is_never_farther_and_equal_where_the_normal_is_square_to_the_ax
     assert equal > 500
 
 
-def test_continuous_and_no_faster_than_its_points_move():
-    rng = np.random.default_rng(11)
-    for _ in range(150):
-        groove, wire, T = random_scene(rng)
-        v, w = rng.normal(size=3), rng.normal(size=3) / groove.radius
-        step = 1e-3 * groove.radius
-        last = None
-        for k in range(60):
-            M = rotation(w, k * step * np.linalg.norm(w))
-            M[:3, 3] += k * step * v
-            P = T.copy()
-            P[:3, :3] = M[:3, :3] @ T[:3, :3]
-            P[:3, 3] = T[:3, 3] + M[:3, 3]
-            d = signed_distance(groove, wire, P).distance
-            reach = math.hypot(wire.radius, 0.5 * wire.length)
-            if last is not None:
-                assert abs(d - last) <= 1.0001 * step * (np.linalg.norm(v) + np.linalg.norm(w) * reach)
-            last = d
-
-
 @pytest.mark.parametrize(
     ("T", "wanted", "feature"),
     [

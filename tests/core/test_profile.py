@@ -8,7 +8,7 @@ import shapely
 from shapely import Polygon
 
 from clamp3d.core.meshing import _polygons
-from clamp3d.core.profile import Arc, Profile, Segment, chord_angle, chord_count, sagitta
+from clamp3d.core.profile import Arc, Profile, Segment, sagitta
 from clamp3d.errors import InputError
 
 
@@ -101,18 +101,6 @@ def test_what_is_left_of_a_thin_lune_is_polygons(side):
     assert all(piece.geom_type == "Polygon" and piece.area > 0.0 for piece in pieces)
     area = shapely.union_all(pieces).area
     assert area < profile.area if side == "inner" else area > profile.area
-
-
-def test_chords_are_as_few_as_their_width_allows():
-    rng = np.random.default_rng(2)
-    for _ in range(500):
-        radius, error, angle = *10.0 ** rng.uniform((0.0, -6.0), (3.0, 0.0)), rng.uniform(-6.28, 6.28)
-        widest = chord_angle(radius, error)
-        assert radius - radius * math.cos(0.5 * widest) == pytest.approx(error, abs=1e-12 * radius)
-        n = chord_count(angle, widest)
-        assert abs(angle) <= n * widest * (1.0 + 1e-8)
-        assert n == 1 or (n - 1) * widest <= abs(angle)
-    assert chord_angle(1.0, 5.0) == pytest.approx(2.0 * math.pi)
 
 
 def test_hexagons_and_rectangles_have_their_sides():
