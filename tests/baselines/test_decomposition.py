@@ -88,6 +88,13 @@ def test_a_time_limit_ends_the_process(workers: list[subprocess.Popen[str]]) -> 
     assert not cache.cache_dir().exists()
 
 
+def test_a_process_that_fails_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("clamp3d.baselines.decomposition._RUN", "os:abort")  # which takes no arguments
+    with pytest.raises(SolverError, match="CoACD gave no hulls for P1: TypeError"):
+        decompose(V, F, COARSE, name="P1")
+    assert not cache.cache_dir().exists()
+
+
 def test_a_bad_mesh_never_reaches_coacd(workers: list[subprocess.Popen[str]]) -> None:
     for vertices, faces, rule in ((np.full_like(V, np.nan), F, "finite"), (V, F[1:], "watertight")):
         with pytest.raises(InputError, match=rule):

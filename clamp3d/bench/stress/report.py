@@ -136,8 +136,8 @@ def plot(run: StressRun, path: Path) -> None:
     axes.spines[:].set_visible(False)
     legend = (
         "Share that went wrong. 0: nothing. White: not for this method. Grey: every case refused in words, or no time\n"
-        f"left. †: the interpreter died. {run.n} cases a family (clamps a hundredth; others than cas\n"
-        f"as many as their time allows), seed {run.seed}."
+        f"left. †: the interpreter died. {run.n} cases a family, clamps a hundredth, methods other than cas as many\n"
+        f"as their time allows; seed {run.seed}."
     )
     figure.text(0.02, 0.7 / height, legend, fontsize=7.5, va="top")
     save_figure(figure, path)
