@@ -13,7 +13,7 @@ from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.relation3d import relative_pose
 from clamp3d.errors import InputError
 from clamp3d.testing import body
-from tests.core.oracle import axis_distance, load, make_oracle, surface_distance
+from tests.core.oracle import axis_distance, axis_of, exact_distance, load, surface_distance
 
 CASES = load()
 
@@ -36,8 +36,8 @@ def test_oracle_is_what_its_script_makes():
     mp.mp.dps = 50
     for case in CASES[:: len(CASES) // 10]:
         g, w = case.groove, case.cylinder
-        c, d = make_oracle.axis_of(case.pose)
-        value = make_oracle.exact_distance(g.radius, g.half_angle, g.length, w.radius, w.length, c, d)
+        c, d = axis_of(case.pose)
+        value = exact_distance(g.radius, g.half_angle, g.length, w.radius, w.length, c, d)
         assert abs(mp.mpf(value) - mp.mpf(case.value)) < mp.mpf(10) ** -18 * case.size
 
 
@@ -96,7 +96,7 @@ def test_world_offsets_cost_nothing():
         c, d = R * (Bm[:, 3] - Am[:, 3]), R * Bm[:, 2]
         n = mp.norm(d)
         g, w = case.groove, case.cylinder
-        exact = make_oracle.exact_distance(g.radius, g.half_angle, g.length, w.radius, w.length, list(c), list(d / n))
+        exact = exact_distance(g.radius, g.half_angle, g.length, w.radius, w.length, list(c), list(d / n))
         answer = signed_distance(g, w, relative_pose(A, B))
         assert abs(mp.mpf(answer.distance) - mp.mpf(exact)) <= 1e-12 * case.size
 

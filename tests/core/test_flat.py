@@ -9,7 +9,7 @@ from clamp3d.bench.stress.poses.flat_truth import flat_truth
 from clamp3d.core.distance import Feature, signed_distance
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
-from tests.core.oracle import make_oracle
+from tests.core.oracle import surface_distance
 
 
 def random_scene(rng):
@@ -45,10 +45,6 @@ def test_agrees_with_branch_and_bound_from_the_definition():
     assert narrow > 260
 
 
-def in_material(groove, points, slack):
-    return make_oracle.point_distance(points, groove.radius, groove.half_angle, groove.length / 2) <= slack
-
-
 def depth_in(wire, T, points):
     """How deep points (k, 3) lie in a flat-ended cylinder, negative outside it (not the distance there)."""
     m = (points - T[:3, 3]) @ T[:3, :3]
@@ -64,7 +60,7 @@ def test_witnesses_lie_on_both_bodies_and_the_normal_is_unit():
         q, p = a.point_on_groove, a.point_on_cylinder
         assert abs(np.linalg.norm(a.normal) - 1.0) < 1e-12
         assert np.abs(q + a.distance * a.normal - p).max() <= tol
-        on_groove = abs(make_oracle.point_distance(q[None], groove.radius, groove.half_angle, groove.length / 2)[0])
+        on_groove = surface_distance(groove, q[None])[0]
         if not a.axis_inside:
             assert on_groove <= tol or a.distance <= -0.5 * wire.length + tol  # a point within counts
             assert abs(depth_in(wire, T, p[None])[0]) <= tol, (groove, wire, T.tolist())
