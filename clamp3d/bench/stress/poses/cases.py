@@ -14,7 +14,7 @@ from clamp3d.core.pose import Array
 from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
 
 Extended = np.longdouble
-"""80-bit floats where the platform has them: only there is the quick truth good enough (see `oracle`)."""
+"""80-bit floats where the platform has them: only there is the quick truth good enough (see `truth`)."""
 
 
 @dataclass(frozen=True, slots=True)
