@@ -135,8 +135,8 @@ class Search:
 
 def _components(velocity: Array, d: Array) -> tuple[float, float]:
     """The a and b for which ``a d + b z`` is nearest to a velocity (3,)."""
-    along, up, cosine = float(velocity @ d), float(velocity[2]), float(d[2])
+    along, along_z, cosine = float(velocity @ d), float(velocity[2]), float(d[2])
     sine2 = 1.0 - cosine * cosine
     if sine2 < 1e-6:
-        return 0.0, up
-    return (along - cosine * up) / sine2, (up - cosine * along) / sine2
+        return 0.0, along_z
+    return (along - cosine * along_z) / sine2, (along_z - cosine * along) / sine2

@@ -45,7 +45,7 @@ def parallel(groove: Groove, rod: Rod) -> Answer:
     x, y, z = rod.centre
     gap, feature = features.section(groove, x, y)
     qx, qy, nx, ny = features.section_foot(groove, feature, x, y)
-    up = math.copysign(1.0, rod.axis.z)
+    axis_sign = math.copysign(1.0, rod.axis.z)
     lo, hi = max(z - half, -H), min(z + half, H)
     bound = UNIT * (6.0 * (R + abs(x) + abs(y)) + r)
     bound_along = bound + UNIT * 4.0 * (H + abs(z) + half)
@@ -53,14 +53,14 @@ def parallel(groove: Groove, rod: Rod) -> Answer:
         inside = lo if lo > 0.0 else (hi if hi < 0.0 else 0.0)  # the axis point that is farthest from both ends
         if H - abs(inside) < -gap:
             side = -1.0 if inside < 0.0 else 1.0
-            point, t = Vector(x, y, side * H), (inside - z) * up
+            point, t = Vector(x, y, side * H), (inside - z) * axis_sign
             return Answer(abs(inside) - H - r, point, Vector(0.0, 0.0, side), features.END_FACE, t, bound_along)
         middle = 0.5 * (lo + hi)
         # R - r first: exact for nearly equal radii, and rho is what is left.
         distance = (R - r) - math.sqrt(x * x + y * y) if feature == features.ARC else gap - r
-        return Answer(distance, Vector(qx, qy, middle), Vector(nx, ny, 0.0), feature, (middle - z) * up, bound)
+        return Answer(distance, Vector(qx, qy, middle), Vector(nx, ny, 0.0), feature, (middle - z) * axis_sign, bound)
     side = 1.0 if hi == H else -1.0
-    t, end = -side * half * up, lo - hi
+    t, end = -side * half * axis_sign, lo - hi
     if gap <= 0.0:
         return Answer(end - r, Vector(x, y, side * H), Vector(0.0, 0.0, side), features.END_FACE, t, bound_along)
     distance = math.sqrt(gap * gap + end * end)
@@ -102,13 +102,13 @@ def inside_rate(groove: Groove, rod: Rod, t: float) -> Vector:
     is square to the axis.
     """
     x, y, z = features.axis_point(rod, t)
-    rho, up = math.sqrt(x * x + y * y), 1.0 if z >= 0.0 else -1.0
+    rho, z_sign = math.sqrt(x * x + y * y), 1.0 if z >= 0.0 else -1.0
     depths = (rho - groove.R, groove.h - y, groove.H - abs(z), groove.H + abs(z))
     normals = (
         Vector(-x / rho, -y / rho, 0.0),
         Vector(0.0, 1.0, 0.0),
-        Vector(0.0, 0.0, up),
-        Vector(0.0, 0.0, -up),
+        Vector(0.0, 0.0, z_sign),
+        Vector(0.0, 0.0, -z_sign),
     )
     first = 0
     for face in range(1, 4):

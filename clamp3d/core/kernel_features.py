@@ -371,8 +371,8 @@ def clip(groove: Groove, rod: Rod, half: float) -> tuple[float, float]:
     """Part lo <= t <= hi of the axis, |t| <= half, in the block {y <= h, |z| <= H}; lo > hi if there is none."""
     c, d = rod.centre, rod.axis
     over = 1.0 / (d.z if abs(d.z) > TINY else TINY)
-    down, up = (-groove.H - c.z) * over, (groove.H - c.z) * over
-    lo, hi = max(-half, min(down, up)), min(half, max(down, up))
+    bottom, top = (-groove.H - c.z) * over, (groove.H - c.z) * over
+    lo, hi = max(-half, min(bottom, top)), min(half, max(bottom, top))
     level = (groove.h - c.y) / d.y
     hi = min(hi, level) if d.y > 0.0 else hi
     lo = max(lo, level) if d.y < 0.0 else lo

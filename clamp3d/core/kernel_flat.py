@@ -80,13 +80,13 @@ def plane_point(rod: Rod, a: float, along: float, across: float) -> tuple[float,
     r, half = rod.r, rod.half
     if a < 0.0:
         return (-half, 0.0, a / across) if -a < (r - half) * across else (math.inf, 0.0, 0.0)
-    up = 1.0 if along >= 0.0 else -1.0
+    sign = 1.0 if along >= 0.0 else -1.0
     f = a - half * abs(along) - r * across
     if f >= 0.0:
-        return f, up * half, r if across > 0.0 else 0.0
+        return f, sign * half, r if across > 0.0 else 0.0
     inset = -f / (abs(along) + across)
     if inset <= min(r, half):
-        return -inset, up * (half - inset), (r - inset) if across > 0.0 else 0.0
+        return -inset, sign * (half - inset), (r - inset) if across > 0.0 else 0.0
     if r <= half:
         return -r, a / along if along != 0.0 else 0.0, 0.0
     return -half, 0.0, a / across if across > 0.0 else 0.0
@@ -115,8 +115,8 @@ def on_face(groove: Groove, rod: Rod, normal: Vector, level: float, search: Sear
 
 
 @formula
-def rim_point(rod: Rod, up: float, is_farthest: bool, inset: float) -> RimPoint:
-    """Local maximum of the distance from the groove's axis on a rim (up: 1, -1) of the cylinder less ``inset``.
+def rim_point(rod: Rod, end: float, is_farthest: bool, inset: float) -> RimPoint:
+    """Local maximum of the distance from the groove's axis on a rim (end: 1, -1) of the cylinder less ``inset``.
 
     The farthest point of the rim, or the other local maximum. Seen along the groove a rim is an ellipse; its farthest
     points are found like the nearest ones of an end arc. Its minor axis is (ex, ey), the direction of the axis' part
@@ -126,7 +126,7 @@ def rim_point(rod: Rod, up: float, is_farthest: bool, inset: float) -> RimPoint:
     d, e2, e = rod.axis, rod.e2, math.sqrt(rod.e2)
     ex, ey = d.x / e, d.y / e
     radius = rod.r - inset
-    middle = features.axis_point(rod, up * (rod.half - inset))
+    middle = features.axis_point(rod, end * (rod.half - inset))
     b = abs(d.z)
     p = (ex * middle.y - ey * middle.x) / radius
     v = (ex * middle.x + ey * middle.y) / radius
@@ -149,42 +149,42 @@ def rim_point(rod: Rod, up: float, is_farthest: bool, inset: float) -> RimPoint:
     if rho < features.TINY:
         return none
     by_radius = (point.x * out.x + point.y * out.y) / rho
-    return RimPoint(rho, point, by_radius, up * (point.x * d.x + point.y * d.y) / rho)
+    return RimPoint(rho, point, by_radius, end * (point.x * d.x + point.y * d.y) / rho)
 
 
 @formula
-def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool) -> tuple[RimPoint, float]:
+def free_rim(groove: Groove, rod: Rod, end: float, is_farthest: bool) -> tuple[RimPoint, float]:
     """The point of a rim that reaches behind the arc, shrunk until it just touches it, and by how much it is shrunk.
 
     Its rho is -1 if that is no candidate.
     """
     inset, most = 0.0, min(rod.r, rod.half)
     none = RimPoint(-1.0, rod.centre, 0.0, 0.0)
-    point = rim_point(rod, up, is_farthest, inset)
+    point = rim_point(rod, end, is_farthest, inset)
     for _ in range(60):
         rate = point.by_radius + point.by_length
         step = (point.rho - groove.R) / rate if rate > 0.0 else math.inf  # Newton's: convex, so it stays on this side
         if not inset + step < most:  # it never does: of a disc, what is left last
             if rod.r <= rod.half:
                 return none, most
-            point = rim_point(rod, up, is_farthest, most)
+            point = rim_point(rod, end, is_farthest, most)
             return (point, most) if point.rho >= groove.R else (none, most)
         inset += step
-        point = rim_point(rod, up, is_farthest, inset)
+        point = rim_point(rod, end, is_farthest, inset)
         if point.rho <= 0.0 or abs(point.rho - groove.R) <= 2.0 * UNIT * groove.R or abs(step) <= 1e-12 * groove.R:
             break
     return point, inset
 
 
 @formula
-def on_arc_surface(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Search) -> Search:
+def on_arc_surface(groove: Groove, rod: Rod, end: float, is_farthest: bool, search: Search) -> Search:
     """The search with the arc surface against a rim, from inside."""
     R = groove.R
-    rim, inset = rim_point(rod, up, is_farthest, 0.0), 0.0
+    rim, inset = rim_point(rod, end, is_farthest, 0.0), 0.0
     if not (rim.rho > 0.0 and R - rim.rho <= search.limit):  # nor if a square has overflowed
         return search
     if rim.rho > R:
-        rim, inset = free_rim(groove, rod, up, is_farthest)
+        rim, inset = free_rim(groove, rod, end, is_farthest)
     if rim.rho <= 0.0 or abs(rim.point.z) > groove.H:
         return search
     scale = R / rim.rho if inset < min(rod.r, rod.half) else 1.0
@@ -254,15 +254,15 @@ def best_point(groove: Groove, rod: Rod, search: Search) -> Search:
     search = on_edge(rod, Vector(s, h, 0.0), along_z, -H, H, features.LIP_N, search)
     far = rod.half * abs(d.z) + rod.r * math.sqrt(rod.e2)
     for k in range(2):
-        up = 1.0 if k == 0 else -1.0
-        gap = up * c.z - far - H
-        if up * c.z + far < H or (gap > 0.0 and gap > search.limit):
+        end = 1.0 if k == 0 else -1.0
+        gap = end * c.z - far - H
+        if end * c.z + far < H or (gap > 0.0 and gap > search.limit):
             continue
         if is_above:
             along_x = Vector(1.0, 0.0, 0.0)
-            search = on_edge(rod, Vector(0.0, h, up * H), along_x, -math.inf, -s, features.END_EDGE_M, search)
-            search = on_edge(rod, Vector(0.0, h, up * H), along_x, s, math.inf, features.END_EDGE_N, search)
-        search = on_circle(groove, rod, up * H, search)
+            search = on_edge(rod, Vector(0.0, h, end * H), along_x, -math.inf, -s, features.END_EDGE_M, search)
+            search = on_edge(rod, Vector(0.0, h, end * H), along_x, s, math.inf, features.END_EDGE_N, search)
+        search = on_circle(groove, rod, end * H, search)
     return search
 
 

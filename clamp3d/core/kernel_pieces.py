@@ -158,16 +158,16 @@ def on_face_at(groove: Groove, rod: Rod, ez: float, t: float, best: Candidate) -
 
 
 @formula
-def end_gap(groove: Groove, rod: Rod, up: float) -> Gap:
-    """Gap of the end face at the top (up = 1) or the bottom (-1)."""
-    ez, z, dz = up * groove.H, rod.centre.z, rod.axis.z
+def end_gap(groove: Groove, rod: Rod, end: float) -> Gap:
+    """Gap of the end face at the top (end = 1) or the bottom (-1)."""
+    ez, z, dz = end * groove.H, rod.centre.z, rod.axis.z
     reach = rod.half * abs(dz)
-    front, back = up * z + reach - groove.H, groove.H - up * z + reach  # how far the axis is on either side
+    front, back = end * z + reach - groove.H, groove.H - end * z + reach  # how far the axis is on either side
     is_through = front > 0.0 and back > 0.0 and dz != 0.0
     t = (ez - z) / dz
     p = features.axis_point(rod, t)
     if is_through and features.section(groove, p.x, p.y)[0] < 0.0:
-        return gap_through(groove, rod, up, front, back)
+        return gap_through(groove, rod, end, front, back)
     best = Candidate(math.inf, 0.0, features.END_FACE, rod.centre)
     best = on_face_at(groove, rod, ez, -rod.half, best)
     best = on_face_at(groove, rod, ez, rod.half, best)
@@ -183,16 +183,16 @@ def end_gap(groove: Groove, rod: Rod, up: float) -> Gap:
 
 
 @formula
-def gap_through(groove: Groove, rod: Rod, up: float, front: float, back: float) -> Gap:
+def gap_through(groove: Groove, rod: Rod, end: float, front: float, back: float) -> Gap:
     """Gap of an end face that the axis goes through: by its way out, sideways or back along z."""
-    ez, d = up * groove.H, rod.axis
+    ez, d = end * groove.H, rod.axis
     x, y, _ = features.axis_point(rod, (ez - rod.centre.z) / d.z)
     gap, feature = features.section(groove, x, y)
     if min(front, back) < -gap:
-        way = up if back < front else -up
-        end = features.axis_point(rod, math.copysign(rod.half, -d.z * way))
-        point, normal, rate = Vector(x, y, ez), Vector(0.0, 0.0, up), Vector(0.0, 0.0, way)
-        return Gap(-min(front, back) - rod.r, point, normal, features.END_FACE, rate, end)
+        way = end if back < front else -end
+        axis_end = features.axis_point(rod, math.copysign(rod.half, -d.z * way))
+        point, normal, rate = Vector(x, y, ez), Vector(0.0, 0.0, end), Vector(0.0, 0.0, way)
+        return Gap(-min(front, back) - rod.r, point, normal, features.END_FACE, rate, axis_end)
     qx, qy, nx, ny = features.section_foot(groove, feature, x, y)
     rate = Vector(nx, ny, -(nx * d.x + ny * d.y) / d.z)  # the crossing point moves in the face's plane
     point, normal, crossing = Vector(qx, qy, ez), Vector(nx, ny, 0.0), Vector(x, y, ez)

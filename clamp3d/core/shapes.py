@@ -128,8 +128,8 @@ def _drilled(name: str, body: Extrusion, holes: Sequence[Hole], low: Array, high
         if hole.axis == "z":
             extrusions.append(Extrusion(Profile.circle(hole.radius, hole.at), "Z", float(low[2]), float(high[2])))
         else:  # outlines along Y are (u, v) = (x, -z)
-            at = (hole.at[0], -hole.at[1])
-            extrusions.append(Extrusion(Profile.circle(hole.radius, at), "Y", float(low[1]), float(high[1])))
+            centre = (hole.at[0], -hole.at[1])
+            extrusions.append(Extrusion(Profile.circle(hole.radius, centre), "Y", float(low[1]), float(high[1])))
     solid = Solid(name, (body,), tuple(extrusions))
     if len(extrusions) > 1 and sum(hole.volume for hole in extrusions) >= body.volume:
         from clamp3d.core.meshing import enclosed
