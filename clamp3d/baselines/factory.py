@@ -40,18 +40,15 @@ def contact_model(
     Parameters
     ----------
     name : {"cas", "chords", "wedges", "hulls", "mesh"}
-        Exact arcs in closed form; equal chords in the section; convex wedges, CoACD's hulls or triangle meshes in 3D,
-        the last three measured by FCL.
+        Exact arcs; chords in the section; convex wedges, CoACD's hulls or triangle meshes in 3D, measured by FCL.
     parts : mapping of str to Solid or mesh, optional
-        Shapes of the grooved parts by name, each in its own frame, mm. Wedges, hulls and mesh need them. A part is cut
-        or meshed when it is first measured.
+        Grooved parts by name, in their own frames, mm, for wedges, hulls and mesh; cut or meshed when first measured.
     unit_angle : float, optional
         Largest angle of a chord in rad, for chords and wedges; 5 degrees by default.
     threshold : float or DecompositionParameters, optional
         Concavity in mm that CoACD may leave, for hulls; 2 mm by default.
     mesh_error : float, optional
-        Chord error of the meshes in mm, for hulls and mesh; 0.05 mm by default. Meshes among ``parts`` stay as they
-        are.
+        Chord error in mm of the meshes made of solids, for hulls and mesh; 0.05 mm by default.
     progress : bool, optional
         Whether CoACD's progress is shown on stderr; by default only on a terminal.
     time_limit : float

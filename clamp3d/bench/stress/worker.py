@@ -7,7 +7,7 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal, Protocol, Self
+from typing import Any, Literal, Protocol, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,13 +35,13 @@ class Rows:
         """The named cases."""
         i = np.asarray(rows, dtype=np.intp)
         taken: dict[str, Any] = {}
-        for f in fields(self):  # type: ignore[arg-type]
+        for f in fields(cast(Any, self)):
             column = getattr(self, f.name)
             if isinstance(column, Rows):
                 taken[f.name] = column.take(i)
             elif isinstance(column, np.ndarray):
                 taken[f.name] = column[i]
-        return replace(self, **taken)  # type: ignore[type-var]
+        return cast(Self, replace(cast(Any, self), **taken))
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,12 +18,14 @@ import numpy as np
 
 from clamp3d.core.pose import Array
 
+Point = tuple[float, float, float]
+
 
 class Wire(NamedTuple):
     """A flat-ended cylinder: its ``middle`` (x, y, z) and unit ``axis``, ``radius`` and half its length, mm."""
 
-    middle: tuple[float, float, float]
-    axis: tuple[float, float, float]
+    middle: Point
+    axis: Point
     radius: float
     half: float
 
@@ -32,12 +34,12 @@ class Material(NamedTuple):
     """What of the box from ``low`` to ``high`` (x, y, z) is outside the groove's circle."""
 
     radius: float
-    low: tuple[float, float, float]
-    high: tuple[float, float, float]
+    low: Point
+    high: Point
 
 
 @numba.njit(cache=True)
-def _own(x, y, z, wire):  # type: ignore[no-untyped-def]
+def _own(x: float, y: float, z: float, wire: Wire) -> tuple[float, Point, float]:
     """Signed distance of a point from the flat-ended cylinder, a gradient of it, and the gradient's rounding error."""
     c, d = wire.middle, wire.axis
     size = abs(x) + abs(y) + abs(z) + abs(c[0]) + abs(c[1]) + abs(c[2])
@@ -60,7 +62,7 @@ def _own(x, y, z, wire):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _tangent(point, low, high, material, wire):  # type: ignore[no-untyped-def]
+def _tangent(point: Point, low: Point, high: Point, material: Material, wire: Wire) -> tuple[float, Point]:
     """Least value over the material in a box of the plane that is tangent to f at a point, and the gradient there."""
     x, y, z = point
     R = material.radius
@@ -84,7 +86,7 @@ def _tangent(point, low, high, material, wire):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _within(point, low, high):  # type: ignore[no-untyped-def]
+def _within(point: Point, low: Point, high: Point) -> Point:
     """The point of a box that is nearest to another one."""
     return (
         min(max(point[0], low[0]), high[0]),
@@ -94,7 +96,7 @@ def _within(point, low, high):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _point(point, material):  # type: ignore[no-untyped-def]
+def _point(point: Point, material: Material) -> tuple[Point, bool]:
     """A point of the material near another one, and whether there is one: on the right side of the arc, in the box."""
     R, low, high = material
     x, y, z = _within(point, low, high)
@@ -111,7 +113,7 @@ def _point(point, material):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _halves(low, high):  # type: ignore[no-untyped-def]
+def _halves(low: Point, high: Point) -> tuple[tuple[Point, Point], tuple[Point, Point]]:
     """The two halves of a box, cut across its longest side."""
     (x0, y0, z0), (x1, y1, z1) = low, high
     wx, wy, wz = x1 - x0, y1 - y0, z1 - z0
@@ -126,14 +128,14 @@ def _halves(low, high):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _is_empty(low, high, material):  # type: ignore[no-untyped-def]
+def _is_empty(low: Point, high: Point, material: Material) -> bool:
     """Whether a box holds nothing of the material."""
     R = material.radius
     return max(low[0] ** 2, high[0] ** 2) + max(low[1] ** 2, high[1] ** 2) < R * R
 
 
 @numba.njit(cache=True)
-def _search(material, wire, start, tolerance, most):  # type: ignore[no-untyped-def]
+def _search(material: Material, wire: Wire, start: Point, tolerance: float, most: int) -> tuple[float, float]:
     """Interval [lower, upper] of the least f over the material, of which ``start`` is a point, by ``most`` boxes.
 
     The tangent planes are those at a box's middle, and at its point that is nearest to the best one so far.
