@@ -45,16 +45,16 @@ def shown(value: object) -> str:
 def readable_file(path: Path, most: float = math.inf) -> int:
     """Size in bytes of a file that can be read to its end: no folder, pipe or device, and at most ``most`` bytes."""
     try:
-        found = os.stat(path)
+        status = os.stat(path)
     except FileNotFoundError:
         raise InputError(f"{short(path)}: no such file") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{short(path)}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         raise InputError(f"{short(path)}: not a regular file")
-    if found.st_size > most:
-        raise InputError(f"{short(path)}: {found.st_size} bytes, at most {most:.0f} are read")
-    return found.st_size
+    if status.st_size > most:
+        raise InputError(f"{short(path)}: {status.st_size} bytes, at most {most:.0f} are read")
+    return status.st_size
 
 
 def short(value: object, most: int = 200) -> str:
@@ -131,7 +131,8 @@ def array(name: str, value: object, shape: tuple[int | None, ...], *, finite: bo
     if out.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, out.shape, strict=True)):
         raise InputError(f"{name} must have shape ({words}), got {out.shape}")
     if finite and not np.isfinite(out).all():
-        raise InputError(f"{name} must be finite, got {_first_bad(out)}")
+        row = np.argwhere(~np.isfinite(out))[0]
+        raise InputError(f"{name} must be finite, got {out[tuple(row)]} at {row.tolist()}")
     return out
 
 
@@ -144,21 +145,14 @@ def _as_floats(value: object) -> NDArray[np.float64] | None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a masked number in a list: NaN
-            given = np.asarray(value)
-        if given.dtype.kind not in "biufO":
-            # An empty list has no kind of its own; other text, complex numbers, times are no numbers.
-            return given.astype(np.float64) if given.size == 0 and given.dtype.kind == "f" else None
-        if given.dtype.kind == "O" and any(real(item) is None for item in given.flat):
+            out = np.asarray(value)
+        is_object = out.dtype.kind == "O"
+        if out.dtype.kind not in "biufO" or (is_object and any(real(item) is None for item in out.flat)):
             return None
         with np.errstate(over="ignore"):
-            return given.astype(np.float64)
+            return out.astype(np.float64)
     except (TypeError, ValueError, OverflowError, RecursionError):
         return None
-
-
-def _first_bad(values: NDArray[np.float64]) -> str:
-    row = tuple(int(i[0]) for i in np.nonzero(~np.isfinite(values)))
-    return f"{values[row]} at {list(row)}"
 
 
 def instance(name: str, value: object, *kinds: type) -> None:
@@ -212,7 +206,7 @@ def function(name: str, value: object) -> None:
 def path(name: str, value: object) -> Path:
     """A file's or a folder's path, from a text or a path."""
     if isinstance(value, (str, os.PathLike)):
-        found = os.fspath(value)
-        if isinstance(found, str) and "\0" not in found:
-            return Path(found)
+        plain = os.fspath(value)
+        if isinstance(plain, str) and "\0" not in plain:
+            return Path(plain)
     raise InputError(f"{name} must be a path, got {shown(value)}")

@@ -86,10 +86,10 @@ def need(library: str, what: str) -> None:
     >>> need("matplotlib", "a drawing")
     """
     try:
-        there = importlib.util.find_spec(library) is not None
+        is_missing = importlib.util.find_spec(library) is None
     except ValueError:
-        there = False
-    if not there:
+        is_missing = True
+    if is_missing:
         raise missing(library, what)
 
 

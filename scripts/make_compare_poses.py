@@ -1,12 +1,11 @@
 """Make ``clamp3d/study/data/compare_poses.csv``: poses of a wire in a groove with their distances to 25 digits.
 
 ``python scripts/make_compare_poses.py`` (minutes). The values come from the search of
-``tests/core/data/make_oracle.py``; the kernel only helps to find poses near contact.
+``tests/core/oracle.py``; the kernel only helps to find poses near contact.
 """
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from pathlib import Path
 
@@ -21,10 +20,10 @@ FIELDS = ("lean", "group", "x", "y", "z", "a", "b", "c", "distance")
 
 
 def load_oracle():
-    spec = importlib.util.spec_from_file_location("make_oracle", ROOT / "tests/core/data/make_oracle.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    sys.path.insert(0, str(ROOT))
+    from tests.core import oracle
+
+    return oracle
 
 
 def distance(origin, turn) -> float:

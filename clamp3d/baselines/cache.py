@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -29,9 +28,11 @@ def load(key: str) -> dict[str, NDArray[Any]] | None:
         return None
 
 
-def keep(key: str, file: Path) -> None:
-    """Copy a ``file`` of arrays (.npz) whole or not at all; a cache that cannot be written is no error."""
+def keep(key: str, arrays: dict[str, NDArray[Any]]) -> None:
+    """Keep a file of arrays whole or not at all; a cache that cannot be written is no error."""
     with contextlib.suppress(OSError):
         cache_dir().mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=cache_dir(), prefix=".part-") as folder:
-            os.replace(shutil.copy(file, folder), cache_dir() / f"{key}.npz")
+            part = Path(folder, "part.npz")
+            np.savez(part, allow_pickle=False, **arrays)
+            os.replace(part, cache_dir() / f"{key}.npz")

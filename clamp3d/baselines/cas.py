@@ -25,15 +25,14 @@ class Cas:
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to the arc surface and the two faces beside it, for a wire that passes through; see `ContactModel`."""
         T_a_b = pose_of(pair, T_a_b)
-        found = groove_pieces(pair.groove, pair.cylinder, (pair.T_groove_a @ T_a_b) @ pair.T_b_cylinder)
+        measured = groove_pieces(pair.groove, pair.cylinder, (pair.T_groove_a @ T_a_b) @ pair.T_b_cylinder)
         R, p = pair.T_groove_a[:3, :3], pair.T_a_groove[:3, 3]
-        feature = tuple(_NAMES[code] for code in found.feature[_SIDES].tolist())
+        feature = tuple(_NAMES[code] for code in measured.feature[_SIDES].tolist())
         return Pieces(
-            found.distance[_SIDES], (found.point_on_groove[_SIDES] @ R) + p, found.normal[_SIDES] @ R, feature
+            measured.distance[_SIDES], (measured.point_on_groove[_SIDES] @ R) + p, measured.normal[_SIDES] @ R, feature
         )
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
-        T_a_b = poses_of(pair, T_a_b)
-        poses = np.ascontiguousarray((pair.T_groove_a @ T_a_b) @ pair.T_b_cylinder)
-        return signed_distances(pair.groove, pair.cylinder, poses)
+        poses = (pair.T_groove_a @ poses_of(pair, T_a_b)) @ pair.T_b_cylinder
+        return signed_distances(pair.groove, pair.cylinder, np.ascontiguousarray(poses))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from functools import lru_cache
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from clamp3d.baselines.model import Pieces, check_unit_angle, pose_of, poses_of
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.pose import Array, check_pose, check_pose_array, inverse
+from clamp3d.core.pose import Array, check_pose, inverse
 from clamp3d.core.primitives import SweptArc
 from clamp3d.core.profile import chord_count, sagitta
 from clamp3d.errors import InputError
@@ -30,9 +31,8 @@ class Chords:
     limits = ("parallel axes only", "groove too tight by the chord error")
     meshes_built = 0
 
-    def __init__(self, unit_angle: float) -> None:
-        unit_angle = check_unit_angle(unit_angle)
-        self.unit_angle = unit_angle
+    def __init__(self, unit_angle: float = math.radians(5.0)) -> None:
+        self.unit_angle = check_unit_angle(unit_angle)
 
     def segments(self, pairs: Iterable[GroovePair]) -> int:
         """Chords of the grooves of ``pairs`` together: m of Table 5."""
@@ -51,8 +51,7 @@ class Chords:
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
-        poses = check_pose_array(poses_of(pair, T_a_b), "T_a_b")
-        T = (inverse(pair.T_a_groove) @ poses) @ pair.T_b_cylinder
+        T = (inverse(pair.T_a_groove) @ poses_of(pair, T_a_b)) @ pair.T_b_cylinder
         starts, ends, _ = _polyline(pair.groove, self.unit_angle)
         signed = [_signed(centre, starts, ends)[0].min() for centre in _section_point(T)]
         return np.array(signed) - pair.cylinder.radius

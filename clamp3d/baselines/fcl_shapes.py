@@ -18,15 +18,16 @@ What python-fcl 0.7.0 does, measured on wedges of a groove of radius 12 against 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import fcl
+import igl
 import numpy as np
 import trimesh
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from clamp3d.collide.surface import fcl_tree
 from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder
@@ -81,26 +82,12 @@ def convex(vertices: ArrayLike, faces: ArrayLike, name: str = "convex shape") ->
     height = ((V @ normals[real].T) - np.einsum("ij,ij->i", corners[real, 0], normals[real])) / length[real]
     if height.max() > _CONVEX * np.ptp(V, axis=0).max():
         raise InputError(f"{name} must be convex: a vertex stands {height.max():.3g} mm outside one of its faces")
-    return _shape("convex", solid, fcl.Convex(V * UNIT, len(F), encoded(F)))
-
-
-def encoded(faces: NDArray[Any]) -> NDArray[Any]:
-    """Triangles (m, 3) as `fcl.Convex` takes them: each with its number of corners before it."""
-    return np.insert(faces, 0, 3, axis=1).ravel()
+    return _shape("convex", solid, fcl.Convex(V * UNIT, len(F), np.insert(F, 0, 3, axis=1).ravel()))
 
 
 def bvh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Shape:
     """A closed triangle mesh (`fcl.BVHModel`); InputError if it is empty, open or inside out."""
     return _tree("mesh", _solid(vertices, faces, name))
-
-
-def tree(vertices: NDArray[Any], faces: NDArray[Any]) -> Any:
-    """A triangle mesh as `fcl.BVHModel`, as it is."""
-    model = fcl.BVHModel()
-    model.beginModel(len(vertices), len(faces))
-    model.addSubModel(vertices, faces)
-    model.endModel()
-    return model
 
 
 def facets(mesh: Shape) -> list[Shape]:
@@ -182,12 +169,7 @@ def contained(shape: Shape, wire: Wire) -> bool:
     middle = wire.T[:3, 3]
     if (middle < shape.bounds[0]).any() or (middle > shape.bounds[1]).any():
         return False
-    corners = shape.solid.vertices[shape.solid.faces] - middle
-    a, b, c = np.moveaxis(corners, 1, 0)
-    la, lb, lc = np.linalg.norm(corners, axis=2).T
-    below = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
-    angle = 2.0 * np.arctan2(np.linalg.det(corners), below)  # solid angle of each triangle (Van Oosterom, Strackee)
-    return bool(angle.sum() > 2.0 * math.pi)
+    return bool(igl.winding_number(shape.solid.vertices, shape.solid.faces, middle[None])[0] > 0.5)
 
 
 def _nearest(shape: Shape, wire: Wire) -> Measurement:
@@ -221,7 +203,7 @@ def _shape(kind: Kind, solid: Mesh, geometry: Any) -> Shape:
 
 
 def _tree(kind: Kind, solid: Mesh) -> Shape:
-    return _shape(kind, solid, tree(solid.vertices * UNIT, solid.faces))
+    return _shape(kind, solid, fcl_tree(solid.vertices * UNIT, solid.faces))
 
 
 def _solid(vertices: ArrayLike, faces: ArrayLike, name: str) -> Mesh:

@@ -10,7 +10,7 @@ from clamp3d.checks import array, instance, number, shown
 from clamp3d.core.contact_model import ContactModel as ContactModel
 from clamp3d.core.contact_model import Pieces as Pieces
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.pose import Array, check_pose
+from clamp3d.core.pose import Array, check_pose, check_pose_array
 from clamp3d.core.primitives import LARGEST
 from clamp3d.errors import InputError
 
@@ -53,11 +53,6 @@ def pose_of(pair: GroovePair, T_a_b: Array) -> Array:
 
 
 def poses_of(pair: GroovePair, T_a_b: Array) -> Array:
-    """``T_a_b`` as the (n, 4, 4) array that `ContactModel.distances` works on, as `pose_of` does."""
+    """``T_a_b`` as the (n, 4, 4) array that `ContactModel.distances` works on, checked by `check_pose_array`."""
     instance("pair", pair, GroovePair)
-    T = array("T_a_b", T_a_b, (None, 4, 4), finite=False)
-    small = np.abs(T).max(axis=(1, 2), initial=0.0) < 1e-2 * LARGEST
-    for i in np.flatnonzero(~small):
-        check_pose(T[i], f"T_a_b[{i}]")
-        raise InputError(f"T_a_b[{i}] must have an offset up to {1e-2 * LARGEST:g} mm, got {shown(T[i, :3, 3])}")
-    return T
+    return check_pose_array(T_a_b, "T_a_b")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Protocol, TypeVar, cast
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, cast
 
 import numpy as np
 
@@ -11,12 +11,10 @@ from clamp3d.baselines.fcl_shapes import Shape, Wire, bvh, distance, facets, mea
 from clamp3d.baselines.model import Pieces, pose_of, poses_of
 from clamp3d.checks import instance
 from clamp3d.core.groove_pair import GroovePair
-from clamp3d.core.pose import Array, check_pose_array
+from clamp3d.core.pose import Array, check_pose
 from clamp3d.core.primitives import Cylinder
 from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
-
-_T = TypeVar("_T")
 
 
 class TriangleMesh(Protocol):
@@ -47,7 +45,7 @@ class Polytopes:
 
     def pieces(self, wire: Wire, T_a_wire: Array) -> Pieces:
         """One gap per polytope, with the wire at a pose (4, 4) in the part's frame."""
-        wire.place(check_pose_array(T_a_wire[None])[0])
+        wire.place(check_pose(T_a_wire))
         measured = [measure(shape, wire) for shape in self.shapes]
         distance, point, normal = (
             np.array([getattr(m, key) for m in measured]) for key in ("distance", "point", "normal")
@@ -59,7 +57,7 @@ class Polytopes:
 
         FCL's own broadphase answers the same and takes as long here: a wire's box covers most of a groove.
         """
-        poses = check_pose_array(T_a_wire)
+        poses = T_a_wire
         # Box of the cylinder: half extents |axis| L/2 + r sqrt(1 - axis^2) per coordinate.
         axis, middle = poses[:, :3, 2], poses[:, :3, 3]
         reach = np.abs(axis) * wire.cylinder.length / 2 + wire.cylinder.radius * np.sqrt(np.maximum(0.0, 1.0 - axis**2))
@@ -78,43 +76,47 @@ class Polytopes:
         return out
 
 
-class PerPart(dict[str, _T]):
-    """Something made for a part when it is first asked for; the dictionary holds what was made so far.
-
-    Raises InputError for a part that is not there.
-    """
-
-    def __init__(self, names: Iterable[str], make: Callable[[str], _T]) -> None:
-        super().__init__()
-        self._names, self._make = tuple(names), make
-
-    def __missing__(self, name: str) -> _T:
-        if name not in self._names:
-            raise InputError(f"unknown part {name!r}; available: {', '.join(self._names)}")
-        made = self[name] = self._make(name)
-        return made
-
-
 class PolytopeModel:
-    """What wedges, hulls and meshes share: parts as `Polytopes`, made when they are first measured.
+    """What wedges, hulls and meshes share: parts as `Polytopes`, each cut when it is first measured.
 
-    ``parts`` answer distances; ``pieces_of`` are their pieces where those are other shapes (the facets of a mesh).
+    Parameters
+    ----------
+    parts : mapping of str to Solid or mesh
+        Grooved parts by name, mm.
     """
 
-    def __init__(self, parts: PerPart[Polytopes], pieces_of: PerPart[Polytopes] | None = None) -> None:
-        self.parts = parts
-        self._pieces_of = parts if pieces_of is None else pieces_of
+    def __init__(self, parts: Mapping[str, PartOrMesh]) -> None:
+        instance("parts", parts, Mapping)
+        self._parts = parts
+        self._cut: dict[str, Polytopes] = {}
         self._wires: dict[Cylinder, Wire] = {}
+
+    @property
+    def meshes_built(self) -> int:
+        """How many parts had to be meshed so far."""
+        return 0
+
+    def cut(self, name: str, part: PartOrMesh) -> Polytopes:
+        """The polytopes of a part; each model has its own."""
+        raise NotImplementedError
+
+    def polytopes(self, name: str) -> Polytopes:
+        """The polytopes that answer distances. Raises InputError for a part that is not there."""
+        if name not in self._parts:
+            raise InputError(f"unknown part {name!r}; available: {', '.join(self._parts)}")
+        if name not in self._cut:
+            self._cut[name] = self.cut(name, self._parts[name])
+        return self._cut[name]
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every piece of part a; see `ContactModel`."""
         T_a_b = pose_of(pair, T_a_b)
-        return self._pieces_of[pair.a].pieces(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)
+        return self.polytopes(pair.a).pieces(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
         T_a_b = poses_of(pair, T_a_b)
-        return self.parts[pair.a].distances(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)
+        return self.polytopes(pair.a).distances(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)
 
     def _wire(self, cylinder: Cylinder) -> Wire:
         """FCL's cylinder of this size, made once."""
@@ -151,19 +153,24 @@ class Meshes(PolytopeModel):
     limits = ("surface only", "no depth beyond 0.9 of the wire's radius", "groove too tight by the mesh's chord error")
 
     def __init__(self, parts: Mapping[str, PartOrMesh], mesh_error: float = 0.05) -> None:
-        instance("parts", parts, Mapping)
-
-        def surface(name: str) -> Polytopes:
-            mesh = part_mesh(parts[name], mesh_error)
-            return Polytopes([bvh(mesh.vertices, mesh.faces, name)], ["surface"])
-
-        def faces(name: str) -> Polytopes:
-            shapes = facets(self.parts[name].shapes[0])
-            return Polytopes(shapes, [f"facet {i + 1}" for i in range(len(shapes))])
-
-        super().__init__(PerPart([*parts], surface), PerPart([*parts], faces))
+        super().__init__(parts)
+        self.mesh_error = mesh_error
+        self._facets: dict[str, Polytopes] = {}
 
     @property
     def meshes_built(self) -> int:
         """How many parts had to be meshed so far."""
-        return len(self.parts)
+        return len(self._cut)
+
+    def cut(self, name: str, part: PartOrMesh) -> Polytopes:
+        """See `PolytopeModel`."""
+        mesh = part_mesh(part, self.mesh_error)
+        return Polytopes([bvh(mesh.vertices, mesh.faces, name)], ["surface"])
+
+    def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
+        """Gaps to every flat face of part a; see `ContactModel`."""
+        T_a_b = pose_of(pair, T_a_b)
+        if pair.a not in self._facets:
+            shapes = facets(self.polytopes(pair.a).shapes[0])
+            self._facets[pair.a] = Polytopes(shapes, [f"facet {i + 1}" for i in range(len(shapes))])
+        return self._facets[pair.a].pieces(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -14,8 +14,7 @@ from shapely.geometry.polygon import orient
 
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.model import check_unit_angle
-from clamp3d.baselines.polytopes import PerPart, PolytopeModel, Polytopes
-from clamp3d.checks import instance
+from clamp3d.baselines.polytopes import PartOrMesh, PolytopeModel, Polytopes
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import Arc, Segment, chord_count
 from clamp3d.core.shapes import Solid
@@ -30,18 +29,11 @@ _SLIVER = 1e-6
 _SAME = 1e-9  # mm
 
 
-@dataclass(frozen=True, slots=True)
-class Wedge:
-    """A convex prism: ``polygon`` (k, 2) counter-clockwise, drawn along the groove; ``name`` tells its place."""
+class Wedge(NamedTuple):
+    """A convex prism: its place in the part, and its ``polygon`` (k, 2), counter-clockwise, drawn along the groove."""
 
     name: str
     polygon: Array
-
-    @property
-    def area(self) -> float:
-        """Area of the polygon in mm^2."""
-        x, y = (self.polygon - self.polygon[0]).T
-        return 0.5 * float((x @ np.roll(y, -1)) - (y @ np.roll(x, -1)))
 
 
 class Wedges(PolytopeModel):
@@ -61,13 +53,17 @@ class Wedges(PolytopeModel):
 
     name = "wedges"
     limits = ("groove too tight by the chord error", "bolt hole filled", "depth of single wedges")
-    meshes_built = 0
 
-    def __init__(self, parts: Mapping[str, Solid], unit_angle: float = math.radians(5.0)) -> None:
-        unit_angle = check_unit_angle(unit_angle)
-        instance("parts", parts, Mapping)
-        self.unit_angle = unit_angle
-        super().__init__(PerPart([*parts], lambda name: _polytopes(parts[name], unit_angle)))
+    def __init__(self, parts: Mapping[str, PartOrMesh], unit_angle: float = math.radians(5.0)) -> None:
+        super().__init__(parts)
+        self.unit_angle = check_unit_angle(unit_angle)
+
+    def cut(self, name: str, part: PartOrMesh) -> Polytopes:
+        """See `PolytopeModel`. Raises InputError for a mesh, and as `part_wedges` does."""
+        if not isinstance(part, Solid):
+            raise InputError(f"part {name} must be a Solid to be cut into wedges, got {type(part).__name__}")
+        wedges = wedge_solids(part, self.unit_angle)
+        return Polytopes([convex(V, F, f"{name} {wedge}") for wedge, V, F in wedges], [wedge for wedge, _, _ in wedges])
 
 
 def part_wedges(part: Solid, unit_angle: float) -> list[Wedge]:
@@ -103,8 +99,8 @@ def prism(polygon: Array, start: float, end: float) -> tuple[Array, NDArray[np.i
     """Vertices (2k, 3) and outward triangles (4k - 4, 3) of a polygon (k, 2) drawn from z = start to end."""
     from trimesh.creation import extrude_polygon
 
-    made = extrude_polygon(shapely.Polygon(polygon), end - start)
-    return made.vertices + np.array([0.0, 0.0, start]), np.asarray(made.faces, dtype=np.int64)
+    solid = extrude_polygon(shapely.Polygon(polygon), end - start)
+    return solid.vertices + np.array([0.0, 0.0, start]), np.asarray(solid.faces, dtype=np.int64)
 
 
 def wedge_solids(part: Solid, unit_angle: float) -> list[tuple[str, Array, NDArray[np.int64]]]:
@@ -132,16 +128,15 @@ def _sectors(cell: shapely.Polygon, arc: Arc, unit_angle: float) -> list[Wedge]:
             along, beside = 2.0 * size * ray[k], 2.0 * size * sign * np.array([ray[k, 1], -ray[k, 0]])
             ends = [centre - along, centre + along]
             sectors[name] = [*ends, ends[1] + beside, ends[0] + beside]
-    wedges = [Wedge(name, _common(cell, corners)) for name, corners in sectors.items()]
-    return [wedge for wedge in wedges if len(wedge.polygon) and wedge.area > _SLIVER]
-
-
-def _common(cell: shapely.Polygon, corners: list[Array]) -> Array:
-    """What two convex polygons share (k, 2), counter-clockwise; empty if that is no polygon."""
-    common = shapely.remove_repeated_points(shapely.intersection(cell, shapely.Polygon(corners)), _SAME)
-    if not isinstance(common, shapely.Polygon) or common.is_empty:
-        return np.empty((0, 2))
-    return np.asarray(orient(common).exterior.coords)[:-1]
+    common = {
+        name: shapely.remove_repeated_points(shapely.intersection(cell, shapely.Polygon(corners)), _SAME)
+        for name, corners in sectors.items()
+    }
+    return [
+        Wedge(name, np.asarray(orient(polygon).exterior.coords)[:-1])
+        for name, polygon in common.items()
+        if isinstance(polygon, shapely.Polygon) and polygon.area > _SLIVER
+    ]
 
 
 def _filled(edges: tuple[Segment | Arc, ...]) -> Array:
@@ -168,8 +163,3 @@ def _mouth(arc: Arc) -> tuple[float, float]:
     """First coordinates of the groove's left and right end, or of its widest place."""
     reach = arc.radius if -arc.sweep > math.pi else arc.radius * math.sin(-arc.sweep / 2)
     return arc.centre[0] - reach, arc.centre[0] + reach
-
-
-def _polytopes(part: Solid, unit_angle: float) -> Polytopes:
-    solids = wedge_solids(part, unit_angle)
-    return Polytopes([convex(V, F, f"{part.name} {name}") for name, V, F in solids], [name for name, _, _ in solids])

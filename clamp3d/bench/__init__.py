@@ -1,1 +1,1 @@
-"""Experiments on the methods: charts, complexity, stability, image measurement."""
+"""Experiments on the methods: comparison, stress, the paper's tables, image measurement."""

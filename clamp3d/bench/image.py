@@ -150,8 +150,8 @@ def image_study(run: Assembly, *, count: int = 100_000, seed: int = 0) -> ImageS
     shown = picture(run, PX_PER_MM, seed=seed)
     values = marked_distances(shown, count, marking_error=MARKING_ERROR, calliper_error=CALLIPER_ERROR, seed=seed)
     left, right, below = find_end_points(shown.image)
-    found = measure_image([left, below], [left, right], shown.reference, marking_error=FITTING_ERROR)
-    return ImageStudy(shown.distance, values[:5], values - shown.distance, found)
+    automatic = measure_image([left, below], [left, right], shown.reference, marking_error=FITTING_ERROR)
+    return ImageStudy(shown.distance, values[:5], values - shown.distance, automatic)
 
 
 def _distance(marks: Array, reference_mm: float | Array, kind: Kind) -> Array:

@@ -113,7 +113,7 @@ def snap_marks(image: Image, marks: Array, radius: float) -> Array:
 
     if not (math.isfinite(radius) and radius >= 2.0):
         raise InputError(f"snap radius must be >= 2 px, got {radius}")
-    found = []
+    corners = []
     reach = math.ceil(radius) + _AROUND
     for x, y in check_marks(image, marks):
         left, top = max(0, round(float(x)) - reach), max(0, round(float(y)) - reach)
@@ -126,8 +126,8 @@ def snap_marks(image: Image, marks: Array, radius: float) -> Array:
             raise InputError(f"no corner within {radius:g} px of the mark ({x:g}, {y:g}); mark it without snapping")
         fine = corner_subpix(grey, np.array([peak]), window_size=2 * _AROUND - 3)[0]
         row, column = fine if np.isfinite(fine).all() and math.dist(fine, peak) <= radius else peak
-        found.append((float(column) + left, float(row) + top))
-    return np.array(found)
+        corners.append((float(column) + left, float(row) + top))
+    return np.array(corners)
 
 
 def check_marks(image: Image, marks: Array) -> Array:
@@ -152,12 +152,12 @@ def _contour(image: Image, name: PartName) -> Array:
     if not regions:
         raise InputError(f"no region of the colour of {name} in the picture; mark the end points by hand")
     largest = max(regions, key=lambda region: region.area)
-    around = np.zeros(nearest.shape, dtype=bool)
-    around[tuple(largest.coords.T)] = True
-    around = dilation(around, disk(3))
+    nearby = np.zeros(nearest.shape, dtype=bool)
+    nearby[tuple(largest.coords.T)] = True
+    nearby = dilation(nearby, disk(3))
     # Share of the part's colour against the background: 1/2 on the edge, whatever the blur.
     towards = np.subtract(PAINT[name], BACKGROUND)
-    share = np.where(around, (pixels - BACKGROUND) @ towards / (towards @ towards), 0.0)
+    share = np.where(nearby, (pixels - BACKGROUND) @ towards / (towards @ towards), 0.0)
     contour: Array = max(find_contours(share, 0.5), key=len)
     return contour[:, ::-1]
 

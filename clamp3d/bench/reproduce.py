@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from clamp3d.baselines import Cas, Chords
 from clamp3d.bench import published
-from clamp3d.bench.complexity import fitted, grid_search
 from clamp3d.bench.image import image_study
-from clamp3d.clamp.assemble import STEP, assemble
+from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import ConnectionType, PartName
 from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
@@ -28,9 +27,6 @@ PLATEAU = (
     "The paper's plateau of 31.863 mm at 1, 5 and 10 degrees is its step, not its geometry: the program moved the down "
     "splint by 1/3 mm, and all three chord errors end on the same next step above 31.530 mm."
 )
-
-SAME_ORDER = 0.25
-"""A measured exponent refutes a published one from which it differs by more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,27 +109,6 @@ class WorkRow:
 
 
 @dataclass(frozen=True, slots=True)
-class OrderRow:
-    """An order of growth in Table 5: the published exponent of ``variable``, and that of the counts of a search.
-
-    ``search`` "grid" is the paper's own, every combination of places of the moving parts; "stepped" is this program's,
-    one way along the bolt on which the wires settle. ``parts`` are the moving ones: a of Table 5.
-    """
-
-    search: str
-    parts: int
-    quantity: str
-    variable: str
-    published: float
-    measured: float
-
-    @property
-    def refuted(self) -> bool:
-        """Whether the counts grow otherwise than published."""
-        return abs(self.measured - self.published) > SAME_ORDER
-
-
-@dataclass(frozen=True, slots=True)
 class Reproduction:
     """All tables; see the rows. ``image_trials`` are five distances (mm) measured in a drawn picture, marked by hand
     with a chosen, seeded error: beside the paper's five they show the spread, not the same numbers.
@@ -146,7 +121,6 @@ class Reproduction:
     table4: tuple[DistanceRow, ...]
     image_trials: tuple[float, ...]
     table5: tuple[WorkRow, ...]
-    orders: tuple[OrderRow, ...]
     plateau: str = PLATEAU
 
 
@@ -172,7 +146,6 @@ def reproduce(progress: Callable[[str], None] = lambda message: None) -> Reprodu
     assert exact is not None
     progress("Table 4: image detection")
     trials = tuple(float(v) for v in image_study(exact).trials)
-    progress("Table 5: orders of growth")
     return Reproduction(
         table1=connection_rows(exact),
         table2=_table2(),
@@ -181,7 +154,6 @@ def reproduce(progress: Callable[[str], None] = lambda message: None) -> Reprodu
         table4=tuple(table4),
         image_trials=trials,
         table5=tuple(table5),
-        orders=_orders(table5, exact),
     )
 
 
@@ -202,30 +174,6 @@ def _pose_row(assembly: Assembly, part: PartName) -> PoseRow:
 def _matrix(x: float, y: float, angle_deg: float) -> Array:
     c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
     return np.array([[c, -s, x], [s, c, y], [0.0, 0.0, 1.0]])
-
-
-def _orders(rows: Sequence[WorkRow], assembly: Assembly) -> tuple[OrderRow, ...]:
-    """Table 5: positions by steps n, positions and contact tests by segments m an arc."""
-    clamp = assembly.clamp
-    finer = (1, 2, 4)
-    stepped = [assemble(clamp, Cas(), solver="stepped", step=STEP / k).work.motion_steps for k in finer]
-    chords = [row for row in rows if row.solver == "stepped" and row.method == "chords"]
-    m = [row.segments / 4.0 for row in chords]
-    steps = (6, 12, 24)
-    coarse = [grid_search(assembly, Cas(), n=n, parts=2, grooves=4).positions for n in steps]
-    models = [Chords(math.radians(unit)) for unit in published.CHORD_DISTANCES]
-    grid = [grid_search(assembly, model, n=8, parts=2, grooves=4) for model in models]
-    positions, tests = "positions M", "contact tests M C"
-    return (
-        OrderRow("grid", 2, f"{positions}, arcs", "n", 2.0, fitted(steps, coarse)),
-        OrderRow("grid", 2, f"{positions}, chords", "m", 1.0, fitted(m, [g.positions for g in grid])),
-        OrderRow("grid", 2, f"{tests}, chords", "m", 2.0, fitted(m, [g.tests for g in grid])),
-        OrderRow("stepped", 3, f"{positions}, arcs", "n", 3.0, fitted(finer, stepped)),
-        OrderRow("stepped", 3, f"{positions}, chords", "m", 2.0, fitted(m, [row.motion_steps for row in chords])),
-        OrderRow(
-            "stepped", 3, f"{tests}, chords", "m", 3.0, fitted(m, [r.contact_queries * r.segments for r in chords])
-        ),
-    )
 
 
 def _table2() -> tuple[RelationRow, ...]:

@@ -8,7 +8,7 @@ from itertools import zip_longest
 from typing import Any
 
 from clamp3d.bench import published
-from clamp3d.bench.reproduce import OrderRow, PoseRow, RelationRow, Reproduction, WorkRow
+from clamp3d.bench.reproduce import PoseRow, RelationRow, Reproduction, WorkRow
 from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.matrix import millimetres
 from clamp3d.collide.distance import Distance
@@ -41,7 +41,6 @@ def reproduction_to_dict(tables: Reproduction) -> dict[str, Any]:
         "measured_mm": published.ACTUAL_DISTANCE,
         "image_trials_mm": list(tables.image_trials),
         "table5": [asdict(row) for row in tables.table5],
-        "table5_orders": [asdict(row) | {"refuted": row.refuted} for row in tables.orders],
         "plateau": tables.plateau,
     }
 
@@ -79,7 +78,6 @@ def reproduction_to_text(tables: Reproduction) -> str:
         distances=_distances(tables),
         plateau=tables.plateau,
         work=[_work(row) for row in tables.table5],
-        orders=[_order(row) for row in tables.orders],
     )
 
 
@@ -133,8 +131,3 @@ def _work(row: WorkRow) -> Sequence[object]:
 
 def _unit(angle_deg: float | None) -> str | None:
     return None if angle_deg is None else f"{angle_deg:g} deg"
-
-
-def _order(row: OrderRow) -> Sequence[object]:
-    exponents = f"{row.variable}^{row.published:g}", f"{row.variable}^{row.measured:z.2f}"
-    return [row.search, row.parts, row.quantity, *exponents, "REFUTED" if row.refuted else "as published"]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import zipfile
+import zlib
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -35,8 +36,9 @@ def read_3mf(path: Path, _: str | None) -> Reading:
     try:
         with zipfile.ZipFile(path) as archive:
             _check_size(archive, path)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, expat.ExpatError) as error:
-        raise InputError(f"{path}: not a readable 3MF file ({error})") from None
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, expat.ExpatError) as error:
+        reason = getattr(error, "strerror", None) or str(error)  # a cut archive leads outside of the file: an OSError
+        raise InputError(f"{path}: not a readable 3MF file ({reason})") from None
     try:
         model = lib3mf.get_wrapper().CreateModel()
         reader = model.QueryReader("3mf")

@@ -13,7 +13,7 @@ from clamp3d.cli.terminal import finish, show
 @declared("stress")
 def command(
     families: tuple[str, ...] = option(
-        "Only this family, or pose, flat, solid, motion, mesh, assembly for a kind; may be repeated.",
+        "Only this family, or pose, flat, motion, assembly for a kind; may be repeated.",
         "--family",
         multiple=True,
         metavar="NAME",

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 
 
@@ -117,8 +116,8 @@ class Distance:
     def moved(self, T: Array) -> Distance:
         """The same with points and normal taken along by ``T`` (4, 4)."""
         R, t = T[:3, :3], T[:3, 3]
-        p, q = (None if x is None else dot(R, x) + t for x in (self.point_a, self.point_b))
-        return replace(self, point_a=p, point_b=q, normal=None if self.normal is None else dot(R, self.normal))
+        p, q = (None if x is None else R @ x + t for x in (self.point_a, self.point_b))
+        return replace(self, point_a=p, point_b=q, normal=None if self.normal is None else R @ self.normal)
 
     def swapped(self) -> Distance:
         """The distance of b and a in place of a and b."""

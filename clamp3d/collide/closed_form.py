@@ -19,8 +19,7 @@ from clamp3d.collide.convex import Convex, Rod, convex_distance
 from clamp3d.collide.hull import MEMBER, Hull
 from clamp3d.collide.nearest import segment_pairs, to_faces
 from clamp3d.core.distance import SignedDistance, signed_distance
-from clamp3d.core.linear import cross, dot, norm, to_source, to_target
-from clamp3d.core.pose import Array, inverse
+from clamp3d.core.pose import Array, cross, inverse, norm, to_source, to_target
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 
 _TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -47,7 +46,7 @@ class Bore:
         if self.half_angle < math.pi:
             return ((SweptArc(self.radius, self.half_angle, self.length), self.T),)
         half = SweptArc(self.radius, 0.5 * math.pi, self.length)
-        return ((half, self.T), (half, dot(self.T, _TURN)))
+        return ((half, self.T), (half, self.T @ _TURN))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +142,8 @@ def bore_rod(bore: Bore, rod: Rod, T: Array) -> Distance:
 
     In an overlap the capsule that holds the rod gives a lower bound, and the rod's own answer is how deep a point lies.
     """
-    covers = [(groove, place, dot(dot(inverse(place), T), rod.T)) for groove, place in bore.covers()]
-    tilt = norm(cross(bore.T[:3, 2], dot(T[:3, :3], rod.T[:3, 2])))
+    covers = [(groove, place, inverse(place) @ T @ rod.T) for groove, place in bore.covers()]
+    tilt = norm(cross(bore.T[:3, 2], T[:3, :3] @ rod.T[:3, 2]))
     flat = [(signed_distance(groove, Cylinder(rod.radius, rod.length), P), place) for groove, place, P in covers]
     answer, place = min(flat, key=lambda found: found[0].distance)
     found = replace(kernel_distance(answer).moved(place), unique=False if tilt < 1e-12 else None)
@@ -175,7 +174,7 @@ def _bore_hull(bore: Bore, piece: Convex, T: Array) -> Distance:
         return Distance()
     for groove, place in bore.covers():
         R, t = place[:3, :3], place[:3, 3]
-        E, V = dot(edges - t, R), dot(corners - t, R)
+        E, V = (edges - t) @ R, (corners - t) @ R
         for start, end in E:
             P = np.eye(4)
             length = norm(end - start)
@@ -191,10 +190,10 @@ def _bore_hull(bore: Bore, piece: Convex, T: Array) -> Distance:
         lines = [[(x, h, -H), (x, h, H)] for x in (-s, s)]
         lines += [[(x, h, z), (math.copysign(far, x), h, z)] for x in (-s, s) for z in (-H, H)]
         L = np.array(lines)
-        M = dot(inverse(T), place)
+        M = inverse(T) @ place
         if any(piece.crossed_by(to_target(M, line)) for line in L):
             return Distance()
-        for d, p, q in (segment_pairs(L, E), to_faces(L.reshape(-1, 3), dot(triangles - t, R))):
+        for d, p, q in (segment_pairs(L, E), to_faces(L.reshape(-1, 3), (triangles - t) @ R)):
             if 0.0 < d < found.upper:
                 e = 8.0 * 2.0**-52 * float(np.abs(V).max() + groove.radius + H)
                 n = (q - p) / d
@@ -270,7 +269,7 @@ def face_to_face(known: Distance, piece: Convex, other: Convex, a: ClosedForm, b
     """
     n, R, t = known.normal, T[:3, :3], T[:3, 3]
     assert n is not None
-    p, q = piece.face(n), dot(other.face(dot(-n, R)), R.T) + t
+    p, q = piece.face(n), other.face(-n @ R) @ R.T + t
     gap = known.lower
     p, q = np.vstack([p, q - gap * n]), np.vstack([p + gap * n, q])
     if gap >= 0.0:
@@ -283,5 +282,5 @@ def _along(piece: Convex, T: Array | None) -> Array:
     """Shifts (k, 3) along a rod's axis in equal steps; none for other pieces."""
     if not isinstance(piece, Rod):
         return np.empty((0, 3))
-    axis = piece.T[:3, 2] if T is None else dot(T[:3, :3], piece.T[:3, 2])
+    axis = piece.T[:3, 2] if T is None else T[:3, :3] @ piece.T[:3, 2]
     return np.outer(np.linspace(-1.0, 1.0, 2 * _SHIFTS - 1) * piece.length, axis)

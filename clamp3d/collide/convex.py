@@ -18,8 +18,7 @@ import numpy as np
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.hull import FLAT, MEMBER, SMALL, Hull
 from clamp3d.collide.nearest import rim_minimum, segment_pairs, to_faces
-from clamp3d.core.linear import cross, dot, norm, to_source, to_target
-from clamp3d.core.pose import Array, inverse
+from clamp3d.core.pose import Array, cross, inverse, norm, to_source, to_target
 
 _LEVEL = 1e-6
 """Below this sine it is not claimed that the nearest points are the only ones: rounding decides."""
@@ -38,7 +37,7 @@ class Rod:
 
     def support(self, n: Array) -> Array:
         """The points (k, 3) that lie furthest along ``n`` (k, 3)."""
-        m = dot(n, self.T[:3, :3])
+        m = n @ self.T[:3, :3]
         across = np.hypot(m[:, 0], m[:, 1])
         local = m * np.where(across > 1e-12, self.radius / np.maximum(across, 1e-12), 0.0)[:, None]
         local[:, 2] = np.copysign(0.5 * self.length, m[:, 2])
@@ -46,7 +45,7 @@ class Rod:
 
     def face(self, n: Array) -> Array:
         """Points (k, 3) of what lies furthest along ``n`` (3,): a line on the side, the rim of an end, a point."""
-        m = dot(n, self.T[:3, :3])
+        m = n @ self.T[:3, :3]
         across = float(np.hypot(m[0], m[1]))
         if across < FLAT:
             turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
@@ -62,7 +61,7 @@ class Rod:
 
     def flatness(self, n: Array, within: float = FLAT) -> tuple[int, Array | None]:
         """Dimension of what lies furthest along ``n`` (3,), and its direction if it is a line."""
-        m = dot(n, self.T[:3, :3])
+        m = n @ self.T[:3, :3]
         if float(np.hypot(m[0], m[1])) < within:
             return 2, None
         return (1, self.T[:3, 2]) if abs(m[2]) < within else (0, None)
@@ -77,7 +76,7 @@ class Rod:
     def normals(self, n: Array) -> Array:
         """Directions near ``n`` (k, 3) in which the surface is flat or round (m, 3): the axis, and across it."""
         axis = self.T[:3, 2]
-        along = dot(n, axis)[:, None]
+        along = (n @ axis)[:, None]
         across = n - along * axis
         size = np.linalg.norm(across, axis=1)
         aside = size > 1e-9
@@ -138,11 +137,11 @@ def _unique(a: Convex, Ta: Array, b: Convex, Tb: Array, found: Distance) -> bool
 
 def _several(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array, within: float) -> bool:
     """Whether faces, or parallel lines, look at each other along ``n`` (3,); angles below ``within`` count as none."""
-    (i, u), (j, v) = a.flatness(dot(n, Ta[:3, :3]), within), b.flatness(dot(-n, Tb[:3, :3]), within)
+    (i, u), (j, v) = a.flatness(n @ Ta[:3, :3], within), b.flatness(-n @ Tb[:3, :3], within)
     if i == 0 or j == 0:
         return False
     if u is not None and v is not None:
-        return bool(norm(cross(dot(Ta[:3, :3], u), dot(Tb[:3, :3], v))) <= within)
+        return bool(norm(cross(Ta[:3, :3] @ u, Tb[:3, :3] @ v)) <= within)
     return True
 
 
@@ -154,8 +153,8 @@ def _hulls(a: Hull, Ta: Array, b: Hull, Tb: Array, n: Array | None) -> Distance:
     """Two polyhedra: corners against faces and edges against edges; of large ones what looks along ``n``."""
     if n is None and max(len(a.vertices), len(b.vertices)) > SMALL:
         return Distance()
-    Va, Ea, Fa = (_placed(x, Ta) for x in a.near(None if n is None else dot(n, Ta[:3, :3])))
-    Vb, Eb, Fb = (_placed(x, Tb) for x in b.near(None if n is None else dot(-n, Tb[:3, :3])))
+    Va, Ea, Fa = (_placed(x, Ta) for x in a.near(None if n is None else n @ Ta[:3, :3]))
+    Vb, Eb, Fb = (_placed(x, Tb) for x in b.near(None if n is None else -n @ Tb[:3, :3]))
     trials = [segment_pairs(Ea, Eb), to_faces(Va, Fb)]
     d, q, p = to_faces(Vb, Fa)
     d, p, q = min([*trials, (d, p, q)], key=lambda found: found[0])
@@ -177,15 +176,15 @@ def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None, rims: bool
     """A cylinder and a polyhedron: its axis against edges and faces, less the radius; then its rims."""
     if n is None and len(b.vertices) > SMALL:
         return Distance()
-    _V, E, F = (_placed(x, Tb) for x in b.near(None if n is None else dot(-n, Tb[:3, :3])))
+    _V, E, F = (_placed(x, Tb) for x in b.near(None if n is None else -n @ Tb[:3, :3]))
     ends = _placed(a.ends, Ta)
     d, x, q = min([segment_pairs(ends[None], E), to_faces(ends, F)], key=lambda found: found[0])
     if not d > 1e-9 * a.radius or b.crossed_by(_placed(ends, inverse(Tb))):
         return Distance()
     m = (q - x) / d
-    axis = dot(Ta[:3, :3], a.T[:3, 2])
+    axis = Ta[:3, :3] @ a.T[:3, 2]
     found = Distance()
-    if abs(float(dot(m, axis))) <= FLAT:  # square to the axis: on the side
+    if abs(float(m @ axis)) <= FLAT:  # square to the axis: on the side
         p = x + a.radius * m
         low, normal = _slab(a, Ta, b, Tb, m[None])
         if d >= a.radius:
@@ -204,7 +203,7 @@ def _rods(a: Rod, Ta: Array, b: Rod, Tb: Array, rims: bool) -> Distance:
     ends_a, ends_b = _placed(a.ends, Ta), _placed(b.ends, Tb)
     d, x, y = segment_pairs(ends_a[None], ends_b[None])
     n = (y - x) / max(d, 1e-300)
-    square = all(abs(float(dot(n, dot(T[:3, :3], rod.T[:3, 2])))) <= FLAT for rod, T in ((a, Ta), (b, Tb)))
+    square = all(abs(float(n @ (T[:3, :3] @ rod.T[:3, 2]))) <= FLAT for rod, T in ((a, Ta), (b, Tb)))
     if square and d > 1e-9 * (a.radius + b.radius):  # else the feet are on ends, not on the sides
         p, q = x + a.radius * n, y - b.radius * n
         if d > a.radius + b.radius:
@@ -225,7 +224,7 @@ def _rims(a: Rod, Ta: Array, b: Convex, Tb: Array) -> Distance:
     back = inverse(Tb)
     found = Distance()
     for end in a.ends:
-        T = dot(Ta, a.T)
+        T = Ta @ a.T
         T[:3, 3] = _placed(end, Ta)
         rim = rim_minimum(lambda x: _placed(b.closest(_placed(x, back)), Tb), T, a.radius)
         if rim is not None:
@@ -262,7 +261,7 @@ def _object(piece: Convex, T: Array) -> Any:
     import fcl
 
     shape, own = _geometry(piece)
-    P = dot(T, own)
+    P = T @ own
     return fcl.CollisionObject(shape, fcl.Transform(P[:3, :3], P[:3, 3]))
 
 
@@ -310,7 +309,7 @@ def _touching(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
     trials = []
     for piece, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
         axes = piece.T[:3, 2] * np.array([[1.0], [-1.0]]) if isinstance(piece, Rod) else piece.planes[:200, :3]
-        trials.append(dot(sign * axes, T[:3, :3].T))
+        trials.append((sign * axes) @ T[:3, :3].T)
     low, normal = _slab(a, Ta, b, Tb, np.vstack(trials))
     return Distance(low, normal=normal, method="convex")
 
@@ -325,10 +324,10 @@ def _slab(a: Convex, Ta: Array, b: Convex, Tb: Array, near: Array) -> tuple[floa
     """
     Ra, Rb = Ta[:3, :3], Tb[:3, :3]
     offset = Tb[:3, 3] - Ta[:3, 3]
-    n = np.vstack([near, dot(a.normals(dot(near, Ra)), Ra.T), -dot(b.normals(-dot(near, Rb)), Rb.T)])
-    na, nb = dot(n, Ra), -dot(n, Rb)
+    n = np.vstack([near, a.normals(near @ Ra) @ Ra.T, -(b.normals(-(near @ Rb)) @ Rb.T)])
+    na, nb = n @ Ra, -(n @ Rb)
     reach = np.einsum("ij,ij->i", na, a.support(na)) + np.einsum("ij,ij->i", nb, b.support(nb))
-    gap = dot(n, offset) - reach
+    gap = n @ offset - reach
     gap -= 4.0 * _EPS * (float(np.abs(offset).sum()) + np.abs(gap))
     k = int(np.argmax(gap))
     return float(gap[k]), n[k]

@@ -16,8 +16,7 @@ import numpy as np
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.convex import Convex, Rod
 from clamp3d.collide.hull import Hull, hull
-from clamp3d.core.linear import dot, norm, to_target
-from clamp3d.core.pose import Array
+from clamp3d.core.pose import Array, norm, to_target
 
 _RIM = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 _EPS = 2.0**-52
@@ -35,7 +34,7 @@ Supports = Callable[[Array], Array]
 def supports(piece: Convex, T: Array) -> Supports:
     """Support points of a piece placed by ``T`` (4, 4)."""
     R = T[:3, :3]
-    return lambda N: to_target(T, piece.support(dot(N, R)))
+    return lambda N: to_target(T, piece.support(N @ R))
 
 
 def _outline(piece: Convex, T: Array) -> tuple[Array, Array, Array]:
@@ -44,11 +43,11 @@ def _outline(piece: Convex, T: Array) -> tuple[Array, Array, Array]:
     if isinstance(piece, Hull):
         V = piece.vertices
         E = directions(V[piece.edges[:, 1]] - V[piece.edges[:, 0]])
-        return dot(piece.planes[:, :3], R.T), dot(E, R.T), dot(V, R.T) + t
-    z = dot(R, piece.T[:3, 2])
+        return piece.planes[:, :3] @ R.T, E @ R.T, V @ R.T + t
+    z = R @ piece.T[:3, 2]
     rim = piece.radius * np.column_stack([np.cos(_RIM), np.sin(_RIM)])
     ends = [np.column_stack([rim, np.full(len(rim), s * 0.5 * piece.length)]) for s in (-1.0, 1.0)]
-    P = dot(T, piece.T)
+    P = T @ piece.T
     return np.array([z, -z]), z[None], to_target(P, np.vstack(ends))
 
 
@@ -102,8 +101,8 @@ def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array, *, tolerance: float
     seeds = [flat, _SPHERE, crossed(Ea[:8], Eb[:8])]
     for piece, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
         if isinstance(piece, Rod):  # across the axis, away from the other's middle
-            z = dot(T[:3, :3], piece.T[:3, 2])
-            out = middle - dot(middle, z) * z
+            z = T[:3, :3] @ piece.T[:3, 2]
+            out = middle - (middle @ z) * z
             if norm(out) > 1e-9 * scale:
                 seeds.append(np.array([sign, -sign])[:, None] * out / norm(out))
     N = np.vstack(seeds)
@@ -116,7 +115,7 @@ def _faces(N: Array, Va: Array, Vb: Array) -> Array:
     """Points (k, 3) that span the flat faces of the difference which look along ``N``."""
     found = []
     for n in N:
-        A, B = (V[h >= h.max() - 1e-9 * (1.0 + np.ptp(h))] for V, h in ((Va, dot(Va, n)), (Vb, -dot(Vb, n))))
+        A, B = (V[h >= h.max() - 1e-9 * (1.0 + np.ptp(h))] for V, h in ((Va, Va @ n), (Vb, -(Vb @ n))))
         if len(A) * len(B) <= 4096:
             found.append((A[:, None] - B[None]).reshape(-1, 3))
     return np.vstack(found) if found else np.empty((0, 3))

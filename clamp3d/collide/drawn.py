@@ -11,8 +11,7 @@ from clamp3d.collide.closed_form import Bore, ClosedForm
 from clamp3d.collide.convex import Convex, Rod
 from clamp3d.collide.hull import Hull, hull
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.linear import cross, dot, to_target
-from clamp3d.core.pose import Array
+from clamp3d.core.pose import Array, cross, to_target
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.core.shapes import Solid
 
@@ -78,8 +77,8 @@ def _pose(body: Extrusion, centre: tuple[float, float], middle: float = -math.pi
     y = -np.array([math.cos(middle), math.sin(middle), 0.0])
     R = np.column_stack([[y[1], -y[0], 0.0], y, [0.0, 0.0, 1.0]])
     T = np.eye(4)
-    T[:3, :3] = dot(body.frame, R)
-    T[:3, 3] = dot(body.frame, np.array([*centre, 0.5 * (body.start + body.end)]))
+    T[:3, :3] = body.frame @ R
+    T[:3, 3] = body.frame @ np.array([*centre, 0.5 * (body.start + body.end)])
     return T
 
 
@@ -103,7 +102,7 @@ def _less(body: ClosedForm, hole: Extrusion) -> list[ClosedForm] | None:
     if circle is not None:
         T = _pose(hole, circle.centre)
         z, middle = T[:3, 2], T[:3, 3]
-        ends = [dot(piece.support(np.array([-z, z])) - middle, z) for piece in body.outers]
+        ends = [(piece.support(np.array([-z, z])) - middle) @ z for piece in body.outers]
         low, high = float(max(below for below, _ in ends)), float(min(above for _, above in ends))
         T[:3, 3] = middle + 0.5 * (low + high) * z
         return [replace(body, bores=(*body.bores, Bore(circle.radius, math.pi, max(high - low, 1e-6), T)))]
@@ -113,9 +112,9 @@ def _less(body: ClosedForm, hole: Extrusion) -> list[ClosedForm] | None:
     along = np.roll(corners, -1, axis=0) - corners
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
     offsets = -np.einsum("ij,ij->i", normals, corners)
-    if ((dot(corners, normals.T) + offsets) > _FLAT * (1.0 + np.abs(corners).max())).any():
+    if ((corners @ normals.T + offsets) > _FLAT * (1.0 + np.abs(corners).max())).any():
         return None
-    planes = np.column_stack([dot(np.column_stack([normals, 0.0 * offsets]), hole.frame.T), offsets])
+    planes = np.column_stack([np.column_stack([normals, 0.0 * offsets]) @ hole.frame.T, offsets])
     return [piece for plane in planes if (piece := _beyond(body, plane)) is not None]
 
 
@@ -140,8 +139,8 @@ def _beyond(body: ClosedForm, plane: Array) -> ClosedForm | None:
             return None
         outers.append(around)
     for rod in rods:
-        offset = -float(dot(plane[:3], rod.T[:3, 3]) + plane[3])
-        if abs(float(dot(plane[:3], rod.T[:3, 2]))) < _FLAT and abs(offset) < rod.radius:
+        offset = -float(plane[:3] @ rod.T[:3, 3] + plane[3])
+        if abs(float(plane[:3] @ rod.T[:3, 2])) < _FLAT and abs(offset) < rod.radius:
             # Where the wall leaves the round side there is a corner: the tangents there make it one of the hull.
             outers = [_tangential(piece, rod, plane[:3], offset) for piece in outers]
     return replace(body, outers=tuple(outers))
@@ -153,5 +152,5 @@ def _tangential(piece: Convex, rod: Rod, wall: Array, offset: float) -> Convex:
     for side in (-1.0, 1.0):
         if isinstance(piece, Hull):
             out = (offset * wall + side * math.sqrt(rod.radius**2 - offset**2) * across) / rod.radius
-            piece = piece.clipped(np.array([*-out, rod.radius + float(dot(out, rod.T[:3, 3]))])) or piece
+            piece = piece.clipped(np.array([*-out, rod.radius + float(out @ rod.T[:3, 3])])) or piece
     return piece

@@ -12,9 +12,7 @@ from clamp3d.collide.closed_form import Bore, ClosedForm
 from clamp3d.collide.convex import Rod
 from clamp3d.collide.hull import nearly_hull
 from clamp3d.collide.surface import Surface
-from clamp3d.core.linear import atan2, dot, to_source, to_target
-from clamp3d.core.pose import Array
-from clamp3d.core.triangles import distinct, side_keys
+from clamp3d.core.pose import Array, to_source, to_target
 from clamp3d.fit.features import FittedSurface
 from clamp3d.fit.fit import FitResult
 
@@ -44,7 +42,7 @@ def bodies_of_fit(
     points = V.copy()
     for convex in result.cylinders:
         # Facets are inscribed: their tangents in place of their chords enclose the round surface.
-        own = distinct(F[convex.faces])
+        own = np.unique(F[convex.faces])
         T = convex.T_part_feature
         local = to_source(T, V[own])
         out = np.hypot(local[:, 0], local[:, 1])
@@ -78,7 +76,7 @@ def bodies_of_fit(
         for k, surface in enumerate(result.features):
             local = to_source(surface.T_part_feature, x)
             out, z = np.hypot(local[:, 0], local[:, 1]) - surface.radius, np.abs(local[:, 2]) - 0.5 * surface.length
-            turned = np.abs(atan2(local[:, 0], -local[:, 1])) - surface.half_angle
+            turned = np.abs(np.arctan2(local[:, 0], -local[:, 1])) - surface.half_angle
             # Over a facet of its own the fitted surface is the part's, within the error of the fit; elsewhere it may
             # have a window.
             over = (owner[face] == k) & (aside <= surface.fit_error + slack)
@@ -87,9 +85,9 @@ def bodies_of_fit(
             local = to_source(surface.T_part_feature, x)
             cut = np.hypot(local[:, 0], local[:, 1]) < surface.radius - slack
             # At its ends: faces that look out of it, not the floor or the step that it ends at.
-            leaves = dot(normal[face], surface.T_part_feature[:3, 2]) * np.sign(local[:, 2]) > 1e-6
+            leaves = (normal[face] @ surface.T_part_feature[:3, 2]) * np.sign(local[:, 2]) > 1e-6
             cut &= np.abs(local[:, 2]) < 0.5 * surface.length + np.where(leaves, slack, -slack)
-            on &= ~(cut & (np.abs(atan2(local[:, 0], -local[:, 1])) < surface.half_angle))
+            on &= ~(cut & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) < surface.half_angle))
         found = np.where(on, 0.0, -mesh_error - away)
         # Nearer to the facets than their own error a point proves nothing; further in it does.
         far = np.flatnonzero(~on & (away > mesh_error))
@@ -118,12 +116,13 @@ def _bore(
     local = to_source(T, V)
     own = np.zeros(len(F), dtype=bool)
     for other in hollow:
-        own[other.faces] |= other is feature or _on_cylinder(local[distinct(F[other.faces])], feature.radius, error)
+        own[other.faces] |= other is feature or _on_cylinder(local[np.unique(F[other.faces])], feature.radius, error)
     least, edges = _nearest_to_axis(local[:, :2][F])
     if least[own].min() < feature.radius - sagitta - 1e-9 * feature.radius:
         return None
     limit = np.full(F.shape, feature.radius - error)
-    sides, number = np.unique(side_keys(F, np.roll(F, -1, axis=1), len(V)), return_inverse=True)
+    after = np.roll(F, -1, axis=1)
+    sides, number = np.unique(np.minimum(F, after) * len(V) + np.maximum(F, after), return_inverse=True)
     number = number.reshape(F.shape)
     shared = np.zeros(len(sides), dtype=bool)
     shared[number[own]] = True
@@ -168,7 +167,7 @@ def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> 
     ``through`` (m,): the triangles of holes and grooves that are bores of the whole mesh.
     """
     full = [f for f in result.cylinders if f.full]
-    everything = [distinct(F)]
+    everything = [np.unique(F)]
     if not full:
         return [], everything
     T = full[0].T_part_feature
@@ -177,7 +176,7 @@ def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> 
     rods: list[Rod] = []
     taken: list[tuple[float, float]] = []
     for feature in full:
-        own = distinct(F[feature.faces])
+        own = np.unique(F[feature.faces])
         low, high = float(z[own].min()), float(z[own].max())
         slack = feature.fit_error + 1e-9 * (high - low)
         coaxial = np.abs(out[own] - feature.radius).max() <= 10.0 * slack
@@ -188,7 +187,7 @@ def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> 
             continue
         place = feature.T_part_feature.copy()
         middle = (
-            float(dot(V[own] - place[:3, 3], place[:3, 2]).min() + dot(V[own] - place[:3, 3], place[:3, 2]).max()) / 2
+            float(((V[own] - place[:3, 3]) @ place[:3, 2]).min() + ((V[own] - place[:3, 3]) @ place[:3, 2]).max()) / 2
         )
         place[:3, 3] += middle * place[:3, 2]
         rods.append(Rod(feature.radius, high - low, place))
@@ -198,7 +197,7 @@ def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> 
     for low, high in zip(edges[0::2], edges[1::2], strict=True):
         slack = 1e-6 * (1.0 + float(np.ptp(z)))
         inside = (z[F].min(axis=1) >= low - slack) & (z[F].max(axis=1) <= high + slack)
-        index = distinct(F[inside])
+        index = np.unique(F[inside])
         if len(index) and np.ptp(z[index]) > slack:  # a flat face between two stretches is the end of either
             rest.append(index)
     return (rods, rest) if rods else ([], everything)

@@ -8,9 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.core.linear import dot, norm
-from clamp3d.core.pose import Array
-from clamp3d.core.triangles import closest_points, distinct
+from clamp3d.core.pose import Array, norm
+from clamp3d.core.triangles import closest_points
 
 MEMBER = 1e-9
 """Relative to the size of the parts: a point this far outside still counts as on the surface."""
@@ -47,10 +46,10 @@ class Hull:
 
     def support(self, n: Array) -> Array:
         """The vertices (k, 3) that lie furthest along ``n`` (k, 3)."""
-        return np.asarray(self.vertices[np.argmax(dot(n, self.vertices.T), axis=1)])
+        return np.asarray(self.vertices[np.argmax(n @ self.vertices.T, axis=1)])
 
     def _highest(self, n: Array, within: float = FLAT) -> Array:
-        height = dot(self.vertices, n)
+        height = self.vertices @ n
         return np.asarray(self.vertices[height >= height.max() - within * (1.0 + float(np.ptp(height)))][:24])
 
     def face(self, n: Array) -> Array:
@@ -69,18 +68,18 @@ class Hull:
 
     def depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""
-        return np.asarray(-(dot(points, self.planes[:, :3].T) + self.planes[:, 3]).max(axis=1))
+        return np.asarray(-(points @ self.planes[:, :3].T + self.planes[:, 3]).max(axis=1))
 
     def normals(self, n: Array) -> Array:
         """The face normals (k, 3) nearest to ``n`` (k, 3)."""
-        return np.asarray(self.planes[np.argmax(dot(n, self.planes[:, :3].T), axis=1), :3])
+        return np.asarray(self.planes[np.argmax(n @ self.planes[:, :3].T, axis=1), :3])
 
     def near(self, n: Array | None) -> tuple[Array, Array, Array]:
         """Corners (k, 3), edges (k, 2, 3) and triangles (k, 3, 3), of a large hull only those that face ``n`` (3,)."""
         V = self.vertices
         if n is None or len(V) <= SMALL:
             return V, V[self.edges], V[self.faces]
-        height = dot(V, n)
+        height = V @ n
         high = height >= height.max() - 0.01 * float(np.ptp(height))
         return V[high], V[self.edges[high[self.edges].any(axis=1)]], V[self.faces[high[self.faces].any(axis=1)]]
 
@@ -94,7 +93,7 @@ class Hull:
 
     def crossed_by(self, ends: Array) -> bool:
         """Whether the segment between ``ends`` (2, 3) meets the polyhedron."""
-        h, k = dot(ends, self.planes[:, :3].T) + self.planes[:, 3]
+        h, k = ends @ self.planes[:, :3].T + self.planes[:, 3]
         if ((h > 0.0) & (k > 0.0)).any():
             return False
         enters, leaves = h > 0.0, k > 0.0
@@ -104,7 +103,7 @@ class Hull:
     def clipped(self, plane: Array) -> Hull | None:
         """What of it lies in the half-space plane[:3] . x + plane[3] >= 0; None if it has no volume."""
         V = self.vertices
-        height = dot(V, plane[:3]) + plane[3]
+        height = V @ plane[:3] + plane[3]
         slack = MEMBER * (1.0 + float(np.abs(V).max()))
         if height.min() >= -slack:
             return self
@@ -160,7 +159,7 @@ def _reach(vertices: Array, faces: NDArray[np.int64], points: Array) -> float:
     corners, across = corners[wide], across[wide] / volume[wide, None, None]
     worst = 0.0
     for point in points - middle:
-        weight = np.maximum(dot(across, point), 0.0)
+        weight = np.maximum(across @ point, 0.0)
         weight /= np.maximum(weight.sum(axis=1), 1.0)[:, None]
         worst = max(worst, float(np.linalg.norm(np.einsum("ij,ijk->ik", weight, corners) - point, axis=1).min()))
     return worst
@@ -200,12 +199,12 @@ def hull_error(vertices: Array, faces: NDArray[np.int64]) -> float:
     within h / cos t of z, and cos t is the depth of c below the plane over the distance of c and z.
     """
     scale = float(np.abs(vertices).max())
-    few = distinct(np.arange(64) * 2654435761 % len(faces))  # far apart, in no step with the rings of a mesh
+    few = np.unique(np.arange(64) * 2654435761 % len(faces))  # far apart, in no step with the rings of a mesh
     if _Sides.of(vertices, faces[few]).highest(vertices).max(initial=0.0) > 1e-6 * scale:
         return np.inf
     sides = _Sides.of(vertices, faces)
     centre = vertices.mean(axis=0)
-    depth = float((sides.offset - dot(sides.normal, centre))[sides.flat].min(initial=np.inf))
+    depth = float((sides.offset - sides.normal @ centre)[sides.flat].min(initial=np.inf))
     if not 0.0 < depth < np.inf:
         return np.inf
     # A point of a sliver is this far from a neighbour's plane.
@@ -242,11 +241,11 @@ class _Sides:
     def highest(self, points: Array) -> Array:
         """How high (m,) the highest of points (n, 3) is above each plane."""
         step = max(1, _MEMORY // len(points))
-        parts = [dot(points, self.normal[k : k + step].T).max(axis=0) for k in range(0, len(self.normal), step)]
+        parts = [(points @ self.normal[k : k + step].T).max(axis=0) for k in range(0, len(self.normal), step)]
         return np.concatenate(parts) - self.offset
 
     def above(self, points: Array) -> NDArray[np.bool_]:
         """Which of points (n, 3) are above some plane by more than rounding."""
         step, limit = max(1, _MEMORY // len(self.normal)), self.offset + self.rounding
-        parts = [(dot(points[k : k + step], self.normal.T) > limit).any(axis=1) for k in range(0, len(points), step)]
+        parts = [(points[k : k + step] @ self.normal.T > limit).any(axis=1) for k in range(0, len(points), step)]
         return np.concatenate(parts)

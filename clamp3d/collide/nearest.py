@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from clamp3d.core.linear import dot
 from clamp3d.core.pose import Array
 
 Found = tuple[float, Array, Array]
@@ -69,7 +68,7 @@ def rim_minimum(closest: Callable[[Array], Array], T: Array, radius: float) -> t
     def slope(angle: float) -> float:
         x = rim(np.array([angle]))
         along = -np.sin(angle) * T[:3, 0] + np.cos(angle) * T[:3, 1]
-        return float(dot((x - closest(x))[0], along))
+        return float((x - closest(x))[0] @ along)
 
     turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     x = rim(turn)

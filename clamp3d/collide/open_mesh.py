@@ -12,8 +12,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.mesh_distance import nearest_points, one_inside, rounding_of, surfaces_meet
 from clamp3d.collide.model import Model
 from clamp3d.collide.surface import Surface
-from clamp3d.core.linear import to_target
-from clamp3d.core.pose import Array, inverse
+from clamp3d.core.pose import Array, inverse, to_target
 
 _PAIRS = 4000
 """Pairs of crossing triangles that are looked at."""

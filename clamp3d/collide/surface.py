@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from clamp3d.core.mesh import edges_of, is_closed
 from clamp3d.core.pose import Array
-from clamp3d.core.shells import corners_of, shells
+from clamp3d.core.shells import shells
 
 _LEVELS = 4
 """Groups that the triangles with errors are put in at most, each four times finer than the one before."""
@@ -95,7 +95,7 @@ class Surface:
     @cached_property
     def normals(self) -> Array:
         """Unit normals (m, 3) of the triangles, 0 for slivers."""
-        a, b, c = corners_of(self.vertices, self.faces)
+        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
         N = np.cross(b - a, c - a)
         size = np.linalg.norm(N, axis=1)
         return np.asarray(np.where((size > 1e-14 * self.scale**2)[:, None], N / np.maximum(size, 1e-300)[:, None], 0.0))
@@ -221,7 +221,7 @@ def at_edges(vertices: Array, faces: NDArray[np.int64], error: Array, patch: NDA
     lies on the mesh.
     """
     _, pairs, across = edges_of(faces, 2)
-    a, b, c = corners_of(vertices, faces)
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
     one, other = normal[pairs[:, 0]], normal[pairs[:, 1]]

@@ -14,8 +14,7 @@ from clamp3d.collide.closed_form import ClosedForm, bore_rod
 from clamp3d.collide.convex import Convex, Rod, convex_distance
 from clamp3d.collide.hull import Hull, nearly_hull
 from clamp3d.collide.model import Model
-from clamp3d.core.linear import dot, to_target
-from clamp3d.core.pose import Array, inverse
+from clamp3d.core.pose import Array, inverse, to_target
 
 
 def swept_lower(
@@ -75,10 +74,10 @@ def _swept_hull(piece: Convex, poses: tuple[Array, ...], angle: float) -> tuple[
 def _swept_rod(rod: Rod, poses: tuple[Array, ...], angle: float) -> Rod:
     """A rod, in its own part's frame at the middle pose, that holds the moving one all the time."""
     ends = rod.T[:3, 3] + np.outer([-0.5 * rod.length, 0.5 * rod.length], rod.T[:3, 2])
-    home = inverse(dot(poses[1], rod.T))
+    home = inverse(poses[1] @ rod.T)
     ways = np.array([to_target(home, to_target(T, ends)) for T in poses])
     local, sag = ways.reshape(-1, 3), _sagitta(ways, angle)
-    axes = [dot(dot(home[:3, :3], T[:3, :3]), rod.T[:3, 2]) for T in poses]
+    axes = [home[:3, :3] @ T[:3, :3] @ rod.T[:3, 2] for T in poses]
     tilt = rod.radius * max(float(np.hypot(axis[0], axis[1])) for axis in axes)
     low, high = float(local[:, 2].min() - sag - tilt), float(local[:, 2].max() + sag + tilt)
     aside = float(np.hypot(local[:, 0], local[:, 1]).max())

@@ -102,34 +102,29 @@ def arc_circle(
     >>> arc_circle(7.0, math.radians(100), 6.935, 0.0, 0.0, tolerance=1e-9).gap
     0.06500000000000039
     """
-    arc_radius, half_angle, circle_radius, x, y, tolerance = _checked(
-        arc_radius, half_angle, circle_radius, x, y, tolerance
-    )
-    m_x, m_y = -arc_radius * math.sin(half_angle), -arc_radius * math.cos(half_angle)
-    distance_m, distance_n = math.hypot(x - m_x, y - m_y), math.hypot(x + m_x, y - m_y)
+    pair = _Pair(arc_radius, half_angle, circle_radius, x, y, tolerance)
+    R, r, x, y = pair.arc_radius, pair.circle_radius, pair.x, pair.y
+    s, h = pair.chord
+    from_m, from_n = math.hypot(x + s, y - h), math.hypot(x - s, y - h)
     points: tuple[tuple[float, float], ...]
-    if _in_span(x, y, half_angle):
+    if pair.is_in_span:
         from_centre = math.hypot(x, y)
-        if from_centre > arc_radius:
-            gap = (from_centre - arc_radius) - circle_radius
-        else:  # radii first: their difference is the small number that matters
-            gap = (arc_radius - circle_radius) - from_centre
-        coaxial = from_centre <= _EPS * _EPS * arc_radius  # direction lost; the quotient would overflow
-        scale = 0.0 if coaxial else arc_radius / from_centre
-        point = (0.0, -arc_radius) if coaxial else (x * scale, y * scale)
+        # Inside radii first: their difference is the small number that matters.
+        gap = (from_centre - R) - r if from_centre > R else (R - r) - from_centre
+        coaxial = from_centre <= _EPS * _EPS * R  # direction lost; the quotient would overflow
+        point = (0.0, -R) if coaxial else (x * (R / from_centre), y * (R / from_centre))
         feature, points = ArcFeature.ARC, (point,)
-        if math.hypot(abs(point[0]) + m_x, point[1] - m_y) <= tolerance:
+        if math.hypot(abs(point[0]) - s, point[1] - h) <= pair.tolerance:
             feature = ArcFeature.M if x < 0.0 else ArcFeature.N
     else:
-        gap = min(distance_m, distance_n) - circle_radius
-        if abs(distance_m - distance_n) <= tolerance:
-            feature, points = ArcFeature.BOTH_ENDS, ((m_x, m_y), (-m_x, m_y))
-        elif distance_m < distance_n:
-            feature, points = ArcFeature.M, ((m_x, m_y),)
+        gap = min(from_m, from_n) - r
+        if abs(from_m - from_n) <= pair.tolerance:
+            feature, points = ArcFeature.BOTH_ENDS, ((-s, h), (s, h))
+        elif from_m < from_n:
+            feature, points = ArcFeature.M, ((-s, h),)
         else:
-            feature, points = ArcFeature.N, ((-m_x, m_y),)
-    relation = classify_arc_circle(gap, arc_radius, half_angle, circle_radius, x, y, tolerance=tolerance)
-    return ArcContact(relation, gap, feature, points, tolerance)
+            feature, points = ArcFeature.N, ((s, h),)
+    return ArcContact(pair.relation(gap), gap, feature, points, pair.tolerance)
 
 
 def classify_arc_circle(
@@ -139,31 +134,11 @@ def classify_arc_circle(
 
     The other parameters, and errors, are those of `arc_circle`.
     """
-    arc_radius, half_angle, circle_radius, x, y, tolerance = _checked(
-        arc_radius, half_angle, circle_radius, x, y, tolerance
-    )
+    pair = _Pair(arc_radius, half_angle, circle_radius, x, y, tolerance)
     checked_gap = real(gap)
     if checked_gap is None or math.isnan(checked_gap):
         raise InputError(f"gap must be a number, got {shown(gap)}")
-    gap = checked_gap
-    if gap < -tolerance:
-        return ArcRelation.INTERSECT
-    chord_x, chord_y = arc_radius * math.sin(half_angle), -arc_radius * math.cos(half_angle)
-    if gap <= tolerance:
-        if _in_span(x, y, half_angle):
-            exterior = math.hypot(x, y) > arc_radius
-        else:  # Fig. 6: the side of the line RM on which the centre lies, RM being the tangent in M (or N)
-            outward = (abs(x) - chord_x) * math.sin(half_angle) - (y - chord_y) * math.cos(half_angle)
-            exterior = outward >= -tolerance
-        return ArcRelation.EXTERIOR_CONTACT if exterior else ArcRelation.INTERIOR_CONTACT
-    in_region = y <= chord_y and math.hypot(x, y) <= arc_radius
-    through_chord = y >= chord_y and abs(x) <= chord_x and y - chord_y <= circle_radius
-    return ArcRelation.INSIDE if in_region or through_chord else ArcRelation.OUTSIDE
-
-
-def _in_span(x: float, y: float, half_angle: float) -> bool:
-    """Whether the centre's direction meets the arc. Folded to [0, pi] about -y, so no angle wraps."""
-    return math.atan2(abs(x), 0.0 - y) <= half_angle  # 0.0 - y, not -y: atan2(0, -0.0) is pi
+    return pair.relation(checked_gap)
 
 
 def check_tolerance(tolerance: float, *radii: float) -> float:
@@ -174,13 +149,48 @@ def check_tolerance(tolerance: float, *radii: float) -> float:
     return tolerance
 
 
-def _checked(
-    arc_radius: float, half_angle: float, circle_radius: float, x: float, y: float, tolerance: float
-) -> tuple[float, float, float, float, float, float]:
-    """All six as floats, with the tolerance to apply. Raises InputError naming the value that breaks its rule."""
-    arc_radius, circle_radius = size("arc_radius", arc_radius), size("circle_radius", circle_radius)
-    half_angle = arc_angle("half_angle", half_angle)
-    x, y = place("circle centre x", x), place("circle centre y", y)
-    tolerance = check_tolerance(tolerance, arc_radius, circle_radius)
-    tolerance = max(tolerance, 4.0 * _EPS * (arc_radius + circle_radius + abs(x) + abs(y)))
-    return arc_radius, half_angle, circle_radius, x, y, tolerance
+@dataclass(slots=True)
+class _Pair:
+    """An arc and a circle as `arc_circle` takes them. Raises InputError naming the value that breaks its rule."""
+
+    arc_radius: float
+    half_angle: float
+    circle_radius: float
+    x: float
+    y: float
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        self.arc_radius = size("arc_radius", self.arc_radius)
+        self.circle_radius = size("circle_radius", self.circle_radius)
+        self.half_angle = arc_angle("half_angle", self.half_angle)
+        self.x, self.y = place("circle centre x", self.x), place("circle centre y", self.y)
+        rounding = 4.0 * _EPS * (self.arc_radius + self.circle_radius + abs(self.x) + abs(self.y))
+        self.tolerance = max(check_tolerance(self.tolerance, self.arc_radius, self.circle_radius), rounding)
+
+    @property
+    def chord(self) -> tuple[float, float]:
+        """The end N of the arc; M is its mirror image."""
+        return self.arc_radius * math.sin(self.half_angle), -self.arc_radius * math.cos(self.half_angle)
+
+    @property
+    def is_in_span(self) -> bool:
+        """Whether the centre's direction meets the arc. Folded to [0, pi] about -y, so no angle wraps."""
+        return math.atan2(abs(self.x), 0.0 - self.y) <= self.half_angle  # 0.0 - y, not -y: atan2(0, -0.0) is pi
+
+    def relation(self, gap: float) -> ArcRelation:
+        """Column of Table 3 for a gap, mm."""
+        if gap < -self.tolerance:
+            return ArcRelation.INTERSECT
+        s, h = self.chord
+        from_centre = math.hypot(self.x, self.y)
+        if gap <= self.tolerance:
+            if self.is_in_span:
+                exterior = from_centre > self.arc_radius
+            else:  # Fig. 6: the side of the line RM on which the centre lies, RM being the tangent in M (or N)
+                outward = (abs(self.x) - s) * math.sin(self.half_angle) - (self.y - h) * math.cos(self.half_angle)
+                exterior = outward >= -self.tolerance
+            return ArcRelation.EXTERIOR_CONTACT if exterior else ArcRelation.INTERIOR_CONTACT
+        in_region = self.y <= h and from_centre <= self.arc_radius
+        through_chord = self.y >= h and abs(self.x) <= s and self.y - h <= self.circle_radius
+        return ArcRelation.INSIDE if in_region or through_chord else ArcRelation.OUTSIDE

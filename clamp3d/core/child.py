@@ -14,10 +14,8 @@ import struct
 import subprocess
 import sys
 import threading
-import time
 import traceback
 from collections import deque
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
@@ -103,7 +101,6 @@ class Worker:
         *arguments: Any,
         time_limit: float,
         memory: float | None = None,
-        watch: Callable[[list[str]], None] = lambda log: None,
     ) -> Any:
         """The result of ``function(*arguments)`` in the process.
 
@@ -117,8 +114,6 @@ class Worker:
             Seconds after which the process is ended.
         memory : float, optional
             Bytes that this call may take beyond what the process has, where the system can limit that.
-        watch : callable
-            Receives the last lines that the process printed, about ten times a second.
 
         Raises
         ------
@@ -138,7 +133,7 @@ class Worker:
                 if self._process is None or self._process.poll() is not None:
                     self._start()
                 request = {"function": function, "arguments": arguments, "memory": memory}
-                answer = self._exchange(_pack(request), time_limit, watch)
+                answer = self._exchange(_pack(request), time_limit)
             except BaseException:  # also for Ctrl-C: the process may still be at work
                 self.close()
                 raise
@@ -186,21 +181,16 @@ class Worker:
         for thread in self._threads:
             thread.start()
 
-    def _exchange(self, request: bytes, time_limit: float, watch: Callable[[list[str]], None]) -> dict[str, Any]:
+    def _exchange(self, request: bytes, time_limit: float) -> dict[str, Any]:
         process = self._process
         assert process is not None
         assert process.stdin is not None
         with suppress(BrokenPipeError):  # it has ended: said below
             _send(process.stdin, request)
-        deadline = time.monotonic() + time_limit
-        while True:
-            try:
-                answer = self._answers.get(timeout=min(0.1, max(0.0, deadline - time.monotonic())))
-                break
-            except queue.Empty:
-                if time.monotonic() >= deadline:
-                    raise WorkerTimeoutError(f"no answer in {time_limit:g} s") from None
-                watch(self.log)
+        try:
+            answer = self._answers.get(timeout=time_limit)
+        except queue.Empty:
+            raise WorkerTimeoutError(f"no answer in {time_limit:g} s") from None
         if answer is None:
             code = process.wait()
             self._threads[1].join(timeout=5.0)
@@ -209,29 +199,6 @@ class Worker:
             raise WorkerEndedError(code, self.log)
         reply: dict[str, Any] = _unpack(answer)
         return reply
-
-
-def run_child(
-    module: str,
-    *arguments: str,
-    time_limit: float,
-    watch: Callable[[list[str]], None] = lambda log: None,
-) -> tuple[int | None, list[str]]:
-    """Call ``main(*arguments)`` of a module in a process of its own for at most ``time_limit`` s.
-
-    Returns its exit code (None: not done in time) and the last lines that it printed, which ``watch`` receives about
-    ten times a second. An exception is exit code 1, and its message the last line.
-    """
-    with Worker(f"{module}:main") as worker:
-        try:
-            worker.call(f"{module}:main", *arguments, time_limit=time_limit, watch=watch)
-        except WorkerTimeoutError:
-            return None, worker.log
-        except WorkerEndedError as error:
-            return error.code, worker.log
-        except (Clamp3dError, OSError, RuntimeError, MemoryError) as error:
-            return 1, [*worker.log, str(error) or type(error).__name__]
-        return 0, worker.log
 
 
 def serve() -> None:

@@ -12,11 +12,12 @@ translation that frees the bodies), of which it is a lower bound for a cylinder.
 
 from __future__ import annotations
 
+import functools
 import os
 from dataclasses import dataclass, field
 from enum import IntEnum
 from types import ModuleType
-from typing import Literal, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,6 +50,24 @@ class Feature(IntEnum):
 
 
 _FEATURES = tuple(Feature)
+
+VECTOR = (np.float64, 3)
+TWIST = (np.float64, 6)
+_RECORD = np.dtype(
+    [
+        ("distance", np.float64),
+        ("point_on_groove", *VECTOR),
+        ("point_on_cylinder", *VECTOR),
+        ("normal", *VECTOR),
+        ("feature", np.int8),
+        ("along", np.float64),
+        ("error_bound", np.float64),
+        ("axis_inside", np.bool_),
+        ("gradient", *TWIST),
+    ],
+    align=True,
+)
+"""What the kernel writes: the fields of `SignedDistance` in their order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,19 +142,6 @@ def as_pose(pose: ArrayLike) -> Array:
     return np.require(check_pose(pose), np.float64, ["C", "A", "W"])
 
 
-def repaired(T: Array, name: str) -> Array:
-    """The poses (n, 4, 4) or the pose (4, 4) that the kernel refused, without their rounding errors.
-
-    Raises InputError if one is not rigid, or its offset is too large; PoseWarning says what was mended.
-    """
-    T = check_pose(T, name) if T.ndim == 2 else check_pose_array(T, name)
-    far = np.flatnonzero(np.atleast_1d(np.abs(T[..., :3, 3]).sum(axis=-1)) >= LARGEST)
-    if len(far):
-        where, offset = (name, T[:3, 3]) if T.ndim == 2 else (f"{name}[{far[0]}]", T[far[0], :3, 3])
-        raise InputError(f"{where} must have an offset below {LARGEST:g} mm, got {offset.tolist()}")
-    return T
-
-
 def _unit_axes(T: Array) -> Array:
     """Positions and axes (n, 2, 3) that the kernel refused, with axes of length 1. Raises InputError for others."""
     longest = np.abs(T[:, 1]).max(axis=1, keepdims=True)
@@ -148,17 +154,12 @@ def _unit_axes(T: Array) -> Array:
     return np.stack([T[:, 0], axis / np.linalg.norm(axis, axis=1, keepdims=True)], axis=1)
 
 
-_kernel: ModuleType | None = None
-
-
+@functools.cache
 def kernel() -> ModuleType:
     """Return the compiled entry points, loaded (or compiled, with a notice on stderr) on first use."""
-    global _kernel
-    if _kernel is None:
-        from clamp3d.core import kernel as module
+    from clamp3d.core import kernel as module
 
-        _kernel = module
-    return _kernel
+    return module
 
 
 def signed_distance(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) -> SignedDistance:
@@ -198,28 +199,14 @@ def signed_distance(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) ->
     """
     if type(groove) is not SweptArc or type(cylinder) is not Cylinder:
         check_shapes(groove, cylinder)
-    flat = type(cylinder) is Cylinder
     T = as_pose(pose)
-    run = _kernel or kernel()
-    record = np.empty((1, run.WIDTH))
-    half, along = 0.5 * groove.length, 0.5 * cylinder.length
-    if run.records(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, record) >= 0:
-        return signed_distance(groove, cylinder, repaired(T, "pose"))
-    out = record[0]
-    values = out.tolist()
-    distance = values[0]
-    return SignedDistance(
-        distance,
-        out[1:4],
-        out[4:7],
-        out[7:10],
-        _FEATURES[int(values[11])],
-        values[12],
-        values[10],
-        distance < -(min(cylinder.radius, along) if flat else cylinder.radius),
-        out[13:19],
-        (groove, cylinder, T),
-    )
+    out = np.empty(1, _RECORD)
+    half, along, flat = 0.5 * groove.length, 0.5 * cylinder.length, type(cylinder) is Cylinder
+    if kernel().records(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, out) >= 0:
+        return signed_distance(groove, cylinder, check_pose(T))
+    values: list[Any] = [*out.tolist()[0], (groove, cylinder, T)]
+    values[4] = _FEATURES[values[4]]
+    return SignedDistance(*values)
 
 
 @overload
@@ -281,38 +268,20 @@ def signed_distances(
     if workers is not None:
         workers = whole("workers", workers, least=1)
     out = _measured(groove, cylinder, T, full, workers)
-    if not full:
-        return out
-    columns = kernel()
-    return SignedDistances(
-        out[:, columns.DISTANCE],
-        out[:, 1:4],
-        out[:, 4:7],
-        out[:, 7:10],
-        out[:, columns.FEATURE].astype(np.int8),
-        out[:, columns.ALONG],
-        out[:, columns.ERROR_BOUND],
-        out[:, columns.DISTANCE] < -_inner_size(cylinder),
-        out[:, columns.GRADIENT :],
-    )
+    return SignedDistances(**{name: out[name] for name in _RECORD.names or ()}) if full else out
 
 
-def _inner_size(cylinder: AnyCylinder) -> float:
-    """By how much the cylinder can shrink before nothing, or its axis alone, is left; mm."""
-    return min(cylinder.radius, 0.5 * cylinder.length) if isinstance(cylinder, Cylinder) else cylinder.radius
-
-
-def _measured(groove: SweptArc, cylinder: AnyCylinder, T: Array, full: bool, workers: int | None) -> Array:
+def _measured(groove: SweptArc, cylinder: AnyCylinder, T: Array, full: bool, workers: int | None) -> NDArray[Any]:
     """Distances (n,) or full records of the kernel for poses (n, 4, 4) or (n, 2, 3), shared by threads."""
     n = len(T)
     run = kernel().records if full else kernel().distances
-    out = np.empty((n, kernel().WIDTH) if full else n)
-    flat = isinstance(cylinder, Cylinder)
-    sizes = (groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, flat)
+    out: NDArray[Any] = np.empty(n, _RECORD if full else np.float64)
     threads = min(workers or os.cpu_count() or 1, max(1, n // 4096))
 
     def part(start: int, stop: int) -> bool:
-        return int(run(T[start:stop], *sizes, out[start:stop])) < 0
+        half, along, flat = 0.5 * groove.length, 0.5 * cylinder.length, isinstance(cylinder, Cylinder)
+        rows = out[start:stop]
+        return int(run(T[start:stop], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, rows)) < 0
 
     if threads == 1:
         is_done = part(0, n)
@@ -324,5 +293,5 @@ def _measured(groove: SweptArc, cylinder: AnyCylinder, T: Array, full: bool, wor
             is_done = all(pool.map(part, cuts[:-1], cuts[1:]))
     if is_done:
         return out
-    mended = _unit_axes(T) if T.shape[1] == 2 else repaired(T, "poses")
+    mended = _unit_axes(T) if T.shape[1] == 2 else check_pose_array(T)
     return _measured(groove, cylinder, mended, full, workers)

@@ -35,11 +35,9 @@ class Search:
         self.slack = max(ACCURACY if resolution is None else positive("resolution", resolution), rounding)
         self._turn = motion.angle * motion.axis
         self._tilt_of_rim = cylinder.radius if isinstance(cylinder, Cylinder) else 0.0
-        axis = start[:3, 2]
-        ends = self._from_turn_axis(start, 0.0)
-        turning = np.linalg.norm(np.cross(self._turn, ends), axis=1).max()
-        tilting = self._tilt_of_rim * np.linalg.norm(np.cross(self._turn, axis))
-        self.speed = float(np.linalg.norm(motion.travel) + turning + tilting) * (1.0 + 1e-12)
+        half = 0.5 * cylinder.length * start[:3, 2]
+        tilting = self._tilt_of_rim * float(np.linalg.norm(np.cross(self._turn, start[:3, 2])))
+        self.speed = (motion.speed(start[:3, 3] + np.array([-half, half])) + tilting) * (1.0 + 1e-12)
 
     def _rounding(self) -> float:
         """Largest rounding in mm of a point of the axis at a pose of the motion."""
@@ -135,8 +133,8 @@ class Search:
 
 def _components(velocity: Array, d: Array) -> tuple[float, float]:
     """The a and b for which ``a d + b z`` is nearest to a velocity (3,)."""
-    along, up, cosine = float(velocity @ d), float(velocity[2]), float(d[2])
+    along, along_z, cosine = float(velocity @ d), float(velocity[2]), float(d[2])
     sine2 = 1.0 - cosine * cosine
     if sine2 < 1e-6:
-        return 0.0, up
-    return (along - cosine * up) / sine2, (up - cosine * along) / sine2
+        return 0.0, along_z
+    return (along - cosine * along_z) / sine2, (along_z - cosine * along) / sine2

@@ -16,37 +16,30 @@ import numpy as np
 
 from clamp3d.core.jit import formula, inlined
 from clamp3d.core.kernel_features import Groove, Rod, phi
+from clamp3d.core.kernel_vector import Vector, cross, dot, length, plus
 
 STRETCHES = 400
 """Stretches of an arc that are looked at; then the search ends with a wider bound, which it tells."""
 
 # What `root` solves, with w and t as above, g = w - r, e = |t| - half:
-RIM, SIDE, END, RIDGE, MIDDLE = range(5)
-"""The least distance from the rim, from the axis, from the end's plane; where g = e; where t = 0."""
+RIM, SIDE, RIDGE, MIDDLE = range(4)
+"""The least distance from the rim, from the axis; where g = e; where t = 0."""
 
 
 class Line(NamedTuple):
-    """The edge ``k + p u``, lo <= p <= hi: k = (x, y, z) from the cylinder's middle, u = (ux, 0, uz) is x or z.
+    """The edge ``foot + p direction``, lo <= p <= hi, from the cylinder's middle; the foot is square to it."""
 
-    u is square to k.
-    """
-
-    x: float
-    y: float
-    z: float
-    ux: float
-    uz: float
+    foot: Vector
+    direction: Vector
     lo: float
     hi: float
 
 
 class EndArc(NamedTuple):
-    """An end arc in the plane z: its radius, and its centre from the axis' nearest point, which is at ``off`` on it."""
+    """An end arc: its radius, and its centre from the axis' nearest point, which is at ``off`` on it."""
 
     R: float
-    x: float
-    y: float
-    z: float
+    centre: Vector
     off: float
 
 
@@ -89,48 +82,51 @@ class Place(NamedTuple):
 
 
 @inlined
-def from_axis(rod: Rod, x: float, y: float, z: float) -> tuple[float, float]:
-    """Distance of a point, given from the cylinder's middle, from its axis, and its place along it."""
-    t = x * rod.dx + y * rod.dy + z * rod.dz
-    x -= t * rod.dx
-    y -= t * rod.dy
-    z -= t * rod.dz
-    return math.sqrt(x * x + y * y + z * z), t
+def cylinder_distance(rod: Rod, w: float, t: float) -> float:
+    """Signed distance f of a point from the cylinder by its distance from the axis and its place along it."""
+    return phi(w - rod.r, abs(t) - rod.half)
 
 
 @inlined
-def beside(rod: Rod, w: float, t: float) -> float:
-    """Signed distance f of a point from the cylinder by its distance from the axis and its place along it."""
-    return phi(w - rod.r, abs(t) - rod.half)
+def from_axis(rod: Rod, point: Vector) -> tuple[float, float]:
+    """Distance of a point, given from the cylinder's middle, from its axis, and its place along it."""
+    t = dot(point, rod.axis)
+    return length(plus(point, -t, rod.axis)), t
+
+
+@inlined
+def tilt2(line: Line, rod: Rod) -> float:
+    """Square of the sine of the angle between line and axis."""
+    normal = cross(line.direction, rod.axis)
+    return dot(normal, normal)
 
 
 @formula
 def line_course(line: Line, rod: Rod, p: float) -> Course:
     """w and t at a place of a line."""
-    x, y, z = line.x + p * line.ux, line.y, line.z + p * line.uz
-    t = x * rod.dx + y * rod.dy + z * rod.dz
-    vx, vy, vz = x - t * rod.dx, y - t * rod.dy, z - t * rod.dz
-    w = math.sqrt(vx * vx + vy * vy + vz * vz)
-    t1 = line.ux * rod.dx + line.uz * rod.dz
-    w1 = (line.ux * vx + line.uz * vz) / w if w > 0.0 else 0.0
-    across2 = rod.dy * rod.dy + (line.uz * rod.dx) ** 2 + (line.ux * rod.dz) ** 2
-    return Course(w, t, w1, t1, (across2 - w1 * w1) / w if w > 0.0 else 0.0, 0.0)
+    point = plus(line.foot, p, line.direction)
+    t = dot(point, rod.axis)
+    across = plus(point, -t, rod.axis)
+    w = length(across)
+    w1 = dot(line.direction, across) / w if w > 0.0 else 0.0
+    return Course(w, t, w1, dot(line.direction, rod.axis), (tilt2(line, rod) - w1 * w1) / w if w > 0.0 else 0.0, 0.0)
 
 
 @formula
 def arc_course(arc: EndArc, rod: Rod, angle: float) -> Course:
     """w and t at an angle from the arc's deepest point; the rates of w are infinite on the axis."""
+    d = rod.axis
     sine, cosine = arc.R * math.sin(angle), arc.R * math.cos(angle)
-    x, y = sine + arc.x, -cosine + arc.y
-    t = x * rod.dx + y * rod.dy + arc.z * rod.dz
-    vx, vy, vz = x - t * rod.dx, y - t * rod.dy, arc.z - t * rod.dz
-    w = math.sqrt(vx * vx + vy * vy + vz * vz)
-    t1 = cosine * rod.dx + sine * rod.dy
-    t2 = cosine * rod.dy - sine * rod.dx
+    point = plus(arc.centre, 1.0, Vector(sine, -cosine, 0.0))
+    t = dot(point, d)
+    across = plus(point, -t, d)
+    w = length(across)
+    t1 = cosine * d.x + sine * d.y
+    t2 = cosine * d.y - sine * d.x
     if w == 0.0:
         return Course(w, t + arc.off, math.inf, t1, math.inf, t2)
-    w1 = (vx * cosine + vy * sine) / w
-    w2 = (arc.R * arc.R - t1 * t1 + vy * cosine - vx * sine - w1 * w1) / w
+    w1 = (across.x * cosine + across.y * sine) / w
+    w2 = (arc.R * arc.R - t1 * t1 + across.y * cosine - across.x * sine - w1 * w1) / w
     return Course(w, t + arc.off, w1, t1, w2, t2)
 
 
@@ -144,8 +140,6 @@ def equation(kind: int, rod: Rod, course: Course, side: float) -> tuple[float, f
         return max(g, 0.0) * w1 + max(e, 0.0) * e1, bend
     if kind == SIDE:
         return w1, w2
-    if kind == END:
-        return e1, e2
     if kind == RIDGE:
         return g - e, w1 - e1
     return course.t, course.t1
@@ -192,15 +186,22 @@ def root(
     return p
 
 
+@inlined
+def improved(best: Place, course_of: Callable[[Any, Rod, float], Course], curve: Any, rod: Rod, p: float) -> Place:
+    """The best so far, or a place of an edge."""
+    course = course_of(curve, rod, p)
+    f = cylinder_distance(rod, course.w, course.t)
+    return Place(f, p, best.left) if f < best.f else best
+
+
 @formula
 def on_line(rod: Rod, line: Line, limit: float) -> Place:
     """Least f on a line. What cannot be below ``limit`` is not looked for: then the value is infinite.
 
     Between the point nearest to the axis and the one nearest to the middle plane w and |t| go opposite ways.
     """
-    along = line.ux * rod.dx + line.uz * rod.dz
-    across2 = rod.dy * rod.dy + (line.uz * rod.dx) ** 2 + (line.ux * rod.dz) ** 2
-    t0 = line.x * rod.dx + line.y * rod.dy + line.z * rod.dz
+    along, across2 = dot(line.direction, rod.axis), tilt2(line, rod)
+    t0 = dot(line.foot, rod.axis)
     b = min(max(-t0 / along, line.lo), line.hi) if along != 0.0 else math.inf
     a = min(max(along * t0 / across2, line.lo), line.hi) if across2 > 0.0 else b
     b = a if along == 0.0 else b
@@ -215,10 +216,10 @@ def on_line(rod: Rod, line: Line, limit: float) -> Place:
         return Place(eb, b, math.inf)
     best = Place(phi(ga, ea), a, math.inf) if phi(ga, ea) <= phi(gb, eb) else Place(phi(gb, eb), b, math.inf)
     lo, hi, middle = min(a, b), max(a, b), 0.5 * (a + b)
-    size = math.sqrt(line.x * line.x + line.y * line.y + line.z * line.z)
+    size = length(line.foot)
     if ga <= ea and gb >= eb:  # where side and end are equally far, which is the least inside
         p = root(line_course, line, rod, RIDGE, lo, hi, middle, size)
-        best = better(best, line, rod, p)
+        best = improved(best, line_course, line, rod, p)
         if best.f <= 0.0:
             return best
     # The rim from outside: from just beyond the end on, where it begins to pull against the side.
@@ -226,15 +227,7 @@ def on_line(rod: Rod, line: Line, limit: float) -> Place:
     near = (side * rod.half * (1.0 + 1e-6) - t0) / along if along != 0.0 else middle
     start = near if lo < near < hi else middle
     p = root(line_course, line, rod, RIM, lo, hi, start, size)
-    return better(best, line, rod, p)
-
-
-@inlined
-def better(best: Place, line: Line, rod: Rod, p: float) -> Place:
-    """The best so far, or a place of a line."""
-    course = line_course(line, rod, p)
-    f = beside(rod, course.w, course.t)
-    return Place(f, p, math.inf) if f < best.f else best
+    return improved(best, line_course, line, rod, p)
 
 
 @inlined
@@ -252,7 +245,7 @@ def stretch_about(arc: EndArc, rod: Rod, course: Course, half: float) -> Stretch
     """The ranges on a stretch of an arc that reaches ``half`` rad to both sides."""
     tilt = arc.R * math.sqrt(rod.e2)
     # Largest derivatives of w^2 by the angle; t is at most ``tilt`` from off.
-    slope = 2.0 * arc.R * math.sqrt(arc.x * arc.x + arc.y * arc.y)
+    slope = 2.0 * arc.R * math.sqrt(arc.centre.x * arc.centre.x + arc.centre.y * arc.centre.y)
     first, second, third = slope + tilt * tilt, slope + 2.0 * tilt * tilt, slope + 4.0 * tilt * tilt
     g, e = course.w - rod.r, abs(course.t) - rod.half
     low = max(math.sqrt(max(course.w * course.w - first * half, 0.0)), course.w - arc.R * half)  # the least w
@@ -288,7 +281,6 @@ def one_minimum(stretch: Stretch, course: Course, rim_third: float) -> tuple[int
     """What to solve for the one minimum of a stretch (-1: not known), and the slope if f is monotone (else 0)."""
     s, side = stretch, 1.0 if course.t >= 0.0 else -1.0
     w1, w2, e1, e2 = course.w1, course.w2, side * course.t1, side * course.t2
-    is_split = abs(course.t) <= s.tilt * s.half  # the sign of t may change
     if s.g_low > 0.0 and s.e_low > 0.0:  # all of it beyond the rim
         slope = s.g * w1 + s.e * e1
         bend = w1 * w1 + s.g * w2 + e1 * e1 + s.e * e2
@@ -299,65 +291,47 @@ def one_minimum(stretch: Stretch, course: Course, rim_third: float) -> tuple[int
         if w2 > s.third * s.half:
             return SIDE, 0.0
         return -1, w1 if abs(w1) > s.bend * s.half else 0.0
-    if is_split:
-        return -1, 0.0
-    if s.g_high <= min(s.e_low, 0.0):  # all of it nearest to the end
-        if e2 > s.tilt * s.half:
-            return END, 0.0
-        return -1, e1 if abs(e1) > s.tilt * s.half else 0.0
-    if abs(w1) > s.bend * s.half and abs(e1) > s.tilt * s.half:
+    is_split = abs(course.t) <= s.tilt * s.half  # the sign of t may change
+    if not is_split and abs(w1) > s.bend * s.half and abs(e1) > s.tilt * s.half:
         return (-1, w1) if (w1 > 0.0) == (e1 > 0.0) else (RIDGE, 0.0)
     return -1, 0.0
 
 
 @inlined
-def lower(best: Place, arc: EndArc, rod: Rod, angle: float) -> Place:
-    """The best so far, or the point of an arc at an angle."""
-    course = arc_course(arc, rod, angle)
-    f = beside(rod, course.w, course.t)
-    return Place(f, angle, best.left) if f < best.f else best
-
-
-@inlined
 def end_arc_of(groove: Groove, rod: Rod, ez: float) -> EndArc:
     """The arc of the end in the plane z = ez."""
-    off = (ez - rod.z) * rod.dz - rod.x * rod.dx - rod.y * rod.dy
-    return EndArc(groove.R, -rod.x - off * rod.dx, -rod.y - off * rod.dy, ez - rod.z - off * rod.dz, off)
+    out = Vector(-rod.centre.x, -rod.centre.y, ez - rod.centre.z)
+    off = dot(out, rod.axis)
+    return EndArc(groove.R, plus(out, -off, rod.axis), off)
 
 
 @formula
-def settled(arc: EndArc, rod: Rod, middle: float, stretch: Stretch, best: Place, eps: float) -> tuple[Place, float]:
+def settled(
+    arc: EndArc, rod: Rod, middle: float, course: Course, stretch: Stretch, best: Place, eps: float
+) -> tuple[Place, float]:
     """The best so far or that of a stretch, and a lower bound of what may be lower in it (infinite if nothing is)."""
     s = stretch
-    course = arc_course(arc, rod, middle)
     f = phi(s.g, s.e)
     bound = bound_by_mixture(s, course, f)
     if bound >= best.f - eps:
         return best, math.inf
     lo, hi = middle - s.half, middle + s.half
     if f < 0.0 and abs(course.t) <= s.tilt * s.half < abs(course.t1):
-        best = lower(best, arc, rod, root(arc_course, arc, rod, MIDDLE, lo, hi, middle, 1.0))
+        best = improved(best, arc_course, arc, rod, root(arc_course, arc, rod, MIDDLE, lo, hi, middle, 1.0))
     # Third derivative of half the squared distance from the rim; that of the cylinder's middle bounds it too.
     rim_third = 3.0 * s.by * s.bend + s.g_high * s.third + 3.0 * s.tilt * s.tilt + s.e_high * s.tilt
-    from_middle = arc.R * math.sqrt(rod.x * rod.x + rod.y * rod.y)
+    from_middle = arc.R * math.sqrt(rod.centre.x * rod.centre.x + rod.centre.y * rod.centre.y)
     rim_third = min(rim_third, from_middle + rod.r * s.third + rod.half * s.tilt)
-    limit = best.f - eps
-    if s.g_low > 0.0 and s.e_low > 0.0 and limit > 0.0:
-        side = 1.0 if course.t >= 0.0 else -1.0
-        w1, e1 = course.w1, side * course.t1
-        slope, bend = s.g * w1 + s.e * e1, w1 * w1 + s.g * course.w2 + e1 * e1 + s.e * side * course.t2
-        if 0.5 * (s.g * s.g + s.e * s.e) - fall(slope, bend, rim_third, s.half) >= 0.5 * limit * limit:
-            return best, math.inf
     kind, slope = one_minimum(s, course, rim_third)
     if slope != 0.0:
-        return lower(best, arc, rod, lo if slope > 0.0 else hi), math.inf
+        return improved(best, arc_course, arc, rod, lo if slope > 0.0 else hi), math.inf
     if kind < 0:
         return best, bound
     angle = root(arc_course, arc, rod, kind, lo, hi, middle, 1.0)
     end = arc_course(arc, rod, angle)
-    if kind == RIDGE and beside(rod, end.w, end.t) > 0.0:
+    if kind == RIDGE and cylinder_distance(rod, end.w, end.t) > 0.0:
         return best, bound
-    return lower(best, arc, rod, angle), math.inf
+    return improved(best, arc_course, arc, rod, angle), math.inf
 
 
 @formula
@@ -365,29 +339,26 @@ def on_arc(groove: Groove, rod: Rod, ez: float, limit: float, eps: float) -> Pla
     """Least f on the end arc z = ez, and its angle from the deepest point; infinite if none is below ``limit``."""
     arc = end_arc_of(groove, rod, ez)
     best = Place(limit, math.nan, math.inf)
-    stack = np.empty((64, 2))  # middles and halves of the stretches that are left
-    cuts = 4
-    for i in range(cuts):
-        stack[i, 0] = groove.half_angle * ((2.0 * i + 1.0) / cuts - 1.0)
-        stack[i, 1] = groove.half_angle / cuts
-    top = cuts
+    middles, halves = np.empty(64), np.empty(64)  # of the stretches that are left
+    top = 4
+    for i in range(top):
+        halves[i] = groove.half_angle / top
+        middles[i] = halves[i] * (2.0 * i + 1.0 - top)
     looked = 0
     while top > 0:
         top -= 1
         looked += 1
-        middle, half = stack[top, 0], stack[top, 1]
+        middle, half = middles[top], halves[top]
         course = arc_course(arc, rod, middle)
-        f = beside(rod, course.w, course.t)
+        f = cylinder_distance(rod, course.w, course.t)
         if f < best.f:
             best = Place(f, middle, best.left)
         stretch = stretch_about(arc, rod, course, half)
         bound = max(f - groove.R * half, phi(stretch.g_low, stretch.e_low))
-        if phi(stretch.g_low, stretch.e_low) >= best.f - eps:
+        if bound >= best.f - eps:
             continue
         if stretch.bend < math.inf:
-            if bound >= best.f - eps:
-                continue
-            best, mixed = settled(arc, rod, middle, stretch, best, eps)
+            best, mixed = settled(arc, rod, middle, course, stretch, best, eps)
             if mixed == math.inf:
                 continue
             bound = max(bound, mixed)
@@ -399,7 +370,7 @@ def on_arc(groove: Groove, rod: Rod, ez: float, limit: float, eps: float) -> Pla
         e1 = course.t1 if course.t >= 0.0 else -course.t1
         slope = stretch.g * course.w1 + stretch.e * e1 if f > 0.0 else (course.w1 if stretch.g > stretch.e else e1)
         ahead = half if slope > 0.0 else -half
-        stack[top, 0], stack[top, 1] = middle + ahead, half
-        stack[top + 1, 0], stack[top + 1, 1] = middle - ahead, half
+        middles[top], middles[top + 1] = middle + ahead, middle - ahead
+        halves[top], halves[top + 1] = half, half
         top += 2
     return best if not math.isnan(best.p) else Place(math.inf, 0.0, best.left)

@@ -18,6 +18,7 @@ import math
 from typing import NamedTuple
 
 from clamp3d.core.jit import formula, inlined
+from clamp3d.core.kernel_vector import Vector, dot, minus, plus
 
 # Codes of the features; Feature in distance.py gives them names.
 ARC, LIP_M, LIP_N, FLAT_M, FLAT_N, END_FACE, END_ARC, END_EDGE_M, END_EDGE_N, CORNER_M, CORNER_N = map(float, range(11))
@@ -42,12 +43,8 @@ class Groove(NamedTuple):
 class Rod(NamedTuple):
     """A cylinder or capsule: its middle, unit axis d, ``e2 = dx^2 + dy^2``, radius, half the axis' length."""
 
-    x: float
-    y: float
-    z: float
-    dx: float
-    dy: float
-    dz: float
+    centre: Vector
+    axis: Vector
     e2: float
     r: float
     half: float
@@ -59,9 +56,7 @@ class Candidate(NamedTuple):
     d2: float
     t: float
     feature: float
-    x: float
-    y: float
-    z: float
+    point: Vector
 
 
 class EndCircle(NamedTuple):
@@ -77,6 +72,12 @@ class EndCircle(NamedTuple):
     p: float
     v: float
     reach: float
+
+
+@inlined
+def groove_of(R: float, half_angle: float, H: float) -> Groove:
+    """The groove of this radius, half angle and half length."""
+    return Groove(R, half_angle, R * math.sin(half_angle), -R * math.cos(half_angle), H)
 
 
 @inlined
@@ -149,70 +150,87 @@ def beyond_end(feature: float) -> float:
 
 
 @inlined
+def face_normal(groove: Groove, feature: float, point: Vector) -> Vector:
+    """Normal of the face on which a point of the groove is; zero for an edge."""
+    if feature == ARC:
+        return Vector(-point.x / groove.R, -point.y / groove.R, 0.0)
+    if feature in (FLAT_M, FLAT_N):
+        return Vector(0.0, 1.0, 0.0)
+    return Vector(0.0, 0.0, math.copysign(1.0, point.z) if feature == END_FACE else 0.0)
+
+
+@inlined
+def axis_point(rod: Rod, t: float) -> Vector:
+    """The point of the axis at t."""
+    return plus(rod.centre, t, rod.axis)
+
+
+@inlined
 def on_axis_end(groove: Groove, rod: Rod, t: float, best: Candidate) -> Candidate:
     """The best so far, or the point of S that is nearest to the axis' end at t."""
-    x, y, z = rod.x + t * rod.dx, rod.y + t * rod.dy, rod.z + t * rod.dz
-    end = abs(z) - groove.H
+    p = axis_point(rod, t)
+    end = abs(p.z) - groove.H
     if end > 0.0 and end * end >= best.d2:
         return best
-    gap, feature = section(groove, x, y)
+    gap, feature = section(groove, p.x, p.y)
     d2 = gap * gap
     # In the material by the rounding of z alone (an axis in the plane of an end face): it is on the face.
     if gap <= 0.0 and (end > 0.0 or end * end < d2):
-        candidate = Candidate(end * end, t, END_FACE, x, y, math.copysign(groove.H, z))
+        candidate = Candidate(end * end, t, END_FACE, Vector(p.x, p.y, math.copysign(groove.H, p.z)))
     else:
-        qx, qy, _, _ = section_foot(groove, feature, x, y)
+        x, y, _, _ = section_foot(groove, feature, p.x, p.y)
+        z = p.z
         if end > 0.0:
             d2, z, feature = d2 + end * end, math.copysign(groove.H, z), beyond_end(feature)
-        candidate = Candidate(d2, t, feature, qx, qy, z)
+        candidate = Candidate(d2, t, feature, Vector(x, y, z))
     return candidate if candidate.d2 < best.d2 else best
 
 
 @inlined
 def on_lip(groove: Groove, rod: Rod, side: float, best: Candidate) -> Candidate:
     """The best so far, or the inside of the lip on a side (-1: M, 1: N) that the axis' inside faces."""
+    d = rod.axis
     sx = side * groove.s
-    wx, wy = rod.x - sx, rod.y - groove.h
-    cross = wx * rod.dy - wy * rod.dx
+    wx, wy = rod.centre.x - sx, rod.centre.y - groove.h
+    cross = wx * d.y - wy * d.x
     if cross * cross >= best.d2 * rod.e2:  # the distance of the lines
         return best
     over = 1.0 / rod.e2
-    t = -(wx * rod.dx + wy * rod.dy) * over
-    z = rod.z + t * rod.dz
+    t = -(wx * d.x + wy * d.y) * over
+    z = rod.centre.z + t * d.z
     if abs(t) > rod.half or abs(z) > groove.H:
         return best
-    return Candidate(cross * cross * over, t, LIP_M if side < 0.0 else LIP_N, sx, groove.h, z)
+    return Candidate(cross * cross * over, t, LIP_M if side < 0.0 else LIP_N, Vector(sx, groove.h, z))
 
 
 @inlined
 def on_end_edge(groove: Groove, rod: Rod, ez: float, best: Candidate) -> Candidate:
     """The best so far, or a point of the edges {y = h, z = ez, |x| >= s} that the axis' inside faces."""
-    wy, wz = rod.y - groove.h, rod.z - ez
-    f2 = rod.dy * rod.dy + rod.dz * rod.dz
-    cross = wy * rod.dz - wz * rod.dy
+    d = rod.axis
+    wy, wz = rod.centre.y - groove.h, rod.centre.z - ez
+    f2 = d.y * d.y + d.z * d.z
+    cross = wy * d.z - wz * d.y
     if cross * cross >= best.d2 * f2:
         return best
     over = 1.0 / max(f2, TINY)
-    t = -(wy * rod.dy + wz * rod.dz) * over
-    x = rod.x + t * rod.dx
+    t = -(wy * d.y + wz * d.z) * over
+    x = rod.centre.x + t * d.x
     if abs(t) > rod.half or abs(x) < groove.s:
         return best
-    return Candidate(cross * cross * over, t, END_EDGE_M if x < 0.0 else END_EDGE_N, x, groove.h, ez)
+    return Candidate(cross * cross * over, t, END_EDGE_M if x < 0.0 else END_EDGE_N, Vector(x, groove.h, ez))
 
 
 @inlined
 def on_corner(groove: Groove, rod: Rod, side: float, ez: float, best: Candidate) -> tuple[Candidate, bool]:
     """The best so far, or a corner that the axis' inside faces; whether the distance falls into the end arc there."""
-    kx, ky = side * groove.s, groove.h
-    mx, my, mz = kx - rod.x, ky - rod.y, ez - rod.z
-    t = mx * rod.dx + my * rod.dy + mz * rod.dz
-    mx -= t * rod.dx
-    my -= t * rod.dy
-    mz -= t * rod.dz
-    d2 = mx * mx + my * my + mz * mz
-    falls = abs(kx) * my - side * ky * mx > 0.0
+    corner = Vector(side * groove.s, groove.h, ez)
+    m = minus(corner, rod.centre)
+    t = dot(m, rod.axis)
+    m = plus(m, -t, rod.axis)
+    d2 = dot(m, m)
+    falls = abs(corner.x) * m.y - side * corner.y * m.x > 0.0
     if abs(t) <= rod.half and d2 < best.d2:
-        return Candidate(d2, t, CORNER_M if side < 0.0 else CORNER_N, kx, ky, ez), falls
+        return Candidate(d2, t, CORNER_M if side < 0.0 else CORNER_N, corner), falls
     return best, falls
 
 
@@ -276,15 +294,15 @@ def farther_root(k: float, a: float, q: float) -> float:
 @inlined
 def end_circle(groove: Groove, rod: Rod, ez: float) -> EndCircle:
     """The circle of the end arc in the plane z = ez, seen along the axis."""
-    R, e = groove.R, math.sqrt(rod.e2)
+    R, e, c, d = groove.R, math.sqrt(rod.e2), rod.centre, rod.axis
     over = 1.0 / e
-    ex, ey = rod.dx * over, rod.dy * over
-    p = (rod.y * ex - rod.x * ey) * (1.0 / R)
-    v = (-rod.dz * (rod.x * ex + rod.y * ey) - e * (ez - rod.z)) * (1.0 / R)
-    if rod.dz > 0.0:
+    ex, ey = d.x * over, d.y * over
+    p = (c.y * ex - c.x * ey) * (1.0 / R)
+    v = (-d.z * (c.x * ex + c.y * ey) - e * (ez - c.z)) * (1.0 / R)
+    if d.z > 0.0:
         v = -v
     # The ellipse lies outside (for a point inside it) or inside (outside) its scaled copy through the point.
-    reach = R * abs(abs(rod.dz) - math.sqrt(rod.dz * rod.dz * p * p + v * v))
+    reach = R * abs(abs(d.z) - math.sqrt(d.z * d.z * p * p + v * v))
     return EndCircle(ez, ex, ey, p, v, reach)
 
 
@@ -296,22 +314,21 @@ def circle_point(groove: Groove, rod: Rod, circle: EndCircle, C: float, S: float
     n = 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
     C *= n
     S *= n
-    qx = groove.R * (S * circle.ex - C * circle.ey)
-    qy = groove.R * (S * circle.ey + C * circle.ex)
-    t = (qx - rod.x) * rod.dx + (qy - rod.y) * rod.dy + (circle.z - rod.z) * rod.dz
+    q = Vector(groove.R * (S * circle.ex - C * circle.ey), groove.R * (S * circle.ey + C * circle.ex), circle.z)
+    t = dot(minus(q, rod.centre), rod.axis)
     du = groove.R * (C - circle.p)
-    dv = groove.R * (abs(rod.dz) * S - circle.v)
-    is_faced = abs(t) <= rod.half and not in_mouth(groove, qx, qy)
-    return Candidate(du * du + dv * dv if is_faced else math.inf, t, END_ARC, qx, qy, circle.z)
+    dv = groove.R * (abs(rod.axis.z) * S - circle.v)
+    is_faced = abs(t) <= rod.half and not in_mouth(groove, q.x, q.y)
+    return Candidate(du * du + dv * dv if is_faced else math.inf, t, END_ARC, q)
 
 
 @formula
 def farther_point(groove: Groove, rod: Rod, circle: EndCircle) -> Candidate:
     """The local minimum of `on_end_arc` on the other side of the ellipse's major axis."""
-    k, q, a = rod.e2, abs(rod.dz) * circle.v, abs(circle.p)
+    k, q, a = rod.e2, abs(rod.axis.z) * circle.v, abs(circle.p)
     nu = farther_root(k, a, abs(q))
     if nu <= 0.0:
-        return Candidate(math.inf, 0.0, END_ARC, 0.0, 0.0, 0.0)
+        return Candidate(math.inf, 0.0, END_ARC, rod.centre)
     return circle_point(groove, rod, circle, circle.p / (k - nu), -q / nu)
 
 
@@ -337,7 +354,7 @@ def on_end_arc(groove: Groove, rod: Rod, circle: EndCircle, best: Candidate) -> 
     """
     if circle.reach * circle.reach >= best.d2:
         return best
-    k, q, a = rod.e2, abs(rod.dz) * circle.v, abs(circle.p)
+    k, q, a = rod.e2, abs(rod.axis.z) * circle.v, abs(circle.p)
     if abs(q) > TINY or a > k:
         mu = nearer_root(k, a, abs(q))
         both = 1.0 / ((k + mu) * mu)
@@ -352,59 +369,42 @@ def on_end_arc(groove: Groove, rod: Rod, circle: EndCircle, best: Candidate) -> 
 @inlined
 def clip(groove: Groove, rod: Rod, half: float) -> tuple[float, float]:
     """Part lo <= t <= hi of the axis, |t| <= half, in the block {y <= h, |z| <= H}; lo > hi if there is none."""
-    over = 1.0 / (rod.dz if abs(rod.dz) > TINY else TINY)
-    down, up = (-groove.H - rod.z) * over, (groove.H - rod.z) * over
-    lo, hi = max(-half, min(down, up)), min(half, max(down, up))
-    level = (groove.h - rod.y) / rod.dy
-    hi = min(hi, level) if rod.dy > 0.0 else hi
-    lo = max(lo, level) if rod.dy < 0.0 else lo
-    none = (rod.dy == 0.0 and rod.y > groove.h) or (abs(rod.dz) <= TINY and abs(rod.z) > groove.H)
+    c, d = rod.centre, rod.axis
+    over = 1.0 / (d.z if abs(d.z) > TINY else TINY)
+    bottom, top = (-groove.H - c.z) * over, (groove.H - c.z) * over
+    lo, hi = max(-half, min(bottom, top)), min(half, max(bottom, top))
+    level = (groove.h - c.y) / d.y
+    hi = min(hi, level) if d.y > 0.0 else hi
+    lo = max(lo, level) if d.y < 0.0 else lo
+    none = (d.y == 0.0 and c.y > groove.h) or (abs(d.z) <= TINY and abs(c.z) > groove.H)
     return lo, -math.inf if none else hi
 
 
 @formula
-def point_depth(groove: Groove, x: float, y: float, z: float) -> tuple[float, float]:
-    """Distance of a point of S from the boundary of S (negative outside): min of three, and its feature."""
-    depth, feature = math.sqrt(x * x + y * y) - groove.R, ARC
-    if groove.h - y < depth:
-        depth, feature = groove.h - y, FLAT_N if x >= 0.0 else FLAT_M
-    if groove.H - abs(z) < depth:
-        depth, feature = groove.H - abs(z), END_FACE
-    return depth, feature
-
-
-@formula
-def depth_at(groove: Groove, rod: Rod, t: float) -> float:
-    """Depth of an axis point in S."""
-    return point_depth(groove, rod.x + t * rod.dx, rod.y + t * rod.dy, rod.z + t * rod.dz)[0]
-
-
-@formula
-def depth_below_plane(groove: Groove, rod: Rod, plane: int) -> tuple[float, float]:
-    """Depth of the axis' middle below the flats (0), the top (1) or the bottom (2), and its rate along the axis."""
-    if plane == 0:
-        return groove.h - rod.y, -rod.dy
-    if plane == 1:
-        return groove.H - rod.z, -rod.dz
-    return groove.H + rod.z, rod.dz
+def depth_of(groove: Groove, point: Vector) -> tuple[float, float]:
+    """Distance of a point of S from the boundary of S, and the feature that is nearest; negative outside S."""
+    gap, feature = section(groove, point.x, point.y)
+    end = groove.H - abs(point.z)
+    return (end, END_FACE) if end < -gap else (-gap, feature)
 
 
 @formula
 def arc_crossing(groove: Groove, rod: Rod, depth: float, rate: float, is_first: bool) -> float:
     """One of the two places where the axis is as deep behind the arc, rho - R, as ``depth + rate t``; NaN if none."""
+    c, d = rod.centre, rod.axis
     n = groove.R + depth  # (n + rate t)^2 = (cx + dx t)^2 + (cy + dy t)^2
     A = rod.e2 - rate * rate
-    B = rod.x * rod.dx + rod.y * rod.dy - n * rate
-    C = rod.x * rod.x + rod.y * rod.y - n * n
+    B = c.x * d.x + c.y * d.y - n * rate
+    C = c.x * c.x + c.y * c.y - n * n
     square = B * B - A * C
     if square < 0.0:
         return math.nan
     w = -B - math.copysign(math.sqrt(square), B)
     t = w / A if is_first else C / w
     for _ in range(2):  # the quadratic squares its terms: Newton's steps on the unsquared equation restore them
-        x, y = rod.x + t * rod.dx, rod.y + t * rod.dy
-        rho = math.sqrt(x * x + y * y)
-        slope = (x * rod.dx + y * rod.dy) / rho - rate
+        p = axis_point(rod, t)
+        rho = math.sqrt(p.x * p.x + p.y * p.y)
+        slope = (p.x * d.x + p.y * d.y) / rho - rate
         if rho > 0.0 and slope != 0.0:
             t -= (rho - groove.R - (depth + rate * t)) / slope
     return t
@@ -413,7 +413,8 @@ def arc_crossing(groove: Groove, rod: Rod, depth: float, rate: float, is_first: 
 @formula
 def deeper(groove: Groove, rod: Rod, lo: float, hi: float, t: float, best: float) -> float:
     """The place t on the axis if it is one of lo <= t <= hi and deeper in S than ``best``, else that."""
-    return t if lo <= t <= hi and depth_at(groove, rod, t) > depth_at(groove, rod, best) else best
+    is_deeper = lo <= t <= hi and depth_of(groove, axis_point(rod, t))[0] > depth_of(groove, axis_point(rod, best))[0]
+    return t if is_deeper else best
 
 
 @formula
@@ -424,9 +425,12 @@ def deepest(groove: Groove, rod: Rod, lo: float, hi: float) -> float:
     two linear ones cross, or where rho - R crosses a linear one (a quadratic).
     """
     best = deeper(groove, rod, lo, hi, hi, lo)
-    for plane in range(3):
-        depth, rate = depth_below_plane(groove, rod, plane)
-        other, other_rate = depth_below_plane(groove, rod, (plane + 1) % 3)
+    c, d = rod.centre, rod.axis
+    # Depth of the axis' middle below the flats, the top and the bottom, and its rate along the axis.
+    planes = ((groove.h - c.y, -d.y), (groove.H - c.z, -d.z), (groove.H + c.z, d.z))
+    for k in range(3):
+        depth, rate = planes[k]
+        other, other_rate = planes[(k + 1) % 3]
         best = deeper(groove, rod, lo, hi, (depth - other) / (other_rate - rate), best)
         for root in range(2):
             best = deeper(groove, rod, lo, hi, arc_crossing(groove, rod, depth, rate, root == 0), best)

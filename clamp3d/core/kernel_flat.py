@@ -16,44 +16,22 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from clamp3d.core import kernel_features as features
 from clamp3d.core.jit import formula, inlined
 from clamp3d.core.kernel_distance import (
     UNIT,
     Answer,
-    Rate,
     inside,
     inside_rate,
     is_parallel,
+    mixture,
     nearest,
     parallel,
     way_out,
 )
-from clamp3d.core.kernel_edges import Line, beside, from_axis, on_arc, on_line
-from clamp3d.core.kernel_features import (
-    ARC,
-    CORNER_M,
-    CORNER_N,
-    END_ARC,
-    END_EDGE_M,
-    END_EDGE_N,
-    END_FACE,
-    FLAT_M,
-    FLAT_N,
-    LIP_M,
-    LIP_N,
-    TINY,
-    Groove,
-    Rod,
-    beyond_end,
-    clip,
-    farther_root,
-    in_mouth,
-    is_behind_arc,
-    nearer_root,
-    phi,
-    section,
-    section_foot,
-)
+from clamp3d.core.kernel_edges import Line, cylinder_distance, from_axis, on_arc, on_line
+from clamp3d.core.kernel_features import Groove, Rod
+from clamp3d.core.kernel_vector import Vector, dot, length, minus, over, plus, times
 
 
 class Search(NamedTuple):
@@ -64,9 +42,7 @@ class Search(NamedTuple):
     """
 
     f: float
-    x: float
-    y: float
-    z: float
+    point: Vector
     feature: float
     limit: float
     least: float
@@ -78,19 +54,17 @@ class RimPoint(NamedTuple):
     """A point of a rim, its distance rho from the groove's axis (-1: none), the rates of rho by radius and length."""
 
     rho: float
-    x: float
-    y: float
-    z: float
+    point: Vector
     by_radius: float
     by_length: float
 
 
 @inlined
-def better(search: Search, f: float, x: float, y: float, z: float, feature: float) -> Search:
+def better(search: Search, f: float, point: Vector, feature: float) -> Search:
     """The search with a point of the groove, if it is the best so far."""
     limit = min(search.limit, f)
     if f < search.f:
-        return Search(f, x, y, z, feature, limit, search.least, search.left, search.eps)
+        return Search(f, point, feature, limit, search.least, search.left, search.eps)
     return search
 
 
@@ -106,70 +80,59 @@ def plane_point(rod: Rod, a: float, along: float, across: float) -> tuple[float,
     r, half = rod.r, rod.half
     if a < 0.0:
         return (-half, 0.0, a / across) if -a < (r - half) * across else (math.inf, 0.0, 0.0)
-    up = 1.0 if along >= 0.0 else -1.0
+    sign = 1.0 if along >= 0.0 else -1.0
     f = a - half * abs(along) - r * across
     if f >= 0.0:
-        return f, up * half, r if across > 0.0 else 0.0
+        return f, sign * half, r if across > 0.0 else 0.0
     inset = -f / (abs(along) + across)
     if inset <= min(r, half):
-        return -inset, up * (half - inset), (r - inset) if across > 0.0 else 0.0
+        return -inset, sign * (half - inset), (r - inset) if across > 0.0 else 0.0
     if r <= half:
         return -r, a / along if along != 0.0 else 0.0, 0.0
     return -half, 0.0, a / across if across > 0.0 else 0.0
 
 
-@inlined
-def on_flats(groove: Groove, rod: Rod, search: Search) -> Search:
-    """The search with the flat faces."""
-    if rod.y < groove.h and rod.r <= rod.half:
+@formula
+def on_face(groove: Groove, rod: Rod, normal: Vector, level: float, search: Search) -> Search:
+    """The search with the faces in the plane of the points q whose ``normal q`` is ``level``: the flats, or an end."""
+    a, along = dot(normal, rod.centre) - level, dot(normal, rod.axis)
+    across = length(plus(rod.axis, -along, normal))
+    if (a < 0.0 and rod.r <= rod.half) or a - rod.half * abs(along) - rod.r * across >= search.limit:
         return search
-    across = math.sqrt(rod.dx * rod.dx + rod.dz * rod.dz)
-    f, along, out = plane_point(rod, rod.y - groove.h, rod.dy, across)
-    x, z = rod.x - along * rod.dx, rod.z - along * rod.dz
+    f, t, out = plane_point(rod, a, along, across)
+    q = features.axis_point(rod, -t)
     if across > 0.0:
-        x += out * (rod.dy * rod.dx / across)
-        z += out * (rod.dy * rod.dz / across)
-    if f == math.inf or abs(z) > groove.H or abs(x) < groove.s:
+        q = plus(plus(q, out * along / across, rod.axis), -out / across, normal)
+    if f == math.inf:
         return search
-    return better(search, f, x, groove.h, z, FLAT_N if x >= 0.0 else FLAT_M)
+    if normal.y > 0.0:
+        if abs(q.z) > groove.H or abs(q.x) < groove.s:
+            return search
+        return better(search, f, Vector(q.x, level, q.z), features.FLAT_N if q.x >= 0.0 else features.FLAT_M)
+    if features.section(groove, q.x, q.y)[0] > 0.0:
+        return search
+    return better(search, f, Vector(q.x, q.y, normal.z * level), features.END_FACE)
 
 
 @formula
-def on_end_face(groove: Groove, rod: Rod, up: float, search: Search) -> Search:
-    """The search with the end face at the top (up = 1) or the bottom (-1)."""
-    across = math.sqrt(rod.e2)
-    a = up * rod.z - groove.H
-    if (a < 0.0 and rod.r <= rod.half) or a - rod.half * abs(rod.dz) - rod.r * across >= search.limit:
-        return search
-    f, along, out = plane_point(rod, a, up * rod.dz, across)
-    x, y = rod.x - along * rod.dx, rod.y - along * rod.dy
-    if across > 0.0:
-        x += out * up * rod.dz * rod.dx / across
-        y += out * up * rod.dz * rod.dy / across
-    if f == math.inf or section(groove, x, y)[0] > 0.0:
-        return search
-    return better(search, f, x, y, up * groove.H, END_FACE)
-
-
-@formula
-def rim_point(rod: Rod, up: float, is_farthest: bool, inset: float) -> RimPoint:
-    """Local maximum of the distance from the groove's axis on a rim (up: 1, -1) of the cylinder less ``inset``.
+def rim_point(rod: Rod, end: float, is_farthest: bool, inset: float) -> RimPoint:
+    """Local maximum of the distance from the groove's axis on a rim (end: 1, -1) of the cylinder less ``inset``.
 
     The farthest point of the rim, or the other local maximum. Seen along the groove a rim is an ellipse; its farthest
     points are found like the nearest ones of an end arc. Its minor axis is (ex, ey), the direction of the axis' part
     across the groove, of length e; the major one (-ey, ex).
     """
-    none = RimPoint(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    e2, e = rod.e2, math.sqrt(rod.e2)
-    ex, ey = rod.dx / e, rod.dy / e
-    along, radius = up * (rod.half - inset), rod.r - inset
-    x, y, z = rod.x + along * rod.dx, rod.y + along * rod.dy, rod.z + along * rod.dz
-    b = abs(rod.dz)
-    p = (ex * y - ey * x) / radius
-    v = (ex * x + ey * y) / radius
+    none = RimPoint(-1.0, rod.centre, 0.0, 0.0)
+    d, e2, e = rod.axis, rod.e2, math.sqrt(rod.e2)
+    ex, ey = d.x / e, d.y / e
+    radius = rod.r - inset
+    middle = features.axis_point(rod, end * (rod.half - inset))
+    b = abs(d.z)
+    p = (ex * middle.y - ey * middle.x) / radius
+    v = (ex * middle.x + ey * middle.y) / radius
     q, a = abs(p), abs(b * v)
-    if q > TINY or a > e2:
-        k = nearer_root(e2, a, q) if is_farthest else -farther_root(e2, a, q)
+    if q > features.TINY or a > e2:
+        k = features.nearer_root(e2, a, q) if is_farthest else -features.farther_root(e2, a, q)
         if not is_farthest and k >= 0.0:
             return none
         C, S = p / k, b * v / (k + e2)
@@ -180,108 +143,84 @@ def rim_point(rod: Rod, up: float, is_farthest: bool, inset: float) -> RimPoint:
         S = b * v / e2
         C = math.sqrt(max(0.0, 1.0 - S * S)) * (1.0 if is_farthest else -1.0)
     # The minor axis in space: across the cylinder's axis, (ex dz, ey dz, -e), with the sign that makes ex, ey rise.
-    sign = 1.0 if rod.dz >= 0.0 else -1.0
-    ux, uy, uz = -ey * C + ex * b * S, ex * C + ey * b * S, -e * sign * S
-    x, y, z = x + radius * ux, y + radius * uy, z + radius * uz
-    rho = math.sqrt(x * x + y * y)
-    if rho < TINY:
+    out = Vector(-ey * C + ex * b * S, ex * C + ey * b * S, -e * math.copysign(1.0, d.z) * S)
+    point = plus(middle, radius, out)
+    rho = math.sqrt(point.x * point.x + point.y * point.y)
+    if rho < features.TINY:
         return none
-    return RimPoint(rho, x, y, z, (x * ux + y * uy) / rho, up * (x * rod.dx + y * rod.dy) / rho)
+    by_radius = (point.x * out.x + point.y * out.y) / rho
+    return RimPoint(rho, point, by_radius, end * (point.x * d.x + point.y * d.y) / rho)
 
 
 @formula
-def free_rim(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Search) -> tuple[RimPoint, float]:
+def free_rim(groove: Groove, rod: Rod, end: float, is_farthest: bool) -> tuple[RimPoint, float]:
     """The point of a rim that reaches behind the arc, shrunk until it just touches it, and by how much it is shrunk.
 
     Its rho is -1 if that is no candidate.
     """
     inset, most = 0.0, min(rod.r, rod.half)
-    none = RimPoint(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    point = rim_point(rod, up, is_farthest, inset)
-    if search.limit < 0.0 and is_farthest:  # less than the best inset frees this rim, or it goes on
-        inset = -search.limit
-        if inset < most:
-            point = rim_point(rod, up, is_farthest, inset)
-        if inset == most or point.rho <= groove.R:
-            return none, inset
-    last = math.inf
+    none = RimPoint(-1.0, rod.centre, 0.0, 0.0)
+    point = rim_point(rod, end, is_farthest, inset)
     for _ in range(60):
         rate = point.by_radius + point.by_length
-        step = (point.rho - groove.R) / rate if rate > 0.0 else math.inf
-        # Convex, so Newton's steps stay on this side of the root: what passes the bound is no candidate.
-        if is_farthest and inset + step > 64.0 * search.eps - search.least:
-            return none, inset
+        step = (point.rho - groove.R) / rate if rate > 0.0 else math.inf  # Newton's: convex, so it stays on this side
         if not inset + step < most:  # it never does: of a disc, what is left last
             if rod.r <= rod.half:
                 return none, most
-            point = rim_point(rod, up, is_farthest, most)
+            point = rim_point(rod, end, is_farthest, most)
             return (point, most) if point.rho >= groove.R else (none, most)
         inset += step
-        point = rim_point(rod, up, is_farthest, inset)
-        size = abs(step)
-        if point.rho <= 0.0 or abs(point.rho - groove.R) <= 2.0 * UNIT * groove.R:
+        point = rim_point(rod, end, is_farthest, inset)
+        if point.rho <= 0.0 or abs(point.rho - groove.R) <= 2.0 * UNIT * groove.R or abs(step) <= 1e-12 * groove.R:
             break
-        if size <= 1e-12 * groove.R or (size <= 1e-8 * groove.R and size > 0.7 * last):
-            break
-        last = size
     return point, inset
 
 
 @formula
-def on_arc_surface(groove: Groove, rod: Rod, up: float, is_farthest: bool, search: Search) -> Search:
+def on_arc_surface(groove: Groove, rod: Rod, end: float, is_farthest: bool, search: Search) -> Search:
     """The search with the arc surface against a rim, from inside."""
     R = groove.R
-    x, y = rod.x + up * rod.half * rod.dx, rod.y + up * rod.half * rod.dy
-    if R - math.sqrt(x * x + y * y) - rod.r > search.limit + 4.0 * search.eps:
+    rim, inset = rim_point(rod, end, is_farthest, 0.0), 0.0
+    if not (rim.rho > 0.0 and R - rim.rho <= search.limit):  # nor if a square has overflowed
         return search
-    point, inset = rim_point(rod, up, is_farthest, 0.0), 0.0
-    if not (point.rho > 0.0 and R - point.rho <= search.limit):  # nor if a square has overflowed
+    if rim.rho > R:
+        rim, inset = free_rim(groove, rod, end, is_farthest)
+    if rim.rho <= 0.0 or abs(rim.point.z) > groove.H:
         return search
-    if point.rho > R:
-        point, inset = free_rim(groove, rod, up, is_farthest, search)
-    if point.rho <= 0.0 or abs(point.z) > groove.H:
+    scale = R / rim.rho if inset < min(rod.r, rod.half) else 1.0
+    point = Vector(rim.point.x * scale, rim.point.y * scale, rim.point.z)
+    if features.in_mouth(groove, point.x, point.y):
         return search
-    x, y = point.x, point.y
-    if inset < min(rod.r, rod.half):
-        x *= R / point.rho
-        y *= R / point.rho
-    if in_mouth(groove, x, y):
-        return search
-    f = R - point.rho
+    f = R - rim.rho
     if inset > 0.0:
-        w, t = from_axis(rod, x - rod.x, y - rod.y, point.z - rod.z)
-        f = beside(rod, w, t)
-    return better(search, f, x, y, point.z, ARC)
+        f = point_distance(rod, point)
+    return better(search, f, point, features.ARC)
+
+
+@inlined
+def point_distance(rod: Rod, point: Vector) -> float:
+    """Signed distance f of a point from the cylinder."""
+    w, t = from_axis(rod, minus(point, rod.centre))
+    return cylinder_distance(rod, w, t)
 
 
 @formula
-def on_lip_line(groove: Groove, rod: Rod, side: float, search: Search) -> Search:
-    """The search with the lip at a side (-1: M, 1: N)."""
-    H, s, h = groove.H, groove.s, groove.h
-    line = Line(side * s - rod.x, h - rod.y, 0.0, 0.0, 1.0, -H - rod.z, H - rod.z)
-    place = on_line(rod, line, search.limit)
+def on_edge(
+    rod: Rod, origin: Vector, direction: Vector, lo: float, hi: float, feature: float, search: Search
+) -> Search:
+    """The search with the edge ``origin + p direction``, lo <= p <= hi, which ends in corners.
+
+    The origin is square to the direction, which is x or z.
+    """
+    middle = dot(rod.centre, direction)
+    foot = minus(plus(origin, middle, direction), rod.centre)
+    place = on_line(rod, Line(foot, direction, lo - middle, hi - middle), search.limit)
     if place.f > search.limit:
         return search
-    z = min(max(place.p + rod.z, -H), H)
-    feature = LIP_M if side < 0.0 else LIP_N
-    if abs(z) == H:
-        feature = CORNER_M if side < 0.0 else CORNER_N
-    return better(search, place.f, side * s, h, z, feature)
-
-
-@formula
-def on_end_line(groove: Groove, rod: Rod, side: float, ez: float, search: Search) -> Search:
-    """The search with the edge of the end z = ez at a side."""
-    s, h = groove.s, groove.h
-    lo, hi = (-math.inf, -s - rod.x) if side < 0.0 else (s - rod.x, math.inf)
-    place = on_line(rod, Line(0.0, h - rod.y, ez - rod.z, 1.0, 0.0, lo, hi), search.limit)
-    if place.f > search.limit:
-        return search
-    x = side * max(side * (place.p + rod.x), s)
-    feature = END_EDGE_M if side < 0.0 else END_EDGE_N
-    if x == side * s:
-        feature = CORNER_M if side < 0.0 else CORNER_N
-    return better(search, place.f, x, h, ez, feature)
+    p = min(max(place.p + middle, lo), hi)
+    if p in (lo, hi):
+        feature = features.CORNER_M if feature in (features.LIP_M, features.END_EDGE_M) else features.CORNER_N
+    return better(search, place.f, plus(origin, p, direction), feature)
 
 
 @formula
@@ -289,98 +228,82 @@ def on_circle(groove: Groove, rod: Rod, ez: float, search: Search) -> Search:
     """The search with the end arc in the plane z = ez."""
     place = on_arc(groove, rod, ez, search.limit, search.eps)
     if place.f < math.inf:
-        x, y = groove.R * math.sin(place.p), -groove.R * math.cos(place.p)
-        w, t = from_axis(rod, x - rod.x, y - rod.y, ez - rod.z)
-        search = better(search, beside(rod, w, t), x, y, ez, END_ARC)
+        point = Vector(groove.R * math.sin(place.p), -groove.R * math.cos(place.p), ez)
+        search = better(search, point_distance(rod, point), point, features.END_ARC)
     left = min(search.left, place.left)
-    return Search(search.f, search.x, search.y, search.z, search.feature, search.limit, search.least, left, search.eps)
+    return Search(search.f, search.point, search.feature, search.limit, search.least, left, search.eps)
 
 
 @formula
 def best_point(groove: Groove, rod: Rod, search: Search) -> Search:
     """The point of the groove where f is least: its f is infinite if none is as low as the search's limit."""
-    H = groove.H
-    search = on_flats(groove, rod, search)
-    search = on_end_face(groove, rod, 1.0, search)
-    search = on_end_face(groove, rod, -1.0, search)
+    s, h, H = groove.s, groove.h, groove.H
+    c, d = rod.centre, rod.axis
+    search = on_face(groove, rod, Vector(0.0, 1.0, 0.0), h, search)
+    search = on_face(groove, rod, Vector(0.0, 0.0, 1.0), H, search)
+    search = on_face(groove, rod, Vector(0.0, 0.0, -1.0), H, search)
     if rod.e2 > 0.0:
-        outer = 1.0 if rod.x * rod.dx + rod.y * rod.dy >= 0.0 else -1.0  # the end farther from the groove's axis
+        outer = 1.0 if c.x * d.x + c.y * d.y >= 0.0 else -1.0  # the end farther from the groove's axis
         for k in range(4):
             search = on_arc_surface(groove, rod, outer if k % 2 == 0 else -outer, k < 2, search)
     if search.f < math.inf and search.limit <= search.least:
         return search
-    is_above = rod.y + rod.half * abs(rod.dy) + rod.r * math.sqrt(rod.dx * rod.dx + rod.dz * rod.dz) >= groove.h
-    if search.f == math.inf or is_above or groove.h > 0.0:
-        search = on_lip_line(groove, rod, -1.0, search)
-        search = on_lip_line(groove, rod, 1.0, search)
-    far = rod.half * abs(rod.dz) + rod.r * math.sqrt(rod.e2)
+    is_above = c.y + rod.half * abs(d.y) + rod.r * math.sqrt(d.x * d.x + d.z * d.z) >= h
+    along_z = Vector(0.0, 0.0, 1.0)
+    search = on_edge(rod, Vector(-s, h, 0.0), along_z, -H, H, features.LIP_M, search)
+    search = on_edge(rod, Vector(s, h, 0.0), along_z, -H, H, features.LIP_N, search)
+    far = rod.half * abs(d.z) + rod.r * math.sqrt(rod.e2)
     for k in range(2):
-        up = 1.0 if k == 0 else -1.0
-        gap = up * rod.z - far - H
-        if up * rod.z + far < H or (gap > 0.0 and gap > search.limit):
+        end = 1.0 if k == 0 else -1.0
+        gap = end * c.z - far - H
+        if end * c.z + far < H or (gap > 0.0 and gap > search.limit):
             continue
         if is_above:
-            search = on_end_line(groove, rod, -1.0, up * H, search)
-            search = on_end_line(groove, rod, 1.0, up * H, search)
-        search = on_circle(groove, rod, up * H, search)
+            along_x = Vector(1.0, 0.0, 0.0)
+            search = on_edge(rod, Vector(0.0, h, end * H), along_x, -math.inf, -s, features.END_EDGE_M, search)
+            search = on_edge(rod, Vector(0.0, h, end * H), along_x, s, math.inf, features.END_EDGE_N, search)
+        search = on_circle(groove, rod, end * H, search)
     return search
 
 
 @inlined
-def face_normal(groove: Groove, best: Search) -> Rate:
-    """Normal of the face on which a point of the groove is; else zero."""
-    if best.feature == ARC:
-        return Rate(-best.x / groove.R, -best.y / groove.R, 0.0)
-    if best.feature in (FLAT_M, FLAT_N):
-        return Rate(0.0, 1.0, 0.0)
-    return Rate(0.0, 0.0, (1.0 if best.z > 0.0 else -1.0) if best.feature == END_FACE else 0.0)
-
-
-@inlined
-def edge_direction(groove: Groove, best: Search) -> Rate:
+def edge_direction(groove: Groove, best: Search) -> Vector:
     """Direction of the edge on which a point of the groove is; else zero."""
-    if best.feature == END_ARC:
-        return Rate(-best.y / groove.R, best.x / groove.R, 0.0)
-    if best.feature in (END_EDGE_M, END_EDGE_N):
-        return Rate(1.0, 0.0, 0.0)
-    return Rate(0.0, 0.0, 1.0 if best.feature in (LIP_M, LIP_N) else 0.0)
+    if best.feature == features.END_ARC:
+        return Vector(-best.point.y / groove.R, best.point.x / groove.R, 0.0)
+    if best.feature in (features.END_EDGE_M, features.END_EDGE_N):
+        return Vector(1.0, 0.0, 0.0)
+    return Vector(0.0, 0.0, 1.0 if best.feature in (features.LIP_M, features.LIP_N) else 0.0)
 
 
 @inlined
-def mixture(u: float, side: Rate, v: float, end: Rate) -> Rate:
-    """``u side + v end``."""
-    return Rate(u * side.x + v * end.x, u * side.y + v * end.y, u * side.z + v * end.z)
-
-
-@inlined
-def shares(groove: Groove, best: Search, side: Rate, end: Rate) -> tuple[float, float]:
+def shares(groove: Groove, best: Search, side: Vector, end: Vector) -> tuple[float, float]:
     """Shares of side and end in a mixture along the face's normal, or square to the edge; 0 and 0 if there is none."""
-    m = face_normal(groove, best)
-    u, v = max(side.x * m.x + side.y * m.y + side.z * m.z, 0.0), max(end.x * m.x + end.y * m.y + end.z * m.z, 0.0)
+    m = features.face_normal(groove, best.feature, best.point)
+    u, v = max(dot(side, m), 0.0), max(dot(end, m), 0.0)
     if u + v == 0.0:
         m = edge_direction(groove, best)
-        by_side, by_end = side.x * m.x + side.y * m.y + side.z * m.z, end.x * m.x + end.y * m.y + end.z * m.z
+        by_side, by_end = dot(side, m), dot(end, m)
         if by_side * by_end < 0.0:
             u, v = abs(by_end), abs(by_side)
     return u, v
 
 
 @formula
-def witness(groove: Groove, rod: Rod, best: Search, bound: float) -> tuple[Rate, Rate, float]:
+def witness(groove: Groove, rod: Rod, best: Search, bound: float) -> tuple[Vector, Vector, float]:
     """Unit normal at a point of the groove where f is least, the rate of f by a shift, the place on the axis."""
-    x, y, z = best.x - rod.x, best.y - rod.y, best.z - rod.z
-    w, t = from_axis(rod, x, y, z)
+    point = minus(best.point, rod.centre)
+    w, t = from_axis(rod, point)
     f, g, e = best.f, w - rod.r, abs(t) - rod.half
-    up = -1.0 if t >= 0.0 else 1.0
-    to_end = Rate(up * rod.dx, up * rod.dy, up * rod.dz)  # from the point back to the end, and to the side
+    to_end = times(-1.0 if t >= 0.0 else 1.0, rod.axis)  # from the point back to the end, and to the side
     to_side = to_end
-    if w > TINY:
-        to_side = Rate(-(x - t * rod.dx) / w, -(y - t * rod.dy) / w, -(z - t * rod.dz) / w)
+    if w > features.TINY:
+        to_side = over(plus(point, -t, rod.axis), -w)
     else:
         g = -math.inf
     u, v = shares(groove, best, to_side, to_end)
     is_mixed = u + v > 0.0
-    on_face = best.feature in (ARC, FLAT_M, FLAT_N, END_FACE)
+    on_face = best.feature in (features.ARC, features.FLAT_M, features.FLAT_N, features.END_FACE)
     if f <= 0.0:
         if not (abs(g - e) <= 64.0 * bound and is_mixed):
             u, v = (1.0, 0.0) if g >= e else (0.0, 1.0)
@@ -399,71 +322,74 @@ def witness(groove: Groove, rod: Rod, best: Search, bound: float) -> tuple[Rate,
 @formula
 def flat_parallel(groove: Groove, rod: Rod) -> Answer:
     """Axis along z: the plane problem of a disc and the section, and the gap along z."""
-    x, y, z, r, half, H = rod.x, rod.y, rod.z, rod.r, rod.half, groove.H
-    gap, feature = section(groove, x, y)
+    x, y, z = rod.centre
+    r, half, H = rod.r, rod.half, groove.H
+    gap, feature = features.section(groove, x, y)
     end = abs(z) - H
     bound = UNIT * (6.0 * (groove.R + abs(x) + abs(y)) + 4.0 * (H + abs(z) + half) + r)
     if gap < 0.0 and end <= max(half - r, 0.0):  # the groove goes on where nothing is left of the cylinder
         if half >= r:
-            return parallel(groove, Rod(x, y, z, rod.dx, rod.dy, rod.dz, rod.e2, r, half - r))
-        out = way_out(groove, x, y, z)
-        return Answer(out.distance - half, out.x, out.y, out.z, out.nx, out.ny, out.nz, out.feature, 0.0, bound)
+            return parallel(groove, shrunk(rod))
+        out = way_out(groove, rod.centre)
+        return Answer(out.distance - half, out.point, out.normal, out.feature, 0.0, bound)
     g, e = gap - r if gap > 0.0 else -r, max(end, 0.0) - half
-    if feature == ARC and gap > 0.0:
+    if feature == features.ARC and gap > 0.0:
         g = (groove.R - r) - math.sqrt(x * x + y * y)
-    f = phi(g, e)
-    qx, qy, nx, ny = section_foot(groove, feature, x, y)
+    f = features.phi(g, e)
+    qx, qy, nx, ny = features.section_foot(groove, feature, x, y)
     if gap <= 0.0:
         qx, qy = x, y
     above = 1.0 if z > 0.0 else -1.0
     lo, hi = max(z - half, -H), min(z + half, H)
-    qz, nz = 0.5 * (lo + hi) if lo <= hi else above * H, 0.0
+    qz, normal = 0.5 * (lo + hi) if lo <= hi else above * H, Vector(nx, ny, 0.0)
     if g > 0.0 and e > 0.0:
-        nx, ny, nz = nx * (g / f), ny * (g / f), above * (e / f)
-        feature = beyond_end(feature)
+        normal = Vector(nx * (g / f), ny * (g / f), above * (e / f))
+        feature = features.beyond_end(feature)
     elif g >= e:
         if g < 0.0 and abs(qz - z) - half > g:  # the middle of the line of contact is nearer to an end
             qz = min(max(z, -H), H)
     else:
         qz = min(max(z, -H), H)
-        nx, ny, nz = 0.0, 0.0, above
+        normal = Vector(0.0, 0.0, above)
         if end >= 0.0:
-            feature = END_FACE if gap <= 0.0 else beyond_end(feature)
-    return Answer(f, qx, qy, qz, nx, ny, nz, feature, (qz - z) * math.copysign(1.0, rod.dz), bound)
+            feature = features.END_FACE if gap <= 0.0 else features.beyond_end(feature)
+    return Answer(f, Vector(qx, qy, qz), normal, feature, (qz - z) * math.copysign(1.0, rod.axis.z), bound)
+
+
+@inlined
+def shrunk(rod: Rod) -> Rod:
+    """The capsule of what is left last of a cylinder that is longer than wide."""
+    return Rod(rod.centre, rod.axis, rod.e2, rod.r, rod.half - rod.r)
 
 
 @formula
-def parallel_with_rate(groove: Groove, rod: Rod) -> tuple[Answer, Rate]:
+def parallel_with_rate(groove: Groove, rod: Rod) -> tuple[Answer, Vector]:
     """Answer and rate for an axis along z."""
     answer = flat_parallel(groove, rod)
-    rate = Rate(answer.nx, answer.ny, answer.nz)
+    rate = answer.normal
     if rod.half < rod.r:
         if abs(answer.distance + rod.half) <= answer.bound:
-            rate = Rate(0.0, 0.0, 0.0)  # nothing is left of a disc, and its middle is not in the material yet
+            rate = Vector(0.0, 0.0, 0.0)  # nothing is left of a disc, and its middle is not in the material yet
     elif answer.distance < -rod.r:
-        left = Rod(rod.x, rod.y, rod.z, 0.0, 0.0, math.copysign(1.0, rod.dz), 0.0, rod.r, rod.half - rod.r)
-        rate = inside_rate(groove, left, answer.t)
+        along_z = Vector(0.0, 0.0, math.copysign(1.0, rod.axis.z))
+        rate = inside_rate(groove, Rod(rod.centre, along_z, 0.0, rod.r, rod.half - rod.r), answer.t)
     return answer, rate
 
 
 @formula
-def after_nothing_left(groove: Groove, rod: Rod, capsule: Answer) -> tuple[bool, Answer, Rate]:
+def after_nothing_left(groove: Groove, rod: Rod, capsule: Answer) -> tuple[bool, Answer, Vector]:
     """Whether what is left last of the cylinder is in the material; then answer and rate."""
-    bound, rate = capsule.bound, Rate(capsule.nx, capsule.ny, capsule.nz)
+    bound = capsule.bound
     if rod.half < rod.r:
-        if section(groove, rod.x, rod.y)[0] > 0.0 or abs(rod.z) > groove.H:
-            return False, capsule, rate
-        out = way_out(groove, rod.x, rod.y, rod.z)
-        distance = out.distance - rod.half
-        middle = Answer(distance, out.x, out.y, out.z, out.nx, out.ny, out.nz, out.feature, 0.0, bound)
-        return True, middle, Rate(out.nx, out.ny, out.nz)
-    left = Rod(rod.x, rod.y, rod.z, rod.dx, rod.dy, rod.dz, rod.e2, rod.r, rod.half - rod.r)
-    lo, hi = clip(groove, rod, left.half)
-    if lo > hi or not (
-        is_behind_arc(groove, rod.x + lo * rod.dx, rod.y + lo * rod.dy)
-        or is_behind_arc(groove, rod.x + hi * rod.dx, rod.y + hi * rod.dy)
-    ):
-        return False, capsule, rate
+        if features.section(groove, rod.centre.x, rod.centre.y)[0] > 0.0 or abs(rod.centre.z) > groove.H:
+            return False, capsule, capsule.normal
+        out = way_out(groove, rod.centre)
+        return True, Answer(out.distance - rod.half, out.point, out.normal, out.feature, 0.0, bound), out.normal
+    left = shrunk(rod)
+    lo, hi = features.clip(groove, rod, left.half)
+    low, high = features.axis_point(rod, lo), features.axis_point(rod, hi)
+    if lo > hi or not (features.is_behind_arc(groove, low.x, low.y) or features.is_behind_arc(groove, high.x, high.y)):
+        return False, capsule, capsule.normal
     answer = inside(groove, left, lo, hi, bound)
     return True, answer, inside_rate(groove, left, answer.t)
 
@@ -474,11 +400,11 @@ def is_of_capsule(rod: Rod, capsule: Answer) -> bool:
     distance, end = capsule.distance, abs(capsule.t) - rod.half
     if distance < -rod.r or (distance < 0.0 and end > distance):
         return False
-    return end < 0.0 or abs(capsule.nx * rod.dx + capsule.ny * rod.dy + capsule.nz * rod.dz) <= 8.0 * UNIT
+    return end < 0.0 or abs(dot(capsule.normal, rod.axis)) <= 8.0 * UNIT
 
 
 @formula
-def searched(groove: Groove, rod: Rod, capsule: Answer) -> tuple[Answer, Rate]:
+def searched(groove: Groove, rod: Rod, capsule: Answer) -> tuple[Answer, Vector]:
     """Answer and rate where the capsule's are not the cylinder's."""
     least = capsule.distance
     if capsule.distance < -rod.r:
@@ -487,29 +413,28 @@ def searched(groove: Groove, rod: Rod, capsule: Answer) -> tuple[Answer, Rate]:
         if is_inside:
             return answer, rate
     bound = 2.0 * capsule.bound + 4.0 * UNIT * rod.r
-    eps = UNIT * (abs(rod.x) + abs(rod.y) + abs(rod.z) + rod.half + groove.H + groove.R + rod.r)
+    c = rod.centre
+    eps = UNIT * (abs(c.x) + abs(c.y) + abs(c.z) + rod.half + groove.H + groove.R + rod.r)
     # No more than where the capsule is nearest: what cannot be below that is not looked for.
-    w, t = from_axis(rod, capsule.x - rod.x, capsule.y - rod.y, capsule.z - rod.z)
-    start = beside(rod, w, t)
-    best = Search(math.inf, capsule.x, capsule.y, capsule.z, capsule.feature, start + bound, least, math.inf, eps)
+    start = point_distance(rod, capsule.point)
+    best = Search(math.inf, capsule.point, capsule.feature, start + bound, least, math.inf, eps)
     best = best_point(groove, rod, best)
     left = best.left
     if best.f == math.inf:
-        best = better(best, start, capsule.x, capsule.y, capsule.z, capsule.feature)
+        best = better(best, start, capsule.point, capsule.feature)
     normal, rate, t = witness(groove, rod, best, bound)
     if rod.half < rod.r and best.f + rod.half <= bound:
-        rate = Rate(0.0, 0.0, 0.0)  # nothing is left of a disc, and its middle is not in the material yet
+        rate = Vector(0.0, 0.0, 0.0)  # nothing is left of a disc, and its middle is not in the material yet
     bound += max(best.f - left, 0.0)
-    answer = Answer(best.f, best.x, best.y, best.z, normal.x, normal.y, normal.z, best.feature, t, bound)
-    return answer, rate
+    return Answer(best.f, best.point, normal, best.feature, t, bound), rate
 
 
 @inlined
-def flat_nearest(groove: Groove, rod: Rod) -> tuple[Answer, Rate]:
+def flat_nearest(groove: Groove, rod: Rod) -> tuple[Answer, Vector]:
     """Signed distance of a flat-ended cylinder, and its rate by a shift."""
     if is_parallel(groove, rod, max(rod.half, rod.r)):
         return parallel_with_rate(groove, rod)
     capsule = nearest(groove, rod)
     if is_of_capsule(rod, capsule):
-        return capsule, Rate(capsule.nx, capsule.ny, capsule.nz)
+        return capsule, capsule.normal
     return searched(groove, rod, capsule)

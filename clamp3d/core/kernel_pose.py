@@ -6,16 +6,23 @@ import math
 
 from clamp3d.core.jit import inlined
 from clamp3d.core.kernel_features import Rod
+from clamp3d.core.kernel_vector import Vector, cross, dot, times
 from clamp3d.core.pose import RIGID_TOLERANCE, Array
 from clamp3d.core.primitives import LARGEST
 
 
 @inlined
-def place(T: Array, k: int) -> tuple[float, float, float, float, float, float]:
+def row(T: Array, k: int, i: int) -> Vector:
+    """First three numbers of row i of pose k."""
+    return Vector(T[k, i, 0], T[k, i, 1], T[k, i, 2])
+
+
+@inlined
+def place(T: Array, k: int) -> tuple[Vector, Vector]:
     """Position and axis as given, of pose k of (n, 4, 4) or of (n, 2, 3), which is these two alone."""
     if T.shape[1] == 2:
-        return T[k, 0, 0], T[k, 0, 1], T[k, 0, 2], T[k, 1, 0], T[k, 1, 1], T[k, 1, 2]
-    return T[k, 0, 3], T[k, 1, 3], T[k, 2, 3], T[k, 0, 2], T[k, 1, 2], T[k, 2, 2]
+        return row(T, k, 0), row(T, k, 1)
+    return Vector(T[k, 0, 3], T[k, 1, 3], T[k, 2, 3]), Vector(T[k, 0, 2], T[k, 1, 2], T[k, 2, 2])
 
 
 @inlined
@@ -24,35 +31,24 @@ def rigid(T: Array, k: int) -> bool:
 
     Of (n, 2, 3): whether the axis is of unit length to the same tolerance.
     """
+    p, d = place(T, k)
+    is_near = abs(p.x) + abs(p.y) + abs(p.z) < LARGEST
     if T.shape[1] == 2:
-        x, y, z, dx, dy, dz = place(T, k)
-        return abs(dx * dx + dy * dy + dz * dz - 1.0) <= RIGID_TOLERANCE and abs(x) + abs(y) + abs(z) < LARGEST
-    a, b, c = T[k, 0, 0], T[k, 0, 1], T[k, 0, 2]
-    d, e, f = T[k, 1, 0], T[k, 1, 1], T[k, 1, 2]
-    g, h, i = T[k, 2, 0], T[k, 2, 1], T[k, 2, 2]
-    aa = abs(a * a + b * b + c * c - 1.0)
-    bb = abs(d * d + e * e + f * f - 1.0)
-    cc = abs(g * g + h * h + i * i - 1.0)
-    ab = abs(a * d + b * e + c * f)
-    ac = abs(a * g + b * h + c * i)
-    bc = abs(d * g + e * h + f * i)
-    # Every comparison is false for a NaN. The sum decides nearly always: it is no less than the largest.
-    if not aa + bb + cc + ab + ac + bc <= RIGID_TOLERANCE:
-        t = RIGID_TOLERANCE
-        if not (aa <= t and bb <= t and cc <= t and ab <= t and ac <= t and bc <= t):
-            return False
-    if not a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.0:
-        return False
-    offset = abs(T[k, 0, 3]) + abs(T[k, 1, 3]) + abs(T[k, 2, 3])
+        return abs(dot(d, d) - 1.0) <= RIGID_TOLERANCE and is_near
+    a, b, c = row(T, k, 0), row(T, k, 1), row(T, k, 2)
+    # Every comparison is false for a NaN.
+    t = RIGID_TOLERANCE
+    is_unit = abs(dot(a, a) - 1.0) <= t and abs(dot(b, b) - 1.0) <= t and abs(dot(c, c) - 1.0) <= t
+    is_square = abs(dot(a, b)) <= t and abs(dot(a, c)) <= t and abs(dot(b, c)) <= t
     last = abs(T[k, 3, 0]) + abs(T[k, 3, 1]) + abs(T[k, 3, 2]) + abs(T[k, 3, 3] - 1.0)
-    return bool(offset < LARGEST and last == 0.0)
+    return bool(is_unit and is_square and dot(a, cross(b, c)) > 0.0 and is_near and last == 0.0)
 
 
 @inlined
 def rod_at(T: Array, k: int, r: float, half: float) -> Rod:
     """The cylinder of this radius and half length at the valid pose k: its axis as given, normalised."""
-    x, y, z, dx, dy, dz = place(T, k)
-    g = dx * dx + dy * dy + dz * dz
+    centre, axis = place(T, k)
+    g = dot(axis, axis)
     n = 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)  # by its series near 1: no root to wait for
-    dx, dy, dz = dx * n, dy * n, dz * n
-    return Rod(x, y, z, dx, dy, dz, dx * dx + dy * dy, r, half)
+    d = times(n, axis)
+    return Rod(centre, d, d.x * d.x + d.y * d.y, r, half)

@@ -15,10 +15,6 @@ from clamp3d.errors import InputError
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-_ASLANT = np.array([0.48, 0.6, 0.64])
-"""A unit vector that no axis or diagonal is at right angles to."""
-_BETWEEN = 9
-
 LARGEST, SMALLEST = 1e12, 1e-9
 """Largest coordinate and least extent in mm: beyond them products of three lengths lose their digits or vanish."""
 
@@ -134,25 +130,22 @@ def _used(V: Array, F: IntArray) -> tuple[Array, IntArray]:
 
 def _cleaned(V: Array, F: IntArray, rounding: float, name: str, notes: list[str]) -> tuple[Array, IntArray]:
     """The mesh without folded and doubled triangles, and without slivers that keep it open; ``notes`` say so."""
-    F = F[~_folded(F)]
+    F = F[(np.roll(F, 1, axis=1) != F).all(axis=1)]
     single = _without_doubles(F)
     if len(single) < len(F):
         notes.append(f"{len(F) - len(single)} doubled triangles left out")
     if len(single) == 0:
         raise InputError(f"{name}: no triangle with an area")
-    V, F = _used(V, single)
-    if (_edges(F)[2] % 2).any():
-        thin = _in_the_way(V, F, rounding)
-        if thin.any():
-            notes.append(f"{int(thin.sum())} triangles without an area left out")
-            V, F = _used(V, F[~thin])
-    return V, F
+    thin = _in_the_way(V, single, rounding)
+    if thin.any():
+        notes.append(f"{int(thin.sum())} triangles without an area left out")
+    return _used(V, single[~thin])
 
 
 def _one_winding(V: Array, F: IntArray, notes: list[str]) -> IntArray:
     """The faces with one winding on each connected surface; ``notes`` say how many were turned."""
-    _, edge, uses = _edges(F)
-    if not _balance(F, edge)[uses == 2].any():
+    _, uses, balance = _edges(F)
+    if not balance[uses == 2].any():
         return F
     import trimesh  # takes longer to load than most meshes to read
 
@@ -177,11 +170,11 @@ def _outward(V: Array, F: IntArray, name: str, notes: list[str]) -> IntArray:
 
 
 def closed_mesh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Mesh:
-    """Take a mesh as it is, or refuse it: nothing is repaired, as `make_mesh` would.
+    """Take a closed mesh as it is, or refuse it: what `make_mesh` would have to repair.
 
     CoACD and FCL end the interpreter on some of what is refused here, and give a wrong answer without a word on the
-    rest. The one thing that is mended: an STL gives every triangle corners of its own, so vertices that are equal to
-    the bit become one where a mesh is open without that.
+    rest. The one thing that is mended: an STL gives every triangle corners of its own, so equal vertices become one
+    where a mesh is open without that.
 
     Parameters
     ----------
@@ -196,115 +189,57 @@ def closed_mesh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Me
     Raises
     ------
     InputError
-        As `make_mesh`; also for a face with two equal corners, an open or shared edge, faces of opposite winding, a
-        volume that is not > 0, or a body inside out.
+        As `make_mesh`; also for a mesh that is not closed, or that it would repair.
 
     Examples
     --------
     >>> tetrahedron = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> closed_mesh(tetrahedron, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]).faces.shape
     (4, 3)
-    >>> closed_mesh(tetrahedron, [[0, 2, 1], [0, 1, 3], [1, 2, 3]])
-    Traceback (most recent call last):
-    clamp3d.errors.InputError: mesh must be watertight: 3 of 6 edges have one face only, at face 0, vertices 0 and 2
     """
-    V, F = _arrays(checks.array(f"{name}: vertices", vertices, (None, 3)), faces, name)
-    if _folded(F).any():
-        row = int(np.argmax(_folded(F)))
-        raise InputError(f"{name} faces must have three different corners, got {F[row].tolist()} at row {row}")
-    directed, edge, uses = _edges(F)
-    if (uses == 1).any():
-        merged, index = np.unique(V + 0.0, axis=0, return_inverse=True)
-        G = index.reshape(-1)[F]
-        G = np.ascontiguousarray(G[~_folded(G)])
-        if len(G) and not (_edges(G)[2] == 1).any():
-            V, F = merged, G
-            directed, edge, uses = _edges(F)
-    for wrong, what in ((uses == 1, "have one face only"), (uses > 2, "have more than two faces")):
-        if wrong.any():
-            place = _place(directed, wrong[edge])
-            raise InputError(f"{name} must be watertight: {wrong.sum()} of {len(uses)} edges {what}, {place}")
-    balance = _balance(F, edge) != 0
-    if balance.any():
-        place = _place(directed, balance[edge])
-        raise InputError(f"{name} must have one winding: {balance.sum()} edges run the same way in both faces, {place}")
-    size = volume(V, F)
-    if not size > 0.0:
-        raise InputError(f"{name} must enclose a volume > 0 mm^3, got {size:.6g}; its faces may be inside out")
-    for rows in inside_out(V, F):
-        raise InputError(
-            f"{name} must have all bodies the right way out: the one of face {int(rows[0])} ({len(rows)} faces) "
-            f"encloses {volume(V, F[rows]):.6g} mm^3 and is no cavity of another"
-        )
+    mesh = make_mesh(vertices, faces, name=name)
+    if mesh.notes:
+        raise InputError(f"{name} must be watertight and wound outward: {'; '.join(mesh.notes)}")
+    V, F = _arrays(vertices, faces, name, 1.0)
+    if not is_closed(F):
+        V, F = mesh.vertices, mesh.faces
     V.flags.writeable = F.flags.writeable = False
     return Mesh(name, V, F, True)
 
 
-def _arrays(vertices: ArrayLike, faces: ArrayLike, name: str, scale: float = 1.0) -> tuple[Array, IntArray]:
+def _arrays(vertices: ArrayLike, faces: ArrayLike, name: str, scale: float) -> tuple[Array, IntArray]:
     """Vertices (n, 3) in mm, those in use only, and faces (m, 3), m > 0, as arrays of their own."""
     V = checks.array(f"{name}: vertices", vertices, (None, 3), finite=False)
-    if len(V) == 0:
-        raise InputError(f"{name}: vertices must not be empty")
-    F = _indices(f"{name}: faces", faces)
-    if F.min() < 0 or F.max() >= len(V):
-        bad = int(F.max()) if F.max() >= len(V) else int(F.min())
-        raise InputError(f"{name}: face index {bad} is out of range for {len(V)} vertices")
-    used, F = np.unique(F, return_inverse=True)
-    V, F = V[used], F.reshape(-1, 3)
-    if not np.isfinite(V).all():
-        bad = int(np.flatnonzero(~np.isfinite(V).all(axis=1))[0])
-        raise InputError(f"{name}: vertex {used[bad]} is not finite: {V[bad].tolist()}")
-    with np.errstate(over="ignore", under="ignore"):
-        V = V * scale
-    if not np.abs(V).max() <= LARGEST:
-        bad = int(np.abs(V).max(axis=1).argmax())
-        raise InputError(f"{name}: vertex {used[bad]} must be within {LARGEST:g} mm, got {V[bad].tolist()}")
-    return V, F
-
-
-def _indices(name: str, faces: ArrayLike) -> IntArray:
-    """Faces (m, 3), m > 0, of whole numbers."""
     try:
         F = np.asarray(faces)
     except (TypeError, ValueError, OverflowError, RecursionError):
-        raise InputError(f"{name} must be an array of integers with shape (m, 3)") from None
+        raise InputError(f"{name}: faces must be an array of integers with shape (m, 3)") from None
     if F.dtype.kind not in "iu" and F.size:
-        raise InputError(f"{name} must be integers, got {F.dtype}")
+        raise InputError(f"{name}: faces must be integers, got {F.dtype}")
     if F.ndim != 2 or F.shape[1:] != (3,) or len(F) == 0:
-        raise InputError(f"{name} must have shape (m, 3), got {F.shape}")
-    if F.dtype.kind == "u" and F.max() > np.iinfo(np.int64).max:
-        raise InputError(f"{name}: index {F.max()} is out of range")
-    return F.astype(np.int64)
+        raise InputError(f"{name}: faces must have shape (m, 3), got {F.shape}")
+    outside = (F < 0) | (len(V) <= F)
+    if outside.any():
+        raise InputError(f"{name}: face index {F[outside][0]} is out of range for {len(V)} vertices")
+    used, index = np.unique(F, return_inverse=True)
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        V = V[used] * scale
+    wrong = ~(np.abs(V) <= LARGEST).all(axis=1)
+    if wrong.any():
+        k = int(wrong.argmax())
+        raise InputError(f"{name}: vertex {used[k]} is not finite, or not within {LARGEST:g} mm: {V[k].tolist()}")
+    return V, index.reshape(-1, 3).astype(np.int64)
 
 
 def _merge(V: Array, F: IntArray, tolerance: float) -> tuple[Array, IntArray]:
     """Merge vertices closer than ``tolerance`` (a tree, not a grid: a grid parts equal points at its lines)."""
     unique, inverse = np.unique(V, axis=0, return_inverse=True)
     F = inverse.reshape(-1)[F].astype(np.int64)
-    if not _may_be_close(unique, tolerance):
-        return unique, F
     from scipy.spatial import cKDTree
 
     label = joined(cKDTree(unique).query_pairs(tolerance, output_type="ndarray"), len(unique))
     keep, number = np.unique(label, return_inverse=True)
     return unique[keep], number[F]
-
-
-def _may_be_close(V: Array, tolerance: float) -> bool:
-    """Whether two points (n, 3) may be within ``tolerance``; quick where they are not.
-
-    Along any direction they are no further apart than they are; few other points lie between them there.
-    """
-    along = (V - V[0]) @ _ASLANT
-    order = np.argsort(along, kind="stable")
-    V, along = V[order], along[order]
-    for k in range(1, _BETWEEN):
-        rows = np.flatnonzero(along[k:] - along[:-k] <= 2.0 * tolerance)
-        if not len(rows):
-            return False
-        if (np.linalg.norm(V[rows + k] - V[rows], axis=1) <= 2.0 * tolerance).any():
-            return True
-    return True
 
 
 def _slivers(V: Array, F: IntArray, rounding: float) -> NDArray[np.bool_]:
@@ -320,9 +255,9 @@ def _in_the_way(V: Array, F: IntArray, rounding: float) -> NDArray[np.bool_]:
     """Slivers (m,) on edges of an odd number of faces, if without them there are no such edges; else none."""
     thin = _slivers(V, F, rounding)
     gone = np.zeros(len(F), dtype=bool)
-    while thin.any() and not gone.all():
+    while not gone.all():
         rest = np.flatnonzero(~gone)
-        _, edge, uses = _edges(F[rest])
+        edge, uses, _ = _edges(F[rest])
         odd = (uses % 2 == 1)[edge].reshape(-1, 3).any(axis=1)
         if not odd.any():
             return gone
@@ -332,23 +267,20 @@ def _in_the_way(V: Array, F: IntArray, rounding: float) -> NDArray[np.bool_]:
     return np.zeros(len(F), dtype=bool)
 
 
-def _folded(F: IntArray) -> NDArray[np.bool_]:
-    """Faces (m,) with two equal corners."""
-    return np.asarray((F[:, 0] == F[:, 1]) | (F[:, 1] == F[:, 2]) | (F[:, 2] == F[:, 0]))
+def _ends(F: IntArray) -> IntArray:
+    """Both ends (3m, 2) of the sides of faces (m, 3), face by face."""
+    return np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2)
 
 
-def _edges(F: IntArray) -> tuple[IntArray, NDArray[np.intp], NDArray[np.intp]]:
-    """Edges (3m, 2) face by face, the number (3m,) of each without direction, and how many faces each of those has."""
-    directed = F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    key = directed.max(axis=1) * (F.max() + 1) + directed.min(axis=1)  # one number for both ends: quick to sort
+def _edges(F: IntArray) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[Any]]:
+    """The number (3m,) of each side's edge; of each edge (k,) how many faces it has, and how their directions differ.
+
+    That is how much more often they run along it from its smaller end than from the other.
+    """
+    ends = _ends(F)
+    key = ends.max(axis=1) * (F.max() + 1) + ends.min(axis=1)  # one number for both ends: quick to sort
     _, edge, uses = np.unique(key, return_inverse=True, return_counts=True)
-    return directed, edge, uses
-
-
-def _balance(F: IntArray, edge: NDArray[np.intp]) -> NDArray[Any]:
-    """How much more often each ``edge`` of `_edges` is run along from its smaller end than from the other."""
-    forward = np.roll(F, -1, axis=1) > F
-    return np.bincount(edge, weights=np.where(forward.ravel(), 1, -1))
+    return edge, uses, np.bincount(edge, weights=np.sign(ends[:, 1] - ends[:, 0]))
 
 
 def _without_doubles(F: IntArray) -> IntArray:
@@ -362,16 +294,15 @@ def _without_doubles(F: IntArray) -> IntArray:
     side = np.where(F[rows, (smallest + 1) % 3] < F[rows, (smallest + 2) % 3], 1, -1)
     once: IntArray = F[np.sort(first)]
     without: IntArray = F[np.sort(first[np.bincount(group.reshape(-1), weights=side) != 0])]
-    if len(without) in (0, len(once)) or not (_edges(once)[2] % 2).any() or (_edges(without)[2] % 2).any():
+    if len(without) in (0, len(once)) or not (_edges(once)[1] % 2).any() or (_edges(without)[1] % 2).any():
         return once
     return without
 
 
 def _closure(V: Array, F: IntArray) -> tuple[bool, str]:
     """Whether triangles enclose a volume, and what is odd about their edges."""
-    _, edge, uses = _edges(F)
+    _, uses, balance = _edges(F)
     rim, crossed = int((uses == 1).sum()), int((uses > 2).sum())
-    balance = _balance(F, edge)
     if not balance.any():
         if not crossed:
             return True, ""
@@ -388,14 +319,8 @@ def _closure(V: Array, F: IntArray) -> tuple[bool, str]:
 
 def is_closed(F: IntArray) -> bool:
     """Whether every edge of faces (m, 3) has two of them, which run along it in opposite directions."""
-    _, edge, uses = _edges(F)
-    balance = _balance(F, edge)
+    _, uses, balance = _edges(F)
     return bool((uses == 2).all() and not balance.any())
-
-
-def _place(directed: IntArray, wrong: NDArray[np.bool_]) -> str:
-    k = int(np.argmax(wrong))
-    return f"at face {k // 3}, vertices {directed[k, 0]} and {directed[k, 1]}"
 
 
 def edges_of(F: IntArray, uses: int) -> tuple[IntArray, IntArray, IntArray]:
@@ -407,7 +332,7 @@ def edges_of(F: IntArray, uses: int) -> tuple[IntArray, IntArray, IntArray]:
     >>> [x.tolist() for x in edges_of(np.array([[0, 1, 2], [2, 1, 3]]), 2)]
     [[[1, 2]], [[0, 1]], [[0, 3]]]
     """
-    directed, edge, counts = _edges(F)
+    edge, counts, _ = _edges(F)
     order = np.argsort(edge, kind="stable")
     sides = order[counts[edge[order]] == uses].reshape(-1, uses)
-    return np.sort(directed[sides[:, 0]], axis=1), sides // 3, F[sides // 3, (sides + 2) % 3]
+    return np.sort(_ends(F)[sides[:, 0]], axis=1), sides // 3, F[sides // 3, (sides + 2) % 3]

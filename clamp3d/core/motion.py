@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.checks import array, items, number, text
-from clamp3d.core.linear import cross, norm
-from clamp3d.core.pose import Array, check_pose, rotation, unit
+from clamp3d.core.pose import Array, check_pose, cross, norm, rotation, unit
 from clamp3d.errors import InputError
 
 FARTHEST = 1e9

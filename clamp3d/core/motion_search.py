@@ -103,8 +103,7 @@ def least(
     start, stop = distance(0.0), distance(1.0)
     t, upper = (0.0, start[1]) if start[1] <= stop[1] else (1.0, stop[1])
     evaluations = 2
-    between = _Bounds(speed, bound)
-    heap = [between(_Stretch(-math.inf, 0.0, 1.0, start[0], stop[0]), upper - accuracy)]
+    heap = [_bounded(_Stretch(-math.inf, 0.0, 1.0, start[0], stop[0]), speed, bound, upper - accuracy)]
     lower = math.inf  # of all stretches that no time parts
     while heap and heap[0].lower < upper - accuracy and evaluations < most:
         stretch = heapq.heappop(heap)
@@ -117,7 +116,7 @@ def least(
         if here[1] < upper:
             t, upper = middle, here[1]
         for half in _halves(stretch, middle, here[0]):
-            heapq.heappush(heap, between(half, upper - accuracy))
+            heapq.heappush(heap, _bounded(half, speed, bound, upper - accuracy))
     return Least(t, min([lower, upper, *(stretch.lower for stretch in heap[:1])]), upper, evaluations)
 
 
@@ -144,11 +143,10 @@ def first_time(
     at_start, upper = distance(0.0)
     if at_start <= level:
         return FirstTime(Outcome.REACHED if upper <= level else Outcome.UNDECIDED, 0.0, 1)
-    between = _Bounds(speed, bound)
     todo = [_Stretch(-math.inf, 0.0, 1.0, at_start, distance(1.0)[0])]
     evaluations = 2
     while todo:
-        stretch = between(todo.pop(), level)
+        stretch = _bounded(todo.pop(), speed, bound, level)
         if stretch.lower > level:
             continue
         middle = 0.5 * (stretch.start + stretch.stop)
@@ -162,18 +160,13 @@ def first_time(
     return FirstTime(Outcome.CLEAR, 1.0, evaluations)
 
 
-class _Bounds:
-    """What bounds the distance on a stretch: the speed, and where that is not enough the caller's own bound."""
-
-    def __init__(self, speed: float, bound: BoundBetween | None) -> None:
-        self.speed, self.bound = speed, bound
-
-    def __call__(self, stretch: _Stretch, enough: float) -> _Stretch:
-        way = self.speed * (stretch.stop - stretch.start)
-        lower = max(stretch.lower, bound_by_speed(stretch.at_start, stretch.at_stop, way))
-        if lower < enough and self.bound is not None:
-            lower = max(lower, self.bound(stretch.start, stretch.stop))
-        return stretch._replace(lower=lower)
+def _bounded(stretch: _Stretch, speed: float, bound: BoundBetween | None, enough: float) -> _Stretch:
+    """A stretch with its bound by the speed, and where that is below ``enough`` with the caller's own."""
+    way = speed * (stretch.stop - stretch.start)
+    lower = max(stretch.lower, bound_by_speed(stretch.at_start, stretch.at_stop, way))
+    if lower < enough and bound is not None:
+        lower = max(lower, bound(stretch.start, stretch.stop))
+    return stretch._replace(lower=lower)
 
 
 def _halves(stretch: _Stretch, middle: float, here: float) -> tuple[_Stretch, _Stretch]:

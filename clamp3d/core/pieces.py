@@ -7,9 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.core.distance import as_pose, repaired
-from clamp3d.core.pose import Array
+from clamp3d.core.distance import TWIST, VECTOR, as_pose
+from clamp3d.core.pose import Array, check_pose
 from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc, check_shapes
+
+_RECORD = np.dtype(
+    [
+        ("distance", np.float64),
+        ("point_on_groove", *VECTOR),
+        ("normal", *VECTOR),
+        ("feature", np.int8),
+        ("gradient", *TWIST),
+    ],
+    align=True,
+)
+"""What the kernel writes: the fields of `GroovePieces` in their order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,11 +93,10 @@ def groove_pieces(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) -> G
     if type(groove) is not SweptArc or type(cylinder) not in (Capsule, Cylinder):
         check_shapes(groove, cylinder)
     T = as_pose(pose)
-    out = np.empty((5, 14))
+    out = np.empty(5, _RECORD)
     from clamp3d.core.kernel_pieces import pieces  # compiled on first use
 
-    if not pieces(
-        T[None], groove.radius, groove.half_angle, 0.5 * groove.length, cylinder.radius, 0.5 * cylinder.length, out
-    ):
-        return groove_pieces(groove, cylinder, repaired(T, "pose"))
-    return GroovePieces(out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7].astype(np.int8), out[:, 8:14])
+    half, along = 0.5 * groove.length, 0.5 * cylinder.length
+    if not pieces(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, out):
+        return groove_pieces(groove, cylinder, check_pose(T))
+    return GroovePieces(**{name: out[name] for name in _RECORD.names or ()})

@@ -26,6 +26,8 @@ MIN_MESH_ERROR = 1e-6
 """Smallest chord error in mm: a circle of radius 24 then has some 11 000 chords."""
 
 _CLOSURE = 1e-9  # mm; the ends of neighbouring edges are computed by different formulas
+_FINE = 1e-4
+"""Chord error, relative to the outline's extent, with which an outline is looked at for crossings."""
 
 
 def sagitta(radius: float, angle: float) -> float:
@@ -218,13 +220,24 @@ class Profile:
                 )
         if not self.edges or self.area <= 0.0:
             raise InputError("outline must run counter-clockwise and enclose an area > 0 mm^2")
-        from clamp3d.core.crossing import first_crossing, turning  # which needs the edges of this module
+        self._check_simple()
 
-        if crossing := first_crossing(self.edges):
-            i, j, (a, b) = crossing
-            raise InputError(f"outline must not cross itself: edges {i} and {j} cross at ({a:.6g}, {b:.6g}) mm")
-        if abs(rounds := turning(self.edges) / (2.0 * math.pi) - 1.0) > 0.5:
-            raise InputError(f"outline must not cross itself: it turns {rounds + 1.0:.3g} times in one round, not once")
+    def _check_simple(self) -> None:
+        """Raise InputError if the outline crosses itself; it may touch itself, and run along itself.
+
+        Then what it runs round twice, or the wrong way, counts twice in its area, or off it. Arcs are taken as chords.
+        """
+        from shapely import Polygon, make_valid
+        from shapely.validation import explain_validity
+
+        extent = max(np.ptp(self.bounds, axis=0))
+        error = max(_FINE * extent, MIN_MESH_ERROR)
+        ring = Polygon(self.polygon(error))
+        if ring.is_valid:
+            return
+        off = abs(make_valid(ring).area - (self.area - sum(self.chord_areas(error) * np.array([1.0, -1.0]))))
+        if off > (error if self.arcs else _CLOSURE * extent) * ring.length:
+            raise InputError(f"outline must not cross itself: {explain_validity(ring).lower()}")
 
     @classmethod
     def of(cls, *pieces: Point | Arc) -> Profile:

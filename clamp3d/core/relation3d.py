@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 
 from clamp3d.core.arc_circle import ArcRelation, check_tolerance
 from clamp3d.core.distance import Feature, SignedDistance, as_pose, signed_distance
-from clamp3d.core.linear import norm
 from clamp3d.core.pose import Array, check_pose
-from clamp3d.core.primitives import AnyCylinder, Capsule, SweptArc, check_shapes
+from clamp3d.core.primitives import LARGEST, AnyCylinder, SweptArc, check_shapes
 
 Relation3D: TypeAlias = ArcRelation
 
@@ -104,40 +103,13 @@ def _hollow_side(contact: SignedDistance) -> bool:
 def _reaches_hollow(groove: SweptArc, cylinder: AnyCylinder, T: Array) -> bool:
     """Whether the cylinder meets the hollow, given that it is clear of the material.
 
-    Hollow and material make up the block {y <= h, |z| <= H}, so it meets the one if it meets the other. The nearest
-    points of an axis and the block: a plane problem in y and z. A cylinder with flat ends and the block are convex:
-    they are apart if a plane across y and z is between them.
+    Hollow and material make up the block {y <= h, |z| <= H}, so it meets the one if it meets the other. The kernel
+    measures the block as a groove that is too small to matter.
     """
-    h, H = -groove.radius * math.cos(groove.half_angle), 0.5 * groove.length
-    cy, cz = T[1:3, 3].tolist()
-    dy, dz = (T[1:3, 2] / norm(T[:3, 2])).tolist()
-    half = 0.5 * cylinder.length
-    if not isinstance(cylinder, Capsule):
-        angle = np.linspace(0.0, np.pi, 181)
-        for _ in range(12):
-            ny, nz = np.sin(angle), np.cos(angle)
-            along = ny * dy + nz * dz
-            reach = half * np.abs(along) + cylinder.radius * np.sqrt(np.maximum(0.0, 1.0 - along * along))
-            gap = ny * (cy - h) + nz * cz - np.abs(nz) * H - reach
-            k = int(np.argmax(gap))
-            step = angle[1] - angle[0]
-            angle = np.linspace(max(0.0, angle[k] - step), min(np.pi, angle[k] + step), 181)
-        return bool(gap[k] < 0.0)
-
-    def distance(t: float) -> float:
-        return math.hypot(max(cy + t * dy - h, 0.0), max(abs(cz + t * dz) - H, 0.0))
-
-    # Convex in t: least at an end, where it meets a plane of the block, or at the foot of an edge of the block.
-    places = [-half, half]
-    n2 = dy * dy + dz * dz
-    if dy != 0.0:
-        places.append((h - cy) / dy)
-    for edge in (-H, H):
-        if dz != 0.0:
-            places.append((edge - cz) / dz)
-        if n2 > 0.0:
-            places.append((h - cy) * (dy / n2) + (edge - cz) * (dz / n2))
-    return min(distance(min(max(t, -half), half)) for t in places) < cylinder.radius
+    notch = SweptArc(max(1e-12 * groove.radius, 1.0 / LARGEST), 0.5 * math.pi, groove.length)
+    above = T.copy()
+    above[1, 3] += groove.radius * math.cos(groove.half_angle)
+    return signed_distance(notch, cylinder, above).distance < 0.0
 
 
 def relative_pose(T_world_a: ArrayLike, T_world_b: ArrayLike) -> Array:

@@ -16,14 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.checks import array, choice, instance, items, number, text
-from clamp3d.core.drilling import leaves_something
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.linear import norm
 from clamp3d.core.mesh import Mesh, make_mesh
-from clamp3d.core.pose import Array
+from clamp3d.core.pose import Array, norm
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc, place
 from clamp3d.core.primitives import size as _size
-from clamp3d.core.profile import Arc, Profile
+from clamp3d.core.profile import MIN_MESH_ERROR, Arc, Profile
 from clamp3d.errors import InputError
 
 Fit = Literal["round", "off"]
@@ -84,6 +82,8 @@ class Hole:
         choice("hole axis", self.axis, ("y", "z"))
 
 
+_THINNEST = 1e-4
+"""What holes leave of a part that is thinner than twice this, relative to its extent, is nothing."""
 FARTHEST_OFF = 1e5
 """A mesh that may be so far (mm) from its surface says nothing of it; the bounds of much larger ones overflow."""
 
@@ -115,9 +115,9 @@ Shape: TypeAlias = Solid | MeshShape
 AnyShape: TypeAlias = Shape | Cylinder | Capsule | SweptArc
 
 
-def _drill(holes: Sequence[Hole], low: Array, high: Array) -> tuple[Extrusion, ...]:
+def _drilled(name: str, body: Extrusion, holes: Sequence[Hole], low: Array, high: Array) -> Solid:
+    """A body with round holes right through its box. Raises InputError if they lie beside it or leave nothing of it."""
     extrusions = []
-    circles: dict[str, list[tuple[float, float, float]]] = {}
     for hole in items("holes", holes, "holes"):
         instance("hole", hole, Hole)
         across = [0, 2] if hole.axis == "y" else [0, 1]
@@ -128,13 +128,17 @@ def _drill(holes: Sequence[Hole], low: Array, high: Array) -> tuple[Extrusion, .
         if hole.axis == "z":
             extrusions.append(Extrusion(Profile.circle(hole.radius, hole.at), "Z", float(low[2]), float(high[2])))
         else:  # outlines along Y are (u, v) = (x, -z)
-            at = (hole.at[0], -hole.at[1])
-            extrusions.append(Extrusion(Profile.circle(hole.radius, at), "Y", float(low[1]), float(high[1])))
-        u, v = np.array(hole.at) - 0.5 * (low + high)[across]
-        circles.setdefault(hole.axis, []).append((hole.radius, float(u), float(v)))
-    if not leaves_something(0.5 * (high - low), circles):
-        raise InputError(f"{len(extrusions)} holes together leave nothing of the part")
-    return tuple(extrusions)
+            centre = (hole.at[0], -hole.at[1])
+            extrusions.append(Extrusion(Profile.circle(hole.radius, centre), "Y", float(low[1]), float(high[1])))
+    solid = Solid(name, (body,), tuple(extrusions))
+    if len(extrusions) > 1 and sum(hole.volume for hole in extrusions) >= body.volume:
+        from clamp3d.core.meshing import enclosed
+
+        error = max(_THINNEST * float((high - low).max()), MIN_MESH_ERROR)
+        if enclosed(solid, error) is None:
+            nothing = f"{len(extrusions)} holes together leave nothing of the part"
+            raise InputError(f"{nothing} that is thicker than {2.0 * error:.2g} mm")
+    return solid
 
 
 def cylinder(radius: float, length: float, *, bore: float = 0.0, name: str = "cylinder") -> Solid:
@@ -189,7 +193,7 @@ def box(
     x, y, z = (_size("size", value) for value in array("size", size, (3,)))
     corner = np.array([x, y, z]) / 2
     body = Extrusion(Profile.rectangle(x, y), "Z", -z / 2, z / 2)
-    return Solid(name, (body,), _drill(holes, -corner, corner))
+    return _drilled(name, body, holes, -corner, corner)
 
 
 def extrusion(outline: Profile | ArrayLike, height: float, *, name: str = "extrusion") -> Solid:
@@ -318,7 +322,7 @@ def groove_block(
     w, back, half_length = width / 2, face - height, groove.length / 2
     outline = Profile.of((-w, face), (-w, back), (w, back), (w, face), *(arc for _, _, arc in arcs))
     low, high = np.array([-w, back, -half_length]), np.array([w, face, half_length])
-    return Solid(name, (Extrusion(outline, "Z", -half_length, half_length),), _drill(holes, low, high))
+    return _drilled(name, Extrusion(outline, "Z", -half_length, half_length), holes, low, high)
 
 
 def as_shape(shape: AnyShape) -> Shape:

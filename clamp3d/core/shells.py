@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.core.pose import Array
-from clamp3d.core.triangles import distinct
 
 Faces = NDArray[np.int64]
 
@@ -30,29 +29,6 @@ def volume(vertices: Array, faces: Faces) -> float:
     enclosed = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
     area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
     return enclosed if abs(enclosed) > _FLAT * area * float((high - low).max()) else 0.0
-
-
-def corners_of(vertices: Array, faces: Faces) -> tuple[Array, Array, Array]:
-    """First, second and third corners (m, 3) of all triangles."""
-    a, b, c = (np.ascontiguousarray(vertices[faces[:, k]]) for k in range(3))
-    return a, b, c
-
-
-def winding_number(corners: tuple[Array, Array, Array], point: Array) -> float:
-    """How often a surface winds round a point (3,): 1 inside, 0 outside, -1 inside one that is inside out.
-
-    ``corners`` are those of `corners_of`. Sum of the triangles' solid angles over 4 pi (Van Oosterom and Strackee 1983,
-    doi:10.1109/TBME.1983.325207).
-    """
-    a, b, c = (x - point for x in corners)
-    la, lb, lc = (np.sqrt(np.einsum("ij,ij->i", x, x)) for x in (a, b, c))
-    triple = (
-        a[:, 0] * (b[:, 1] * c[:, 2] - b[:, 2] * c[:, 1])
-        + a[:, 1] * (b[:, 2] * c[:, 0] - b[:, 0] * c[:, 2])
-        + a[:, 2] * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
-    )
-    ab, bc, ca = (np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a)))
-    return float(np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2.0 * np.pi))
 
 
 def joined(groups: Faces, n: int) -> Faces:
@@ -84,16 +60,15 @@ def inside_out(vertices: Array, faces: Faces) -> list[NDArray[np.intp]]:
     A cavity lies wholly inside the rest. Its winding number there is negative: a body of no material, which a wire in
     it would not be seen in.
     """
-    parts = shells(faces, len(vertices))
+    import igl
+
     turned = []
-    for rows in parts:
+    for rows in shells(faces, len(vertices)):
         if volume(vertices, faces[rows]) >= 0.0:
             continue
-        rest = np.ones(len(faces), dtype=bool)
-        rest[rows] = False
-        samples = distinct(faces[rows])
+        rest = np.delete(faces, rows, axis=0)
+        samples = np.unique(faces[rows])
         samples = samples[:: max(1, len(samples) // _MOST_SAMPLES)]
-        outer = corners_of(vertices, faces[rest])
-        if not rest.any() or min(winding_number(outer, vertices[k]) for k in samples) < 0.9:
+        if not len(rest) or igl.winding_number(vertices, rest, vertices[samples]).min() < 0.9:
             turned.append(rows)
     return turned

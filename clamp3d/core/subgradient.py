@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import positive
 from clamp3d.core.distance import Feature, SignedDistance, as_pose, signed_distance, signed_distances
-from clamp3d.core.linear import norm
-from clamp3d.core.pose import Array, rotation
+from clamp3d.core.pose import Array, norm, rotation
 from clamp3d.core.primitives import AnyCylinder, SweptArc, check_shapes
 
 _TOLERANCE = 1e-7

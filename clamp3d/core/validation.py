@@ -30,14 +30,16 @@ _KINDS = {
 def checked(kind: type[T]) -> type[T]:
     """A dataclass with keywords alone that raises InputError with one line when it is made of wrong values."""
 
-    @functools.wraps(kind.__init__)
+    cls: typing.Any = kind
+
+    @functools.wraps(cls.__init__)
     def init(self: T, **values: typing.Any) -> None:
         plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in values.items()}
         converted = validate(kind, plain, kind.__name__)
-        for field in fields(kind):  # type: ignore[arg-type]
+        for field in fields(cls):
             object.__setattr__(self, field.name, getattr(converted, field.name))
 
-    kind.__init__ = init  # type: ignore[assignment, method-assign]
+    cls.__init__ = init
     return kind
 
 

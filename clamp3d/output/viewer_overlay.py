@@ -41,5 +41,5 @@ def overlay(clamp: Clamp, text: str) -> tuple[str, dict[str, list[trimesh.Trimes
         raise InputError(f"overlay {kind}: {unit} must be a number, got {size!r}") from None
     setting: dict[str, Any] = {"unit_angle": math.radians(value)} if kind == "wedges" else {"threshold": value}
     model: Any = contact_model(kind, parts(clamp), **setting)
-    made = {a: [shape.solid for shape in model.parts[a].shapes] for a, _ in groove_pairs(clamp)}
+    made = {a: [shape.solid for shape in model.polytopes(a).shapes] for a, _ in groove_pairs(clamp)}
     return title.format(value), {a: [trimesh.Trimesh(s.vertices, s.faces) for s in own] for a, own in made.items()}

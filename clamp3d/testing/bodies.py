@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.profile import Arc, Profile
@@ -49,7 +48,7 @@ def body(shape: AnyBody) -> Body:
         return Body(_solid(shape), shape.bounds)
     if isinstance(shape, MeshShape):
         V = shape.mesh.vertices
-        return Body(_mesh(V[shape.mesh.faces]), np.array([V.min(axis=0), V.max(axis=0)]))
+        return Body(_mesh(V, shape.mesh.faces), np.array([V.min(axis=0), V.max(axis=0)]))
     if isinstance(shape, Cylinder):
         r, half = shape.radius, 0.5 * shape.length
         corner = np.array([r, r, half])
@@ -58,11 +57,8 @@ def body(shape: AnyBody) -> Body:
         )
     if isinstance(shape, Capsule):
         r, half = shape.radius, 0.5 * shape.length
-        corner = np.array([r, r, half + r])
-        return Body(
-            lambda x: np.hypot(np.hypot(x[:, 0], x[:, 1]), np.maximum(np.abs(x[:, 2]) - half, 0.0)) - r,
-            np.array([-corner, corner]),
-        )
+        corner, axis = np.array([r, r, half + r]), np.array([0.0, 0.0, half])
+        return Body(lambda x: np.linalg.norm(x - np.clip(x, -axis, axis), axis=1) - r, np.array([-corner, corner]))
     if isinstance(shape, SweptArc):
         far = np.full(3, math.inf)
         return Body(_groove(shape), np.array([-far, far]))
@@ -88,35 +84,28 @@ def _prism(across: Array, along: Array) -> Array:
 def _outline(profile: Profile) -> Callable[[Array], Array]:
     """Signed distance of points (n, 2) from an outline, from the definition of its segments and arcs."""
 
-    arcs = [edge for edge in profile.edges if isinstance(edge, Arc)]
-    edges = [edge for edge in profile.edges if not isinstance(edge, Arc)] + arcs
-    k = len(edges) - len(arcs)
-    # All edges at once: columns (edges, 1) of their numbers against rows of points.
-    su, sv, eu, ev = (np.array([(*edge.start, *edge.end) for edge in edges]).T)[..., None]
-    lu, lv = eu - su, ev - sv
-    square = (lu * lu + lv * lv)[:k]
-    given = [(*arc.centre, arc.radius, 0.5 * (arc.start_angle + arc.end_angle), arc.sweep) for arc in arcs]
-    mu, mv, radius, middle, sweep = np.array(given).reshape(-1, 5).T[..., None]
-    sign, whole = np.sign(sweep), np.abs(sweep) >= 2.0 * math.pi - 1e-9
-    closed = np.concatenate([np.zeros((k, 1), bool), whole])
-
     def distance(x: Array) -> Array:
-        u, v = x.T
-        au, av, bu, bv = u - su, v - sv, u - eu, v - ev
-        turn = np.where(closed, 0.0, np.arctan2(au * bv - av * bu, au * bu + av * bv)).sum(axis=0) / (2.0 * math.pi)
-        least = np.full(len(x), np.inf)
-        if k:
-            s = np.clip((au[:k] * lu[:k] + av[:k] * lv[:k]) / square, 0.0, 1.0)
-            least = np.hypot(au[:k] - s * lu[:k], av[:k] - s * lv[:k]).min(axis=0)
-        if arcs:
-            rho, off = np.hypot(u - mu, v - mv), np.arctan2(v - mv, u - mu) - middle
-            on = np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi) <= 0.5 * np.abs(sweep)
-            ends = np.minimum(np.hypot(au[k:], av[k:]), np.hypot(bu[k:], bv[k:]))
-            least = np.minimum(least, np.where(on, np.abs(rho - radius), ends).min(axis=0))
-            # Between an arc and its chord the arc turns once more round the point than the chord does.
-            side = (lu[k:] * av[k:] - lv[k:] * au[k:]) * sign
-            turn += (sign * ((rho < radius) & ((side < 0.0) | whole))).sum(axis=0)
-        return np.asarray(np.where(np.round(turn) != 0, -least, least))
+        least, turn = np.full(len(x), math.inf), np.zeros(len(x))
+        for edge in profile.edges:
+            (au, av), (bu, bv), chord = (x - edge.start).T, (x - edge.end).T, np.subtract(edge.end, edge.start)
+            is_whole = isinstance(edge, Arc) and abs(edge.sweep) >= 2.0 * math.pi - 1e-9
+            if not is_whole:
+                turn += np.arctan2(au * bv - av * bu, au * bu + av * bv)
+            if isinstance(edge, Arc):
+                u, v = (x - edge.centre).T
+                off = np.arctan2(v, u) - 0.5 * (edge.start_angle + edge.end_angle)
+                is_beside = np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi) <= 0.5 * abs(edge.sweep)
+                rho, ends = np.hypot(u, v), np.minimum(np.hypot(au, av), np.hypot(bu, bv))
+                near = np.where(is_beside, np.abs(rho - edge.radius), ends)
+                # Between an arc and its chord the arc turns once more round the point than the chord does.
+                sign = math.copysign(1.0, edge.sweep)
+                is_between = is_whole | (sign * (chord[0] * av - chord[1] * au) < 0.0)
+                turn += 2.0 * math.pi * sign * ((rho < edge.radius) & is_between)
+            else:
+                s = np.clip((au * chord[0] + av * chord[1]) / (chord @ chord), 0.0, 1.0)
+                near = np.hypot(au - s * chord[0], av - s * chord[1])
+            least = np.minimum(least, near)
+        return np.where(np.abs(turn) > math.pi, -least, least)
 
     return distance
 
@@ -124,29 +113,18 @@ def _outline(profile: Profile) -> Callable[[Array], Array]:
 def _solid(solid: Solid) -> Field:
     """The bodies less the holes; those along a body's axis are cut out of its outline: that keeps distances exact."""
     holes = [(hole, _outline(hole.profile)) for hole in solid.holes]
-
-    def one(extrusion: Extrusion) -> Field:
-        outline, frame = _outline(extrusion.profile), extrusion.frame
-        middle, half = 0.5 * (extrusion.start + extrusion.end), 0.5 * (extrusion.end - extrusion.start)
-
-        def field(x: Array) -> Array:
-            local = x @ frame
-            across = outline(local[:, :2])
-            for hole, circle in holes:
-                if hole.axis == extrusion.axis:
-                    across = np.maximum(across, -circle(local[:, :2]))
-            return _prism(across, np.abs(local[:, 2] - middle) - half)
-
-        return field
-
-    fields = [one(extrusion) for extrusion in solid.bodies]
-    crossing = [(hole, f) for hole, f in holes if any(hole.axis != made.axis for made in solid.bodies)]
+    bodies = [(extrusion, _outline(extrusion.profile)) for extrusion in solid.bodies]
 
     def field(x: Array) -> Array:
-        found = np.min([f(x) for f in fields], axis=0)
-        for hole, circle in crossing:
-            found = np.maximum(found, -circle((x @ hole.frame)[:, :2]))
-        return np.asarray(found)
+        least = np.full(len(x), math.inf)
+        for extrusion, outline in bodies:
+            local = x @ extrusion.frame
+            along = np.maximum(extrusion.start - local[:, 2], local[:, 2] - extrusion.end)
+            own = [-circle(local[:, :2]) for hole, circle in holes if hole.axis == extrusion.axis]
+            value = _prism(np.max([outline(local[:, :2]), *own], axis=0), along)
+            crossing = [-circle((x @ hole.frame)[:, :2]) for hole, circle in holes if hole.axis != extrusion.axis]
+            least = np.minimum(least, np.max([value, *crossing], axis=0))
+        return least
 
     return field
 
@@ -165,24 +143,9 @@ def _groove(groove: SweptArc) -> Field:
     return field
 
 
-def _mesh(triangles: Array) -> Field:
-    """Distance from triangles (m, 3, 3), negative where they wind round the point (solid angles)."""
-    sides = np.roll(triangles, -1, axis=1) - triangles
-    normal = np.cross(sides[:, 0], sides[:, 1])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    walls = np.cross(normal[:, None], sides)
+def _mesh(vertices: Array, faces: NDArray[np.int64]) -> Field:
+    """Distance from the triangles, negative where they wind round the point."""
+    import igl
 
-    def some(x: Array) -> Array:
-        r = x[:, None, None] - triangles
-        s = np.clip((r * sides).sum(-1) / np.maximum((sides * sides).sum(-1), 1e-300), 0.0, 1.0)
-        edge = np.linalg.norm(r - s[..., None] * sides, axis=-1).min(axis=2)
-        height = np.abs(np.einsum("nmj,mj->nm", r[:, :, 0], normal))
-        least = np.where(((r * walls).sum(-1) >= 0.0).all(axis=2), height, edge).min(axis=1)
-        a, b, c = (-r[:, :, k] for k in range(3))
-        la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
-        below = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
-        turns = np.arctan2((a * np.cross(b, c)).sum(-1), below).sum(axis=1) / (2.0 * math.pi)
-        return np.asarray(np.where(turns > 0.5, -least, least))
-
-    step = max(1, 200_000 // len(triangles))
-    return lambda x: np.concatenate([some(x[k : k + step]) for k in range(0, len(x), step)] or [np.empty(0)])
+    kind = igl.SIGNED_DISTANCE_TYPE_WINDING_NUMBER
+    return lambda x: np.asarray(igl.signed_distance(x, vertices, faces, sign_type=kind)[0])

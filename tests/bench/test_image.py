@@ -81,23 +81,18 @@ def test_default_errors_are_those_of_the_published_values(shown: Picture) -> Non
 )
 def test_found_end_points_are_the_drawn_ones(scale: float, line: str, jumper: str) -> None:
     closed = assemble(load_clamp(line=line, jumper=jumper), Cas())
-    for seed in range(2):
-        drawn = picture(closed, scale, seed=seed)
-        error = find_end_points(drawn.image) - drawn.end_points
-        assert np.abs(error).max() < 0.15
-        assert error.std() < 2.0 * FITTING_ERROR
+    drawn = picture(closed, scale)
+    error = find_end_points(drawn.image) - drawn.end_points
+    assert np.abs(error).max() < 0.15
+    assert error.std() < 2.0 * FITTING_ERROR
 
 
 def test_study(run: Assembly) -> None:
     study = image_study(run, count=20_000, seed=7)
-    assert np.array_equal(study.trials, image_study(run, count=20_000, seed=7).trials)
-    assert study.trials.shape == (5,)
     assert study.trials == pytest.approx(study.exact + study.errors[:5])
     rms = np.sqrt(np.mean(study.errors**2))
     assert study.median_error == pytest.approx(0.6745 * rms, rel=0.03)  # normal errors
-    assert study.worst_error >= rms
-    assert abs(study.automatic.distance - run.distance) < 4.0 * study.automatic.uncertainty
-    assert study.automatic.uncertainty < 0.03
+    assert abs(study.automatic.distance - run.distance) < 4.0 * study.automatic.uncertainty < 0.12
 
 
 def test_snapping_finds_the_corner(shown: Picture) -> None:
@@ -125,37 +120,22 @@ def test_bad_values() -> None:
         find_end_points(np.full((50, 50, 3), 236, dtype=np.uint8))
 
 
-class TestCommand:
-    """``clamp3d measure-image`` on a photograph of the user's own."""
-
-    def photograph(self, shown: Picture, folder: Path) -> tuple[Path, list[str]]:
-        file = folder / "clamp.png"
-        Image.fromarray(shown.image).save(file)
-        left, right, below = ((f"{x:.3f},{y:.3f}") for x, y in shown.end_points)
-        return file, ["--points", f"{left} {below}", "--reference", f"{left} {right}", "--scale", "137"]
-
-    def test_measures(self, shown: Picture, tmp_path: Path) -> None:
-        file, options = self.photograph(shown, tmp_path)
-        out = tmp_path / "out.json"
-        result = CliRunner().invoke(command, [str(file), *options, "--json", str(out)])
-        assert result.exit_code == 0, result.output
-        assert "31.530 mm +- 1.597 mm" in result.stdout
-        data = json.loads(out.read_text())
-        assert data["distance"] == pytest.approx(shown.distance, abs=1e-3)
-        assert data["kind"] == "height"
-
-    def test_bad_input_is_one_line(self, shown: Picture, tmp_path: Path) -> None:
-        file, options = self.photograph(shown, tmp_path)
-        (tmp_path / "text.png").write_text("not a picture")
-        cases = [
-            ([str(tmp_path / "none.png"), *options], "No such file"),
-            ([str(tmp_path / "text.png"), *options], "not a picture"),
-            ([str(file), *options[:1], "1,2 3", *options[2:]], "--points must be two positions"),
-            ([str(file), *options[:1], "1,2 30,99999", *options[2:]], "must lie in the picture, which is 637 x 754 px"),
-        ]
-        for arguments, message in cases:
-            result = CliRunner().invoke(command, arguments)
-            assert result.exit_code != 0
-            said = result.output + str(result.exception)
-            assert message in said
-            assert "Traceback" not in result.output
+def test_the_command_measures_a_photograph(shown: Picture, tmp_path: Path) -> None:
+    file, out = tmp_path / "clamp.png", tmp_path / "out.json"
+    Image.fromarray(shown.image).save(file)
+    (tmp_path / "text.png").write_text("not a picture")
+    left, right, below = (f"{x:.3f},{y:.3f}" for x, y in shown.end_points)
+    options = ["--points", f"{left} {below}", "--reference", f"{left} {right}", "--scale", "137"]
+    result = CliRunner().invoke(command, [str(file), *options, "--json", str(out)])
+    assert result.exit_code == 0, result.output
+    assert "31.530 mm +- 1.597 mm" in result.stdout
+    assert json.loads(out.read_text())["distance"] == pytest.approx(shown.distance, abs=1e-3)
+    for arguments, message in (
+        ([str(tmp_path / "none.png"), *options], "No such file"),
+        ([str(tmp_path / "text.png"), *options], "not a picture"),
+        ([str(file), *options[:1], "1,2 3", *options[2:]], "--points must be two positions"),
+        ([str(file), *options[:1], "1,2 30,99999", *options[2:]], "must lie in the picture, which is 637 x 754 px"),
+    ):
+        result = CliRunner().invoke(command, arguments)
+        assert result.exit_code != 0
+        assert message in result.output + str(result.exception)

@@ -52,7 +52,7 @@ def with_corner(bits):
         ("a.stl", bytes(84), "no triangles"),
         ("a.stl", with_corner(0x7FC00000), "not finite"),
         ("a.stl", with_corner(0x7F800000), "not finite"),
-        ("a.stl", with_corner(0x7F7FFFFF), r"must be within 1e\+12 mm"),
+        ("a.stl", with_corner(0x7F7FFFFF), r"not within 1e\+12 mm"),
         ("a.stl", TEXT[: len(TEXT) // 2], "cut off"),
         ("a.stl", TEXT + TEXT[:80], "cut off"),
         ("a.stl", TEXT.replace(b"endsolid", b""), "cut off"),

@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError, run_child
+from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.errors import InputError, SolverError
 
 STAND_IN = """
@@ -24,11 +24,6 @@ def fail(kind):
 
 def pid():
     return os.getpid()
-
-def main(seconds):
-    import time
-    os.write(1, b"said\\n")
-    time.sleep(float(seconds))
 """
 FUNCTIONS = ("stand_in:echo", "stand_in:fail", "stand_in:pid", "os:abort", "os:_exit", "time:sleep", "numpy:ones")
 REFUSED = ("socket:create_connection", "os:system")
@@ -95,14 +90,6 @@ def test_modules_of_the_current_folder_are_not_imported(tmp_path, monkeypatch):
     with Worker("numpy:ones") as made:
         assert made.call("numpy:ones", 3, time_limit=60.0).tolist() == [1.0] * 3
     assert not (tmp_path / "executed").exists()
-
-
-def test_a_module_is_run_with_its_output_and_time(worker):
-    assert run_child("stand_in", "0", time_limit=60.0) == (0, ["said"])
-    assert run_child("stand_in", "600", time_limit=2.0) == (None, ["said"])
-    code, said = run_child("stand_in", "soon", time_limit=60.0)
-    assert code == 1
-    assert "ValueError: could not convert string to float: 'soon'" in said[-1]
 
 
 def test_it_ends_with_its_caller():

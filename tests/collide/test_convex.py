@@ -13,8 +13,7 @@ from scipy.spatial import ConvexHull
 from clamp3d.collide.convex import Rod, convex_distance
 from clamp3d.collide.convex_depth import convex_depth
 from clamp3d.collide.hull import Hull, hull
-from clamp3d.core.linear import to_target
-from clamp3d.core.pose import inverse, rotation, translation
+from clamp3d.core.pose import inverse, rotation, to_target, translation
 from clamp3d.testing import directions
 from tests.hulls import apart
 

@@ -15,8 +15,7 @@ from clamp3d.collide.mesh_distance import are_apart, surface_distance, within
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.overlap import common, deepest, thickness
 from clamp3d.collide.surface import Surface
-from clamp3d.core.linear import to_target
-from clamp3d.core.pose import inverse, rotation, translation
+from clamp3d.core.pose import inverse, rotation, to_target, translation
 from clamp3d.core.primitives import SweptArc
 from clamp3d.testing import assert_distance, body
 from tests.kinds import DRAWN, box_mesh, faceted_shape, poses

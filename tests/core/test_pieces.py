@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from clamp3d.core.distance import Feature, signed_distance
+from clamp3d.core.distance import signed_distance
 from clamp3d.core.pieces import groove_pieces
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Capsule, SweptArc
@@ -83,16 +83,6 @@ def test_each_piece_is_the_distance_from_its_own_surface():
                 expected = factor * (free if factor > 0.0 else deepest)[row]
                 assert found.distance[row] + 2.0 == pytest.approx(expected, abs=1e-4)
     assert inside > 100
-
-
-def test_thick_wire_rests_on_both_lips():
-    groove, wire = SweptArc(12.0, 1.0, 50.0), Capsule(14.0, 80.0)
-    s, h = 12.0 * math.sin(1.0), -12.0 * math.cos(1.0)
-    p = groove_pieces(groove, wire, translation(0.0, h + math.sqrt(14.0**2 - s * s), 0.0))
-    assert np.abs(p.distance[:3]).max() < 1e-14
-    assert [Feature(f) for f in p.feature[1:3]] == [Feature.LIP_M, Feature.LIP_N]
-    assert np.allclose(p.point_on_groove[1:3, :2], [[-s, h], [s, h]], atol=1e-14)
-    assert np.allclose(p.normal[1], [s / 14.0, math.sqrt(1 - (s / 14.0) ** 2), 0.0])
 
 
 def test_an_axis_that_ends_in_the_plane_of_an_end_face_is_outside():

@@ -8,7 +8,7 @@ import shapely
 from shapely import Polygon
 
 from clamp3d.core.meshing import _polygons
-from clamp3d.core.profile import Arc, Profile, Segment, chord_angle, chord_count, sagitta
+from clamp3d.core.profile import Arc, Profile, Segment, sagitta
 from clamp3d.errors import InputError
 
 
@@ -103,18 +103,6 @@ def test_what_is_left_of_a_thin_lune_is_polygons(side):
     assert area < profile.area if side == "inner" else area > profile.area
 
 
-def test_chords_are_as_few_as_their_width_allows():
-    rng = np.random.default_rng(2)
-    for _ in range(500):
-        radius, error, angle = *10.0 ** rng.uniform((0.0, -6.0), (3.0, 0.0)), rng.uniform(-6.28, 6.28)
-        widest = chord_angle(radius, error)
-        assert radius - radius * math.cos(0.5 * widest) == pytest.approx(error, abs=1e-12 * radius)
-        n = chord_count(angle, widest)
-        assert abs(angle) <= n * widest * (1.0 + 1e-8)
-        assert n == 1 or (n - 1) * widest <= abs(angle)
-    assert chord_angle(1.0, 5.0) == pytest.approx(2.0 * math.pi)
-
-
 def test_hexagons_and_rectangles_have_their_sides():
     hexagon = Profile.hexagon(30.0)
     corners = np.array([edge.start for edge in hexagon.edges])
@@ -135,49 +123,26 @@ def test_outlines_that_are_open_or_clockwise_are_refused():
 
 
 CROSSED = [
-    ([(0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 2.5)], "edges 0 and 2 cross at (1.11111, 1.11111) mm"),
-    ([(-3.0, -1.0), Arc((0.0, 0.0), 3.0, -1.5, 1.5), (-3.0, 1.0), (4.0, 0.5), (-4.0, 0.0)], "edges 1 and 3 cross at"),
-    ([(0.0, 0.0), (3.0, 0.0), (1.0, 1.0), (1.5, 2.0), (0.5, 2.0), (1.0, 1.0)], None),  # touches itself at a corner
-    ([(1.0, 1.0), (0.0, 3.0), (2.0, 3.0), (1.0, 1.0), (0.0, 0.0), (5.0, 0.0)], "turns"),  # crosses at a corner
+    ([(0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 2.5)], r"self-intersection\[1.1111"),
+    ([(-3.0, -1.0), Arc((0.0, 0.0), 3.0, -1.5, 1.5), (-3.0, 1.0), (4.0, 0.5), (-4.0, 0.0)], "self-intersection"),
+    ([(1.0, 1.0), (0.0, 3.0), (2.0, 3.0), (1.0, 1.0), (0.0, 0.0), (5.0, 0.0)], "self-intersection"),  # at a corner
+    (
+        [*[(0.0, 0.0), (2.0, 0.0), (0.0, 2.0)], *[(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)]],
+        "self-intersection",
+    ),  # twice round
 ]
 
 
 @pytest.mark.parametrize(("pieces", "words"), CROSSED)
 def test_an_outline_that_crosses_itself_is_refused(pieces, words):
-    if words is None:
-        assert Profile.of(*pieces).area > 0.0
-    else:
-        with pytest.raises(InputError, match="outline must not cross itself") as error:
-            Profile.of(*pieces)
-        assert words in str(error.value)
+    with pytest.raises(InputError, match=f"outline must not cross itself: .*{words}"):
+        Profile.of(*pieces)
 
 
-def test_random_outlines_are_refused_where_shapely_finds_them_crossed():
-    """Those that come nearer to themselves than their chords are off are not asked about."""
-    rng, told = np.random.default_rng(4), [0, 0]
-    for _ in range(300):
-        n = int(rng.integers(3, 7))
-        corners = rng.uniform(-5.0, 5.0, (n, 2)).tolist()
-        pieces = []
-        for p, q in zip(corners, [*corners[1:], corners[0]], strict=True):
-            bulge = float(rng.choice([0.0, 0.0, -0.3, 0.3, 1.0]))
-            pieces += [bulging(p, q, bulge)] if bulge else [tuple(p)]
-        edges = []
-        for i, piece in enumerate(pieces):
-            end = pieces[(i + 1) % n]
-            end = end.start if isinstance(end, Arc) else end
-            edges.append(piece if isinstance(piece, Arc) else Segment(piece, end))
-        chain = [x for e in edges for x in (e.chords(1e-5, e.start) if isinstance(e, Arc) else [e.start])]
-        simple, area = (
-            Polygon(chain).is_valid,
-            sum(p[0] * q[1] - p[1] * q[0] for p, q in zip(chain, chain[1:] + chain[:1], strict=True)),
-        )
-        if area < 1e-3:
-            continue
-        if simple:
-            Profile(tuple(edges))
-        else:
-            with pytest.raises(InputError, match="cross itself"):
-                Profile(tuple(edges))
-        told[simple] += 1
-    assert min(told) > 20
+def test_an_outline_may_touch_itself_and_run_along_itself():
+    corner = [(0.0, 0.0), (3.0, 0.0), (1.0, 1.0), (1.5, 2.0), (0.5, 2.0), (1.0, 1.0)]
+    assert Profile.of(*corner).area == 2.0
+    bridge = [(0.0, 4.0), (3.0, 4.0), (3.0, 6.0), (6.0, 6.0), (6.0, 3.0), (3.0, 3.0), (3.0, 4.0), (0.0, 4.0)]
+    assert Profile.of((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0), *bridge).area == 72.0
+    crescent = [Arc((0.0, 0.0), 5.0, 0.0, math.pi), Arc((-1.0, 0.0), 4.0, math.pi, 0.0), (4.0, 0.0)]
+    assert Profile.of(*crescent).area == pytest.approx(4.5 * math.pi)

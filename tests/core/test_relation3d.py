@@ -10,7 +10,6 @@ from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.core.relation3d import Relation3D, groove_relation
 from clamp3d.errors import InputError
-from tests.core.test_distance import scenes
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 S, H = 7.0 * math.sin(GROOVE.half_angle), -7.0 * math.cos(GROOVE.half_angle)
@@ -83,49 +82,29 @@ def test_uncertain_where_the_tolerance_is_below_the_error_bound():
             groove_relation(GROOVE, wire, T, tolerance=tolerance)
 
 
-@settings(max_examples=150, deadline=None)
-@given(scenes)
-def test_inside_means_a_common_point_with_the_hollow(scene):
-    groove, wire, T = scene
-    tolerance = 1e-9 * min(groove.radius, wire.radius)
-    relation = groove_relation(groove, wire, T, tolerance=tolerance).relation
-    if relation not in (Relation3D.INSIDE, Relation3D.OUTSIDE):
-        return
-    h, half = -groove.radius * math.cos(groove.half_angle), groove.length / 2
-    t = np.linspace(-0.5, 0.5, 2001) * wire.length
-    P = T[:3, 3] + t[:, None] * T[:3, 2]
-    gap = np.hypot(np.maximum(P[:, 1] - h, 0.0), np.maximum(np.abs(P[:, 2]) - half, 0.0)).min() - wire.radius
-    if gap < -1e-9:
-        assert relation is Relation3D.INSIDE
-    elif gap > wire.length / 4000 + 1e-9:
-        assert relation is Relation3D.OUTSIDE
-
-
-def test_a_flat_ended_cylinder_is_inside_if_it_reaches_the_block():
-    """By turns to the nearest point of the block and of the cylinder, which lead to where they are nearest."""
+@pytest.mark.parametrize("kind", [Cylinder, Capsule])
+def test_a_flat_ended_cylinder_is_inside_if_it_reaches_the_block(kind):
+    """By turns to the nearest point of the block and of the wire, which leads to where they are nearest."""
     rng = np.random.default_rng(4)
-    said = {Relation3D.INSIDE: 0, Relation3D.OUTSIDE: 0}
+    counts = {Relation3D.INSIDE: 0, Relation3D.OUTSIDE: 0}
     for _ in range(200):
-        wire, T = (
-            Cylinder(rng.uniform(0.5, 6.0), rng.uniform(0.5, 20.0)),
-            rotation(rng.normal(size=3), rng.uniform(0, 3)),
-        )
+        wire, T = kind(rng.uniform(0.5, 6.0), rng.uniform(0.5, 20.0)), rotation(rng.normal(size=3), rng.uniform(0, 3))
         T[:3, 3] = rng.uniform((-4.0, H - 2.0, -33.0), (4.0, H + 12.0, 33.0))
         relation = groove_relation(GROOVE, wire, T, tolerance=1e-9).relation
-        if relation not in said:
+        if relation not in counts:
             continue
-        p = T[:3, 3]
+        p, r, half = T[:3, 3], wire.radius, 0.5 * wire.length
         for _ in range(200):
             q = np.array([p[0], min(p[1], H), np.clip(p[2], -25.0, 25.0)])
             m = (q - T[:3, 3]) @ T[:3, :3]
-            m[:2] *= min(1.0, wire.radius / max(math.hypot(m[0], m[1]), 1e-300))
-            m[2] = np.clip(m[2], -0.5 * wire.length, 0.5 * wire.length)
-            p = T[:3, 3] + T[:3, :3] @ m
+            foot = np.array([0.0, 0.0, np.clip(m[2], -half, half)])
+            out = m - foot if kind is Capsule else m * (1.0, 1.0, 0.0)
+            p = T[:3, 3] + T[:3, :3] @ (foot + out * min(1.0, r / max(np.linalg.norm(out), 1e-300)))
         n, d = (p - q) * (0.0, 1.0, 1.0), T[:3, 2]  # the block has no end along x
         n /= max(np.linalg.norm(n), 1e-300)
-        near = n @ T[:3, 3] - 0.5 * wire.length * abs(n @ d) - wire.radius * np.linalg.norm(np.cross(n, d))
+        near = n @ T[:3, 3] - half * abs(n @ d) - r * (1.0 if kind is Capsule else np.linalg.norm(np.cross(n, d)))
         apart = near - n[1] * H - abs(n[2]) * 25.0  # how far the plane square to n keeps them apart
         if apart > 1e-9 or np.linalg.norm(p - q) < 1e-9:
-            said[relation] += 1
+            counts[relation] += 1
             assert relation is (Relation3D.OUTSIDE if apart > 1e-9 else Relation3D.INSIDE)
-    assert min(said.values()) > 20
+    assert min(counts.values()) > 20

@@ -1,19 +1,15 @@
-"""What one method is measured for: errors, wrong verdicts near contact, times, memory."""
+"""What one method is measured for: errors, wrong verdicts near contact, times."""
 
 from __future__ import annotations
 
-import os
-import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from clamp3d.bench.compare.methods import MANY, Method, Prepared, load, prepare
-from clamp3d.bench.compare.scene import BANDS, CLEAR, OVERLAP, Poses, coherent_poses, known_poses
+from clamp3d.bench.compare.scene import BANDS, CLEAR, OVERLAP, Poses, known_poses
 from clamp3d.core.pose import Array
 
 _PASSES = 3
@@ -21,7 +17,7 @@ _PASSES = 3
 _PART = 1e-3
 """Seconds of a stretch that is timed by itself: now and then one runs undisturbed also where a core is shared."""
 _BATCH = 0.05
-"""Seconds of a batch: long beside the start of threads."""
+"""Seconds of a batch."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,15 +33,12 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A method on the poses of `compare.scene`; errors in mm, times in CPU seconds of one core, memory in MB.
+    """A method on the poses of `compare.scene`; errors in mm, times in CPU seconds of one core.
 
     ``median_error`` and ``worst_error`` are of the distance of a wire that is clear, ``depth_error`` is the worst on
     overlaps up to 0.3 mm deep (None: no depth). ``load`` is the import of the libraries, ``setup`` what comes before
-    the first pose. ``one`` and ``many`` are CPU seconds per pose over as many clear poses as overlapping ones;
-    ``coherent`` is the same on a slow motion, where a solver may start from its last answer; ``threaded`` is by the
-    clock, on all cores (None: the method has no threads). Each is the least of repeated passes (`least`): what the
-    method takes where nothing else slows the machine. ``memory`` is what the
-    process grew by from set-up and queries, ``library_memory`` from the import (None where the system does not tell).
+    the first pose. ``one`` and ``many`` are seconds per pose over as many clear poses as overlapping ones, each the
+    least of repeated passes (`least`): what the method takes where nothing else slows the machine.
     """
 
     method: str
@@ -61,10 +54,6 @@ class Measured:
     setup: float
     one: float
     many: float
-    coherent: float
-    threaded: float | None
-    memory: float | None
-    library_memory: float | None
 
     @property
     def error(self) -> float:
@@ -81,34 +70,26 @@ def measure(
 ) -> Measured:
     """Measure one method in this process; ``budget`` is about how many seconds the timing of each kind may take."""
     poses = known_poses()
-    before = resident()
     start = time.process_time()
     load(method)
-    load_time, loaded = time.process_time() - start, resident()
+    load_time = time.process_time() - start
     start = time.process_time()
     ready = prepare(method)
     setup = time.process_time() - start + ready.elsewhere
     if ready.parallel_only:
         poses = poses.select(poses.parallel)
     values = np.array([ready.one(T) for T in poses.T])
-    grown = resident()  # before the batch, whose poses and answers are the caller's, and before the arc beside it
     clear, overlap = poses.group == CLEAR, poses.group == OVERLAP
     error = np.abs(poses.error(values))
     half = np.flatnonzero(overlap)
     half = np.concatenate([half, np.flatnonzero(clear)[: len(half)]])
     timed = np.ascontiguousarray(poses.T[half])
-
-    def pose_by_pose(poses: Array) -> float:
-        return least(lambda part: [ready.one(T) for T in part], poses, budget)
-
-    one, coherent = pose_by_pose(timed), pose_by_pose(coherent_poses(len(timed), straight=ready.parallel_only))
+    one = least(lambda part: [ready.one(T) for T in part], timed, budget)
     if not np.allclose(ready.many(timed), values[half], rtol=0.0, atol=1e-12 + 0.5 * error.max()):
         raise AssertionError(f"{method.label}: one and many differ")
-    times = max(1, min(MANY // len(timed), int(_BATCH / (_seconds(ready.many, timed, time.perf_counter) + 1e-9))))
+    times = max(1, min(MANY // len(timed), int(_BATCH / (_seconds(ready.many, timed) + 1e-9))))
     batch = np.tile(timed, (times, 1, 1))
     many = least(ready.many, batch, budget, whole=True)
-    run = ready.threaded
-    threaded = None if run is None else least(run, batch, budget, whole=True, clock=time.perf_counter)
     return Measured(
         method=method.family,
         setting=method.setting,
@@ -123,10 +104,6 @@ def measure(
         setup=setup,
         one=one,
         many=many,
-        coherent=coherent,
-        threaded=threaded,
-        memory=None if grown is None or loaded is None else max(0.0, grown - loaded),
-        library_memory=None if loaded is None or before is None else max(0.0, loaded - before),
     )
 
 
@@ -137,15 +114,8 @@ def verdicts(poses: Poses, values: Array, band: float) -> Band:
     return Band(band, int((~hit).sum()), int(hit.sum()), int((said & ~hit).sum()), int((hit & ~said).sum()))
 
 
-def least(
-    run: Callable[[Array], object],
-    poses: Array,
-    budget: float,
-    *,
-    whole: bool = False,
-    clock: Callable[[], float] = time.process_time,
-) -> float:
-    """Least time per pose by ``clock`` in which ``run`` answers ``poses`` (n, 4, 4).
+def least(run: Callable[[Array], object], poses: Array, budget: float, *, whole: bool = False) -> float:
+    """Least CPU time per pose in which ``run`` answers ``poses`` (n, 4, 4).
 
     They are gone through in parts of about a millisecond (``whole``: as they are), again and again for ``budget`` s;
     the least times of the parts are added up. Other work on the machine can only make a part slower, and Python more
@@ -154,27 +124,15 @@ def least(
     times: list[list[float]] = []
     parts = [poses]
     if not whole:
-        count = max(1, int(_PART / (_seconds(run, poses[:1], clock) + 1e-9)))
+        count = max(1, int(_PART / (_seconds(run, poses[:1]) + 1e-9)))
         parts = [poses[i : i + count] for i in range(0, len(poses), count)]
     end = time.perf_counter() + budget
     while len(times) < _PASSES or time.perf_counter() < end:
-        times.append([_seconds(run, part, clock) for part in parts])
+        times.append([_seconds(run, part) for part in parts])
     return float(np.min(times, axis=0).sum()) / len(poses)
 
 
-def _seconds(run: Callable[[Array], object], poses: Array, clock: Callable[[], float]) -> float:
-    start = clock()
+def _seconds(run: Callable[[Array], object], poses: Array) -> float:
+    start = time.process_time()
     run(poses)
-    return clock() - start
-
-
-def resident() -> float | None:
-    """Memory of this process in MB: resident now (Linux), its peak (macOS), None elsewhere."""
-    with suppress(OSError):
-        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
-    try:
-        import resource
-    except ImportError:
-        return None
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
+    return time.process_time() - start

@@ -45,25 +45,15 @@ class Method:
             return self.family
         return f"{self.family} {self.setting:g} {UNITS.get(self.family, 'deg')}".rstrip()
 
-    @property
-    def key(self) -> str:
-        """The method as one word, 'wedges:5'."""
-        return self.family if self.setting is None else f"{self.family}:{self.setting!r}"
-
-    @classmethod
-    def parse(cls, key: str) -> Method:
-        """The method of a `key`."""
-        family, _, setting = key.partition(":")
-        return cls(family, float(setting) if setting else None)
-
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
     """A method ready to measure poses of the wire in the groove's frame.
 
     ``one`` takes a pose (4, 4), ``many`` takes poses (n, 4, 4). ``pieces`` counts the convex pieces, triangles or
-    chords. ``threaded`` is ``many`` on all cores. ``depth``: a negative value measures the overlap.
+    chords. ``depth``: a negative value measures the overlap.
     ``elsewhere`` are seconds of the set-up that other processes took (CoACD, also when its answer was cached).
+    ``keep`` are objects of a library whose bindings hold bare pointers to them.
     """
 
     one: Callable[[Array], float]
@@ -72,7 +62,7 @@ class Prepared:
     depth: bool = True
     parallel_only: bool = False
     elsewhere: float = 0.0
-    threaded: Callable[[Array], Array] | None = None
+    keep: object = None
 
 
 UNITS = {"chords": "deg", "wedges": "deg", "hulls": "", "mesh": "mm"}
@@ -139,7 +129,6 @@ def _cas() -> Prepared:
         lambda T: signed_distance(GROOVE, WIRE, T).distance,
         lambda poses: signed_distances(GROOVE, WIRE, poses, workers=1),
         1,
-        threaded=lambda poses: signed_distances(GROOVE, WIRE, poses),
     )
 
 
@@ -167,13 +156,13 @@ def _piece_count(model: Any, groove: GroovePair) -> int:
     """Chords, wedges, hulls or triangles of the groove's part."""
     if model.name == "chords":
         return int(model.segments([groove]))
-    shapes = model.parts[groove.a].shapes
+    shapes = model.polytopes(groove.a).shapes
     return len(shapes[0].solid.faces) if model.name == "mesh" else len(shapes)
 
 
 def coacd_seconds(model: Any) -> float:
     """Seconds that CoACD took in processes of its own, also when its answer was cached."""
-    return sum(made.seconds for made in model.decompositions.values()) if model.name == "hulls" else 0.0
+    return sum(each.seconds for each in model.decompositions.values()) if model.name == "hulls" else 0.0
 
 
 ANGLES_DEG = (1.0, 5.0, 20.0)
@@ -196,11 +185,11 @@ class Series:
     angles: tuple[float | None, ...] = ANGLES_DEG
 
 
-def ready(one: Callable[[Array], float], pieces: int, *, depth: bool) -> Prepared:
+def ready(one: Callable[[Array], float], pieces: int, *, depth: bool, keep: object = None) -> Prepared:
     """A method that is asked pose by pose; asked once here, for what it makes when it is first used."""
 
     def many(poses: Array) -> Array:
         return np.array([one(T) for T in poses])
 
     many(np.eye(4)[None])
-    return Prepared(one, many, pieces, depth=depth)
+    return Prepared(one, many, pieces, depth=depth, keep=keep)

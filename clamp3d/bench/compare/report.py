@@ -8,35 +8,25 @@ from typing import Any
 from clamp3d.bench import published
 from clamp3d.bench.compare.assemblies import Assembled
 from clamp3d.bench.compare.measure import Measured
-from clamp3d.bench.compare.methods import Method
-from clamp3d.bench.compare.run import KNOWN, Comparison, NotMeasured, exact_distance
+from clamp3d.bench.compare.run import Comparison, NotMeasured, exact_distance
 from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
 
 
 def comparison_to_dict(comparison: Comparison) -> dict[str, Any]:
-    """Everything measured as JSON data: mm, seconds, MB; ``known`` are figures from elsewhere for the same groove."""
+    """Everything measured as JSON data: mm, seconds."""
     truth = exact_distance(comparison)
-
-    def contact(row: Measured | NotMeasured) -> dict[str, Any]:
-        known = KNOWN.get(Method(row.method, row.setting).key)
-        data = asdict(row)
-        if known is not None:
-            data["known"] = {"error": known[0], "pieces": known[1]}
-        return data
 
     def assembly(row: Assembled | NotMeasured) -> dict[str, Any]:
         data = asdict(row)
-        if isinstance(row, Assembled):
-            data |= {"error": row.distance - truth, "published": _published(row)}
-        return data
+        return data | ({"error": row.distance - truth} if isinstance(row, Assembled) else {})
 
     return {
         "machine": asdict(comparison.machine),
         "seconds": comparison.seconds,
-        "contact": [contact(row) for row in comparison.contact],
-        "peers": [contact(row) for row in comparison.peers],
-        "assembly": [assembly(row) for row in (*comparison.exact, *comparison.stepped)],
+        "contact": [asdict(row) for row in comparison.contact],
+        "peers": [asdict(row) for row in comparison.peers],
+        "assembly": [assembly(row) for row in comparison.assemblies],
         "image": asdict(comparison.image),
     }
 
@@ -52,45 +42,30 @@ def comparison_to_text(comparison: Comparison) -> str:
         contact=[_contact(row) for row in rows if isinstance(row, Measured)],
         missing_contact=[row for row in rows if isinstance(row, NotMeasured)],
         assembly=_assembly(comparison),
-        missing_assembly=[row for row in (*comparison.exact, comparison.image) if isinstance(row, NotMeasured)],
+        missing_assembly=[row for row in (*comparison.assemblies, comparison.image) if isinstance(row, NotMeasured)],
         published=published.IMAGE_DISTANCES,
         five=lambda values: ", ".join(f"{value:.3f}" for value in values),
     )
 
 
 def _contact(row: Measured) -> list[object]:
-    known = KNOWN.get(Method(row.method, row.setting).key)
     depth = "none" if row.depth_error is None else f"{row.depth_error:.2g}"
-    errors = [f"{row.median_error:.2g}", f"{row.worst_error:.2g}", depth, f"{known[0]:g}" if known else "-"]
     bands = [f"{b.false_hits}/{b.false_misses}" for b in row.bands]
-    threaded = "-" if row.threaded is None else f"{row.threaded * 1e6:.3g}"
-    times = [f"{t * 1e6:.3g}" for t in (row.one, row.coherent, row.many)]
-    times += [threaded, f"{row.setup:.2g}", f"{row.load:.2f}"]
-    both = (row.memory, row.library_memory)
-    return [row.label, row.pieces, *errors, *bands, *times, "-" if None in both else f"{sum(filter(None, both)):.0f}"]
+    times = [f"{row.one * 1e6:.3g}", f"{row.many * 1e6:.3g}", f"{row.setup:.2g}", f"{row.load:.2f}"]
+    return [row.label, row.pieces, f"{row.median_error:.2g}", f"{row.worst_error:.2g}", depth, *bands, *times]
 
 
 def _assembly(comparison: Comparison) -> list[list[object]]:
-    truth = exact_distance(comparison)
-    rows: list[list[object]] = []
-    for exact, stepped in zip(comparison.exact, comparison.stepped, strict=True):
-        if isinstance(exact, Assembled) and isinstance(stepped, Assembled):
-            theirs = _published(stepped)
-            by_gradients = [_signed(exact.distance - truth), f"{exact.seconds:.3f}", exact.contact_queries]
-            by_steps = [f"{theirs:.3f}" if theirs else "-", f"{stepped.seconds:.2f}", stepped.contact_queries]
-            rest = [f"{exact.setup:.2g}", "" if exact.status == "clamped" else exact.status]
-            lengths = f"{exact.distance:.4f}", f"{stepped.distance:.3f}"
-            rows.append([exact.label, lengths[0], *by_gradients, lengths[1], *by_steps, *rest])
-    return rows
-
-
-def _published(row: Assembled) -> float | None:
-    if row.method == "cas":
-        return published.CAS_DISTANCE
-    if row.method in ("chords", "wedges") and row.solver == "stepped":
-        return published.CHORD_DISTANCES.get(row.setting or 0.0)
-    return None
-
-
-def _signed(value: float) -> str:
-    return f"{value:+.2g}" if value else "0"
+    truth, rows = exact_distance(comparison), [row for row in comparison.assemblies if isinstance(row, Assembled)]
+    return [
+        [
+            row.label,
+            f"{row.distance:.4f}",
+            f"{row.distance - truth:+.2g}" if row.distance != truth else "0",
+            f"{row.seconds:.3f}",
+            row.contact_queries,
+            f"{row.setup:.2g}",
+            "" if row.status == "clamped" else row.status,
+        ]
+        for row in rows
+    ]

@@ -24,18 +24,6 @@ SLOW_SETUP = 3.0
 ASSEMBLY_LIMIT = 150.0
 """Seconds for one assembly; CoACD alone takes 60 of them on the reference clamp."""
 
-KNOWN: dict[str, tuple[float, int | None]] = {
-    **{
-        f"{family}:{angle}": (error, None)
-        for family in ("chords", "wedges")
-        for angle, error in ((1.0, 0.00046), (5.0, 0.0114), (10.0, 0.0457), (20.0, 0.182))
-    },
-    "hulls:0.05": (2.17, 2),
-    "hulls:0.02": (0.556, 4),
-    "hulls:0.01": (0.18, 79),
-}
-"""Known figures for this groove: error in mm, and for hulls their number."""
-
 ASSEMBLIES = (
     *(m for m in METHODS if m.family in ("cas", "chords", "wedges")),
     Method("hulls", CLAMP_THRESHOLD),
@@ -63,8 +51,7 @@ class Comparison:
     machine: Machine
     contact: tuple[Measured | NotMeasured, ...]
     peers: tuple[Measured | NotMeasured, ...]
-    exact: tuple[Assembled | NotMeasured, ...]
-    stepped: tuple[Assembled | NotMeasured, ...]
+    assemblies: tuple[Assembled | NotMeasured, ...]
     image: Imaged | NotMeasured
     seconds: float
 
@@ -99,7 +86,7 @@ def compare(
         try:
             if method.family in absent:
                 raise JobError(absent[method.family])
-            return run_job(kind, method.key, time_limit=limit)
+            return run_job(kind, method, time_limit=limit)
         except JobError as error:
             return NotMeasured(method.family, method.setting, method.label, str(error))
 
@@ -112,17 +99,15 @@ def compare(
                 rows.append(job(kind, method, CONTACT_LIMIT, f"{method.label} on known poses"))
             else:
                 done += 1
-    known = [quickest(rows) for rows in rounds]
-    both = [job("assembly", m, ASSEMBLY_LIMIT, f"assembly by {m.label}") for m in ASSEMBLIES]
-    pairs = [found if isinstance(found, tuple) else (found, found) for found in both]
+    rows_on_poses = [quickest(rows) for rows in rounds]
+    assemblies = tuple(job("assembly", m, ASSEMBLY_LIMIT, f"assembly by {m.label}") for m in ASSEMBLIES)
     image = job("image", Method("image"), ASSEMBLY_LIMIT, "measuring in a picture")
     progress(total, total, "done")
     return Comparison(
         machine((*LIBRARIES, *(PEER_LIBRARIES if peers else ()))),
-        tuple(known[: len(METHODS)]),
-        tuple(known[len(METHODS) :]),
-        tuple(exact for exact, _ in pairs),
-        tuple(stepped for _, stepped in pairs),
+        tuple(rows_on_poses[: len(METHODS)]),
+        tuple(rows_on_poses[len(METHODS) :]),
+        assemblies,
         image,
         time.monotonic() - start,
     )
@@ -134,14 +119,13 @@ def quickest(rows: Sequence[Measured | NotMeasured]) -> Measured | NotMeasured:
     if not isinstance(first, Measured):
         return first
     some = [row for row in rows if isinstance(row, Measured)]
-    told = {name: min(getattr(row, name) for row in some) for name in ("load", "setup", "one", "many", "coherent")}
-    threaded = [row.threaded for row in some if row.threaded is not None]
-    return replace(first, **told, threaded=min(threaded, default=None))
+    times = {name: min(getattr(row, name) for row in some) for name in ("load", "setup", "one", "many")}
+    return replace(first, **times)
 
 
-def exact_distance(found: Comparison) -> float:
+def exact_distance(comparison: Comparison) -> float:
     """The assembled clamp's splint distance in mm by the exact method. Raises Clamp3dError if that failed."""
-    for row in found.exact:
+    for row in comparison.assemblies:
         if isinstance(row, Assembled) and row.method == "cas":
             return row.distance
     raise Clamp3dError("the assembly by cas gave no distance to compare with")

@@ -133,19 +133,6 @@ def pose(origin: list[float], turn: list[float]) -> Array:
     return T
 
 
-def coherent_poses(count: int, *, straight: bool = False) -> Array:
-    """Poses (count, 4, 4) of a slow motion: the clear wire goes round in the groove, leans and turns.
-
-    ``straight`` keeps its axis parallel to the groove's.
-    """
-    made = []
-    for t in np.linspace(0.0, 2.0 * math.pi, count, endpoint=False).tolist():
-        lean = 0.0 if straight else 0.01
-        at = [0.9 * math.sin(t), -0.9 * abs(math.cos(t)), 2.0 * math.sin(2.0 * t)]
-        made.append(pose(at, [lean * math.sin(2.0 * t), lean * math.cos(3.0 * t), 0.1 * math.sin(t)]))
-    return np.array(made)
-
-
 def block() -> Solid:
     """The grooved block in its part frame."""
     return grooved_block(GROOVE, width=WIDTH, depth=DEPTH)
@@ -158,8 +145,8 @@ def pair() -> GroovePair:
 
 def in_part_frame(T: Array) -> Array:
     """Poses ``T_a_b`` of `pair` for poses (n, 4, 4) of the wire in the groove's frame; no rounding: quarter turns."""
-    made = pair()
-    return np.asarray(made.T_a_groove @ T @ inverse(made.T_b_cylinder))
+    groove_and_wire = pair()
+    return np.asarray(groove_and_wire.T_a_groove @ T @ inverse(groove_and_wire.T_b_cylinder))
 
 
 def chord_error(unit_angle: float) -> float:

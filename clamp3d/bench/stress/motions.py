@@ -109,7 +109,7 @@ def through(
     travel = np.asarray(travel, np.float64)
     travel = spread(travel, 3) if travel.ndim == 2 else spread(travel)[:, None] * axis
     instant, angle, point = spread(instant), spread(angle), spread(point, 3)
-    motions = Motions(cases.shapes, cases.shape, cases.T_world_wire, point, axis, angle, travel, instant, np.arange(n))
+    motions = Motions(cases.shapes, cases.shape, cases.T_groove_wire, point, axis, angle, travel, instant, np.arange(n))
     for i in range(n):
         motions.start[i] = motions.motion(i).at(-float(instant[i]), motions.start[i])
     return motions
@@ -153,7 +153,7 @@ def _screws(rng: np.random.Generator, n: int) -> Motions:
         rng.uniform(0.05, 0.95, n),
         travel=draw.powers(rng, n, -3, 0, 0.4) * radius * turns,
         angle=turns,
-        point=cases.T_world_wire[:, :3, 3] + radius[:, None] * normal,
+        point=cases.T_groove_wire[:, :3, 3] + radius[:, None] * normal,
         axis=_square_to(rng, normal),
     )
 
@@ -175,44 +175,6 @@ def _thin(rng: np.random.Generator, n: int) -> Motions:
     fast = R[cases.shape] * 10.0 ** rng.uniform(0.5, 2, n)
     way = np.where(crossing[:, None], along, _square_to(rng, normal))
     return through(cases, rng.uniform(0.05, 0.95, n), travel=way * fast[:, None])
-
-
-@MAKERS.family("level")
-def _level(rng: np.random.Generator, n: int) -> Motions:
-    """Clearance that does not change: slides along the groove, turns about its axis or the wire's own; rest."""
-    shapes, shape, feature = draw.setting(rng, n, draw.PARALLEL_FEATURES)
-    contact = draw.contact_on(rng, shapes, shape, feature)
-    contact.ends[:] = False
-    cases = draw.place(rng, shapes, shape, contact, shapes.r[shape] * draw.powers(rng, n, -9, -1), tilt=np.zeros(n))
-    length = shapes.R[shape] * 10.0 ** rng.uniform(-1, 1.5, n) * rng.choice([-1.0, 0.0, 1.0], n, p=[0.45, 0.1, 0.45])
-    own = (rng.random(n) < 0.2)[:, None]  # turns about its own axis: nothing moves
-    return through(
-        cases,
-        0.0,
-        travel=length,
-        angle=rng.choice([-1.0, 0.0, 1.0], n, p=[0.2, 0.6, 0.2]) * rng.uniform(0.01, 6.0, n),
-        point=np.where(own, cases.T_world_wire[:, :3, 3], 0.0),
-        axis=np.where(own, cases.T_world_wire[:, :3, 2], [0.0, 0.0, 1.0]),
-    )
-
-
-@MAKERS.family("start")
-def _start(rng: np.random.Generator, n: int) -> Motions:
-    """Starts in contact or by 1e-12 ... 1e-2 of the radius off it, and leaves, slides or comes back in full circles."""
-    gap = np.where(rng.random(n) < 0.2, -rng.uniform(0, 0.99, n), draw.powers(rng, n, -12, -2, 0.3))
-    cases, normal = _touching(rng, draw.shapes(rng, draw.count(n)), n, draw.FEATURES, gap)
-    turns = rng.random(n) < 0.25
-    away = np.where(rng.random(n) < 0.3, 0.0, rng.uniform(-0.2, 1.5, n))[:, None]
-    length = (cases.shapes.R[cases.shape] * 10.0 ** rng.uniform(-2, 1, n))[:, None]
-    straight = (np.cos(away) * _square_to(rng, normal) + np.sin(away) * normal) * length
-    return through(
-        cases,
-        0.0,
-        travel=np.where(turns[:, None], 0.0, straight),
-        angle=np.where(turns, 2.0 * np.pi * rng.integers(1, 4, n), 0.0),
-        point=cases.T_world_wire[:, :3, 3] + length * normal,
-        axis=_square_to(rng, normal),
-    )
 
 
 def least_distance(cases: Motions, i: int, end: float = 1.0, named: tuple[float, ...] = ()) -> tuple[float, float]:
@@ -260,8 +222,8 @@ class CasMethod:
             first = first_contact(groove, wire, motion, start)
             distance[i] = least.distance.value
             # In an overlap the answer bounds the depth of the whole way from one side only: the search's own error.
-            known = [d.uncertainty for d in (least.distance, first.distance) if np.isfinite(d.uncertainty)]
-            bound[i] = max(known, default=0.0) + max(least.resolution, first.resolution)
+            uncertainties = [d.uncertainty for d in (least.distance, first.distance) if np.isfinite(d.uncertainty)]
+            bound[i] = max(uncertainties, default=0.0) + max(least.resolution, first.resolution)
             self.lowest[int(cases.number[i])] = least.t
             self.first[int(cases.number[i])] = (first.touches, first.t, first.distance.value)
         return Measured(distance, bound)
@@ -367,4 +329,4 @@ def check_first_contacts(cases: Motions, truths: Truths) -> None:
             answers.note(f"first_contact: {flaw}, case {i}")
 
 
-MOTIONS = {name: MotionFamily(name, *made) for name, made in MAKERS.items()}
+MOTIONS = {name: MotionFamily(name, *maker) for name, maker in MAKERS.items()}

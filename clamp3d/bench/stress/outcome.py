@@ -42,8 +42,8 @@ def examples(what: str, rows: ArrayLike, truth: ArrayLike, answer: ArrayLike = n
     """The first few of ``rows``, with ``truth`` and ``answer`` of all cases, or one number for all."""
     rows = np.asarray(rows, np.intp)[:EXAMPLES]
     n = int(rows.max(initial=0)) + 1
-    told, said = (np.broadcast_to(x, n) if np.ndim(x) == 0 else np.asarray(x) for x in (truth, answer))
-    return [Example(int(i), what, float(told[i]), float(said[i])) for i in rows]
+    truths, answers = (np.broadcast_to(x, n) if np.ndim(x) == 0 else np.asarray(x) for x in (truth, answer))
+    return [Example(int(i), what, float(truths[i]), float(answers[i])) for i in rows]
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,13 +46,6 @@ def _errors(outcome: Outcome) -> str:
     return f"{_length(outcome.worst_error)} / {_length(outcome.median_error)}{ratio}"
 
 
-def _each(outcome: Outcome) -> str:
-    if not outcome.asked or not outcome.seconds:  # not asked, or it died each time
-        return ""
-    seconds = outcome.seconds / outcome.asked
-    return next(f"{seconds * k:.3g} {unit}" for k, unit in ((1e6, "us"), (1e3, "ms"), (1.0, "s")) if seconds * k < 1e3)
-
-
 _MATRICES = (
     (
         "Share of wrong verdicts (false hits, false misses, exceptions, crashes, no answer in time) among the "
@@ -60,7 +53,6 @@ _MATRICES = (
         _rate,
     ),
     ("Largest and median error in mm (largest in parts of the method's own bound):", _errors),
-    ("Time a case, set-up of the shapes included:", _each),
 )
 """Title and cell of the matrices of families and methods."""
 
@@ -144,8 +136,8 @@ def plot(run: StressRun, path: Path) -> None:
     axes.spines[:].set_visible(False)
     legend = (
         "Share that went wrong. 0: nothing. White: not for this method. Grey: every case refused in words, or no time\n"
-        f"left. †: the interpreter died. {run.n} cases a family (meshes a tenth, clamps a hundredth; others than cas\n"
-        f"as many as their time allows), seed {run.seed}."
+        f"left. †: the interpreter died. {run.n} cases a family, clamps a hundredth, methods other than cas as many\n"
+        f"as their time allows; seed {run.seed}."
     )
     figure.text(0.02, 0.7 / height, legend, fontsize=7.5, va="top")
     save_figure(figure, path)

@@ -12,12 +12,10 @@ from typing import Any
 from clamp3d.bench.machine import Machine, machine
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.family import Family
-from clamp3d.bench.stress.meshes import MESHES
 from clamp3d.bench.stress.motions import MOTIONS
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.poses.family import POSES
 from clamp3d.bench.stress.poses.flat import FLATS
-from clamp3d.bench.stress.poses.solids import SOLIDS
 from clamp3d.core.child import end_with_parent
 from clamp3d.errors import InputError, SolverError
 
@@ -26,9 +24,7 @@ LIBRARIES = ("numpy", "numba", "scipy", "python-fcl", "coacd", "mpmath")
 KINDS: dict[str, Mapping[str, Family]] = {
     "pose": POSES,
     "flat": FLATS,
-    "solid": SOLIDS,
     "motion": MOTIONS,
-    "mesh": MESHES,
     "assembly": ASSEMBLIES,
 }
 """Kind -> its families by name."""
@@ -40,10 +36,10 @@ METHODS: dict[str, str] = {name: about for f in FAMILIES.values() for name, (abo
 
 
 def expand(names: list[str]) -> list[str]:
-    """Families by name; ``pose``, ``flat``, ``solid``, ``motion``, ``mesh`` and ``assembly`` stand for their kind.
+    """Families by name; ``pose``, ``flat``, ``motion`` and ``assembly`` stand for their kind.
 
-    >>> expand(["ties", "mesh"])[:2]
-    ['ties', 'mesh: contact']
+    >>> expand(["ties", "motion"])[:2]
+    ['ties', 'motion: grazing']
     """
     return [family for name in names for family in KINDS.get(name, [name])]
 
@@ -75,8 +71,10 @@ def run_family(
     family: str, methods: Sequence[str], n: int, seed: int, time_limit: float, check: int
 ) -> tuple[list[Outcome], float]:
     """Those of ``methods`` that it can be put to on one family, and the worst difference of ``check`` truths."""
-    asked = FAMILIES[family]
-    return asked.run([m for m in methods if m in asked.methods], max(1, int(n * asked.part)), seed, time_limit, check)
+    chosen = FAMILIES[family]
+    return chosen.run(
+        [m for m in methods if m in chosen.methods], max(1, int(n * chosen.part)), seed, time_limit, check
+    )
 
 
 def run_stress(
@@ -99,19 +97,19 @@ def run_stress(
     """
     families = list(FAMILIES) if families is None else expand(list(families))
     methods = list(METHODS if methods is None else methods)
-    for given, known, what in ((families, {**KINDS, **FAMILIES}, "family"), (methods, METHODS, "method")):
-        for name in given:
-            if name not in known:
-                raise InputError(f"unknown {what} {name!r}; available: {', '.join(known)}")
+    for names, available, what in ((families, {**KINDS, **FAMILIES}, "family"), (methods, METHODS, "method")):
+        for name in names:
+            if name not in available:
+                raise InputError(f"unknown {what} {name!r}; available: {', '.join(available)}")
     for label, value, least in (("n", n, 1), ("seed", seed, 0), ("check", check, 0), ("workers", workers, 1)):
         if value < least:
             raise InputError(f"{label} must be at least {least}, got {value}")
-    found: dict[str, tuple[list[Outcome], float]] = {}
+    results: dict[str, tuple[list[Outcome], float]] = {}
 
     def done(family: str, result: tuple[list[Outcome], float]) -> None:
-        found[family] = result
+        results[family] = result
         if progress is not None:
-            progress(family, len(found), len(families))
+            progress(family, len(results), len(families))
 
     if workers == 1:
         for family in families:
@@ -125,10 +123,10 @@ def run_stress(
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise
-    outcomes = tuple(o for family in families for o in found[family][0])
-    for family, (_, off) in found.items():
+    outcomes = tuple(o for family in families for o in results[family][0])
+    for family, (_, off) in results.items():
         allowed = FAMILIES[family].truth_error
         if off > allowed:
             raise SolverError(f"{family}: the truth itself is off by {off:.3g} of the scene, must be <= {allowed:.3g}")
-    worst = max(difference for _, difference in found.values())
+    worst = max(difference for _, difference in results.values())
     return StressRun(seed, n, check, worst, machine(LIBRARIES), outcomes)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import importlib
 import pickle
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal, Protocol, Self
+from typing import Any, Literal, Protocol, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,9 +18,6 @@ from clamp3d.errors import Clamp3dError, without_numbers
 
 _MAX_DEATHS = 5
 _START_LIMIT = 120.0  # s
-_IMPORTED = ("scipy.optimize", "scipy.spatial", "trimesh", "fcl")
-"""Loaded in a child before the clock runs."""
-
 Measures = Literal["depth", "clearance", "verdict"]
 """What a method's answers are good for: signed distances, distances while apart, or their sign alone."""
 
@@ -40,13 +35,13 @@ class Rows:
         """The named cases."""
         i = np.asarray(rows, dtype=np.intp)
         taken: dict[str, Any] = {}
-        for f in fields(self):  # type: ignore[arg-type]
+        for f in fields(cast(Any, self)):
             column = getattr(self, f.name)
             if isinstance(column, Rows):
                 taken[f.name] = column.take(i)
             elif isinstance(column, np.ndarray):
                 taken[f.name] = column[i]
-        return replace(self, **taken)  # type: ignore[type-var]
+        return cast(Self, replace(cast(Any, self), **taken))
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,14 +98,8 @@ class Answers:
             self.notes.append(text)
 
 
-@dataclass(frozen=True, slots=True)
-class _Reply:
-    """What a method said to some rows: its answer, or why there is none."""
-
-    rows: NDArray[np.intp]
-    measured: Measured | None
-    why: str
-    seconds: float
+_Reply = tuple[NDArray[np.intp], Measured | None, str, float]
+"""Rows, what the method said to them, or why it said nothing, and the seconds that it took."""
 
 
 def _measure(method: Method, cases: Any, rows: NDArray[np.intp]) -> _Reply:
@@ -124,31 +113,30 @@ def _measure(method: Method, cases: Any, rows: NDArray[np.intp]) -> _Reply:
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         why = f"{type(error).__name__}: {error} ({place.name})"
-    return _Reply(rows, measured, why, time.perf_counter() - start)
+    return rows, measured, why, time.perf_counter() - start
 
 
 def _replies(method: Method, cases: Any, rows: NDArray[np.intp]) -> list[_Reply]:
     """Ask for all rows at once, and one by one if that gives no answer."""
     reply = _measure(method, cases, rows)
-    if reply.measured is not None or len(rows) == 1:
+    if reply[1] is not None or len(rows) == 1:
         return [reply]
     return [_measure(method, cases, rows[k : k + 1]) for k in range(len(rows))]
 
 
 def _record(answers: Answers, reply: _Reply) -> None:
-    rows, measured = reply.rows, reply.measured
+    rows, measured, why, seconds = reply
     answers.asked[rows] = True
-    answers.seconds += reply.seconds
-    if measured is not None:
-        answers.distance[rows] = np.where(measured.unfit, np.nan, measured.distance)
-        answers.bound[rows] = measured.bound
-        answers.refused[rows] = measured.unfit
-        if np.any(measured.unfit):
-            answers.note(f"refused: {measured.why}")
-    else:
-        refused = reply.why.startswith("refused: ")
-        (answers.refused if refused else answers.failed)[rows] = True
-        answers.note(without_numbers(reply.why))
+    answers.seconds += seconds
+    if measured is None:
+        (answers.refused if why.startswith("refused: ") else answers.failed)[rows] = True
+        answers.note(without_numbers(why))
+        return
+    answers.distance[rows] = np.where(measured.unfit, np.nan, measured.distance)
+    answers.bound[rows] = measured.bound
+    answers.refused[rows] = measured.unfit
+    if np.any(measured.unfit):
+        answers.note(f"refused: {measured.why}")
 
 
 def _groups(cases: Any) -> list[NDArray[np.intp]]:
@@ -179,12 +167,9 @@ _held: dict[str, tuple[Method, Any]] = {}
 
 
 def prepare(setup: bytes) -> None:
-    """Child: make the method, import what it may need, and keep the cases."""
+    """Child: make the method, let it import what it needs by a first question, and keep the cases."""
     make, cases = pickle.loads(setup)
     _held["here"] = make(), cases
-    for name in _IMPORTED:
-        with contextlib.suppress(ImportError):
-            importlib.import_module(name)
 
 
 def answer(rows: NDArray[np.intp]) -> bytes:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
 import mpmath
 import numpy as np
 
 from clamp3d.bench.compare.scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, known_poses
 from clamp3d.core.pose import check_pose
+from tests.core import oracle
 
 POSES = known_poses()
 
@@ -46,12 +44,6 @@ def test_parallel_distances_are_the_closed_form_at_50_digits() -> None:
 
 
 def test_tilted_distances_are_those_of_the_search() -> None:
-    path = Path(__file__).parents[2] / "core" / "data" / "make_oracle.py"
-    spec = importlib.util.spec_from_file_location("make_oracle", path)
-    assert spec is not None
-    assert spec.loader is not None
-    oracle = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(oracle)
     for i in np.flatnonzero(~POSES.parallel)[::52]:
         c, d = oracle.axis_of(POSES.T[i])
         value = oracle.exact_distance(GROOVE.radius, GROOVE.half_angle, GROOVE.length, WIRE.radius, WIRE.length, c, d)

@@ -1,22 +1,19 @@
 """Whole clamps: the truth against closed forms and brute force, and the exact solver without a fault on each family."""
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 from clamp3d.baselines.cas import Cas
-from clamp3d.bench.stress.assemblies.clamps import clamp_of, random_clamp, scaled
+from clamp3d.bench.stress.assemblies.clamps import clamp_of, random_clamp
 from clamp3d.bench.stress.assemblies.envelope import Envelope
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES, EXACT
 from clamp3d.bench.stress.assemblies.minima import minima
 from clamp3d.bench.stress.run import run_family
-from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import Section
 
-CLAMPS = 5
+CLAMPS = 3
 
 
 @pytest.mark.parametrize("family", ASSEMBLIES)
@@ -79,29 +76,7 @@ def test_envelopes_of_a_wire_against_the_distance_to_the_groove():
                 assert least == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("factor", [1e-3, 1e-2, 1e2])
-def test_sizes_scale_every_distance(factor):
-    clamp = random_clamp(np.random.default_rng(8))
-    other = scaled(clamp, factor)
-    for one, same in zip(minima(Envelope(clamp)), minima(Envelope(other)), strict=True):
-        assert same.d == pytest.approx(factor * one.d, abs=1e-9 * max(1.0, factor))
-    closed = [solve_final_state(Section(c, Cas())).q[4:] for c in (clamp, other)]
-    assert closed[1] == pytest.approx(factor * closed[0], abs=1e-8 * max(1.0, factor))
-
-
-def test_a_method_that_is_wrong_is_found_wrong():
-    """The paper's search stops a step short, chords stop early by their error: no place of rest, but within bounds."""
-    (stepped, chords), _ = run_family("assembly: random clamps", ["stepped", "chords 5 deg"], 300, 1, 60.0, 0)
-    assert stepped.asked == chords.asked == 3
+def test_the_papers_search_stops_a_step_short():
+    (stepped,), _ = run_family("assembly: random clamps", ["stepped"], 300, 1, 60.0, 0)
+    assert stepped.asked == 3
     assert 1e-4 < stepped.worst_error < 3.0
-    assert chords.worst_error > 1e-4
-    assert chords.worst_ratio < 1.0
-
-
-@pytest.mark.parametrize("family", ["assembly: poor starts", "assembly: sizes"])
-def test_a_case_runs_as_python_and_prints_its_truth(family):
-    text = ASSEMBLIES[family].case(4, 0, 3)
-    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
-    truths = [float(word.split()[0]) for word in text.splitlines()[-1].split("d = ")[1].split(",")]
-    reached = float(done.stdout.splitlines()[0].split()[-2])
-    assert min(abs(reached - truth) for truth in truths) < 1e-6

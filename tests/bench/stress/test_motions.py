@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import re
 
 import numpy as np
 import pytest
@@ -12,9 +11,9 @@ import clamp3d.collide.motions as collide_motions
 from clamp3d.bench.stress import motions
 from clamp3d.bench.stress.motions import MOTIONS, TRUTH_ERROR, least_distance, through
 from clamp3d.bench.stress.poses.cases import Cases, Shapes
-from clamp3d.bench.stress.run import FAMILIES, run_family
+from clamp3d.bench.stress.run import run_family
 
-CASES = 10  # the campaign of docs/methods.md has 100 000
+CASES = 5  # the campaign of docs/methods.md has 100 000
 
 
 @pytest.mark.parametrize("family", MOTIONS)
@@ -22,7 +21,7 @@ def test_cas_is_never_wrong_and_never_beyond_its_bound(family):
     (outcome,), difference = run_family(family, ["cas"], CASES, 20, 60.0, 1)
     assert difference < TRUTH_ERROR
     assert outcome.answered + outcome.refused == outcome.asked == CASES
-    assert outcome.refused <= 2, outcome.notes  # a clearance that stays within 1e-6 mm of contact
+    assert outcome.refused <= 1, outcome.notes  # a clearance that stays within 1e-6 mm of contact
     assert (outcome.false_hits, outcome.false_misses, outcome.exceptions) == (0, 0, 0), outcome.notes
     assert outcome.beyond_bound == 0, outcome.examples
     assert outcome.worst_error < 1e-6
@@ -67,47 +66,33 @@ def test_stepped_motion_misses_what_is_thin_and_cas_does_not():
     assert stepped.false_hits == 0
 
 
-class _Broken:
+def _broken(fault):
     """`min_clearance` and `first_contact` with one fault."""
 
-    def __init__(self, fault):
-        self.fault = fault
-
-    def min_clearance(self, groove, wire, motion, start):
+    def min_clearance(groove, wire, motion, start):
         right = collide_motions.min_clearance(groove, wire, motion, start)
-        if self.fault != "steps over thin parts":
+        if fault != "steps over thin parts":
             return right
         near = [clamp3d.kernel.signed_distance(groove, wire, motion.at(s, start)) for s in np.linspace(0.0, 1.0, 101)]
         i = int(np.argmin([one.distance for one in near]))
         return dataclasses.replace(right, t=i / 100, distance=clamp3d.Distance(near[i].distance, near[i].distance))
 
-    def first_contact(self, groove, wire, motion, start):
+    def first_contact(groove, wire, motion, start):
         right = collide_motions.first_contact(groove, wire, motion, start)
-        at = {"misses": 1.0, "late": min(1.0, right.t + 1e-4), "early": max(0.0, right.t - 1e-4)}
-        t = at.get(self.fault, right.t)
+        t = {"misses": 1.0, "late": min(1.0, right.t + 1e-4)}.get(fault, right.t)
         contact = clamp3d.kernel.signed_distance(groove, wire, motion.at(t, start)).distance
-        touches = right.touches and self.fault != "misses"
+        touches = right.touches and fault != "misses"
         return dataclasses.replace(right, touches=touches, t=t, distance=clamp3d.Distance(contact, contact))
+
+    return min_clearance, first_contact
 
 
 @pytest.mark.parametrize("fault", ["none", "steps over thin parts", "misses", "late"])
 def test_a_wrong_min_clearance_or_first_contact_is_found_out(fault, monkeypatch):
-    broken = _Broken(fault)
-    monkeypatch.setattr(motions, "min_clearance", broken.min_clearance)
-    monkeypatch.setattr(motions, "first_contact", broken.first_contact)
+    for name, function in zip(("min_clearance", "first_contact"), _broken(fault), strict=True):
+        monkeypatch.setattr(motions, name, function)
     (outcome,), _ = run_family("motion: thin and fast", ["cas"], 20, 3, 60.0, 0)
     assert (outcome.wrong > 2) == (fault != "none"), outcome.notes
     if fault == "steps over thin parts":
         assert outcome.false_misses > 2
         assert outcome.beyond_bound > 4
-
-
-def test_a_case_prints_as_lines_that_run(capsys):
-    for family in ("motion: screws", "motion: grazing"):
-        text = FAMILIES[family].case(30, 1, 7)
-        exec(text, {})
-        printed = capsys.readouterr().out
-        expected = float(text.split("# truth: least ")[1].split()[0])
-        assert float(re.findall(r"distance=Distance\((?:at most )?(\S+) mm", printed)[0]) == pytest.approx(
-            expected, abs=1e-6
-        )

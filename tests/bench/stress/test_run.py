@@ -1,6 +1,7 @@
 """The stress families: truths checked among themselves, and cas without a fault on all of them."""
 
 import json
+import re
 import time
 
 import numpy as np
@@ -11,7 +12,6 @@ from clamp3d.bench.stress.outcome import judge
 from clamp3d.bench.stress.poses.cases import Cases, Shapes
 from clamp3d.bench.stress.poses.family import POSES
 from clamp3d.bench.stress.poses.flat import FLATS
-from clamp3d.bench.stress.poses.solids import SOLIDS
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, EXTENDED_WORKS, point_sdf, truth, truth_50_digits
 from clamp3d.bench.stress.run import KINDS, run_family, run_stress
 from clamp3d.bench.stress.worker import Answers, Measured, run_isolated
@@ -38,13 +38,6 @@ def test_flat_ends_are_never_wrong_and_never_beyond_their_bound(family):
     assert (outcome.answered, outcome.wrong, outcome.beyond_bound) == (70, 0, 0), outcome.examples
 
 
-@pytest.mark.parametrize("family", SOLIDS)
-def test_finite_bodies_are_never_wrong_and_never_beyond_their_bound(family):
-    (outcome,), difference = run_family(family, ["cas"], int(max(300, 8 / SOLIDS[family].part)), 20, 60.0, 1)
-    assert difference <= SOLIDS[family].truth_error
-    assert (outcome.wrong, outcome.beyond_bound) == (0, 0), outcome.examples
-
-
 @pytest.mark.skipif(not EXTENDED_WORKS, reason="the quick truth needs 80-bit floats")
 @pytest.mark.parametrize("family", POSES)
 def test_no_point_of_the_axis_is_lower_than_the_truth(family):
@@ -52,10 +45,7 @@ def test_no_point_of_the_axis_is_lower_than_the_truth(family):
     cases = POSES[family].cases(60, 11)
     s, k = cases.shapes, cases.shape
     R, a, H, r, half = (np.asarray(v, np.longdouble)[k, None] for v in (s.R, s.half_angle, s.L / 2, s.r, s.length / 2))
-    T = np.asarray(cases.T_world_wire, np.longdouble)
-    if cases.T_world_groove is not None:
-        G = np.asarray(cases.T_world_groove, np.longdouble)
-        T = np.swapaxes(G, 1, 2) @ (T - G * [0, 0, 0, 1])
+    T = np.asarray(cases.T_groove_wire, np.longdouble)
     axis = T[:, :3, 2] / np.sqrt((T[:, :3, 2] ** 2).sum(1))[:, None]
     rng = np.random.default_rng(1)
     t = np.sort(np.concatenate([half * rng.uniform(-1, 1, (60, 1999)), -half, half], 1), axis=1)
@@ -103,7 +93,7 @@ def test_same_seed_same_cases_and_same_result_on_two_processes():
     ]
     assert drop(one) == drop(two)
     other = POSES["tangency"].cases(100, 6)
-    assert not np.array_equal(POSES["tangency"].cases(100, 5).T_world_wire, other.T_world_wire)
+    assert not np.array_equal(POSES["tangency"].cases(100, 5).T_groove_wire, other.T_groove_wire)
 
 
 def test_a_wrong_method_is_found_out():
@@ -146,7 +136,7 @@ _BAD = POSES["tangency"].cases(6, 0).gap[[2, 4]]
 
 def test_a_method_that_ends_the_interpreter_is_counted():
     cases = POSES["tangency"].cases(6, 0)
-    answers = run_isolated(_Fatal, cases, time_limit=60.0, case_limit=2.0)
+    answers = run_isolated(_Fatal, cases, time_limit=60.0, case_limit=1.0)
     assert answers.crashed == [2]
     assert answers.timeouts == [4]
     assert np.isfinite(answers.distance).sum() == 4
@@ -177,10 +167,14 @@ def test_command(tmp_path):
     assert files["a.png"].read_bytes()[:4] == b"\x89PNG"
 
 
-def test_command_prints_a_case_that_runs(capsys):
-    result = CliRunner().invoke(group, ["stress", "--family", "far from the origin", "--n", "40", "--case", "7"])
+@pytest.mark.parametrize("family", ["tangency", "flat ends: rims", "motion: screws", "assembly: poor starts"])
+def test_command_prints_a_case_that_runs(family, capsys):
+    result = CliRunner().invoke(group, ["stress", "--family", family, "--n", "300", "--case", "2"])
     assert result.exit_code == 0
-    exec(result.output, {})
-    printed = capsys.readouterr().out
-    expected = float(result.output.split("# truth: ")[1].split()[0])
-    assert float(printed.split("distance=")[1].split(",")[0]) == pytest.approx(expected, abs=1e-12)
+    code, _, truth = result.output.rpartition("# truth: ")
+    exec(code, {})
+    printed, truths = (
+        [float(word) for word in re.findall(r"-?\d+\.\d+(?:e[-+]\d+)?", text)]
+        for text in (capsys.readouterr().out, truth)
+    )
+    assert min(abs(one - other) for one in printed for other in truths) < 1e-6

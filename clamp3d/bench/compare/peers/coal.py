@@ -38,8 +38,7 @@ def _tree(unit_angle: float, shape: str) -> Prepared:
         manager.distance(wire, callback)
         return float(callback.data.result.min_distance)
 
-    one.keep = keep  # type: ignore[attr-defined]  # coal's bindings hold bare pointers
-    return ready(one, len(keep), depth=False)
+    return ready(one, len(keep), depth=False, keep=keep)
 
 
 def _mesh(coal: Any, V: Array, F: Array) -> Any:
@@ -48,11 +47,11 @@ def _mesh(coal: Any, V: Array, F: Array) -> Any:
         corners.append(corner)
     for a, b, c in F.tolist():
         triangles.append(coal.Triangle(a, b, c))
-    made = coal.BVHModelOBBRSS()
-    made.beginModel(len(F), len(V))
-    made.addSubModel(corners, triangles)
-    made.endModel()
-    return made
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(F), len(V))
+    model.addSubModel(corners, triangles)
+    model.endModel()
+    return model
 
 
 def _axis(unit_angle: float) -> Prepared:
@@ -68,8 +67,7 @@ def _axis(unit_angle: float) -> Prepared:
         result.clear()
         return float(ask(here, place, request, result)) - WIRE.radius
 
-    one.keep = part, axis  # type: ignore[attr-defined]
-    return ready(one, len(F), depth=True)
+    return ready(one, len(F), depth=True, keep=(part, axis))
 
 
 def _sector(unit_angle: float) -> Prepared:
@@ -92,8 +90,7 @@ def _sector(unit_angle: float) -> Prepared:
             d = min(d, functors[j](places[j], place, request, result))
         return float(d)
 
-    one.keep = shapes, wire  # type: ignore[attr-defined]
-    return ready(one, len(shapes), depth=True)
+    return ready(one, len(shapes), depth=True, keep=(shapes, wire))
 
 
 SERIES = {

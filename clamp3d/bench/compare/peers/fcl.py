@@ -26,22 +26,21 @@ def _tree(unit_angle: float) -> Prepared:
 
     def one(T: Array) -> float:
         wire.setTransform(fcl.Transform(T[:3, :3], T[:3, 3]))
-        told = fcl.DistanceData()
-        manager.distance(wire, told, fcl.defaultDistanceCallback)
-        return float(told.result.min_distance)
+        data = fcl.DistanceData()
+        manager.distance(wire, data, fcl.defaultDistanceCallback)
+        return float(data.result.min_distance)
 
-    one.keep = keep  # type: ignore[attr-defined]
-    return ready(one, len(keep), depth=False)
+    return ready(one, len(keep), depth=False, keep=keep)
 
 
 def _mesh(V: Array, F: Array) -> Any:
     import fcl
 
-    made = fcl.BVHModel()
-    made.beginModel(len(V), len(F))
-    made.addSubModel(V, F)
-    made.endModel()
-    return fcl.CollisionObject(made, fcl.Transform())
+    model = fcl.BVHModel()
+    model.beginModel(len(V), len(F))
+    model.addSubModel(V, F)
+    model.endModel()
+    return fcl.CollisionObject(model, fcl.Transform())
 
 
 def _axis(unit_angle: float) -> Prepared:

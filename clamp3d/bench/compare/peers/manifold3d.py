@@ -31,8 +31,8 @@ def _make(unit_angle: float) -> Prepared:
         V, F = np.ascontiguousarray(V, float), np.ascontiguousarray(F, np.uint64)
         return manifold3d.Manifold(manifold3d.Mesh64(vert_properties=V, tri_verts=F))
 
-    made, half = mesh(block(), chord_error(unit_angle) * (1.0 + 1e-9)), 0.5 * WIRE.length
-    part = manifold(made.vertices @ pair().T_a_groove[:3, :3], made.faces)
+    block_mesh, half = mesh(block(), chord_error(unit_angle) * (1.0 + 1e-9)), 0.5 * WIRE.length
+    part = manifold(block_mesh.vertices @ pair().T_a_groove[:3, :3], block_mesh.faces)
     wire = manifold(
         np.array([(0.0, 0.0, -half), (_THIN, 0.0, -half), (0.0, _THIN, -half), (0.0, 0.0, half)]),
         [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)],
@@ -41,7 +41,7 @@ def _make(unit_angle: float) -> Prepared:
     def one(T: Array) -> float:
         return float(part.min_gap(wire.transform(T[:3]), _FARTHEST)) - WIRE.radius
 
-    return ready(one, len(made.faces), depth=True)
+    return ready(one, len(block_mesh.faces), depth=True)
 
 
 _NEEDS = ("manifold3d", "trimesh", "scipy.spatial")  # what makes the mesh, too

@@ -1,14 +1,13 @@
 """MuJoCo 4: box geoms of one body, convex as it advises for other shapes; in metres, no farther than 2 mm asked.
 
 Whole part: a distance sensor between two bodies (native convex collision), its wire placed where kinematics would put
-it; many poses at once by `mujoco.rollout`, which runs in C++ with a thread for each `MjData`. A sector:
+it; many poses at once by `mujoco.rollout`, which runs in C++. A sector:
 `mj_geomDistance` of two geoms. Contacts with a margin (`mj_collision`) take longer, and miss hits of a cylinder.
 """
 
 from __future__ import annotations
 
 import importlib
-import os
 from typing import Any
 
 import numpy as np
@@ -52,31 +51,25 @@ def _whole(unit_angle: float, shape: str) -> Prepared:
     model, wire = _model(unit_angle, shape)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    at, turn, told = data.geom_xpos[wire], data.geom_xmat[wire], data.sensordata
+    position, turn, reading = data.geom_xpos[wire], data.geom_xmat[wire], data.sensordata
     spec = int(mujoco.mjtState.mjSTATE_MOCAP_POS) | int(mujoco.mjtState.mjSTATE_MOCAP_QUAT)
     size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)
 
     def one(T: Array) -> float:
-        at[:] = T[:3, 3] * _MM
+        position[:] = T[:3, 3] * _MM
         turn[:] = T[:3, :3].ravel()
         mujoco.mj_sensorPos(model, data)
-        return float(told[0]) / _MM
+        return float(reading[0]) / _MM
 
-    def batch(poses: Array, threads: int) -> Array:
+    def many(poses: Array) -> Array:
         turn = Rotation.from_matrix(poses[:, :3, :3]).as_quat()[:, [3, 0, 1, 2]]
         control = np.hstack([poses[:, :3, 3] * _MM, turn])[:, None]
-        with rollout.Rollout(nthread=threads if threads > 1 else 0) as pool:
-            states = [mujoco.MjData(model) for _ in range(threads)]
-            _, seen = pool.rollout(model, states, np.zeros((len(poses), size)), control, control_spec=spec)
+        with rollout.Rollout(nthread=0) as pool:
+            _, seen = pool.rollout(model, [data], np.zeros((len(poses), size)), control, control_spec=spec)
         return np.asarray(seen[:, 0, 0]) / _MM
 
     one(np.eye(4))
-    return Prepared(
-        one,
-        lambda poses: batch(poses, 1),
-        wire,
-        threaded=lambda poses: batch(poses, os.cpu_count() or 1),
-    )
+    return Prepared(one, many, wire)
 
 
 def _sector(unit_angle: float) -> Prepared:
@@ -84,10 +77,10 @@ def _sector(unit_angle: float) -> Prepared:
     model, wire = _model(unit_angle, "capsule")
     data, find = mujoco.MjData(model), sectors(wire - 2)
     mujoco.mj_kinematics(model, data)
-    at, turn = data.geom_xpos[wire], data.geom_xmat[wire]
+    position, turn = data.geom_xpos[wire], data.geom_xmat[wire]
 
     def one(T: Array) -> float:
-        at[:] = T[:3, 3] * _MM
+        position[:] = T[:3, 3] * _MM
         turn[:] = T[:3, :3].ravel()
         i, j = find(T)
         d = mujoco.mj_geomDistance(model, data, i, wire, _FARTHEST * _MM, None)

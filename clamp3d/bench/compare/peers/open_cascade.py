@@ -98,11 +98,11 @@ def together(shapes: Iterable[Any]) -> Any:
     from OCP.BRep import BRep_Builder
     from OCP.TopoDS import TopoDS_Compound
 
-    builder, made = BRep_Builder(), TopoDS_Compound()
-    builder.MakeCompound(made)
+    builder, compound = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(compound)
     for shape in shapes:
-        builder.Add(made, shape)
-    return made
+        builder.Add(compound, shape)
+    return compound
 
 
 def _series(make: Callable[[float], Prepared]) -> Series:

@@ -37,20 +37,20 @@ def _rim(unit_angle: float) -> Array:
 
 def boxes(unit_angle: float) -> list[tuple[Array, Array]]:
     """Size (3,) and pose (4, 4) in the groove's frame: the box behind each chord, then the two beside the mouth."""
-    rim, made = _rim(unit_angle), []
+    rim, placed = _rim(unit_angle), []
     for a, b in pairwise(rim):
         middle, width = 0.5 * (a + b), math.dist(a, b)
         along, out = (b - a) / width, middle / math.hypot(*middle)
         T = np.eye(4)
         T[:2, 0], T[:2, 1], T[:2, 3] = along, out, middle + 0.5 * THICKNESS * out
         T[2, 2] = along[0] * out[1] - along[1] * out[0]
-        made.append((np.array([width, THICKNESS, GROOVE.length]), T))
+        placed.append((np.array([width, THICKNESS, GROOVE.length]), T))
     side, face = _MOUTH
     for s in (-1.0, 1.0):
         T = np.eye(4)
         T[:2, 3] = s * 0.5 * (side + 0.5 * WIDTH), face - 0.5 * DEPTH
-        made.append((np.array([0.5 * WIDTH - side, DEPTH, GROOVE.length]), T))
-    return made
+        placed.append((np.array([0.5 * WIDTH - side, DEPTH, GROOVE.length]), T))
+    return placed
 
 
 def surface(unit_angle: float) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any
 
@@ -41,10 +41,10 @@ def _fitting(make: Callable[[np.random.Generator], Clamp | Case | None]) -> Call
     """The generator, asked again where it gives None: grooves that do not fit into the splints."""
 
     def case(rng: np.random.Generator) -> Case:
-        found = None
-        while found is None:
-            found = make(rng)
-        return found if isinstance(found, Case) else Case(found)
+        drawn = None
+        while drawn is None:
+            drawn = make(rng)
+        return drawn if isinstance(drawn, Case) else Case(drawn)
 
     return case
 
@@ -186,40 +186,6 @@ def _tilted(rng: np.random.Generator) -> Clamp | None:
     R, half, offset = _grooves(rng)
     wires = np.array([rng.uniform(20.0, 60.0), rng.uniform(2.0, 20.0)])[:: int(rng.choice([-1, 1]))]
     return clamp_of(R, half, offset, wires, max_tilt_deg=float(rng.choice([1e-6, 1e-3, rng.uniform(0.1, 12.8)])))
-
-
-@MAKERS.family("sizes", _fitting)
-def _sizes(rng: np.random.Generator) -> Clamp:
-    """The whole clamp 1e-3 to 1e2 times its size: metres in place of millimetres, or a clamp of metres."""
-    return scaled(random_clamp(rng), float(10.0 ** rng.uniform(-3.0, 2.0)))
-
-
-_NO_LENGTHS = {
-    "back_half_angle_deg",
-    "max_tilt_deg",
-    "joints",
-    "connections",
-    "name",
-    "description",
-    "unit",
-    "sequence",
-    "limits",
-}
-
-
-def scaled(clamp: Clamp, factor: float) -> Clamp:
-    """The clamp with every length times ``factor``."""
-
-    def of(value: Any, name: str) -> Any:
-        if name in _NO_LENGTHS:
-            return value
-        if isinstance(value, Wire):
-            return Wire(diameter=2.0 * value.radius * factor)
-        if is_dataclass(value):
-            return replace(value, **{f.name: of(getattr(value, f.name), f.name) for f in fields(value)})  # type: ignore[type-var]
-        return value * factor
-
-    return replace(clamp, **{f.name: of(getattr(clamp, f.name), f.name) for f in fields(clamp)})
 
 
 def snippet(case: Case) -> str:

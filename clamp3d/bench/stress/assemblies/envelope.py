@@ -41,7 +41,7 @@ class _Groove:
 def _grooves(clamp: Clamp, wire: PartName) -> tuple[_Groove, _Groove, float]:
     """Up groove in P1's coordinates, down groove in P2's, and the wire's radius."""
     side, key = (-1.0, "line_groove") if wire == "P6" else (1.0, "jumper_groove")
-    found = []
+    grooves = []
     for part, middle, face in (
         (clamp.up_splint, clamp.up_splint.width / 2, clamp.up_splint.thickness),
         (clamp.down_splint, 0.0, clamp.down_splint.face_depth),
@@ -49,8 +49,8 @@ def _grooves(clamp: Clamp, wire: PartName) -> tuple[_Groove, _Groove, float]:
         g = getattr(part, key)
         to_face = abs(g.centre_depth - face)
         half_mouth = math.sqrt((g.radius - to_face) * (g.radius + to_face))
-        found.append(_Groove(middle + side * g.offset, g.centre_depth, g.radius, half_mouth, face))
-    return found[0], found[1], (clamp.line if wire == "P6" else clamp.jumper).radius
+        grooves.append(_Groove(middle + side * g.offset, g.centre_depth, g.radius, half_mouth, face))
+    return grooves[0], grooves[1], (clamp.line if wire == "P6" else clamp.jumper).radius
 
 
 def _root(a: Array, b: Array | float) -> Array:
@@ -250,8 +250,8 @@ def _slide(wire: Wire, tilts: Array, x: float, level: Array, reach: float) -> Ar
     values = wire.least(places, tilts)
     # Of each row the unblocked stretch around x, which the walls of the window end.
     column = np.arange(places.shape[1])
-    at = (places < here[0, 0]).sum(1)[:, None]
+    start = (places < here[0, 0]).sum(1)[:, None]
     blocked = ~(values <= level[:, None]) | (places < here[0, 1]) | (places > here[0, 2])
-    first = np.where(blocked & (column < at), column, -1).max(1)[:, None]
-    last = np.where(blocked & (column > at), column, len(column)).min(1)[:, None]
+    first = np.where(blocked & (column < start), column, -1).max(1)[:, None]
+    last = np.where(blocked & (column > start), column, len(column)).min(1)[:, None]
     return np.asarray(np.fmin.reduce(np.where((column > first) & (column < last), values, np.nan), axis=1))

@@ -8,14 +8,13 @@ a clamp of which the exact solver did not name every firm equilibrium (`Minimum`
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.baselines import Cas, Chords
+from clamp3d.baselines import Cas
 from clamp3d.bench.stress.assemblies.clamps import MAKERS, Case, snippet
 from clamp3d.bench.stress.assemblies.envelope import Envelope
 from clamp3d.bench.stress.assemblies.minima import Minimum, minima
@@ -29,12 +28,9 @@ from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.stepped import solve_stepped
 from clamp3d.core.pose import Array
-from clamp3d.core.profile import chord_count, sagitta
 
 EXACT = 1e-8
 """Bound in mm of the exact solver's answers: ten times the residuals that it proves, and of a clamp of usual size."""
-
-_UNIT = math.radians(5.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,37 +75,14 @@ def _exact(case: Case) -> Rest:
     return Rest(state.q, tuple(other.q for other in equilibria(section)))
 
 
-def _chords(case: Case) -> Rest:
-    return Rest(solve_final_state(Section(case.clamp, Chords(_UNIT)), case.start).q, None)
-
-
 def _stepped(case: Case) -> Rest:
     return Rest(solve_stepped(Section(case.clamp, Cas()), step=STEP, tilt_step=TILT_STEP).q, None)
-
-
-def _chord_bound(clamp: Clamp) -> float:
-    """Sagittas of the two grooves of a wire over the cosine of the steepest contact: forces add up to the bolt's."""
-    up, down = clamp.up_splint, clamp.down_splint
-    worst = 0.0
-    for key in ("line_groove", "jumper_groove"):
-        error, steepest = 0.0, 0.0
-        for part, face, tilt in ((up, up.thickness, 0.0), (down, down.face_depth, clamp.tilt_stop)):
-            groove = getattr(part, key)
-            half = math.acos(min(1.0, abs(groove.centre_depth - face) / groove.radius))
-            error += sagitta(groove.radius, 2.0 * half / chord_count(2.0 * half, _UNIT))
-            steepest = max(steepest, half + tilt)
-        worst = max(worst, error / math.cos(steepest) if steepest < 0.5 * math.pi else math.inf)
-    return worst
 
 
 METHODS: dict[str, tuple[str, Callable[[], Solver]]] = {
     "cas": (
         "closed forms of the arc groove; its bound is that of rounding; of a clamp the exact solver, 1e-8 mm",
         lambda: Solver(_exact, lambda clamp: EXACT),
-    ),
-    "chords 5 deg": (
-        "convex partitioning in the section, chords of 5 degrees; its bound is the chord error",
-        lambda: Solver(_chords, _chord_bound),
     ),
     "stepped": (
         "of a clamp the paper's search: the down splint moves by 1/3 mm and 1 degree; its bound is the step",
@@ -121,7 +94,7 @@ METHODS: dict[str, tuple[str, Callable[[], Solver]]] = {
 COUNTS = (
     "one clamp for 100 cases; a false hit is an answer that is not an equilibrium within the method's bound, a false "
     "miss a clamp of which the exact solver did not name every firm equilibrium, the error how far in mm an answer "
-    "overlaps or can fall (of chords and steps: is from the nearest equilibrium)"
+    "overlaps or can fall (of steps: is from the nearest equilibrium)"
 )
 """What the counts mean for these families."""
 
@@ -203,7 +176,7 @@ class Truths(dict[int, tuple[Envelope, list[Minimum]]]):
 
     def nearest(self, i: int, d: float) -> float:
         """The distance of the equilibrium that is nearest to ``d``; NaN if there is none."""
-        return min((found.d for found in self[i][1]), key=lambda found: abs(found - d), default=float("nan"))
+        return min((rest.d for rest in self[i][1]), key=lambda other: abs(other - d), default=float("nan"))
 
     def error(self, i: int, rest: Rest) -> float:
         """How far an answer is from rest, mm."""
@@ -215,9 +188,9 @@ class Truths(dict[int, tuple[Envelope, list[Minimum]]]):
         """The lowest equilibrium that a solver that is to name all did not; NaN if there is none."""
         if rest.others is None:
             return float("nan")
-        (envelope, found), named = self[i], np.array([q[4] for q in rest.others])
-        far = (m.d for m in found if m.firm and not m.slipped and np.abs(named - m.d).min() > SAME * envelope.lever)
+        (envelope, rests), named = self[i], np.array([q[4] for q in rest.others])
+        far = (m.d for m in rests if m.firm and not m.slipped and np.abs(named - m.d).min() > SAME * envelope.lever)
         return next(far, float("nan"))
 
 
-ASSEMBLIES = {name: AssemblyFamily(name, *made) for name, made in MAKERS.items()}
+ASSEMBLIES = {name: AssemblyFamily(name, *maker) for name, maker in MAKERS.items()}

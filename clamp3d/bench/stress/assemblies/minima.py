@@ -94,24 +94,24 @@ def minima(envelope: Envelope, count: int = 301) -> list[Minimum]:
         sides = [np.clip(rows + side, 0, count - 1) for side in (-1, 1)]
         beside = [valleys.d[side, valleys.settle(side, x)] for side in sides]
         tables.append((x, valleys.d[rows, columns], *beside, np.searchsorted(rows, np.arange(count + 1))))
-    found: list[Minimum] = []
+    rests: list[Minimum] = []
     for k in range(count):
         own = [range(table[4][k], table[4][k + 1]) for table in tables]
         for a, b in itertools.product(*own):
             here, left, right = (
-                max(tables[0][c][a], tables[1][c][b], faces[at]) + lifted[at]
-                for c, at in ((1, k), (2, max(k - 1, 0)), (3, min(k + 1, count - 1)))
+                max(tables[0][c][a], tables[1][c][b], faces[place]) + lifted[place]
+                for c, place in ((1, k), (2, max(k - 1, 0)), (3, min(k + 1, count - 1)))
             )
             if (k > 0 and left < here) or (k < count - 1 and right < here):
                 continue
             q = _lowest(envelope, float(tilts[k]), float(tilts[1] - tilts[0]), tables[0][0][a], tables[1][0][b])
             d, tilt = float(q[4]), float(q[5] / envelope.lever)
-            same = any(abs(d - other.d) <= _SAME and abs(tilt - other.tilt) <= 1e-5 for other in found)
+            same = any(abs(d - other.d) <= _SAME and abs(tilt - other.tilt) <= 1e-5 for other in rests)
             if not same and envelope.falls(q) <= _SAME:
                 firm = envelope.falls(q, _NEAR * envelope.lever, _SHALLOW * envelope.lever) <= _SAME
                 slipped = bool(np.isneginf(min(tables[0][1][a], tables[1][1][b])))
-                found.append(Minimum(d, tilt, firm, slipped))
-    return sorted(found, key=lambda minimum: minimum.d)
+                rests.append(Minimum(d, tilt, firm, slipped))
+    return sorted(rests, key=lambda minimum: minimum.d)
 
 
 def _lowest(envelope: Envelope, tilt: float, width: float, x6: float, x7: float) -> Array:
@@ -124,10 +124,10 @@ def _lowest(envelope: Envelope, tilt: float, width: float, x6: float, x7: float)
         for w, wire in enumerate(envelope.wires):
             valleys = Valleys(wire, tilts)
             for side in (range(_POINTS // 2, -1, -1), range(_POINTS // 2, _POINTS)):
-                at = x[w]
+                place = x[w]
                 for k in side:
-                    column = valleys.column(k, at)
-                    at = places[k, w] = float(valleys.x[k, column])
+                    column = valleys.column(k, place)
+                    place = places[k, w] = float(valleys.x[k, column])
                     level[k] = max(level[k], valleys.d[k, column])
         level += envelope.lifted(tilts)
         best = int(level.argmin())

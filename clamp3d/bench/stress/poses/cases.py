@@ -14,7 +14,7 @@ from clamp3d.core.pose import Array
 from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
 
 Extended = np.longdouble
-"""80-bit floats where the platform has them: only there is the quick truth good enough (see `oracle`)."""
+"""80-bit floats where the platform has them: only there is the quick truth good enough (see `truth`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,35 +67,29 @@ class Shapes:
 
 @dataclass(frozen=True, slots=True)
 class Cases(Rows):
-    """n cases: ``shape`` (n,) row of ``shapes``, poses (n, 4, 4), and ``gap`` (n,) mm that each was built for.
+    """n cases: ``shape`` (n,) row of ``shapes``, poses ``T_groove_wire`` (n, 4, 4), and ``gap`` (n,) mm.
 
-    ``T_world_groove`` and ``T_world_wire`` place both bodies in the world; where the first is None the groove stands
-    in the origin and ``T_world_wire`` is the pose in the groove's frame. ``gap`` is NaN where a case was not built
-    from an answer; another place of the groove may be nearer than the one built for.
+    ``gap`` is what a case was built for, NaN where it was not built from an answer; another place of the groove may be
+    nearer.
     """
 
     shapes: Shapes
     shape: NDArray[np.intp]
-    T_world_wire: Array
+    T_groove_wire: Array
     gap: Array
-    T_world_groove: Array | None = None
 
     def scene(self) -> Array:
         """Largest length of each case (n,), mm: sizes, and the distance of the two bodies' origins."""
-        apart = self.T_world_wire[:, :3, 3]
-        if self.T_world_groove is not None:
-            apart = apart - self.T_world_groove[:, :3, 3]
-        return np.asarray(np.maximum(self.shapes.size()[self.shape], np.abs(apart).max(axis=1)))
+        return np.asarray(np.maximum(self.shapes.size()[self.shape], np.abs(self.T_groove_wire[:, :3, 3]).max(axis=1)))
 
     def snippet(self, i: int) -> str:
         """Python lines that ask for case i alone, bit by bit the same numbers."""
-        lines = self.shapes.snippet(int(self.shape[i]))
-        lines.append(f"T_world_wire = np.array({self.T_world_wire[i].tolist()})")
-        pose = "T_world_wire"
-        if self.T_world_groove is not None:
-            lines.append(f"T_world_groove = np.array({self.T_world_groove[i].tolist()})")
-            pose = "clamp3d.kernel.relative_pose(T_world_groove, T_world_wire)"
-        return "\n".join([*lines, f"print(clamp3d.kernel.signed_distance(groove, wire, {pose}))"])
+        lines = [
+            *self.shapes.snippet(int(self.shape[i])),
+            f"T_groove_wire = np.array({self.T_groove_wire[i].tolist()})",
+            "print(clamp3d.kernel.signed_distance(groove, wire, T_groove_wire))",
+        ]
+        return "\n".join(lines)
 
 
 def unit_rows(vectors: Any) -> NDArray[Any]:

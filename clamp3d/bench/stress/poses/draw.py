@@ -60,8 +60,8 @@ def setting(
 
 def shapes_for(rng: np.random.Generator, n: int, **given: ArrayLike) -> tuple[Shapes, NDArray[np.intp]]:
     """Random shapes for n cases, and the shape (n,) of each case."""
-    made = shapes(rng, count(n), **given)
-    return made, spread(n, len(made))
+    drawn = shapes(rng, count(n), **given)
+    return drawn, spread(n, len(drawn))
 
 
 def poses_from_axes(rng: np.random.Generator, centre: Any, direction: Any) -> Array:
@@ -124,7 +124,7 @@ def contact_on(
     widest = np.where(a > np.pi / 2, R, R * sin)
     below = np.stack([side * (widest + R * rng.uniform(0.0, 3.0, n)), -R * (cos + rng.uniform(0.0, 2.0, n)), zero], 1)
     on_arc = np.stack([R * np.sin(p), -R * np.cos(p), zero], 1)
-    up, out = np.stack([zero, one, zero], 1), np.stack([zero, zero, end], 1)
+    upward, out = np.stack([zero, one, zero], 1), np.stack([zero, zero, end], 1)
     inward = -on_arc / R[:, None]
     at_end, within = H * end, H * rng.uniform(-1.0, 1.0, n)
     # The lip's cone: turned from +y towards the arc's inner normal there, by pi - half_angle in all.
@@ -139,10 +139,10 @@ def contact_on(
     table = {
         "arc": (on_arc, within, inward),
         "lip": (lip, within, lip_normal),
-        "flat": (beside, within, up),
+        "flat": (beside, within, upward),
         "end face": (below, at_end, out),
         "end arc": (on_arc, at_end, mix(inward, out, w)),
-        "end edge": (beside, at_end, mix(up, out, w)),
+        "end edge": (beside, at_end, mix(upward, out, w)),
         "corner": (lip, at_end, mix(lip_normal, out, w2)),
     }
     for name, (place, z, direction) in table.items():

@@ -22,11 +22,7 @@ from clamp3d.bench.stress.worker import Measured, Measures, run_here
 from clamp3d.core.distance import SignedDistances, signed_distances
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import SweptArc
-from clamp3d.core.relation3d import relative_pose
 from clamp3d.core.shapes import Solid, groove_block
-
-_WORLD = 5e-16
-"""Rounding of a position by `relative_pose`, in parts of the distance between the two origins."""
 
 FCL_ERROR = 2e-6
 """Error of FCL's own distance in mm, as measured in `baselines.fcl_shapes` (worst of 600 000), rounded up."""
@@ -40,32 +36,20 @@ THRESHOLD = 1.0 / 12.0
 UNIT = math.radians(5.0)
 
 
-def poses(cases: Cases) -> Array:
-    """Poses (n, 4, 4) of the wires in their grooves' frames, as a user gets them from world poses."""
-    if cases.T_world_groove is None:
-        return cases.T_world_wire
-    return np.array([relative_pose(a, b) for a, b in zip(cases.T_world_groove, cases.T_world_wire, strict=True)])
-
-
-def _by_kernel(cases: Cases, T: Array) -> SignedDistances:
+def _by_kernel(cases: Cases) -> SignedDistances:
     k = int(cases.shape[0])
-    return signed_distances(cases.shapes.groove(k), cases.shapes.wire(k), T, full=True, workers=1)
+    return signed_distances(cases.shapes.groove(k), cases.shapes.wire(k), cases.T_groove_wire, full=True, workers=1)
 
 
 class CasMethod:
-    """The kernel, with its error bound; what `relative_pose` rounds is added to it."""
+    """The kernel, with its error bound."""
 
     measures: Measures = "depth"
 
     def measure(self, cases: Cases) -> Measured:
         """See `Method`."""
-        found = _by_kernel(cases, poses(cases))
-        bound = found.error_bound
-        if cases.T_world_groove is not None:
-            apart = cases.T_world_wire[:, :3, 3] - cases.T_world_groove[:, :3, 3]
-            reach = np.sqrt((apart**2).sum(1)) + 0.5 * cases.shapes.length[cases.shape[0]]
-            bound = bound + 2.0 * _WORLD * reach
-        return Measured(found.distance, bound)
+        answers = _by_kernel(cases)
+        return Measured(answers.distance, answers.error_bound)
 
 
 class ChordsMethod:
@@ -76,7 +60,7 @@ class ChordsMethod:
     def measure(self, cases: Cases) -> Measured:
         """See `Method`. It works in the section: wires beside the groove's length are none of its business."""
         k = int(cases.shape[0])
-        T = poses(cases)
+        T = cases.T_groove_wire
         distance = contact_model("chords", unit_angle=UNIT).distances(cases.shapes.pair(k), T)
         beside = np.abs(T[:, 2, 3]) > 0.5 * (cases.shapes.L[k] + cases.shapes.length[k])
         bound = chord_error(cases.shapes.groove(k), UNIT) + 2e-9 * cases.scene()  # 1e-9 rad counts as parallel
@@ -100,9 +84,9 @@ class SolidMethod:
     def measure(self, cases: Cases) -> Measured:
         """See `Method`."""
         k = int(cases.shape[0])
-        T = poses(cases)
+        T = cases.T_groove_wire
         pair = cases.shapes.pair(k)
-        exact = _by_kernel(cases, T)
+        exact = _by_kernel(cases)
         ended = np.abs(np.einsum("ni,ni->n", exact.normal, T[:, :3, 2])) > 1e-9
         part = block(pair.groove, exact.point_on_groove[~ended])
         distance = np.full(len(cases), np.nan)
@@ -189,4 +173,4 @@ class PoseFamily(Family):
         return f"{cases.snippet(i)}\n# truth: {float(truth_50_digits(cases, i))!r} mm"
 
 
-POSES = {name: PoseFamily(name, *made) for name, made in (features.MAKERS | magnitudes.MAKERS).items()}
+POSES = {name: PoseFamily(name, *maker) for name, maker in (features.MAKERS | magnitudes.MAKERS).items()}

@@ -44,10 +44,10 @@ def _parallel_tangency(rng: np.random.Generator, n: int) -> Cases:
 def _equal_radii(rng: np.random.Generator, n: int) -> Cases:
     """Wire radius = groove radius (1 +- 1e-3 ... 1e-15) and equal to the last bit, nearly coaxial."""
     k = draw.count(n)
-    given = asdict(draw.shapes(rng, k))
-    del given["flat"]
-    given["r"] = given["R"] * (1.0 + draw.powers(rng, k, -16, -3))
-    shapes, shape = draw.shapes(rng, k, **given), draw.spread(n, k)
+    columns = asdict(draw.shapes(rng, k))
+    del columns["flat"]
+    columns["r"] = columns["R"] * (1.0 + draw.powers(rng, k, -16, -3))
+    shapes, shape = draw.shapes(rng, k, **columns), draw.spread(n, k)
     R = shapes.R[shape]
     offset = R[:, None] * np.stack([draw.powers(rng, n, -16, -3) for _ in range(3)], 1)
     tilt = np.stack([draw.powers(rng, n, -16, -3, 0.5) for _ in range(2)] + [np.ones(n)], 1)
@@ -124,28 +124,6 @@ def _wire_ends(rng: np.random.Generator, n: int) -> Cases:
     return draw.free(rng, shapes, shape, centre, tilt)
 
 
-@MAKERS.family("narrow mouth")
-def _narrow_mouth(rng: np.random.Generator, n: int) -> Cases:
-    """Arcs over 180 deg: mouth narrower than the wire; inside free, in the mouth not."""
-    k = draw.count(n)
-    a = np.pi / 2 + rng.uniform(1e-6, 1.5, k)
-    R = 10.0 ** rng.uniform(0, 2, k)
-    shapes = draw.shapes(rng, k, R=R, half_angle=a, r=R * (1.0 - 10.0 ** rng.uniform(-6, -0.1, k)))
-    shape = draw.spread(n, k)
-    gap = shapes.r[shape] * draw.powers(rng, n, -14, -1)
-    s, h = shapes.lips(shape)
-    reach = np.asarray(shapes.r[shape], Extended) + np.asarray(gap, Extended)
-    fits = reach >= s  # rests on both lips from inside (-) or outside (+)
-    y = h + rng.choice([-1.0, 1.0], n) * np.sqrt(np.maximum(reach * reach - s * s, 0))
-    inside = np.asarray(shapes.R - shapes.r, Extended)[shape] - np.asarray(gap, Extended)
-    angle = rng.uniform(-1, 1, n) * shapes.half_angle[shape]
-    at_lips = fits & (rng.random(n) < 0.6)
-    x = np.where(at_lips, 0.0, inside * np.sin(angle))
-    y = np.where(at_lips, y, -inside * np.cos(angle))
-    tilt = np.stack([draw.powers(rng, n, -12, -1, 0.7) for _ in range(2)] + [np.ones(n)], 1)
-    return draw.free(rng, shapes, shape, np.stack([x, y, 0 * x], 1), tilt)
-
-
 @MAKERS.family("embedded")
 def _embedded(rng: np.random.Generator, n: int) -> Cases:
     """Wires wholly inside the material, or their axis inside it: contained is a hit."""
@@ -196,30 +174,6 @@ def _crossed(rng: np.random.Generator, n: int) -> Cases:
     x = R * rng.uniform(-2, 2, n)
     d = np.stack([np.ones(n), *(draw.powers(rng, n, -16, -2, 0.4) for _ in range(2))], 1)
     return draw.free(rng, shapes, shape, np.stack([x, y, z], 1), d)
-
-
-@MAKERS.family("in a face's plane")
-def _in_plane(rng: np.random.Generator, n: int) -> Cases:
-    """Axis in the plane of an end face or of the flat faces to 1e-18 ... 1e-9, through what lies in it."""
-    shapes, shape, _ = draw.setting(rng, n)
-    R, a, H = shapes.R[shape], shapes.half_angle[shape], 0.5 * shapes.L[shape]
-    off = R * draw.powers(rng, n, -18, -9, 0.4)
-    out = draw.powers(rng, n, -18, -9, 0.4)
-    # Through the lips, the arc's ends, or anywhere.
-    aim = rng.choice([-1.0, 1.0, 0.0], n)
-    x, y = aim * R * np.sin(a), -R * np.cos(a)
-    anywhere = rng.random(n) < 0.5
-    x, y = np.where(anywhere, rng.uniform(-2, 2, n) * R, x), np.where(anywhere, rng.uniform(-2, 2, n) * R, y)
-    z = rng.uniform(-1.5, 1.5, n) * H
-    turn = np.where(rng.random(n) < 0.5, rng.uniform(-np.pi, np.pi, n), rng.choice([-1, 1], n) * np.pi / 4)
-    u, v = np.cos(turn), np.sin(turn)
-    t = rng.uniform(-0.7, 0.7, n) * shapes.length[shape]
-    in_end = rng.random(n) < 0.6
-    end = rng.choice([-1.0, 1.0], n) * H
-    h = -R * np.cos(a)
-    d = np.stack([u, np.where(in_end, v, out), np.where(in_end, out, v)], 1)
-    centre = np.stack([x - t * u, np.where(in_end, y - t * v, h + off), np.where(in_end, end + off, z - t * v)], 1)
-    return draw.free(rng, shapes, shape, centre, d)
 
 
 @MAKERS.family("through two points")

@@ -79,7 +79,7 @@ def _discs(rng: np.random.Generator, n: int) -> Cases:
 def interval(cases: Cases, i: int, most: int = MAX_BOXES) -> tuple[float, float]:
     """The interval in mm that holds the signed distance of case i."""
     case = _alone(cases, i)
-    s, scene, T = case.shapes, float(case.scene()[0]), case.T_world_wire[0]
+    s, scene, T = case.shapes, float(case.scene()[0]), case.T_groove_wire[0]
     R, half_angle, L, r, length = (float(column[0]) for column in (s.R, s.half_angle, s.L, s.r, s.length))
     low, high = flat_truth(R, half_angle, L, r, length, T, NARROW * scene, most)
     rounding = 20.0 * NARROW * scene if high < -min(r, 0.5 * length) + _KNOWN * scene else 0.05 * NARROW * scene
@@ -130,9 +130,9 @@ class FlatFamily(Family):
         error = np.maximum(np.maximum(low - d, d - high), 0.0)
         wrong = Wrong((d < -bound) & (low >= 0.0), (d > bound) & (high < 0.0), error > bound)
         worst = wrong.examples(error, 0.5 * (low + high), d)
-        known, signed = (high - low <= _KNOWN * size).mean(), ((low >= 0.0) | (high < 0.0)).mean()
+        narrow, signed = (high - low <= _KNOWN * size).mean(), ((low >= 0.0) | (high < 0.0)).mean()
         answers.note(
-            f"the truth is known to {_KNOWN:g} of the scene in {known:.1%} of the cases, its sign in {signed:.1%}"
+            f"the truth is known to {_KNOWN:g} of the scene in {narrow:.1%} of the cases, its sign in {signed:.1%}"
         )
         return score(self.name, name, answers, error, size, wrong, worst)
 

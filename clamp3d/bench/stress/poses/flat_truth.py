@@ -18,27 +18,28 @@ import numpy as np
 
 from clamp3d.core.pose import Array
 
+Point = tuple[float, float, float]
+
 
 class Wire(NamedTuple):
     """A flat-ended cylinder: its ``middle`` (x, y, z) and unit ``axis``, ``radius`` and half its length, mm."""
 
-    middle: tuple[float, float, float]
-    axis: tuple[float, float, float]
+    middle: Point
+    axis: Point
     radius: float
     half: float
 
 
 class Material(NamedTuple):
-    """What of the box from ``low`` to ``high`` (x, y, z) is outside a circle if ``hollow``, else inside it."""
+    """What of the box from ``low`` to ``high`` (x, y, z) is outside the groove's circle."""
 
     radius: float
-    hollow: bool
-    low: tuple[float, float, float]
-    high: tuple[float, float, float]
+    low: Point
+    high: Point
 
 
 @numba.njit(cache=True)
-def _own(x, y, z, wire):  # type: ignore[no-untyped-def]
+def _own(x: float, y: float, z: float, wire: Wire) -> tuple[float, Point, float]:
     """Signed distance of a point from the flat-ended cylinder, a gradient of it, and the gradient's rounding error."""
     c, d = wire.middle, wire.axis
     size = abs(x) + abs(y) + abs(z) + abs(c[0]) + abs(c[1]) + abs(c[2])
@@ -61,10 +62,10 @@ def _own(x, y, z, wire):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _tangent(point, low, high, material, wire):  # type: ignore[no-untyped-def]
+def _tangent(point: Point, low: Point, high: Point, material: Material, wire: Wire) -> tuple[float, Point]:
     """Least value over the material in a box of the plane that is tangent to f at a point, and the gradient there."""
     x, y, z = point
-    R, hollow = material.radius, material.hollow
+    R = material.radius
     f, (gx, gy, gz), error = _own(x, y, z, wire)
     mx, my, mz = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
     ax, ay, az = 0.5 * (high[0] - low[0]), 0.5 * (high[1] - low[1]), 0.5 * (high[2] - low[2])
@@ -77,15 +78,15 @@ def _tangent(point, low, high, material, wire):  # type: ignore[no-untyped-def]
     ex, ey = mx / rho, my / rho
     k = gx * ex + gy * ey
     across = abs(ey) * ax + abs(ex) * ay
-    chord = math.sqrt(max(R * R - across * across, 0.0)) if hollow else R
-    if (k > 0.0) == hollow and (not hollow or rho - math.sqrt(ax * ax + ay * ay) > -chord):  # on this side of the axis
+    chord = math.sqrt(max(R * R - across * across, 0.0))
+    if k > 0.0 and rho - math.sqrt(ax * ax + ay * ay) > -chord:  # on this side of the axis
         rest = abs(gx - k * ex) * ax + abs(gy - k * ey) * ay + abs(gz) * az
         least = max(least, at_middle + k * (chord - rho) - rest)
     return least, (gx, gy, gz)
 
 
 @numba.njit(cache=True)
-def _within(point, low, high):  # type: ignore[no-untyped-def]
+def _within(point: Point, low: Point, high: Point) -> Point:
     """The point of a box that is nearest to another one."""
     return (
         min(max(point[0], low[0]), high[0]),
@@ -95,24 +96,24 @@ def _within(point, low, high):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _point(point, material):  # type: ignore[no-untyped-def]
+def _point(point: Point, material: Material) -> tuple[Point, bool]:
     """A point of the material near another one, and whether there is one: on the right side of the arc, in the box."""
-    R, hollow, low, high = material
+    R, low, high = material
     x, y, z = _within(point, low, high)
     rho = math.sqrt(x * x + y * y)
-    if (rho < R) == hollow:
+    if rho < R:
         if rho == 0.0:
-            return (x, y, z), not hollow
+            return (x, y, z), False
         x, y = x * (R / rho), y * (R / rho)
         if y > high[1]:
             y = high[1]
             x = math.copysign(math.sqrt(max(R * R - y * y, 0.0)), x)
-    square, inside = x * x + y * y, low[0] <= x <= high[0] and low[1] <= y <= high[1]
-    return (x, y, z), inside and (square >= R * R * (1.0 - 1e-15) if hollow else square <= R * R * (1.0 + 1e-15))
+    inside = low[0] <= x <= high[0] and low[1] <= y <= high[1]
+    return (x, y, z), inside and x * x + y * y >= R * R * (1.0 - 1e-15)
 
 
 @numba.njit(cache=True)
-def _halves(low, high):  # type: ignore[no-untyped-def]
+def _halves(low: Point, high: Point) -> tuple[tuple[Point, Point], tuple[Point, Point]]:
     """The two halves of a box, cut across its longest side."""
     (x0, y0, z0), (x1, y1, z1) = low, high
     wx, wy, wz = x1 - x0, y1 - y0, z1 - z0
@@ -127,16 +128,14 @@ def _halves(low, high):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _is_empty(low, high, material):  # type: ignore[no-untyped-def]
+def _is_empty(low: Point, high: Point, material: Material) -> bool:
     """Whether a box holds nothing of the material."""
     R = material.radius
-    if material.hollow:
-        return max(low[0] ** 2, high[0] ** 2) + max(low[1] ** 2, high[1] ** 2) < R * R
-    return max(low[0], -high[0], 0.0) ** 2 + max(low[1], -high[1], 0.0) ** 2 > R * R * (1.0 + 1e-15)
+    return max(low[0] ** 2, high[0] ** 2) + max(low[1] ** 2, high[1] ** 2) < R * R
 
 
 @numba.njit(cache=True)
-def _search(material, wire, start, tolerance, most):  # type: ignore[no-untyped-def]
+def _search(material: Material, wire: Wire, start: Point, tolerance: float, most: int) -> tuple[float, float]:
     """Interval [lower, upper] of the least f over the material, of which ``start`` is a point, by ``most`` boxes.
 
     The tangent planes are those at a box's middle, and at its point that is nearest to the best one so far.
@@ -178,13 +177,6 @@ def _search(material, wire, start, tolerance, most):  # type: ignore[no-untyped-
     return best - tolerance, best
 
 
-def _wire(r: float, length: float, T: Array) -> Wire:
-    axis = T[:3, 2] / np.linalg.norm(T[:3, 2])
-    x, y, z = T[:3, 3].tolist()
-    u, v, w = axis.tolist()
-    return Wire((x, y, z), (u, v, w), float(r), 0.5 * float(length))
-
-
 def flat_truth(
     R: float, half_angle: float, L: float, r: float, length: float, T: Array, tolerance: float, most: int = 200_000
 ) -> tuple[float, float]:
@@ -193,24 +185,13 @@ def flat_truth(
     It is at most ``tolerance`` mm wide, or as wide as ``most`` boxes left it. No less than minus the smaller of radius
     and half length: what goes deeper is not the inset any more.
     """
-    wire, z = _wire(r, length, T), float(T[2, 3])
+    axis = T[:3, 2] / np.linalg.norm(T[:3, 2])
+    x, y, z = T[:3, 3].tolist()
+    u, v, w = axis.tolist()
+    wire = Wire((x, y, z), (u, v, w), float(r), 0.5 * float(length))
     s, h, H = R * math.sin(half_angle), -R * math.cos(half_angle), 0.5 * L
     lips = [(x, h, end) for x in (-s, s) for end in (-H, min(max(z, -H), H), H)]
     start = min(lips, key=lambda q: _own(q[0], q[1], q[2], wire)[0])
-    material = Material(float(R), True, (-math.inf, -math.inf, -H), (math.inf, h, H))
+    material = Material(float(R), (-math.inf, -math.inf, -H), (math.inf, h, H))
     low, high = _search(material, wire, start, tolerance, most)
-    return float(low), float(high)
-
-
-def solid_truth(
-    R: float, hollow: bool, half: Array, r: float, length: float, T: Array, tolerance: float, most: int = 200_000
-) -> tuple[float, float]:
-    """The same for a finite body in place of the groove: a box of half sizes (3,), and of it only one side of a circle.
-
-    A ``hollow`` one has a hole of radius R (or none: 0) along z, any other is the cylinder of radius R in the box.
-    """
-    x, y, z = half.tolist()
-    material = Material(float(R), bool(hollow), (-x, -y, -z), (x, y, z))
-    start = (x, y, z) if hollow else (0.0, 0.0, 0.0)
-    low, high = _search(material, _wire(r, length, T), start, tolerance, most)
     return float(low), float(high)

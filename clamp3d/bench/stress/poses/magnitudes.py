@@ -8,7 +8,7 @@ import numpy as np
 
 from clamp3d.bench.stress.family import Makers
 from clamp3d.bench.stress.poses import draw
-from clamp3d.bench.stress.poses.cases import Cases, Extended
+from clamp3d.bench.stress.poses.cases import Cases
 
 MAKERS = Makers()
 
@@ -37,29 +37,9 @@ def _mixed_sizes(rng: np.random.Generator, n: int) -> Cases:
     """Wire and groove, or length and radius, different by 1e-6 ... 1e6."""
     k = draw.count(n)
     R = 10.0 ** rng.uniform(-3, 3, k)
-    given = {name: R * 10.0 ** rng.uniform(-6, 6, k) for name in ("r", "L", "length")}
-    shapes = draw.shapes(rng, k, R=R, **given)
+    columns = {name: R * 10.0 ** rng.uniform(-6, 6, k) for name in ("r", "L", "length")}
+    shapes = draw.shapes(rng, k, R=R, **columns)
     shape, feature = draw.spread(n, k), rng.choice(draw.FEATURES, n)
     gap = np.minimum(shapes.r, shapes.R)[shape] * draw.powers(rng, n, -12, 0)
     tilt = draw.powers(rng, n, -12, 0, 0.3)
     return draw.place(rng, shapes, shape, draw.contact_on(rng, shapes, shape, feature), gap, tilt=tilt)
-
-
-@MAKERS.family("far from the origin")
-def _far(rng: np.random.Generator, n: int) -> Cases:
-    """Both bodies turned and 1e3 ... 1e9 mm from the world's origin."""
-    near = draw.touching(rng, n, draw.shapes(rng, draw.count(n)), (-9, -1))
-    away = rng.normal(size=(n, 3))
-    away *= (10.0 ** rng.uniform(3, 9, n) / np.sqrt((away**2).sum(1)))[:, None]
-    world = draw.poses_from_axes(rng, away, rng.normal(size=(n, 3)))
-    exact = np.asarray(world, Extended) @ np.asarray(near.T_world_wire, Extended)
-    return replace(near, T_world_wire=np.asarray(exact, np.float64), gap=np.full(n, np.nan), T_world_groove=world)
-
-
-@MAKERS.family("poses barely rigid")
-def _barely_rigid(rng: np.random.Generator, n: int) -> Cases:
-    """Rotations off by up to 1e-9, as products of many poses are."""
-    cases = draw.touching(rng, n, draw.shapes(rng, draw.count(n)), (-15, -1))
-    T = cases.T_world_wire.copy()
-    T[:, :3, :3] += rng.uniform(-1.0, 1.0, (n, 3, 3)) * 10.0 ** rng.uniform(-16, -9.8, n)[:, None, None]
-    return replace(cases, T_world_wire=T, gap=np.full(n, np.nan))

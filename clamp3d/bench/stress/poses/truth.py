@@ -59,12 +59,8 @@ class _Scene:
         )
         self.H, self.half = self.L / 2, length / 2
         self.sx, self.h = self.R * np.sin(self.a), -self.R * np.cos(self.a)
-        c = np.asarray(cases.T_world_wire[:, :3, 3], Extended)
-        d = np.asarray(cases.T_world_wire[:, :3, 2], Extended)
-        if cases.T_world_groove is not None:
-            T = np.asarray(cases.T_world_groove, Extended)
-            c = np.einsum("nij,ni->nj", T[:, :3, :3], c - T[:, :3, 3])
-            d = np.einsum("nij,ni->nj", T[:, :3, :3], d)
+        c = np.asarray(cases.T_groove_wire[:, :3, 3], Extended)
+        d = np.asarray(cases.T_groove_wire[:, :3, 2], Extended)
         self.c, self.d = c, unit_rows(d)
         self.lean = np.sqrt((self.d[:, :2] ** 2).sum(1))
         self.size = np.asarray(cases.scene(), Extended)
@@ -180,13 +176,8 @@ def truth_50_digits(cases: Cases, i: int) -> Any:
     k = int(cases.shape[i])
     s = cases.shapes
     R, a, L, r, length = (mp.mpf(float(v[k])) for v in (s.R, s.half_angle, s.L, s.r, s.length))
-    T = cases.T_world_wire[i]
+    T = cases.T_groove_wire[i]
     c, d = [mp.mpf(v) for v in T[:3, 3].tolist()], [mp.mpf(v) for v in T[:3, 2].tolist()]
-    if cases.T_world_groove is not None:
-        G = cases.T_world_groove[i]
-        w = [c[j] - mp.mpf(float(G[j, 3])) for j in range(3)]
-        c = [mp.fsum(mp.mpf(float(G[m, j])) * w[m] for m in range(3)) for j in range(3)]
-        d = [mp.fsum(mp.mpf(float(G[m, j])) * d[m] for m in range(3)) for j in range(3)]
     norm = mp.sqrt(mp.fsum(v * v for v in d))
     d = [v / norm for v in d]
     half = length / 2
