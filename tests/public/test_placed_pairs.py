@@ -22,48 +22,25 @@ def checked(pairs, folder):
     return judge(pairs, check(load(path), depths=False))
 
 
-@pytest.fixture(scope="module")
-def placed(tmp_path_factory):
-    """All families in one file."""
+def marked(names):
+    """Each as a parameter of a test; those without an answer in time are not run."""
+    slow = pytest.mark.xfail(reason="Open CASCADE does not end", run=False)
+    return [pytest.param(name, marks=[slow] * (name in NO_ANSWER)) for name in names]
+
+
+@pytest.mark.parametrize("family", marked(family for family in FAMILIES if family != "duplicate"))
+def test_no_verdict_is_wrong_and_every_pair_is_decided(family, tmp_path):
+    rng = np.random.default_rng(list(FAMILIES).index(family))
+    counts, lines = checked([placed_pair(family, rng, gap, splines=0.0) for gap in GAPS], tmp_path)
+    assert counts[family]["wrong"] == 0, lines
+    if family in UNDECIDED and counts[family]["uncertain"]:
+        pytest.xfail("a shallow overlap is undecided")
+    assert counts[family]["uncertain"] == 0, lines
+
+
+@pytest.mark.parametrize("kind", marked(SOLIDS))
+def test_one_part_twice_is_an_overlap(kind, tmp_path):
     rng = np.random.default_rng(0)
-    families = [family for family in FAMILIES if family not in NO_ANSWER and family != "duplicate"]
-    pairs = [placed_pair(family, rng, gap, splines=0.0) for family in families for gap in GAPS]
-    return checked(pairs, tmp_path_factory.mktemp("placed"))
-
-
-@pytest.fixture(scope="module")
-def twice(tmp_path_factory):
-    """Solids of each kind twice, as copies and as instances."""
-    rng = np.random.default_rng(0)
-    pairs = [
-        PlacedPair(f"duplicate {kind}", *duplicate(rng, gap, kind), gap)
-        for kind in SOLIDS
-        if kind not in NO_ANSWER
-        for gap in (0.0, 0.001, 0.009)
-    ]
-    return checked(pairs, tmp_path_factory.mktemp("twice"))
-
-
-def marked(name, *names, reason):
-    run = name not in NO_ANSWER
-    return pytest.param(name, marks=[pytest.mark.xfail(reason=reason, run=run, strict=False)] * (name in names))
-
-
-@pytest.mark.parametrize("family", [marked(f, *NO_ANSWER, reason="slow") for f in FAMILIES if f != "duplicate"])
-def test_no_verdict_is_wrong(family, placed):
-    counts, lines = placed
-    assert counts[family]["wrong"] == 0, [line for line in lines if family in line]
-
-
-@pytest.mark.parametrize(
-    "family", [marked(f, *UNDECIDED, *NO_ANSWER, reason="undecided") for f in FAMILIES if f != "duplicate"]
-)
-def test_every_pair_is_decided(family, placed):
-    counts, lines = placed
-    assert counts[family]["uncertain"] == 0, [line for line in lines if family in line]
-
-
-@pytest.mark.parametrize("kind", [marked(kind, *NO_ANSWER, reason="slow") for kind in SOLIDS])
-def test_one_part_twice_is_an_overlap(kind, twice):
-    counts, lines = twice
+    pairs = [PlacedPair(f"duplicate {kind}", *duplicate(rng, gap, kind), gap) for gap in (0.0, 0.001, 0.009)]
+    counts, lines = checked(pairs, tmp_path)
     assert counts[f"duplicate {kind}"]["right"] == 3, lines
