@@ -1,11 +1,13 @@
 """Shapes of every kind, for properties that hold for any of them."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import trimesh
 from hypothesis import strategies as st
 
+from clamp3d.collide.check import check
 from clamp3d.collide.surface import Surface
 from clamp3d.core import shapes
 from clamp3d.core.extrusion import Extrusion
@@ -68,3 +70,11 @@ def poses(reach: float) -> st.SearchStrategy:
     angle = st.one_of(st.floats(0.0, 2.0 * math.pi), st.sampled_from([0.0, 1e-3, math.pi / 2, math.pi]))
     axis = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
     return st.builds(pose, axis, angle, st.tuples(*[st.floats(-reach, reach)] * 3))
+
+
+def measured_alike(scene, result):
+    """A check that measures every pair; its verdicts are those of ``result``, which only bounded the distances."""
+    complete = check(replace(scene, motions=()), pairs=result.asked, distances=True)
+    for row in complete.pairs:
+        assert result.verdict(row.a, row.b) is row.verdict, (row.a, row.b)
+    return complete

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -25,7 +26,7 @@ from clamp3d.collide.scene import Scene, name_pairs
 from clamp3d.collide.verdict import Verdict
 from clamp3d.collide.where import Locator
 from clamp3d.core.pose import Array, inverse
-from clamp3d.errors import InputError, MissingLibraryError, SolverError
+from clamp3d.errors import InputError, MissingLibraryError
 
 _SAME = 9
 """Digits (of mm, or of a rotation) to which relative poses agree that one measurement serves."""
@@ -35,7 +36,6 @@ def check(
     scene: Scene,
     *,
     pairs: Sequence[tuple[str, str]] | None = None,
-    full: bool = False,
     distances: bool = False,
     depths: bool = True,
     progress: Progress | None = None,
@@ -49,8 +49,6 @@ def check(
         Parts, thresholds, allowed contacts and motions.
     pairs : sequence of (str, str), optional
         Names of the pairs to look at; all by default.
-    full : bool
-        Ask every pair at every level down to the finest meshes: slow, for comparison.
     distances : bool
         Measure every pair to `clamp3d.collide.refine.ACCURACY`, not only until its verdict is certain.
     depths : bool
@@ -84,66 +82,57 @@ def check(
     instance("scene", scene, Scene)
     if cache is not None:
         instance("cache", cache, ModelCache)
-    full, distances, depths = flag("full", full), flag("distances", distances), flag("depths", depths)
+    distances, depths = flag("distances", distances), flag("depths", depths)
     function("progress", progress)
-    shop = cache or ModelCache()
-    counters = shop.counters
+    cache = cache or ModelCache()
+    counters = cache.counters
     built, queries = counters.built.copy(), counters.queries.copy()
-    times = [time.perf_counter()]
+    clock = _Stages()
     placed = scene.placed
-    of_shape = [shop.model(shape) for shape in placed.shapes]
+    of_shape = [cache.model(shape) for shape in placed.shapes]
     models = [of_shape[k] for k in placed.which.tolist()]
-    n = len(models)
     boxes = Boxes.of(np.array([m.bounds for m in of_shape]).reshape(-1, 2, 3)[placed.which], placed.poses)
     named = None if pairs is None else _numbered(scene, pairs)
-    every = n * (n - 1) // 2 if named is None else len(named)
-    chosen = _candidates(boxes, scene.thresholds.reach, named, everything=full or distances)
-    gaps = box_gaps(boxes, chosen)
-    counters.queries["boxes"] += len(chosen)
-    times.append(time.perf_counter())
-    rows, decided = [], Counter({"broad phase": every - len(chosen)})
-    questions = _Questions(scene, models, full=full, distances=distances, depths=depths)
-    for k, ((i, j), gap) in enumerate(zip(chosen.tolist(), gaps.tolist(), strict=True)):
+    every = math.comb(len(models), 2) if named is None else len(named)
+    near = _candidates(boxes, scene.thresholds.reach, named, everything=distances)
+    counters.queries["boxes"] += len(near)
+    questions = _Questions(scene, models, distances=distances, depths=depths)
+    clock.end("broad phase")
+    rows = []
+    for k, ((i, j), gap) in enumerate(zip(near.tolist(), box_gaps(boxes, near).tolist(), strict=True)):
         if progress is not None:
-            progress("pairs", k, len(chosen))
-        row = questions.row(i, j, gap)
-        if row.verdict not in (Verdict.FAILED, Verdict.UNCERTAIN):
-            decided[row.distance.level] += 1
-        rows.append(row)
-    times.append(time.perf_counter())
+            progress("pairs", k, len(near))
+        rows.append(questions.row(i, j, gap))
+    clock.end("pairs")
     moved = check_motions(scene, models, named, progress)
-    times.append(time.perf_counter())
-    stages = ("broad phase", "pairs", "motions") if scene.motions else ("broad phase", "pairs")
+    if scene.motions:
+        clock.end("motions")
+    decided = Counter(row.distance.level for row in rows if row.verdict not in (Verdict.FAILED, Verdict.UNCERTAIN))
     work = Work(
-        parts=n,
-        shapes=len(set(models)),
+        parts=len(models),
+        shapes=len(of_shape),
         pairs=every,
-        candidates=len(chosen),
+        candidates=len(near),
         **{name: counters.built[name] - built[name] for name in ("meshes", "triangles", "hulls", "fits")},
         queries=dict(counters.queries - queries),
-        decided=dict(+decided),
-        seconds={name: round(end - start, 6) for name, start, end in zip(stages, times, times[1:], strict=False)},
-        full=full,
+        decided=dict(+(decided + Counter({"broad phase": every - len(near)}))),
+        seconds=clock.seconds,
     )
     names = None if named is None else tuple((scene.parts[i].name, scene.parts[j].name) for i, j in named)
     return CheckResult(scene, tuple(rows), moved, names, work)
 
 
-def check_full(scene: Scene, result: CheckResult, *, progress: Progress | None = None) -> CheckResult:
-    """Every pair asked at every level, whatever the first ones say, and compared with ``result``.
+class _Stages:
+    """Seconds of each stage of a check."""
 
-    Raises SolverError naming the first pair whose verdict is not the same.
-    """
-    complete = check(replace(scene, motions=()), pairs=result.asked, full=True, progress=progress)
-    seen = {(row.a, row.b): row.verdict for row in result.pairs}
-    for row in complete.pairs:
-        verdict = seen.get((row.a, row.b), Verdict.CLEAR)
-        if verdict is not row.verdict:
-            raise SolverError(
-                f"pair {row.a}:{row.b}: the check says {verdict.value}, the full model {row.verdict.value} "
-                f"({row.distance.lower:.9g} to {row.distance.upper:.9g} mm)"
-            )
-    return complete
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._start = time.perf_counter()
+
+    def end(self, stage: str) -> None:
+        """The stage that began when the one before ended is over."""
+        now = time.perf_counter()
+        self.seconds[stage], self._start = round(now - self._start, 6), now
 
 
 def _numbered(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, int]]:
@@ -175,9 +164,9 @@ def _candidates(
 class _Questions:
     """What is asked of each pair of a scene; one answer serves pairs of equal shapes in equal relative poses."""
 
-    def __init__(self, scene: Scene, models: list[Model], *, full: bool, distances: bool, depths: bool) -> None:
+    def __init__(self, scene: Scene, models: list[Model], *, distances: bool, depths: bool) -> None:
         self.scene, self.models = scene, models
-        self.full, self.distances, self.depths = full, distances, depths
+        self.distances, self.depths = distances, depths
         self._answers: dict[tuple[object, ...], tuple[Verdict, Distance]] = {}
 
     def row(self, i: int, j: int, gap: float) -> PairResult:
@@ -211,7 +200,7 @@ class _Questions:
         accuracy = accuracy_for(a, b)
 
         def enough(distance: Distance) -> bool:
-            return not self.full and (not self.distances or measured(distance, accuracy))
+            return not self.distances or measured(distance, accuracy)
 
         verdict, distance = judge(a, b, T, start, self.scene.thresholds, allowance, enough)
         distance = with_normal(distance)

@@ -83,8 +83,7 @@ class Work:
     """What an answer took: what was built for it, how often each level was asked, and the seconds of each stage.
 
     ``shapes``: different ones among the parts; ``candidates``: pairs that the broad phase left; ``decided``: pairs by
-    the level that gave the verdict, without those that failed or are undecided; ``full``: every pair was asked at every
-    level.
+    the level that gave the verdict, without those that failed or are undecided.
     """
 
     parts: int
@@ -98,7 +97,6 @@ class Work:
     queries: Mapping[str, int]
     decided: Mapping[str, int]
     seconds: Mapping[str, float]
-    full: bool
 
 
 @dataclass(frozen=True, eq=False)

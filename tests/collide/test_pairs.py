@@ -10,13 +10,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.check import check, check_full
+from clamp3d.collide.check import check
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core import shapes
 from clamp3d.core.pose import rotation, translation
 from clamp3d.core.primitives import SweptArc
 from clamp3d.testing import common, separation
+from tests.kinds import measured_alike
 
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0)  # top at -3.5, back at -23.5
 WIRE = shapes.cylinder(6.935, 80.0)
@@ -75,7 +76,7 @@ def test_verdicts(b, T, verdict):
     scene, result = pair(BLOCK, b, T, clearance=0.5)
     assert result.verdict("a", "b").value == verdict
     assert result.verdict("b", "a").value == verdict
-    check_full(scene, result)
+    measured_alike(scene, result)
 
 
 def test_bolt_in_hole_and_tube_on_pin_are_measured_across_the_gap():
@@ -137,7 +138,7 @@ def test_any_pair_against_the_definitions_of_the_shapes(a, b, axis, angle, at, f
     T[:3, 3] = at
     scene = Scene(clearance=1.0).add("a", a).add("b", b, T)
     result = check(scene)
-    rows = check_full(scene, result).pairs if full else result.pairs  # the first levels' verdict is the full model's
+    rows = measured_alike(scene, result).pairs if full else result.pairs
     truth = separation(a, b, T)
     for row in rows:
         assert row.distance.lower <= truth.upper + 1e-6
@@ -179,7 +180,7 @@ def test_thresholds():
     assert t.verdict(Distance(-math.inf, -0.02)) is Verdict.CLASH
 
 
-@pytest.mark.parametrize(("full", "shift"), [(False, 0.0), (False, 1e-9), (True, 1e-9)])
+@pytest.mark.parametrize(("distances", "shift"), [(False, 0.0), (False, 1e-9), (True, 1e-9)])
 @pytest.mark.parametrize(
     "make",
     [
@@ -189,9 +190,9 @@ def test_thresholds():
         lambda: shapes.groove_block(SweptArc(12.0, 1.2, 50.0), 60.0, 30.0),
     ],
 )
-def test_a_part_that_is_there_twice_clashes(make, shift, full):
+def test_a_part_that_is_there_twice_clashes(make, shift, distances):
     # The surfaces coincide, so no point of either lies deep in the other: only what is between them does.
     T = rotation([1, 2, 3], 0.7) @ translation(5.0, 6.0, 7.0)
     scene = Scene().add("a", make(), T).add("b", make(), T @ translation(shift, 0.0, 0.0))
-    (row,) = check(scene, full=full).pairs
+    (row,) = check(scene, distances=distances).pairs
     assert row.verdict is Verdict.DUPLICATE
