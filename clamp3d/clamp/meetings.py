@@ -35,7 +35,7 @@ def _meet(solids: dict[PartName, Solid], before: Waypoint, after: Waypoint, pair
         start, end = (inverse(w.poses[a].T()) @ w.poses[b].T() for w in (before, after))
         if np.array_equal(start, end) or _stay_apart(solids, before, after, (a, b)):
             continue
-        if first_contact(solids[a], solids[b], Motion.to_pose(end), start, margin=TOUCHING).touches:
+        if first_contact(solids[a], solids[b], Motion.to_pose(end), start, margin=TOUCHING).touches is not False:
             yield a, b
 
 

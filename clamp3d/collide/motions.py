@@ -29,8 +29,9 @@ class MotionDistance:
 
     Attributes
     ----------
-    touches : bool
-        Whether the bodies come within the margin (0 mm for `min_clearance`) of each other.
+    touches : bool or None
+        Whether the bodies come within the margin (0 mm for `min_clearance`) of each other; None where a search ended
+        before that was known.
     t : float
         Normalised time from 0 to 1: of the first contact, or of the least distance.
     distance : Distance
@@ -46,7 +47,7 @@ class MotionDistance:
         For a groove and a cylinder the kernel's own answer at ``t``, with the feature's name.
     """
 
-    touches: bool
+    touches: bool | None
     t: float
     distance: Distance
     pose: Array
@@ -73,8 +74,8 @@ def first_contact(
     ----------
     a, b : Solid, MeshShape, Cylinder, Capsule or SweptArc
         Two bodies. A `SweptArc` and a `Cylinder` or `Capsule` are measured by the kernel, other pairs as `distance`
-        measures them, to 1e-6 mm. A larger ``distance`` at the answer than ``margin`` means that the search ended
-        early, and only that all before is free.
+        measures them, to 1e-6 mm. A larger ``distance`` at a contact than ``margin`` means that the search ended
+        early: all before is free, and they meet later.
     motion : Motion
         Moves b.
     T_a_b : array_like (4, 4), optional
@@ -106,12 +107,15 @@ def first_contact(
     if margin < 0.0:
         raise InputError(f"margin must be >= 0 but for a groove and a cylinder, got {margin:g}")
     pair = _moving_pair(a, b, motion, T_a_b)
-    t = pair.first_time(margin)
-    if t is None:
-        least, t = pair.least_distance()
-        return _answer(pair, False, t, least)
-    here = pair.at(t, measured)
-    return _answer(pair, here.upper <= margin + RESOLUTION, t, here)
+    first = pair.first_time(margin)
+    if first is not None:
+        here = pair.at(first, measured)
+        if here.upper <= margin + RESOLUTION:
+            return _answer(pair, True, first, here)
+    least, t = pair.least_distance()
+    if first is not None and least.upper <= margin + RESOLUTION:  # the search ended early, and they meet later
+        return _answer(pair, True, first, here)
+    return _answer(pair, False if least.lower > margin else None, t, least)
 
 
 def min_clearance(
@@ -172,7 +176,7 @@ def _from_kernel(search: Search, touches: bool | None, t: float, slack: float) -
     return MotionDistance(touches, t, _overlap(distance), search.pose(t), slack, search.evaluations, contact)
 
 
-def _answer(pair: MovingPair, touches: bool, t: float, distance: Distance) -> MotionDistance:
+def _answer(pair: MovingPair, touches: bool | None, t: float, distance: Distance) -> MotionDistance:
     pose = pair.motion.at(t, pair.start)
     width = max(distance.upper - distance.lower, ACCURACY)
     distance = _overlap(with_normal(distance.moved(pose).swapped()))

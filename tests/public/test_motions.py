@@ -9,7 +9,7 @@ import trimesh
 from clamp3d import Motion, Scene, check, first_contact, load, min_clearance
 from clamp3d.kernel import Cylinder, translation
 from clamp3d.shapes import MeshShape, SweptArc, box, cylinder, groove_block, make_mesh
-from tests.kinds import pose
+from tests.kinds import DRAWN, faceted_shape, pose
 
 ACCURACY = 3e-4
 """How far apart bodies may still be at a first contact, mm."""
@@ -154,3 +154,14 @@ def test_a_pin_of_cad_beside_its_hole_meets_the_plate(plate_and_pin, aside, t):
     found = first_contact(plate.shape, pin.shape, down(20.0), translation(aside, 0, 0) @ pin.T_world)
     assert found.touches
     assert t - 0.001 <= found.t <= t + 1e-9
+
+
+def test_bodies_that_slide_along_each_other_and_meet_later_touch():
+    """Heads of two bolts pass at a hair's breadth before the shank meets: the search for the first time ends early."""
+    bolt = next(shape for shape in DRAWN if shape.name == "bolt")
+    angle = math.atan2(-0.9621351675436614, -0.2725727781267431)
+    start = translation(-19.914325967547395, 0.0, 9.538685459192337) @ pose((0.0, 0.0, 1.0), angle, (0.0, 0.0, 0.0))
+    way = Motion.translate((28.26490223, 8.0, -7.70344421))
+    hit = first_contact(faceted_shape(bolt, 0.3), bolt, way, start)
+    assert hit.touches
+    assert hit.t <= min_clearance(faceted_shape(bolt, 0.3), bolt, way, start).t

@@ -225,7 +225,7 @@ class CasMethod:
             uncertainties = [d.uncertainty for d in (least.distance, first.distance) if np.isfinite(d.uncertainty)]
             bound[i] = max(uncertainties, default=0.0) + max(least.resolution, first.resolution)
             self.lowest[int(cases.number[i])] = least.t
-            self.first[int(cases.number[i])] = (first.touches, first.t, first.distance.value)
+            self.first[int(cases.number[i])] = (bool(first.touches), first.t, first.distance.value)
         return Measured(distance, bound)
 
 
