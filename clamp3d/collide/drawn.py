@@ -9,13 +9,12 @@ import numpy as np
 
 from clamp3d.collide.closed_form import Bore, ClosedForm
 from clamp3d.collide.convex import Convex, Rod
-from clamp3d.collide.hull import Hull, hull
+from clamp3d.collide.hull import STRAIGHT, Hull, hull, prism
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import Array, cross, to_target
 from clamp3d.core.profile import Arc, Profile
 from clamp3d.core.shapes import Solid
 
-_FLAT = 1e-9
 _TANGENTS = 12
 
 
@@ -47,7 +46,7 @@ def _pieces(body: Extrusion) -> list[tuple[tuple[Convex, ...], list[Bore]]] | No
     corners = np.array([edge.start for edge in body.profile.edges])
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
     turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    if (turn < -_FLAT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)).any():
+    if (turn < -STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)).any():
         return None
     pieces: list[tuple[tuple[Convex, ...], list[Bore]]] = []
     grooves = []
@@ -58,8 +57,8 @@ def _pieces(body: Extrusion) -> list[tuple[tuple[Convex, ...], list[Bore]]] | No
             grooves.append(Bore(arc.radius, 0.5 * abs(arc.sweep), body.length, T))
         else:
             pieces.append(((Rod(arc.radius, body.length, _pose(body, arc.centre)), _beyond_chord(body, arc)), []))
-    if (turn > _FLAT).any():
-        pieces.insert(0, ((hull(_prism(body, corners)),), grooves))
+    if (turn > STRAIGHT).any():
+        pieces.insert(0, ((prism(corners, body.start, body.end, body.frame),), grooves))
     elif grooves:
         return None
     return pieces
@@ -82,18 +81,13 @@ def _pose(body: Extrusion, centre: tuple[float, float], middle: float = -math.pi
     return T
 
 
-def _prism(body: Extrusion, corners: Array) -> Array:
-    ends = [np.column_stack([corners, np.full(len(corners), z)]) for z in (body.start, body.end)]
-    return np.asarray(np.vstack(ends) @ body.frame.T)
-
-
 def _beyond_chord(body: Extrusion, arc: Arc) -> Hull:
     """Prism around the segment between a convex arc and its chord: tangents in place of the arc."""
     step = arc.sweep / _TANGENTS
     angles = [arc.start_angle, *(arc.start_angle + (k + 0.5) * step for k in range(_TANGENTS)), arc.end_angle]
     radii = [arc.radius, *[arc.radius / math.cos(0.5 * step)] * _TANGENTS, arc.radius]
     around = np.column_stack([np.cos(angles), np.sin(angles)]) * np.array(radii)[:, None]
-    return hull(_prism(body, np.array(arc.centre) + around))
+    return prism(np.array(arc.centre) + around, body.start, body.end, body.frame)
 
 
 def _less(body: ClosedForm, hole: Extrusion) -> list[ClosedForm] | None:
@@ -112,7 +106,7 @@ def _less(body: ClosedForm, hole: Extrusion) -> list[ClosedForm] | None:
     along = np.roll(corners, -1, axis=0) - corners
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
     offsets = -np.einsum("ij,ij->i", normals, corners)
-    if ((corners @ normals.T + offsets) > _FLAT * (1.0 + np.abs(corners).max())).any():
+    if ((corners @ normals.T + offsets) > STRAIGHT * (1.0 + np.abs(corners).max())).any():
         return None
     planes = np.column_stack([np.column_stack([normals, 0.0 * offsets]) @ hole.frame.T, offsets])
     return [piece for plane in planes if (piece := _beyond(body, plane)) is not None]
@@ -140,7 +134,7 @@ def _beyond(body: ClosedForm, plane: Array) -> ClosedForm | None:
         outers.append(around)
     for rod in rods:
         offset = -float(plane[:3] @ rod.T[:3, 3] + plane[3])
-        if abs(float(plane[:3] @ rod.T[:3, 2])) < _FLAT and abs(offset) < rod.radius:
+        if abs(float(plane[:3] @ rod.T[:3, 2])) < STRAIGHT and abs(offset) < rod.radius:
             # Where the wall leaves the round side there is a corner: the tangents there make it one of the hull.
             outers = [_tangential(piece, rod, plane[:3], offset) for piece in outers]
     return replace(body, outers=tuple(outers))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from clamp3d.collide.closed_form import Bore, ClosedForm
 from clamp3d.collide.convex import Rod
-from clamp3d.collide.hull import nearly_hull
+from clamp3d.collide.hull import hull
 from clamp3d.collide.surface import Surface
 from clamp3d.core.pose import Array, to_source, to_target
 from clamp3d.fit.features import FittedSurface
@@ -98,8 +98,7 @@ def bodies_of_fit(
     rods, rest = _rods(result, V, F, through)
     made = [ClosedForm((rod,), tuple(bores), error=error + stated) for rod in rods]
     for index in rest:
-        around, off = nearly_hull(points[index])
-        made.append(ClosedForm((around,), tuple(bores), error=error + off + stated + bulging, surface=depth))
+        made.append(ClosedForm((hull(points[index]),), tuple(bores), error=error + stated + bulging, surface=depth))
     return tuple(made)
 
 

@@ -15,13 +15,14 @@ MEMBER = 1e-9
 """Relative to the size of the parts: a point this far outside still counts as on the surface."""
 FLAT = 1e-8
 """Sine of the angle below which a face or line counts as square to a direction."""
+STRAIGHT = 1e-9
+"""Sine of the turn of an outline below which it goes straight on."""
 SMALL = 40
 """Hulls with more corners are searched only where FCL finds the nearest points."""
 _SLIVER = 1e-12
 """Relative to the size: triangles narrower than this have no plane to speak of."""
 _MEMORY = 2_000_000
 """Heights of points above planes that are worked out at a time."""
-_EPS = 2.0**-52
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,77 +119,46 @@ class Hull:
 
 def hull(points: Array) -> Hull:
     """Convex hull of points (n, 3). Raises ValueError if they lie in one plane."""
+    from scipy.spatial import ConvexHull, QhullError  # takes longer to import than most hulls to make
+
     points = np.ascontiguousarray(points, dtype=np.float64)
-    made, complete = _hull(points, *_by_manifold(points))
-    return made if complete else _hull(points, *_by_qhull(points))[0]
-
-
-def nearly_hull(points: Array) -> tuple[Hull, float]:
-    """Convex hull of most of the points (n, 3), and how far (mm) the others are from it; quicker where many are level.
-
-    Raises ValueError if they lie in one plane.
-    """
-    points = np.ascontiguousarray(points, dtype=np.float64)
-    made, complete = _hull(points, *_by_manifold(points))
-    if complete:
-        return made, 0.0
-    return made, _reach(made.vertices, made.faces, points[_Sides.of(made.vertices, made.faces).above(points)])
-
-
-def _hull(points: Array, vertices: Array, faces: NDArray[np.int64]) -> tuple[Hull, bool]:
-    """The hull of its vertices and triangles, and whether all points (n, 3) lie in it, to rounding."""
-    sides = _Sides.of(vertices, faces)
-    top = sides.highest(points)
-    # Up to the highest point: no rounding of a triangle cuts into the hull.
-    rows = np.column_stack([sides.normal, -(sides.offset + top)])[sides.flat]
-    planes = sorted({tuple(plane) for plane in rows.round(14).tolist()})
-    return Hull(vertices, np.array(planes), faces), not (top > sides.rounding).any()
-
-
-def _reach(vertices: Array, faces: NDArray[np.int64], points: Array) -> float:
-    """How far (mm) points (k, 3) are at most from what the vertices of a closed mesh span.
-
-    A point is a sum of the corners of the triangle that it lies behind, as seen from their middle. Weights below 0, and
-    what they add up to beyond 1, are cut: the rest is a point between the vertices, near to it.
-    """
-    middle = vertices.mean(axis=0)
-    corners = vertices[faces] - middle
-    across = np.cross(np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1))
-    volume = np.einsum("ij,ij->i", corners[:, 0], across[:, 0])
-    wide = np.abs(volume) > 1e-15 * float(np.abs(corners).max()) ** 3  # beside a sliver its neighbours do as well
-    corners, across = corners[wide], across[wide] / volume[wide, None, None]
-    worst = 0.0
-    for point in points - middle:
-        weight = np.maximum(across @ point, 0.0)
-        weight /= np.maximum(weight.sum(axis=1), 1.0)[:, None]
-        worst = max(worst, float(np.linalg.norm(np.einsum("ij,ijk->ik", weight, corners) - point, axis=1).min()))
-    return worst
-
-
-def _by_manifold(points: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Vertices and triangles; what stands out by less than 1e-7 of the size is left out."""
-    import manifold3d
-
-    solid = manifold3d.Manifold.hull_points(points)
-    made = solid.to_mesh64()
-    vertices, faces = np.array(made.vert_properties)[:, :3], np.array(made.tri_verts, dtype=np.int64)
-    if not len(faces) or not solid.volume() > 1e-14 * float(np.ptp(vertices, axis=0).max()) ** 3:
-        raise ValueError("the points lie in one plane")
-    return vertices, faces
-
-
-def _by_qhull(points: Array) -> tuple[Array, NDArray[np.int64]]:
-    """The same to rounding, by a library that takes longer to import than most hulls to make."""
-    from scipy.spatial import ConvexHull
-
-    made = ConvexHull(points)
+    try:
+        made = ConvexHull(points)
+    except QhullError as error:
+        raise ValueError("the points lie in one plane") from error
     faces = made.simplices.astype(np.int64)
     a, b, c = (points[faces[:, k]] for k in range(3))
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), made.equations[:, :3]) < 0.0
     faces[inward] = faces[inward, ::-1]
-    place = np.empty(len(points), dtype=np.int64)
-    place[made.vertices] = np.arange(len(made.vertices))
-    return points[made.vertices], place[faces]
+    number = np.empty(len(points), dtype=np.int64)
+    number[made.vertices] = np.arange(len(made.vertices))
+    normals = made.equations[np.unique(made.equations.round(12), axis=0, return_index=True)[1], :3]
+    return Hull(points[made.vertices], _planes(normals, points), number[faces])
+
+
+def prism(corners: Array, start: float, end: float, frame: Array) -> Hull:
+    """A convex outline (k, 2), anticlockwise, drawn from ``start`` to ``end`` mm along z of ``frame`` (3, 3)."""
+    before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
+    size = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    corners = corners[before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] > STRAIGHT * size]
+    n = len(corners)
+    ends = [np.column_stack([corners, np.full(n, z)]) for z in (start, end)]
+    vertices = np.vstack(ends) @ frame.T
+    fan = np.column_stack([np.zeros(n - 2, dtype=np.int64), np.arange(1, n - 1), np.arange(2, n)])
+    here, following = np.arange(n), np.roll(np.arange(n), -1)
+    sides = [np.column_stack([here, following, following + n]), np.column_stack([here, following + n, here + n])]
+    faces = np.vstack([fan[:, ::-1], fan + n, *sides])
+    along = np.roll(corners, -1, axis=0) - corners
+    outward = np.column_stack([along[:, 1], -along[:, 0], np.zeros(n)]) / np.linalg.norm(along, axis=1)[:, None]
+    normals = np.vstack([outward, [(0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]]) @ frame.T
+    return Hull(vertices, _planes(normals, vertices), faces if np.linalg.det(frame) > 0.0 else faces[:, ::-1])
+
+
+def _planes(normals: Array, points: Array) -> Array:
+    """Planes (m, 4) square to unit normals (m, 3), up to the highest of the points (n, 3): none is cut off."""
+    step = max(1, _MEMORY // len(points))
+    top = [(points @ normals[k : k + step].T).max(axis=0) for k in range(0, len(normals), step)]
+    return np.column_stack([normals, -np.concatenate(top)])
 
 
 def hull_error(vertices: Array, faces: NDArray[np.int64]) -> float:
@@ -199,53 +169,22 @@ def hull_error(vertices: Array, faces: NDArray[np.int64]) -> float:
     within h / cos t of z, and cos t is the depth of c below the plane over the distance of c and z.
     """
     scale = float(np.abs(vertices).max())
-    few = np.unique(np.arange(64) * 2654435761 % len(faces))  # far apart, in no step with the rings of a mesh
-    if _Sides.of(vertices, faces[few]).highest(vertices).max(initial=0.0) > 1e-6 * scale:
-        return np.inf
-    sides = _Sides.of(vertices, faces)
+    corners = vertices[faces]
+    sides = np.roll(corners, -1, axis=1) - corners
+    normal = np.cross(sides[:, 0], sides[:, 1])
+    twice_area, longest = np.linalg.norm(normal, axis=1), np.linalg.norm(sides, axis=2).max(axis=1)
+    flat = twice_area > _SLIVER * scale * longest  # others have no plane to speak of
+    normal, corner = normal[flat] / twice_area[flat, None], corners[flat, 0]
+    few = np.unique(np.arange(64) * 2654435761 % max(1, len(normal)))  # far apart, in no step with the rings of a mesh
+    offset = np.einsum("ij,ij->i", normal, corner)
+    for rows in (few, slice(None)):
+        height = float((-_planes(normal[rows], vertices)[:, 3] - offset[rows]).max(initial=0.0))
+        if height > 1e-6 * scale:
+            return np.inf
     centre = vertices.mean(axis=0)
-    depth = float((sides.offset - sides.normal @ centre)[sides.flat].min(initial=np.inf))
+    depth = float((offset - normal @ centre).min(initial=np.inf))
     if not 0.0 < depth < np.inf:
         return np.inf
     # A point of a sliver is this far from a neighbour's plane.
-    height = float(sides.highest(vertices).max()) + (0.0 if sides.flat.all() else _SLIVER * scale)
-    return max(0.0, height) * float(np.linalg.norm(vertices - centre, axis=1).max()) / depth
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sides:
-    """Unit normals (m, 3) and offsets (m,) of triangles' planes, both 0 of slivers; rounding (m,) of heights above."""
-
-    normal: Array
-    offset: Array
-    rounding: Array
-
-    @classmethod
-    def of(cls, vertices: Array, faces: NDArray[np.int64]) -> _Sides:
-        """The planes of triangles (m, 3)."""
-        corners, scale = vertices[faces], float(np.abs(vertices).max())
-        sides = np.roll(corners, -1, axis=1) - corners
-        normal = np.cross(sides[:, 0], sides[:, 1])
-        twice_area, longest = np.linalg.norm(normal, axis=1), np.linalg.norm(sides, axis=2).max(axis=1)
-        narrow = twice_area / np.maximum(longest, 1e-300)
-        normal = np.where((narrow > _SLIVER * scale)[:, None], normal / np.maximum(twice_area, 1e-300)[:, None], 0.0)
-        size = float(np.ptp(vertices, axis=0).max())
-        rounding = 16.0 * _EPS * scale * (1.0 + size / np.maximum(narrow, _SLIVER * scale))
-        return cls(normal, np.einsum("ij,ij->i", normal, corners[:, 0]), rounding)
-
-    @property
-    def flat(self) -> NDArray[np.bool_]:
-        """Which triangles (m,) are no slivers."""
-        return np.asarray(self.normal.any(axis=1))
-
-    def highest(self, points: Array) -> Array:
-        """How high (m,) the highest of points (n, 3) is above each plane."""
-        step = max(1, _MEMORY // len(points))
-        parts = [(points @ self.normal[k : k + step].T).max(axis=0) for k in range(0, len(self.normal), step)]
-        return np.concatenate(parts) - self.offset
-
-    def above(self, points: Array) -> NDArray[np.bool_]:
-        """Which of points (n, 3) are above some plane by more than rounding."""
-        step, limit = max(1, _MEMORY // len(self.normal)), self.offset + self.rounding
-        parts = [(points[k : k + step] @ self.normal.T > limit).any(axis=1) for k in range(0, len(points), step)]
-        return np.concatenate(parts)
+    height += 0.0 if flat.all() else _SLIVER * scale
+    return height * float(np.linalg.norm(vertices - centre, axis=1).max()) / depth

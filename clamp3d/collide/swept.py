@@ -12,7 +12,7 @@ import numpy as np
 
 from clamp3d.collide.closed_form import ClosedForm, bore_rod
 from clamp3d.collide.convex import Convex, Rod, convex_distance
-from clamp3d.collide.hull import Hull, nearly_hull
+from clamp3d.collide.hull import Hull, hull
 from clamp3d.collide.model import Model
 from clamp3d.core.pose import Array, inverse, to_target
 
@@ -67,8 +67,7 @@ def _swept_hull(piece: Convex, poses: tuple[Array, ...], angle: float) -> tuple[
     """Hull of a polyhedron at all three poses, in the standing part's frame, and how far arcs leave it."""
     assert isinstance(piece, Hull)
     ways = np.array([to_target(T, piece.vertices) for T in poses])
-    around, off = nearly_hull((ways if angle else ways[::2]).reshape(-1, 3))
-    return around, off + _sagitta(ways, angle)
+    return hull((ways if angle else ways[::2]).reshape(-1, 3)), _sagitta(ways, angle)
 
 
 def _swept_rod(rod: Rod, poses: tuple[Array, ...], angle: float) -> Rod:
