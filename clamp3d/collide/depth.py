@@ -15,7 +15,7 @@ from clamp3d.collide.convex import Convex
 from clamp3d.collide.convex_depth import convex_depth
 from clamp3d.collide.mesh_distance import are_apart, rounding_of
 from clamp3d.collide.model import Model
-from clamp3d.collide.overlap import Common, common, deepest, thickness
+from clamp3d.collide.overlap import Common, common, deepest
 from clamp3d.collide.surface import Surface
 from clamp3d.core.pose import Array
 
@@ -28,11 +28,13 @@ _HALVINGS = 5
 _EXACT = 1e-9
 """Error (mm) of a closed form up to which it counts as exact: rounding of a CAD file's points."""
 _CLOSE = 1.05
-"""Ratio of the bounds of the interference at which they are close enough."""
+"""Ratio of a way out, less what meshes are off by, to the depth of a point at which no shorter one is looked for."""
 
 
 def convex_piece(model: Model) -> Convex | None:
     """The one convex piece that a body is made of; None if it is made of more, has holes, or is not exact."""
+    if model.exact is not None and not (model.chords and model.outer(model.chords[0]).is_convex):
+        return None  # its facets tell that without what a closed form costs
     if not model.bodies or len(model.bodies) != 1:
         return None
     (body,) = model.bodies
@@ -78,19 +80,13 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
     if shared is None:
         return replace(distance, lower=-np.inf, interference=interference)
     # Meshes around drawn bodies attest no depth.
-    attested = 0.0 if a.between or b.between else max(0.0, deepest(outer_a, outer_b, T, shared)[0])
-    bound = _most_interference(outer_a, outer_b, T, shared, attested)
-    interference = max(interference[0], attested), max(interference[0], attested, min(interference[1], bound))
-    upper = min(distance.upper, -interference[0]) if interference[0] > 0.0 else distance.upper
-    length, direction = _way_out(outer_a, outer_b, T, shared, interference[0])
+    attested = 0.0 if a.between or b.between else deepest(outer_a, outer_b, T, shared)[0]
+    deep = max(interference[0], attested)
+    upper = min(distance.upper, -deep) if deep > 0.0 else distance.upper
+    length, direction = _way_out(outer_a, outer_b, T, shared, deep)
+    interference = deep, max(deep, min(interference[1], length))  # no point is deeper than the bodies
     lower = min(-length, upper)
     return replace(distance, lower=lower, upper=upper, normal=direction, level="depth", interference=interference)
-
-
-def _most_interference(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> float:
-    """Upper bound (mm) of the greatest depth of a point of one body in the other, from meshes that are or hold them."""
-    off = a.error + b.error + rounding_of(a, b, T)
-    return thickness(a, b, T, shared, lambda bound: bound <= _CLOSE * (depth + off)) + off
 
 
 def _way_out(a: Surface, b: Surface, T: Array, shared: Common, deep: float) -> tuple[float, Array | None]:
@@ -101,8 +97,12 @@ def _way_out(a: Surface, b: Surface, T: Array, shared: Common, deep: float) -> t
     candidates = np.vstack([shared.mean_normal(a), shared.directions(_DIRECTIONS), np.eye(3), T[:3, :3].T])
     for direction in candidates:
         reach = float(np.ptp(shared.vertices @ direction)) + slack
+        low = min(deep, reach)
         for sign in (1.0, -1.0):
-            length = _shortest(a, b, T, sign * direction, min(deep, reach), min(reach, best))
+            if best <= _CLOSE * deep + slack:
+                return best, way
+            lengths = low + _SHARES * (reach - low)
+            length = _shortest(a, b, T, sign * direction, low, lengths[lengths < best])
             if length < best:
                 best, way = length, sign * direction
     return best, way
@@ -113,15 +113,12 @@ def _outer(model: Model) -> Surface:
     return model.outer(model.chords[min(1, len(model.chords) - 1)])
 
 
-def _shortest(a: Surface, b: Surface, T: Array, direction: Array, low: float, high: float) -> float:
-    """A length (mm) between ``low`` and ``high`` after which ``b`` is apart; infinite if that is not so at ``high``."""
-    for length in (low + _SHARES * (high - low)).tolist():
-        if are_apart(a, b, _moved(T, length * direction)):
-            high = length
-            break
-        low = length
-    else:
-        return np.inf
+def _shortest(a: Surface, b: Surface, T: Array, direction: Array, low: float, lengths: Array) -> float:
+    """A length (mm) after which ``b`` is apart, at most the first of ``lengths`` (k,) that does, or infinite."""
+    high = next((length for length in lengths.tolist() if are_apart(a, b, _moved(T, length * direction))), np.inf)
+    if high == np.inf:
+        return high
+    low = max([low, *lengths[lengths < high].tolist()])
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         if are_apart(a, b, _moved(T, middle * direction)):

@@ -73,20 +73,24 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
     if not _boxes_allow(inner, outer, T, contact):
         return False
     inner.counters.queries["containment"] += 1
-    small, large = inner.outer(inner.chords[-1]), outer.inner(outer.chords[-1])
-    slack = small.error + _chord(inner, outer)
-    if large is None or not within(small, large, T, contact + slack + large.error):
-        return False
-    if slack + large.error <= contact or inner.exact is None or outer.exact is None:
+    slack = 0.0
+    for level in (0, -1):  # coarse meshes mostly tell that it does not
+        small, large = inner.outer(inner.chords[level]), outer.inner(outer.chords[level])
+        if large is None:
+            return False
+        slack = small.error + large.error + _chord(level, inner, outer)
+        if not within(small, large, T, contact + slack):
+            return False
+    if slack <= contact or inner.exact is None or outer.exact is None:
         return True
     # The meshes are coarser than the threshold: what is shared must be all of the inner one but a skin.
     shared = cad_process.common(outer.exact.brep, inner.exact.brep, T, 1.0)
     return shared.volume >= inner.exact.volume - contact * shared.area
 
 
-def _chord(*models: Model) -> float:
+def _chord(level: int, *models: Model) -> float:
     """How far (mm) meshes around and inside of drawn solids are from the solids."""
-    return sum(model.chords[-1] for model in models if model.between)
+    return sum(model.chords[level] for model in models if model.between)
 
 
 def _boxes_allow(inner: Model, outer: Model, T: Array, contact: float) -> bool:

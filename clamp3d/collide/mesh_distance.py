@@ -22,6 +22,10 @@ Enough = Callable[[Distance], bool]
 
 _MOST_POINTS = 400
 """Vertices of a mesh, spread over it, that are tried as points inside another one."""
+_CUTS, _FEW_CUTS = 60_000, 2_000
+"""Triangles that those of an overlap are cut into beyond their number, to bound its thickness: tenths of a second, or
+less where Open CASCADE can be asked instead.
+"""
 _HALVINGS = 30
 """Halvings of the way between two nearest points after which the true surface on it is known to rounding."""
 
@@ -32,9 +36,10 @@ def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough) 
     In an overlap the bounds are those of the interference: the greatest depth of a point of one body in the other. It
     is bounded from above only where that can be ``enough``.
     """
+    cuts = _CUTS if a.exact is None or b.exact is None else _FEW_CUTS
+    outer = surface_distance(a.outer(error), b.outer(error), T, enough, cuts)
     if not (a.between or b.between):
-        return surface_distance(a.outer(error), b.outer(error), T, enough)
-    outer = surface_distance(a.outer(error), b.outer(error), T, enough)
+        return outer
     inner_a, inner_b = a.inner(error), b.inner(error)
     if inner_a is None or inner_b is None:
         return Distance(outer.lower)
@@ -64,23 +69,24 @@ def _towards(model: Model, T: Array, inside: Array, outside: Array) -> Array:
     return np.asarray(inside + low * (outside - inside))
 
 
-def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough) -> Distance:
+def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int = _CUTS) -> Distance:
     """Signed distance of two meshes, ``b`` at ``T`` (4, 4) in a's frame; answers as `meshes_distance`."""
     rounding = rounding_of(a, b, T)
     if surfaces_meet(a, b, T):
-        return _overlap(a, b, T, rounding, enough)
+        return _overlap(a, b, T, enough, cuts)
     lower, upper, p, q = nearest_points(a, b, T)
     if upper <= rounding:
-        return _overlap(a, b, T, rounding, enough)
+        return _overlap(a, b, T, enough, cuts)
     if one_inside(a, b, T) or one_inside(b, a, inverse(T)):
-        return _overlap(a, b, T, rounding, enough)
+        return _overlap(a, b, T, enough, cuts)
     local = (q - T[:3, 3]) @ T[:3, :3]
     off = float(a.error_at(p[None])[0] + b.error_at(local[None])[0])
     return Distance(lower - rounding, upper + off + rounding, p, q)
 
 
-def _overlap(a: Surface, b: Surface, T: Array, rounding: float, enough: Enough) -> Distance:
+def _overlap(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int) -> Distance:
     """Bounds of the interference of two meshes of which one meets the other or lies inside it."""
+    rounding = rounding_of(a, b, T)
     off = a.error + b.error + rounding
     vertex = _deepest_vertex(a, b, T)
     if vertex is not None and -vertex.upper > 0.05 * min(float(np.ptp(s.box, axis=0).max()) for s in (a, b)):
@@ -101,7 +107,7 @@ def _overlap(a: Surface, b: Surface, T: Array, rounding: float, enough: Enough) 
     of_meshes = depth + a.error + b.error  # what was measured there: no bound of the meshes' overlap is less
     if enough(unbounded) or not enough(of_thickness(max(0.0, -upper, of_meshes))):
         return unbounded
-    return of_thickness(thickness(a, b, T, shared, lambda bound: enough(of_thickness(bound))))
+    return of_thickness(thickness(a, b, T, shared, lambda bound: enough(of_thickness(bound)), cuts))
 
 
 def _nothing(_: Distance) -> bool:

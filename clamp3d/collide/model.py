@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.brep.open_cascade import PLANE
+from clamp3d.brep.open_cascade import CYLINDER, PLANE
 from clamp3d.brep.solid import CHORD, BrepSolid
 from clamp3d.collide.closed_form import ClosedForm
 from clamp3d.collide.drawn import bodies_of
@@ -114,6 +114,8 @@ class Model:
     def _fit(self) -> FitResult | None:
         """Round surfaces found in a mesh, or named by a CAD file; None where none are looked for."""
         if isinstance(self.shape, BrepSolid):
+            if not (self.shape.surfaces.kind == CYLINDER).any():
+                return None
             from clamp3d.fit.fit import fit_solid
 
             return fit_solid(self.shape)

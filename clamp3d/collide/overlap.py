@@ -18,9 +18,6 @@ _INNER = 40
 """Triangles of an overlap under which a point is tried."""
 _CORNERS = 400
 """Corners of an overlap that are measured."""
-_CUTS = 60_000
-"""Triangles that those of an overlap are cut into beyond their number, to bound its thickness: tenths of a second."""
-
 _HAIR = 1e-9
 """Relative to the size: a piece that reaches over a border by less is not cut there."""
 
@@ -105,7 +102,7 @@ def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Ar
     return float(depth[k]), points[k]
 
 
-def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Callable[[float], bool]) -> float:
+def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Callable[[float], bool], cuts: int) -> float:
     """Upper bound (mm) of how deep any point of one mesh's surface lies in the other, sharpened until ``is_enough``.
 
     Lemma: the distance from a fixed triangle is convex, so over a triangle of the common part it is largest at a
@@ -115,7 +112,7 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Calla
     if 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
         return np.inf
     bound = np.inf
-    for pieces in cut_up(a, b, T, shared.vertices[shared.faces]):
+    for pieces in cut_up(a, b, T, shared.vertices[shared.faces], cuts):
         bound = float(pieces.at_most.max(initial=0.0))
         if is_enough(bound) or not is_enough(float(pieces.middles.max(initial=0.0))):
             break
@@ -145,7 +142,7 @@ class Pieces:
         )
 
 
-def cut_up(a: Surface, b: Surface, T: Array, triangles: Array, most: int = _CUTS) -> Iterator[Pieces]:
+def cut_up(a: Surface, b: Surface, T: Array, triangles: Array, most: int) -> Iterator[Pieces]:
     """Triangles (m, 3, 3), and what is left when the furthest are cut, again and again, until ``most`` are added."""
     back = inverse(T)
     pieces = Pieces.of(a, b, triangles, back)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.collide.hull import hull_error
 from clamp3d.core.mesh import edges_of, is_closed
 from clamp3d.core.pose import Array
 from clamp3d.core.shells import shells
@@ -99,6 +100,11 @@ class Surface:
         N = np.cross(b - a, c - a)
         size = np.linalg.norm(N, axis=1)
         return np.asarray(np.where((size > 1e-14 * self.scale**2)[:, None], N / np.maximum(size, 1e-300)[:, None], 0.0))
+
+    @cached_property
+    def is_convex(self) -> bool:
+        """Whether the mesh, which is closed, is its own hull but for a millionth of its size."""
+        return hull_error(self.vertices, self.faces) < np.inf
 
     @cached_property
     def _tree(self) -> Any:
