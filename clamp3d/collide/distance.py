@@ -188,4 +188,4 @@ def _measured(a: Model, b: Model, T: Array, accuracy: float, model: ContactModel
     distance = with_normal(refine(a, b, T, from_boxes(a, b, T), lambda known: measured(known, wide)))
     if model is not None and (by_model := modelled(a, b, T, distance, model)) is not distance:
         return by_model
-    return penetration(a, b, T, distance) if distance.upper < 0.0 or distance.lower < -ACCURACY else distance
+    return penetration(a, b, T, distance) if distance.lower < -ACCURACY else distance

@@ -92,7 +92,7 @@ def test_no_sampled_depth_is_above_the_thickness(i, j, T):
     if shared is None:
         return
     truth = depths(a, b, T)
-    bound = thickness(a, b, T, shared, lambda bound: bound <= 1.1 * truth)
+    bound = thickness(a, b, T, shared, lambda bound: bound <= 1.1 * truth, 60_000)
     assert truth <= bound + 1e-9
     if math.isfinite(bound):
         point, at = deepest(a, b, T, shared)
@@ -102,9 +102,9 @@ def test_no_sampled_depth_is_above_the_thickness(i, j, T):
 def test_the_thickness_of_a_slab_is_its_own():
     """Falsifiable: two boxes 0.3 mm in each other, along their faces."""
     a, b, T = box_mesh((10.0, 10.0, 10.0)), box_mesh((6.0, 6.0, 6.0)), translation(0.2, 0.1, 7.7)
-    bound = thickness(a, b, T, common(a, b, T), lambda bound: bound <= 0.31)
+    bound = thickness(a, b, T, common(a, b, T), lambda bound: bound <= 0.31, 60_000)
     assert 0.3 - 1e-9 <= bound <= 0.31
-    assert thickness(a, b, T, common(a, b, T), lambda bound: bound <= 0.29) >= 0.3 - 1e-9
+    assert thickness(a, b, T, common(a, b, T), lambda bound: bound <= 0.29, 60_000) >= 0.3 - 1e-9
     assert common(a, b, translation(0.0, 0.0, 8.1)) is None
 
 
