@@ -30,12 +30,16 @@ Where it does not end, finer meshes decide.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommonPart:
-    """What two solids share: ``volume`` mm^3, ``area`` mm^2, ``box`` (2, 3), ``triangles`` (k, 3, 3) of its border."""
+    """What two solids share: ``volume`` mm^3, ``area`` mm^2, ``box`` (2, 3), ``points`` (k, 3) of its border.
+
+    ``chord`` mm: how far the border's triangles between the points are from it.
+    """
 
     volume: float
     area: float
     box: Array
-    triangles: Array
+    points: Array
+    chord: float
 
 
 @cache

@@ -28,6 +28,9 @@ TOLERANCE = 1e-6
 ANGLE = 0.35
 """Largest turn (rad) from facet to facet, so that a small fillet gets facets enough to be seen as round."""
 
+_SLENDER = 400.0
+"""Ratio of a common part's size to its thickness beyond which its chords go by the size: else they take seconds."""
+
 SAMPLED = 2.0
 """Factor on the deviation measured at the edges' middles; 4/3 is enough where the surface is quadratic."""
 
@@ -365,10 +368,11 @@ def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
     return float(search.Value()), p, q
 
 
-def common(a: bytes, b: bytes, T: Array, share: float) -> tuple[float, float, Array, Array]:
-    """The common part of ``a`` and of ``b`` at ``T`` (4, 4): volume (mm^3), area (mm^2), box (2, 3), border (k, 3, 3).
+def common(a: bytes, b: bytes, T: Array, share: float) -> tuple[float, float, Array, Array, float]:
+    """Volume (mm^3), area (mm^2), box (2, 3), points and chord of the common part of ``a`` and ``b`` at ``T`` (4, 4).
 
-    The chords of the border's triangles are ``share`` of the part's thickness, volume over area.
+    The points (k, 3) are corners of triangles of its border within the chord (mm) of it, which is ``share`` of the
+    part's thickness, volume over area, or of its size divided by `_SLENDER`.
     Raises Clamp3dError if Open CASCADE cannot make it.
     """
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
@@ -379,14 +383,13 @@ def common(a: bytes, b: bytes, T: Array, share: float) -> tuple[float, float, Ar
         raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
     shape = made.Shape()
     if next(explore(shape, "SOLID"), None) is None:
-        return 0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3, 3))
+        return 0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3)), 0.0
     volume, area = abs(volume_of(shape)), area_of(shape)
-    BRepMesh_IncrementalMesh(shape, max(share * volume / max(area, 1e-300), TOLERANCE), False, ANGLE, False)
-    border = [np.empty((0, 3, 3))]
-    for k, face in enumerate(explore(shape, "FACE")):
-        P, triangles, _ = _triangles_of(face, k)
-        border.append(P[triangles])
-    return volume, area, bounds_of(shape), np.concatenate(border)
+    box = bounds_of(shape)
+    chord = max(share * volume / max(area, 1e-300), share / _SLENDER * float(np.linalg.norm(box[1] - box[0])))
+    BRepMesh_IncrementalMesh(shape, chord, False, ANGLE, False)
+    border = [_triangles_of(face, k)[0] for k, face in enumerate(explore(shape, "FACE"))]
+    return volume, area, box, np.concatenate(border), chord
 
 
 def depths(brep: bytes, points: Array) -> Array:
