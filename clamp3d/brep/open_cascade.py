@@ -58,6 +58,22 @@ class Surfaces:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class CommonPart:
+    """What two solids share: ``volume`` (mm^3), ``area`` (mm^2) and ``box`` (2, 3); nothing if the volume is 0.
+
+    ``points`` (n, 3) lie on its border, of which triangles between them are within ``chord`` mm; ``flat`` (m, 3, 3) are
+    those of its plane faces.
+    """
+
+    volume: float
+    area: float
+    box: Array
+    points: Array
+    flat: Array
+    chord: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Tessellation:
     """Triangles of one solid.
 
@@ -368,11 +384,10 @@ def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
     return float(search.Value()), p, q
 
 
-def common(a: bytes, b: bytes, T: Array, share: float) -> tuple[float, float, Array, Array, float]:
-    """Volume (mm^3), area (mm^2), box (2, 3), points and chord of the common part of ``a`` and ``b`` at ``T`` (4, 4).
+def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
+    """The common part of ``a`` and of ``b`` at ``T`` (4, 4).
 
-    The points (k, 3) are corners of triangles of its border within the chord (mm) of it, which is ``share`` of the
-    part's thickness, volume over area, or of its size divided by `_SLENDER`.
+    The chord is ``share`` of the part's thickness, volume over area, or of its size divided by `_SLENDER`.
     Raises Clamp3dError if Open CASCADE cannot make it.
     """
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
@@ -383,13 +398,18 @@ def common(a: bytes, b: bytes, T: Array, share: float) -> tuple[float, float, Ar
         raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
     shape = made.Shape()
     if next(explore(shape, "SOLID"), None) is None:
-        return 0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3)), 0.0
+        return CommonPart(0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3)), np.empty((0, 3, 3)), 0.0)
     volume, area = abs(volume_of(shape)), area_of(shape)
     box = bounds_of(shape)
     chord = max(share * volume / max(area, 1e-300), share / _SLENDER * float(np.linalg.norm(box[1] - box[0])))
     BRepMesh_IncrementalMesh(shape, chord, False, ANGLE, False)
-    border = [_triangles_of(face, k)[0] for k, face in enumerate(explore(shape, "FACE"))]
-    return volume, area, box, np.concatenate(border), chord
+    points, flat = [np.empty((0, 3))], [np.empty((0, 3, 3))]
+    for k, face in enumerate(explore(shape, "FACE")):
+        P, triangles, _ = _triangles_of(face, k)
+        points.append(P)
+        if _surface_of(face)[0] == PLANE:
+            flat.append(P[triangles])
+    return CommonPart(volume, area, box, np.concatenate(points), np.concatenate(flat), chord)
 
 
 def depths(brep: bytes, points: Array) -> Array:

@@ -8,10 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from clamp3d.brep import cad_process
-from clamp3d.brep.open_cascade import TOLERANCE
+from clamp3d.brep.open_cascade import TOLERANCE, CommonPart
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.mesh_distance import holds
 from clamp3d.collide.model import Model
+from clamp3d.collide.overlap import cut_up
 from clamp3d.core.pose import Array
 from clamp3d.errors import Clamp3dError
 
@@ -20,6 +21,8 @@ _TRIED = 24
 """Points of the common part's border whose depth is measured exactly: as many of those that look deepest by the meshes,
 and of all that may be the deepest.
 """
+_PIECES = 4000
+"""Triangles that the flat faces of that border are cut into beyond their number, to find these points."""
 
 
 def exact_distance(a: Model, b: Model, T: Array) -> Distance:
@@ -46,7 +49,7 @@ def exact_overlap(a: Model, b: Model, T: Array, share: float) -> Distance:
         return unknown
     if shared.volume <= TOLERANCE * max(1e-12, shared.area) or not len(shared.points):
         return Distance(-TOLERANCE, TOLERANCE, level="exact", method=METHOD)
-    deepest = _deepest(a, b, T, shared.points)
+    deepest = _deepest(a, b, T, shared)
     if deepest is None:
         return unknown
     depth, point = deepest
@@ -56,27 +59,30 @@ def exact_overlap(a: Model, b: Model, T: Array, share: float) -> Distance:
     )
 
 
-def _deepest(a: Model, b: Model, T: Array, points: Array) -> tuple[float, Array] | None:
-    """The largest depth (mm) of points (k, 3) of the common part's border in either solid, and the point (3,).
+def _deepest(a: Model, b: Model, T: Array, shared: CommonPart) -> tuple[float, Array] | None:
+    """The largest depth (mm) of points of the common part's border in either solid, and the point (3,).
 
     None where some of them do not lie in both by their meshes: Open CASCADE was wrong.
     """
-    local = (points - T[:3, 3]) @ T[:3, :3]
-    looks, slack = np.zeros(len(points)), np.inf
+    assert a.exact is not None
+    assert b.exact is not None
     if a.chords and b.chords:
         x, y = a.outer(a.chords[-1]), b.outer(b.chords[-1])
+        *_, pieces = cut_up(x, y, T, shared.flat, _PIECES)
+        points = np.vstack([shared.points, pieces.triangles.mean(axis=1)])
+        local = (points - T[:3, 3]) @ T[:3, :3]
         off = 2.0 * TOLERANCE
         if not (holds(x, points, x.error + off) and holds(y, local, y.error + off)):
             return None
-        looks = np.maximum(x.distance(points), y.distance(local))
-        slack = 2.0 * (x.error + y.error)
+        looks, slack = np.maximum(x.distance(points), y.distance(local)), 2.0 * (x.error + y.error)
+    else:
+        points = np.vstack([shared.points, shared.flat.mean(axis=1)])
+        looks, slack = np.zeros(len(points)), np.inf
     order = np.argsort(-looks, kind="stable")
     order = order[looks[order] >= looks.max() - slack]
     spread = order[np.linspace(0, len(order) - 1, min(len(order), _TRIED)).round().astype(int)]
-    tried = np.concatenate([order[:_TRIED], spread])
-    assert a.exact is not None
-    assert b.exact is not None
-    in_a, in_b = cad_process.depths(a.exact.brep, points[tried]), cad_process.depths(b.exact.brep, local[tried])
-    depths = np.maximum(in_a, in_b)
+    points = points[np.concatenate([order[:_TRIED], spread])]
+    in_b = cad_process.depths(b.exact.brep, (points - T[:3, 3]) @ T[:3, :3])
+    depths = np.maximum(cad_process.depths(a.exact.brep, points), in_b)
     k = int(np.argmax(depths))
-    return float(depths[k]), points[tried[k]]
+    return float(depths[k]), points[k]
