@@ -423,8 +423,16 @@ def _samples(face: Any, number: int) -> tuple[Array, float]:
         corners = np.concatenate([middles, *at_corners])
     everything = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 2)
     points = np.array([surface.Value(u, v).Coord() for u, v in everything.tolist()]).reshape(-1, 4, 3)
-    off = np.linalg.norm(points[:, :3].mean(axis=1) - points[:, 3], axis=1).max(initial=0.0)
-    return points.reshape(-1, 3), float(off)
+    return points.reshape(-1, 3), float(_heights(points).max(initial=0.0))
+
+
+def _heights(points: Array) -> Array:
+    """How far (m,) the last of four points (m, 4, 3) is from the plane of the others; of slivers from their middle."""
+    a, b, c, last = points.transpose(1, 0, 2)
+    normal, offset = np.cross(b - a, c - a), last - (a + b + c) / 3.0
+    size, away = np.linalg.norm(normal, axis=1), np.linalg.norm(offset, axis=1)
+    height = np.abs(np.einsum("ij,ij->i", normal, offset)) / np.maximum(size, 1e-300)
+    return np.asarray(np.where(size > 1e-6 * away**2, height, away))
 
 
 def depths(brep: bytes, points: Array) -> Array:

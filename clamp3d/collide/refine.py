@@ -25,7 +25,7 @@ from clamp3d.errors import SolverError
 ACCURACY = 1e-7
 """Width (mm) of the interval at which a distance counts as known; relative to the size where that is more."""
 
-SHARES = (0.02, 0.004)
+SHARES = (0.04, 0.015)
 """Chords of the border of a common part, of its thickness: the first is quick, the second takes up to seconds."""
 
 Enough = Callable[[Distance], bool]
