@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
 
+from clamp3d.brep.bodies import Reading
 from clamp3d.checks import readable_file, short
 from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.errors import Clamp3dError, InputError
 
-READ_BODIES = "clamp3d.brep.formats:read_plain"
-READ_URDF = "clamp3d.brep.urdf_file:read_urdf"
+_READ = "clamp3d.brep.formats:read_plain"
 LIMITS = "CLAMP3D_READ_LIMITS"
 """Environment variable: a factor for the limits of memory and time."""
 OUTSIDE = "CLAMP3D_READ_OUTSIDE"
@@ -37,7 +36,7 @@ def reading_process() -> Iterator[Worker]:
     if outer is not None:
         yield outer
         return
-    with Worker(READ_BODIES, READ_URDF, confined=True) as worker:
+    with Worker(_READ, confined=True) as worker:
         token = _shared.set(worker)
         try:
             yield worker
@@ -45,10 +44,11 @@ def reading_process() -> Iterator[Worker]:
             _shared.reset(token)
 
 
-def read_in_process(function: str, path: Path, *arguments: Any) -> Any:
-    """The result of ``function(path, *arguments)``, called in the reading process.
+def read_in_process(path: Path, unit: str | None = None, joints: Mapping[str, float] | None = None) -> Reading:
+    """The bodies of a file, read in the reading process.
 
-    Raises InputError if the file cannot be read, also if its reader crashes, or takes too much time or memory.
+    Raises InputError if the file cannot be read, also if its reader crashes, or takes too much time or memory, and
+    MissingLibraryError if its reader is not installed.
     """
     size = readable_file(path)
     factor = _factor()
@@ -57,7 +57,8 @@ def read_in_process(function: str, path: Path, *arguments: Any) -> Any:
     absolute = str(path.absolute())
     with reading_process() as worker:
         try:
-            return worker.call(function, absolute, *arguments, time_limit=seconds, memory=memory)
+            named = {str(name): value for name, value in (joints or {}).items()}
+            return Reading.from_plain(worker.call(_READ, absolute, unit, named, time_limit=seconds, memory=memory))
         except WorkerTimeoutError:
             problem = f"not read in {seconds:.0f} s; {LIMITS}=4 allows four times as much"
         except MemoryError:

@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 
 from clamp3d import checks
-from clamp3d.brep.formats import FORMATS
+from clamp3d.brep.formats import FORMATS, ROBOT
 from clamp3d.brep.worker import reading_process
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.loader import builtin_clamps, load_clamp, parse_toml, read_text
@@ -138,5 +138,5 @@ def _is_clamp(path: Path) -> bool:
 
 def _choices() -> str:
     built_in = ", ".join(builtin_clamps())
-    files = ", ".join((*FORMATS, ".urdf"))
+    files = ", ".join((*FORMATS, ROBOT))
     return f"built in: {built_in}; or give a clamp or scene file (.toml), a folder, or a file ({files})"
