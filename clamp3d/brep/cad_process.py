@@ -6,13 +6,12 @@ Each function here calls the one of the same name in `clamp3d.brep.open_cascade`
 from __future__ import annotations
 
 import atexit
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from clamp3d.brep.open_cascade import Surfaces, Tessellation
+from clamp3d.brep.open_cascade import CommonPart, Surfaces, Tessellation
 from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
@@ -26,16 +25,6 @@ _COMMON_SECONDS = 5.0
 
 Where it does not end, finer meshes decide.
 """
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CommonPart:
-    """What two solids share: ``volume`` mm^3, ``area`` mm^2, ``box`` (2, 3), ``triangles`` (k, 3, 3) of its border."""
-
-    volume: float
-    area: float
-    box: Array
-    triangles: Array
 
 
 @cache
@@ -77,8 +66,8 @@ def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
 
 
 def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
-    """The common part of two solids, its border in chords of ``share`` of its thickness."""
-    return CommonPart(*_ask("common", a, b, T, share, seconds=_COMMON_SECONDS))
+    """The common part of two solids; chords of its border are ``share`` of its thickness."""
+    return CommonPart(**_ask("common", a, b, T, share, seconds=_COMMON_SECONDS))
 
 
 def depths(brep: bytes, points: Array) -> Array:

@@ -28,6 +28,9 @@ TOLERANCE = 1e-6
 ANGLE = 0.35
 """Largest turn (rad) from facet to facet, so that a small fillet gets facets enough to be seen as round."""
 
+_SLENDER = 400.0
+"""Ratio of a common part's size to its thickness beyond which its chords go by the size: else they take seconds."""
+
 SAMPLED = 2.0
 """Factor on the deviation measured at the edges' middles; 4/3 is enough where the surface is quadratic."""
 
@@ -52,6 +55,22 @@ class Surfaces:
     frame: Array
     size: Array
     sense: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommonPart:
+    """What two solids share: ``volume`` (mm^3), ``area`` (mm^2) and ``box`` (2, 3); nothing if the volume is 0.
+
+    ``points`` (n, 3) lie on its border, of which triangles between them are within ``chord`` mm; ``flat`` (m, 3, 3) are
+    those of its plane faces.
+    """
+
+    volume: float
+    area: float
+    box: Array
+    points: Array
+    flat: Array
+    chord: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -365,10 +384,10 @@ def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
     return float(search.Value()), p, q
 
 
-def common(a: bytes, b: bytes, T: Array, share: float) -> tuple[float, float, Array, Array]:
-    """The common part of ``a`` and of ``b`` at ``T`` (4, 4): volume (mm^3), area (mm^2), box (2, 3), border (k, 3, 3).
+def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
+    """The common part of ``a`` and of ``b`` at ``T`` (4, 4).
 
-    The chords of the border's triangles are ``share`` of the part's thickness, volume over area.
+    The chord is ``share`` of the part's thickness, volume over area, or of its size divided by `_SLENDER`.
     Raises Clamp3dError if Open CASCADE cannot make it.
     """
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
@@ -379,14 +398,18 @@ def common(a: bytes, b: bytes, T: Array, share: float) -> tuple[float, float, Ar
         raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
     shape = made.Shape()
     if next(explore(shape, "SOLID"), None) is None:
-        return 0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3, 3))
+        return CommonPart(0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3)), np.empty((0, 3, 3)), 0.0)
     volume, area = abs(volume_of(shape)), area_of(shape)
-    BRepMesh_IncrementalMesh(shape, max(share * volume / max(area, 1e-300), TOLERANCE), False, ANGLE, False)
-    border = [np.empty((0, 3, 3))]
+    box = bounds_of(shape)
+    chord = max(share * volume / max(area, 1e-300), share / _SLENDER * float(np.linalg.norm(box[1] - box[0])))
+    BRepMesh_IncrementalMesh(shape, chord, False, ANGLE, False)
+    points, flat = [np.empty((0, 3))], [np.empty((0, 3, 3))]
     for k, face in enumerate(explore(shape, "FACE")):
         P, triangles, _ = _triangles_of(face, k)
-        border.append(P[triangles])
-    return volume, area, bounds_of(shape), np.concatenate(border)
+        points.append(P)
+        if _surface_of(face)[0] == PLANE:
+            flat.append(P[triangles])
+    return CommonPart(volume, area, box, np.concatenate(points), np.concatenate(flat), chord)
 
 
 def depths(brep: bytes, points: Array) -> Array:

@@ -25,6 +25,9 @@ from clamp3d.errors import SolverError
 ACCURACY = 1e-7
 """Width (mm) of the interval at which a distance counts as known; relative to the size where that is more."""
 
+SHARES = (0.02, 0.004)
+"""Chords of the border of a common part, of its thickness: the first is quick, the second takes up to seconds."""
+
 Enough = Callable[[Distance], bool]
 
 
@@ -75,6 +78,8 @@ def _levels(a: Model, b: Model, T: Array, cad_forms: bool) -> Iterator[Callable[
 
         queries["exact"] += 1
         yield lambda _: exact_distance(a, b, T)
+        for share in SHARES:
+            yield partial(_by_common_part, a, b, T, share)
         for chord in LAST_CHORDS:  # Open CASCADE did not find the common part
             if a.refine_to(chord) | b.refine_to(chord):
                 yield partial(_by_meshes, a, b, T, chord)
@@ -103,6 +108,12 @@ def _by_meshes(a: Model, b: Model, T: Array, chord: float, enough: Enough) -> Di
     a.counters.queries["meshes"] += 1
     chord_error = f", chord error {chord:.2g} mm" if a.refines or b.refines else ""
     return meshes_distance(a, b, T, chord, enough).labelled("meshes", f"meshes (FCL){chord_error}")
+
+
+def _by_common_part(a: Model, b: Model, T: Array, share: float, _: Enough) -> Distance:
+    from clamp3d.collide.exact import exact_overlap
+
+    return exact_overlap(a, b, T, share)
 
 
 def _chords(a: Model, b: Model) -> list[float]:

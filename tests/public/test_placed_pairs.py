@@ -10,10 +10,6 @@ from clamp3d import check, load
 from tests.public.placed_pairs import FAMILIES, SOLIDS, PlacedPair, duplicate, judge, placed_pair, write_pairs
 
 GAPS = (2e-4, 0.0103, -5e-3, -0.03)  # scripts/check-placed asks for many more
-NO_ANSWER = {"ring_in_groove", "spline_in_bore", "spline", "ball_in_socket", "tube_in_tube"}
-"""Families and solids of which Open CASCADE takes up to a minute a pair; scripts/check-placed has them too."""
-UNDECIDED = {"taper_in_hub", "ring_on_shaft", "ball_in_ring"}
-"""Families of which some shallow overlaps stay open where Open CASCADE does not find the common part in its time."""
 
 
 def checked(pairs, folder):
@@ -22,23 +18,15 @@ def checked(pairs, folder):
     return judge(pairs, check(load(path), depths=False))
 
 
-def marked(names):
-    """Each as a parameter of a test; those without an answer in time are not run."""
-    slow = pytest.mark.xfail(reason="Open CASCADE does not end", run=False)
-    return [pytest.param(name, marks=[slow] * (name in NO_ANSWER)) for name in names]
-
-
-@pytest.mark.parametrize("family", marked(family for family in FAMILIES if family != "duplicate"))
+@pytest.mark.parametrize("family", [family for family in FAMILIES if family != "duplicate"])
 def test_no_verdict_is_wrong_and_every_pair_is_decided(family, tmp_path):
     rng = np.random.default_rng(list(FAMILIES).index(family))
     counts, lines = checked([placed_pair(family, rng, gap, splines=0.0) for gap in GAPS], tmp_path)
     assert counts[family]["wrong"] == 0, lines
-    if family in UNDECIDED and counts[family]["uncertain"]:
-        pytest.xfail("a shallow overlap is undecided")
     assert counts[family]["uncertain"] == 0, lines
 
 
-@pytest.mark.parametrize("kind", marked(SOLIDS))
+@pytest.mark.parametrize("kind", SOLIDS)
 def test_one_part_twice_is_an_overlap(kind, tmp_path):
     rng = np.random.default_rng(0)
     pairs = [PlacedPair(f"duplicate {kind}", *duplicate(rng, gap, kind), gap) for gap in (0.0, 0.001, 0.009)]
