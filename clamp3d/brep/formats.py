@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from clamp3d.brep.bodies import Reading
+from clamp3d.brep.worker import OUTSIDE
 
 UNITS_MM: dict[str, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 """Millimetres in one unit of length."""
@@ -54,8 +56,12 @@ def read(path: Path, unit: str | None = None) -> Reading:
     return reading
 
 
-def read_plain(name: str, unit: str | None, joints: dict[str, float]) -> dict[str, Any]:
-    """The bodies of any file as dicts, lists and arrays, for the process that asked for them."""
+def read_plain(name: str, unit: str | None, joints: dict[str, float], outside: bool) -> dict[str, Any]:
+    """The bodies of any file as dicts, lists and arrays, for the process that asked for them.
+
+    ``outside``: whether the file may name others outside of its folder.
+    """
+    os.environ[OUTSIDE] = str(int(outside))  # this process reads for another one, whose settings may change
     path = Path(name)
     if path.suffix.lower() != ROBOT:
         return read(path, unit).to_plain()
