@@ -30,7 +30,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from clamp3d.baselines import cache as disk
-from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
+from clamp3d.brep.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.errors import InputError, SolverError
 

@@ -14,13 +14,26 @@ import numpy as np
 
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.checks import short
+from clamp3d.core import shapes
 from clamp3d.core.mesh import Array, Mesh, make_mesh
-from clamp3d.core.shapes import MeshShape
+from clamp3d.core.shapes import MeshShape, Solid
 from clamp3d.errors import InputError
 
-MOST_BODIES = 20_000
-"""Bodies that a file may place: a few hundred bytes can name each other into millions of them."""
 _NAMED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A solid that a function of `clamp3d.core.shapes` draws: its ``kind`` ("box", "cylinder") and ``sizes``, mm."""
+
+    kind: str
+    sizes: tuple[float, ...]
+
+    @property
+    def solid(self) -> Solid:
+        """The solid. Raises InputError for sizes that are not > 0."""
+        solid: Solid = getattr(shapes, self.kind)(*self.sizes)
+        return solid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,8 +41,14 @@ class Body:
     """A shape under the name that its file gives it, placed by ``T`` (4, 4); instances share one shape."""
 
     name: str
-    shape: MeshShape
+    shape: MeshShape | Drawn
     T: Array
+
+    @property
+    def mesh(self) -> Mesh:
+        """The triangles of a shape that is not drawn."""
+        assert not isinstance(self.shape, Drawn)
+        return self.shape.mesh
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,11 +63,14 @@ class Reading:
         Bodies that the file announces and that are not among them: name and reason.
     notes : tuple of str
         What was assumed or repaired, and what the file holds besides bodies.
+    joined : tuple of (str, str) or None
+        Of a robot: names of the links that a joint connects; bodies of one name are one link.
     """
 
     bodies: tuple[Body, ...]
     missing: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    joined: tuple[tuple[str, str], ...] | None = None
 
     @property
     def announced(self) -> int:
@@ -70,16 +92,15 @@ class Reading:
         count = f"{len(self.bodies)} of {self.announced} bodies read; missing: {listed}"
         if not partial:
             raise InputError(f"{short(path)}: only {count} (--partial goes on with those)")
-        return Reading(self.bodies, self.missing, (count, *self.notes))
+        return replace(self, notes=(count, *self.notes))
 
     def merged(self, name: str) -> Mesh:
         """All bodies, each at its place, as one mesh in mm."""
         if len(self.bodies) == 1 and np.array_equal(self.bodies[0].T, np.eye(4)):
-            return self.bodies[0].shape.mesh
-        meshes = [body.shape.mesh for body in self.bodies]
-        starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-        placed = [body.shape.mesh.vertices @ body.T[:3, :3].T + body.T[:3, 3] for body in self.bodies]
-        faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+            return self.bodies[0].mesh
+        starts = np.cumsum([0, *(len(body.mesh.vertices) for body in self.bodies)])
+        placed = [body.mesh.vertices @ body.T[:3, :3].T + body.T[:3, 3] for body in self.bodies]
+        faces = [body.mesh.faces + start for body, start in zip(self.bodies, starts, strict=False)]
         mesh = make_mesh(np.concatenate(placed), np.concatenate(faces), name=name)
         return replace(mesh, notes=(*self.notes, *mesh.notes))
 
@@ -92,27 +113,33 @@ class Reading:
             "bodies": [(body.name, numbers[id(body.shape)], body.T) for body in self.bodies],
             "missing": self.missing,
             "notes": self.notes,
+            "joined": self.joined,
         }
 
     @classmethod
     def from_plain(cls, plain: dict[str, Any]) -> Reading:
         """From what `to_plain` gave."""
-        shapes = [_shape(**shape) for shape in plain["shapes"]]
+        shapes = [_shape(*shape) for shape in plain["shapes"]]
         bodies = [Body(name, shapes[k], T) for name, k, T in plain["bodies"]]
-        return cls(tuple(bodies), tuple(plain["missing"]), tuple(plain["notes"]))
+        joined = None if plain["joined"] is None else tuple((a, b) for a, b in plain["joined"])
+        return cls(tuple(bodies), tuple(plain["missing"]), tuple(plain["notes"]), joined)
 
 
-def _plain(shape: MeshShape) -> dict[str, Any]:
+def _plain(shape: MeshShape | Drawn) -> tuple[str, Any]:
+    if isinstance(shape, Drawn):
+        return "drawn", shape
     if isinstance(shape, BrepSolid):
-        return {"name": shape.name, "exact": shape.to_arrays()}
-    return {"name": shape.name, "mesh": shape.mesh}
+        return "exact", shape.__reduce__()[1]
+    return "mesh", shape
 
 
-def _shape(name: str, exact: dict[str, Any] | None = None, mesh: dict[str, Any] | None = None) -> MeshShape:
-    if exact is not None:
-        return BrepSolid.from_arrays(name, exact)
-    assert mesh is not None
-    return MeshShape(Mesh(**mesh | {"notes": tuple(mesh["notes"])}), "off", name)
+def _shape(kind: str, plain: Any) -> MeshShape | Drawn:
+    if kind == "drawn":
+        return Drawn(plain["kind"], tuple(plain["sizes"]))
+    if kind == "exact":
+        return BrepSolid(*plain)
+    mesh = Mesh(**plain["mesh"] | {"notes": tuple(plain["mesh"]["notes"])})
+    return MeshShape(**plain | {"mesh": mesh})
 
 
 def part_name(name: str) -> str:

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.brep.bodies import MOST_BODIES, Body, Reading
+from clamp3d.brep.bodies import Reading
 from clamp3d.brep.open_cascade import explore, volume_of
+from clamp3d.brep.placing import Collector
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.core.mesh import Array
 from clamp3d.errors import Clamp3dError, InputError
@@ -59,8 +60,7 @@ def bodies_of(roots: Iterable[Node]) -> tuple[Reading, int]:
 
     What is no solid is among the reading's missing. Raises InputError for too many bodies, or too deep a tree.
     """
-    bodies: list[Body] = []
-    missing: list[str] = []
+    collector = Collector()
     shapes: dict[Key, BrepSolid | str] = {}
     loose = 0
     for node, T in _leaves(roots):
@@ -69,26 +69,20 @@ def bodies_of(roots: Iterable[Node]) -> tuple[Reading, int]:
             key = Key(solid)
             name = node.named.get(key) or node.name
             if key not in shapes:
-                shapes[key] = _made(key.shape, name)
+                shapes[key] = _shape(key.shape, name)
             place = T @ matrix(solid.Location())
-            made = shapes[key]
-            if isinstance(made, str):
-                missing.append(f"{name} ({made})")
-            elif abs(np.linalg.det(place[:3, :3]) - 1.0) > 1e-6:
-                missing.append(f"{name} (placed with a scale or a reflection)")
-            else:
-                bodies.append(Body(name, made, place))
-            if len(bodies) + len(missing) > MOST_BODIES:
-                raise InputError(f"more than {MOST_BODIES} bodies")
+            is_rigid = abs(np.linalg.det(place[:3, :3]) - 1.0) < 1e-6
+            collector.add(name, shapes[key] if is_rigid else "placed with a scale or a reflection", place)
         surfaces = sum(1 for _ in explore(node.shape, "SHELL", "SOLID"))
         surfaces += sum(1 for _ in explore(node.shape, "FACE", "SHELL"))
         if surfaces:
-            missing.append(f"{node.name} ({'a surface' if surfaces == 1 else f'{surfaces} surfaces'}, not a solid)")
+            collector.add(node.name, f"{'a surface' if surfaces == 1 else f'{surfaces} surfaces'}, not a solid", T)
         elif not solids:
             loose += 1
-    said = "1 product holds" if loose == 1 else f"{loose} products hold"
-    notes = (f"{said} curves or points only: left out",) if loose else ()
-    return Reading(tuple(bodies), tuple(missing), notes), len(shapes)
+    if loose:
+        holders = "1 product holds" if loose == 1 else f"{loose} products hold"
+        collector.notes.append(f"{holders} curves or points only: left out")
+    return collector.reading(), len(shapes)
 
 
 def _leaves(roots: Iterable[Node]) -> Iterator[tuple[Node, Array]]:
@@ -108,7 +102,7 @@ def _leaves(roots: Iterable[Node]) -> Iterator[tuple[Node, Array]]:
         stack.append((iter(node.below), T))
 
 
-def _made(solid: Any, name: str) -> BrepSolid | str:
+def _shape(solid: Any, name: str) -> BrepSolid | str:
     """The solid as a shape, or why it cannot be one."""
     try:
         size = volume_of(solid)

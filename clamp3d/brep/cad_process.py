@@ -1,23 +1,20 @@
-"""Open CASCADE in a process of its own, which stays alive: a fault in it ends no more than the question.
+"""Open CASCADE in the process for foreign files, which stays alive: a fault in it ends no more than the question.
 
 Each function here calls the one of the same name in `clamp3d.brep.open_cascade`.
 """
 
 from __future__ import annotations
 
-import atexit
-from functools import cache
 from typing import Any
 
 import numpy as np
 
+from clamp3d.brep.child import WorkerEndedError, WorkerTimeoutError
 from clamp3d.brep.open_cascade import CommonPart, Surfaces, Tessellation
-from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
+from clamp3d.brep.process import OPEN_CASCADE, process
 from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
 
-_MODULE = "clamp3d.brep.open_cascade"
-_NAMES = ("tessellate", "surfaces", "distance", "common", "depths", "bounds_at")
 _SECONDS = 120.0
 """Time limit of a question; a few hundred milliseconds are usual."""
 _COMMON_SECONDS = 5.0
@@ -27,17 +24,9 @@ Where it does not end, finer meshes decide.
 """
 
 
-@cache
-def process() -> Worker:
-    """The one process; it is started by the first question."""
-    worker = Worker(*(f"{_MODULE}:{name}" for name in _NAMES), confined=True)
-    atexit.register(worker.close)
-    return worker
-
-
 def _ask(name: str, *arguments: Any, seconds: float = _SECONDS) -> Any:
     try:
-        return process().call(f"{_MODULE}:{name}", *arguments, time_limit=seconds)
+        return process().call(f"{OPEN_CASCADE}:{name}", *arguments, time_limit=seconds)
     except WorkerEndedError as error:
         raise SolverError(f"Open CASCADE ended with {error.ending}") from None
     except WorkerTimeoutError:

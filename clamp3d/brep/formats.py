@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
+import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from clamp3d.brep.bodies import Reading
-from clamp3d.errors import MissingLibraryError
+from clamp3d.brep.worker import OUTSIDE
 
 UNITS_MM: dict[str, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 """Millimetres in one unit of length."""
@@ -23,22 +23,16 @@ class Format(NamedTuple):
         Function of ``clamp3d.brep`` that reads them: path and unit in mm give a `Reading`.
     unit : str or None
         Unit that the format fixes ("stated": each file states it; None: neither does).
-    library : str
-        Optional library that it needs.
-    advice : str
-        What to say without the library.
     """
 
     module: str
     function: str
     unit: str | None = None
-    library: str = ""
-    advice: str = ""
 
 
 _MESH = Format("triangle_file", "read_triangles")
 _GLTF = Format("gltf_file", "read_gltf", "m")
-_STEP = Format("step_file", "read_step", "stated", "OCP", "STEP needs Open CASCADE: pip install 'clamp3d[step]'")
+_STEP = Format("step_file", "read_step", "stated")
 FORMATS: dict[str, Format] = {
     ".stl": _MESH,
     ".obj": _MESH,
@@ -46,31 +40,31 @@ FORMATS: dict[str, Format] = {
     ".off": _MESH,
     ".glb": _GLTF,
     ".gltf": _GLTF,
-    ".3mf": Format("threemf_file", "read_3mf", "stated", "lib3mf", "3MF needs lib3mf: pip install 'clamp3d[3mf]'"),
+    ".3mf": Format("threemf_file", "read_3mf", "stated"),
     ".step": _STEP,
     ".stp": _STEP,
 }
-"""Readable formats by the ending of the file's name."""
-
-
-def require_library(kind: str) -> None:
-    """Raise MissingLibraryError if the library that reads files of this ``kind`` (".3mf") is not installed."""
-    library = FORMATS[kind].library
-    try:
-        installed = not library or importlib.util.find_spec(library) is not None
-    except ValueError:
-        installed = False
-    if not installed:
-        raise MissingLibraryError(FORMATS[kind].advice)
+"""Readable formats of geometry by the ending of the file's name."""
+ROBOT = ".urdf"
+"""The ending of robot descriptions, whose links are drawn or name files of geometry."""
 
 
 def read(path: Path, unit: str | None = None) -> Reading:
-    """The bodies of a file, read in this process; ``unit`` is one of `UNITS_MM`."""
-    module, function, *_ = FORMATS[path.suffix.lower()]
-    made: Reading = getattr(importlib.import_module(f"clamp3d.brep.{module}"), function)(path, unit)
-    return made
+    """The bodies of a file of `FORMATS`, read in this process; ``unit`` is one of `UNITS_MM`."""
+    module, function, _ = FORMATS[path.suffix.lower()]
+    reading: Reading = getattr(importlib.import_module(f"clamp3d.brep.{module}"), function)(path, unit)
+    return reading
 
 
-def read_plain(path: str, unit: str | None) -> dict[str, Any]:
-    """The same as dicts, lists and arrays, for the process that asked for it."""
-    return read(Path(path), unit).to_plain()
+def read_plain(name: str, unit: str | None, joints: dict[str, float], outside: bool) -> dict[str, Any]:
+    """The bodies of any file as dicts, lists and arrays, for the process that asked for them.
+
+    ``outside``: whether the file may name others outside of its folder.
+    """
+    os.environ[OUTSIDE] = str(int(outside))  # this process reads for another one, whose settings may change
+    path = Path(name)
+    if path.suffix.lower() != ROBOT:
+        return read(path, unit).to_plain()
+    from clamp3d.brep.urdf_file import read_urdf
+
+    return read_urdf(path, joints).to_plain()

@@ -1,26 +1,50 @@
-"""Meshes of a file as bodies: units and axes, placements that scale or mirror, instances that share a shape."""
+"""Bodies of a file as they are read: counted, and meshes brought to mm, with Z up and placed rigidly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 
 import numpy as np
 
-from clamp3d.brep.bodies import MOST_BODIES, Body, Reading
+from clamp3d.brep.bodies import Body, Drawn, Reading
 from clamp3d.core.mesh import Array, IntArray, make_mesh
 from clamp3d.core.shapes import MeshShape
 from clamp3d.errors import InputError
 
+MOST_BODIES = 20_000
+"""Bodies that a file may place: a few hundred bytes can name each other into millions of them."""
 
-class Placer:
-    """Collects the bodies of a file whose unit is ``scale`` mm and whose axes are turned by ``R`` (3, 3)."""
 
-    def __init__(self, scale: float, R: Array | None = None) -> None:
-        self.scale = scale
-        self.R = np.eye(3) if R is None else R
+class Collector:
+    """Collects the bodies of a file, and those that are missing, in the file's order."""
+
+    def __init__(self) -> None:
         self.bodies: list[Body] = []
         self.missing: list[str] = []
         self.notes: list[str] = []
+
+    def add(self, name: str, shape: MeshShape | Drawn | str, T: Array) -> None:
+        """One more body at ``T`` (4, 4), or why it has no shape. Raises InputError for too many bodies."""
+        if len(self.bodies) + len(self.missing) >= MOST_BODIES:
+            raise InputError(f"more than {MOST_BODIES} bodies")
+        if isinstance(shape, str):
+            self.missing.append(f"{name} ({shape})")
+        else:
+            self.bodies.append(Body(name, shape, T))
+
+    def reading(self, joined: Iterable[tuple[str, str]] | None = None) -> Reading:
+        """What was collected."""
+        links = None if joined is None else tuple(joined)
+        return Reading(tuple(self.bodies), tuple(self.missing), tuple(self.notes), links)
+
+
+class Placer(Collector):
+    """Collects the meshes of a file whose unit is ``scale`` mm and whose axes are turned by ``R`` (3, 3)."""
+
+    def __init__(self, scale: float, R: Array | None = None) -> None:
+        super().__init__()
+        self.scale = scale
+        self.R = np.eye(3) if R is None else R
         self._shapes: dict[tuple[Hashable, bytes], MeshShape | str] = {}
 
     def place(self, name: str, key: Hashable, arrays: Callable[[], tuple[Array, IntArray]], T: Array) -> None:
@@ -28,23 +52,17 @@ class Placer:
 
         A scale, shear or reflection in ``T`` goes into the vertices. Raises InputError for too many bodies.
         """
-        if len(self.bodies) + len(self.missing) >= MOST_BODIES:
-            raise InputError(f"more than {MOST_BODIES} bodies")
         if not np.isfinite(T).all() or abs(np.linalg.det(T[:3, :3])) < 1e-12:
-            self.missing.append(f"{name} (its placement is flat or not finite)")
+            self.add(name, "its placement is flat or not finite", T)
             return
         pose, form = rigid_part(T)
         own = (key, form.round(12).tobytes())
         if own not in self._shapes:
             self._shapes[own] = self._shape(name, arrays, form)
-        shape = self._shapes[own]
-        if isinstance(shape, str):
-            self.missing.append(f"{name} ({shape})")
-            return
         place = np.eye(4)
         place[:3, :3] = self.R @ pose[:3, :3] @ self.R.T
         place[:3, 3] = self.scale * self.R @ pose[:3, 3]
-        self.bodies.append(Body(name, shape, place))
+        self.add(name, self._shapes[own], place)
 
     def _shape(self, name: str, arrays: Callable[[], tuple[Array, IntArray]], form: Array) -> MeshShape | str:
         try:
@@ -57,10 +75,6 @@ class Placer:
             return str(error).removeprefix(f"{name}: ")
         self.notes += [f"{name}: {note}" for note in mesh.notes]
         return shape
-
-    def reading(self) -> Reading:
-        """What was placed."""
-        return Reading(tuple(self.bodies), tuple(self.missing), tuple(self.notes))
 
 
 def rigid_part(T: Array) -> tuple[Array, Array]:

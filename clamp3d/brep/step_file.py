@@ -6,6 +6,7 @@ This runs in a process of its own (`clamp3d.brep.worker`): a damaged file can en
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ def read_step(path: Path, _: str | None = None) -> Reading:
         raise InputError(f"{path}: not a readable STEP file")
     reading, solids = bodies_of(_roots(document, path.stem))
     missing = (*found.orphans, *_lost(document, found, solids))
-    return Reading(reading.bodies, missing + reading.missing, reading.notes)
+    return replace(reading, missing=missing + reading.missing)
 
 
 def _roots(document: Any, stem: str) -> Iterator[Node]:

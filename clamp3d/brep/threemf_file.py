@@ -15,13 +15,17 @@ from pathlib import Path
 from typing import IO, Any
 from xml.parsers import expat
 
-import lib3mf
 import numpy as np
 
-from clamp3d.brep.bodies import MOST_BODIES, Reading
-from clamp3d.brep.placing import Placer
+from clamp3d.brep.bodies import Reading
+from clamp3d.brep.placing import MOST_BODIES, Placer
 from clamp3d.core.mesh import Array
-from clamp3d.errors import InputError
+from clamp3d.errors import InputError, missing
+
+try:
+    import lib3mf
+except ImportError:
+    raise missing("lib3mf", "3MF") from None
 
 _UNITS = {"MicroMeter": 1e-3, "MilliMeter": 1.0, "CentiMeter": 10.0, "Meter": 1000.0, "Inch": 25.4, "Foot": 304.8}
 _HARMLESS = re.compile("attribute|namespace|metadata|texture|thumbnail|colou?r|propert|uuid", re.IGNORECASE)

@@ -1,69 +1,147 @@
-"""Robot descriptions (URDF): the shapes of each link where the joints put them, by yourdfpy.
+"""Robot descriptions (URDF) as bodies named after their links, where the joints put them, by yourdfpy.
 
-yourdfpy reads what it can of a damaged file and says nothing, so the file is parsed strictly before, and the links,
-shapes and joints in it are counted. This runs in the process for foreign files. Needs the extra ``urdf``.
+yourdfpy reads what it can of a damaged file and says nothing, so the file is parsed strictly before. Of each link the
+collision shapes are taken, or the visual ones if it has no others. This runs in the process for foreign files. Needs
+the extra ``urdf``.
 """
 
 from __future__ import annotations
 
 import io
 import math
+import os
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import trimesh
-import yourdfpy
 
 from clamp3d import checks
-from clamp3d.brep.bodies import MOST_BODIES
-from clamp3d.core.mesh import Array, make_mesh
+from clamp3d.brep.bodies import Drawn, Reading
+from clamp3d.brep.formats import FORMATS, read
+from clamp3d.brep.placing import Placer
+from clamp3d.brep.worker import OUTSIDE
+from clamp3d.core.mesh import Array, IntArray, Mesh, make_mesh
 from clamp3d.core.pose import nearest_rigid
-from clamp3d.errors import InputError
+from clamp3d.core.shapes import MeshShape
+from clamp3d.errors import InputError, missing
+
+try:
+    import yourdfpy
+except ImportError:
+    raise missing("yourdfpy", "URDF") from None
 
 _SHAPES = {"box", "cylinder", "sphere", "mesh"}
+_MOST_BYTES = 2**26
 
 
-def read_urdf(path: str, joints: dict[str, float]) -> dict[str, Any]:
+def read_urdf(path: Path, joints: dict[str, float]) -> Reading:
     """The shapes of a robot's links in mm, in the frame of the root link, at the values of its ``joints``.
 
-    Returns
-    -------
-    dict
-        ``shapes``: a dict for each, with its ``link``, ``kind``, place ``T`` (4, 4), and ``size`` of a box, ``radius``
-        and ``length`` of a cylinder, ``mesh`` and ``error`` of a sphere, ``file`` and ``scale`` of a mesh file, or the
-        ``reason`` why it cannot be read.
-        ``joined``: the pairs of links that a joint connects. ``notes``: what was assumed.
-
+    Values are in rad, or mm for joints that slide; without one a joint is at 0, or its nearest limit.
     Raises InputError for a file that is no whole URDF, unknown joints and values out of their limits.
     """
-    file = Path(path)
-    root = _parsed(file)
+    checks.readable_file(path, _MOST_BYTES)
+    text = ElementTree.tostring(_parsed(path))
     try:
         robot = yourdfpy.URDF.load(
-            io.BytesIO(ElementTree.tostring(root)),
-            load_meshes=False,
-            build_scene_graph=True,
-            load_collision_meshes=False,
+            io.BytesIO(text), load_meshes=False, build_scene_graph=True, load_collision_meshes=False
         )
     except Exception as error:  # it raises whatever its parser meets
-        raise InputError(f"{file}: not a readable URDF file ({' '.join(str(error).split())})") from None
-    robot.update_cfg(_joint_values(file, robot, joints))
-    shapes = []
+        raise InputError(f"{path}: not a readable URDF file ({' '.join(str(error).split())})") from None
+    robot.update_cfg(_joint_values(path, robot, joints))
+    links = _Links(path)
     for link in robot.robot.links:
         T_link = np.asarray(robot.get_transform(link.name))
-        for item in link.collisions or link.visuals:
-            T = T_link if item.origin is None else T_link @ item.origin
+        for shape in link.collisions or link.visuals:
+            T = T_link if shape.origin is None else T_link @ shape.origin
             if not np.isfinite(T).all():
-                raise InputError(f"{file}: a place in link {link.name} is not finite")
-            shapes.append({"link": link.name, "T": _in_mm(T), **_shape(item.geometry)})
-    notes = []
+                raise InputError(f"{path}: a place in link {link.name} is not finite")
+            links.put(link.name, shape.geometry, T)
     if not all(link.collisions for link in robot.robot.links if link.visuals):
-        notes.append("links without collision shapes are taken by their visual ones")
-    joined = [(joint.parent, joint.child) for joint in robot.robot.joints]
-    return {"shapes": shapes, "joined": joined, "notes": notes}
+        links.notes.append("links without collision shapes are taken by their visual ones")
+    return links.reading((joint.parent, joint.child) for joint in robot.robot.joints)
+
+
+class _Links(Placer):
+    """Collects the shapes of a robot's links."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(1.0)
+        self.path = path
+        self._files: dict[Path, Mesh] = {}
+
+    def put(self, name: str, geometry: Any, T: Array) -> None:
+        """One more shape of the link ``name`` at ``T`` (4, 4), whose lengths are metres."""
+        T = nearest_rigid(np.asarray(T, dtype=np.float64))
+        T[:3, 3] *= 1000.0
+        try:
+            if geometry.mesh is not None:
+                mesh = self._mesh(geometry.mesh.filename)
+                scale = 1.0 if geometry.mesh.scale is None else geometry.mesh.scale
+                self.place(name, mesh.name, partial(_arrays, mesh), T @ np.diag([*np.broadcast_to(scale, 3), 1.0]))
+            else:
+                self.add(name, _shape(geometry), T)
+        except InputError as error:
+            self.add(name, str(error), T)
+
+    def _mesh(self, name: str) -> Mesh:
+        """The mesh of a file, as ROS reads it: numbers without a unit are metres, and the axes of glTF stay."""
+        path = _mesh_file(self.path, name)
+        if path not in self._files:
+            form = FORMATS.get(path.suffix.lower())
+            if form is None or form.module == "step_file":
+                raise InputError(f"{name}: a mesh must be one of {', '.join(FORMATS)}, without STEP")
+            reading = read(path, None if form.unit else "m").complete(path)
+            mesh = reading.merged(path.name)
+            if form.unit == "m":
+                mesh = make_mesh(mesh.vertices[:, [0, 2, 1]] * (1, 1, -1), mesh.faces, name=path.name)
+            self.notes += [f"{path.name}: {note}" for note in mesh.notes]
+            self._files[path] = mesh
+        return self._files[path]
+
+
+def _arrays(mesh: Mesh) -> tuple[Array, IntArray]:
+    return mesh.vertices, mesh.faces
+
+
+def _shape(geometry: Any) -> MeshShape | Drawn:
+    """A box, a cylinder, or a sphere as facets, in mm. Raises InputError for sizes that are not > 0."""
+    if geometry.sphere is not None:
+        radius = checks.positive("radius of a sphere", 1000.0 * geometry.sphere.radius)
+        facets = trimesh.creation.icosphere(4, radius)
+        nearest = float(np.abs(np.einsum("ij,ij->i", facets.triangles[:, 0], facets.face_normals)).min())
+        return MeshShape(make_mesh(facets.vertices, facets.faces, name="sphere"), "off", "sphere", radius - nearest)
+    if geometry.box is not None:
+        drawn = Drawn("box", tuple(1000.0 * float(x) for x in geometry.box.size))
+    else:
+        drawn = Drawn("cylinder", (1000.0 * geometry.cylinder.radius, 1000.0 * geometry.cylinder.length))
+    drawn.solid  # noqa: B018  whose sizes are checked when it is made
+    return drawn
+
+
+def _mesh_file(path: Path, name: str) -> Path:
+    """A mesh beside the description or in the folder above, or, of a package, in any folder above it."""
+    bare = name.removeprefix("file://")
+    if bare.startswith("package://"):
+        inside = Path(bare.removeprefix("package://"))
+        for folder in path.resolve().parents:
+            for choice in (folder / inside, folder / Path(*inside.parts[1:])):
+                if choice.is_file() and _within(choice, folder):
+                    return choice
+        raise InputError(f"{name}: no such file in a folder above {path.name}")
+    file = path.parent / bare
+    if not _within(file, path.resolve().parent.parent):
+        raise InputError(f"{name}: is outside of the robot's folder and the one above; {OUTSIDE}=1 allows that")
+    checks.readable_file(file)
+    return file
+
+
+def _within(file: Path, folder: Path) -> bool:
+    return os.environ.get(OUTSIDE) == "1" or file.resolve().is_relative_to(folder.resolve())
 
 
 def _parsed(path: Path) -> ElementTree.Element:
@@ -78,40 +156,38 @@ def _parsed(path: Path) -> ElementTree.Element:
         names = [item.get("name") for item in root.findall(kind)]
         if None in names:
             raise InputError(f"{path}: {kind} {names.index(None) + 1} has no name")
-        for name, count in Counter(names).items():
-            if count > 1:
-                raise InputError(f"{path}: {count} of its {kind}s are called {checks.shown(name)}")
-    links = {str(link.get("name")): link for link in root.findall("link")}
-    for name, link in links.items():
+        name, count = max(Counter(names).items(), key=lambda item: item[1], default=("", 0))
+        if count > 1:
+            raise InputError(f"{path}: {count} of its {kind}s are called {checks.shown(name)}")
+    for link in root.findall("link"):
+        name = checks.shown(link.get("name"))
         if any(link.find(f".//{inner}") is not None for inner in ("link", "joint")):
-            raise InputError(f"{path}: link {checks.shown(name)} holds another link or joint")
+            raise InputError(f"{path}: link {name} holds another link or joint")
         for item in (*link.findall("collision"), *link.findall("visual")):
             kinds = [shape.tag for shape in item.findall("geometry/*")]
             if len(kinds) != 1 or kinds[0] not in _SHAPES:
+                listed = ", ".join(sorted(_SHAPES))
                 raise InputError(
-                    f"{path}: a shape of link {checks.shown(name)} must be one of {', '.join(sorted(_SHAPES))}, "
-                    f"got {', '.join(kinds) or 'none'}"
+                    f"{path}: a shape of link {name} must be one of {listed}, got {', '.join(kinds) or 'none'}"
                 )
-    if len(root.findall("link/*/geometry")) > MOST_BODIES:
-        raise InputError(f"{path}: more than {MOST_BODIES} bodies")
-    _check_tree(path, root, set(links))
+    _check_tree(path, root)
     return root
 
 
-def _check_tree(path: Path, root: ElementTree.Element, links: set[str]) -> None:
+def _check_tree(path: Path, root: ElementTree.Element) -> None:
     """Raise InputError unless every link but one hangs on it by joints."""
+    links = {str(link.get("name")) for link in root.findall("link")}
     above: dict[str, str] = {}
     for joint in root.findall("joint"):
-        name = checks.shown(joint.get("name"))
-        parent, child = (
-            "" if end is None else end.get("link", "") for end in (joint.find("parent"), joint.find("child"))
-        )
-        for end, link in (("parent", parent), ("child", child)):
+        parent, child = (joint.find(end) for end in ("parent", "child"))
+        ends = ["" if end is None else end.get("link", "") for end in (parent, child)]
+        for kind, link in zip(("parent", "child"), ends, strict=True):
             if link not in links:
-                raise InputError(f"{path}: the {end} of joint {name} must be a link, got {checks.shown(link)}")
-        if child in above:
-            raise InputError(f"{path}: link {checks.shown(child)} is the child of more than one joint")
-        above[child] = parent
+                name = checks.shown(joint.get("name"))
+                raise InputError(f"{path}: the {kind} of joint {name} must be a link, got {checks.shown(link)}")
+        if ends[1] in above:
+            raise InputError(f"{path}: link {checks.shown(ends[1])} is the child of more than one joint")
+        above[ends[1]] = ends[0]
     roots = sorted(links - above.keys())
     if len(roots) > 1:
         listed = ", ".join(roots[:4])
@@ -146,35 +222,3 @@ def _joint_values(path: Path, robot: Any, values: dict[str, float]) -> dict[str,
                 )
         configuration[name] = value
     return configuration
-
-
-def _shape(geometry: Any) -> dict[str, Any]:
-    if geometry.box is not None:
-        return {"kind": "box", "size": [1000.0 * float(x) for x in geometry.box.size]}
-    if geometry.cylinder is not None:
-        radius, length = geometry.cylinder.radius, geometry.cylinder.length
-        return {"kind": "cylinder", "radius": 1000.0 * radius, "length": 1000.0 * length}
-    if geometry.sphere is not None:
-        try:
-            mesh, error = _ball(1000.0 * geometry.sphere.radius)
-        except InputError as problem:
-            return {"kind": "unreadable", "reason": str(problem)}
-        return {"kind": "sphere", "mesh": mesh, "error": error}
-    scale = 1.0 if geometry.mesh.scale is None else geometry.mesh.scale
-    scales = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,))
-    return {"kind": "mesh", "file": geometry.mesh.filename, "scale": scales.tolist()}
-
-
-def _ball(radius: float) -> tuple[Any, float]:
-    """A sphere as facets, and how far (mm) they are from it."""
-    checks.positive("radius of a sphere", radius)
-    made = trimesh.creation.icosphere(4, radius)
-    corners = np.asarray(made.triangles)
-    nearest = float(np.abs(np.einsum("ij,ij->i", corners[:, 0], made.face_normals)).min())
-    return make_mesh(made.vertices, made.faces, name="sphere"), radius - nearest
-
-
-def _in_mm(T: Array) -> Array:
-    pose = nearest_rigid(np.asarray(T, dtype=np.float64))
-    pose[:3, 3] *= 1000.0
-    return pose

@@ -7,18 +7,15 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
+from clamp3d.brep.bodies import Reading
+from clamp3d.brep.child import WorkerEndedError, WorkerTimeoutError
+from clamp3d.brep.process import READ, process
 from clamp3d.checks import readable_file, short
-from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.errors import Clamp3dError, InputError
 
-READ_BODIES = "clamp3d.brep.formats:read_plain"
-READ_URDF = "clamp3d.brep.urdf_file:read_urdf"
 LIMITS = "CLAMP3D_READ_LIMITS"
 """Environment variable: a factor for the limits of memory and time."""
 OUTSIDE = "CLAMP3D_READ_OUTSIDE"
@@ -27,48 +24,34 @@ _MEMORY, _PER_BYTE = 2 * 2**30, 60
 """Bytes that reading may take in any case, and for each byte of the file."""
 _SECONDS, _PER_MEGABYTE = 60.0, 20.0
 
-_shared: ContextVar[Worker | None] = ContextVar("_shared", default=None)
 
+def read_in_process(path: Path, unit: str | None = None, joints: Mapping[str, float] | None = None) -> Reading:
+    """The bodies of a file, read in the process.
 
-@contextmanager
-def reading_process() -> Iterator[Worker]:
-    """All files that are read within this block are read in one process; blocks may be nested."""
-    outer = _shared.get()
-    if outer is not None:
-        yield outer
-        return
-    with Worker(READ_BODIES, READ_URDF, confined=True) as worker:
-        token = _shared.set(worker)
-        try:
-            yield worker
-        finally:
-            _shared.reset(token)
-
-
-def read_in_process(function: str, path: Path, *arguments: Any) -> Any:
-    """The result of ``function(path, *arguments)``, called in the reading process.
-
-    Raises InputError if the file cannot be read, also if its reader crashes, or takes too much time or memory.
+    Raises InputError if the file cannot be read, also if its reader crashes, or takes too much time or memory, and
+    MissingLibraryError if its reader is not installed.
     """
     size = readable_file(path)
     factor = _factor()
     seconds = factor * (_SECONDS + _PER_MEGABYTE * size / 1e6)
     memory = factor * (_MEMORY + _PER_BYTE * size)
     absolute = str(path.absolute())
-    with reading_process() as worker:
-        try:
-            return worker.call(function, absolute, *arguments, time_limit=seconds, memory=memory)
-        except WorkerTimeoutError:
-            problem = f"not read in {seconds:.0f} s; {LIMITS}=4 allows four times as much"
-        except MemoryError:
-            problem = f"takes more than {memory / 2**30:.1f} GB to read; {LIMITS}=4 allows four times as much"
-        except WorkerEndedError as error:
-            reason = error.last or "the file is damaged, or uses what the reader does not support"
-            problem = f"the reader ended with {error.ending}: {reason}"
-        except Clamp3dError as error:
-            raise type(error)(str(error).replace(absolute, str(path))) from None
-        except OSError as error:
-            raise InputError(str(error).replace(absolute, str(path))) from None
+    outside = os.environ.get(OUTSIDE) == "1"
+    named = {str(name): value for name, value in (joints or {}).items()}
+    try:
+        plain = process().call(READ, absolute, unit, named, outside, time_limit=seconds, memory=memory)
+        return Reading.from_plain(plain)
+    except WorkerTimeoutError:
+        problem = f"not read in {seconds:.0f} s; {LIMITS}=4 allows four times as much"
+    except MemoryError:
+        problem = f"takes more than {memory / 2**30:.1f} GB to read; {LIMITS}=4 allows four times as much"
+    except WorkerEndedError as error:
+        reason = error.last or "the file is damaged, or uses what the reader does not support"
+        problem = f"the reader ended with {error.ending}: {reason}"
+    except Clamp3dError as error:
+        raise type(error)(str(error).replace(absolute, str(path))) from None
+    except OSError as error:
+        raise InputError(str(error).replace(absolute, str(path))) from None
     raise InputError(f"{short(path)}: {problem}")
 
 

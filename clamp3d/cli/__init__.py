@@ -18,7 +18,6 @@ import click
 
 import clamp3d
 from clamp3d.cli.terminal import ExitCode, end_on_signals, show, tolerate_closed_pipes
-from clamp3d.core.child import own_process
 from clamp3d.errors import EXTRAS, Clamp3dError, NotClampedError, SequenceError, SolverError, missing, one_line
 
 # Name -> (module and function, one line for the list of commands). A module is loaded when its command is called.
@@ -86,7 +85,7 @@ def main() -> None:
     """Entry point: one line for every fault, never a traceback; CLAMP3D_DEBUG=1 shows it."""
     tolerate_closed_pipes()
     end_on_signals()
-    own_process()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads only cost time to start
     try:
         _check_environment()
         with warnings.catch_warnings():

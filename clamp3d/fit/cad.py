@@ -36,8 +36,8 @@ def cad_features(reading: Reading, name: str) -> tuple[Mesh, list[tuple[float, d
         vertices.append(placed)
         faces.append(solid.mesh.faces + n)
         n, m = n + len(placed), m + len(solid.mesh.faces)
-    closed = all(body.shape.mesh.watertight for body in reading.bodies)
-    rounding = max(body.shape.mesh.rounding for body in reading.bodies)
+    closed = all(body.mesh.watertight for body in reading.bodies)
+    rounding = max(body.mesh.rounding for body in reading.bodies)
     mesh = Mesh(name, np.concatenate(vertices), np.concatenate(faces), closed, rounding)
     words = [f"{count} {'free-form' if kind == 'other' else kind}" for kind, count in sorted(others.items())]
     return mesh, features, [*reading.notes, *([f"faces that are no cylinders: {', '.join(words)}"] if words else [])]

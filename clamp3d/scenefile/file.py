@@ -12,8 +12,7 @@ from pathlib import Path
 import msgspec
 
 from clamp3d import checks
-from clamp3d.brep.formats import FORMATS
-from clamp3d.brep.worker import reading_process
+from clamp3d.brep.formats import FORMATS, ROBOT
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.loader import builtin_clamps, load_clamp, parse_toml, read_text
 from clamp3d.collide.allowed import Allowed
@@ -34,8 +33,7 @@ def load_scene(path: str | Path) -> Scene:
     path = checks.path("scene", path)
     text = read_text(path)
     name = escaped((path.resolve().parent.name if path.stem == "scene" else "") or path.stem)
-    with reading_process():
-        return parse_scene(text, origin=str(path), folder=path.parent, name=name)
+    return parse_scene(text, origin=str(path), folder=path.parent, name=name)
 
 
 def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name: str = "scene") -> Scene:
@@ -138,5 +136,5 @@ def _is_clamp(path: Path) -> bool:
 
 def _choices() -> str:
     built_in = ", ".join(builtin_clamps())
-    files = ", ".join((*FORMATS, ".urdf"))
+    files = ", ".join((*FORMATS, ROBOT))
     return f"built in: {built_in}; or give a clamp or scene file (.toml), a folder, or a file ({files})"

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from clamp3d import checks
 from clamp3d.brep.bodies import part_name
-from clamp3d.brep.worker import reading_process
 from clamp3d.collide.scene import Scene
 from clamp3d.core.shapes import Fit
 from clamp3d.errors import InputError
@@ -102,9 +101,7 @@ def load(
         raise InputError("source must not be empty")
     if has_bodies(path) and not (os.path.isdir(path) and _is_builtin(str(path))):
         refuse_wires(path, "a file of bodies", wires)
-        with reading_process():
-            parts = read_parts(path, reader)
-        return _scene(parts, path.resolve().name if os.path.isdir(path) else path.stem)
+        return _scene(read_parts(path, reader), path.resolve().name if os.path.isdir(path) else path.stem)
     from clamp3d.scenefile.file import load_described
 
     reader.refuse(checks.short(path), "unit", "fit", "chord", "joints", "poses", "partial")

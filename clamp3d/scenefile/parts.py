@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import os
 from collections.abc import Iterable, Mapping
@@ -12,18 +13,20 @@ from pathlib import Path
 import numpy as np
 
 from clamp3d import checks
-from clamp3d.brep.bodies import Reading, part_name, unique_names
-from clamp3d.brep.formats import FORMATS
+from clamp3d.brep.bodies import Drawn, Reading, part_name, unique_names
+from clamp3d.brep.formats import FORMATS, ROBOT
 from clamp3d.brep.mesh_file import load_bodies
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.allowed import Allowed
 from clamp3d.collide.scene import Part
 from clamp3d.core.pose import UNIT_TOLERANCE, Array
-from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, MeshShape
+from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, MeshShape, Shape
 from clamp3d.errors import InputError
 
 COLUMNS = ("name", "x", "y", "z", "qx", "qy", "qz", "qw")
 """Columns of a table of poses: mm, and a unit quaternion."""
+_ANY = 1e4
+"""Overlap (mm) that is allowed between shapes of one link: they are one body."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +97,7 @@ class Parts:
 
 def has_bodies(path: Path) -> bool:
     """Whether a path is read by `read_parts`: a geometry file, a robot description, or a folder."""
-    return path.suffix.lower() in (*FORMATS, ".urdf") or os.path.isdir(path)  # False for names that no folder can have
+    return path.suffix.lower() in (*FORMATS, ROBOT) or os.path.isdir(path)  # False for names that no folder can have
 
 
 def refuse_wires(path: object, kind: str, wires: dict[str, str | float]) -> None:
@@ -108,31 +111,38 @@ def read_parts(path: Path, reader: Reader) -> Parts:
     if os.path.isdir(path):
         reader.refuse("a folder", "joints")
         return _folder(path, reader)
-    reader.refuse(checks.short(path), "poses")
-    if path.suffix.lower() == ".urdf":
-        from clamp3d.scenefile.urdf import read_urdf
-
-        return read_urdf(path, reader)
-    reader.refuse(checks.short(path), "joints")
-    return to_parts(load_bodies(path, unit=reader.unit, partial=reader.partial), reader)
+    is_robot = path.suffix.lower() == ROBOT
+    reader.refuse(checks.short(path), "poses", *([] if is_robot else ["joints"]))
+    joints = reader.joints if is_robot else None
+    return to_parts(load_bodies(path, unit=reader.unit, joints=joints, partial=reader.partial), reader)
 
 
 def to_parts(reading: Reading, reader: Reader) -> Parts:
-    """The bodies of a reading as parts with unique names."""
-    shapes: dict[int, MeshShape] = {}
+    """The bodies of a reading as parts with unique names, and what a robot's joints allow."""
+    shapes: dict[int, Shape] = {}
     parts = []
     for name, body in zip(unique_names(body.name for body in reading.bodies), reading.bodies, strict=True):
         shape = shapes.setdefault(id(body.shape), _fitted(body.shape, reader))
         parts.append(Part(name, shape, body.T))
-    return Parts(tuple(parts), reading.notes)
+    if reading.joined is None:
+        return Parts(tuple(parts), reading.notes)
+    links: dict[str, list[str]] = {}
+    for part, body in zip(parts, reading.bodies, strict=True):
+        links.setdefault(body.name, []).append(part.name)
+    allowed = [Allowed(a, b, _ANY) for names in links.values() for a, b in itertools.combinations(names, 2)]
+    for parent, child in reading.joined:
+        allowed += [Allowed(a, b) for a in links.get(parent, ()) for b in links.get(child, ())]
+    return Parts(tuple(parts), reading.notes, tuple(allowed))
 
 
-def _fitted(shape: MeshShape, reader: Reader) -> MeshShape:
-    """A mesh taken as the reader says; a solid from CAD needs no fit and knows its chord error."""
+def _fitted(shape: MeshShape | Drawn, reader: Reader) -> Shape:
+    """A mesh taken as the reader says; what is drawn, or knows its chord error, is taken as it is."""
+    if isinstance(shape, Drawn):
+        return shape.solid
     if isinstance(shape, BrepSolid):
         reader.refuse("STEP, whose faces are exact", "fit", "chord")
         return shape
-    if reader.fit is None and not reader.chord:
+    if shape.error or (reader.fit is None and not reader.chord):
         return shape
     return replace(shape, fit=reader.fit or shape.fit, error=float(reader.chord or 0.0))
 

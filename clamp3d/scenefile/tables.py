@@ -141,7 +141,7 @@ class MeshTable(PartTable, kw_only=True):
         (body,) = bodies
         if not np.array_equal(body.T, np.eye(4)):
             raise InputError(f"{self.file} places its body itself: leave out shape, and it is placed so")
-        return shapes.MeshShape(body.shape.mesh, self.fit, self.file, self.chord)
+        return shapes.MeshShape(body.mesh, self.fit, self.file, self.chord)
 
 
 class FileTable(PartTable, kw_only=True):

@@ -15,6 +15,7 @@ from threemf import TIP, doubled, write_3mf
 
 from clamp3d import InputError, check, load
 from clamp3d.brep.bodies import unique_names
+from clamp3d.brep.process import process
 from clamp3d.brep.worker import LIMITS, OUTSIDE
 from clamp3d.shapes import load_mesh
 
@@ -149,9 +150,11 @@ def test_a_mesh_that_takes_too_much_memory_or_time(tmp_path, monkeypatch):
 def test_a_reader_that_ends_by_a_signal_is_said_and_the_next_file_is_read(tmp_path, monkeypatch):
     (tmp_path / "lib3mf.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGSEGV)\n")
     monkeypatch.syspath_prepend(str(tmp_path))
+    process().close()
     refused(
         write_3mf(tmp_path / "a.3mf"), "the reader ended with SIGSEGV: the file is damaged, or uses what the reader"
     )
+    (tmp_path / "lib3mf.py").unlink()
     folder = tmp_path / "cell"
     folder.mkdir()
     for name in ("a.stl", "b.stl"):

@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
+from clamp3d.brep.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.errors import InputError, SolverError
 
 STAND_IN = """
@@ -94,7 +94,7 @@ def test_modules_of_the_current_folder_are_not_imported(tmp_path, monkeypatch):
 
 def test_it_ends_with_its_caller():
     code = (
-        "import os, signal\nfrom clamp3d.core.child import Worker\nworker = Worker('os:getpid', 'time:sleep')\n"
+        "import os, signal\nfrom clamp3d.brep.child import Worker\nworker = Worker('os:getpid', 'time:sleep')\n"
         "print(worker.call('os:getpid', time_limit=60.0), flush=True)\nos.kill(os.getpid(), signal.SIGKILL)"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120)

@@ -6,7 +6,7 @@ import pickle
 from typing import Any, Literal
 
 from clamp3d.bench.compare.methods import Method
-from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
+from clamp3d.brep.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.errors import Clamp3dError
 
 Kind = Literal["contact", "peer", "assembly", "image"]

@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol, Self, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.core.child import Worker, WorkerEndedError, WorkerTimeoutError
+from clamp3d.brep.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.core.pose import Array
 from clamp3d.errors import Clamp3dError, without_numbers
 

@@ -26,8 +26,6 @@ import numpy as np
 from clamp3d import errors
 from clamp3d.errors import Clamp3dError
 
-_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
-"""Starting NumPy's threads takes 0.04 s of CPU."""
 _SIZE = struct.Struct(">Q")
 _LARGEST = 2**34
 """Bytes of a message that are read at most."""
@@ -35,6 +33,8 @@ _ARRAY = 1
 """Number of MessagePack's extension type that holds an array."""
 _FORBIDDEN = ("socket.connect", "socket.getaddrinfo", "socket.bind", "subprocess.", "os.system", "os.exec", "os.fork")
 _OWN_ERRORS = ("InputError", "MissingLibraryError", "SolverError", "Clamp3dError")
+_ERRORS: dict[str, type[Exception]] = {"MemoryError": MemoryError, "OSError": OSError, "RuntimeError": RuntimeError}
+_ERRORS |= {name: getattr(errors, name) for name in _OWN_ERRORS}
 
 
 class WorkerEndedError(Clamp3dError):
@@ -45,7 +45,9 @@ class WorkerEndedError(Clamp3dError):
 
     def __init__(self, code: int, log: list[str]) -> None:
         self.code = code
-        self.ending = _ending(code)
+        self.ending = f"exit code {code}"
+        if code < 0:
+            self.ending = signal.Signals(-code).name if -code in {*signal.Signals} else f"signal {-code}"
         self.last = log[-1] if log and code >= 0 else ""
         super().__init__(f"the process ended with {self.ending}{': ' * bool(self.last)}{self.last}")
 
@@ -80,6 +82,7 @@ class Worker:
         self._functions = functions
         self._confined = confined
         self._process: subprocess.Popen[bytes] | None = None
+        self._owner = 0
         self._lock = threading.Lock()
         self._lines: deque[str] = deque(maxlen=50)
         self._threads: list[threading.Thread] = []
@@ -130,24 +133,21 @@ class Worker:
             raise ValueError(f"function must be one of {', '.join(self._functions)}, got {function!r}")
         with self._lock:
             try:
-                if self._process is None or self._process.poll() is not None:
+                if self._process is None or self._owner != os.getpid() or self._process.poll() is not None:
                     self._start()
                 request = {"function": function, "arguments": arguments, "memory": memory}
                 answer = self._exchange(_pack(request), time_limit)
             except BaseException:  # also for Ctrl-C: the process may still be at work
                 self.close()
                 raise
-        kind, message = answer["error"], answer["message"]
-        if kind is None:
+        if answer["error"] is None:
             return answer["result"]
-        if kind == "MemoryError":
-            raise MemoryError
-        raise OSError(message) if kind == "OSError" else getattr(errors, kind, RuntimeError)(message)
+        raise _ERRORS[answer["error"]](answer["message"])
 
     def close(self) -> None:
         """End the process at once, if there is one."""
         process, self._process = self._process, None
-        if process is None:
+        if process is None or self._owner != os.getpid():  # a forked process leaves it to the one that started it
             return
         process.kill()
         process.wait()
@@ -160,16 +160,18 @@ class Worker:
 
     def _start(self) -> None:
         self.close()
+        self._owner = os.getpid()
         own = str(Path(__file__).parents[2])  # also where that is the current folder, which is "" on the path
         folders = (own if os.path.abspath(folder) == own else folder for folder in sys.path)
         path = os.pathsep.join(folder for folder in folders if os.path.isabs(folder))
+        settings = {"OPENBLAS_NUM_THREADS": "1", "CLAMP3D_CONFINED": str(int(self._confined))}
         # A session of its own keeps Ctrl-C with the caller, who then ends the worker.
         process = self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", "from clamp3d.core.child import serve; serve()", *self._functions],
+            [sys.executable, "-P", "-c", "from clamp3d.brep.child import serve; serve()", *self._functions],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            env=os.environ | {"PYTHONPATH": path} | _ONE_THREAD | {"CLAMP3D_CONFINED": str(int(self._confined))},
+            env=os.environ | {"PYTHONPATH": path} | settings,
             start_new_session=True,
         )
         self._lines = deque(maxlen=50)
@@ -226,23 +228,21 @@ def serve() -> None:
 
 
 def _answer(function: str, arguments: list[Any]) -> bytes:
-    kind, message, result = None, "", None
     try:
         module, _, name = function.partition(":")
-        result = getattr(importlib.import_module(module), name)(*arguments)
-        return _pack({"error": None, "message": "", "result": result})
+        return _pack({"error": None, "result": getattr(importlib.import_module(module), name)(*arguments)})
     except Clamp3dError as error:
         kind = next(name for name in _OWN_ERRORS if isinstance(error, getattr(errors, name)))
         message = str(error)
     except MemoryError:
-        kind = "MemoryError"
+        kind, message = "MemoryError", ""
     except OSError as error:
         kind, message = "OSError", f"{error.filename}: {error.strerror}" if error.filename else str(error)
     except Exception as error:  # a fault of the function: the caller says so
         frame = traceback.extract_tb(error.__traceback__)[-1]
         kind = "RuntimeError"
         message = f"{type(error).__name__}: {error} at {os.path.basename(frame.filename)}:{frame.lineno}"
-    return _pack({"error": kind, "message": message, "result": None})
+    return _pack({"error": kind, "message": message})
 
 
 def _refuse(event: str, _: object) -> None:
@@ -297,8 +297,7 @@ def _pack(value: Any) -> bytes:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray) and not value.dtype.hasobject:
-        head = msgspec.msgpack.encode((value.dtype.str, value.shape))
-        return msgspec.msgpack.Ext(_ARRAY, _SIZE.pack(len(head)) + head + value.tobytes())
+        return msgspec.msgpack.Ext(_ARRAY, msgspec.msgpack.encode((value.dtype.str, value.shape, value.tobytes())))
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"{type(value).__name__} cannot be sent to another process")
@@ -309,22 +308,8 @@ def _unpack(message: bytes) -> Any:
 
 
 def _array(_: int, data: memoryview) -> Any:
-    start = _SIZE.size + _SIZE.unpack_from(data)[0]
-    kind, shape = msgspec.msgpack.decode(data[_SIZE.size : start])
-    return np.frombuffer(data, np.dtype(kind), offset=start).reshape(shape).copy()  # a copy is aligned
-
-
-def _ending(code: int) -> str:
-    try:
-        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
-    except ValueError:
-        return f"signal {-code}"
-
-
-def own_process() -> None:
-    """Compute in one thread: the command line calls this first of all."""
-    for name, value in _ONE_THREAD.items():
-        os.environ.setdefault(name, value)
+    kind, shape, values = msgspec.msgpack.decode(data)
+    return np.frombuffer(bytearray(values), np.dtype(kind)).reshape(shape)
 
 
 def end_with_parent() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 _PARENT = """
 import multiprocessing, os, signal, sys, time
-from clamp3d.core.child import end_with_parent
+from clamp3d.brep.child import end_with_parent
 
 def work(said):
     end_with_parent()
@@ -44,7 +44,7 @@ def test_a_worker_ends_when_its_parent_does(how, tmp_path):
 def test_a_worker_of_nobody_goes_on():
     """Called in a process that `multiprocessing` did not start it does nothing."""
     code = (
-        "from clamp3d.core.child import end_with_parent; import time; end_with_parent(); time.sleep(0.3); print('on')"
+        "from clamp3d.brep.child import end_with_parent; import time; end_with_parent(); time.sleep(0.3); print('on')"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
     assert (run.returncode, run.stdout) == (0, "on\n"), run.stderr
