@@ -39,13 +39,13 @@ def exact_overlap(a: Model, b: Model, T: Array, share: float) -> Distance:
     """
     assert a.exact is not None
     assert b.exact is not None
-    unknown = Distance(-np.inf, TOLERANCE, level="exact", method=f"{METHOD}, without a common part")
+    unknown = Distance(level="exact", method=f"{METHOD}, without a common part")
     try:
         shared = cad_process.common(a.exact.brep, b.exact.brep, T, share)
     except Clamp3dError:  # it takes too long, or fails
         return unknown
     if shared.volume <= TOLERANCE * max(1e-12, shared.area) or not len(shared.points):
-        return Distance(-TOLERANCE, TOLERANCE, level="exact", method=METHOD)
+        return Distance(-TOLERANCE, level="exact", method=METHOD)
     deepest = _deepest(a, b, T, shared)
     if deepest is None:
         return unknown

@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from clamp3d.brep.open_cascade import TOLERANCE
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.closed_form import ClosedForm, bodies_distance
@@ -175,7 +176,9 @@ def _nearest_of_several(a: Model, b: Model, T: Array, level: str) -> Distance:
 
 
 def accuracy_for(a: Model, b: Model, accuracy: float = ACCURACY) -> float:
-    """``accuracy`` (mm), or what is relative to the size of two shapes, whichever is more."""
+    """``accuracy`` (mm), or what is relative to the size of two shapes or Open CASCADE's, whichever is more."""
+    if a.exact is not None and b.exact is not None:
+        accuracy = max(accuracy, 2.1 * TOLERANCE)
     return max(accuracy, ACCURACY * 1e-3 * float(max(np.abs(a.bounds).max(), np.abs(b.bounds).max())))
 
 
