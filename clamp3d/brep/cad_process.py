@@ -1,6 +1,6 @@
 """Open CASCADE in the process for foreign files, which stays alive: a fault in it ends no more than the question.
 
-Each function here calls the one of the same name in `clamp3d.brep.open_cascade`.
+Each function here calls the one of the same name in `open_cascade`, `faces`, `tessellation` or `pairs`.
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from clamp3d.brep.child import WorkerEndedError, WorkerTimeoutError
-from clamp3d.brep.open_cascade import CommonPart, Surfaces, Tessellation
-from clamp3d.brep.process import OPEN_CASCADE, process
+from clamp3d.brep.faces import Surfaces
+from clamp3d.brep.pairs import CommonPart
+from clamp3d.brep.process import process
+from clamp3d.brep.tessellation import Tessellation
 from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
 
@@ -26,7 +28,7 @@ Where it does not end, finer meshes decide.
 
 def _ask(name: str, *arguments: Any, seconds: float = _SECONDS) -> Any:
     try:
-        return process().call(f"{OPEN_CASCADE}:{name}", *arguments, time_limit=seconds)
+        return process().call(f"clamp3d.brep.{name}", *arguments, time_limit=seconds)
     except WorkerEndedError as error:
         raise SolverError(f"Open CASCADE ended with {error.ending}") from None
     except WorkerTimeoutError:
@@ -35,30 +37,30 @@ def _ask(name: str, *arguments: Any, seconds: float = _SECONDS) -> Any:
 
 def tessellate(brep: bytes, chord: float) -> Tessellation:
     """Triangles of a solid, each with its error."""
-    return Tessellation(**_ask("tessellate", brep, chord))
+    return Tessellation(**_ask("tessellation:tessellate", brep, chord))
 
 
 def surfaces(brep: bytes) -> Surfaces:
     """The surfaces of a solid's faces."""
-    return Surfaces(**_ask("surfaces", brep))
+    return Surfaces(**_ask("faces:surfaces", brep))
 
 
 def bounds_at(brep: bytes, T: Array) -> Array:
     """Box (2, 3) of a solid placed by ``T`` (4, 4), mm."""
-    return np.asarray(_ask("bounds_at", brep, T))
+    return np.asarray(_ask("open_cascade:bounds_at", brep, T))
 
 
 def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
     """Distance (mm) of two solids and nearest points (3,); 0 where they touch or overlap."""
-    gap, p, q = _ask("distance", a, b, T)
+    gap, p, q = _ask("pairs:distance", a, b, T)
     return gap, p, q
 
 
 def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
     """The common part of two solids; chords of its border are ``share`` of its thickness."""
-    return CommonPart(**_ask("common", a, b, T, share, seconds=_COMMON_SECONDS))
+    return CommonPart(**_ask("pairs:common", a, b, T, share, seconds=_COMMON_SECONDS))
 
 
 def depths(brep: bytes, points: Array) -> Array:
     """Distance (k,) mm of points (k, 3) from the surface of a solid."""
-    return np.asarray(_ask("depths", brep, points))
+    return np.asarray(_ask("pairs:depths", brep, points))

@@ -9,14 +9,20 @@ from clamp3d.brep.child import Worker
 
 READ = "clamp3d.brep.formats:read_plain"
 """The function that reads a file."""
-OPEN_CASCADE = "clamp3d.brep.open_cascade"
-"""The module whose questions the process answers."""
-_QUESTIONS = ("tessellate", "surfaces", "distance", "common", "depths", "bounds_at")
+_QUESTIONS = (
+    "open_cascade:bounds_at",
+    "faces:surfaces",
+    "tessellation:tessellate",
+    "pairs:distance",
+    "pairs:common",
+    "pairs:depths",
+)
+"""What Open CASCADE is asked, by module and function of this package."""
 
 
 @cache
 def process() -> Worker:
     """The process of this one; the first call starts it, and it ends with this one."""
-    worker = Worker(READ, *(f"{OPEN_CASCADE}:{name}" for name in _QUESTIONS), confined=True)
+    worker = Worker(READ, *(f"clamp3d.brep.{name}" for name in _QUESTIONS), confined=True)
     atexit.register(worker.close)
     return worker

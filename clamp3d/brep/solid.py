@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from clamp3d.brep import cad_process
+from clamp3d.brep.faces import Surfaces
 from clamp3d.brep.open_cascade import (
-    Surfaces,
-    Tessellation,
     bounds_of,
     from_bytes,
     require_open_cascade,
     to_bytes,
     volume_of,
 )
+from clamp3d.brep.tessellation import Tessellation
 from clamp3d.core.mesh import Array, IntArray, Mesh, is_closed
 from clamp3d.core.shapes import MeshShape
 
@@ -65,15 +65,6 @@ class BrepSolid(MeshShape):
     def of(cls, solid: Any, name: str) -> BrepSolid:
         """From a TopoDS_Shape, in this process."""
         return cls(name, to_bytes(solid), bounds_of(solid), abs(volume_of(solid)))
-
-    def to_arrays(self) -> dict[str, Any]:
-        """All of it as plain data, for another process."""
-        return {"brep": self.brep, "bounds": self.bounds, "volume": self.volume}
-
-    @classmethod
-    def from_arrays(cls, name: str, arrays: dict[str, Any]) -> BrepSolid:
-        """From what `to_arrays` gave."""
-        return cls(name, **arrays)
 
     @cached_property
     def solid(self) -> Any:

@@ -36,6 +36,8 @@ def read_in_process(path: Path, unit: str | None = None, joints: Mapping[str, fl
     seconds = factor * (_SECONDS + _PER_MEGABYTE * size / 1e6)
     memory = factor * (_MEMORY + _PER_BYTE * size)
     absolute = str(path.absolute())
+    if any("\ud800" <= c <= "\udfff" for c in absolute):  # bytes of a name that are no text
+        raise InputError(f"{short(path)}: its name, or that of its folder, is not UTF-8; rename it")
     outside = os.environ.get(OUTSIDE) == "1"
     named = {str(name): value for name, value in (joints or {}).items()}
     try:

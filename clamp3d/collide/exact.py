@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from clamp3d.brep import cad_process
-from clamp3d.brep.open_cascade import TOLERANCE, CommonPart
+from clamp3d.brep.pairs import TOLERANCE, CommonPart
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.mesh_distance import holds
 from clamp3d.collide.model import Model

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.brep.open_cascade import CYLINDER, PLANE
+from clamp3d.brep.faces import CYLINDER, PLANE
 from clamp3d.brep.solid import CHORD, BrepSolid
 from clamp3d.collide.closed_form import ClosedForm
 from clamp3d.collide.drawn import bodies_of

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from clamp3d.brep.open_cascade import TOLERANCE
+from clamp3d.brep.pairs import TOLERANCE
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.closed_form import ClosedForm, bodies_distance

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.brep.bodies import Body, Reading
-from clamp3d.brep.open_cascade import CYLINDER, KINDS, PLANE
+from clamp3d.brep.faces import CYLINDER, KINDS, PLANE
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.core.mesh import Array, IntArray, Mesh
 from clamp3d.fit.cylinder import Axis, perpendicular
