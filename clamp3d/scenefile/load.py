@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clamp3d import checks
@@ -89,19 +90,26 @@ def load(
         poses=None if poses is None else checks.path("poses", poses),
         partial=checks.flag("partial", partial),
     )
-    if not isinstance(source, (str, os.PathLike)):
-        from clamp3d.brep.objects import read_object
+    if isinstance(source, (str, os.PathLike)):
+        if not os.fspath(source):  # else it would be the folder that one is in
+            raise InputError("source must not be empty")
+        return _from_path(checks.path("source", source), reader, wires)
+    refuse_wires(type(source).__name__, "an object", wires)
+    return _from_object(source, reader)
 
-        refuse_wires(type(source).__name__, "an object", wires)
-        reader.refuse("an object", "joints", "poses", "unit")
-        reading, name = read_object(source)
-        return _scene(to_parts(reading.complete(name, partial=partial), reader), name)
-    path = checks.path("source", source)
-    if not os.fspath(source):  # else it would be the folder that one is in
-        raise InputError("source must not be empty")
-    if has_bodies(path) and not (os.path.isdir(path) and _is_builtin(str(path))):
+
+def _from_object(source: Any, reader: Reader) -> Scene:
+    from clamp3d.brep.objects import read_object
+
+    reader.refuse("an object", "joints", "poses", "unit")
+    reading, name = read_object(source)
+    return _scene(to_parts(reading.complete(name, partial=reader.partial), reader), name)
+
+
+def _from_path(path: Path, reader: Reader, wires: dict[str, str | float]) -> Clamp | Scene:
+    if has_bodies(path) and not (path.is_dir() and _is_builtin(str(path))):
         refuse_wires(path, "a file of bodies", wires)
-        return _scene(read_parts(path, reader), path.resolve().name if os.path.isdir(path) else path.stem)
+        return _scene(read_parts(path, reader), path.resolve().name if path.is_dir() else path.stem)
     from clamp3d.scenefile.file import load_described
 
     reader.refuse(checks.short(path), "unit", "fit", "chord", "joints", "poses", "partial")
