@@ -12,7 +12,6 @@ from clamp3d.brep.pairs import TOLERANCE, CommonPart
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.mesh_distance import holds
 from clamp3d.collide.model import Model
-from clamp3d.collide.overlap import cut_up
 from clamp3d.core.pose import Array
 from clamp3d.errors import Clamp3dError
 
@@ -21,8 +20,6 @@ _TRIED = 24
 """Points of the common part's border whose depth is measured exactly: as many of those that look deepest by the meshes,
 and of all that may be the deepest.
 """
-_PIECES = 4000
-"""Triangles that the flat faces of that border are cut into beyond their number, to find these points."""
 
 
 def exact_distance(a: Model, b: Model, T: Array) -> Distance:
@@ -42,20 +39,22 @@ def exact_overlap(a: Model, b: Model, T: Array, share: float) -> Distance:
     """
     assert a.exact is not None
     assert b.exact is not None
-    unknown = Distance(-np.inf, TOLERANCE, level="exact", method=f"{METHOD}, without a common part")
+    unknown = Distance(level="exact", method=f"{METHOD}, without a common part")
     try:
         shared = cad_process.common(a.exact.brep, b.exact.brep, T, share)
     except Clamp3dError:  # it takes too long, or fails
         return unknown
     if shared.volume <= TOLERANCE * max(1e-12, shared.area) or not len(shared.points):
-        return Distance(-TOLERANCE, TOLERANCE, level="exact", method=METHOD)
+        return Distance(-TOLERANCE, level="exact", method=METHOD)
     deepest = _deepest(a, b, T, shared)
     if deepest is None:
         return unknown
     depth, point = deepest
-    # Between the points both surfaces are within a chord of straight lines, so nothing is much deeper.
+    # A point less deep than a chord may lie beside the part, whose border is only that well known. Between the points
+    # both surfaces are within a chord of straight lines, so nothing is much deeper.
+    attested = depth if depth > shared.chord else 0.0
     return Distance(
-        -depth - 2.0 * shared.chord - TOLERANCE, TOLERANCE - depth, point, point, None, None, "exact", METHOD
+        -depth - 2.0 * shared.chord - TOLERANCE, TOLERANCE - attested, point, point, None, None, "exact", METHOD
     )
 
 
@@ -66,23 +65,19 @@ def _deepest(a: Model, b: Model, T: Array, shared: CommonPart) -> tuple[float, A
     """
     assert a.exact is not None
     assert b.exact is not None
+    points = shared.points
+    local = (points - T[:3, 3]) @ T[:3, :3]
+    looks, slack = np.zeros(len(points)), np.inf
     if a.chords and b.chords:
         x, y = a.outer(a.chords[-1]), b.outer(b.chords[-1])
-        *_, pieces = cut_up(x, y, T, shared.flat, _PIECES)
-        points = np.vstack([shared.points, pieces.triangles.mean(axis=1)])
-        local = (points - T[:3, 3]) @ T[:3, :3]
-        off = 2.0 * TOLERANCE
+        off = shared.chord + 2.0 * TOLERANCE
         if not (holds(x, points, x.error + off) and holds(y, local, y.error + off)):
             return None
         looks, slack = np.maximum(x.distance(points), y.distance(local)), 2.0 * (x.error + y.error)
-    else:
-        points = np.vstack([shared.points, shared.flat.mean(axis=1)])
-        looks, slack = np.zeros(len(points)), np.inf
     order = np.argsort(-looks, kind="stable")
     order = order[looks[order] >= looks.max() - slack]
     spread = order[np.linspace(0, len(order) - 1, min(len(order), _TRIED)).round().astype(int)]
-    points = points[np.concatenate([order[:_TRIED], spread])]
-    in_b = cad_process.depths(b.exact.brep, (points - T[:3, 3]) @ T[:3, :3])
-    depths = np.maximum(cad_process.depths(a.exact.brep, points), in_b)
+    tried = np.concatenate([order[:_TRIED], spread])
+    depths = np.maximum(cad_process.depths(a.exact.brep, points[tried]), cad_process.depths(b.exact.brep, local[tried]))
     k = int(np.argmax(depths))
-    return float(depths[k]), points[k]
+    return float(depths[k]), points[tried[k]]

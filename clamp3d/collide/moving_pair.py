@@ -65,7 +65,7 @@ class MovingPair:
     def least_distance(
         self, thresholds: Thresholds | None = None, allowance: float | None = None
     ) -> tuple[Distance, float]:
-        """Least distance on the way, and its time; with ``thresholds`` only until their verdict is certain."""
+        """Least distance on the way, and its time; with ``thresholds`` sharp where that is cheap or they need it."""
         accuracy = ACCURACY if thresholds is None else CHECKED
         best, at, overlaps = Distance(), 0.0, 0
 
@@ -81,8 +81,12 @@ class MovingPair:
                 raise _CertainError
             return here.lower, here.upper
 
+        def is_certain(lower: float, upper: float) -> bool:
+            verdict = thresholds and thresholds.verdict(Distance(lower, upper), allowance)
+            return verdict not in (None, Verdict.UNCERTAIN)
+
         try:
-            bounds = least(distance, self.speed, bound=self.between, accuracy=accuracy, most=MOST)
+            bounds = least(distance, self.speed, bound=self.between, accuracy=accuracy, most=MOST, is_enough=is_certain)
         except _CertainError:
             return replace(best, lower=-np.inf), at
         return replace(best, lower=min(bounds.lower, best.upper)), at

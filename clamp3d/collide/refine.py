@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from clamp3d.brep.pairs import TOLERANCE
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.broad import Boxes, box_gaps
 from clamp3d.collide.closed_form import ClosedForm, bodies_distance
@@ -25,7 +26,7 @@ from clamp3d.errors import SolverError
 ACCURACY = 1e-7
 """Width (mm) of the interval at which a distance counts as known; relative to the size where that is more."""
 
-SHARES = (0.02, 0.004)
+SHARES = (0.04, 0.015)
 """Chords of the border of a common part, of its thickness: the first is quick, the second takes up to seconds."""
 
 Enough = Callable[[Distance], bool]
@@ -175,7 +176,9 @@ def _nearest_of_several(a: Model, b: Model, T: Array, level: str) -> Distance:
 
 
 def accuracy_for(a: Model, b: Model, accuracy: float = ACCURACY) -> float:
-    """``accuracy`` (mm), or what is relative to the size of two shapes, whichever is more."""
+    """``accuracy`` (mm), or what is relative to the size of two shapes or Open CASCADE's, whichever is more."""
+    if a.exact is not None and b.exact is not None:
+        accuracy = max(accuracy, 2.1 * TOLERANCE)
     return max(accuracy, ACCURACY * 1e-3 * float(max(np.abs(a.bounds).max(), np.abs(b.bounds).max())))
 
 

@@ -78,6 +78,7 @@ def least(
     bound: BoundBetween | None = None,
     accuracy: float = ACCURACY,
     most: int = MOST,
+    is_enough: Callable[[float, float], bool] = lambda lower, upper: False,
 ) -> Least:
     """Find the least distance between the times 0 and 1.
 
@@ -93,6 +94,8 @@ def least(
         How far the bounds of the answer may be apart, mm, besides those of ``distance``.
     most : int
         How often ``distance`` is asked; the bounds are further apart where that is not enough.
+    is_enough : callable, optional
+        Whether bounds (mm) of the answer are sharp enough, so that a tenth of ``most`` ends the search.
 
     Examples
     --------
@@ -106,6 +109,8 @@ def least(
     heap = [_bounded(_Stretch(-math.inf, 0.0, 1.0, start[0], stop[0]), speed, bound, upper - accuracy)]
     lower = math.inf  # of all stretches that no time parts
     while heap and heap[0].lower < upper - accuracy and evaluations < most:
+        if 10 * evaluations >= most and is_enough(min(heap[0].lower, lower), upper):
+            break
         stretch = heapq.heappop(heap)
         middle = _meeting(stretch, speed)
         if not stretch.start < middle < stretch.stop:
