@@ -85,7 +85,7 @@ class Worker:
         self._owner = 0
         self._lock = threading.Lock()
         self._lines: deque[str] = deque(maxlen=50)
-        self._threads: list[threading.Thread] = []
+        self._listener = threading.Thread()
 
     def __enter__(self) -> Worker:
         return self
@@ -98,13 +98,7 @@ class Worker:
         """The last lines that the process printed."""
         return [line for line in list(self._lines) if line]
 
-    def call(
-        self,
-        function: str,
-        *arguments: Any,
-        time_limit: float,
-        memory: float | None = None,
-    ) -> Any:
+    def call(self, function: str, *arguments: Any, time_limit: float, memory: float | None = None) -> Any:
         """The result of ``function(*arguments)`` in the process.
 
         Parameters
@@ -151,8 +145,7 @@ class Worker:
             return
         process.kill()
         process.wait()
-        for thread in self._threads:
-            thread.join(timeout=5.0)
+        self._listener.join(timeout=5.0)
         for pipe in (process.stdin, process.stdout, process.stderr):
             with suppress(OSError):  # an unwritten rest of a request
                 if pipe is not None:
@@ -175,32 +168,39 @@ class Worker:
             start_new_session=True,
         )
         self._lines = deque(maxlen=50)
-        self._answers: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._threads = [
-            threading.Thread(target=_forward, args=(process.stdout, self._answers), daemon=True),
-            threading.Thread(target=_keep_lines, args=(process.stderr, self._lines), daemon=True),
-        ]
-        for thread in self._threads:
-            thread.start()
+        self._listener = threading.Thread(target=_keep_lines, args=(process.stderr, self._lines), daemon=True)
+        self._listener.start()
 
     def _exchange(self, request: bytes, time_limit: float) -> dict[str, Any]:
         process = self._process
         assert process is not None
         assert process.stdin is not None
-        with suppress(BrokenPipeError):  # it has ended: said below
-            _send(process.stdin, request)
+        assert process.stdout is not None
+        expired = threading.Event()
+
+        def end() -> None:
+            expired.set()
+            process.kill()
+
+        timer = threading.Timer(time_limit, end)
+        timer.daemon = True
+        timer.start()
         try:
-            answer = self._answers.get(timeout=time_limit)
-        except queue.Empty:
-            raise WorkerTimeoutError(f"no answer in {time_limit:g} s") from None
-        if answer is None:
-            code = process.wait()
-            self._threads[1].join(timeout=5.0)
-            if any(word in line for line in self.log for word in ("bad_alloc", "MemoryError")):
-                raise MemoryError
-            raise WorkerEndedError(code, self.log)
-        reply: dict[str, Any] = _unpack(answer)
-        return reply
+            with suppress(BrokenPipeError):  # it has ended: said below
+                _send(process.stdin, request)
+            answer = _receive(process.stdout)
+        finally:
+            timer.cancel()
+        if answer is not None:
+            reply: dict[str, Any] = _unpack(answer)
+            return reply
+        code = process.wait()
+        if expired.is_set():
+            raise WorkerTimeoutError(f"no answer in {time_limit:g} s")
+        self._listener.join(timeout=5.0)
+        if any(word in line for line in self.log for word in ("bad_alloc", "MemoryError")):
+            raise MemoryError
+        raise WorkerEndedError(code, self.log)
 
 
 def serve() -> None:
@@ -210,18 +210,17 @@ def serve() -> None:
     os.dup2(2, 1)  # what a library prints goes to the log
     if os.environ["CLAMP3D_CONFINED"] == "1":
         sys.addaudithook(_refuse)
-    requests: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+    requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def receive() -> None:
-        _forward(incoming, requests)
+        while (message := _receive(incoming)) is not None:
+            requests.put(message)
         os._exit(1)  # the caller is gone, and a call may still be at work
 
     threading.Thread(target=receive, daemon=True).start()
     allowed = sys.argv[1:]
     while True:
-        message = requests.get()
-        assert message is not None
-        request = _unpack(message)
+        request = _unpack(requests.get())
         assert request["function"] in allowed
         _limit(request["memory"])
         _send(outgoing, _answer(request["function"], request["arguments"]))
@@ -274,15 +273,13 @@ def _send(pipe: IO[bytes], message: bytes) -> None:
     pipe.flush()
 
 
-def _forward(pipe: IO[bytes], messages: queue.SimpleQueue[bytes | None]) -> None:
-    """Put every whole message of a pipe into the queue, and None at its end."""
-    with suppress(OSError, ValueError):  # closed on this side
-        while len(head := pipe.read(_SIZE.size)) == _SIZE.size:
-            (size,) = _SIZE.unpack(head)
-            if size > _LARGEST or len(message := pipe.read(size)) < size:
-                break
-            messages.put(message)
-    messages.put(None)
+def _receive(pipe: IO[bytes]) -> bytes | None:
+    """The next message of a pipe, or None at its end."""
+    head = pipe.read(_SIZE.size)
+    if len(head) < _SIZE.size or (size := _SIZE.unpack(head)[0]) > _LARGEST:
+        return None
+    message = pipe.read(size)
+    return message if len(message) == size else None
 
 
 def _keep_lines(pipe: IO[bytes], lines: deque[str]) -> None:

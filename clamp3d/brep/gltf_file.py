@@ -12,9 +12,6 @@ import json
 import math
 import os
 import struct
-from collections import defaultdict
-from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -46,7 +43,6 @@ _HARMLESS = (
 _TRIANGLES, _STRIP = 4, 5
 _NORMALIZED = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
 """What a whole number is divided by where an accessor says "normalized"."""
-_DEEPEST = 500
 
 
 class _Buffers(FilePathResolver):
@@ -74,25 +70,26 @@ def read_gltf(path: Path, unit: str | None) -> Reading:
     try:
         tree, binary = _parts(path)
         placer = Placer(UNITS_MM[unit or "m"], _Z_UP)
-        nodes = list(_nodes(path, tree, placer))
-        names = [str(n.get("name") or tree["meshes"][n["mesh"]].get("name") or path.stem) for _, n in nodes]
-        divisors = _simplify(path, tree, {node["mesh"] for _, node in nodes}, placer)
+        if tree.get("skins") or any("targets" in p for mesh in tree.get("meshes", []) for p in mesh["primitives"]):
+            placer.notes.append("skins and morph targets are left at rest")
+        nodes = _nodes(path, tree)
+        meshes = {k: _Mesh(path, tree, k) for k in {tree["nodes"][n]["mesh"] for n in nodes}}
+        names = [str(tree["nodes"][n].get("name") or meshes[tree["nodes"][n]["mesh"]].name or path.stem) for n in nodes]
         scene = trimesh.load_scene(
-            io.BytesIO(json.dumps(tree).encode()),
+            io.BytesIO(json.dumps(_simplified(tree, meshes)).encode()),
             file_type="gltf",
             resolver=_Buffers(path, binary),
             process=False,
             skip_materials=True,
         )
-        pieces = defaultdict(list)
-        for key, mesh in scene.geometry.items():  # "7", "7_1", ...: the primitives of mesh 7, in their order
-            pieces[int(key.partition("_")[0])].append(mesh)
-        for name, (k, node) in zip(names, nodes, strict=True):
-            mesh = node["mesh"]
-            if len(pieces[mesh]) != len(tree["meshes"][mesh]["primitives"]):
-                placer.missing.append(f"{name} (not readable)")
-            elif pieces[mesh]:
-                placer.place(name, mesh, partial(_arrays, pieces[mesh], divisors[mesh]), scene.graph.get(str(k))[0])
+        for key, piece in scene.geometry.items():  # "7", "7_1", ...: the primitives of mesh 7, in their order
+            meshes[int(key.partition("_")[0])].pieces.append(piece)
+        for n, name in zip(nodes, names, strict=True):
+            k = tree["nodes"][n]["mesh"]
+            if len(meshes[k].pieces) != len(meshes[k].primitives):
+                placer.add(name, "not readable", np.eye(4))
+            elif meshes[k].pieces:
+                placer.place(name, k, meshes[k].arrays, scene.graph.get(str(n))[0])
             else:
                 placer.notes.append(f"{name}: points or lines, left out")
         return placer.reading()
@@ -126,79 +123,72 @@ def _parts(path: Path) -> tuple[dict[str, Any], bytes]:
     return tree, binary
 
 
-def _nodes(path: Path, tree: dict[str, Any], placer: Placer) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Number and content of each node of the scene that has a mesh; what is not there becomes missing, and goes."""
-    nodes, meshes = tree.setdefault("nodes", []), tree.setdefault("meshes", [])
+def _nodes(path: Path, tree: dict[str, Any]) -> list[int]:
+    """Numbers of the scene's nodes that have a mesh. Raises InputError for one that is not there, or there twice."""
+    nodes = tree.get("nodes", [])
     if not tree.get("scenes"):
         below = {child for node in nodes for child in node.get("children", [])}
         tree["scenes"], tree["scene"] = [{"nodes": [k for k in range(len(nodes)) if k not in below]}], 0
-    roots = tree["scenes"][tree.get("scene", 0)].setdefault("nodes", [])
-    stack, visited = [(k, 0) for k in reversed(_present(roots, nodes, placer))], set()
+    stack = list(reversed(tree["scenes"][tree.get("scene", 0)].get("nodes", [])))
+    visited: dict[int, None] = {}
     while stack:
-        k, depth = stack.pop()
-        if k in visited or depth > _DEEPEST:
-            raise InputError(f"{path}: node {k} is in the tree twice, or more than {_DEEPEST} levels deep")
-        visited.add(k)
-        node = nodes[k]
-        mesh = node.get("mesh")
-        if mesh is not None and 0 <= mesh < len(meshes):
-            yield k, node
-        elif mesh is not None:
-            placer.missing.append(f"{node.pop('name', f'node {k}')} (mesh {node.pop('mesh')} is not in the file)")
-        stack += [(child, depth + 1) for child in reversed(_present(node.get("children", []), nodes, placer))]
-
-
-def _present(numbers: list[int], nodes: list[Any], placer: Placer) -> list[int]:
-    """The ``numbers`` without those of nodes that are not in the file, which become missing."""
-    placer.missing += [f"node {k} (not in the file)" for k in numbers if not 0 <= k < len(nodes)]
-    numbers[:] = [k for k in numbers if 0 <= k < len(nodes)]
-    return numbers
-
-
-def _simplify(path: Path, tree: dict[str, Any], used: set[int], placer: Placer) -> dict[int, list[float]]:
-    """Leave trimesh nothing but what bodies are made of; the divisor of the numbers of each mesh's primitives.
-
-    Raises InputError for what trimesh would skip, or read as zeros.
-    """
-    if tree.get("skins") or any("targets" in p for mesh in tree["meshes"] for p in mesh["primitives"]):
-        placer.notes.append("skins and morph targets are left at rest")
-    accessors = tree.setdefault("accessors", [])
-    divisors = {}
-    for k, mesh in enumerate(tree["meshes"]):
-        kept = []
-        for primitive in mesh["primitives"] if k in used else []:
-            mode = primitive.get("mode", _TRIANGLES)
-            if mode not in (_TRIANGLES, _STRIP):
-                if mode < _TRIANGLES:  # points and lines
-                    continue
-                raise InputError(f"{path}: triangles of mode {mode} are not read; export as a list of triangles")
-            form = {"attributes": {"POSITION": primitive["attributes"]["POSITION"]}, "mode": mode}
-            kept.append(form | {key: primitive[key] for key in ("indices",) if key in primitive})
-        for number in [p["attributes"]["POSITION"] for p in kept] + [p["indices"] for p in kept if "indices" in p]:
-            if "sparse" in accessors[number] or "bufferView" not in accessors[number]:
-                raise InputError(f"{path}: sparse or empty numbers are not read; export without compression")
-        corners = [accessors[p["attributes"]["POSITION"]] for p in kept]
-        divisors[k] = [_NORMALIZED[c["componentType"]] if c.get("normalized") else 1.0 for c in corners]
-        tree["meshes"][k] = {"name": str(k), "primitives": kept}
-    places = ("children", "matrix", "translation", "rotation", "scale", "mesh")
-    for k, node in enumerate(tree["nodes"]):
-        turn = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+        k = stack.pop()
+        if not 0 <= k < len(nodes) or not 0 <= nodes[k].get("mesh", 0) < max(1, len(tree.get("meshes", []))):
+            raise InputError(f"{path}: node {k}, or its mesh, is not in the file")
+        if k in visited:
+            raise InputError(f"{path}: node {k} is in the tree twice")
+        visited[k] = None
+        turn = nodes[k].get("rotation", (0.0, 0.0, 0.0, 1.0))
         if not abs(math.hypot(*turn) - 1.0) <= UNIT_TOLERANCE:
             raise InputError(f"{path}: the rotation of a node must be a quaternion of length 1, got {shown(turn)}")
-        tree["nodes"][k] = {"name": str(k)} | {key: node[key] for key in places if key in node}
-    for buffer in tree.setdefault("buffers", []):
-        buffer.setdefault("uri", "")
-    for key in tree.keys() - {"asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews", "buffers"}:
-        del tree[key]
-    tree.setdefault("bufferViews", [])
-    return divisors
+        stack += reversed(nodes[k].get("children", []))
+    return [k for k in visited if "mesh" in nodes[k]]
 
 
-def _arrays(pieces: list[trimesh.Trimesh], divisors: list[float]) -> tuple[Array, IntArray]:
-    """Vertices (n, 3) and faces (m, 3) of the primitives of a mesh together."""
-    for piece in pieces:
-        if piece.faces.max() >= len(piece.vertices):
-            raise InputError(f"face index {piece.faces.max()} is out of range for {len(piece.vertices)} vertices")
-    vertices = [np.asarray(piece.vertices) / divisor for piece, divisor in zip(pieces, divisors, strict=True)]
-    V, F = trimesh.util.append_faces(vertices, [piece.faces for piece in pieces])
-    return np.asarray(V, dtype=np.float64), np.asarray(F, dtype=np.int64)
+class _Mesh:
+    """What is read of a mesh: ``primitives`` of triangles, which trimesh makes ``pieces`` of."""
+
+    def __init__(self, path: Path, tree: dict[str, Any], number: int) -> None:
+        self.name = tree["meshes"][number].get("name")
+        self.primitives: list[dict[str, Any]] = []
+        self.pieces: list[trimesh.Trimesh] = []
+        self._divisors: list[float] = []
+        for primitive in tree["meshes"][number]["primitives"]:
+            mode = primitive.get("mode", _TRIANGLES)
+            if mode < _TRIANGLES:  # points and lines
+                continue
+            if mode not in (_TRIANGLES, _STRIP):
+                raise InputError(f"{path}: triangles of mode {mode} are not read; export as a list of triangles")
+            corners = primitive["attributes"]["POSITION"]
+            indices = {"indices": primitive["indices"]} if "indices" in primitive else {}
+            for accessor in (tree["accessors"][k] for k in (corners, *indices.values())):
+                if "sparse" in accessor or "bufferView" not in accessor:
+                    raise InputError(f"{path}: sparse or empty numbers are not read; export without compression")
+            corner = tree["accessors"][corners]
+            self._divisors.append(_NORMALIZED[corner["componentType"]] if corner.get("normalized") else 1.0)
+            self.primitives.append({"attributes": {"POSITION": corners}, "mode": mode} | indices)
+
+    def arrays(self) -> tuple[Array, IntArray]:
+        """Vertices (n, 3) and faces (m, 3) of all pieces together."""
+        for piece in self.pieces:
+            if piece.faces.max() >= len(piece.vertices):
+                raise InputError(f"face index {piece.faces.max()} is out of range for {len(piece.vertices)} vertices")
+        vertices = [np.asarray(piece.vertices) / n for piece, n in zip(self.pieces, self._divisors, strict=True)]
+        V, F = trimesh.util.append_faces(vertices, [piece.faces for piece in self.pieces])
+        return np.asarray(V, dtype=np.float64), np.asarray(F, dtype=np.int64)
+
+
+def _simplified(tree: dict[str, Any], meshes: dict[int, _Mesh]) -> dict[str, Any]:
+    """The file with nothing in it but what bodies are made of; nodes and meshes are called by their numbers."""
+    places = ("children", "matrix", "translation", "rotation", "scale", "mesh")
+    primitives = [meshes[k].primitives if k in meshes else [] for k in range(len(tree.get("meshes", [])))]
+    return {key: tree.get(key, []) for key in ("scenes", "accessors", "bufferViews")} | {
+        "asset": tree.get("asset", {}),
+        "scene": tree.get("scene", 0),
+        "meshes": [{"name": str(k), "primitives": kept} for k, kept in enumerate(primitives)],
+        "nodes": [
+            {"name": str(k)} | {key: node[key] for key in places if key in node}
+            for k, node in enumerate(tree.get("nodes", []))
+        ],
+        "buffers": [{"uri": ""} | buffer for buffer in tree.get("buffers", [])],
+    }

@@ -63,11 +63,8 @@ def announced(path: Path) -> Announced:
     text = path.read_bytes().decode("latin-1")
     if "ISO-10303-21" not in text[:1000]:
         raise InputError(f"{path}: not a readable STEP file")
-    if "/*" in text:
-        text = _NOISE.sub(lambda m: "''" if m[0][0] == "'" else " ", text)
-    elif text.count("'") % 2 == 0:
-        text = "''".join(text.split("'")[::2])
-    if text.count("'") % 2:
+    text = _NOISE.sub(lambda m: "$" if m[0][0] == "'" else " ", text)
+    if "'" in text:
         raise _damaged(path, "a text in it does not end")
     if not re.search(r"END-ISO-10303-21\s*;", text):
         raise _damaged(path, "its end is missing")
@@ -83,9 +80,8 @@ def announced(path: Path) -> Announced:
     solids = 0
     kinds: dict[int, str] = {}
     referred = {_number(path, number) for section in sections for number in _REFERRED.findall(section)}
-    lacking = any(_lacks(section) for section in sections)
     for record in (record for section in sections for record in section.split(";") if record.strip()):
-        number, content = _entity(path, record, lacking)
+        number, content = _entity(path, record)
         if number in kinds:
             raise _damaged(path, f"#{number} is defined twice")
         if content[0] == "(":
@@ -116,21 +112,15 @@ def _sections(text: str) -> Iterator[str]:
         at = end.end()
 
 
-def _lacks(section: str) -> bool:
-    """Whether `_LACKING` is somewhere in a section, in a fifth of its time."""
-    dense = "".join(section.split())
-    return ",," in dense or ",)" in dense or "(," in dense
-
-
-def _entity(path: Path, record: str, lacking: bool) -> tuple[int, str]:
-    """Number and content of ``#number = content``; ``lacking``: whether some entity of the file lacks a value."""
+def _entity(path: Path, record: str) -> tuple[int, str]:
+    """Number and content of ``#number = content``."""
     found = _RECORD.match(record)
     if found is None:
         raise _damaged(path, f"no entity at {' '.join(record.split())[:60]!r}")
     number, content = _number(path, found[1]), found[2].rstrip()
     if not content.endswith(")") or content.count("(") != content.count(")") or "=" in content:
         raise _damaged(path, f"#{number} does not end")
-    if lacking and _LACKING.search(content):
+    if _LACKING.search(content):
         raise _damaged(path, f"#{number} lacks a value")
     return number, content
 

@@ -176,7 +176,7 @@ def _parsed(path: Path) -> ElementTree.Element:
 
 def _check_tree(path: Path, root: ElementTree.Element) -> None:
     """Raise InputError unless every link but one hangs on it by joints."""
-    links = {str(link.get("name")) for link in root.findall("link")}
+    links = [str(link.get("name")) for link in root.findall("link")]
     above: dict[str, str] = {}
     for joint in root.findall("joint"):
         parent, child = (joint.find(end) for end in ("parent", "child"))
@@ -188,15 +188,14 @@ def _check_tree(path: Path, root: ElementTree.Element) -> None:
         if ends[1] in above:
             raise InputError(f"{path}: link {checks.shown(ends[1])} is the child of more than one joint")
         above[ends[1]] = ends[0]
-    roots = sorted(links - above.keys())
-    if len(roots) > 1:
-        listed = ", ".join(roots[:4])
-        raise InputError(f"{path}: {len(roots)} links hang on no joint: {listed}; all but one must be a joint's child")
-    reached = set(roots)
+    root_link = next((link for link in links if link not in above), "")
+    reached = {root_link}
     while grown := {child for child, parent in above.items() if parent in reached} - reached:
         reached |= grown
-    if lost := sorted(links - reached):
-        raise InputError(f"{path}: no path of joints from the root to link {checks.shown(lost[0])}")
+    if lost := [link for link in links if link not in reached]:
+        raise InputError(
+            f"{path}: no path of joints from link {checks.shown(root_link)} to link {checks.shown(lost[0])}"
+        )
 
 
 def _joint_values(path: Path, robot: Any, values: dict[str, float]) -> dict[str, float]:
@@ -209,10 +208,9 @@ def _joint_values(path: Path, robot: Any, values: dict[str, float]) -> dict[str,
     configuration = {}
     for name, joint in joints.items():
         factor, unit = (1000.0, "mm") if joint.type == "prismatic" else (1.0, "rad")
-        low, high = -math.inf, math.inf
-        if joint.type != "continuous" and joint.limit is not None:
-            low = -math.inf if joint.limit.lower is None else joint.limit.lower
-            high = math.inf if joint.limit.upper is None else joint.limit.upper
+        limit = None if joint.type == "continuous" else joint.limit
+        low = -math.inf if limit is None or limit.lower is None else limit.lower
+        high = math.inf if limit is None or limit.upper is None else limit.upper
         value = min(max(0.0, low), high)
         if name in values:
             value = checks.number(f"joint {name}", values[name]) / factor

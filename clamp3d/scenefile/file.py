@@ -20,7 +20,7 @@ from clamp3d.collide.scene import Part, Scene
 from clamp3d.core import shapes
 from clamp3d.core.validation import validate
 from clamp3d.errors import Clamp3dError, InputError, escaped
-from clamp3d.scenefile.parts import Parts, refuse_wires
+from clamp3d.scenefile.parts import Parts, Reader
 from clamp3d.scenefile.pose_table import Pose
 from clamp3d.scenefile.tables import ClampTable, FileTable, MeshTable, SceneTable, clamp_source, part_table
 
@@ -103,11 +103,12 @@ def _clamp_scene(table: ClampTable, folder: Path) -> Scene:
     return scene.moved({part.name: T @ part.T_world for part in scene.parts})
 
 
-def load_described(path: Path, wires: dict[str, str | float]) -> Clamp | Scene:
-    """A clamp by the name or the file ``path``, with its ``wires`` replaced, or the scene in a file."""
+def load_described(path: Path, reader: Reader) -> Clamp | Scene:
+    """A clamp by the name or the file ``path``, with the ``reader``'s wires, or the scene in a file."""
+    reader.refuse(checks.short(path), "unit", "fit", "chord", "joints", "poses", "partial")
     if str(path) in builtin_clamps() or _is_clamp(path):
-        return load_clamp(path, **wires)
-    refuse_wires(path, "a scene", wires)
+        return load_clamp(path, line=reader.line, jumper=reader.jumper)
+    reader.refuse(checks.short(path), "line", "jumper")
     scene = load_scene(path)
     if not scene.parts:
         raise InputError(f"{checks.short(path)}: the scene has no parts; add [parts.NAME], include or [clamp]")

@@ -47,6 +47,8 @@ class Reader:
         Table of poses for a folder of meshes.
     partial : bool
         Go on with what was read where bodies are missing.
+    line, jumper : str, float or None
+        Wires that replace a clamp's own.
     """
 
     unit: str | None = None
@@ -55,6 +57,8 @@ class Reader:
     joints: Mapping[str, float] = field(default_factory=dict)
     poses: Path | None = None
     partial: bool = False
+    line: str | float | None = None
+    jumper: str | float | None = None
 
     def __post_init__(self) -> None:
         if self.fit is not None:
@@ -76,6 +80,8 @@ _GOES_WITH = {
     "joints": "a robot description (.urdf)",
     "poses": "a folder of meshes",
     "partial": "a file with geometry",
+    "line": "a clamp",
+    "jumper": "a clamp",
 }
 
 
@@ -95,19 +101,9 @@ class Parts:
         return Parts(tuple(parts), self.notes, tuple(allowed))
 
 
-def has_bodies(path: Path) -> bool:
-    """Whether a path is read by `read_parts`: a geometry file, a robot description, or a folder."""
-    return path.suffix.lower() in (*FORMATS, ROBOT) or os.path.isdir(path)  # False for names that no folder can have
-
-
-def refuse_wires(path: object, kind: str, wires: dict[str, str | float]) -> None:
-    """Raises InputError for a wire that is to replace one of ``path``, which is of another ``kind`` than a clamp."""
-    for name in wires:
-        raise InputError(f"{name} goes with a clamp; {checks.short(path)} is {kind}")
-
-
 def read_parts(path: Path, reader: Reader) -> Parts:
     """The parts of a geometry file, a robot description or a folder of meshes. Raises InputError."""
+    reader.refuse(checks.short(path), "line", "jumper")
     if os.path.isdir(path):
         reader.refuse("a folder", "joints")
         return _folder(path, reader)

@@ -161,9 +161,9 @@ def damage(what):
 @pytest.mark.parametrize(
     ("what", "message"),
     [
-        ("index of a mesh", r"only 1 of 2 bodies read; missing: bad \(mesh 7 is not in the file\)"),
+        ("index of a mesh", "node 1, or its mesh, is not in the file"),
         ("index of a vertex", r"missing: bad \(face index 99 is out of range for 8 vertices\)"),
-        ("node", r"missing: node 9 \(not in the file\)"),
+        ("node", "node 9, or its mesh, is not in the file"),
         ("extension", "needs EXT_meshopt_compression, which is not read"),
         ("circle", "in the tree twice"),
         ("turn", "rotation of a node must be a quaternion of length 1, got"),

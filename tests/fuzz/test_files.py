@@ -52,7 +52,7 @@ def spoilt_text(draw, text):
 
 
 @pytest.mark.parametrize(("name", "text", "command"), [("clamp", CLAMP, "run"), ("scene", SCENE, "check")])
-@examples(30)
+@examples(15)
 @given(data=st.data())
 def test_clamp_and_scene_files(name, text, command, data):
     with new_folder() as folder:
