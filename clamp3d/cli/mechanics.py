@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from clamp3d.cli.options import number
+import click
+
+from clamp3d.cli.options import group, number, option
 
 if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
@@ -16,22 +18,35 @@ def numbers(text: str) -> tuple[float, ...]:
     return tuple(number(part) for part in text.split(","))
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
+@dataclass(frozen=True)
+class Mechanics:
     """Torque (Nm), friction of thread and nut face, measured splint distance (mm), friction of the grooves."""
 
-    torque: float | None
-    friction: tuple[float, ...] | None
-    measured: float | None
-    groove_friction: tuple[float, ...] | None
+    torque: float | None = option(
+        "Also tell what this torque at the nut does: preload, force in each contact, when a wire slips.", metavar="NM"
+    )
+    friction: tuple[float, ...] | None = option(
+        "Friction of thread and nut face, with --torque.  [default: 0.1,0.14,0.2]", type=numbers, metavar="MU,..."
+    )
+    measured: float | None = option("Also tell whether friction explains this distance of the splints.", metavar="MM")
+    groove_friction: tuple[float, ...] | None = option(
+        "Friction of the wires in their grooves, with --torque and --measured; alone it tells between which distances "
+        "the clamp stays.  [default: 0.1,0.2]",
+        type=numbers,
+        metavar="MU,...",
+    )
 
     @property
     def anything(self) -> bool:
         """Whether anything is to be computed."""
         return not (self.torque is None and self.measured is None and self.groove_friction is None)
 
-    def check(self) -> None:
-        """Raise InputError for a value that breaks its rule."""
+    def check(self, solver: str) -> None:
+        """Raise click.UsageError for options that do not go together, InputError for a value that breaks its rule."""
+        if self.friction is not None and self.torque is None:
+            raise click.UsageError("--friction goes with --torque")
+        if self.anything and solver != "exact":
+            raise click.UsageError(f"--torque, --measured and --groove-friction go with --solver exact, not {solver}")
         from clamp3d.clamp.torque import check_torque, coefficients
 
         if self.torque is not None:
@@ -70,3 +85,7 @@ class Asked:
             return text, data
         measured = {"distance_mm": self.measured, "least_friction": finder.friction_for(self.measured)}
         return f"{text}\n{measured_to_text(finder, bands, self.measured)}", data | {"measured": measured}
+
+
+MECHANICS = group(Mechanics)
+"""``--torque --friction --measured --groove-friction``."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from clamp3d.cli.mechanics import Asked, numbers
+from clamp3d.cli.mechanics import MECHANICS, Mechanics
 from clamp3d.cli.options import CLAMP, JSON, METHOD, QUIET, VIEWING, ClampSource, Method, Viewing, declared, option
 from clamp3d.cli.progress import narrator
 from clamp3d.cli.terminal import finish, show
@@ -26,19 +26,7 @@ def command(
         "--equilibria/--no-equilibria",
         default=None,
     ),
-    torque: float | None = option(
-        "Also tell what this torque at the nut does: preload, force in each contact, when a wire slips.", metavar="NM"
-    ),
-    friction: tuple[float, ...] | None = option(
-        "Friction of thread and nut face, with --torque.  [default: 0.1,0.14,0.2]", type=numbers, metavar="MU,..."
-    ),
-    measured: float | None = option("Also tell whether friction explains this distance of the splints.", metavar="MM"),
-    groove_friction: tuple[float, ...] | None = option(
-        "Friction of the wires in their grooves, with --torque and --measured; alone it tells between which distances "
-        "the clamp stays.  [default: 0.1,0.2]",
-        type=numbers,
-        metavar="MU,...",
-    ),
+    mechanics: Mechanics = MECHANICS,
     json_file: Path | None = JSON,
     view: bool = option("Show the run in a browser while it goes on; prints the page's address."),
     viewing: Viewing = VIEWING,
@@ -52,17 +40,10 @@ def command(
     settings = method.settings()
     if equilibria and settings["solver"] != "exact":
         raise click.UsageError(f"--equilibria goes with --solver exact, not {settings['solver']}")
-    if friction is not None and torque is None:
-        raise click.UsageError("--friction goes with --torque")
-    asked = Asked(torque, friction, measured, groove_friction)
-    if asked.anything and settings["solver"] != "exact":
-        raise click.UsageError(
-            f"--torque, --measured and --groove-friction go with --solver exact, not {settings['solver']}"
-        )
     settings["others"] = (
         equilibria if equilibria is not None else method.method == "cas" and settings["solver"] == "exact"
     )
-    asked.check()
+    mechanics.check(settings["solver"])
     from clamp3d.clamp.assemble import assemble
     from clamp3d.output.files import write_json
     from clamp3d.output.run_report import run_to_text
@@ -74,8 +55,8 @@ def command(
     def done(run: Assembly) -> None:
         show(run_to_text(run))
         data = run.to_dict()
-        if asked.anything:
-            text, more = asked.answer(run)
+        if mechanics.anything:
+            text, more = mechanics.answer(run)
             show(text)
             data |= more
         if json_file is not None:

@@ -2,31 +2,58 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import JSON, PICTURE, QUIET, declared, option
+from clamp3d.cli.options import JSON, PICTURE, QUIET, declared, group, option
 from clamp3d.cli.terminal import finish, show
+from clamp3d.errors import InputError
 
 
-@declared("stress")
-def command(
+@dataclass(frozen=True)
+class Runs:
+    """Which cases are put to which methods, and how."""
+
     families: tuple[str, ...] = option(
         "Only this family, or pose, flat, motion, assembly for a kind; may be repeated.",
         "--family",
         multiple=True,
         metavar="NAME",
-    ),
-    methods: tuple[str, ...] = option("Only this method; may be repeated.", "--method", multiple=True, metavar="NAME"),
-    show_list: bool = option("List families and methods.", "--list"),
-    n: int = option("Cases per family.", type=click.IntRange(1), default=1000),
-    seed: int = option("Seed of the cases.", type=click.IntRange(0), default=0),
-    check: int = option("Truths checked at 50 digits.", type=click.IntRange(0), default=20),
+    )
+    methods: tuple[str, ...] = option("Only this method; may be repeated.", "--method", multiple=True, metavar="NAME")
+    n: int = option("Cases per family.", type=click.IntRange(1), default=1000)
+    seed: int = option("Seed of the cases.", type=click.IntRange(0), default=0)
+    check: int = option("Truths checked at 50 digits.", type=click.IntRange(0), default=20)
     time_limit: float = option(
         "Seconds for each other method per family.", type=click.FloatRange(1.0), default=60.0, metavar="S"
-    ),
-    workers: int = option("Processes.", type=click.IntRange(1), default=1),
+    )
+    workers: int = option("Processes.", type=click.IntRange(1), default=1)
+
+    def case(self, number: int) -> str:
+        """One case of the one family as Python. Raises click.UsageError for several, InputError beyond the last."""
+        from clamp3d.bench.stress.run import FAMILIES
+
+        if len(self.families) != 1 or self.families[0] not in FAMILIES:
+            raise click.UsageError("--case needs one --family; see --list")
+        family = FAMILIES[self.families[0]]
+        count = max(1, int(self.n * family.part))
+        if number >= count:
+            raise InputError(f"--case must be less than the number of cases, {count}, got {number}")
+        return family.case(count, self.seed, number)
+
+    @property
+    def text(self) -> str:
+        """The command that asks for them."""
+        some = [f' --family "{name}"' for name in self.families] + [f' --method "{name}"' for name in self.methods]
+        return f"clamp3d stress --n {self.n} --seed {self.seed} --check {self.check}{''.join(some)}"
+
+
+@declared("stress")
+def command(
+    runs: Runs = group(Runs),
+    show_list: bool = option("List families and methods.", "--list"),
     case: int | None = option(
         "Print case I of the family as Python, with its truth.", type=click.IntRange(0), metavar="I"
     ),
@@ -41,7 +68,6 @@ def command(
     """
     from clamp3d.bench.stress.report import markdown, plot, table
     from clamp3d.bench.stress.run import FAMILIES, METHODS, run_stress
-    from clamp3d.errors import InputError
 
     if show_list:
         for each in FAMILIES.values():
@@ -50,13 +76,7 @@ def command(
             show(f"{name:28s} (method) {about}")
         return
     if case is not None:
-        if len(families) != 1 or families[0] not in FAMILIES:
-            raise click.UsageError("--case needs one --family; see --list")
-        family = FAMILIES[families[0]]
-        n = max(1, int(n * family.part))
-        if case >= n:
-            raise InputError(f"--case must be less than the number of cases, {n}, got {case}")
-        show(family.case(n, seed, case))
+        show(runs.case(case))
         return
 
     from clamp3d.cli.progress import bar
@@ -64,21 +84,20 @@ def command(
 
     with bar(quiet) as report:
         result = run_stress(
-            families or None,
-            methods or None,
-            n=n,
-            seed=seed,
-            check=check,
-            time_limit=time_limit,
-            workers=workers,
+            runs.families or None,
+            runs.methods or None,
+            n=runs.n,
+            seed=runs.seed,
+            check=runs.check,
+            time_limit=runs.time_limit,
+            workers=runs.workers,
             progress=report,
         )
     show(table(result))
     if json_file is not None:
         write_json(json_file, result.to_dict())
     if markdown_file is not None:
-        extra = "".join(f' --family "{f}"' for f in families) + "".join(f' --method "{m}"' for m in methods)
-        write_text(markdown_file, markdown(result, f"clamp3d stress --n {n} --seed {seed} --check {check}{extra}"))
+        write_text(markdown_file, markdown(result, runs.text))
     if plot_file is not None:
         plot(result, plot_file)
     own = [o for o in result.outcomes if o.method == "cas"]

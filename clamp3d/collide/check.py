@@ -18,7 +18,7 @@ from clamp3d.collide.broad import Boxes, box_gaps, near_pairs
 from clamp3d.collide.check_motions import check_motions
 from clamp3d.collide.depth import penetration
 from clamp3d.collide.judge import judge
-from clamp3d.collide.model import Model, ModelCache, Progress
+from clamp3d.collide.model import Counters, Model, ModelCache, Progress
 from clamp3d.collide.reasons import failure, undecided
 from clamp3d.collide.refine import accuracy_for, measured, with_normal
 from clamp3d.collide.result import BAD, CheckResult, PairResult, Work
@@ -85,9 +85,7 @@ def check(
     distances, depths = flag("distances", distances), flag("depths", depths)
     function("progress", progress)
     cache = cache or ModelCache()
-    counters = cache.counters
-    built, queries = counters.built.copy(), counters.queries.copy()
-    clock = _Stages()
+    log = _Log(cache.counters)
     placed = scene.placed
     of_shape = [cache.model(shape) for shape in placed.shapes]
     models = [of_shape[k] for k in placed.which.tolist()]
@@ -95,44 +93,53 @@ def check(
     named = None if pairs is None else _numbered(scene, pairs)
     every = math.comb(len(models), 2) if named is None else len(named)
     near = _candidates(boxes, scene.thresholds.reach, named, everything=distances)
-    counters.queries["boxes"] += len(near)
+    cache.counters.queries["boxes"] += len(near)
     questions = _Questions(scene, models, distances=distances, depths=depths)
-    clock.end("broad phase")
+    log.end("broad phase")
     rows = []
     for k, ((i, j), gap) in enumerate(zip(near.tolist(), box_gaps(boxes, near).tolist(), strict=True)):
         if progress is not None:
             progress("pairs", k, len(near))
         rows.append(questions.row(i, j, gap))
-    clock.end("pairs")
+    log.end("pairs")
     moved = check_motions(scene, models, named, progress)
     if scene.motions:
-        clock.end("motions")
-    decided = Counter(row.distance.level for row in rows if row.verdict not in (Verdict.FAILED, Verdict.UNCERTAIN))
-    work = Work(
-        parts=len(models),
-        shapes=len(of_shape),
-        pairs=every,
-        candidates=len(near),
-        **{name: counters.built[name] - built[name] for name in ("meshes", "triangles", "hulls", "fits")},
-        queries=dict(counters.queries - queries),
-        decided=dict(+(decided + Counter({"broad phase": every - len(near)}))),
-        seconds=clock.seconds,
-    )
+        log.end("motions")
     names = None if named is None else tuple((scene.parts[i].name, scene.parts[j].name) for i, j in named)
+    work = log.work(rows, parts=len(models), shapes=len(of_shape), pairs=every, candidates=len(near))
     return CheckResult(scene, tuple(rows), moved, names, work)
 
 
-class _Stages:
-    """Seconds of each stage of a check."""
+class _Log:
+    """What a check builds and asks, and the seconds of each of its stages."""
 
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
+    def __init__(self, counters: Counters) -> None:
+        self._counters = counters
+        self._built, self._queries = counters.built.copy(), counters.queries.copy()
+        self._seconds: dict[str, float] = {}
         self._start = time.perf_counter()
 
     def end(self, stage: str) -> None:
         """The stage that began when the one before ended is over."""
         now = time.perf_counter()
-        self.seconds[stage], self._start = round(now - self._start, 6), now
+        self._seconds[stage], self._start = round(now - self._start, 6), now
+
+    def work(self, rows: Sequence[PairResult], *, parts: int, shapes: int, pairs: int, candidates: int) -> Work:
+        """All of it, with how many pairs each level decided."""
+        decided = Counter(row.distance.level for row in rows if row.verdict not in (Verdict.FAILED, Verdict.UNCERTAIN))
+        decided["broad phase"] = pairs - candidates
+        built, queries = self._counters.built - self._built, self._counters.queries - self._queries
+        counts = {name: built[name] for name in ("meshes", "triangles", "hulls", "fits")}
+        return Work(
+            parts,
+            shapes,
+            pairs,
+            candidates,
+            **counts,
+            queries=dict(queries),
+            decided=dict(+decided),
+            seconds=self._seconds,
+        )
 
 
 def _numbered(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, int]]:

@@ -39,9 +39,28 @@ def bodies_of_fit(
     V, F = model.vertices, model.faces
     chord = np.zeros(len(F)) if chord is None else chord
     flat = np.zeros(len(F), dtype=bool) if flat is None else flat
+    error = max((feature.fit_error for feature in result.features), default=0.0)
+    hollow = (*result.grooves, *result.holes)
+    bores, through = [], np.zeros(len(F), dtype=bool)
+    for feature in hollow:
+        bore = _bore(feature, hollow, V, F, error, feature.error_bound + float(chord[feature.faces].max()))
+        if bore is not None:
+            bores.append(bore)
+            through[feature.faces] = True
+    depth = _FittedDepth(result, model, chord, flat)
+    rods, rest = _rods(result, V, F, through)
+    made = [ClosedForm((rod,), tuple(bores), error=error + stated) for rod in rods]
+    points = _outside(result, V, F, chord) if rest else V
+    for index in rest:
+        off = error + stated + depth.bulging
+        made.append(ClosedForm((hull(points[index]),), tuple(bores), error=off, surface=depth))
+    return tuple(made)
+
+
+def _outside(result: FitResult, V: Array, F: Faces, chord: Array) -> Array:
+    """The vertices (n, 3), those of convex cylinders moved out to where tangents are, not chords."""
     points = V.copy()
     for convex in result.cylinders:
-        # Facets are inscribed: their tangents in place of their chords enclose the round surface.
         own = np.unique(F[convex.faces])
         T = convex.T_part_feature
         local = to_source(T, V[own])
@@ -50,56 +69,63 @@ def bodies_of_fit(
         reach = convex.radius / (1.0 - sagitta / convex.radius) + convex.fit_error
         local[:, :2] *= (np.maximum(reach, out) / out)[:, None]
         points[own] = to_target(T, local)
-    error = max((feature.fit_error for feature in result.features), default=0.0)
-    mesh_error = max([float(chord.max()), *(feature.error_bound for feature in result.features)])
+    return points
 
-    hollow = (*result.grooves, *result.holes)
-    bores, through = [], np.zeros(len(F), dtype=bool)
-    for feature in hollow:
-        bore = _bore(feature, hollow, V, F, error, feature.error_bound + float(chord[feature.faces].max()))
-        if bore is not None:
-            bores.append(bore)
-            through[feature.faces] = True
-    owner = np.full(len(F), -1)
-    for k, feature in enumerate(result.features):
-        owner[feature.faces] = k
-    normal = model.normals
-    slack = 1e-9 * model.scale
-    bulging = float(chord[(owner < 0) & ~flat].max(initial=0.0))
-    # Where all other faces are cylinders, what is said of those below corrects the borders of the flat ones.
-    is_exact = (chord <= slack) | (flat & (bulging == 0.0))
 
-    def depth(x: Array) -> Array:
-        away, face, foot = model.nearest(x)
-        on = (away <= slack) & (owner[face] < 0) & is_exact[face]
-        aside = np.linalg.norm(np.cross(x - foot, normal[face]), axis=1)
-        for k, surface in enumerate(result.features):
+class _FittedDepth:
+    """Depth of points in a fitted mesh, never too much: 0 on what is certainly the part's surface.
+
+    ``bulging`` (mm): how far faces that are neither flat nor fitted can stand out of their triangles.
+    """
+
+    def __init__(self, result: FitResult, model: Surface, chord: Array, flat: NDArray[np.bool_]) -> None:
+        self._result, self._model = result, model
+        self._owner = np.full(len(model.faces), -1)
+        for k, feature in enumerate(result.features):
+            self._owner[feature.faces] = k
+        self._error = max([float(chord.max()), *(feature.error_bound for feature in result.features)])
+        self._slack = 1e-9 * model.scale
+        self.bulging = float(chord[(self._owner < 0) & ~flat].max(initial=0.0))
+        # Where all other faces are cylinders, what is said of those below corrects the borders of the flat ones.
+        self._is_exact = (chord <= self._slack) | (flat & (self.bulging == 0.0))
+
+    def __call__(self, x: Array) -> Array:
+        """Depth (k,) mm of points (k, 3); negative outside."""
+        away, face, foot = self._model.nearest(x)
+        on = (away <= self._slack) & (self._owner[face] < 0) & self._is_exact[face]
+        on |= self._on_fitted(x, face, foot)
+        on &= ~self._in_hollow(x, face)
+        depth = np.where(on, 0.0, -self._error - away)
+        # Nearer to the facets than their own error a point proves nothing; further in it does.
+        far = np.flatnonzero(~on & (away > self._error))
+        within = far[self._model.contains(x[far])]
+        depth[within] = away[within] - self._error
+        return depth
+
+    def _on_fitted(self, x: Array, face: Faces, foot: Array) -> NDArray[np.bool_]:
+        """Which points lie on a fitted surface over a facet of its own; elsewhere it may have a window."""
+        aside = np.linalg.norm(np.cross(x - foot, self._model.normals[face]), axis=1)
+        on = np.zeros(len(x), dtype=bool)
+        for k, surface in enumerate(self._result.features):
             local = to_source(surface.T_part_feature, x)
             out, z = np.hypot(local[:, 0], local[:, 1]) - surface.radius, np.abs(local[:, 2]) - 0.5 * surface.length
             turned = np.abs(np.arctan2(local[:, 0], -local[:, 1])) - surface.half_angle
-            # Over a facet of its own the fitted surface is the part's, within the error of the fit; elsewhere it may
-            # have a window.
-            over = (owner[face] == k) & (aside <= surface.fit_error + slack)
-            on |= over & (np.abs(out) <= slack) & (z <= slack) & (turned <= 1e-9)
-        for surface in hollow:  # facets beside a round edge fill what is between its chords and the arc
-            local = to_source(surface.T_part_feature, x)
-            cut = np.hypot(local[:, 0], local[:, 1]) < surface.radius - slack
-            # At its ends: faces that look out of it, not the floor or the step that it ends at.
-            leaves = (normal[face] @ surface.T_part_feature[:3, 2]) * np.sign(local[:, 2]) > 1e-6
-            cut &= np.abs(local[:, 2]) < 0.5 * surface.length + np.where(leaves, slack, -slack)
-            on &= ~(cut & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) < surface.half_angle))
-        found = np.where(on, 0.0, -mesh_error - away)
-        # Nearer to the facets than their own error a point proves nothing; further in it does.
-        far = np.flatnonzero(~on & (away > mesh_error))
-        within = far[model.contains(x[far])]
-        found[within] = away[within] - mesh_error
-        return found
+            # Over a facet of its own the fitted surface is the part's, within the error of the fit.
+            over = (self._owner[face] == k) & (aside <= surface.fit_error + self._slack)
+            on |= over & (np.abs(out) <= self._slack) & (z <= self._slack) & (turned <= 1e-9)
+        return on
 
-    rods, rest = _rods(result, V, F, through)
-    made = [ClosedForm((rod,), tuple(bores), error=error + stated) for rod in rods]
-    for index in rest:
-        made.append(ClosedForm((hull(points[index]),), tuple(bores), error=error + stated + bulging, surface=depth))
-    return tuple(made)
+    def _in_hollow(self, x: Array, face: Faces) -> NDArray[np.bool_]:
+        """Which points lie in a groove or hole, where facets beside it fill what is between its chords and the arc."""
+        inside = np.zeros(len(x), dtype=bool)
+        for surface in (*self._result.grooves, *self._result.holes):
+            local = to_source(surface.T_part_feature, x)
+            cut = np.hypot(local[:, 0], local[:, 1]) < surface.radius - self._slack
+            # At its ends: faces that look out of it, not the floor or the step that it ends at.
+            leaves = (self._model.normals[face] @ surface.T_part_feature[:3, 2]) * np.sign(local[:, 2]) > 1e-6
+            cut &= np.abs(local[:, 2]) < 0.5 * surface.length + np.where(leaves, self._slack, -self._slack)
+            inside |= cut & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) < surface.half_angle)
+        return inside
 
 
 def _bore(

@@ -119,6 +119,56 @@ def export(
     ['pin.stl', 'pin.stl.manifest.json']
     """
     checks.instance("source", source, Clamp, Scene, Assembly)
+    clamp = source if isinstance(source, Clamp) else source.clamp if isinstance(source, Assembly) else None
+    target = _target(source, path, format, layout, unit, check_mesh_error(mesh_error))
+    if isinstance(source, Assembly):
+        state = state or "final"
+        scene = source.scene_at(find_state(source, state))
+        scene = replace(scene, parts=tuple(replace(part, T_world=_rounded(part.T_world)) for part in scene.parts))
+        placed = place(scene, names)
+        settings = {"clamp": source.clamp.name, **target.settings(), "state": state, "status": source.status}
+    else:
+        if state is not None:
+            raise InputError("state goes with an assembled clamp")
+        placed = place(source, names)
+        kind = "clamp" if isinstance(source, Clamp) else "scene"
+        settings = {kind: source.name, **target.settings(), "state": None, "status": None}
+    settings |= {"unit": target.unit, "up": "Y" if target.format == "glb" else "Z"}
+    settings["mesh_error_mm"] = None if target.format == "step" else target.mesh_error
+
+    meshed = [] if target.format == "step" else posed(placed, target.mesh_error)
+    files = _files(target, source.name if isinstance(source, Scene) else settings["clamp"], placed, meshed)
+    contents = {key: data for key, (data, _) in files.items()}
+    listing = f"{target.file.name}.manifest.json" if target.file else f"manifest-{target.format}.json"
+    contents[listing] = manifest(placed, meshed, files, settings, clamp)
+    *paths, listed = write_files(target.file.parent if target.file else Path(path), contents)
+    return Export(tuple(paths), listed)
+
+
+@dataclass(frozen=True, slots=True)
+class _Target:
+    """How an export is written; ``file`` None: into a folder."""
+
+    format: Format
+    file: Path | None
+    layout: Layout
+    unit: str
+    mesh_error: float
+
+    def settings(self) -> dict[str, Any]:
+        """What the manifest says of it first."""
+        return {"format": self.format, "layout": self.layout}
+
+
+def _target(
+    source: Clamp | Scene | Assembly,
+    path: str | Path,
+    format: str | None,
+    layout: Layout | None,
+    unit: str | None,
+    mesh_error: float,
+) -> _Target:
+    """The choices of an export with their defaults. Raises InputError for those that do not go together."""
     chosen, file = destination(path, format)
     if layout is None:
         layout = "assembly" if file else default_layout(chosen)
@@ -128,45 +178,28 @@ def export(
     checks.choice("unit", unit, MILLIMETRES)
     if chosen == "glb" and unit != "m":
         raise InputError(f"unit of glb must be m, as glTF 2.0 demands, got {checks.shown(unit)}")
-    mesh_error = check_mesh_error(mesh_error)
     if file is not None and layout == "parts":
         raise InputError(f"layout parts needs a folder, got the file {file}")
     if layout == "assembly" and isinstance(source, Clamp):
         raise InputError("layout assembly needs poses: assemble the clamp first, or its parts would lie on one origin")
-    if state is not None and not isinstance(source, Assembly):
-        raise InputError("state goes with an assembled clamp")
+    return _Target(chosen, file, layout, unit, mesh_error)
 
-    settings: dict[str, Any] = {"format": chosen, "layout": layout}
-    if isinstance(source, Assembly):
-        state = state or "final"
-        settings = {"clamp": source.clamp.name, **settings, "state": state, "status": source.status}
-        scene = source.scene_at(find_state(source, state))
-        placed = place(replace(scene, parts=tuple(replace(p, T_world=_rounded(p.T_world)) for p in scene.parts)), names)
-        name = source.clamp.name
-    else:
-        kind = "clamp" if isinstance(source, Clamp) else "scene"
-        settings = {kind: source.name, **settings, "state": None, "status": None}
-        placed, name = place(source, names), source.name
-    settings |= {"unit": unit, "up": "Y" if chosen == "glb" else "Z"}
-    settings["mesh_error_mm"] = None if chosen == "step" else mesh_error
 
+def _files(
+    target: _Target, name: str, placed: Sequence[PlacedPart], meshed: Sequence[PosedMesh]
+) -> dict[str, tuple[bytes, Sequence[str]]]:
+    """Contents of each file by its name, and the parts in it."""
     title = "".join(c if c.isprintable() else " " for c in name)
-    meshed = [] if chosen == "step" else posed(placed, mesh_error)
     files: dict[str, tuple[bytes, Sequence[str]]] = {}
-    if layout == "assembly":
-        stem = file.stem if file else file_stem(name)
-        for key, data in _render(chosen, placed, meshed, stem, title, unit, mesh_error).items():
-            files[key if file is None or len(files) else file.name] = data, [item.name for item in placed]
-    else:
-        for i, (item, stem) in enumerate(zip(placed, _stems(placed), strict=True)):
-            one = _render(chosen, [item], meshed[i : i + 1], stem, f"{title} {item.label}", unit, mesh_error)
-            files |= {key: (data, [item.name]) for key, data in one.items()}
-    contents = {key: data for key, (data, _) in files.items()}
-    listing = f"{file.name}.manifest.json" if file else f"manifest-{chosen}.json"
-    clamp = source.clamp if isinstance(source, Assembly) else source if isinstance(source, Clamp) else None
-    contents[listing] = manifest(placed, meshed, files, settings, clamp)
-    *paths, listed = write_files(file.parent if file else Path(path), contents)
-    return Export(tuple(paths), listed)
+    if target.layout == "assembly":
+        stem = target.file.stem if target.file else file_stem(name)
+        for key, data in _render(target, placed, meshed, stem, title).items():
+            files[key if target.file is None or files else target.file.name] = data, [item.name for item in placed]
+        return files
+    for i, (item, stem) in enumerate(zip(placed, _stems(placed), strict=True)):
+        one = _render(target, [item], meshed[i : i + 1], stem, f"{title} {item.label}")
+        files |= {key: (data, [item.name]) for key, data in one.items()}
+    return files
 
 
 def _rounded(T: Array) -> Array:
@@ -190,23 +223,17 @@ def _stems(placed: Sequence[PlacedPart]) -> list[str]:
 
 
 def _render(
-    format: Format,
-    placed: Sequence[PlacedPart],
-    meshed: Sequence[PosedMesh],
-    base: str,
-    title: str,
-    unit: str,
-    mesh_error: float,
+    target: _Target, placed: Sequence[PlacedPart], meshed: Sequence[PosedMesh], base: str, title: str
 ) -> dict[str, bytes]:
     """Contents of one exported file by its name (OBJ has two)."""
-    if format == "obj":
-        model, materials = mesh_formats.obj(meshed, title, unit, f"{base}.mtl")
+    if target.format == "obj":
+        model, materials = mesh_formats.obj(meshed, title, target.unit, f"{base}.mtl")
         return {f"{base}.obj": model, f"{base}.mtl": materials}
     content = {
-        "stl": lambda: mesh_formats.stl(meshed, title, unit),
-        "ply": lambda: mesh_formats.ply(meshed, title, unit),
-        "glb": lambda: mesh_formats.glb(meshed, title, mesh_error),
-        "3mf": lambda: mesh_formats.three_mf(meshed, title, unit, mesh_error),
-        "step": lambda: step(placed, title, unit),
-    }[format]()
-    return {f"{base}.{format}": content}
+        "stl": lambda: mesh_formats.stl(meshed, title, target.unit),
+        "ply": lambda: mesh_formats.ply(meshed, title, target.unit),
+        "glb": lambda: mesh_formats.glb(meshed, title, target.mesh_error),
+        "3mf": lambda: mesh_formats.three_mf(meshed, title, target.unit, target.mesh_error),
+        "step": lambda: step(placed, title, target.unit),
+    }[target.format]()
+    return {f"{base}.{target.format}": content}
