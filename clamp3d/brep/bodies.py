@@ -72,11 +72,6 @@ class Reading:
     notes: tuple[str, ...] = ()
     joined: tuple[tuple[str, str], ...] | None = None
 
-    @property
-    def announced(self) -> int:
-        """How many bodies the file announces."""
-        return len(self.bodies) + len(self.missing)
-
     def complete(self, path: str | Path, *, partial: bool = False) -> Reading:
         """Itself; with ``partial`` also if bodies are missing, which a note then says.
 
@@ -89,7 +84,7 @@ class Reading:
             raise InputError(f"{short(path)}: no body in the file" + (f": {listed}" if listed else ""))
         if not self.missing:
             return self
-        count = f"{len(self.bodies)} of {self.announced} bodies read; missing: {listed}"
+        count = f"{len(self.bodies)} of {len(self.bodies) + len(self.missing)} bodies read; missing: {listed}"
         if not partial:
             raise InputError(f"{short(path)}: only {count} (--partial goes on with those)")
         return replace(self, notes=(count, *self.notes))
@@ -152,7 +147,7 @@ def part_name(name: str) -> str:
     return re.sub(r"[\s:,*?\[\]]+", "-", printable).strip("-") or "part"
 
 
-def unique_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+def unique_names(names: Iterable[str]) -> list[str]:
     """Names with which parts can be told apart: those that occur more than once are numbered, in their order.
 
     >>> unique_names(["nut", "plate", "nut"])
@@ -160,11 +155,11 @@ def unique_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
     """
     bare = [part_name(name) for name in names]
     often = Counter(bare)
-    used = set(taken) | {name for name in bare if often[name] == 1}
+    used = {name for name in bare if often[name] == 1}
     unique = []
     counters = {name: itertools.count(1) for name in often}
     for name in bare:
-        if often[name] > 1 or name in taken:
+        if often[name] > 1:
             name = next(numbered for k in counters[name] if (numbered := f"{name}_{k}") not in used)
             used.add(name)
         unique.append(name)

@@ -31,6 +31,8 @@ _LARGEST = 2**34
 """Bytes of a message that are read at most."""
 _ARRAY = 1
 """Number of MessagePack's extension type that holds an array."""
+_OUT_OF_MEMORY = ("bad_alloc", "MemoryError", "Memory allocation")
+"""What a process prints that ends for want of memory: C++, Python, OpenBLAS."""
 _FORBIDDEN = ("socket.connect", "socket.getaddrinfo", "socket.bind", "subprocess.", "os.system", "os.exec", "os.fork")
 _OWN_ERRORS = ("InputError", "MissingLibraryError", "SolverError", "Clamp3dError")
 _ERRORS: dict[str, type[Exception]] = {"MemoryError": MemoryError, "OSError": OSError, "RuntimeError": RuntimeError}
@@ -198,7 +200,7 @@ class Worker:
         if expired.is_set():
             raise WorkerTimeoutError(f"no answer in {time_limit:g} s")
         self._listener.join(timeout=5.0)
-        if any(word in line for line in self.log for word in ("bad_alloc", "MemoryError")):
+        if any(word in line for line in self.log for word in _OUT_OF_MEMORY):
             raise MemoryError
         raise WorkerEndedError(code, self.log)
 

@@ -57,11 +57,10 @@ def _node(item: Any) -> Node | None:
 
 
 def _all(node: Node | None, name: str) -> list[Node]:
-    return (
-        []
-        if node is None
-        else [Node(name, node.T, node.shape, [Node(name, n.T, n.shape, n.below) for n in node.below])]
-    )
+    """The node and what is directly below it, called ``name``."""
+    if node is None:
+        return []
+    return [Node(name, node.T, node.shape, [Node(name, n.T, n.shape, n.below) for n in node.below])]
 
 
 def _nodes(items: Iterable[Any]) -> list[Node]:

@@ -50,6 +50,8 @@ def read_urdf(path: Path, joints: dict[str, float]) -> Reading:
         robot = yourdfpy.URDF.load(
             io.BytesIO(text), load_meshes=False, build_scene_graph=True, load_collision_meshes=False
         )
+    except MemoryError:
+        raise
     except Exception as error:  # it raises whatever its parser meets
         raise InputError(f"{path}: not a readable URDF file ({' '.join(str(error).split())})") from None
     robot.update_cfg(_joint_values(path, robot, joints))
