@@ -89,8 +89,9 @@ def _outline(profile: Profile) -> Callable[[Array], Array]:
         for edge in profile.edges:
             (au, av), (bu, bv), chord = (x - edge.start).T, (x - edge.end).T, np.subtract(edge.end, edge.start)
             is_whole = isinstance(edge, Arc) and abs(edge.sweep) >= 2.0 * math.pi - 1e-9
+            beside = chord[0] * av - chord[1] * au + 0.0  # of a point on the chord no -0.0, which would turn it back
             if not is_whole:
-                turn += np.arctan2(au * bv - av * bu, au * bu + av * bv)
+                turn += np.arctan2(beside, au * bu + av * bv)
             if isinstance(edge, Arc):
                 u, v = (x - edge.centre).T
                 off = np.arctan2(v, u) - 0.5 * (edge.start_angle + edge.end_angle)
@@ -99,7 +100,7 @@ def _outline(profile: Profile) -> Callable[[Array], Array]:
                 near = np.where(is_beside, np.abs(rho - edge.radius), ends)
                 # Between an arc and its chord the arc turns once more round the point than the chord does.
                 sign = math.copysign(1.0, edge.sweep)
-                is_between = is_whole | (sign * (chord[0] * av - chord[1] * au) < 0.0)
+                is_between = is_whole | (sign * beside < 0.0)
                 turn += 2.0 * math.pi * sign * ((rho < edge.radius) & is_between)
             else:
                 s = np.clip((au * chord[0] + av * chord[1]) / (chord @ chord), 0.0, 1.0)
