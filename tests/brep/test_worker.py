@@ -68,6 +68,19 @@ def test_one_process_answers_until_it_fails_and_the_next_call_starts_another(wor
     assert worker.call("stand_in:pid", time_limit=60.0) != first
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes cannot be forked here")
+@pytest.mark.filterwarnings("ignore:This process.*fork:DeprecationWarning")
+def test_a_forked_process_starts_a_worker_of_its_own(worker):
+    first = worker.call("stand_in:pid", time_limit=60.0)
+    child = os.fork()
+    if child == 0:
+        other = worker.call("stand_in:pid", time_limit=60.0)
+        worker.close()
+        os._exit(7 if other != first else 1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+    assert worker.call("stand_in:pid", time_limit=60.0) == first
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
 def test_memory_is_limited_for_each_call_alone(worker):
     with pytest.raises(MemoryError):
