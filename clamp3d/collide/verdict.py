@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -33,7 +34,6 @@ class Verdict(StrEnum):
 
 VERDICTS = tuple(Verdict)
 """Verdicts by number, as arrays keep them."""
-_PLACE = {verdict: place for place, verdict in enumerate(VERDICTS)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +58,6 @@ class Thresholds:
         """Pairs further apart than this (mm) are clear."""
         return max(self.contact, self.clearance)
 
-    def clash(self, allowance: float | None = None) -> float:
-        """Below this (mm) an upper bound alone says clash."""
-        return -max(allowance or 0.0, self.contact) - RESOLUTION
-
     def verdict(self, distance: Distance, allowance: float | None = None) -> Verdict:
         """The verdict that all distances between the bounds of ``distance`` share, else uncertain.
 
@@ -84,45 +80,26 @@ class Thresholds:
         lower, upper = distance.lower, distance.upper
         if upper - lower <= 2.0 * RESOLUTION:
             lower = upper = 0.5 * (lower + upper)
-        plain = self._of(lower) if self._of(lower) is self._of(upper) else Verdict.UNCERTAIN
-        if allowance is None or plain is Verdict.CLEAR:
-            return plain
-        limit = -max(allowance, self.contact)
-        if distance.lower >= limit - RESOLUTION:
-            if distance.lower >= self.reach:
-                return Verdict.CLEAR
-            return Verdict.ALLOWED if distance.upper < self.reach else Verdict.UNCERTAIN
-        return Verdict.CLASH if distance.upper < limit else Verdict.UNCERTAIN
+        marks, verdicts = self._scale(allowance)
+        place = bisect_left(marks, lower)
+        return verdicts[place] if place == bisect_left(marks, upper) else Verdict.UNCERTAIN
 
     def verdicts(self, lower: Array, upper: Array, allowance: float | None = None) -> NDArray[np.int8]:
         """The places in VERDICTS of many distances by their bounds (n,), each as `verdict` gives it."""
         sharp = upper - lower <= 2.0 * RESOLUTION
         middle = np.where(sharp, upper, 0.0) + 0.5 * np.where(sharp, lower - upper, 0.0)
-        low, high = self._places(np.where(sharp, middle, lower)), self._places(np.where(sharp, middle, upper))
-        plain = np.where(low == high, low, _PLACE[Verdict.UNCERTAIN])
+        marks, verdicts = self._scale(allowance)
+        low, high = (np.searchsorted(marks, np.where(sharp, middle, bound)) for bound in (lower, upper))
+        places = np.array([VERDICTS.index(verdict) for verdict in verdicts], dtype=np.int8)
+        return np.where(low == high, places[low], np.int8(VERDICTS.index(Verdict.UNCERTAIN)))
+
+    def _scale(self, allowance: float | None) -> tuple[tuple[float, ...], tuple[Verdict, ...]]:
+        """Distances (mm) at which the verdict changes, and the verdicts below, between and above them."""
+        touching = self.contact + RESOLUTION
+        clear = max(touching, self.clearance - RESOLUTION)
         if allowance is None:
-            return np.asarray(plain, dtype=np.int8)
-        limit = -max(allowance, self.contact)
-        shallow = lower >= limit - RESOLUTION
-        allowed = np.where(upper < self.reach, _PLACE[Verdict.ALLOWED], _PLACE[Verdict.UNCERTAIN])
-        allowed = np.where(lower >= self.reach, _PLACE[Verdict.CLEAR], allowed)
-        deep = np.where(upper < limit, _PLACE[Verdict.CLASH], _PLACE[Verdict.UNCERTAIN])
-        meant = np.where(shallow, allowed, deep)
-        return np.asarray(np.where(plain == _PLACE[Verdict.CLEAR], plain, meant), dtype=np.int8)
-
-    def _places(self, distance: Array) -> NDArray[np.int64]:
-        """The places in VERDICTS of exact distances (n,)."""
-        cases = [distance < -self.contact - RESOLUTION, distance <= self.contact + RESOLUTION]
-        cases.append(distance < self.clearance - RESOLUTION)
-        names = (Verdict.CLASH, Verdict.CONTACT, Verdict.CLEARANCE)
-        return np.select(cases, [_PLACE[name] for name in names], _PLACE[Verdict.CLEAR])
-
-    def _of(self, distance: float) -> Verdict:
-        if distance < -self.contact - RESOLUTION:
-            return Verdict.CLASH
-        if distance <= self.contact + RESOLUTION:
-            return Verdict.CONTACT
-        return Verdict.CLEARANCE if distance < self.clearance - RESOLUTION else Verdict.CLEAR
+            return (-touching, touching, clear), (Verdict.CLASH, Verdict.CONTACT, Verdict.CLEARANCE, Verdict.CLEAR)
+        return (-max(allowance, self.contact) - RESOLUTION, clear), (Verdict.CLASH, Verdict.ALLOWED, Verdict.CLEAR)
 
     def between(self, distance: Distance, allowance: float | None = None) -> list[str]:
         """The thresholds that lie between the bounds of a distance, in words: why its verdict is uncertain."""

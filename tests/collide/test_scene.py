@@ -256,17 +256,6 @@ def test_poses_inside_are_contained_as_a_check_says():
         assert {"contained", "clash", "clear"} <= set(sweep.verdict.ravel())
 
 
-@pytest.mark.parametrize("allowance", [None, 0.0, 0.3])
-def test_what_an_upper_bound_alone_says_is_a_clash(allowance):
-    """Whatever the lower bound; a little above, the lower one decides."""
-    thresholds = Thresholds(clearance=0.5)
-    limit = thresholds.clash(allowance)
-    for upper in (limit - 1e-12, limit - 1e-6, limit - 1.0):
-        for lower in (-math.inf, upper - 3.0, upper - 1e-7, upper):
-            assert thresholds.verdict(Distance(lower, upper), allowance) is Verdict.CLASH
-    assert thresholds.verdict(Distance(limit + 2e-6, limit + 2e-6), allowance) is not Verdict.CLASH
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
