@@ -36,7 +36,7 @@ def to_bytes(shape: Any) -> bytes:
     return stream.getvalue()
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=512)
 def from_bytes(brep: bytes) -> Any:
     """The TopoDS_Shape of `to_bytes`. Raises MissingLibraryError without Open CASCADE."""
     require_open_cascade()
