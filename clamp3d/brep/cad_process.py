@@ -62,5 +62,5 @@ def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
 
 
 def depths(brep: bytes, points: Array) -> Array:
-    """Distance (k,) mm of points (k, 3) from the surface of a solid."""
+    """Signed depth (k,) mm of points (k, 3) in a solid: negative outside."""
     return np.asarray(_ask("pairs:depths", brep, points))

@@ -102,15 +102,20 @@ def _heights(points: Array) -> Array:
 
 
 def depths(brep: bytes, points: Array) -> Array:
-    """Distance (k,) mm of points (k, 3) from the surface of a solid."""
+    """Signed depth (k,) mm of points (k, 3) in a solid: negative outside."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+    from OCP.BRepClass3d import BRepClass3d_SolidClassifier
     from OCP.BRepExtrema import BRepExtrema_DistShapeShape
     from OCP.gp import gp_Pnt
+    from OCP.TopAbs import TopAbs_State
 
-    shells = [*explore(from_bytes(brep), "SHELL")]
-    nearest = np.full(len(points), np.inf)
+    shape = from_bytes(brep)
+    shells, side = [*explore(shape, "SHELL")], BRepClass3d_SolidClassifier(shape)
+    signed = np.empty(len(points))
     for k, point in enumerate(points.tolist()):
         vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*point)).Vertex()
-        for shell in shells:
-            nearest[k] = min(nearest[k], BRepExtrema_DistShapeShape(shell, vertex).Value())
-    return nearest
+        signed[k] = min(BRepExtrema_DistShapeShape(shell, vertex).Value() for shell in shells)
+        side.Perform(gp_Pnt(*point), TOLERANCE)
+        if side.State() == TopAbs_State.TopAbs_OUT:
+            signed[k] = -signed[k]
+    return signed

@@ -46,25 +46,25 @@ def exact_overlap(a: Model, b: Model, T: Array, share: float) -> Distance:
         return unknown
     if shared.volume <= TOLERANCE * max(1e-12, shared.area) or not len(shared.points):
         return Distance(-TOLERANCE, level="exact", method=METHOD)
-    deepest = _deepest(a, b, T, shared)
-    if deepest is None:
+    points = _deep_points(a, b, T, shared)
+    if points is None:
         return unknown
-    depth, point = deepest
-    # A point less deep than a chord may lie beside the part, whose border is only that well known. Between the points
-    # both surfaces are within a chord of straight lines, so nothing is much deeper.
-    attested = depth if depth > shared.chord else 0.0
-    return Distance(
-        -depth - 2.0 * shared.chord - TOLERANCE, TOLERANCE - attested, point, point, None, None, "exact", METHOD
-    )
+    in_a = cad_process.depths(a.exact.brep, points)
+    in_b = cad_process.depths(b.exact.brep, (points - T[:3, 3]) @ T[:3, :3])
+    # Between the points both surfaces are within a chord of straight lines, so nothing is much deeper.
+    most = float(np.maximum(np.abs(in_a), np.abs(in_b)).max()) + 2.0 * shared.chord
+    # A point near the border, which is only that well known, may lie beside the part and attests nothing.
+    attested = np.where(np.minimum(in_a, in_b) >= -2.0 * TOLERANCE, np.maximum(in_a, in_b), 0.0)
+    k = int(np.argmax(attested))
+    upper = TOLERANCE - float(attested[k])
+    return Distance(-most - TOLERANCE, upper, points[k], points[k], None, None, "exact", METHOD)
 
 
-def _deepest(a: Model, b: Model, T: Array, shared: CommonPart) -> tuple[float, Array] | None:
-    """The largest depth (mm) of points of the common part's border in either solid, and the point (3,).
+def _deep_points(a: Model, b: Model, T: Array, shared: CommonPart) -> Array | None:
+    """Points (k, 3) of the common part's border that may be the deepest.
 
-    None where some of them do not lie in both by their meshes: Open CASCADE was wrong.
+    None where some of the border does not lie in both by their meshes: Open CASCADE was wrong.
     """
-    assert a.exact is not None
-    assert b.exact is not None
     points = shared.points
     local = (points - T[:3, 3]) @ T[:3, :3]
     looks, slack = np.zeros(len(points)), np.inf
@@ -77,7 +77,4 @@ def _deepest(a: Model, b: Model, T: Array, shared: CommonPart) -> tuple[float, A
     order = np.argsort(-looks, kind="stable")
     order = order[looks[order] >= looks.max() - slack]
     spread = order[np.linspace(0, len(order) - 1, min(len(order), _TRIED)).round().astype(int)]
-    tried = np.concatenate([order[:_TRIED], spread])
-    depths = np.maximum(cad_process.depths(a.exact.brep, points[tried]), cad_process.depths(b.exact.brep, local[tried]))
-    k = int(np.argmax(depths))
-    return float(depths[k]), points[tried[k]]
+    return np.asarray(points[np.concatenate([order[:_TRIED], spread])])
