@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import CLAMP, JSON, PICTURE, QUIET, ClampSource, declared, option
+from clamp3d.cli.options import CLAMP, JSON, PICTURE, QUIET, ClampSource, declared, group, option
 from clamp3d.cli.terminal import finish, show
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Who assembles the clamps."""
+
+    processes: int = option("Processes.", type=click.IntRange(1, 1024), default=1)
+    scheduler: str | None = option("Spread over this Dask cluster (extra 'cluster').", metavar="ADDRESS")
 
 
 @declared("tolerance")
@@ -22,8 +31,7 @@ def command(
         type=click.Choice(("uniform", "normal")),
         default="uniform",
     ),
-    processes: int = option("Processes.", type=click.IntRange(1, 1024), default=1),
-    scheduler: str | None = option("Spread over this Dask cluster (extra 'cluster').", metavar="ADDRESS"),
+    workers: Workers = group(Workers),
     json_file: Path | None = JSON,
     plot_file: Path | None = option("Draw the histogram (.png, .svg, .pdf).", "--plot", type=PICTURE),
     quiet: bool = QUIET,
@@ -54,8 +62,8 @@ def command(
             tolerance=tolerance,
             wire_tolerance_percent=wire_tolerance_percent,
             distribution="normal" if distribution == "normal" else "uniform",
-            processes=processes,
-            scheduler=scheduler,
+            processes=workers.processes,
+            scheduler=workers.scheduler,
             progress=lambda done, of: report("clamps", done, of),
         )
     show(tolerance_to_text(result, rows, note))

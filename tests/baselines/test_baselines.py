@@ -70,7 +70,7 @@ def _check_pieces(model: ContactModel, poses: Array) -> None:
 
 
 def test_wedges_of_a_fine_unit_are_the_exact_groove_at_any_tilt() -> None:
-    poses = _poses(60, 0.02)
+    poses = _poses(36, 0.02)
     exact = Cas().distances(PAIR, poses)
     model = Wedges({"P1": BLOCK}, math.radians(2.0))
     error = model.distances(PAIR, poses) - exact
