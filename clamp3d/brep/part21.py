@@ -62,28 +62,28 @@ def announced(path: Path) -> Announced:
     """What the file announces. Raises InputError if its text is not whole, naming the first fault."""
     text = path.read_bytes().decode("latin-1")
     if "ISO-10303-21" not in text[:1000]:
-        raise InputError(f"{path}: not a readable STEP file")
+        raise InputError("not a readable STEP file")
     text = _NOISE.sub(lambda m: "$" if m[0][0] == "'" else " ", text)
     if "'" in text:
-        raise _damaged(path, "a text in it does not end")
+        raise _damaged("a text in it does not end")
     if not re.search(r"END-ISO-10303-21\s*;", text):
-        raise _damaged(path, "its end is missing")
+        raise _damaged("its end is missing")
     at = 0
     for mark in _HEADER:
         if (found := mark.search(text, at)) is None:
-            raise _damaged(path, "its header is not whole")
+            raise _damaged("its header is not whole")
         at = found.end()
     sections = list(_sections(text))
     if not sections:
-        raise _damaged(path, "it has no DATA section that ends")
+        raise _damaged("it has no DATA section that ends")
     every: list[str] = []
     solids = 0
     kinds: dict[int, str] = {}
-    referred = {_number(path, number) for section in sections for number in _REFERRED.findall(section)}
+    referred = {_number(number) for section in sections for number in _REFERRED.findall(section)}
     for record in (record for section in sections for record in section.split(";") if record.strip()):
-        number, content = _entity(path, record)
+        number, content = _entity(record)
         if number in kinds:
-            raise _damaged(path, f"#{number} is defined twice")
+            raise _damaged(f"#{number} is defined twice")
         if content[0] == "(":
             names = _NAMES.findall(content)
             kinds[number] = names[0] if names else ""
@@ -94,11 +94,11 @@ def announced(path: Path) -> Announced:
             every.append(name)
             solids += name in _SOLIDS
         if len(kinds) > MOST_ENTITIES:
-            raise InputError(f"{path}: more than {MOST_ENTITIES} entities")
+            raise InputError(f"more than {MOST_ENTITIES} entities")
     dangling = referred - kinds.keys()
     if dangling:
         more = f" (and {len(dangling) - 1} more)" if len(dangling) > 1 else ""
-        raise _damaged(path, f"#{min(dangling)} is referred to and not there{more}")
+        raise _damaged(f"#{min(dangling)} is referred to and not there{more}")
     alone = [(number, kind) for number, kind in kinds.items() if kind in _PARTS and number not in referred]
     orphans = tuple(f"{_PARTS[kind]} (#{number}) that belongs to nothing" for number, kind in alone)
     return Announced(Counter(every), solids, orphans)
@@ -112,25 +112,25 @@ def _sections(text: str) -> Iterator[str]:
         at = end.end()
 
 
-def _entity(path: Path, record: str) -> tuple[int, str]:
+def _entity(record: str) -> tuple[int, str]:
     """Number and content of ``#number = content``."""
     found = _RECORD.match(record)
     if found is None:
-        raise _damaged(path, f"no entity at {' '.join(record.split())[:60]!r}")
-    number, content = _number(path, found[1]), found[2].rstrip()
+        raise _damaged(f"no entity at {' '.join(record.split())[:60]!r}")
+    number, content = _number(found[1]), found[2].rstrip()
     if not content.endswith(")") or content.count("(") != content.count(")") or "=" in content:
-        raise _damaged(path, f"#{number} does not end")
+        raise _damaged(f"#{number} does not end")
     if _LACKING.search(content):
-        raise _damaged(path, f"#{number} lacks a value")
+        raise _damaged(f"#{number} lacks a value")
     return number, content
 
 
-def _number(path: Path, digits: str) -> int:
+def _number(digits: str) -> int:
     try:
         return int(digits)
     except ValueError:  # Python reads 4300 digits
-        raise _damaged(path, f"#{digits[:20]}... has {len(digits)} digits") from None
+        raise _damaged(f"#{digits[:20]}... has {len(digits)} digits") from None
 
 
-def _damaged(path: Path, what: str) -> InputError:
-    return InputError(f"{path}: the STEP file is damaged: {what}")
+def _damaged(what: str) -> InputError:
+    return InputError(f"the STEP file is damaged: {what}")
