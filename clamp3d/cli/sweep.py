@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from clamp3d.cli.options import CLAMP, JSON, PICTURE, ClampSource, declared, group, option
-from clamp3d.cli.terminal import show
+from clamp3d.cli.terminal import save, show
 from clamp3d.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,7 +60,6 @@ def command(
     little opening. Touches wrongly: on a lip, or too far open. Cannot seat: on a face beside the groove.
     """
     from clamp3d.clamp.placement import SEAT_TOLERANCE, Placement
-    from clamp3d.output.files import write_json
     from clamp3d.output.placement_report import draw_map, grid, planes, sweep_to_dict, sweep_to_text
 
     varied = ranges.by_freedom()
@@ -76,7 +75,6 @@ def command(
     mapped = planes(varied) if map_file is not None or json_file is not None else []
     grids = {(x, y): grid(closing, x, y, varied, steps) for x, y in mapped}
     show(sweep_to_text(closing, tolerances, cloud))
-    if json_file is not None:
-        write_json(json_file, sweep_to_dict(closing, tolerances, grids, cloud))
+    save(json_file, lambda: sweep_to_dict(closing, tolerances, grids, cloud))
     if map_file is not None:
         draw_map(map_file, closing, tolerances, grids, varied)
