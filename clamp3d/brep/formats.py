@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from clamp3d.brep.bodies import Reading
 from clamp3d.brep.worker import OUTSIDE
@@ -56,15 +56,14 @@ def read(path: Path, unit: str | None = None) -> Reading:
     return reading
 
 
-def read_plain(name: str, unit: str | None, joints: dict[str, float], outside: bool) -> dict[str, Any]:
-    """The bodies of any file as dicts, lists and arrays, for the process that asked for them.
+def read_any(path: Path, unit: str | None, joints: dict[str, float], outside: bool) -> Reading:
+    """The bodies of any file, for the process that asked for them.
 
     ``outside``: whether the file may name others outside of its folder.
     """
     os.environ[OUTSIDE] = str(int(outside))  # this process reads for another one, whose settings may change
-    path = Path(name)
     if path.suffix.lower() != ROBOT:
-        return read(path, unit).to_plain()
+        return read(path, unit)
     from clamp3d.brep.urdf_file import read_urdf
 
-    return read_urdf(path, joints).to_plain()
+    return read_urdf(path, joints)

@@ -5,16 +5,20 @@ A damaged file can end the interpreter, a small archive can unpack to gigabytes.
 
 from __future__ import annotations
 
+import atexit
 import math
 import os
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from clamp3d.brep.bodies import Reading
-from clamp3d.brep.child import WorkerEndedError, WorkerTimeoutError
-from clamp3d.brep.process import READ, process
+from clamp3d.brep.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.checks import readable_file, short
 from clamp3d.errors import Clamp3dError, InputError
+
+if TYPE_CHECKING:
+    from clamp3d.brep.bodies import Reading
 
 LIMITS = "CLAMP3D_READ_LIMITS"
 """Environment variable: a factor for the limits of memory and time."""
@@ -23,6 +27,14 @@ OUTSIDE = "CLAMP3D_READ_OUTSIDE"
 _MEMORY, _PER_BYTE = 2 * 2**30, 60
 """Bytes that reading may take in any case, and for each byte of the file."""
 _SECONDS, _PER_MEGABYTE = 60.0, 20.0
+
+
+@cache
+def process() -> Worker:
+    """The process in which foreign files are read and Open CASCADE works: the first call starts it."""
+    worker = Worker(confined=True)
+    atexit.register(worker.close)
+    return worker
 
 
 def read_in_process(path: Path, unit: str | None = None, joints: Mapping[str, float] | None = None) -> Reading:
@@ -41,8 +53,11 @@ def read_in_process(path: Path, unit: str | None = None, joints: Mapping[str, fl
     outside = os.environ.get(OUTSIDE) == "1"
     named = {str(name): value for name, value in (joints or {}).items()}
     try:
-        plain = process().call(READ, absolute, unit, named, outside, time_limit=seconds, memory=memory)
-        return Reading.from_plain(plain)
+        arguments = (Path(absolute), unit, named, outside)
+        reading: Reading = process().call(
+            "clamp3d.brep.formats:read_any", *arguments, time_limit=seconds, memory=memory
+        )
+        return reading
     except WorkerTimeoutError:
         problem = f"not read in {seconds:.0f} s; {LIMITS}=4 allows four times as much"
     except MemoryError:

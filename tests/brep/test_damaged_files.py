@@ -15,8 +15,7 @@ from threemf import TIP, doubled, write_3mf
 
 from clamp3d import InputError, check, load
 from clamp3d.brep.bodies import unique_names
-from clamp3d.brep.process import process
-from clamp3d.brep.worker import LIMITS, OUTSIDE
+from clamp3d.brep.worker import LIMITS, OUTSIDE, process
 from clamp3d.shapes import load_mesh
 
 ROOT = Path(__file__).parents[2]
