@@ -12,26 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from clamp3d.checks import short
-from clamp3d.core import shapes
 from clamp3d.core.mesh import Array, Mesh, make_mesh
-from clamp3d.core.shapes import MeshShape, Solid
+from clamp3d.core.shapes import MeshShape, Shape
 from clamp3d.errors import InputError
 
 _NAMED = 4
-
-
-@dataclass(frozen=True, slots=True)
-class Drawn:
-    """A solid that a function of `clamp3d.core.shapes` draws: its ``kind`` ("box", "cylinder") and ``sizes``, mm."""
-
-    kind: str
-    sizes: tuple[float, ...]
-
-    @property
-    def solid(self) -> Solid:
-        """The solid. Raises InputError for sizes that are not > 0."""
-        solid: Solid = getattr(shapes, self.kind)(*self.sizes)
-        return solid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,13 +24,13 @@ class Body:
     """A shape under the name that its file gives it, placed by ``T`` (4, 4); instances share one shape."""
 
     name: str
-    shape: MeshShape | Drawn
+    shape: Shape
     T: Array
 
     @property
     def mesh(self) -> Mesh:
         """The triangles of a shape that is not drawn."""
-        assert not isinstance(self.shape, Drawn)
+        assert isinstance(self.shape, MeshShape)
         return self.shape.mesh
 
 

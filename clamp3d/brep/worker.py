@@ -8,14 +8,13 @@ from __future__ import annotations
 import atexit
 import math
 import os
-from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from clamp3d.brep.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.checks import readable_file, short
-from clamp3d.errors import Clamp3dError, InputError
+from clamp3d.errors import InputError
 
 if TYPE_CHECKING:
     from clamp3d.brep.bodies import Reading
@@ -37,8 +36,8 @@ def process() -> Worker:
     return worker
 
 
-def read_in_process(path: Path, unit: str | None = None, joints: Mapping[str, float] | None = None) -> Reading:
-    """The bodies of a file, read in the process.
+def read_in_process(path: Path, option: Any = None) -> Reading:
+    """The bodies of a file, read in the process; ``option`` is its unit, or the joints of a robot.
 
     Raises InputError if the file cannot be read, also if its reader crashes, or takes too much time or memory, and
     MissingLibraryError if its reader is not installed.
@@ -47,13 +46,8 @@ def read_in_process(path: Path, unit: str | None = None, joints: Mapping[str, fl
     factor = _factor()
     seconds = factor * (_SECONDS + _PER_MEGABYTE * size / 1e6)
     memory = factor * (_MEMORY + _PER_BYTE * size)
-    absolute = str(path.absolute())
-    if any("\ud800" <= c <= "\udfff" for c in absolute):  # bytes of a name that are no text
-        raise InputError(f"{short(path)}: its name, or that of its folder, is not UTF-8; rename it")
-    outside = os.environ.get(OUTSIDE) == "1"
-    named = {str(name): value for name, value in (joints or {}).items()}
+    arguments = (path.absolute(), option, os.environ.get(OUTSIDE) == "1")
     try:
-        arguments = (Path(absolute), unit, named, outside)
         reading: Reading = process().call(
             "clamp3d.brep.formats:read_any", *arguments, time_limit=seconds, memory=memory
         )
@@ -65,10 +59,8 @@ def read_in_process(path: Path, unit: str | None = None, joints: Mapping[str, fl
     except WorkerEndedError as error:
         reason = error.last or "the file is damaged, or uses what the reader does not support"
         problem = f"the reader ended with {error.ending}: {reason}"
-    except Clamp3dError as error:
-        raise type(error)(str(error).replace(absolute, str(path))) from None
-    except OSError as error:
-        raise InputError(str(error).replace(absolute, str(path))) from None
+    except InputError as error:
+        problem = str(error)
     raise InputError(f"{short(path)}: {problem}")
 
 

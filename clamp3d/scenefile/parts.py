@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 
 from clamp3d import checks
-from clamp3d.brep.bodies import Drawn, Reading, part_name, unique_names
+from clamp3d.brep.bodies import Reading, part_name, unique_names
 from clamp3d.brep.formats import FORMATS, ROBOT
 from clamp3d.brep.mesh_file import load_bodies
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.allowed import Allowed
 from clamp3d.collide.scene import Part
 from clamp3d.core.pose import UNIT_TOLERANCE, Array
-from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, MeshShape, Shape
+from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, Shape, Solid
 from clamp3d.errors import InputError
 
 COLUMNS = ("name", "x", "y", "z", "qx", "qy", "qz", "qw")
@@ -131,10 +131,10 @@ def to_parts(reading: Reading, reader: Reader) -> Parts:
     return Parts(tuple(parts), reading.notes, tuple(allowed))
 
 
-def _fitted(shape: MeshShape | Drawn, reader: Reader) -> Shape:
+def _fitted(shape: Shape, reader: Reader) -> Shape:
     """A mesh taken as the reader says; what is drawn, or knows its chord error, is taken as it is."""
-    if isinstance(shape, Drawn):
-        return shape.solid
+    if isinstance(shape, Solid):
+        return shape
     if isinstance(shape, BrepSolid):
         reader.refuse("STEP, whose faces are exact", "fit", "chord")
         return shape

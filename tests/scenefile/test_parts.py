@@ -129,7 +129,7 @@ def test_joints_start_within_their_limits(robot):
 @pytest.mark.parametrize(
     ("joints", "message"),
     [
-        ({"elbow": 1.0}, "unknown joint 'elbow'; available: turn, slide"),
+        ({"elbow": 1.0}, "joint must be one of turn, slide, got 'elbow'"),
         ({"turn": 2.5}, "joint turn must be from -1 to 2 rad, got 2.5"),
         ({"slide": 60.0}, "joint slide must be from 10 to 50 mm, got 60"),
     ],
