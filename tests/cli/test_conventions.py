@@ -51,7 +51,7 @@ class TestFiles:
         [
             ("run", "--json", "-"),
             ("tolerance", "--n", "2", "--json", "-"),
-            ("sweep", "--steps", "3", "--json", "-"),
+            ("sweep", "--steps", "4", "--json", "-"),
             ("check", "boxes.toml", "--json", "-"),
             ("fit", "ball.stl", "--json", "-"),
         ],
