@@ -186,7 +186,7 @@ def test_check_of_some_pairs_is_clean(tmp_path):
             "unknown part 'leg'; available: leaf-a",
         ),
         (["check", EXAMPLES / "hinge" / "scene.toml", "--clearance", "-1"], "clearance must be 0 or > contact"),
-        (["sweep", "--yaw-deg", "95"], "yaw must be > 0 and < 90 deg, got 95 deg"),
+        (["sweep", "--yaw-deg", "95"], "yaw: half range must be > 0 and < 90 deg, got 95"),
         (["sweep", "--offset", "-1"], "offset: half range must be > 0"),
         (["sweep", "--offset", "0", "--yaw-deg", "0", "--pitch-deg", "0"], "nothing to vary"),
         (["sweep", "--map", "map.bmp"], "the name must end in one of .png, .svg, .pdf"),
