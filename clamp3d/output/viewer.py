@@ -274,6 +274,7 @@ class Viewer:
             "overlays": [{"name": name, "path": f"{ROOT}/overlay {name}"} for name in drawing.overlays],
             "cut": drawing.cut,
             "cut_open": clamp is not None,
+            "facets": self._mesh_error,
             "frame": drawing.frame() if drawing.timeline.stops else None,
         }
         used = {row["verdict"] for stop in self._story["stops"] for row in stop["rows"]}
