@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from clamp3d.cli.options import CLAMP, JSON, PICTURE, QUIET, ClampSource, declared, option
-from clamp3d.cli.terminal import finish, show
+from clamp3d.cli.terminal import finish, save, show
 
 
 @declared("sweep")
@@ -32,7 +32,6 @@ def command(
     from clamp3d.clamp.placement import placement
     from clamp3d.cli.progress import bar
     from clamp3d.output.figures import save_figure
-    from clamp3d.output.files import write_json
     from clamp3d.output.placement_report import capture_figure, placement_to_dict, placement_to_text
 
     with bar(quiet) as report:
@@ -46,8 +45,7 @@ def command(
             progress=lambda done, of: report("start places", done, of),
         )
     show(placement_to_text(placed))
-    if json_file is not None:
-        write_json(json_file, placement_to_dict(placed))
+    save(json_file, lambda: placement_to_dict(placed))
     if map_file is not None:
         save_figure(capture_figure(placed), map_file)
-    finish(finding=False, failed=bool(placed.capture.count(Outcome.NOT_PROVEN)))
+    finish(False, failed=bool(placed.capture.count(Outcome.NOT_PROVEN)))

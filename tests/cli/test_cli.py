@@ -68,7 +68,7 @@ def test_a_clamp_that_does_not_close_is_a_finding(main):
         (["run", "--line", "LJ-631"], "unknown conductor 'LJ-631'"),
         (["run", "--jumper", "-4"], "jumper diameter must be > 0"),
         (["run", "--method", "magic"], "'magic' is not one of"),
-        (["run", "--unit-angle-deg", "5"], "--unit-angle-deg goes with"),
+        (["run", "--unit-angle-deg", "5"], "unit_angle goes with method chords or wedges"),
         (["run", "--method", "chords", "--unit-angle-deg", "0"], "unit angle must be between 0 and 180 deg, got 0"),
         (["run", "--step", "-1"], "step must be > 0 mm, got -1"),
         (["run", "--solver", "exact", "--step", "1"], "--step and --tilt-step-deg go with --solver stepped"),
