@@ -92,17 +92,18 @@ def test_odd_files_that_are_whole_are_read(tmp_path, raw):
     [
         (TIP.replace("3", "9"), '<item objectid="1"/>', "not a readable 3MF file"),
         (TIP, '<item objectid="1"/><item objectid="2"/>', "not a readable 3MF file"),
-        (doubled(16), '<item objectid="17"/>', "more than 20000 bodies"),
-        (doubled(50), '<item objectid="51"/>', "not read in 3 s"),
+        (doubled(15), '<item objectid="16"/>', "more than 20000 bodies"),
         (TIP, "", "no body in the file"),
     ],
-    ids=["index", "object", "doubled", "endless", "empty"],
+    ids=["index", "object", "doubled", "empty"],
 )
-def test_3mf_that_names_too_much_or_what_is_not_there(tmp_path, monkeypatch, objects, build, message):
-    monkeypatch.setenv(LIMITS, "0.05")  # 3 s
-    path = write_3mf(tmp_path / "a.3mf", objects, build)
-    assert path.stat().st_size < 3000
-    refused(path, message)
+def test_3mf_that_names_too_much_or_what_is_not_there(tmp_path, objects, build, message):
+    refused(write_3mf(tmp_path / "a.3mf", objects, build), message)
+
+
+def test_3mf_of_some_kilobytes_that_would_take_years_is_given_up(tmp_path, monkeypatch):
+    monkeypatch.setenv(LIMITS, "0.02")
+    refused(write_3mf(tmp_path / "a.3mf", doubled(50), '<item objectid="51"/>'), "not read in 1 s")
 
 
 def test_objects_components_and_build_items_of_3mf(tmp_path):
@@ -271,9 +272,7 @@ def test_pipes_and_devices_are_no_files(tmp_path, suffix):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="closed and full streams as Linux has them")
-@pytest.mark.parametrize(
-    ("streams", "code"), [("2>&-", 0), ("2>/dev/full", 0), (">/dev/full", 2), (">&- 2>&-", 0), ("</dev/null 2>&-", 0)]
-)
+@pytest.mark.parametrize(("streams", "code"), [("2>/dev/full", 0), (">/dev/full", 2), (">&- 2>&-", 0)])
 def test_a_clean_check_says_so_whatever_becomes_of_its_streams(tmp_path, streams, code):
     for k in range(2):
         (tmp_path / f"{k}.stl").write_bytes(TEXT)
