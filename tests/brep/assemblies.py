@@ -3,9 +3,9 @@
 import itertools
 import math
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
+from igl import winding_number
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
@@ -275,23 +275,15 @@ def deepest_corner(a, b):
     The classifier has faults: it takes points beside a plate with twelve half holes for the middle of it. So what seems
     deep must be wound round by the triangles too.
     """
-    from_boundary, points, place, found = from_shell(b), mesh_corners(a), BRepClass3d_SolidClassifier(b), 0.0
-    mesh = cache(lambda: BrepSolid.of(solid_of(b), "solid").mesh)
+    from_boundary, points, place, greatest = from_shell(b), mesh_corners(a), BRepClass3d_SolidClassifier(b), 0.0
+    solid = BrepSolid.of(solid_of(b), "solid")
     for point in points[:: max(1, len(points) // 100)]:
         place.Perform(point, 1e-7)
-        if place.State() == TopAbs_State.TopAbs_IN:
-            depth = from_boundary(point)
-            if depth > found and (depth < 0.1 or winding(mesh(), np.array(point.Coord())) > 0.5):
-                found = depth
-    return found
-
-
-def winding(mesh, point):
-    """How often triangles wind round a point."""
-    a, b, c = (mesh.vertices[mesh.faces] - point).transpose(1, 0, 2)
-    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
-    dots = [(x * y).sum(axis=1) * z for x, y, z in ((a, b, lc), (b, c, la), (c, a, lb))]
-    return np.arctan2((a * np.cross(b, c)).sum(axis=1), la * lb * lc + sum(dots)).sum() / (2.0 * np.pi)
+        if place.State() == TopAbs_State.TopAbs_IN and (depth := from_boundary(point)) > greatest:
+            corner = np.array([point.Coord()])
+            if depth < 0.1 or winding_number(solid.mesh.vertices, solid.mesh.faces, corner)[0] > 0.5:
+                greatest = depth
+    return greatest
 
 
 def mesh_corners(shape):
