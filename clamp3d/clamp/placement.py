@@ -24,8 +24,8 @@ from clamp3d.checks import array, choice, instance, number, positive, whole
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.distance import Feature, signed_distances
-from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import InputError, NotClampedError
 
