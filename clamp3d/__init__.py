@@ -9,7 +9,7 @@ Lengths are millimetres, angles radians, poses 4x4 column-vector matrices ``T_ta
 | `check` | verdicts of all pairs of a scene, at rest and in motion (`CheckResult`, `Verdict`) |
 | `distance` | signed distance of any two bodies between proven bounds (`Distance`); `measure` for a scene |
 | `assemble` | puts a clamp (`Clamp`) together with its wires (`Assembly`) |
-| `monte_carlo` | how its final state scatters; `sensitivity` to every dimension; `placement` tolerance of a wire |
+| `monte_carlo` | how its final state scatters; `sensitivity` to every dimension; `placement` of a wire it catches |
 | `view` | in a browser; `export`, `report`: files for reviewers |
 | `fit_file` | round surfaces found in a mesh file; `fit_mesh` in a mesh |
 | `clamp3d.shapes` | bodies: cylinders, boxes, groove blocks, meshes |

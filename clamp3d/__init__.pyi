@@ -13,7 +13,6 @@ from .clamp.sensitivity import sensitivity as sensitivity
 from .clamp.tolerance import monte_carlo as monte_carlo
 from .collide.answer import Distance as Distance
 from .collide.answer import Distances as Distances
-from .collide.check import check as check
 from .collide.distance import distance as distance
 from .collide.distance import distances as distances
 from .collide.distance import measure as measure
@@ -33,6 +32,7 @@ from .fit.fit import fit_mesh as fit_mesh
 from .output.export import export as export
 from .output.report import report as report
 from .output.viewer import view as view
+from .scenefile.check import check as check
 from .scenefile.file import load_scene as load_scene
 from .scenefile.load import load as load
 

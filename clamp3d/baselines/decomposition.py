@@ -90,7 +90,7 @@ def decompose(
         with suppress(KeyError, TypeError, ValueError):
             return Decomposition(_hulls(arrays), float(arrays["seconds"]), True)
     try:
-        with Worker(_RUN) as worker, _status(name, progress):
+        with Worker() as worker, _status(name, progress):
             arrays = worker.call(_RUN, solid.vertices, solid.faces, settings, time_limit=time_limit)
         result = Decomposition(_hulls(arrays), float(arrays["seconds"]), False)
     except WorkerTimeoutError:

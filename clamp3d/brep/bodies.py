@@ -8,32 +8,15 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from clamp3d.brep.solid import BrepSolid
 from clamp3d.checks import short
-from clamp3d.core import shapes
 from clamp3d.core.mesh import Array, Mesh, make_mesh
-from clamp3d.core.shapes import MeshShape, Solid
+from clamp3d.core.shapes import MeshShape, Shape
 from clamp3d.errors import InputError
 
 _NAMED = 4
-
-
-@dataclass(frozen=True, slots=True)
-class Drawn:
-    """A solid that a function of `clamp3d.core.shapes` draws: its ``kind`` ("box", "cylinder") and ``sizes``, mm."""
-
-    kind: str
-    sizes: tuple[float, ...]
-
-    @property
-    def solid(self) -> Solid:
-        """The solid. Raises InputError for sizes that are not > 0."""
-        solid: Solid = getattr(shapes, self.kind)(*self.sizes)
-        return solid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,13 +24,13 @@ class Body:
     """A shape under the name that its file gives it, placed by ``T`` (4, 4); instances share one shape."""
 
     name: str
-    shape: MeshShape | Drawn
+    shape: Shape
     T: Array
 
     @property
     def mesh(self) -> Mesh:
         """The triangles of a shape that is not drawn."""
-        assert not isinstance(self.shape, Drawn)
+        assert isinstance(self.shape, MeshShape)
         return self.shape.mesh
 
 
@@ -98,43 +81,6 @@ class Reading:
         faces = [body.mesh.faces + start for body, start in zip(self.bodies, starts, strict=False)]
         mesh = make_mesh(np.concatenate(placed), np.concatenate(faces), name=name)
         return replace(mesh, notes=(*self.notes, *mesh.notes))
-
-    def to_plain(self) -> dict[str, Any]:
-        """All of it as dicts, lists and arrays, for another process; each shape once."""
-        shapes = {id(body.shape): body.shape for body in self.bodies}
-        numbers = {key: k for k, key in enumerate(shapes)}
-        return {
-            "shapes": [_plain(shape) for shape in shapes.values()],
-            "bodies": [(body.name, numbers[id(body.shape)], body.T) for body in self.bodies],
-            "missing": self.missing,
-            "notes": self.notes,
-            "joined": self.joined,
-        }
-
-    @classmethod
-    def from_plain(cls, plain: dict[str, Any]) -> Reading:
-        """From what `to_plain` gave."""
-        shapes = [_shape(*shape) for shape in plain["shapes"]]
-        bodies = [Body(name, shapes[k], T) for name, k, T in plain["bodies"]]
-        joined = None if plain["joined"] is None else tuple((a, b) for a, b in plain["joined"])
-        return cls(tuple(bodies), tuple(plain["missing"]), tuple(plain["notes"]), joined)
-
-
-def _plain(shape: MeshShape | Drawn) -> tuple[str, Any]:
-    if isinstance(shape, Drawn):
-        return "drawn", shape
-    if isinstance(shape, BrepSolid):
-        return "exact", shape.__reduce__()[1]
-    return "mesh", shape
-
-
-def _shape(kind: str, plain: Any) -> MeshShape | Drawn:
-    if kind == "drawn":
-        return Drawn(plain["kind"], tuple(plain["sizes"]))
-    if kind == "exact":
-        return BrepSolid(*plain)
-    mesh = Mesh(**plain["mesh"] | {"notes": tuple(plain["mesh"]["notes"])})
-    return MeshShape(**plain | {"mesh": mesh})
 
 
 def part_name(name: str) -> str:

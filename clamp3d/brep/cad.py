@@ -13,9 +13,7 @@ from clamp3d.brep.open_cascade import explore, volume_of
 from clamp3d.brep.placing import Collector
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.core.mesh import Array
-from clamp3d.errors import Clamp3dError, InputError
-
-_DEEPEST = 200
+from clamp3d.errors import Clamp3dError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,12 +56,12 @@ def matrix(location: Any) -> Array:
 def bodies_of(roots: Iterable[Node]) -> tuple[Reading, int]:
     """All solids below ``roots`` with names and places, equal ones sharing a shape; and how many different ones.
 
-    What is no solid is among the reading's missing. Raises InputError for too many bodies, or too deep a tree.
+    What is no solid is among the reading's missing. Raises InputError for too many bodies.
     """
     collector = Collector()
     shapes: dict[Key, BrepSolid | str] = {}
     loose = 0
-    for node, T in _leaves(roots):
+    for node, T in _leaves(roots, np.eye(4)):
         solids = list(explore(node.shape, "SOLID"))
         for solid in solids:
             key = Key(solid)
@@ -85,21 +83,13 @@ def bodies_of(roots: Iterable[Node]) -> tuple[Reading, int]:
     return collector.reading(), len(shapes)
 
 
-def _leaves(roots: Iterable[Node]) -> Iterator[tuple[Node, Array]]:
+def _leaves(nodes: Iterable[Node], above: Array) -> Iterator[tuple[Node, Array]]:
     """Nodes with a shape and their places in the world, in the order of the tree."""
-    stack = [(iter(roots), np.eye(4))]
-    while stack:
-        nodes, above = stack[-1]
-        node = next(nodes, None)
-        if node is None:
-            stack.pop()
-            continue
+    for node in nodes:
         T = above @ node.T
         if node.shape is not None:
             yield node, T
-        if len(stack) > _DEEPEST:
-            raise InputError(f"assemblies more than {_DEEPEST} levels deep")
-        stack.append((iter(node.below), T))
+        yield from _leaves(node.below, T)
 
 
 def _shape(solid: Any, name: str) -> BrepSolid | str:

@@ -1,4 +1,8 @@
-"""The file formats that hold bodies: which function reads each of them, in the process for foreign files."""
+"""The file formats that hold bodies: which function reads each of them, in the process for foreign files.
+
+A reader takes a path and the unit, and gives what it read, and what the file announces and it could not read. It raises
+InputError for what it refuses. Whatever else a library raises is made one line here.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ from typing import Any, NamedTuple
 
 from clamp3d.brep.bodies import Reading
 from clamp3d.brep.worker import OUTSIDE
+from clamp3d.errors import Clamp3dError, InputError
 
 UNITS_MM: dict[str, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 """Millimetres in one unit of length."""
@@ -19,20 +24,19 @@ class Format(NamedTuple):
 
     Attributes
     ----------
-    module, function : str
-        Function of ``clamp3d.brep`` that reads them: path and unit in mm give a `Reading`.
+    reader : str
+        Module and function of ``clamp3d.brep`` that reads them.
     unit : str or None
         Unit that the format fixes ("stated": each file states it; None: neither does).
     """
 
-    module: str
-    function: str
+    reader: str
     unit: str | None = None
 
 
-_MESH = Format("triangle_file", "read_triangles")
-_GLTF = Format("gltf_file", "read_gltf", "m")
-_STEP = Format("step_file", "read_step", "stated")
+_MESH = Format("triangle_file:read_triangles")
+_GLTF = Format("gltf_file:read_gltf", "m")
+_STEP = Format("step_file:read_step", "stated")
 FORMATS: dict[str, Format] = {
     ".stl": _MESH,
     ".obj": _MESH,
@@ -40,7 +44,7 @@ FORMATS: dict[str, Format] = {
     ".off": _MESH,
     ".glb": _GLTF,
     ".gltf": _GLTF,
-    ".3mf": Format("threemf_file", "read_3mf", "stated"),
+    ".3mf": Format("threemf_file:read_3mf", "stated"),
     ".step": _STEP,
     ".stp": _STEP,
 }
@@ -49,22 +53,24 @@ ROBOT = ".urdf"
 """The ending of robot descriptions, whose links are drawn or name files of geometry."""
 
 
-def read(path: Path, unit: str | None = None) -> Reading:
-    """The bodies of a file of `FORMATS`, read in this process; ``unit`` is one of `UNITS_MM`."""
-    module, function, _ = FORMATS[path.suffix.lower()]
-    reading: Reading = getattr(importlib.import_module(f"clamp3d.brep.{module}"), function)(path, unit)
-    return reading
+def read(path: Path, option: Any = None) -> Reading:
+    """The bodies of a file, read in this process; ``option`` is one of `UNITS_MM`, or the joints of a robot."""
+    kind = path.suffix.lower()
+    reader = "urdf_file:read_urdf" if kind == ROBOT else FORMATS[kind].reader
+    module, _, function = reader.partition(":")
+    try:
+        reading: Reading = getattr(importlib.import_module(f"clamp3d.brep.{module}"), function)(path, option)
+        return reading
+    except (Clamp3dError, MemoryError):
+        raise
+    except OSError as error:
+        raise InputError(error.strerror or str(error)) from None
+    except Exception as error:  # libraries raise whatever their parsers meet
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(f"not a readable {kind[1:].upper()} file ({reason})") from None
 
 
-def read_plain(name: str, unit: str | None, joints: dict[str, float], outside: bool) -> dict[str, Any]:
-    """The bodies of any file as dicts, lists and arrays, for the process that asked for them.
-
-    ``outside``: whether the file may name others outside of its folder.
-    """
-    os.environ[OUTSIDE] = str(int(outside))  # this process reads for another one, whose settings may change
-    path = Path(name)
-    if path.suffix.lower() != ROBOT:
-        return read(path, unit).to_plain()
-    from clamp3d.brep.urdf_file import read_urdf
-
-    return read_urdf(path, joints).to_plain()
+def read_any(path: Path, option: Any, outside: bool) -> Reading:
+    """The same for another process; ``outside``: whether the file may name others outside of its folder."""
+    os.environ[OUTSIDE] = str(int(outside))  # the settings of the process that asks may change
+    return read(path, option)

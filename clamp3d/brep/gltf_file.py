@@ -58,46 +58,38 @@ class _Buffers(FilePathResolver):
         try:
             return self.absolute(unquote(name)).read_bytes()
         except ValueError:
-            raise InputError(
-                f"{self.file_path}: names {shown(name)}, which is outside of its folder; {OUTSIDE}=1 allows that"
-            ) from None
+            raise InputError(f"names {shown(name)}, which is outside of its folder; {OUTSIDE}=1 allows that") from None
         except OSError as error:
-            raise InputError(f"{self.file_path}: names {shown(name)}: {error.strerror}") from None
+            raise InputError(f"names {shown(name)}: {error.strerror}") from None
 
 
 def read_gltf(path: Path, unit: str | None) -> Reading:
     """The meshes of a glTF or GLB file. Raises InputError if it is damaged, or holds what cannot be read."""
-    try:
-        tree, binary = _parts(path)
-        placer = Placer(UNITS_MM[unit or "m"], _Z_UP)
-        if tree.get("skins") or any("targets" in p for mesh in tree.get("meshes", []) for p in mesh["primitives"]):
-            placer.notes.append("skins and morph targets are left at rest")
-        nodes = _nodes(path, tree)
-        meshes = {k: _Mesh(path, tree, k) for k in {tree["nodes"][n]["mesh"] for n in nodes}}
-        names = [str(tree["nodes"][n].get("name") or meshes[tree["nodes"][n]["mesh"]].name or path.stem) for n in nodes]
-        scene = trimesh.load_scene(
-            io.BytesIO(json.dumps(_simplified(tree, meshes)).encode()),
-            file_type="gltf",
-            resolver=_Buffers(path, binary),
-            process=False,
-            skip_materials=True,
-        )
-        for key, piece in scene.geometry.items():  # "7", "7_1", ...: the primitives of mesh 7, in their order
-            meshes[int(key.partition("_")[0])].pieces.append(piece)
-        for n, name in zip(nodes, names, strict=True):
-            k = tree["nodes"][n]["mesh"]
-            if len(meshes[k].pieces) != len(meshes[k].primitives):
-                placer.add(name, "not readable", np.eye(4))
-            elif meshes[k].pieces:
-                placer.place(name, k, meshes[k].arrays, scene.graph.get(str(n))[0])
-            else:
-                placer.notes.append(f"{name}: points or lines, left out")
-        return placer.reading()
-    except (InputError, MemoryError):
-        raise
-    except Exception as error:  # the file's own JSON, and trimesh, raise whatever they meet
-        reason = f" ({type(error).__name__}: {error})" if str(error) else ": it is cut off or damaged"
-        raise InputError(f"{path}: not a readable {path.suffix[1:].upper()} file{reason}") from None
+    tree, binary = _parts(path)
+    placer = Placer(UNITS_MM[unit or "m"], _Z_UP)
+    if tree.get("skins") or any("targets" in p for mesh in tree.get("meshes", []) for p in mesh["primitives"]):
+        placer.notes.append("skins and morph targets are left at rest")
+    nodes = _nodes(tree)
+    meshes = {k: _Mesh(tree, k) for k in {tree["nodes"][n]["mesh"] for n in nodes}}
+    scene = trimesh.load_scene(
+        io.BytesIO(json.dumps(_simplified(tree, meshes)).encode()),
+        file_type="gltf",
+        resolver=_Buffers(path, binary),
+        process=False,
+        skip_materials=True,
+    )
+    for key, piece in scene.geometry.items():  # "7", "7_1", ...: the primitives of mesh 7, in their order
+        meshes[int(key.partition("_")[0])].pieces.append(piece)
+    for n in nodes:
+        k = tree["nodes"][n]["mesh"]
+        name = str(tree["nodes"][n].get("name") or tree["meshes"][k].get("name") or path.stem)
+        if len(meshes[k].pieces) != len(meshes[k].primitives):
+            placer.add(name, "not readable", np.eye(4))
+        elif meshes[k].pieces:
+            placer.place(name, k, meshes[k].arrays, scene.graph.get(str(n))[0])
+        else:
+            placer.notes.append(f"{name}: points or lines, left out")
+    return placer.reading()
 
 
 def _parts(path: Path) -> tuple[dict[str, Any], bytes]:
@@ -107,23 +99,23 @@ def _parts(path: Path) -> tuple[dict[str, Any], bytes]:
     if raw[:4] == b"glTF":
         version, length, size, kind = struct.unpack_from("<IIII", raw, 4)
         if version != 2 or kind != 0x4E4F534A:
-            raise InputError(f"{path}: not a readable GLB file (version {version})")
+            raise InputError(f"not a readable GLB file (version {version})")
         if length > len(raw):
-            raise InputError(f"{path}: the file is cut off: {len(raw)} of {length} bytes")
+            raise InputError(f"the file is cut off: {len(raw)} of {length} bytes")
         text = raw[20 : 20 + size]
         if length > 28 + size:
             binary = raw[28 + size : 28 + size + struct.unpack_from("<I", raw, 20 + size)[0]]
     tree = json.loads(text)
     if not isinstance(tree, dict):
-        raise InputError(f"{path}: not a readable {path.suffix[1:].upper()} file (no object)")
+        raise InputError("not a readable glTF file (no object)")
     required = [x for x in tree.get("extensionsRequired", []) if not str(x).startswith(_HARMLESS)]
     if required:
         listed = ", ".join(map(str, required))
-        raise InputError(f"{path}: needs {listed}, which is not read; export without compression")
+        raise InputError(f"needs {listed}, which is not read; export without compression")
     return tree, binary
 
 
-def _nodes(path: Path, tree: dict[str, Any]) -> list[int]:
+def _nodes(tree: dict[str, Any]) -> list[int]:
     """Numbers of the scene's nodes that have a mesh. Raises InputError for one that is not there, or there twice."""
     nodes = tree.get("nodes", [])
     if not tree.get("scenes"):
@@ -134,13 +126,13 @@ def _nodes(path: Path, tree: dict[str, Any]) -> list[int]:
     while stack:
         k = stack.pop()
         if not 0 <= k < len(nodes) or not 0 <= nodes[k].get("mesh", 0) < max(1, len(tree.get("meshes", []))):
-            raise InputError(f"{path}: node {k}, or its mesh, is not in the file")
+            raise InputError(f"node {k}, or its mesh, is not in the file")
         if k in visited:
-            raise InputError(f"{path}: node {k} is in the tree twice")
+            raise InputError(f"node {k} is in the tree twice")
         visited[k] = None
         turn = nodes[k].get("rotation", (0.0, 0.0, 0.0, 1.0))
         if not abs(math.hypot(*turn) - 1.0) <= UNIT_TOLERANCE:
-            raise InputError(f"{path}: the rotation of a node must be a quaternion of length 1, got {shown(turn)}")
+            raise InputError(f"the rotation of a node must be a quaternion of length 1, got {shown(turn)}")
         stack += reversed(nodes[k].get("children", []))
     return [k for k in visited if "mesh" in nodes[k]]
 
@@ -148,8 +140,7 @@ def _nodes(path: Path, tree: dict[str, Any]) -> list[int]:
 class _Mesh:
     """What is read of a mesh: ``primitives`` of triangles, which trimesh makes ``pieces`` of."""
 
-    def __init__(self, path: Path, tree: dict[str, Any], number: int) -> None:
-        self.name = tree["meshes"][number].get("name")
+    def __init__(self, tree: dict[str, Any], number: int) -> None:
         self.primitives: list[dict[str, Any]] = []
         self.pieces: list[trimesh.Trimesh] = []
         self._divisors: list[float] = []
@@ -158,12 +149,12 @@ class _Mesh:
             if mode < _TRIANGLES:  # points and lines
                 continue
             if mode not in (_TRIANGLES, _STRIP):
-                raise InputError(f"{path}: triangles of mode {mode} are not read; export as a list of triangles")
+                raise InputError(f"triangles of mode {mode} are not read; export as a list of triangles")
             corners = primitive["attributes"]["POSITION"]
             indices = {"indices": primitive["indices"]} if "indices" in primitive else {}
             for accessor in (tree["accessors"][k] for k in (corners, *indices.values())):
                 if "sparse" in accessor or "bufferView" not in accessor:
-                    raise InputError(f"{path}: sparse or empty numbers are not read; export without compression")
+                    raise InputError("sparse or empty numbers are not read; export without compression")
             corner = tree["accessors"][corners]
             self._divisors.append(_NORMALIZED[corner["componentType"]] if corner.get("normalized") else 1.0)
             self.primitives.append({"attributes": {"POSITION": corners}, "mode": mode} | indices)

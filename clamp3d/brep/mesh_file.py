@@ -53,7 +53,8 @@ def load_bodies(
         checks.choice("unit", unit, UNITS_MM)
         if is_robot or FORMATS[kind].unit == "stated":
             raise InputError(f"unit: {kind[1:].upper()} files state their unit themselves")
-    return read_in_process(file, unit, joints).complete(file, partial=partial)
+    values = {str(name): checks.number(f"joint {name}", value) for name, value in (joints or {}).items()}
+    return read_in_process(file, values if is_robot else unit).complete(file, partial=partial)
 
 
 def load_mesh(path: str | Path, *, unit: str | None = None) -> Mesh:

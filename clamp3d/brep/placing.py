@@ -6,9 +6,9 @@ from collections.abc import Callable, Hashable, Iterable
 
 import numpy as np
 
-from clamp3d.brep.bodies import Body, Drawn, Reading
+from clamp3d.brep.bodies import Body, Reading
 from clamp3d.core.mesh import Array, IntArray, make_mesh
-from clamp3d.core.shapes import MeshShape
+from clamp3d.core.shapes import MeshShape, Shape
 from clamp3d.errors import InputError
 
 MOST_BODIES = 20_000
@@ -23,7 +23,7 @@ class Collector:
         self.missing: list[str] = []
         self.notes: list[str] = []
 
-    def add(self, name: str, shape: MeshShape | Drawn | str, T: Array) -> None:
+    def add(self, name: str, shape: Shape | str, T: Array) -> None:
         """One more body at ``T`` (4, 4), or why it has no shape. Raises InputError for too many bodies."""
         if len(self.bodies) + len(self.missing) >= MOST_BODIES:
             raise InputError(f"more than {MOST_BODIES} bodies")

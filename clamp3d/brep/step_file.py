@@ -49,7 +49,7 @@ def read_step(path: Path, _: str | None = None) -> Reading:
     reader = STEPCAFControl_Reader()
     reader.SetNameMode(True)
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone or not reader.Transfer(document):
-        raise InputError(f"{path}: not a readable STEP file")
+        raise InputError("not a readable STEP file")
     reading, solids = bodies_of(_roots(document, path.stem))
     missing = (*found.orphans, *_lost(document, found, solids))
     return replace(reading, missing=missing + reading.missing)

@@ -37,26 +37,21 @@ def read_triangles(path: Path, unit: str | None) -> Reading:
 def _arrays(path: Path) -> tuple[Array, IntArray]:
     """Vertices (n, 3) and faces (m, 3), in the file's unit."""
     raw, kind = path.read_bytes(), path.suffix[1:].lower()
-    announced = _ANNOUNCED[kind](path, raw)
+    announced = _ANNOUNCED[kind](raw)
     options: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
-    try:
-        with np.errstate(all="ignore"):  # numbers that are none are refused below
-            scene = trimesh.load_scene(io.BytesIO(raw), file_type=kind, process=False, **options)
-            meshes = [geometry for geometry in scene.dump() if isinstance(geometry, trimesh.Trimesh)]
-    except MemoryError:
-        raise
-    except Exception:  # trimesh raises whatever its parsers meet
-        raise InputError(f"{path}: not a readable {kind.upper()} file") from None
+    with np.errstate(all="ignore"):  # numbers that are none are refused by `make_mesh`
+        scene = trimesh.load_scene(io.BytesIO(raw), file_type=kind, process=False, **options)
+        meshes = [geometry for geometry in scene.dump() if isinstance(geometry, trimesh.Trimesh)]
     read = sum(len(mesh.faces) for mesh in meshes)
     if not read:
-        raise InputError(f"{path}: no triangles in the file")
+        raise InputError("no triangles in the file")
     if read < announced:
-        raise InputError(f"{path}: the file is damaged: it announces {announced} triangles or faces, {read} were read")
+        raise InputError(f"the file is damaged: it announces {announced} triangles or faces, {read} were read")
     vertices, faces = trimesh.util.append_faces([mesh.vertices for mesh in meshes], [mesh.faces for mesh in meshes])
     return np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
 
 
-def _announced_stl(path: Path, raw: bytes) -> int:
+def _announced_stl(raw: bytes) -> int:
     """How many triangles an STL file announces. Raises InputError if it ends before them."""
     if raw.lstrip()[:5].lower() == b"solid" and b"\0" not in raw[:1000]:
         solid, endsolid, facet, endfacet, vertex = (
@@ -64,29 +59,29 @@ def _announced_stl(path: Path, raw: bytes) -> int:
             for word in (b"solid", b"endsolid", b"facet", b"endfacet", b"vertex")
         )
         if solid != endsolid or facet != endfacet or vertex != 3 * facet:
-            raise InputError(f"{path}: the file is cut off: {solid} solids begin in it, {endsolid} end")
+            raise InputError(f"the file is cut off: {solid} solids begin in it, {endsolid} end")
         return facet
     if not raw:
         return 0
     announced = int.from_bytes(raw[80:84], "little")
     if len(raw) != 84 + 50 * announced:
         raise InputError(
-            f"{path}: the file is cut off or damaged: its {announced} triangles take {84 + 50 * announced} bytes, "
+            f"the file is cut off or damaged: its {announced} triangles take {84 + 50 * announced} bytes, "
             f"it has {len(raw)}"
         )
     return announced
 
 
-def _announced_obj(_: Path, raw: bytes) -> int:
+def _announced_obj(raw: bytes) -> int:
     return sum(len(line.split()) - 3 for line in re.findall(rb"(?m)^[ \t]*f[ \t][^\r\n#]*", raw))
 
 
-def _announced_ply(_: Path, raw: bytes) -> int:
+def _announced_ply(raw: bytes) -> int:
     number = re.search(rb"element\s+face\s+(\d+)", raw[:100_000])
     return int(number[1]) if number else 0
 
 
-def _announced_off(_: Path, raw: bytes) -> int:
+def _announced_off(raw: bytes) -> int:
     number = re.search(rb"^\s*\w*OFF\s*(?:#[^\n]*\n\s*)*\d+\s+(\d+)", raw[:100_000])
     return int(number[1]) if number else 0
 

@@ -5,16 +5,19 @@ A damaged file can end the interpreter, a small archive can unpack to gigabytes.
 
 from __future__ import annotations
 
+import atexit
 import math
 import os
-from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from clamp3d.brep.bodies import Reading
-from clamp3d.brep.child import WorkerEndedError, WorkerTimeoutError
-from clamp3d.brep.process import READ, process
+from clamp3d.brep.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.checks import readable_file, short
-from clamp3d.errors import Clamp3dError, InputError
+from clamp3d.errors import InputError
+
+if TYPE_CHECKING:
+    from clamp3d.brep.bodies import Reading
 
 LIMITS = "CLAMP3D_READ_LIMITS"
 """Environment variable: a factor for the limits of memory and time."""
@@ -25,8 +28,16 @@ _MEMORY, _PER_BYTE = 2 * 2**30, 60
 _SECONDS, _PER_MEGABYTE = 60.0, 20.0
 
 
-def read_in_process(path: Path, unit: str | None = None, joints: Mapping[str, float] | None = None) -> Reading:
-    """The bodies of a file, read in the process.
+@cache
+def process() -> Worker:
+    """The process in which foreign files are read and Open CASCADE works: the first call starts it."""
+    worker = Worker(confined=True)
+    atexit.register(worker.close)
+    return worker
+
+
+def read_in_process(path: Path, option: Any = None) -> Reading:
+    """The bodies of a file, read in the process; ``option`` is its unit, or the joints of a robot.
 
     Raises InputError if the file cannot be read, also if its reader crashes, or takes too much time or memory, and
     MissingLibraryError if its reader is not installed.
@@ -35,14 +46,12 @@ def read_in_process(path: Path, unit: str | None = None, joints: Mapping[str, fl
     factor = _factor()
     seconds = factor * (_SECONDS + _PER_MEGABYTE * size / 1e6)
     memory = factor * (_MEMORY + _PER_BYTE * size)
-    absolute = str(path.absolute())
-    if any("\ud800" <= c <= "\udfff" for c in absolute):  # bytes of a name that are no text
-        raise InputError(f"{short(path)}: its name, or that of its folder, is not UTF-8; rename it")
-    outside = os.environ.get(OUTSIDE) == "1"
-    named = {str(name): value for name, value in (joints or {}).items()}
+    arguments = (path.absolute(), option, os.environ.get(OUTSIDE) == "1")
     try:
-        plain = process().call(READ, absolute, unit, named, outside, time_limit=seconds, memory=memory)
-        return Reading.from_plain(plain)
+        reading: Reading = process().call(
+            "clamp3d.brep.formats:read_any", *arguments, time_limit=seconds, memory=memory
+        )
+        return reading
     except WorkerTimeoutError:
         problem = f"not read in {seconds:.0f} s; {LIMITS}=4 allows four times as much"
     except MemoryError:
@@ -50,10 +59,8 @@ def read_in_process(path: Path, unit: str | None = None, joints: Mapping[str, fl
     except WorkerEndedError as error:
         reason = error.last or "the file is damaged, or uses what the reader does not support"
         problem = f"the reader ended with {error.ending}: {reason}"
-    except Clamp3dError as error:
-        raise type(error)(str(error).replace(absolute, str(path))) from None
-    except OSError as error:
-        raise InputError(str(error).replace(absolute, str(path))) from None
+    except InputError as error:
+        problem = str(error)
     raise InputError(f"{short(path)}: {problem}")
 
 

@@ -206,25 +206,38 @@ class Ways:
         share, first = 1.0, None
         for pair in pairs:
             row = self._clash(pair, place, start, share * by)
-            if row is None:
-                continue
-            # Before they touch they are apart, and at the time of their least distance they overlap.
-            length = float(np.abs(by).max())
-            low, high = share * (row.contact_at or 0.0), share * (1.0 if row.t is None else row.t)
-            middle = low + _LOOK / length
-            while (high - low) * length > RESOLUTION:
-                middle = middle if low < middle < high else 0.5 * (low + high)
-                apart = self._clash(pair, place, start, middle * by) is None
-                low, high = (middle, high) if apart else (low, middle)
-            share, first = low, pair
+            while row is not None:
+                earlier = share * self._onset(pair, place, start, share * by, row)
+                is_new = share - earlier > RESOLUTION / float(np.abs(by).max())
+                share, first = earlier, pair
+                row = self._clash(pair, place, start, share * by) if is_new else None
         return share, first
+
+    def _onset(self, pair: Pair, place: Poses, start: Array, by: Array, row: PairResult) -> float:
+        """Where on its way ``by`` (3,) a pair begins an overlap, as a share of it: there may be an earlier one."""
+        length = float(np.abs(by).max())
+        # Before they touch they are apart, and at the time of their least distance they overlap.
+        low, high = row.contact_at or 0.0, 1.0 if row.t is None else row.t
+        middle = low + _LOOK / length
+        while (high - low) * length > RESOLUTION:
+            middle = middle if low < middle < high else 0.5 * (low + high)
+            if self._overlap(pair, place, start + middle * by) is None:
+                low = middle
+            else:
+                high = middle
+        return low
+
+    def _overlap(self, pair: Pair, place: Poses, offset: Array) -> PairResult | None:
+        """The row of a pair that overlaps with the moving part ``offset`` (3,) off its place."""
+        there = check(self._scene([pair], place, offset), pairs=[pair], depths=False, cache=self.cache)
+        return None if there.clean else there.rows[0]
 
     def _clash(self, pair: Pair, place: Poses, start: Array, by: Array) -> PairResult | None:
         """The row of a pair that overlaps on its way, or may do so."""
         for t in _LOOKS:
-            there = check(self._scene([pair], place, start + t * by), pairs=[pair], depths=False, cache=self.cache)
-            if not there.clean:
-                return replace(there.rows[0], t=t)
+            row = self._overlap(pair, place, start + t * by)
+            if row is not None:
+                return replace(row, t=t)
         scene = self._scene([pair], place, start, by)
         rows = check(scene, pairs=[pair], depths=False, cache=self.cache).rows
         return next((row for row in rows if row.verdict in NOT_CLEAN), None)

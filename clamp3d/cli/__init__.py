@@ -33,7 +33,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "export": ("export.command", "Write the parts as files for CAD review."),
     "check": ("check.command", "Check which parts of a scene clash, touch or keep their clearance."),
     "accept": ("check.accept_command", "Accept findings of check, with a reason."),
-    "sweep": ("sweep.command", "Map how far a wire may be misplaced before a clamp no longer closes on it."),
+    "sweep": ("sweep.command", "Map from where a clamp catches a wire, and how far that may lean."),
     "tolerance": ("tolerance.command", "Sensitivity to each dimension, and a Monte Carlo over tolerances."),
     "conductors": ("conductors.command", "List the conductor catalogue."),
 }

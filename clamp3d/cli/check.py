@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,8 @@ from clamp3d.cli.options import (
     option,
 )
 from clamp3d.cli.progress import bar
-from clamp3d.cli.terminal import finish_checked, show
+from clamp3d.cli.terminal import finish, save, show
+from clamp3d.errors import InputError
 
 if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
@@ -29,10 +30,33 @@ if TYPE_CHECKING:
 BCF = Output((".bcfzip", ".bcf"))
 
 
+def name_pairs(text: str) -> list[tuple[str, str]]:
+    """Pairs of names, as the type of an option."""
+    pairs = []
+    for item in text.split(","):
+        a, _, b = (name.strip() for name in item.partition(":"))
+        if not a or not b or ":" in b:
+            raise click.BadParameter(f"must read like P1:P6,P2:P7, got {item!r}")
+        pairs.append((a, b))
+    return pairs
+
+
+@dataclass(frozen=True)
+class Files:
+    """Where the result is written."""
+
+    json_file: Path | None = JSON
+    csv_file: Path | None = option("Write the findings as CSV; - is stdout.", "--csv")
+    bcf_file: Path | None = option("Write the findings as BCF 2.1 topics, for review tools.", "--bcf", type=BCF)
+    html_file: Path | None = option("Write a page in 3D; - is stdout.", "--html")
+
+
 @declared("check")
 def command(
     source: Source = group(Source, source=argument(metavar="INPUT", required=True, shell_complete=complete_inputs)),
-    pairs: str | None = option("Only these pairs, for instance P1:P6,P2:P7.", metavar="A:B,..."),
+    pairs: list[tuple[str, str]] | None = option(
+        "Only these pairs, for instance P1:P6,P2:P7.", type=name_pairs, metavar="A:B,..."
+    ),
     clearance: float | None = option("Gap that parts must keep; replaces the file's.", metavar="MM"),
     distances: bool = option("Measure every pair, not only as finely as its verdict needs."),
     baseline: Path | None = option(
@@ -40,10 +64,7 @@ def command(
         type=INPUT_FILE,
         metavar="LAST.json",
     ),
-    json_file: Path | None = JSON,
-    csv_file: Path | None = option("Write the findings as CSV; - is stdout.", "--csv"),
-    bcf_file: Path | None = option("Write the findings as BCF 2.1 topics, for review tools.", "--bcf", type=BCF),
-    html_file: Path | None = option("Write a page in 3D; - is stdout.", "--html"),
+    files: Files = group(Files),
     quiet: bool = QUIET,
 ) -> None:
     """Check which parts of INPUT clash, touch or keep their clearance, at rest and in motion.
@@ -56,11 +77,9 @@ def command(
     """
     from clamp3d.collide.check import check
     from clamp3d.collide.scene import Scene
-    from clamp3d.output.files import write_json, write_text
     from clamp3d.output.groups import accepted_file, compare, grouped, groups_csv, read_accepted
     from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
 
-    chosen_pairs = _pairs(pairs) if pairs is not None else None
     loaded = source.load()
     run: Assembly | None = None
     if isinstance(loaded, Scene):
@@ -75,25 +94,23 @@ def command(
     accepted = read_accepted(accepted_file(source.source))
     compare((), baseline, accepted)  # a file that cannot be read is reported before the work
     with bar(quiet) as report:
-        result = check(scene, pairs=chosen_pairs, distances=distances or run is not None, progress=report)
+        result = check(scene, pairs=pairs, distances=distances or run is not None, progress=report)
     groups = grouped(result)
     comparison = compare(groups, baseline, accepted)
     if run is not None:
         show("\n".join([run.status, *(f.text for f in run.findings if f.severity == "error" and f.text != run.status)]))
     show(check_to_text(result, comparison, accepted))
-    if json_file is not None:
-        status = {} if run is None else {"status": run.status}
-        write_json(json_file, check_to_dict(result, comparison) | status)
-    if csv_file is not None:
-        write_text(csv_file, groups_csv(groups, comparison))
-    if bcf_file is not None:
+    status = {} if run is None else {"status": run.status}
+    save(files.json_file, lambda: check_to_dict(result, comparison) | status)
+    save(files.csv_file, lambda: groups_csv(groups, comparison))
+    save(files.html_file, lambda: check_to_html(result))
+    if files.bcf_file is not None:
         from clamp3d.output.bcf import write_bcf
 
-        write_bcf(result, bcf_file)
-    if html_file is not None:
-        write_text(html_file, check_to_html(result))
-    verdicts = {group.verdict for group in comparison.open(groups)}
-    finish_checked(verdicts, finding=run is not None and not run.passed, empty=not result.work.pairs)
+        write_bcf(result, files.bcf_file)
+    finish(run is not None and not run.passed, verdicts={group.verdict for group in comparison.open(groups)})
+    if not result.work.pairs:
+        raise InputError("there is no pair of parts to judge")
 
 
 @declared("accept")
@@ -112,13 +129,3 @@ def accept_command(
     path = accepted_file(source)
     entries = accept(path, identifiers, why=why, who=who)
     show(f"{path}: {len(entries)} accepted" + (f", {n} before" if (n := len(set(identifiers)) - len(entries)) else ""))
-
-
-def _pairs(text: str) -> list[tuple[str, str]]:
-    pairs = []
-    for item in text.split(","):
-        names = [name.strip() for name in item.split(":")]
-        if len(names) != 2 or not all(names):
-            raise click.BadParameter(f"must read like P1:P6,P2:P7, got {item!r}", param_hint="--pairs")
-        pairs.append((names[0], names[1]))
-    return pairs

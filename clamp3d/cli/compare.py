@@ -6,7 +6,7 @@ from pathlib import Path
 
 from clamp3d.cli.options import JSON, QUIET, Output, declared, option
 from clamp3d.cli.progress import bar
-from clamp3d.cli.terminal import show
+from clamp3d.cli.terminal import save, show
 
 CHART = Output((".png", ".svg", ".html"))
 
@@ -26,13 +26,11 @@ def command(
     from clamp3d.bench.compare.chart import save_comparison
     from clamp3d.bench.compare.report import comparison_to_dict, comparison_to_text
     from clamp3d.bench.compare.run import compare
-    from clamp3d.output.files import write_json
 
     with bar(quiet) as report:
         comparison = compare(peers=peers, progress=lambda done, total, what: report(what, done, total))
     show(comparison_to_text(comparison))
-    if json_file is not None:
-        write_json(json_file, comparison_to_dict(comparison))
+    save(json_file, lambda: comparison_to_dict(comparison))
     if plot_file is not None:
         save_comparison(
             comparison, plot_file, "clamp3d compare" + (" --peers" if peers else "") + f" --plot {plot_file.name}"

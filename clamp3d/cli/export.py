@@ -40,7 +40,7 @@ def command(
     ),
     sequence: str | None = SEQUENCE,
     mesh_error: float = option("Chord error of meshes.", default=0.01, metavar="MM"),
-    unit: str | None = option("Unit of the file.  [default: mm; m for glb]", type=click.Choice(UNITS)),
+    file_unit: str | None = option("Unit of the file.  [default: mm; m for glb]", "--unit", type=click.Choice(UNITS)),
     quiet: bool = option("No messages.", "--quiet", "-q"),
 ) -> None:
     """Write the parts of INPUT for CAD review, with a manifest beside them.
@@ -69,7 +69,7 @@ def command(
         label = find_state(loaded, state).label
         if not quiet:
             show(f"state {state}: {label} ({loaded.status})", err=True)
-    written = export(loaded, output, format=chosen, layout=layout, state=state, mesh_error=mesh_error, unit=unit)
+    written = export(loaded, output, format=chosen, layout=layout, state=state, mesh_error=mesh_error, unit=file_unit)
     for path in (*written.files, written.manifest):
         show(str(path))
-    finish(finding=isinstance(loaded, Assembly) and not loaded.passed)
+    finish(isinstance(loaded, Assembly) and not loaded.passed)

@@ -8,7 +8,7 @@ import click
 
 from clamp3d.cli.options import JSON, UNITS, argument, declared, option
 from clamp3d.cli.progress import bar
-from clamp3d.cli.terminal import show
+from clamp3d.cli.terminal import save, show
 
 
 @declared("fit")
@@ -26,7 +26,6 @@ def command(
     A mesh without any is no error: exit code 0.
     """
     from clamp3d.fit.fit import fit_file
-    from clamp3d.output.files import write_json, write_text
     from clamp3d.output.fit_report import fit_to_html, fit_to_text
 
     with bar(quiet) as report:
@@ -35,7 +34,5 @@ def command(
         for note in result.notes:
             show(f"note: {note}", err=True)
     show(fit_to_text(result))
-    if json_file is not None:
-        write_json(json_file, result.to_dict())
-    if html_file is not None:
-        write_text(html_file, fit_to_html(result))
+    save(json_file, result.to_dict)
+    save(html_file, lambda: fit_to_html(result))

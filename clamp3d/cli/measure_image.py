@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from clamp3d.cli.options import INPUT_FILE, JSON, argument, declared, option
-from clamp3d.cli.terminal import show
+from clamp3d.cli.terminal import save, show
 
 
 @declared("measure-image")
@@ -39,7 +39,6 @@ def command(
 
     from clamp3d.bench.image import MARKING_ERROR, Kind, measure_image
     from clamp3d.bench.picture import check_marks, load_image, snap_marks
-    from clamp3d.output.files import write_json
 
     marks = np.array(_marks("--points", points) + _marks("--reference", reference))
     shown = load_image(image)
@@ -60,8 +59,8 @@ def command(
         f"scale        {measured.mm_per_px:.6f} mm/px, marks +- {marking_error:g} px, reading +- {calliper_error:g} mm"
     )
     show(f"marks        {', '.join(f'({x:.2f}, {y:.2f})' for x, y in marks)}")
-    if json_file is not None:
-        write_json(json_file, {"image": str(image), "kind": kind, "marks": marks.tolist(), **asdict(measured)})
+    data = {"image": str(image), "kind": kind, "marks": marks.tolist(), **asdict(measured)}
+    save(json_file, lambda: data)
 
 
 def _marks(option: str, text: str) -> list[tuple[float, float]]:

@@ -36,19 +36,14 @@ class Mechanics:
         metavar="MU,...",
     )
 
-    @property
-    def anything(self) -> bool:
-        """Whether anything is to be computed."""
-        return not (self.torque is None and self.measured is None and self.groove_friction is None)
-
     def check(self, solver: str) -> None:
         """Raise click.UsageError for options that do not go together, InputError for a value that breaks its rule."""
-        if self.friction is not None and self.torque is None:
-            raise click.UsageError("--friction goes with --torque")
-        if self.anything and solver != "exact":
-            raise click.UsageError(f"--torque, --measured and --groove-friction go with --solver exact, not {solver}")
         from clamp3d.clamp.torque import check_torque, coefficients
 
+        if self.friction is not None and self.torque is None:
+            raise click.UsageError("--friction goes with --torque")
+        if self != Mechanics(None, None, None, None) and solver != "exact":
+            raise click.UsageError(f"--torque, --measured and --groove-friction go with --solver exact, not {solver}")
         if self.torque is not None:
             check_torque(self.torque)
         for name, values in (("friction", self.friction), ("groove friction", self.groove_friction)):
@@ -56,35 +51,30 @@ class Mechanics:
                 coefficients(name, values)
 
     def answer(self, run: Assembly) -> tuple[str, dict[str, Any]]:
-        """Text and data for JSON of an assembled clamp."""
-        from clamp3d.clamp.torque import GROOVE_FRICTION, THREAD_FRICTION, tighten
-        from clamp3d.output.forces_report import tightening_to_text
-
+        """Text and data for JSON of an assembled clamp; nothing if nothing was asked for."""
+        if self == Mechanics(None, None, None, None):
+            return "", {}
         if not run.clamped:
             return f"torque and friction: not computed, {run.status}", {}
-        texts, data = [], dict[str, Any]()
+        from clamp3d.clamp.friction import FrictionBand
+        from clamp3d.clamp.torque import GROOVE_FRICTION, THREAD_FRICTION, coefficients, tighten
+        from clamp3d.output.forces_report import bands_to_text, measured_to_text, tightening_to_text
+
+        text, data = "", dict[str, Any]()
         groove = self.groove_friction or GROOVE_FRICTION
         if self.torque is not None:
             tight = tighten(run, self.torque, friction=self.friction or THREAD_FRICTION, groove_friction=groove)
-            texts.append(tightening_to_text(tight))
-            data["torque"] = tight.to_dict()
+            text, data["torque"] = f"\n{tightening_to_text(tight)}\n", tight.to_dict()
         if self.torque is None or self.measured is not None:
-            text, data["friction_band"] = self._band(run, groove)
-            texts.append(text)
-        return "\n" + "\n\n".join(texts), data
-
-    def _band(self, run: Assembly, groove: tuple[float, ...]) -> tuple[str, dict[str, Any]]:
-        from clamp3d.clamp.friction import FrictionBand
-        from clamp3d.clamp.torque import coefficients
-        from clamp3d.output.forces_report import bands_to_text, measured_to_text
-
-        finder = FrictionBand(run.clamp)
-        bands = [finder.band(mu) for mu in coefficients("groove friction", groove)]
-        text, data = bands_to_text(bands), {"bands": [band.to_dict() for band in bands]}
-        if self.measured is None:
-            return text, data
-        measured = {"distance_mm": self.measured, "least_friction": finder.friction_for(self.measured)}
-        return f"{text}\n{measured_to_text(finder, bands, self.measured)}", data | {"measured": measured}
+            finder = FrictionBand(run.clamp)
+            bands = [finder.band(mu) for mu in coefficients("groove friction", groove)]
+            text += f"\n{bands_to_text(bands)}\n"
+            data["friction_band"] = {"bands": [band.to_dict() for band in bands]}
+            if self.measured is not None:
+                text += f"{measured_to_text(finder, bands, self.measured)}\n"
+                measured = {"distance_mm": self.measured, "least_friction": finder.friction_for(self.measured)}
+                data["friction_band"]["measured"] = measured
+        return text.removesuffix("\n"), data
 
 
 MECHANICS = group(Mechanics)

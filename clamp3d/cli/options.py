@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from clamp3d.baselines.model import ContactModel
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.collide.scene import Scene
+    from clamp3d.core.shapes import Fit
 
 Declared = Callable[[str, str], click.Parameter]
 """Makes the option or argument for a parameter with a name and an annotation."""
@@ -40,6 +41,22 @@ def number(text: str | float) -> float:
     if not math.isfinite(value):
         raise click.BadParameter(f"must be a finite number or a fraction like 1/3, got {text!r}")
     return value
+
+
+def radians(text: str | float) -> float:
+    """An angle of so many degrees, as the type of an option."""
+    return math.radians(number(text))
+
+
+def joint_values(text: str) -> dict[str, float]:
+    """Values by the names of joints, as the type of an option."""
+    values = {}
+    for item in text.split(","):
+        name, equals, value = item.partition("=")
+        if not equals or not name.strip():
+            raise click.BadParameter(f"must read like elbow=1.57,slide=20, got {item!r}")
+        values[name.strip()] = number(value)
+    return values
 
 
 class Output(click.Path):
@@ -168,13 +185,17 @@ class Source(ClampSource):
     """What a command is to work on: a clamp, a scene or a file with parts."""
 
     source: str = argument(metavar="[INPUT]", default="reference", required=False, shell_complete=complete_inputs)
-    input_unit: str | None = option("Unit of a mesh file.  [default: mm; m for glTF]", type=click.Choice(UNITS))
-    fit: str | None = option(
+    unit: str | None = option(
+        "Unit of a mesh file.  [default: mm; m for glTF]", "--input-unit", type=click.Choice(UNITS)
+    )
+    fit: Fit | None = option(
         "Round surfaces of a mesh file: off: its facets are the part; round: fitted.  [default: off]",
         type=click.Choice(["off", "round"]),
     )
     chord: float | None = option("How far a mesh file's true surface can be from its facets.", metavar="MM")
-    joints: str | None = option("Joint values of a URDF: rad, or mm for those that slide.", metavar="NAME=VALUE,...")
+    joints: dict[str, float] | None = option(
+        "Joint values of a URDF: rad, or mm for those that slide.", type=joint_values, metavar="NAME=VALUE,..."
+    )
     poses: Path | None = option(
         "Poses of a folder of meshes: CSV with name,x,y,z,qx,qy,qz,qw.", type=INPUT_FILE, metavar="CSV"
     )
@@ -184,27 +205,7 @@ class Source(ClampSource):
         """A clamp, or a scene from a scene file or any file that holds bodies."""
         from clamp3d.scenefile.load import load
 
-        return load(
-            self.source,
-            line=self.line,
-            jumper=self.jumper,
-            unit=self.input_unit,
-            fit=self.fit,  # type: ignore[arg-type]
-            chord=self.chord,
-            joints=_joints(self.joints),
-            poses=self.poses,
-            partial=self.partial,
-        )
-
-
-def _joints(text: str | None) -> dict[str, float]:
-    values = {}
-    for item in text.split(",") if text else ():
-        name, equals, value = item.partition("=")
-        if not equals or not name.strip():
-            raise click.BadParameter(f"must read like elbow=1.57,slide=20, got {item!r}", param_hint="--joints")
-        values[name.strip()] = number(value)
-    return values
+        return load(**vars(self))
 
 
 SOURCE = group(Source)
@@ -227,7 +228,9 @@ class Method:
         type=click.Choice(list(METHODS)),
         default="cas",
     )
-    unit_angle_deg: float | None = option("Angle of a chord: chords, wedges.  [default: 5]", metavar="A")
+    unit_angle: float | None = option(
+        "Angle of a chord: chords, wedges.  [default: 5]", "--unit-angle-deg", type=radians, metavar="A"
+    )
     threshold: float | None = option("Concavity that CoACD may leave: hulls.  [default: 2]", metavar="MM")
     mesh_error: float | None = option("Chord error of hulls and mesh.  [default: 0.05]", metavar="MM")
     solver: str | None = option(
@@ -237,41 +240,38 @@ class Method:
     )
     sequence: str | None = SEQUENCE
     step: float | None = option("Move along the bolt, stepped solver.  [default: 1/3]", metavar="MM")
-    tilt_step_deg: float | None = option("Turn of the stepped solver.  [default: 1]", metavar="A")
+    tilt_step: float | None = option(
+        "Turn of the stepped solver.  [default: 1]", "--tilt-step-deg", type=radians, metavar="A"
+    )
 
     def refuse(self) -> None:
         """Raise click.UsageError if anything was chosen: there is no clamp to use it for."""
         if {*vars(self).values()} != {"cas", None}:
             raise click.UsageError("--method, --solver and their options go with a clamp, not with a scene")
 
-    def settings(self) -> dict[str, Any]:
-        """Arguments of `assemble` for the solver. Raises click.UsageError for options that do not go together."""
-        by_step = self.step is not None or self.tilt_step_deg is not None
+    def settings(self, equilibria: bool | None = None) -> dict[str, Any]:
+        """Arguments of `assemble`, ``equilibria`` by default where they are exact.
+
+        Raises click.UsageError for options that do not go together.
+        """
+        moves = {"sequence": self.sequence, "step": self.step, "tilt_step": self.tilt_step}
+        by_step = self.step is not None or self.tilt_step is not None
         if self.solver == "exact" and by_step:
             raise click.UsageError("--step and --tilt-step-deg go with --solver stepped, not exact")
         default = "stepped" if by_step else "exact" if self.method in ("cas", "chords") else "bisection"
-        tilt_step = None if self.tilt_step_deg is None else math.radians(self.tilt_step_deg)
-        chosen = {"sequence": self.sequence, "step": self.step, "tilt_step": tilt_step}
-        return {"solver": self.solver or default} | {key: value for key, value in chosen.items() if value is not None}
+        solver = self.solver or default
+        if equilibria and solver != "exact":
+            raise click.UsageError(f"--equilibria goes with --solver exact, not {solver}")
+        others = self.method == "cas" and solver == "exact" if equilibria is None else equilibria
+        given = {key: value for key, value in moves.items() if value is not None}
+        return {"solver": solver, "others": others} | given
 
     def model(self, clamp: Clamp, *, quiet: bool = False) -> ContactModel:
-        """The contact model. Raises click.UsageError for options that do not go together."""
+        """The contact model. Raises InputError for options that do not go with it."""
         from clamp3d.clamp.parts import parts
 
-        angle = None if self.unit_angle_deg is None else math.radians(self.unit_angle_deg)
-        settings = {"unit_angle": angle, "threshold": self.threshold, "mesh_error": self.mesh_error}
-        for option, setting in zip(("--unit-angle-deg", "--threshold", "--mesh-error"), settings, strict=True):
-            takers = [name for name, accepted in METHODS.items() if setting in accepted]
-            if settings[setting] is not None and self.method not in takers:
-                raise click.UsageError(f"{option} goes with --method {' or '.join(takers)}, not {self.method}")
-        return contact_model(
-            self.method,
-            parts(clamp),
-            unit_angle=angle,
-            threshold=self.threshold,
-            mesh_error=self.mesh_error,
-            progress=False if quiet else None,
-        )
+        settings: dict[str, Any] = {key: getattr(self, key) for key in ("unit_angle", "threshold", "mesh_error")}
+        return contact_model(self.method, parts(clamp), progress=False if quiet else None, **settings)
 
 
 METHOD = group(Method)

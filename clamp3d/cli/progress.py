@@ -29,12 +29,9 @@ class Narrator:
             self._status.update(Text(escaped(text)))
 
     def waypoint(self, waypoint: Waypoint) -> None:
-        """A line that stays: what a run has reached."""
-        line = escaped(f"{waypoint.step:14s} {waypoint.label}")
-        if self._status is not None:
-            self._status.console.print(line, markup=False, highlight=False, soft_wrap=True)
-        elif not self._quiet:
-            print(line, file=sys.stderr)
+        """A line that stays, above the status: what a run has reached."""
+        if not self._quiet:
+            print(escaped(f"{waypoint.step:14s} {waypoint.label}"), file=sys.stderr)
 
     def position(self, tried: int, distance: float) -> None:
         """What a solver is trying."""
@@ -59,17 +56,10 @@ def bar(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
     if quiet or not sys.stderr.isatty():
         yield lambda stage, done, of: None
         return
-    from rich import progress
     from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import Progress
 
-    columns = (
-        progress.TextColumn("{task.description}", markup=False),
-        progress.BarColumn(),
-        progress.MofNCompleteColumn(),
-        progress.TimeElapsedColumn(),
-        progress.TextColumn("left:"),
-        progress.TimeRemainingColumn(),
-    )
-    with progress.Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+    with Progress(console=Console(stderr=True), transient=True) as shown:
         task = shown.add_task("", total=None)
-        yield lambda stage, done, of: shown.update(task, description=escaped(stage), completed=done, total=of)
+        yield lambda stage, done, of: shown.update(task, description=escape(escaped(stage)), completed=done, total=of)

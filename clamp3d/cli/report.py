@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from clamp3d.cli.options import FOLDER, METHOD, QUIET, SOURCE, Method, Source, declared, option
 from clamp3d.cli.progress import narrator
-from clamp3d.cli.terminal import finish, finish_checked, show
+from clamp3d.cli.terminal import finish, show
 from clamp3d.errors import need
+
+if TYPE_CHECKING:
+    from clamp3d.clamp.result import Assembly
+    from clamp3d.collide.scene import Scene
 
 
 @declared("report")
@@ -27,33 +32,29 @@ def command(
     also if a clamp does not close on both wires, or parts of it meet that should not.
     """
     need("matplotlib", "a report")
-    settings = method.settings()
-    from clamp3d.clamp.assemble import assemble
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.clamp.scene import CONTACT
+    from clamp3d.cli.viewing import narrated
     from clamp3d.collide.verdict import Thresholds
     from clamp3d.output.files import check_folder
     from clamp3d.output.report import make_report
     from clamp3d.output.report_page import write_report
 
+    settings = method.settings()
     check_folder(output)
     Thresholds(CONTACT, clearance or 0.0)
     loaded = source.load()
+    if isinstance(loaded, Clamp):
+        subject: Assembly | Scene = narrated(loaded, method.model(loaded, quiet=quiet), settings, quiet)
+    else:
+        method.refuse()
+        subject = loaded
     with narrator(quiet) as narrate:
-        if isinstance(loaded, Clamp):
-            model = method.model(loaded, quiet=quiet)
-            others = method.method == "cas" and settings["solver"] == "exact"
-            subject = assemble(
-                loaded, model, others=others, on_waypoint=narrate.waypoint, progress=narrate.position, **settings
-            )
-            review = make_report(subject, clearance=clearance, progress=narrate.status)
-        else:
-            method.refuse()
-            review = make_report(loaded, clearance=clearance, progress=narrate.status)
+        review = make_report(subject, clearance=clearance, progress=narrate.status)
         paths = write_report(review, output, progress=narrate.status)
     for path in paths:
         show(str(path))
     if review.assembly is not None:
-        finish(finding=not review.passed)
+        finish(not review.passed)
     else:
-        finish_checked({row.result.verdict for row in (*review.rows, *review.motions)})
+        finish(False, verdicts={row.result.verdict for row in (*review.rows, *review.motions)})

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from clamp3d.cli.options import JSON, QUIET, declared
-from clamp3d.cli.terminal import show
+from clamp3d.cli.terminal import save, show
 
 
 @declared("reproduce")
@@ -18,9 +18,7 @@ def command(
     """Print Tables 1-5 of the paper beside this program's values, with the difference of each."""
     from clamp3d.bench.reproduce import reproduce
     from clamp3d.bench.reproduce_report import reproduction_to_dict, reproduction_to_text
-    from clamp3d.output.files import write_json
 
     tables = reproduce(lambda message: None if quiet else click.echo(message, err=True))
-    if json_file is not None:
-        write_json(json_file, reproduction_to_dict(tables))
+    save(json_file, lambda: reproduction_to_dict(tables))
     show(reproduction_to_text(tables))

@@ -5,12 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from clamp3d.cli.mechanics import MECHANICS, Mechanics
 from clamp3d.cli.options import CLAMP, JSON, METHOD, QUIET, VIEWING, ClampSource, Method, Viewing, declared, option
-from clamp3d.cli.progress import narrator
-from clamp3d.cli.terminal import finish, show
+from clamp3d.cli.terminal import finish, save, show
 from clamp3d.errors import SequenceError
 
 if TYPE_CHECKING:
@@ -37,47 +34,36 @@ def command(
     Exit code 1 if the clamp does not close on both wires, parts meet that should not, or a step of the sequence is
     blocked: the message names what blocks it, where and when, and the page shows it.
     """
-    settings = method.settings()
-    if equilibria and settings["solver"] != "exact":
-        raise click.UsageError(f"--equilibria goes with --solver exact, not {settings['solver']}")
-    settings["others"] = (
-        equilibria if equilibria is not None else method.method == "cas" and settings["solver"] == "exact"
-    )
+    settings = method.settings(equilibria)
     mechanics.check(settings["solver"])
-    from clamp3d.clamp.assemble import assemble
-    from clamp3d.output.files import write_json
+    from clamp3d.cli.viewing import Page, narrated
     from clamp3d.output.run_report import run_to_text
 
     loaded = source.clamp()
     model = method.model(loaded, quiet=quiet)
-    result: Assembly | None = None
+    is_shown = view or viewing.html_file is not None or viewing.url is not None
+    page = Page(viewing, serve=view, quiet=quiet) if is_shown else None
 
     def done(run: Assembly) -> None:
         show(run_to_text(run))
-        data = run.to_dict()
-        if mechanics.anything:
-            text, more = mechanics.answer(run)
+        text, more = mechanics.answer(run)
+        if text:
             show(text)
-            data |= more
-        if json_file is not None:
-            write_json(json_file, data)
+        save(json_file, lambda: run.to_dict() | more)
 
-    viewed = view or viewing.html_file is not None or viewing.url is not None
     try:
-        if viewed:
-            from clamp3d.cli.viewing import run_and_view
-
-            result = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=view, done=done)
+        if page is not None:
+            result = page.assemble(loaded, model, settings, done)
         else:
-            with narrator(quiet) as narrate:
-                result = assemble(loaded, model, on_waypoint=narrate.waypoint, progress=narrate.position, **settings)
+            result = narrated(loaded, model, settings, quiet)
             done(result)
     except SequenceError as error:
-        show(f"not assembled: {error}")
-        if json_file is not None:
-            write_json(json_file, {"status": f"not assembled: {error}", "blocks": [b.to_dict() for b in error.blocks]})
-        if viewed:
-            from clamp3d.cli.viewing import view_blocked
-
-            view_blocked(error, viewing, quiet=quiet, serve=view)
-    finish(finding=result is None or not result.passed)
+        blocked = error
+        show(f"not assembled: {blocked}")
+        save(
+            json_file, lambda: {"status": f"not assembled: {blocked}", "blocks": [b.to_dict() for b in blocked.blocks]}
+        )
+        if page is not None:
+            page.check(blocked.scene)
+        finish(True)
+    finish(not result.passed)

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from clamp3d.cli.options import JSON, PICTURE, QUIET, declared, group, option
-from clamp3d.cli.terminal import finish, show
+from clamp3d.cli.terminal import finish, save, show
 from clamp3d.errors import InputError
 
 
@@ -80,7 +80,6 @@ def command(
         return
 
     from clamp3d.cli.progress import bar
-    from clamp3d.output.files import write_json, write_text
 
     with bar(quiet) as report:
         result = run_stress(
@@ -94,11 +93,9 @@ def command(
             progress=report,
         )
     show(table(result))
-    if json_file is not None:
-        write_json(json_file, result.to_dict())
-    if markdown_file is not None:
-        write_text(markdown_file, markdown(result, runs.text))
+    save(json_file, result.to_dict)
+    save(markdown_file, lambda: markdown(result, runs.text))
     if plot_file is not None:
         plot(result, plot_file)
     own = [o for o in result.outcomes if o.method == "cas"]
-    finish(finding=any(o.wrong or o.beyond_bound for o in own))
+    finish(any(o.wrong or o.beyond_bound for o in own))

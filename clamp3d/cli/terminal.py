@@ -6,13 +6,14 @@ import io
 import os
 import signal
 import sys
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from enum import IntEnum
-from typing import NoReturn
+from pathlib import Path
+from typing import Any, NoReturn
 
 import click
 
-from clamp3d.errors import InputError, escaped
+from clamp3d.errors import escaped
 
 
 class ExitCode(IntEnum):
@@ -36,34 +37,34 @@ def show(text: str, *, err: bool = False) -> None:
     click.echo(escaped(text, keep="\n"), err=err or taken)
 
 
-def finish(*, finding: bool, failed: bool = False, undecided: bool = False, empty: bool = False) -> None:
+def save(path: Path | None, make: Callable[[], dict[str, Any] | str]) -> None:
+    """Write what ``make`` gives to a file, if there is to be one: a text as it is, anything else as JSON."""
+    if path is not None:
+        from clamp3d.output.files import write_json, write_text
+
+        content = make()
+        if isinstance(content, str):
+            write_text(path, content)
+        else:
+            write_json(path, content)
+
+
+def finish(finding: bool, *, failed: bool = False, verdicts: Collection[str] = ()) -> None:
     """End the command with the exit code of its verdict: what is certain counts most, then what failed.
 
-    ``empty``: there was nothing to judge, which is not clean.
+    ``verdicts`` of a scene count as what they say.
     """
+    from clamp3d.collide.result import BAD
+    from clamp3d.collide.verdict import Verdict
+
     codes = (
-        (finding, ExitCode.FINDING),
-        (failed, ExitCode.FAILED),
-        (undecided, ExitCode.UNDECIDED),
+        (finding or any(verdict in verdicts for verdict in BAD), ExitCode.FINDING),
+        (failed or Verdict.FAILED in verdicts, ExitCode.FAILED),
+        (Verdict.UNCERTAIN in verdicts, ExitCode.UNDECIDED),
     )
     code = next((code for true, code in codes if true), ExitCode.CLEAN)
     if code:
         raise click.exceptions.Exit(code)
-    if empty:
-        raise InputError("there is no pair of parts to judge")
-
-
-def finish_checked(verdicts: Collection[str], *, finding: bool = False, empty: bool = False) -> None:
-    """End a command by the verdicts of a scene, and by what else was a finding; see `finish`."""
-    from clamp3d.collide.result import BAD
-    from clamp3d.collide.verdict import Verdict
-
-    finish(
-        finding=finding or any(verdict in verdicts for verdict in BAD),
-        failed=Verdict.FAILED in verdicts,
-        undecided=Verdict.UNCERTAIN in verdicts,
-        empty=empty,
-    )
 
 
 STDOUT_TAKEN = "clamp3d.stdout"

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from clamp3d.cli.options import CLAMP, JSON, PICTURE, QUIET, ClampSource, declared, group, option
-from clamp3d.cli.terminal import finish, show
+from clamp3d.cli.terminal import finish, save, show
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,6 @@ def command(
     from clamp3d.clamp.tolerance import monte_carlo
     from clamp3d.cli.progress import bar
     from clamp3d.errors import NotClampedError, SolverError
-    from clamp3d.output.files import write_json
     from clamp3d.output.tolerance_report import draw_histogram, tolerance_to_dict, tolerance_to_text
 
     loaded = source.clamp()
@@ -67,8 +66,7 @@ def command(
             progress=lambda done, of: report("clamps", done, of),
         )
     show(tolerance_to_text(result, rows, note))
-    if json_file is not None:
-        write_json(json_file, tolerance_to_dict(result, rows))
+    save(json_file, lambda: tolerance_to_dict(result, rows))
     if plot_file is not None:
         draw_histogram(plot_file, result)
-    finish(finding=result.nominal is None, failed=bool(result.unproven))
+    finish(result.nominal is None, failed=bool(result.unproven))

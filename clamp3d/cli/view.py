@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import click
+
 from clamp3d.cli.options import METHOD, SOURCE, VIEWING, Method, Source, Viewing, declared, option
-from clamp3d.cli.terminal import finish, finish_checked, show
+from clamp3d.cli.terminal import finish, show
 from clamp3d.errors import SequenceError
 
 
@@ -22,21 +24,21 @@ def command(
     should, or a step of the sequence is blocked: then it is shown how.
     """
     from clamp3d.clamp.dimensions import Clamp
-    from clamp3d.cli.viewing import check_and_view, run_and_view, view_blocked
+    from clamp3d.cli.viewing import Page
 
-    settings = method.settings()
+    settings = method.settings(equilibria=False)
     loaded = source.load()
-    serve = viewing.html_file is None
-    if isinstance(loaded, Clamp):
-        model = method.model(loaded, quiet=quiet)
-        try:
-            run = run_and_view(loaded, model, settings, viewing, quiet=quiet, serve=serve)
-        except SequenceError as error:
-            show(f"not assembled: {error}")
-            view_blocked(error, viewing, quiet=quiet, serve=serve)
-            finish(finding=True)
-        finish(finding=not run.passed)
-    else:
+    page = Page(viewing, serve=viewing.html_file is None, quiet=quiet)
+    if not isinstance(loaded, Clamp):
         method.refuse()
-        result = check_and_view(loaded, viewing, quiet=quiet, serve=serve)
-        finish_checked(result.counts)
+        if viewing.overlays:
+            raise click.UsageError("--overlay goes with a clamp, not with a scene")
+        finish(False, verdicts=page.check(loaded).counts)
+        return
+    try:
+        run = page.assemble(loaded, method.model(loaded, quiet=quiet), settings)
+    except SequenceError as error:
+        show(f"not assembled: {error}")
+        page.check(error.scene)
+        finish(True)
+    finish(not run.passed)

@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -325,8 +325,8 @@ def groove_block(
     return _drilled(name, Extrusion(outline, "Z", -half_length, half_length), holes, low, high)
 
 
-def as_shape(shape: AnyShape) -> Shape:
-    """The shape that a scene works on: a bare cylinder as a solid, others as they are.
+def as_shape(shape: Any) -> Shape:
+    """The shape that a scene works on: a bare cylinder as a solid, a mesh of trimesh in mm, others as they are.
 
     Raises InputError for a `SweptArc` (it has no outer faces), for a `Capsule` and for anything that is no shape.
     """
@@ -341,4 +341,8 @@ def as_shape(shape: AnyShape) -> Shape:
         )
     if isinstance(shape, SweptArc):
         raise InputError("a SweptArc has no outer faces: make a part of it with groove_block(groove, width, height)")
-    raise InputError(f"a part's shape must be a Solid, MeshShape or Cylinder, got {type(shape).__name__}")
+    if type(shape).__module__.startswith("trimesh") and hasattr(shape, "faces"):
+        return MeshShape(make_mesh(shape.vertices, shape.faces))
+    raise InputError(
+        f"a part's shape must be a Solid, MeshShape, Cylinder or a mesh of trimesh, got {type(shape).__name__}"
+    )

@@ -43,9 +43,10 @@ def checked(kind: type[T]) -> type[T]:
     return kind
 
 
-def validate(kind: typing.Any, data: typing.Any, origin: str, key: str = "") -> typing.Any:
+def validate(kind: typing.Any, data: typing.Any, origin: str, key: str = "", *, strict: bool = True) -> typing.Any:
     """``data`` as ``kind`` (a dataclass or a msgspec.Struct); ``key`` is where it stands in ``origin``.
 
+    Unless ``strict`` a number may also be a text.
     Raises InputError: one line with origin, key, value and rule.
     """
     if isinstance(data, dict) and isinstance(kind, type) and is_dataclass(kind):
@@ -56,7 +57,7 @@ def validate(kind: typing.Any, data: typing.Any, origin: str, key: str = "") -> 
             if isinstance(value, dict):
                 data[name] = validate(_bare(hints[name]), value, origin, _joined(key, name))
     try:
-        return msgspec.convert(data, kind)
+        return msgspec.convert(data, kind, strict=strict)
     except msgspec.ValidationError as failure:
         raise InputError(f"{origin}: {_told(failure, kind, data, key)}") from None
 
@@ -93,7 +94,8 @@ def _rule(message: str, kind: typing.Any, data: typing.Any) -> str:
     if length := re.fullmatch(r"Expected `array` (of length \d+), got \d+", message):
         return length[1]
     bound = re.fullmatch(r"Expected `(\w+)` (?:of length )?([<>]=?) (.*)", message)
-    if bound is not None and not (isinstance(data, float) and not math.isfinite(data)):
+    is_float = bound is not None and bound[1] == "float" and isinstance(data, (float, str))
+    if bound is not None and not (is_float and not math.isfinite(float(data))):
         return f"{'of length ' * (bound[1] == 'array')}{_WORDS[bound[2]]} {float(bound[3]):g}"
     expected = re.match(r"Expected `(.*?)`, got", message)
     words = [_KINDS[word] for word in expected[1].split(" | ") if word in _KINDS] if expected else []

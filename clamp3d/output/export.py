@@ -23,6 +23,7 @@ from clamp3d.output.manifest import manifest
 from clamp3d.output.mesh_formats import MILLIMETRES
 from clamp3d.output.placed import PlacedPart, PosedMesh, place, posed
 from clamp3d.output.step import step
+from clamp3d.scenefile.check import opened
 
 Format: TypeAlias = Literal["stl", "obj", "ply", "glb", "3mf", "step"]
 Layout: TypeAlias = Literal["parts", "assembly"]
@@ -64,7 +65,7 @@ def default_layout(format: Format) -> Layout:
 
 
 def export(
-    source: Clamp | Scene | Assembly,
+    source: Any,
     path: str | Path,
     *,
     format: Format | None = None,
@@ -79,7 +80,7 @@ def export(
     Parameters
     ----------
     source
-        A scene, or an assembled clamp at one of its states; the parts of a clamp as such stay in their own frames.
+        What `check` takes, or an assembled clamp at one of its states; the parts of a `Clamp` stay in their own frames.
     path
         A file, whose suffix is the format (``out.step``), or a folder, which needs ``format``.
     format
@@ -118,7 +119,8 @@ def export(
     ...     [path.name for path in (*written.files, written.manifest)]
     ['pin.stl', 'pin.stl.manifest.json']
     """
-    checks.instance("source", source, Clamp, Scene, Assembly)
+    if not isinstance(source, Clamp):
+        source = opened(source)
     clamp = source if isinstance(source, Clamp) else source.clamp if isinstance(source, Assembly) else None
     target = _target(source, path, format, layout, unit, check_mesh_error(mesh_error))
     if isinstance(source, Assembly):

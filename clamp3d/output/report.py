@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from clamp3d.checks import function, instance
 from clamp3d.checks import path as checked_path
@@ -24,6 +24,7 @@ from clamp3d.output.assembly_steps import StepRow, TighteningRow, step_rows, tig
 from clamp3d.output.groups import Group, grouped
 from clamp3d.output.pages import render
 from clamp3d.output.wording import distance_text, group_text, headline, sentence, titles
+from clamp3d.scenefile.check import opened
 
 Severity = Literal["error", "warning", "note", "ok"]
 
@@ -118,7 +119,7 @@ class Report:
 
 
 def report(
-    source: Scene | Assembly,
+    source: Any,
     folder: str | Path,
     *,
     clearance: float | None = None,
@@ -130,8 +131,8 @@ def report(
 
     Parameters
     ----------
-    source : Scene or Assembly
-        What to report on.
+    source
+        What to report on: what `check` takes, or an assembly.
     folder : str or Path
         Where report.html, report.json and pairs.csv go; all of them or none.
     clearance : float, optional
@@ -147,7 +148,7 @@ def report(
     Raises
     ------
     InputError
-        For a bad clearance, or a folder that cannot be written to.
+        For what cannot be read, a bad clearance, or a folder that cannot be written to.
 
     Examples
     --------
@@ -160,7 +161,7 @@ def report(
     from clamp3d.output.report_page import write_report
 
     folder = checked_path("folder", folder)
-    made = make_report(source, clearance=clearance, progress=progress)
+    made = make_report(opened(source), clearance=clearance, progress=progress)
     return write_report(made, folder, progress=progress or (lambda step: None))
 
 

@@ -49,6 +49,7 @@ from clamp3d.output.wording import (
     titles,
     worst_first,
 )
+from clamp3d.scenefile.check import opened
 
 CLEARANCE = 5.0
 """Gap in mm from which two parts of a clamp count as clear."""
@@ -274,6 +275,7 @@ class Viewer:
             "overlays": [{"name": name, "path": f"{ROOT}/overlay {name}"} for name in drawing.overlays],
             "cut": drawing.cut,
             "cut_open": clamp is not None,
+            "facets": self._mesh_error,
             "frame": drawing.frame() if drawing.timeline.stops else None,
         }
         used = {row["verdict"] for stop in self._story["stops"] for row in stop["rows"]}
@@ -310,13 +312,13 @@ class Viewer:
         return f"Drawn with facets within {self._mesh_error:g} mm; measured {measured}, not on the facets."
 
 
-def view(shown: Scene | Assembly | CheckResult, *, serve: bool = True, **options: Any) -> Viewer:
+def view(shown: Any, *, serve: bool = True, **options: Any) -> Viewer:
     """Show a scene, checked, with its motions, or an assembly, in a browser or as a page.
 
     Parameters
     ----------
-    shown : Scene, Assembly or CheckResult
-        A scene is checked first; a result of `check` is shown as it is.
+    shown
+        A result of `check` or `assemble`, or what `check` takes: a scene is checked first, a clamp assembled.
     serve : bool
         Serve the page at ``viewer.url`` until ``viewer.close()``.
     **options
@@ -330,7 +332,7 @@ def view(shown: Scene | Assembly | CheckResult, *, serve: bool = True, **options
     Raises
     ------
     InputError
-        For what is neither, and as `Viewer`.
+        For what cannot be read, and as `Viewer`.
 
     Examples
     --------
@@ -340,11 +342,11 @@ def view(shown: Scene | Assembly | CheckResult, *, serve: bool = True, **options
     ...     viewer.story["findings"][0]["verdict"]
     'contained'
     """
+    if not isinstance(shown, CheckResult):
+        shown = opened(shown)
     if isinstance(shown, Scene):
         scene = _scene(shown, options.pop("clearance", None))
         shown = check(scene, distances=len(scene.parts) <= MEASURED)
-    if not isinstance(shown, (Assembly, CheckResult)):
-        raise InputError(f"view() takes a Scene, an Assembly or a CheckResult, got {type(shown).__name__}")
     if isinstance(shown, Assembly):
         options.setdefault("model", shown.model)
     viewer = Viewer(shown, serve=serve, **options)

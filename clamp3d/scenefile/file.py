@@ -20,9 +20,9 @@ from clamp3d.collide.scene import Part, Scene
 from clamp3d.core import shapes
 from clamp3d.core.validation import validate
 from clamp3d.errors import Clamp3dError, InputError, escaped
-from clamp3d.scenefile.parts import Parts, Reader
+from clamp3d.scenefile.parts import Reader, prefixed
 from clamp3d.scenefile.pose_table import Pose
-from clamp3d.scenefile.tables import ClampTable, FileTable, MeshTable, SceneTable, clamp_source, part_table
+from clamp3d.scenefile.tables import ClampTable, FileTable, SceneTable, clamp_source, part_table
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -54,36 +54,29 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
     parts: list[Part] = []
     allowed: list[Allowed] = []
     notes: list[str] = []
-    files: dict[tuple[object, ...], shapes.AnyShape] = {}
-    read: dict[bytes, Parts] = {}
-    where = ""
+    scenes: dict[bytes, Scene] = {}
+    where = "clamp"
 
-    def take(more: Parts, of: str) -> None:
-        parts.extend(more.parts)
-        allowed.extend(more.allowed)
-        notes.extend(f"{of}: {note}" for note in more.notes)
+    def take(scene: Scene, of: str) -> None:
+        parts.extend(scene.parts)
+        allowed.extend(scene.allowed)
+        notes.extend(f"{of}: {note}" for note in scene.notes)
 
     try:
         if table.clamp is not None:
-            clamp = _clamp_scene(table.clamp, folder)
-            take(Parts(clamp.parts, (), clamp.allowed), "clamp")
+            take(_clamp_scene(table.clamp, folder), "clamp")
         where = "include"
         for file in [table.include] if isinstance(table.include, str) else table.include:
             take(FileTable(file=file).read(folder), file)
         for part_name, part in tables.items():
             where = f"parts.{part_name}"
-            if isinstance(part, FileTable):
-                same = msgspec.json.encode(msgspec.structs.replace(part, pose=Pose()))
-                if same not in read:  # nor are files of several bodies read twice
-                    read[same] = part.read(folder)
-                take(read[same].prefixed(part_name, part.pose.T()), part_name)
+            if not isinstance(part, FileTable):
+                parts.append(Part(part_name, shapes.as_shape(part.make(folder)), part.pose.T()))
                 continue
-            if isinstance(part, MeshTable):  # one file is one shape, however often it is used
-                key = (part.file, part.unit, part.fit, part.chord)
-                files[key] = shape = files.get(key) or part.make(folder)
-            else:
-                shape = part.make(folder)
-            parts.append(Part(part_name, shapes.as_shape(shape), part.pose.T()))
+            same = msgspec.json.encode(msgspec.structs.replace(part, pose=Pose()))
+            if same not in scenes:  # a file is read once, and its shapes are shared
+                scenes[same] = part.read(folder)
+            take(prefixed(scenes[same], part_name, part.pose.T()), part_name)
         where = "allowed"
         allowed += [Allowed(*item.parts, item.overlap) for item in table.allowed]
         where = "motions"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from clamp3d import checks
@@ -12,7 +13,7 @@ from clamp3d.brep.formats import FORMATS, ROBOT
 from clamp3d.collide.scene import Scene
 from clamp3d.core.shapes import Fit
 from clamp3d.errors import InputError
-from clamp3d.scenefile.parts import Parts, Reader, read_parts, to_parts
+from clamp3d.scenefile.parts import Reader, read_parts, to_parts
 
 if TYPE_CHECKING:
     from clamp3d.clamp.dimensions import Clamp
@@ -90,9 +91,9 @@ def _load_path(source: str | os.PathLike[str], reader: Reader) -> Clamp | Scene:
     if not os.fspath(source):  # else it would be the folder that one is in
         raise InputError("source must not be empty")
     if os.path.isdir(path) and str(path) not in builtin_clamps():
-        return _scene(read_parts(path, reader), path.resolve().name)
+        return _named(read_parts(path, reader), path.resolve().name)
     if path.suffix.lower() in (*FORMATS, ROBOT):
-        return _scene(read_parts(path, reader), path.stem)
+        return _named(read_parts(path, reader), path.stem)
     return load_described(path, reader)
 
 
@@ -101,8 +102,8 @@ def _load_object(source: Any, reader: Reader) -> Scene:
 
     reader.refuse("an object", "joints", "poses", "unit", "line", "jumper")
     reading, name = read_object(source)
-    return _scene(to_parts(reading.complete(name, partial=reader.partial), reader), name)
+    return _named(to_parts(reading.complete(name, partial=reader.partial), reader), name)
 
 
-def _scene(parts: Parts, name: str) -> Scene:
-    return Scene(parts.parts, allowed=parts.allowed, name=part_name(name), notes=parts.notes)
+def _named(scene: Scene, name: str) -> Scene:
+    return replace(scene, name=part_name(name))

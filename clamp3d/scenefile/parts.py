@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import csv
 import itertools
-import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
 
 from clamp3d import checks
-from clamp3d.brep.bodies import Drawn, Reading, part_name, unique_names
+from clamp3d.brep.bodies import Reading, part_name, unique_names
 from clamp3d.brep.formats import FORMATS, ROBOT
 from clamp3d.brep.mesh_file import load_bodies
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.collide.allowed import Allowed
-from clamp3d.collide.scene import Part
-from clamp3d.core.pose import UNIT_TOLERANCE, Array
-from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, MeshShape, Shape
+from clamp3d.collide.scene import Part, Scene
+from clamp3d.core.pose import Array
+from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, Shape, Solid
+from clamp3d.core.validation import validate
 from clamp3d.errors import InputError
+from clamp3d.scenefile.pose_table import Pose
 
 COLUMNS = ("name", "x", "y", "z", "qx", "qy", "qz", "qw")
 """Columns of a table of poses: mm, and a unit quaternion."""
@@ -85,23 +87,15 @@ _GOES_WITH = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """Parts with names of their own, contacts that are meant between them, and what was noted on the way in."""
-
-    parts: tuple[Part, ...]
-    notes: tuple[str, ...] = ()
-    allowed: tuple[Allowed, ...] = ()
-
-    def prefixed(self, name: str, T: Array) -> Parts:
-        """The same moved by ``T`` (4, 4) and called ``name``, or ``name/...`` if there are several."""
-        names = {p.name: name if len(self.parts) == 1 else f"{name}/{p.name}" for p in self.parts}
-        parts = (Part(names[p.name], p.shape, T @ p.T_world) for p in self.parts)
-        allowed = (Allowed(names[x.a], names[x.b], x.overlap) for x in self.allowed)
-        return Parts(tuple(parts), self.notes, tuple(allowed))
+def prefixed(scene: Scene, name: str, T: Array) -> Scene:
+    """A scene that was read, moved by ``T`` (4, 4), its parts called ``name``, or ``name/...`` if there are several."""
+    names = {p.name: name if len(scene.parts) == 1 else f"{name}/{p.name}" for p in scene.parts}
+    parts = (Part(names[p.name], p.shape, T @ p.T_world) for p in scene.parts)
+    allowed = (Allowed(names[x.a], names[x.b], x.overlap) for x in scene.allowed)
+    return Scene(tuple(parts), allowed=tuple(allowed), notes=scene.notes)
 
 
-def read_parts(path: Path, reader: Reader) -> Parts:
+def read_parts(path: Path, reader: Reader) -> Scene:
     """The parts of a geometry file, a robot description or a folder of meshes. Raises InputError."""
     reader.refuse(checks.short(path), "line", "jumper")
     if os.path.isdir(path):
@@ -113,28 +107,27 @@ def read_parts(path: Path, reader: Reader) -> Parts:
     return to_parts(load_bodies(path, unit=reader.unit, joints=joints, partial=reader.partial), reader)
 
 
-def to_parts(reading: Reading, reader: Reader) -> Parts:
+def to_parts(reading: Reading, reader: Reader) -> Scene:
     """The bodies of a reading as parts with unique names, and what a robot's joints allow."""
     shapes: dict[int, Shape] = {}
     parts = []
+    links: dict[str, list[str]] = {}
     for name, body in zip(unique_names(body.name for body in reading.bodies), reading.bodies, strict=True):
         shape = shapes.setdefault(id(body.shape), _fitted(body.shape, reader))
         parts.append(Part(name, shape, body.T))
-    if reading.joined is None:
-        return Parts(tuple(parts), reading.notes)
-    links: dict[str, list[str]] = {}
-    for part, body in zip(parts, reading.bodies, strict=True):
-        links.setdefault(body.name, []).append(part.name)
-    allowed = [Allowed(a, b, _ANY) for names in links.values() for a, b in itertools.combinations(names, 2)]
-    for parent, child in reading.joined:
-        allowed += [Allowed(a, b) for a in links.get(parent, ()) for b in links.get(child, ())]
-    return Parts(tuple(parts), reading.notes, tuple(allowed))
+        links.setdefault(body.name, []).append(name)
+    allowed = []
+    if reading.joined is not None:
+        allowed = [Allowed(a, b, _ANY) for names in links.values() for a, b in itertools.combinations(names, 2)]
+        for parent, child in reading.joined:
+            allowed += [Allowed(a, b) for a in links.get(parent, ()) for b in links.get(child, ())]
+    return Scene(tuple(parts), allowed=tuple(allowed), notes=reading.notes)
 
 
-def _fitted(shape: MeshShape | Drawn, reader: Reader) -> Shape:
+def _fitted(shape: Shape, reader: Reader) -> Shape:
     """A mesh taken as the reader says; what is drawn, or knows its chord error, is taken as it is."""
-    if isinstance(shape, Drawn):
-        return shape.solid
+    if isinstance(shape, Solid):
+        return shape
     if isinstance(shape, BrepSolid):
         reader.refuse("STEP, whose faces are exact", "fit", "chord")
         return shape
@@ -143,7 +136,7 @@ def _fitted(shape: MeshShape | Drawn, reader: Reader) -> Shape:
     return replace(shape, fit=reader.fit or shape.fit, error=float(reader.chord or 0.0))
 
 
-def _folder(folder: Path, reader: Reader) -> Parts:
+def _folder(folder: Path, reader: Reader) -> Scene:
     """Every geometry file of a folder, in the order of their names, each where the table of poses puts it."""
     files = sorted(f for f in folder.iterdir() if f.suffix.lower() in FORMATS and f.is_file())
     if not files:
@@ -164,63 +157,42 @@ def _folder(folder: Path, reader: Reader) -> Parts:
     if left and not reader.partial:
         raise InputError(f"{reader.poses}: no pose for {', '.join(left[:4])} ({len(left)} of {len(files)} files)")
     notes = [f"{len(left)} of {len(files)} files have no pose and are left out"] if left else []
-    read: dict[str, Parts] = {}
-    bodies: list[tuple[str, Part]] = []
+    scenes: dict[str, Scene] = {}
+    parts: list[Part] = []
     for name, T in places:
-        if name not in read:
-            read[name] = read_parts(named[name], replace(reader, poses=None))
-            notes += [f"{name}: {note}" for note in read[name].notes]
-        bodies += [(p.name, p) for p in read[name].prefixed(part_name(name), T).parts]
-    names = unique_names(name for name, _ in bodies)
-    return Parts(tuple(replace(p, name=n) for n, (_, p) in zip(names, bodies, strict=True)), tuple(notes))
+        if name not in scenes:
+            scenes[name] = read_parts(named[name], replace(reader, poses=None))
+            notes += [f"{name}: {note}" for note in scenes[name].notes]
+        parts += prefixed(scenes[name], part_name(name), T).parts
+    names = unique_names(part.name for part in parts)
+    return Scene(tuple(replace(part, name=name) for name, part in zip(names, parts, strict=True)), notes=tuple(notes))
 
 
 def read_poses(path: Path) -> list[tuple[str, Array]]:
     """Names and poses (4, 4) of a table with the columns of `COLUMNS`; a name may be there more than once."""
     from clamp3d.clamp.loader import read_text
-    from clamp3d.scenefile.pose_table import Pose
 
     rows = csv.reader(read_text(path).splitlines())
+    head = [cell.strip() for cell in next(rows, [])]
+    if tuple(head) != COLUMNS:
+        raise InputError(f"{path}: the first line must be {','.join(COLUMNS)}, got {checks.shown(','.join(head))}")
     poses = []
     try:
-        head = [cell.strip() for cell in next(rows, [])]
-        if tuple(head) != COLUMNS:
-            raise InputError(f"{path}: the first line must be {','.join(COLUMNS)}, got {checks.shown(','.join(head))}")
         for row in rows:
             if not any(cell.strip() for cell in row):
                 continue
-            if len(row) != len(COLUMNS):
-                raise ValueError(f"{len(COLUMNS)} values are needed, got {len(row)}")
-            x, y, z, *turn = (_number(column, cell) for column, cell in zip(COLUMNS[1:], row[1:], strict=True))
-            size = math.hypot(*turn)
-            if not abs(size - 1.0) <= UNIT_TOLERANCE:
-                raise ValueError(f"the quaternion must have length 1, got {size:.6g}")
-            qx, qy, qz, qw = turn
-            poses.append((row[0].strip(), Pose(translation=(x, y, z), quaternion=(qx, qy, qz, qw)).T()))
-    except (ValueError, csv.Error) as error:
-        if isinstance(error, InputError) and str(error).startswith(f"{path}: "):
-            raise
+            name, *numbers = (cell.strip() for cell in row)
+            table = {"translation": numbers[:3], "quaternion": numbers[3:]}
+            poses.append((name, validate(Pose, table, f"{path}: line {rows.line_num}", strict=False).T()))
+    except csv.Error as error:
         raise InputError(f"{path}: line {rows.line_num}: {error}") from None
     if not poses:
         raise InputError(f"{path}: no pose in the table")
     return poses
 
 
-def _number(column: str, cell: str) -> float:
-    """The number in a cell; Python's underscores between digits are none of a table's."""
-    try:
-        value = math.nan if "_" in cell else float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ValueError(f"{column} must be a finite number, got {checks.shown(cell.strip())}")
-    return value
-
-
 def names_like(patterns: Iterable[str], names: Iterable[str]) -> list[str]:
     """Names that are in ``patterns``, or fit one of them; a pattern that fits none stays, and is refused as unknown."""
-    from fnmatch import fnmatchcase
-
     available = dict.fromkeys(names)
     matching: dict[str, None] = {}
     for pattern in patterns:

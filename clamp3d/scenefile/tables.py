@@ -15,12 +15,13 @@ from clamp3d import checks
 from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import ClampPart, Length, Offset, check_conductor
 from clamp3d.clamp.loader import load_clamp
+from clamp3d.collide.scene import Scene
 from clamp3d.core import shapes
 from clamp3d.core.motion import Motion
 from clamp3d.core.primitives import SweptArc
 from clamp3d.core.validation import validate
 from clamp3d.errors import InputError
-from clamp3d.scenefile.parts import Parts, Reader, names_like, read_parts
+from clamp3d.scenefile.parts import Reader, names_like, read_parts
 from clamp3d.scenefile.pose_table import Angle, Number, Pose, Table, Vector
 
 
@@ -122,28 +123,6 @@ class ClampPartTable(PartTable, kw_only=True):
         return parts(load_clamp(clamp_source(self.clamp, folder), line=self.line, jumper=self.jumper))[self.part]
 
 
-class MeshTable(PartTable, kw_only=True):
-    """``shape = "mesh"``: a file of one body beside the scene, as a mesh; see `MeshShape` for ``fit``."""
-
-    shape: Literal["mesh"]
-    file: str
-    unit: Literal["mm", "cm", "m", "in"] | None = None
-    fit: shapes.Fit = "off"
-    chord: Annotated[float, Meta(ge=0.0, lt=1e5)] = 0.0
-
-    def make(self, folder: Path) -> shapes.AnyShape:
-        """The shape."""
-        from clamp3d.brep.mesh_file import load_bodies
-
-        bodies = load_bodies(folder / self.file, unit=self.unit).bodies
-        if len(bodies) != 1:
-            raise InputError(f"{self.file} holds {len(bodies)} bodies: leave out shape, and it gives as many parts")
-        (body,) = bodies
-        if not np.array_equal(body.T, np.eye(4)):
-            raise InputError(f"{self.file} places its body itself: leave out shape, and it is placed so")
-        return shapes.MeshShape(body.mesh, self.fit, self.file, self.chord)
-
-
 class FileTable(PartTable, kw_only=True):
     """A ``file`` and no ``shape``: all bodies of it, as `clamp3d.load` reads them, moved by ``pose``."""
 
@@ -155,15 +134,32 @@ class FileTable(PartTable, kw_only=True):
     poses: str | None = None
     partial: bool = False
 
-    def read(self, folder: Path) -> Parts:
+    def read(self, folder: Path) -> Scene:
         """Its parts, not yet moved or renamed."""
         poses = None if self.poses is None else folder / self.poses
         keys = ("unit", "fit", "chord", "joints", "partial")
         return read_parts(folder / self.file, Reader(poses=poses, **{key: getattr(self, key) for key in keys}))
 
 
-ShapeTable: TypeAlias = CylinderTable | BoxTable | GrooveBlockTable | ClampPartTable | MeshTable
-SHAPES: dict[str, type[ShapeTable]] = {
+class MeshTable(FileTable, kw_only=True):
+    """``shape = "mesh"``: a file of one body, in its own frame; see `MeshShape` for ``fit``."""
+
+    shape: Literal["mesh"]
+
+    def read(self, folder: Path) -> Scene:
+        """The part, not yet moved or renamed."""
+        scene = super().read(folder)
+        if len(scene.parts) != 1:
+            raise InputError(
+                f"{self.file} holds {len(scene.parts)} bodies: leave out shape, and it gives as many parts"
+            )
+        if not np.array_equal(scene.parts[0].T_world, np.eye(4)):
+            raise InputError(f"{self.file} places its body itself: leave out shape, and it is placed so")
+        return scene
+
+
+AnyTable: TypeAlias = CylinderTable | BoxTable | GrooveBlockTable | ClampPartTable | FileTable
+SHAPES: dict[str, type[AnyTable]] = {
     "cylinder": CylinderTable,
     "box": BoxTable,
     "groove-block": GrooveBlockTable,
@@ -172,10 +168,10 @@ SHAPES: dict[str, type[ShapeTable]] = {
 }
 
 
-def part_table(data: Any, origin: str, key: str) -> ShapeTable | FileTable:
+def part_table(data: Any, origin: str, key: str) -> AnyTable:
     """The table of a part, by its ``shape`` or as a file. Raises InputError."""
     shape = data.get("shape") if isinstance(data, dict) else None
-    kind: type[ShapeTable | FileTable] | None = SHAPES.get(shape) if isinstance(shape, str) else None
+    kind: type[AnyTable] | None = SHAPES.get(shape) if isinstance(shape, str) else None
     if isinstance(data, dict) and "file" in data and "shape" not in data:
         kind = FileTable
     if kind is None:
@@ -186,7 +182,7 @@ def part_table(data: Any, origin: str, key: str) -> ShapeTable | FileTable:
             + (f", got {checks.shown(shape)}" if shape is not None else "")
             + (f"; did you mean {near[0]}?" if near else "")
         )
-    table: ShapeTable | FileTable = validate(kind, data, origin, key)
+    table: AnyTable = validate(kind, data, origin, key)
     return table
 
 

@@ -15,8 +15,7 @@ from threemf import TIP, doubled, write_3mf
 
 from clamp3d import InputError, check, load
 from clamp3d.brep.bodies import unique_names
-from clamp3d.brep.process import process
-from clamp3d.brep.worker import LIMITS, OUTSIDE
+from clamp3d.brep.worker import LIMITS, OUTSIDE, process
 from clamp3d.shapes import load_mesh
 
 ROOT = Path(__file__).parents[2]
@@ -93,17 +92,18 @@ def test_odd_files_that_are_whole_are_read(tmp_path, raw):
     [
         (TIP.replace("3", "9"), '<item objectid="1"/>', "not a readable 3MF file"),
         (TIP, '<item objectid="1"/><item objectid="2"/>', "not a readable 3MF file"),
-        (doubled(50), '<item objectid="51"/>', "more than 20000 bodies"),
-        (doubled(200), '<item objectid="201"/>', "components more than 60 levels deep"),
+        (doubled(15), '<item objectid="16"/>', "more than 20000 bodies"),
         (TIP, "", "no body in the file"),
     ],
-    ids=["index", "object", "doubled", "deep", "empty"],
+    ids=["index", "object", "doubled", "empty"],
 )
-def test_3mf_that_names_too_much_or_what_is_not_there(tmp_path, monkeypatch, objects, build, message):
-    monkeypatch.setenv(LIMITS, "0.2")  # 12 s: what names itself into millions is counted, not made
-    path = write_3mf(tmp_path / "a.3mf", objects, build)
-    assert path.stat().st_size < 3000
-    refused(path, message)
+def test_3mf_that_names_too_much_or_what_is_not_there(tmp_path, objects, build, message):
+    refused(write_3mf(tmp_path / "a.3mf", objects, build), message)
+
+
+def test_3mf_of_some_kilobytes_that_would_take_years_is_given_up(tmp_path, monkeypatch):
+    monkeypatch.setenv(LIMITS, "0.02")
+    refused(write_3mf(tmp_path / "a.3mf", doubled(50), '<item objectid="51"/>'), "not read in 1 s")
 
 
 def test_objects_components_and_build_items_of_3mf(tmp_path):
@@ -124,10 +124,10 @@ def test_objects_components_and_build_items_of_3mf(tmp_path):
     np.testing.assert_allclose(np.ptp(third.shape.mesh.vertices, axis=0), 2 * 25.4, rtol=1e-6)
 
 
-def test_an_archive_that_unpacks_to_gigabytes_is_not_unpacked(tmp_path):
-    with zipfile.ZipFile(tmp_path / "a.3mf", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        archive.writestr("3D/3dmodel.model", " " * (300 << 20))
-    refused(tmp_path / "a.3mf", "unpacks to 315 MB, .* times its size")
+def test_a_3mf_whose_numbers_were_changed_on_the_way_is_refused(tmp_path):
+    path = write_3mf(tmp_path / "a.3mf", method=zipfile.ZIP_STORED)
+    path.write_bytes(path.read_bytes().replace(b'x="1"', b'x="9"'))
+    refused(path, "the file is damaged: 3D/3dmodel.model in it is not what was written")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
@@ -155,11 +155,10 @@ def test_every_format_is_read_within_limits(tmp_path, monkeypatch, kind):
     refused(path, "not read in 0 s; CLAMP3D_READ_LIMITS=4 allows four times|takes more than 0.0 GB")
 
 
-def test_a_file_whose_name_is_no_text_is_refused_in_one_line(tmp_path):
+def test_a_file_whose_name_is_no_text_is_read(tmp_path):
     name = os.fsdecode(b"\xff.stl")
     (tmp_path / name).write_bytes(PIN)
-    with pytest.raises(InputError, match="its name, or that of its folder, is not UTF-8; rename it"):
-        load(tmp_path / name)
+    assert [part.name for part in load(tmp_path / name).parts] == ["part"]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals as Linux has them")
@@ -223,15 +222,15 @@ MORE = '<parent link="tip"/><child link="end"/>'
     ("text", "instead", "message"),
     [
         (ROBOT[300:], "", "not a readable URDF file"),
-        ('  <link name="end">', '</robot>\n  <link name="end">', r"not a readable URDF file \(junk after document"),
-        (MORE, '<parent link="end"/><child link="tip"/>', "child of more than one joint"),
-        (MORE, '<parent link="end"/><child link="end"/>', "no path of joints from link 'base' to link 'end'"),
-        (MORE, '<parent link="tip"/><child link="arm"/>', "the child of joint 'more' must be a link, got 'arm'"),
-        (ROBOT[ROBOT.index("  <joint name=\"more\"") : -9], "", "no path of joints from link 'base' to link 'end'"),
+        ('  <link name="end">', '</robot>\n  <link name="end">', "not a readable URDF file .*junk after doc"),
+        (MORE, '<parent link="end"/><child link="tip"/>', "one tree of all links"),
+        (MORE, '<parent link="end"/><child link="end"/>', "one tree of all links"),
+        (MORE, '<parent link="tip"/><child link="arm"/>', "a joint must connect links, got 'arm'"),
+        (ROBOT[ROBOT.index("  <joint name=\"more\"") : -9], "", "one tree of all links"),
         ('"end"><c', '"tip"><c', "2 of its links are called 'tip'"),
-        ('<link name="tip">', "<link>", "link 2 has no name"),
-        ("sphere radius", "ball radius", "a shape of link 'tip' must be one of box, cylinder, mesh, sphere, got ball"),
-        ('<box size="0.1 0.1 0.02"/>', "", "a shape of link 'base' must be .*, got none"),
+        ('<link name="tip">', "<link>", "not a readable URDF file"),
+        ("sphere radius", "ball radius", "not a readable URDF file .*ball"),
+        ('<box size="0.1 0.1 0.02"/>', "", "a collision of link 'base' must have 1 shape, got 0"),
         ('<box size="0.1 0.1 0.02"/>', '<mesh filename="no.stl"/>', r"missing: base \(.*no such file"),
         ('<box size="0.1 0.1 0.02"/>', '<mesh filename="../../no.stl"/>', "outside of the robot's folder"),
         ('radius="0.012"', 'radius="big"', "not a readable URDF file"),
@@ -273,9 +272,7 @@ def test_pipes_and_devices_are_no_files(tmp_path, suffix):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="closed and full streams as Linux has them")
-@pytest.mark.parametrize(
-    ("streams", "code"), [("2>&-", 0), ("2>/dev/full", 0), (">/dev/full", 2), (">&- 2>&-", 0), ("</dev/null 2>&-", 0)]
-)
+@pytest.mark.parametrize(("streams", "code"), [("2>/dev/full", 0), (">/dev/full", 2), (">&- 2>&-", 0)])
 def test_a_clean_check_says_so_whatever_becomes_of_its_streams(tmp_path, streams, code):
     for k in range(2):
         (tmp_path / f"{k}.stl").write_bytes(TEXT)

@@ -5,19 +5,14 @@ import subprocess
 import sys
 import time
 
-import numpy as np
 import pytest
 
 from clamp3d.brep.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.errors import InputError, SolverError
 
 STAND_IN = """
-import os, sys
-import numpy as np
+import os
 from clamp3d.errors import InputError, SolverError
-
-def echo(value):
-    return value
 
 def fail(kind):
     raise {"input": InputError("no such thing"), "solver": SolverError("none"), "other": KeyError("x")}[kind]
@@ -25,29 +20,14 @@ def fail(kind):
 def pid():
     return os.getpid()
 """
-FUNCTIONS = ("stand_in:echo", "stand_in:fail", "stand_in:pid", "os:abort", "os:_exit", "time:sleep", "numpy:ones")
-REFUSED = ("socket:create_connection", "os:system")
 
 
 @pytest.fixture
 def worker(tmp_path, monkeypatch):
     (tmp_path / "stand_in.py").write_text(STAND_IN)
     monkeypatch.syspath_prepend(str(tmp_path))
-    with Worker(*FUNCTIONS, *REFUSED, confined=True) as made:
+    with Worker(confined=True) as made:
         yield made
-
-
-def test_values_and_arrays_come_back_as_they_were_sent(worker):
-    arrays = {"a": np.arange(6.0).reshape(2, 3), "b": np.array([], dtype=np.int32), "c": np.array([True]), "d": b"\0"}
-    value = [None, True, 7, 0.1, "text", [arrays, np.float64(2.5)]]
-    back = worker.call("stand_in:echo", value, time_limit=60.0)
-    assert back[:5] == value[:5]
-    assert back[5][1] == 2.5
-    for key in "abc":
-        np.testing.assert_array_equal(back[5][0][key], arrays[key], strict=True)
-    assert back[5][0]["a"].flags.writeable
-    with pytest.raises(TypeError, match="ndarray cannot be sent to another process"):
-        worker.call("stand_in:echo", np.array([{}]), time_limit=60.0)
 
 
 def test_one_process_answers_until_it_fails_and_the_next_call_starts_another(worker):
@@ -88,26 +68,26 @@ def test_memory_is_limited_for_each_call_alone(worker):
     assert len(worker.call("numpy:ones", 10**7, time_limit=60.0)) == 10**7
 
 
-def test_what_it_may_not_do_is_refused(worker):
-    with pytest.raises(ValueError, match="function must be one of"):
-        worker.call("os:remove", "x", time_limit=60.0)
-    for function, argument in zip(REFUSED, (["127.0.0.1", 9], "true"), strict=True):
-        with pytest.raises(OSError, match="not allowed while a file is read"):
-            worker.call(function, argument, time_limit=60.0)
+@pytest.mark.parametrize(
+    ("function", "argument"), [("socket:create_connection", ["127.0.0.1", 9]), ("os:system", "true")]
+)
+def test_what_it_may_not_do_is_refused(worker, function, argument):
+    with pytest.raises(OSError, match="not allowed while a file is read"):
+        worker.call(function, argument, time_limit=60.0)
 
 
 def test_modules_of_the_current_folder_are_not_imported(tmp_path, monkeypatch):
     (tmp_path / "numpy.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'w')")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", ["", *sys.path])  # as in a notebook, and at the prompt
-    with Worker("numpy:ones") as made:
+    with Worker() as made:
         assert made.call("numpy:ones", 3, time_limit=60.0).tolist() == [1.0] * 3
     assert not (tmp_path / "executed").exists()
 
 
 def test_it_ends_with_its_caller():
     code = (
-        "import os, signal\nfrom clamp3d.brep.child import Worker\nworker = Worker('os:getpid', 'time:sleep')\n"
+        "import os, signal\nfrom clamp3d.brep.child import Worker\nworker = Worker()\n"
         "print(worker.call('os:getpid', time_limit=60.0), flush=True)\nos.kill(os.getpid(), signal.SIGKILL)"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120)

@@ -1,40 +1,35 @@
-"""The command line as a user meets it: a process, its exit code, stdout, stderr and files."""
+"""The command line in this process: exit codes, stdout and stderr, files, ``-``, one line for every fault."""
 
 import json
 import math
-import subprocess
-import sys
+import warnings
 
+import click
+import numpy as np
 import pytest
+import trimesh
 
+from clamp3d import cli
 from clamp3d.bench import published
+from clamp3d.cli.options import Output, number
+from clamp3d.core.pose import PoseWarning
+from clamp3d.errors import SolverError
+
+BOX = '[parts.{name}]\nshape = "box"\nsize = [10, 10, 10]\npose = {{ translation = [{x}, 0, 0] }}\n'
 
 
-def clamp3d(*arguments, **kwargs):
-    command = [sys.executable, "-m", "clamp3d", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **kwargs)
+def boxes(folder, distance, names=("a", "b")):
+    path = folder / "boxes.toml"
+    path.write_text("".join(BOX.format(name=json.dumps(name), x=k * distance) for k, name in enumerate(names)))
+    return path
 
 
-def test_without_a_command_there_is_help():
-    done = clamp3d()
-    assert (done.returncode, done.stderr, done.stdout) == (0, "", clamp3d("--help").stdout)
-
-
-def test_help_lists_every_command_and_loads_no_numeric_library():
-    done = clamp3d("--help")
-    assert done.returncode == 0
-    assert "reproduce" in done.stdout
-    heavy = ("numba", "scipy", "trimesh", "fcl", "coacd", "meshcat")
-    code = f"import sys, clamp3d.cli; print([m for m in {heavy} if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
-
-
-def test_run_prints_the_published_state_and_writes_json(tmp_path):
+def test_run_prints_the_published_state_and_writes_json(tmp_path, main):
     path = tmp_path / "out.json"
-    done = clamp3d("run", "--json", path)
-    assert done.returncode == 0, done.stderr
-    assert "clamped; distance between the splints 31.530 mm, tilt 12.00 deg" in done.stdout
-    assert "line between the splints" in done.stderr
+    code, out, err = main("run", "--json", path)
+    assert code == 0
+    assert "clamped; distance between the splints 31.530 mm, tilt 12.00 deg" in out
+    assert "line between the splints" in err
     data = json.loads(path.read_text())
     assert {"clamp", "method", "solver", "distance_mm", "parts", "contacts", "work"} <= set(data)
     for part, (x, y, angle) in published.FINAL_STATE.items():
@@ -50,13 +45,9 @@ def test_run_prints_the_published_state_and_writes_json(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_quiet_says_nothing_on_stderr():
-    assert clamp3d("run", "--quiet").stderr == ""
-
-
-def test_a_clamp_that_does_not_close_is_a_finding(main):
-    code, out, _ = main("run", "--line", "LJ-16", "--jumper", "LJ-16", "-q")
-    assert code == 1
+def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stderr(main):
+    code, out, err = main("run", "--line", "LJ-16", "--jumper", "LJ-16", "-q")
+    assert (code, err) == (1, "")
     assert "not clamped: faces meet" in out
 
 
@@ -65,19 +56,144 @@ def test_a_clamp_that_does_not_close_is_a_finding(main):
     [
         (["rum"], "No such command 'rum'. Did you mean 'run'?"),
         (["run", "nothing"], "unknown clamp 'nothing'; built in: reference"),
-        (["run", "--line", "LJ-631"], "unknown conductor 'LJ-631'"),
-        (["run", "--jumper", "-4"], "jumper diameter must be > 0"),
         (["run", "--method", "magic"], "'magic' is not one of"),
-        (["run", "--unit-angle-deg", "5"], "--unit-angle-deg goes with"),
+        (["run", "--unit-angle-deg", "5"], "unit_angle goes with method chords or wedges, got method 'cas'"),
         (["run", "--method", "chords", "--unit-angle-deg", "0"], "unit angle must be between 0 and 180 deg, got 0"),
         (["run", "--step", "-1"], "step must be > 0 mm, got -1"),
         (["run", "--solver", "exact", "--step", "1"], "--step and --tilt-step-deg go with --solver stepped"),
-        (["run", "--json", "/nowhere/x.json", "-q"], "cannot write /nowhere/x.json: No such file or directory"),
         (["run", "--json"], "requires an argument"),
+        (["check", "a.urdf", "--joints", "elbow"], "must read like elbow=1.57,slide=20, got 'elbow'"),
+        (["view", "boxes.toml", "--overlay", "wedges"], "--overlay goes with a clamp, not with a scene"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_code_2(arguments, message, main):
-    code, _, err = main(*arguments)
-    assert code == 2
-    assert message in err.splitlines()[-1]
-    assert "Traceback" not in err
+def test_bad_input_is_one_line_and_exit_code_2(arguments, message, main, tmp_path, monkeypatch):
+    boxes(tmp_path, 20.0)
+    monkeypatch.chdir(tmp_path)
+    code, out, err = main(*arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+
+
+def test_every_file_option_writes_to_stdout_for_a_dash():
+    context = click.Context(cli.group)
+    options = [option for name in cli.COMMANDS for option in cli.group.get_command(context, name).params]
+    files = [option for option in options if isinstance(option, click.Option) and option.metavar == "FILE"]
+    assert len(files) > 10
+    assert [option.opts for option in files if not isinstance(option.type, Output)] == []
+
+
+def test_no_two_parameters_of_a_command_share_a_name():
+    """Options in groups come from several classes: of two with one name the second would take the first one's value."""
+    context = click.Context(cli.group)
+    for name in cli.COMMANDS:
+        names = [parameter.name for parameter in cli.group.get_command(context, name).params]
+        assert len(names) == len(set(names)), name
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "--json", "-"),
+        ("tolerance", "--n", "2", "--json", "-"),
+        ("sweep", "--steps", "4", "--json", "-"),
+        ("check", "boxes.toml", "--json", "-"),
+        ("fit", "ball.stl", "--json", "-"),
+    ],
+)
+def test_json_on_stdout_is_nothing_but_json(arguments, tmp_path, monkeypatch, whole_main):
+    boxes(tmp_path, 20.0)
+    trimesh.creation.icosphere(subdivisions=1).export(tmp_path / "ball.stl")
+    before = sorted(tmp_path.iterdir())
+    monkeypatch.chdir(tmp_path)
+    code, out, err = whole_main(*arguments)
+    assert code == 0, err
+    assert isinstance(json.loads(out), dict)
+    assert len(err.splitlines()) >= 2  # the text for people
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_page_on_stdout(tmp_path, whole_main):
+    code, out, _ = whole_main("check", boxes(tmp_path, 20.0), "--html", "-")
+    assert code == 0
+    assert out.lower().startswith("<!doctype html>")
+    assert out.rstrip().endswith("</html>")
+
+
+def test_only_one_file_can_be_stdout(tmp_path, whole_main):
+    code, out, err = whole_main("check", boxes(tmp_path, 20.0), "--html", "-", "--json", "-")
+    assert (code, out) == (2, "")
+    assert "only one file can be stdout" in err
+
+
+def test_undecided(tmp_path, whole_main):
+    """A coarse tube whose facets do not say whether the pin in it, 0.01 mm thinner, touches."""
+    tube = trimesh.creation.annulus(5.0, 9.0, 10.0, sections=24)
+    tube.export(tmp_path / "tube.stl")
+    scene = tmp_path / "fit.toml"
+    scene.write_text(
+        'contact = 1e-3\n[parts.tube]\nshape = "mesh"\nfile = "tube.stl"\nchord = 0.05\n'
+        '[parts.pin]\nshape = "cylinder"\nradius = 4.99\nlength = 20\n'
+    )
+    code, out, _ = whole_main("check", scene, "--json", "-")
+    data = json.loads(out)
+    assert [row["verdict"] for row in data["pairs"]] == ["uncertain"]
+    assert (code, data["clean"]) == (3, False)
+    assert whole_main("report", scene, "--output", tmp_path / "report", "-q")[0] == 3
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "message"),
+    [
+        (IndexError("list index"), 4, "clamp3d: error: inside clamp3d: IndexError: list index at conductors.py:"),
+        (MemoryError(), 4, "clamp3d: error: inside clamp3d: MemoryError"),
+        (SolverError("optimality is 1e-3"), 4, "clamp3d: error: optimality is 1e-3\n"),
+        (KeyboardInterrupt(), 130, "\nclamp3d: interrupted\n"),
+    ],
+)
+def test_a_fault_is_one_line_and_no_finding(error, code, message, monkeypatch, main):
+    def fail():
+        raise error
+
+    monkeypatch.setattr("clamp3d.clamp.conductors.catalogue", fail)
+    status, out, err = main("conductors")
+    assert (status, out, err.strip().count("\n")) == (code, "", 0)
+    assert err.startswith(message)
+    monkeypatch.setenv("CLAMP3D_DEBUG", "1")
+    assert ("Traceback (most recent call last)" in main("conductors")[2]) == (code == 4)
+
+
+def test_control_characters_do_not_reach_the_terminal(tmp_path, whole_main):
+    names = ("\x1b[31mred", "bell\x07\u202e")
+    code, out, err = whole_main("check", boxes(tmp_path, 9.0, names))
+    assert code == 1
+    assert "\\x1b[31mred" in out
+    assert all(c.isprintable() or c == "\n" for c in out + err)
+
+
+@pytest.mark.parametrize(("text", "value"), [("1/3", 1 / 3), ("0.25", 0.25), (" 2e-3 ", 2e-3), ("-3/2", -1.5)])
+def test_fractions(text, value):
+    assert number(text) == value
+
+
+@pytest.mark.parametrize("text", ["1/0", "x", "", "nan", "inf", "1e400", "1/2/3", "1,5", "1_0"])
+def test_anything_else_is_refused(text):
+    with pytest.raises(click.BadParameter, match="must be a finite number or a fraction like 1/3, got"):
+        number(text)
+
+
+def test_a_third_of_a_millimetre_is_the_papers_step(main):
+    found = json.loads(main("run", "-q", "--step", "1/3", "--json", "-")[1])
+    assert found["solver"] == "stepped"
+    assert np.round(found["distance_mm"], 3) == 31.530
+
+
+def test_a_warning_is_one_line_on_stderr(monkeypatch, main):
+    """Without the file, the category and the line of source that Python's own form shows."""
+
+    def mended():
+        warnings.warn("T_world has rounding errors\nof 1e-6", PoseWarning, stacklevel=2)
+        return {}
+
+    monkeypatch.setattr("clamp3d.clamp.conductors.catalogue", mended)
+    code, _, err = main("conductors")
+    assert (code, err) == (0, "warning: T_world has rounding errors\\nof 1e-6\n")

@@ -104,7 +104,7 @@ def test_parts_check_themselves_and_scenes_take_them():
     assert Scene((part,)).add("wire", Cylinder(1.0, 2.0)).parts[1].shape.name == "cylinder"
     for bad, message in (
         (lambda: Part("a b", BLOCK), "part name must not be empty or hold a space"),
-        (lambda: Part("a", 3), "a part's shape must be a Solid, MeshShape or Cylinder, got int"),
+        (lambda: Part("a", 3), "a part's shape must be a Solid, MeshShape, Cylinder or a mesh of trimesh, got int"),
         (lambda: Part("a", BLOCK, np.diag([2.0, 1, 1, 1])), "pose of a must be rigid"),
         (lambda: Scene((part,)).add(part), "part 'block' is there twice"),
         (lambda: Scene().add(part, BLOCK), "takes a Part alone"),

@@ -5,6 +5,7 @@ the cut faces, found with the browser's own camera, against the part's colour.
 """
 
 import io
+import math
 import os
 import re
 import shutil
@@ -428,13 +429,65 @@ def test_meshcat_server_that_was_there_before(browser, run):
         server.communicate()
 
 
-def test_a_part_can_be_named_isolated_ghosted_and_hidden(browser, tmp_path):
+@pytest.fixture
+def boxes_page(browser, tmp_path):
     scene = Scene().add("left", shapes.box((10, 10, 10))).add("right", shapes.box((10, 10, 10)), translation(30, 0, 0))
     view(scene, serve=False).save_html(tmp_path / "two.html")
     page = open_page(browser, (tmp_path / "two.html").as_uri(), offline=True)
     wait_for(page, "document.querySelector('.part')")
     page.locator("#switch-cutaway").uncheck()
     page.wait_for_timeout(200)
+    yield page
+    assert page.problems == []
+
+
+def test_a_section_hides_what_is_before_it(boxes_page):
+    page = boxes_page
+    middles = on_screen(page, [(0.0, -5.0, 0.0), (30.0, -5.0, 0.0)])
+
+    def named():
+        found = []
+        for x, y in middles:
+            page.mouse.click(x, y)
+            found.append(page.evaluate("document.getElementById('identity').hidden") or page.inner_text("#identity b"))
+        return found
+
+    assert named() == ["left", "right"]
+    page.select_option("#section-axis", "X")
+    assert page.inner_text("#section-place") == "X 15.00 mm"
+    assert named() == ["left", True]
+    image = pixels(page)
+    x, y = middles[1]
+    assert image[round(y), round(x)].min() > 200  # the ground, no part
+    page.click("#section-flip")
+    assert named() == [True, "right"]
+    page.locator("#section-at").fill("1")
+    assert page.inner_text("#section-place") == "X 35.00 mm"
+    assert named() == [True, True]
+    page.select_option("#section-axis", "")
+    assert named() == ["left", "right"]
+
+
+def test_two_clicks_measure(boxes_page):
+    page = boxes_page
+    page.keyboard.press("m")
+    for point in on_screen(page, [(0.0, -5.0, 0.0), (30.0, -5.0, 2.0)]):
+        page.mouse.click(*point)
+    words = page.inner_text("#measured")
+    found = re.fullmatch(
+        r"left to right: ([\d.]+) mm between the points, within 0.02 mm \(X ([\d.]+), Y 0.00, Z ([\d.]+)\); "
+        r"the parts: gap 20.0000 mm",
+        words,
+    )
+    assert found, words
+    pixel = 0.2
+    np.testing.assert_allclose([float(x) for x in found.groups()], [math.hypot(30.0, 2.0), 30.0, 2.0], atol=pixel)
+    page.keyboard.press("Escape")
+    assert not page.is_visible("#measured")
+
+
+def test_a_part_can_be_named_isolated_ghosted_and_hidden(boxes_page):
+    page = boxes_page
     ((x, y),) = on_screen(page, [(30.0, -5.0, 0.0)])
     page.mouse.click(x, y)
     assert page.inner_text("#identity b") == "right"
@@ -449,7 +502,6 @@ def test_a_part_can_be_named_isolated_ghosted_and_hidden(browser, tmp_path):
     assert not page.evaluate(
         "viewer.scene_tree.find(['clamp3d', 'whole', 'left', 'solid', '<object>']).object.material.visible"
     )
-    assert page.problems == []
 
 
 def test_the_address_can_name_a_finding(browser, hinge):

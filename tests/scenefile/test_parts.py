@@ -43,10 +43,10 @@ def test_a_folder_of_meshes_with_poses(folder, tmp_path):
     [
         (["bolt,1,2,3,0,0,0,1"], r"no pose for plate \(1 of 2 files\)"),
         (["bolt,1,2,3,0,0,0,1", "nut,1,2,3,0,0,0,1"], "no file for 'nut' in .*; there are bolt, plate"),
-        (["bolt,1,2,3,0,0,0,2", "plate,0,0,0,0,0,0,1"], "line 2: the quaternion must have length 1, got 2"),
-        (["bolt,1,2,3,0,0,1"], "line 2: 8 values are needed, got 7"),
-        (["bolt,1,2,nan,0,0,0,1"], "line 2: z must be a finite number, got 'nan'"),
-        (["bolt,1,2,0,0,0,0,1", "plate,1_0,0,0,0,0,0,1"], "line 3: x must be a finite number, got '1_0'"),
+        (["bolt,1,2,3,0,0,0,2", "plate,0,0,0,0,0,0,1"], "line 2: quaternion: must have length 1, got 2"),
+        (["bolt,1,2,3,0,0,1"], "line 2: quaternion: must be of length 4, got .'0', '0', '1'."),
+        (["bolt,1,2,nan,0,0,0,1"], "line 2: translation.2: must be a finite number, got 'nan'"),
+        (["bolt,1,2,0,0,0,0,1", "plate,1_0,0,0,0,0,0,1"], "line 3: translation.0: must be a valid number, got '1_0'"),
         (["bolt" * 50_000 + ",1,2,0,0,0,0,1"], "line 2: field larger than field limit"),
         ([], "no pose in the table"),
     ],
@@ -129,7 +129,7 @@ def test_joints_start_within_their_limits(robot):
 @pytest.mark.parametrize(
     ("joints", "message"),
     [
-        ({"elbow": 1.0}, "unknown joint 'elbow'; available: turn, slide"),
+        ({"elbow": 1.0}, "joint must be one of turn, slide, got 'elbow'"),
         ({"turn": 2.5}, "joint turn must be from -1 to 2 rad, got 2.5"),
         ({"slide": 60.0}, "joint slide must be from 10 to 50 mm, got 60"),
     ],

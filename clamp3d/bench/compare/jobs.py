@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from typing import Any, Literal
 
 from clamp3d.bench.compare.methods import Method
@@ -19,8 +18,8 @@ class JobError(Exception):
 def run_job(kind: Kind, method: Method, *, time_limit: float) -> Any:
     """The answer of a job. Raises JobError if it fails, crashes or is not done in ``time_limit`` s."""
     try:
-        with Worker(_ANSWER) as worker:
-            return pickle.loads(worker.call(_ANSWER, kind, method.family, method.setting, time_limit=time_limit))
+        with Worker() as worker:
+            return worker.call(_ANSWER, kind, method.family, method.setting, time_limit=time_limit)
     except WorkerTimeoutError:
         raise JobError(f"not finished in {time_limit:g} s") from None
     except WorkerEndedError as error:
@@ -32,20 +31,20 @@ def run_job(kind: Kind, method: Method, *, time_limit: float) -> Any:
 _ANSWER = f"{__name__}:answer"
 
 
-def answer(kind: str, family: str, setting: float | None) -> bytes:
+def answer(kind: str, family: str, setting: float | None) -> Any:
     """Do a job in this process."""
     method = Method(family, setting)
     if kind == "image":
         from clamp3d.bench.compare.assemblies import imaged
 
-        return pickle.dumps(imaged())
+        return imaged()
     if kind == "assembly":
         from clamp3d.bench.compare.assemblies import assembled
 
-        return pickle.dumps(assembled(method))
+        return assembled(method)
     from clamp3d.bench.compare.measure import measure
     from clamp3d.bench.compare.methods import load, prepare
     from clamp3d.bench.compare.peers import load_peer, prepare_peer
 
     how = {"load": load_peer, "prepare": prepare_peer} if kind == "peer" else {"load": load, "prepare": prepare}
-    return pickle.dumps(measure(method, **how))
+    return measure(method, **how)

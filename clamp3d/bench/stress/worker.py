@@ -172,9 +172,9 @@ def prepare(setup: bytes) -> None:
     _held["here"] = make(), cases
 
 
-def answer(rows: NDArray[np.intp]) -> bytes:
+def answer(rows: NDArray[np.intp]) -> list[_Reply]:
     """Child: the method's replies to some rows."""
-    return pickle.dumps(_replies(*_held["here"], rows))
+    return _replies(*_held["here"], rows)
 
 
 def run_isolated(make: Callable[[], Method], cases: Any, *, time_limit: float, case_limit: float = 20.0) -> Answers:
@@ -187,7 +187,7 @@ def run_isolated(make: Callable[[], Method], cases: Any, *, time_limit: float, c
     queue: list[NDArray[np.intp]] = _groups(cases)[::-1]
     end = time.monotonic() + time_limit
     setup, is_ready, deaths = pickle.dumps((make, cases)), False, 0
-    with Worker(_PREPARE, _ANSWER) as worker:
+    with Worker() as worker:
         while queue and time.monotonic() < end and deaths < _MAX_DEATHS:
             try:
                 if not is_ready:
@@ -198,7 +198,7 @@ def run_isolated(make: Callable[[], Method], cases: Any, *, time_limit: float, c
                 break
             rows = queue.pop()
             try:
-                for reply in pickle.loads(worker.call(_ANSWER, rows, time_limit=case_limit)):
+                for reply in worker.call(_ANSWER, rows, time_limit=case_limit):
                     _record(answers, reply)
                 continue
             except WorkerTimeoutError:

@@ -117,7 +117,13 @@ function clamp3dViewer(messages, done) {
     if (how === "isolate") highlight([identified]);
     else { own[identified] = how; look(identified, how); $("home").hidden = false; viewer.set_dirty(); }
   });
-  function partAt(x, y) {
+  const root = () => viewer.scene_tree.find(["clamp3d"]).object;
+  const section = sectionTool($, viewer, root);
+  const measure = measureTool($, viewer, root, () => story.facets, (a, b) => {
+    const row = story.stops[Math.max(0, stop)].rows.find((r) => (r.a === a && r.b === b) || (r.a === b && r.b === a));
+    return row ? "; the parts: " + row.gap : "";
+  });
+  function hitAt(x, y) {
     const box = viewer.renderer.domElement.getBoundingClientRect(), T = MeshCat.THREE, ray = new T.Raycaster();
     ray.setFromCamera(new T.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height), viewer.camera);
     let nearest = null;
@@ -126,15 +132,19 @@ function clamp3dViewer(messages, done) {
       if (!n || own[name] === "hide" || !node(path.split("/").slice(0, 3).join("/")).object.visible) continue;
       const meshes = [];
       n.object.traverse((o) => { if (o.isMesh) meshes.push(o); });
-      const hit = ray.intersectObjects(meshes, false)[0];
-      if (hit && (!nearest || hit.distance < nearest.distance)) nearest = { name, distance: hit.distance };
+      const hit = ray.intersectObjects(meshes, false).find((h) => viewer.renderer.clippingPlanes.every((p) => p.distanceToPoint(h.point) >= 0));
+      if (hit && (!nearest || hit.distance < nearest.distance)) nearest = { name, distance: hit.distance, point: hit.point };
     }
-    return nearest ? nearest.name : "";
+    return nearest || { name: "", point: null };
   }
   let pressed = null;
   pane.addEventListener("pointerdown", (e) => { pressed = [e.clientX, e.clientY]; });
   pane.addEventListener("pointerup", (e) => {
-    if (story && pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < 4) identify(partAt(e.clientX, e.clientY));
+    if (story && pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < 4) {
+      const hit = hitAt(e.clientX, e.clientY);
+      if (measure.active()) measure.click(hit.name, hit.point);
+      else identify(hit.name);
+    }
     pressed = null;
   });
 
@@ -142,10 +152,9 @@ function clamp3dViewer(messages, done) {
   let flight = 0;
   function fly(low, high, eye, time) {
     const V = MeshCat.THREE.Vector3;
-    const root = viewer.scene_tree.find(["clamp3d"]).object;
     const camera = viewer.camera;
     viewer.scene.updateMatrixWorld(true);
-    const local = (x, y, z) => camera.parent.worldToLocal(new V(x, y, z).applyMatrix4(root.matrixWorld));
+    const local = (x, y, z) => camera.parent.worldToLocal(new V(x, y, z).applyMatrix4(root().matrixWorld));
     const corners = [];
     for (const x of [low[0], high[0]]) for (const y of [low[1], high[1]]) for (const z of [low[2], high[2]]) corners.push(local(x, y, z));
     const target = local((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
@@ -299,7 +308,8 @@ function clamp3dViewer(messages, done) {
   $("back").addEventListener("click", () => { const i = current(animator.time); go(animator.time > story.stops[i].arrive + 0.05 ? i : i - 1); });
   $("forward").addEventListener("click", () => go(current(animator.time) + 1));
   document.addEventListener("keydown", (e) => {
-    if (e.key === "h" || e.key === "Escape") { identify(""); pick(null); }
+    if (e.key === "h" || e.key === "Escape") { identify(""); measure.clear(); pick(null); }
+    if (e.key === "m" && e.target.tagName !== "INPUT") $("measure").click();
     if ($("timeline").hidden || e.target.tagName === "INPUT" && e.target.type !== "checkbox") return;
     if (e.key === "ArrowRight") $("forward").click();
     else if (e.key === "ArrowLeft") $("back").click();
@@ -311,6 +321,7 @@ function clamp3dViewer(messages, done) {
     $("story").innerHTML = story.panel;
     document.title = story.title + " - clamp3d";
     addSwitches();
+    if (story.frame) section.reset(story.frame.low, story.frame.high);
     $("timeline").hidden = !(story.done && story.stops.length > 1);
     $("marks").replaceChildren(...(story.done && story.stops.length > 1 ? story.stops.map(mark) : []));
     stop = -1;

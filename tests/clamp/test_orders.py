@@ -1,0 +1,50 @@
+"""Ways of the six parts among each other: the search's answers against brute force on a lattice."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+
+pytest.importorskip("manifold3d")
+
+from orders import MOVING, has_way, open_bodies, possible, questions
+
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.dimensions import PARTS
+from clamp3d.clamp.loader import load_clamp
+from clamp3d.clamp.ways import Ways
+from clamp3d.errors import SequenceError
+
+COUNT = int(os.environ.get("CLAMP3D_ORDERS", "4"))
+"""How many of the 192 questions are put to the search: each takes some seconds."""
+
+
+@pytest.fixture(scope="module")
+def truth():
+    yield {question: has_way(*question) for question in questions()}
+    open_bodies.cache_clear()  # before Python ends, or the library reports what is left
+
+
+def test_the_search_finds_a_way_where_there_is_one(truth):
+    rng = np.random.default_rng(3)
+    chosen = [list(truth)[k] for k in rng.permutation(len(truth))[:COUNT]]
+    place = {name: assemble().path[4].T_world(name) for name in PARTS}
+    ways = Ways(load_clamp())
+    for part, others in chosen:
+        legs = ways.find([(part, other) for other in others], place)
+        assert bool(legs) == truth[part, others], (part, others, legs)
+
+
+def test_orders_that_brute_force_allows(truth):
+    """Of 720 orders of the parts one by one those are possible in which every part still has a way."""
+    allowed = possible(truth)
+    assert len(allowed) == 192
+    order = allowed[7]
+    assert assemble(sequence=" -> ".join(order)).status == "clamped"
+    blocked = ("P4", "P1", "P3", "P7", "P2", "P5")
+    assert set(blocked) == set(MOVING)
+    assert blocked not in allowed
+    with pytest.raises(SequenceError):
+        assemble(sequence=" -> ".join(blocked))

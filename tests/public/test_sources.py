@@ -1,0 +1,87 @@
+"""`check`, `view`, `report` and `export` take a path, a list of parts and objects of other libraries alike."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+import trimesh
+
+import clamp3d
+from clamp3d import shapes
+from clamp3d.kernel import translation
+
+
+@pytest.fixture
+def boxes(tmp_path):
+    """Two boxes of 10 mm, 5 mm into each other, by everything that they can come as."""
+    at = translation(5.0, 0.0, 0.0)
+    scene = trimesh.Scene()
+    scene.add_geometry(trimesh.creation.box((10, 10, 10)), node_name="a", geom_name="a")
+    scene.add_geometry(trimesh.creation.box((10, 10, 10)), node_name="b", geom_name="b", transform=at)
+    clamp3d.export(
+        clamp3d.Scene().add("a", shapes.box(10, 10, 10)).add("b", shapes.box(10, 10, 10), at), tmp_path / "two.glb"
+    )
+    box = shapes.box(10, 10, 10)
+    return {
+        "path": tmp_path / "two.glb",
+        "text": str(tmp_path / "two.glb"),
+        "list": [("a", box), ("b", box, at)],
+        "meshes": [("a", trimesh.creation.box((10, 10, 10))), ("b", trimesh.creation.box((10, 10, 10)), at)],
+        "trimesh": scene,
+        "scene": clamp3d.Scene().add("a", box).add("b", box, at),
+    }
+
+
+@pytest.mark.parametrize("kind", ["path", "text", "list", "meshes", "trimesh", "scene"])
+def test_every_source_is_taken_by_all_four(boxes, kind, tmp_path):
+    source = boxes[kind]
+    result = clamp3d.check(source)
+    (row,) = result.findings
+    assert ({row.a, row.b}, str(row.verdict)) == ({"a", "b"}, "clash")
+    assert row.distance.upper == pytest.approx(-5.0, abs=1e-6)
+    with clamp3d.view(source, serve=False) as viewer:
+        assert viewer.story["findings"][0]["verdict"] == "clash"
+    data, page, _ = sorted(clamp3d.report(source, tmp_path / "report"), key=lambda path: path.suffix != ".json")
+    assert json.loads(data.read_text())["passed"] is False
+    assert page.exists()
+    (written,) = clamp3d.export(source, tmp_path / "out.stl").files
+    assert trimesh.load(written).volume == pytest.approx(2000.0, rel=1e-6)
+
+
+def test_a_clamp_is_assembled_first(tmp_path):
+    assert clamp3d.check("reference").counts == clamp3d.check(clamp3d.assemble()).counts == {"allowed": 8, "clear": 13}
+    with clamp3d.view("reference", serve=False) as viewer:
+        assert viewer.story["headline"] == "clamped"
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("nowhere.step", "nowhere.step: no such file"),
+        ([1], r"a list of parts must hold \(name, shape\) or \(name, shape, pose\), got 1"),
+        ([("a", 5)], "a part's shape must be a Solid, MeshShape, Cylinder or a mesh of trimesh, got int"),
+        (3, "source must be a path, a clamp's name, or an object of .*, got 3"),
+    ],
+)
+def test_what_is_no_source_is_refused_in_one_line(source, message):
+    for function in (
+        clamp3d.check,
+        clamp3d.view,
+        lambda s: clamp3d.report(s, "x"),
+        lambda s: clamp3d.export(s, "x.stl"),
+    ):
+        with pytest.raises(clamp3d.InputError, match=message) as refused:
+            function(source)
+        assert "\n" not in str(refused.value)
+
+
+def test_results_can_be_pickled(boxes):
+    result = clamp3d.check(boxes["scene"])
+    again = pickle.loads(pickle.dumps(result))
+    assert again.to_dict() == result.to_dict()
+    assembly = clamp3d.assemble()
+    assert pickle.loads(pickle.dumps(assembly)).distance == assembly.distance
+    np.testing.assert_array_equal(
+        pickle.loads(pickle.dumps(result.findings[0])).distance.point_a, result.findings[0].distance.point_a
+    )
