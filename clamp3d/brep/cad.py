@@ -10,7 +10,7 @@ import numpy as np
 
 from clamp3d.brep.bodies import Reading
 from clamp3d.brep.open_cascade import explore, volume_of
-from clamp3d.brep.placing import Collector
+from clamp3d.brep.placing import Placer
 from clamp3d.brep.solid import BrepSolid
 from clamp3d.core.mesh import Array
 from clamp3d.errors import Clamp3dError
@@ -58,7 +58,7 @@ def bodies_of(roots: Iterable[Node]) -> tuple[Reading, int]:
 
     What is no solid is among the reading's missing. Raises InputError for too many bodies.
     """
-    collector = Collector()
+    collector = Placer()
     shapes: dict[Key, BrepSolid | str] = {}
     loose = 0
     for node, T in _leaves(roots, np.eye(4)):

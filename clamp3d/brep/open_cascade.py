@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -50,23 +50,16 @@ def from_bytes(brep: bytes) -> Any:
 
 def explore(shape: Any, kind: str, outside: str = "SHAPE") -> Iterator[Any]:
     """Sub-shapes of a ``kind`` ("SOLID", "FACE", ...), ``outside`` of those of another, in the explorer's order."""
-    explorer, cast, kinds = _explorer(kind, outside)
-    walk = explorer(shape, *kinds)
-    while walk.More():
-        yield cast(walk.Current())
-        walk.Next()
-
-
-@cache
-def _explorer(kind: str, outside: str) -> tuple[Any, ...]:
-    """Open CASCADE's explorer, the cast to one kind of shape, and its names of the kinds."""
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopoDS import TopoDS
 
     name = kind.capitalize()
     cast = getattr(TopoDS, f"{name}_s", None) or getattr(TopoDS, name)
-    return TopExp_Explorer, cast, [getattr(TopAbs_ShapeEnum, f"TopAbs_{k}") for k in (kind, outside)]
+    walk = TopExp_Explorer(shape, *(getattr(TopAbs_ShapeEnum, f"TopAbs_{k}") for k in (kind, outside)))
+    while walk.More():
+        yield cast(walk.Current())
+        walk.Next()
 
 
 def bounds_of(shape: Any) -> Array:

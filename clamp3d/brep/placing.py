@@ -15,13 +15,19 @@ MOST_BODIES = 20_000
 """Bodies that a file may place: a few hundred bytes can name each other into millions of them."""
 
 
-class Collector:
-    """Collects the bodies of a file, and those that are missing, in the file's order."""
+class Placer:
+    """Collects the bodies of a file, and those that are missing, in the file's order.
 
-    def __init__(self) -> None:
+    Of meshes the unit is ``scale`` mm, and the axes are turned by ``R`` (3, 3).
+    """
+
+    def __init__(self, scale: float = 1.0, R: Array | None = None) -> None:
         self.bodies: list[Body] = []
         self.missing: list[str] = []
         self.notes: list[str] = []
+        self.scale = scale
+        self.R = np.eye(3) if R is None else R
+        self._shapes: dict[tuple[Hashable, bytes], MeshShape | str] = {}
 
     def add(self, name: str, shape: Shape | str, T: Array) -> None:
         """One more body at ``T`` (4, 4), or why it has no shape. Raises InputError for too many bodies."""
@@ -36,16 +42,6 @@ class Collector:
         """What was collected."""
         links = None if joined is None else tuple(joined)
         return Reading(tuple(self.bodies), tuple(self.missing), tuple(self.notes), links)
-
-
-class Placer(Collector):
-    """Collects the meshes of a file whose unit is ``scale`` mm and whose axes are turned by ``R`` (3, 3)."""
-
-    def __init__(self, scale: float, R: Array | None = None) -> None:
-        super().__init__()
-        self.scale = scale
-        self.R = np.eye(3) if R is None else R
-        self._shapes: dict[tuple[Hashable, bytes], MeshShape | str] = {}
 
     def place(self, name: str, key: Hashable, arrays: Callable[[], tuple[Array, IntArray]], T: Array) -> None:
         """One more body: vertices and faces that ``arrays`` gives, the same for each ``key``, at ``T`` (4, 4).

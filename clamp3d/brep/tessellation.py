@@ -46,14 +46,10 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
 
     Raises Clamp3dError if a face gets no triangles.
     """
-    return tessellation_of(from_bytes(brep), chord)
-
-
-def tessellation_of(solid: Any, chord: float) -> Tessellation:
-    """The same of a TopoDS_Shape."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
 
+    solid = from_bytes(brep)
     BRepTools.Clean_s(solid)
     BRepMesh_IncrementalMesh(solid, 0.7 * chord, False, ANGLE, False)
     faces = [*explore(solid, "FACE")]

@@ -66,7 +66,7 @@ class _Links(Placer):
     """Collects the shapes of a robot's links."""
 
     def __init__(self, path: Path) -> None:
-        super().__init__(1.0)
+        super().__init__()
         self.path = path
         self._files: dict[Path, Mesh] = {}
 
@@ -121,23 +121,16 @@ def _shape(geometry: Any) -> Shape:
 def _mesh_file(path: Path, name: str) -> Path:
     """A mesh beside the description or in the folder above, or, of a package, in any folder above it."""
     bare = name.removeprefix("file://")
+    files = [(path.parent / bare, path.resolve().parent.parent)]
     if bare.startswith("package://"):
         inside = Path(bare.removeprefix("package://"))
-        for folder in path.resolve().parents:
-            for choice in (folder / inside, folder / Path(*inside.parts[1:])):
-                if choice.is_file() and _within(choice, folder):
-                    return choice
-        raise InputError(f"no such file in a folder above {path.name}")
-    file = path.parent / bare
-    if not _within(file, path.resolve().parent.parent):
-        raise InputError(f"is outside of the robot's folder and the one above; {OUTSIDE}=1 allows that")
-    if not file.is_file():
-        raise InputError("no such file")
-    return file
-
-
-def _within(file: Path, folder: Path) -> bool:
-    return os.environ.get(OUTSIDE) == "1" or file.resolve().is_relative_to(folder.resolve())
+        inner = (inside, Path(*inside.parts[1:]))
+        files = [(folder / part, folder) for folder in path.resolve().parents for part in inner]
+    for file, folder in files:
+        is_within = os.environ.get(OUTSIDE) == "1" or file.resolve().is_relative_to(folder.resolve())
+        if is_within and file.is_file():
+            return file
+    raise InputError(f"no such file in the robot's folder, the one above or its package; {OUTSIDE}=1 allows others")
 
 
 def _check_whole(root: ElementTree.Element) -> None:

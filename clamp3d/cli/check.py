@@ -77,7 +77,8 @@ def command(
     """
     from clamp3d.collide.check import check
     from clamp3d.collide.scene import Scene
-    from clamp3d.output.groups import accepted_file, compare, grouped, groups_csv, read_accepted
+    from clamp3d.output.baseline import compare, groups_csv
+    from clamp3d.output.groups import accepted_file, grouped, read_accepted
     from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
 
     loaded = source.load()
@@ -92,11 +93,11 @@ def command(
     if clearance is not None:
         scene = replace(scene, clearance=clearance)
     accepted = read_accepted(accepted_file(source.source))
-    compare((), baseline, accepted)  # a file that cannot be read is reported before the work
+    compare(scene, (), baseline, accepted)  # a file that cannot be read is reported before the work
     with bar(quiet) as report:
         result = check(scene, pairs=pairs, distances=distances or run is not None, progress=report)
     groups = grouped(result)
-    comparison = compare(groups, baseline, accepted)
+    comparison = compare(scene, groups, baseline, accepted)
     if run is not None:
         show("\n".join([run.status, *(f.text for f in run.findings if f.severity == "error" and f.text != run.status)]))
     show(check_to_text(result, comparison, accepted))

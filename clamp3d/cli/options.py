@@ -296,11 +296,8 @@ class Viewing:
         metavar="NAME[=SIZE]",
     )
     draw_error: float = option("Chord error of drawn facets.", default=0.01, metavar="MM")
-    clearance: float = option(
-        "Gap from which parts are clear.  [default: 5 for a clamp; the scene's own]",
-        default=5.0,
-        show_default=False,
-        metavar="MM",
+    clearance: float | None = option(
+        "Gap from which parts are clear.  [default: 5 for a clamp; the scene's own]", metavar="MM"
     )
 
 

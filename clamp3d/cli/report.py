@@ -57,4 +57,4 @@ def command(
     if review.assembly is not None:
         finish(not review.passed)
     else:
-        finish(False, verdicts={row.result.verdict for row in (*review.rows, *review.motions)})
+        finish(verdicts={row.result.verdict for row in (*review.rows, *review.motions)})

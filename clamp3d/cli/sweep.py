@@ -48,4 +48,4 @@ def command(
     save(json_file, lambda: placement_to_dict(placed))
     if map_file is not None:
         save_figure(capture_figure(placed), map_file)
-    finish(False, failed=bool(placed.capture.count(Outcome.NOT_PROVEN)))
+    finish(failed=bool(placed.capture.count(Outcome.NOT_PROVEN)))

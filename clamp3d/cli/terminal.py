@@ -49,7 +49,7 @@ def save(path: Path | None, make: Callable[[], dict[str, Any] | str]) -> None:
             write_json(path, content)
 
 
-def finish(finding: bool, *, failed: bool = False, verdicts: Collection[str] = ()) -> None:
+def finish(finding: bool = False, *, failed: bool = False, verdicts: Collection[str] = ()) -> None:
     """End the command with the exit code of its verdict: what is certain counts most, then what failed.
 
     ``verdicts`` of a scene count as what they say.

@@ -33,7 +33,7 @@ def command(
         method.refuse()
         if viewing.overlays:
             raise click.UsageError("--overlay goes with a clamp, not with a scene")
-        finish(False, verdicts=page.check(loaded).counts)
+        finish(verdicts=page.check(loaded).counts)
         return
     try:
         run = page.assemble(loaded, method.model(loaded, quiet=quiet), settings)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import click
-from click.core import ParameterSource
 
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.assemble import assemble
@@ -75,7 +74,7 @@ class Page:
 
     def check(self, scene: Scene) -> CheckResult:
         """Check a scene on the page."""
-        if click.get_current_context().get_parameter_source("clearance") is ParameterSource.COMMANDLINE:
+        if self.viewing.clearance is not None:
             scene = replace(scene, clearance=self.viewing.clearance)
         with self._viewer(scene) as viewer:
             with bar(self.quiet) as report:

@@ -6,10 +6,8 @@ are one group. Text, JSON, page, report and CSV list these groups.
 
 from __future__ import annotations
 
-import csv
 import getpass
 import hashlib
-import io
 import json
 import math
 import re
@@ -19,7 +17,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from clamp3d.collide.result import BAD, CheckResult, PairResult
 from clamp3d.collide.scene import Scene
@@ -28,12 +26,8 @@ from clamp3d.core.shapes import Shape
 from clamp3d.errors import InputError
 from clamp3d.output.files import write_text
 
-Status = Literal["new", "changed", "same", "accepted"]
-
 _JUMP, _JUMP_SHARE = 0.01, 0.2
 """A distance that differs from the next by more mm than this, and by more than this share, has a cause of its own."""
-_CHANGED, _CHANGED_SHARE = 1e-3, 1e-3
-"""A distance has changed since the last check if it differs by more mm than this, or by more than this share."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -213,68 +207,3 @@ def accept(path: Path, identifiers: Sequence[str], *, why: str, who: str = "") -
     if entries:
         write_text(path, text)
     return entries
-
-
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """Groups beside those of an earlier check: the ``status`` of each by its identifier, and which are ``gone``."""
-
-    status: Mapping[str, Status]
-    gone: tuple[dict[str, Any], ...] = ()
-    has_baseline: bool = False
-
-    def open(self, groups: Iterable[Group]) -> list[Group]:
-        """The groups that count for the exit code: not accepted, and with a baseline the new ones only."""
-        counting = ("new",) if self.has_baseline else ("new", "changed", "same")
-        return [group for group in groups if self.status[group.id] in counting]
-
-
-def compare(groups: Sequence[Group], baseline: Path | None, accepted: Mapping[str, Accepted]) -> Comparison:
-    """Compare groups with those of a result that ``check --json`` wrote. Raises InputError if it holds none.
-
-    A group counts as new too where it was no clash in the earlier check and is one now.
-    """
-    before = {} if baseline is None else _read_groups(baseline)
-
-    def status(group: Group) -> Status:
-        if group.id in accepted:
-            return "accepted"
-        old = before.get(group.id)
-        if old is None or (group.verdict in BAD and old.get("verdict") not in BAD):
-            return "new"
-        least, most = old.get("at_least_mm"), old.get("at_most_mm")
-        slack = max(_CHANGED, _CHANGED_SHARE * abs(group.upper))
-        apart = (most is not None and group.lower > most + slack) or (least is not None and group.upper < least - slack)
-        alike = (old.get("verdict"), old.get("count")) == (group.verdict.value, len(group.rows))
-        return "changed" if apart or not alike else "same"
-
-    ids = {group.id for group in groups}
-    gone = tuple(old for identifier, old in before.items() if identifier not in ids)
-    return Comparison({group.id: status(group) for group in groups}, gone, baseline is not None)
-
-
-def _read_groups(path: Path) -> dict[str, dict[str, Any]]:
-    try:
-        groups = json.loads(path.read_text(encoding="utf-8"))["groups"]
-        return {group["id"]: group for group in groups}
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError):
-        raise InputError(f"{path}: not a result of `clamp3d check --json` with groups of findings") from None
-
-
-def groups_csv(groups: Sequence[Group], comparison: Comparison) -> str:
-    """One line for each pair of each group, with a header; lengths in mm."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(
-        ["id", "status", "group", "a", "b", "verdict", "motion", "t", "at_least_mm", "at_most_mm", "method"]
-    )
-    for group in groups:
-        for row in group.rows:
-            d = row.distance
-            bounds = ["" if math.isinf(value) else value for value in (d.lower, d.upper)]
-            place = [row.a, row.b, row.verdict.value, row.motion or "", "" if row.t is None else row.t]
-            family = f"{group.a} and {group.b}"
-            writer.writerow([group.id, comparison.status[group.id], family, *place, *bounds, d.method])
-    return out.getvalue()

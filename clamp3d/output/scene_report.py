@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import combinations
@@ -10,7 +11,8 @@ from typing import Any
 from clamp3d import __version__
 from clamp3d.collide.result import CheckResult, Work
 from clamp3d.collide.verdict import Verdict
-from clamp3d.output.groups import Accepted, Comparison, Group, grouped
+from clamp3d.output.baseline import Comparison
+from clamp3d.output.groups import Accepted, Group, grouped
 from clamp3d.output.tables import text_table
 from clamp3d.output.wording import (
     counted,
@@ -44,10 +46,14 @@ def check_to_dict(result: CheckResult, comparison: Comparison | None = None) -> 
     """The result as JSON data; lengths in mm. Pairs that are not listed are clear."""
     groups = [group.to_dict() for group in grouped(result)]
     if comparison is not None:
-        groups = [group | {"status": comparison.status[group["id"]]} for group in groups]
-    data = {"clamp3d": __version__, "headline": headline(result), "groups": groups}
+        groups = [
+            group | {"status": comparison.status[group["id"]], "changed": comparison.changed.get(group["id"], ())}
+            for group in groups
+        ]
+    data: dict[str, Any] = {"clamp3d": __version__, "headline": headline(result), "groups": groups}
     if comparison is not None and comparison.has_baseline:
         data["gone"] = list(comparison.gone)
+        data["moved_mm"] = {name: mm if math.isfinite(mm) else None for name, mm in (comparison.moved or {}).items()}
     return data | result.to_dict() | {"work": asdict(result.work)}
 
 
@@ -85,7 +91,17 @@ def comparison_text(comparison: Comparison) -> list[str]:
     summary = f"  since the baseline: {status.count('new')} new, {status.count('changed')} changed"
     summary += f", {len(comparison.gone)} gone, {status.count('same')} unchanged, {n_accepted} accepted"
     gone = (f"  gone: {old['a']} and {old['b']}, {old['verdict']}; id {old['id']}" for old in comparison.gone)
-    return [summary, *gone]
+    return [summary, *_moved(comparison.moved or {}), *gone]
+
+
+def _moved(moved: Mapping[str, float]) -> list[str]:
+    """The parts that moved and those that are new, each in a line."""
+    far = [
+        f"{name} by {mm:.4g} mm" if mm > 0.0 else f"{name} turned" for name, mm in moved.items() if math.isfinite(mm)
+    ]
+    new = [name for name, mm in moved.items() if math.isinf(mm)]
+    lines = [("parts moved", far), ("new parts", new)]
+    return [f"  {words}: {', '.join(_cut(items, _NOTES, 'more'))}" for words, items in lines if items]
 
 
 def _counts(result: CheckResult) -> str:
@@ -100,7 +116,7 @@ def _counts(result: CheckResult) -> str:
 
 
 def _findings(result: CheckResult, comparison: Comparison | None, accepted: Mapping[str, Accepted]) -> list[str]:
-    """A line for each group; what merely touches at rest is in the table of pairs."""
+    """A line for each group; what merely touches at rest, as before, is in the table of pairs."""
     names = titles(result.scene)
 
     def line(group: Group) -> str:
@@ -108,10 +124,16 @@ def _findings(result: CheckResult, comparison: Comparison | None, accepted: Mapp
         if status == "accepted" and (entry := accepted.get(group.id)):
             status = f"accepted by {entry.who} on {entry.when} ({entry.why})"
         shown = comparison is not None and (comparison.has_baseline or status.startswith("accepted"))
-        return f"  {f'{status}: ' if shown else ''}{group_text(group, names)}; id {group.id}"
+        pairs = [] if comparison is None or status != "changed" else comparison.changed.get(group.id, ())
+        which = _cut([f"{a} and {b}" for a, b in pairs], _NOTES, "more")
+        changed = f"; changed: {', '.join(which)}" if which and len(group.rows) > 1 else ""
+        return f"  {f'{status}: ' if shown else ''}{group_text(group, names)}{changed}; id {group.id}"
 
-    groups = grouped(result)
-    return [line(g) for g in groups if g.verdict is not Verdict.CONTACT or g.motion is not None]
+    def matters(group: Group) -> bool:
+        differs = comparison is not None and comparison.has_baseline and comparison.status[group.id] != "same"
+        return group.verdict is not Verdict.CONTACT or group.motion is not None or differs
+
+    return [line(group) for group in grouped(result) if matters(group)]
 
 
 def _cut(lines: Sequence[str], most: int, rest: str) -> list[str]:

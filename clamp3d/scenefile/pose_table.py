@@ -45,23 +45,20 @@ class Pose(Table):
             raise ValueError("axis: give axis and angle_deg together")
         if self.axis is not None and not any(self.axis):
             raise ValueError("axis: must not have length zero")
-        if self.quaternion is not None and not any(self.quaternion):
-            raise ValueError("quaternion: must not have length zero")
         if self.quaternion is not None and not abs((size := math.hypot(*self.quaternion)) - 1.0) <= UNIT_TOLERANCE:
             raise ValueError(f"quaternion: must have length 1, got {size:.6g}")
         if self.matrix is not None:
             if any(self.translation):
                 raise ValueError("matrix: holds the translation already")
-            rows = [list(row) for row in self.matrix]
-            if len(rows) not in (3, 4) or (len(rows) == 4 and rows[3] != [0.0, 0.0, 0.0, 1.0]):
+            if len(self.matrix) not in (3, 4) or self.matrix[3:] not in ([], [(0.0, 0.0, 0.0, 1.0)]):
                 raise ValueError("matrix: must have 3 rows of 4 numbers, or a fourth row 0, 0, 0, 1")
-            R = np.array(rows)[:3, :3]
+            R = np.array(self.matrix)[:3, :3]
             with np.errstate(over="ignore", invalid="ignore"):
                 off = float(np.abs(R @ R.T - np.eye(3)).max())
-            if off <= _SNAP and np.linalg.det(R) < 0.0:
-                raise ValueError("matrix: must be rigid (a rotation and a translation): it reflects")
             if not off <= _SNAP:
                 raise ValueError(f"matrix: must be rigid (a rotation and a translation): deviates by {off:.3g}")
+            if np.linalg.det(R) < 0.0:
+                raise ValueError("matrix: must be rigid (a rotation and a translation): it reflects")
 
     def T(self) -> Array:
         """The pose (4, 4). A typed matrix is brought to the nearest rotation: its printed digits are not exact."""

@@ -3,27 +3,17 @@
 import itertools
 import math
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
+from igl import winding_number
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Fuse
 from OCP.BRepBndLib import BRepBndLib
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex, BRepBuilderAPI_Transform
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.BRepPrimAPI import (
-    BRepPrimAPI_MakeBox,
-    BRepPrimAPI_MakeCone,
-    BRepPrimAPI_MakeCylinder,
-    BRepPrimAPI_MakeSphere,
-    BRepPrimAPI_MakeTorus,
-)
-from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf
-from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_State
 from OCP.TopLoc import TopLoc_Location
 from step_scenes import Tree, location
@@ -31,46 +21,9 @@ from step_scenes import Tree, location
 from clamp3d.brep.cad import Key, matrix
 from clamp3d.brep.open_cascade import explore
 from clamp3d.brep.solid import BrepSolid, require_open_cascade
-
-
-def moved(shape, T):
-    """The shape with its geometry moved by T (4, 4)."""
-    move = gp_Trsf()
-    move.SetValues(*(float(x) for x in np.asarray(T)[:3].ravel()))
-    return BRepBuilderAPI_Transform(shape, move, True).Shape()
-
-
-def shift(x, y, z):
-    T = np.eye(4)
-    T[:3, 3] = x, y, z
-    return T
-
-
-def box(low, high):
-    return BRepPrimAPI_MakeBox(gp_Pnt(*map(float, low)), gp_Pnt(*map(float, high))).Shape()
-
-
-def rod(radius, low, high, at=(0.0, 0.0)):
-    axis = gp_Ax2(gp_Pnt(at[0], at[1], low), gp_Dir(0, 0, 1))
-    return BRepPrimAPI_MakeCylinder(axis, radius, high - low).Shape()
-
-
-def cone(r0, r1, low, high):
-    return BRepPrimAPI_MakeCone(gp_Ax2(gp_Pnt(0, 0, low), gp_Dir(0, 0, 1)), r0, r1, high - low).Shape()
-
-
-def ball(radius, at=(0, 0, 0)):
-    return BRepPrimAPI_MakeSphere(gp_Pnt(*map(float, at)), radius).Shape()
-
-
-def ring(major, minor, z=0.0):
-    return BRepPrimAPI_MakeTorus(gp_Ax2(gp_Pnt(0, 0, z), gp_Dir(0, 0, 1)), major, minor).Shape()
-
-
-def cut(shape, *tools):
-    for tool in tools:
-        shape = BRepAlgoAPI_Cut(shape, tool).Shape()
-    return shape
+from tests.public.placed_pairs import ball, common_volume, cone, cut, moved, ring, rod, shift
+from tests.public.placed_pairs import block as box
+from tests.public.placed_pairs import first_solid as solid_of
 
 
 def fuse(shape, *others):
@@ -79,15 +32,11 @@ def fuse(shape, *others):
     return shape
 
 
-def solid_of(shape):
-    return next(iter(explore(shape, "SOLID")))
-
-
 def fasteners():
     """Two plates, two shouldered screws with washers and nuts: planes, cylinders, coaxial fits."""
     holes = [(12.0, 0.0), (-12.0, 0.0)]
-    plate = cut(box((-25, -10, 0), (25, 10, 6)), *(rod(3.2, -1, 7, at) for at in holes))
-    under = cut(box((-25, -10, -6), (25, 10, 0)), *(rod(3.0, -7, 1, at) for at in holes))
+    plate = cut(box((-25, -10, 0), (25, 10, 6)), *(rod(3.2, -1, 7, *at) for at in holes))
+    under = cut(box((-25, -10, -6), (25, 10, 0)), *(rod(3.0, -7, 1, *at) for at in holes))
     parts = {"plate": plate, "under": under}
     for k, (x, y) in enumerate(holes):
         washer = cut(rod(6, 6, 7.2), rod(3.2, 5, 8))
@@ -129,8 +78,8 @@ def taper():
     """A taper pin in a hub, a ball in its socket, a rubber ring in its groove: cones, spheres, tori."""
     plate = cut(box((-14, -14, -10), (14, 14, 10)), cone(2.0, 2.5, -10.0, 10.0))
     pin = cone(2.0, 2.5, -10.0, 10.0)
-    stud = fuse(rod(3.0, 10, 21, (9, 9)), ball(5.0, (9, 9, 25)))
-    socket = cut(box((0, 0, 25), (18, 18, 33)), ball(5.0, (9, 9, 25)))
+    stud = moved(fuse(rod(3.0, 10, 21), ball(5.0, 25)), shift(9, 9))
+    socket = cut(box((0, 0, 25), (18, 18, 33)), moved(ball(5.0, 25), shift(9, 9)))
     groove = moved(cut(rod(9.0, -4, 4), ring(9.0, 1.5)), shift(-30, 0, 0))
     return {"plate": plate, "pin": pin, "stud": stud, "socket": socket, "groove": groove,
             "seal": moved(ring(9.0, 1.5), shift(-30, 0, 0))}  # fmt: skip
@@ -160,9 +109,9 @@ def gears():
         turn = 0.0 if k == 0 else math.pi / teeth * (1 + teeth % 2)
         c, s = math.cos(turn), math.sin(turn)
         T = np.array([[c, -s, 0, x], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
-        body = cut(moved(solid_of(gear.wrapped), T), rod(3.0, -5, 12, (x, 0.0)))
+        body = cut(moved(solid_of(gear.wrapped), T), rod(3.0, -5, 12, x))
         parts[f"gear_{k}"] = body
-        parts[f"shaft_{k}"] = rod(3.0, -10, 16, (x, 0.0))
+        parts[f"shaft_{k}"] = rod(3.0, -10, 16, x)
     return parts
 
 
@@ -221,22 +170,15 @@ def separation(a, b):
     return BRepExtrema_DistShapeShape(a, b).Value()
 
 
-def common_volume(a, b):
-    """What two solids have in common, by Open CASCADE: its shape and volume (mm3)."""
-    common = BRepAlgoAPI_Common(a, b).Shape()
-    properties = GProp_GProps()
-    BRepGProp.VolumeProperties_s(common, properties)
-    return common, properties.Mass()
-
-
 def truth(a, b):
     """By Open CASCADE: the distance; of an overlap the volume, and corners of its mesh measured against both."""
     distance = separation(a, b)
     if distance > 1e-7:
         return Truth(distance)
-    common, volume = common_volume(a, b)
+    volume = common_volume(a, b)
     if volume <= 1e-9:  # or the boolean has failed: ask some points
         return Truth(0.0, 0.0, max(deepest_corner(a, b), deepest_corner(b, a)))
+    common = BRepAlgoAPI_Common(a, b).Shape()
     return Truth(0.0, volume, max(deepest(common, x) for x in (a, b)))
 
 
@@ -275,23 +217,15 @@ def deepest_corner(a, b):
     The classifier has faults: it takes points beside a plate with twelve half holes for the middle of it. So what seems
     deep must be wound round by the triangles too.
     """
-    from_boundary, points, place, found = from_shell(b), mesh_corners(a), BRepClass3d_SolidClassifier(b), 0.0
-    mesh = cache(lambda: BrepSolid.of(solid_of(b), "solid").mesh)
+    from_boundary, points, place, greatest = from_shell(b), mesh_corners(a), BRepClass3d_SolidClassifier(b), 0.0
+    solid = BrepSolid.of(solid_of(b), "solid")
     for point in points[:: max(1, len(points) // 100)]:
         place.Perform(point, 1e-7)
-        if place.State() == TopAbs_State.TopAbs_IN:
-            depth = from_boundary(point)
-            if depth > found and (depth < 0.1 or winding(mesh(), np.array(point.Coord())) > 0.5):
-                found = depth
-    return found
-
-
-def winding(mesh, point):
-    """How often triangles wind round a point."""
-    a, b, c = (mesh.vertices[mesh.faces] - point).transpose(1, 0, 2)
-    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
-    dots = [(x * y).sum(axis=1) * z for x, y, z in ((a, b, lc), (b, c, la), (c, a, lb))]
-    return np.arctan2((a * np.cross(b, c)).sum(axis=1), la * lb * lc + sum(dots)).sum() / (2.0 * np.pi)
+        if place.State() == TopAbs_State.TopAbs_IN and (depth := from_boundary(point)) > greatest:
+            corner = np.array([point.Coord()])
+            if depth < 0.1 or winding_number(solid.mesh.vertices, solid.mesh.faces, corner)[0] > 0.5:
+                greatest = depth
+    return greatest
 
 
 def mesh_corners(shape):

@@ -9,8 +9,8 @@ from assemblies import ASSEMBLIES, judged, near, nudged, truth, write_step
 from clamp3d import check, load
 
 
-# scripts/measure-step does the same for larger ones, as drawn and moved in several ways.
-@pytest.mark.parametrize("name", ASSEMBLIES)
+# scripts/measure-step does the same for the bearing and larger ones, as drawn and moved in several ways.
+@pytest.mark.parametrize("name", [name for name in ASSEMBLIES if name != "bearing"])
 def test_verdicts_and_bounds_of_an_assembly_whose_parts_are_moved(name, tmp_path):
     parts = nudged(ASSEMBLIES[name](), 1)
     scene = load(write_step(parts, tmp_path / f"{name}.step"))

@@ -232,7 +232,7 @@ MORE = '<parent link="tip"/><child link="end"/>'
         ("sphere radius", "ball radius", "not a readable URDF file .*ball"),
         ('<box size="0.1 0.1 0.02"/>', "", "a collision of link 'base' must have 1 shape, got 0"),
         ('<box size="0.1 0.1 0.02"/>', '<mesh filename="no.stl"/>', r"missing: base \(.*no such file"),
-        ('<box size="0.1 0.1 0.02"/>', '<mesh filename="../../no.stl"/>', "outside of the robot's folder"),
+        ('<box size="0.1 0.1 0.02"/>', '<mesh filename="../../no.stl"/>', "no such file in the robot's folder"),
         ('radius="0.012"', 'radius="big"', "not a readable URDF file"),
         ('radius="0.012"', 'radius="-1"', r"missing: tip \(radius of a sphere must be"),
         ("robot", "robots", "it holds <robots>, not <robot>"),

@@ -46,8 +46,8 @@ def test_arcs_apart_on_one_axis_stay_apart():
 
 
 def test_a_file_gives_holes_grooves_and_cylinders_with_their_places(tmp_path):
-    plate = cut(box((-20, -10, 0), (20, 10, 6)), rod(3, -1, 7, (5, 2)), rod(2, 3, 7, (-8, 0)), rod(4, -1, 7, (20, 0)))
-    result = fit_file(write_step({"plate": plate, "pin": rod(2.5, 0, 30, (60, 0))}, tmp_path / "a.step"))
+    plate = cut(box((-20, -10, 0), (20, 10, 6)), rod(3, -1, 7, 5, 2), rod(2, 3, 7, -8), rod(4, -1, 7, 20))
+    result = fit_file(write_step({"plate": plate, "pin": rod(2.5, 0, 30, 60)}, tmp_path / "a.step"))
     through, blind = result.holes
     (pin,), (groove,) = result.cylinders, result.grooves
     assert (through.radius, through.through, blind.radius, blind.through) == (3.0, True, 2.0, False)

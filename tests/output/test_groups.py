@@ -15,7 +15,8 @@ from clamp3d.collide.scene import Scene
 from clamp3d.core import shapes
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import translation
-from clamp3d.output.groups import compare, grouped
+from clamp3d.output.baseline import compare
+from clamp3d.output.groups import grouped
 from clamp3d.output.report import make_report
 from clamp3d.output.scene_report import check_to_dict, check_to_text
 from clamp3d.output.viewer import view
@@ -91,16 +92,49 @@ def test_undecided_pairs_are_never_called_clean_or_free_of_clashes(n_clashes):
     assert "Clean" not in said
 
 
-def test_what_is_new_changed_and_gone_since_a_baseline(tmp_path):
+def baseline_of(scene, tmp_path):
     last = tmp_path / "last.json"
-    last.write_text(json.dumps(check_to_dict(check(rail([0.3, 0.3, 0.3, 0.9])))))
-    same = grouped(check(rail([0.3, 0.3, 0.3, 0.9])))
-    assert set(compare(same, last, {}).status.values()) == {"same"}
-    assert compare(same, last, {}).open(same) == []
-    deeper = grouped(check(rail([0.4, 0.4, 0.4, 0.0, 0.0])))
-    comparison = compare(deeper, last, {})
-    assert [comparison.status[group.id] for group in deeper] == ["changed", "new"]
+    last.write_text(json.dumps(check_to_dict(check(scene))))
+    return last
+
+
+def test_what_is_new_changed_and_gone_since_a_baseline(tmp_path):
+    last = baseline_of(rail([0.3, 0.3, 0.3, 0.9]), tmp_path)
+    same = check(rail([0.3, 0.3, 0.3, 0.9]))
+    comparison = compare(same.scene, grouped(same), last, {})
+    assert set(comparison.status.values()) == {"same"}
+    assert (comparison.open(grouped(same)), comparison.changed, comparison.moved) == ([], {}, {})
+    deeper = check(rail([0.4, 0.4, 0.4, 0.0, 0.0]))
+    comparison = compare(deeper.scene, grouped(deeper), last, {})
+    assert [comparison.status[group.id] for group in grouped(deeper)] == ["changed", "new"]
     assert [old["b"] for old in comparison.gone] == ["nut_3"]
+
+
+def test_one_part_of_many_that_moves_is_named_though_its_verdict_stays(tmp_path):
+    """Twelve nuts on a rail, as deep as before; one has gone 0.02 mm along it, and all together 7 mm."""
+    scene = rail([0.3] * 12)
+    last = baseline_of(scene, tmp_path)
+    away = translation(7.0, 0.0, 0.0)
+    poses = {part.name: away @ part.T_world for part in scene.parts}
+    poses["nut_4"] = poses["nut_4"] @ translation(0.02, 0.0, 0.0)
+    result = check(scene.moved(poses))
+    (group,) = grouped(result)
+    comparison = compare(result.scene, [group], last, {})
+    assert comparison.status == {group.id: "changed"}
+    assert [set(pair) for pair in comparison.changed[group.id]] == [{"rail", "nut_4"}]
+    assert comparison.moved == {"nut_4": pytest.approx(0.02, abs=1e-9)}
+    said = check_to_text(result, comparison)
+    assert "  parts moved: nut_4 by 0.02 mm\n" in said
+    assert "; changed: rail and nut_4; id" in said
+    assert check_to_dict(result, comparison)["moved_mm"] == comparison.moved
+
+
+def test_a_part_that_is_new_is_named(tmp_path):
+    last = baseline_of(rail([0.3, 0.3]), tmp_path)
+    result = check(rail([0.3, 0.3, 0.3]))
+    comparison = compare(result.scene, grouped(result), last, {})
+    assert [set(pair) for pair in next(iter(comparison.changed.values()))] == [{"rail", "nut_2"}]
+    assert "  new parts: nut_2\n" in check_to_text(result, comparison)
 
 
 def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main):

@@ -141,7 +141,7 @@ def test_joint_values_that_do_not_go(robot, joints, message):
 
 def test_a_robot_without_one_of_its_meshes_is_refused(robot):
     (robot.parent / "rail.stl").unlink()
-    with pytest.raises(InputError, match=r"3 of 4 bodies read; missing: rail \(.*rail.stl: no such file\)"):
+    with pytest.raises(InputError, match=r"3 of 4 bodies read; missing: rail \(.*rail.stl: no such file .*\)"):
         load(robot)
     assert [p.name for p in load(robot, partial=True).parts] == ["base", "tip_1", "tip_2"]
     robot.write_text("<robot")

@@ -1,0 +1,169 @@
+"""What has changed since an earlier check: groups of findings beside those of its JSON, and the parts that moved."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from clamp3d.collide.result import BAD, PairResult
+from clamp3d.collide.scene import Scene
+from clamp3d.core.pose import Array, inverse
+from clamp3d.errors import InputError
+from clamp3d.output.groups import Accepted, Group
+
+Status = Literal["new", "changed", "same", "accepted"]
+Names = tuple[str, str]
+
+_CHANGED, _CHANGED_SHARE = 1e-3, 1e-3
+"""A distance has changed since the last check if it differs by more mm than this, or by more than this share."""
+_MOVED = 1e-6
+"""Mm (or, of a turn, parts) by which two poses differ if they are not the same pose, written and read again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Groups beside those of an earlier check.
+
+    Attributes
+    ----------
+    status : mapping
+        Of each group by its identifier.
+    changed : mapping
+        The pairs of a group that were not in it before, or stand otherwise to each other now.
+    gone : tuple of dict
+        The earlier groups that are no more, as the JSON has them.
+    moved : mapping
+        The parts that moved against most others, with how far in mm; infinite where a part is new.
+    has_baseline : bool
+    """
+
+    status: Mapping[str, Status]
+    changed: Mapping[str, tuple[Names, ...]]
+    gone: tuple[Mapping[str, Any], ...] = ()
+    moved: Mapping[str, float] | None = None
+    has_baseline: bool = False
+
+    def open(self, groups: Iterable[Group]) -> list[Group]:
+        """The groups that count for the exit code: not accepted, and with a baseline the new ones only."""
+        counting = ("new",) if self.has_baseline else ("new", "changed", "same")
+        return [group for group in groups if self.status[group.id] in counting]
+
+
+def compare(
+    scene: Scene, groups: Sequence[Group], baseline: Path | None, accepted: Mapping[str, Accepted]
+) -> Comparison:
+    """Compare groups with those of a result that ``check --json`` wrote. Raises InputError if it holds none.
+
+    A group counts as new too where it was no clash in the earlier check and is one now.
+    """
+    if baseline is None:
+        return Comparison({g.id: "accepted" if g.id in accepted else "new" for g in groups}, {})
+    before = Baseline.read(baseline)
+    status: dict[str, Status] = {}
+    changed: dict[str, tuple[Names, ...]] = {}
+    for group in groups:
+        old = before.groups.get(group.id)
+        pairs = () if old is None else tuple((r.a, r.b) for r in group.rows if before.differs(scene, old, r))
+        if group.id in accepted:
+            status[group.id] = "accepted"
+        elif old is None or (group.verdict in BAD and old.get("verdict") not in BAD):
+            status[group.id] = "new"
+        else:
+            alike = (old.get("verdict"), old.get("count")) == (group.verdict.value, len(group.rows))
+            status[group.id] = "same" if alike and not pairs else "changed"
+        if pairs:
+            changed[group.id] = pairs
+    gone = tuple(old for identifier, old in before.groups.items() if identifier not in status)
+    return Comparison(status, changed, gone, before.moved(scene), True)
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """An earlier check: its groups by their identifiers, the bounds of its rows, and where its parts stood."""
+
+    groups: Mapping[str, Mapping[str, Any]]
+    bounds: Mapping[tuple[str | None, ...], tuple[float | None, float | None]]
+    poses: Mapping[str, Array]
+
+    @classmethod
+    def read(cls, path: Path) -> Baseline:
+        """From the JSON of a check. Raises InputError for a file that is none."""
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+            groups = {group["id"]: group for group in data["groups"]}
+            bounds = {
+                (*sorted((row["a"], row["b"])), row.get("motion")): (row["at_least_mm"], row["at_most_mm"])
+                for row in (*data["pairs"], *data["motions"])
+            }
+            poses = {name: np.array(part["T_world"], dtype=np.float64) for name, part in data["parts"].items()}
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise InputError(f"{path}: not a result of `clamp3d check --json` with groups of findings") from None
+        return cls(groups, bounds, poses)
+
+    def differs(self, scene: Scene, group: Mapping[str, Any], row: PairResult) -> bool:
+        """Whether a pair is new in its group, or its distance or its parts' places to each other have changed."""
+        names = sorted((row.a, row.b))
+        if names not in [sorted(pair) for pair in group.get("pairs", [])]:
+            return True
+        least, most = self.bounds.get((*names, row.motion), (None, None))
+        slack = max(_CHANGED, _CHANGED_SHARE * abs(row.distance.upper))
+        if (most is not None and row.distance.lower > most + slack) or (
+            least is not None and row.distance.upper < least - slack
+        ):
+            return True
+        if row.a not in self.poses or row.b not in self.poses:
+            return True
+        now = inverse(_pose(scene, row.a)) @ _pose(scene, row.b)
+        return not _same(now, inverse(self.poses[row.a]) @ self.poses[row.b])
+
+    def moved(self, scene: Scene) -> dict[str, float]:
+        """Parts that moved against most others, or are new, with how far their frames' origins went."""
+        # Where all moved alike, as one assembly, nothing has moved in it.
+        way = {p.name: p.T_world @ inverse(self.poses[p.name]) for p in scene.parts if p.name in self.poses}
+        keys = {name: tuple(T[:3].round(6).ravel() + 0.0) for name, T in way.items()}
+        most = Counter(keys.values()).most_common(1)
+        common = next((way[name] for name, key in keys.items() if [key] == [k for k, _ in most]), np.eye(4))
+        far = {part.name: math.inf for part in scene.parts if part.name not in way}
+        for name, T in way.items():
+            if not _same(T, common):
+                at = self.poses[name]
+                far[name] = float(np.linalg.norm(_pose(scene, name)[:3, 3] - (common @ at)[:3, 3]))
+        return far
+
+
+def _pose(scene: Scene, name: str) -> Array:
+    return scene.parts[scene.index(name)].T_world
+
+
+def _same(T: Array, other: Array) -> bool:
+    return bool(np.abs(T - other).max() <= _MOVED)
+
+
+def groups_csv(groups: Sequence[Group], comparison: Comparison) -> str:
+    """One line for each pair of each group, with a header; lengths in mm."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(
+        ["id", "status", "group", "a", "b", "verdict", "motion", "t", "at_least_mm", "at_most_mm", "method"]
+    )
+    for group in groups:
+        for row in group.rows:
+            d = row.distance
+            bounds = ["" if math.isinf(value) else value for value in (d.lower, d.upper)]
+            place = [row.a, row.b, row.verdict.value, row.motion or "", "" if row.t is None else row.t]
+            family, status = f"{group.a} and {group.b}", comparison.status[group.id]
+            if status == "changed" and (row.a, row.b) not in comparison.changed.get(group.id, ()):
+                status = "same"
+            writer.writerow([group.id, status, family, *place, *bounds, d.method])
+    return out.getvalue()
