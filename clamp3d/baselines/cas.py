@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from clamp3d.baselines.model import Pieces, pose_of, poses_of
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.distance import Feature, signed_distances
-from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pieces import groove_pieces
 from clamp3d.core.pose import Array
 

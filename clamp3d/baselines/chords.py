@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from clamp3d.baselines.model import Pieces, check_unit_angle, pose_of, poses_of
-from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.pose import Array, check_pose, inverse
 from clamp3d.core.primitives import SweptArc
 from clamp3d.core.profile import chord_count, sagitta

@@ -8,8 +8,8 @@ import numpy as np
 
 from clamp3d.checks import array, instance, number, shown
 from clamp3d.core.contact_model import ContactModel as ContactModel
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.contact_model import Pieces as Pieces
-from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array, check_pose, check_pose_array
 from clamp3d.core.primitives import LARGEST
 from clamp3d.errors import InputError

@@ -10,7 +10,7 @@ import numpy as np
 from clamp3d.baselines.fcl_shapes import Shape, Wire, bvh, distance, facets, measure
 from clamp3d.baselines.model import Pieces, pose_of, poses_of
 from clamp3d.checks import instance
-from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.pose import Array, check_pose
 from clamp3d.core.primitives import Cylinder
 from clamp3d.core.shapes import Solid

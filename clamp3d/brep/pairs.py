@@ -88,8 +88,9 @@ def _samples(face: Any, number: int) -> tuple[Array, float]:
         at_corners = [np.stack([corners[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
         corners = np.concatenate([middles, *at_corners])
     everything = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 2)
-    points = np.array([surface.Value(u, v).Coord() for u, v in everything.tolist()]).reshape(-1, 4, 3)
-    return points.reshape(-1, 3), float(_heights(points).max(initial=0.0))
+    uv, place = np.unique(everything, axis=0, return_inverse=True)  # triangles share their corners
+    points = np.array([surface.Value(u, v).Coord() for u, v in uv.tolist()]).reshape(-1, 3)
+    return points, float(_heights(points[place.reshape(-1, 4)]).max(initial=0.0))
 
 
 def _heights(points: Array) -> Array:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from clamp3d.clamp.dimensions import Clamp, PartName
-from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Cylinder, SweptArc
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.clamp.section import SIZE, WIRES, D, S, Section, U
-from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.pose import Array
 
 _TILTS, _POSITIONS = 481, 961

@@ -21,7 +21,7 @@ from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import Pair
-from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.pose import Array, SectionPose
 
 SPLINTS: tuple[PartName, PartName] = ("P1", "P2")

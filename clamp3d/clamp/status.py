@@ -24,7 +24,7 @@ from clamp3d.clamp.places import section_poses
 from clamp3d.clamp.section import EDGES, SPLINTS, WIRES, D, Section
 from clamp3d.clamp.stepped import SteppedState
 from clamp3d.clamp.surfaces import TOUCHING
-from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.pose import SectionPose, inverse
 
 CLAMPED = "clamped"

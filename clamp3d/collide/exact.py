@@ -10,7 +10,6 @@ import numpy as np
 from clamp3d.brep import cad_process
 from clamp3d.brep.pairs import TOLERANCE, CommonPart
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.mesh_distance import holds
 from clamp3d.collide.model import Model
 from clamp3d.core.pose import Array
 from clamp3d.errors import Clamp3dError
@@ -69,11 +68,13 @@ def _deep_points(a: Model, b: Model, T: Array, shared: CommonPart) -> Array | No
     local = (points - T[:3, 3]) @ T[:3, :3]
     looks, slack = np.zeros(len(points)), np.inf
     if a.chords and b.chords:
-        x, y = a.outer(a.chords[-1]), b.outer(b.chords[-1])
-        off = shared.chord + 2.0 * TOLERANCE
-        if not (holds(x, points, x.error + off) and holds(y, local, y.error + off)):
-            return None
-        looks, slack = np.maximum(x.distance(points), y.distance(local)), 2.0 * (x.error + y.error)
+        sides = ((a.outer(a.chords[-1]), points), (b.outer(b.chords[-1]), local))
+        away = [surface.distance(seen) for surface, seen in sides]
+        for (surface, seen), far in zip(sides, away, strict=True):
+            outside = far > surface.error + shared.chord + 2.0 * TOLERANCE
+            if not surface.contains(seen[outside]).all():
+                return None
+        looks, slack = np.maximum(*away), 2.0 * sum(surface.error for surface, _ in sides)
     order = np.argsort(-looks, kind="stable")
     order = order[looks[order] >= looks.max() - slack]
     spread = order[np.linspace(0, len(order) - 1, min(len(order), _TRIED)).round().astype(int)]

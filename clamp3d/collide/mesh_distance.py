@@ -176,17 +176,12 @@ def nearest_points(a: Surface, b: Surface, T: Array) -> tuple[float, float, Arra
     return lower, max(best, 0.0), *points
 
 
-def holds(surface: Surface, points: Array, slack: float) -> bool:
-    """Whether all of points (k, 3) lie in a closed mesh or within ``slack`` mm of it."""
-    return bool(surface.contains(points[surface.distance(points) > slack]).all())
-
-
 def within(inner: Surface, outer: Surface, T: Array, slack: float) -> bool:
     """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer`` or within ``slack`` mm of it."""
     points = inner.vertices @ T[:3, :3].T + T[:3, 3]
     if (points < outer.box[0] - slack).any() or (points > outer.box[1] + slack).any():
         return False
-    if not holds(outer, points, slack):
+    if not outer.contains(points[outer.distance(points) > slack]).all():
         return False
     rest = inner.manifold.transform(np.ascontiguousarray(T[:3])) - outer.manifold
     if rest.is_empty():

@@ -11,8 +11,7 @@ from clamp3d.collide.answer import Distance
 from clamp3d.collide.closed_form import bore_rod
 from clamp3d.collide.convex import Rod
 from clamp3d.collide.model import Model
-from clamp3d.core.contact_model import ContactModel
-from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.contact_model import ContactModel, GroovePair
 from clamp3d.core.pose import Array, inverse
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.core.profile import chord_count, sagitta

@@ -9,13 +9,12 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import instance
 from clamp3d.collide.answer import Distance
-from clamp3d.collide.closed_form import kernel_distance
 from clamp3d.collide.model import ModelCache
-from clamp3d.collide.moving_pair import ACCURACY, MovingPair
-from clamp3d.collide.refine import measured, with_normal
+from clamp3d.collide.moving_groove import MovingInGroove
+from clamp3d.collide.moving_pair import MovingPair
+from clamp3d.collide.refine import measured
 from clamp3d.collide.verdict import RESOLUTION
 from clamp3d.core.distance import SignedDistance
-from clamp3d.core.groove_motion import Search
 from clamp3d.core.motion import Motion, scene_pose
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import Capsule, Cylinder, SweptArc, place
@@ -83,7 +82,7 @@ def first_contact(
     margin : float
         Distance in mm that counts as contact; below 0, a depth, for a groove and a cylinder alone.
     resolution : float, optional
-        For groove and cylinder: accuracy of the search in mm, 1e-9 of the largest size by default.
+        For groove and cylinder: accuracy of the search in mm, 1e-6 by default.
 
     Raises
     ------
@@ -101,14 +100,12 @@ def first_contact(
     (True, 0.5375, 'groove kernel')
     """
     margin = place("margin", margin)
-    search = _kernel_search(a, b, motion, T_a_b, resolution)
-    if search is not None:
-        return _from_kernel(search, *search.first_contact(margin))
-    if margin < 0.0:
+    pair = _moving_pair(a, b, motion, T_a_b, resolution)
+    if margin < 0.0 and not isinstance(pair, MovingInGroove):
         raise InputError(f"margin must be >= 0 but for a groove and a cylinder, got {margin:g}")
-    pair = _moving_pair(a, b, motion, T_a_b)
     first = pair.first_time(margin)
     if first is not None:
+        first = pair.reached(first, margin)
         here = pair.at(first, measured)
         if here.upper <= margin + RESOLUTION:
             return _answer(pair, True, first, here)
@@ -135,52 +132,29 @@ def min_clearance(
     >>> round(least.distance.value, 12), least.t
     (0.085786437627, 0.0)
     """
-    search = _kernel_search(a, b, motion, T_a_b, resolution)
-    if search is not None:
-        return _from_kernel(search, None, *search.least())
-    pair = _moving_pair(a, b, motion, T_a_b)
+    pair = _moving_pair(a, b, motion, T_a_b, resolution)
     least, t = pair.least_distance()
     return _answer(pair, least.upper <= RESOLUTION, t, least)
 
 
-def _start(motion: Motion, T_a_b: ArrayLike | None) -> tuple[Motion, Array]:
-    """The motion as a screw, and the pose at its start. Raises InputError for anything else."""
+def _moving_pair(
+    a: AnyShape, b: AnyShape, motion: Motion, T_a_b: ArrayLike | None, resolution: float | None
+) -> MovingPair:
+    """The two bodies with the motion as a screw. Raises InputError for anything else."""
     instance("motion", motion, Motion)
     T = np.eye(4) if T_a_b is None else scene_pose(T_a_b, "T_a_b")
-    return motion.resolved(T), T
-
-
-def _moving_pair(a: AnyShape, b: AnyShape, motion: Motion, T_a_b: ArrayLike | None) -> MovingPair:
-    screw, T = _start(motion, T_a_b)
+    screw = motion.resolved(T)
+    if isinstance(a, SweptArc) and isinstance(b, (Cylinder, Capsule)):
+        return MovingInGroove(a, b, screw, T, resolution)
     cache = ModelCache()
     return MovingPair(cache.model(as_shape(b)), cache.model(as_shape(a)), screw, T, np.eye(4))
 
 
-def _kernel_search(
-    a: AnyShape, b: AnyShape, motion: Motion, T_a_b: ArrayLike | None, resolution: float | None
-) -> Search | None:
-    """The kernel's search for a groove and a cylinder; None for other bodies."""
-    screw, T = _start(motion, T_a_b)
-    if isinstance(a, SweptArc) and isinstance(b, (Cylinder, Capsule)):
-        return Search(a, b, screw, T, resolution)
-    return None
-
-
-def _from_kernel(search: Search, touches: bool | None, t: float, slack: float) -> MotionDistance:
-    """The answer at time ``t``; ``touches`` None: as the distance there says."""
-    contact = search.at(t)
-    distance = kernel_distance(contact)
-    if touches is None:
-        touches = distance.upper <= 0.0
-        distance = replace(distance, lower=distance.lower - slack)
-    return MotionDistance(touches, t, _overlap(distance), search.pose(t), slack, search.evaluations, contact)
-
-
 def _answer(pair: MovingPair, touches: bool | None, t: float, distance: Distance) -> MotionDistance:
-    pose = pair.motion.at(t, pair.start)
-    width = max(distance.upper - distance.lower, ACCURACY)
-    distance = _overlap(with_normal(distance.moved(pose).swapped()))
-    return MotionDistance(touches, t, distance, pose, width, pair.evaluations)
+    contact = pair.contact(t) if isinstance(pair, MovingInGroove) else None
+    width = max(distance.upper - distance.lower, pair.accuracy)
+    distance = _overlap(pair.as_seen(distance, t))
+    return MotionDistance(touches, t, distance, pair.motion.at(t, pair.start), width, pair.evaluations, contact)
 
 
 def _overlap(distance: Distance) -> Distance:

@@ -8,7 +8,7 @@ import numpy as np
 
 from clamp3d.collide.answer import Distance
 from clamp3d.collide.model import Model
-from clamp3d.collide.refine import Enough, from_boxes, refine
+from clamp3d.collide.refine import Enough, from_boxes, refine, with_normal
 from clamp3d.collide.swept import swept_lower
 from clamp3d.collide.verdict import Thresholds, Verdict
 from clamp3d.core.motion import Motion
@@ -21,8 +21,6 @@ CHECKED = 1e-4
 """The same for the least distance of a scene's motion, which has to give a verdict and a number to print."""
 MOST = 5000
 """Times at which a pair is looked at most, in one search: with meshes about a second."""
-_OVERLAPS = 64
-"""Times at which a pair is looked at after it was seen to overlap, for a deeper one."""
 _UNINFORMATIVE = 8
 """Swept bounds in a row that said no more than the speed, after which they are no longer asked for."""
 
@@ -33,6 +31,10 @@ class _CertainError(Exception):
 
 class MovingPair:
     """A shape that moves against one that stands; all distances are in the moving shape's frame."""
+
+    accuracy = ACCURACY
+    overlaps = 64
+    """Times at which a pair is looked at after it was seen to overlap, for a deeper one."""
 
     def __init__(self, moving: Model, still: Model, motion: Motion, start: Array, T_still: Array) -> None:
         self.a, self.b = moving, still
@@ -51,6 +53,14 @@ class MovingPair:
         T = self.pose(t)
         return refine(self.a, self.b, T, from_boxes(self.a, self.b, T), enough, cad_forms=True)
 
+    def as_seen(self, distance: Distance, t: float) -> Distance:
+        """A distance at time ``t`` as the standing shape sees it, where that stands in the origin."""
+        return with_normal(distance.moved(self.motion.at(t, self.start)).swapped())
+
+    def reached(self, first: float, level: float) -> float:
+        """Where the distance comes down to ``level`` mm, for a ``first`` time that is never late: that time itself."""
+        return first
+
     def between(self, start: float, stop: float) -> float:
         """Lower bound (mm) of the distance between two times, from swept shapes; minus infinity if they say nothing."""
         if self._uninformative >= _UNINFORMATIVE or not (self.a.closed and self.b.closed):
@@ -66,7 +76,7 @@ class MovingPair:
         self, thresholds: Thresholds | None = None, allowance: float | None = None
     ) -> tuple[Distance, float]:
         """Least distance on the way, and its time; with ``thresholds`` sharp where that is cheap or they need it."""
-        accuracy = ACCURACY if thresholds is None else CHECKED
+        accuracy = self.accuracy if thresholds is None else CHECKED
         best, at, overlaps = Distance(), 0.0, 0
 
         def distance(t: float) -> tuple[float, float]:
@@ -77,7 +87,7 @@ class MovingPair:
                 if thresholds is not None and thresholds.verdict(here, allowance) is Verdict.CLASH:
                     raise _CertainError
             overlaps += best.upper < -ACCURACY
-            if overlaps > _OVERLAPS:  # how deep it is at its deepest no bound here tells
+            if overlaps > self.overlaps:  # how deep it is at its deepest no bound here tells
                 raise _CertainError
             return here.lower, here.upper
 
@@ -109,12 +119,12 @@ class MovingPair:
         def distance(t: float) -> tuple[float, float]:
             def enough(distance: Distance) -> bool:
                 width = distance.upper - distance.lower
-                return width <= 0.5 * ACCURACY or distance.lower > level + self.speed or distance.upper <= level
+                return width <= 0.5 * self.accuracy or distance.lower > level + self.speed or distance.upper <= level
 
             here = self.at(t, enough)
             return here.lower, here.upper
 
-        answer = first_time(distance, self.speed, level, bound=self.between, accuracy=ACCURACY, most=MOST)
+        answer = first_time(distance, self.speed, level, bound=self.between, accuracy=self.accuracy, most=MOST)
         return None if answer.outcome.name == "CLEAR" else answer.t
 
 

@@ -109,25 +109,21 @@ def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -
     return Axis(centroid + (middle @ to_world), axis.direction @ to_world, float(axis.radius))
 
 
-def circle(points: Array) -> tuple[Array, float] | None:
-    """Centre (2,) and radius of the algebraic (Kasa) circle through ``points`` (n, 2), n >= 3; None if on a line."""
-    m = points.mean(axis=0)
-    p = points - m
+def axis_along(direction: Array, points: Array) -> Axis | None:
+    """Cylinder along a unit ``direction`` (3,) by the circle of ``points`` (n, 3) seen along it; None if on a line.
+
+    The circle is the algebraic one (Kasa's).
+    """
+    frame = np.stack(perpendicular(direction))
+    p = points @ frame.T
+    middle = p.mean(axis=0)
+    p = p - middle
     A = np.column_stack([2.0 * p, np.ones(len(p))])
-    sol, _, rank, _ = np.linalg.lstsq(A, (p * p).sum(axis=1), rcond=1e-9)
+    solution, _, rank, _ = np.linalg.lstsq(A, (p * p).sum(axis=1), rcond=1e-9)
     if rank < 3:
         return None
-    return m + sol[:2], float(np.sqrt(max(sol[2] + sol[0] ** 2 + sol[1] ** 2, 0.0)))
-
-
-def axis_along(direction: Array, points: Array) -> Axis | None:
-    """Cylinder along a unit ``direction`` (3,) by the circle of ``points`` (n, 3) seen along it; None if on a line."""
-    u, w = perpendicular(direction)
-    fitted = circle(np.column_stack([points @ u, points @ w]))
-    if fitted is None:
-        return None
-    centre, radius = fitted
-    return Axis(centre[0] * u + centre[1] * w, direction, radius)
+    centre, square = solution[:2], float(solution[2] + solution[:2] @ solution[:2])
+    return Axis((middle + centre) @ frame, direction, float(np.sqrt(max(square, 0.0))))
 
 
 def covariance(local: Array, radius: float, noise: float) -> Array | None:

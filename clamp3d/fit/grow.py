@@ -91,15 +91,6 @@ def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float
         span = float(search.span(axis, faces).max())
         if settled:
             break
-    corners = np.unique(F[faces])
-    if len(points) < len(corners) <= min(60, 1.25 * len(points)):
-        # Scatter can look like points on chords: if all points make one consistent surface, none was.
-        whole = fit_axis(V[corners], axis)
-        if whole is not None:
-            res = whole.residual(V[corners])
-            wider = max(floor, _tolerance(res))
-            if wider <= 3.0 * tolerance and float(np.abs(res).max()) <= wider:
-                axis, points, tolerance = whole, corners, wider
     return Region(axis, sign, faces, points, tolerance, span, search.strips)
 
 

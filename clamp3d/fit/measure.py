@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,64 +25,23 @@ def arc(surface: Surface, axis: Axis, u: Array, w: Array, faces: IntArray) -> tu
     return covered(a[:, :1] + turned(a, a[:, :1]), FULL_TURN_GAP)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Border:
-    """Border ``edges`` (k, 2, 3) of a region and their lengths (k,).
+def _ends(values: Array, lengths: Array, sides: list[BoolArray], step: float) -> tuple[float, float, float] | None:
+    """Low and high end of ``values`` (k,) and their error: medians of border edges by their lengths on two ``sides``.
 
-    ``bend`` (k,) in rad to the triangle outside and ``growth`` (k,), its area in terms of the region's triangles, are
-    infinite on the mesh's rim. ``inner_bend``: median bend within the region.
+    None where one side has no border. Triangles across the border, facets of ``step``, may straddle an edge and belong
+    to neither side: the end lies about half a facet further, half a facet uncertain.
     """
-
-    edges: Array
-    length: Array
-    bend: Array
-    growth: Array
-    inner_bend: float
-
-    def ends(
-        self, values: Array, sides: list[BoolArray], step: float, extent: float
-    ) -> tuple[float, float, float] | None:
-        """Low and high end of ``values`` (k,) and their error: length-weighted medians on two ``sides`` (k,).
-
-        None where one side has no border. An end is sharp if the mesh ends there too, or a crease leads to much larger
-        triangles, as in a CAD mesh. Otherwise the triangles across the border may straddle the edge; on a dense mesh
-        (facets of ``step`` well below ``extent``) they belong to neither side, so the end lies about half a facet
-        further, half a facet uncertain.
-        """
-        found, errors = [], []
-        for sign, side in zip((-1.0, 1.0), sides, strict=True):
-            if not side.any():
-                return None
-            v, w = values[side], self.length[side]
-            at = _quantile(v, w, 0.5)
-            crease = np.median(self.bend[side]) > 2.0 * self.inner_bend
-            dense = step < 0.1 * extent
-            if (crease and np.median(self.growth[side]) > 4.0) or step >= 0.5 * extent:
-                uncertainty = 0.0
-            else:
-                uncertainty = 0.5 * step if dense else step
-            found.append(at + sign * uncertainty if dense else at)
-            # A few border edges belong to a corner or a pock mark: nine tenths of the border say how far it strays.
-            errors.append(_quantile(np.abs(v - at), w, 0.9) + uncertainty)
-        return found[0], found[1], max(errors)
-
-
-def _quantile(values: Array, weights: Array, share: float) -> float:
-    order = np.argsort(values, kind="stable")
-    total = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(total, share * total[-1])])
-
-
-def _border(surface: Surface, faces: IntArray) -> _Border:
-    crossing, outside, within = border(surface, faces)
-    rim = surface.rim[np.isin(surface.rim_faces, faces)]
-    ends = surface.V[np.concatenate([surface.edges[crossing], rim])]
-    beyond = np.full(len(rim), np.inf)
-    bend = np.concatenate([surface.bend[crossing], beyond])
-    growth = np.concatenate([surface.areas[outside] / np.median(surface.areas[faces]), beyond])
-    bends = surface.bend[within & (surface.bend > 1e-4)]
-    inner = np.median(bends) if len(bends) else 0.0
-    return _Border(ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), bend, growth, inner)
+    ends, errors = [], []
+    for sign, side in zip((-1.0, 1.0), sides, strict=True):
+        if not side.any():
+            return None
+        v, w = values[side], lengths[side]
+        middle = float(np.quantile(v, 0.5, method="inverted_cdf", weights=w))
+        # A few border edges belong to a corner or a pock mark: nine tenths of the border say how far it strays.
+        stray = float(np.quantile(np.abs(v - middle), 0.9, method="inverted_cdf", weights=w))
+        ends.append(middle + sign * 0.5 * step)
+        errors.append(stray + 0.5 * step)
+    return ends[0], ends[1], max(errors)
 
 
 def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
@@ -98,20 +56,22 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
 
     corners = (surface.V[np.unique(surface.F[region.faces])] - axis.point) @ R
     z0, z1 = float(corners[:, 2].min()), float(corners[:, 2].max())
-    rim = _border(surface, region.faces)
-    local = (rim.edges - axis.point) @ R
-    along = np.abs(local[:, 1, 2] - local[:, 0, 2]) > 0.5 * rim.length
+    crossing, _, _ = border(surface, region.faces)
+    edges = np.concatenate([surface.edges[crossing], surface.rim[np.isin(surface.rim_faces, region.faces)]])
+    local = (surface.V[edges] - axis.point) @ R
+    lengths = np.linalg.norm(local[:, 1] - local[:, 0], axis=1)
+    along = np.abs(local[:, 1, 2] - local[:, 0, 2]) > 0.5 * lengths
     z, angle = local[:, :, 2].mean(axis=1), np.arctan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
     # Off the corners, where the two kinds of border mix.
     v, t = (2.0 * z - z0 - z1) / (z1 - z0), angle / half
     length_error = arc_error = 0.0
     rounds = [~along & (k * v > 0.8) & (np.abs(t) < 0.85) for k in (-1, 1)]
-    step = 0.0 if region.strips else np.median(np.ptp((surface.V[surface.F[region.faces]]) @ d, axis=1))
-    if ends := rim.ends(z, rounds, step, z1 - z0):
+    facet = float(np.median(np.ptp((surface.V[surface.F[region.faces]]) @ d, axis=1)))
+    if ends := _ends(z, lengths, rounds, _straddling(region, facet, z1 - z0)):
         z0, z1, length_error = ends
     lips = [along & (k * t > 0.8) & (np.abs(v) < 0.85) for k in (-1, 1)]
-    step = 0.0 if region.strips else _facet(surface, axis, region.faces)
-    if half < np.pi and (ends := rim.ends(angle, lips, step, 2.0 * half)):
+    facet = _facet(surface, axis, region.faces)
+    if half < np.pi and (ends := _ends(angle, lengths, lips, _straddling(region, facet, 2.0 * half))):
         a, b, arc_error = ends
         half = 0.5 * (b - a)
         c, s = np.cos(0.5 * (a + b)), np.sin(0.5 * (a + b))
@@ -158,6 +118,11 @@ def _errors(
         "chord_error": sagitta(axis.radius, region.span),
         "faces": surface.rows[region.faces],
     }
+
+
+def _straddling(region: Region, facet: float, extent: float) -> float:
+    """Size of the triangles that may straddle a region's border: those of strips, and as long ones, end at it."""
+    return 0.0 if region.strips or facet >= 0.5 * extent else facet
 
 
 def _facet(surface: Surface, axis: Axis, faces: IntArray) -> float:

@@ -21,7 +21,7 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.meshing import mesh
 from clamp3d.core.pose import Array, inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc

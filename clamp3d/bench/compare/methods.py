@@ -12,7 +12,7 @@ import numpy as np
 
 from clamp3d.baselines import ContactModel, contact_model
 from clamp3d.bench.compare.scene import GROOVE, WIRE, block, chord_error, in_part_frame, pair
-from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.pose import Array, inverse
 
 if TYPE_CHECKING:

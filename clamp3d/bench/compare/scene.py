@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.baselines import chords
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.groove_pair import GroovePair
 from clamp3d.core.pose import Array, inverse, rotation
 from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.core.profile import Arc, Profile

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.bench.stress.worker import Rows
-from clamp3d.core.groove_pair import GroovePair
+from clamp3d.core.contact_model import GroovePair
 from clamp3d.core.pose import Array
 from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
 
