@@ -5,14 +5,16 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from clamp3d.errors import escaped
 
 if TYPE_CHECKING:
     from rich.status import Status
 
-    from clamp3d.clamp.result import Waypoint
+    from clamp3d.baselines.model import ContactModel
+    from clamp3d.clamp.dimensions import Clamp
+    from clamp3d.clamp.result import Assembly, Waypoint
 
 
 class Narrator:
@@ -48,6 +50,25 @@ def narrator(quiet: bool) -> Iterator[Narrator]:
 
     with Console(stderr=True).status("") as status:
         yield Narrator(quiet, status)
+
+
+def narrated(
+    clamp: Clamp,
+    model: ContactModel,
+    settings: dict[str, Any],
+    quiet: bool,
+    *listeners: Callable[[Waypoint], None],
+) -> Assembly:
+    """Assemble a clamp with the waypoints on stderr, and to ``listeners``."""
+    from clamp3d.clamp.assemble import assemble
+
+    with narrator(quiet) as narrate:
+
+        def listen(waypoint: Waypoint) -> None:
+            for listener in (*listeners, narrate.waypoint):
+                listener(waypoint)
+
+        return assemble(clamp, model, on_waypoint=listen, progress=narrate.position, **settings)
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clamp3d.cli.options import FOLDER, METHOD, QUIET, SOURCE, Method, Source, declared, option
-from clamp3d.cli.progress import narrator
+from clamp3d.cli.progress import narrated, narrator
 from clamp3d.cli.terminal import finish, show
 from clamp3d.errors import need
 
@@ -34,7 +34,6 @@ def command(
     need("matplotlib", "a report")
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.clamp.scene import CONTACT
-    from clamp3d.cli.viewing import narrated
     from clamp3d.collide.verdict import Thresholds
     from clamp3d.output.files import check_folder
     from clamp3d.output.report import make_report

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from clamp3d.cli.mechanics import MECHANICS, Mechanics
 from clamp3d.cli.options import CLAMP, JSON, METHOD, QUIET, VIEWING, ClampSource, Method, Viewing, declared, option
+from clamp3d.cli.progress import narrated
 from clamp3d.cli.terminal import finish, save, show
 from clamp3d.errors import SequenceError
 
@@ -36,13 +37,15 @@ def command(
     """
     settings = method.settings(equilibria)
     mechanics.check(settings["solver"])
-    from clamp3d.cli.viewing import Page, narrated
     from clamp3d.output.run_report import run_to_text
 
     loaded = source.clamp()
     model = method.model(loaded, quiet=quiet)
-    is_shown = view or viewing.html_file is not None or viewing.url is not None
-    page = Page(viewing, serve=view, quiet=quiet) if is_shown else None
+    page = None
+    if view or viewing.html_file is not None or viewing.url is not None:
+        from clamp3d.cli.viewing import Page
+
+        page = Page(viewing, serve=view, quiet=quiet)
 
     def done(run: Assembly) -> None:
         show(run_to_text(run))
@@ -58,12 +61,10 @@ def command(
             result = narrated(loaded, model, settings, quiet)
             done(result)
     except SequenceError as error:
-        blocked = error
-        show(f"not assembled: {blocked}")
-        save(
-            json_file, lambda: {"status": f"not assembled: {blocked}", "blocks": [b.to_dict() for b in blocked.blocks]}
-        )
+        status, blocks = f"not assembled: {error}", [block.to_dict() for block in error.blocks]
+        show(status)
+        save(json_file, lambda: {"status": status, "blocks": blocks})
         if page is not None:
-            page.check(blocked.scene)
+            page.check(error.scene)
         finish(True)
     finish(not result.passed)

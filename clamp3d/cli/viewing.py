@@ -1,4 +1,4 @@
-"""Clamps assembled with what a command says of it: on stderr, and for ``view`` and ``run --view`` on a page."""
+"""A viewer beside the work, for ``clamp3d view`` and ``clamp3d run --view``."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ from typing import Any
 import click
 
 from clamp3d.baselines.model import ContactModel
-from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.clamp.result import Assembly, Waypoint
+from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.cli.options import Viewing
-from clamp3d.cli.progress import bar, narrator
+from clamp3d.cli.progress import bar, narrated
 from clamp3d.cli.terminal import show
 from clamp3d.collide.check import check
 from clamp3d.collide.result import CheckResult
@@ -24,21 +23,6 @@ from clamp3d.collide.scene import Scene
 from clamp3d.output.files import STDOUT
 from clamp3d.output.viewer import MEASURED, Viewer
 from clamp3d.output.viewer_overlay import overlay
-
-Listener = Callable[[Waypoint], None]
-
-
-def narrated(
-    clamp: Clamp, model: ContactModel, settings: dict[str, Any], quiet: bool, *listeners: Listener
-) -> Assembly:
-    """Assemble with the waypoints on stderr, and to ``listeners``."""
-    with narrator(quiet) as narrate:
-
-        def listen(waypoint: Waypoint) -> None:
-            for listener in (*listeners, narrate.waypoint):
-                listener(waypoint)
-
-        return assemble(clamp, model, on_waypoint=listen, progress=narrate.position, **settings)
 
 
 @dataclass(frozen=True)
