@@ -188,6 +188,8 @@ def test_check_of_some_pairs_is_clean(tmp_path):
             "unknown part 'leg'; available: leaf-a",
         ),
         (["check", EXAMPLES / "hinge" / "scene.toml", "--clearance", "-1"], "clearance must be 0 or > contact"),
+        (["sweep", "--yaw-deg", "95"], "yaw must be > 0 and < 90 deg, got 95 deg"),
+        (["sweep", "--pitch-deg", "0"], "pitch must be > 0 and < 90 deg, got 0 deg"),
         (["sweep", "--map", "map.bmp"], "the name must end in one of .png, .svg, .pdf"),
     ],
 )
@@ -198,3 +200,22 @@ def test_bad_input_is_one_line_and_exit_2(arguments, message, tmp_path):
     assert done.stderr.count("\n") == 1
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_sweep_writes_map_and_points(tmp_path):
+    from PIL import Image
+
+    picture, data = tmp_path / "map.png", tmp_path / "map.json"
+    done = clamp3d("sweep", "--wire", "P7", "--steps", "8", "--map", picture, "--json", data)
+    assert done.returncode == 0, done.stderr
+    assert "  yaw    -5.402 to +5.402 deg\n" in done.stdout
+    written = json.loads(data.read_text())
+    assert (len(written["height_mm"]), len(written["sideways_mm"])) == (2, 8)
+    assert {name for row in written["outcome"] for name in row} == {"seated", "not clamped"}
+    assert sum(written["counts"].values()) == 16
+    low, high = written["captured_mm"]
+    assert f"sideways {low:+.1f} to {high:+.1f} mm" in done.stdout
+    with Image.open(picture) as image:
+        assert image.width > 1000
+        colours = {c for _, c in image.convert("RGB").getcolors(1 << 20)}
+    assert {(0x33, 0x22, 0x88), (0xD5, 0xD8, 0xDC)} <= colours
