@@ -79,7 +79,7 @@ def command(
     from clamp3d.collide.scene import Scene
     from clamp3d.output.baseline import compare, groups_csv
     from clamp3d.output.groups import accepted_file, grouped, read_accepted
-    from clamp3d.output.scene_report import check_to_dict, check_to_html, check_to_text
+    from clamp3d.output.scene_report import check_to_dict, check_to_text
 
     loaded = source.load()
     run: Assembly | None = None
@@ -104,7 +104,10 @@ def command(
     status = {} if run is None else {"status": run.status}
     save(files.json_file, lambda: check_to_dict(result, comparison) | status)
     save(files.csv_file, lambda: groups_csv(groups, comparison))
-    save(files.html_file, lambda: check_to_html(result))
+    if files.html_file is not None:
+        from clamp3d.output.viewer import check_to_html  # a page alone needs meshcat
+
+        save(files.html_file, lambda: check_to_html(result))
     if files.bcf_file is not None:
         from clamp3d.output.bcf import write_bcf
 

@@ -24,15 +24,17 @@ def command(
     should, or a step of the sequence is blocked: then it is shown how.
     """
     from clamp3d.clamp.dimensions import Clamp
-    from clamp3d.cli.viewing import Page
 
     settings = method.settings(equilibria=False)
     loaded = source.load()
-    page = Page(viewing, serve=viewing.html_file is None, quiet=quiet)
     if not isinstance(loaded, Clamp):
         method.refuse()
         if viewing.overlays:
             raise click.UsageError("--overlay goes with a clamp, not with a scene")
+    from clamp3d.cli.viewing import Page
+
+    page = Page(viewing, serve=viewing.html_file is None, quiet=quiet)
+    if not isinstance(loaded, Clamp):
         finish(verdicts=page.check(loaded).counts)
         return
     try:

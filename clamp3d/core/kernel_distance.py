@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from clamp3d.core import kernel_features as features
 from clamp3d.core.jit import formula, inlined
-from clamp3d.core.kernel_features import Candidate, Groove, Rod
+from clamp3d.core.kernel_features import Candidate, EndCircle, Groove, Rod
 from clamp3d.core.kernel_vector import Vector, dot, length, minus, over, plus
 
 UNIT = 2.0**-53
@@ -180,30 +180,27 @@ def outside(groove: Groove, rod: Rod) -> Candidate:
 @inlined
 def at_ends(groove: Groove, rod: Rod, best: Candidate, top: bool, bottom: bool) -> Candidate:
     """The best so far, or a corner, an edge or an arc of the ends that the axis reaches."""
-    H = groove.H
-    is_above = rod.centre.y + rod.half * abs(rod.axis.y) >= groove.h
-    low, high = features.end_circle(groove, rod, -H), features.end_circle(groove, rod, H)
+    low, high = features.end_circle(groove, rod, -groove.H), features.end_circle(groove, rod, groove.H)
     is_low_asked = is_high_asked = False
     if bottom:
-        best, falls = features.on_corner(groove, rod, -1.0, -H, best)
-        best, falls_too = features.on_corner(groove, rod, 1.0, -H, best)
-        is_low_asked = falls or falls_too or has_two_minima(rod, low.p, low.v)
-        if is_above:
-            best = features.on_end_edge(groove, rod, -H, best)
+        best, is_low_asked = at_end(groove, rod, low, best)
     if top:
-        best, falls = features.on_corner(groove, rod, -1.0, H, best)
-        best, falls_too = features.on_corner(groove, rod, 1.0, H, best)
-        is_high_asked = falls or falls_too or has_two_minima(rod, high.p, high.v)
-        if is_above:
-            best = features.on_end_edge(groove, rod, H, best)
-    if is_low_asked and not (is_high_asked and high.reach < low.reach):
-        best = features.on_end_arc(groove, rod, low, best)
-        is_low_asked = False
-    if is_high_asked:
-        best = features.on_end_arc(groove, rod, high, best)
+        best, is_high_asked = at_end(groove, rod, high, best)
     if is_low_asked:
         best = features.on_end_arc(groove, rod, low, best)
+    if is_high_asked:
+        best = features.on_end_arc(groove, rod, high, best)
     return best
+
+
+@inlined
+def at_end(groove: Groove, rod: Rod, circle: EndCircle, best: Candidate) -> tuple[Candidate, bool]:
+    """The best so far, or a corner or an edge of an end; whether a point of its arc may be nearer."""
+    best, falls = features.on_corner(groove, rod, -1.0, circle.z, best)
+    best, falls_too = features.on_corner(groove, rod, 1.0, circle.z, best)
+    if rod.centre.y + rod.half * abs(rod.axis.y) >= groove.h:
+        best = features.on_end_edge(groove, rod, circle.z, best)
+    return best, falls or falls_too or has_two_minima(rod, circle.p, circle.v)
 
 
 @inlined

@@ -330,8 +330,7 @@ def flat_parallel(groove: Groove, rod: Rod) -> Answer:
     if gap < 0.0 and end <= max(half - r, 0.0):  # the groove goes on where nothing is left of the cylinder
         if half >= r:
             return parallel(groove, shrunk(rod))
-        out = way_out(groove, rod.centre)
-        return Answer(out.distance - half, out.point, out.normal, out.feature, 0.0, bound)
+        return left_of_disc(groove, rod, bound)
     g, e = gap - r if gap > 0.0 else -r, max(end, 0.0) - half
     if feature == features.ARC and gap > 0.0:
         g = (groove.R - r) - math.sqrt(x * x + y * y)
@@ -354,6 +353,13 @@ def flat_parallel(groove: Groove, rod: Rod) -> Answer:
         if end >= 0.0:
             feature = features.END_FACE if gap <= 0.0 else features.beyond_end(feature)
     return Answer(f, Vector(qx, qy, qz), normal, feature, (qz - z) * math.copysign(1.0, rod.axis.z), bound)
+
+
+@inlined
+def left_of_disc(groove: Groove, rod: Rod, bound: float) -> Answer:
+    """What is left last of a cylinder that is wider than long, its middle, in the material."""
+    out = way_out(groove, rod.centre)
+    return Answer(out.distance - rod.half, out.point, out.normal, out.feature, 0.0, bound)
 
 
 @inlined
@@ -383,8 +389,8 @@ def after_nothing_left(groove: Groove, rod: Rod, capsule: Answer) -> tuple[bool,
     if rod.half < rod.r:
         if features.section(groove, rod.centre.x, rod.centre.y)[0] > 0.0 or abs(rod.centre.z) > groove.H:
             return False, capsule, capsule.normal
-        out = way_out(groove, rod.centre)
-        return True, Answer(out.distance - rod.half, out.point, out.normal, out.feature, 0.0, bound), out.normal
+        answer = left_of_disc(groove, rod, bound)
+        return True, answer, answer.normal
     left = shrunk(rod)
     lo, hi = features.clip(groove, rod, left.half)
     low, high = features.axis_point(rod, lo), features.axis_point(rod, hi)

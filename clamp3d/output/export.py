@@ -121,30 +121,30 @@ def export(
     """
     if not isinstance(source, Clamp):
         source = opened(source)
-    clamp = source if isinstance(source, Clamp) else source.clamp if isinstance(source, Assembly) else None
     target = _target(source, path, format, layout, unit, check_mesh_error(mesh_error))
-    if isinstance(source, Assembly):
-        state = state or "final"
-        scene = source.scene_at(find_state(source, state))
-        scene = replace(scene, parts=tuple(replace(part, T_world=_rounded(part.T_world)) for part in scene.parts))
-        placed = place(scene, names)
-        settings = {"clamp": source.clamp.name, **target.settings(), "state": state, "status": source.status}
-    else:
-        if state is not None:
-            raise InputError("state goes with an assembled clamp")
-        placed = place(source, names)
-        kind = "clamp" if isinstance(source, Clamp) else "scene"
-        settings = {kind: source.name, **target.settings(), "state": None, "status": None}
-    settings |= {"unit": target.unit, "up": "Y" if target.format == "glb" else "Z"}
-    settings["mesh_error_mm"] = None if target.format == "step" else target.mesh_error
-
+    shown, settings = _at_state(source, state)
+    placed = place(shown, names)
     meshed = [] if target.format == "step" else posed(placed, target.mesh_error)
-    files = _files(target, source.name if isinstance(source, Scene) else settings["clamp"], placed, meshed)
+    files = _files(target, source.clamp.name if isinstance(source, Assembly) else source.name, placed, meshed)
     contents = {key: data for key, (data, _) in files.items()}
     listing = f"{target.file.name}.manifest.json" if target.file else f"manifest-{target.format}.json"
-    contents[listing] = manifest(placed, meshed, files, settings, clamp)
+    clamp = source if isinstance(source, Clamp) else source.clamp if isinstance(source, Assembly) else None
+    contents[listing] = manifest(placed, meshed, files, target.settings() | settings, clamp)
     *paths, listed = write_files(target.file.parent if target.file else Path(path), contents)
     return Export(tuple(paths), listed)
+
+
+def _at_state(source: Clamp | Scene | Assembly, state: str | None) -> tuple[Clamp | Scene, dict[str, Any]]:
+    """What is written, an assembly at a state of its way, and what the manifest says of that."""
+    if not isinstance(source, Assembly):
+        if state is not None:
+            raise InputError("state goes with an assembled clamp")
+        kind = "clamp" if isinstance(source, Clamp) else "scene"
+        return source, {kind: source.name, "state": None, "status": None}
+    state = state or "final"
+    scene = source.scene_at(find_state(source, state))
+    scene = replace(scene, parts=tuple(replace(part, T_world=_rounded(part.T_world)) for part in scene.parts))
+    return scene, {"clamp": source.clamp.name, "state": state, "status": source.status}
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +159,13 @@ class _Target:
 
     def settings(self) -> dict[str, Any]:
         """What the manifest says of it first."""
-        return {"format": self.format, "layout": self.layout}
+        return {
+            "format": self.format,
+            "layout": self.layout,
+            "unit": self.unit,
+            "up": "Y" if self.format == "glb" else "Z",
+            "mesh_error_mm": None if self.format == "step" else self.mesh_error,
+        }
 
 
 def _target(

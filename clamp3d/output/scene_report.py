@@ -176,11 +176,3 @@ def work_text(work: Work) -> list[str]:
         f"built: {work.meshes} meshes ({work.triangles} triangles), {work.hulls} hulls, {work.fits} fits "
         f"for {work.shapes} shapes; queries: {queries or 'none'}; {sum(work.seconds.values()):.2f} s",
     ]
-
-
-def check_to_html(result: CheckResult) -> str:
-    """The result as one page in 3D that needs no other file and no network."""
-    from clamp3d.output.viewer import view
-
-    with view(result, serve=False, notes=[*result.scene.notes, *work_text(result.work)]) as viewer:
-        return viewer.html()

@@ -35,6 +35,7 @@ from clamp3d.output.files import write_text
 from clamp3d.output.groups import grouped
 from clamp3d.output.pages import render
 from clamp3d.output.palette import FORCE, VERDICT_COLOURS
+from clamp3d.output.scene_report import work_text
 from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
 from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
 from clamp3d.output.viewer_timeline import FIRST, UNCUT, ClampStory, Row, Stop, scene_stops
@@ -78,8 +79,6 @@ class Viewer:
         Gap that counts as clear, mm; by default the scene's own, and 5 mm for a clamp.
     overlays : dict, optional
         Convex pieces of parts to show as well, by a name: ``{name: {part: [trimesh.Trimesh, ...]}}``.
-    notes : sequence of str
-        Lines for the end of the page.
     serve : bool
         Serve the page on this machine (``host``, ``port``: the first free one from 7000); else it is only kept for
         `save_html`. No browser is opened, and none is waited for.
@@ -100,7 +99,6 @@ class Viewer:
         mesh_error: float = 0.01,
         clearance: float | None = None,
         overlays: Mapping[str, Pieces] | None = None,
-        notes: Sequence[str] = (),
         serve: bool = True,
         url: str | None = None,
         host: str = "127.0.0.1",
@@ -111,7 +109,7 @@ class Viewer:
         for name, pieces in overlays.items():
             instance(f"overlay {text('name of an overlay', name)}", pieces, Mapping)
         serve = flag("serve", serve)
-        self._model, self._mesh_error, self._notes = model, mesh_error, list(notes)
+        self._model, self._mesh_error = model, mesh_error
         clamp = shown if isinstance(shown, Clamp) else getattr(shown, "clamp", None)
         wide = CLEARANCE if clearance is None else clearance
         self._clamp = None if clamp is None else ClampStory(clamp, model, wide)
@@ -219,6 +217,7 @@ class Viewer:
             "findings": self._scene_findings(result),
             "pairs": worst_first(result.pairs)[:_LISTED],
             "motions": worst_first(result.motions)[:_LISTED],
+            "notes": [*result.scene.notes, *work_text(result.work)],
         }
 
     def _rows(self, scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[Row]:
@@ -284,7 +283,6 @@ class Viewer:
             "scene": scene,
             "state": state,
             "accuracy": accuracy,
-            "notes": self._notes,
             "parts": titles(scene),
             "part_colours": drawing.colours,
             "colours": VERDICT_COLOURS,
@@ -297,7 +295,7 @@ class Viewer:
         }
         numbered = enumerate(self._story["findings"])
         context["groups"] = [list(members) for _, members in itertools.groupby(numbered, lambda pair: pair[1]["group"])]
-        missing = {"assembly": None, "forces": (), "pairs": (), "motions": ()}
+        missing = {"assembly": None, "forces": (), "pairs": (), "motions": (), "notes": ()}
         self._panel = render("viewer.panel.html", **(self._story | missing | context | more))
         drawing.property(ROOT, "story", self._story | {"panel": self._panel})
 
@@ -356,6 +354,12 @@ def view(shown: Any, *, serve: bool = True, **options: Any) -> Viewer:
         viewer.close()
         raise
     return viewer
+
+
+def check_to_html(result: CheckResult) -> str:
+    """The result as one page in 3D that needs no other file and no network."""
+    with view(result, serve=False) as viewer:
+        return viewer.html()
 
 
 def _scene(shown: Any, clearance: float | None) -> Scene:

@@ -200,7 +200,7 @@ def test_bad_settings_are_one_clear_line_and_leave_no_file(reference: Clamp, odd
         (odd_scene, {"format": "stl", "state": "final"}, "state goes with an assembled clamp"),
         (odd_scene, {"format": "stl", "names": ["P8"]}, "unknown part 'P8'; available: P1"),
         (odd_scene, {"format": "stl", "names": []}, "names must name at least one part, available: P1"),
-        (parts(reference), {"format": "stl"}, "source must be a Clamp or Scene or Assembly, got dict"),
+        (parts(reference), {"format": "stl"}, "source must be a path, a clamp's name, or an object of CadQuery"),
     ]:
         with pytest.raises(InputError, match="^.*" + message.replace("(", r"\(")):
             export(source, tmp_path / "none", **arguments)

@@ -25,8 +25,7 @@ from clamp3d.fit.fit import fit_mesh
 from clamp3d.output.fit_report import fit_to_html
 from clamp3d.output.groups import grouped
 from clamp3d.output.palette import PART_COLOURS
-from clamp3d.output.scene_report import check_to_html
-from clamp3d.output.viewer import Viewer, view
+from clamp3d.output.viewer import Viewer, check_to_html, view
 
 playwright_api = pytest.importorskip(
     "playwright.sync_api", reason="browser tests need playwright: pip install 'clamp3d[dev]'"
