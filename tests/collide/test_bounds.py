@@ -1,6 +1,5 @@
 """Bounds of distances: any pair, every level, meshes, fitted meshes and contact models, against the oracle."""
 
-import itertools
 import math
 from dataclasses import replace
 
@@ -11,10 +10,8 @@ from hypothesis import strategies as st
 
 from clamp3d import baselines, distance, shapes
 from clamp3d.collide.model import ModelCache
-from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.pose import inverse, rotation, translation
 from clamp3d.core.primitives import Cylinder, SweptArc
-from clamp3d.core.profile import Arc, Profile
 from clamp3d.testing import assert_distance, body
 from tests.kinds import BLOCK, DRAWN, faceted_shape, poses
 
@@ -24,13 +21,13 @@ SLOW = settings(
 SOME = st.sampled_from(DRAWN)
 
 
-@settings(SLOW, max_examples=20)
+@settings(SLOW, max_examples=12)
 @given(SOME, SOME, poses(25.0))
 def test_any_pair_of_drawn_solids(a, b, T):
     assert_distance(distance(a, b, T), a, b, T)
 
 
-@settings(SLOW, max_examples=20)
+@settings(SLOW, max_examples=12)
 @given(
     st.builds(SweptArc, st.floats(3.0, 15.0), st.floats(0.2, 3.0), st.floats(2.0, 60.0)),
     st.builds(Cylinder, st.floats(0.5, 12.0), st.floats(1.0, 90.0)),
@@ -56,7 +53,7 @@ def test_facets_that_are_the_part(key, b, T):
     assert_distance(distance(faceted, b, T, accuracy=1e-3), faceted, b, T, cells=3000)
 
 
-@settings(SLOW, max_examples=20)
+@settings(SLOW, max_examples=12)
 @given(st.sampled_from([key for key in FACETED if key[1] != "off"]), st.sampled_from([DRAWN[3], DRAWN[5]]), poses(20.0))
 def test_a_fitted_mesh_has_the_bounds_of_the_part_it_comes_from(key, b, T):
     """Its corners lie on the part's surface, so what is said of it must hold for the part."""
@@ -81,7 +78,7 @@ def test_a_drawn_solid_lies_between_its_two_meshes(shape, error):
     assert outer.contains(x[body(shape).field(x) < 0.0]).all()
 
 
-@settings(SLOW, max_examples=20)
+@settings(SLOW, max_examples=12)
 @given(
     st.sampled_from(["chords", "wedges"]),
     st.sampled_from([2.0, 10.0, 30.0]),
@@ -117,20 +114,3 @@ def test_bounding_boxes_hold_the_shape(shape):
     for form in model.forms:
         deep = form.depth(x)
         assert (body(shape).field(x)[deep > 1e-9] <= 1e-9).all()
-
-
-def _narrow(concave):
-    """Two grooves, or two bumps, whose arcs all but meet: the tangents of each cross the other's."""
-    if concave:
-        return shapes.groove_block(SweptArc(12.0, 1.9, 40.0), 90.0, 30.0, others=[(24.02, 12.0, 1.9)])
-    foot = -12.0 * math.sin(0.6)
-    bumps = [Arc((x, 0.0), 12.0, -0.6, math.pi + 0.6) for x in (12.01, -12.01)]
-    outline = Profile.of((-40.0, foot), (-40.0, -20.0), (40.0, -20.0), (40.0, foot), *bumps)
-    return shapes.Solid("bumps", (Extrusion(outline, "Z", -20.0, 20.0),))
-
-
-def _points_of(rod):
-    """Points (n, 3) of a cylinder: on its axis, and on circles that fill it."""
-    r, turn = rod.radius * np.array([0.0, 0.5, 1.0]), np.linspace(0.0, 2.0 * math.pi, 49)[1:]
-    grid = np.array(list(itertools.product(r, turn, rod.length * np.linspace(-0.5, 0.5, 25))))
-    return np.column_stack([grid[:, 0] * np.cos(grid[:, 1]), grid[:, 0] * np.sin(grid[:, 1]), grid[:, 2]])

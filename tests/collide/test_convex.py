@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from clamp3d.collide.convex import Rod, convex_distance
 from clamp3d.collide.convex_depth import convex_depth
 from clamp3d.collide.hull import Hull, hull
 from clamp3d.core.pose import inverse, rotation, to_target, translation
-from clamp3d.testing import directions
 from tests.hulls import apart
 
 HERE = np.eye(4)
@@ -59,7 +57,7 @@ def some_pair(seed):
     return a, b, translation(*((reach + rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6.0, 0.5)) * n)) @ T
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(24))
 def test_the_signed_distance_of_two_pieces(seed):
     """Between bounds that hold, sharp where they are apart, with points of both pieces and the normal between them."""
     a, b, T = some_pair(seed)
@@ -86,32 +84,6 @@ def test_the_signed_distance_of_two_pieces(seed):
         assert least <= found.upper + 1e-8
 
 
-@pytest.mark.parametrize("count", [4, 9, 60])
-def test_edges_and_planes_of_a_hull(count):
-    """Against Qhull: its planes, and between them Euler's count of edges; near a direction what faces it is kept."""
-    made = hull(np.random.default_rng(count).normal(size=(count, 3)))
-    truth = ConvexHull(made.vertices)
-    planes = np.unique(truth.equations.round(9), axis=0)
-    assert np.unique(made.planes.round(9), axis=0) == pytest.approx(planes, abs=2e-9)
-    assert len(made.edges) == len(made.vertices) + len(made.faces) - 2
-    for n in directions(12):
-        V, E, F = made.near(n)
-        top = made.vertices @ n
-        if len(made.vertices) <= 40:
-            assert (len(V), len(E), len(F)) == (len(made.vertices), len(made.edges), len(made.faces))
-            continue
-        high = top >= top.max() - 0.01 * np.ptp(top)
-        assert {*map(tuple, V)} == {*map(tuple, made.vertices[high])}
-        assert len(E) == sum(high[list(edge)].any() for edge in made.edges)
-        assert len(F) == sum(high[list(face)].any() for face in made.faces)
-    assert len(CUBE.edges) == 12
-    assert len(CUBE.planes) == 6
-    with pytest.raises(ValueError, match="one plane"):
-        hull(to_target(TURNED, np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)])))
-    with pytest.raises(ValueError, match="one plane"):
-        hull(np.array([(0, 0, 0), (1, 1, 1), (2, 2, 2), (3, 3, 3)]))
-
-
 def test_what_is_left_before_a_plane():
     rng = np.random.default_rng(1)
     for _ in range(20):
@@ -130,36 +102,10 @@ def test_what_is_left_before_a_plane():
     assert CUBE.clipped(np.array([0.0, 0.0, 1.0, -3.0])) is None
 
 
-@pytest.mark.parametrize(
-    ("T", "unique"),
-    [
-        (translation(0.0, 0.0, 7.0), False),  # face to face
-        (translation(0.0, 0.0, 7.0) @ rotation((1.0, 0.0, 0.0), 0.2), False),  # an edge along a face
-        (translation(0.0, 0.0, 8.0) @ rotation((1.0, 2.0, 3.0), 0.4), True),
-        (translation(6.0, 0.0, 0.0) @ rotation((1.0, 0.0, 0.0), 0.4) @ rotation((0.0, 0.0, 1.0), 0.5), False),
-        (translation(0.0, 0.0, 7.0) @ rotation((1.0, 2.0, 0.0), 1e-7), None),  # rounding decides
-    ],
-)
-def test_whether_the_nearest_points_are_the_only_ones(T, unique):
-    assert convex_distance(CUBE, HERE, CUBE, T).unique is unique
-
-
-@pytest.mark.parametrize(
-    ("T", "unique"),
-    [
-        (translation(0.0, 0.0, 7.0), False),  # an end over a face
-        (translation(0.0, 0.0, 7.0) @ rotation((1.0, 0.0, 0.0), 0.5 * math.pi), False),  # its side along a face
-        (translation(0.0, 0.0, 9.0) @ rotation((1.0, 0.0, 0.0), 0.4), True),  # the lowest point of a rim
-    ],
-)
-def test_whether_the_nearest_points_of_a_cylinder_are_the_only_ones(T, unique):
-    assert convex_distance(CUBE, HERE, Rod(1.0, 4.0, HERE), T).unique is unique
-
-
 def test_points_of_boxes_and_cylinders_attest_their_distance():
     """Of nearly parallel ones too: the points are in the pieces and no further apart than is said, to rounding."""
     rng, seen = np.random.default_rng(0), 0
-    for _ in range(250):
+    for _ in range(120):
         a, b = (
             Rod(*rng.uniform(1.0, 9.0, 2), HERE)
             if rng.random() < 0.55
@@ -176,7 +122,7 @@ def test_points_of_boxes_and_cylinders_attest_their_distance():
         assert np.linalg.norm(q - p) <= found.upper + 1e-13
         assert min(a.depth(p[None])[0], b.depth(to_target(inverse(T), q)[None])[0]) >= -1e-11
         assert found.upper - found.lower <= 5e-7
-    assert seen > 150
+    assert seen > 70
 
 
 @pytest.mark.parametrize("tilt", [0.0, 8e-10, -8e-10])
@@ -187,18 +133,3 @@ def test_the_depth_of_cylinders_that_lean_by_less_than_counts_as_parallel(tilt):
     truth = -0.1 - 10.0 * abs(tilt)
     assert found.lower - 1e-14 <= truth <= found.upper + 1e-14
     assert found.upper - found.lower <= 40.0 * abs(tilt) + 1e-12
-
-
-def test_the_depth_of_parallel_cylinders_is_known_to_rounding():
-    """Of two discs end on end: against sums without rounding."""
-    rng = np.random.default_rng(12)
-    for _ in range(200):
-        (r, s), (length, other), off = (
-            rng.uniform(30.0, 60.0, 2).tolist(),
-            rng.uniform(5.0, 10.0, 2).tolist(),
-            rng.uniform(1.0, 5.0),
-        )
-        found = convex_depth(Rod(r, length, HERE), HERE, Rod(s, other, HERE), translation(0.0, 0.0, off))
-        depth = (Fraction(length) + Fraction(other)) / 2 - Fraction(off)
-        assert found.lower <= -depth <= found.upper
-        assert found.upper - found.lower < 5e-12

@@ -41,15 +41,6 @@ def test_poses(text):
     np.testing.assert_allclose(pose_of(text), expected, atol=2e-6)
 
 
-def test_roll_pitch_yaw_turn_about_fixed_axes_in_this_order():
-    # Roll 90 takes y to z, then pitch 90 takes z to x: y ends on x.
-    np.testing.assert_array_equal(pose_of("rpy_deg = [90, 90, 0]")[:3, 1], [1, 0, 0])
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_euler("xyz", [10, 20, 30], degrees=True).as_matrix()
-    np.testing.assert_allclose(pose_of("rpy_deg = [10, 20, 30]")[:3, :3], turn, atol=1e-15)
-
-
 def test_every_kind_of_part(tmp_path):
     import trimesh
 
@@ -219,22 +210,6 @@ def test_open_and_unreadable_meshes(tmp_path):
         parse_scene(table.format("junk"), folder=tmp_path)
     with pytest.raises(InputError, match="no such file"):
         load_scene(Path(tmp_path / "missing.toml"))
-
-
-def test_a_file_is_read_once_for_each_way_to_read_it(tmp_path, monkeypatch):
-    import trimesh
-
-    from clamp3d.scenefile import tables
-
-    trimesh.creation.box((10, 10, 10)).export(tmp_path / "cube.stl")
-    asked = []
-    read = tables.read_parts
-    monkeypatch.setattr(tables, "read_parts", lambda path, reader: asked.append(reader.unit) or read(path, reader))
-    table = '[parts.{}]\nfile = "cube.stl"\nunit = "{}"\npose = {{ translation = [{}, 0, 0] }}\n'
-    text = "".join(table.format(*row) for row in (("a", "mm", 0), ("b", "mm", 20), ("c", "cm", 300), ("d", "mm", 40)))
-    scene = parse_scene(text, folder=tmp_path)
-    assert asked == ["mm", "cm"]
-    assert [part.T_world[0, 3] for part in scene.parts] == [0.0, 20.0, 300.0, 40.0]
 
 
 @pytest.mark.parametrize("size", [1e-300, 1.0, 1e308])

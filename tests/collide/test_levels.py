@@ -142,16 +142,6 @@ def test_a_cylinder_on_facets(i, radius, length, T):
         assert found.upper >= -depths(mesh, MODELS.model(rod).outer(0.001), T, 6000) - 0.05 * radius - 0.1
 
 
-def test_a_pin_in_a_hole_of_facets_is_measured_from_its_axis():
-    plate = faceted_shape(shapes.box((40.0, 40.0, 8.0), holes=[shapes.Hole(5.0)]), 0.01)
-    flats = surface(plate)
-    (hole,) = (min(np.hypot(x, y) for x, y, _ in sampled(flats, 60_000)) for _ in range(1))
-    found = rods_distance(flats, MODELS.model(shapes.cylinder(4.5, 30.0)).bodies, np.eye(4))
-    assert found.lower == pytest.approx(found.upper, abs=1e-6)
-    assert found.lower <= hole - 4.5 + 1e-9
-    assert found.upper >= 0.48
-
-
 # --- Depth ------------------------------------------------------------------------------------------------------------
 
 

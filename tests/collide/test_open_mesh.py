@@ -29,16 +29,6 @@ def row(a, b, T, **scene):
     return check(Scene(**scene).add("a", a).add("b", b, T), distances=True).pairs[0]
 
 
-@pytest.mark.parametrize(
-    "other", [shapes.box((4, 4, 4)), opened(trimesh.creation.box((4, 4, 4)), 3), shapes.cylinder(2, 4)]
-)
-def test_apart_the_distance_is_that_of_the_surfaces(other):
-    found = row(CUP, other, translation(8.0, 0.5, 0.3), clearance=2.0)
-    assert found.verdict.value == "clearance"
-    assert found.distance.lower <= 1.0 <= found.distance.upper < 1.0 + 1e-9
-    assert "inside of open" in found.distance.method
-
-
 def test_what_an_open_mesh_may_hold_is_not_said_to_be_clear():
     found = row(CUP, shapes.box((4, 4, 4)), np.eye(4))
     assert found.verdict.value == "uncertain"
@@ -71,8 +61,7 @@ def tube():
     return shapes.MeshShape(make_mesh(V, F), "off", "tube")
 
 
-@pytest.mark.parametrize("moving", ["bead", "tube"])
-@pytest.mark.parametrize(("start", "way"), [(-100.0, 400.0), (-100.0, 200.0), (-900.0, 1000.0)])
+@pytest.mark.parametrize(("moving", "start", "way"), [("bead", -100.0, 400.0), ("tube", -900.0, 1000.0)])
 def test_what_goes_through_an_open_mesh_is_not_said_to_be_clear_on_the_way(moving, start, way):
     scene = Scene().add("tube", tube()).add("bead", shapes.box((3, 3, 3)), translation(0.3, 0.2, start))
     go = Motion.translate((0.0, 0.0, way if moving == "bead" else -way), parts=moving)
@@ -124,13 +113,6 @@ def test_no_move_shorter_than_its_depth_ends_a_crossing(drawn):
         t = T[:3, 3] + way / np.linalg.norm(way) * depth * 0.999
         moved = fcl.CollisionObject(b.bvh, fcl.Transform(T[:3, :3], t))
         assert fcl.collide(still, moved, fcl.CollisionRequest(), fcl.CollisionResult())
-
-
-def test_crossings_are_found():
-    """The depth is not merely zero: a nail right through a wall goes through it however it is moved a little."""
-    wall = Surface(np.array([[-9.0, -9, 0], [9, -9, 0], [0, 9, 0]]), np.array([[0, 1, 2]]))
-    nail = Surface(np.array([[0.0, 0, -2], [0.1, 0, -2], [0, 0, 3]]), np.array([[0, 1, 2]]))
-    assert _crossing(wall, nail, np.eye(4))[0] == pytest.approx(2.0, rel=1e-2)
 
 
 def test_bodies_that_share_an_edge_are_closed_and_a_doubled_wall_is_left_out():

@@ -4,25 +4,19 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from clamp3d.collide import check_motions
-from clamp3d.collide.broad import near_between
 from clamp3d.collide.check import check
 from clamp3d.collide.poses import check_poses
-from clamp3d.collide.scene import Part, Scene
+from clamp3d.collide.scene import Scene
 from clamp3d.core import shapes
-from clamp3d.core.motion import Motion
 from clamp3d.core.pose import translation
-from clamp3d.output.placed import place
 from clamp3d.output.scene_report import check_to_text
 from clamp3d.output.viewer import view
-from clamp3d.scenefile.parts import names_like
 
-SIZES = (150, 600)
+SIZES = (100, 400)
 BOX = shapes.box((10, 10, 10))
 PIN = shapes.cylinder(3, 12)
 
@@ -59,35 +53,6 @@ def allowed(scene: Scene) -> Scene:
     return scene
 
 
-def half_of_it_moves(scene: Scene) -> Scene:
-    names = tuple(part.name for part in scene.parts[::2])
-    return replace(scene, motions=(Motion.translate((0, 0, 500), parts=names),))
-
-
-def test_all_ways_of_a_motion_are_compared_with_the_standing_parts_at_once(monkeypatch):
-    boxes = []
-
-    def counted(ways, standing, reach):
-        boxes.append((len(ways.centre), len(standing.centre)))
-        return near_between(ways, standing, reach)
-
-    monkeypatch.setattr(check_motions, "near_between", counted)
-    check(half_of_it_moves(row_of_boxes(100)))
-    assert boxes == [(50, 50)]
-
-
-class Name(str):
-    """A name that counts how often it is compared with another."""
-
-    compared = 0
-
-    def __eq__(self, other: object) -> bool:
-        Name.compared += 1
-        return super().__eq__(other)
-
-    __hash__ = str.__hash__
-
-
 STEPS: dict[str, Callable[[Scene], object]] = {
     "add": lambda scene: row_of_boxes(len(scene.parts)),
     "allow": allowed,
@@ -108,21 +73,6 @@ def test_work_grows_with_the_parts(step):
     run(few)  # what is made once
     grown = calls(lambda: run(many)) / calls(lambda: run(few))
     assert grown <= 1.3 * SIZES[1] / SIZES[0], f"{step}: {grown:.1f} times the work for 4 times the parts"
-
-
-@pytest.mark.parametrize(
-    "run",
-    [
-        lambda names: names_like(["*"], names),
-        lambda names: names_like([str(name) for name in names], names),
-        lambda names: place(Scene(tuple(Part(name, BOX) for name in names))),
-        lambda names: place(Scene(tuple(Part(name, BOX) for name in names)), [str(name) for name in names]),
-    ],
-)
-def test_names_are_looked_up_not_searched_for(run):
-    before, names = Name.compared, [Name(f"p{k}") for k in range(100)]
-    run(names)
-    assert Name.compared - before <= 10 * len(names)
 
 
 def test_pages_grow_with_the_parts(tmp_path):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from shapely import Polygon
 
 from clamp3d.collide.check import check
-from clamp3d.collide.mesh_distance import meshes_distance, surface_distance
+from clamp3d.collide.mesh_distance import meshes_distance
 from clamp3d.collide.model import ModelCache
 from clamp3d.collide.scene import Scene
 from clamp3d.collide.surface import Surface, at_edges
@@ -20,9 +20,7 @@ from clamp3d.collide.verdict import Verdict
 from clamp3d.core import shapes
 from clamp3d.core.extrusion import Extrusion
 from clamp3d.core.mesh import make_mesh
-from clamp3d.core.meshing import enclosed, enclosing
 from clamp3d.core.pose import rotation, translation
-from clamp3d.core.primitives import SweptArc
 from clamp3d.core.profile import Profile
 
 
@@ -35,75 +33,6 @@ BRACKET = trimesh.creation.extrude_polygon(Polygon([(0, 0), (40, 0), (40, 5), (5
 
 def mesh_shape(made: trimesh.Trimesh, fit: str = "off") -> shapes.MeshShape:
     return shapes.MeshShape(make_mesh(made.vertices, made.faces), fit)
-
-
-@settings(max_examples=60, deadline=None)
-@given(point=st.tuples(*[st.floats(-50.0, 60.0)] * 3))
-def test_nearest_point_of_a_mesh_is_exact(point):
-    """Against every triangle, one by one."""
-    surface = Surface(np.array(BRACKET.vertices), np.array(BRACKET.faces))
-    x = np.array(point)
-    (found,), (face,), (foot,) = surface.nearest(x[None])
-    feet = trimesh.triangles.closest_point(BRACKET.triangles, np.repeat(x[None], len(BRACKET.faces), axis=0))
-    assert found == pytest.approx(np.linalg.norm(feet - x, axis=1).min(), abs=1e-12)
-    assert np.linalg.norm(foot - feet[face]) < 1e-9
-
-
-GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
-PARTS = (
-    shapes.cylinder(5.0, 20.0),
-    shapes.cylinder(5.0, 20.0, bore=4.8),
-    shapes.box((30.0, 20.0, 8.0), holes=[shapes.Hole(3.0, (5.0, 0.0)), shapes.Hole(2.0, (0.0, 0.0), "y")]),
-    shapes.groove_block(GROOVE, 40.0, 20.0, holes=[shapes.Hole(2.0, (13.0, -10.0))]),
-)
-
-
-@settings(max_examples=40, deadline=None)
-@given(part=st.sampled_from(PARTS), error=st.sampled_from([0.5, 0.1, 0.02]), seed=st.integers(0, 2**32 - 1))
-def test_a_drawn_part_lies_between_its_meshes(part, error, seed):
-    """Points of the inner mesh are in the part, points outside of the outer one are not: by the closed form."""
-    forms = ModelCache().model(part).bodies
-    rng = np.random.default_rng(seed)
-
-    def depth(points):
-        return np.max([form.depth(points) for form in forms], axis=0)
-
-    outer, inner = (Surface(*made(part, error)) for made in (enclosing, enclosed))
-    on_inner = trimesh.Trimesh(inner.vertices, inner.faces, process=False).sample(200, seed=int(rng.integers(2**31)))
-    assert depth(np.vstack([on_inner, inner.vertices])).min() >= -1e-9
-    points = rng.uniform(outer.box[0] - 0.1, outer.box[1] + 0.1, (400, 3))
-    assert (outer.contains(points) >= (depth(points) > 1e-9)).all()
-
-
-@settings(max_examples=25, deadline=None)
-@given(
-    tilt=st.floats(0.0, 1.5),
-    turn=st.floats(0.0, 3.0),
-    gap=st.floats(-6.0, -1.0).map(lambda e: 10.0**e),
-    error=st.sampled_from([0.5, 0.06]),
-)
-def test_bounds_of_meshes_hold_at_any_angle(tilt, turn, gap, error):
-    """A tube cut open at its end by a plate, at every tilt: the support function says how far the rim reaches."""
-    tube, plate = shapes.cylinder(5.0, 20.0, bore=4.9), shapes.box((80.0, 80.0, 4.0))
-    R = rotation([0.0, 1.0, 0.0], tilt) @ rotation([0.0, 0.0, 1.0], turn)
-    reach = 10.0 * math.cos(tilt) + 5.0 * math.sin(tilt)
-    T = translation(0.0, 0.0, 2.0 + reach + gap) @ R
-    cache = ModelCache()
-    found = meshes_distance(cache.model(plate), cache.model(tube), T, error, SHARP)
-    assert found.lower <= gap + 1e-9
-    assert found.upper >= gap - 1e-9
-    if found.point_b is not None and gap > 0.0:
-        assert abs(found.point_a[2]) <= 2.0 + 1e-9
-
-
-@pytest.mark.parametrize("fit", ["off", "round"])
-def test_a_box_on_the_inner_face_of_a_bracket_touches(fit):
-    scene = (
-        Scene().add("bracket", mesh_shape(BRACKET, fit)).add("box", shapes.box((10, 10, 10)), translation(20, 10, 10))
-    )
-    (row,) = check(scene).pairs
-    assert row.verdict is Verdict.CONTACT
-    assert row.distance.upper - row.distance.lower < 1e-6
 
 
 @settings(max_examples=30, deadline=None)
@@ -147,23 +76,6 @@ def test_a_round_bar_in_a_round_hole_whose_facets_differ(radius, verdict):
     bar = trimesh.creation.cylinder(radius=radius, height=20.0, sections=200)
     scene = Scene().add("plate", mesh_shape(plate)).add("bar", mesh_shape(bar), rotation([0, 0, 1], 0.01))
     assert check(scene, pairs=[("plate", "bar")]).verdict("plate", "bar").value == verdict
-
-
-def test_a_mesh_wholly_inside_another_overlaps_and_one_in_its_cavity_does_not():
-    ball = trimesh.creation.icosphere(subdivisions=2, radius=1.0)
-    shell = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
-    core = trimesh.creation.icosphere(subdivisions=3, radius=5.0)
-    full = Surface(np.array(shell.vertices), np.array(shell.faces))
-    hollow = Surface(
-        np.vstack([shell.vertices, core.vertices]), np.vstack([shell.faces, core.faces[:, ::-1] + len(shell.vertices)])
-    )
-    small = Surface(np.array(ball.vertices), np.array(ball.faces))
-    for a, b, T in ((full, small, translation(2, 0, 0)), (small, full, translation(-2, 0, 0))):
-        found = surface_distance(a, b, T, SHARP)
-        assert found.upper < -6.0
-    apart = surface_distance(hollow, small, translation(0, 0, 1), SHARP)
-    assert apart.lower == pytest.approx(3.0, abs=0.1)
-    assert surface_distance(hollow, small, translation(7.5, 0, 0), SHARP).upper < 0.0
 
 
 def test_flat_faces_of_a_part_with_a_hole_stay_exact():

@@ -78,28 +78,6 @@ def test_a_cylinder_that_turns_near_a_plate(radius, length, angle, beside, axis,
         assert low <= least + 1e-9
 
 
-@settings(SLOW, max_examples=10)
-@given(
-    st.floats(1.0, 30.0), st.floats(0.3, 3.0), st.floats(0.5, 3.0), st.booleans(), st.booleans(), st.floats(0.0, 1.0)
-)
-@example(20.0, 2.0, 2.9, False, False, 0.25)
-@example(20.0, 2.0, 2.9, True, False, 0.25)
-def test_what_swings_past_strays_from_straight_lines(arm, size, angle, pin, mesh, when):
-    """A body on an arm about z passes a wall that stands off its highest point: between two places it is on its arc."""
-    moving = shapes.cylinder(size, 2.0 * size) if pin else shapes.box((size, size, size))
-    wall = shapes.box((200.0, 2.0, 50.0))
-    T_wall = translation(0.0, arm + 1.5 * size + 1.1, 0.0)
-    way = Motion.screw((0.0, 0.0, 1.0), angle)
-    start = rotation((0.0, 0.0, 1.0), -when * angle) @ translation(0.0, arm, 0.0)
-    stretch = [np.linalg.inv(T_wall) @ pose_at(way, t, start) for t in (0.0, 0.5, 1.0)]
-    shape = faceted_shape(moving, 0.3) if mesh else moving
-    low = swept_lower(CACHE.model(wall), CACHE.model(shape), *stretch, angle=0.5 * angle)
-    for t in (when, *np.linspace(0.0, 1.0, 21)):
-        P = pose_at(way, t, start)
-        reach = size if pin else 0.5 * size * np.abs(P[1, :3]).sum()
-        assert low <= T_wall[1, 3] - 1.0 - (P[1, 3] + reach) + (0.3 if mesh and pin else 0.0) + 1e-9
-
-
 @pytest.mark.parametrize("seed", [177, 414, 431, 527, 485])
 def test_turns_that_are_carried_across_their_axis(seed):
     """Travel can cancel the turn: the places are close to each other, and the bow between them is deep all the same."""
@@ -138,7 +116,7 @@ def test_least_distances_of_a_groove_and_a_cylinder(groove, wire, way, start):
 
 
 @pytest.mark.parametrize("outer", [shapes.box((60.0, 60.0, 60.0)), faceted_shape(shapes.box((60.0, 60.0, 60.0)), 0.3)])
-@pytest.mark.parametrize("inner", [DRAWN[0], FACETED[0], FACETED[4], FACETED[5]])
+@pytest.mark.parametrize("inner", [DRAWN[0], FACETED[4]])
 def test_what_is_inside_all_the_time_overlaps_all_the_time(inner, outer):
     """No surface meets another on the way, and yet there is no clearance at any time, and contact from the start."""
     for way in (Motion.translate((3.0, 2.0, -1.0)), Motion.screw((1.0, 2.0, 3.0), 0.4)):
@@ -153,7 +131,7 @@ def test_what_is_inside_all_the_time_overlaps_all_the_time(inner, outer):
             assert swept_lower(CACHE.model(a), CACHE.model(b), *stretch, angle=0.5 * way.angle) <= 0.0
 
 
-@settings(SLOW, max_examples=30)
+@settings(SLOW, max_examples=8)
 @given(st.floats(0.01, 0.99), st.floats(100.0, 2000.0), st.floats(0.05, 1.0), st.sampled_from([0, 1, 2]), st.booleans())
 @example(0.51, 1000.0, 0.5, 0, False)
 @example(0.49, 1000.0, 0.5, 1, True)
