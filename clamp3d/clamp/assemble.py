@@ -262,7 +262,7 @@ def _undeclared(clamp: Clamp, contacts: Sequence[Contact], log: Log) -> tuple[Di
         if c.declared == 0 and c.type
     }
     waiting = [pair for pair in PAIRS if clamp.connection(*pair) == 0 and pair not in touching]
-    met = meetings(clamp, log.path, waiting)
+    met = meetings(clamp, log.path, waiting, log.cache)
     on_the_way = (Difference(*pair, 0, 2, None, None, where) for pair, where in met.items())
     return (*touching.values(), *on_the_way)
 

@@ -13,29 +13,37 @@ from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.surfaces import TOUCHING
+from clamp3d.collide.model import ModelCache
 from clamp3d.collide.motions import first_contact
+from clamp3d.collide.moving_pair import MovingPair
 from clamp3d.core.motion import Motion
 from clamp3d.core.pose import inverse
 from clamp3d.core.shapes import Solid
 
 
-def meetings(clamp: Clamp, path: Sequence[Waypoint], pairs: Sequence[Pair]) -> dict[Pair, str]:
+def meetings(clamp: Clamp, path: Sequence[Waypoint], pairs: Sequence[Pair], cache: ModelCache) -> dict[Pair, str]:
     """Those of ``pairs`` that touch or overlap anywhere on ``path``, with the step in which each does so first."""
     waiting, solids, met = list(pairs), parts(clamp), {}
     for before, after in itertools.pairwise(path):
-        for pair in _meet(solids, before, after, waiting):
+        for pair in _meet(solids, before, after, waiting, cache):
             met[pair] = f"{after.step} ({after.label})"
         waiting = [pair for pair in waiting if pair not in met]
     return met
 
 
-def _meet(solids: dict[PartName, Solid], before: Waypoint, after: Waypoint, pairs: Sequence[Pair]) -> Iterator[Pair]:
+def _meet(
+    solids: dict[PartName, Solid], before: Waypoint, after: Waypoint, pairs: Sequence[Pair], cache: ModelCache
+) -> Iterator[Pair]:
     """Those of ``pairs`` that meet between two waypoints: each goes by one screw from pose to pose of the other."""
     for a, b in pairs:
         start, end = (inverse(w.poses[a].T()) @ w.poses[b].T() for w in (before, after))
         if np.array_equal(start, end) or _stay_apart(solids, before, after, (a, b)):
             continue
-        if first_contact(solids[a], solids[b], Motion.to_pose(end), start, margin=TOUCHING).touches is not False:
+        motion = Motion.to_pose(end)
+        way = MovingPair(cache.model(solids[b]), cache.model(solids[a]), motion.resolved(start), start, np.eye(4))
+        if way.first_time(TOUCHING) is None:  # how near they come otherwise does not matter
+            continue
+        if first_contact(solids[a], solids[b], motion, start, margin=TOUCHING).touches is not False:
             yield a, b
 
 

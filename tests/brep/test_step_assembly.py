@@ -173,3 +173,24 @@ def test_a_text_that_begins_again_and_again_is_read_once(tmp_path, before, again
     file.write_text(f"ISO-10303-21;{before}{400_000 * again}END-ISO-10303-21;")
     with pytest.raises(InputError, match=told):
         announced(file)
+
+
+def test_coloured_and_layered_faces_are_read(tmp_path):
+    """Colours and layers put labels without a name below a part."""
+    from OCP.Quantity import Quantity_Color, Quantity_NameOfColor
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
+
+    tree = Tree()
+    box = BRepPrimAPI_MakeBox(10.0, 10.0, 10.0).Shape()
+    label = tree.product("box", box)
+    face = tree.tool.AddSubShape(label, TopExp_Explorer(box, TopAbs_ShapeEnum.TopAbs_FACE).Current())
+    red = Quantity_Color(Quantity_NameOfColor.Quantity_NOC_RED)
+    XCAFDoc_DocumentTool.ColorTool_s(tree.document.Main()).SetColor(face, red, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
+    XCAFDoc_DocumentTool.LayerTool_s(tree.document.Main()).SetLayer(label, TCollection_ExtendedString("outer"))
+    scene = load(tree.write(tmp_path / "coloured.step"))
+    assert [part.name for part in scene.parts] == ["box"]
+    mesh = scene.parts[0].shape.mesh
+    assert volume(mesh.vertices, mesh.faces) == pytest.approx(1000.0)

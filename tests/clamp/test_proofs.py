@@ -14,6 +14,7 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.meetings import meetings
 from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.section import D, Section
+from clamp3d.collide.model import ModelCache
 from clamp3d.core.pose import SectionPose
 from clamp3d.errors import SolverError
 from clamp3d.testing import assert_returns
@@ -81,9 +82,9 @@ def test_a_splint_that_turns_past_a_wire_meets_it_between_two_waypoints():
 
     beside = (0.7 * reach, 0.0)
     turned = path(0.9, -0.9, beside)  # the splint lies along x when it is level
-    assert meetings(clamp, turned, [("P1", "P6")]) == {("P1", "P6"): "P1 (after)"}
+    assert meetings(clamp, turned, [("P1", "P6")], ModelCache()) == {("P1", "P6"): "P1 (after)"}
     for pairs in itertools.permutations([("P1", "P6"), ("P1", "P5"), ("P1", "P4")]):  # the others are far away
-        assert meetings(clamp, turned, pairs) == {("P1", "P6"): "P1 (after)"}
+        assert meetings(clamp, turned, pairs, ModelCache()) == {("P1", "P6"): "P1 (after)"}
     away = path(0.9, -0.9, (0.7 * reach, 4.0 * reach))
-    assert meetings(clamp, away, [("P1", "P6")]) == {}
-    assert meetings(clamp, path(0.9, 0.9, beside), [("P1", "P6")]) == {}
+    assert meetings(clamp, away, [("P1", "P6")], ModelCache()) == {}
+    assert meetings(clamp, path(0.9, 0.9, beside), [("P1", "P6")], ModelCache()) == {}
