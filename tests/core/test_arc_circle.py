@@ -76,25 +76,6 @@ def test_end_points_by_fig_6(half_deg: int, share: float, end: str) -> None:
             assert contact.points == (pytest.approx((float(m[0]), float(m[1])), abs=1e-14),)
 
 
-@pytest.mark.parametrize(("offset", "gap"), [(0.05, 0.015), (0.065, 0.0), (0.0650001, -1e-7)])
-@pytest.mark.parametrize("turn_deg", [0, 37, -59])
-def test_tangency_near_equal_radii(offset: float, gap: float, turn_deg: float) -> None:
-    x, y = offset * math.sin(math.radians(turn_deg)), -offset * math.cos(math.radians(turn_deg))
-    assert arc_circle(R, MINOR, 6.935, x, y, tolerance=1e-10).gap == pytest.approx(gap, abs=2e-15)
-
-
-@pytest.mark.parametrize("half_deg", [1e-6, 1.0, 90.0, 179.999])
-def test_span_has_no_seam(half_deg: float) -> None:
-    """The gap is 1-Lipschitz in the centre: no jump at +-180 degrees, at M, at N or on the axis."""
-    half = math.radians(half_deg)
-    for radius in (1e-9, 3.0, 7.0, 12.0):
-        turns = np.linspace(-math.pi, math.pi, 2001)
-        gaps = [arc_circle(R, half, 2.0, radius * math.sin(t), -radius * math.cos(t), tolerance=0).gap for t in turns]
-        step = radius * (turns[1] - turns[0])
-        assert np.abs(np.diff(gaps)).max() <= step + 1e-13
-        assert gaps[0] == pytest.approx(gaps[-1], abs=1e-13)
-
-
 def test_tolerance_decides() -> None:
     for gap, tolerance, relation in (
         (1e-4, 1e-3, ArcRelation.INTERIOR_CONTACT),

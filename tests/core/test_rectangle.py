@@ -62,12 +62,6 @@ def test_equal_corners_do_not_hide_the_other_wall() -> None:
     assert contact.relation is HoleRelation.OVERLAP
 
 
-def test_bolt_that_fills_the_hole() -> None:
-    contact = hole_bolt(Rectangle(0.0, 0.0, 10.0, H), BOLT, tolerance=TOL)
-    assert contact.relation is HoleRelation.TWO_POINTS_TWO_SIDES
-    assert len(contact.points) == 4
-
-
 def test_bolt_that_ends_in_the_hole_meets_its_wall() -> None:
     """A short bolt's own corners count: its lower right corner touches the wall of the leaning hole."""
     t = math.radians(10.0)

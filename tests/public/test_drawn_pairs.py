@@ -32,6 +32,10 @@ APART = {
     "a cylinder on a box": (box((20, 20, 10)), cylinder(3, 15), translation(0, 0, 8.0625) @ QUARTER, 0.0625),
     "a pin in a tube": (TUBE, PIN, translation(0, 0, 3), 0.1),
     "a pin off the middle of a tube": (TUBE, PIN, translation(0.03, 0.04, 3), 0.05),
+    "a pin askew in a tube": (
+        cylinder(8, 20, bore=5.05), cylinder(5, 30), rotation((1, 0, 0), 0.002),
+        math.cos(0.002) * (5.05 - 10 * math.tan(0.002)) - 5,
+    ),
     "a pin in a hole": (PLATE, cylinder(3.75, 20), translation(3, 2, 1), 0.25),
     "a wire in its groove": (BLOCK, WIRE, np.eye(4), 0.065),
     "a wire low in its groove": (BLOCK, WIRE, translation(0, -0.0649, 0), 1e-4),

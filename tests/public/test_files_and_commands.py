@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from clamp3d import InputError, Scene, assemble, check, export, load, load_scene, report, view
+from clamp3d import InputError, Scene, assemble, check, export, load, report, view
 from clamp3d.kernel import rotation, translation
 from clamp3d.shapes import Hole, SweptArc, box, cylinder, groove_block
 
@@ -232,15 +232,6 @@ def test_an_undecided_pair_ends_with_3_and_is_not_said_to_be_clean(tmp_path, mai
     code, out, _ = main("check", tmp_path, "--quiet")
     assert code == 3
     assert "uncertain" in out or "undecided" in out
-
-
-@pytest.mark.parametrize("example", ["hinge", "pipe-clip", "v-block"])
-def test_scene_files_and_their_cad_files(example):
-    scene = load_scene(EXAMPLES / example / "scene.toml")
-    result = check(scene)
-    assert len(result.pairs) + len(result.motions) > 0
-    assert not {row.verdict.value for row in result.rows} & {"failed"}
-    assert result.to_dict()["counts"] == result.counts
 
 
 def test_help_lists_the_commands():

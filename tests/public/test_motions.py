@@ -71,7 +71,7 @@ CLEARANCES = {
     "wire to the bottom": (BLOCK, WIRE, Motion.translate((0, -30, 0)), translation(0, 30, 0), 0.065),
     "pin through a tube": (TUBE, PIN, Motion.translate((0, 0, -240)), translation(0, 0, 120), 0.1),
     "pin beside the middle": (TUBE, PIN, down(240), translation(0.03, -0.04, 120), 0.05),
-    "turning pin in a tube": (TUBE, PIN, Motion.screw((0, 0, 1), 3.0, travel=4.0), translation(0.06, 0, 0), 0.04),
+    "turning pin in a tube": (TUBE, PIN, Motion.screw((0, 0, 1), 4.0, point=(0.03, 0, 0), travel=4.0), np.eye(4), 0.04),
     "box past a box": (
         box((10, 10, 10)), box((4, 4, 4)), Motion.translate((40, 0, 0)), translation(-20, 7.25, 0), 0.25,
     ),

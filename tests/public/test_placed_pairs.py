@@ -10,6 +10,8 @@ from clamp3d import check, load
 from tests.public.placed_pairs import FAMILIES, SOLIDS, PlacedPair, duplicate, judge, placed_pair, write_pairs
 
 GAPS = (2e-4, 0.0103, -5e-3, -0.03)  # scripts/check-placed asks for many more
+SLOW = {"ring_in_groove", "ball_in_ring"}
+"""Families of free-form faces: one gap on either side of the contact threshold."""
 
 
 def checked(pairs, folder):
@@ -21,7 +23,9 @@ def checked(pairs, folder):
 @pytest.mark.parametrize("family", [family for family in FAMILIES if family != "duplicate"])
 def test_no_verdict_is_wrong_and_every_pair_is_decided(family, tmp_path):
     rng = np.random.default_rng(list(FAMILIES).index(family))
-    counts, lines = checked([placed_pair(family, rng, gap, splines=0.0) for gap in GAPS], tmp_path)
+    counts, lines = checked(
+        [placed_pair(family, rng, gap, splines=0.0) for gap in (GAPS[1:3] if family in SLOW else GAPS)], tmp_path
+    )
     assert counts[family]["wrong"] == 0, lines
     assert counts[family]["uncertain"] == 0, lines
 
