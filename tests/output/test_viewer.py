@@ -213,7 +213,7 @@ def test_scene_with_a_motion_stops_at_first_contact_and_marks_it():
 
 
 def test_a_clean_clamp_has_notes_and_no_findings():
-    """Two holes are wider than the bolt that the matrix says touches them: nothing that anybody has to mend."""
+    """Two holes are wider than the bolt that the matrix says touches them: no issue."""
     with view("reference", serve=False) as viewer:
         assert viewer.story["findings"] == []
         page = viewer.html()
