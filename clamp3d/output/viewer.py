@@ -56,7 +56,7 @@ CLEARANCE = 5.0
 """Gap in mm from which two parts of a clamp count as clear."""
 _LISTED = 500
 """Rows of a table on the page; a result's JSON has all."""
-_SEVERITY = {"error": "clash", "warning": "contact", "note": "clear"}
+_SEVERITY = {"error": "clash", "warning": "contact"}
 """The verdict whose colour a finding of an assembly has."""
 MEASURED = 40
 """Scenes of up to so many parts are measured pair by pair, larger ones only as far as their verdicts need."""
@@ -203,8 +203,15 @@ class Viewer:
         self._drawing.forces(len(self._waypoints) - 1, forces)
         worst = {finding.severity for finding in run.findings}
         state = "found" if "error" in worst else "note" if "warning" in worst else "clean"
-        findings = [self._assembly_finding(k, finding) for k, finding in enumerate(run.findings)]
-        return {"text": run.status, "state": state, "assembly": run, "forces": forces, "findings": findings}
+        grave = [finding for finding in run.findings if finding.severity != "note"]
+        return {
+            "text": run.status,
+            "state": state,
+            "assembly": run,
+            "forces": forces,
+            "findings": [self._assembly_finding(k, finding) for k, finding in enumerate(grave)],
+            "notes": [finding.text for finding in run.findings if finding.severity == "note"],
+        }
 
     def _finish_check(self, result: CheckResult) -> dict[str, Any]:
         """What the page says of a checked scene."""

@@ -242,6 +242,7 @@ def test_limits_are_where_it_no_longer_closes(final):
         turns[:, k] = [end * share for share in (1.0 - 1e-6, 1.0 + 1e-6) for end in (limit.low, limit.high)]
         opening, in_grooves = close_on(final, "P6", turns)
         assert (in_grooves & (opening <= found.seat_tolerance)).tolist() == [True, True, False, False]
+    assert [limit.reach for limit in found.limits] == [0.1, 0.05]
     narrow = placement(columns=4, yaw=0.01, pitch=0.001).limits
     assert [(limit.low, limit.high) for limit in narrow] == [(-0.01, 0.01), (-0.001, 0.001)]
 

@@ -104,9 +104,17 @@ def test_limits_come_from_the_file(tmp_path):
         load_clamp(file)
 
 
-@pytest.mark.parametrize(("torque", "friction"), [(0.0, (0.1,)), (math.nan, (0.1,)), (80.0, (0.0,)), (80.0, ())])
-def test_bad_values(run, torque, friction):
-    with pytest.raises(InputError):
+@pytest.mark.parametrize(
+    ("torque", "friction", "message"),
+    [
+        (0.0, (0.1,), "torque must be > 0 and at most 1e6 Nm, got 0"),
+        (math.nan, (0.1,), "torque must be a finite number, got nan"),
+        (80.0, (0.0,), "friction must be > 0 and at most 1, got 0$"),
+        (80.0, (), "friction must be > 0 and at most 1, got nothing"),
+    ],
+)
+def test_bad_values(run, torque, friction, message):
+    with pytest.raises(InputError, match=message):
         tighten(run, torque, friction=friction)
 
 
@@ -114,6 +122,9 @@ def test_every_coefficient_names_its_source(run):
     sources = {c.name: c.source for c in tighten(run, 80.0).coefficients}
     assert "VDI 2230" in sources["torque terms"]
     assert sources["friction of wire and groove"].startswith("chosen")
+    values = {c.name: c.value for c in tighten(run, 80.0, friction=(0.15,), groove_friction=(0.3,)).coefficients}
+    assert values["friction of thread and nut face"] == "0.15"
+    assert values["friction of wire and groove"] == "0.3"
     given = {c.name: c.source for c in tighten(run, 80.0, groove_friction=(0.3,)).coefficients}
     assert given["friction of wire and groove"].startswith("given")
 
@@ -243,6 +254,9 @@ def test_certificates(finder):
         total = sum(f.force * f.direction[2] for f in end.forces if f.a == "P1")
         assert total == pytest.approx(-1.0, abs=1e-6)  # the up splint takes the bolt's whole force
         assert (end.distance + beyond * MARGIN) not in band
+    written = band.to_dict()
+    assert written["least"]["weakest"]["drive"] == band.least.weakest.drive
+    assert written["greatest"]["distance_mm"] == band.greatest.distance
     section, q = finder.section, finder.final.q
     assert Balance(section, q, 0.1).refute().drive < 1e-7  # in equilibrium there is no such motion
 

@@ -212,6 +212,15 @@ def test_scene_with_a_motion_stops_at_first_contact_and_marks_it():
     assert end["high"][2] == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_clean_clamp_has_notes_and_no_findings():
+    """Two holes are wider than the bolt that the matrix says touches them: nothing that anybody has to mend."""
+    with view("reference", serve=False) as viewer:
+        assert viewer.story["findings"] == []
+        page = viewer.html()
+    assert "Findings, worst first" not in page
+    assert page.count("but does not touch: 1.000 mm apart in the final state") >= 2
+
+
 def test_clash_at_rest_is_marked_where_it_is():
     scene = Scene(name="clash").add("a", shapes.box((10.0, 10.0, 10.0)))
     scene = scene.add("b", shapes.box((10.0, 10.0, 10.0)), translation(9.0, 1.0, 2.0))
