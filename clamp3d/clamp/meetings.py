@@ -41,9 +41,8 @@ def _meet(
             continue
         motion = Motion.to_pose(end)
         way = MovingPair(cache.model(solids[b]), cache.model(solids[a]), motion.resolved(start), start, np.eye(4))
-        if way.first_time(TOUCHING) is None:  # how near they come otherwise does not matter
-            continue
-        if first_contact(solids[a], solids[b], motion, start, margin=TOUCHING).touches is not False:
+        near = way.first_time(TOUCHING) is not None  # how near they come otherwise does not matter
+        if near and first_contact(solids[a], solids[b], motion, start, margin=TOUCHING).touches is not False:
             yield a, b
 
 

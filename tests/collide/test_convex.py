@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from clamp3d.collide.convex import Rod, convex_distance
+from clamp3d.collide.convex import Rod, _deepest, convex_distance
 from clamp3d.collide.convex_depth import convex_depth
 from clamp3d.collide.hull import Hull, hull
 from clamp3d.core.pose import inverse, rotation, to_target, translation
@@ -55,6 +55,15 @@ def some_pair(seed):
     n /= np.linalg.norm(n)
     reach = (corners(a, HERE) @ n).max() - (corners(b, T) @ n).min()
     return a, b, translation(*((reach + rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6.0, 0.5)) * n)) @ T
+
+
+def test_a_point_beside_a_piece_attests_no_overlap():
+    """Two boxes that touch; the point lies in one of them, and by rounding as far beside the other."""
+    off = 1e-9
+    corners_of = np.array([(x, y, z) for x in (-5.0, 5.0) for y in (-5.0, 5.0) for z in (-5.0, 5.0)])
+    box = hull(corners_of)
+    found = _deepest(box, HERE, box, translation(10.0, 0.0, 0.0), [np.array([5.0 + off, 0.0, 0.0])], -1.0, 1e-6)
+    assert 0.0 <= found.upper <= 4.0 * off
 
 
 @pytest.mark.parametrize("seed", range(24))
