@@ -21,6 +21,10 @@ from clamp3d.errors import InputError
             lambda c: replace(c, bolt=replace(c.bolt, diameter=60.0)),
             "Clamp: up_splint.hole_diameter must be > bolt.diameter = 60 mm, got 22",
         ),
+        (
+            lambda c: replace(c, line=Wire(diameter=300.0)),
+            "Clamp: line: the diameter must be less than twice up_splint.width = 137 mm, got 300; are both in mm?",
+        ),
     ],
 )
 def test_wrong_values_in_python_are_one_line_too(make, message):
