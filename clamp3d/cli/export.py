@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import click
 
 from clamp3d.cli.options import SEQUENCE, SOURCE, UNITS, Source, declared, option
+from clamp3d.cli.progress import bar
 from clamp3d.cli.terminal import finish, show
 
 if TYPE_CHECKING:
-    from clamp3d.collide.scene import Scene
+    from clamp3d.collide.result import CheckResult
     from clamp3d.output.export import Format, Layout
 
 FORMATS = ("stl", "obj", "ply", "glb", "3mf", "step")
@@ -40,6 +41,7 @@ def command(
     ),
     sequence: str | None = SEQUENCE,
     mesh_error: float = option("Chord error of meshes.", default=0.01, metavar="MM"),
+    clashes: bool = option("Check the parts, and add what clashing parts have in common as red bodies.", "--clashes"),
     file_unit: str | None = option("Unit of the file.  [default: mm; m for glb]", "--unit", type=click.Choice(UNITS)),
     quiet: bool = option("No messages.", "--quiet", "-q"),
 ) -> None:
@@ -52,14 +54,22 @@ def command(
     """
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.clamp.result import Assembly
+    from clamp3d.collide.scene import Scene
     from clamp3d.output.export import default_layout, destination, export
 
     chosen, file = destination(output, format)
-    loaded: Clamp | Scene | Assembly = source.load()
+    loaded: Clamp | Scene | Assembly | CheckResult = source.load()
     whole = file is not None or (layout or default_layout(chosen)) == "assembly"
     placed = isinstance(loaded, Clamp) and (whole or state is not None)
     if sequence is not None and not placed:
         raise click.UsageError("--sequence goes with a clamp, and with --state or one file for all parts")
+    if clashes:
+        if not isinstance(loaded, Scene):
+            raise click.UsageError("--clashes goes with a scene or a file with parts, not with a clamp")
+        from clamp3d.collide.check import check
+
+        with bar(quiet) as report:
+            loaded = check(loaded, depths=False, progress=report)
     if isinstance(loaded, Clamp) and placed:
         from clamp3d.clamp.assemble import assemble
         from clamp3d.clamp.states import state as find_state

@@ -13,6 +13,7 @@ from clamp3d import checks
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.states import state as find_state
+from clamp3d.collide.result import CheckResult
 from clamp3d.collide.scene import Scene
 from clamp3d.core.pose import Array
 from clamp3d.core.profile import check_mesh_error
@@ -22,6 +23,7 @@ from clamp3d.output.files import file_stem, write_files
 from clamp3d.output.manifest import manifest
 from clamp3d.output.mesh_formats import MILLIMETRES
 from clamp3d.output.placed import PlacedPart, PosedMesh, place, posed
+from clamp3d.output.shared_bodies import shared_bodies
 from clamp3d.output.step import step
 from clamp3d.scenefile.check import opened
 
@@ -81,6 +83,7 @@ def export(
     ----------
     source
         What `check` takes, or an assembled clamp at one of its states; the parts of a `Clamp` stay in their own frames.
+        Of a `CheckResult` also what clashing parts have in common, as red bodies named ``clash A - B``.
     path
         A file, whose suffix is the format (``out.step``), or a folder, which needs ``format``.
     format
@@ -119,11 +122,14 @@ def export(
     ...     [path.name for path in (*written.files, written.manifest)]
     ['pin.stl', 'pin.stl.manifest.json']
     """
+    result = source if isinstance(source, CheckResult) else None
     if not isinstance(source, Clamp):
-        source = opened(source)
+        source = opened(source if result is None else result.scene)
     target = _target(source, path, format, layout, unit, check_mesh_error(mesh_error))
     shown, settings = _at_state(source, state)
     placed = place(shown, names)
+    if result is not None:
+        placed += tuple(shared_bodies(result, placed, None if target.format == "step" else target.mesh_error))
     meshed = [] if target.format == "step" else posed(placed, target.mesh_error)
     files = _files(target, source.clamp.name if isinstance(source, Assembly) else source.name, placed, meshed)
     contents = {key: data for key, (data, _) in files.items()}

@@ -134,7 +134,7 @@ def _document(placed: Sequence[PlacedPart], title: str) -> Any:
     if tree:
         name(root, title)
     for item in placed:
-        label = shapes.AddShape(_exact(item), False)  # one product for all instances of a shape from CAD
+        label = shapes.AddShape(exact_solid(item), False)  # one product for all instances of a shape from CAD
         name(label, item.shape.name if instances[id(item.shape)] > 1 else item.label)
         r, g, b = (channel / 255 for channel in rgb(item.colour))
         colour = Quantity_Color(r, g, b, Quantity_TypeOfColor.Quantity_TOC_sRGB)
@@ -145,7 +145,7 @@ def _document(placed: Sequence[PlacedPart], title: str) -> Any:
     return document
 
 
-def _exact(item: PlacedPart) -> Any:
+def exact_solid(item: PlacedPart) -> Any:
     """The TopoDS_Shape of a part: drawn anew, or as it came from CAD. Raises InputError for a mesh."""
     if isinstance(item.shape, BrepSolid):
         return item.shape.solid

@@ -124,3 +124,17 @@ def test_an_order_of_assembly_is_exported_as_it_stands_after_a_step(clamp3d, tmp
     assert "sequence step 3, P7: no way" in capfd.readouterr().err
     assert not (tmp_path / "b").exists()
     assert clamp3d("export", "-f", "stl", "-o", tmp_path / "c", *order) == 2
+
+
+def test_clashes_are_exported_on_demand(clamp3d, tmp_path: Path) -> None:
+    """A scene file gives the bodies of its clashes; a clamp has none to give and is refused."""
+    (tmp_path / "scene.toml").write_text(
+        '[parts.a]\nshape = "box"\nsize = [10, 10, 10]\n[parts.b]\nshape = "box"\nsize = [10, 10, 10]\n'
+        "pose = { translation = [8, 0, 0] }\n",
+        encoding="utf-8",
+    )
+    assert clamp3d("export", tmp_path / "scene.toml", "--clashes", "-q", "--output", tmp_path / "out.glb") == 0
+    scene = trimesh.load(tmp_path / "out.glb")
+    assert set(scene.graph.nodes_geometry) == {"a", "b", "clash a - b"}
+    assert clamp3d("export", "--clashes", "-q", "--output", tmp_path / "clamp.glb") == 2
+    assert not (tmp_path / "clamp.glb").exists()

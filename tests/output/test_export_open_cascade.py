@@ -15,7 +15,10 @@ import trimesh
 
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
 from clamp3d.clamp.parts import parts
+from clamp3d.collide.check import check
 from clamp3d.collide.scene import Scene
+from clamp3d.core import shapes
+from clamp3d.core.pose import translation
 from clamp3d.errors import InputError
 from clamp3d.output.export import export
 from clamp3d.output.palette import PART_COLOURS
@@ -208,3 +211,31 @@ def test_step_same_input_same_bytes_and_manifest(
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "today")
     with pytest.raises(InputError, match="SOURCE_DATE_EPOCH must be whole seconds since 1970, got 'today'"):
         export(odd_scene, tmp_path, format="step")
+
+
+@pytest.mark.parametrize("suffix", ["step", "glb"])
+def test_clashes_are_bodies_of_their_own(tmp_path: Path, suffix: str) -> None:
+    """Two turned boxes and a pin in one of them: the common parts, calculated by hand, under the pairs' names."""
+    scene = Scene().add("a", shapes.box((10, 10, 10)), translation(3, 0, 0)).add("b", shapes.box((10, 10, 10)))
+    scene = scene.moved({"b": translation(11, 2, 1)}).add("pin", shapes.cylinder(1.0, 4.0), translation(3, 0, 6))
+    path = export(check(scene), tmp_path / f"all.{suffix}").files[0]
+    common = {"clash a - b": 2.0 * 8.0 * 9.0, "clash a - pin": np.pi * 1.0}
+    if suffix == "step":
+        volumes = {p.name: solid_volume(p.shape) for p in read_step(path)[1]}
+        tolerance = 1e-9
+    else:
+        read = trimesh.load(path)
+        volumes = {name: read.geometry[read.graph[name][1]].volume * 1e9 for name in read.graph.nodes_geometry}
+        tolerance = 0.02
+    assert volumes.keys() == {"a", "b", "pin", *common}
+    for name, volume in common.items():
+        assert volumes[name] == pytest.approx(volume, rel=tolerance)
+
+
+def solid_volume(shape: Any) -> float:
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties)
+    return float(properties.Mass())

@@ -510,3 +510,58 @@ def test_the_address_can_name_a_finding(browser, hinge):
     wait_for(page, "document.querySelector('.finding.now')")
     assert page.evaluate("document.querySelector('.finding.now').dataset.id") == group.id
     assert page.problems == []
+
+
+def test_the_list_of_findings_holds_those_of_the_part_that_is_picked(browser, tmp_path):
+    scene = Scene()
+    for k, x in enumerate((0.0, 9.0, 50.0, 58.0)):
+        scene = scene.add("abcd"[k], shapes.box((10, 10, 10)), translation(x, 0, 0))
+    page = open_scene(browser, check(scene), tmp_path)
+    rows = "[...document.querySelectorAll('#findings > li')].filter((e) => !e.hidden).map((e) => e.innerText)"
+    assert len(page.evaluate(rows)) == 2
+    page.click(".part[data-part=c]")
+    assert page.inner_text("#filtered").strip() == "- 1 with c, of 2"
+    (row,) = page.evaluate(rows)
+    assert re.search("c.*d", row)
+    page.keyboard.press("Escape")
+    assert len(page.evaluate(rows)) == 2
+    assert page.inner_text("#filtered") == ""
+    assert page.problems == []
+
+
+def test_labels_never_cover_each_other(browser, tmp_path):
+    """Rays through a grid of pixels, by three.js: none meets two labels that are drawn; some labels always are."""
+    scene = Scene()
+    for k in range(12):
+        scene = scene.add(f"washer_number_{k}", shapes.box((3, 3, 0.5)), translation(0.4 * k, 0, 0.7 * k))
+    page = open_scene(browser, check(scene), tmp_path)
+    page.locator("#switch-labels").check()
+    for path in ("viewer.camera.zoom = 1", "viewer.camera.zoom = 3"):
+        seen = page.evaluate(
+            path
+            + """; (() => {
+                viewer.camera.updateProjectionMatrix();
+                viewer.render();
+                const T = MeshCat.THREE, ray = new T.Raycaster(), labels = [], drawn = new Set();
+                viewer.scene.traverseVisible((o) => { if (o.isSprite && o.material.visible) labels.push(o); });
+                let most = 0;
+                for (let x = -1; x < 1; x += 0.01) for (let y = -1; y < 1; y += 0.01) {
+                    ray.setFromCamera(new T.Vector2(x, y), viewer.camera);
+                    const hits = ray.intersectObjects(labels, false);
+                    for (const hit of hits) drawn.add(hit.object.uuid);
+                    most = Math.max(most, hits.length);
+                }
+                return [most, drawn.size];
+            })()"""
+        )
+        assert seen[0] == 1
+        assert seen[1] >= 4
+    assert page.problems == []
+
+
+def open_scene(browser, result, folder):
+    (folder / "check.html").write_text(check_to_html(result), encoding="utf-8")
+    page = open_page(browser, (folder / "check.html").as_uri(), offline=True)
+    wait_for(page, "document.querySelector('.part')")
+    page.wait_for_timeout(200)
+    return page

@@ -102,6 +102,15 @@ function clamp3dViewer(messages, done) {
     viewer.set_dirty();
   }
 
+  // The list of findings holds those of one part, or all.
+  function filter(name) {
+    const rows = [...document.querySelectorAll("#findings > li")];
+    const names = (li) => [...li.querySelectorAll(".finding")].flatMap(({ dataset }) => [story.findings[dataset.k].a, story.findings[dataset.k].b]);
+    for (const li of rows) li.hidden = Boolean(name) && !names(li).includes(name);
+    const left = rows.filter((li) => !li.hidden).length;
+    if (rows.length) $("filtered").textContent = name ? ` - ${left || "none"} with ${name}, of ${rows.length}` : "";
+  }
+
   // A click on a part, in the picture or in the list, names it and offers to isolate, ghost or hide it.
   let identified = "";
   function identify(name) {
@@ -109,6 +118,7 @@ function clamp3dViewer(messages, done) {
     for (const e of document.querySelectorAll(".part")) e.classList.toggle("now", e.dataset.part === name);
     $("identity").hidden = !name;
     $("identity").firstElementChild.textContent = name;
+    filter(name);
   }
   $("identity").addEventListener("click", (e) => {
     const how = e.target.dataset.do;
@@ -118,6 +128,8 @@ function clamp3dViewer(messages, done) {
     else { own[identified] = how; look(identified, how); $("home").hidden = false; viewer.set_dirty(); }
   });
   const root = () => viewer.scene_tree.find(["clamp3d"]).object;
+  const render = viewer.render.bind(viewer);
+  viewer.render = () => { spreadLabels(viewer, root()); render(); };
   const section = sectionTool($, viewer, root);
   const measure = measureTool($, viewer, root, () => story.facets, (a, b) => {
     const row = story.stops[Math.max(0, stop)].rows.find((r) => (r.a === a && r.b === b) || (r.a === b && r.b === a));

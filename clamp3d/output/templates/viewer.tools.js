@@ -1,5 +1,5 @@
 "use strict";
-// Two tools over the picture: a plane that cuts everything open, and the distance between two clicked points.
+// Over the picture: a plane that cuts everything open, the distance between two clicked points, labels kept apart.
 // `scene` is the node that holds all in mm; `say` shows a line of text over the picture.
 
 // What lies before the plane is not drawn. Returns its `reset(low, high)`: the box that it moves in.
@@ -71,4 +71,29 @@ function measureTool($, viewer, scene, facets, known) {
       + `(X ${x}, Y ${y}, Z ${z})${parts}`);
   }
   return { active, click, clear() { button.setAttribute("aria-pressed", "false"); clear(); } };
+}
+
+// Labels never cover each other: each takes the first free place at its point, or is left out until one comes nearer.
+// Lengths come before names. Called before each frame.
+function spreadLabels(viewer, scene) {
+  const T = MeshCat.THREE, labels = [], taken = [], at = new T.Vector3(), size = new T.Vector3();
+  const { clientWidth: width, clientHeight: height } = viewer.renderer.domElement;
+  const projection = viewer.camera.projectionMatrix.elements;
+  scene.updateMatrixWorld(true);
+  scene.traverseVisible((o) => { if (o.isSprite) labels.push(o); });
+  const isName = (o) => Number(o.parent.parent && o.parent.parent.name === "labels");
+  labels.sort((a, b) => isName(a) - isName(b));
+  for (const label of labels) {
+    at.setFromMatrixPosition(label.matrixWorld).project(viewer.camera);
+    size.setFromMatrixScale(label.matrixWorld);
+    const [w, h] = [size.x * projection[0] * width / 2, size.y * projection[5] * height / 2];
+    const [x, y] = [width * (at.x + 1) / 2, height * (1 - at.y) / 2];
+    const places = [[0.5, 0.5], [0.5, -0.55], [0.5, 1.55], [-0.05, 0.5], [1.05, 0.5]];
+    const free = places.map(([u, v]) => ({ u, v, left: x - u * w, top: y - (1 - v) * h, w, h })).find((own) =>
+      taken.every((o) => own.left >= o.left + o.w || o.left >= own.left + own.w || own.top >= o.top + o.h || o.top >= own.top + own.h));
+    label.material.visible = Boolean(free);
+    if (!free) continue;
+    label.center.set(free.u, free.v);
+    taken.push(free);
+  }
 }

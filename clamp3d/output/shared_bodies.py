@@ -1,0 +1,52 @@
+"""What clashing parts have in common, as bodies of their own for an exported file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from clamp3d.brep.open_cascade import bounds_of, to_bytes, volume_of
+from clamp3d.brep.solid import BrepSolid
+from clamp3d.collide.result import BAD, CheckResult
+from clamp3d.core.mesh import make_mesh
+from clamp3d.core.shapes import MeshShape
+from clamp3d.output.common import overlap
+from clamp3d.output.palette import VERDICT_COLOURS
+from clamp3d.output.placed import PlacedPart, posed
+from clamp3d.output.step import exact_solid, location
+
+
+def shared_bodies(result: CheckResult, placed: Sequence[PlacedPart], mesh_error: float | None) -> list[PlacedPart]:
+    """The common part of each two of the ``placed`` parts that clash at rest, in the world, in red.
+
+    Of the facets within ``mesh_error`` mm, or with exact faces where that is None. Pairs whose common part has no
+    volume are left out.
+    """
+    parts = {part.name: part for part in placed}
+    rows = [row for row in result.pairs if row.verdict in BAD and {row.a, row.b} <= parts.keys()]
+    bodies = []
+    for row in rows:
+        name, (a, b) = f"clash {row.a} - {row.b}", (parts[row.a], parts[row.b])
+        shape = _exact(name, a, b) if mesh_error is None else _faceted(name, a, b, mesh_error)
+        if shape is not None:
+            bodies.append(PlacedPart(name, shape, np.eye(4), VERDICT_COLOURS["clash"]))
+    return bodies
+
+
+def _exact(name: str, a: PlacedPart, b: PlacedPart) -> BrepSolid | None:
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
+
+    shape: Any = BRepAlgoAPI_Common(*(exact_solid(item).Moved(location(item.T)) for item in (a, b))).Shape()
+    volume = volume_of(shape)
+    return BrepSolid(name, to_bytes(shape), bounds_of(shape), volume) if volume > 0.0 else None
+
+
+def _faceted(name: str, a: PlacedPart, b: PlacedPart, mesh_error: float) -> MeshShape | None:
+    first, second = posed([a, b], mesh_error)
+    common = overlap(first.mesh, first.T, second.mesh, second.T)
+    if common is None:
+        return None
+    common.apply_transform(first.T)
+    return MeshShape(make_mesh(common.vertices, common.faces), name=name)
