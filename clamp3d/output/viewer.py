@@ -38,7 +38,7 @@ from clamp3d.output.palette import FORCE, VERDICT_COLOURS
 from clamp3d.output.scene_report import work_text
 from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
 from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
-from clamp3d.output.viewer_timeline import FIRST, UNCUT, ClampStory, Row, Stop, scene_stops
+from clamp3d.output.viewer_timeline import FIRST, UNCUT, ClampStory, Row, Stop, distance_curves, scene_stops
 from clamp3d.output.wording import (
     circumstances,
     distance_text,
@@ -222,6 +222,7 @@ class Viewer:
             "text": headline(result),
             "state": severity(result),
             "findings": self._scene_findings(result),
+            "curves": list(distance_curves(result, self._drawing.timeline.stops, self._rows)),
             "pairs": worst_first(result.pairs)[:_LISTED],
             "motions": worst_first(result.motions)[:_LISTED],
             "notes": [*result.scene.notes, *work_text(result.work)],
@@ -248,7 +249,7 @@ class Viewer:
         for group in grouped(result):
             for row in group.rows[: max(0, _LISTED - len(findings))]:
                 number = self._stop_of(row)
-                data = {"a": row.a, "b": row.b, "verdict": row.verdict.value, "group": group.id}
+                data = {"a": row.a, "b": row.b, "motion": row.motion, "verdict": row.verdict.value, "group": group.id}
                 data |= {"title": group_sentence(group, names), "text": sentence(row, names)}
                 data["detail"] = circumstances(row)
                 findings.append(data | self._place(number, meetings.get(number) or focus(row.distance)))
@@ -276,6 +277,7 @@ class Viewer:
             "done": done,
             "stops": [_stop_data(stop, *drawing.extent([stop.poses])) for stop in drawing.timeline.stops],
             "findings": more.get("findings", []),
+            "curves": more.get("curves", []),
             "forces": [force.to_dict() for force in more.get("forces", ())],
             "nodes": {part.name: drawing.paths(part.name) for part in scene.parts},
             "overlays": [{"name": name, "path": f"{ROOT}/overlay {name}"} for name in drawing.overlays],

@@ -35,6 +35,8 @@ FIRST = "first contact"
 _HOLD = 1.2  # s at each stop
 _FASTEST, _SLOWEST = 0.9, 4.0  # s between two stops
 _MOTION = 4.0  # s of a motion of a scene from t = 0 to 1
+_CURVES, _SAMPLES = 4, 24
+"""So many pairs of a motion are drawn as curves, each through so many moments: what `view` may take beside `check`."""
 _MEASURED = 12
 """Moments of first contact that a motion stops at, and pairs that are measured at its end, at most."""
 _TURN = math.radians(3.0)
@@ -100,7 +102,8 @@ class Stop:
     """A moment on the time line: reached at ``arrive`` s, left at ``leave`` s.
 
     ``poses`` are where the parts are drawn, ``via`` fractions of the way here with the poses of parts that do not go
-    straight. Playing halts at a stop that ``halts``; ``mark`` is what the time line says there.
+    straight. Playing halts at a stop that ``halts``; ``mark`` is what the time line says there. ``t`` is the
+    motion's own time, from 0 to 1.
     """
 
     step: str
@@ -111,6 +114,7 @@ class Stop:
     halts: bool = False
     via: tuple[tuple[float, Poses], ...] = ()
     seconds: float | None = None
+    t: float = 0.0
     arrive: float = 0.0
     leave: float = 0.0
 
@@ -216,7 +220,7 @@ def _motion_stops(
         now = tuple(replace(row, verdict="contact", what=FIRST) for row in touching_now)
         label = f"{motion.name}: {'first' if k == 0 else 'next'} contact at t = {first_text(t)}"
         seconds = max(0.3, _MOTION * (t - before))
-        yield Stop(motion.name, label, poses, now, "" if k else FIRST, k == 0, way(before, t), seconds)
+        yield Stop(motion.name, label, poses, now, "" if k else FIRST, k == 0, way(before, t), seconds, t)
         before = t
     # Parts whose least distance is at the end are as the check says; the others are measured where they stand now.
     at_end = {(row.a, row.b): _row(result, row) for row in rows if row.t == 1.0}
@@ -225,7 +229,41 @@ def _motion_stops(
     ends = (*at_end.values(), *(measure(result.scene.moved(poses), elsewhere) if elsewhere else ()))
     end = f"{motion.name}: end" + (", through the contact" if contacts else "")
     seconds = max(0.3, _MOTION * (1.0 - before))
-    yield Stop(motion.name, end, poses, ends, next_mark, via=way(before, 1.0), seconds=seconds)
+    yield Stop(motion.name, end, poses, ends, next_mark, via=way(before, 1.0), seconds=seconds, t=1.0)
+
+
+def distance_curves(result: CheckResult, stops: Sequence[Stop], measure: Measure) -> Iterator[dict[str, Any]]:
+    """The bounds of the distance (mm) of the worst findings of each motion at moments of the time line (s)."""
+    for motion in result.scene.motions:
+        rows = worst_first([row for row in result.findings if row.motion == motion.name])[:_CURVES]
+        if not rows:
+            continue
+        pairs = [(row.a, row.b) for row in rows]
+        own = [k for k, stop in enumerate(stops) if stop.step == motion.name]
+        start = stops[own[0] - 1].poses
+        going = motion.resolved(start[motion.parts[0]])
+        moments = [moment for k in own for moment in _moments(stops[k - 1], stops[k], first=k == own[0])]
+        measured = [
+            measure(result.scene.moved({name: going.at(t, start[name]) for name in motion.parts}), pairs)
+            for _, t in moments
+        ]
+        for row, distances in zip(rows, zip(*measured, strict=True), strict=True):
+            yield {
+                "motion": motion.name,
+                "a": row.a,
+                "b": row.b,
+                "seconds": [seconds for seconds, _ in moments],
+                "t": [t for _, t in moments],
+                "bounds": [[d["at_least_mm"], d["at_most_mm"]] for d in (one.distance.to_dict() for one in distances)],
+            }
+
+
+def _moments(before: Stop, stop: Stop, *, first: bool) -> Iterator[tuple[float, float]]:
+    """Times on the time line (s) and in the motion from one stop to the next, with its start where it is the first."""
+    t0 = 0.0 if first else before.t
+    n = max(1, round(_SAMPLES * (stop.t - t0)))
+    for k in range(0 if first else 1, n + 1):
+        yield before.leave + k / n * (stop.arrive - before.leave), t0 + k / n * (stop.t - t0)
 
 
 def first_contacts(rows: Iterable[PairResult]) -> dict[float, list[PairResult]]:

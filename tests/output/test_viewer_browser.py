@@ -20,6 +20,7 @@ from clamp3d.collide.scene import Scene
 from clamp3d.core import shapes
 from clamp3d.core.mesh import make_mesh
 from clamp3d.core.meshing import mesh
+from clamp3d.core.motion import Motion
 from clamp3d.core.pose import translation
 from clamp3d.fit.fit import fit_mesh
 from clamp3d.output.fit_report import fit_to_html
@@ -556,6 +557,54 @@ def test_labels_never_cover_each_other(browser, tmp_path):
         )
         assert seen[0] == 1
         assert seen[1] >= 4
+    assert page.problems == []
+
+
+@pytest.fixture(scope="module")
+def sliding():
+    """A box that slides 25 mm along X, from a gap of 20 mm to an overlap of 5 mm."""
+    cube = shapes.box((10, 10, 10))
+    scene = Scene().add("still", cube).add("slider", cube, translation(30, 0, 0))
+    return check(scene.with_motion(Motion.translate((-25.0, 0.0, 0.0), parts="slider", name="push")))
+
+
+def test_the_curve_of_a_finding_holds_its_distance(sliding):
+    """At every moment the bounds hold the distance calculated by hand, on the time line in the right place."""
+    with view(sliding, serve=False) as viewer:
+        (curve,), stops = viewer.story["curves"], viewer.story["stops"]
+    assert {curve["a"], curve["b"]} == {"still", "slider"}
+    t, bounds = np.array(curve["t"]), np.array(curve["bounds"], dtype=float)
+    assert (t[0], t[-1]) == (0.0, 1.0)
+    assert 20 <= len(t) <= 30
+    np.testing.assert_allclose(bounds, np.column_stack([20.0 - 25.0 * t] * 2), atol=1e-6)
+    seconds = {stop["label"]: (stop["arrive"], stop["leave"]) for stop in stops}
+    (rest, first, end) = seconds.values()
+    drawn = np.array(curve["seconds"])
+    np.testing.assert_allclose(drawn[[0, -1]], [rest[1], end[0]])
+    (meeting,) = t[np.isclose(drawn, first[0])]
+    assert 0.8 - 0.01 / 25.0 - 1e-6 <= meeting <= 0.8  # contact is a gap of 0.01 mm
+    late = t > meeting
+    np.testing.assert_allclose(drawn[late], first[1] + (t[late] - meeting) / (1.0 - meeting) * (end[0] - first[1]))
+
+
+def test_a_picked_finding_of_a_motion_shows_its_curve(browser, sliding, tmp_path):
+    page = open_scene(browser, sliding, tmp_path)
+    assert not page.is_visible("#curve")
+    page.click(".finding")
+    page.evaluate("document.getElementById('marks').children[0].click()")
+    wait_for(page, "document.querySelector('#curve figcaption').textContent.includes('t = 0.000')")
+    assert re.search(r"(19.9999|20.0000) to 20.000[01] mm$", page.inner_text("#curve figcaption"))
+    page.evaluate("document.getElementById('marks').lastChild.click()")
+    wait_for(page, "document.querySelector('#curve figcaption').textContent.includes('t = 1.000')")
+    assert re.search(r"-5.000[01] to -(5.0000|4.9999) mm$", page.inner_text("#curve figcaption"))
+    heights = page.evaluate(
+        "[...document.querySelectorAll('#curve polygon')[0].points].map((p) => p.y)"
+        ".concat(document.querySelector('#curve line').y1.baseVal.value)"
+    )
+    # 25 mm from the highest to the lowest point, 5 of them under the line at 0
+    assert (max(heights) - heights[-1]) / (max(heights) - min(heights)) == pytest.approx(0.2, abs=1e-3)
+    page.keyboard.press("Escape")
+    assert not page.is_visible("#curve")
     assert page.problems == []
 
 

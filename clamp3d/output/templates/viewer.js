@@ -227,6 +227,7 @@ function clamp3dViewer(messages, done) {
     }
     const finding = e.target.closest(".finding"), row = e.target.closest(".rows tr[data-a]");
     const again = (finding || row) && (finding || row).classList.contains("now");
+    drawCurve(again || !finding ? null : story.findings[Number(finding.dataset.k)]);
     if (again) pick(null);
     else if (finding) {
       const f = story.findings[Number(finding.dataset.k)];
@@ -244,7 +245,7 @@ function clamp3dViewer(messages, done) {
     }
   });
   addEventListener("hashchange", openFinding);
-  $("home").addEventListener("click", () => { identify(""); pick(null); });
+  $("home").addEventListener("click", () => { identify(""); drawCurve(null); pick(null); });
   pane.addEventListener("pointerdown", () => { touched = true; flight++; });
   pane.addEventListener("wheel", () => { touched = true; flight++; }, { passive: true });
 
@@ -275,6 +276,28 @@ function clamp3dViewer(messages, done) {
     let i = 0;
     while (i + 1 < story.stops.length && story.stops[i + 1].arrive <= t + 1e-6) i++;
     return i;
+  }
+  // The distance of a picked finding while its motion plays: a band between its bounds, a line at 0 mm.
+  let curve = null;
+  function drawCurve(finding) {
+    curve = (finding && story.curves.find((c) => c.motion === finding.motion && c.a === finding.a && c.b === finding.b)) || null;
+    $("curve").hidden = !curve;
+    if (!curve) return;
+    // The certain side sets the scale: where a depth is hardly bounded the band leaves the picture at its lower edge.
+    const upper = curve.bounds.map((b) => b[1]), low = Math.min(0, ...upper), high = Math.max(0, ...upper);
+    const point = (mm, i) => [1000 * curve.seconds[i] / end(), mm === null ? 1000 : 94 - 90 * (mm - low) / (high - low || 1)];
+    const band = [...curve.bounds.map((b, i) => point(b[1], i)), ...curve.bounds.map((b, i) => point(b[0], i)).reverse()];
+    const zero = point(0, 0)[1];
+    $("curve").firstElementChild.innerHTML = `<line x1="0" x2="1000" y1="${zero}" y2="${zero}"/><polygon points="${band.join(" ")}"/>`;
+    sayCurve();
+  }
+  function sayCurve() {
+    const i = curve.seconds.reduce((best, s, k) => (Math.abs(s - animator.time) < Math.abs(curve.seconds[best] - animator.time) ? k : best), 0);
+    const [lower, upper] = curve.bounds[i];
+    const text = `distance of ${curve.a} and ${curve.b} at t = ${curve.t[i].toFixed(3)}: `
+      + (lower === null ? "" : (Math.floor(lower * 1e4) / 1e4).toFixed(4) + " to ") + (lower === null ? "at most " : "") + (Math.ceil(upper * 1e4) / 1e4).toFixed(4) + " mm";
+    write($("curve").lastElementChild, "", text);
+    write($("curve").firstElementChild, "aria-label", text);
   }
   function toggle() {
     if (animator.playing) animator.pause();
@@ -311,6 +334,7 @@ function clamp3dViewer(messages, done) {
     write($("label"), "", (story.stops.indexOf(at) + 1) + "/" + story.stops.length + "  " + (moving ? "moving to: " : "") + at.label);
     write($("step"), "", at.label.startsWith(at.step) ? "" : "step " + at.step);
     if (i !== stop) showStop(i);
+    if (curve) sayCurve();
     follow();
   }
   (function frame() { refresh(); requestAnimationFrame(frame); })();
@@ -320,7 +344,7 @@ function clamp3dViewer(messages, done) {
   $("back").addEventListener("click", () => { const i = current(animator.time); go(animator.time > story.stops[i].arrive + 0.05 ? i : i - 1); });
   $("forward").addEventListener("click", () => go(current(animator.time) + 1));
   document.addEventListener("keydown", (e) => {
-    if (e.key === "h" || e.key === "Escape") { identify(""); measure.clear(); pick(null); }
+    if (e.key === "h" || e.key === "Escape") { identify(""); measure.clear(); drawCurve(null); pick(null); }
     if (e.key === "m" && e.target.tagName !== "INPUT") $("measure").click();
     if ($("timeline").hidden || e.target.tagName === "INPUT" && e.target.type !== "checkbox") return;
     if (e.key === "ArrowRight") $("forward").click();
