@@ -18,6 +18,7 @@ from clamp3d.cli.options import Viewing
 from clamp3d.cli.progress import bar, narrated
 from clamp3d.cli.terminal import show
 from clamp3d.collide.check import check
+from clamp3d.collide.model import ModelCache
 from clamp3d.collide.result import CheckResult
 from clamp3d.collide.scene import Scene
 from clamp3d.output.files import STDOUT
@@ -61,8 +62,12 @@ class Page:
         if self.viewing.clearance is not None:
             scene = replace(scene, clearance=self.viewing.clearance)
         with self._viewer(scene) as viewer:
+            cache = ModelCache()
             with bar(self.quiet) as report:
-                result = check(scene, distances=len(scene.parts) <= MEASURED, progress=report)
+                if viewer.url is not None:  # somebody may be looking: verdicts first
+                    still = replace(scene, motions=())
+                    viewer.preview(check(still, depths=False, progress=report, cache=cache))
+                result = check(scene, distances=len(scene.parts) <= MEASURED, progress=report, cache=cache)
             viewer.finish(result)
             self._save(viewer)
         return result

@@ -154,6 +154,12 @@ class Viewer:
         self._drawing.dimension(len(self._waypoints) - 1, "splints", *self._clamp.opening(waypoint))
         self._set_story(f"{waypoint.step}: {waypoint.label}", state="running")
 
+    def preview(self, result: CheckResult) -> None:
+        """Show the findings at rest while depths and motions are still measured."""
+        instance("result", result, CheckResult)
+        findings = self._scene_findings(result)
+        self._set_story(f"{headline(result)}; depths and motions follow", state="running", findings=findings)
+
     def finish(self, result: Assembly | CheckResult) -> None:
         """Show the result, and play the whole time line once."""
         shown = self._finish_assembly(result) if isinstance(result, Assembly) else self._finish_check(result)

@@ -9,6 +9,7 @@ import math
 import os
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -606,6 +607,21 @@ def test_a_picked_finding_of_a_motion_shows_its_curve(browser, sliding, tmp_path
     page.keyboard.press("Escape")
     assert not page.is_visible("#curve")
     assert page.problems == []
+
+
+def test_a_served_page_lists_findings_before_their_depths(browser, sliding):
+    scene = sliding.scene.add("deep", shapes.box((4, 4, 4)), translation(0, 0, 6))
+    with Viewer(scene, serve=True) as viewer:
+        viewer.preview(check(replace(scene, motions=()), depths=False))
+        page = open_page(browser, viewer.url)
+        wait_for(page, "document.querySelectorAll('.finding').length === 1")
+        assert "depths and motions follow" in page.inner_text("#headline")
+        assert "still and deep clash: overlap at least 0.9999 mm" in page.inner_text(".finding")
+        viewer.finish(check(scene))
+        wait_for(page, "document.querySelectorAll('#findings > li').length === 3")
+        assert "still and deep clash: overlap 1.000000 mm" in page.inner_text("#findings")
+        assert "follow" not in page.inner_text("#headline")
+        assert page.problems == []
 
 
 def open_scene(browser, result, folder):
