@@ -535,7 +535,7 @@ def test_labels_never_cover_each_other(browser, tmp_path):
     """Rays through a grid of pixels, by three.js: none meets two labels that are drawn; some labels always are."""
     scene = Scene()
     for k in range(12):
-        scene = scene.add(f"washer_number_{k}", shapes.box((3, 3, 0.5)), translation(0.4 * k, 0, 0.7 * k))
+        scene = scene.add(f"washer_number_{k}", shapes.box((3, 3, 0.05)), translation(0.4 * k, 0, 0.1 * k))
     page = open_scene(browser, check(scene), tmp_path)
     page.locator("#switch-labels").check()
     for path in ("viewer.camera.zoom = 1", "viewer.camera.zoom = 3"):
