@@ -73,7 +73,8 @@ def _announced_stl(raw: bytes) -> int:
 
 
 def _announced_obj(raw: bytes) -> int:
-    return sum(len(line.split()) - 3 for line in re.findall(rb"(?m)^[ \t]*f[ \t][^\r\n#]*", raw))
+    # A line with too few corners counts too: trimesh leaves it out.
+    return sum(max(1, len(line.split()) - 3) for line in re.findall(rb"(?m)^[ \t]*f[ \t][^\r\n#]*", raw))
 
 
 def _announced_ply(raw: bytes) -> int:

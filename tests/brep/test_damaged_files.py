@@ -62,6 +62,7 @@ def with_corner(bits):
         ("a.ply", PLY, "not a readable PLY file|it announces 2 triangles"),
         ("a.off", b"OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "not a readable OFF file|it announces 2 triangles"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n", "not a readable OBJ file|damaged|out of range"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf nan\n", "it announces 2 triangles or faces, 1 were read"),
         ("a.3mf", b"not a zip", "not a readable 3MF file"),
     ],
 )
