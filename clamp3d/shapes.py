@@ -5,11 +5,11 @@
 >>> wire = cylinder(6.5, 80.0)
 """
 
-from clamp3d.brep.mesh_file import load_mesh
-from clamp3d.core.mesh import Mesh, make_mesh
-from clamp3d.core.meshing import mesh
-from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
-from clamp3d.core.shapes import Hole, MeshShape, Solid, box, cylinder, extrusion, groove_block, sphere
+from clamp3d.files.mesh_file import load_mesh
+from clamp3d.geometry.mesh import Mesh, make_mesh
+from clamp3d.geometry.meshing import mesh
+from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
+from clamp3d.geometry.shapes import Hole, MeshShape, Solid, box, cylinder, extrusion, groove_block, sphere
 
 __all__ = [
     "Capsule",

@@ -19,15 +19,15 @@ from collections.abc import Callable
 import numpy as np
 
 from clamp3d.bench.compare.peers.open_cascade import asked, axis, cylinder, together
-from clamp3d.brep.open_cascade import explore
-from clamp3d.collide.model import ModelCache
-from clamp3d.collide.poses import check_poses
-from clamp3d.collide.scene import Part, Scene
-from clamp3d.core.distance import signed_distance, signed_distances
-from clamp3d.core.pose import rotation, translation
-from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
-from clamp3d.core.shapes import cylinder as cylinder_shape
-from clamp3d.core.shapes import groove_block
+from clamp3d.engine.model import ModelCache
+from clamp3d.engine.poses import check_poses
+from clamp3d.engine.scene import Part, Scene
+from clamp3d.files.open_cascade import explore
+from clamp3d.geometry.pose import rotation, translation
+from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
+from clamp3d.geometry.shapes import cylinder as cylinder_shape
+from clamp3d.geometry.shapes import groove_block
+from clamp3d.kernel.distance import signed_distance, signed_distances
 from clamp3d.output.step import solid
 
 GROOVE, WIRE = SweptArc(12.0, np.radians(70.0), 50.0), Cylinder(10.5, 80.0)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clamp3d.core.arc_circle import ArcRelation, arc_circle
-from clamp3d.core.rectangle import HoleContact, HoleRelation, Rectangle, hole_bolt
+from clamp3d.kernel.arc_and_circle import ArcRelation, arc_circle
+from clamp3d.kernel.rectangle import HoleContact, HoleRelation, Rectangle, hole_bolt
 from clamp3d.output.palette import INK, PART_COLOURS, VERDICT_COLOURS, darker
 
 if TYPE_CHECKING:

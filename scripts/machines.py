@@ -31,7 +31,7 @@ from build123d import (
     fillet,
 )
 
-from clamp3d.brep.cad import Key
+from clamp3d.files.cad import Key
 
 
 def whole(parts, name, bearing, *places):

@@ -18,8 +18,8 @@ BOXES = {
     "python": ("in", 780, 60, 190, 70, "Python", ("Scene().add(...)",)),
     "load": ("scene", 30, 180, 700, 60, "load()", ("scenefile/load.py",)),
     "assemble": ("clamp", 30, 290, 330, 90, "assemble() -> Assembly", ("clamp/assemble.py", "clamp/final_state.py")),
-    "scene": ("scene", 430, 290, 540, 90, "Scene: parts, poses, motions", ("collide/scene.py", "core/shapes.py")),
-    "broad": ("engine", 30, 440, 150, 100, "near pairs", ("collide/broad.py", "boxes, R-tree")),
+    "scene": ("scene", 430, 290, 540, 90, "Scene: parts, poses, motions", ("engine/scene.py", "geometry/shapes.py")),
+    "broad": ("engine", 30, 440, 150, 100, "near pairs", ("engine/broad.py", "boxes, R-tree")),
     "forms": (
         "engine",
         200,
@@ -27,7 +27,7 @@ BOXES = {
         190,
         100,
         "kernel, pieces",
-        ("core/distance.py", "collide/closed_form.py", "collide/convex.py"),
+        ("kernel/distance.py", "engine/closed_form.py", "engine/convex.py"),
     ),
     "meshes": (
         "engine",
@@ -36,10 +36,10 @@ BOXES = {
         195,
         100,
         "meshes",
-        ("collide/mesh_distance.py", "collide/overlap.py", "FCL, manifold3d"),
+        ("engine/mesh_distance.py", "engine/overlap.py", "FCL, manifold3d"),
     ),
-    "exact": ("engine", 625, 440, 165, 100, "Open CASCADE", ("collide/exact.py", "brep/cad_process.py")),
-    "verdict": ("engine", 810, 440, 160, 100, "Distance, verdict", ("collide/answer.py", "collide/verdict.py")),
+    "exact": ("engine", 625, 440, 165, 100, "Open CASCADE", ("engine/exact.py", "files/cad_process.py")),
+    "verdict": ("engine", 810, 440, 160, 100, "Distance, verdict", ("engine/answer.py", "engine/verdict.py")),
     "text": ("out", 30, 620, 210, 90, "text, JSON, table", ("output/scene_report.py", "output/run_report.py")),
     "report": ("out", 273, 620, 210, 90, "report()", ("output/report.py", "output/report_page.py")),
     "view": ("out", 516, 620, 210, 90, "view()", ("output/viewer.py", "output/viewer_scene.py")),
@@ -66,7 +66,7 @@ ARROWS = [
 ]
 NOTES = [
     (30, 40, "input of a command or a script"),
-    (120, 430, "check(), measure(), distance() (collide/refine.py): the next level only while the verdict is open"),
+    (120, 430, "check(), measure(), distance() (engine/refine.py): the next level only while the verdict is open"),
     (30, 740, "one engine for every command; cli/ prints its results and sets the exit code"),
 ]
 

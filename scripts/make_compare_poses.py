@@ -1,7 +1,7 @@
 """Make ``clamp3d/study/data/compare_poses.csv``: poses of a wire in a groove with their distances to 25 digits.
 
 ``python scripts/make_compare_poses.py`` (minutes). The values come from the search of
-``tests/core/oracle.py``; the kernel only helps to find poses near contact.
+``tests/kernel/oracle.py``; the kernel only helps to find poses near contact.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from clamp3d.bench.compare.scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, pose
-from clamp3d.core.distance import signed_distance
+from clamp3d.kernel.distance import signed_distance
 
 ROOT = Path(__file__).resolve().parent.parent
 FIELDS = ("lean", "group", "x", "y", "z", "a", "b", "c", "distance")
@@ -21,7 +21,7 @@ FIELDS = ("lean", "group", "x", "y", "z", "a", "b", "c", "distance")
 
 def load_oracle():
     sys.path.insert(0, str(ROOT))
-    from tests.core import oracle
+    from tests.kernel import oracle
 
     return oracle
 

@@ -20,8 +20,8 @@ sys.dont_write_bytecode = False
 # numba reads a kernel from its cache also where a formula in another file has changed: each state has its own cache.
 ROOT = Path(__file__).parents[1]
 if "PYTEST_XDIST_WORKER" not in os.environ:
-    core = ROOT / "clamp3d" / "core"
-    files = [*sorted(core.glob("kernel*.py")), core / "jit.py", core / "pose.py", core / "primitives.py"]
+    geometry = ROOT / "clamp3d" / "geometry"
+    files = [*sorted((ROOT / "clamp3d" / "kernel").glob("*.py")), geometry / "pose.py", geometry / "primitives.py"]
     state = hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
     os.environ["NUMBA_CACHE_DIR"] = str(Path(os.environ.get("NUMBA_CACHE_DIR", ROOT / ".pytest_cache")) / state)
 

@@ -7,15 +7,15 @@ import numpy as np
 import trimesh
 from hypothesis import strategies as st
 
-from clamp3d.collide.check import check
-from clamp3d.collide.surface import Surface
-from clamp3d.core import shapes
-from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.mesh import make_mesh
-from clamp3d.core.meshing import mesh
-from clamp3d.core.pose import rotation, translation
-from clamp3d.core.primitives import SweptArc
-from clamp3d.core.profile import Profile
+from clamp3d.engine.check import check
+from clamp3d.engine.surface import Surface
+from clamp3d.geometry import shapes
+from clamp3d.geometry.extrusion import Extrusion
+from clamp3d.geometry.mesh import make_mesh
+from clamp3d.geometry.meshing import mesh
+from clamp3d.geometry.pose import rotation, translation
+from clamp3d.geometry.primitives import SweptArc
+from clamp3d.geometry.profile import Profile
 
 TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
 """A pose that nothing is square to."""

@@ -10,13 +10,13 @@ from clamp3d import distance, first_contact, min_clearance, shapes
 from clamp3d.baselines.wedges import wedge_solids
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.collide.answer import Distance
-from clamp3d.core.meshing import chord_error
-from clamp3d.core.motion import Motion
-from clamp3d.core.pose import inverse, rotation, translation
-from clamp3d.core.primitives import Cylinder, SweptArc
-from clamp3d.core.profile import sagitta
+from clamp3d.engine.answer import Distance
 from clamp3d.fit.fit import fit_mesh
+from clamp3d.geometry.meshing import chord_error
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import inverse, rotation, translation
+from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.geometry.profile import sagitta
 from clamp3d.testing import (
     Body,
     assert_distance,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from clamp3d.baselines.model import Pieces, pose_of, poses_of
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.distance import Feature, signed_distances
-from clamp3d.core.pieces import groove_pieces
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
+from clamp3d.kernel.contact_model import GroovePair
+from clamp3d.kernel.distance import Feature, signed_distances
+from clamp3d.kernel.pieces import groove_pieces
 
 _SIDES = slice(0, 3)
 """Rows of `groove_pieces` that a wire through the whole groove can touch; the end faces are behind it."""

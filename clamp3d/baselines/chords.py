@@ -9,11 +9,11 @@ from functools import lru_cache
 import numpy as np
 
 from clamp3d.baselines.model import Pieces, check_unit_angle, pose_of, poses_of
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.pose import Array, check_pose, inverse
-from clamp3d.core.primitives import SweptArc
-from clamp3d.core.profile import chord_count, sagitta
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import Array, check_pose, inverse
+from clamp3d.geometry.primitives import SweptArc
+from clamp3d.geometry.profile import chord_count, sagitta
+from clamp3d.kernel.contact_model import GroovePair
 
 _PARALLEL = 1e-9
 _FACE = 1e3

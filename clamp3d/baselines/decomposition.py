@@ -30,9 +30,9 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from clamp3d.baselines import cache as disk
-from clamp3d.brep.child import Worker, WorkerEndedError, WorkerTimeoutError
-from clamp3d.core.mesh import Mesh, closed_mesh
 from clamp3d.errors import InputError, SolverError
+from clamp3d.files.child import Worker, WorkerEndedError, WorkerTimeoutError
+from clamp3d.geometry.mesh import Mesh, closed_mesh
 
 _RUN = "clamp3d.baselines.coacd_worker:run"
 

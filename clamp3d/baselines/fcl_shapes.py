@@ -27,11 +27,11 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from clamp3d.collide.surface import fcl_tree
-from clamp3d.core.mesh import Mesh, closed_mesh
-from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Cylinder
+from clamp3d.engine.surface import fcl_tree
 from clamp3d.errors import InputError
+from clamp3d.geometry.mesh import Mesh, closed_mesh
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.primitives import Cylinder
 
 UNIT = 16384.0
 """FCL units per mm. See the module."""

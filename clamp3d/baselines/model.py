@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from clamp3d.checks import array, instance, number, shown
-from clamp3d.core.contact_model import ContactModel as ContactModel
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.contact_model import Pieces as Pieces
-from clamp3d.core.pose import Array, check_pose, check_pose_array
-from clamp3d.core.primitives import LARGEST
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import Array, check_pose, check_pose_array
+from clamp3d.geometry.primitives import LARGEST
+from clamp3d.kernel.contact_model import ContactModel as ContactModel
+from clamp3d.kernel.contact_model import GroovePair
+from clamp3d.kernel.contact_model import Pieces as Pieces
 
 FINEST_DEG = 0.01
 """Smallest angle of a chord: a full circle then has 36 000."""

@@ -10,15 +10,15 @@ import numpy as np
 from clamp3d.baselines.fcl_shapes import Shape, Wire, bvh, distance, facets, measure
 from clamp3d.baselines.model import Pieces, pose_of, poses_of
 from clamp3d.checks import instance
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.pose import Array, check_pose
-from clamp3d.core.primitives import Cylinder
-from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import Array, check_pose
+from clamp3d.geometry.primitives import Cylinder
+from clamp3d.geometry.shapes import Solid
+from clamp3d.kernel.contact_model import GroovePair
 
 
 class TriangleMesh(Protocol):
-    """Vertices (n, 3) mm and faces (m, 3): what `trimesh.Trimesh` and `core.mesh.Mesh` have."""
+    """Vertices (n, 3) mm and faces (m, 3): what `trimesh.Trimesh` and `geometry.mesh.Mesh` have."""
 
     @property
     def vertices(self) -> Any: ...  # noqa: D102
@@ -129,7 +129,7 @@ def part_mesh(part: PartOrMesh, mesh_error: float) -> TriangleMesh:
     """The mesh of a part within ``mesh_error`` mm, or the mesh itself if it is one."""
     if not isinstance(part, Solid):
         return part
-    from clamp3d.core.meshing import mesh
+    from clamp3d.geometry.meshing import mesh
 
     return cast(TriangleMesh, mesh(part, mesh_error))
 

@@ -15,10 +15,10 @@ from shapely.geometry.polygon import orient
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.model import check_unit_angle
 from clamp3d.baselines.polytopes import PartOrMesh, PolytopeModel, Polytopes
-from clamp3d.core.pose import Array
-from clamp3d.core.profile import Arc, Segment, chord_count
-from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.profile import Arc, Segment, chord_count
+from clamp3d.geometry.shapes import Solid
 
 _BACK_ERROR = 0.01
 """Chord error in mm of convex arcs (the round back), which no wire reaches."""

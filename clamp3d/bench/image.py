@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 from clamp3d.bench.picture import Picture, find_end_points, picture
 from clamp3d.checks import array, choice, instance, number, whole
 from clamp3d.clamp.result import Assembly
-from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import Array
 
 Kind = Literal["height", "straight"]
 

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Assembly
-from clamp3d.core.pose import Array
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import Array
 from clamp3d.output.section import inner_edges, outline
 
 Image = NDArray[np.uint8]

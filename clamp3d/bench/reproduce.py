@@ -17,11 +17,11 @@ from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.matrix import millimetres
 from clamp3d.clamp.result import Assembly, Solver
-from clamp3d.collide.distance import Distance
-from clamp3d.core.arc_circle import arc_circle
-from clamp3d.core.pose import Array, inverse
-from clamp3d.core.rectangle import Rectangle, hole_bolt
+from clamp3d.engine.distance import Distance
 from clamp3d.errors import need
+from clamp3d.geometry.pose import Array, inverse
+from clamp3d.kernel.arc_and_circle import arc_circle
+from clamp3d.kernel.rectangle import Rectangle, hole_bolt
 
 PLATEAU = (
     "The paper's plateau of 31.863 mm at 1, 5 and 10 degrees is its step, not its geometry: the program moved the down "

@@ -19,8 +19,8 @@ from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import SIZE, WIRES, Section
 from clamp3d.clamp.status import closing_status
-from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
+from clamp3d.geometry.pose import Array
 
 FLAT = 4
 """Columns of the map for each of its rows: a splint is that much wider than its opening is high."""

@@ -22,8 +22,8 @@ from clamp3d.clamp.curvature import lagrangian_hessian
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import SIZE, WIRES, B, D, Gaps, S, Section, U, V, W
-from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
+from clamp3d.geometry.pose import Array
 
 STRIDE = 0.01
 """How far a step moves any coordinate, in parts of the down splint's half width (0.7 mm for the reference clamp)."""

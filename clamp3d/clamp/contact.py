@@ -17,14 +17,14 @@ from clamp3d.clamp.parts import parts
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.clamp.section import SPLINTS
 from clamp3d.clamp.surfaces import SURFACES, TOUCHING, Surface, surfaces_at
-from clamp3d.collide.answer import Distance
-from clamp3d.collide.distance import measure
-from clamp3d.collide.model import ModelCache
-from clamp3d.core.arc_circle import classify_arc_circle
-from clamp3d.core.pose import Array, SectionPose, inverse
-from clamp3d.core.profile import Arc
-from clamp3d.core.rectangle import Rectangle, hole_bolt
-from clamp3d.core.shapes import Solid
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.distance import measure
+from clamp3d.engine.model import ModelCache
+from clamp3d.geometry.pose import Array, SectionPose, inverse
+from clamp3d.geometry.profile import Arc
+from clamp3d.geometry.shapes import Solid
+from clamp3d.kernel.arc_and_circle import classify_arc_circle
+from clamp3d.kernel.rectangle import Rectangle, hole_bolt
 
 Poses = Mapping[PartName, SectionPose]
 

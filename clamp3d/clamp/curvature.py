@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.clamp.section import SIZE, SPLINTS, WIRES, Gaps, Section
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 LEVEL = 1e-6
 """Curvature in 1/mm that counts as none: rounding of the differences that it is taken from."""

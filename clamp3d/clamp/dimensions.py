@@ -14,8 +14,8 @@ from typing import Annotated, Literal, TypeAlias, cast
 from msgspec import Meta
 
 from clamp3d.clamp.conductors import conductor
-from clamp3d.core.validation import checked
 from clamp3d.errors import InputError
+from clamp3d.validation import checked
 
 SMALLEST = 1e-6
 """Least length in mm: ratios of lengths stay within what a picture, a file and a turn of a nut can hold."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from clamp3d.clamp.dimensions import Clamp, PartName
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.kernel.contact_model import GroovePair
 
 # Columns: the feature's x, y, z in part axes. A groove's mouth is +y and its axis z; a cylinder's axis is z.
 _MOUTH_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])

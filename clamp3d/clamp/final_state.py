@@ -19,8 +19,8 @@ from clamp3d.clamp.curvature import LEVEL, lagrangian_hessian, least_curvature, 
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section, U
-from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
+from clamp3d.geometry.pose import Array
 
 TOLERANCE = 1e-9
 """Largest violated gap and largest optimality residual of a proven answer, in mm."""

@@ -15,8 +15,8 @@ from clamp3d.clamp.section import D, Section
 from clamp3d.clamp.sequence import Step
 from clamp3d.clamp.steps import Closing, Log, close_splints, tighten_nut
 from clamp3d.clamp.ways import DIRECTIONS, SPARE, Leg, Ways, way_out
-from clamp3d.core.pose import Array
 from clamp3d.errors import SequenceError, SolverError
+from clamp3d.geometry.pose import Array
 
 SCREW: Pair = ("P4", "P5")
 Offsets = dict[PartName, Array]

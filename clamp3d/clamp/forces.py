@@ -11,7 +11,7 @@ from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.final_state import FinalState
 from clamp3d.clamp.matrix import plain
 from clamp3d.clamp.section import Section
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 HELD = "held on the bolt's axis"
 """What carries the sideways force that frictionless contacts leave, where the joints are said to have no play."""

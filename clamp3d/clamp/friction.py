@@ -38,8 +38,8 @@ from clamp3d.clamp.forces import Force, world_force
 from clamp3d.clamp.matrix import plain
 from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section, U
 from clamp3d.clamp.status import closing_status
-from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
+from clamp3d.geometry.pose import Array
 
 MARGIN = 1e-3
 """How far beyond an end of the band it is proven that nothing balances, mm: the last digit that is printed."""

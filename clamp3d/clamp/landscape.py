@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.clamp.section import SIZE, WIRES, D, S, Section, U
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
+from clamp3d.kernel.contact_model import GroovePair
 
 _TILTS, _POSITIONS = 481, 961
 _ADVANCES = 80

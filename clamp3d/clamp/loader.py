@@ -13,8 +13,8 @@ from typing import TypeAlias
 from clamp3d import checks
 from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import SMALLEST, Clamp, Wire
-from clamp3d.core.validation import validate
 from clamp3d.errors import InputError
+from clamp3d.validation import validate
 
 _MOST_BYTES = 2**26
 _MOST_DOTS = 64

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clamp3d.clamp.dimensions import PARTS, TITLES, ConnectionType, PartName
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 if TYPE_CHECKING:
     from clamp3d.clamp.contact import Contact

@@ -13,12 +13,12 @@ from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.surfaces import TOUCHING
-from clamp3d.collide.model import ModelCache
-from clamp3d.collide.motions import first_contact
-from clamp3d.collide.moving_pair import MovingPair
-from clamp3d.core.motion import Motion
-from clamp3d.core.pose import inverse
-from clamp3d.core.shapes import Solid
+from clamp3d.engine.model import ModelCache
+from clamp3d.engine.motions import first_contact
+from clamp3d.engine.moving_pair import MovingPair
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import inverse
+from clamp3d.geometry.shapes import Solid
 
 
 def meetings(clamp: Clamp, path: Sequence[Waypoint], pairs: Sequence[Pair], cache: ModelCache) -> dict[Pair, str]:

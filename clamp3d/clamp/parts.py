@@ -23,10 +23,10 @@ from clamp3d.clamp.dimensions import (
     Saddle,
     UpSplint,
 )
-from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.profile import Arc, Profile
-from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
+from clamp3d.geometry.extrusion import Extrusion
+from clamp3d.geometry.profile import Arc, Profile
+from clamp3d.geometry.shapes import Solid
 
 _kept = lru_cache(maxsize=16)
 """A clamp asks for the same parts at every pose."""

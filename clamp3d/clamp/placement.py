@@ -24,10 +24,10 @@ from clamp3d.clamp.capture import FLAT, CaptureMap, capture_map
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.result import Assembly
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.distance import Feature, signed_distances
-from clamp3d.core.pose import Array, inverse
 from clamp3d.errors import InputError, NotClampedError
+from clamp3d.geometry.pose import Array, inverse
+from clamp3d.kernel.contact_model import GroovePair
+from clamp3d.kernel.distance import Feature, signed_distances
 
 Turn = Literal["yaw", "pitch"]
 TURNS: tuple[Turn, ...] = ("yaw", "pitch")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.section import B, S, Section, U, V, W
-from clamp3d.core.pose import Array, SectionPose
+from clamp3d.geometry.pose import Array, SectionPose
 
 Poses = dict[PartName, SectionPose]
 

@@ -15,9 +15,9 @@ from clamp3d.clamp.forces import Force
 from clamp3d.clamp.matrix import Difference, Pair, differences, plain
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.clamp.status import ClosingStatus, Seat
-from clamp3d.collide.scene import Scene
-from clamp3d.core.pose import Array, SectionPose
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import need
+from clamp3d.geometry.pose import Array, SectionPose
 
 Solver = Literal["exact", "stepped", "bisection"]
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.surfaces import TOUCHING
-from clamp3d.collide.allowed import Allowed
-from clamp3d.collide.scene import Part, Scene
-from clamp3d.core.pose import Array
+from clamp3d.engine.allowed import Allowed
+from clamp3d.engine.scene import Part, Scene
+from clamp3d.geometry.pose import Array
 
 CONTACT = TOUCHING
 

@@ -21,8 +21,8 @@ from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import Pair
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.pose import Array, SectionPose
+from clamp3d.geometry.pose import Array, SectionPose
+from clamp3d.kernel.contact_model import GroovePair
 
 SPLINTS: tuple[PartName, PartName] = ("P1", "P2")
 WIRES: tuple[PartName, PartName] = ("P6", "P7")

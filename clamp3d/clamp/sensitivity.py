@@ -21,8 +21,8 @@ from clamp3d.clamp.dimensions import Clamp, Wire
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.section import SIZE, Section
 from clamp3d.clamp.status import closing_status
-from clamp3d.core.pose import Array
 from clamp3d.errors import NotClampedError, SolverError
+from clamp3d.geometry.pose import Array
 
 _GROOVES = ("line_groove", "jumper_groove")
 DIMENSIONS: tuple[str, ...] = (

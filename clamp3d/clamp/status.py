@@ -24,8 +24,8 @@ from clamp3d.clamp.places import section_poses
 from clamp3d.clamp.section import EDGES, SPLINTS, WIRES, D, Section
 from clamp3d.clamp.stepped import SteppedState
 from clamp3d.clamp.surfaces import TOUCHING
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.pose import SectionPose, inverse
+from clamp3d.geometry.pose import SectionPose, inverse
+from clamp3d.kernel.contact_model import GroovePair
 
 CLAMPED = "clamped"
 _KEPT_APART: frozenset[Pair] = frozenset((("P1", "P4"), ("P3", "P4"), ("P4", "P5")))

@@ -15,8 +15,8 @@ import numpy as np
 
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.section import WIRES, D, Gaps, S, Section
-from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError
+from clamp3d.geometry.pose import Array
 
 FREE = 1e-9
 """Overlap up to this many mm is rounding, not overlap."""

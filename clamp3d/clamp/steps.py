@@ -14,9 +14,9 @@ from clamp3d.clamp.matrix import PAIRS, Pair
 from clamp3d.clamp.places import Poses, saddle_rise, section_poses
 from clamp3d.clamp.result import Event, Waypoint
 from clamp3d.clamp.section import SIZE, WIRES, D, Section
-from clamp3d.collide.model import ModelCache
-from clamp3d.core.pose import Array, SectionPose
+from clamp3d.engine.model import ModelCache
 from clamp3d.errors import SolverError
+from clamp3d.geometry.pose import Array, SectionPose
 
 Meetings = list[tuple[Pair, Array]]
 """Pairs of parts, each with the state (10,) in which they meet."""

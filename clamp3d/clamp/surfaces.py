@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.pose import Array
-from clamp3d.core.profile import Arc, Edge
-from clamp3d.core.shapes import Solid
+from clamp3d.geometry.extrusion import Extrusion
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.profile import Arc, Edge
+from clamp3d.geometry.shapes import Solid
 
 TOUCHING = 1e-6
 """Gap or overlap in mm up to which two parts of a clamp touch."""
@@ -64,7 +64,7 @@ def surface_name(solid: Solid, point: Array, tolerance: float = TOUCHING) -> str
 
     Of surfaces that are as near to within ``tolerance`` mm the first of `SURFACES` counts.
 
-    >>> from clamp3d.core.shapes import cylinder
+    >>> from clamp3d.geometry.shapes import cylinder
     >>> surface_name(cylinder(5.0, 20.0), np.array([5.0, 0.0, 3.0]))
     'round face'
     """

@@ -22,15 +22,15 @@ from typing import Any, Literal
 import numpy as np
 
 from clamp3d.baselines.cas import Cas
-from clamp3d.brep.child import end_with_parent
 from clamp3d.checks import choice, function, instance, number, whole
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
 from clamp3d.clamp.status import closing_status
-from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, SolverError, need, without_numbers
+from clamp3d.files.child import end_with_parent
+from clamp3d.geometry.pose import Array
 
 Distribution = Literal["uniform", "normal"]
 Sample = tuple[float | None, str]

@@ -17,14 +17,14 @@ from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.matrix import Pair, plain
 from clamp3d.clamp.parts import parts, wire_solid
 from clamp3d.clamp.section import WIRES
-from clamp3d.collide.allowed import Allowed
-from clamp3d.collide.check import check
-from clamp3d.collide.model import ModelCache
-from clamp3d.collide.result import NOT_CLEAN, PairResult
-from clamp3d.collide.scene import Part, Scene
-from clamp3d.core.motion import Motion
-from clamp3d.core.pose import Array
-from clamp3d.core.shapes import Solid
+from clamp3d.engine.allowed import Allowed
+from clamp3d.engine.check import check
+from clamp3d.engine.model import ModelCache
+from clamp3d.engine.result import NOT_CLEAN, PairResult
+from clamp3d.engine.scene import Part, Scene
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.shapes import Solid
 
 SPARE = 20.0
 """Free way in mm between a part that waits and what is in its way."""

@@ -75,8 +75,8 @@ def command(
     clash or the clamp does not close as it should, else 4 if a pair failed, else 3 if one is undecided, and 2 if there
     are no two parts.
     """
-    from clamp3d.collide.check import check
-    from clamp3d.collide.scene import Scene
+    from clamp3d.engine.check import check
+    from clamp3d.engine.scene import Scene
     from clamp3d.output.baseline import compare, groups_csv
     from clamp3d.output.groups import accepted_file, grouped, read_accepted
     from clamp3d.output.scene_report import check_to_dict, check_to_text

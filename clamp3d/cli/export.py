@@ -12,7 +12,7 @@ from clamp3d.cli.progress import bar
 from clamp3d.cli.terminal import finish, show
 
 if TYPE_CHECKING:
-    from clamp3d.collide.result import CheckResult
+    from clamp3d.engine.result import CheckResult
     from clamp3d.output.export import Format, Layout
 
 FORMATS = ("stl", "obj", "ply", "glb", "3mf", "step")
@@ -54,7 +54,7 @@ def command(
     """
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.clamp.result import Assembly
-    from clamp3d.collide.scene import Scene
+    from clamp3d.engine.scene import Scene
     from clamp3d.output.export import default_layout, destination, export
 
     chosen, file = destination(output, format)
@@ -66,7 +66,7 @@ def command(
     if clashes:
         if not isinstance(loaded, Scene):
             raise click.UsageError("--clashes goes with a scene or a file with parts, not with a clamp")
-        from clamp3d.collide.check import check
+        from clamp3d.engine.check import check
 
         with bar(quiet) as report:
             loaded = check(loaded, depths=False, progress=report)

@@ -20,8 +20,8 @@ from clamp3d.errors import need
 if TYPE_CHECKING:
     from clamp3d.baselines.model import ContactModel
     from clamp3d.clamp.dimensions import Clamp
-    from clamp3d.collide.scene import Scene
-    from clamp3d.core.shapes import Fit
+    from clamp3d.engine.scene import Scene
+    from clamp3d.geometry.shapes import Fit
 
 Declared = Callable[[str, str], click.Parameter]
 """Makes the option or argument for a parameter with a name and an annotation."""

@@ -12,7 +12,7 @@ from clamp3d.errors import need
 
 if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
-    from clamp3d.collide.scene import Scene
+    from clamp3d.engine.scene import Scene
 
 
 @declared("report")
@@ -34,7 +34,7 @@ def command(
     need("matplotlib", "a report")
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.clamp.scene import CONTACT
-    from clamp3d.collide.verdict import Thresholds
+    from clamp3d.engine.verdict import Thresholds
     from clamp3d.output.files import check_folder
     from clamp3d.output.report import make_report
     from clamp3d.output.report_page import write_report

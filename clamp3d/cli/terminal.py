@@ -54,8 +54,8 @@ def finish(finding: bool = False, *, failed: bool = False, verdicts: Collection[
 
     ``verdicts`` of a scene count as what they say.
     """
-    from clamp3d.collide.result import BAD
-    from clamp3d.collide.verdict import Verdict
+    from clamp3d.engine.result import BAD
+    from clamp3d.engine.verdict import Verdict
 
     codes = (
         (finding or any(verdict in verdicts for verdict in BAD), ExitCode.FINDING),

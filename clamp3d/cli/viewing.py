@@ -17,10 +17,10 @@ from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.cli.options import Viewing
 from clamp3d.cli.progress import bar, narrated
 from clamp3d.cli.terminal import show
-from clamp3d.collide.check import check
-from clamp3d.collide.model import ModelCache
-from clamp3d.collide.result import CheckResult
-from clamp3d.collide.scene import Scene
+from clamp3d.engine.check import check
+from clamp3d.engine.model import ModelCache
+from clamp3d.engine.result import CheckResult
+from clamp3d.engine.scene import Scene
 from clamp3d.output.files import STDOUT
 from clamp3d.output.viewer import MEASURED, Viewer
 from clamp3d.output.viewer_overlay import overlay

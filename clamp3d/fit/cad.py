@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.brep.bodies import Body, Reading
-from clamp3d.brep.faces import CYLINDER, KINDS, PLANE
-from clamp3d.brep.solid import BrepSolid
-from clamp3d.core.mesh import Array, IntArray, Mesh
+from clamp3d.files.bodies import Body, Reading
+from clamp3d.files.faces import CYLINDER, KINDS, PLANE
+from clamp3d.files.solid import BrepSolid
 from clamp3d.fit.cylinder import Axis, perpendicular
 from clamp3d.fit.surface import covered
+from clamp3d.geometry.mesh import Array, IntArray, Mesh
 
 _SAME = 1e-6
 """Cylinders (mm, rad) nearer than this are one."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import fdtri
 
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 _DIGITS = 1e-15
 CONFIDENCE = 0.9973

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.core.mesh import IntArray
-from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Cylinder, SweptArc
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.primitives import Cylinder, SweptArc
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from clamp3d import checks
-from clamp3d.brep.bodies import Body, Reading
-from clamp3d.brep.mesh_file import load_bodies, load_mesh
-from clamp3d.brep.solid import BrepSolid
 from clamp3d.checks import function, instance
-from clamp3d.core.mesh import Array, Mesh
+from clamp3d.files.bodies import Body, Reading
+from clamp3d.files.mesh_file import load_bodies, load_mesh
+from clamp3d.files.solid import BrepSolid
 from clamp3d.fit.cad import cad_features
 from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
 from clamp3d.fit.measure import measure
 from clamp3d.fit.regions import find_regions, join
 from clamp3d.fit.surface import Surface
+from clamp3d.geometry.mesh import Array, Mesh
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,9 +136,9 @@ def fit_mesh(mesh: Mesh, *, progress: Callable[[str, float], None] | None = None
 
     Examples
     --------
-    >>> from clamp3d.core import shapes
-    >>> from clamp3d.core.mesh import make_mesh
-    >>> from clamp3d.core.meshing import mesh
+    >>> from clamp3d.geometry import shapes
+    >>> from clamp3d.geometry.mesh import make_mesh
+    >>> from clamp3d.geometry.meshing import mesh
     >>> wire = mesh(shapes.cylinder(6.5, 80.0))
     >>> (fitted,) = fit_mesh(make_mesh(wire.vertices, wire.faces)).cylinders
     >>> round(fitted.radius, 9), round(fitted.length, 9), fitted.full

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from clamp3d.core.mesh import IntArray
-from clamp3d.core.pose import Array
-from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
 from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface, border, facet_span
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.profile import sagitta
 
 MIN_LINES = 4
 """Fewest lines on a surface: three always lie on some circle (a trapezoid or V groove is not an arc)."""

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from clamp3d.core.mesh import IntArray
-from clamp3d.core.pose import Array
-from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, patches_of, perpendicular, surface_error
 from clamp3d.fit.grow import Region
 from clamp3d.fit.surface import BoolArray, Surface, angles, border, covered, turned
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.profile import sagitta
 
 FULL_TURN_GAP = np.radians(30.0)
 """A surface whose largest uncovered angle is below this goes all the way round."""

@@ -11,13 +11,13 @@ from itertools import combinations
 
 import numpy as np
 
-from clamp3d.core.mesh import IntArray
-from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
 from clamp3d.fit.grow import Region, Search
 from clamp3d.fit.measure import arc
 from clamp3d.fit.seeds import patches, strips
 from clamp3d.fit.surface import Surface
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.profile import sagitta
 
 
 def find_regions(surface: Surface, progress: Callable[[str, float], None] | None = None) -> list[Region]:

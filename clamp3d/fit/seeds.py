@@ -13,11 +13,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from clamp3d.core.mesh import IntArray
-from clamp3d.core.profile import sagitta
 from clamp3d.fit.cylinder import Axis, axis_along, fit_axis, perpendicular
 from clamp3d.fit.grow import Region, Search, accept, grow
 from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.profile import sagitta
 
 _PATCH_SIZES = (24, 96, 384, 1536)
 _GATES = tuple(np.radians(a) for a in (12.0, 25.0, 46.0))

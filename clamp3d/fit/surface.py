@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from clamp3d.core.mesh import Array, IntArray, Mesh
 from clamp3d.fit.cylinder import Axis, perpendicular
+from clamp3d.geometry.mesh import Array, IntArray, Mesh
 
 BoolArray = NDArray[np.bool_]
 

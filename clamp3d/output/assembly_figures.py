@@ -11,9 +11,9 @@ from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Assembly
-from clamp3d.core.meshing import mesh
-from clamp3d.core.pose import Array, SectionPose
-from clamp3d.core.profile import MIN_MESH_ERROR
+from clamp3d.geometry.meshing import mesh
+from clamp3d.geometry.pose import Array, SectionPose
+from clamp3d.geometry.profile import MIN_MESH_ERROR
 from clamp3d.output.figures import blank, near, same_scale, title
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
 from clamp3d.output.placed import PosedMesh

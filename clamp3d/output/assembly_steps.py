@@ -10,7 +10,7 @@ from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.status import Seat, seats
-from clamp3d.core.pose import SectionPose
+from clamp3d.geometry.pose import SectionPose
 from clamp3d.output.section import edge_openings
 
 TIGHTENING_STAGES = 4

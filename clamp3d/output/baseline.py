@@ -14,10 +14,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from clamp3d.collide.result import BAD, PairResult
-from clamp3d.collide.scene import Scene
-from clamp3d.core.pose import Array, inverse
+from clamp3d.engine.result import BAD, PairResult
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import Array, inverse
 from clamp3d.output.groups import Accepted, Group
 
 Status = Literal["new", "changed", "same", "accepted"]

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-from clamp3d.collide.result import CheckResult
-from clamp3d.core.pose import Array
+from clamp3d.engine.result import CheckResult
+from clamp3d.geometry.pose import Array
 from clamp3d.output.figures import picture
 from clamp3d.output.files import whole_file
 from clamp3d.output.groups import Group, grouped

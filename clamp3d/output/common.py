@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from clamp3d.core.pose import Array, inverse
+from clamp3d.geometry.pose import Array, inverse
 
 
 def cut_open(

@@ -13,11 +13,11 @@ from clamp3d import checks
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.states import state as find_state
-from clamp3d.collide.result import CheckResult
-from clamp3d.collide.scene import Scene
-from clamp3d.core.pose import Array
-from clamp3d.core.profile import check_mesh_error
+from clamp3d.engine.result import CheckResult
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.profile import check_mesh_error
 from clamp3d.output import mesh_formats
 from clamp3d.output.files import file_stem, write_files
 from clamp3d.output.manifest import manifest
@@ -115,8 +115,8 @@ def export(
     Examples
     --------
     >>> import tempfile
-    >>> from clamp3d.collide.scene import Scene
-    >>> from clamp3d.core import shapes
+    >>> from clamp3d.engine.scene import Scene
+    >>> from clamp3d.geometry import shapes
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     written = export(Scene().add("pin", shapes.cylinder(5.0, 40.0)), folder + "/pin.stl")
     ...     [path.name for path in (*written.files, written.manifest)]

@@ -16,7 +16,7 @@ from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import CONTACT
-from clamp3d.collide.verdict import Thresholds
+from clamp3d.engine.verdict import Thresholds
 from clamp3d.errors import InputError, need
 from clamp3d.output.files import STDOUT, whole_file
 from clamp3d.output.palette import INK, VERDICT_COLOURS

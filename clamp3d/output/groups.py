@@ -19,11 +19,11 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from clamp3d.collide.result import BAD, CheckResult, PairResult
-from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import Verdict
-from clamp3d.core.shapes import Shape
+from clamp3d.engine.result import BAD, CheckResult, PairResult
+from clamp3d.engine.scene import Scene
+from clamp3d.engine.verdict import Verdict
 from clamp3d.errors import InputError
+from clamp3d.geometry.shapes import Shape
 from clamp3d.output.files import write_text
 
 _JUMP, _JUMP_SHARE = 0.01, 0.2
@@ -88,9 +88,9 @@ def grouped(result: CheckResult) -> tuple[Group, ...]:
 
     A pair that clashes at rest is not listed again for the motions.
 
-    >>> from clamp3d.collide.check import check
-    >>> from clamp3d.core import shapes
-    >>> from clamp3d.core.pose import translation
+    >>> from clamp3d.engine.check import check
+    >>> from clamp3d.geometry import shapes
+    >>> from clamp3d.geometry.pose import translation
     >>> scene = Scene().add("rail", shapes.box((90.0, 10.0, 10.0)))
     >>> for k, height in enumerate((9.0, 9.0, 9.0, 6.0)):
     ...     scene = scene.add(f"nut-{k}", shapes.box((5.0, 5.0, 10.0)), translation(20.0 * k - 30.0, 0.0, height))
@@ -145,7 +145,7 @@ def families(scene: Scene) -> dict[str, str]:
 
     A number without a separator before it counts for parts of one shape only.
 
-    >>> from clamp3d.core import shapes
+    >>> from clamp3d.geometry import shapes
     >>> ball, pin = shapes.cylinder(2.0, 4.0), shapes.cylinder(1.0, 4.0)
     >>> scene = Scene().add("ball", ball).add("ball_2", pin).add("P1", ball).add("P2", ball).add("P3", pin)
     >>> list(families(scene).values())

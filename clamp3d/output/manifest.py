@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from clamp3d import __version__
-from clamp3d.brep.solid import BrepSolid
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.core.meshing import volume_bounds
-from clamp3d.core.shapes import Solid
+from clamp3d.files.solid import BrepSolid
+from clamp3d.geometry.meshing import volume_bounds
+from clamp3d.geometry.shapes import Solid
 from clamp3d.output.mesh_formats import MILLIMETRES
 from clamp3d.output.placed import PlacedPart, PosedMesh
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clamp3d.core.pose import Array
 from clamp3d.errors import InputError, need
+from clamp3d.geometry.pose import Array
 from clamp3d.output.palette import rgb
 from clamp3d.output.placed import PosedMesh
 

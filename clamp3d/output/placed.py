@@ -11,11 +11,11 @@ import numpy as np
 from clamp3d.checks import items, text
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.collide.scene import Scene, unknown_part
-from clamp3d.core.meshing import mesh
-from clamp3d.core.pose import Array
-from clamp3d.core.shapes import MeshShape, Shape
+from clamp3d.engine.scene import Scene, unknown_part
 from clamp3d.errors import InputError
+from clamp3d.geometry.meshing import mesh
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.shapes import MeshShape, Shape
 from clamp3d.output.palette import part_colours
 
 if TYPE_CHECKING:

@@ -15,11 +15,11 @@ from clamp3d.checks import path as checked_path
 from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.result import Assembly
-from clamp3d.collide.answer import Distance
-from clamp3d.collide.check import check
-from clamp3d.collide.result import BAD, PairResult
-from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import Thresholds, Verdict
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.check import check
+from clamp3d.engine.result import BAD, PairResult
+from clamp3d.engine.scene import Scene
+from clamp3d.engine.verdict import Thresholds, Verdict
 from clamp3d.output.assembly_steps import StepRow, TighteningRow, step_rows, tightening_rows
 from clamp3d.output.groups import Group, grouped
 from clamp3d.output.pages import render
@@ -153,7 +153,7 @@ def report(
     Examples
     --------
     >>> import tempfile
-    >>> from clamp3d.core import shapes
+    >>> from clamp3d.geometry import shapes
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     [path.name for path in report(Scene().add("pin", shapes.cylinder(5.0, 40.0)), folder)]
     ['report.html', 'report.json', 'pairs.csv']

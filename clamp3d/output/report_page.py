@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clamp3d import __version__
-from clamp3d.collide.verdict import Verdict
+from clamp3d.engine.verdict import Verdict
 from clamp3d.output.files import write_files
 from clamp3d.output.manifest import versions
 from clamp3d.output.pages import now, render

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clamp3d.collide.result import PairResult
-from clamp3d.collide.scene import Scene
-from clamp3d.core.pose import Array
-from clamp3d.core.profile import MIN_MESH_ERROR
-from clamp3d.core.shapes import Solid
+from clamp3d.engine.result import PairResult
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import Clamp3dError
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.profile import MIN_MESH_ERROR
+from clamp3d.geometry.shapes import Solid
 from clamp3d.output.common import overlap
 from clamp3d.output.figures import blank
 from clamp3d.output.palette import INK, VERDICT_COLOURS

@@ -9,8 +9,8 @@ from itertools import combinations
 from typing import Any
 
 from clamp3d import __version__
-from clamp3d.collide.result import CheckResult, Work
-from clamp3d.collide.verdict import Verdict
+from clamp3d.engine.result import CheckResult, Work
+from clamp3d.engine.verdict import Verdict
 from clamp3d.output.baseline import Comparison
 from clamp3d.output.groups import Accepted, Group, grouped
 from clamp3d.output.tables import text_table

@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
 from clamp3d.clamp.parts import parts
-from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.pose import SectionPose
-from clamp3d.core.profile import Arc, Point, Profile
-from clamp3d.core.shapes import Solid
+from clamp3d.geometry.extrusion import Extrusion
+from clamp3d.geometry.pose import SectionPose
+from clamp3d.geometry.profile import Arc, Point, Profile
+from clamp3d.geometry.shapes import Solid
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, darker, rgb
 
 if TYPE_CHECKING:

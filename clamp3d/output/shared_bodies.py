@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.brep.open_cascade import bounds_of, to_bytes, volume_of
-from clamp3d.brep.solid import BrepSolid
-from clamp3d.collide.result import BAD, CheckResult
-from clamp3d.core.mesh import make_mesh
-from clamp3d.core.shapes import MeshShape
+from clamp3d.engine.result import BAD, CheckResult
+from clamp3d.files.open_cascade import bounds_of, to_bytes, volume_of
+from clamp3d.files.solid import BrepSolid
+from clamp3d.geometry.mesh import make_mesh
+from clamp3d.geometry.shapes import MeshShape
 from clamp3d.output.common import overlap
 from clamp3d.output.palette import VERDICT_COLOURS
 from clamp3d.output.placed import PlacedPart, posed

@@ -13,13 +13,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from clamp3d.brep.open_cascade import explore
-from clamp3d.brep.solid import BrepSolid, require_open_cascade
-from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.pose import Array
-from clamp3d.core.profile import Arc
-from clamp3d.core.shapes import Solid
 from clamp3d.errors import Clamp3dError, InputError
+from clamp3d.files.open_cascade import explore
+from clamp3d.files.solid import BrepSolid, require_open_cascade
+from clamp3d.geometry.extrusion import Extrusion
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.profile import Arc
+from clamp3d.geometry.shapes import Solid
 from clamp3d.output.pages import now
 from clamp3d.output.palette import rgb
 from clamp3d.output.placed import PlacedPart

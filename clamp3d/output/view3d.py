@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 from clamp3d.output.palette import darker, rgb
 from clamp3d.output.placed import PosedMesh
 

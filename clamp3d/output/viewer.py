@@ -23,14 +23,14 @@ from clamp3d.checks import flag, instance, text
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.forces import HELD
 from clamp3d.clamp.result import Assembly, Finding, Waypoint
-from clamp3d.collide.check import check
-from clamp3d.collide.distance import measure
-from clamp3d.collide.model import ModelCache
-from clamp3d.collide.result import CheckResult, PairResult
-from clamp3d.collide.scene import Scene
-from clamp3d.core.pose import Array
-from clamp3d.core.shapes import MeshShape
+from clamp3d.engine.check import check
+from clamp3d.engine.distance import measure
+from clamp3d.engine.model import ModelCache
+from clamp3d.engine.result import CheckResult, PairResult
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.shapes import MeshShape
 from clamp3d.output.files import write_text
 from clamp3d.output.groups import grouped
 from clamp3d.output.pages import render
@@ -349,7 +349,7 @@ def view(shown: Any, *, serve: bool = True, **options: Any) -> Viewer:
 
     Examples
     --------
-    >>> from clamp3d.core import shapes
+    >>> from clamp3d.geometry import shapes
     >>> scene = Scene(name="two balls").add("a", shapes.cylinder(5.0, 10.0)).add("b", shapes.cylinder(4.0, 10.0))
     >>> with view(scene, serve=False) as viewer:
     ...     viewer.story["findings"][0]["verdict"]

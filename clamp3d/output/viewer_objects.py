@@ -13,7 +13,7 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 from clamp3d.output.palette import INK
 
 _CREASE = math.radians(25.0)

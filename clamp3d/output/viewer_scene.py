@@ -19,10 +19,10 @@ from meshcat.geometry import Object
 from numpy.typing import ArrayLike
 
 from clamp3d.clamp.forces import Force
-from clamp3d.collide.answer import Distance
-from clamp3d.collide.result import BAD
-from clamp3d.collide.scene import Part, Scene
-from clamp3d.core.pose import Array
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.result import BAD
+from clamp3d.engine.scene import Part, Scene
+from clamp3d.geometry.pose import Array
 from clamp3d.output import viewer_objects as draw
 from clamp3d.output.common import cut_open, overlap
 from clamp3d.output.palette import FORCE, INK, VERDICT_COLOURS, darker

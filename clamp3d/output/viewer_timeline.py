@@ -16,20 +16,20 @@ from clamp3d.clamp.contact import NONE, measure_contacts
 from clamp3d.clamp.dimensions import TITLES, Clamp
 from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.scene import CONTACT, clamp_scene
-from clamp3d.collide.answer import Distance
-from clamp3d.collide.model import ModelCache
-from clamp3d.collide.result import BAD, CheckResult, PairResult
-from clamp3d.collide.scene import Scene
-from clamp3d.collide.verdict import Verdict
-from clamp3d.core.motion import Motion
-from clamp3d.core.pose import Array, rotation
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.model import ModelCache
+from clamp3d.engine.result import BAD, CheckResult, PairResult
+from clamp3d.engine.scene import Scene
+from clamp3d.engine.verdict import Verdict
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import Array, rotation
 from clamp3d.output.palette import VERDICT_COLOURS
 from clamp3d.output.section import edge_openings, part_anchor
 from clamp3d.output.wording import distance_text, first_text, worst_first
 
 Poses = Mapping[str, Array]
 Measure = Callable[[Scene, Sequence[tuple[str, str]]], Iterable["Row"]]
-"""Measures pairs of a scene, as `clamp3d.collide.distance.measure` does, with their verdicts."""
+"""Measures pairs of a scene, as `clamp3d.engine.distance.measure` does, with their verdicts."""
 
 FIRST = "first contact"
 _HOLD = 1.2  # s at each stop

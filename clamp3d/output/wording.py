@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from typing import TYPE_CHECKING
 
-from clamp3d.collide.answer import Distance
-from clamp3d.collide.result import BAD, CheckResult, PairResult
-from clamp3d.collide.scene import Part, Scene
-from clamp3d.collide.verdict import Verdict
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.result import BAD, CheckResult, PairResult
+from clamp3d.engine.scene import Part, Scene
+from clamp3d.engine.verdict import Verdict
 from clamp3d.output.groups import Group, grouped
 
 if TYPE_CHECKING:
-    from clamp3d.collide.where import Overlap
+    from clamp3d.engine.where import Overlap
 
 
 def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
@@ -68,7 +68,7 @@ def _to_digits(exact: Decimal, digits: int, rounding: str) -> Decimal:
 def part_title(part: Part) -> str:
     """A part's name with what it is, where the name does not say it.
 
-    >>> from clamp3d.core import shapes
+    >>> from clamp3d.geometry import shapes
     >>> part_title(Scene().add("wire", shapes.cylinder(6.5, 80.0)).parts[0])
     'wire'
     """
@@ -219,7 +219,7 @@ def where_text(where: Overlap) -> str:
     """The volume that two parts share, with certain digits only, and the box around it.
 
     >>> import numpy as np
-    >>> from clamp3d.collide.where import Overlap
+    >>> from clamp3d.engine.where import Overlap
     >>> where_text(Overlap((12.3412, 12.3419), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.04]])))
     'shared volume 12.34 mm3, within X 0 to 3, Y 1 to 4, Z 2 to 5.1 mm'
     >>> where_text(Overlap((0.2, 12.0), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]), of_facets=True))

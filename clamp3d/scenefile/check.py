@@ -9,10 +9,10 @@ from clamp3d.checks import shown
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly
-from clamp3d.collide.check import check as check_scene
-from clamp3d.collide.model import ModelCache, Progress
-from clamp3d.collide.result import CheckResult
-from clamp3d.collide.scene import Part, Scene
+from clamp3d.engine.check import check as check_scene
+from clamp3d.engine.model import ModelCache, Progress
+from clamp3d.engine.result import CheckResult
+from clamp3d.engine.scene import Part, Scene
 from clamp3d.errors import InputError
 from clamp3d.scenefile.load import load
 
@@ -59,8 +59,8 @@ def check(
 
     Examples
     --------
-    >>> from clamp3d.core import shapes
-    >>> from clamp3d.core.pose import translation
+    >>> from clamp3d.geometry import shapes
+    >>> from clamp3d.geometry.pose import translation
     >>> check([("a", shapes.box((10, 10, 10))), ("b", shapes.cylinder(3, 10), translation(0, 0, 9))])
     CheckResult('scene': not clean; 1 clash)
     """

@@ -12,17 +12,17 @@ from pathlib import Path
 import msgspec
 
 from clamp3d import checks
-from clamp3d.brep.formats import FORMATS, ROBOT
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.loader import builtin_clamps, load_clamp, parse_toml, read_text
-from clamp3d.collide.allowed import Allowed
-from clamp3d.collide.scene import Part, Scene
-from clamp3d.core import shapes
-from clamp3d.core.validation import validate
+from clamp3d.engine.allowed import Allowed
+from clamp3d.engine.scene import Part, Scene
 from clamp3d.errors import Clamp3dError, InputError, escaped
+from clamp3d.files.formats import FORMATS, ROBOT
+from clamp3d.geometry import shapes
 from clamp3d.scenefile.parts import Reader, prefixed
 from clamp3d.scenefile.pose_table import Pose
 from clamp3d.scenefile.tables import ClampTable, FileTable, SceneTable, clamp_source, part_table
+from clamp3d.validation import validate
 
 
 def load_scene(path: str | Path) -> Scene:

@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from clamp3d import checks
-from clamp3d.brep.bodies import part_name
-from clamp3d.brep.formats import FORMATS, ROBOT
-from clamp3d.collide.scene import Scene
-from clamp3d.core.shapes import Fit
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.files.bodies import part_name
+from clamp3d.files.formats import FORMATS, ROBOT
+from clamp3d.geometry.shapes import Fit
 from clamp3d.scenefile.parts import Reader, read_parts, to_parts
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def _load_path(source: str | os.PathLike[str], reader: Reader) -> Clamp | Scene:
 
 
 def _load_object(source: Any, reader: Reader) -> Scene:
-    from clamp3d.brep.objects import read_object
+    from clamp3d.files.objects import read_object
 
     reader.refuse("an object", "joints", "poses", "unit", "line", "jumper")
     reading, name = read_object(source)

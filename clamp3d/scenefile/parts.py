@@ -13,17 +13,17 @@ from pathlib import Path
 import numpy as np
 
 from clamp3d import checks
-from clamp3d.brep.bodies import Reading, part_name, unique_names
-from clamp3d.brep.formats import FORMATS, ROBOT
-from clamp3d.brep.mesh_file import load_bodies
-from clamp3d.brep.solid import BrepSolid
-from clamp3d.collide.allowed import Allowed
-from clamp3d.collide.scene import Part, Scene
-from clamp3d.core.pose import Array
-from clamp3d.core.shapes import FARTHEST_OFF, FITS, Fit, Shape, Solid
-from clamp3d.core.validation import validate
+from clamp3d.engine.allowed import Allowed
+from clamp3d.engine.scene import Part, Scene
 from clamp3d.errors import InputError
+from clamp3d.files.bodies import Reading, part_name, unique_names
+from clamp3d.files.formats import FORMATS, ROBOT
+from clamp3d.files.mesh_file import load_bodies
+from clamp3d.files.solid import BrepSolid
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.shapes import FARTHEST_OFF, FITS, Fit, Shape, Solid
 from clamp3d.scenefile.pose_table import Pose
+from clamp3d.validation import validate
 
 COLUMNS = ("name", "x", "y", "z", "qx", "qy", "qz", "qw")
 """Columns of a table of poses: mm, and a unit quaternion."""

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta, Struct
 
-from clamp3d.core.pose import UNIT_TOLERANCE, Array, nearest_rigid, rotation, turn_of
+from clamp3d.geometry.pose import UNIT_TOLERANCE, Array, nearest_rigid, rotation, turn_of
 
 _SNAP = 1e-4
 Number = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]

@@ -15,14 +15,14 @@ from clamp3d import checks
 from clamp3d.clamp.conductors import conductor
 from clamp3d.clamp.dimensions import ClampPart, Length, Offset, check_conductor
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.collide.scene import Scene
-from clamp3d.core import shapes
-from clamp3d.core.motion import Motion
-from clamp3d.core.primitives import SweptArc
-from clamp3d.core.validation import validate
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.geometry import shapes
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.primitives import SweptArc
 from clamp3d.scenefile.parts import Reader, names_like, read_parts
 from clamp3d.scenefile.pose_table import Angle, Number, Pose, Table, Vector
+from clamp3d.validation import validate
 
 
 class HoleTable(Table):

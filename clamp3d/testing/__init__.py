@@ -6,7 +6,7 @@ least. From that alone `common` bounds how deep two bodies share a point, by bra
 the oracle proves it broken; what the oracle cannot decide passes.
 
 >>> from clamp3d import distance, shapes
->>> from clamp3d.core.pose import translation
+>>> from clamp3d.geometry.pose import translation
 >>> box, wire, T = shapes.box((10, 10, 10)), shapes.cylinder(3, 20), translation(9, 0, 0)
 >>> assert_distance(distance(box, wire, T), box, wire, T)
 """

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from clamp3d.collide.answer import Distance
-from clamp3d.collide.motions import MotionDistance
-from clamp3d.core.motion import Motion
-from clamp3d.core.pose import Array
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.motions import MotionDistance
 from clamp3d.fit.features import FittedSurface
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import Array
 from clamp3d.testing.bodies import AnyBody, Body, body
 from clamp3d.testing.search import Common, common, nearest
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.core.pose import Array
-from clamp3d.core.primitives import Capsule, Cylinder, SweptArc
-from clamp3d.core.profile import Arc, Profile
-from clamp3d.core.shapes import MeshShape, Solid
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
+from clamp3d.geometry.profile import Arc, Profile
+from clamp3d.geometry.shapes import MeshShape, Solid
 
 Field = Callable[[Array], Array]
 """Of points (n, 3): <= 0 on the body, > 0 elsewhere, and nowhere steeper than 1. So a point with the value g > 0 is at

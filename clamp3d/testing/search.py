@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clamp3d.collide.answer import Distance
-from clamp3d.core.pose import Array
+from clamp3d.engine.answer import Distance
+from clamp3d.geometry.pose import Array
 from clamp3d.testing.bodies import AnyBody, Body, body
 
 _PROJECTIONS, _FOLLOWED = 8, 3

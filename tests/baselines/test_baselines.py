@@ -21,11 +21,11 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.meshing import mesh
-from clamp3d.core.pose import Array, inverse, rotation, translation
-from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
+from clamp3d.geometry.meshing import mesh
+from clamp3d.geometry.pose import Array, inverse, rotation, translation
+from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.kernel.contact_model import GroovePair
 
 GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)
 PAIR = block_pair(GROOVE, Cylinder(10.5, 200.0))

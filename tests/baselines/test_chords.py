@@ -5,10 +5,10 @@ import pytest
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.pose import rotation, translation
-from clamp3d.core.primitives import Cylinder, SweptArc
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import rotation, translation
+from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.kernel.contact_model import GroovePair
 
 
 def pair(radius, half_deg, wire):

@@ -15,9 +15,9 @@ from scipy.spatial import ConvexHull
 from clamp3d.baselines import cache
 from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
 from clamp3d.bench.compare.scene import grooved_block
-from clamp3d.core.meshing import mesh
-from clamp3d.core.primitives import SweptArc
 from clamp3d.errors import InputError, SolverError
+from clamp3d.geometry.meshing import mesh
+from clamp3d.geometry.primitives import SweptArc
 
 BLOCK = grooved_block(SweptArc(12.0, math.radians(70.0), 60.0), width=137.0, depth=30.0)
 COARSE = DecompositionParameters(threshold=0.05, real_metric=False)

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from clamp3d.baselines.decomposition import decompose
 from clamp3d.baselines.fcl_shapes import Shape, Wire, bvh, contained, convex, distance, facets, measure
 from clamp3d.baselines.wedges import prism
-from clamp3d.core.pose import Array, rotation, translation
-from clamp3d.core.primitives import Cylinder
 from clamp3d.errors import InputError
+from clamp3d.geometry.pose import Array, rotation, translation
+from clamp3d.geometry.primitives import Cylinder
 
 V, F = prism(np.array([[-20.0, -10.0], [20.0, -10.0], [20.0, 10.0], [-20.0, 10.0]]), -25.0, 25.0)
 BOX, MESH = convex(V, F), bvh(V, F)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clamp3d.core.mesh import closed_mesh
 from clamp3d.errors import InputError
+from clamp3d.geometry.mesh import closed_mesh
 
 V = np.array([[x, y, z] for x in (0.0, 2.0) for y in (0.0, 3.0) for z in (0.0, 4.0)])
 F = np.array(

@@ -15,10 +15,10 @@ from clamp3d.baselines.wedges import Wedge, Wedges, part_wedges, prism
 from clamp3d.bench.compare.scene import grooved_block
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.core.primitives import SweptArc
-from clamp3d.core.profile import Arc
-from clamp3d.core.shapes import Solid
 from clamp3d.errors import InputError
+from clamp3d.geometry.primitives import SweptArc
+from clamp3d.geometry.profile import Arc
+from clamp3d.geometry.shapes import Solid
 
 
 def assert_filled_once(wedges: list[Wedge], outline: shapely.Polygon) -> None:

@@ -17,7 +17,7 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts, wire_solid
-from clamp3d.core.meshing import mesh
+from clamp3d.geometry.meshing import mesh
 
 LATTICE = 5.0
 """Mm between points of the lattice: every part is thicker."""

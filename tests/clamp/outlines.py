@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 _COARSE, _FINE = 0.05, 0.005
 _NEAR = (0.6, 0.03)

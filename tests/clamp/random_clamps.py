@@ -19,8 +19,8 @@ from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import WIRES, D, Section
-from clamp3d.core.pose import Array
 from clamp3d.errors import SolverError
+from clamp3d.geometry.pose import Array
 
 OPTIMISER = 1e-5
 """Mm to which the optimiser on points agrees."""

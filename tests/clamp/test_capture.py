@@ -20,9 +20,9 @@ from clamp3d.clamp.parts import parts
 from clamp3d.clamp.placement import close_on, placement
 from clamp3d.clamp.section import WIRES, Section
 from clamp3d.clamp.status import ClosingStatus
-from clamp3d.core.meshing import mesh
-from clamp3d.core.pose import rotation
 from clamp3d.errors import InputError, NotClampedError, SolverError
+from clamp3d.geometry.meshing import mesh
+from clamp3d.geometry.pose import rotation
 from clamp3d.output.placement_report import capture_figure
 
 COUNT = int(os.environ.get("CLAMP3D_RANDOM_STARTS", "40"))

@@ -21,9 +21,9 @@ from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.surfaces import surface_name
 from clamp3d.cli import group
-from clamp3d.collide.distance import measure
-from clamp3d.core.pose import Array, inverse
-from clamp3d.core.shapes import Solid
+from clamp3d.engine.distance import measure
+from clamp3d.geometry.pose import Array, inverse
+from clamp3d.geometry.shapes import Solid
 from clamp3d.testing import body
 
 WIRES = [

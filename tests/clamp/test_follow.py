@@ -17,8 +17,8 @@ from clamp3d.clamp.parts import parts
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.steps import section_poses
 from clamp3d.clamp.ways import DIRECTIONS, Ways, way_out
-from clamp3d.core.meshing import mesh
 from clamp3d.errors import SequenceError
+from clamp3d.geometry.meshing import mesh
 from clamp3d.output.report import make_report
 
 manifold3d = pytest.importorskip("manifold3d")

@@ -9,8 +9,8 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import WIRES, D, S, Section
-from clamp3d.core.pieces import groove_pieces
-from clamp3d.core.pose import inverse
+from clamp3d.geometry.pose import inverse
+from clamp3d.kernel.pieces import groove_pieces
 
 SLOPES = 5  # line (right, up), jumper (right, up), yaw of the down splint; rad
 

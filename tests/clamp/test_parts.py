@@ -17,9 +17,9 @@ from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.core.meshing import mesh, volume_bounds
-from clamp3d.core.profile import Arc, Profile
 from clamp3d.errors import InputError
+from clamp3d.geometry.meshing import mesh, volume_bounds
+from clamp3d.geometry.profile import Arc, Profile
 
 CLAMP = load_clamp()
 REFERENCE = parts(CLAMP)

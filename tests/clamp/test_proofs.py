@@ -14,9 +14,9 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.meetings import meetings
 from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.section import D, Section
-from clamp3d.collide.model import ModelCache
-from clamp3d.core.pose import SectionPose
+from clamp3d.engine.model import ModelCache
 from clamp3d.errors import SolverError
+from clamp3d.geometry.pose import SectionPose
 from clamp3d.testing import assert_returns
 
 

@@ -22,8 +22,8 @@ from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.sensitivity import sensitivity
 from clamp3d.clamp.tolerance import monte_carlo
 from clamp3d.cli import main
-from clamp3d.core.profile import Arc
 from clamp3d.errors import NotClampedError, SolverError, without_numbers
+from clamp3d.geometry.profile import Arc
 
 COMMANDS = ("run", "check", "tolerance --n 1", "sweep --steps 4", "report -o", "export -o", "view --html")
 COUNT = int(os.environ.get("CLAMP3D_RANDOM_CLAMPS", "12"))

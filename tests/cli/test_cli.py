@@ -12,8 +12,8 @@ import trimesh
 from clamp3d import cli
 from clamp3d.bench import published
 from clamp3d.cli.options import Output, number
-from clamp3d.core.pose import PoseWarning
 from clamp3d.errors import SolverError
+from clamp3d.geometry.pose import PoseWarning
 
 BOX = '[parts.{name}]\nshape = "box"\nsize = [10, 10, 10]\npose = {{ translation = [{x}, 0, 0] }}\n'
 

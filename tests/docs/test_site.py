@@ -41,7 +41,7 @@ PAGES = [
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_pages_name_files_that_exist(page):
-    """``collide/check.py`` is a file of the package, ``tests/...`` and ``scripts/...`` are files of the project."""
+    """``engine/check.py`` is a file of the package, ``tests/...`` and ``scripts/...`` are files of the project."""
     for name in re.findall(r"(?<![\w/.-])(?:[\w-]+/)+[\w-]+\.\w+\b", page.read_text(encoding="utf-8")):
         places = (ROOT / name, PACKAGE / name, ROOT / "docs" / name)
         if name.split("/")[0] in {f.name for folder in (ROOT, PACKAGE, ROOT / "docs") for f in folder.iterdir()}:

@@ -23,10 +23,10 @@ reveal_type(gap)
 reveal_type(gap.value)
 """
 REVEALED = [
-    "clamp3d.collide.result.CheckResult",
+    "clamp3d.engine.result.CheckResult",
     "clamp3d.clamp.result.Assembly",
-    "clamp3d.clamp.dimensions.Clamp | clamp3d.collide.scene.Scene",
-    "clamp3d.collide.answer.Distance",
+    "clamp3d.clamp.dimensions.Clamp | clamp3d.engine.scene.Scene",
+    "clamp3d.engine.answer.Distance",
     "float",
 ]
 

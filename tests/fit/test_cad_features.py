@@ -12,8 +12,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "brep"))
 
 from assemblies import box, cone, cut, fuse, ring, rod, shift, solid_of, write_step
 
-from clamp3d.brep.bodies import Body, Reading
-from clamp3d.brep.solid import BrepSolid
+from clamp3d.files.bodies import Body, Reading
+from clamp3d.files.solid import BrepSolid
 from clamp3d.fit.cad import cad_features
 from clamp3d.fit.fit import fit_file
 

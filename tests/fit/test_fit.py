@@ -16,8 +16,8 @@ from fit_shapes import (
     surface_points,
 )
 
-from clamp3d.core.mesh import make_mesh
 from clamp3d.fit.fit import fit_mesh
+from clamp3d.geometry.mesh import make_mesh
 
 
 def fitted(mesh, *, T=None, sigma=0.0, seed=0, float32=True):

@@ -6,10 +6,10 @@ import pytest
 import trimesh
 from fit_shapes import RADIUS, splint
 
-from clamp3d.brep.mesh_file import load_mesh
-from clamp3d.core.mesh import make_mesh
 from clamp3d.errors import InputError
+from clamp3d.files.mesh_file import load_mesh
 from clamp3d.fit.fit import fit_file, fit_mesh
+from clamp3d.geometry.mesh import make_mesh
 
 
 @pytest.fixture(scope="module")

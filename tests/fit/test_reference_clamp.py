@@ -10,8 +10,8 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Wire
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.core.meshing import mesh
 from clamp3d.fit.fit import fit_file
+from clamp3d.geometry.meshing import mesh
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,9 @@ import numpy as np
 import trimesh
 from fit_shapes import splint
 
-from clamp3d.core.mesh import make_mesh
 from clamp3d.fit import seeds
 from clamp3d.fit.fit import fit_mesh
+from clamp3d.geometry.mesh import make_mesh
 
 SPLINT = splint(0.3, hole=11.0)
 

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from clamp3d import shapes
-from clamp3d.core.meshing import mesh
+from clamp3d.geometry.meshing import mesh
 from clamp3d.kernel import SweptArc
 from tests.fuzz.rules import assert_outputs, call, examples, is_refused, new_folder
 from tests.fuzz.samples import CLAMP, SCENE, TETRA

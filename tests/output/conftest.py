@@ -9,7 +9,7 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import PARTS, Clamp
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.scene import clamp_scene
-from clamp3d.collide.scene import Scene
+from clamp3d.engine.scene import Scene
 from clamp3d.output.report import Report, make_report
 from clamp3d.output.report_page import report_html
 

@@ -15,12 +15,12 @@ import trimesh
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.scene import clamp_scene
-from clamp3d.collide.scene import Scene
-from clamp3d.core import shapes
-from clamp3d.core.mesh import make_mesh
-from clamp3d.core.meshing import volume_bounds
-from clamp3d.core.pose import translation
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.geometry import shapes
+from clamp3d.geometry.mesh import make_mesh
+from clamp3d.geometry.meshing import volume_bounds
+from clamp3d.geometry.pose import translation
 from clamp3d.output.export import FORMATS, export
 from clamp3d.output.palette import PART_COLOURS
 

@@ -15,11 +15,11 @@ import trimesh
 
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.collide.check import check
-from clamp3d.collide.scene import Scene
-from clamp3d.core import shapes
-from clamp3d.core.pose import translation
+from clamp3d.engine.check import check
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.geometry import shapes
+from clamp3d.geometry.pose import translation
 from clamp3d.output.export import export
 from clamp3d.output.palette import PART_COLOURS
 

@@ -10,11 +10,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from clamp3d.collide.check import check
-from clamp3d.collide.scene import Scene
-from clamp3d.core import shapes
-from clamp3d.core.motion import Motion
-from clamp3d.core.pose import translation
+from clamp3d.engine.check import check
+from clamp3d.engine.scene import Scene
+from clamp3d.geometry import shapes
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import translation
 from clamp3d.output.baseline import compare
 from clamp3d.output.groups import grouped
 from clamp3d.output.report import make_report

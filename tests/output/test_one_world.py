@@ -6,8 +6,8 @@ import io
 import pytest
 
 from clamp3d.clamp.assemble import assemble
-from clamp3d.collide.check import check
-from clamp3d.collide.distance import measure
+from clamp3d.engine.check import check
+from clamp3d.engine.distance import measure
 from clamp3d.output.report import make_report
 from clamp3d.output.report_page import report_csv, report_to_dict
 from clamp3d.output.scene_report import check_to_dict

@@ -15,13 +15,13 @@ import pytest
 
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.contact import measure_contacts
-from clamp3d.collide.distance import measure
-from clamp3d.collide.scene import Scene
-from clamp3d.core import shapes
-from clamp3d.core.motion import Motion
-from clamp3d.core.pose import translation
-from clamp3d.core.primitives import SweptArc
+from clamp3d.engine.distance import measure
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.geometry import shapes
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import translation
+from clamp3d.geometry.primitives import SweptArc
 from clamp3d.output.report import make_report, report
 from clamp3d.output.report_page import report_csv, report_html, write_report
 

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from matplotlib.figure import Figure
 
-from clamp3d.core.pose import translation
+from clamp3d.geometry.pose import translation
 from clamp3d.output.view3d import Camera, PosedMesh, draw_solids
 
 FRONT = Camera(azimuth=0.0, elevation=0.0)  # looks along +Y: right is X, up is Z, near is -Y

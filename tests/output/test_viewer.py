@@ -20,14 +20,14 @@ import umsgpack
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.forces import HELD
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.collide.check import check
-from clamp3d.collide.distance import measure
-from clamp3d.collide.scene import Scene
-from clamp3d.core import shapes
-from clamp3d.core.meshing import mesh
-from clamp3d.core.motion import Motion
-from clamp3d.core.pose import translation
+from clamp3d.engine.check import check
+from clamp3d.engine.distance import measure
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import Clamp3dError, InputError
+from clamp3d.geometry import shapes
+from clamp3d.geometry.meshing import mesh
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import translation
 from clamp3d.output import placed, serving
 from clamp3d.output.serving import MeshcatServer, PageServer
 from clamp3d.output.viewer import Viewer, view

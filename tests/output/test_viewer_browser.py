@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 
 from clamp3d.clamp.assemble import assemble
-from clamp3d.collide.check import check
-from clamp3d.collide.scene import Scene
-from clamp3d.core import shapes
-from clamp3d.core.mesh import make_mesh
-from clamp3d.core.meshing import mesh
-from clamp3d.core.motion import Motion
-from clamp3d.core.pose import translation
+from clamp3d.engine.check import check
+from clamp3d.engine.scene import Scene
 from clamp3d.fit.fit import fit_mesh
+from clamp3d.geometry import shapes
+from clamp3d.geometry.mesh import make_mesh
+from clamp3d.geometry.meshing import mesh
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import translation
 from clamp3d.output.fit_report import fit_to_html
 from clamp3d.output.groups import grouped
 from clamp3d.output.palette import PART_COLOURS

@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from clamp3d import InputError, check, load
-from clamp3d.core.shapes import MeshShape
+from clamp3d.geometry.shapes import MeshShape
 from clamp3d.scenefile import tables
 from clamp3d.scenefile.parts import read_parts
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from clamp3d.bench.compare.methods import Method
-from clamp3d.brep.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.errors import Clamp3dError
+from clamp3d.files.child import Worker, WorkerEndedError, WorkerTimeoutError
 
 Kind = Literal["contact", "peer", "assembly", "image"]
 

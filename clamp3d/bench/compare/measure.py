@@ -10,7 +10,7 @@ import numpy as np
 
 from clamp3d.bench.compare.methods import MANY, Method, Prepared, load, prepare
 from clamp3d.bench.compare.scene import BANDS, CLEAR, OVERLAP, Poses, known_poses
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 _PASSES = 3
 """Times that everything is asked at least."""

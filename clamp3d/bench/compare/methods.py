@@ -12,8 +12,8 @@ import numpy as np
 
 from clamp3d.baselines import ContactModel, contact_model
 from clamp3d.bench.compare.scene import GROOVE, WIRE, block, chord_error, in_part_frame, pair
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.pose import Array, inverse
+from clamp3d.geometry.pose import Array, inverse
+from clamp3d.kernel.contact_model import GroovePair
 
 if TYPE_CHECKING:
     from clamp3d.clamp.dimensions import Clamp
@@ -78,7 +78,7 @@ METHODS = (
 
 def load(method: Method) -> None:
     """Import what the method needs, so that its set-up time is its own."""
-    own = {"cas": ("clamp3d.core.kernel",), "chords": ()}
+    own = {"cas": ("clamp3d.kernel.entries",), "chords": ()}
     for module in own.get(method.family, ("fcl", "manifold3d", "scipy.spatial", "trimesh")):
         importlib.import_module(module)
 
@@ -123,7 +123,7 @@ def assembly_model(method: Method, clamp: Clamp, *, time_limit: float = 300.0) -
 
 
 def _cas() -> Prepared:
-    from clamp3d.core.distance import signed_distance, signed_distances
+    from clamp3d.kernel.distance import signed_distance, signed_distances
 
     return Prepared(
         lambda T: signed_distance(GROOVE, WIRE, T).distance,

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.baselines import chords
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.extrusion import Extrusion
-from clamp3d.core.pose import Array, inverse, rotation
-from clamp3d.core.primitives import Cylinder, SweptArc
-from clamp3d.core.profile import Arc, Profile
-from clamp3d.core.shapes import Solid
+from clamp3d.geometry.extrusion import Extrusion
+from clamp3d.geometry.pose import Array, inverse, rotation
+from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.geometry.profile import Arc, Profile
+from clamp3d.geometry.shapes import Solid
+from clamp3d.kernel.contact_model import GroovePair
 
 
 def grooved_block(groove: SweptArc, *, width: float, depth: float) -> Solid:

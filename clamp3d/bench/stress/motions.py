@@ -23,10 +23,10 @@ from clamp3d.bench.stress.poses import draw
 from clamp3d.bench.stress.poses.cases import Cases, Shapes, unit_rows
 from clamp3d.bench.stress.poses.truth import truth_50_digits
 from clamp3d.bench.stress.worker import Answers, Measured, Measures, Rows, run_here
-from clamp3d.collide.motions import first_contact, min_clearance
-from clamp3d.core.distance import signed_distances
-from clamp3d.core.motion import Motion
-from clamp3d.core.pose import Array
+from clamp3d.engine.motions import first_contact, min_clearance
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import Array
+from clamp3d.kernel.distance import signed_distances
 
 TRUTH_ERROR = 1e-9
 """Largest error of a truth in parts of the scene."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.bench.stress.worker import Answers, Measures
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 Mask = NDArray[np.bool_]
 

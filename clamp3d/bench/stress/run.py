@@ -16,8 +16,8 @@ from clamp3d.bench.stress.motions import MOTIONS
 from clamp3d.bench.stress.outcome import Outcome
 from clamp3d.bench.stress.poses.family import POSES
 from clamp3d.bench.stress.poses.flat import FLATS
-from clamp3d.brep.child import end_with_parent
 from clamp3d.errors import InputError, SolverError
+from clamp3d.files.child import end_with_parent
 
 LIBRARIES = ("numpy", "numba", "scipy", "python-fcl", "coacd", "mpmath")
 

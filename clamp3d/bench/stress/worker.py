@@ -12,9 +12,9 @@ from typing import Any, Literal, Protocol, Self, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.brep.child import Worker, WorkerEndedError, WorkerTimeoutError
-from clamp3d.core.pose import Array
 from clamp3d.errors import Clamp3dError, without_numbers
+from clamp3d.files.child import Worker, WorkerEndedError, WorkerTimeoutError
+from clamp3d.geometry.pose import Array
 
 _MAX_DEATHS = 5
 _START_LIMIT = 120.0  # s

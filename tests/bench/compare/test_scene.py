@@ -6,8 +6,8 @@ import mpmath
 import numpy as np
 
 from clamp3d.bench.compare.scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, known_poses
-from clamp3d.core.pose import check_pose
-from tests.core import oracle
+from clamp3d.geometry.pose import check_pose
+from tests.kernel import oracle
 
 POSES = known_poses()
 

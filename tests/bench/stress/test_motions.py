@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import clamp3d
-import clamp3d.collide.motions as collide_motions
+import clamp3d.engine.motions as collide_motions
 from clamp3d.bench.stress import motions
 from clamp3d.bench.stress.motions import MOTIONS, TRUTH_ERROR, least_distance, through
 from clamp3d.bench.stress.poses.cases import Cases, Shapes

@@ -15,7 +15,7 @@ from typing import Any
 from clamp3d.bench.compare.methods import AXIS_ANGLES_DEG, SECTOR_ANGLES_DEG, Prepared, Series, ready
 from clamp3d.bench.compare.peers.pieces import AXIS, boxes, sectors, surface
 from clamp3d.bench.compare.scene import WIRE
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 
 def _tree(unit_angle: float, shape: str) -> Prepared:

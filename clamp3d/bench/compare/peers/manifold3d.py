@@ -15,8 +15,8 @@ import numpy as np
 
 from clamp3d.bench.compare.methods import Prepared, Series, ready
 from clamp3d.bench.compare.scene import WIRE, block, chord_error, pair
-from clamp3d.core.meshing import mesh
-from clamp3d.core.pose import Array
+from clamp3d.geometry.meshing import mesh
+from clamp3d.geometry.pose import Array
 
 _FARTHEST = WIRE.radius + 2.0  # mm
 _THIN = 1e-8  # mm

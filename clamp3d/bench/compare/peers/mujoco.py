@@ -15,7 +15,7 @@ import numpy as np
 from clamp3d.bench.compare.methods import SECTOR_ANGLES_DEG, Prepared, Series, ready
 from clamp3d.bench.compare.peers.pieces import boxes, sectors
 from clamp3d.bench.compare.scene import WIRE
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 _MM = 1e-3
 _FARTHEST = 2.0  # mm

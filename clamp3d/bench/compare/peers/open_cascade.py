@@ -15,8 +15,8 @@ from typing import Any
 
 from clamp3d.bench.compare.methods import Prepared, Series, ready
 from clamp3d.bench.compare.scene import GROOVE, WIRE, block, pair
-from clamp3d.brep.open_cascade import explore
-from clamp3d.core.pose import Array, inverse
+from clamp3d.files.open_cascade import explore
+from clamp3d.geometry.pose import Array, inverse
 from clamp3d.output.step import location, solid
 
 

@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from clamp3d.bench.compare.scene import DEPTH, GROOVE, WIDTH, WIRE
-from clamp3d.core.pose import Array
-from clamp3d.core.profile import chord_count
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.profile import chord_count
 
 THICKNESS = 3.0
 """Of the boxes behind the chords, mm."""

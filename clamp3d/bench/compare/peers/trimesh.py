@@ -8,7 +8,7 @@ from typing import Any
 from clamp3d.bench.compare.methods import Prepared, Series, ready
 from clamp3d.bench.compare.peers.pieces import AXIS, surface
 from clamp3d.bench.compare.scene import WIRE
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 
 def _make(unit_angle: float) -> Prepared:

@@ -20,7 +20,7 @@ from clamp3d.bench.stress.family import Makers
 from clamp3d.clamp.dimensions import Clamp, Wire
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import Section
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 _RADIUS, _OFFSET = 23.8012, 48.0
 _PLACES = tuple((part, key) for part in ("up_splint", "down_splint") for key in ("line_groove", "jumper_groove"))

@@ -24,7 +24,7 @@ import numpy as np
 
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.section import WIRES
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 
 @dataclass(frozen=True, slots=True)

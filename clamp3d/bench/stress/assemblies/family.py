@@ -27,7 +27,7 @@ from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.stepped import solve_stepped
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 EXACT = 1e-8
 """Bound in mm of the exact solver's answers: ten times the residuals that it proves, and of a clamp of usual size."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.bench.stress.assemblies.envelope import Envelope, Wire
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 _LEVELS, _POINTS = 14, 13  # the last tilts are 1e-13 rad apart
 _SAME = 1e-7

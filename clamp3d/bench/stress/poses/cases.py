@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.bench.stress.worker import Rows
-from clamp3d.core.contact_model import GroovePair
-from clamp3d.core.pose import Array
-from clamp3d.core.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
+from clamp3d.kernel.contact_model import GroovePair
 
 Extended = np.longdouble
 """80-bit floats where the platform has them: only there is the quick truth good enough (see `truth`)."""

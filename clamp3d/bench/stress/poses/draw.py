@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.bench.stress.poses.cases import Cases, Extended, Shapes, unit_rows
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 PARALLEL_FEATURES = ("arc", "lip", "flat")
 FEATURES = (*PARALLEL_FEATURES, "end face", "end arc", "end edge", "corner")

@@ -19,10 +19,10 @@ from clamp3d.bench.stress.poses import features, magnitudes
 from clamp3d.bench.stress.poses.cases import Cases
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, truth, truth_50_digits
 from clamp3d.bench.stress.worker import Measured, Measures, run_here
-from clamp3d.core.distance import SignedDistances, signed_distances
-from clamp3d.core.pose import Array
-from clamp3d.core.primitives import SweptArc
-from clamp3d.core.shapes import Solid, groove_block
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.primitives import SweptArc
+from clamp3d.geometry.shapes import Solid, groove_block
+from clamp3d.kernel.distance import SignedDistances, signed_distances
 
 FCL_ERROR = 2e-6
 """Error of FCL's own distance in mm, as measured in `baselines.fcl_shapes` (worst of 600 000), rounded up."""

@@ -9,7 +9,7 @@ import numpy as np
 from clamp3d.bench.stress.family import Makers
 from clamp3d.bench.stress.poses import draw
 from clamp3d.bench.stress.poses.cases import Cases, Extended
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 MAKERS = Makers()
 

@@ -16,7 +16,7 @@ from clamp3d.bench.stress.poses.family import METHODS as POSE_METHODS
 from clamp3d.bench.stress.poses.flat_truth import flat_truth
 from clamp3d.bench.stress.poses.truth import truth
 from clamp3d.bench.stress.worker import Answers
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 Make = Callable[[np.random.Generator, int], Cases]
 

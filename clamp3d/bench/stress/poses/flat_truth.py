@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from clamp3d.core.pose import Array
+from clamp3d.geometry.pose import Array
 
 Point = tuple[float, float, float]
 

@@ -1,0 +1,216 @@
+"""Check a scene: near pairs from the broad phase, each refined until its verdict is certain."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.checks import flag, function, instance
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.broad import Boxes, box_gaps, near_pairs
+from clamp3d.engine.check_motions import check_motions
+from clamp3d.engine.depth import penetration
+from clamp3d.engine.judge import judge
+from clamp3d.engine.model import Counters, Model, ModelCache, Progress
+from clamp3d.engine.reasons import failure, undecided
+from clamp3d.engine.refine import accuracy_for, measured, with_normal
+from clamp3d.engine.result import BAD, CheckResult, PairResult, Work
+from clamp3d.engine.scene import Scene, name_pairs
+from clamp3d.engine.verdict import Verdict
+from clamp3d.engine.where import Locator
+from clamp3d.errors import InputError, MissingLibraryError
+from clamp3d.geometry.pose import Array, inverse
+
+_SAME = 9
+"""Digits (of mm, or of a rotation) to which relative poses agree that one measurement serves."""
+
+
+def check(
+    scene: Scene,
+    *,
+    pairs: Sequence[tuple[str, str]] | None = None,
+    distances: bool = False,
+    depths: bool = True,
+    progress: Progress | None = None,
+    cache: ModelCache | None = None,
+) -> CheckResult:
+    """Verdicts of all pairs of a scene, at rest and in its motions.
+
+    Parameters
+    ----------
+    scene : Scene
+        Parts, thresholds, allowed contacts and motions.
+    pairs : sequence of (str, str), optional
+        Names of the pairs to look at; all by default.
+    distances : bool
+        Measure every pair to `clamp3d.engine.refine.ACCURACY`, not only until its verdict is certain.
+    depths : bool
+        Measure the penetration depth of clashes, as `clamp3d.engine.distance.distance` does; without, "at least".
+    progress : callable, optional
+        Is told (stage, done, of).
+    cache : ModelCache, optional
+        Keeps models from one check to the next.
+
+    Returns
+    -------
+    CheckResult
+        Rows with verdict and distance; pairs that never came near are clear and have no row, unless ``distances``. A
+        pair whose models contradict each other or cannot be made has the verdict failed, and its reason.
+
+    Raises
+    ------
+    InputError
+        For unknown names.
+    MissingLibraryError
+        If a part needs a library that is not installed.
+
+    Examples
+    --------
+    >>> from clamp3d.geometry import shapes
+    >>> from clamp3d.geometry.pose import translation
+    >>> scene = Scene().add("a", shapes.box((10, 10, 10))).add("b", shapes.cylinder(3, 10), translation(0, 0, 9))
+    >>> check(scene)
+    CheckResult('scene': not clean; 1 clash)
+    """
+    instance("scene", scene, Scene)
+    if cache is not None:
+        instance("cache", cache, ModelCache)
+    distances, depths = flag("distances", distances), flag("depths", depths)
+    function("progress", progress)
+    cache = cache or ModelCache()
+    log = _Log(cache.counters)
+    placed = scene.placed
+    of_shape = [cache.model(shape) for shape in placed.shapes]
+    models = [of_shape[k] for k in placed.which.tolist()]
+    boxes = Boxes.of(np.array([m.bounds for m in of_shape]).reshape(-1, 2, 3)[placed.which], placed.poses)
+    named = None if pairs is None else _numbered(scene, pairs)
+    every = math.comb(len(models), 2) if named is None else len(named)
+    near = _candidates(boxes, scene.thresholds.reach, named, everything=distances)
+    cache.counters.queries["boxes"] += len(near)
+    questions = _Questions(scene, models, distances=distances, depths=depths)
+    log.end("broad phase")
+    rows = []
+    for k, ((i, j), gap) in enumerate(zip(near.tolist(), box_gaps(boxes, near).tolist(), strict=True)):
+        if progress is not None:
+            progress("pairs", k, len(near))
+        rows.append(questions.row(i, j, gap))
+    log.end("pairs")
+    moved = check_motions(scene, models, named, progress)
+    if scene.motions:
+        log.end("motions")
+    names = None if named is None else tuple((scene.parts[i].name, scene.parts[j].name) for i, j in named)
+    work = log.work(rows, parts=len(models), shapes=len(of_shape), pairs=every, candidates=len(near))
+    return CheckResult(scene, tuple(rows), moved, names, work)
+
+
+class _Log:
+    """What a check builds and asks, and the seconds of each of its stages."""
+
+    def __init__(self, counters: Counters) -> None:
+        self._counters = counters
+        self._built, self._queries = counters.built.copy(), counters.queries.copy()
+        self._seconds: dict[str, float] = {}
+        self._start = time.perf_counter()
+
+    def end(self, stage: str) -> None:
+        """The stage that began when the one before ended is over."""
+        now = time.perf_counter()
+        self._seconds[stage], self._start = round(now - self._start, 6), now
+
+    def work(self, rows: Sequence[PairResult], *, parts: int, shapes: int, pairs: int, candidates: int) -> Work:
+        """All of it, with how many pairs each level decided."""
+        decided = Counter(row.distance.level for row in rows if row.verdict not in (Verdict.FAILED, Verdict.UNCERTAIN))
+        decided["broad phase"] = pairs - candidates
+        built, queries = self._counters.built - self._built, self._counters.queries - self._queries
+        counts = {name: built[name] for name in ("meshes", "triangles", "hulls", "fits")}
+        return Work(
+            parts,
+            shapes,
+            pairs,
+            candidates,
+            **counts,
+            queries=dict(queries),
+            decided=dict(+decided),
+            seconds=self._seconds,
+        )
+
+
+def _numbered(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, int]]:
+    """Pairs of names as sorted pairs of numbers, each once. Raises InputError for unknown names."""
+    numbers = set()
+    for a, b in name_pairs("pairs", pairs):
+        i, j = sorted((scene.index(a), scene.index(b)))
+        if i == j:
+            raise InputError(f"pair {a}:{b} must name two different parts")
+        numbers.add((i, j))
+    return sorted(numbers)
+
+
+def _candidates(
+    boxes: Boxes, reach: float, named: list[tuple[int, int]] | None, *, everything: bool
+) -> NDArray[np.int64]:
+    """Pairs (m, 2) that may be within ``reach`` mm, of those ``named``; ``everything``: all of them."""
+    n = len(boxes.centre)
+    if everything:
+        rows = list(itertools.combinations(range(n), 2)) if named is None else named
+        return np.array(rows, dtype=np.int64).reshape(-1, 2)
+    near = near_pairs(boxes, reach)
+    if named is None:
+        return near
+    keep = set(named)
+    return np.array([pair for pair in near.tolist() if tuple(pair) in keep], dtype=np.int64).reshape(-1, 2)
+
+
+class _Questions:
+    """What is asked of each pair of a scene; one answer serves pairs of equal shapes in equal relative poses."""
+
+    def __init__(self, scene: Scene, models: list[Model], *, distances: bool, depths: bool) -> None:
+        self.scene, self.models = scene, models
+        self.distances, self.depths = distances, depths
+        self._answers: dict[tuple[object, ...], tuple[Verdict, Distance]] = {}
+
+    def row(self, i: int, j: int, gap: float) -> PairResult:
+        """The row of parts ``i`` and ``j``, whose boxes keep ``gap`` mm."""
+        first, second = self.scene.parts[i], self.scene.parts[j]
+        a, b = self.models[i], self.models[j]
+        allowance = self.scene.allowance(first.name, second.name)
+        T = inverse(first.T_world) @ second.T_world
+        key = (a, b, allowance, tuple((T[:3] + 0.0).round(_SAME).ravel().tolist()))
+        if key not in self._answers:
+            start = Distance(gap, level="boxes", method="bounding boxes")
+            try:
+                self._answers[key] = self._measured(a, b, T, start, allowance)
+            except MissingLibraryError:
+                raise
+            except Exception as error:  # one pair that fails is a finding, not the end of all others
+                return PairResult(first.name, second.name, Verdict.FAILED, start, reason=failure(error))
+        verdict, distance = self._answers[key]
+        row = PairResult(first.name, second.name, verdict, distance.moved(first.T_world))
+        if verdict in BAD:
+            return replace(row, locator=Locator(a, b, first.T_world, T))
+        if verdict is Verdict.UNCERTAIN:
+            models = {first.name: a, second.name: b}
+            return replace(row, reason=undecided(models, distance, self.scene.thresholds, allowance))
+        return row
+
+    def _measured(
+        self, a: Model, b: Model, T: Array, start: Distance, allowance: float | None
+    ) -> tuple[Verdict, Distance]:
+        """Verdict and distance of ``b`` at ``T`` (4, 4) in a's frame."""
+        accuracy = accuracy_for(a, b)
+
+        def enough(distance: Distance) -> bool:
+            return not self.distances or measured(distance, accuracy)
+
+        verdict, distance = judge(a, b, T, start, self.scene.thresholds, allowance, enough)
+        distance = with_normal(distance)
+        if verdict in BAD:
+            distance = penetration(a, b, T, distance) if self.depths else distance.of_overlap()
+        return verdict, distance

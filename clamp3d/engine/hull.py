@@ -1,0 +1,190 @@
+"""Convex polyhedra: their corners, edges and planes, the hull of points, and whether a mesh is convex."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.geometry.pose import Array, norm
+from clamp3d.geometry.triangles import closest_points
+
+MEMBER = 1e-9
+"""Relative to the size of the parts: a point this far outside still counts as on the surface."""
+FLAT = 1e-8
+"""Sine of the angle below which a face or line counts as square to a direction."""
+STRAIGHT = 1e-9
+"""Sine of the turn of an outline below which it goes straight on."""
+SMALL = 40
+"""Hulls with more corners are searched only where FCL finds the nearest points."""
+_SLIVER = 1e-12
+"""Relative to the size: triangles narrower than this have no plane to speak of."""
+_MEMORY = 2_000_000
+"""Heights of points above planes that are worked out at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """A convex polyhedron: ``vertices`` (n, 3), ``planes`` (m, 4) with outward unit normals, normal . x + d <= 0."""
+
+    vertices: Array
+    planes: Array
+    faces: NDArray[np.int64] = field(repr=False)
+
+    @cached_property
+    def edges(self) -> NDArray[np.int64]:
+        """Corner numbers (k, 2) of the edges; those between two triangles of one flat face are left out."""
+        F, V = self.faces, self.vertices
+        normal = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+        both = np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        order = np.lexsort((both[:, 1], both[:, 0]))
+        pairs, owner = both[order].reshape(-1, 4)[:, :2], (order // 3).reshape(-1, 2)
+        bent = np.linalg.norm(np.cross(normal[owner[:, 0]], normal[owner[:, 1]]), axis=1) > 1e-10
+        return np.asarray(pairs[bent])
+
+    def support(self, n: Array) -> Array:
+        """The vertices (k, 3) that lie furthest along ``n`` (k, 3)."""
+        return np.asarray(self.vertices[np.argmax(n @ self.vertices.T, axis=1)])
+
+    def _highest(self, n: Array, within: float = FLAT) -> Array:
+        height = self.vertices @ n
+        return np.asarray(self.vertices[height >= height.max() - within * (1.0 + float(np.ptp(height)))][:24])
+
+    def face(self, n: Array) -> Array:
+        """Points (k, 3) of what lies furthest along ``n`` (3,): corners, and the middles between each two of them."""
+        corners = self._highest(n)
+        i, j = np.triu_indices(len(corners))
+        return np.asarray(0.5 * (corners[i] + corners[j]))
+
+    def flatness(self, n: Array, within: float = FLAT) -> tuple[int, Array | None]:
+        """Dimension of what lies furthest along ``n`` (3,), and its direction if it is a line."""
+        corners = self._highest(n, within)
+        if len(corners) == 2:
+            along = corners[1] - corners[0]
+            return 1, along / norm(along)
+        return (0, None) if len(corners) == 1 else (2, None)
+
+    def depth(self, points: Array) -> Array:
+        """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""
+        return np.asarray(-(points @ self.planes[:, :3].T + self.planes[:, 3]).max(axis=1))
+
+    def normals(self, n: Array) -> Array:
+        """The face normals (k, 3) nearest to ``n`` (k, 3)."""
+        return np.asarray(self.planes[np.argmax(n @ self.planes[:, :3].T, axis=1), :3])
+
+    def near(self, n: Array | None) -> tuple[Array, Array, Array]:
+        """Corners (k, 3), edges (k, 2, 3) and triangles (k, 3, 3), of a large hull only those that face ``n`` (3,)."""
+        V = self.vertices
+        if n is None or len(V) <= SMALL:
+            return V, V[self.edges], V[self.faces]
+        height = V @ n
+        high = height >= height.max() - 0.01 * float(np.ptp(height))
+        return V[high], V[self.edges[high[self.edges].any(axis=1)]], V[self.faces[high[self.faces].any(axis=1)]]
+
+    def closest(self, points: Array) -> Array:
+        """The points of the surface (k, 3) that are nearest to ``points`` (k, 3), which lie outside."""
+        k, m = len(points), len(self.faces)
+        pairs = np.tile(self.vertices[self.faces], (k, 1, 1)), np.repeat(points, m, axis=0)
+        feet = closest_points(*pairs).reshape(k, m, 3)
+        nearest = np.linalg.norm(feet - points[:, None], axis=2).argmin(axis=1)
+        return np.asarray(feet[np.arange(k), nearest])
+
+    def crossed_by(self, ends: Array) -> bool:
+        """Whether the segment between ``ends`` (2, 3) meets the polyhedron."""
+        h, k = ends @ self.planes[:, :3].T + self.planes[:, 3]
+        if ((h > 0.0) & (k > 0.0)).any():
+            return False
+        enters, leaves = h > 0.0, k > 0.0
+        low = (h[enters] / (h - k)[enters]).max(initial=0.0)
+        return bool(low <= (h[leaves] / (h - k)[leaves]).min(initial=1.0))
+
+    def clipped(self, plane: Array) -> Hull | None:
+        """What of it lies in the half-space plane[:3] . x + plane[3] >= 0; None if it has no volume."""
+        V = self.vertices
+        height = V @ plane[:3] + plane[3]
+        slack = MEMBER * (1.0 + float(np.abs(V).max()))
+        if height.min() >= -slack:
+            return self
+        if height.max() <= slack:
+            return None
+        a, b = self.edges.T
+        crossed = height[a] * height[b] < 0.0
+        a, b = a[crossed], b[crossed]
+        share = (height[a] / (height[a] - height[b]))[:, None]
+        return hull(np.vstack([V[height >= 0.0], V[a] + share * (V[b] - V[a])]))
+
+
+def hull(points: Array) -> Hull:
+    """Convex hull of points (n, 3). Raises ValueError if they lie in one plane."""
+    from scipy.spatial import ConvexHull, QhullError  # takes longer to import than most hulls to make
+
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    try:
+        made = ConvexHull(points)
+    except QhullError as error:
+        raise ValueError("the points lie in one plane") from error
+    faces = made.simplices.astype(np.int64)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), made.equations[:, :3]) < 0.0
+    faces[inward] = faces[inward, ::-1]
+    number = np.empty(len(points), dtype=np.int64)
+    number[made.vertices] = np.arange(len(made.vertices))
+    normals = made.equations[np.unique(made.equations.round(12), axis=0, return_index=True)[1], :3]
+    return Hull(points[made.vertices], _planes(normals, points), number[faces])
+
+
+def prism(corners: Array, start: float, end: float, frame: Array) -> Hull:
+    """A convex outline (k, 2), anticlockwise, drawn from ``start`` to ``end`` mm along z of ``frame`` (3, 3)."""
+    before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
+    size = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    corners = corners[before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] > STRAIGHT * size]
+    n = len(corners)
+    ends = [np.column_stack([corners, np.full(n, z)]) for z in (start, end)]
+    vertices = np.vstack(ends) @ frame.T
+    fan = np.column_stack([np.zeros(n - 2, dtype=np.int64), np.arange(1, n - 1), np.arange(2, n)])
+    here, following = np.arange(n), np.roll(np.arange(n), -1)
+    sides = [np.column_stack([here, following, following + n]), np.column_stack([here, following + n, here + n])]
+    faces = np.vstack([fan[:, ::-1], fan + n, *sides])
+    along = np.roll(corners, -1, axis=0) - corners
+    outward = np.column_stack([along[:, 1], -along[:, 0], np.zeros(n)]) / np.linalg.norm(along, axis=1)[:, None]
+    normals = np.vstack([outward, [(0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]]) @ frame.T
+    return Hull(vertices, _planes(normals, vertices), faces if np.linalg.det(frame) > 0.0 else faces[:, ::-1])
+
+
+def _planes(normals: Array, points: Array) -> Array:
+    """Planes (m, 4) square to unit normals (m, 3), up to the highest of the points (n, 3): none is cut off."""
+    step = max(1, _MEMORY // len(points))
+    top = [(points @ normals[k : k + step].T).max(axis=0) for k in range(0, len(normals), step)]
+    return np.column_stack([normals, -np.concatenate(top)])
+
+
+def hull_error(vertices: Array, faces: NDArray[np.int64]) -> float:
+    """How far (mm) points of the convex hull of a closed mesh are from the mesh at most; inf if it is far from convex.
+
+    Let a point c inside see all triangles (m, 3), wound outward, and no vertex (n, 3) be more than h above a triangle's
+    plane. A ray from c that leaves the mesh at z through a plane whose normal it makes the angle t with leaves the hull
+    within h / cos t of z, and cos t is the depth of c below the plane over the distance of c and z.
+    """
+    scale = float(np.abs(vertices).max())
+    corners = vertices[faces]
+    sides = np.roll(corners, -1, axis=1) - corners
+    normal = np.cross(sides[:, 0], sides[:, 1])
+    twice_area, longest = np.linalg.norm(normal, axis=1), np.linalg.norm(sides, axis=2).max(axis=1)
+    flat = twice_area > _SLIVER * scale * longest  # others have no plane to speak of
+    normal, corner = normal[flat] / twice_area[flat, None], corners[flat, 0]
+    few = np.unique(np.arange(64) * 2654435761 % max(1, len(normal)))  # far apart, in no step with the rings of a mesh
+    offset = np.einsum("ij,ij->i", normal, corner)
+    for rows in (few, slice(None)):
+        height = float((-_planes(normal[rows], vertices)[:, 3] - offset[rows]).max(initial=0.0))
+        if height > 1e-6 * scale:
+            return np.inf
+    centre = vertices.mean(axis=0)
+    depth = float((offset - normal @ centre).min(initial=np.inf))
+    if not 0.0 < depth < np.inf:
+        return np.inf
+    # A point of a sliver is this far from a neighbour's plane.
+    height += 0.0 if flat.all() else _SLIVER * scale
+    return height * float(np.linalg.norm(vertices - centre, axis=1).max()) / depth

@@ -1,0 +1,103 @@
+"""The verdict of one pair: its distance refined until it is certain, equal parts in one place, one part in another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.depth import depth_of_pieces
+from clamp3d.engine.mesh_distance import within
+from clamp3d.engine.model import Model
+from clamp3d.engine.refine import Enough, refine
+from clamp3d.engine.verdict import RESOLUTION, Thresholds, Verdict
+from clamp3d.files import cad_process
+from clamp3d.geometry.pose import Array, inverse
+
+
+def judge(
+    a: Model,
+    b: Model,
+    T: Array,
+    start: Distance,
+    thresholds: Thresholds,
+    allowance: float | None,
+    enough: Enough = lambda _: True,
+) -> tuple[Verdict, Distance]:
+    """Verdict and distance of ``b`` at ``T`` (4, 4) in a's frame, from ``start`` on, until certain and ``enough``.
+
+    Of an overlap the distance bounds minus the interference, or minus the depth where two convex pieces tell it.
+    """
+    if is_duplicate(a, b, T, thresholds.contact):
+        return Verdict.DUPLICATE, replace(start, lower=-np.inf, upper=-0.0, level="boxes", method="equal shapes")
+
+    def certain(distance: Distance) -> bool:
+        return enough(distance) and thresholds.verdict(distance, allowance) is not Verdict.UNCERTAIN
+
+    distance = refine(a, b, T, start, certain)
+    verdict = thresholds.verdict(distance, allowance)
+    shallow = verdict is Verdict.CONTACT and distance.upper < -RESOLUTION
+    if shallow or (verdict is Verdict.UNCERTAIN and distance.upper < thresholds.reach):
+        exact = depth_of_pieces(a, b, T)  # known, the depth decides; else the interference, which is no more
+        if exact is not None:
+            distance = replace(exact, level="features")
+            verdict = thresholds.verdict(distance, allowance)
+    if verdict is Verdict.CLASH:
+        verdict = kind_of_overlap(a, b, T, thresholds.contact)
+    return verdict, distance
+
+
+def is_duplicate(a: Model, b: Model, T: Array, contact: float) -> bool:
+    """Whether two parts have one shape and, within ``contact`` mm, one place; ``b`` at ``T`` (4, 4) in a's frame."""
+    if a.shape is not b.shape and a.shape != b.shape:
+        return False
+    low, high = a.bounds
+    corners = np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    shift = corners @ T[:3, :3].T + T[:3, 3] - corners
+    return bool(np.linalg.norm(shift, axis=1).max() <= contact)
+
+
+def kind_of_overlap(a: Model, b: Model, T: Array, contact: float) -> Verdict:
+    """Clash, contained, or duplicate where each of two parts lies in the other, all within ``contact`` mm."""
+    inside = [_holds(b, a, T, contact), _holds(a, b, inverse(T), contact)]
+    if all(inside):
+        return Verdict.DUPLICATE
+    return Verdict.CONTAINED if any(inside) else Verdict.CLASH
+
+
+def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
+    """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer``, within ``contact`` mm."""
+    if not (inner.closed and outer.closed and inner.chords and outer.chords):
+        return False
+    if not _boxes_allow(inner, outer, T, contact):
+        return False
+    inner.counters.queries["containment"] += 1
+    slack = 0.0
+    for level in (0, -1):  # coarse meshes mostly tell that it does not
+        small, large = inner.outer(inner.chords[level]), outer.inner(outer.chords[level])
+        if large is None:
+            return False
+        slack = small.error + large.error + _chord(level, inner, outer)
+        if not within(small, large, T, contact + slack):
+            return False
+    if slack <= contact or inner.exact is None or outer.exact is None:
+        return True
+    # The meshes are coarser than the threshold: what is shared must be all of the inner one but a skin.
+    shared = cad_process.common(outer.exact.brep, inner.exact.brep, T, 1.0)
+    return shared.volume >= inner.exact.volume - contact * shared.area
+
+
+def _chord(level: int, *models: Model) -> float:
+    """How far (mm) meshes around and inside of drawn solids are from the solids."""
+    return sum(model.chords[level] for model in models if model.between)
+
+
+def _boxes_allow(inner: Model, outer: Model, T: Array, contact: float) -> bool:
+    """Whether the boxes of two parts leave open that one holds the other: cheap, without a mesh."""
+    low, high = outer.bounds
+    middle, half = 0.5 * (inner.bounds[0] + inner.bounds[1]), 0.5 * (inner.bounds[1] - inner.bounds[0])
+    centre = T[:3, :3] @ middle + T[:3, 3]
+    # The part touches each side of its box: somewhere it reaches at least half as far as the box in each direction.
+    reach = 0.5 * np.abs(T[:3, :3]) @ half - contact
+    return bool(((centre + reach >= low) & (centre - reach <= high)).all())

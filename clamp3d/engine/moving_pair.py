@@ -1,0 +1,135 @@
+"""One body that moves against one that stands: distances at a time and over a stretch, and the first contact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.model import Model
+from clamp3d.engine.motion_search import first_time, least
+from clamp3d.engine.refine import Enough, from_boxes, refine, with_normal
+from clamp3d.engine.swept import swept_lower
+from clamp3d.engine.verdict import Thresholds, Verdict
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import Array, inverse
+
+ACCURACY = 1e-6
+"""A first contact and a least distance are searched to within this (mm), or to what the models give."""
+CHECKED = 1e-4
+"""The same for the least distance of a scene's motion, which has to give a verdict and a number to print."""
+MOST = 5000
+"""Times at which a pair is looked at most, in one search: with meshes about a second."""
+_UNINFORMATIVE = 8
+"""Swept bounds in a row that said no more than the speed, after which they are no longer asked for."""
+
+
+class _CertainError(Exception):
+    """Ends a search whose verdict is certain."""
+
+
+class MovingPair:
+    """A shape that moves against one that stands; all distances are in the moving shape's frame."""
+
+    accuracy = ACCURACY
+    overlaps = 64
+    """Times at which a pair is looked at after it was seen to overlap, for a deeper one."""
+
+    def __init__(self, moving: Model, still: Model, motion: Motion, start: Array, T_still: Array) -> None:
+        self.a, self.b = moving, still
+        self.motion, self.start, self.back = motion, start, inverse(T_still)
+        self.speed = motion.speed(box_corners(moving, start))
+        self.evaluations = 0
+        self._uninformative = 0
+
+    def pose(self, t: float) -> Array:
+        """The standing shape (4, 4) in the moving shape's frame."""
+        return inverse(self.back @ self.motion.at(t, self.start))
+
+    def at(self, t: float, enough: Enough) -> Distance:
+        """Distance at time ``t``, refined until ``enough``."""
+        self.evaluations += 1
+        T = self.pose(t)
+        return refine(self.a, self.b, T, from_boxes(self.a, self.b, T), enough, cad_forms=True)
+
+    def as_seen(self, distance: Distance, t: float) -> Distance:
+        """A distance at time ``t`` as the standing shape sees it, where that stands in the origin."""
+        return with_normal(distance.moved(self.motion.at(t, self.start)).swapped())
+
+    def reached(self, first: float, level: float) -> float:
+        """Where the distance comes down to ``level`` mm, for a ``first`` time that is never late: that time itself."""
+        return first
+
+    def between(self, start: float, stop: float) -> float:
+        """Lower bound (mm) of the distance between two times, from swept shapes; minus infinity if they say nothing."""
+        if self._uninformative >= _UNINFORMATIVE or not (self.a.closed and self.b.closed):
+            return -np.inf
+        middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
+        poses = (self.pose(start), self.pose(middle), self.pose(stop))
+        angle = self.motion.angle * half
+        lower = swept_lower(self.a, self.b, *poses, angle=angle, screw=self.motion.is_screw)
+        self._uninformative = 0 if lower > 0.0 else self._uninformative + 1
+        return lower
+
+    def least_distance(
+        self, thresholds: Thresholds | None = None, allowance: float | None = None
+    ) -> tuple[Distance, float]:
+        """Least distance on the way, and its time; with ``thresholds`` sharp where that is cheap or they need it."""
+        accuracy = self.accuracy if thresholds is None else CHECKED
+        best, at, overlaps = Distance(), 0.0, 0
+
+        def distance(t: float) -> tuple[float, float]:
+            nonlocal best, at, overlaps
+            here = self._sharp(t, best.upper, accuracy, thresholds)
+            if here.upper < best.upper:
+                best, at = here, t
+                if thresholds is not None and thresholds.verdict(here, allowance) is Verdict.CLASH:
+                    raise _CertainError
+            overlaps += best.upper < -ACCURACY
+            if overlaps > self.overlaps:  # how deep it is at its deepest no bound here tells
+                raise _CertainError
+            return here.lower, here.upper
+
+        def is_certain(lower: float, upper: float) -> bool:
+            verdict = thresholds and thresholds.verdict(Distance(lower, upper), allowance)
+            return verdict not in (None, Verdict.UNCERTAIN)
+
+        try:
+            bounds = least(distance, self.speed, bound=self.between, accuracy=accuracy, most=MOST, is_enough=is_certain)
+        except _CertainError:
+            return replace(best, lower=-np.inf), at
+        return replace(best, lower=min(bounds.lower, best.upper)), at
+
+    def _sharp(self, t: float, best: float, accuracy: float, thresholds: Thresholds | None) -> Distance:
+        """The distance at ``t``, refined as far as it can matter: known, deep enough, or above the ``best`` so far."""
+
+        def enough(distance: Distance) -> bool:
+            if distance.upper - distance.lower <= 0.5 * accuracy or distance.lower >= best + self.speed:
+                return True
+            if thresholds is None:  # of an overlap nothing is searched that the distance at one time does not tell
+                return distance.upper < -ACCURACY
+            return thresholds.verdict(distance) is Verdict.CLASH
+
+        return self.at(t, enough)
+
+    def first_time(self, level: float) -> float | None:
+        """Everything before this time is proven to be further apart than ``level`` mm; None if all of the way is."""
+
+        def distance(t: float) -> tuple[float, float]:
+            def enough(distance: Distance) -> bool:
+                width = distance.upper - distance.lower
+                return width <= 0.5 * self.accuracy or distance.lower > level + self.speed or distance.upper <= level
+
+            here = self.at(t, enough)
+            return here.lower, here.upper
+
+        answer = first_time(distance, self.speed, level, bound=self.between, accuracy=self.accuracy, most=MOST)
+        return None if answer.outcome.name == "CLEAR" else answer.t
+
+
+def box_corners(model: Model, T: Array) -> Array:
+    """Corners (8, 3) of the box around a shape, placed by ``T`` (4, 4)."""
+    pick = np.indices((2, 2, 2)).reshape(3, -1).T
+    points = np.where(pick == 0, model.bounds[0], model.bounds[1])
+    return np.asarray(points @ T[:3, :3].T + T[:3, 3])

@@ -1,0 +1,245 @@
+"""A triangle mesh as FCL (distances), libigl (nearest points, inside) and manifold3d (common parts) want it.
+
+Flat faces of a mesh are the part's own, round ones are off by their chords: every triangle has an error of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.engine.hull import hull_error
+from clamp3d.geometry.mesh import edges_of, is_closed
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.shells import shells
+
+_LEVELS = 4
+"""Groups that the triangles with errors are put in at most, each four times finer than the one before."""
+_SHARP = np.cos(np.radians(30.0))
+"""Cosine of the angle between the normals of two triangles beyond which their edge is one of the part's."""
+
+
+@dataclass(eq=False)
+class Surface:
+    """A mesh, ``vertices`` (n, 3) mm, ``faces`` (m, 3), wound outward where it is closed.
+
+    ``face_error`` (m,) mm: every point of the true surface is within this of a triangle, and the other way round;
+    None where the mesh is the part, or holds it, or is held by it.
+    """
+
+    vertices: Array
+    faces: NDArray[np.int64]
+    face_error: Array | None = None
+
+    def __post_init__(self) -> None:
+        self.vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
+        self.faces = np.ascontiguousarray(self.faces, dtype=np.int64)
+
+    @property
+    def error(self) -> float:
+        """Largest error of a triangle, mm."""
+        return 0.0 if self.face_error is None else float(self.face_error.max(initial=0.0))
+
+    @cached_property
+    def scale(self) -> float:
+        """Largest coordinate, mm: what rounding is relative to."""
+        return float(np.abs(self.vertices).max())
+
+    @cached_property
+    def box(self) -> Array:
+        """Lower and upper corner (2, 3), mm."""
+        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @cached_property
+    def bvh(self) -> Any:
+        """FCL's tree of oriented boxes."""
+        return fcl_tree(self.vertices, self.faces)
+
+    @cached_property
+    def groups(self) -> tuple[tuple[Any, float], ...]:
+        """Triangles by their error: (FCL's tree, largest error in mm), the exact ones first."""
+        if self.face_error is None or self.error == 0.0:
+            return ((self.bvh, 0.0),)
+        level = np.full(len(self.faces), _LEVELS)
+        off = self.face_error > 0.0
+        level[off] = np.minimum(np.log2(self.error / self.face_error[off]) // 2.0, _LEVELS - 1).astype(int)
+        places = sorted(set(level.tolist()), reverse=True)
+        if len(places) == 1:
+            return ((self.bvh, self.error),)
+        rows = [level == k for k in places]
+        return tuple((fcl_tree(self.vertices, self.faces[row]), float(self.face_error[row].max())) for row in rows)
+
+    @cached_property
+    def manifold(self) -> Any:
+        """The same mesh for booleans."""
+        import manifold3d
+
+        return manifold3d.Manifold(
+            manifold3d.Mesh64(
+                vert_properties=self.vertices, tri_verts=np.ascontiguousarray(self.faces, dtype=np.uint64)
+            )
+        )
+
+    @cached_property
+    def shell_points(self) -> Array:
+        """Six vertices (k, 6, 3) of each connected surface: those furthest out along the axes."""
+        extremes = []
+        for rows in shells(self.faces, len(self.vertices)):
+            own = self.vertices[np.unique(self.faces[rows])]
+            extremes.append(own[np.concatenate([own.argmin(axis=0), own.argmax(axis=0)])])
+        return np.array(extremes)
+
+    @cached_property
+    def normals(self) -> Array:
+        """Unit normals (m, 3) of the triangles, 0 for slivers."""
+        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
+        N = np.cross(b - a, c - a)
+        size = np.linalg.norm(N, axis=1)
+        return np.asarray(np.where((size > 1e-14 * self.scale**2)[:, None], N / np.maximum(size, 1e-300)[:, None], 0.0))
+
+    @cached_property
+    def is_convex(self) -> bool:
+        """Whether the mesh, which is closed, is its own hull but for a millionth of its size."""
+        return hull_error(self.vertices, self.faces) < np.inf
+
+    @cached_property
+    def _tree(self) -> Any:
+        import igl
+
+        tree = igl.AABB()
+        tree.init(self.vertices, self.faces)
+        return tree
+
+    def nearest(self, points: Array) -> tuple[Array, NDArray[np.int64], Array]:
+        """Distance (k,) of points (k, 3) from the surface, the triangle (k,) that is nearest, and its point (k, 3)."""
+        if not len(points):
+            return np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, 3))
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        square, face, foot = self._tree.squared_distance(self.vertices, self.faces, points)
+        return np.sqrt(np.atleast_1d(square)), np.atleast_1d(face), np.asarray(foot).reshape(-1, 3)
+
+    def distance(self, points: Array) -> Array:
+        """Distance (k,) of points (k, 3) from the surface, never negative."""
+        return self.nearest(points)[0]
+
+    def contains(self, points: Array) -> NDArray[np.bool_]:
+        """Which of the points (k, 3), none of them on the surface, lie inside.
+
+        Nothing of the surface lies between a point and the triangle nearest to it, so where the nearest point is in the
+        middle of a triangle its normal says the side. For other points, and of open surfaces, winding numbers do.
+        """
+        inside = ((points > self.box[0]) & (points < self.box[1])).all(axis=1)
+        rows = np.flatnonzero(inside)
+        if not len(rows):
+            return np.asarray(inside)
+        near = np.ascontiguousarray(points[rows], dtype=np.float64)
+        behind, is_certain = self._behind_nearest(near)
+        if not is_certain.all():
+            behind[~is_certain] = self._winds_round(near[~is_certain])
+        inside[rows] = behind
+        return np.asarray(inside)
+
+    def _behind_nearest(self, points: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether points (k, 3) are behind the triangle nearest to them, and whether it is nearest in its middle."""
+        _, face, foot = self.nearest(points)
+        corners = self.vertices[self.faces[face]]
+        normal = self.normals[face]
+        sides = np.roll(corners, -1, axis=1) - corners
+        inward = np.cross(normal[:, None], sides)
+        margin = np.einsum("kij,kij->ki", foot[:, None] - corners, inward) / np.maximum((sides**2).sum(axis=2), 1e-300)
+        away = np.einsum("ki,ki->k", points - foot, normal)
+        is_certain = self._is_closed & (margin.min(axis=1) > _MIDDLE) & (np.abs(away) > 1e-9 * self.scale)
+        return away < 0.0, np.asarray(is_certain)
+
+    @cached_property
+    def _is_closed(self) -> bool:
+        return is_closed(self.faces)
+
+    def _winds_round(self, points: Array) -> NDArray[np.bool_]:
+        import igl
+
+        turns = np.empty(len(points))
+        exactly = self.distance(points) <= _SINGLE * self.scale
+        if np.count_nonzero(~exactly) <= _FEW:
+            exactly[:] = True
+        for rows, winding in ((exactly, igl.winding_number), (~exactly, igl.fast_winding_number)):
+            if rows.any():
+                turns[rows] = winding(self.vertices, self.faces, np.ascontiguousarray(points[rows]))
+        return np.asarray(np.abs(turns) > 0.5)
+
+    def certain_depth(self, points: Array) -> Array:
+        """How deep points (k, 3) lie inside the true body at least; negative where that is not certain.
+
+        The distance from the mesh less the error of its triangles; minus infinity for points outside of the mesh.
+        """
+        inside = self.contains(points)
+        depth = np.full(len(points), -np.inf)
+        depth[inside] = self.distance(points[inside]) - self.error
+        return depth
+
+    def error_at(self, points: Array) -> Array:
+        """How far (k,) mm the true surface may be from points (k, 3) of this one."""
+        if self.face_error is None:
+            return np.zeros(len(points))
+        away, face, _ = self.nearest(points)
+        # On an edge the nearest triangle is either of two.
+        return np.where(away <= 1e-9 * self.scale, np.maximum(self._edge_error[face], 0.0), self.error)
+
+    @cached_property
+    def _edge_error(self) -> Array:
+        """The largest error (m,) of a triangle and all that share a corner with it."""
+        assert self.face_error is not None
+        corner = np.zeros(len(self.vertices))
+        for k in range(3):
+            np.maximum.at(corner, self.faces[:, k], self.face_error)
+        return np.asarray(corner[self.faces].max(axis=1))
+
+
+_MIDDLE = 1e-4
+"""How far from a triangle's sides, relative to these, a nearest point counts as in its middle."""
+_SINGLE = 1e-4
+"""Distance from the surface, relative to its size, up to which the fast winding number, in single floats, may err."""
+_FEW = 8
+"""Points up to which the exact sum over all triangles is quicker than the tree of the fast winding number."""
+
+
+def fcl_tree(vertices: Array, faces: NDArray[np.int64]) -> Any:
+    """FCL's tree of oriented boxes of triangles (m, 3)."""
+    import fcl
+
+    tree = fcl.BVHModel()
+    tree.beginModel(len(vertices), len(faces))
+    tree.addSubModel(vertices, faces)
+    tree.endModel()
+    return tree
+
+
+def at_edges(vertices: Array, faces: NDArray[np.int64], error: Array, patch: NDArray[np.int64] | None = None) -> Array:
+    """Errors (m,) of triangles that hold for their patches' true borders too; ``error`` (m,) is square to each patch.
+
+    ``patch`` (m,) numbers the patches; else triangles that meet at more than 30 degrees are of two.
+    Two patches that bulge by e and f meet within (e + f) / sin(w) of the edge between them, w being the angle of the
+    material if that is acute; else within e + f. At a blunt or hollow edge with a flat patch the foot of every point
+    lies on the mesh.
+    """
+    _, pairs, across = edges_of(faces, 2)
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    one, other = normal[pairs[:, 0]], normal[pairs[:, 1]]
+    convex = np.einsum("ij,ij->i", one, vertices[across[:, 1]] - a[pairs[:, 0]]) <= 1e-8
+    cosine = np.einsum("ij,ij->i", one, other)
+    both = error[pairs]
+    total = both.sum(axis=1)
+    knife = convex & (cosine < 0.0)
+    total[knife] /= np.maximum(np.sqrt(1.0 - np.minimum(1.0, cosine[knife] ** 2)), 1e-6)
+    sharp = cosine < _SHARP if patch is None else patch[pairs[:, 0]] != patch[pairs[:, 1]]
+    wider = sharp & ((knife & (total > 0.0)) | (both > 0.0).all(axis=1))
+    widened = error.copy()
+    for side in (0, 1):
+        np.maximum.at(widened, pairs[wider, side], np.where(both[wider, side] > 0.0, total[wider], 0.0))
+    return widened

@@ -1,0 +1,93 @@
+"""Lower bounds that hold for a whole stretch of a motion: one part still, the other's pieces swept.
+
+A cylinder is swept into a longer and thicker one: sliding along its own axis costs nothing, so a pin in its bore
+keeps its clearance over any stretch. A polyhedron is swept into the hull of its first and last position.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from clamp3d.engine.closed_form import ClosedForm, bore_rod
+from clamp3d.engine.convex import Convex, Rod, convex_distance
+from clamp3d.engine.hull import Hull, hull
+from clamp3d.engine.model import Model
+from clamp3d.geometry.pose import Array, inverse, to_target
+
+
+def swept_lower(
+    a: Model, b: Model, before: Array, middle: Array, after: Array, *, angle: float, screw: bool = True
+) -> float:
+    """Distance (mm) that ``b`` certainly keeps from ``a`` while it goes from ``before`` over ``middle`` to ``after``.
+
+    All three (4, 4) in a's frame, evenly spaced on a way that turns by ``angle`` (rad) between two of them: one screw,
+    or a turn of a that is carried across its axis. Minus infinity for half a turn or more.
+    """
+    if abs(angle) >= 0.5 * np.pi:
+        return -np.inf
+    there: tuple[Array, ...] = (before, middle, after)
+    back = tuple(inverse(T) for T in there)
+    if not screw:  # seen from a, the points of b are on spirals, which no arc bounds
+        a, b, there, back = b, a, back, there
+    best = np.inf
+    for x in a.forms:
+        for y in b.forms:
+            low = _one_way(x, y, there, angle)
+            if screw:
+                low = max(low, _bores(y, x, back, angle))
+            best = min(best, low - x.error - y.error)
+    return float(best)
+
+
+def _one_way(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angle: float) -> float:
+    best = _bores(still, moving, poses, angle)
+    for piece in still.outers:
+        for other in moving.outers:
+            if isinstance(other, Rod):
+                swept: Convex = _swept_rod(other, poses, angle)
+                best = max(best, convex_distance(piece, np.eye(4), swept, poses[1], rims=False).lower)
+            else:
+                around, sag = _swept_hull(other, poses, angle)
+                best = max(best, convex_distance(piece, np.eye(4), around, np.eye(4), rims=False).lower - sag)
+    return best
+
+
+def _bores(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angle: float) -> float:
+    best = -np.inf
+    for bore in still.bores:
+        for piece in moving.outers:
+            if isinstance(piece, Rod):
+                best = max(best, bore_rod(bore, _swept_rod(piece, poses, angle), poses[1]).lower)
+    return best
+
+
+def _swept_hull(piece: Convex, poses: tuple[Array, ...], angle: float) -> tuple[Hull, float]:
+    """Hull of a polyhedron at all three poses, in the standing part's frame, and how far arcs leave it."""
+    assert isinstance(piece, Hull)
+    ways = np.array([to_target(T, piece.vertices) for T in poses])
+    return hull((ways if angle else ways[::2]).reshape(-1, 3)), _sagitta(ways, angle)
+
+
+def _swept_rod(rod: Rod, poses: tuple[Array, ...], angle: float) -> Rod:
+    """A rod, in its own part's frame at the middle pose, that holds the moving one all the time."""
+    ends = rod.T[:3, 3] + np.outer([-0.5 * rod.length, 0.5 * rod.length], rod.T[:3, 2])
+    home = inverse(poses[1] @ rod.T)
+    ways = np.array([to_target(home, to_target(T, ends)) for T in poses])
+    local, sag = ways.reshape(-1, 3), _sagitta(ways, angle)
+    axes = [home[:3, :3] @ T[:3, :3] @ rod.T[:3, 2] for T in poses]
+    tilt = rod.radius * max(float(np.hypot(axis[0], axis[1])) for axis in axes)
+    low, high = float(local[:, 2].min() - sag - tilt), float(local[:, 2].max() + sag + tilt)
+    aside = float(np.hypot(local[:, 0], local[:, 1]).max())
+    T = rod.T.copy()
+    T[:3, 3] += 0.5 * (low + high) * rod.T[:3, 2]
+    return Rod(rod.radius + aside + sag, high - low, T)
+
+
+def _sagitta(ways: Array, angle: float) -> float:
+    """How far points stray from straight lines between their places ``ways`` (3, k, 3), ``angle`` of a turn apart."""
+    # Straight travel leaves no second difference; on an arc of angle a and radius r it is 4 r sin^2(a / 2), and the
+    # arc leaves its chord by 2 r sin^2(a / 4).
+    bend = float(np.linalg.norm(ways[0] - 2.0 * ways[1] + ways[2], axis=1).max())
+    return bend / (8.0 * math.cos(0.25 * angle) ** 2)

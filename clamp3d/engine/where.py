@@ -1,0 +1,128 @@
+"""Where two parts overlap: the volume that they share between bounds, a box around it, and a point deep inside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from clamp3d.engine.model import Model
+from clamp3d.engine.overlap import Common, common, deepest
+from clamp3d.errors import Clamp3dError
+from clamp3d.geometry.pose import Array
+
+_SHARE = 0.005
+"""Relative width of the interval of the volume at which it is not refined further."""
+_EXACT = 1e-6
+"""Relative accuracy taken for a volume by Open CASCADE."""
+
+
+@dataclass(frozen=True, eq=False)
+class Overlap:
+    """Where two parts overlap.
+
+    Attributes
+    ----------
+    volume : (float, float)
+        The volume that they share lies between these, mm^3.
+    box : ndarray (2, 3)
+        Lower and upper corner of a box in the world that holds all of the overlap, mm.
+    of_facets : bool
+        Whether volume, box and point are those of given meshes, of which nobody says how far they are from the parts.
+    point : ndarray (3,) or None
+        A point of the world that lies in both parts; None where no mesh inside them overlaps.
+    """
+
+    volume: tuple[float, float]
+    box: Array
+    of_facets: bool = False
+    point: Array | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        low, high = self.volume
+        return {
+            "volume_at_least_mm3": low,
+            "volume_at_most_mm3": high,
+            "volume_of_facets": self.of_facets,
+            "box_mm": self.box.tolist(),
+            "point": None if self.point is None else self.point.tolist(),
+        }
+
+
+@dataclass(eq=False)
+class Locator:
+    """Two overlapping parts: ``b`` at ``T_ab`` (4, 4) in a's frame, ``a`` at ``T_a`` in the world."""
+
+    a: Model
+    b: Model
+    T_a: Array
+    T_ab: Array
+
+    @cached_property
+    def overlap(self) -> Overlap | None:
+        """Where they overlap; None if not even meshes around them do, or one has no inside that is known."""
+        if not (self.a.closed and self.b.closed):
+            return None
+        rough = self._by_meshes() if self.a.chords and self.b.chords else None
+        if rough is not None and (rough.volume[1] - rough.volume[0] <= _SHARE * rough.volume[1]):
+            return rough
+        return self._exact(rough) or rough
+
+    def _by_meshes(self) -> Overlap | None:
+        overlap = None
+        for chord in sorted({*self.a.chords, *self.b.chords}, reverse=True):
+            finer = self._at(chord)
+            if finer is None:
+                break
+            overlap = finer
+            if finer.volume[1] - finer.volume[0] <= _SHARE * finer.volume[1]:
+                break
+        return overlap
+
+    def _at(self, chord: float) -> Overlap | None:
+        """From meshes of one chord error (mm)."""
+        outer_a, outer_b = self.a.outer(chord), self.b.outer(chord)
+        outer = common(outer_a, outer_b, self.T_ab)
+        if outer is None:
+            return None
+        inner_a, inner_b = self.a.inner(chord), self.b.inner(chord)
+        inner: Common | None = None
+        if inner_a is outer_a and inner_b is outer_b:
+            inner = outer
+        elif inner_a is not None and inner_b is not None:
+            inner = common(inner_a, inner_b, self.T_ab)
+        off = outer_a.error + outer_b.error
+        slack = (off + 1e-11 * (outer_a.scale + outer_b.scale)) * float(outer.areas[1].sum())
+        low = 0.0 if inner is None else max(0.0, inner.volume - slack)
+        point = None
+        if inner is not None and inner_a is not None and inner_b is not None:
+            point = self._in_world(deepest(inner_a, inner_b, self.T_ab, inner)[1])
+        corners = self._in_world(outer.vertices)
+        box = np.array([corners.min(axis=0) - off, corners.max(axis=0) + off])
+        given = any(model.exact is None and not model.between and not model.drawn for model in (self.a, self.b))
+        return Overlap((low, outer.volume + slack), box, given and off == 0.0, point)
+
+    def _exact(self, rough: Overlap | None) -> Overlap | None:
+        """From Open CASCADE, for two solids from CAD; None for others, and where it fails."""
+        if self.a.exact is None or self.b.exact is None:
+            return None
+        from clamp3d.files.cad_process import common as exact_common
+
+        try:
+            shared = exact_common(self.a.exact.brep, self.b.exact.brep, self.T_ab, 0.1)
+        except Clamp3dError:
+            return None
+        if not shared.volume > 0.0:
+            return None
+        corners = self._in_world(
+            np.array([(x, y, z) for x in shared.box[:, 0] for y in shared.box[:, 1] for z in shared.box[:, 2]])
+        )
+        box = np.array([corners.min(axis=0), corners.max(axis=0)])
+        volume = (shared.volume * (1.0 - _EXACT), shared.volume * (1.0 + _EXACT))
+        return Overlap(volume, box if rough is None else rough.box, False, None if rough is None else rough.point)
+
+    def _in_world(self, points: Array) -> Array:
+        return np.asarray(points @ self.T_a[:3, :3].T + self.T_a[:3, 3])

@@ -1,0 +1,98 @@
+"""The surfaces of a solid's faces: planes, cylinders, cones, spheres and tori with their sizes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.files.open_cascade import explore, from_bytes
+from clamp3d.geometry.mesh import Array
+
+KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
+"""Kinds of a face; the index is the kind's number in `Surfaces.kind`."""
+PLANE, CYLINDER, CONE, SPHERE, TORUS, OTHER = range(6)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surfaces:
+    """The surfaces of n faces, part frame, mm.
+
+    Attributes
+    ----------
+    kind : ndarray of int (n,)
+        Index into `KINDS`.
+    frame : ndarray (n, 4, 3)
+        Origin and the axes x, y, z of each surface; z is the plane's normal or the axis.
+    size : ndarray (n, 2)
+        Cylinder and sphere: radius; cone: radius at the origin and semi-angle (rad); torus: major and minor radius.
+    sense : ndarray (n,)
+        1.0 where the material lies below the plane or inside the cylinder, sphere, ...; -1.0 for holes and hollows.
+    """
+
+    kind: NDArray[np.int64]
+    frame: Array
+    size: Array
+    sense: Array
+
+
+def surfaces(brep: bytes) -> Surfaces:
+    """The surfaces of a solid's faces, in the explorer's order."""
+    return surfaces_of([*explore(from_bytes(brep), "FACE")])
+
+
+def surfaces_of(faces: list[Any]) -> Surfaces:
+    """The same of a list of TopoDS_Face."""
+    from OCP.TopAbs import TopAbs_Orientation
+
+    rows = [surface_of(face) for face in faces]
+    outward = [face.Orientation() != TopAbs_Orientation.TopAbs_REVERSED for face in faces]
+    sense = [1.0 if out is direct else -1.0 for out, (*_, direct) in zip(outward, rows, strict=True)]
+    return Surfaces(
+        np.array([row[0] for row in rows], dtype=np.int64),
+        np.array([row[1] for row in rows]).reshape(-1, 4, 3),
+        np.array([row[2] for row in rows]).reshape(-1, 2),
+        np.array(sense),
+    )
+
+
+def surface_of(face: Any) -> tuple[int, Array, tuple[float, float], bool]:
+    """Kind, frame and sizes of a face's surface, and whether its own normal points away from the axis or along z."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+
+    surface = BRepAdaptor_Surface(face)
+    name = surface.GetType().name.removeprefix("GeomAbs_").lower()
+    kind = KINDS.index(name) if name in KINDS else OTHER
+    if kind == OTHER:
+        return OTHER, np.vstack([np.zeros(3), np.eye(3)]), (0.0, 0.0), True
+    form = getattr(surface, name.capitalize())()
+    position = form.Position()
+    axes = (position.XDirection(), position.YDirection(), position.Direction())
+    frame = np.array([position.Location().Coord(), *(axis.Coord() for axis in axes)])
+    if kind == PLANE:
+        size = (0.0, 0.0)
+    elif kind == CONE:
+        size = (float(form.RefRadius()), float(form.SemiAngle()))
+    elif kind == TORUS:
+        size = (float(form.MajorRadius()), float(form.MinorRadius()))
+    else:
+        size = (float(form.Radius()), 0.0)
+    return kind, frame, size, bool(position.Direct())
+
+
+def height(kind: int, frame: Array, size: Array, points: Array) -> Array:
+    """Signed distance (k,) of points (k, 3) from a whole surface; positive on the side of the normal or outside."""
+    x, y, z = ((points - frame[0]) @ frame[1:].T).T
+    across = np.hypot(x, y)
+    if kind == PLANE:
+        return np.asarray(z)
+    if kind == CYLINDER:
+        return np.asarray(across - size[0])
+    if kind == CONE:
+        return np.asarray((across - size[0]) * math.cos(size[1]) - z * math.sin(size[1]))
+    if kind == SPHERE:
+        return np.asarray(np.sqrt(across**2 + z**2) - size[0])
+    return np.asarray(np.hypot(across - size[0], z) - size[1])

@@ -1,0 +1,185 @@
+"""glTF and GLB files as placed meshes, by trimesh; the nodes that the file announces are counted against its answer.
+
+A node's mesh is one body, whatever number of materials it is split into. Metres with Y up become mm with Z up. trimesh
+reads a file of which everything but shapes and places is taken away, and of which nodes and meshes are called by their
+numbers; what it would misread is refused here. This runs in the process for foreign files.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import struct
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+import trimesh
+from trimesh.resolvers import FilePathResolver
+
+from clamp3d.checks import shown
+from clamp3d.errors import InputError
+from clamp3d.files.bodies import Reading
+from clamp3d.files.formats import UNITS_MM
+from clamp3d.files.placing import Placer
+from clamp3d.files.worker import OUTSIDE
+from clamp3d.geometry.mesh import Array, IntArray
+from clamp3d.geometry.pose import UNIT_TOLERANCE
+
+_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+_HARMLESS = (
+    "KHR_materials_",
+    "KHR_texture_",
+    "KHR_lights_",
+    "KHR_xmp",
+    "KHR_mesh_quantization",
+    "EXT_texture_",
+    "MSFT_",
+)
+"""Required extensions that change no body, and the one whose numbers are scaled here."""
+_TRIANGLES, _STRIP = 4, 5
+_NORMALIZED = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
+"""What a whole number is divided by where an accessor says "normalized"."""
+
+
+class _Buffers(FilePathResolver):
+    """Gives trimesh the binary part of a GLB as the file without a name, and files of the same folder."""
+
+    def __init__(self, path: Path, binary: bytes) -> None:
+        super().__init__(str(path), allow_anywhere=os.environ.get(OUTSIDE) == "1")
+        self._binary = binary
+
+    def get(self, name: str) -> bytes:
+        if not name:
+            return self._binary
+        try:
+            return self.absolute(unquote(name)).read_bytes()
+        except ValueError:
+            raise InputError(f"names {shown(name)}, which is outside of its folder; {OUTSIDE}=1 allows that") from None
+        except OSError as error:
+            raise InputError(f"names {shown(name)}: {error.strerror}") from None
+
+
+def read_gltf(path: Path, unit: str | None) -> Reading:
+    """The meshes of a glTF or GLB file. Raises InputError if it is damaged, or holds what cannot be read."""
+    tree, binary = _parts(path)
+    placer = Placer(UNITS_MM[unit or "m"], _Z_UP)
+    if tree.get("skins") or any("targets" in p for mesh in tree.get("meshes", []) for p in mesh["primitives"]):
+        placer.notes.append("skins and morph targets are left at rest")
+    nodes = _nodes(tree)
+    meshes = {k: _Mesh(tree, k) for k in {tree["nodes"][n]["mesh"] for n in nodes}}
+    scene = trimesh.load_scene(
+        io.BytesIO(json.dumps(_simplified(tree, meshes)).encode()),
+        file_type="gltf",
+        resolver=_Buffers(path, binary),
+        process=False,
+        skip_materials=True,
+    )
+    for key, piece in scene.geometry.items():  # "7", "7_1", ...: the primitives of mesh 7, in their order
+        meshes[int(key.partition("_")[0])].pieces.append(piece)
+    for n in nodes:
+        k = tree["nodes"][n]["mesh"]
+        name = str(tree["nodes"][n].get("name") or tree["meshes"][k].get("name") or path.stem)
+        if len(meshes[k].pieces) != len(meshes[k].primitives):
+            placer.add(name, "not readable", np.eye(4))
+        elif meshes[k].pieces:
+            placer.place(name, k, meshes[k].arrays, scene.graph.get(str(n))[0])
+        else:
+            placer.notes.append(f"{name}: points or lines, left out")
+    return placer.reading()
+
+
+def _parts(path: Path) -> tuple[dict[str, Any], bytes]:
+    """The JSON of a file, and the binary part of a GLB."""
+    raw = path.read_bytes()
+    text, binary = raw, b""
+    if raw[:4] == b"glTF":
+        version, length, size, kind = struct.unpack_from("<IIII", raw, 4)
+        if version != 2 or kind != 0x4E4F534A:
+            raise InputError(f"not a readable GLB file (version {version})")
+        if length > len(raw):
+            raise InputError(f"the file is cut off: {len(raw)} of {length} bytes")
+        text = raw[20 : 20 + size]
+        if length > 28 + size:
+            binary = raw[28 + size : 28 + size + struct.unpack_from("<I", raw, 20 + size)[0]]
+    tree = json.loads(text)
+    if not isinstance(tree, dict):
+        raise InputError("not a readable glTF file (no object)")
+    required = [x for x in tree.get("extensionsRequired", []) if not str(x).startswith(_HARMLESS)]
+    if required:
+        listed = ", ".join(map(str, required))
+        raise InputError(f"needs {listed}, which is not read; export without compression")
+    return tree, binary
+
+
+def _nodes(tree: dict[str, Any]) -> list[int]:
+    """Numbers of the scene's nodes that have a mesh. Raises InputError for one that is not there, or there twice."""
+    nodes = tree.get("nodes", [])
+    if not tree.get("scenes"):
+        below = {child for node in nodes for child in node.get("children", [])}
+        tree["scenes"], tree["scene"] = [{"nodes": [k for k in range(len(nodes)) if k not in below]}], 0
+    stack = list(reversed(tree["scenes"][tree.get("scene", 0)].get("nodes", [])))
+    visited: dict[int, None] = {}
+    while stack:
+        k = stack.pop()
+        if not 0 <= k < len(nodes) or not 0 <= nodes[k].get("mesh", 0) < max(1, len(tree.get("meshes", []))):
+            raise InputError(f"node {k}, or its mesh, is not in the file")
+        if k in visited:
+            raise InputError(f"node {k} is in the tree twice")
+        visited[k] = None
+        turn = nodes[k].get("rotation", (0.0, 0.0, 0.0, 1.0))
+        if not abs(math.hypot(*turn) - 1.0) <= UNIT_TOLERANCE:
+            raise InputError(f"the rotation of a node must be a quaternion of length 1, got {shown(turn)}")
+        stack += reversed(nodes[k].get("children", []))
+    return [k for k in visited if "mesh" in nodes[k]]
+
+
+class _Mesh:
+    """What is read of a mesh: ``primitives`` of triangles, which trimesh makes ``pieces`` of."""
+
+    def __init__(self, tree: dict[str, Any], number: int) -> None:
+        self.primitives: list[dict[str, Any]] = []
+        self.pieces: list[trimesh.Trimesh] = []
+        self._divisors: list[float] = []
+        for primitive in tree["meshes"][number]["primitives"]:
+            mode = primitive.get("mode", _TRIANGLES)
+            if mode < _TRIANGLES:  # points and lines
+                continue
+            if mode not in (_TRIANGLES, _STRIP):
+                raise InputError(f"triangles of mode {mode} are not read; export as a list of triangles")
+            corners = primitive["attributes"]["POSITION"]
+            indices = {"indices": primitive["indices"]} if "indices" in primitive else {}
+            for accessor in (tree["accessors"][k] for k in (corners, *indices.values())):
+                if "sparse" in accessor or "bufferView" not in accessor:
+                    raise InputError("sparse or empty numbers are not read; export without compression")
+            corner = tree["accessors"][corners]
+            self._divisors.append(_NORMALIZED[corner["componentType"]] if corner.get("normalized") else 1.0)
+            self.primitives.append({"attributes": {"POSITION": corners}, "mode": mode} | indices)
+
+    def arrays(self) -> tuple[Array, IntArray]:
+        """Vertices (n, 3) and faces (m, 3) of all pieces together."""
+        for piece in self.pieces:
+            if piece.faces.max() >= len(piece.vertices):
+                raise InputError(f"face index {piece.faces.max()} is out of range for {len(piece.vertices)} vertices")
+        vertices = [np.asarray(piece.vertices) / n for piece, n in zip(self.pieces, self._divisors, strict=True)]
+        V, F = trimesh.util.append_faces(vertices, [piece.faces for piece in self.pieces])
+        return np.asarray(V, dtype=np.float64), np.asarray(F, dtype=np.int64)
+
+
+def _simplified(tree: dict[str, Any], meshes: dict[int, _Mesh]) -> dict[str, Any]:
+    """The file with nothing in it but what bodies are made of; nodes and meshes are called by their numbers."""
+    places = ("children", "matrix", "translation", "rotation", "scale", "mesh")
+    primitives = [meshes[k].primitives if k in meshes else [] for k in range(len(tree.get("meshes", [])))]
+    return {key: tree.get(key, []) for key in ("scenes", "accessors", "bufferViews")} | {
+        "asset": tree.get("asset", {}),
+        "scene": tree.get("scene", 0),
+        "meshes": [{"name": str(k), "primitives": kept} for k, kept in enumerate(primitives)],
+        "nodes": [
+            {"name": str(k)} | {key: node[key] for key in places if key in node}
+            for k, node in enumerate(tree.get("nodes", []))
+        ],
+        "buffers": [{"uri": ""} | buffer for buffer in tree.get("buffers", [])],
+    }

@@ -1,0 +1,122 @@
+"""What Open CASCADE says of two solids: their distance, their common part, and how deep points lie in one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from clamp3d.errors import Clamp3dError
+from clamp3d.files.open_cascade import area_of, bounds_of, explore, from_bytes, moved, volume_of
+from clamp3d.files.tessellation import ANGLE, triangles_of
+from clamp3d.geometry.mesh import Array
+
+TOLERANCE = 1e-6
+"""Accuracy (mm) taken for an answer by Open CASCADE, ten times its own confusion of points (1e-7)."""
+
+_SLENDER = 400.0
+"""Ratio of a common part's size to its thickness beyond which its chords go by the size: else they take seconds."""
+
+
+_SAMPLES = 500
+"""Triangles that a face of a common part is cut into at least, to find where it is deepest."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommonPart:
+    """What two solids share: ``volume`` (mm^3), ``area`` (mm^2) and ``box`` (2, 3); nothing if the volume is 0.
+
+    ``points`` (n, 3) lie on its border, which is within ``chord`` mm of triangles between them.
+    """
+
+    volume: float
+    area: float
+    box: Array
+    points: Array
+    chord: float
+
+
+def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
+    """Distance (mm) of ``b`` at ``T`` (4, 4) in a's frame, and nearest points (3,); 0 where they touch or overlap.
+
+    Raises Clamp3dError if Open CASCADE finds none.
+    """
+    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+
+    search = BRepExtrema_DistShapeShape(from_bytes(a), moved(from_bytes(b), T))
+    if not search.IsDone() or search.NbSolution() < 1:
+        raise Clamp3dError("Open CASCADE finds no distance of the two solids")
+    p, q = (np.array(x.Coord()) for x in (search.PointOnShape1(1), search.PointOnShape2(1)))
+    return float(search.Value()), p, q
+
+
+def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
+    """The common part of ``a`` and of ``b`` at ``T`` (4, 4).
+
+    Its border is meshed with chords that are ``share`` of its thickness, volume over area, or of its size divided by
+    `_SLENDER`. Raises Clamp3dError if Open CASCADE cannot make it.
+    """
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+
+    made = BRepAlgoAPI_Common(from_bytes(a), moved(from_bytes(b), T))
+    if not made.IsDone():
+        raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
+    shape = made.Shape()
+    if next(explore(shape, "SOLID"), None) is None:
+        return CommonPart(0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3)), 0.0)
+    volume, area, box = abs(volume_of(shape)), area_of(shape), bounds_of(shape)
+    chord = max(share * volume / max(area, 1e-300), share / _SLENDER * float(np.linalg.norm(box[1] - box[0])))
+    BRepMesh_IncrementalMesh(shape, max(chord, TOLERANCE), False, ANGLE, False)
+    samples = [_samples(face, k) for k, face in enumerate(explore(shape, "FACE"))]
+    return CommonPart(volume, area, box, np.vstack([points for points, _ in samples]), max(off for _, off in samples))
+
+
+def _samples(face: Any, number: int) -> tuple[Array, float]:
+    """Points (n, 3) of a meshed face, at least some hundreds, and how far (mm) triangles between them are from it.
+
+    Meshes of a face may have no point inside of it, so its triangles are cut in the surface's parameters.
+    """
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+
+    surface = BRepAdaptor_Surface(face)
+    _, triangles, uv = triangles_of(face, number)
+    corners = uv[triangles]
+    while 0 < len(corners) < _SAMPLES:
+        middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
+        at_corners = [np.stack([corners[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
+        corners = np.concatenate([middles, *at_corners])
+    everything = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 2)
+    uv, place = np.unique(everything, axis=0, return_inverse=True)  # triangles share their corners
+    points = np.array([surface.Value(u, v).Coord() for u, v in uv.tolist()]).reshape(-1, 3)
+    return points, float(_heights(points[place.reshape(-1, 4)]).max(initial=0.0))
+
+
+def _heights(points: Array) -> Array:
+    """How far (m,) the last of four points (m, 4, 3) is from the plane of the others; of slivers from their middle."""
+    a, b, c, last = points.transpose(1, 0, 2)
+    normal, offset = np.cross(b - a, c - a), last - (a + b + c) / 3.0
+    size, away = np.linalg.norm(normal, axis=1), np.linalg.norm(offset, axis=1)
+    height = np.abs(np.einsum("ij,ij->i", normal, offset)) / np.maximum(size, 1e-300)
+    return np.asarray(np.where(size > 1e-6 * away**2, height, away))
+
+
+def depths(brep: bytes, points: Array) -> Array:
+    """Signed depth (k,) mm of points (k, 3) in a solid: negative outside."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+    from OCP.BRepClass3d import BRepClass3d_SolidClassifier
+    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+    from OCP.gp import gp_Pnt
+    from OCP.TopAbs import TopAbs_State
+
+    shape = from_bytes(brep)
+    shells, side = [*explore(shape, "SHELL")], BRepClass3d_SolidClassifier(shape)
+    signed = np.empty(len(points))
+    for k, point in enumerate(points.tolist()):
+        vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*point)).Vertex()
+        signed[k] = min(BRepExtrema_DistShapeShape(shell, vertex).Value() for shell in shells)
+        side.Perform(gp_Pnt(*point), TOLERANCE)
+        if side.State() == TopAbs_State.TopAbs_OUT:
+            signed[k] = -signed[k]
+    return signed

@@ -1,0 +1,84 @@
+"""Bodies of a file as they are read: counted, and meshes brought to mm, with Z up and placed rigidly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable
+
+import numpy as np
+
+from clamp3d.errors import InputError
+from clamp3d.files.bodies import Body, Reading
+from clamp3d.geometry.mesh import Array, IntArray, make_mesh
+from clamp3d.geometry.shapes import MeshShape, Shape
+
+MOST_BODIES = 20_000
+"""Bodies that a file may place: a few hundred bytes can name each other into millions of them."""
+
+
+class Placer:
+    """Collects the bodies of a file, and those that are missing, in the file's order.
+
+    Of meshes the unit is ``scale`` mm, and the axes are turned by ``R`` (3, 3).
+    """
+
+    def __init__(self, scale: float = 1.0, R: Array | None = None) -> None:
+        self.bodies: list[Body] = []
+        self.missing: list[str] = []
+        self.notes: list[str] = []
+        self.scale = scale
+        self.R = np.eye(3) if R is None else R
+        self._shapes: dict[tuple[Hashable, bytes], MeshShape | str] = {}
+
+    def add(self, name: str, shape: Shape | str, T: Array) -> None:
+        """One more body at ``T`` (4, 4), or why it has no shape. Raises InputError for too many bodies."""
+        if len(self.bodies) + len(self.missing) >= MOST_BODIES:
+            raise InputError(f"more than {MOST_BODIES} bodies")
+        if isinstance(shape, str):
+            self.missing.append(f"{name} ({shape})")
+        else:
+            self.bodies.append(Body(name, shape, T))
+
+    def reading(self, joined: Iterable[tuple[str, str]] | None = None) -> Reading:
+        """What was collected."""
+        links = None if joined is None else tuple(joined)
+        return Reading(tuple(self.bodies), tuple(self.missing), tuple(self.notes), links)
+
+    def place(self, name: str, key: Hashable, arrays: Callable[[], tuple[Array, IntArray]], T: Array) -> None:
+        """One more body: vertices and faces that ``arrays`` gives, the same for each ``key``, at ``T`` (4, 4).
+
+        A scale, shear or reflection in ``T`` goes into the vertices. Raises InputError for too many bodies.
+        """
+        if not np.isfinite(T).all() or abs(np.linalg.det(T[:3, :3])) < 1e-12:
+            self.add(name, "its placement is flat or not finite", T)
+            return
+        pose, form = rigid_part(T)
+        own = (key, form.round(12).tobytes())
+        if own not in self._shapes:
+            self._shapes[own] = self._shape(name, arrays, form)
+        place = np.eye(4)
+        place[:3, :3] = self.R @ pose[:3, :3] @ self.R.T
+        place[:3, 3] = self.scale * self.R @ pose[:3, 3]
+        self.add(name, self._shapes[own], place)
+
+    def _shape(self, name: str, arrays: Callable[[], tuple[Array, IntArray]], form: Array) -> MeshShape | str:
+        try:
+            V, F = arrays()
+            if np.linalg.det(form) < 0.0:
+                F = F[:, ::-1]
+            mesh = make_mesh(V @ (self.R @ form).T, F, name=name, scale=self.scale, float32=True)
+            shape = MeshShape(mesh, "off", name)
+        except InputError as error:
+            return str(error).removeprefix(f"{name}: ")
+        self.notes += [f"{name}: {note}" for note in mesh.notes]
+        return shape
+
+
+def rigid_part(T: Array) -> tuple[Array, Array]:
+    """A placement (4, 4) as a rigid pose after a scale, shear or reflection (3, 3): the identity where it is rigid."""
+    R = T[:3, :3]
+    pose = T.copy()
+    if np.abs(R @ R.T - np.eye(3)).max() <= 1e-5 and np.linalg.det(R) > 0.0:
+        return pose, np.eye(3)
+    left, _, right = np.linalg.svd(R)
+    pose[:3, :3] = turn = left * (1.0, 1.0, np.sign(np.linalg.det(R))) @ right
+    return pose, turn.T @ R

@@ -1,0 +1,106 @@
+"""A solid from CAD: its exact boundary as Open CASCADE wrote it; triangles are made when somebody asks for them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from clamp3d.files import cad_process
+from clamp3d.files.faces import Surfaces
+from clamp3d.files.open_cascade import (
+    bounds_of,
+    from_bytes,
+    require_open_cascade,
+    to_bytes,
+    volume_of,
+)
+from clamp3d.files.tessellation import Tessellation
+from clamp3d.geometry.mesh import Array, IntArray, Mesh, is_closed
+from clamp3d.geometry.shapes import MeshShape
+
+__all__ = ["CHORD", "BrepSolid", "require_open_cascade"]
+
+CHORD = 0.02
+"""Chord error (mm) of ``mesh``."""
+
+
+class BrepSolid(MeshShape):
+    """One solid with exact faces, which is a mesh shape to whoever asks for its ``mesh``.
+
+    Parameters
+    ----------
+    name : str
+        What its file calls it.
+    brep : bytes
+        The solid in its own frame, mm, in Open CASCADE's binary format (BinTools), without triangles.
+    bounds : ndarray (2, 3)
+        Lower and upper corner of a box that holds it, mm.
+    volume : float
+        Its volume, mm^3.
+    """
+
+    def __init__(self, name: str, brep: bytes, bounds: Array, volume: float) -> None:
+        for key, value in (("name", name), ("fit", "off")):
+            object.__setattr__(self, key, value)
+        self.__dict__.update(brep=brep, bounds=np.asarray(bounds, dtype=np.float64), volume=float(volume))
+        self.__dict__["_tessellations"] = {}
+
+    brep: bytes
+    bounds: Array
+    volume: float
+    _tessellations: dict[float, Tessellation]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.name, self.brep, self.bounds, self.volume)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, BrepSolid) and self.brep == other.brep
+
+    def __hash__(self) -> int:
+        return hash(self.brep)
+
+    @classmethod
+    def of(cls, solid: Any, name: str) -> BrepSolid:
+        """From a TopoDS_Shape, in this process."""
+        return cls(name, to_bytes(solid), bounds_of(solid), abs(volume_of(solid)))
+
+    @cached_property
+    def solid(self) -> Any:
+        """The TopoDS_Shape, in this process. Raises MissingLibraryError without Open CASCADE."""
+        return from_bytes(self.brep)
+
+    @cached_property
+    def surfaces(self) -> Surfaces:
+        """The surfaces of its faces."""
+        return cad_process.surfaces(self.brep)
+
+    def tessellated(self, chord: float) -> Tessellation:
+        """Triangles within about ``chord`` mm of its faces. Raises Clamp3dError if a face gets none."""
+        if chord not in self._tessellations:
+            self._tessellations[chord] = cad_process.tessellate(self.brep, chord)
+        return self._tessellations[chord]
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """Its triangles at `CHORD`."""
+        made = self.tessellated(CHORD)
+        closed = is_closed(made.faces)
+        notes = () if closed else ("the triangles of the solid do not close",)
+        rounding = float(np.abs(made.vertices).max()) * 2.0**-50
+        return Mesh(self.name, made.vertices, made.faces, closed, rounding, notes)
+
+    @property
+    def error(self) -> float:
+        """How far ``mesh`` can be from the faces, mm."""
+        return float(self.tessellated(CHORD).errors.max())
+
+    @property
+    def face(self) -> IntArray:
+        """Number of the exact face of each triangle of ``mesh``, in the explorer's order, from 0."""
+        return self.tessellated(CHORD).face
+
+    def bounds_at(self, T: Array) -> Array:
+        """Lower and upper corner (2, 3) of the bounding box of the exact faces, placed by ``T`` (4, 4)."""
+        return cad_process.bounds_at(self.brep, T)

@@ -1,0 +1,126 @@
+"""STEP files as placed solids: the product tree with names, placements and shared instances (Open CASCADE's XDE).
+
+This runs in a process of its own (`clamp3d.files.worker`): a damaged file can end it. Needs the extra ``step``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clamp3d.errors import InputError
+from clamp3d.files.bodies import Reading
+from clamp3d.files.cad import Key, Node, bodies_of, matrix
+from clamp3d.files.open_cascade import require_open_cascade
+from clamp3d.files.part21 import Announced, announced
+
+_OTHERS = {
+    "CSG_SOLID": "solids of constructive geometry",
+    "EXTRUDED_AREA_SOLID": "swept solids",
+    "REVOLVED_AREA_SOLID": "swept solids",
+    "SWEPT_FACE_SOLID": "swept solids",
+    "SOLID_REPLICA": "copied solids",
+    "TESSELLATED_SOLID": "tessellated solids",
+    "TESSELLATED_SHELL": "tessellated shells",
+}
+"""Bodies that Open CASCADE does not make into solids."""
+_PLACE = "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"
+
+
+def read_step(path: Path, _: str | None = None) -> Reading:
+    """The solids of a STEP file, in the order of its tree, in mm.
+
+    Raises InputError if its text is damaged or Open CASCADE cannot read it.
+    """
+    found = announced(path)
+    require_open_cascade()
+    from OCP.IFSelect import IFSelect_ReturnStatus
+    from OCP.STEPCAFControl import STEPCAFControl_Reader
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
+    XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
+    reader = STEPCAFControl_Reader()
+    reader.SetNameMode(True)
+    if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone or not reader.Transfer(document):
+        raise InputError("not a readable STEP file")
+    reading, solids = bodies_of(_roots(document, path.stem))
+    missing = (*found.orphans, *_lost(document, found, solids))
+    return replace(reading, missing=missing + reading.missing)
+
+
+def _roots(document: Any, stem: str) -> Iterator[Node]:
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+    from OCP.XCAFDoc import XCAFDoc_ShapeTool as Tool
+
+    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    for label in _children(tool.BaseLabel()):
+        if Tool.IsShape_s(label) and Tool.IsFree_s(label):
+            yield _node(label, stem)
+
+
+def _node(label: Any, otherwise: str) -> Node:
+    """A label of the product tree: its name, placement and shape, or the labels below it."""
+    from OCP.TDF import TDF_Label
+    from OCP.XCAFDoc import XCAFDoc_ShapeTool as Tool
+
+    product = TDF_Label()
+    if not Tool.GetReferredShape_s(label, product):
+        product = label
+    name = _name(product) or _name(label) or otherwise
+    T = matrix(Tool.GetLocation_s(label))
+    if Tool.IsAssembly_s(product):
+        below = (_node(child, name) for child in _children(product) if Tool.IsComponent_s(child))
+        return Node(name, T, None, below)
+    named = {}
+    for child in _children(product):
+        if Tool.IsSubShape_s(child):
+            shape = Tool.GetShape_s(child)
+            named[Key(shape)] = _name(child)
+    shape = Tool.GetShape_s(product)
+    return Node(name, T if product is not label else np.eye(4), shape, (), named)
+
+
+def _children(label: Any) -> Iterator[Any]:
+    from OCP.TDF import TDF_ChildIterator
+
+    walk = TDF_ChildIterator(label)
+    while walk.More():
+        yield walk.Value()
+        walk.Next()
+
+
+def _name(label: Any) -> str:
+    """A label's name; none where Open CASCADE has put the label's own address, as in ``=>[0:1:1:2]``."""
+    from OCP.TDataStd import TDataStd_Name
+
+    key = TDataStd_Name.GetID_s()
+    if not label.IsAttribute(key):  # FindAttribute ends the process on a label without one (a coloured face)
+        return ""
+    attribute = TDataStd_Name()
+    label.FindAttribute(key, attribute)
+    name = str(attribute.Get().ToExtString()).strip()
+    return "" if name.startswith("=>[") else name
+
+
+def _lost(document: Any, found: Announced, solids: int) -> Iterator[str]:
+    """Bodies and instances that the file announces and Open CASCADE has not made: ``solids`` different ones it has."""
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+    from OCP.XCAFDoc import XCAFDoc_ShapeTool as Tool
+
+    for kind, words in _OTHERS.items():
+        if found.counts[kind]:
+            yield f"{found.counts[kind]} {words}, which Open CASCADE does not read"
+    if found.solids > solids:
+        yield f"{found.solids - solids} of the file's {found.solids} solids (not readable)"
+    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    instances = sum(Tool.IsComponent_s(below) for label in _children(tool.BaseLabel()) for below in _children(label))
+    uses, places = (found.counts[f"{kind}"] for kind in ("NEXT_ASSEMBLY_USAGE_OCCURRENCE", _PLACE))
+    if max(uses, places) > instances or 0 < places < uses:
+        yield f"{uses} instances in the tree, {places} places for them, {instances} read"

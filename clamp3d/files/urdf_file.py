@@ -1,0 +1,182 @@
+"""Robot descriptions (URDF) as bodies named after their links, where the joints put them, by yourdfpy.
+
+yourdfpy reads what it can of a damaged file and says nothing, so the file is parsed strictly before. Of each link the
+collision shapes are taken, or the visual ones if it has no others. This runs in the process for foreign files. Needs
+the extra ``urdf``.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+from collections import Counter
+from functools import partial
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import networkx
+import numpy as np
+import trimesh
+
+from clamp3d import checks
+from clamp3d.errors import InputError, missing
+from clamp3d.files.bodies import Reading
+from clamp3d.files.formats import FORMATS, read
+from clamp3d.files.placing import Placer
+from clamp3d.files.worker import OUTSIDE
+from clamp3d.geometry.mesh import Array, IntArray, Mesh, make_mesh
+from clamp3d.geometry.pose import nearest_rigid
+from clamp3d.geometry.shapes import MeshShape, Shape, box, cylinder
+
+try:
+    import yourdfpy
+except ImportError:
+    raise missing("yourdfpy", "URDF") from None
+
+_MOST_BYTES = 2**26
+
+
+def read_urdf(path: Path, joints: dict[str, float]) -> Reading:
+    """The shapes of a robot's links in mm, in the frame of the root link, at the values of its ``joints``.
+
+    Values are in rad, or mm for joints that slide; without one a joint is at 0, or its nearest limit.
+    Raises InputError for a file that is no whole URDF, unknown joints and values out of their limits.
+    """
+    checks.readable_file(path, _MOST_BYTES)
+    root = ElementTree.parse(path).getroot()
+    _check_whole(root)
+    robot = yourdfpy.URDF.load(
+        io.BytesIO(ElementTree.tostring(root)), load_meshes=False, build_scene_graph=True, load_collision_meshes=False
+    )
+    robot.update_cfg(_joint_values(robot, joints))
+    links = _Links(path)
+    for link in robot.robot.links:
+        T_link = np.asarray(robot.get_transform(link.name))
+        for shape in link.collisions or link.visuals:
+            links.put(link.name, shape.geometry, T_link if shape.origin is None else T_link @ shape.origin)
+    if not all(link.collisions for link in robot.robot.links if link.visuals):
+        links.notes.append("links without collision shapes are taken by their visual ones")
+    return links.reading((joint.parent, joint.child) for joint in robot.robot.joints)
+
+
+class _Links(Placer):
+    """Collects the shapes of a robot's links."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.path = path
+        self._files: dict[Path, Mesh] = {}
+
+    def put(self, name: str, geometry: Any, T: Array) -> None:
+        """One more shape of the link ``name`` at ``T`` (4, 4), whose lengths are metres."""
+        if not np.isfinite(T).all():
+            raise InputError(f"a place in link {name} is not finite")
+        T = nearest_rigid(np.asarray(T, dtype=np.float64))
+        T[:3, 3] *= 1000.0
+        file = "" if geometry.mesh is None else geometry.mesh.filename
+        try:
+            if file:
+                mesh = self._mesh(file)
+                scale = 1.0 if geometry.mesh.scale is None else geometry.mesh.scale
+                self.place(name, mesh.name, partial(_arrays, mesh), T @ np.diag([*np.broadcast_to(scale, 3), 1.0]))
+            else:
+                self.add(name, _shape(geometry), T)
+        except InputError as error:
+            self.add(name, f"{file}: {error}" if file else str(error), T)
+
+    def _mesh(self, name: str) -> Mesh:
+        """The mesh of a file, as ROS reads it: numbers without a unit are metres, and the axes of glTF stay."""
+        path = _mesh_file(self.path, name)
+        if path not in self._files:
+            form = FORMATS.get(path.suffix.lower())
+            if form is None or form.reader.startswith("step"):
+                raise InputError(f"a mesh must be one of {', '.join(FORMATS)}, without STEP")
+            mesh = read(path, None if form.unit else "m").complete(path.name).merged(path.name)
+            if form.unit == "m":
+                mesh = make_mesh(mesh.vertices[:, [0, 2, 1]] * (1, 1, -1), mesh.faces, name=path.name)
+            self.notes += [f"{path.name}: {note}" for note in mesh.notes]
+            self._files[path] = mesh
+        return self._files[path]
+
+
+def _arrays(mesh: Mesh) -> tuple[Array, IntArray]:
+    return mesh.vertices, mesh.faces
+
+
+def _shape(geometry: Any) -> Shape:
+    """A box, a cylinder, or a sphere as facets, in mm. Raises InputError for sizes that are not > 0."""
+    if geometry.box is not None:
+        return box(tuple(1000.0 * float(x) for x in geometry.box.size))
+    if geometry.cylinder is not None:
+        return cylinder(1000.0 * geometry.cylinder.radius, 1000.0 * geometry.cylinder.length)
+    radius = checks.positive("radius of a sphere", 1000.0 * geometry.sphere.radius)
+    facets = trimesh.creation.icosphere(4, radius)
+    nearest = float(np.abs(np.einsum("ij,ij->i", facets.triangles[:, 0], facets.face_normals)).min())
+    return MeshShape(make_mesh(facets.vertices, facets.faces, name="sphere"), "off", "sphere", radius - nearest)
+
+
+def _mesh_file(path: Path, name: str) -> Path:
+    """A mesh beside the description or in the folder above, or, of a package, in any folder above it."""
+    bare = name.removeprefix("file://")
+    files = [(path.parent / bare, path.resolve().parent.parent)]
+    if bare.startswith("package://"):
+        inside = Path(bare.removeprefix("package://"))
+        inner = (inside, Path(*inside.parts[1:]))
+        files = [(folder / part, folder) for folder in path.resolve().parents for part in inner]
+    for file, folder in files:
+        is_within = os.environ.get(OUTSIDE) == "1" or file.resolve().is_relative_to(folder.resolve())
+        if is_within and file.is_file():
+            return file
+    raise InputError(f"no such file in the robot's folder, the one above or its package; {OUTSIDE}=1 allows others")
+
+
+def _check_whole(root: ElementTree.Element) -> None:
+    """Raise InputError for what yourdfpy would pass over, and unless links and joints make one tree."""
+    if root.tag != "robot":
+        raise InputError(f"not a readable URDF file (it holds <{root.tag}>, not <robot>)")
+    for kind in ("link", "joint"):
+        name, count = max(
+            Counter(item.get("name") for item in root.findall(kind)).items(), key=itemgetter(1), default=("", 0)
+        )
+        if count > 1:
+            raise InputError(f"{count} of its {kind}s are called {checks.shown(name)}")
+        if root.find(f"link//{kind}") is not None:
+            raise InputError(f"a link holds another {kind}")
+    for link in root.findall("link"):
+        for item in (*link.findall("collision"), *link.findall("visual")):
+            if (count := len(item.findall("geometry/*"))) != 1:
+                raise InputError(
+                    f"a {item.tag} of link {checks.shown(link.get('name'))} must have 1 shape, got {count}"
+                )
+    tree: Any = networkx.MultiDiGraph()
+    tree.add_nodes_from(link.get("name") for link in root.findall("link"))
+    count = len(tree)
+    ends = zip(root.iterfind("joint/parent"), root.iterfind("joint/child"), strict=True)
+    tree.add_edges_from((parent.get("link"), child.get("link")) for parent, child in ends)
+    if len(tree) > count:
+        raise InputError(f"a joint must connect links, got {checks.shown([*tree][count])}")
+    if not networkx.is_arborescence(tree):
+        raise InputError("the joints must make one tree of all links, in which none is the child of two")
+
+
+def _joint_values(robot: Any, values: dict[str, float]) -> dict[str, float]:
+    """Value of each actuated joint: as given, else 0 or the nearest limit; m for those that slide."""
+    joints = {name: robot.joint_map[name] for name in robot.actuated_joint_names}
+    for name in values:
+        checks.choice("joint", name, joints)
+    configuration = {}
+    for name, joint in joints.items():
+        factor, unit = (1000.0, "mm") if joint.type == "prismatic" else (1.0, "rad")
+        limit = None if joint.type == "continuous" else joint.limit
+        low = -math.inf if limit is None or limit.lower is None else limit.lower
+        high = math.inf if limit is None or limit.upper is None else limit.upper
+        value = values[name] / factor if name in values else min(max(0.0, low), high)
+        if not low - 1e-9 <= value <= high + 1e-9:
+            raise InputError(
+                f"joint {name} must be from {low * factor:g} to {high * factor:g} {unit}, got {value * factor:g}"
+            )
+        configuration[name] = value
+    return configuration

@@ -1,0 +1,74 @@
+"""The separate closed surfaces of a mesh: their volumes, what winds round what, and which of them are inside out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.geometry.pose import Array
+
+Faces = NDArray[np.int64]
+
+_FLAT = 1e-14
+"""A volume below this part of area x extent is rounding."""
+
+_MOST_SAMPLES = 64
+
+
+def volume(vertices: Array, faces: Faces) -> float:
+    """Signed volume of a closed surface in mm^3, positive if its faces wind outward, 0.0 if it is flat to rounding.
+
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> 6.0 * volume(corners, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+    1.0
+    """
+    used = vertices[faces].reshape(-1, 3)
+    low, high = used.min(axis=0), used.max(axis=0)
+    # The middle as origin: far from it the volumes cancel badly.
+    a, b, c = np.moveaxis(vertices[faces] - 0.5 * (low + high), 1, 0)
+    enclosed = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    return enclosed if abs(enclosed) > _FLAT * area * float((high - low).max()) else 0.0
+
+
+def joined(groups: Faces, n: int) -> Faces:
+    """The least number (n,) among 0 to ``n`` - 1 that each is joined to by ``groups`` (m, k), over others or directly.
+
+    >>> joined(np.array([[3, 1], [4, 3], [0, 2]]), 5).tolist()
+    [0, 1, 0, 1, 1]
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    first, others = np.repeat(groups[:, 0], groups.shape[1] - 1), groups[:, 1:].ravel()
+    graph = coo_matrix((np.ones(len(others), bool), (first, others)), shape=(n, n))
+    _, group = connected_components(graph, directed=False)
+    _, least = np.unique(group, return_index=True)
+    return np.asarray(least[group])
+
+
+def shells(faces: Faces, vertices: int) -> list[NDArray[np.intp]]:
+    """Rows of ``faces`` of each connected surface; ``vertices`` is how many there are."""
+    label = joined(faces, vertices)[faces[:, 0]]
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+
+
+def inside_out(vertices: Array, faces: Faces) -> list[NDArray[np.intp]]:
+    """Rows of ``faces`` of each closed surface that winds inward and is not a cavity of another one.
+
+    A cavity lies wholly inside the rest. Its winding number there is negative: a body of no material, which a wire in
+    it would not be seen in.
+    """
+    import igl
+
+    turned = []
+    for rows in shells(faces, len(vertices)):
+        if volume(vertices, faces[rows]) >= 0.0:
+            continue
+        rest = np.delete(faces, rows, axis=0)
+        samples = np.unique(faces[rows])
+        samples = samples[:: max(1, len(samples) // _MOST_SAMPLES)]
+        if not len(rest) or igl.winding_number(vertices, rest, vertices[samples]).min() < 0.9:
+            turned.append(rows)
+    return turned

@@ -1,0 +1,32 @@
+"""Nearest points of triangles, without trimesh, whose import takes 0.5 s of CPU."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clamp3d.geometry.pose import Array
+
+
+def closest_points(triangles: Array, points: Array) -> Array:
+    """The point (n, 3) of each triangle (n, 3, 3) that is nearest to the point (n, 3) of the same row.
+
+    >>> closest_points(np.array([[[0.0, 0, 0], [4, 0, 0], [0, 4, 0]]]), np.array([[1.0, 1.0, 5.0]])).tolist()
+    [[1.0, 1.0, 0.0]]
+    """
+    starts = triangles
+    sides = np.roll(triangles, -1, axis=1) - triangles
+    to_point = points[:, None] - starts
+    square = (sides * sides).sum(axis=2)
+    share = np.clip((to_point * sides).sum(axis=2) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    feet = starts + share[:, :, None] * sides
+    away = ((feet - points[:, None]) ** 2).sum(axis=2)
+    rows = np.arange(len(points))
+    nearest = feet[rows, away.argmin(axis=1)]
+    normal = np.cross(sides[:, 0], sides[:, 1])
+    # Inside: left of all three sides, as seen from the tip of the normal.
+    left = (np.cross(normal[:, None], sides) * to_point).sum(axis=2)
+    inside = (left > 0.0).all(axis=1)
+    n, p = normal[inside], points[inside]
+    height = ((p - starts[inside, 0]) * n).sum(axis=1) / (n * n).sum(axis=1)
+    nearest[inside] = p - height[:, None] * n
+    return np.asarray(nearest)

@@ -1,0 +1,116 @@
+"""Bounds of distances: any pair, every level, meshes, fitted meshes and contact models, against the oracle."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from clamp3d import baselines, distance, shapes
+from clamp3d.engine.model import ModelCache
+from clamp3d.geometry.pose import inverse, rotation, translation
+from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.testing import assert_distance, body
+from tests.kinds import BLOCK, DRAWN, faceted_shape, poses
+
+SLOW = settings(
+    deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate], suppress_health_check=[HealthCheck.too_slow]
+)
+SOME = st.sampled_from(DRAWN)
+
+
+@settings(SLOW, max_examples=12)
+@given(SOME, SOME, poses(25.0))
+def test_any_pair_of_drawn_solids(a, b, T):
+    assert_distance(distance(a, b, T), a, b, T)
+
+
+@settings(SLOW, max_examples=12)
+@given(
+    st.builds(SweptArc, st.floats(3.0, 15.0), st.floats(0.2, 3.0), st.floats(2.0, 60.0)),
+    st.builds(Cylinder, st.floats(0.5, 12.0), st.floats(1.0, 90.0)),
+    poses(25.0),
+)
+def test_a_bare_groove_and_a_cylinder(groove, wire, T):
+    assert_distance(distance(groove, wire, T), groove, wire, T)
+    assert_distance(distance(wire, groove, inverse(T)), wire, groove, inverse(T))
+
+
+FACETED = {
+    (a.name, fit): (a, faceted_shape(a, 0.3 if fit == "off" else 0.05, fit))
+    for a in DRAWN
+    for fit in ("off", "round")
+    if fit == "off" or any(e.profile.arcs for e in (*a.bodies, *a.holes))
+}
+
+
+@settings(SLOW, max_examples=8)
+@given(st.sampled_from([key for key in FACETED if key[1] == "off"]), SOME, poses(20.0))
+def test_facets_that_are_the_part(key, b, T):
+    faceted = FACETED[key][1]
+    assert_distance(distance(faceted, b, T, accuracy=1e-3), faceted, b, T, cells=3000)
+
+
+@settings(SLOW, max_examples=12)
+@given(st.sampled_from([key for key in FACETED if key[1] != "off"]), st.sampled_from([DRAWN[3], DRAWN[5]]), poses(20.0))
+def test_a_fitted_mesh_has_the_bounds_of_the_part_it_comes_from(key, b, T):
+    """Its corners lie on the part's surface, so what is said of it must hold for the part."""
+    solid, faceted = FACETED[key]
+    found = distance(faceted, b, T, accuracy=1e-3)
+    assert_distance(replace(found, point_a=None, normal=None), solid, b, T)
+
+
+@pytest.mark.parametrize("error", [1.0, 0.1])
+@pytest.mark.parametrize("shape", DRAWN, ids=lambda shape: shape.name)
+def test_a_drawn_solid_lies_between_its_two_meshes(shape, error):
+    model = ModelCache().model(shape)
+    rng = np.random.default_rng(0)
+    inner, outer = model.inner(error), model.outer(error)
+    corners = inner.vertices[inner.faces]
+    on = np.einsum("mkc,mcd->mkd", rng.dirichlet(np.ones(3), (len(corners), 30)), corners).reshape(-1, 3)
+    assert body(shape).field(np.vstack([inner.vertices, on])).max() <= 1e-9
+    x = rng.uniform(*body(shape).box, (6000, 3))
+    corners = outer.vertices[outer.faces]
+    on = np.einsum("mkc,mcd->mkd", rng.dirichlet(np.ones(3), (len(corners), 30)), corners).reshape(-1, 3)
+    assert body(shape).field(np.vstack([outer.vertices, on])).min() >= -1e-9
+    assert outer.contains(x[body(shape).field(x) < 0.0]).all()
+
+
+@settings(SLOW, max_examples=12)
+@given(
+    st.sampled_from(["chords", "wedges"]),
+    st.sampled_from([2.0, 10.0, 30.0]),
+    st.floats(-3.0, 3.0),
+    st.floats(-2.0, 3.0),
+    st.floats(-1.5, 1.5),
+)
+def test_contact_models_bound_what_they_approximate(name, unit, x, y, turn):
+    wire = shapes.cylinder(5.0, 70.0)
+    model = baselines.contact_model(name, {"block": BLOCK}, unit_angle=math.radians(unit))
+    T = translation(x, y, 0.0) @ rotation((0.0, 0.0, 1.0), turn)
+    found = distance(BLOCK, wire, T, model=model)
+    assert found.lower <= found.value <= found.upper
+    assert_distance(replace(found, point_a=None, normal=None, estimate=None), BLOCK, wire, T)
+
+
+def test_of_a_model_without_known_bounds_none_are_claimed():
+    wire, T = shapes.cylinder(5.0, 70.0), translation(0.0, 1.0, 0.0)
+    model = baselines.contact_model("mesh", {"block": BLOCK, "cylinder": wire})
+    found = distance(BLOCK, wire, T, model=model)
+    assert (found.level, found.lower, found.upper) == ("model", -math.inf, math.inf)
+    assert found.estimate == pytest.approx(distance(BLOCK, wire, T).value, abs=0.1)
+
+
+@pytest.mark.parametrize("shape", DRAWN, ids=lambda shape: shape.name)
+def test_bounding_boxes_hold_the_shape(shape):
+    model = ModelCache().model(shape)
+    low, high = body(shape).box
+    x = np.random.default_rng(1).uniform(low - 5.0, high + 5.0, (20_000, 3))
+    inside = body(shape).field(x) < 0.0
+    assert (x[inside] >= model.bounds[0] - 1e-9).all()
+    assert (x[inside] <= model.bounds[1] + 1e-9).all()
+    for form in model.forms:
+        deep = form.depth(x)
+        assert (body(shape).field(x)[deep > 1e-9] <= 1e-9).all()

@@ -1,0 +1,144 @@
+"""Convex pieces: their geometry against points, their signed distance against hulls and prisms of many sides."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import ConvexHull
+
+from clamp3d.engine.convex import Rod, _deepest, convex_distance
+from clamp3d.engine.convex_depth import convex_depth
+from clamp3d.engine.hull import Hull, hull
+from clamp3d.geometry.pose import inverse, rotation, to_target, translation
+from tests.hulls import apart
+
+HERE = np.eye(4)
+TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
+CUBE = hull(np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-2.0, 2.0) for z in (-3.0, 3.0)]))
+
+
+def corners(piece, T, sides=90, scale=1.0):
+    """Corners (k, 3) of a piece at ``T``; of a rod a prism in it, or with a larger ``scale`` around it."""
+    if isinstance(piece, Hull):
+        return to_target(T, piece.vertices)
+    turn = 2.0 * math.pi * np.arange(sides) / sides
+    rim = scale * piece.radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    ends = [np.column_stack([rim, np.full(sides, z * piece.length)]) for z in (-0.5, 0.5)]
+    return to_target(T @ piece.T, np.vstack(ends))
+
+
+def signed(one, other):
+    """Signed distance of two hulls of points: minus the least translation that parts them, in an overlap."""
+    gap = apart(one, other)
+    if gap > 1e-9:
+        return gap
+    return float(ConvexHull((one[:, None] - other[None]).reshape(-1, 3)).equations[:, 3].max())
+
+
+def some_piece(rng):
+    if rng.random() < 0.4:
+        return Rod(rng.uniform(0.5, 3.0), rng.uniform(0.5, 9.0), TURNED @ rotation(rng.normal(size=3), 1.0))
+    return hull(rng.normal(size=(rng.choice([4, 8, 30, 70]), 3)) * rng.uniform(0.5, 3.0, 3))
+
+
+def some_pair(seed):
+    """Two pieces, one of them placed so that they are apart or overlap by a step from 1e-6 to 3 mm."""
+    rng = np.random.default_rng(seed)
+    a, b = some_piece(rng), some_piece(rng)
+    if isinstance(a, Rod) and isinstance(b, Rod):
+        b = CUBE if seed % 2 else hull(rng.normal(size=(12, 3)))
+    T = rotation(rng.normal(size=3), rng.uniform(0.0, 3.0)) if seed % 3 else np.eye(4)
+    n = rng.normal(size=3)
+    n /= np.linalg.norm(n)
+    reach = (corners(a, HERE) @ n).max() - (corners(b, T) @ n).min()
+    return a, b, translation(*((reach + rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6.0, 0.5)) * n)) @ T
+
+
+def test_a_point_beside_a_piece_attests_no_overlap():
+    """Two boxes that touch; the point lies in one of them, and by rounding as far beside the other."""
+    off = 1e-9
+    corners_of = np.array([(x, y, z) for x in (-5.0, 5.0) for y in (-5.0, 5.0) for z in (-5.0, 5.0)])
+    box = hull(corners_of)
+    found = _deepest(box, HERE, box, translation(10.0, 0.0, 0.0), [np.array([5.0 + off, 0.0, 0.0])], -1.0, 1e-6)
+    assert 0.0 <= found.upper <= 4.0 * off
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_the_signed_distance_of_two_pieces(seed):
+    """Between bounds that hold, sharp where they are apart, with points of both pieces and the normal between them."""
+    a, b, T = some_pair(seed)
+    widest = 1.0 / math.cos(math.pi / 90)
+    least, most = (signed(corners(a, HERE, scale=s), corners(b, T, scale=s)) for s in (widest, 1.0))
+    for found in (convex_distance(a, HERE, b, T), convex_distance(b, T, a, HERE)):
+        assert found.lower <= most + 1e-8
+        assert found.lower <= found.upper
+        if least > 1e-8:
+            assert found.upper >= least - 1e-8
+            assert found.upper - found.lower <= 1e-8 * (1.0 + found.upper)
+        elif most < -1e-8:
+            assert found.upper <= 1e-9
+    found = convex_distance(a, HERE, b, T)
+    if found.point_a is None or found.upper == math.inf:
+        return
+    p, q = found.point_a, found.point_b
+    assert min(a.depth(p[None])[0], b.depth(to_target(inverse(T), q)[None])[0]) >= -1e-7
+    assert np.linalg.norm(found.normal) == pytest.approx(1.0, abs=1e-9)
+    if found.lower > 1e-6:
+        assert np.linalg.norm(q - p) == pytest.approx(found.upper, abs=1e-8)
+        assert (q - p) == pytest.approx(found.upper * found.normal, abs=1e-5)
+    elif found.upper < 0.0:  # a point of both is as deep in one of them: no shorter move parts them
+        assert least <= found.upper + 1e-8
+
+
+def test_what_is_left_before_a_plane():
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        n = rng.normal(size=3)
+        plane = np.append(n / np.linalg.norm(n), rng.uniform(-2.5, 2.5))
+        left = CUBE.clipped(plane)
+        truth = trimesh.intersections.slice_mesh_plane(
+            trimesh.convex.convex_hull(CUBE.vertices), plane[:3], -plane[3] * plane[:3], cap=True
+        )
+        if left is None:
+            assert truth.is_empty
+            continue
+        assert ConvexHull(left.vertices).volume == pytest.approx(truth.volume, rel=1e-9)
+        assert (left.vertices @ plane[:3] + plane[3]).min() >= -1e-9
+    assert CUBE.clipped(np.array([0.0, 0.0, 1.0, 3.0])) is CUBE
+    assert CUBE.clipped(np.array([0.0, 0.0, 1.0, -3.0])) is None
+
+
+def test_points_of_boxes_and_cylinders_attest_their_distance():
+    """Of nearly parallel ones too: the points are in the pieces and no further apart than is said, to rounding."""
+    rng, seen = np.random.default_rng(0), 0
+    for _ in range(120):
+        a, b = (
+            Rod(*rng.uniform(1.0, 9.0, 2), HERE)
+            if rng.random() < 0.55
+            else hull(0.5 * rng.uniform(1.0, 9.0, 3) * CUBE.vertices / np.array([1.0, 2.0, 3.0]))
+            for _ in range(2)
+        )
+        T = rotation(rng.normal(size=3), rng.choice([1e-7, 1e-5, 1e-3, 0.3, 2.0]))
+        T[:3, 3] = rng.normal(size=3) * rng.choice([6.0, 12.0])
+        found = convex_distance(a, HERE, b, T)
+        if found.upper <= 0.0:
+            continue
+        seen += 1
+        p, q = found.point_a, found.point_b
+        assert np.linalg.norm(q - p) <= found.upper + 1e-13
+        assert min(a.depth(p[None])[0], b.depth(to_target(inverse(T), q)[None])[0]) >= -1e-11
+        assert found.upper - found.lower <= 5e-7
+    assert seen > 70
+
+
+@pytest.mark.parametrize("tilt", [0.0, 8e-10, -8e-10])
+def test_the_depth_of_cylinders_that_lean_by_less_than_counts_as_parallel(tilt):
+    """End on end, 0.1 mm in each other: the narrower one's rim goes as much deeper as it leans."""
+    T = translation(0.0, 0.0, 9.9) @ rotation((1.0, 0.0, 0.0), tilt)
+    found = convex_depth(Rod(20.0, 10.0, HERE), HERE, Rod(10.0, 10.0, HERE), T)
+    truth = -0.1 - 10.0 * abs(tilt)
+    assert found.lower - 1e-14 <= truth <= found.upper + 1e-14
+    assert found.upper - found.lower <= 40.0 * abs(tilt) + 1e-12

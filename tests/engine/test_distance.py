@@ -1,0 +1,186 @@
+import math
+
+import numpy as np
+import pytest
+
+from clamp3d.baselines.chords import Chords
+from clamp3d.clamp.assemble import assemble
+from clamp3d.clamp.parts import parts
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.check import check
+from clamp3d.engine.distance import distance, measure
+from clamp3d.engine.motions import first_contact
+from clamp3d.engine.result import CheckResult, PairResult
+from clamp3d.engine.scene import Part, Scene
+from clamp3d.engine.verdict import Verdict
+from clamp3d.errors import InputError
+from clamp3d.geometry import shapes
+from clamp3d.geometry.extrusion import Extrusion
+from clamp3d.geometry.mesh import make_mesh
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import inverse, rotation, translation
+from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.geometry.profile import Profile
+from clamp3d.kernel.distance import signed_distance
+
+GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
+BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
+CUBE, ROD = shapes.box((2, 4, 6)), shapes.cylinder(1.0, 4.0)
+
+
+def test_a_cylinder_has_flat_ends_and_the_kernel_a_lower_bound_of_them():
+    groove, wire, T = SweptArc(12.0, math.radians(70.0), 60.0), Cylinder(10.5, 80.0), translation(0.0, -3.0, 73.0)
+    d = distance(groove, wire, T)
+    assert d.value == pytest.approx(3.0, abs=1e-9)
+    assert d.uncertainty < 1e-9
+    assert signed_distance(groove, wire, T).distance < d.value
+    assert distance(wire, groove, inverse(T)).value == pytest.approx(3.0, abs=1e-9)
+    assert distance(shapes.groove_block(groove, 60.0, 40.0), shapes.cylinder(10.5, 80.0), T).value == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "T", "unique"),
+    [
+        (shapes.box((10, 10, 10)), shapes.box((10, 10, 10)), translation(12, 3, 0), False),
+        (shapes.box((10, 10, 10)), shapes.box((10, 10, 10)), translation(12, 0, 0) @ rotation([1, 1, 0], 0.3), True),
+        (shapes.cylinder(3, 20), shapes.cylinder(3, 20), translation(9, 0, 0), False),
+        (shapes.cylinder(3, 20), shapes.cylinder(3, 20), translation(9, 0, 0) @ rotation([1, 0, 0], 1.0), True),
+        (BLOCK, shapes.cylinder(6.5, 80), translation(0, -0.2, 0), False),
+        (CUBE, CUBE, translation(0, 0, 9) @ rotation((1, 0, 0), 0.2), False),  # an edge along a face
+        (CUBE, CUBE, translation(9, 0, 0) @ rotation((1, 0, 0), 0.4) @ rotation((0, 0, 1), 0.5), False),  # and edges
+        (CUBE, ROD, translation(0, 0, 7), False),  # an end over a face
+        (CUBE, ROD, translation(0, 0, 7) @ rotation((1, 0, 0), 0.5 * math.pi), False),  # its side along a face
+        (CUBE, ROD, translation(0, 0, 9) @ rotation((1, 0, 0), 0.4), True),  # the lowest point of a rim
+    ],
+)
+def test_nearest_points_that_are_not_the_only_ones_are_told(a, b, T, unique):
+    found = distance(a, b, T)
+    assert found.unique is unique
+    assert found.point_a + found.value * found.normal == pytest.approx(found.point_b, abs=1e-9)
+    # Moved together along the normal they touch.
+    closer = T.copy()
+    closer[:3, 3] -= found.value * found.normal
+    assert distance(a, b, closer).value == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_bolt_whose_axis_lies_in_the_plane_between_the_halves_of_a_hole():
+    clamp = assemble()
+    splint, bolt = parts(clamp.clamp)["P1"], parts(clamp.clamp)["P4"]
+    found = distance(bolt, splint, inverse(clamp.scene.parts[3].T_world))
+    assert found.lower <= found.upper < -1.0
+
+
+def test_contact_models_answer_where_a_groove_is_nearest():
+    scene = assemble().scene
+    model = Chords(math.radians(5.0))
+    exact, asked = measure(scene), measure(scene, model=model)
+    grooves = {pair for pair, d in asked.items() if d.method == "chords"}
+    assert grooves == {("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7"), ("P2", "P3")}
+    for pair, d in asked.items():
+        if pair in grooves:  # the chords lie in the hollow: never too wide
+            assert d.lower - 1e-9 <= exact[pair].value <= d.upper + 1e-9
+            assert d.value < exact[pair].value + 1e-9
+            assert d.point_a + d.value * d.normal == pytest.approx(d.point_b, abs=1e-9)
+        else:
+            assert d.value == exact[pair].value
+    assert "chords" in asked["P1", "P6"].to_dict()["method"]
+
+
+def test_parts_check_themselves_and_scenes_take_them():
+    part = Part("block", BLOCK)
+    assert Scene().add(part).parts[0].T_world.tolist() == np.eye(4).tolist()
+    assert Scene((part,)).add("wire", Cylinder(1.0, 2.0)).parts[1].shape.name == "cylinder"
+    for bad, message in (
+        (lambda: Part("a b", BLOCK), "part name must not be empty or hold a space"),
+        (lambda: Part("a", 3), "a part's shape must be a Solid, MeshShape, Cylinder or a mesh of trimesh, got int"),
+        (lambda: Part("a", BLOCK, np.diag([2.0, 1, 1, 1])), "pose of a must be rigid"),
+        (lambda: Scene((part,)).add(part), "part 'block' is there twice"),
+        (lambda: Scene().add(part, BLOCK), "takes a Part alone"),
+    ):
+        with pytest.raises(InputError, match=message):
+            bad()
+
+
+def test_a_clash_in_a_motion_is_in_counts_findings_and_data_alike():
+    drop = Motion.translate((0.0, -31.0, 0.0), parts="wire", name="drop")
+    scene = Scene((Part("block", BLOCK), Part("wire", Cylinder(6.935, 80.0), translation(0, 30, 0))), motions=(drop,))
+    result = check(scene)
+    assert isinstance(result, CheckResult)
+    assert not result.clean
+    assert result.counts == {"clash": 1, "clear": 1}
+    (row,) = result.findings
+    assert (row.motion, row.verdict) == ("drop", Verdict.CLASH)
+    assert [f["motion"] for f in result.to_dict()["findings"]] == ["drop"]
+    assert repr(result) == "CheckResult('scene': not clean; 1 clash, 1 clear)"
+    assert "<td>drop</td>" in result._repr_html_()
+
+
+def floor_with_bead():
+    floor = shapes.box((400, 40, 10))
+    bead = Extrusion(Profile.circle(5.0, (-53.25, -1.0)), "Y", -20.0, 20.0)
+    return shapes.Solid("floor", (*floor.bodies, bead))
+
+
+def test_sliding_close_above_a_floor_is_no_contact_before_the_bead():
+    # The block's edge is 0.02 mm above the floor and meets the bead, which stands out 1 mm.
+    reach = math.sqrt(25.0 - 4.02**2)
+    hit = first_contact(
+        floor_with_bead(),
+        shapes.box((20, 20, 20)),
+        Motion.translate((250, 0, 0)),
+        translation(-53.25 - reach - 10.0 - 0.115 * 250.0, 0, 15.02),
+    )
+    assert hit.touches
+    assert hit.t <= 0.115 + 1e-12
+    assert hit.t == pytest.approx(0.115, abs=2e-6)
+
+
+OCTAHEDRON = make_mesh(
+    3.0 * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]),
+    [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]],
+)
+
+
+@pytest.mark.parametrize("depth", [1e-2, 1e-3, 2e-4, 1e-5])
+@pytest.mark.parametrize("gap", [0.05, 1e-3, 0.0])
+def test_a_hole_that_just_breaks_through_a_face(depth, gap):
+    """A tip in front of the slot that the hole leaves in the face: the slot's edge is nearest, far from any chord."""
+    plate = shapes.box((20.0, 20.0, 10.0), holes=[shapes.Hole(5.0 + depth, (5.0, 0.0))])
+    half = math.sqrt((5.0 + depth) ** 2 - 5.0**2)
+    # The tip's edges fall back at 45 degrees, so the slot's edge is nearest to the tip, or to one of its edges.
+    truth = math.hypot(gap, half) if half <= gap else (gap + half) / math.sqrt(2.0)
+    d = distance(plate, shapes.MeshShape(OCTAHEDRON, fit="off"), translation(13.0 + gap, 0.0, 0.0))
+    assert d.lower <= truth + 1e-9
+    assert d.upper >= truth - 1e-9
+
+
+def test_witnesses_lie_on_the_bodies_where_meshes_decide():
+    """A coin of many corners on edge in a tube: no closed form, so the meshes have the last word."""
+    tube, turn = shapes.cylinder(8.0, 10.0, bore=5.0), np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    outline = Profile.of(*((1.5 * math.cos(x), 1.5 * math.sin(x)) for x in turn.tolist()))
+    T = translation(3.0, 0.4, 0.3) @ rotation([1, 0.3, 0.2], 1.1)
+    d = distance(tube, shapes.Solid("coin", (Extrusion(outline, "Z", -0.25, 0.25),)), T)
+    assert "meshes" in d.method
+    assert np.linalg.norm(d.point_b - d.point_a) == pytest.approx(d.value, abs=1e-9)
+    assert d.point_a + d.value * d.normal == pytest.approx(d.point_b, abs=1e-9)
+    assert np.hypot(*d.point_a[:2]) == pytest.approx(5.0, abs=1e-9)
+    x, y, z = np.linalg.inv(T)[:3] @ [*d.point_b, 1.0]
+    assert max(math.hypot(x, y) - 1.5, abs(z) - 0.25) <= 1e-9
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "estimate", "said"),
+    [
+        (9.99, math.inf, None, "at least 9.99 mm"),
+        (-3.0, math.inf, None, "at least -3 mm"),
+        (-math.inf, -2.0, None, "at most -2 mm"),
+        (-math.inf, math.inf, None, "no bounds known"),
+        (-math.inf, math.inf, 0.5, "0.5 mm by the model, no bounds known"),
+        (0.25, 0.5, None, "0.5 mm, uncertainty 2.5e-01"),
+    ],
+)
+def test_what_is_known_from_one_side_alone_is_said_as_an_inequality(lower, upper, estimate, said):
+    found = Distance(lower, upper, estimate=estimate, method="boxes")
+    assert repr(found) == f"Distance({said}, 'boxes')"
+    assert found.uncertainty == (0.25 if lower == 0.25 else math.inf)
+    assert f"distance={found!r}" in repr(PairResult("a", "b", Verdict.CLEARANCE, found))

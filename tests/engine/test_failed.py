@@ -1,0 +1,104 @@
+"""A pair that cannot be answered is a row of its own, with its reason; exit codes follow the worst certain verdict."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from clamp3d.cli import group
+from clamp3d.engine import judge, moving_pair
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.check import check
+from clamp3d.engine.scene import Scene
+from clamp3d.engine.verdict import Thresholds, Verdict
+from clamp3d.errors import InputError, SolverError
+from clamp3d.geometry import shapes
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import translation
+
+SCENE = """
+[parts.a]
+shape = "box"
+size = [10, 10, 10]
+[parts.b]
+shape = "box"
+size = [10, 10, 10]
+pose = { translation = [9.999, 0, 0] }
+[parts.c]
+shape = "box"
+size = [10, 10, 10]
+pose = { translation = [0, 0, %g] }
+"""
+
+
+@pytest.fixture
+def broken(monkeypatch):
+    """The pair a, b fails; every other one is answered."""
+    refine = judge.refine
+
+    def ask(a, b, T, *args, **kwargs):
+        if abs(abs(T[0, 3]) - 9.999) < 1e-9 and abs(T[2, 3]) < 1e-9:
+            raise SolverError("features and boxes disagree")
+        return refine(a, b, T, *args, **kwargs)
+
+    monkeypatch.setattr(judge, "refine", ask)
+    monkeypatch.setattr(moving_pair, "refine", ask)
+
+
+def boxes(z: float) -> Scene:
+    box = shapes.box((10, 10, 10))
+    return Scene().add("a", box).add("b", box, translation(9.999, 0, 0)).add("c", box, translation(0, 0, z))
+
+
+def test_a_pair_that_fails_is_a_row_and_the_others_are_answered(broken):
+    result = check(boxes(9.0))
+    assert result.verdict("a", "b") is Verdict.FAILED
+    assert result.verdict("a", "c") is Verdict.CLASH
+    (row,) = [row for row in result.pairs if row.verdict is Verdict.FAILED]
+    assert row.to_dict()["reason"] == "features and boxes disagree"
+    assert not check(boxes(10.0)).clean
+
+
+def test_a_motion_that_fails_is_a_row(broken):
+    scene = Scene(parts=(*boxes(30.0).parts,), motions=(Motion.translate((0.0, 0.0, 5.0), parts=("c",), name="up"),))
+    moved = Scene(parts=scene.parts, motions=(Motion.translate((0.0, 3.0, 0.0), parts=("b",), name="aside"),))
+    assert [row.verdict for row in check(scene).motions] == []
+    (row,) = check(moved).motions
+    assert (row.verdict, row.motion, row.t) == (Verdict.FAILED, "aside", None)
+    assert row.reason
+
+
+@pytest.mark.parametrize(
+    ("z", "broken_pair", "code"), [(10.0, False, 0), (9.0, False, 1), (9.0, True, 1), (10.0, True, 4)]
+)
+def test_exit_code_is_that_of_the_worst_certain_verdict(z, broken_pair, code, tmp_path, request):
+    if broken_pair:
+        request.getfixturevalue("broken")
+    file, page = tmp_path / "scene.toml", tmp_path / "page.html"
+    file.write_text(SCENE % z)
+    done = CliRunner().invoke(group, ["check", str(file), "--json", "-", "--html", str(page), "-q"])
+    assert done.exit_code == code, done.output
+    data = json.loads(done.stdout)
+    assert ("failed" in data["counts"]) == broken_pair
+    if broken_pair:
+        assert "features and boxes disagree" in page.read_text()
+        assert "1 pair failed" in data["headline"]
+
+
+def test_one_part_alone_is_nothing_to_check(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text('[parts.a]\nshape = "box"\nsize = [1, 1, 1]\n')
+    with pytest.raises(InputError, match="no pair of parts"):  # exit code 2
+        CliRunner().invoke(group, ["check", str(file), "-q"], catch_exceptions=False)
+
+
+def test_an_uncertain_verdict_names_the_thresholds_between_its_bounds():
+    limits = Thresholds(contact=0.01, clearance=0.5)
+    assert limits.between(Distance(0.2, 0.9)) == ["a gap of 0.5 mm (clearance)"]
+    assert limits.between(Distance(-0.03, 0.02)) == [
+        "a gap of 0.01 mm (contact)",
+        "an overlap of 0.01 mm (contact)",
+    ]
+    assert limits.between(Distance(-0.03, 0.0), 0.02) == ["an overlap of 0.02 mm (allowed)"]

@@ -1,0 +1,83 @@
+"""Hulls of points that nearly lie in faces, and meshes that are nearly convex."""
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from clamp3d import Verdict, check, distance
+from clamp3d.engine.hull import hull
+from clamp3d.engine.scene import Scene
+from clamp3d.geometry.mesh import make_mesh
+from clamp3d.geometry.pose import translation
+from clamp3d.geometry.shapes import MeshShape
+from clamp3d.shapes import box
+from clamp3d.testing import directions
+
+
+def roof(rise, n=5):
+    """A plate of 2 by 2 by 0.3 below z = 0 whose top is a grid that rises by ``rise`` in its middle."""
+    x, y = (g.ravel() for g in np.meshgrid(np.linspace(-1.0, 1.0, n), np.linspace(-1.0, 1.0, n)))
+    top = np.column_stack([x, y, 0.5 * rise * (2.0 - x * x - y * y)])
+    return np.vstack([top, np.column_stack([x, y, np.full(n * n, -0.3)])])
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.sampled_from([0.0, 1e-13, 1e-10, 1e-8, 5e-8, 1e-6]), st.integers(0, 2**32 - 1))
+def test_no_point_is_left_out(rise, seed):
+    """By the support function: along any direction the hull reaches as far as the furthest point."""
+    rng = np.random.default_rng(seed)
+    turn = trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3]
+    points = (roof(rise) + rise * rng.normal(size=(50, 3)) * [0.0, 0.0, 0.3]) @ turn.T * 40.0
+    made = hull(points)
+    assert (points @ made.planes[:, :3].T + made.planes[:, 3]).max() <= 1e-13 * 40.0
+    N = np.vstack([directions(300), turn[:, 2] + 1e-7 * rng.normal(size=(300, 3))])
+    assert (made.vertices @ N.T).max(axis=0) == pytest.approx((points @ N.T).max(axis=0), abs=1e-12)
+    assert len(made.vertices) - 1.5 * len(made.faces) + len(made.faces) == 2
+
+
+def plate(middle, n=8):
+    """A plate of 100 by 100 by 10 mm below z = 0: a grid whose small cell in the middle is a pyramid."""
+    g = np.concatenate([np.linspace(-50.0, -0.05, n), [0.05], np.linspace(1.0, 50.0, n)])
+    m, V, F = len(g), [], []
+    for z in (0.0, -10.0):
+        V += [(x, y, z) for x in g for y in g]
+    V.append((0.0, 0.0, middle))
+    for i in range(m - 1):
+        for j in range(m - 1):
+            a, b, c, d = i * m + j, (i + 1) * m + j, (i + 1) * m + j + 1, i * m + j + 1
+            if i == j == n - 1:
+                F += [(a, b, len(V) - 1), (b, c, len(V) - 1), (c, d, len(V) - 1), (d, a, len(V) - 1)]
+            else:
+                F += [(a, b, c), (a, c, d)]
+            F += [(m * m + a, m * m + c, m * m + b), (m * m + a, m * m + d, m * m + c)]
+        edge = m - 1
+        for p, q in (
+            (i * m, i * m + m),
+            (i * m + m + edge, i * m + edge),
+            (i + 1, i),
+            (edge * m + i, edge * m + i + 1),
+        ):
+            F += [(q, p, m * m + p), (q, m * m + p, m * m + q)]
+    return MeshShape(make_mesh(V, F), "off")
+
+
+def test_a_small_dent_is_not_filled():
+    """A tip in a dent of 0.1 by 0.1 mm that is 0.02 mm deep, a part in 1e9 of the plate's volume."""
+    corners = np.array([(0.0, 0.0, -0.01), (0.003, 0.0, 1.0), (-0.003, 0.003, 1.0), (-0.003, -0.003, 1.0)])
+    tip = MeshShape(make_mesh(corners, [(0, 2, 1), (0, 3, 2), (0, 1, 3), (1, 2, 3)]), "off")
+    dented = plate(-0.02)
+    truth = 0.01 * np.cos(np.arctan(0.02 / 0.05))  # of the tip from the dent's sides
+    found = distance(dented, tip)
+    assert found.lower - 1e-12 <= truth <= found.upper + 1e-12
+    assert found.upper - found.lower < 1e-8
+    assert check(Scene(contact=1e-3).add("dented", dented).add("tip", tip)).verdict("dented", "tip") is Verdict.CLEAR
+
+
+@pytest.mark.parametrize("rise", [1e-7, 5e-6])
+def test_a_small_rise_is_seen(rise):
+    """What a roof stands out by is less than 1e-7 of the plate's size."""
+    found = distance(plate(rise), box((10.0, 10.0, 10.0)), translation(0.0, 0.0, 5.0 + 1e-3))
+    assert found.lower <= 1e-3 - rise <= found.upper
+    assert found.upper - found.lower < 1e-9

@@ -1,0 +1,203 @@
+"""Each level of the engine alone: its bound, or its certificate, against samples and against brute force."""
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from clamp3d import distance, shapes
+from clamp3d.engine.batch import bounds_at_poses
+from clamp3d.engine.facets import rods_distance
+from clamp3d.engine.mesh_distance import are_apart, surface_distance, within
+from clamp3d.engine.model import ModelCache
+from clamp3d.engine.overlap import common, deepest, thickness
+from clamp3d.engine.surface import Surface
+from clamp3d.geometry.pose import inverse, rotation, to_target, translation
+from clamp3d.geometry.primitives import SweptArc
+from clamp3d.testing import assert_distance, body
+from tests.kinds import DRAWN, box_mesh, faceted_shape, poses
+
+QUICK = settings(deadline=None, max_examples=15, suppress_health_check=[*HealthCheck])
+FACETED = [faceted_shape(shape, 0.5) for shape in DRAWN]
+SOME = st.sampled_from(range(len(DRAWN)))
+MODELS = ModelCache()
+
+
+def surface(shape):
+    return Surface(shape.mesh.vertices, shape.mesh.faces)
+
+
+def sharp(found):
+    return found.upper - found.lower < 1e-7
+
+
+def sampled(one, count, seed=0):
+    """Points (count, 3) of a surface."""
+    made = trimesh.Trimesh(one.vertices, one.faces, process=False)
+    return np.asarray(made.sample(count, seed=seed))
+
+
+def depths(a, b, T, count=1500):
+    """How deep sampled points of either surface lie in the other, by libigl's exact distances; 0 outside."""
+    points, others = to_target(inverse(T), sampled(a, count)), sampled(b, count, 1)
+    found = []
+    for inner, outer in ((points, b), (to_target(T, others), a)):
+        found.append(np.where(outer.contains(inner), outer.distance(inner), 0.0).max())
+    return max(found)
+
+
+# --- Meshes -----------------------------------------------------------------------------------------------------------
+
+
+@QUICK
+@given(SOME, SOME, poses(22.0))
+def test_the_distance_of_two_meshes_is_between_its_bounds(i, j, T):
+    """Apart: FCL against manifold3d's own search; in an overlap no sampled point is deeper than the interference."""
+    a, b = surface(FACETED[i]), surface(FACETED[j])
+    found = surface_distance(a, b, T, sharp)
+    shared = (a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3]))).volume()
+    if shared > 1e-9:
+        assert found.lower <= -depths(a, b, T) + 1e-9
+        assert found.upper <= 1e-9
+        return
+    truth = a.manifold.min_gap(b.manifold.transform(np.ascontiguousarray(T[:3])), 200.0)
+    assert found.lower - 1e-6 <= truth <= found.upper + 1e-6
+    assert np.linalg.norm(found.point_b - found.point_a) == pytest.approx(truth, abs=1e-6)
+    assert are_apart(a, b, T) or found.lower < 1e-9
+
+
+@QUICK
+@given(SOME, SOME, poses(15.0), st.floats(0.01, 0.5))
+def test_errors_of_both_meshes_widen_the_bounds_by_their_sum(i, j, T, error):
+    a, b = surface(FACETED[i]), surface(FACETED[j])
+    plain = surface_distance(a, b, T, sharp)
+    loose = [Surface(s.vertices, s.faces, np.full(len(s.faces), error)) for s in (a, b)]
+    wide = surface_distance(*loose, T, sharp)
+    assert wide.lower <= plain.lower + 1e-9
+    assert wide.upper >= plain.lower + 2.0 * error - 1e-9  # an attested overlap loses both errors too
+    if plain.lower > 0.0:
+        assert wide.lower == pytest.approx(plain.lower - 2.0 * error, abs=1e-9)
+        assert wide.upper == pytest.approx(plain.upper + 2.0 * error, abs=1e-9)
+
+
+def test_an_overlap_of_meshes_is_known_but_for_the_errors_of_both():
+    """Faces 0.3 mm in each other, that may be 0.05 and 0.1 mm off: the bodies are 0.15 to 0.45 mm deep."""
+    a, b = box_mesh((10.0, 10.0, 10.0), 0.05), box_mesh((6.0, 6.0, 6.0), 0.1)
+    for one, other, T in ((a, b, translation(0.2, 0.1, 7.7)), (b, a, translation(-0.2, -0.1, -7.7))):
+        found = surface_distance(one, other, T, lambda bounds: bounds.lower > -0.5)
+        assert -0.5 < found.lower <= -0.45 + 1e-9
+        assert -0.15 - 1e-9 <= found.upper < 0.0
+
+
+@QUICK
+@given(SOME, SOME, poses(12.0))
+def test_no_sampled_depth_is_above_the_thickness(i, j, T):
+    """And it is no idle bound: sharpened to the end it is within a factor of the deepest sample."""
+    a, b = surface(FACETED[i]), surface(FACETED[j])
+    shared = common(a, b, T)
+    if shared is None:
+        return
+    truth = depths(a, b, T)
+    bound = thickness(a, b, T, shared, lambda bound: bound <= 1.1 * truth, 60_000)
+    assert truth <= bound + 1e-9
+    if math.isfinite(bound):
+        point, at = deepest(a, b, T, shared)
+        assert point <= bound + 1e-9 or not a.contains(at[None])[0]
+
+
+def test_the_thickness_of_a_slab_is_its_own():
+    """Falsifiable: two boxes 0.3 mm in each other, along their faces."""
+    a, b, T = box_mesh((10.0, 10.0, 10.0)), box_mesh((6.0, 6.0, 6.0)), translation(0.2, 0.1, 7.7)
+    bound = thickness(a, b, T, common(a, b, T), lambda bound: bound <= 0.31, 60_000)
+    assert 0.3 - 1e-9 <= bound <= 0.31
+    assert thickness(a, b, T, common(a, b, T), lambda bound: bound <= 0.29, 60_000) >= 0.3 - 1e-9
+    assert common(a, b, translation(0.0, 0.0, 8.1)) is None
+
+
+@pytest.mark.parametrize("out", [-5.0, -0.1, 0.0, 0.3, 2.0, 9.0])
+@pytest.mark.parametrize("slack", [1e-9, 0.5])
+def test_what_lies_within_another_stands_out_by_no_more_than_the_slack(out, slack):
+    large, small = box_mesh((20.0, 20.0, 20.0)), box_mesh((4.0, 4.0, 4.0))
+    assert within(small, large, translation(8.0 + out, 0.0, 0.0), slack) == (out <= slack)
+    assert not within(large, small, np.eye(4), slack)
+
+
+# --- Cylinders on facets ----------------------------------------------------------------------------------------------
+
+
+@QUICK
+@given(SOME, st.floats(0.5, 6.0), st.floats(2.0, 40.0), poses(22.0))
+def test_a_cylinder_on_facets(i, radius, length, T):
+    """A lower bound against samples of both surfaces, an upper one against the cylinder's own definition."""
+    mesh, rod = surface(FACETED[i]), shapes.cylinder(radius, length)
+    found = rods_distance(mesh, MODELS.model(rod).bodies, T)
+    points = to_target(inverse(T), sampled(mesh, 4000))
+    away = body(rod).field(points).min()
+    if away > 0.0:  # the field is never more than the distance
+        across = np.hypot(points[:, 0], points[:, 1]) - radius
+        along = np.abs(points[:, 2]) - 0.5 * length
+        truth = np.hypot(np.maximum(across, 0.0), np.maximum(along, 0.0)).min()
+        assert found.lower <= truth + 1e-9
+    else:
+        assert found.lower <= away + 1e-9
+    if found.point_b is not None and 0.0 < found.upper < math.inf:
+        assert mesh.distance(found.point_a[None])[0] <= 1e-6
+        assert body(rod).field(to_target(inverse(T), found.point_b[None]))[0] <= 1e-6
+        assert np.linalg.norm(found.point_b - found.point_a) <= found.upper + 1e-9
+    if found.upper < -1e-6:
+        assert found.upper >= -depths(mesh, MODELS.model(rod).outer(0.001), T, 6000) - 0.05 * radius - 0.1
+
+
+# --- Depth ------------------------------------------------------------------------------------------------------------
+
+
+@settings(QUICK, max_examples=12)
+@given(SOME, SOME, poses(9.0))
+def test_the_verified_translation_parts_the_bodies(i, j, T):
+    """By manifold3d: moved by the depth's upper bound the meshes share nothing; less than its lower one, they do."""
+    a, b = FACETED[i], FACETED[j]
+    found = distance(a, b, T)
+    if found.upper > -1e-3:
+        return
+    one, two = surface(a).manifold, surface(b).manifold.transform(np.ascontiguousarray(T[:3]))
+    if math.isfinite(found.lower):
+        assert np.linalg.norm(found.normal) == pytest.approx(1.0, abs=1e-9)
+        out = two.translate(tuple(-found.lower * found.normal))
+        assert (one ^ out).volume() <= 1e-5
+    for way in np.random.default_rng(0).normal(size=(25, 3)):
+        near = two.translate(tuple(0.98 * -found.upper * way / np.linalg.norm(way)))
+        assert (one ^ near).volume() > 0.0
+
+
+# --- Many poses -------------------------------------------------------------------------------------------------------
+
+GROOVES = [SweptArc(12.0, 1.2, 50.0), SweptArc(7.0, 1.05, 9.0), SweptArc(7.0, 2.1, 30.0)]
+HOLDERS = [
+    *(shapes.groove_block(groove, 40.0, 30.0) for groove in GROOVES),
+    shapes.box((40.0, 40.0, 10.0), holes=[shapes.Hole(6.0, (3.0, 0.0))]),
+    shapes.cylinder(9.0, 20.0, bore=6.0),
+]
+
+
+@QUICK
+@given(st.sampled_from(HOLDERS), st.floats(0.3, 11.0), st.floats(0.5, 80.0), st.integers(0, 10**6))
+def test_bounds_at_many_poses_hold_for_each_of_them(holder, radius, length, seed):
+    """With single answers and with the bodies' definition; from the other body they are the same."""
+    rng = np.random.default_rng(seed)
+    T = np.array([rotation(rng.normal(size=3), t) for t in rng.choice([0.0, 0.003, 0.3, 2.0], 8)])
+    T[:, :3, 3] = rng.normal(size=(8, 3)) * rng.choice([0.1, 1.0, 9.0], 8)[:, None]
+    wire = shapes.cylinder(radius, length)
+    a, b = MODELS.model(holder), MODELS.model(wire)
+    many, other = bounds_at_poses(a, b, T), bounds_at_poses(b, a, inverse(T))
+    assert np.allclose(many.lower, other.lower, rtol=0.0, atol=1e-9)
+    for k, pose in enumerate(T):
+        alone = bounds_at_poses(a, b, pose[None])
+        for name in ("lower", "upper", "point_a", "point_b", "normal"):
+            assert getattr(alone, name)[0] == pytest.approx(getattr(many, name)[k], abs=1e-9, nan_ok=True), name
+        one = distance(holder, wire, pose, cache=MODELS)
+        assert many.lower[k] <= max(one.upper, 0.0) + 1e-9
+        assert one.lower <= many.upper[k] + 1e-9
+    assert_distance(distance(holder, wire, T[0], cache=MODELS), holder, wire, T[0], cells=4000)

@@ -1,0 +1,174 @@
+"""Motions in a scene against closed forms and dense sampling."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from clamp3d.engine.check import check
+from clamp3d.engine.motions import first_contact, min_clearance
+from clamp3d.engine.scene import Scene
+from clamp3d.engine.verdict import Verdict
+from clamp3d.errors import InputError
+from clamp3d.geometry import shapes
+from clamp3d.geometry.mesh import make_mesh
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import rotation, translation
+from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.geometry.shapes import MeshShape
+from clamp3d.output.scene_report import check_to_text
+from clamp3d.output.wording import finding_text
+
+GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
+BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
+WIRE = shapes.cylinder(6.935, 80.0)
+
+
+def move(standing, moving, start, motion, cache=None, **settings):
+    scene = Scene(**settings).add("still", standing).add("moving", moving, start)
+    return check(replace(scene, motions=(motion,)), cache=cache).motions
+
+
+@pytest.mark.parametrize("angle", [1e-13, 1e-10, 1e-6, 2.0])
+@pytest.mark.parametrize("far", [0.0, 1e4, 1e8])
+def test_a_part_that_hardly_turns_arrives_too(angle, far):
+    """A turn that is rounding, as of poses with twelve digits: its axis is 1e13 mm away, the goal 50 mm."""
+    rng = np.random.default_rng(1)
+    start = rotation(rng.normal(size=3), 1.0)
+    start[:3, 3] = far * rng.normal(size=3)
+    goal = rotation(rng.normal(size=3), angle) @ start
+    goal[:3, 3] = start[:3, 3] + 30.0 * rng.normal(size=3)
+    motion = Motion.to_pose(goal, parts="a").resolved(start)
+    np.testing.assert_allclose(motion.at(1.0, start), goal, rtol=4e-16, atol=1e-11)
+    middle = 0.5 * (start[:3, 3] + goal[:3, 3])
+    np.testing.assert_allclose(motion.at(0.5, start)[:3, 3], middle, rtol=4e-16, atol=max(1e-11, 50.0 * angle))
+
+
+def test_a_turn_about_an_axis_far_away_costs_a_groove_no_accuracy():
+    groove, wire, start = SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), translation(-1.0, -1.0, 0.0)
+    goals = [rotation((0.1, 0.2, 1.0), angle) for angle in (0.0, 1e-10)]
+    for goal in goals:
+        goal[:3, 3] = 3.0, 0.5, 0.0
+    straight, turned = (min_clearance(groove, wire, Motion.to_pose(goal), start) for goal in goals)
+    assert turned.resolution == pytest.approx(straight.resolution)
+    assert turned.distance.upper == pytest.approx(straight.distance.upper, abs=1e-8)
+
+
+def test_a_depth_is_no_margin_of_bodies_whose_depth_is_not_measured_on_the_way():
+    """Boxes of 10 and 4 mm are 6.9 mm deep in each other soon before they are concentric."""
+    a, b = shapes.box((10, 10, 10)), shapes.box((4, 4, 4))
+    with pytest.raises(InputError, match="margin must be >= 0"):
+        first_contact(a, b, Motion.translate((-20, 0, 0)), translation(20.0, 0.0, 0.0), margin=-6.9)
+
+
+def test_motions_follow_one_another():
+    box, rod = shapes.box((10, 10, 10)), shapes.cylinder(1, 10)
+    scene = (
+        Scene(clearance=2.0)
+        .add("box", box)
+        .add("rod", rod, translation(30, 0, 0))
+        .add("tip", rod, translation(40, 0, 0))
+    )
+    up = Motion.translate((0, 20, 0), parts=("rod", "tip"), name="up")
+    over = Motion.translate((-60, 0, 0), parts=("rod", "tip"), name="over")
+    result = check(replace(scene, motions=(up, over)))
+    assert result.motions == ()  # passes 14 mm above the box
+    down = Motion.translate((0, -14.5, 0), parts="rod", name="down")
+    short = replace(over, travel=np.array([-30.0, 0, 0]))
+    result = check(replace(scene, motions=(up, short, down)))
+    assert [(r.motion, r.a, r.b, r.verdict.value) for r in result.motions] == [("down", "rod", "box", "clash")]
+    assert result.motions[0].contact_at == pytest.approx((14.0 - 0.01) / 14.5, abs=1e-4)
+
+
+def test_a_part_that_a_motion_names_twice_moves_once():
+    box = shapes.box((10, 10, 10))
+    scene = Scene(clearance=6.0).add("still", box).add("moving", box, translation(13, 0, 0))
+    go = Motion.translate((1.0, 0.0, 0.0), parts=("moving", "moving"))
+    found = check(replace(scene, motions=(go, go))).motions
+    assert [row.distance.value for row in found] == pytest.approx([3.0, 4.0])
+
+
+@pytest.mark.parametrize("gap", [0.01, 0.0100001, 0.01 + 5e-7])
+def test_what_counts_as_contact_has_a_first_time(gap):
+    """A gap of the contact threshold to rounding is contact."""
+    box = shapes.box((10, 10, 10))
+    (row,) = move(box, box, translation(10.0 + gap, 0, 0), Motion.translate((0, 5, 0), parts="moving"), contact=0.01)
+    assert (row.verdict.value, row.contact_at) == ("contact", 0.0)
+
+
+def joined(*boxes):
+    """A mesh of boxes (low, high) that are united."""
+    made = trimesh.boolean.union([trimesh.creation.box(bounds=bounds) for bounds in boxes], engine="manifold")
+    return MeshShape(make_mesh(made.vertices, made.faces), "off")
+
+
+@pytest.mark.parametrize("gap", [0.02])
+@pytest.mark.parametrize("kind", ["slide", "sink", "turn", "screw"])
+def test_first_contact_of_meshes_does_not_depend_on_what_slides_close_by(kind, gap):
+    """A block just above a floor meets a bead on it, a bar that turns there a post: the times are known by hand."""
+    if kind in ("slide", "sink"):  # sinking it is as near as half the gap when it arrives
+        floor = joined(((-100, -30, -10), (100, 30, 0)), ((1.5, -10, -1), (3.5, 10, 1)))
+        part, start = joined(((-10, -10, 0), (10, 10, 20))), translation(-20.0, 0.0, gap)
+        way = Motion.translate((100.0, 0.0, -4.0 * gap if kind == "sink" else 0.0))
+        truth, length = 0.115, 100.0
+    else:
+        floor = joined(((-60, -60, -10), (60, 60, 0)), ((20, 20, -1), (30, 30, 5)))
+        part, start = joined(((-40, -2, 0), (40, 2, 3))), translation(0.0, 0.0, gap)
+        way = Motion.screw((0.0, 0.0, 1.0), 1.2, travel=-0.5 * gap if kind == "screw" else 0.0)
+        # The post's corner (30, 20) comes to lie on the bar's side, 2 mm from the axis.
+        truth, length = (math.atan2(20, 30) - math.asin(2 / math.hypot(20, 30))) / 1.2, 1.2 * math.hypot(20, 30)
+    # In frames that nothing is square to.
+    A = rotation((0.3, 0.5, 0.8), 0.7)
+    turned = replace(way, travel=A[:3, :3] @ way.travel, axis=A[:3, :3] @ way.axis)
+    V = floor.mesh.vertices @ A[:3, :3].T
+    floor = MeshShape(make_mesh(V, floor.mesh.faces), "off")
+    hit = first_contact(floor, part, turned, A @ start)
+    assert hit.touches
+    assert 0.0 <= (truth - hit.t) * length <= 2e-4
+    assert hit.evaluations < 1000
+
+
+def test_a_fin_is_met_though_its_foot_is_nearer_the_axis_than_a_plate_that_screws_past():
+    """The post itself is never reached: the fin's sides alone are inside the hull of what the plate's face sweeps."""
+    import manifold3d
+
+    root = np.array([(0.0, -0.5, -0.5), (0.0, 0.5, -0.5), (0.0, 0.5, 0.5), (0.0, -0.5, 0.5), (20.5, 0.0, 0.0)])
+    fin = manifold3d.Manifold.hull_points(root).translate((0.0, 0.0, 30.0))
+    made = (manifold3d.Manifold.cylinder(600.0, 17.0, 17.0, 96, True) + fin).to_mesh64()
+    post = MeshShape(make_mesh(made.vert_properties, made.tri_verts), "off")
+    plate = joined(((20, -100, -0.5), (60, 100, 0.5)))
+    motion = Motion.screw((0.0, 0.0, 1.0), 0.15, travel=100.0, parts=("plate",))
+    scene = Scene(Scene().add("post", post).add("plate", plate).parts, motions=(motion,))
+    row = check(scene, depths=False).motions[0]
+    assert row.verdict is Verdict.CLASH
+    assert 0.29 < row.contact_at < 0.3
+
+
+def test_what_the_models_leave_open_at_the_nearest_time_is_not_searched_for_elsewhere():
+    """0.01 mm apart at the start, known to 0.05: no more steps tell whether they touch."""
+    mesh = trimesh.creation.icosphere(1, 10.0)
+    ball = MeshShape(make_mesh(mesh.vertices, mesh.faces), "off", error=0.05)
+    motion = Motion.screw((0.3, 0.1, 1.0), 1.6, point=(0.0, 60.0, 0.0), parts=("ball",))
+    start = translation(-mesh.bounds[0, 0] + 3.01, 0.0, 0.0)
+    scene = Scene().add("tube", shapes.box((6.0, 20.0, 30.0))).add("ball", ball, start)
+    result = check(Scene(scene.parts, motions=(motion,)), depths=False)
+    row = result.motions[0]
+    assert row.verdict is Verdict.UNCERTAIN
+    assert row.distance.lower == pytest.approx(-0.04, abs=3e-4)
+    assert row.distance.upper == pytest.approx(0.06, abs=3e-4)
+
+
+def test_a_first_contact_is_not_told_later_than_it_is():
+    """Within 0.01 mm after 0.12347 of the way."""
+    way = Motion.translate((-10.0, 0.0, 0.0), parts=("b",))
+    box = shapes.box((10.0, 10.0, 10.0))
+    scene = Scene().add("a", box).add("b", box, translation(11.2447, 0.0, 0.0))
+    result = check(Scene(scene.parts, motions=(way,)))
+    assert result.motions[0].contact_at == pytest.approx(0.12347, abs=2e-5)
+    assert "first contact at t = 0.1234," in finding_text(result.motions[0], {"a": "a", "b": "b"})
+    row = next(line for line in check_to_text(result).splitlines() if line.startswith("  translation"))
+    assert " 0.1234 " in row

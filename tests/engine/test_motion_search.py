@@ -1,0 +1,81 @@
+"""The search over time, on distances that are formulas of the time."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from clamp3d.engine.motion_search import Outcome, bound_by_speed, first_time, least
+
+times = st.floats(0.0, 1.0)
+
+
+def exactly(f):
+    return lambda t: (f(t), f(t))
+
+
+@given(st.lists(st.tuples(times, st.floats(-2.0, 5.0)), min_size=1, max_size=6), times, times)
+def test_bound_by_speed_is_below_every_distance_of_that_speed(peaks, start, stop):
+    """Cones of slope 3: their minimum is a distance that changes at most that fast."""
+    start, stop = sorted((start, stop))
+
+    def f(t):
+        return min(v + 3.0 * abs(t - p) for p, v in peaks)
+
+    low = bound_by_speed(f(start), f(stop), 3.0 * (stop - start))
+    assert all(f(start + k / 50.0 * (stop - start)) >= low - 1e-12 for k in range(51))
+
+
+@given(st.lists(st.tuples(times, st.floats(0.0, 5.0)), min_size=1, max_size=6))
+def test_least_and_first_time_of_the_minimum_of_cones(peaks):
+    def f(t):
+        return min(v + 3.0 * abs(t - p) for p, v in peaks)
+
+    value = min(v for _, v in peaks)
+    answer = least(exactly(f), 3.0, accuracy=1e-6)
+    assert answer.lower - 1e-12 <= value <= answer.upper <= answer.lower + 1e-6  # the rounding of the cones
+    assert f(answer.t) == answer.upper
+    level = value + 0.5
+    first = max(0.0, min(p - (level - v) / 3.0 for p, v in peaks if v <= level))
+    result = first_time(exactly(f), 3.0, level, accuracy=1e-6)
+    assert result.outcome is Outcome.REACHED
+    assert first - 1e-6 <= result.t <= first + 1e-12
+    assert first_time(exactly(f), 3.0, value - 1e-3).outcome is Outcome.CLEAR
+
+
+def test_intervals_give_bounds_that_hold_and_first_times_that_are_never_late():
+    def between(t):
+        return abs(t - 0.5) - 0.01, abs(t - 0.5) + 0.02
+
+    answer = least(between, 1.0)
+    assert answer.lower == pytest.approx(-0.01, abs=1e-6)
+    assert answer.upper == pytest.approx(0.02, abs=1e-6)
+    assert first_time(between, 1.0, 0.1).t == pytest.approx(0.39, abs=2e-6)
+    assert first_time(between, 1.0, 0.495).outcome is Outcome.UNDECIDED  # it is not known of the start
+
+
+def test_a_constant_distance_needs_a_bound_between_times_or_ends_undecided():
+    assert first_time(exactly(lambda t: 0.01), 100.0, 0.0).outcome is Outcome.CLEAR
+    assert first_time(exactly(lambda t: 1e-5), 100.0, 0.0, most=500).outcome is Outcome.UNDECIDED
+    wide = least(exactly(lambda t: 1e-5), 100.0, most=500)
+    assert wide.lower < 0.0 < wide.upper
+    assert wide.evaluations == 500
+    known = least(exactly(lambda t: 1e-5), 100.0, bound=lambda start, stop: 1e-5)
+    assert (known.lower, known.upper, known.evaluations) == (1e-5, 1e-5, 2)
+    assert first_time(exactly(lambda t: 1e-5), 100.0, 0.0, bound=lambda start, stop: 1e-5).evaluations == 2
+
+
+def test_grazing_by_less_than_the_accuracy_is_reached_and_by_more_is_clear():
+    def parabola(gap):
+        return exactly(lambda t: gap + 4.0 * (t - 0.5) ** 2)
+
+    assert first_time(parabola(1e-8), 4.0, 0.0).outcome is Outcome.REACHED
+    assert first_time(parabola(1e-5), 4.0, 0.0).outcome is Outcome.CLEAR
+    assert least(parabola(1e-8), 4.0).t == pytest.approx(0.5, abs=1e-3)
+
+
+def test_what_stands_still_is_searched_at_once():
+    assert least(exactly(lambda t: 1.5), 0.0).evaluations == 2
+    assert first_time(exactly(lambda t: 1.5), 0.0, 1.0).outcome is Outcome.CLEAR
+    assert math.isclose(first_time(exactly(lambda t: 1.5), 0.0, 2.0).t, 0.0)

@@ -1,0 +1,158 @@
+"""Bounds that hold on a whole way: swept pieces, least distances and first contacts, against the oracle."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, assume, example, given, settings
+from hypothesis import strategies as st
+
+from clamp3d import first_contact, min_clearance, shapes
+from clamp3d.engine.distance import distance
+from clamp3d.engine.model import ModelCache
+from clamp3d.engine.moving_pair import MovingPair
+from clamp3d.engine.swept import swept_lower
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import rotation, translation
+from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.testing import assert_lower_on_way, assert_motion, pose_at
+from tests.kinds import DRAWN, faceted_shape, poses
+
+SLOW = settings(
+    deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate], suppress_health_check=[*HealthCheck]
+)
+FACETED = [faceted_shape(shape, 0.3) for shape in DRAWN]
+CACHE = ModelCache()
+vector = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
+screws = st.builds(
+    lambda axis, angle, point, travel: Motion.screw(axis, angle, point=np.multiply(10.0, point), travel=travel),
+    vector,
+    st.floats(-2.5, 2.5),
+    vector,
+    st.floats(-25.0, 25.0),
+)
+straight = st.builds(lambda by: Motion.translate(np.multiply(40.0, by)), vector)
+ways = st.one_of(screws, straight)
+
+
+def holds_on_way(a, b, way, start, until=1.0):
+    stretch = [pose_at(way, t, start) for t in (0.0, 0.5 * until, until)]
+    low = swept_lower(CACHE.model(a), CACHE.model(b), *stretch, angle=0.5 * until * way.angle)
+    assume(low > -30.0)
+    # What is lowest may be at an end, at the middle, or between them, where points stray from straight lines most.
+    assert_lower_on_way(low, a, b, [pose_at(way, t * until, start) for t in np.linspace(0.0, 1.0, 5)], cells=2000)
+
+
+@settings(SLOW, max_examples=10)
+@given(st.sampled_from(DRAWN), st.sampled_from(DRAWN), ways, poses(30.0), st.sampled_from([1.0, 0.3]))
+def test_no_time_of_a_stretch_is_below_its_bound(a, b, way, start, until):
+    holds_on_way(a, b, way, start, until)
+
+
+@settings(SLOW, max_examples=10)
+@given(
+    st.floats(0.5, 4.0),
+    st.floats(4.0, 20.0),
+    st.floats(0.3, 2.9),
+    st.floats(-8.0, 8.0),
+    st.sampled_from([0, 1, 2]),
+    st.floats(0.02, 4.0),
+)
+@example(6.0, 4.0, 1.5, 0.0, 0, 0.5)  # a disc that turns over a plate: its rim goes down by the tilt
+@example(0.5, 20.0, 2.9, 0.0, 1, 0.5)  # a needle that swings: its end goes down by the sagitta
+def test_a_cylinder_that_turns_near_a_plate(radius, length, angle, beside, axis, gap):
+    """Above a plate the lowest point is known to the digit: the rim of an end, at any time of a turn about y."""
+    plate, pin = shapes.box((200.0, 200.0, 4.0)), shapes.cylinder(radius, length)
+    way = Motion.screw(np.eye(3)[axis], angle, point=(beside, 0.0, math.hypot(radius, 0.5 * length) + 2.0 + gap))
+    upright = rotation((0.0, 1.0, 0.0), 0.5 * math.pi)
+    for start in (np.eye(4), upright):
+        T = translation(0.0, 0.0, math.hypot(radius, 0.5 * length) + 2.0 + gap) @ start
+        T = pose_at(way, -0.5, T)
+        stretch = [pose_at(way, t, T) for t in (0.0, 0.5, 1.0)]
+        low = swept_lower(CACHE.model(plate), CACHE.model(pin), *stretch, angle=0.5 * angle)
+        least = math.inf
+        for t in np.linspace(0.0, 1.0, 41):
+            P = pose_at(way, t, T)
+            reach = 0.5 * length * abs(P[2, 2]) + radius * math.hypot(P[2, 0], P[2, 1])
+            least = min(least, P[2, 3] - reach - 2.0)
+        assert low <= least + 1e-9
+
+
+@pytest.mark.parametrize("seed", [177, 414, 431, 527, 485])
+def test_turns_that_are_carried_across_their_axis(seed):
+    """Travel can cancel the turn: the places are close to each other, and the bow between them is deep all the same."""
+    rng, block = np.random.default_rng(seed), shapes.box((6.0, 4.0, 2.0))
+    half, aside, axis = rng.uniform(0.1, 0.7), rng.normal(size=3), rng.normal(size=3)
+    T = rotation(rng.normal(size=3), 1.0)
+    T[:3, 3] = aside / np.linalg.norm(aside) * rng.uniform(7.0, 10.0)
+    point, travel = T[:3, 3] + 8.0 * rng.normal(size=3), 12.0 * rng.normal(size=3)
+    way = Motion(axis / np.linalg.norm(axis), point, 2.0 * half, travel)
+    least = min(distance(block, block, way.at(t, T)).upper for t in np.linspace(0.0, 1.0, 17))
+    pair = MovingPair(CACHE.model(block), CACHE.model(block), way, T, np.eye(4))
+    assert pair.between(0.0, 1.0) <= least
+
+
+@settings(SLOW, max_examples=6)
+@given(st.sampled_from(DRAWN + FACETED), st.sampled_from(DRAWN), ways, poses(25.0))
+def test_least_distances_and_first_contacts(a, b, way, start):
+    assert_motion(min_clearance(a, b, way, start), a, b, way, start, tolerance=1e-5, cells=1500, times=5)
+    assert_motion(first_contact(a, b, way, start), a, b, way, start, first=True, tolerance=1e-5, cells=1500, times=5)
+
+
+@settings(SLOW, max_examples=6)
+@given(
+    st.builds(SweptArc, st.floats(5.0, 15.0), st.floats(0.3, 2.8), st.floats(5.0, 40.0)),
+    st.builds(Cylinder, st.floats(1.0, 8.0), st.floats(2.0, 60.0)),
+    ways,
+    poses(30.0),
+)
+def test_least_distances_of_a_groove_and_a_cylinder(groove, wire, way, start):
+    """The kernel's search takes the cylinder's ends as rounded: it is never too wide, so never late."""
+    hit = first_contact(groove, wire, way, start)
+    assert_motion(hit, groove, wire, way, start, first=True, times=5, cells=1500) if hit.touches else None
+    least = min_clearance(groove, wire, way, start).distance.lower
+    along = [pose_at(way, t, start) for t in np.linspace(0.0, 1.0, 9)]
+    assert_lower_on_way(least, groove, wire, along, cells=1500)
+
+
+@pytest.mark.parametrize("outer", [shapes.box((60.0, 60.0, 60.0)), faceted_shape(shapes.box((60.0, 60.0, 60.0)), 0.3)])
+@pytest.mark.parametrize("inner", [DRAWN[0], FACETED[4]])
+def test_what_is_inside_all_the_time_overlaps_all_the_time(inner, outer):
+    """No surface meets another on the way, and yet there is no clearance at any time, and contact from the start."""
+    for way in (Motion.translate((3.0, 2.0, -1.0)), Motion.screw((1.0, 2.0, 3.0), 0.4)):
+        for a, b in ((outer, inner), (inner, outer)):
+            start = translation(1.0, 1.0, 1.0)
+            hit, least = first_contact(a, b, way, start), min_clearance(a, b, way, start)
+            assert hit.touches
+            assert hit.t <= 1e-3
+            assert least.touches
+            assert least.distance.lower < 0.0
+            stretch = [pose_at(way, t, start) for t in (0.0, 0.5, 1.0)]
+            assert swept_lower(CACHE.model(a), CACHE.model(b), *stretch, angle=0.5 * way.angle) <= 0.0
+
+
+@settings(SLOW, max_examples=8)
+@given(st.floats(0.01, 0.99), st.floats(100.0, 2000.0), st.floats(0.05, 1.0), st.sampled_from([0, 1, 2]), st.booleans())
+@example(0.51, 1000.0, 0.5, 0, False)
+@example(0.49, 1000.0, 0.5, 1, True)
+def test_a_thin_plate_is_met_wherever_on_the_way_it_stands(when, length, thick, kind, back):
+    """A way of metres through a sheet: nothing between two times that are looked at may be stepped over."""
+    sheet = shapes.box((50.0, 50.0, thick))
+    pin = (Cylinder(2.0, 5.0), shapes.box((3.0, 4.0, 5.0)), FACETED[3])[kind]
+    half = (2.5, 2.5, 20.0)[kind]
+    start, way = translation(0.0, 0.0, when * length), Motion.translate((0.0, 0.0, -length))
+    if back:
+        start[:3, 3], way = [0.0, 0.0, -when * length], Motion.translate((0.0, 0.0, length))
+    hit = first_contact(sheet, pin, way, start)
+    assert hit.touches
+    truth = max(0.0, when - (half + 0.5 * thick) / length)
+    assert truth - 2e-4 / length * 1000.0 <= hit.t <= truth + 1e-9
+    least = min_clearance(sheet, pin, way, start)
+    assert least.touches
+    beside = translation(25.0 + 15.0, 0.0, 0.0)  # past the sheet's edge it is known how near
+    least = min_clearance(sheet, pin, way, beside @ start)
+    assert not least.touches
+    gap = 15.0 - (2.0, 1.5, 5.0)[kind]
+    assert least.distance.lower <= gap + 1e-9
+    assert least.distance.upper >= gap - 1e-9
+    assert least.distance.upper <= 1.03 * gap + 1e-3

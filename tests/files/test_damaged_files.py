@@ -1,0 +1,300 @@
+"""Damaged and hostile files of every format: refused in one line that names the fault, or read right."""
+
+import json
+import os
+import struct
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from threemf import TIP, doubled, write_3mf
+
+from clamp3d import InputError, check, load
+from clamp3d.files.bodies import unique_names
+from clamp3d.files.worker import LIMITS, OUTSIDE, process
+from clamp3d.shapes import load_mesh
+
+ROOT = Path(__file__).parents[2]
+PIN = (ROOT / "examples" / "hinge" / "pin.stl").read_bytes()
+COUNT = (len(PIN) - 84) // 50
+TEXT = trimesh.exchange.stl.export_stl_ascii(trimesh.creation.box((1.0, 2.0, 0.1))).encode()
+PLY = (
+    b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 2\n"
+    b"property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+)
+
+
+def refused(path, message, **options):
+    with pytest.raises(InputError, match=message) as caught:
+        load(path, **options)
+    assert "\n" not in str(caught.value)
+    assert path.name in str(caught.value)
+
+
+def with_corner(bits):
+    """The pin with another number in place of its second triangle's first one."""
+    return PIN[:146] + struct.pack("<I", bits) + PIN[150:]
+
+
+@pytest.mark.parametrize(
+    ("name", "raw", "message"),
+    [
+        ("a.stl", PIN[:-1], "cut off or damaged: its 216 triangles take 10884 bytes, it has 10883"),
+        ("a.stl", PIN + PIN[-50:], "cut off or damaged"),
+        ("a.stl", PIN[:80] + struct.pack("<I", 2**32 - 1) + PIN[84:], "cut off or damaged"),
+        ("a.stl", b"solid".ljust(80) + PIN[80:-7], "cut off or damaged"),
+        ("a.stl", PIN[:60], "cut off or damaged"),
+        ("a.stl", b"", "no triangles"),
+        ("a.stl", bytes(84), "no triangles"),
+        ("a.stl", with_corner(0x7FC00000), "not finite"),
+        ("a.stl", with_corner(0x7F800000), "not finite"),
+        ("a.stl", with_corner(0x7F7FFFFF), r"not within 1e\+12 mm"),
+        ("a.stl", TEXT[: len(TEXT) // 2], "cut off"),
+        ("a.stl", TEXT + TEXT[:80], "cut off"),
+        ("a.stl", TEXT.replace(b"endsolid", b""), "cut off"),
+        ("a.stl", TEXT.replace(b"0.05", b"nan", 1), "not finite"),
+        ("a.stl", TEXT.replace(b"0.05", b"zero", 1), "not a readable STL file"),
+        ("a.stl", TEXT.replace(b"endloop", b"vertex 0 0 0\nendloop", 1), "cut off"),
+        ("a.ply", PLY, "not a readable PLY file|it announces 2 triangles"),
+        ("a.off", b"OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "not a readable OFF file|it announces 2 triangles"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n", "not a readable OBJ file|damaged|out of range"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf nan\n", "it announces 2 triangles or faces, 1 were read"),
+        ("a.3mf", b"not a zip", "not a readable 3MF file"),
+    ],
+)
+def test_a_file_that_is_not_whole_is_refused(tmp_path, name, raw, message):
+    (tmp_path / name).write_bytes(raw)
+    refused(tmp_path / name, message)
+
+
+@pytest.mark.parametrize(
+    "raw",
+    [
+        b"solid".ljust(80) + PIN[80:],
+        TEXT.upper().replace(b"\n", b"\r\n"),
+        b"\n\n" + TEXT.replace(b"facet n", b"   facet n").replace(b" 0.05", b" +5.0E-02"),
+    ],
+    ids=["binary that begins with solid", "capitals", "other numbers"],
+)
+def test_odd_files_that_are_whole_are_read(tmp_path, raw):
+    (tmp_path / "a.stl").write_bytes(raw)
+    (tmp_path / "b.stl").write_bytes(PIN if raw[80:] == PIN[80:] else TEXT)
+    a, b = (load_mesh(tmp_path / name) for name in ("a.stl", "b.stl"))
+    np.testing.assert_array_equal(a.vertices, b.vertices)
+    np.testing.assert_array_equal(a.faces, b.faces)
+
+
+@pytest.mark.parametrize(
+    ("objects", "build", "message"),
+    [
+        (TIP.replace("3", "9"), '<item objectid="1"/>', "not a readable 3MF file"),
+        (TIP, '<item objectid="1"/><item objectid="2"/>', "not a readable 3MF file"),
+        (doubled(15), '<item objectid="16"/>', "more than 20000 bodies"),
+        (TIP, "", "no body in the file"),
+    ],
+    ids=["index", "object", "doubled", "empty"],
+)
+def test_3mf_that_names_too_much_or_what_is_not_there(tmp_path, objects, build, message):
+    refused(write_3mf(tmp_path / "a.3mf", objects, build), message)
+
+
+def test_3mf_of_some_kilobytes_that_would_take_years_is_given_up(tmp_path, monkeypatch):
+    monkeypatch.setenv(LIMITS, "0.02")
+    refused(write_3mf(tmp_path / "a.3mf", doubled(50), '<item objectid="51"/>'), "not read in 1 s")
+
+
+def test_objects_components_and_build_items_of_3mf(tmp_path):
+    objects = (
+        f'{TIP}<object id="2" type="model" name="pair"><components><component objectid="1"/>'
+        '<component objectid="1" transform="1 0 0 0 1 0 0 0 1 5 0 0"/></components></object>'
+    )
+    build = (
+        '<item objectid="2" transform="0 1 0 -1 0 0 0 0 1 0 0 10"/>'
+        '<item objectid="1" transform="2 0 0 0 2 0 0 0 2 9 0 0"/>'
+    )
+    scene = load(write_3mf(tmp_path / "a.3mf", objects, build, unit="inch"))
+    assert [p.name for p in scene.parts] == ["tip_1", "tip_2", "tip_3"]
+    first, second, third = scene.parts
+    assert first.shape is second.shape
+    np.testing.assert_allclose(first.T_world[:3, :3], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
+    np.testing.assert_allclose(second.T_world[:3, 3], 25.4 * np.array([0, 5, 10]), atol=1e-9)
+    np.testing.assert_allclose(np.ptp(third.shape.mesh.vertices, axis=0), 2 * 25.4, rtol=1e-6)
+
+
+def test_a_3mf_whose_numbers_were_changed_on_the_way_is_refused(tmp_path):
+    path = write_3mf(tmp_path / "a.3mf", method=zipfile.ZIP_STORED)
+    path.write_bytes(path.read_bytes().replace(b'x="1"', b'x="9"'))
+    refused(path, "not a readable 3MF file")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
+def test_a_mesh_that_takes_too_much_memory_or_time(tmp_path, monkeypatch):
+    n = 200_000
+    rows = "".join(f"v {k} {k % 7} {k % 11}\n" for k in range(n)) + "".join(
+        f"f {k} {k + 1} {k + 2}\n" for k in range(1, n - 2)
+    )
+    (tmp_path / "a.obj").write_text(rows)
+    monkeypatch.setenv(LIMITS, "0.05")
+    refused(tmp_path / "a.obj", "takes more than 0.1 GB to read; CLAMP3D_READ_LIMITS=4 allows four times as much")
+    monkeypatch.setenv(LIMITS, "lots")
+    with pytest.raises(InputError, match="CLAMP3D_READ_LIMITS must be a number > 0, got 'lots'"):
+        load(tmp_path / "a.obj")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
+@pytest.mark.parametrize("kind", ["stl", "ply", "glb", "urdf"])
+def test_every_format_is_read_within_limits(tmp_path, monkeypatch, kind):
+    path = tmp_path / f"a.{kind}"
+    trimesh.creation.icosphere(6).export(tmp_path / "ball.stl" if kind == "urdf" else path)
+    if kind == "urdf":
+        path.write_text(ROBOT.replace('<sphere radius="0.012"/>', '<mesh filename="ball.stl"/>'))
+    monkeypatch.setenv(LIMITS, "1e-6")
+    refused(path, "not read in 0 s; CLAMP3D_READ_LIMITS=4 allows four times|takes more than 0.0 GB")
+
+
+def test_a_file_whose_name_is_no_text_is_read(tmp_path):
+    name = os.fsdecode(b"\xff.stl")
+    (tmp_path / name).write_bytes(PIN)
+    assert [part.name for part in load(tmp_path / name).parts] == ["part"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="signals as Linux has them")
+def test_a_reader_that_ends_by_a_signal_is_said_and_the_next_file_is_read(tmp_path, monkeypatch):
+    (tmp_path / "lib3mf.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGSEGV)\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    process().close()
+    refused(
+        write_3mf(tmp_path / "a.3mf"), "the reader ended with SIGSEGV: the file is damaged, or uses what the reader"
+    )
+    (tmp_path / "lib3mf.py").unlink()
+    folder = tmp_path / "cell"
+    folder.mkdir()
+    for name in ("a.stl", "b.stl"):
+        (folder / name).write_bytes(PIN)
+    assert [part.name for part in load(folder).parts] == ["a", "b"]
+
+
+def outside_gltf(folder, uri):
+    data = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"uri": uri, "byteLength": 36}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "nodes": [{"mesh": 0}],
+    }
+    (folder / "a.gltf").write_text(json.dumps(data))
+    return folder / "a.gltf"
+
+
+def test_a_gltf_reads_nothing_outside_of_its_folder(tmp_path, monkeypatch):
+    (tmp_path / "secret.bin").write_bytes(b"secret" * 9)
+    folder = tmp_path / "cell"
+    folder.mkdir()
+    for uri in ("../secret.bin", str(tmp_path / "secret.bin"), "%2e%2e/secret.bin", "http://127.0.0.1:9/x.bin"):
+        path = outside_gltf(folder, uri)
+        with pytest.raises(InputError, match=r"outside of its folder|No such file") as caught:
+            load(path)
+        assert "secretsecret" not in str(caught.value)
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
+    (tmp_path / "secret.bin").write_bytes(corners)
+    monkeypatch.setenv(OUTSIDE, "1")
+    assert len(load(outside_gltf(folder, "../secret.bin")).parts[0].shape.mesh.faces) == 1
+    monkeypatch.delenv(OUTSIDE)
+    (folder / "own file.bin").write_bytes(corners)
+    assert len(load(outside_gltf(folder, "own%20file.bin")).parts) == 1
+
+
+ROBOT = """<robot name="arm">
+  <link name="base"><collision><geometry><box size="0.1 0.1 0.02"/></geometry></collision></link>
+  <link name="tip"><collision><geometry><sphere radius="0.012"/></geometry></collision></link>
+  <link name="end"><collision><geometry><sphere radius="0.012"/></geometry></collision></link>
+  <joint name="turn" type="fixed"><parent link="base"/><child link="tip"/><origin xyz="0 0 0.05"/></joint>
+  <joint name="more" type="fixed"><parent link="tip"/><child link="end"/><origin xyz="0 0.01 0.02"/></joint>
+</robot>"""
+MORE = '<parent link="tip"/><child link="end"/>'
+
+
+@pytest.mark.parametrize(
+    ("text", "instead", "message"),
+    [
+        (ROBOT[300:], "", "not a readable URDF file"),
+        ('  <link name="end">', '</robot>\n  <link name="end">', "not a readable URDF file .*junk after doc"),
+        (MORE, '<parent link="end"/><child link="tip"/>', "one tree of all links"),
+        (MORE, '<parent link="end"/><child link="end"/>', "one tree of all links"),
+        (MORE, '<parent link="tip"/><child link="arm"/>', "a joint must connect links, got 'arm'"),
+        (ROBOT[ROBOT.index("  <joint name=\"more\"") : -9], "", "one tree of all links"),
+        ('"end"><c', '"tip"><c', "2 of its links are called 'tip'"),
+        ('<link name="tip">', "<link>", "not a readable URDF file"),
+        ("sphere radius", "ball radius", "not a readable URDF file .*ball"),
+        ('<box size="0.1 0.1 0.02"/>', "", "a collision of link 'base' must have 1 shape, got 0"),
+        ('<box size="0.1 0.1 0.02"/>', '<mesh filename="no.stl"/>', r"missing: base \(.*no such file"),
+        ('<box size="0.1 0.1 0.02"/>', '<mesh filename="../../no.stl"/>', "no such file in the robot's folder"),
+        ('radius="0.012"', 'radius="big"', "not a readable URDF file"),
+        ('radius="0.012"', 'radius="-1"', r"missing: tip \(radius of a sphere must be"),
+        ("robot", "robots", "it holds <robots>, not <robot>"),
+    ],
+)  # fmt: skip
+def test_a_robot_that_is_not_whole_is_refused(tmp_path, text, instead, message):
+    pytest.importorskip("yourdfpy")
+    assert text in ROBOT
+    folder = tmp_path / "arm"
+    folder.mkdir()
+    count = -1 if text == "robot" else 1
+    (folder / "arm.urdf").write_text(ROBOT.replace(text, instead, count))
+    refused(folder / "arm.urdf", message)
+
+
+def test_balls_of_twelve_millimetres_are_measured(tmp_path):
+    pytest.importorskip("yourdfpy")
+    (tmp_path / "arm.urdf").write_text(ROBOT)
+    scene = load(tmp_path / "arm.urdf")
+    assert [part.name for part in scene.parts] == ["base", "tip", "end"]
+    result = check(scene)
+    assert set(result.counts) <= {"clear", "clash", "allowed"}
+    (pair,) = (pair for pair in result.pairs if {pair.a, pair.b} == {"tip", "end"})
+    apart = float(np.hypot(10.0, 20.0)) - 24.0  # two balls in each other by 1.64 mm
+    assert pair.distance.lower <= apart <= pair.distance.upper
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+@pytest.mark.parametrize("suffix", ["", ".toml", ".stl", ".step", ".glb", ".3mf", ".urdf"])
+def test_pipes_and_devices_are_no_files(tmp_path, suffix):
+    pipe, device = tmp_path / f"pipe{suffix}", tmp_path / f"device{suffix}"
+    os.mkfifo(pipe)
+    device.symlink_to("/dev/zero")
+    for path in (pipe, device):
+        with pytest.raises(InputError, match=r"not a regular file|unknown clamp or file"):
+            load(path)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="closed and full streams as Linux has them")
+@pytest.mark.parametrize(("streams", "code"), [("2>/dev/full", 0), (">/dev/full", 2), (">&- 2>&-", 0)])
+def test_a_clean_check_says_so_whatever_becomes_of_its_streams(tmp_path, streams, code):
+    for k in range(2):
+        (tmp_path / f"{k}.stl").write_bytes(TEXT)
+    (tmp_path / "poses.csv").write_text("name,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,9,0,0,0,0,0,1\n")
+    command = f"{sys.executable} -m clamp3d check . --poses poses.csv {streams}"
+    run = subprocess.run(["sh", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120)
+    assert run.returncode == code, run.stderr
+    assert "Traceback" not in run.stderr
+
+
+@pytest.mark.parametrize("key", ["a." * 50_000 + "b = 1", 'x = { "a" . ' + "b . " * 9000 + "c = 1 }"])
+def test_a_key_of_a_hundred_kilobytes_is_refused(tmp_path, key):
+    path = tmp_path / "scene.toml"
+    path.write_text(key + "\n")
+    with pytest.raises(InputError, match="a key of more than 64 dots"):
+        load(path)
+
+
+def test_names_are_unique_whatever_the_file_says():
+    names = ["nut", "nut_1", "nut", "a b", "a:b", "", "\x1b[2J", "nut_1"]
+    unique = unique_names(names)
+    assert len(set(unique)) == len(names)
+    assert unique == ["nut_1", "nut_1_1", "nut_2", "a-b_1", "a-b_2", "part", "2J", "nut_1_2"]
+    assert all(name and not set(name) & set(" :,*?[]\t\n\x1b") for name in unique)

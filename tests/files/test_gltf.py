@@ -1,0 +1,178 @@
+"""glTF by its specification, written number by number: nodes, materials, strips, and what is refused by name."""
+
+import base64
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from clamp3d import InputError, load
+from clamp3d.files.mesh_file import load_bodies
+
+CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
+Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+
+
+class Gltf:
+    """A file in the making."""
+
+    def __init__(self):
+        self.binary = b""
+        self.data = {"asset": {"version": "2.0"}, "accessors": [], "bufferViews": [], "meshes": [], "nodes": []}
+
+    def view(self, array):
+        self.binary += b"\0" * (-len(self.binary) % 4)
+        raw = np.ascontiguousarray(array).tobytes()
+        self.data["bufferViews"].append({"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(raw)})
+        self.binary += raw
+        return len(self.data["bufferViews"]) - 1
+
+    def numbers(self, array, **more):
+        array = np.asarray(array)
+        kinds = {"f4": 5126, "u4": 5125, "u2": 5123, "i2": 5122}
+        kind = "VEC3" if array.ndim == 2 else "SCALAR"
+        component = kinds[array.dtype.str[1:]]
+        made = {"bufferView": self.view(array), "componentType": component, "count": len(array), "type": kind}
+        self.data["accessors"].append(made | more)
+        return len(self.data["accessors"]) - 1
+
+    def mesh(self, *primitives, name="cube"):
+        self.data["meshes"].append({"name": name, "primitives": list(primitives)})
+        return len(self.data["meshes"]) - 1
+
+    def cube(self, V=CUBE.vertices, F=CUBE.faces):
+        position = self.numbers(np.asarray(V, "f4"))
+        return {"attributes": {"POSITION": position}, "indices": self.numbers(np.asarray(F, "u2").ravel())}
+
+    def node(self, **node):
+        self.data["nodes"].append(node)
+        return len(self.data["nodes"]) - 1
+
+    def write(self, path):
+        text = base64.b64encode(self.binary).decode()
+        self.data["buffers"] = [{"byteLength": len(self.binary), "uri": f"data:application/octet-stream;base64,{text}"}]
+        path.write_text(json.dumps(self.data))
+        return path
+
+
+def only(tmp_path, *primitives_of):
+    made = Gltf()
+    made.node(mesh=made.mesh(*(make(made) for make in primitives_of)))
+    (body,) = load_bodies(made.write(tmp_path / "a.gltf")).bodies
+    return trimesh.Trimesh(body.shape.mesh.vertices / 1000.0, body.shape.mesh.faces)
+
+
+def test_nodes_are_parts_with_names_places_and_shared_shapes(tmp_path):
+    made = Gltf()
+    cube = made.mesh(made.cube())
+    turn = [0.0, 0.0, np.sin(0.3), np.cos(0.3)]
+    small = made.node(name="small", mesh=cube, scale=[0.5, 0.5, 0.5], translation=[0.0, 1.0, 0.0])
+    mirrored = made.node(name="mirrored", mesh=cube, scale=[-1.0, 1.0, 1.0])
+    top = made.node(name="arm", children=[small, mirrored], rotation=turn, translation=[1.0, 2.0, 3.0])
+    again = made.node(name="arm", mesh=cube, translation=[4.0, 0.0, 0.0])
+    same = made.node(name="arm", mesh=cube)
+    made.data["scenes"] = [{"nodes": [top, again, same]}]
+    scene = load(made.write(tmp_path / "robot.gltf"))
+    assert [part.name for part in scene.parts] == ["small", "mirrored", "arm_1", "arm_2"]
+    assert scene.parts[2].shape is scene.parts[3].shape
+    truth = trimesh.load_scene(tmp_path / "robot.gltf")
+    worlds = []
+    for node in truth.graph.nodes_geometry:
+        T, key = truth.graph[node]
+        worlds.append(trimesh.transform_points(truth.geometry[key].vertices, T) @ Z_UP.T * 1000.0)
+    for part in scene.parts:
+        got = part.shape.mesh.vertices @ part.T_world[:3, :3].T + part.T_world[:3, 3]
+        assert sum(np.allclose(np.sort(got, axis=0), np.sort(world, axis=0), atol=1e-2) for world in worlds) == 1
+        assert part.shape.mesh.watertight
+
+
+def test_materials_do_not_divide_a_body(tmp_path):
+    mesh = only(tmp_path, lambda g: g.cube(F=CUBE.faces[:5]), lambda g: g.cube(F=CUBE.faces[5:]))
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(6.0)
+
+
+def test_strips(tmp_path):
+    """A prism over five corners: its caps as strips, its walls as triangles without an index."""
+    angle = np.linspace(0.0, 2 * np.pi, 5, endpoint=False)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(5)])
+    V = np.vstack([ring, ring + np.array([0.0, 0.0, 1.0])]).astype("f4")
+    walls = [[k, (k + 1) % 5, 5 + k] for k in range(5)] + [[(k + 1) % 5, 5 + (k + 1) % 5, 5 + k] for k in range(5)]
+
+    def cap(order):
+        index = np.array(order, dtype="u4")
+        return lambda g: {"attributes": {"POSITION": g.numbers(V)}, "indices": g.numbers(index), "mode": 5}
+
+    def plain(g):
+        return {"attributes": {"POSITION": g.numbers(V[np.ravel(walls)])}}
+
+    mesh = only(tmp_path, cap([5, 6, 9, 7, 8]), cap([0, 4, 1, 3, 2]), plain)
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(0.5 * 5 * np.sin(2 * np.pi / 5), rel=1e-6)
+
+
+def test_quantised_numbers(tmp_path):
+    def quantised(g):
+        V = np.round(np.asarray(CUBE.vertices) / 3.0 * 32767).astype("i2")
+        faces = g.numbers(np.asarray(CUBE.faces, "u2").ravel())
+        return {"attributes": {"POSITION": g.numbers(V, normalized=True)}, "indices": faces}
+
+    assert only(tmp_path, quantised).volume == pytest.approx(6.0 / 27.0, rel=1e-3)
+
+
+def damage(what):
+    made = Gltf()
+    made.node(name="good", mesh=made.mesh(made.cube()))
+    if what == "index of a mesh":
+        made.node(name="bad", mesh=7)
+    elif what == "index of a vertex":
+        made.node(name="bad", mesh=made.mesh(made.cube(F=[[0, 1, 99]])))
+    elif what == "node":
+        made.data["scenes"] = [{"nodes": [0, 9]}]
+    elif what == "extension":
+        made.data["extensionsRequired"] = ["EXT_meshopt_compression"]
+    elif what == "circle":
+        made.node(name="bad", children=[2])
+        made.node(children=[1])
+        made.data["scenes"] = [{"nodes": [0, 1]}]
+    elif what == "turn":
+        made.node(name="bad", mesh=made.mesh(made.cube()), rotation=[0.0, 0.0, 0.0, 2.0])
+    elif what == "beyond":
+        made.node(name="bad", mesh=made.mesh(made.cube()))
+        made.data["accessors"][-1]["count"] = 10**9
+    elif what in ("zeros", "sparse", "fan"):
+        primitive = made.cube()
+        accessor = made.data["accessors"][primitive["attributes"]["POSITION"]]
+        if what == "zeros":
+            del accessor["bufferView"]
+        elif what == "sparse":
+            accessor["sparse"] = {"count": 1}
+        else:
+            primitive["mode"] = 6
+        made.node(name="bad", mesh=made.mesh(primitive))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("what", "message"),
+    [
+        ("index of a mesh", "node 1, or its mesh, is not in the file"),
+        ("index of a vertex", r"missing: bad \(face index 99 is out of range for 8 vertices\)"),
+        ("node", "node 9, or its mesh, is not in the file"),
+        ("extension", "needs EXT_meshopt_compression, which is not read"),
+        ("circle", "in the tree twice"),
+        ("turn", "rotation of a node must be a quaternion of length 1, got"),
+        ("beyond", "not a readable GLTF file"),
+        ("zeros", "sparse or empty numbers are not read"),
+        ("sparse", "sparse or empty numbers are not read"),
+        ("fan", "triangles of mode 6 are not read"),
+    ],
+)
+def test_what_is_not_whole_is_refused(tmp_path, what, message):
+    path = damage(what).write(tmp_path / "a.gltf")
+    with pytest.raises(InputError, match=message) as caught:
+        load(path)
+    assert "\n" not in str(caught.value)
+    if "missing" in message:
+        assert len(load(path, partial=True).parts) == 1

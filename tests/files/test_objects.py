@@ -1,0 +1,92 @@
+"""Objects of other libraries: what they hold, where it is, and how it is called."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+
+from clamp3d import InputError, check, load
+from clamp3d.geometry.shells import volume
+
+
+def volumes(scene):
+    return [volume(p.shape.mesh.vertices, p.shape.mesh.faces) for p in scene.parts]
+
+
+def centre(part):
+    return part.T_world[:3, :3] @ part.shape.mesh.vertices.mean(axis=0) + part.T_world[:3, 3]
+
+
+def test_a_trimesh_scene():
+    source = trimesh.Scene()
+    box = trimesh.creation.box((1.0, 2.0, 3.0))
+    move = trimesh.transformations.translation_matrix([5.0, 0.0, 0.0])
+    source.add_geometry(box, node_name="lid", geom_name="box", transform=move)
+    source.add_geometry(box, node_name="base", geom_name="box")
+    source.units = "inches"
+    scene = load(source)
+    assert {p.name: centre(p).round(6).tolist() for p in scene.parts} == {"lid": [127.0, 0, 0], "base": [0, 0, 0]}
+    assert volumes(scene) == pytest.approx([6.0 * 25.4**3] * 2, rel=1e-6)
+    assert check(scene).counts == {"clear": 1}
+    assert load(box).parts[0].name == "part"
+
+
+def test_what_is_no_body_is_refused():
+    for thing in (3, object(), [1, 2], None):
+        with pytest.raises(InputError, match="source must be a path, a clamp's name, or an object of CadQuery"):
+            load(thing)
+    with pytest.raises(InputError, match="source must be a path"):
+        load(pytest.importorskip("build123d").Compound())
+    with pytest.raises(InputError, match="joints goes with a robot description"):
+        load(trimesh.creation.box(), joints={"a": 1.0})
+
+
+def test_shapes_of_open_cascade_and_of_cadquery():
+    pytest.importorskip("OCP")
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+    from step_scenes import location, pin, plate, pose
+
+    assert volumes(load(BRepPrimAPI_MakeBox(1.0, 2.0, 3.0).Shape())) == pytest.approx([6.0])
+    # CadQuery's classes hold a shape in `wrapped`, a Workplane in `vals()`, an assembly a tree with places.
+    T, S = pose(np.random.default_rng(1)), pose(np.random.default_rng(2))
+    held = SimpleNamespace(wrapped=pin())
+    stack = SimpleNamespace(vals=lambda: [held, SimpleNamespace(wrapped=plate())])
+    assert [p.name for p in load(stack).parts] == ["part_1", "part_2"]
+
+    def assembly(name, T, obj, *children):
+        return SimpleNamespace(name=name, loc=SimpleNamespace(wrapped=location(T)), obj=obj, children=list(children))
+
+    tree = assembly(
+        "top", T, None, assembly("bolt", S, held), assembly("bolt", np.eye(4), held, assembly("x", S, stack))
+    )
+    scene = load(tree)
+    assert scene.name == "top"
+    assert [p.name for p in scene.parts] == ["bolt_1", "bolt_2", "x_1", "x_2"]
+    for part, place in zip(scene.parts, (T @ S, T, T @ S, T @ S), strict=True):
+        np.testing.assert_allclose(part.T_world, place, atol=1e-9)
+    assert scene.parts[0].shape is scene.parts[1].shape
+
+
+def test_build123d_parts_and_assemblies():
+    bd = pytest.importorskip("build123d")
+    with bd.BuildPart() as made:
+        bd.Box(4, 4, 4)
+        with bd.Locations((0, 0, 10)):
+            bd.Cylinder(1, 2)
+    assert sorted(volumes(load(made))) == pytest.approx([2 * np.pi, 64.0], rel=1e-2)
+    pin = bd.Cylinder(2, 10)
+    pin.label = "pin"
+    plate = bd.Pos(10, 0, 0) * bd.Box(20, 20, 3)
+    plate.label = "plate"
+    inner = bd.Compound(label="inner", children=[pin, plate])
+    inner.location = bd.Location((0, 0, 5), (0, 0, 90))
+    whole = bd.Compound(label="whole", children=[inner, bd.Pos(0, -30, 0) * bd.Sphere(3)])
+    scene = load(whole)
+    assert scene.name == "whole"
+    assert [p.name for p in scene.parts] == ["pin", "plate", "part"]
+    for part, shape in zip(scene.parts, (inner.children[0], inner.children[1], whole.children[1]), strict=True):
+        truth = shape.moved(inner.location) if shape.parent is inner else shape
+        middle = truth.center(bd.CenterOf.BOUNDING_BOX)
+        V = part.shape.mesh.vertices @ part.T_world[:3, :3].T + part.T_world[:3, 3]
+        np.testing.assert_allclose(0.5 * (V.min(axis=0) + V.max(axis=0)), [*middle], atol=0.05)

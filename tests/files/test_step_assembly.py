@@ -1,0 +1,196 @@
+"""STEP assemblies against what Open CASCADE wrote: names, placements, instances, units, and nothing left out."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("OCP")
+
+from OCP.BRep import BRep_Builder
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_Sewing
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.gp import gp_Pnt
+from OCP.TopoDS import TopoDS_Compound
+from step_scenes import Tree, location, nested, pin, plate, pose
+
+from clamp3d import InputError, export, load
+from clamp3d.files.mesh_file import load_bodies
+from clamp3d.files.open_cascade import explore
+from clamp3d.files.part21 import announced
+from clamp3d.geometry.shells import volume
+
+
+@pytest.fixture(scope="module", params=["MM", "INCH"])
+def written(request, tmp_path_factory):
+    tree, truth = nested(np.random.default_rng(7))
+    return load(tree.write(tmp_path_factory.mktemp("step") / "machine.step", request.param)), truth
+
+
+def test_names_places_and_volumes_of_a_tree(written):
+    scene, truth = written
+    assert scene.name == "machine"
+    assert [part.name for part in scene.parts] == [name for name, _, _ in truth]
+    assert len({id(part.shape) for part in scene.parts}) == 2
+    for part, (_, size, T) in zip(scene.parts, truth, strict=True):
+        np.testing.assert_allclose(part.T_world, T, atol=1e-6)
+        mesh = part.shape.mesh
+        assert mesh.watertight
+        area = part.shape.error * np.abs(mesh.vertices).max() ** 2 * 20
+        assert abs(volume(mesh.vertices, mesh.faces) - size) < area
+
+
+def test_an_assembly_is_written_as_it_was_read(written, tmp_path):
+    scene, _ = written
+    again = load(export(scene, tmp_path / "again.step").files[0])
+    assert [part.name for part in again.parts] == [part.name for part in scene.parts]
+    for part, other in zip(scene.parts, again.parts, strict=True):
+        np.testing.assert_allclose(other.T_world, part.T_world, atol=1e-6)
+        sizes = [volume(shape.mesh.vertices, shape.mesh.faces) for shape in (other.shape, part.shape)]
+        assert sizes[0] == pytest.approx(sizes[1], rel=1e-6)
+    assert len({id(part.shape) for part in again.parts}) == len({id(part.shape) for part in scene.parts})
+
+
+def test_several_solids_of_one_product_are_several_parts(tmp_path):
+    both = TopoDS_Compound()
+    builder = BRep_Builder()
+    builder.MakeCompound(both)
+    builder.Add(both, plate())
+    T = pose(np.random.default_rng(3))
+    builder.Add(both, pin().Moved(location(T)))
+    tree = Tree()
+    tree.product("welded", both)
+    scene = load(tree.write(tmp_path / "welded.step"))
+    assert [part.name for part in scene.parts] == ["welded_1", "welded_2"]
+
+
+def test_what_has_no_name_is_called_after_what_holds_it(tmp_path):
+    tree = Tree()
+    root, blank = tree.product("top"), tree.product(" ", pin())
+    tree.put(root, blank, np.eye(4), name="=>[0:1:1:2]")  # as Open CASCADE names an instance that nobody named
+    tree.put(root, tree.product("lid", plate()), pose(np.random.default_rng(5)), name="=>[0:1:1:3]")
+    assert [part.name for part in load(tree.write(tmp_path / "blank.step")).parts] == ["top", "lid"]
+
+
+@pytest.mark.parametrize(("loose", "said"), [(1, "1 product holds"), (2, "2 products hold")])
+def test_curves_are_left_out_and_said(tmp_path, loose, said):
+    tree = Tree()
+    root = tree.product("top")
+    tree.put(root, tree.product("pin", pin()), np.eye(4))
+    for k in range(loose):
+        line = BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, k), gp_Pnt(5, 0, k)).Edge()
+        tree.put(root, tree.product(f"axis {k}", line), np.eye(4))
+    scene = load(tree.write(tmp_path / "axis.step"))
+    assert [part.name for part in scene.parts] == ["pin"]
+    assert scene.notes == (f"{said} curves or points only: left out",)
+
+
+def test_a_shell_is_refused_by_name_and_counted_on_request(tmp_path):
+    sewing = BRepBuilderAPI_Sewing()
+    for face in [*explore(BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape(), "FACE")][:5]:  # a box without its top
+        sewing.Add(face)
+    sewing.Perform()
+    tree = Tree()
+    root = tree.product("top")
+    tree.put(root, tree.product("pin", pin()), np.eye(4))
+    tree.put(root, tree.product("lid", sewing.SewedShape()), np.eye(4))
+    path = tree.write(tmp_path / "shell.step")
+    with pytest.raises(InputError, match=r"only 1 of 2 bodies read; missing: lid \(a surface, not a solid\)"):
+        load(path)
+    scene = load(path, partial=True)
+    assert [part.name for part in scene.parts] == ["pin"]
+    assert scene.notes[0].startswith("1 of 2 bodies read; missing: lid")
+
+
+def test_a_line_less_is_never_a_body_less(tmp_path):
+    """Every third line of the file deleted in turn, as far as the text alone tells it; the others by the reader."""
+    tree, truth = nested(np.random.default_rng(7))
+    lines = tree.write(tmp_path / "machine.step").read_text().splitlines(keepends=True)
+    first = next(k for k, line in enumerate(lines) if line.startswith("DATA"))
+    told, refused, untold = 0, 0, {}
+    for k in range(first + 1, len(lines) - 3, 3):
+        damaged = tmp_path / f"{k}.step"
+        damaged.write_text("".join(lines[:k] + lines[k + 1 :]))
+        try:
+            announced(damaged)
+            untold[str(damaged)] = lines[k]
+        except InputError:
+            told += 1
+    assert told > 100
+    assert untold
+    for name, line in untold.items():
+        try:
+            sizes = sorted(body.shape.volume for body in load_bodies(name).bodies)
+        except InputError:
+            refused += 1
+            continue
+        assert sizes == pytest.approx(sorted(size for _, size, _ in truth), rel=1e-3), line
+    assert refused < len(untold)
+
+
+def test_a_name_that_is_not_utf8_is_read(tmp_path):
+    tree = Tree()
+    tree.put(tree.product("top"), tree.product("PARTNAME", plate()), np.eye(4))
+    path = tree.write(tmp_path / "a.step")
+    path.write_bytes(path.read_bytes().replace(b"PARTNAME", "Bügel".encode("latin-1")))
+    assert [part.name for part in load(path).parts] == ["Bügel"]
+
+
+@pytest.mark.parametrize(
+    ("text", "instead", "told"),
+    [
+        ("\nDATA;", "\nDATA; /* it's no text; #1 = ( */", None),
+        ("DIRECTION('',", "DIRECTION('it''s (, #999999',", None),
+        ("DIRECTION('',", "DIRECTION('', ,", "lacks a value"),
+        ("DIRECTION('',", "DIRECTION(\n,", "lacks a value"),
+        ("DIRECTION('',", "DIRECTION('it's',", "a text in it does not end"),
+        ("DIRECTION('',", "DIRECTION(('',", "does not end"),
+        ("DIRECTION('',", "DIRECTION(#999999,", "1 entities are referred to and not there, as #999999"),
+        ("DIRECTION('',", "DIRECTION 7 = ('',", "does not end"),
+        ("DIRECTION('',", f"DIRECTION(#{'1' * 5000},", "referred to and not there"),
+        ("\n#12 ", "\n#11 ", "#11 is defined twice"),
+        ("\nDATA;", "\nDATA ('of one part', ('AP214'));", None),
+        ("\nENDSEC;\nEND-", "\nEND-", "no DATA section that ends"),
+    ],
+)
+def test_a_text_that_is_not_whole_is_told(tmp_path, text, instead, told):
+    file = nested(np.random.default_rng(7))[0].write(tmp_path / "machine.step")
+    known, before = announced(file), file.read_text()
+    assert text in before
+    file.write_text(before.replace(text, instead, 1))
+    if told is None:
+        assert announced(file) == known
+    else:
+        with pytest.raises(InputError, match=told):
+            announced(file)
+
+
+@pytest.mark.parametrize(
+    ("before", "again", "told"),
+    [("", "HEADER;", "its header is not whole"), ("HEADER;FILE_SCHEMA(('x'));ENDSEC;", "DATA(", "no DATA section")],
+)
+def test_a_text_that_begins_again_and_again_is_read_once(tmp_path, before, again, told):
+    """To look from each beginning to the end of the text takes an hour."""
+    file = tmp_path / "endless.step"
+    file.write_text(f"ISO-10303-21;{before}{400_000 * again}END-ISO-10303-21;")
+    with pytest.raises(InputError, match=told):
+        announced(file)
+
+
+def test_coloured_and_layered_faces_are_read(tmp_path):
+    """Colours and layers put labels without a name below a part."""
+    from OCP.Quantity import Quantity_Color, Quantity_NameOfColor
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
+
+    tree = Tree()
+    box = BRepPrimAPI_MakeBox(10.0, 10.0, 10.0).Shape()
+    label = tree.product("box", box)
+    face = tree.tool.AddSubShape(label, TopExp_Explorer(box, TopAbs_ShapeEnum.TopAbs_FACE).Current())
+    red = Quantity_Color(Quantity_NameOfColor.Quantity_NOC_RED)
+    XCAFDoc_DocumentTool.ColorTool_s(tree.document.Main()).SetColor(face, red, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
+    XCAFDoc_DocumentTool.LayerTool_s(tree.document.Main()).SetLayer(label, TCollection_ExtendedString("outer"))
+    scene = load(tree.write(tmp_path / "coloured.step"))
+    assert [part.name for part in scene.parts] == ["box"]
+    mesh = scene.parts[0].shape.mesh
+    assert volume(mesh.vertices, mesh.faces) == pytest.approx(1000.0)

@@ -1,0 +1,101 @@
+"""A process that answers requests: what it gives back, what it keeps from its caller, and how its faults are said."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from clamp3d.errors import InputError, SolverError
+from clamp3d.files.child import Worker, WorkerEndedError, WorkerTimeoutError
+
+STAND_IN = """
+import os
+from clamp3d.errors import InputError, SolverError
+
+def fail(kind):
+    raise {"input": InputError("no such thing"), "solver": SolverError("none"), "other": KeyError("x")}[kind]
+
+def pid():
+    return os.getpid()
+"""
+
+
+@pytest.fixture
+def worker(tmp_path, monkeypatch):
+    (tmp_path / "stand_in.py").write_text(STAND_IN)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with Worker(confined=True) as made:
+        yield made
+
+
+def test_one_process_answers_until_it_fails_and_the_next_call_starts_another(worker):
+    first = worker.call("stand_in:pid", time_limit=60.0)
+    for kind, error, message in (
+        ("input", InputError, "no such thing"),
+        ("solver", SolverError, "none"),
+        ("other", RuntimeError, "KeyError: 'x' at stand_in.py"),
+    ):
+        with pytest.raises(error, match=message):
+            worker.call("stand_in:fail", kind, time_limit=60.0)
+    assert worker.call("stand_in:pid", time_limit=60.0) == first
+    for function, arguments, message in (("os:abort", (), "SIGABRT"), ("os:_exit", (7,), "exit code 7")):
+        with pytest.raises(WorkerEndedError, match=message):
+            worker.call(function, *arguments, time_limit=60.0)
+    with pytest.raises(WorkerTimeoutError):
+        worker.call("time:sleep", 600, time_limit=0.5)
+    assert worker.call("stand_in:pid", time_limit=60.0) != first
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes cannot be forked here")
+@pytest.mark.filterwarnings("ignore:This process.*fork:DeprecationWarning")
+def test_a_forked_process_starts_a_worker_of_its_own(worker):
+    first = worker.call("stand_in:pid", time_limit=60.0)
+    child = os.fork()
+    if child == 0:
+        other = worker.call("stand_in:pid", time_limit=60.0)
+        worker.close()
+        os._exit(7 if other != first else 1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+    assert worker.call("stand_in:pid", time_limit=60.0) == first
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
+def test_memory_is_limited_for_each_call_alone(worker):
+    with pytest.raises(MemoryError):
+        worker.call("numpy:ones", 10**8, time_limit=60.0, memory=2**28)
+    assert len(worker.call("numpy:ones", 10**7, time_limit=60.0)) == 10**7
+
+
+@pytest.mark.parametrize(
+    ("function", "argument"), [("socket:create_connection", ["127.0.0.1", 9]), ("os:system", "true")]
+)
+def test_what_it_may_not_do_is_refused(worker, function, argument):
+    with pytest.raises(OSError, match="not allowed while a file is read"):
+        worker.call(function, argument, time_limit=60.0)
+
+
+def test_modules_of_the_current_folder_are_not_imported(tmp_path, monkeypatch):
+    (tmp_path / "numpy.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'w')")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", ["", *sys.path])  # as in a notebook, and at the prompt
+    with Worker() as made:
+        assert made.call("numpy:ones", 3, time_limit=60.0).tolist() == [1.0] * 3
+    assert not (tmp_path / "executed").exists()
+
+
+def test_it_ends_with_its_caller():
+    code = (
+        "import os, signal\nfrom clamp3d.files.child import Worker\nworker = Worker()\n"
+        "print(worker.call('os:getpid', time_limit=60.0), flush=True)\nos.kill(os.getpid(), signal.SIGKILL)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120)
+    child = int(run.stdout)
+    for _ in range(600):
+        try:
+            os.kill(child, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.1)
+    pytest.fail("the process outlives its caller by a minute")

@@ -1,0 +1,66 @@
+"""Shapes that are drawn by one call: boxes, extrusions and spheres."""
+
+import math
+
+import numpy as np
+import pytest
+from shapely import Polygon
+
+from clamp3d import distance
+from clamp3d.errors import InputError
+from clamp3d.geometry.profile import Profile
+from clamp3d.kernel import rotation, translation
+from clamp3d.shapes import box, extrusion, mesh, sphere
+
+ANGLE = [(0.0, 0.0), (10.0, 0.0), (10.0, 2.0), (2.0, 2.0), (2.0, 10.0), (0.0, 10.0)]
+
+
+def test_a_box_takes_three_numbers_or_one_sequence():
+    assert box(10, 20.0, 5) == box((10, 20, 5)) == box(size=np.array([10.0, 20.0, 5.0]))
+
+
+@pytest.mark.parametrize("outline", [ANGLE, ANGLE[::-1], [*ANGLE, ANGLE[0]], Profile.of(*ANGLE)])
+def test_an_extrusion_is_its_polygon_times_its_height(outline):
+    solid = extrusion(outline, 4.0)
+    assert solid.bounds.tolist() == [[0.0, 0.0, -2.0], [10.0, 10.0, 2.0]]
+    made = mesh(solid)
+    assert made.is_watertight
+    assert made.volume == pytest.approx(4.0 * Polygon(ANGLE).area, rel=1e-12)
+    found = distance(solid, box(2, 2, 2), translation(6.0, 7.0, 0.0))
+    assert found.lower - 1e-9 <= 3.0 <= found.upper + 1e-9
+
+
+@pytest.mark.parametrize("mesh_error", [None, 0.5])
+def test_distances_of_a_sphere_hold_for_the_true_one(mesh_error):
+    ball = sphere(5.0, mesh_error=mesh_error)
+    assert 0.0 < ball.error <= (mesh_error or 5e-3)
+    assert np.linalg.norm(ball.mesh.vertices, axis=1) == pytest.approx(5.0, abs=1e-12)
+    centres = ball.mesh.vertices[ball.mesh.faces].mean(axis=1)
+    assert 5.0 - np.linalg.norm(centres, axis=1).min() <= ball.error
+    for turn in (0.0, 0.3, 1.1):
+        T = rotation((1.0, 2.0, 0.0), turn)
+        T[:3, 3] = T[:3, :3] @ (0.0, 0.0, 7.0)  # the ball sees the box's face from its middle
+        found = distance(ball, box(2, 2, 2), T)
+        assert found.lower <= 1.0 <= found.upper
+        assert found.upper - found.lower <= 3.0 * ball.error
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: box(1, 2), "size of a box must be three numbers"),
+        (lambda: box((1, 2), 3, 4), "size of a box must be three numbers"),
+        (lambda: box(1, 2, -1), "size must be a finite length > 0 mm, got -1"),
+        (lambda: extrusion(ANGLE, 0.0), "height must be a finite length > 0 mm"),
+        (lambda: extrusion([(0, 0), (1, 0)], 1.0), "outline must enclose an area"),
+        (lambda: extrusion([(0, 0), (1, 1), (1, 0), (0, 2)], 1.0), "outline must not cross itself"),
+        (lambda: extrusion(3, 1.0), "outline must have shape"),
+        (lambda: sphere(-1.0), "radius must be a finite length > 0 mm, got -1"),
+        (lambda: sphere(1.0, mesh_error=1e-9), "mesh_error of a sphere must be >= 1e-05 mm"),
+        (lambda: sphere(1.0, mesh_error=math.nan), "mesh_error must be a finite number"),
+    ],
+)
+def test_what_is_no_shape_is_refused_in_one_line(make, words):
+    with pytest.raises(InputError, match=words) as error:
+        make()
+    assert "\n" not in str(error.value)

@@ -1,0 +1,60 @@
+"""Least distance of a flat-ended cylinder along a groove's edges, by the kernel's formulas, against dense sampling."""
+
+import math
+
+import numpy as np
+import pytest
+
+from clamp3d.geometry.pose import rotation
+from clamp3d.kernel.edges import on_arc
+from clamp3d.kernel.features import Groove, Rod
+from clamp3d.kernel.vector import Vector
+
+
+def _beside(P, r, l, c, d):  # noqa: E741
+    """Signed distance of points (n, 3) from a cylinder about c along d."""
+    m = P - c
+    t = m @ d
+    g, e = np.linalg.norm(m - t[:, None] * d, axis=1) - r, np.abs(t) - l
+    return np.where(np.maximum(g, e) > 0.0, np.hypot(np.maximum(g, 0.0), np.maximum(e, 0.0)), np.maximum(g, e))
+
+
+def _cylinders(rng, count):
+    """Radius, half length, middle and axis beside an arc of radius 12: along it, across it, on its axis, on an edge."""
+    for k in range(count):
+        r, l, c = *10.0 ** rng.uniform((-1.0, -1.0), (1.3, 2.0)), rng.normal(size=3) * 12.0  # noqa: E741
+        lean = [0.0, 1e-6, 0.05, 0.5, 0.5 * math.pi, rng.uniform(0.0, math.pi)][k % 6]
+        if k % 5 == 0:
+            c[:2] = 0.0
+        if k % 7 == 0:
+            c[0] = 0.0
+        axis = (math.cos(turn := rng.uniform(-math.pi, math.pi)), math.sin(turn), 0.0)
+        yield r, l, c, rotation(axis if k % 3 else (1.0, 0.0, 0.0), lean)[:3, 2]
+
+
+def _rod(r, half, c, d):
+    return Rod(Vector(*map(float, c)), Vector(*map(float, d)), float(d[0] ** 2 + d[1] ** 2), float(r), float(half))
+
+
+def test_an_end_arc_has_no_nearer_point():
+    rng = np.random.default_rng(1)
+    for r, l, c, d in _cylinders(rng, 160):  # noqa: E741
+        half_angle, ez = rng.uniform(0.2, 3.1), rng.choice([0.0, 5.0, 25.0])
+
+        def at(angle, ez=ez, r=r, l=l, c=c, d=d):  # noqa: E741
+            angle = np.atleast_1d(angle)
+            return _beside(np.column_stack([12.0 * np.sin(angle), -12.0 * np.cos(angle), 0.0 * angle + ez]), r, l, c, d)
+
+        groove, rod = Groove(12.0, half_angle, 0.0, 0.0, 0.0), _rod(r, l, c, d)
+        angle = np.linspace(-half_angle, half_angle, 4001)
+        fine = angle[at(angle).argmin()] + np.linspace(-1.0, 1.0, 2001) * half_angle / 2000.0
+        true = at(np.clip(fine, -half_angle, half_angle)).min()
+        best = on_arc(groove, rod, ez, math.inf, 1e-13)
+        assert abs(best.p) <= half_angle * (1.0 + 1e-12)
+        assert best.f == pytest.approx(at(best.p)[0], abs=1e-11)
+        assert best.f <= true + 1e-9
+        assert best.f - best.left <= 1e-9
+        assert min(best.f, best.left) >= true - 1e-4
+        # What is not nearer than what is known is not looked for.
+        assert on_arc(groove, rod, ez, true - 1e-3, 1e-13).f == math.inf
+        assert on_arc(groove, rod, ez, true + 1e-3, 1e-13).f == pytest.approx(best.f, abs=1e-12)
