@@ -6,7 +6,7 @@ import itertools
 import math
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,6 +39,7 @@ def check(
     distances: bool = False,
     depths: bool = True,
     progress: Progress | None = None,
+    on_row: Callable[[PairResult], None] | None = None,
     cache: ModelCache | None = None,
 ) -> CheckResult:
     """Verdicts of all pairs of a scene, at rest and in its motions.
@@ -55,6 +56,9 @@ def check(
         Measure the penetration depth of clashes, as `clamp3d.engine.distance.distance` does; without, "at least".
     progress : callable, optional
         Is told (stage, done, of).
+    on_row : callable, optional
+        Is called with each row at rest: first with the verdict of every pair, then with the depth of each clash, the
+        deepest overlap that is certain first.
     cache : ModelCache, optional
         Keeps models from one check to the next.
 
@@ -84,6 +88,7 @@ def check(
         instance("cache", cache, ModelCache)
     distances, depths = flag("distances", distances), flag("depths", depths)
     function("progress", progress)
+    function("on_row", on_row)
     cache = cache or ModelCache()
     log = _Log(cache.counters)
     placed = scene.placed
@@ -96,11 +101,7 @@ def check(
     cache.counters.queries["boxes"] += len(near)
     questions = _Questions(scene, models, distances=distances, depths=depths)
     log.end("broad phase")
-    rows = []
-    for k, ((i, j), gap) in enumerate(zip(near.tolist(), box_gaps(boxes, near).tolist(), strict=True)):
-        if progress is not None:
-            progress("pairs", k, len(near))
-        rows.append(questions.row(i, j, gap))
+    rows = questions.rows(near.tolist(), box_gaps(boxes, near).tolist(), progress, on_row)
     log.end("pairs")
     moved = check_motions(scene, models, named, progress)
     if scene.motions:
@@ -175,23 +176,52 @@ class _Questions:
         self.scene, self.models = scene, models
         self.distances, self.depths = distances, depths
         self._answers: dict[tuple[object, ...], tuple[Verdict, Distance]] = {}
+        self._depths: dict[tuple[object, ...], Distance] = {}
 
-    def row(self, i: int, j: int, gap: float) -> PairResult:
+    def rows(
+        self,
+        near: list[list[int]],
+        gaps: list[float],
+        progress: Progress | None,
+        on_row: Callable[[PairResult], None] | None,
+    ) -> list[PairResult]:
+        """The rows of pairs ``near`` of parts, whose boxes keep ``gaps`` mm: all verdicts first, then the depths."""
+        rows: list[PairResult] = []
+        for k, ((i, j), gap) in enumerate(zip(near, gaps, strict=True)):
+            if progress is not None:
+                progress("pairs", k, len(near))
+            rows.append(self.row(i, j, gap))
+            if on_row is not None:
+                on_row(rows[k])
+        overlaps = [k for k, row in enumerate(rows) if row.verdict in BAD] if self.depths else []
+        for n, k in enumerate(sorted(overlaps, key=lambda k: rows[k].distance.upper)):
+            if progress is not None:
+                progress("depths", n, len(overlaps))
+            rows[k] = self.row(*near[k], gaps[k], depth=True)
+            if on_row is not None:
+                on_row(rows[k])
+        return rows
+
+    def row(self, i: int, j: int, gap: float, *, depth: bool = False) -> PairResult:
         """The row of parts ``i`` and ``j``, whose boxes keep ``gap`` mm."""
         first, second = self.scene.parts[i], self.scene.parts[j]
         a, b = self.models[i], self.models[j]
         allowance = self.scene.allowance(first.name, second.name)
         T = inverse(first.T_world) @ second.T_world
         key = (a, b, allowance, tuple((T[:3] + 0.0).round(_SAME).ravel().tolist()))
-        if key not in self._answers:
-            start = Distance(gap, level="boxes", method="bounding boxes")
-            try:
+        start = Distance(gap, level="boxes", method="bounding boxes")
+        try:
+            if key not in self._answers:
                 self._answers[key] = self._measured(a, b, T, start, allowance)
-            except MissingLibraryError:
-                raise
-            except Exception as error:  # one pair that fails is a finding, not the end of all others
-                return PairResult(first.name, second.name, Verdict.FAILED, start, reason=failure(error))
+            if depth and key not in self._depths:
+                self._depths[key] = penetration(a, b, T, self._answers[key][1])
+        except MissingLibraryError:
+            raise
+        except Exception as error:  # one pair that fails is a finding, not the end of all others
+            return PairResult(first.name, second.name, Verdict.FAILED, start, reason=failure(error))
         verdict, distance = self._answers[key]
+        if verdict in BAD:
+            distance = self._depths[key] if depth else distance.of_overlap()
         row = PairResult(first.name, second.name, verdict, distance.moved(first.T_world))
         if verdict in BAD:
             return replace(row, locator=Locator(a, b, first.T_world, T))
@@ -210,7 +240,4 @@ class _Questions:
             return not self.distances or measured(distance, accuracy)
 
         verdict, distance = judge(a, b, T, start, self.scene.thresholds, allowance, enough)
-        distance = with_normal(distance)
-        if verdict in BAD:
-            distance = penetration(a, b, T, distance) if self.depths else distance.of_overlap()
-        return verdict, distance
+        return verdict, with_normal(distance)

@@ -250,3 +250,19 @@ def test_equal_parts_of_a_scene_are_each_met_where_they_stand():
         assert sweep.worst[k] == min(sweep.verdict[k], key=[v.value for v in Verdict].index)
     assert (sweep.lower <= sweep.upper).all()
     assert set(sweep.verdict.ravel()) >= {"clash", "clear", "clearance", "allowed"}
+
+
+def test_rows_come_as_they_are_decided_and_the_deepest_overlap_first():
+    cube = shapes.box((10, 10, 10))
+    scene = Scene().add("base", shapes.box((100, 10, 10)))
+    for name, x, z in (("shallow", -30, 9.0), ("clear", 0, 20.0), ("deep", 30, 6.0)):
+        scene = scene.add(name, cube, translation(x, 0, z))
+    rows = []
+    result = check(scene, on_row=rows.append)
+    assert [(row.b, row.distance.lower) for row in rows] == [
+        ("shallow", -np.inf),
+        ("deep", -np.inf),
+        ("deep", pytest.approx(-4.0, abs=1e-9)),
+        ("shallow", pytest.approx(-1.0, abs=1e-9)),
+    ]
+    assert {row.b: row.distance.upper for row in result.pairs} == {row.b: row.distance.upper for row in rows[2:]}
