@@ -10,13 +10,13 @@ import sys
 
 gc.disable()  # what it loads and makes is no garbage
 
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Common  # noqa: E402
-from OCP.BRepExtrema import BRepExtrema_DistShapeShape  # noqa: E402
-from OCP.BRepGProp import BRepGProp  # noqa: E402
-from OCP.GProp import GProp_GProps  # noqa: E402
-from OCP.STEPControl import STEPControl_Reader  # noqa: E402
-from OCP.TopAbs import TopAbs_ShapeEnum  # noqa: E402
-from OCP.TopExp import TopExp_Explorer  # noqa: E402
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+from OCP.BRepGProp import BRepGProp
+from OCP.GProp import GProp_GProps
+from OCP.STEPControl import STEPControl_Reader
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopExp import TopExp_Explorer
 
 reader = STEPControl_Reader()
 reader.ReadFile(sys.argv[1])

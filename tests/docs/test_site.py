@@ -48,13 +48,6 @@ def test_pages_name_files_that_exist(page):
             assert any(place.exists() for place in places), name
 
 
-def test_the_picture_is_what_its_script_draws():
-    spec = importlib.util.spec_from_file_location("make_architecture", ROOT / "scripts" / "make_architecture.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert module.OUTPUT.read_text(encoding="utf-8") == module.draw()
-
-
 def test_the_public_names_are_few_and_documented():
     assert len(clamp3d.__all__) <= 45
     for name in clamp3d.__all__:

@@ -102,7 +102,7 @@ def test_step_without_open_cascade_says_what_to_install(clamp3d, tmp_path: Path,
 
 def test_review_set_is_what_a_new_build_gives() -> None:
     done = subprocess.run(
-        [sys.executable, str(ROOT / "scripts" / "build_meshes.py"), "--check"],
+        [sys.executable, str(ROOT / "scripts" / "build-meshes"), "--check"],
         capture_output=True,
         text=True,
         check=False,

@@ -2,7 +2,7 @@
 
 Groove R 12, wire radius 10.5, block 137 x 30 x 60: a scene with published figures for chords and for CoACD. The poses
 and their signed distances to 25 digits are data (``data/compare_poses.csv``), found at 50 digits by a search that
-knows only the distance of a point from the groove (``scripts/make_compare_poses.py``).
+knows only the distance of a point from the groove (``scripts/make-compare-poses``).
 """
 
 from __future__ import annotations
