@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clamp3d.checks import instance
-from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
+from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Assembly
 from clamp3d.geometry.meshing import mesh
@@ -17,11 +17,10 @@ from clamp3d.geometry.profile import MIN_MESH_ERROR
 from clamp3d.output.figures import blank, near, same_scale, title
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
 from clamp3d.output.placed import PosedMesh
-from clamp3d.output.section import ARROW, Poses, balloon, draw_section, part_anchor, spread
+from clamp3d.output.section import ARROW, Poses, balloon, draw_section, label, label_column, part_anchor
 from clamp3d.output.view3d import Camera, draw_solids
 
 if TYPE_CHECKING:
-    import trimesh
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -37,30 +36,19 @@ def exploded_figure(clamp: Clamp) -> Figure:
     figure = blank(7.6, 6.4)
     ax = figure.add_subplot()
     camera = Camera()
-    poses = exploded_poses(clamp)
-    solids = _solids(clamp)
-    drawn = {name: PosedMesh(solids[name], poses[name].T(), PART_COLOURS[name]) for name in PARTS}
+    drawn = _placed(clamp, exploded_poses(clamp))
     draw_solids(ax, list(drawn.values()), camera)
     x0, x1 = ax.get_xlim()
     width = x1 - x0
-    points = {}
-    for name, shown in drawn.items():
-        outline = camera.view(shown)
-        points[name] = outline[outline[:, 0].argmin() if name == "P6" else outline[:, 0].argmax(), :2]
-    order = sorted((name for name in PARTS if name != "P6"), key=lambda name: float(points[name][1]))
-    heights = dict(zip(order, spread([float(points[n][1]) for n in order], 0.085 * width), strict=True))
-    for name, (px, py) in points.items():
-        level = heights[name] if name in heights else float(py)
-        text = TITLES[name] + {"P6": f"\n{clamp.line.label}", "P7": f"\n{clamp.jumper.label}"}.get(name, "")
-        left = name == "P6"  # its near end is the leftmost of all
-        column = x0 - 0.09 * width if left else x1 + 0.07 * width
-        ax.plot([px, column], [py, level], color=INK, lw=0.6, zorder=5)
-        ax.plot([px], [py], ".", color=INK, ms=4, zorder=5)
-        balloon(ax, name, column, level, size=9.0)
-        if left:
-            ax.annotate(text, (column, level), (0, -14), textcoords="offset points", ha="center", va="top", fontsize=9)
-        else:
-            ax.annotate(text, (column, level), (14, 0), textcoords="offset points", va="center", fontsize=9)
+    corners = {name: camera.project(solid.world)[:, :2] for name, solid in drawn.items()}
+    points = {name: tuple(view[view[:, 0].argmax()].tolist()) for name, view in corners.items() if name != "P6"}
+    label_column(ax, clamp, points, x1 + 0.07 * width, 0.085 * width)
+    # The near end of the power line is the leftmost of all.
+    x, y = corners["P6"][corners["P6"][:, 0].argmin()]
+    ax.plot([x - 0.09 * width, x], [y, y], color=INK, lw=0.5, marker=".", markevery=[1], ms=3.5, zorder=30)
+    balloon(ax, "P6", x - 0.09 * width, y, size=8.0)
+    below: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 8, "color": INK}
+    ax.annotate(label(clamp, "P6"), (x - 0.09 * width, y), (0, -13), **below)
     ax.set_xlim(x0 - 0.18 * width, x1 + 0.32 * width)
     title(ax, "exploded view", f"{clamp.name} clamp: seven parts")
     return figure
@@ -95,21 +83,19 @@ def steps_figure(run: Assembly) -> Figure:
     ends = step_ends(run)
     figure = blank(3.1 * len(ends), 7.4)
     axes = figure.subplots(2, len(ends), squeeze=False, height_ratios=(1.0, 1.2))
-    solids = _solids(run.clamp)
     start = 0
     for i, (step, stop) in enumerate(ends):
         waypoint = run.path[stop]
         poses = near(run.clamp, waypoint.poses)
-        shown = [PosedMesh(solids[n], p.T(), PART_COLOURS[n]) for n, p in poses.items()]
-        draw_solids(axes[0, i], shown, Camera(), pixels=600)
+        draw_solids(axes[0, i], list(_placed(run.clamp, poses).values()), Camera(), pixels=600)
         title(axes[0, i], f"{i + 1}   {step}", waypoint.label)
         draw_section(axes[1, i], run.clamp, poses)
         for name, pose in poses.items():
             balloon(axes[1, i], name, *pose.point(*part_anchor(run.clamp, name, right=False)), size=6.0)
         _arrows(axes[1, i], run.clamp, [w.poses for w in run.path[start : stop + 1]], poses)
         start = stop
-    same_scale([*axes[1]])
-    _same_window([*axes[0]])
+    same_scale(axes[0])
+    same_scale(axes[1])
     return figure
 
 
@@ -135,14 +121,7 @@ def _arrows(ax: Axes, clamp: Clamp, path: Sequence[Poses], shown: Iterable[PartN
         ax.annotate("", way[-1], way[-2], arrowprops=style, zorder=50)
 
 
-def _same_window(axes: list[Axes]) -> None:
-    x0, x1 = min(ax.get_xlim()[0] for ax in axes), max(ax.get_xlim()[1] for ax in axes)
-    y0, y1 = min(ax.get_ylim()[0] for ax in axes), max(ax.get_ylim()[1] for ax in axes)
-    for ax in axes:
-        ax.set_xlim(x0, x1)
-        ax.set_ylim(y0, y1)
-
-
-def _solids(clamp: Clamp) -> dict[PartName, trimesh.Trimesh]:
+def _placed(clamp: Clamp, poses: Poses) -> dict[PartName, PosedMesh]:
     error = max(MIN_MESH_ERROR, _MESH_ERROR * clamp.up_splint.width)
-    return {name: mesh(part, error) for name, part in parts(clamp).items()}
+    solids = parts(clamp)
+    return {name: PosedMesh(mesh(solids[name], error), pose.T(), PART_COLOURS[name]) for name, pose in poses.items()}

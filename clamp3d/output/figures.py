@@ -58,29 +58,19 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: int = 150) -> Path:
     if suffix not in FORMATS:
         raise InputError(f"figure file must end in {', '.join(FORMATS)}, got {path.name!r}")
     with whole_file(path) as temporary:
-        _draw(figure, temporary, suffix[1:], dpi)
+        temporary.write_bytes(picture(figure, suffix[1:], dpi))
     return path
 
 
-def svg(figure: Figure) -> bytes:
-    """The figure as an SVG file."""
-    return picture(figure, "svg")
-
-
-def picture(figure: Figure, format: str) -> bytes:
-    """The figure as a file of a format, for instance "png"."""
-    out = io.BytesIO()
-    _draw(figure, out, format, "figure")
-    return out.getvalue()
-
-
-def _draw(figure: Figure, file: Any, format: str, dpi: Any) -> None:
-    """Save a figure without the time, and with the same names in it each time."""
+def picture(figure: Figure, format: str, dpi: int = 100) -> bytes:
+    """The figure as a file of a format ("svg", "png", "pdf"), without the time: equal figures give equal files."""
     import matplotlib as mpl
 
     metadata: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(format, {})
+    out = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": "clamp3d"}):
-        figure.savefig(file, format=format, dpi=dpi, metadata=metadata)
+        figure.savefig(out, format=format, dpi=dpi, metadata=metadata)
+    return out.getvalue()
 
 
 def section_figure(run: Assembly, waypoint: Waypoint | None = None) -> Figure:
@@ -133,9 +123,10 @@ def contacts_figure(run: Assembly) -> Figure:
     for i, contact in enumerate(contacts):
         _draw_points(overview, [contact], size=5.0)
         if contact.point is not None:
-            side = 1 if i % 2 else -1
             x, y = float(contact.point[0]), -float(contact.point[2])
-            _number(overview, i + 1, (x, y), x + side * 0.09 * run.clamp.up_splint.width)
+            aside = x + (1 if i % 2 else -1) * 0.09 * run.clamp.up_splint.width
+            overview.plot([x, aside], [y, y], color=INK, lw=0.8, zorder=45)
+            numbered(overview, i + 1, (aside, y))
         _enlarge(figure.add_subplot(grid[i // 2, 1 + i % 2]), run, contact, f"{i + 1}  ")
     return figure
 
@@ -170,17 +161,22 @@ def _enlarge(ax: Axes, run: Assembly, contact: Contact, number: str = "") -> Non
     if contact.point is None:
         return
     x, y = float(contact.point[0]), -float(contact.point[2])
-    window = (x - 1.5 * half, y - half), (x + 1.5 * half, y + half)
-    pair = contact.a, contact.b
-    draw_section(ax, run.clamp, run.poses, only=pair, holes=not in_arc, line_width=1.6, window=window)
+    draw_section(ax, run.clamp, run.poses, only=(contact.a, contact.b), holes=not in_arc, line_width=1.6)
     _draw_points(ax, [contact], size=7.0)
     if contact.normal is not None:
         tip = {"arrowstyle": "-|>,head_width=0.2,head_length=0.5", "color": INK, "lw": 1.2, "shrinkB": 0}
         end = x + 0.6 * half * float(contact.normal[0]), y - 0.6 * half * float(contact.normal[2])
         ax.annotate("", end, (x, y), arrowprops=tip, zorder=42)
     ax.set_axis_on()
-    ax.set_xlim(window[0][0], window[1][0])
-    ax.set_ylim(window[1][1], window[0][1])
+    ax.set_xbound(x - 1.5 * half, x + 1.5 * half)
+    ax.set_ybound(y - half, y + half)
+
+
+def numbered(ax: Axes, number: int, at: tuple[float, float], colour: str = INK, offset: float = 0.0) -> None:
+    """A number in a circle at a point, ``offset`` (pt) up and to the right of it."""
+    box = {"boxstyle": "circle,pad=0.25", "fc": "white", "ec": colour, "lw": 1.2}
+    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.5, "fontweight": "bold", "color": INK}
+    ax.annotate(str(number), at, (offset, offset), textcoords="offset points", bbox=box, zorder=46, **style)
 
 
 def title(ax: Axes, text: str, below: str = "") -> None:
@@ -199,12 +195,14 @@ def near(clamp: Clamp, poses: Poses) -> dict[Any, Any]:
 
 def same_scale(axes: Sequence[Axes]) -> None:
     """Give axes of one size windows of one size: equal heights, and equal widths about their own middle."""
-    width = max(ax.get_xlim()[1] - ax.get_xlim()[0] for ax in axes)
-    bottom, top = max(ax.get_ylim()[0] for ax in axes), min(ax.get_ylim()[1] for ax in axes)
+    from matplotlib.transforms import Bbox
+
+    window = Bbox.union([ax.viewLim for ax in axes])
+    width = max(abs(ax.viewLim.width) for ax in axes)
     for ax in axes:
-        middle = 0.5 * sum(ax.get_xlim())
-        ax.set_xlim(middle - width / 2, middle + width / 2)
-        ax.set_ylim(bottom, top)
+        middle = 0.5 * sum(ax.get_xbound())
+        ax.set_xbound(middle - width / 2, middle + width / 2)
+        ax.set_ybound(window.ymin, window.ymax)
 
 
 def _arc_contacts(run: Assembly) -> list[Contact]:
@@ -218,11 +216,3 @@ def _draw_points(ax: Axes, contacts: Sequence[Contact], *, size: float = 6.0) ->
             verdict = Thresholds(contact=CONTACT).verdict(contact.distance)
             style: dict[str, Any] = {"ms": size, "mec": INK, "mew": 0.7, "mfc": VERDICT_COLOURS[verdict]}
             ax.plot([contact.point[0]], [-contact.point[2]], "o", **style, zorder=40, clip_on=False)
-
-
-def _number(ax: Axes, number: int, point: tuple[float, float], x: float) -> None:
-    ax.plot([point[0], x], [point[1]] * 2, color=INK, lw=0.8, zorder=45)
-    box = {"boxstyle": "circle,pad=0.25", "fc": "white", "ec": INK, "lw": 1.0}
-    ax.annotate(
-        str(number), (x, point[1]), ha="center", va="center", fontsize=9, fontweight="bold", zorder=46, bbox=box
-    )

@@ -186,9 +186,9 @@ def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list
 
 
 def _data_address(figure: Figure) -> str:
-    from clamp3d.output.figures import svg
+    from clamp3d.output.figures import picture as drawn
 
-    picture = svg(figure).replace(b"</style>", f"{_DARK}</style>".encode(), 1)
+    picture = drawn(figure, "svg").replace(b"</style>", f"{_DARK}</style>".encode(), 1)
     return "data:image/svg+xml;base64," + base64.b64encode(picture).decode("ascii")
 
 

@@ -16,7 +16,7 @@ from clamp3d.geometry.pose import Array
 from clamp3d.geometry.profile import MIN_MESH_ERROR
 from clamp3d.geometry.shapes import Solid
 from clamp3d.output.common import overlap
-from clamp3d.output.figures import blank
+from clamp3d.output.figures import blank, numbered
 from clamp3d.output.palette import INK, VERDICT_COLOURS
 from clamp3d.output.placed import PosedMesh, place, posed
 from clamp3d.output.view3d import Camera, draw_solids
@@ -37,16 +37,21 @@ _ENLARGED = 0.12
 
 
 def scene_figure(scene: Scene, marks: Sequence[tuple[int, PairResult]] = ()) -> Figure:
-    """All parts of a scene where they stand, with the findings at rest as dots with their numbers."""
+    """All parts of a scene where they stand, with the findings at rest as circles with their numbers.
+
+    The circle of a finding that parts hide is dashed.
+    """
     figure = blank(9.0, 5.6)
     ax = figure.add_subplot()
-    camera = _CAMERAS[0]
     solids = _solids(scene, [part.name for part in scene.parts])
-    draw_solids(ax, list(solids.values()), camera)
+    raster = draw_solids(ax, list(solids.values()), _CAMERAS[0])
     for number, row in marks:
         place = _place(row)
         if place is not None and row.motion is None:
-            _mark(ax, camera.project(place[None])[0], row, str(number))
+            on_top = place + 2.0 / raster.pixels_per_mm * raster.camera.axes()[2]  # a place on a face is not behind it
+            is_seen = raster.seen(raster.pixels(on_top[None]))[0]
+            at = _mark(ax, raster.camera, place, row, "solid" if is_seen else (0, (1.5, 0.8)))
+            numbered(ax, number, at, VERDICT_COLOURS[row.verdict.value], offset=14.0)
     _legend(ax, solids)
     return figure
 
@@ -54,7 +59,7 @@ def scene_figure(scene: Scene, marks: Sequence[tuple[int, PairResult]] = ()) -> 
 def finding_figure(scene: Scene, row: PairResult) -> Figure:
     """The two parts of a finding, where they stand at its moment: whole, and enlarged about the place.
 
-    What the two have in common is drawn in red over them.
+    What the two have in common is red. Parts that hide the place are ghosts.
     """
     figure = blank(9.0, 4.4)
     shown = _solids(_at(scene, row), [row.a, row.b])
@@ -62,28 +67,27 @@ def finding_figure(scene: Scene, row: PairResult) -> Figure:
     common = _common(*solids) if row.distance.upper < 0.0 else None
     place = _place(row)
     if place is None and common is not None:
-        place = common.T[:3, :3] @ common.mesh.center_mass + common.T[:3, 3]
+        place = common.world.mean(axis=0)
     camera = _best_camera(solids, place)
-    outlines = np.vstack([camera.view(s)[:, :2] for s in solids])
-    size = float(np.ptp(outlines, axis=0).max())
-    windows = [(outlines.min(axis=0) - 0.01 * size, outlines.max(axis=0) + 0.01 * size)]
+    is_hidden = place is not None and _hidden(camera, solids, place) > 0
+    inside = [common] if common is not None else [] if is_hidden else None
+    outlines = camera.project(np.vstack([solid.world for solid in solids]))[:, :2]
+    low, high = outlines.min(axis=0), outlines.max(axis=0)
+    size = float((high - low).max())
+    windows = [(low - 0.01 * size, high + 0.01 * size)]
     if place is not None:
-        half = _ENLARGED * size
-        if common is not None:
-            half = max(half, 0.6 * float(np.ptp(camera.view(common)[:, :2], axis=0).max()))
-        at, reach = camera.project(place[None])[0, :2], np.array([1.2, 1.0]) * half
+        extent = 0.0 if common is None else float(np.ptp(camera.project(common.world)[:, :2], axis=0).max())
+        half = np.clip(0.6 * extent, _ENLARGED * size, 2.0 * _ENLARGED * size)
+        at, reach = camera.project(place)[:2], np.array([1.2, 1.0]) * half
         windows.append((at - reach, at + reach))
     axes = figure.subplots(1, len(windows), squeeze=False)[0]
     for ax, window in zip(axes, windows, strict=True):
-        draw_solids(ax, solids, camera, pixels=800, window=window)
-        if common is not None:
-            draw_solids(ax, [common], camera, pixels=800, window=window, zorder=10.0)
+        draw_solids(ax, solids, camera, pixels=800, window=window, inside=inside)
         if place is not None:
-            _mark(ax, camera.project(place[None])[0], row)
+            _mark(ax, camera, place, row)
     if place is not None:
         axes[1].set_axis_on()
-        axes[1].set_xticks([])
-        axes[1].set_yticks([])
+        axes[1].set(xticks=[], yticks=[])
         axes[1].set_title("enlarged", fontsize=8, loc="left", color=INK)
     _legend(axes[0], shown)
     return figure
@@ -153,14 +157,12 @@ def _hidden(camera: Camera, solids: Sequence[PosedMesh], place: Array) -> int:
     return count
 
 
-def _mark(ax: Axes, at: Array, row: PairResult, text: str = "") -> None:
-    colour = VERDICT_COLOURS[row.verdict.value]
-    ax.plot([at[0]], [at[1]], "o", ms=13, mfc="none", mec="white", mew=3.2, zorder=40)
-    ax.plot([at[0]], [at[1]], "o", ms=13, mfc="none", mec=colour, mew=1.8, zorder=41)
-    if text:
-        box = {"boxstyle": "circle,pad=0.2", "fc": "white", "ec": colour, "lw": 1.4}
-        style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, "fontweight": "bold", "zorder": 42}
-        ax.annotate(text, (at[0], at[1]), (14, 14), textcoords="offset points", bbox=box, color=INK, **style)
+def _mark(ax: Axes, camera: Camera, place: Array, row: PairResult, dashes: Any = "solid") -> tuple[float, float]:
+    """A circle about a place; returns where that is on the axes."""
+    x, y, _ = camera.project(place).tolist()
+    for colour, width in (("white", 3.2), (VERDICT_COLOURS[row.verdict.value], 1.8)):
+        ax.scatter([x], [y], s=170, facecolors="none", edgecolors=colour, lw=width, linestyles=[dashes], zorder=41)
+    return x, y
 
 
 def _legend(ax: Axes, solids: dict[str, PosedMesh]) -> None:

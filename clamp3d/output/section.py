@@ -1,19 +1,18 @@
-"""The section through the middle of the clamp, to scale, arcs as arcs: parts, names and dimensions on one axes.
+"""The section through the middle of the clamp, to scale: parts, names and dimensions on one matplotlib axes.
 
 Everything is drawn in the paper's section frame (x right, y down, mm). The splints, the saddle and the wires are cut;
-bolt and nut are shown whole, as drawing practice has it (ISO 128). Needs matplotlib; nothing of pyplot is used.
+bolt and nut are shown whole, as drawing practice has it (ISO 128).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
+from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import SectionPose
@@ -23,37 +22,24 @@ from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS, darker, rgb
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.path import Path as MplPath
+    from matplotlib.patches import PathPatch
 
 Poses = Mapping[PartName, SectionPose]
 
-_HATCH: dict[PartName, str] = {"P1": "////", "P2": "\\\\\\\\", "P3": "////"}
 WIRES: tuple[PartName, ...] = ("P6", "P7")
+ARROW: dict[str, Any] = {
+    "arrowstyle": "-|>,head_width=0.18,head_length=0.45",
+    "color": DIMENSION,
+    "lw": 0.8,
+    "shrinkA": 0.0,
+    "shrinkB": 0.0,
+}
+_HATCH: dict[PartName, str] = {"P1": "////", "P2": "\\\\\\\\", "P3": "////"}
 _LINE: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
-_NUMBER: dict[str, Any] = {"color": DIMENSION, "fontsize": 9, "zorder": 26}
-_HEAD = "-|>,head_width=0.18,head_length=0.45"
-ARROW: dict[str, Any] = {"arrowstyle": _HEAD, "color": DIMENSION, "lw": 0.8, "shrinkA": 0.0, "shrinkB": 0.0}
+_NUMBER: dict[str, Any] = {"color": DIMENSION, "fontsize": 9, "zorder": 26, "textcoords": "offset points"}
 _ORDER: tuple[PartName, ...] = ("P6", "P7", "P1", "P2", "P3", "P4", "P5")
-
-
-def arc_path(profile: Profile) -> MplPath:
-    """The outline as a closed path; each arc as cubic curves of at most 10 degrees, within 1e-8 radii of the arc."""
-    from matplotlib.path import Path
-
-    vertices: list[ArrayLike] = [profile.edges[0].start]
-    codes = [int(Path.MOVETO)]
-    for edge in profile.edges:
-        if isinstance(edge, Arc):
-            low, high = sorted((math.degrees(edge.start_angle), math.degrees(edge.end_angle)))
-            curve = np.asarray(Path.arc(low, high, max(1, math.ceil((high - low) / 10.0))).vertices, dtype=float)
-            vertices += [*(edge.radius * (curve if edge.sweep > 0.0 else curve[::-1])[1:] + edge.centre)]
-            codes += [int(Path.CURVE4)] * (len(curve) - 1)
-        else:
-            vertices.append(edge.end)
-            codes.append(int(Path.LINETO))
-    vertices.append(vertices[0])
-    codes.append(int(Path.CLOSEPOLY))
-    return Path(np.array(vertices), codes)
+_CHORD_ERROR = 1e-3
+"""mm by which a drawn outline may leave its arc: far below a pixel, enlarged too."""
 
 
 def draw_section(
@@ -61,25 +47,92 @@ def draw_section(
     clamp: Clamp,
     poses: Poses,
     *,
-    only: Iterable[PartName] = PARTS,
+    only: Collection[PartName] = PARTS,
     holes: bool = True,
     line_width: float = 0.9,
-    window: tuple[Point, Point] | None = None,
 ) -> None:
-    """Draw the parts of ``only`` at ``poses``; without ``holes`` it is the section beside the bolt.
-
-    ``window`` is the part of the section ((x, y) least, largest) that the axes show, if not all of it.
-    """
-    shown, bodies = set(only), parts(clamp)
+    """Draw the parts of ``only`` at ``poses``; without ``holes`` it is the section beside the bolt."""
     ax.set_aspect("equal")
     ax.set_axis_off()
     ax.margins(0.02)
     if not ax.yaxis_inverted():
         ax.invert_yaxis()
-    for i, name in enumerate(_ORDER):
-        if name in shown and name in poses:
-            _draw_part(ax, bodies[name], poses[name], 2 + i, holes, line_width, window)
+    bodies = parts(clamp)
+    for zorder, name in enumerate(_ORDER, 2):
+        if name in only and name in poses:
+            _draw_part(ax, bodies[name], poses[name], holes, {"lw": line_width, "zorder": zorder})
     ax.autoscale_view()
+
+
+def _draw_part(ax: Axes, part: Solid, pose: SectionPose, holes: bool, style: dict[str, Any]) -> None:
+    """What is cut is hatched; the far wall of a hole is pale behind it."""
+    colour = PART_COLOURS[part.name]
+    style = style | {"ec": darker(colour, 0.45)}
+    pale = "#" + "".join(f"{round(255 - 0.4 * (255 - channel)):02X}" for channel in rgb(colour))
+    for body in part.bodies:
+        whole = _polygon(body)
+        cut = whole.difference(_drilled(part)) if holes and body.axis == "Y" else whole
+        ax.add_patch(_patch(whole, pose, fc=pale, **style))
+        patch = _patch(cut, pose, fc=colour, hatch=_HATCH.get(part.name), hatch_linewidth=0.45, **style)
+        patch.set_hatchcolor(darker(colour, 0.75))
+        ax.add_patch(patch)
+        for u in () if body.axis == "Y" else _front_edges(body.profile):
+            ends = np.array([pose.point(u, -body.end), pose.point(u, -body.start)])
+            ax.plot(*ends.T, color=style["ec"], lw=0.6 * style["lw"], zorder=style["zorder"])
+
+
+def _polygon(body: Extrusion) -> Any:
+    import shapely
+
+    return shapely.Polygon(outline(body).polygon(_CHORD_ERROR))
+
+
+def _drilled(part: Solid) -> Any:
+    """Where the section cuts the holes of a part, which run down it."""
+    import shapely
+
+    spans = [(hole.profile.bounds, hole) for hole in part.holes]
+    return shapely.union_all([shapely.box(u0, -h.end, u1, -h.start) for ((u0, _), (u1, _)), h in spans])
+
+
+def _patch(region: Any, pose: SectionPose, **style: Any) -> PathPatch:
+    """A region (u, v) of a part as a patch of the axes."""
+    import shapely
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    c, s = math.cos(pose.angle), math.sin(pose.angle)
+    region = shapely.affinity.affine_transform(region, [c, s, -s, c, pose.x, pose.y])
+    rings = [ring for polygon in shapely.get_parts(region) for ring in (polygon.exterior, *polygon.interiors)]
+    return PathPatch(Path.make_compound_path(*(Path(ring.coords, closed=True) for ring in rings)), **style)
+
+
+def outline(body: Extrusion) -> Profile:
+    """Outline in (u, v) of a body as it is seen along the wires."""
+    if body.axis == "Y":
+        return body.profile
+    (a0, _), (a1, _) = body.profile.bounds
+    return Profile.rectangle(a1 - a0, body.length, (0.5 * (a0 + a1), -0.5 * (body.start + body.end)))
+
+
+def _front_edges(profile: Profile) -> list[float]:
+    """Where corners of a body drawn along Z show on its front between its two silhouette lines."""
+    (a0, _), (a1, _) = profile.bounds
+    corners = [edge.start for edge in profile.edges if not isinstance(edge, Arc)]
+    return [a for a, b in corners if b < 0.0 and a0 + 1e-9 < a < a1 - 1e-9]
+
+
+def part_anchor(clamp: Clamp, name: PartName, *, right: bool = True) -> tuple[float, float]:
+    """A point (u, v) in the part's material as the section shows it, for its name; ``right``: near its right end."""
+    import shapely
+
+    part = parts(clamp)[name]
+    area = shapely.union_all([_polygon(body) for body in part.bodies]).difference(_drilled(part))
+    if right and name not in WIRES:
+        u0, v0, u1, v1 = area.bounds
+        area = shapely.clip_by_rect(area, u1 - 0.15 * (u1 - u0), v0, u1, v1)
+    point = area.representative_point()
+    return float(point.x), float(point.y)
 
 
 def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
@@ -88,21 +141,37 @@ def draw_labels(ax: Axes, clamp: Clamp, poses: Poses) -> None:
     points = {name: poses[name].point(*part_anchor(clamp, name)) for name in PARTS if name in poses}
     (left, low), (edge, high) = ax.dataLim.get_points()
     column = edge + 0.27 * (edge - left)
-    order = sorted(points, key=lambda name: points[name][1])
-    heights = spread([points[name][1] for name in order], min((high - low) / len(order), 0.1 * (high - low)))
-    bodies, wires = parts(clamp), {"P6": clamp.line, "P7": clamp.jumper}
-    for name, y in zip(order, heights, strict=True):
-        title = bodies[name].title
-        if name in wires:
-            title += f"\n{wires[name].label}"
-        else:
-            x0, y0 = points[name]
-            ax.plot([x0, column - 4.0], [y0, y], color=INK, lw=0.5, zorder=30)
-            ax.plot([x0], [y0], ".", color=INK, ms=3.5, zorder=30)
-        balloon(ax, name, column, y, size=8.0)
-        ax.annotate(title, (column, y), (13, 0), textcoords="offset points", va="center", fontsize=8, color=INK)
-    ax.update_datalim([(column + 0.3 * (edge - left), heights[0]), (column, heights[-1])])
+    label_column(ax, clamp, points, column, min((high - low) / len(points), 0.1 * (high - low)), without_line=WIRES)
+    ax.update_datalim([(column + 0.3 * (edge - left), low)])
     ax.autoscale_view()
+
+
+def label_column(
+    ax: Axes,
+    clamp: Clamp,
+    points: Mapping[PartName, Point],
+    column: float,
+    spacing: float,
+    without_line: Collection[PartName] = (),
+) -> None:
+    """Names of the parts in a column of balloons at x = ``column``, each with a line to its point."""
+    order = sorted(points, key=lambda name: points[name][1])
+    heights = spread([points[name][1] for name in order], spacing)
+    for name, y in zip(order, heights, strict=True):
+        if name not in without_line:
+            x0, y0 = points[name]
+            ax.plot([x0, column], [y0, y], color=INK, lw=0.5, marker=".", markevery=[0], ms=3.5, zorder=30)
+        balloon(ax, name, column, y, size=8.0)
+        ax.annotate(
+            label(clamp, name), (column, y), (13, 0), textcoords="offset points", va="center", fontsize=8, color=INK
+        )
+        ax.update_datalim([(column, y)])
+
+
+def label(clamp: Clamp, name: PartName) -> str:
+    """What a part is; of a wire, which one."""
+    wires = {"P6": clamp.line, "P7": clamp.jumper}
+    return f"{TITLES[name]}\n{wires[name].label}" if name in wires else TITLES[name]
 
 
 def label_wires(ax: Axes, poses: Poses) -> None:
@@ -116,6 +185,18 @@ def balloon(ax: Axes, name: PartName, x: float, y: float, *, size: float) -> Non
     """The name of a part in a circle of its colour."""
     box = {"boxstyle": "circle,pad=0.2", "fc": PART_COLOURS[name], "ec": INK, "lw": 0.7}
     ax.annotate(name, (x, y), ha="center", va="center", fontsize=size, fontweight="bold", zorder=31, bbox=box)
+
+
+def spread(values: list[float], spacing: float) -> list[float]:
+    """The ascending ``values`` moved apart to at least ``spacing``, in all as little as can be (least squares).
+
+    >>> spread([0.0, 1.0, 10.0], 3.0)
+    [-1.0, 2.0, 10.0]
+    """
+    from scipy.optimize import isotonic_regression
+
+    even = spacing * np.arange(len(values))
+    return (isotonic_regression(np.array(values) - even).x + even).tolist()  # type: ignore[no-any-return]
 
 
 def draw_dimensions(ax: Axes, clamp: Clamp, poses: Poses, *, sides: Iterable[int] = (-1, 1)) -> None:
@@ -152,115 +233,22 @@ def _dimension(ax: Axes, above: Point, below: Point, x: float, side: int) -> Non
     for tip, tail in ((top, top - reach), (bottom, bottom + reach)):
         ax.annotate("", (x, tip), (x, tail), arrowprops=ARROW)
     at = (x + 2.0 * side, 0.5 * (top + bottom))
-    text, align = f"{below[1] - above[1]:.3f}", "right" if side < 0 else "left"
-    ax.annotate(text, at, (3 * side, 0), textcoords="offset points", ha=align, va="center", **_NUMBER)
-
-
-def part_anchor(clamp: Clamp, name: PartName, *, right: bool = True) -> tuple[float, float]:
-    """A point (u, v) in the part's material as the section shows it, for its name; ``right``: near its right end."""
-    import shapely
-
-    part = parts(clamp)[name]
-    fine = 0.01 * clamp.bolt.diameter
-    area = shapely.union_all([shapely.Polygon(outline(body).polygon(fine)) for body in part.bodies])
-    for hole in part.holes:
-        (u0, _), (u1, _) = hole.profile.bounds
-        area = area.difference(shapely.box(u0, -hole.end, u1, -hole.start))
-    u0, v0, u1, v1 = area.bounds
-    if right and name not in WIRES:
-        area = shapely.clip_by_rect(area, u1 - 0.15 * (u1 - u0), v0, u1, v1)
-    point = area.representative_point()
-    return float(point.x), float(point.y)
+    align = "right" if side < 0 else "left"
+    ax.annotate(f"{below[1] - above[1]:.3f}", at, (3 * side, 0), ha=align, va="center", **_NUMBER)
 
 
 def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
+    """The angle between the down splint and the horizontal, at its lower corner."""
     down = clamp.down_splint
-    degrees = math.degrees(pose.angle)
     inward = 1.0 if pose.angle >= 0.0 else -1.0  # the lower corner is on the left if the tilt is positive
     corner = pose.point(-inward * down.width / 2, down.underside_depth)
-    reach = inward * 0.19 * down.width
-    if abs(degrees) < 5e-3:
-        ax.annotate("parallel", corner, (0, -11), textcoords="offset points", va="center", **_NUMBER)
+    if abs(math.degrees(pose.angle)) < 5e-3:
+        ax.annotate("parallel", corner, (0, -11), va="center", **_NUMBER)
         return
-    ax.plot([corner[0] - 0.06 * reach, corner[0] + reach * 1.15], [corner[1]] * 2, ls=(0, (8, 2, 1, 2)), **_LINE)
+    reach = inward * 0.19 * down.width
+    ax.plot(corner[0] + reach * np.array([-0.06, 1.15]), [corner[1]] * 2, ls=(0, (8, 2, 1, 2)), **_LINE)
     t = np.linspace(0.0, pose.angle, 30)
-    xs, ys = corner[0] + reach * np.cos(t), corner[1] - reach * np.sin(t)
-    ax.plot(xs, ys, **_LINE)
-    for tip, tail in ((0, 3), (-1, -4)):
-        ax.annotate("", (xs[tip], ys[tip]), (xs[tail], ys[tail]), arrowprops=ARROW)
-    at = (corner[0] + 0.45 * reach, max(corner[1], float(ys.max())))
-    text = f"{abs(degrees):.2f}\N{DEGREE SIGN}"
-    ax.annotate(text, at, (0, -10), textcoords="offset points", ha="center", va="center", **_NUMBER)
-
-
-def _draw_part(
-    ax: Axes,
-    part: Solid,
-    pose: SectionPose,
-    z: int,
-    holes: bool,
-    line_width: float,
-    window: tuple[Point, Point] | None,
-) -> None:
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
-    from matplotlib.transforms import Affine2D, Bbox
-
-    colour = PART_COLOURS[part.name]
-    edge = darker(colour, 0.45)
-    c, s = math.cos(pose.angle), math.sin(pose.angle)
-    place = Affine2D(np.array([[c, s, pose.x], [-s, c, pose.y], [0.0, 0.0, 1.0]]))
-    where = place + ax.transData
-    style: dict[str, Any] = {"lw": line_width, "ec": edge, "zorder": z}
-    for body in part.bodies:
-        path = arc_path(outline(body))
-        patch = PathPatch(path, fc=colour, hatch=_HATCH.get(part.name), hatch_linewidth=0.45, transform=where, **style)
-        patch.set_hatchcolor(darker(colour, 0.75))
-        ax.add_patch(patch)
-        ax.update_datalim(place.transform(path.vertices))
-        if body.axis == "Y":
-            for hole in part.holes if holes else ():  # its far wall, seen behind the cut
-                (u0, _), (u1, _) = hole.profile.bounds
-                corners = [(u0, -hole.end), (u1, -hole.end), (u1, -hole.start), (u0, -hole.start), (u0, -hole.end)]
-                wall = Path(place.transform(corners), closed=True)
-                if window is not None:  # SVG clips by the part's outline or by the axes, not by both
-                    wall = wall.clip_to_bbox(Bbox(np.array(window)))
-                if np.size(wall.vertices):
-                    wall_patch = PathPatch(wall, fc=_pale(colour), transform=ax.transData, **style)
-                    wall_patch.set_clip_path(patch)
-                    ax.add_patch(wall_patch)
-            ax.add_patch(PathPatch(path, fc="none", transform=where, **style))
-        else:
-            for u in _front_edges(body.profile):
-                ax.plot([u, u], [-body.end, -body.start], color=edge, lw=0.6 * line_width, transform=where, zorder=z)
-
-
-def outline(body: Extrusion) -> Profile:
-    """Outline in (u, v) of a body as it is seen along the wires."""
-    if body.axis == "Y":
-        return body.profile
-    (a0, _), (a1, _) = body.profile.bounds
-    return Profile.rectangle(a1 - a0, body.length, (0.5 * (a0 + a1), -0.5 * (body.start + body.end)))
-
-
-def _front_edges(profile: Profile) -> list[float]:
-    """Where corners of a body drawn along Z show on its front between its two silhouette lines."""
-    (a0, _), (a1, _) = profile.bounds
-    corners = [edge.start for edge in profile.edges if not isinstance(edge, Arc)]
-    return [a for a, b in corners if b < 0.0 and a0 + 1e-9 < a < a1 - 1e-9]
-
-
-def _pale(colour: str) -> str:
-    return "#" + "".join(f"{round(255 - 0.4 * (255 - channel)):02X}" for channel in rgb(colour))
-
-
-def spread(values: list[float], spacing: float) -> list[float]:
-    """The ascending ``values`` moved apart to at least ``spacing``, in all as little as can be (least squares).
-
-    >>> spread([0.0, 1.0, 10.0], 3.0)
-    [-1.0, 2.0, 10.0]
-    """
-    from scipy.optimize import isotonic_regression
-
-    even = spacing * np.arange(len(values))
-    return (isotonic_regression(np.array(values) - even).x + even).tolist()  # type: ignore[no-any-return]
+    ax.plot(corner[0] + reach * np.cos(t), corner[1] - reach * np.sin(t), **_LINE)
+    at = (corner[0] + 0.45 * reach, max(corner[1], corner[1] - reach * math.sin(pose.angle)))
+    text = f"{abs(math.degrees(pose.angle)):.2f}\N{DEGREE SIGN}"
+    ax.annotate(text, at, (0, -10), ha="center", va="center", **_NUMBER)

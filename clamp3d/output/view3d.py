@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 _CREASE = math.radians(25.0)
 """Edges sharper than this are drawn; below it the facets stand for one round surface."""
+_GHOST = 0.35
+"""How opaque a part is that hides what is to be seen."""
 _LIGHT = np.array([-0.35, 0.62, 0.70])
 
 
@@ -43,9 +46,89 @@ class Camera:
         """World points (n, 3) to (right, up, depth towards the viewer) (n, 3) in mm."""
         return points @ self.axes().T
 
-    def view(self, solid: PosedMesh) -> Array:
-        """The solid's vertices as `project` gives them."""
-        return self.project(solid.world)
+
+@dataclass(frozen=True, eq=False)
+class Raster:
+    """A window of a view in pixels, (rows, columns) from its lower left corner ``low`` (2,) mm.
+
+    ``depth`` is that of the nearest face towards the viewer, mm, -inf where there is none; ``image`` is RGBA.
+    """
+
+    camera: Camera
+    low: Array
+    pixels_per_mm: float
+    depth: Array
+    image: Array
+
+    @classmethod
+    def of(cls, camera: Camera, low: Array, high: Array, pixels_per_mm: float) -> Raster:
+        """An empty one that reaches at least to ``high`` (2,) mm."""
+        columns, rows = np.ceil((high - low) * pixels_per_mm).astype(int)
+        return cls(camera, low, pixels_per_mm, np.full((rows, columns), -np.inf), np.zeros((rows, columns, 4)))
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top in mm."""
+        width, height = np.array(self.depth.shape[::-1]) / self.pixels_per_mm
+        return float(self.low[0]), float(self.low[0] + width), float(self.low[1]), float(self.low[1] + height)
+
+    def pixels(self, points: Array) -> Array:
+        """World points (..., 3) as (column, row, depth)."""
+        pixels: Array = self.camera.project(points) - [*self.low, 0.0]
+        return pixels * [self.pixels_per_mm, self.pixels_per_mm, 1.0]
+
+    def paint(self, solid: PosedMesh) -> None:
+        """Paint the faces of a solid that face the viewer, where they are nearer than what is there."""
+        normals = self.camera.project(solid.mesh.face_normals @ solid.T[:3, :3].T)
+        shades = np.array(rgb(solid.colour)) / 255.0 * (0.62 + 0.43 * np.maximum(0.0, normals @ _LIGHT))[:, None]
+        corners = self.pixels(solid.world)[solid.mesh.faces]
+        size = np.array(self.depth.shape[::-1])
+        inside = (corners[..., :2].max(1) >= 0.0).all(1) & (corners[..., :2].min(1) <= size).all(1)
+        for i in np.flatnonzero((normals[:, 2] > 1e-9) & inside):
+            self._fill(corners[i], np.append(np.minimum(shades[i], 1.0), 1.0))
+
+    def _fill(self, triangle: Array, colour: Array) -> None:
+        (x0, y0, z0), (x1, y1, z1), (x2, y2, z2) = triangle
+        twice = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+        if abs(twice) < 1e-9:
+            return
+        left, bottom = np.maximum(np.floor(triangle[:, :2].min(0)), 0).astype(int)
+        right, top = np.ceil(triangle[:, :2].max(0)).astype(int) + 1
+        window = self.depth[bottom:top, left:right]
+        y, x = np.ogrid[bottom : bottom + window.shape[0], left : left + window.shape[1]]
+        x, y = x + 0.5, y + 0.5
+        b = ((x - x0) * (y2 - y0) - (x2 - x0) * (y - y0)) / twice
+        c = ((x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)) / twice
+        z = z0 + b * (z1 - z0) + c * (z2 - z0)
+        nearer = (b >= -1e-6) & (c >= -1e-6) & (b + c <= 1.0 + 1e-6) & (z > window)
+        window[nearer] = z[nearer]
+        self.image[bottom:top, left:right][nearer] = colour
+
+    def seen(self, pixels: Array) -> NDArray[np.bool_]:
+        """Which of these (n, 3) pixels with their depth nothing hides."""
+        rows, columns = np.floor(pixels[:, 1::-1]).astype(int).T
+        height, width = self.depth.shape
+        nearest = self._farthest_near[rows.clip(0, height - 1), columns.clip(0, width - 1)]
+        return np.asarray(pixels[:, 2] >= nearest - 0.25 / self.pixels_per_mm)
+
+    @cached_property
+    def _farthest_near(self) -> Array:
+        # An edge lies between pixels of its own two faces: seen if it is not behind all the pixels around it.
+        from scipy.ndimage import minimum_filter
+
+        return np.asarray(minimum_filter(self.depth, 3, mode="nearest"))
+
+    def visible_edges(self, solid: PosedMesh) -> list[Array]:
+        """The stretches (2, 2) of creases and outlines that nothing hides, in mm."""
+        view = self.pixels(solid.world)
+        stretches: list[Array] = []
+        for a, b in view[_edges(solid, self.camera)]:
+            n = max(2, math.ceil(float(np.hypot(*(b - a)[:2]))))
+            points = a + np.linspace(0.0, 1.0, n + 1)[:, None] * (b - a)
+            change = np.diff(np.concatenate([[False], self.seen(points), [False]]).astype(int))
+            starts, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1) - 1
+            stretches += [points[[s, e], :2] for s, e in zip(starts, ends, strict=True) if e > s]
+        return [self.low + stretch / self.pixels_per_mm for stretch in stretches]
 
 
 def draw_solids(
@@ -55,63 +138,36 @@ def draw_solids(
     *,
     pixels: int = 1100,
     window: tuple[Array, Array] | None = None,
-    zorder: float = 1.0,
-) -> None:
+    inside: Sequence[PosedMesh] | None = None,
+) -> Raster:
     """Draw the solids with shading and their visible edges, ``pixels`` along the longer side; axes in mm.
 
-    ``window`` ((2,) least, (2,) largest, mm to the right and up) is what to show, if not all.
+    ``window`` ((2,) least, (2,) largest, mm to the right and up) is what to show, if not all. With solids
+    ``inside`` to be seen the others are ghosts: pale, each with its own visible edges. Returns what hides what.
     """
     from matplotlib.collections import LineCollection
 
-    views = [camera.view(s) for s in solids]
     if window is None:
-        low, high = np.min([v.min(0) for v in views], axis=0)[:2], np.max([v.max(0) for v in views], axis=0)[:2]
-        margin = 5.0 * float((high - low).max()) / pixels
-        low, high = low - margin, high + margin
-    else:
-        low, high = window
-        margin = 0.0
-    pixels_per_mm = pixels / float((high - low).max() - 2.0 * margin)
-    size = np.ceil((high - low) * pixels_per_mm).astype(int)
-    high = low + size / pixels_per_mm
-    depth = np.full((size[1], size[0]), -np.inf)
-    image = np.zeros((size[1], size[0], 4))
-    for solid, view in zip(solids, views, strict=True):
-        normals = solid.mesh.face_normals @ solid.T[:3, :3].T @ camera.axes().T
-        shades = np.minimum(
-            np.array(rgb(solid.colour)) / 255.0 * (0.62 + 0.43 * np.maximum(0.0, normals @ _LIGHT))[:, None], 1.0
-        )
-        corners = ((view - [*low, 0.0]) * [pixels_per_mm, pixels_per_mm, 1.0])[solid.mesh.faces]
-        inside = (corners[..., :2].max(1) >= 0.0).all(1) & (corners[..., :2].min(1) <= size).all(1)
-        for i in np.flatnonzero((normals[:, 2] > 1e-9) & inside):
-            _fill(depth, image, corners[i], np.append(shades[i], 1.0))
+        views = np.concatenate([camera.project(solid.world)[:, :2] for solid in solids])
+        margin = 5.0 * float(np.ptp(views, axis=0).max()) / pixels
+        window = views.min(0) - margin, views.max(0) + margin
     ax.set_aspect("equal")
     ax.set_axis_off()
-    extent = (low[0], high[0], low[1], high[1])
-    ax.imshow(image, extent=extent, origin="lower", interpolation="antialiased", zorder=zorder)
-    for solid, view in zip(solids, views, strict=True):
-        lines = _visible(_edges(solid, camera), view, depth, low, pixels_per_mm)
-        ax.add_collection(LineCollection(lines, colors=darker(solid.colour, 0.4), linewidths=0.6, zorder=zorder + 1))
-    ax.set_xlim(low[0], high[0])
-    ax.set_ylim(low[1], high[1])
-
-
-def _fill(depth: Array, image: Array, triangle: Array, colour: Array) -> None:
-    """Paint a triangle (3, 3) of pixel coordinates and depth where it is nearer than what is there."""
-    (x0, y0, z0), (x1, y1, z1), (x2, y2, z2) = triangle
-    twice = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
-    if abs(twice) < 1e-9:
-        return
-    left, right = max(0, math.floor(min(x0, x1, x2))), min(depth.shape[1], math.ceil(max(x0, x1, x2)) + 1)
-    bottom, top = max(0, math.floor(min(y0, y1, y2))), min(depth.shape[0], math.ceil(max(y0, y1, y2)) + 1)
-    x, y = np.arange(left, right) + 0.5, (np.arange(bottom, top) + 0.5)[:, None]
-    b = ((x - x0) * (y2 - y0) - (x2 - x0) * (y - y0)) / twice
-    c = ((x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)) / twice
-    z = z0 + b * (z1 - z0) + c * (z2 - z0)
-    window = depth[bottom:top, left:right]
-    nearer = (b >= -1e-6) & (c >= -1e-6) & (b + c <= 1.0 + 1e-6) & (z > window)
-    window[nearer] = z[nearer]
-    image[bottom:top, left:right][nearer] = colour
+    layers = [solids] if inside is None else [*([solid] for solid in solids), inside]
+    for zorder, layer in enumerate(layers):
+        raster = Raster.of(camera, *window, pixels / float((window[1] - window[0]).max()))
+        alpha = 1.0 if inside is None or layer is inside else _GHOST
+        for solid in layer:
+            raster.paint(solid)
+        ax.imshow(
+            raster.image, extent=raster.extent, origin="lower", interpolation="antialiased", alpha=alpha, zorder=zorder
+        )
+        for solid in layer:
+            lines, colour = raster.visible_edges(solid), darker(solid.colour, 0.4)
+            ax.add_collection(LineCollection(lines, colors=colour, linewidths=0.6, zorder=zorder + 0.5))
+    ax.set_xlim(*raster.extent[:2])
+    ax.set_ylim(*raster.extent[2:])
+    return raster
 
 
 def _edges(solid: PosedMesh, camera: Camera) -> NDArray[np.int64]:
@@ -122,24 +178,3 @@ def _edges(solid: PosedMesh, camera: Camera) -> NDArray[np.int64]:
     crease = (mesh.face_adjacency_angles > _CREASE) & front.any(1)
     outline = front[:, 0] != front[:, 1]
     return np.asarray(mesh.face_adjacency_edges[crease | outline], dtype=np.int64)
-
-
-def _visible(edges: NDArray[np.int64], view: Array, depth: Array, low: Array, pixels_per_mm: float) -> list[Array]:
-    """The stretches (2, 2) of the edges that nothing hides, in mm."""
-    from scipy.ndimage import minimum_filter
-
-    # An edge lies between pixels of its own two faces: seen if it is not behind all the pixels around it.
-    farthest = minimum_filter(depth, 3, mode="nearest")
-    stretches: list[Array] = []
-    for i, j in edges:
-        a, b = view[i], view[j]
-        n = max(2, math.ceil(float(np.hypot(*(b - a)[:2])) * pixels_per_mm))
-        points = a + np.linspace(0.0, 1.0, n + 1)[:, None] * (b - a)
-        column, row = (((points[:, :2] - low) * pixels_per_mm).astype(int)).T
-        around = farthest[np.clip(row, 0, depth.shape[0] - 1), np.clip(column, 0, depth.shape[1] - 1)]
-        seen = points[:, 2] >= around - 0.25 / pixels_per_mm
-        seen &= (column >= 0) & (row >= 0) & (column <= depth.shape[1]) & (row <= depth.shape[0])
-        starts = np.flatnonzero(seen & ~np.append(False, seen[:-1]))
-        ends = np.flatnonzero(seen & ~np.append(seen[1:], False))
-        stretches += [points[[s, e], :2] for s, e in zip(starts, ends, strict=True) if e > s]
-    return stretches

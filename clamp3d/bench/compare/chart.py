@@ -17,7 +17,7 @@ from clamp3d.bench.compare.measure import Measured
 from clamp3d.bench.compare.report import comparison_to_text
 from clamp3d.bench.compare.run import Comparison, pareto
 from clamp3d.bench.compare.scene import chord_error
-from clamp3d.output.figures import save_figure, svg
+from clamp3d.output.figures import picture, save_figure
 from clamp3d.output.files import write_text
 from clamp3d.output.pages import render
 from clamp3d.output.palette import INK
@@ -232,7 +232,7 @@ def _note(comparison: Comparison, command: str) -> str:
 
 def _page(comparison: Comparison, figure: Figure) -> str:
     """One HTML page without anything outside itself."""
-    drawn = svg(figure).decode("utf-8")
+    drawn = picture(figure, "svg").decode("utf-8")
     return render(
         "compare.html", "clamp3d.bench", svg=drawn[drawn.index("<svg") :], tables=comparison_to_text(comparison)
     )
