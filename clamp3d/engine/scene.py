@@ -15,6 +15,7 @@ from clamp3d.checks import instance, items, shown, text
 from clamp3d.engine.allowed import Allowances, Allowed
 from clamp3d.engine.verdict import Thresholds
 from clamp3d.errors import InputError
+from clamp3d.files.bodies import Component
 from clamp3d.geometry.motion import Motion, scene_pose
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import AnyShape, Shape, as_shape
@@ -28,12 +29,13 @@ class Part:
     """A part and where it stands: ``T_world`` (4, 4), the origin by default, kept as a copy that cannot be written to.
 
     Raises InputError for an empty name or one with a space or one of ``: , * ?``, for what is no shape, and for a pose
-    that is not rigid.
+    that is not rigid. ``component`` is its place in the product tree of the file that it was read from.
     """
 
     name: str
     shape: Shape
     T_world: Array = field(default_factory=lambda: np.eye(4))
+    component: Component | None = None
 
     def __post_init__(self) -> None:
         text("name of a part", self.name)
@@ -46,7 +48,7 @@ class Part:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Made again: an array that was pickled could be written to.
-        return type(self), (self.name, self.shape, self.T_world)
+        return type(self), (self.name, self.shape, self.T_world, self.component)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -198,7 +200,7 @@ class Scene:
         for name in poses:
             self.index(name)
         parts = tuple(
-            Part(p.name, p.shape, poses[p.name]) if p.name in poses else p  # type: ignore[arg-type]
+            replace(p, T_world=poses[p.name]) if p.name in poses else p  # type: ignore[arg-type]
             for p in self.parts
         )
         return replace(self, parts=parts)

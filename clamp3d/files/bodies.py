@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 import re
 from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +20,42 @@ _NAMED = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Component:
+    """A node of a file's product tree: a part or an assembly of parts, at one of its places.
+
+    Attributes
+    ----------
+    name, instance : str
+        Names of the product, and of this place of it.
+    T : ndarray (4, 4)
+        Its pose in the world of the file, mm.
+    assembly : Component or None
+        The assembly that holds it.
+    colour : str or None
+        Colour "#RRGGBB" that the file states for it, or for what holds it.
+    face_colours : dict
+        Colours of single faces by their number in the explorer's order, from 0.
+    """
+
+    name: str
+    instance: str
+    T: Array
+    assembly: Component | None = None
+    colour: str | None = None
+    face_colours: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """A shape under the name that its file gives it, placed by ``T`` (4, 4); instances share one shape."""
+    """A shape under the name that its file gives it, placed by ``T`` (4, 4); instances share one shape.
+
+    ``component`` is its place in the product tree, where the file has one.
+    """
 
     name: str
     shape: Shape
     T: Array
+    component: Component | None = None
 
     @property
     def mesh(self) -> Mesh:

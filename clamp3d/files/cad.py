@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.bodies import Reading
+from clamp3d.files.bodies import Component, Reading
 from clamp3d.files.open_cascade import explore, volume_of
 from clamp3d.files.placing import Placer
 from clamp3d.files.solid import BrepSolid
@@ -18,16 +18,32 @@ from clamp3d.geometry.mesh import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Node:
-    """A part of a tree: its ``name``, its place ``T`` (4, 4) in the node above, and a TopoDS_Shape or nodes ``below``.
+    """A part or an assembly in a tree.
 
-    ``named`` holds names of single solids of the shape, by `Key`.
+    Attributes
+    ----------
+    name, instance : str
+        Names of its product, and of this place of it.
+    T : ndarray (4, 4)
+        Its place in the node above.
+    shape : TopoDS_Shape or None
+        The shape of a part.
+    below : iterable of Node
+        What an assembly holds.
+    colour : str or None
+        Colour "#RRGGBB" at this place alone.
+    names, colours : dict
+        Names of single solids of the shape; colours of the shape, of its solids and of its faces.
     """
 
     name: str
     T: Array
     shape: Any = None
     below: Iterable[Node] = ()
-    named: Mapping[Key, str] = field(default_factory=dict)
+    instance: str = ""
+    colour: str | None = None
+    names: Mapping[Key, str] = field(default_factory=dict)
+    colours: Mapping[Key, str] = field(default_factory=dict)
 
 
 class Key:
@@ -61,20 +77,29 @@ def bodies_of(roots: Iterable[Node]) -> tuple[Reading, int]:
     collector = Placer()
     shapes: dict[Key, BrepSolid | str] = {}
     loose = 0
-    for node, T in _leaves(roots, np.eye(4)):
+    for node, component in _leaves(roots, None):
         solids = list(explore(node.shape, "SOLID"))
         for solid in solids:
             key = Key(solid)
-            name = node.named.get(key) or node.name
+            name = node.names.get(key) or node.name
             if key not in shapes:
                 shapes[key] = _shape(key.shape, name)
-            place = T @ matrix(solid.Location())
+            place = component.T @ matrix(solid.Location())
             is_rigid = abs(np.linalg.det(place[:3, :3]) - 1.0) < 1e-6
-            collector.add(name, shapes[key] if is_rigid else "placed with a scale or a reflection", place)
+            own = Component(
+                name,
+                node.instance or name,
+                place,
+                component if len(solids) > 1 else component.assembly,
+                node.colour or node.colours.get(key) or node.colours.get(Key(node.shape)) or component.colour,
+                {k: node.colours[of] for k, of in enumerate(map(Key, explore(solid, "FACE"))) if of in node.colours},
+            )
+            collector.add(name, shapes[key] if is_rigid else "placed with a scale or a reflection", place, own)
         surfaces = sum(1 for _ in explore(node.shape, "SHELL", "SOLID"))
         surfaces += sum(1 for _ in explore(node.shape, "FACE", "SHELL"))
         if surfaces:
-            collector.add(node.name, f"{'a surface' if surfaces == 1 else f'{surfaces} surfaces'}, not a solid", T)
+            reason = f"{'a surface' if surfaces == 1 else f'{surfaces} surfaces'}, not a solid"
+            collector.add(node.name, reason, component.T)
         elif not solids:
             loose += 1
     if loose:
@@ -83,13 +108,15 @@ def bodies_of(roots: Iterable[Node]) -> tuple[Reading, int]:
     return collector.reading(), len(shapes)
 
 
-def _leaves(nodes: Iterable[Node], above: Array) -> Iterator[tuple[Node, Array]]:
+def _leaves(nodes: Iterable[Node], assembly: Component | None) -> Iterator[tuple[Node, Component]]:
     """Nodes with a shape and their places in the world, in the order of the tree."""
     for node in nodes:
-        T = above @ node.T
+        T = node.T if assembly is None else assembly.T @ node.T
+        colour = node.colour or (assembly.colour if assembly else None)
+        component = Component(node.name, node.instance or node.name, T, assembly, colour)
         if node.shape is not None:
-            yield node, T
-        yield from _leaves(node.below, T)
+            yield node, component
+        yield from _leaves(node.below, component)
 
 
 def _shape(solid: Any, name: str) -> BrepSolid | str:

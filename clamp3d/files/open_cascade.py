@@ -38,7 +38,12 @@ def to_bytes(shape: Any) -> bytes:
 
 @lru_cache(maxsize=512)
 def from_bytes(brep: bytes) -> Any:
-    """The TopoDS_Shape of `to_bytes`. Raises MissingLibraryError without Open CASCADE."""
+    """The TopoDS_Shape of `to_bytes`, one for all that ask. Raises MissingLibraryError without Open CASCADE."""
+    return parse(brep)
+
+
+def parse(brep: bytes) -> Any:
+    """A new TopoDS_Shape of the bytes. Raises MissingLibraryError without Open CASCADE."""
     require_open_cascade()
     from OCP.BinTools import BinTools
     from OCP.TopoDS import TopoDS_Shape

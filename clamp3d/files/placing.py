@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Iterable
 import numpy as np
 
 from clamp3d.errors import InputError
-from clamp3d.files.bodies import Body, Reading
+from clamp3d.files.bodies import Body, Component, Reading
 from clamp3d.geometry.mesh import Array, IntArray, make_mesh
 from clamp3d.geometry.shapes import MeshShape, Shape
 
@@ -29,14 +29,14 @@ class Placer:
         self.R = np.eye(3) if R is None else R
         self._shapes: dict[tuple[Hashable, bytes], MeshShape | str] = {}
 
-    def add(self, name: str, shape: Shape | str, T: Array) -> None:
+    def add(self, name: str, shape: Shape | str, T: Array, component: Component | None = None) -> None:
         """One more body at ``T`` (4, 4), or why it has no shape. Raises InputError for too many bodies."""
         if len(self.bodies) + len(self.missing) >= MOST_BODIES:
             raise InputError(f"more than {MOST_BODIES} bodies")
         if isinstance(shape, str):
             self.missing.append(f"{name} ({shape})")
         else:
-            self.bodies.append(Body(name, shape, T))
+            self.bodies.append(Body(name, shape, T, component))
 
     def reading(self, joined: Iterable[tuple[str, str]] | None = None) -> Reading:
         """What was collected."""

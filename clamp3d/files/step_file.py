@@ -1,4 +1,6 @@
-"""STEP files as placed solids: the product tree with names, placements and shared instances (Open CASCADE's XDE).
+"""STEP files as placed solids: the product tree with names, placements, colours and shared instances.
+
+The tree is read by Open CASCADE's XDE.
 
 This runs in a process of its own (`clamp3d.files.worker`): a damaged file can end it. Needs the extra ``step``.
 """
@@ -77,14 +79,13 @@ def _node(label: Any, otherwise: str) -> Node:
     T = matrix(Tool.GetLocation_s(label))
     if Tool.IsAssembly_s(product):
         below = (_node(child, name) for child in _children(product) if Tool.IsComponent_s(child))
-        return Node(name, T, None, below)
-    named = {}
-    for child in _children(product):
-        if Tool.IsSubShape_s(child):
-            shape = Tool.GetShape_s(child)
-            named[Key(shape)] = _name(child)
-    shape = Tool.GetShape_s(product)
-    return Node(name, T if product is not label else np.eye(4), shape, (), named)
+        return Node(name, T, None, below, _name(label), _colour(label) or _colour(product))
+    parts = {Key(Tool.GetShape_s(x)): x for x in (product, *_children(product)) if Tool.IsShape_s(x)}
+    names = {key: _name(x) for key, x in parts.items() if x is not product}
+    colours = {key: colour for key, x in parts.items() if (colour := _colour(x))}
+    if product is label:  # a shape that is no instance holds its place itself
+        T = np.eye(4)
+    return Node(name, T, Tool.GetShape_s(product), (), _name(label), _colour(label), names, colours)
 
 
 def _children(label: Any) -> Iterator[Any]:
@@ -107,6 +108,18 @@ def _name(label: Any) -> str:
     label.FindAttribute(key, attribute)
     name = str(attribute.Get().ToExtString()).strip()
     return "" if name.startswith("=>[") else name
+
+
+def _colour(label: Any) -> str | None:
+    """The colour "#RRGGBB" that a label states, of its surface before that of its curves."""
+    from OCP.Quantity import Quantity_Color
+    from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType
+
+    colour = Quantity_Color()
+    for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
+        if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
+            return str(Quantity_Color.ColorToHex_s(colour).ToCString())
+    return None
 
 
 def _lost(document: Any, found: Announced, solids: int) -> Iterator[str]:

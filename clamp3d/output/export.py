@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, cast, get_args
@@ -127,7 +127,7 @@ def export(
         source = opened(source if result is None else result.scene)
     target = _target(source, path, format, layout, unit, check_mesh_error(mesh_error))
     shown, settings = _at_state(source, state)
-    placed = place(shown, names)
+    placed = tuple(_coloured(place(shown, names), result))
     if result is not None:
         placed += tuple(shared_bodies(result, placed, None if target.format == "step" else target.mesh_error))
     meshed = [] if target.format == "step" else posed(placed, target.mesh_error)
@@ -138,6 +138,23 @@ def export(
     contents[listing] = manifest(placed, meshed, files, target.settings() | settings, clamp)
     *paths, listed = write_files(target.file.parent if target.file else Path(path), contents)
     return Export(tuple(paths), listed)
+
+
+def _coloured(placed: Iterable[PlacedPart], result: CheckResult | None) -> Iterator[PlacedPart]:
+    """The parts in the colours that their files state, those with a finding in the program's.
+
+    Where a file states none, equal parts have one colour.
+    """
+    findings = {name for row in (result.findings if result else ()) for name in (row.a, row.b)}
+    colours: dict[int, str] = {}
+    for item in placed:
+        component = item.component
+        if component is None:
+            yield item
+        elif item.name in findings:
+            yield replace(item, component=replace(component, face_colours={}))
+        else:
+            yield replace(item, colour=component.colour or colours.setdefault(id(item.shape), item.colour))
 
 
 def _at_state(source: Clamp | Scene | Assembly, state: str | None) -> tuple[Clamp | Scene, dict[str, Any]]:

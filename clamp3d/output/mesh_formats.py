@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clamp3d.errors import InputError, need
-from clamp3d.geometry.pose import Array
+from clamp3d.files.bodies import Component
+from clamp3d.geometry.pose import Array, inverse
 from clamp3d.output.palette import rgb
 from clamp3d.output.placed import PosedMesh
 
@@ -81,27 +82,47 @@ def obj(items: Sequence[PosedMesh], title: str, unit: str, mtl_name: str) -> tup
 
 
 def glb(items: Sequence[PosedMesh], title: str, mesh_error: float) -> bytes:
-    """Binary glTF 2.0: metres and Y up (the root node turns Z up to it), local coordinates, named nodes, materials."""
+    """Binary glTF 2.0: metres and Y up (the root node turns Z up to it), local coordinates, named nodes, materials.
+
+    Parts from a file stand in its tree of assemblies. Parts of one shape and colour share a mesh.
+    """
     import trimesh
 
     # trimesh identifies nodes by their names, its own root among them: unique keys here, the names at the end.
-    names = {"root": title} | {f"part {i}": item.label for i, item in enumerate(items)}
+    names = {"root": title}
     scene = trimesh.Scene()
     scene.graph.update(frame_to="root", frame_from=scene.graph.base_frame, matrix=_Z_UP_TO_Y_UP)  # type: ignore[no-untyped-call]
-    for i, item in enumerate(items):
-        T = item.T.copy()
+    nodes: dict[Component | None, tuple[str, Array]] = {None: ("root", np.eye(4))}
+    meshes: dict[tuple[int, str], PosedMesh] = {}
+
+    def add(name: str, T: Array, assembly: Component | None, geometry: str | None = None) -> str:
+        if assembly not in nodes:
+            assert assembly is not None
+            nodes[assembly] = add(assembly.instance, assembly.T, assembly.assembly), assembly.T
+        parent, T_parent = nodes[assembly]
+        T = inverse(T_parent) @ T
         T[:3, 3] /= MILLIMETRES["m"]
-        local = trimesh.Trimesh(item.mesh.vertices / MILLIMETRES["m"] + 0.0, item.mesh.faces, process=False)
-        key = f"part {i}"
-        scene.add_geometry(local, node_name=key, geom_name=key, parent_node_name="root", transform=T)
+        names[key := f"node {len(names)}"] = name
+        scene.graph.update(frame_to=key, frame_from=parent, matrix=T, geometry=geometry)  # type: ignore[no-untyped-call]
+        return key
+
+    for item in items:
+        own = id(item.mesh), item.colour
+        if own not in meshes:
+            local = trimesh.Trimesh(item.mesh.vertices / MILLIMETRES["m"] + 0.0, item.mesh.faces, process=False)
+            scene.geometry[f"mesh {len(meshes)}"] = local
+            meshes[own] = item
+        geometry = f"mesh {[*meshes].index(own)}"
+        add(item.label, item.T, item.component and item.component.assembly, geometry)
 
     def finish(tree: dict[str, Any]) -> None:
         tree["asset"] = {"version": "2.0", "generator": "clamp3d", "extras": {"unit": "m", "mesh_error_mm": mesh_error}}
-        tree["materials"] = [_material(item) for item in items]
-        for i, entry in enumerate(tree["meshes"]):
+        tree["materials"] = [_material(item) for item in meshes.values()]
+        for i, (entry, item) in enumerate(zip(tree["meshes"], meshes.values(), strict=True)):
+            entry["name"] = item.component.name if item.component else item.label
             for primitive in entry["primitives"]:
                 primitive["material"] = i
-        for entry in (*tree["nodes"], *tree["meshes"]):
+        for entry in tree["nodes"]:
             entry["name"] = names[entry["name"]]
 
     return bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=False, tree_postprocessor=finish))  # type: ignore[no-untyped-call]

@@ -13,6 +13,7 @@ from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.engine.scene import Scene, unknown_part
 from clamp3d.errors import InputError
+from clamp3d.files.bodies import Component
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import MeshShape, Shape
@@ -30,6 +31,7 @@ class PosedMesh:
     T: Array
     colour: str
     label: str = ""
+    component: Component | None = None
 
     @property
     def world(self) -> Array:
@@ -39,12 +41,16 @@ class PosedMesh:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedPart:
-    """A part, its pose ``T_world_part`` (4, 4) in mm (None: it stays in its own frame) and its ``colour`` "#RRGGBB"."""
+    """A part, its pose ``T_world_part`` (4, 4) in mm (None: it stays in its own frame) and its ``colour`` "#RRGGBB".
+
+    ``component`` is its place in the product tree of the file that it was read from.
+    """
 
     name: str
     shape: Shape
     T_world_part: Array | None
     colour: str
+    component: Component | None = None
 
     @property
     def label(self) -> str:
@@ -68,7 +74,7 @@ def posed(parts: Iterable[PlacedPart], mesh_error: float) -> list[PosedMesh]:
     for part in (parts := list(parts)):
         if part.shape not in meshes:
             meshes[part.shape] = _triangles(part.shape, mesh_error)
-    return [PosedMesh(meshes[part.shape], part.T, part.colour, part.label) for part in parts]
+    return [PosedMesh(meshes[part.shape], part.T, part.colour, part.label, part.component) for part in parts]
 
 
 def _triangles(shape: Shape, mesh_error: float) -> trimesh.Trimesh:
@@ -85,11 +91,11 @@ def place(source: Clamp | Scene, names: Iterable[str] | None = None) -> tuple[Pl
 
     Raises InputError for an unknown part or none at all.
     """
-    shapes: dict[str, tuple[Shape, Array | None]]
+    shapes: dict[str, tuple[Shape, Array | None, Component | None]]
     if isinstance(source, Clamp):
-        shapes = {name: (solid, None) for name, solid in parts(source).items()}
+        shapes = {name: (solid, None, None) for name, solid in parts(source).items()}
     else:
-        shapes = {part.name: (part.shape, part.T_world) for part in source.parts}
+        shapes = {part.name: (part.shape, part.T_world, part.component) for part in source.parts}
     available = list(shapes)
     chosen = dict.fromkeys(available if names is None else items("names", names, "part names"))
     for name in chosen:
@@ -98,4 +104,8 @@ def place(source: Clamp | Scene, names: Iterable[str] | None = None) -> tuple[Pl
     if not chosen:
         raise InputError(f"names must name at least one part, available: {', '.join(available) or 'none'}")
     colours = part_colours(available)
-    return tuple(PlacedPart(name, *shapes[name], colours[name]) for name in available if name in chosen)
+    return tuple(
+        PlacedPart(name, shape, T, colours[name], component)
+        for name, (shape, T, component) in shapes.items()
+        if name in chosen
+    )

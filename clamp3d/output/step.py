@@ -1,27 +1,25 @@
-"""STEP (AP214) through Open CASCADE: planes and true cylinders, a product tree with names and colours, no facets.
+"""STEP (AP214) through Open CASCADE: true faces, and the tree, names and colours of the file that parts came from.
 
 Needs the extra ``step`` (cadquery-ocp-novtk); imported when a file is written.
 """
 
 from __future__ import annotations
 
-import itertools
-import re
 import tempfile
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from clamp3d.errors import Clamp3dError, InputError
-from clamp3d.files.open_cascade import explore
+from clamp3d.files.bodies import Component
+from clamp3d.files.open_cascade import explore, parse
 from clamp3d.files.solid import BrepSolid, require_open_cascade
 from clamp3d.geometry.extrusion import Extrusion
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, inverse
 from clamp3d.geometry.profile import Arc
 from clamp3d.geometry.shapes import Solid
-from clamp3d.output.pages import now
-from clamp3d.output.palette import rgb
 from clamp3d.output.placed import PlacedPart
 
 UNITS = {"mm": "MM", "cm": "CM", "m": "M", "in": "INCH"}
@@ -31,34 +29,118 @@ _THROUGH = 1.0  # mm by which a hole's tool stands out at both ends
 
 
 def step(placed: Sequence[PlacedPart], title: str, unit: str) -> bytes:
-    """The parts as one STEP file: an assembly ``title`` if they have poses or are several, else the part alone.
+    """The parts as one STEP file: an assembly, or the part alone if there is one and it has no pose.
 
-    Its time stamp is the environment's SOURCE_DATE_EPOCH (seconds since 1970), if set. Raises InputError for a part
-    that is a mesh, MissingLibraryError without Open CASCADE, Clamp3dError if that fails.
+    Parts from a file stand in its tree of assemblies, the others in the assembly ``title``. Raises InputError for a
+    part that is a mesh, MissingLibraryError without Open CASCADE, Clamp3dError if that fails.
     """
     require_open_cascade()
     from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.Interface import Interface_Static
     from OCP.STEPCAFControl import STEPCAFControl_Writer
 
-    stamp = f"{now():%Y-%m-%dT%H:%M:%S}"
-    document = _document(placed, title)
+    tree = _Tree(title, placed)
     writer = STEPCAFControl_Writer()
-    writer.SetNameMode(True)
-    writer.SetColorMode(True)
     before = Interface_Static.CVal_s("write.step.unit")
     Interface_Static.SetCVal_s("write.step.unit", UNITS[unit])
     try:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "out.step"
-            transferred = writer.Transfer(document)
-            _header(writer, title, stamp)
+            transferred = writer.Transfer(tree.document)
+            _header(writer, title)
             if not transferred or writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
                 raise Clamp3dError(f"Open CASCADE could not write {title} as STEP")
-            content = path.read_bytes()
+            return path.read_bytes()
     finally:
         Interface_Static.SetCVal_s("write.step.unit", before)
-    return _canonical(content)
+
+
+class _Tree:
+    """A document of Open CASCADE (XDE) with a product for each shape, and a component for each place of one."""
+
+    def __init__(self, title: str, placed: Sequence[PlacedPart]) -> None:
+        from OCP.TCollection import TCollection_ExtendedString
+        from OCP.TDocStd import TDocStd_Document
+        from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+        self.document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
+        XCAFDoc_DocumentTool.SetLengthUnit_s(self.document, 1e-3)  # metres: the shapes are in mm
+        self._shapes = XCAFDoc_DocumentTool.ShapeTool_s(self.document.Main())
+        self._colours = XCAFDoc_DocumentTool.ColorTool_s(self.document.Main())
+        self._products: dict[tuple[int, bool], tuple[Any, str]] = {}
+        self._assemblies: dict[Component | None, tuple[Any, Array]] = {}
+        if len(placed) == 1 and _stands_alone(placed[0]):
+            self._product(placed[0])
+            return
+        tops = {top for item in placed if item.component and (top := _top(item.component)) is not item.component}
+        root = tops.pop() if len(tops) == 1 else None  # else an assembly of assemblies
+        label = _named(self._shapes.NewShape(), title if root is None else root.name)
+        self._assemblies |= {None: (label, np.eye(4)), root: (label, np.eye(4) if root is None else root.T)}
+        for item in placed:
+            self._add(item)
+        self._shapes.UpdateAssemblies()
+
+    def _add(self, item: PlacedPart) -> None:
+        holder, T = self._assembly(item.component and item.component.assembly)
+        product, colour = self._product(item)
+        label = _named(self._shapes.AddComponent(holder, product, location(inverse(T) @ item.T)), item.label)
+        if item.colour != colour:
+            self._paint(label, item.colour)
+
+    def _assembly(self, component: Component | None) -> tuple[Any, Array]:
+        """Label and pose of an assembly. Each use of one is a product, so that its parts have names of their own."""
+        if component not in self._assemblies:
+            assert component is not None
+            holder, T = self._assembly(component.assembly)
+            label = _named(self._shapes.NewShape(), component.name)
+            _named(self._shapes.AddComponent(holder, label, location(inverse(T) @ component.T)), component.instance)
+            self._assemblies[component] = label, component.T
+        return self._assemblies[component]
+
+    def _product(self, item: PlacedPart) -> tuple[Any, str]:
+        """Label and colour of a part's shape: those of its first place."""
+        face_colours = item.component.face_colours if item.component else {}
+        key = id(item.shape), bool(face_colours)
+        if key not in self._products:
+            shape = exact_solid(item)
+            label = self._shapes.AddShape(shape, False)
+            self._products[key] = label, item.colour
+            _named(label, item.component.name if item.component else item.label)
+            self._paint(label, item.colour)
+            faces = [*explore(shape, "FACE")]
+            for number, colour in face_colours.items():
+                self._paint(self._shapes.AddSubShape(label, faces[number]), colour)
+        return self._products[key]
+
+    def _paint(self, label: Any, colour: str) -> None:
+        from OCP.Quantity import Quantity_Color
+        from OCP.XCAFDoc import XCAFDoc_ColorType
+
+        value = Quantity_Color()
+        Quantity_Color.ColorFromHex_s(colour, value)
+        self._colours.SetColor(label, value, XCAFDoc_ColorType.XCAFDoc_ColorGen)
+
+
+def _stands_alone(item: PlacedPart) -> bool:
+    """Whether a part has no pose, or is the one product of its file."""
+    is_product = item.component is not None and item.component.assembly is None
+    return item.T_world_part is None or (is_product and np.array_equal(item.T, np.eye(4)))
+
+
+def _top(component: Component) -> Component:
+    """The outermost assembly that holds a component."""
+    while component.assembly is not None:
+        component = component.assembly
+    return component
+
+
+def _named(label: Any, text: str) -> Any:
+    """The label with a name."""
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDataStd import TDataStd_Name
+
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(text, True))
+    return label
 
 
 def solid(part: Solid) -> Any:
@@ -114,41 +196,10 @@ def _only_solid(shape: Any, part: Solid) -> Any:
     return solids[0]
 
 
-def _document(placed: Sequence[PlacedPart], title: str) -> Any:
-    from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDataStd import TDataStd_Name
-    from OCP.TDocStd import TDocStd_Document
-    from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
-
-    def name(label: Any, text: str) -> None:
-        TDataStd_Name.Set_s(label, TCollection_ExtendedString(text, True))
-
-    document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
-    XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)  # metres: the shapes are in mm
-    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
-    instances = Counter(id(item.shape) for item in placed if isinstance(item.shape, BrepSolid))
-    tree = len(placed) > 1 or placed[0].T_world_part is not None
-    root = shapes.NewShape() if tree else None
-    if tree:
-        name(root, title)
-    for item in placed:
-        label = shapes.AddShape(exact_solid(item), False)  # one product for all instances of a shape from CAD
-        name(label, item.shape.name if instances[id(item.shape)] > 1 else item.label)
-        r, g, b = (channel / 255 for channel in rgb(item.colour))
-        colour = Quantity_Color(r, g, b, Quantity_TypeOfColor.Quantity_TOC_sRGB)
-        colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorGen)
-        if tree:
-            name(shapes.AddComponent(root, label, location(item.T)), item.label)
-    shapes.UpdateAssemblies()
-    return document
-
-
 def exact_solid(item: PlacedPart) -> Any:
     """The TopoDS_Shape of a part: drawn anew, or as it came from CAD. Raises InputError for a mesh."""
     if isinstance(item.shape, BrepSolid):
-        return item.shape.solid
+        return parse(item.shape.brep)  # a new one: equal solids of two products stay two
     if isinstance(item.shape, Solid):
         return solid(item.shape)
     raise InputError(f"{item.name} is a mesh: STEP holds true faces, not facets; use stl, obj, ply, glb or 3mf")
@@ -164,42 +215,10 @@ def location(T: Array) -> Any:
     return TopLoc_Location(transform)
 
 
-def _canonical(content: bytes) -> bytes:
-    """The same file, the same bytes each time.
-
-    Open CASCADE numbers the instances of an assembly for as long as the process lives, and lists the colours in the
-    order of their addresses: instances are numbered from 1 here, colours follow the order of their solids.
-    """
-    count = itertools.count(1)
-    content = re.sub(
-        rb"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\d+',(.*?)\);",
-        lambda m: b"NEXT_ASSEMBLY_USAGE_OCCURRENCE('%d',%s);" % (next(count), re.sub(rb"\n *", b"", m[1])),
-        content,
-        flags=re.DOTALL,
-    )
-    colour = rb"^#\d+ = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION"
-    first = re.search(colour, content, re.MULTILINE)
-    if first is None:
-        return content
-    end = content.index(b"ENDSEC;", first.start())
-    blocks = [
-        block for block in re.split(rb"(?=%s)" % colour, content[first.start() : end], flags=re.MULTILINE) if block
-    ]
-    blocks.sort(key=lambda block: int(re.search(rb"STYLED_ITEM\('[^']*',\([^)]*\),#(\d+)\)", block)[1]))  # type: ignore[index]
-    tail = b"".join(blocks)
-    old = [int(number) for number in re.findall(rb"^#(\d+) = ", tail, re.MULTILINE)]
-    new = {before: min(old) + i for i, before in enumerate(old)}
-    tail = re.sub(rb"#(\d+)", lambda m: b"#%d" % new.get(int(m[1]), int(m[1])), tail)
-    return content[: first.start()] + tail + content[end:]
-
-
-def _header(writer: Any, title: str, stamp: str) -> None:
+def _header(writer: Any, title: str) -> None:
     from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
     from OCP.TCollection import TCollection_HAsciiString
 
     header = APIHeaderSection_MakeHeader(writer.ChangeWriter().Model())
     header.SetName(TCollection_HAsciiString(title.encode("ascii", "replace").decode()))
-    header.SetAuthorValue(1, TCollection_HAsciiString(""))
-    header.SetOrganizationValue(1, TCollection_HAsciiString(""))
-    header.SetTimeStamp(TCollection_HAsciiString(stamp))
     header.SetOriginatingSystem(TCollection_HAsciiString("clamp3d"))

@@ -16,7 +16,7 @@ from clamp3d import checks
 from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.scene import Part, Scene
 from clamp3d.errors import InputError
-from clamp3d.files.bodies import Reading, part_name, unique_names
+from clamp3d.files.bodies import Component, Reading, part_name, unique_names
 from clamp3d.files.formats import FORMATS, ROBOT
 from clamp3d.files.mesh_file import load_bodies
 from clamp3d.files.solid import BrepSolid
@@ -88,9 +88,24 @@ _GOES_WITH = {
 
 
 def prefixed(scene: Scene, name: str, T: Array) -> Scene:
-    """A scene that was read, moved by ``T`` (4, 4), its parts called ``name``, or ``name/...`` if there are several."""
-    names = {p.name: name if len(scene.parts) == 1 else f"{name}/{p.name}" for p in scene.parts}
-    parts = (Part(names[p.name], p.shape, T @ p.T_world) for p in scene.parts)
+    """A scene that was read, moved by ``T`` (4, 4), its parts called ``name``, or ``name/...`` if there are several.
+
+    Several parts are below an assembly ``name`` then.
+    """
+    is_one = len(scene.parts) == 1
+    names = {p.name: name if is_one else f"{name}/{p.name}" for p in scene.parts}
+    moved: dict[Component | None, Component | None] = {None: None if is_one else Component(name, name, T)}
+
+    def move(component: Component | None) -> Component | None:
+        if component not in moved:
+            assert component is not None
+            moved[component] = replace(component, T=T @ component.T, assembly=move(component.assembly))
+        return moved[component]
+
+    parts = (
+        replace(p, name=names[p.name], T_world=T @ p.T_world, component=move(p.component) if p.component else None)
+        for p in scene.parts
+    )
     allowed = (Allowed(names[x.a], names[x.b], x.overlap) for x in scene.allowed)
     return Scene(tuple(parts), allowed=tuple(allowed), notes=scene.notes)
 
@@ -114,7 +129,7 @@ def to_parts(reading: Reading, reader: Reader) -> Scene:
     links: dict[str, list[str]] = {}
     for name, body in zip(unique_names(body.name for body in reading.bodies), reading.bodies, strict=True):
         shape = shapes.setdefault(id(body.shape), _fitted(body.shape, reader))
-        parts.append(Part(name, shape, body.T))
+        parts.append(Part(name, shape, body.T, body.component))
         links.setdefault(body.name, []).append(name)
     allowed = []
     if reading.joined is not None:

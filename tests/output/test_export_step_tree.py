@@ -1,0 +1,242 @@
+"""STEP and GLB go out as a STEP file came in: tree, names, colours and instances, read by other readers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+pytest.importorskip("OCP")
+
+from OCP.BRepGProp import BRepGProp
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.GProp import GProp_GProps
+from OCP.Quantity import Quantity_Color
+from OCP.STEPCAFControl import STEPCAFControl_Reader
+from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDF import TDF_ChildIterator, TDF_Label
+from OCP.TDocStd import TDocStd_Document
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopExp import TopExp_Explorer
+from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
+
+from clamp3d import check, export, load
+from clamp3d.kernel import translation
+from tests.files.step_scenes import Tree, pin, plate, pose
+from tests.output.test_export_open_cascade import name_of
+
+RED, GREEN, BLUE = "#FF0000", "#00FF00", "#0000FF"
+
+
+def children(label):
+    walk = TDF_ChildIterator(label)
+    while walk.More():
+        yield walk.Value()
+        walk.Next()
+
+
+def colour_of(label):
+    colour = Quantity_Color()
+    if XCAFDoc_ColorTool.GetColor_s(label, XCAFDoc_ColorType.XCAFDoc_ColorSurf, colour):
+        return Quantity_Color.ColorToHex_s(colour).ToCString()
+    return None
+
+
+def volume(shape):
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties)
+    return round(properties.Mass(), 6)
+
+
+class Leaf:
+    """A part as Open CASCADE's reader finds it: product names from the root, and what the file says of it."""
+
+    def __init__(self, path, label, place, colour):
+        self.path, self.colour = path, colour or colour_of(label)
+        shape = XCAFDoc_ShapeTool.GetShape_s(label)
+        self.solid, self.volume = shape.TShape(), volume(shape)
+        M = place.Transformation()
+        self.T = np.array([[M.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
+        self.face_colours = sorted(filter(None, map(colour_of, children(label))))
+
+    def same_as(self, other, colour):
+        assert self.path == other.path
+        assert (self.volume, self.face_colours, self.colour) == (other.volume, other.face_colours, colour)
+        np.testing.assert_allclose(self.T, other.T, atol=1e-9)
+
+
+def leaves(path):
+    """Parts in the order of the tree, by the name of their components."""
+    document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
+    reader = STEPCAFControl_Reader()
+    reader.ReadFile(str(path))
+    assert reader.Transfer(document)
+    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+
+    def walk(label, place, above, name, colour):
+        below = [child for child in children(label) if XCAFDoc_ShapeTool.IsComponent_s(child)]
+        names = (*above, name_of(label))
+        if not below:
+            yield name, Leaf(names, label, place, colour)
+        for component in below:
+            product = TDF_Label()
+            XCAFDoc_ShapeTool.GetReferredShape_s(component, product)
+            at = place.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(component))
+            yield from walk(product, at, names, name_of(component), colour_of(component))
+
+    for label in children(tool.BaseLabel()):
+        if XCAFDoc_ShapeTool.IsFree_s(label):
+            yield from walk(label, XCAFDoc_ShapeTool.GetLocation_s(label), (), name_of(label), None)
+
+
+def coloured(path):
+    """Two uses of a sub-assembly, a pin in four places, one of them blue; the plate has no colour, but a red face."""
+    tree = Tree()
+    colours = XCAFDoc_DocumentTool.ColorTool_s(tree.document.Main())
+
+    def paint(label, hexadecimal):
+        colour = Quantity_Color()
+        Quantity_Color.ColorFromHex_s(hexadecimal, colour)
+        colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorGen)
+
+    rng = np.random.default_rng(3)
+    root, sub = tree.product("machine"), tree.product("sub, assembly")
+    body = plate()
+    plates, pins = tree.product("plate", body), tree.product("pin", pin())
+    paint(pins, GREEN)
+    paint(tree.tool.AddSubShape(plates, TopExp_Explorer(body, TopAbs_ShapeEnum.TopAbs_FACE).Current()), RED)
+    tree.put(sub, plates, pose(rng), "plate")
+    tree.put(sub, pins, pose(rng), "pin")
+    tree.put(root, sub, pose(rng), "left")
+    tree.put(root, sub, pose(rng), "right")
+    tree.put(root, pins, pose(rng), "loose")
+    tree.put(root, pins, pose(rng), "blue one")
+    paint(list(children(root))[-1], BLUE)
+    layers = XCAFDoc_DocumentTool.LayerTool_s(tree.document.Main())
+    layers.SetLayer(plates, TCollection_ExtendedString("outer"))
+    return tree.write(path)
+
+
+@pytest.fixture
+def machine(tmp_path):
+    return coloured(tmp_path / "machine.step")
+
+
+def test_tree_names_colours_and_instances_stay(machine, tmp_path):
+    before, scene = list(leaves(machine)), load(machine)
+    after = list(leaves(export(scene, tmp_path / "again.step").files[0]))
+    assert [name for name, _ in after] == [part.name for part in scene.parts]
+    assert [part.path for _, part in after][1] == ("machine", "sub, assembly", "pin")
+    own = after[0][1].colour  # the program's, where the file states none
+    for (_, was), (_, part) in zip(before, after, strict=True):
+        part.same_as(was, was.colour or own)
+    assert [part.colour for _, part in after] == [own, GREEN, own, GREEN, GREEN, BLUE]
+    assert [part.face_colours for _, part in after] == [[RED], [], [RED], [], [], []]
+    assert len({part.solid for _, part in after}) == len({part.solid for _, part in before}) == 2
+    assert [part.name for part in load(tmp_path / "again.step").parts] == [part.name for part in scene.parts]
+
+
+def test_parts_with_a_finding_have_the_programs_colour(machine, tmp_path):
+    scene = load(machine)
+    place = {part.name: part.T_world for part in scene.parts}
+    result = check(scene.moved({"pin_1": place["plate_1"]}))
+    (row,) = result.findings
+    assert {row.a, row.b} == {"plate_1", "pin_1"}
+    after = dict(leaves(export(result, tmp_path / "found.step").files[0]))
+    clash = f"clash {row.a} - {row.b}"
+    assert [*after] == [*place, clash]
+    assert after[clash].path == ("machine", clash)
+    assert after[clash].colour == "#D32F2F"
+    assert after["pin_1"].colour not in (GREEN, BLUE)
+    assert (after["pin_2"].colour, after["pin_4"].colour) == (GREEN, BLUE)
+    assert (after["plate_1"].face_colours, after["plate_2"].face_colours) == ([], [RED])
+    np.testing.assert_allclose(after["pin_1"].T, place["plate_1"][:3], atol=1e-9)
+
+
+def test_a_chosen_part_and_a_part_of_one_product(machine, tmp_path):
+    ((name, part),) = leaves(export(load(machine), tmp_path / "pin.step", names=["pin_2"]).files[0])
+    assert (name, part.path) == ("pin_2", ("machine", "sub, assembly", "pin"))
+    tree = Tree()
+    tree.product("lid", plate())
+    before, after = (
+        list(leaves(path))
+        for path in (tree.write(tmp_path / "a.step"), export(load(tmp_path / "a.step"), tmp_path / "b.step").files[0])
+    )
+    assert [(name, part.path) for name, part in after] == [(name, part.path) for name, part in before]
+
+
+def test_equal_solids_of_two_products_and_solids_of_one_keep_their_names(tmp_path):
+    tree = Tree()
+    root = tree.product("pads")
+    for k, name in enumerate(("left pad", "right pad")):
+        tree.put(root, tree.product(name, BRepPrimAPI_MakeBox(1.0, 2.0, 3.0).Shape()), translation(5 * k, 0, 0), "pad")
+    scene = load(tree.write(tmp_path / "pads.step"))
+    again = dict(leaves(export(scene, tmp_path / "again.step").files[0]))
+    assert {name: part.path for name, part in again.items()} == {
+        "left-pad": ("pads", "left pad"),
+        "right-pad": ("pads", "right pad"),
+    }
+
+
+def test_two_files_of_a_scene_are_two_trees(machine, tmp_path):
+    (tmp_path / "two.toml").write_text(
+        '[parts.a]\nfile = "machine.step"\n[parts.b]\nfile = "machine.step"\npose = { translation = [500, 0, 0] }\n'
+        '[parts.ball]\nshape = "cylinder"\nradius = 1\nlength = 2\n'
+    )
+    scene = load(tmp_path / "two.toml")
+    after = dict(leaves(export(scene, tmp_path / "out.step").files[0]))
+    assert [*after] == [part.name for part in scene.parts]
+    for part in scene.parts:
+        np.testing.assert_allclose(after[part.name].T, part.T_world[:3], atol=1e-9)
+    assert after["a/pin_1"].path == ("two", "a", "machine", "sub, assembly", "pin")
+    assert after["ball"].path == ("two", "ball")
+
+
+def test_an_assembly_of_build123d_goes_round(tmp_path):
+    bd = pytest.importorskip("build123d")
+    rod, lid = bd.Cylinder(2, 10), bd.Pos(10, 0, 0) * bd.Box(20, 20, 3)
+    rod.label, lid.label, rod.color, lid.color = "rod", "lid", bd.Color(0, 0, 1), bd.Color(1, 0, 0)
+    inner = bd.Compound(label="inner", children=[rod, lid])
+    inner.location = bd.Location((0, 0, 50), (0, 0, 90))
+    whole = bd.Compound(label="whole", children=[inner])
+    bd.export_step(whole, tmp_path / "in.step")
+    for source in (load(tmp_path / "in.step"), load(whole)):
+        again = bd.import_step(export(source, tmp_path / "out.step").files[0])
+        assert (again.label, [child.label for child in again.children]) == ("whole", ["inner"])
+        parts = {leaf.label: leaf for leaf in again.leaves}
+        assert parts.keys() == {"rod", "lid"}
+        for shape in (rod, lid):
+            leaf = parts[shape.label]
+            got, truth = leaf.moved(leaf.parent.location).bounding_box(), shape.moved(inner.location).bounding_box()
+            np.testing.assert_allclose([*got.min, *got.max], [*truth.min, *truth.max], atol=1e-5)
+    read = bd.import_step(export(load(tmp_path / "in.step"), tmp_path / "out.step").files[0])
+    assert {leaf.label: tuple(leaf.color)[:3] for leaf in read.leaves} == {"rod": (0, 0, 1), "lid": (1, 0, 0)}
+
+
+def test_a_bearing_of_bd_warehouse_keeps_its_rollers(tmp_path):
+    bd = pytest.importorskip("build123d")
+    bearing = pytest.importorskip("bd_warehouse.bearing")
+    bd.export_step(bearing.SingleRowDeepGrooveBallBearing(size="M8-22-7", bearing_type="SKT"), tmp_path / "in.step")
+    before, scene = list(leaves(tmp_path / "in.step")), load(tmp_path / "in.step")
+    after = list(leaves(export(scene, tmp_path / "out.step").files[0]))
+    assert [name for name, _ in after] == [part.name for part in scene.parts]
+    assert [part.path for _, part in after] == [part.path for _, part in before]
+    assert sorted(part.volume for _, part in after) == pytest.approx(sorted(part.volume for _, part in before))
+    assert len({part.solid for _, part in after}) == len({part.solid for _, part in before})
+
+
+def test_glb_has_the_tree_and_shares_meshes_of_one_colour(machine, tmp_path):
+    scene = load(machine)
+    read = trimesh.load_scene(export(scene, tmp_path / "machine.glb").files[0])
+    above = read.graph.transforms.parents
+    assert {name: above[name] for name in ("plate_1", "pin_1", "left", "pin_3")} == {
+        "plate_1": "left", "pin_1": "left", "left": "machine_1", "pin_3": "machine_1",
+    }  # fmt: skip
+    turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    for part in scene.parts:
+        T, key = read.graph[part.name]
+        V = trimesh.transform_points(read.geometry[key].vertices, T) @ turn.T * 1000.0
+        truth = part.shape.mesh.vertices @ part.T_world[:3, :3].T + part.T_world[:3, 3]
+        np.testing.assert_allclose([V.min(axis=0), V.max(axis=0)], [truth.min(axis=0), truth.max(axis=0)], atol=1e-3)
+    assert read.graph["pin_1"][1] == read.graph["pin_3"][1]
+    assert read.graph["pin_1"][1] != read.graph["pin_4"][1]
