@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,10 +16,12 @@ from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.output.groups import Accepted, Group
+from clamp3d.output.tables import csv_table
 
 Status = Literal["new", "changed", "same", "accepted"]
 Names = tuple[str, str]
 
+COLUMNS = ("id", "status", "group", "a", "b", "verdict", "motion", "t", "at_least_mm", "at_most_mm", "method")
 _CHANGED, _CHANGED_SHARE = 1e-3, 1e-3
 """A distance has changed since the last check if it differs by more mm than this, or by more than this share."""
 _MOVED = 1e-6
@@ -129,16 +128,17 @@ class Baseline:
 
     def moved(self, scene: Scene) -> dict[str, float]:
         """Parts that moved against most others, or are new, with how far their frames' origins went."""
-        # Where all moved alike, as one assembly, nothing has moved in it.
         way = {p.name: p.T_world @ inverse(self.poses[p.name]) for p in scene.parts if p.name in self.poses}
-        keys = {name: tuple(T[:3].round(6).ravel() + 0.0) for name, T in way.items()}
-        most = Counter(keys.values()).most_common(1)
-        common = next((way[name] for name, key in keys.items() if [key] == [k for k, _ in most]), np.eye(4))
+        alike: dict[tuple[float, ...], list[str]] = {}
+        for name, T in way.items():
+            alike.setdefault(tuple(T[:3].round(6).ravel() + 0.0), []).append(name)
+        # Where all moved alike, as one assembly, nothing has moved in it.
+        common = way[max(alike.values(), key=len)[0]] if alike else np.eye(4)
         far = {part.name: math.inf for part in scene.parts if part.name not in way}
         for name, T in way.items():
             if not _same(T, common):
-                at = self.poses[name]
-                far[name] = float(np.linalg.norm(_pose(scene, name)[:3, 3] - (common @ at)[:3, 3]))
+                before = common @ self.poses[name]
+                far[name] = float(np.linalg.norm(_pose(scene, name)[:3, 3] - before[:3, 3]))
         return far
 
 
@@ -152,18 +152,12 @@ def _same(T: Array, other: Array) -> bool:
 
 def groups_csv(groups: Sequence[Group], comparison: Comparison) -> str:
     """One line for each pair of each group, with a header; lengths in mm."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(
-        ["id", "status", "group", "a", "b", "verdict", "motion", "t", "at_least_mm", "at_most_mm", "method"]
-    )
+    rows: list[dict[str, Any]] = []
     for group in groups:
         for row in group.rows:
-            d = row.distance
-            bounds = ["" if math.isinf(value) else value for value in (d.lower, d.upper)]
-            place = [row.a, row.b, row.verdict.value, row.motion or "", "" if row.t is None else row.t]
-            family, status = f"{group.a} and {group.b}", comparison.status[group.id]
+            status = comparison.status[group.id]
             if status == "changed" and (row.a, row.b) not in comparison.changed.get(group.id, ()):
                 status = "same"
-            writer.writerow([group.id, status, family, *place, *bounds, d.method])
-    return out.getvalue()
+            own = {"id": group.id, "status": status, "group": f"{group.a} and {group.b}", "verdict": row.verdict.value}
+            rows.append({**row.distance.to_dict(), **own, "a": row.a, "b": row.b, "motion": row.motion, "t": row.t})
+    return csv_table(rows, COLUMNS)

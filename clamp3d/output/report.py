@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
 from clamp3d.checks import function, instance
 from clamp3d.checks import path as checked_path
 from clamp3d.clamp.contact import Contact
-from clamp3d.clamp.dimensions import TITLES
 from clamp3d.clamp.result import Assembly
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.check import check
@@ -46,7 +46,6 @@ class PairRow:
     """A pair as a reviewer reads of it: the engine's row, what it amounts to, and what a clamp knows beyond it."""
 
     result: PairResult
-    titles: str
     severity: Severity
     remark: str = ""
     contact: Contact | None = None
@@ -77,7 +76,7 @@ class Finding:
     group: Group | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Report:
     """Everything that a report says.
 
@@ -95,12 +94,8 @@ class Report:
         The pairs at rest and in motion.
     n_pairs : int
         Number of all pairs; those without a row are clear, parted by their boxes.
-    modelled, not_modelled : tuple of str
-        What the numbers stand on, and what they leave out.
-    settings : dict
-        The settings, in words.
     assembly : Assembly or None
-        The clamp and its way together, with ``steps`` and ``tightening``.
+        The clamp, with its way together.
     """
 
     scene: Scene
@@ -110,12 +105,41 @@ class Report:
     rows: tuple[PairRow, ...]
     motions: tuple[PairRow, ...]
     n_pairs: int
-    modelled: tuple[str, ...]
-    not_modelled: tuple[str, ...]
-    settings: dict[str, str]
     assembly: Assembly | None = None
-    steps: tuple[StepRow, ...] = ()
-    tightening: tuple[TighteningRow, ...] = ()
+
+    @cached_property
+    def steps(self) -> tuple[StepRow, ...]:
+        """How a clamp comes together."""
+        return step_rows(self.assembly) if self.assembly else ()
+
+    @cached_property
+    def tightening(self) -> tuple[TighteningRow, ...]:
+        """The stages of the nut's own step."""
+        return tightening_rows(self.assembly) if self.assembly else ()
+
+    @property
+    def modelled(self) -> list[str]:
+        """What the numbers stand on."""
+        return self._items("modelled.txt")
+
+    @property
+    def not_modelled(self) -> list[str]:
+        """What the numbers leave out."""
+        return self._items("not_modelled.txt")
+
+    def _items(self, template: str) -> list[str]:
+        """The items of a text in ``templates``, which stand one a line."""
+        names = {name: " ".join(title.split()) for name, title in titles(self.scene).items()}
+        lines = render(template, scene=self.scene, assembly=self.assembly, titles=names).splitlines()
+        return [line for line in lines if line.strip()]
+
+    @property
+    def settings(self) -> dict[str, str]:
+        """The settings, in words."""
+        t = self.scene.thresholds
+        of_clamp = {} if self.assembly is None else {"method": self.assembly.method, "solver": self.assembly.solver}
+        clearance = f"{t.clearance:g} mm" if t.clearance else "not set"
+        return of_clamp | {"contact": f"gap or overlap up to {t.contact:g} mm", "clearance": clearance}
 
 
 def report(
@@ -161,8 +185,8 @@ def report(
     from clamp3d.output.report_page import write_report
 
     folder = checked_path("folder", folder)
-    made = make_report(opened(source), clearance=clearance, progress=progress)
-    return write_report(made, folder, progress=progress or (lambda step: None))
+    review = make_report(opened(source), clearance=clearance, progress=progress)
+    return write_report(review, folder, progress=progress or (lambda step: None))
 
 
 def make_report(
@@ -191,11 +215,7 @@ def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
     on_stage = None if progress is None else lambda stage, done, of: progress(f"{stage}: {done} of {of}")
     result = check(scene, progress=on_stage)
     names = titles(scene)
-
-    def row(pair: PairResult) -> PairRow:
-        return PairRow(pair, f"{names[pair.a]}, {names[pair.b]}", _severity(pair.verdict))
-
-    rows = {id(pair): row(pair) for pair in result.rows}
+    rows = {id(pair): PairRow(pair, _severity(pair.verdict)) for pair in result.rows}
     findings = []
     for group in grouped(result):
         worst = rows[id(group.worst)]
@@ -208,9 +228,6 @@ def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
         rows=tuple(rows[id(pair)] for pair in result.pairs),
         motions=tuple(rows[id(pair)] for pair in result.motions),
         n_pairs=result.work.pairs,
-        modelled=_listed("modelled.txt", scene),
-        not_modelled=_listed("not_modelled.txt", scene),
-        settings=_thresholds(scene),
     )
 
 
@@ -234,21 +251,7 @@ def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
         line = f"Not passed: {'see the findings' if assembly.clamped else assembly.status}."
     elif any(f.severity == "warning" for f in findings):
         line += " Some verdicts are uncertain: see the findings."
-    return Report(
-        scene=scene,
-        headline=line,
-        passed=passed,
-        findings=tuple(findings),
-        rows=rows,
-        motions=(),
-        n_pairs=len(rows),
-        modelled=_listed("modelled.txt", scene, assembly),
-        not_modelled=_listed("not_modelled.txt", scene, assembly),
-        settings={"method": assembly.method, "solver": assembly.solver, **_thresholds(scene)},
-        assembly=assembly,
-        steps=step_rows(assembly),
-        tightening=tightening_rows(assembly),
-    )
+    return Report(scene, line, passed, tuple(findings), rows, (), len(rows), assembly)
 
 
 def _contact_row(scene: Scene, contact: Contact, apart: bool) -> PairRow:
@@ -266,7 +269,7 @@ def _contact_row(scene: Scene, contact: Contact, apart: bool) -> PairRow:
         severity, remark = "warning" if contact.declared == 3 else "note", "are declared to touch, and do not"
     elif contact.declared == 3 and Thresholds(scene.contact).verdict(contact.distance) is Verdict.UNCERTAIN:
         severity, remark = "warning", "touch or not, within the error bound of the method"
-    return PairRow(PairResult(a, b, verdict, contact.distance), f"{TITLES[a]}, {TITLES[b]}", severity, remark, contact)
+    return PairRow(PairResult(a, b, verdict, contact.distance), severity, remark, contact)
 
 
 def _severity(verdict: Verdict) -> Severity:
@@ -275,16 +278,3 @@ def _severity(verdict: Verdict) -> Severity:
     if verdict is Verdict.UNCERTAIN:
         return "warning"
     return "note" if verdict in (Verdict.CONTACT, Verdict.CLEARANCE) else "ok"
-
-
-def _thresholds(scene: Scene) -> dict[str, str]:
-    t = scene.thresholds
-    clearance = f"{t.clearance:g} mm" if t.clearance else "not set"
-    return {"contact": f"gap or overlap up to {t.contact:g} mm", "clearance": clearance}
-
-
-def _listed(template: str, scene: Scene, assembly: Assembly | None = None) -> tuple[str, ...]:
-    """The items of a text in ``templates``, which stand one a line."""
-    names = {name: " ".join(title.split()) for name, title in titles(scene).items()}
-    lines = render(template, scene=scene, assembly=assembly, titles=names).splitlines()
-    return tuple(line for line in lines if line.strip())

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import base64
-import csv
-import io
 import json
 import math
 import platform
@@ -20,6 +18,7 @@ from clamp3d.output.manifest import versions
 from clamp3d.output.pages import now, render
 from clamp3d.output.palette import DIMENSION, INK, VERDICT_COLOURS, part_colours
 from clamp3d.output.report import LISTED, SEVERITIES, Finding, PairRow, Report
+from clamp3d.output.tables import csv_table
 from clamp3d.output.wording import distance_text, meaning, titles
 
 if TYPE_CHECKING:
@@ -90,37 +89,31 @@ def report_to_dict(report: Report) -> dict[str, Any]:
         "findings": [_finding_to_dict(finding) for finding in report.findings],
         "pairs": [_pair_to_dict(row) for row in report.rows],
         "motions": [_pair_to_dict(row) for row in report.motions],
-        "modelled": list(report.modelled),
-        "not_modelled": list(report.not_modelled),
+        "modelled": report.modelled,
+        "not_modelled": report.not_modelled,
     }
 
 
 def report_csv(report: Report) -> str:
     """One line for each pair at rest, then those in motion, with a header; lengths in mm, vectors as three columns."""
     rows = [dict(_cells(_pair_to_dict(row))) for row in (*report.rows, *report.motions)]
-    head = dict.fromkeys(key for row in rows for key in row) or ["a", "b", "verdict", "distance_mm", "error_bound_mm"]
-    out = io.StringIO()
-    writer = csv.DictWriter(out, list(head), restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return out.getvalue()
+    return csv_table(rows, () if rows else ("a", "b", "verdict", "distance_mm", "error_bound_mm"))
 
 
 def _cells(data: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     """The cells of a row of the table: a vector has three, an interval two, and what is unknown is empty."""
     for key, value in data.items():
         if key in ("point", "point_a", "point_b", "normal", "direction"):
-            yield from zip((f"{key}_{axis}" for axis in "xyz"), value or ("", "", ""), strict=True)
+            yield from zip((f"{key}_{axis}" for axis in "xyz"), value or (None,) * 3, strict=True)
         elif key == "interference_mm":
-            names = ("interference_at_least_mm", "interference_at_most_mm")
-            yield from zip(names, ("" if x is None else x for x in value or (None, None)), strict=True)
+            yield from zip(("interference_at_least_mm", "interference_at_most_mm"), value or (None, None), strict=True)
         elif key == "where":
-            (low, high), inside = value["box_mm"], value["point"] or ("", "", "")
+            (low, high), inside = value["box_mm"], value["point"] or (None,) * 3
             yield from ((name, value[name]) for name in value if name.startswith("volume"))
             for axis, least, most, at in zip("xyz", low, high, inside, strict=True):
                 yield from ((f"box_{axis}_min", least), (f"box_{axis}_max", most), (f"inside_{axis}", at))
         else:
-            yield key, "" if value is None else value
+            yield key, value
 
 
 def report_html(report: Report, *, progress: Callable[[str], None] = lambda step: None) -> str:

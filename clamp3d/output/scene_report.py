@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from itertools import combinations
 from typing import Any
 
 from clamp3d import __version__
@@ -20,26 +19,12 @@ from clamp3d.output.wording import (
     first_text,
     group_text,
     headline,
-    meaning,
     titles,
     worst_first,
 )
 
-_MATRIX = 14
-"""More parts than this and the matrix no longer fits a terminal."""
 _LISTED, _PAIRS, _NOTES = 60, 30, 12
 """Groups, pairs and notes that the text lists at most."""
-_MARK = {
-    Verdict.CLEAR: ".",
-    Verdict.CLEARANCE: "g",
-    Verdict.CONTACT: "t",
-    Verdict.CLASH: "X",
-    Verdict.CONTAINED: "C",
-    Verdict.DUPLICATE: "D",
-    Verdict.ALLOWED: "a",
-    Verdict.UNCERTAIN: "?",
-    Verdict.FAILED: "!",
-}
 
 
 def check_to_dict(result: CheckResult, comparison: Comparison | None = None) -> dict[str, Any]:
@@ -60,15 +45,12 @@ def check_to_dict(result: CheckResult, comparison: Comparison | None = None) -> 
 def check_to_text(
     result: CheckResult, comparison: Comparison | None = None, accepted: Mapping[str, Accepted] | None = None
 ) -> str:
-    """The result as lines for a terminal: the headline, the groups of findings, the matrix, the pairs, the motions."""
-    n = len(result.scene.parts)
+    """The result as lines for a terminal: the headline, the groups of findings, the pairs, the motions."""
     lines = [f"{result.scene.name}: {headline(result)}", _counts(result)]
     lines += _cut([f"  note: {note}" for note in result.scene.notes], _NOTES, "more notes (--json lists all)")
     if comparison is not None:
         lines += comparison_text(comparison)
     lines += _cut(_findings(result, comparison, accepted or {}), _LISTED, "more (--json or --html lists all)")
-    if 2 <= n <= _MATRIX and result.asked is None:
-        lines += ["", *_matrix(result)]
     if result.pairs:
         rows = [
             (f"{row.a} - {row.b}", row.verdict.value, distance_text(row.distance), row.distance.method)
@@ -156,15 +138,6 @@ def _motions(result: CheckResult) -> str:
         for row in result.motions
     ]
     return text_table(head, rows, indent=2)
-
-
-def _matrix(result: CheckResult) -> list[str]:
-    names = [part.name for part in result.scene.parts]
-    marks = {(a, b): result.verdict(a, b) for a, b in combinations(names, 2)}
-    table = [(a, *(_MARK[marks[a, b]] if (a, b) in marks else "" for b in names)) for a in names]
-    used = [v for v in Verdict if v in marks.values()]
-    legend = ", ".join(f"{_MARK[v]} {v.value} ({meaning(v.value, result.scene)})" for v in used)
-    return [text_table(("", *names), table, indent=2), f"  {legend}"]
 
 
 def work_text(work: Work) -> list[str]:

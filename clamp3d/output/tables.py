@@ -1,9 +1,12 @@
-"""Fixed-width text tables for the terminal."""
+"""Tables: of fixed width for the terminal, and CSV."""
 
 from __future__ import annotations
 
+import csv
+import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from clamp3d.errors import escaped
 
@@ -49,3 +52,17 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, indent:
     with console.capture() as captured:
         console.print(table)
     return "\n".join((" " * indent + line).rstrip() for line in captured.get().splitlines())
+
+
+def csv_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> str:
+    """Rows as CSV with a header: ``columns``, or every key that a row has. None is an empty cell.
+
+    >>> csv_table([{"a": "P1", "gap": 1.5}, {"a": "P2", "t": None}])
+    'a,gap,t\\nP1,1.5,\\nP2,,\\n'
+    """
+    out = io.StringIO()
+    head = columns or list(dict.fromkeys(key for row in rows for key in row))
+    writer = csv.DictWriter(out, head, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return out.getvalue()

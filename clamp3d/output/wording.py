@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from clamp3d.engine.answer import Distance
@@ -33,14 +32,15 @@ def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
             if low == high and (high != 0.0 or places == digits or upper - lower <= 2e-6):
                 return f"{'overlap' if high < 0.0 else 'gap'} {abs(high):.{places}f} mm"
     for kind, least, most in (("overlap", -upper, -lower), ("gap", lower, upper)):
+        if least > 0.0 and math.isinf(most):
+            return f"{kind} at least {_rounded(least, math.floor)} mm"
         if least > 0.0:
-            floor = _rounded(least, ROUND_FLOOR)
-            if math.isinf(most):
-                return f"{kind} at least {floor} mm"
-            return f"{kind} {floor} to {_rounded(most, ROUND_CEILING)} mm"
-    if math.isfinite(upper) and math.isfinite(lower):
-        return f"gap or overlap at most {_rounded(max(upper, -lower), ROUND_CEILING)} mm"
-    return f"gap at most {_rounded(upper, ROUND_CEILING)} mm" if math.isfinite(upper) else "unknown"
+            return f"{kind} {_rounded(least, math.floor)} to {_rounded(most, math.ceil)} mm"
+    if math.isinf(upper):
+        return "unknown"
+    if math.isinf(lower):
+        return f"gap at most {_rounded(upper, math.ceil)} mm"
+    return f"gap or overlap at most {_rounded(max(upper, -lower), math.ceil)} mm"
 
 
 def distance_text(distance: Distance, *, digits: int = 6) -> str:
@@ -48,21 +48,13 @@ def distance_text(distance: Distance, *, digits: int = 6) -> str:
     return gap_text(distance.lower, distance.upper, digits=digits)
 
 
-def _rounded(value: float, rounding: str) -> str:
-    """Four significant digits, six decimals at most, rounded to the safe side."""
-    exact = _decimal(value)
-    digits = min(6, max(0, 3 - exact.adjusted())) if exact else 0
-    text = f"{_to_digits(exact, digits, rounding):f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
-
-
-def _decimal(value: float) -> Decimal:
-    """The digits that name the float: its last bit is no digit of a length."""
-    return Decimal(repr(float(value)))
-
-
-def _to_digits(exact: Decimal, digits: int, rounding: str) -> Decimal:
-    return exact.quantize(Decimal(1).scaleb(-digits), rounding=rounding)
+def _rounded(value: float, towards: Callable[[float], int], digits: int | None = None) -> str:
+    """Four significant digits, six decimals at most, or so many decimals, rounded to the safe side."""
+    if digits is None:
+        digits = 0 if value == 0.0 else min(6, max(0, 3 - math.floor(math.log10(abs(value)))))
+    # The last bit of a float is no digit of a length: 0.3 is 0.3, not a little less.
+    text = f"{towards(round(value * 10**digits, 6)) / 10**digits:.{digits}f}"
+    return text.rstrip("0").rstrip(".") if digits else text
 
 
 def part_title(part: Part) -> str:
@@ -163,9 +155,9 @@ def group_sentence(group: Group, names: Mapping[str, str]) -> str:
     >>> group_sentence(Group("", "pin", "plate", rows, -0.2, -0.2), {})
     'pin and plate clash, 3 times: overlap 0.200000 mm'
     """
-    if len(group.rows) == 1:
-        return sentence(group.worst, names)
-    return _sentence(group.a, group.b, group.verdict, gap_text(group.lower, group.upper), f", {len(group.rows)} times")
+    often = f", {len(group.rows)} times" if len(group.rows) > 1 else ""
+    a, b = (names.get(name, name) for name in (group.a, group.b))
+    return _sentence(a, b, group.verdict, gap_text(group.lower, group.upper), often)
 
 
 def _sentence(a: str, b: str, verdict: Verdict, gap: str, often: str = "") -> str:
@@ -199,19 +191,12 @@ def first_text(t: float) -> str:
     >>> first_text(0.12349), first_text(0.9), first_text(1.0)
     ('0.1234', '0.9000', '1.0000')
     """
-    return f"{_to_digits(_decimal(t), 4, ROUND_FLOOR):f}"
-
-
-def finding_text(row: PairResult, names: Mapping[str, str]) -> str:
-    """A finding in words, and where it is."""
-    return "; ".join(filter(None, (sentence(row, names), circumstances(row))))
+    return f"{math.floor(round(t * 1e4, 6)) / 1e4:.4f}"
 
 
 def group_text(group: Group, names: Mapping[str, str]) -> str:
     """A group of findings in words, and where it is; of several findings, where the worst one is."""
-    if len(group.rows) == 1:
-        return finding_text(group.worst, names)
-    worst = f"worst {group.worst.a} and {group.worst.b}"
+    worst = f"worst {group.worst.a} and {group.worst.b}" if len(group.rows) > 1 else ""
     return "; ".join(filter(None, (group_sentence(group, names), worst, circumstances(group.worst))))
 
 
@@ -226,23 +211,14 @@ def where_text(where: Overlap) -> str:
     'shared volume of the facets 0.2 to 12 mm3, within X 0 to 3, Y 1 to 4, Z 2 to 5 mm'
     """
     low, high = where.volume
-    volume = f"{_rounded(low, ROUND_FLOOR)} to {_rounded(high, ROUND_CEILING)}"
-    for digits in (5, 4, 3, 2):
-        if f"{low:.{digits}g}" == f"{high:.{digits}g}":
-            volume = f"{Decimal(f'{low:.{digits}g}'):f}"
-            break
-    box = ", ".join(
-        f"{axis} {_tenths(a, ROUND_FLOOR)} to {_tenths(b, ROUND_CEILING)}"
-        for axis, a, b in zip("XYZ", *where.box.tolist(), strict=True)
+    certain = (f"{low:.{digits}g}" for digits in (5, 4, 3, 2) if f"{low:.{digits}g}" == f"{high:.{digits}g}")
+    volume = next(certain, f"{_rounded(low, math.floor)} to {_rounded(high, math.ceil)}")
+    ends = (
+        [_rounded(round(x, 6) + 0.0, towards, digits=1) for x in corner]
+        for corner, towards in zip(where.box.tolist(), (math.floor, math.ceil), strict=True)
     )
+    box = ", ".join(f"{axis} {least} to {most}" for axis, least, most in zip("XYZ", *ends, strict=True))
     return f"shared volume{' of the facets' if where.of_facets else ''} {volume} mm3, within {box} mm"
-
-
-def _tenths(value: float, rounding: str) -> str:
-    """A coordinate in tenths of a millimetre, rounded outward but for the rounding of floats."""
-    near = _decimal(round(value, 6) + 0.0)
-    text = f"{_to_digits(near, 1, rounding) + 0:f}"
-    return text.removesuffix(".0")
 
 
 def worst_first(rows: Sequence[PairResult]) -> list[PairResult]:

@@ -21,7 +21,7 @@ from clamp3d.geometry.pose import rotation, translation
 from clamp3d.geometry.primitives import Cylinder, SweptArc
 from clamp3d.geometry.shapes import MeshShape
 from clamp3d.output.scene_report import check_to_text
-from clamp3d.output.wording import finding_text
+from clamp3d.output.wording import circumstances
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
@@ -169,6 +169,6 @@ def test_a_first_contact_is_not_told_later_than_it_is():
     scene = Scene().add("a", box).add("b", box, translation(11.2447, 0.0, 0.0))
     result = check(Scene(scene.parts, motions=(way,)))
     assert result.motions[0].contact_at == pytest.approx(0.12347, abs=2e-5)
-    assert "first contact at t = 0.1234," in finding_text(result.motions[0], {"a": "a", "b": "b"})
+    assert "first contact at t = 0.1234," in circumstances(result.motions[0])
     row = next(line for line in check_to_text(result).splitlines() if line.startswith("  translation"))
     assert " 0.1234 " in row
